@@ -25,7 +25,7 @@ MAX_MODEL_BYTES = 32 * 2**20
 # Folder of the embedded aircraft.
 _ROOT = Path(__file__).parent
 # Radians in one degree.
-_DEGREE = math.pi / 180.0
+_RAD_PER_DEG = math.pi / 180.0
 
 # TOML key: (field of Aircraft, factor to SI).
 _FIELD_BY_KEY = {
@@ -36,12 +36,12 @@ _FIELD_BY_KEY = {
     "airspeed_min_mps": ("airspeed_min", 1.0),
     "airspeed_max_mps": ("airspeed_max", 1.0),
     "stall_speed_mps": ("stall_speed", 1.0),
-    "max_bank_deg": ("max_bank", _DEGREE),
-    "max_pitch_deg": ("max_pitch", _DEGREE),
-    "max_elevator_deg": ("max_elevator", _DEGREE),
-    "max_aileron_deg": ("max_aileron", _DEGREE),
-    "max_rudder_deg": ("max_rudder", _DEGREE),
-    "surface_rate_deg_s": ("surface_rate", _DEGREE),
+    "max_bank_deg": ("max_bank", _RAD_PER_DEG),
+    "max_pitch_deg": ("max_pitch", _RAD_PER_DEG),
+    "max_elevator_deg": ("max_elevator", _RAD_PER_DEG),
+    "max_aileron_deg": ("max_aileron", _RAD_PER_DEG),
+    "max_rudder_deg": ("max_rudder", _RAD_PER_DEG),
+    "surface_rate_deg_s": ("surface_rate", _RAD_PER_DEG),
     "surface_lag_s": ("surface_lag", 1.0),
     "motor_lag_s": ("motor_lag", 1.0),
 }
@@ -107,8 +107,8 @@ class Aircraft:
         if self.model.shipped:
             root = jsbsim_folder()
             return (root / "aircraft" / self.model.shipped, root / "engine", root / "systems")
-        inner = ("Engines", "engine", "Systems", "systems")
-        return (self.folder, *(self.folder / name for name in inner))
+        subfolders = ("Engines", "engine", "Systems", "systems")
+        return (self.folder, *(self.folder / name for name in subfolders))
 
     @property
     def embedded(self) -> bool:
@@ -134,20 +134,20 @@ def aircraft_names() -> tuple[str, ...]:
 def load_aircraft(name: str) -> Aircraft:
     """Return the embedded aircraft with this name.
 
-    Raise FlightError with one line for an unknown name, or for a metadata file with a missing, unknown or invalid
+    Raises FlightError with one line for an unknown name, or for a metadata file with a missing, unknown or invalid
     entry.
 
     >>> aircraft = load_aircraft("aerosonde")
     >>> aircraft.mass, aircraft.airspeed
     (11.0, 25.0)
     """
-    known = aircraft_names()
-    if name not in known:
-        near = did_you_mean(name, known)
+    names = aircraft_names()
+    if name not in names:
+        suggestion = did_you_mean(name, names)
         # A folder must be given with a slash.
-        near = near or (f": did you mean './{name}'?" if Path(name).is_dir() else "")
-        allowed = f"known are {', '.join(known)}, and folders, with a slash"
-        message = f"no aircraft called {name!r}{near} ({allowed})"
+        suggestion = suggestion or (f": did you mean './{name}'?" if Path(name).is_dir() else "")
+        allowed = f"known are {', '.join(names)}, and folders, with a slash"
+        message = f"no aircraft called {name!r}{suggestion} ({allowed})"
         raise FlightError(message, file=name, allowed=allowed)
     return read_aircraft(_ROOT / name)
 
@@ -155,7 +155,7 @@ def load_aircraft(name: str) -> Aircraft:
 def find_aircraft(name: str) -> Aircraft:
     """Return the embedded aircraft with this name, or the one in this folder if the name contains a slash.
 
-    Raise FlightError as `load_aircraft` does.
+    Raises FlightError as `load_aircraft` does.
 
     >>> find_aircraft("c172x").airspeed
     50.0
@@ -163,21 +163,21 @@ def find_aircraft(name: str) -> Aircraft:
     return read_aircraft(Path(name)) if names_folder(name) else load_aircraft(name)
 
 
-def find_again(name: str, asked: str) -> Aircraft:
-    """Return the aircraft called `name` in a setup or log, whose scenario states the name or folder `asked`.
+def find_again(name: str, stated_name: str) -> Aircraft:
+    """Return the aircraft called `name` in a setup or log, whose scenario states the name or folder `stated_name`.
 
-    Raise FlightError as `load_aircraft` does.
+    Raises FlightError as `load_aircraft` does.
 
     >>> find_again("c172x", "aerosonde").name
     'c172x'
     """
-    return find_aircraft(asked if names_folder(asked) and Path(asked).name == name else name)
+    return find_aircraft(stated_name if names_folder(stated_name) and Path(stated_name).name == name else name)
 
 
 def read_aircraft(folder: Path) -> Aircraft:
     """Return the aircraft described by ``<folder>/<folder's name>.toml``.
 
-    Raise FlightError as `load_aircraft` does.
+    Raises FlightError as `load_aircraft` does.
     """
     file = folder / f"{folder.name}.toml"
     try:
@@ -219,23 +219,25 @@ def _toml_advice(folder: Path) -> str:
 
 def _numeric_fields(table: dict[str, Any]) -> dict[str, float]:
     """Return the numeric fields of `Aircraft`; raise FlightError without the file's name."""
-    store = _FUEL_KEYS if set(_FUEL_KEYS) & table.keys() else _BATTERY_KEYS
-    allowed = {*_FIELD_BY_KEY, *store}
+    energy_keys = _FUEL_KEYS if set(_FUEL_KEYS) & table.keys() else _BATTERY_KEYS
+    allowed = {*_FIELD_BY_KEY, *energy_keys}
     missing, unknown = sorted(allowed - table.keys()), sorted(table.keys() - allowed)
-    near = did_you_mean(unknown[0], missing) if unknown else ""
+    suggestion = did_you_mean(unknown[0], missing) if unknown else ""
     # A misspelled key is missing as well; the spelling is the better message.
-    if missing and not near:
+    if missing and not suggestion:
         raise FlightError(f"missing {', '.join(missing)}", field=missing[0])
     if unknown:
-        raise FlightError(f"unknown key {', '.join(unknown)}{near}", field=unknown[0], value=table[unknown[0]])
+        raise FlightError(f"unknown key {', '.join(unknown)}{suggestion}", field=unknown[0], value=table[unknown[0]])
     for key, value in table.items():
         if isinstance(value, bool) or not isinstance(value, int | float) or not 0.0 < value < math.inf:
             raise FlightError(f"{key} = {value!r} is not a positive number", field=key, value=value)
     values = {field: table[key] * factor for key, (field, factor) in _FIELD_BY_KEY.items()}
-    first, second = (float(table[key]) for key in store)
+    first_value, second_value = (float(table[key]) for key in energy_keys)
     # Watt hours to joules, or kilograms of fuel times megajoules per kilogram.
     values["battery_voltage"], values["battery_energy"] = (
-        (first, second * 3600.0) if store is _BATTERY_KEYS else (0.0, first * second * 1e6)
+        (first_value, second_value * 3600.0)
+        if energy_keys is _BATTERY_KEYS
+        else (0.0, first_value * second_value * 1e6)
     )
     return values
 
@@ -244,7 +246,7 @@ def model_hash(aircraft: Aircraft) -> str:
     """Return the SHA-256, as hex, of the names and contents of the model's XML and TOML files.
 
     It changes with any change of the model and so identifies the model of a cached envelope or an old log. Other files
-    in the folder, such as guidance gains, are not included. Raise FlightError for a file that cannot be read.
+    in the folder, such as guidance gains, are not included. Raises FlightError for a file that cannot be read.
 
     >>> len(model_hash(load_aircraft("aerosonde")))
     64
@@ -302,7 +304,7 @@ def make_own_folder(
     1124.9
     """
     target = check_new_folder(folder, overwrite=overwrite)
-    files = _renamed(source, target.name, model or {})
+    files = _renamed_files(source, target.name, model or {})
     write_own_folder(target, files)
     return tuple(sorted(files))
 
@@ -310,18 +312,18 @@ def make_own_folder(
 def write_own_folder(target: Path, files: Mapping[str, bytes]) -> None:
     """Write the files of an aircraft into a folder, completely or not at all.
 
-    In a folder that exists they replace the aircraft's files; files of other kinds stay.
+    In an existing folder the aircraft's files are replaced; files of other kinds stay.
     """
-    stays = [file.name for file in target.iterdir() if file.suffix not in _SUFFIXES] if target.exists() else []
-    new = {name.split("/")[0] for name in files}
-    write_folder(target, files, stays=[name for name in stays if name not in new])
+    other_files = [file.name for file in target.iterdir() if file.suffix not in _SUFFIXES] if target.exists() else []
+    new_names = {name.split("/")[0] for name in files}
+    write_folder(target, files, kept_names=[name for name in other_files if name not in new_names])
 
 
 def check_new_folder(folder: Path, *, overwrite: bool = False) -> Path:
-    """Return the absolute path of a folder in which an aircraft is to be created.
+    """Return the absolute path of the folder of a new aircraft.
 
     overwrite: True accepts the folder of an aircraft that exists.
-    Raise FlightError if it exists otherwise, its parent does not, or its name is not valid for a model.
+    Raises FlightError if it exists otherwise, its parent does not, or its name is not valid for a model.
     """
     target = folder.absolute()
     if _NAME.fullmatch(target.name) is None or target.name in _RESERVED_NAMES:
@@ -339,17 +341,17 @@ def check_new_folder(folder: Path, *, overwrite: bool = False) -> Path:
     return target
 
 
-def _renamed(source: Aircraft, name: str, model: Mapping[str, bytes]) -> dict[str, bytes]:
+def _renamed_files(source: Aircraft, name: str, model: Mapping[str, bytes]) -> dict[str, bytes]:
     """Return the contents of the new folder by path: the aircraft's files and the model's, with its own two renamed."""
     folders = [source.folder, *(folder for folder in source.model_folders if source.folder in folder.parents)]
-    found = [file for folder in folders if folder.is_dir() for file in folder.iterdir()]
+    source_files = [file for folder in folders if folder.is_dir() for file in folder.iterdir()]
     files = {}
-    for file in found:
+    for file in source_files:
         if file.suffix not in _SUFFIXES or not file.is_file():
             continue
-        where = file.relative_to(source.folder)
-        own = where if where.stem != source.name else where.with_name(f"{name}{where.suffix}")
-        files[str(own)] = file.read_bytes()
+        path = file.relative_to(source.folder)
+        new_path = path if path.stem != source.name else path.with_name(f"{name}{path.suffix}")
+        files[str(new_path)] = file.read_bytes()
     metadata = files[f"{name}.toml"].decode("utf-8").replace(f"{source.name}.xml", f"{name}.xml")
     shipped = f"{source.model.shipped}.xml"
     files |= {f"{name}.xml" if file == shipped else file: data for file, data in model.items()}

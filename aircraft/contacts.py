@@ -5,7 +5,7 @@ flight with take-off or landing, so that a flight in the air still loads the sam
 own.
 
 Positions and stiffness scale with span and mass, from an Aerosonde (11 kg, 2.9 m) that took off and landed in JSBSim
-under ArduPlane: a belly of 3000 N/m per skid, 0.18 m below the center of gravity at rest, friction 0.5 and 0.4.
+under ArduPlane: a belly of 3000 N/m per skid, 0.18 m below the centre of gravity at rest, friction 0.5 and 0.4.
 """
 
 import math
@@ -23,13 +23,13 @@ from world.arrays import Floats
 # Landing gear of an aircraft whose model has no contacts.
 Gear = Literal["belly", "wheels"]
 # Meters in each unit of a model.
-_METERS_PER_UNIT = {"M": 1.0, "FT": 0.3048, "IN": 0.0254}
+_METRES_PER_UNIT = {"M": 1.0, "FT": 0.3048, "IN": 0.0254}
 # Kilograms in each unit of a model.
 _KILOGRAMS_PER_UNIT = {"KG": 1.0, "LBS": 0.45359237}
 # Smallest depth of the points that a model without wheels stands on, as a ratio to the deepest point.
 _MIN_SKID_DEPTH_RATIO = 0.75
 
-# Positions relative to the center of gravity, forward, right and down, in spans. Points to the right have a twin to the
+# Positions relative to the centre of gravity, forward, right and down, in spans. Points to the right have a twin to the
 # left, so that belly and wheels have three points each.
 _BELLY_POINTS = {"belly front": (0.12, 0.025, 0.069), "belly rear": (-0.12, 0.0, 0.069)}
 # Wheels.
@@ -51,7 +51,7 @@ class Contact:
     """A point that may touch the ground.
 
     name: name in the model.
-    forward, right, down: position relative to the center of gravity, m.
+    forward, right, down: position relative to the centre of gravity, m.
     stands: True if the aircraft stands and slides on it; other points must not touch the ground at speed.
     wheel: True if it rolls.
     """
@@ -72,13 +72,15 @@ def usual_contacts(aircraft: Aircraft, gear: Gear) -> tuple[Contact, ...]:
     >>> len(made), made[0].name, round(made[0].down, 2), made[-1].stands
     (7, 'belly front left', 0.2, False)
     """
-    span, stands = aircraft.wing_span, _WHEEL_POINTS if gear == "wheels" else _BELLY_POINTS
-    found = []
-    for name, (forward, right, down) in {**stands, **_STRUCTURE_POINTS}.items():
+    span, standing_points = aircraft.wing_span, _WHEEL_POINTS if gear == "wheels" else _BELLY_POINTS
+    contacts = []
+    for name, (forward, right, down) in {**standing_points, **_STRUCTURE_POINTS}.items():
         for side, sign in (("left", -1.0), ("right", 1.0)) if right else (("", 0.0),):
-            place = (forward * span, sign * right * span, down * span)
-            found.append(Contact(f"{name} {side}".strip(), *place, name in stands, name in _WHEEL_POINTS))
-    return tuple(found)
+            position = (forward * span, sign * right * span, down * span)
+            contacts.append(
+                Contact(f"{name} {side}".strip(), *position, name in standing_points, name in _WHEEL_POINTS)
+            )
+    return tuple(contacts)
 
 
 def contacts_of(aircraft: Aircraft, gear: Gear) -> tuple[Contact, ...]:
@@ -86,32 +88,34 @@ def contacts_of(aircraft: Aircraft, gear: Gear) -> tuple[Contact, ...]:
 
     Contacts that it stands on come first.
 
-    Raise ValueError for a model that is not XML.
+    Raises ValueError for a model that is not XML.
 
     >>> from aircraft.catalog import load_aircraft
     >>> [contact.name for contact in contacts_of(load_aircraft("c172x"), "belly") if contact.wheel]
     ['Nose Gear', 'Left Main Gear', 'Right Main Gear']
     """
-    own = _own_contacts(aircraft.model_file.read_bytes())
-    return own or usual_contacts(aircraft, gear)
+    model_contacts = _own_contacts(aircraft.model_file.read_bytes())
+    return model_contacts or usual_contacts(aircraft, gear)
 
 
 def with_contacts(model: bytes, aircraft: Aircraft, gear: Gear) -> bytes:
     """Return a model's XML with the usual contacts, or unchanged if it has contacts of its own."""
     if _own_contacts(model):
         return model
-    made = usual_contacts(aircraft, gear)
-    text = "\n".join(_contact_xml(contact, aircraft, made, _center_of_gravity(model)) for contact in made)
+    contacts = usual_contacts(aircraft, gear)
+    text = "\n".join(_contact_xml(contact, aircraft, contacts, _center_of_gravity(model)) for contact in contacts)
     section = f"<ground_reactions>\n{text}\n</ground_reactions>".encode()
-    found, count = re.subn(rb"<ground_reactions\s*(/>|>\s*</ground_reactions>)", lambda _: section, model, count=1)
-    return found if count else model.replace(b"</fdm_config>", section + b"\n</fdm_config>")
+    changed_model, count = re.subn(
+        rb"<ground_reactions\s*(/>|>\s*</ground_reactions>)", lambda _: section, model, count=1
+    )
+    return changed_model if count else model.replace(b"</fdm_config>", section + b"\n</fdm_config>")
 
 
-def _contact_xml(contact: Contact, aircraft: Aircraft, made: tuple[Contact, ...], centre: Floats) -> str:
+def _contact_xml(contact: Contact, aircraft: Aircraft, contacts: tuple[Contact, ...], centre: Floats) -> str:
     """Return one contact as JSBSim reads it: meters aft, right and up from the model's reference point."""
-    carrying = sum(one.stands for one in made)
-    stiffness = aircraft.mass * GRAVITY / (_SAG_SPANS * aircraft.wing_span) / carrying
-    damping = 2.0 * _DAMPING_RATIO * math.sqrt(stiffness * aircraft.mass / carrying)
+    standing_count = sum(other.stands for other in contacts)
+    stiffness = aircraft.mass * GRAVITY / (_SAG_SPANS * aircraft.wing_span) / standing_count
+    damping = 2.0 * _DAMPING_RATIO * math.sqrt(stiffness * aircraft.mass / standing_count)
     aft, right, up = centre + np.array([-contact.forward, contact.right, -contact.down])
     static, dynamic, rolling = _WHEEL_FRICTION if contact.wheel else _SKID_FRICTION
     kind, name = "BOGEY" if contact.wheel else "STRUCTURE", contact.name.upper().replace(" ", "_")
@@ -133,43 +137,50 @@ def _own_contacts(model: bytes) -> tuple[Contact, ...]:
 
     It stands on its wheels, or on its lowest points if it has none.
     """
-    found = _read_contacts(model)
-    if not any(one.wheel for one in found):
-        deepest = max((one.down for one in found), default=0.0)
-        found = [replace(one, stands=one.down >= _MIN_SKID_DEPTH_RATIO * deepest > 0.0) for one in found]
-    return tuple(sorted(found, key=lambda one: not one.stands))
+    contacts = _read_contacts(model)
+    if not any(contact.wheel for contact in contacts):
+        max_depth = max((contact.down for contact in contacts), default=0.0)
+        contacts = [
+            replace(contact, stands=contact.down >= _MIN_SKID_DEPTH_RATIO * max_depth > 0.0) for contact in contacts
+        ]
+    return tuple(sorted(contacts, key=lambda contact: not contact.stands))
 
 
 def _read_contacts(model: bytes) -> list[Contact]:
     """Return the contacts of a model, with `stands` set for wheels only."""
     section = ElementTree.fromstring(model).find("ground_reactions")
-    found, centre = [], _center_of_gravity(model)
-    for one in [] if section is None else section.findall("contact"):
-        place = _location(one.find("location"))
-        if place is None:
+    contacts, centre = [], _center_of_gravity(model)
+    for element in [] if section is None else section.findall("contact"):
+        position = _location(element.find("location"))
+        if position is None:
             continue
-        wheel = one.get("type", "BOGEY") == "BOGEY"
-        forward, right, down = np.array([-1.0, 1.0, -1.0]) * (place - centre)
-        found.append(Contact(one.get("name", ""), float(forward), float(right), float(down), wheel, wheel))
-    return found
+        is_wheel = element.get("type", "BOGEY") == "BOGEY"
+        forward, right, down = np.array([-1.0, 1.0, -1.0]) * (position - centre)
+        contacts.append(Contact(element.get("name", ""), float(forward), float(right), float(down), is_wheel, is_wheel))
+    return contacts
 
 
 def _center_of_gravity(model: bytes) -> Floats:
-    """Return the loaded aircraft's center of gravity, (3,) m aft, right, up.
+    """Return the loaded aircraft's centre of gravity, (3,) m aft, right, up.
 
     It is relative to the model's reference point, and includes the empty aircraft, its point masses and the initial
     contents of its tanks, as JSBSim sums them up.
     """
     root = ElementTree.fromstring(model)
-    empty = [one for one in root.findall("mass_balance/location") if one.get("name") == "CG"]
-    loads = [(root.find("mass_balance/emptywt"), _location(empty[0]) if empty else None)]
-    loads += [(one.find("weight"), _location(one.find("location"))) for one in root.findall("mass_balance/pointmass")]
-    loads += [(one.find("contents"), _location(one.find("location"))) for one in root.findall("propulsion/tank")]
-    carried = [(_mass(weight), place) for weight, place in loads if place is not None]
-    total = sum(mass for mass, _ in carried)
+    cg_elements = [element for element in root.findall("mass_balance/location") if element.get("name") == "CG"]
+    loads = [(root.find("mass_balance/emptywt"), _location(cg_elements[0]) if cg_elements else None)]
+    loads += [
+        (element.find("weight"), _location(element.find("location")))
+        for element in root.findall("mass_balance/pointmass")
+    ]
+    loads += [
+        (element.find("contents"), _location(element.find("location"))) for element in root.findall("propulsion/tank")
+    ]
+    masses = [(_mass(weight), position) for weight, position in loads if position is not None]
+    total = sum(mass for mass, _ in masses)
     if not total > 0.0:
-        return carried[0][1] if carried else np.zeros(3)
-    return np.asarray(sum(mass * place for mass, place in carried) / total)
+        return masses[0][1] if masses else np.zeros(3)
+    return np.asarray(sum(mass * position for mass, position in masses) / total)
 
 
 def _mass(weight: ElementTree.Element | None) -> float:
@@ -183,5 +194,5 @@ def _location(location: ElementTree.Element | None) -> Floats | None:
     """Return a location of a model, m, (3,), or None if it has none."""
     if location is None:
         return None
-    unit = _METERS_PER_UNIT.get(location.get("unit", "IN"), 1.0)
+    unit = _METRES_PER_UNIT.get(location.get("unit", "IN"), 1.0)
     return unit * np.array([float(location.findtext(axis, "0")) for axis in "xyz"])

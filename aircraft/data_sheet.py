@@ -42,7 +42,7 @@ class DataSheet:
     energy: energy of the battery, or heat of the fuel, J.
     motor: motor speed per volt, rpm/V.
     propeller: diameter and pitch, m.
-    fuel: kg; an aircraft with fuel has no battery.
+    fuel: fuel mass, kg; an aircraft with fuel has no battery.
     """
 
     mass: float
@@ -105,7 +105,7 @@ class AircraftClass:
     lift_max: largest lift coefficient, if the sheet states no area.
     drag: least drag at a Reynolds number of `DRAG_REYNOLDS` on the mean chord.
     oswald: span efficiency.
-    pitch_alpha, pitch_q: per unit of aspect ratio if ``by_aspect``, otherwise absolute.
+    pitch_alpha, pitch_q: values per unit of aspect ratio if ``by_aspect``, otherwise absolute values.
     gyration: radii of gyration about x, y, z as ratios to the span.
     elevator_stall: elevator at the stall, rad; at the sheet's stall speed it reaches its stop.
     """
@@ -252,7 +252,7 @@ def _is_within(value: float, low: float, high: float) -> bool:
 def check_sheet(sheet: DataSheet) -> DataSheet:
     """Return a sheet if it describes a small aircraft.
 
-    Raise FlightError otherwise, in one line with the allowed range.
+    Raises FlightError otherwise, in one line with the allowed range.
 
     >>> check_sheet(DataSheet(2.1, 1.6, 15.0, 10.0)).mass
     2.1
@@ -260,45 +260,47 @@ def check_sheet(sheet: DataSheet) -> DataSheet:
     Traceback (most recent call last):
     world.errors.FlightError: stall 14 m/s: allowed 5.25..13.05 m/s at a cruise speed of 15 m/s
     """
-    for field, (option, unit, low, high, factor) in RANGES.items():
+    for field, (option_name, unit, low, high, factor) in RANGES.items():
         value = getattr(sheet, field) / factor
         if field not in ("mass", "span", "cruise", "stall") and value == 0.0:
             continue
         if not _is_within(value, low, high):
-            raise _refused(option, value, f"allowed {low:g}..{high:g} {unit}", unit)
-    low, high = (share * sheet.cruise for share in STALL_SHARE)
+            raise _out_of_range(option_name, value, f"allowed {low:g}..{high:g} {unit}", unit)
+    low, high = (ratio * sheet.cruise for ratio in STALL_SHARE)
     if not _is_within(sheet.stall, low, high):
-        raise _refused("stall", sheet.stall, f"allowed {_of_cruise(low, high, sheet)}", "m/s")
-    low, high = (share * sheet.cruise for share in TOP_SHARE)
+        raise _out_of_range("stall", sheet.stall, f"allowed {_speed_range_text(low, high, sheet)}", "m/s")
+    low, high = (ratio * sheet.cruise for ratio in TOP_SHARE)
     if sheet.top and not _is_within(sheet.top, low, high):
-        raise _refused("top", sheet.top, f"allowed {_of_cruise(low, high, sheet)}", "m/s")
-    area = _area(sheet)
+        raise _out_of_range("top", sheet.top, f"allowed {_speed_range_text(low, high, sheet)}", "m/s")
+    area = _wing_area(sheet)
     lift = _weight(sheet) / (0.5 * SEA_LEVEL * sheet.stall**2 * area)
-    low, high = (_weight(sheet) / (0.5 * SEA_LEVEL * sheet.stall**2 * one) for one in reversed(LIFT_RANGE))
+    low, high = (
+        _weight(sheet) / (0.5 * SEA_LEVEL * sheet.stall**2 * lift_limit) for lift_limit in reversed(LIFT_RANGE)
+    )
     if not _is_within(lift, *LIFT_RANGE):
         allowed = f"allowed {low:.3g}..{high:.3g} m2 for {sheet.mass:g} kg that stall at {sheet.stall:g} m/s"
-        raise _refused("area", area, allowed, "m2")
+        raise _out_of_range("area", area, allowed, "m2")
     aspect = sheet.span**2 / area
     if not _is_within(aspect, *ASPECT_RANGE):
-        low, high = (math.sqrt(one * area) for one in ASPECT_RANGE)
+        low, high = (math.sqrt(lift_limit * area) for lift_limit in ASPECT_RANGE)
         allowed = f"allowed {low:.2f}..{high:.2f} m with a wing of {area:.3g} m2 ({_area_source(sheet)})"
-        raise _refused("span", sheet.span, allowed, "m")
+        raise _out_of_range("span", sheet.span, allowed, "m")
     if sheet.fuelled and (sheet.motor or sheet.volts):
-        raise _refused("fuel", sheet.fuel, "goes without --battery and --motor", "kg")
+        raise _out_of_range("fuel", sheet.fuel, "goes without --battery and --motor", "kg")
     if not _is_within(sheet.fuel, 0.0, 0.6 * sheet.mass):
-        raise _refused("fuel", sheet.fuel, f"allowed up to 60 % of the mass, {0.6 * sheet.mass:g} kg", "kg")
+        raise _out_of_range("fuel", sheet.fuel, f"allowed up to 60 % of the mass, {0.6 * sheet.mass:g} kg", "kg")
     if not sheet.fuelled and not _is_within(sheet.energy, 0.0, MAX_BATTERY * sheet.mass):
-        most = MAX_BATTERY / 3600.0
-        allowed = f"allowed up to {most * sheet.mass:g} Wh with a mass of {sheet.mass:g} kg, {most:g} Wh/kg"
-        raise _refused("battery", sheet.energy / 3600.0, allowed, "Wh")
+        max_energy = MAX_BATTERY / 3600.0
+        allowed = f"allowed up to {max_energy * sheet.mass:g} Wh with a mass of {sheet.mass:g} kg, {max_energy:g} Wh/kg"
+        raise _out_of_range("battery", sheet.energy / 3600.0, allowed, "Wh")
     return sheet
 
 
-def _refused(option: str, value: float, allowed: str, unit: str) -> FlightError:
+def _out_of_range(option: str, value: float, allowed: str, unit: str) -> FlightError:
     return FlightError.of_argument(option, value, allowed, shown=f"{value:g} {unit}")
 
 
-def _of_cruise(low: float, high: float, sheet: DataSheet) -> str:
+def _speed_range_text(low: float, high: float, sheet: DataSheet) -> str:
     return f"{low:.4g}..{high:.4g} m/s at a cruise speed of {sheet.cruise:g} m/s"
 
 
@@ -306,7 +308,7 @@ def _weight(sheet: DataSheet) -> float:
     return sheet.mass * GRAVITY
 
 
-def _area(sheet: DataSheet) -> float:
+def _wing_area(sheet: DataSheet) -> float:
     """Return the wing area, m^2.
 
     It is the stated area, or the area for the stall speed at the class's largest lift.
@@ -322,7 +324,7 @@ def _area_source(sheet: DataSheet) -> str:
 
 @dataclass(frozen=True, slots=True)
 class SizedAircraft:
-    """A model that matches a data sheet, and the values that were guessed for it.
+    """A model that matches a data sheet, and the names of its guessed values.
 
     numbers: numbers of the model.
     sheet: the sheet with every value filled in.
@@ -339,7 +341,7 @@ def size_aircraft(sheet: DataSheet, title: str = "", kind: AircraftClass | None 
 
     kind: class of the aircraft; None takes the layout's class.
 
-    Raise FlightError if no propeller gives the stated climb and top speed.
+    Raises FlightError if no propeller gives the stated climb and top speed.
 
     >>> made = size_aircraft(check_sheet(DataSheet(2.1, 1.6, 15.0, 10.0)))
     >>> round(made.numbers.area, 3), made.guessed
@@ -348,13 +350,13 @@ def size_aircraft(sheet: DataSheet, title: str = "", kind: AircraftClass | None 
     kind = CLASSES[sheet.layout] if kind is None else kind
     filled, guessed = _fill_sheet(sheet)
     aero = _aerodynamics(filled, kind)
-    drag = _drag_of(filled, aero)
+    drag = _drag_function(filled, aero)
     if sheet.sink:
         aero, drag = _match_sink(filled, aero, sheet.sink)
     propulsion: ElectricMotor | FuelEngine
-    propulsion, filled = (_engine if sheet.fuelled else _size_motor)(sheet, filled, drag)
+    propulsion, filled = (_size_engine if sheet.fuelled else _size_motor)(sheet, filled, drag)
     chord = filled.area / filled.span
-    jx, jy, jz = (filled.mass * (share * filled.span) ** 2 for share in kind.gyration)
+    jx, jy, jz = (filled.mass * (ratio * filled.span) ** 2 for ratio in kind.gyration)
     numbers = ModelNumbers(
         title=title or f"{_LAYOUT_TEXTS[sheet.layout]} of {sheet.mass:g} kg, {sheet.span:g} m",
         source="From a data sheet, scaled from published aircraft of its class: README.md beside this file.",
@@ -379,8 +381,8 @@ _LAYOUT_TEXTS = {"tail": "aircraft with a tail", "wing": "flying wing", "vtail":
 
 def _fill_sheet(sheet: DataSheet) -> tuple[DataSheet, tuple[str, ...]]:
     """Return the sheet with missing values filled in, and the names of those values."""
-    usual: dict[str, Any] = {
-        "area": _area(sheet),
+    defaults: dict[str, Any] = {
+        "area": _wing_area(sheet),
         "top": USUAL_TOP * sheet.cruise,
         "bank": USUAL_BANK,
         "climb": USUAL_CLIMB,
@@ -388,11 +390,11 @@ def _fill_sheet(sheet: DataSheet) -> tuple[DataSheet, tuple[str, ...]]:
     if sheet.fuelled:
         sheet = replace(sheet, energy=sheet.fuel * FUEL_HEAT)
     else:
-        usual["volts"] = next(volts for mass, volts in _USUAL_VOLTS if sheet.mass < mass)
-        usual["energy"] = BATTERY_PER_MASS * sheet.mass
-    guessed = tuple(name for name in usual if not getattr(sheet, name))
-    known = {name: getattr(sheet, name) or usual[name] for name in usual}
-    filled: DataSheet = replace(sheet, **known)
+        defaults["volts"] = next(volts for mass, volts in _USUAL_VOLTS if sheet.mass < mass)
+        defaults["energy"] = BATTERY_PER_MASS * sheet.mass
+    guessed = tuple(name for name in defaults if not getattr(sheet, name))
+    values = {name: getattr(sheet, name) or defaults[name] for name in defaults}
+    filled: DataSheet = replace(sheet, **values)
     return filled, guessed
 
 
@@ -405,45 +407,45 @@ def elliptic_slope(aspect: float) -> float:
     return 2.0 * math.pi * aspect / (2.0 + math.sqrt(4.0 + aspect**2))
 
 
-def _aerodynamics(sheet: DataSheet, kind: AircraftClass) -> AeroCoefficients:
+def _aerodynamics(sheet: DataSheet, aircraft_class: AircraftClass) -> AeroCoefficients:
     area, chord = sheet.area, sheet.area / sheet.span
     aspect = sheet.span / chord
-    slope = kind.lift_slope * elliptic_slope(aspect)
-    per_aspect = aspect if kind.by_aspect else 1.0
-    stiffness = kind.pitch_alpha * per_aspect
+    slope = aircraft_class.lift_slope * elliptic_slope(aspect)
+    aspect_factor = aspect if aircraft_class.by_aspect else 1.0
+    stiffness = aircraft_class.pitch_alpha * aspect_factor
     weight = _weight(sheet)
     cruise_lift = weight / (0.5 * SHEET_DENSITY * sheet.cruise**2 * area)
     lift_max = weight / (0.5 * SEA_LEVEL * sheet.stall**2 * area)
-    lift_0 = cruise_lift - slope * CRUISE_ALPHA - kind.lift_elevator * CRUISE_ELEVATOR
-    stall = (lift_max - lift_0 - kind.lift_elevator * kind.elevator_stall) / slope
+    lift_0 = cruise_lift - slope * CRUISE_ALPHA - aircraft_class.lift_elevator * CRUISE_ELEVATOR
+    stall_alpha = (lift_max - lift_0 - aircraft_class.lift_elevator * aircraft_class.elevator_stall) / slope
     # The elevator reaches its stop at the sheet's stall speed.
-    travel = kind.elevator_stall - CRUISE_ELEVATOR
-    elevator = -stiffness * (stall - CRUISE_ALPHA) / travel
+    travel = aircraft_class.elevator_stall - CRUISE_ELEVATOR
+    elevator = -stiffness * (stall_alpha - CRUISE_ALPHA) / travel
     reynolds = sheet.cruise * chord / VISCOSITY
     return AeroCoefficients(
         lift_0=lift_0,
         lift_alpha=slope,
-        lift_q=kind.lift_q,
-        lift_elevator=kind.lift_elevator,
-        drag_min=kind.drag * (reynolds / DRAG_REYNOLDS) ** DRAG_POWER,
-        drag_lift=1.0 / (math.pi * kind.oswald * aspect),
+        lift_q=aircraft_class.lift_q,
+        lift_elevator=aircraft_class.lift_elevator,
+        drag_min=aircraft_class.drag * (reynolds / DRAG_REYNOLDS) ** DRAG_POWER,
+        drag_lift=1.0 / (math.pi * aircraft_class.oswald * aspect),
         pitch_0=-stiffness * CRUISE_ALPHA - elevator * CRUISE_ELEVATOR,
         pitch_alpha=stiffness,
-        pitch_q=kind.pitch_q * per_aspect,
+        pitch_q=aircraft_class.pitch_q * aspect_factor,
         pitch_elevator=elevator,
-        side_beta=kind.side_beta,
-        side_rudder=kind.side_rudder,
-        roll_beta=kind.roll_beta,
-        roll_p=kind.roll_p,
-        roll_r=kind.roll_r,
-        roll_aileron=kind.roll_aileron,
-        roll_rudder=kind.roll_rudder,
-        yaw_beta=kind.yaw_beta,
-        yaw_p=kind.yaw_p,
-        yaw_r=kind.yaw_r,
-        yaw_aileron=kind.yaw_aileron,
-        yaw_rudder=kind.yaw_rudder,
-        stall_alpha=stall + 8.0 / STALL_SHARPNESS,
+        side_beta=aircraft_class.side_beta,
+        side_rudder=aircraft_class.side_rudder,
+        roll_beta=aircraft_class.roll_beta,
+        roll_p=aircraft_class.roll_p,
+        roll_r=aircraft_class.roll_r,
+        roll_aileron=aircraft_class.roll_aileron,
+        roll_rudder=aircraft_class.roll_rudder,
+        yaw_beta=aircraft_class.yaw_beta,
+        yaw_p=aircraft_class.yaw_p,
+        yaw_r=aircraft_class.yaw_r,
+        yaw_aileron=aircraft_class.yaw_aileron,
+        yaw_rudder=aircraft_class.yaw_rudder,
+        stall_alpha=stall_alpha + 8.0 / STALL_SHARPNESS,
         stall_sharpness=STALL_SHARPNESS,
     )
 
@@ -452,7 +454,7 @@ def _aerodynamics(sheet: DataSheet, kind: AircraftClass) -> AeroCoefficients:
 Drag = Callable[[float], float]
 
 
-def _drag_of(sheet: DataSheet, aero: AeroCoefficients) -> Drag:
+def _drag_function(sheet: DataSheet, aero: AeroCoefficients) -> Drag:
     """Return a function for the drag, N, of level flight at an airspeed, m/s."""
 
     def drag(airspeed: float) -> float:
@@ -469,88 +471,95 @@ def _match_sink(sheet: DataSheet, aero: AeroCoefficients, sink: float) -> tuple[
     angle = math.asin(min(0.5, sink / sheet.cruise))
     area_pressure = 0.5 * SHEET_DENSITY * sheet.cruise**2 * sheet.area
     lift = _weight(sheet) * math.cos(angle) / area_pressure
-    least = _weight(sheet) * math.sin(angle) / area_pressure - aero.drag_lift * lift**2
-    low, high = 0.4 * aero.drag_min, 2.5 * aero.drag_min
-    if not low <= least <= high:
-        slow, fast = (
-            sheet.cruise * (one + aero.drag_lift * lift**2) * area_pressure / _weight(sheet) for one in (low, high)
+    drag_min = _weight(sheet) * math.sin(angle) / area_pressure - aero.drag_lift * lift**2
+    min_drag, max_drag = 0.4 * aero.drag_min, 2.5 * aero.drag_min
+    if not min_drag <= drag_min <= max_drag:
+        min_sink, max_sink = (
+            sheet.cruise * (limit_drag + aero.drag_lift * lift**2) * area_pressure / _weight(sheet)
+            for limit_drag in (min_drag, max_drag)
         )
-        allowed = f"allowed {slow:.2f}..{fast:.2f} m/s for this wing at {sheet.cruise:g} m/s"
+        allowed = f"allowed {min_sink:.2f}..{max_sink:.2f} m/s for this wing at {sheet.cruise:g} m/s"
         raise FlightError.at("TECS_SINK_MIN", "", sink, allowed, shown=f"{sink:g} m/s")
-    changed = replace(aero, drag_min=least)
-    return changed, _drag_of(sheet, changed)
+    new_aero = replace(aero, drag_min=drag_min)
+    return new_aero, _drag_function(sheet, new_aero)
 
 
 # ----------------------------------------------------------------------
 # Motor and propeller that give the stated climb at cruise and the stated top speed.
 
 
-def _size_motor(stated: DataSheet, sheet: DataSheet, drag: Drag) -> tuple[ElectricMotor, DataSheet]:
+def _size_motor(stated_sheet: DataSheet, sheet: DataSheet, drag: Drag) -> tuple[ElectricMotor, DataSheet]:
     """Size motor and propeller for a sheet, and return them with the sheet's resulting climb and top speed.
 
     A stated propeller fixes diameter and pitch, a stated motor its speed per volt; free values are chosen to meet the
     climb, and the throttle of level flight or the top speed. If motor and propeller are both stated, climb and top
     speed follow from them where the sheet states none.
     """
-    if stated.motor and stated.propeller[0]:
-        wanted = [name for name in ("climb", "top") if getattr(stated, name)]
-        motor, flown = _solve_motor(stated, sheet, drag, wanted)
-        if flown.climb <= STEEPEST_CLIMB:
-            return motor, flown
+    if stated_sheet.motor and stated_sheet.propeller[0]:
+        target_fields = [name for name in ("climb", "top") if getattr(stated_sheet, name)]
+        motor, result = _solve_motor(stated_sheet, sheet, drag, target_fields)
+        if result.climb <= STEEPEST_CLIMB:
+            return motor, result
         # Limit the climb of an aircraft with more thrust than that.
-        return _solve_motor(stated, replace(sheet, climb=STEEPEST_CLIMB), drag, ["climb"])
-    if (stated.climb and stated.top) or not (stated.top or stated.trim_throttle):
-        return _solve_motor(stated, sheet, drag, ["climb", "top"])
-    if stated.climb:
+        return _solve_motor(stated_sheet, replace(sheet, climb=STEEPEST_CLIMB), drag, ["climb"])
+    if (stated_sheet.climb and stated_sheet.top) or not (stated_sheet.top or stated_sheet.trim_throttle):
+        return _solve_motor(stated_sheet, sheet, drag, ["climb", "top"])
+    if stated_sheet.climb:
         with contextlib.suppress(FlightError):
-            return _solve_motor(stated, sheet, drag, ["climb", "trim_throttle"])
+            return _solve_motor(stated_sheet, sheet, drag, ["climb", "trim_throttle"])
         # The climb that an autopilot is configured with is often less than the motor gives.
-        return _solve_motor(stated, sheet, drag, ["climb", "top"])
+        return _solve_motor(stated_sheet, sheet, drag, ["climb", "top"])
     # A propeller of the usual size, and the speed per volt from the top speed or the throttle: either determines the
     # climb better than a guess.
-    plain = replace(stated, top=0.0, trim_throttle=0.0)
-    usual, _ = _solve_motor(plain, replace(sheet, top=USUAL_TOP * sheet.cruise), drag, ["climb", "top"])
-    size = stated.propeller if stated.propeller[0] else (usual.propeller.diameter, 0.0)
-    wanted = ["top"] if stated.top else ["trim_throttle"]
-    motor, flown = _solve_motor(replace(stated, propeller=size), sheet, drag, wanted)
-    if flown.climb <= STEEPEST_CLIMB:
-        return motor, flown
-    return _solve_motor(replace(stated, trim_throttle=0.0), sheet, drag, ["climb", "top"])
+    unstated = replace(stated_sheet, top=0.0, trim_throttle=0.0)
+    usual_motor, _ = _solve_motor(unstated, replace(sheet, top=USUAL_TOP * sheet.cruise), drag, ["climb", "top"])
+    propeller = stated_sheet.propeller if stated_sheet.propeller[0] else (usual_motor.propeller.diameter, 0.0)
+    target_fields = ["top"] if stated_sheet.top else ["trim_throttle"]
+    motor, result = _solve_motor(replace(stated_sheet, propeller=propeller), sheet, drag, target_fields)
+    if result.climb <= STEEPEST_CLIMB:
+        return motor, result
+    return _solve_motor(replace(stated_sheet, trim_throttle=0.0), sheet, drag, ["climb", "top"])
 
 
-def _solve_motor(stated: DataSheet, sheet: DataSheet, drag: Drag, wanted: list[str]) -> tuple[ElectricMotor, DataSheet]:
+def _solve_motor(
+    stated_sheet: DataSheet, sheet: DataSheet, drag: Drag, target_fields: list[str]
+) -> tuple[ElectricMotor, DataSheet]:
     """Return the motor that meets these fields of the sheet, with as many free numbers.
 
     The last free number is the motor's speed per volt, or the propeller's pitch.
     """
-    volts, (diameter, pitch) = sheet.volts, stated.propeller
+    volts, (diameter, pitch) = sheet.volts, stated_sheet.propeller
     # With the Aerosonde's blade shape the ratio of pitch to diameter is the zero-thrust ratio.
-    steep = pitch / diameter / BOOK_PROPELLER.zero_thrust_ratio if pitch else 1.0
-    base = BOOK_PROPELLER.scaled(diameter=diameter / BOOK_PROPELLER.diameter if diameter else 1.0, pitch=steep)
-    emf = 60.0 / (2.0 * math.pi * stated.motor) if stated.motor else 0.0
-    first_size = 1.0 if diameter else math.sqrt(sheet.mass / 11.0)
+    pitch_ratio = pitch / diameter / BOOK_PROPELLER.zero_thrust_ratio if pitch else 1.0
+    base = BOOK_PROPELLER.scaled(diameter=diameter / BOOK_PROPELLER.diameter if diameter else 1.0, pitch=pitch_ratio)
+    emf = 60.0 / (2.0 * math.pi * stated_sheet.motor) if stated_sheet.motor else 0.0
+    initial_size = 1.0 if diameter else math.sqrt(sheet.mass / 11.0)
     # Initial guess: unloaded propeller speed slightly above the speed for the top airspeed, rad/s.
-    first_turns = 1.2 * sheet.top / base.zero_thrust_ratio / (base.diameter * first_size) * 2.0 * math.pi
-    single = len(wanted) == 1 and wanted != ["climb"]
+    initial_speed = 1.2 * sheet.top / base.zero_thrust_ratio / (base.diameter * initial_size) * 2.0 * math.pi
+    has_one_unknown = len(target_fields) == 1 and target_fields != ["climb"]
 
-    def made(free: Sequence[float]) -> ElectricMotor:
-        size, speed = (1.0, free[0]) if single else (*free, 1.0, 1.0)[:2]
-        propeller = base.scaled(blades=size * first_size) if diameter else base.scaled(diameter=size * first_size)
+    def make_motor(free: Sequence[float]) -> ElectricMotor:
+        size_factor, speed_factor = (1.0, free[0]) if has_one_unknown else (*free, 1.0, 1.0)[:2]
+        propeller = (
+            base.scaled(blades=size_factor * initial_size)
+            if diameter
+            else base.scaled(diameter=size_factor * initial_size)
+        )
         if emf:
-            return _on_battery(propeller.scaled(pitch=speed), volts, emf, sheet.cruise)
-        return _on_battery(propeller, volts, volts / (speed * first_turns), sheet.cruise)
+            return _motor_on_battery(propeller.scaled(pitch=speed_factor), volts, emf, sheet.cruise)
+        return _motor_on_battery(propeller, volts, volts / (speed_factor * initial_speed), sheet.cruise)
 
     def errors(free: Sequence[float]) -> list[float]:
-        motor = made(free)
-        return [_thrust_error(motor, sheet, drag, name) for name in wanted]
+        motor = make_motor(free)
+        return [_thrust_error(motor, sheet, drag, name) for name in target_fields]
 
-    motor = made(_solve_errors(errors, len(wanted), sheet))
+    motor = make_motor(_solve_errors(errors, len(target_fields), sheet))
     if not _MIN_DIAMETER_M <= motor.propeller.diameter <= _MAX_DIAMETER_RATIO * sheet.span:
         raise _no_propeller(sheet)
     return motor, _with_performance(sheet, motor, drag)
 
 
-def _on_battery(propeller: Propeller, volts: float, emf: float, cruise: float) -> ElectricMotor:
+def _motor_on_battery(propeller: Propeller, volts: float, emf: float, cruise: float) -> ElectricMotor:
     """Return a motor of this speed per volt with the Aerosonde's losses relative to its cruise power."""
     power = 0.3 * volts**2 * emf
     motor = ElectricMotor(propeller, volts, emf, 0.1, 0.5, WINDMILL)
@@ -562,30 +571,32 @@ def _on_battery(propeller: Propeller, volts: float, emf: float, cruise: float) -
     return motor
 
 
-def _engine(stated: DataSheet, sheet: DataSheet, drag: Drag) -> tuple[FuelEngine, DataSheet]:
+def _size_engine(stated_sheet: DataSheet, sheet: DataSheet, drag: Drag) -> tuple[FuelEngine, DataSheet]:
     """Return an engine whose torque meets the climb or the top speed.
 
     If both are stated, the propeller's pitch is chosen too.
     """
-    pull = drag(sheet.cruise) + _weight(sheet) * math.sin(sheet.climb)
+    needed_thrust = drag(sheet.cruise) + _weight(sheet) * math.sin(sheet.climb)
     diameter, pitch = sheet.propeller
-    steep = pitch / diameter / BOOK_PROPELLER.zero_thrust_ratio if diameter else 1.0
-    usual = min(math.sqrt(sheet.mass / 11.0), _ENGINE_DIAMETER_RATIO * sheet.span / BOOK_PROPELLER.diameter)
-    base = BOOK_PROPELLER.scaled(diameter=diameter / BOOK_PROPELLER.diameter if diameter else usual, pitch=steep)
-    first_torque = 0.12 * pull * base.diameter
+    pitch_ratio = pitch / diameter / BOOK_PROPELLER.zero_thrust_ratio if diameter else 1.0
+    usual_size = min(math.sqrt(sheet.mass / 11.0), _ENGINE_DIAMETER_RATIO * sheet.span / BOOK_PROPELLER.diameter)
+    base = BOOK_PROPELLER.scaled(
+        diameter=diameter / BOOK_PROPELLER.diameter if diameter else usual_size, pitch=pitch_ratio
+    )
+    initial_torque = 0.12 * needed_thrust * base.diameter
     # A stated top speed determines the climb better than a guess.
-    wanted = [name for name in ("climb", "top") if getattr(stated, name)] or ["climb"]
+    target_fields = [name for name in ("climb", "top") if getattr(stated_sheet, name)] or ["climb"]
 
-    def made(free: Sequence[float]) -> FuelEngine:
-        torque, steeper = (*free, 1.0)[:2]
-        torque *= first_torque
-        return FuelEngine(base.scaled(pitch=steeper), torque, _FRICTION_RATIO * torque, windmill=WINDMILL)
+    def make_engine(free: Sequence[float]) -> FuelEngine:
+        torque, pitch_factor = (*free, 1.0)[:2]
+        torque *= initial_torque
+        return FuelEngine(base.scaled(pitch=pitch_factor), torque, _FRICTION_RATIO * torque, windmill=WINDMILL)
 
     def errors(free: Sequence[float]) -> list[float]:
-        engine = made(free)
-        return [_thrust_error(engine, sheet, drag, name) for name in wanted]
+        engine = make_engine(free)
+        return [_thrust_error(engine, sheet, drag, name) for name in target_fields]
 
-    engine = made(_solve_errors(errors, len(wanted), sheet))
+    engine = make_engine(_solve_errors(errors, len(target_fields), sheet))
     return engine, _with_performance(sheet, engine, drag)
 
 
@@ -593,16 +604,16 @@ def _engine(stated: DataSheet, sheet: DataSheet, drag: Drag) -> tuple[FuelEngine
 Drive = ElectricMotor | FuelEngine
 
 
-def _thrust_error(motor: Drive, sheet: DataSheet, drag: Drag, name: str) -> float:
+def _thrust_error(motor: Drive, sheet: DataSheet, drag: Drag, field: str) -> float:
     """Return the relative error of the thrust from the thrust that a field of the sheet needs."""
-    speed = sheet.top if name == "top" else sheet.cruise
-    throttle = sheet.trim_throttle if name == "trim_throttle" else 1.0
-    needed = drag(speed) + (_weight(sheet) * math.sin(sheet.climb) if name == "climb" else 0.0)
-    return motor.thrust(throttle, speed, SHEET_DENSITY) / needed - 1.0
+    speed = sheet.top if field == "top" else sheet.cruise
+    throttle = sheet.trim_throttle if field == "trim_throttle" else 1.0
+    needed_thrust = drag(speed) + (_weight(sheet) * math.sin(sheet.climb) if field == "climb" else 0.0)
+    return motor.thrust(throttle, speed, SHEET_DENSITY) / needed_thrust - 1.0
 
 
 def _solve_errors(errors: Callable[[Sequence[float]], list[float]], count: int, sheet: DataSheet) -> list[float]:
-    """Solve for positive numbers near 1 at which all errors vanish. Raise FlightError without a solution."""
+    """Return positive numbers near 1 that make all errors vanish. Raises FlightError without a solution."""
     if not count:
         return []
     for size in (1.0, 0.6, 1.7):
@@ -623,11 +634,11 @@ _THRUST_TOLERANCE_RATIO = 1e-7
 
 
 def _solve_by_newton(errors: Callable[[Floats], Floats], x: Floats) -> Floats | None:
-    """Solve for numbers within the bound at which the errors vanish, by Newton's method; return None if it fails.
+    """Find the zero of the errors within the bound by Newton's method; return None if it fails.
 
     A step that does not reduce the errors is halved.
     """
-    off = errors(x)
+    residual = errors(x)
     for _ in range(100):
         slopes = np.array(
             [
@@ -635,37 +646,39 @@ def _solve_by_newton(errors: Callable[[Floats], Floats], x: Floats) -> Floats | 
                 for step in _DIFFERENCE_STEP * np.eye(x.size)
             ]
         ).T
-        whole = np.linalg.lstsq(slopes, -off, rcond=None)[0]
-        size = min(1.0, _MAX_STEP / max(float(np.abs(whole).max()), 1e-12))
-        while size > 1e-6:
-            there = np.clip(x + size * whole, -_SEARCH_BOUND, _SEARCH_BOUND)
-            if np.linalg.norm(left := errors(there)) < np.linalg.norm(off):
+        full_step = np.linalg.lstsq(slopes, -residual, rcond=None)[0]
+        fraction = min(1.0, _MAX_STEP / max(float(np.abs(full_step).max()), 1e-12))
+        while fraction > 1e-6:
+            candidate = np.clip(x + fraction * full_step, -_SEARCH_BOUND, _SEARCH_BOUND)
+            if np.linalg.norm(candidate_residual := errors(candidate)) < np.linalg.norm(residual):
                 break
-            size *= 0.5
+            fraction *= 0.5
         else:
             break
-        x, off = there, left
-    return x if np.abs(off).max() < _THRUST_TOLERANCE_RATIO else None
+        x, residual = candidate, candidate_residual
+    return x if np.abs(residual).max() < _THRUST_TOLERANCE_RATIO else None
 
 
 def _no_propeller(sheet: DataSheet) -> FlightError:
     climb = math.degrees(sheet.climb)
     allowed = "a steeper climb goes with a higher top speed, a flatter one with a lower"
-    no = f"no propeller gives it at {sheet.cruise:g} m/s with a top speed of {sheet.top:.3g} m/s"
-    return FlightError.of_argument("climb", climb, f"{no}: {allowed}", shown=f"{climb:.3g} degrees")
+    reason = f"no propeller gives it at {sheet.cruise:g} m/s with a top speed of {sheet.top:.3g} m/s"
+    return FlightError.of_argument("climb", climb, f"{reason}: {allowed}", shown=f"{climb:.3g} degrees")
 
 
 def _with_performance(sheet: DataSheet, motor: Drive, drag: Drag) -> DataSheet:
-    """Return the sheet with the climb and top speed of a motor. Raise FlightError if it cannot climb."""
-    spare = motor.thrust(1.0, sheet.cruise, SHEET_DENSITY) - drag(sheet.cruise)
-    climb = math.asin(max(-1.0, min(0.95, spare / _weight(sheet))))
-    least = RANGES["climb"][2]
-    if climb < math.radians(least):
-        gives = f"with this propeller and {sheet.volts:g} V it climbs {math.degrees(climb):.1f} degrees at cruise"
-        raise _refused("motor", sheet.motor, f"{gives}: allowed {least:g} degrees and more", "rpm a volt")
+    """Return the sheet with the climb and top speed of a motor. Raises FlightError if it cannot climb."""
+    excess_thrust = motor.thrust(1.0, sheet.cruise, SHEET_DENSITY) - drag(sheet.cruise)
+    climb = math.asin(max(-1.0, min(0.95, excess_thrust / _weight(sheet))))
+    min_climb_deg = RANGES["climb"][2]
+    if climb < math.radians(min_climb_deg):
+        result_text = f"with this propeller and {sheet.volts:g} V it climbs {math.degrees(climb):.1f} degrees at cruise"
+        raise _out_of_range(
+            "motor", sheet.motor, f"{result_text}: allowed {min_climb_deg:g} degrees and more", "rpm a volt"
+        )
     low, high = sheet.cruise, 4.0 * sheet.cruise
     for _ in range(60):
-        middle = 0.5 * (low + high)
-        faster = motor.thrust(1.0, middle, SHEET_DENSITY) > drag(middle)
-        low, high = (middle, high) if faster else (low, middle)
+        airspeed = 0.5 * (low + high)
+        has_excess = motor.thrust(1.0, airspeed, SHEET_DENSITY) > drag(airspeed)
+        low, high = (airspeed, high) if has_excess else (low, airspeed)
     return replace(sheet, climb=climb, top=low)

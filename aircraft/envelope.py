@@ -72,9 +72,9 @@ class Envelope:
     def air_angles(self, airspeed: float, amsl: float) -> tuple[float, float]:
         """Return the steepest climb and descent relative to the air, rad, by bilinear interpolation.
 
-        Both are positive. NaN at an airspeed outside the table or below the slowest level flight; between that speed
-        and the slowest trim of the table the values of that trim are used. Altitudes outside the table use its nearest
-        edge.
+        Both are positive. They are NaN at an airspeed outside the table or below the slowest level flight; between that
+        speed and the slowest trim of the table the values of that trim are used. Altitudes outside the table use its
+        nearest edge.
         """
         if not airspeed >= float(np.interp(amsl, self.amsl, self.level_speed_min)):
             return math.nan, math.nan
@@ -96,15 +96,21 @@ class Envelope:
         """
         if not (self.climb_sd or self.descent_sd or self.fastest_sd):
             return self
-        less = {name: UNDECIDED * getattr(self, f"{name}_sd") for name in ("climb", "descent")}
+        margins = {name: UNDECIDED * getattr(self, f"{name}_sd") for name in ("climb", "descent")}
         # A loss of altitude stays as it is.
         climb, descent = (
-            np.where(table > 0.0, np.maximum(0.0, table - less[name]), table)
+            np.where(table > 0.0, np.maximum(0.0, table - margins[name]), table)
             for name, table in (("climb", self.climb), ("descent", self.descent))
         )
-        fastest = np.fmax(self.level_speed_min, self.level_speed_max - UNDECIDED * self.fastest_sd)
+        max_level_speed = np.fmax(self.level_speed_min, self.level_speed_max - UNDECIDED * self.fastest_sd)
         return replace(
-            self, climb=climb, descent=descent, level_speed_max=fastest, climb_sd=0.0, descent_sd=0.0, fastest_sd=0.0
+            self,
+            climb=climb,
+            descent=descent,
+            level_speed_max=max_level_speed,
+            climb_sd=0.0,
+            descent_sd=0.0,
+            fastest_sd=0.0,
         )
 
     def slope_limits(
@@ -112,11 +118,10 @@ class Envelope:
     ) -> tuple[float, float]:
         """Return the steepest climb and dive over the ground on a leg in this steady wind, rad.
 
-        Both are positive.
         tailwind, crosswind: m/s along and across the leg's course.
 
-        A tailwind flattens the slope over the ground, a headwind steepens it. NaN if the aircraft cannot make progress
-        along the leg, or where `air_angles` is NaN.
+        Both slopes are positive. A tailwind flattens the slope over the ground, a headwind steepens it. Both are
+        NaN if the aircraft cannot make progress along the leg, and where `air_angles` is NaN.
         """
         climb, descent = self.air_angles(airspeed, amsl)
         return (
@@ -129,23 +134,23 @@ class Envelope:
 
         air_angle: angle relative to the air, rad, positive in a climb.
 
-        Interpolated by the parabola through idle, level and full throttle, and constant beyond them. NaN if power is
-        unknown or the airspeed is outside the table.
+        It follows the parabola through idle, level flight and full throttle, and is constant beyond idle and full
+        throttle. It is NaN if power is unknown or the airspeed is outside the table.
         """
         if not self.power_level.size:
             return math.nan
         climb, descent = self.air_angles(airspeed, amsl)
-        idle, level, full = (
+        idle, level, full_throttle = (
             _bilinear(self.airspeed, self.amsl, getattr(self, name), airspeed, amsl) for name in POWERS
         )
-        x = math.sin(air_angle)
-        low, high = -math.sin(descent), math.sin(climb)
-        if x >= high or x <= low or not low < 0.0 < high:
-            return full if x >= high else idle if x <= low else math.nan
+        sine = math.sin(air_angle)
+        min_sine, max_sine = -math.sin(descent), math.sin(climb)
+        if sine >= max_sine or sine <= min_sine or not min_sine < 0.0 < max_sine:
+            return full_throttle if sine >= max_sine else idle if sine <= min_sine else math.nan
         return (
-            idle * x * (x - high) / (low * (low - high))
-            + level * (x - low) * (x - high) / (low * high)
-            + full * x * (x - low) / (high * (high - low))
+            idle * sine * (sine - max_sine) / (min_sine * (min_sine - max_sine))
+            + level * (sine - min_sine) * (sine - max_sine) / (min_sine * max_sine)
+            + full_throttle * sine * (sine - min_sine) / (max_sine * (max_sine - min_sine))
         )
 
     def level_speeds(self, amsl: float) -> tuple[float, float]:
@@ -160,18 +165,18 @@ class Envelope:
 def ground_slope(air_angle: float, airspeed: float, tailwind: float, crosswind: float) -> float:
     """Return the path angle over the ground of a steady climb at ``air_angle`` to the air, rad.
 
-    NaN without progress.
+    It is NaN if the aircraft cannot make progress over the ground.
     """
-    along = ground_speed(airspeed * math.cos(air_angle), tailwind, crosswind)
-    return math.atan2(airspeed * math.sin(air_angle), along)
+    speed_over_ground = ground_speed(airspeed * math.cos(air_angle), tailwind, crosswind)
+    return math.atan2(airspeed * math.sin(air_angle), speed_over_ground)
 
 
 @compiled
 def ground_speed(airspeed: float, tailwind: float, crosswind: float) -> float:
     """Return the ground speed along a course held against the wind, m/s; NaN if it cannot be held."""
-    square = airspeed**2 - crosswind**2
-    along = math.sqrt(square) + tailwind if square > 0.0 else -1.0
-    return along if along > 0.0 else math.nan
+    speed2 = airspeed**2 - crosswind**2
+    speed_over_ground = math.sqrt(speed2) + tailwind if speed2 > 0.0 else -1.0
+    return speed_over_ground if speed_over_ground > 0.0 else math.nan
 
 
 @compiled
@@ -182,8 +187,8 @@ def turn_radius(speed: float, bank: float) -> float:
 
 def _bilinear(xs: Floats, ys: Floats, table: Floats, x: float, y: float) -> float:
     rows = _interpolate_rows(ys, table, y)
-    first = int(np.argmax(~np.isnan(rows)))
-    rows[:first] = rows[first]
+    first_known = int(np.argmax(~np.isnan(rows)))
+    rows[:first_known] = rows[first_known]
     return float(np.interp(x, xs, rows, left=np.nan, right=np.nan))
 
 

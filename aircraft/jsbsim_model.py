@@ -78,40 +78,45 @@ def read_model(table: object, aircraft: str) -> Model:
 
     aircraft: name of the aircraft, which is also the name of JSBSim's model unless the table states another.
 
-    Raise FlightError with one line, which begins with the key, for an unknown, missing or invalid entry.
+    Raises FlightError with one line, which begins with the key, for an unknown, missing or invalid entry.
     """
-    table = _table(table, "model", ("shipped_by_jsbsim", "engine_settles", "command", "reading"))
-    commands = _table(table.get("command", {}), "model.command", _COMMANDS)
-    readings = _table(table.get("reading", {}), "model.reading", _READINGS)
-    made = []
-    for name, ours in zip(_COMMANDS, DEFAULT_MODEL.commands, strict=True):
+    table = _checked_table(table, "model", ("shipped_by_jsbsim", "engine_settles", "command", "reading"))
+    commands = _checked_table(table.get("command", {}), "model.command", _COMMANDS)
+    readings = _checked_table(table.get("reading", {}), "model.reading", _READINGS)
+    command_properties = []
+    for name, default in zip(_COMMANDS, DEFAULT_MODEL.commands, strict=True):
         if name not in commands:
-            made.append(ours)
+            command_properties.append(default)
             continue
-        prop, above, below = _entry(commands[name], f"model.command.{name}", 2)
-        made.append(CommandProperty(prop, above, below))
-    read = []
-    for name, mine in zip(_READINGS, DEFAULT_MODEL.readings, strict=True):
+        property_name, above, below = _read_entry(commands[name], f"model.command.{name}", 2)
+        command_properties.append(CommandProperty(property_name, above, below))
+    reading_properties = []
+    for name, default_reading in zip(_READINGS, DEFAULT_MODEL.readings, strict=True):
         if name not in readings:
-            read.append(mine)
+            reading_properties.append(default_reading)
         elif readings[name] == []:
-            read.append(Reading("", 0.0))
+            reading_properties.append(Reading("", 0.0))
         else:
-            prop, factor = _entry(readings[name], f"model.reading.{name}", 1)
-            read.append(Reading(prop, factor))
-    return Model(_shipped(table, aircraft), _flag(table, "engine_settles"), tuple(made), tuple(read))
+            property_name, factor = _read_entry(readings[name], f"model.reading.{name}", 1)
+            reading_properties.append(Reading(property_name, factor))
+    return Model(
+        _shipped_model(table, aircraft),
+        _read_flag(table, "engine_settles"),
+        tuple(command_properties),
+        tuple(reading_properties),
+    )
 
 
-def _table(value: object, key: str, known: tuple[str, ...]) -> dict[str, Any]:
+def _checked_table(value: object, key: str, known_keys: tuple[str, ...]) -> dict[str, Any]:
     if not isinstance(value, dict):
         raise FlightError(f"{key} = {value!r} is not a table", field=key, value=value)
-    if unknown := sorted(value.keys() - set(known)):
-        near = did_you_mean(unknown[0], sorted(set(known) - value.keys()))
-        raise FlightError(f"{key}: unknown key {', '.join(unknown)}{near}", field=key, value=unknown[0])
+    if unknown := sorted(value.keys() - set(known_keys)):
+        suggestion = did_you_mean(unknown[0], sorted(set(known_keys) - value.keys()))
+        raise FlightError(f"{key}: unknown key {', '.join(unknown)}{suggestion}", field=key, value=unknown[0])
     return value
 
 
-def _shipped(table: dict[str, Any], aircraft: str) -> str:
+def _shipped_model(table: dict[str, Any], aircraft: str) -> str:
     """Return the name of JSBSim's own model.
 
     It names a folder and must not lead outside JSBSim's folder.
@@ -125,24 +130,24 @@ def _shipped(table: dict[str, Any], aircraft: str) -> str:
     return value
 
 
-def _flag(table: dict[str, Any], name: str) -> bool:
+def _read_flag(table: dict[str, Any], name: str) -> bool:
     value = table.get(name, False)
     if not isinstance(value, bool):
         raise FlightError(f"model.{name} = {value!r} is not true or false", field=f"model.{name}", value=value)
     return value
 
 
-def _entry(value: object, key: str, numbers: int) -> tuple[Any, ...]:
+def _read_entry(value: object, key: str, factor_count: int) -> tuple[Any, ...]:
     """Return a property and its factors, all different from zero."""
-    good = isinstance(value, list) and len(value) == 1 + numbers and isinstance(value[0], str)
+    is_valid = isinstance(value, list) and len(value) == 1 + factor_count and isinstance(value[0], str)
     # JSBSim aborts the process on a name with a space in it.
-    if good and isinstance(value, list):
-        good = bool(value[0]) and value[0].isascii() and not any(letter.isspace() for letter in value[0])
-        good = good and all(
-            isinstance(number, int | float) and not isinstance(number, bool) and math.isfinite(number) and number != 0.0
-            for number in value[1:]
+    if is_valid and isinstance(value, list):
+        is_valid = bool(value[0]) and value[0].isascii() and not any(letter.isspace() for letter in value[0])
+        is_valid = is_valid and all(
+            isinstance(factor, int | float) and not isinstance(factor, bool) and math.isfinite(factor) and factor != 0.0
+            for factor in value[1:]
         )
-    if not good or not isinstance(value, list):
-        allowed = f"a property and {numbers} number(s) other than 0"
+    if not is_valid or not isinstance(value, list):
+        allowed = f"a property and {factor_count} number(s) other than 0"
         raise FlightError(f"{key} = {value!r} is not {allowed}", field=key, value=value, allowed=allowed)
-    return (value[0], *(float(number) for number in value[1:]))
+    return (value[0], *(float(factor) for factor in value[1:]))

@@ -33,9 +33,9 @@ FACTORS = {
 # Ratio of the stops of elevons and ruddervators to the larger stop of the two commands that they mix.
 MIXED_TRAVEL = 1.3
 # kg m^2 in one slug ft^2.
-_SLUG_FT2 = 1.3558179483314004
+_KG_M2_PER_SLUG_FT2 = 1.3558179483314004
 # Kilograms in one pound.
-_POUND = 0.45359237
+_KG_PER_POUND = 0.45359237
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,13 +90,13 @@ class AeroCoefficients:
 class ModelNumbers:
     """All numbers of a model, in SI units and radians.
 
-    title: for a person.
+    title: title for people.
     source: source of the numbers, a sentence.
-    inertia: Jx, Jy, Jz, Jxz about the center of gravity, kg m^2; Jxz is the integral of x z dm.
+    inertia: Jx, Jy, Jz, Jxz about the centre of gravity, kg m^2; Jxz is the integral of x z dm.
     throw: travel of elevator, aileron and rudder in either direction.
     rate: rate limit of the surfaces, rad/s.
     lag: lag of surfaces and of the motor, s.
-    lift_behind: distance of the wing's forces behind the center of gravity, m.
+    lift_behind: distance of the wing's forces behind the centre of gravity, m.
     """
 
     title: str
@@ -121,16 +121,16 @@ def model_xml(name: str, numbers: ModelNumbers) -> str:
 
     It has no ``<input>`` and ``<output>`` channels, and the properties of `aircraft.jsbsim_model.DEFAULT_MODEL`.
     """
-    jx, jy, jz, jxz = (value / _SLUG_FT2 for value in numbers.inertia)
+    jx, jy, jz, jxz = (value / _KG_M2_PER_SLUG_FT2 for value in numbers.inertia)
     return f"""<?xml version="1.0"?>
-<!-- {_comment(numbers.title)}
-     {_comment(numbers.source)}
+<!-- {_comment_text(numbers.title)}
+     {_comment_text(numbers.source)}
      Written by aircraft/model_writer.py; signs and equations as in aircraft/aerosonde/aerosonde.xml. -->
 <fdm_config name="{name}" version="2.0" release="BETA">
   <fileheader>
     <author>planfly</author>
     <version>1.0</version>
-    <description>{_comment(numbers.title)}</description>
+    <description>{_comment_text(numbers.title)}</description>
   </fileheader>
 
   <metrics>
@@ -148,7 +148,7 @@ def model_xml(name: str, numbers: ModelNumbers) -> str:
     <iyy unit="SLUG*FT2"> {number(jy)} </iyy>
     <izz unit="SLUG*FT2"> {number(jz)} </izz>
     <ixz unit="SLUG*FT2"> {number(jxz)} </ixz>
-    <emptywt unit="LBS"> {number(numbers.mass / _POUND)} </emptywt>
+    <emptywt unit="LBS"> {number(numbers.mass / _KG_PER_POUND)} </emptywt>
     <location name="CG" unit="M"> <x> 0 </x> <y> 0 </y> <z> 0 </z> </location>
     <pointmass name="payload">
       <weight unit="LBS"> 0 </weight>
@@ -168,7 +168,7 @@ def model_xml(name: str, numbers: ModelNumbers) -> str:
 """
 
 
-def _comment(text: str) -> str:
+def _comment_text(text: str) -> str:
     """Return a text without characters that are not allowed in XML and its comments."""
     return text.replace("&", "and").replace("<", "").replace(">", "").replace("--", "-")
 
@@ -179,24 +179,24 @@ def _comment(text: str) -> str:
 
 def _flight_control(numbers: ModelNumbers) -> str:
     elevator, aileron, rudder = numbers.throw
-    plain = {"elevator": elevator, "aileron": aileron, "rudder": rudder}
-    mixed = {"tail": (), "wing": ("elevator", "aileron"), "vtail": ("elevator", "rudder")}[numbers.layout]
+    travels = {"elevator": elevator, "aileron": aileron, "rudder": rudder}
+    mixed_controls = {"tail": (), "wing": ("elevator", "aileron"), "vtail": ("elevator", "rudder")}[numbers.layout]
     channels = [
         _servo(f"surface/{name}-rad", f"command/{name}-rad", limit, numbers)
-        for name, limit in plain.items()
-        if name not in mixed
+        for name, limit in travels.items()
+        if name not in mixed_controls
     ]
-    if mixed:
-        first, second = mixed
+    if mixed_controls:
+        first_control, second_control = mixed_controls
         name = "elevon" if numbers.layout == "wing" else "ruddervator"
-        limit = MIXED_TRAVEL * max(plain[first], plain[second])
+        limit = MIXED_TRAVEL * max(travels[first_control], travels[second_control])
         sides = {"left": 1.0, "right": -1.0}
         # The outer functions only convert between commands and surfaces; the servos between them have lag and stops.
         for side, sign in sides.items():
-            asked = total(f"<p> command/{first}-rad </p>", scaled(sign, f"command/{second}-rad"))
-            channels.append(_function(f"{name}/{side}-command-rad", asked))
+            command = total(f"<p> command/{first_control}-rad </p>", scaled(sign, f"command/{second_control}-rad"))
+            channels.append(_function(f"{name}/{side}-command-rad", command))
             channels.append(_servo(f"{name}/{side}-rad", f"{name}/{side}-command-rad", limit, numbers))
-        for control, signs in ((first, (0.5, 0.5)), (second, (0.5, -0.5))):
+        for control, signs in ((first_control, (0.5, 0.5)), (second_control, (0.5, -0.5))):
             parts = (scaled(sign, f"{name}/{side}-rad") for side, sign in zip(sides, signs, strict=True))
             channels.append(_function(f"surface/{control}-rad", total(*parts)))
     lag = 1.0 / numbers.lag[1]
@@ -249,7 +249,7 @@ def _external_reactions(numbers: ModelNumbers) -> str:
     declared = "\n".join(f'    <property value="1"> ident/{name} </property>' for name in numbers.factors)
     x, y, z = numbers.propulsion.direction
     # JSBSim's structural axes point aft, right and up; the body's forward, right and down.
-    ahead, right, below = numbers.propulsion.place
+    forward, right, below = numbers.propulsion.place
     # Without a rudder only sideslip could balance the torque and the ailerons against it, and trims have no sideslip.
     torque = "    <!-- No torque of the propeller: its elevons are rigged against it. -->"
     if numbers.layout != "wing":
@@ -269,7 +269,7 @@ def _external_reactions(numbers: ModelNumbers) -> str:
 {numbers.propulsion.functions(numbers.factors)}
     <force name="thrust" frame="BODY">
       <function> <product> <p> motor/thrust-n </p> <v> 0.2248089430997105 </v> </product> </function>
-      <location unit="M"> <x> {number(-ahead)} </x> <y> {number(right)} </y> <z> {number(-below)} </z> </location>
+      <location unit="M"> <x> {number(-forward)} </x> <y> {number(right)} </y> <z> {number(-below)} </z> </location>
       <direction> <x> {number(x)} </x> <y> {number(y)} </y> <z> {number(z)} </z> </direction>
     </force>
 {torque}
@@ -280,7 +280,7 @@ def _external_reactions(numbers: ModelNumbers) -> str:
 # Forces and moments. In the stability frame JSBSim takes X aft and Z up as positive: drag and lift.
 
 # Element of dynamic pressure times wing area.
-_Q = "<p> aero/qbar-area </p>"
+_DYNAMIC_FORCE = "<p> aero/qbar-area </p>"
 # Property of the angle of attack.
 _ALPHA = "aero/alpha-rad"
 # Property of the sideslip.
@@ -299,16 +299,16 @@ _CONTROL = "aero/control-factor"
 
 def _aerodynamics(numbers: ModelNumbers) -> str:
     span, chord = "<p> metrics/bw-ft </p>", "<p> metrics/cbarw-ft </p>"
-    forces, moments = _forces(numbers.aero, numbers.factors), _moments(numbers.aero, numbers.factors)
+    forces, moments = _force_terms(numbers.aero, numbers.factors), _moment_terms(numbers.aero, numbers.factors)
     drag_factor = "<p> aero/drag-factor </p>"
-    written = "\n".join(
+    axes = "\n".join(
         [
-            _axis("X", "force/drag", product(_Q, drag_factor, forces[0]), ' frame="STABILITY"'),
-            _axis("Z", "force/lift", product(_Q, forces[1]), ' frame="STABILITY"'),
-            _axis("Y", "force/side", product(_Q, forces[2]), ' frame="STABILITY"'),
-            _axis("ROLL", "moment/roll", product(_Q, span, moments[0])),
-            _axis("PITCH", "moment/pitch", product(_Q, chord, moments[1])),
-            _axis("YAW", "moment/yaw", product(_Q, span, moments[2])),
+            _axis("X", "force/drag", product(_DYNAMIC_FORCE, drag_factor, forces[0]), ' frame="STABILITY"'),
+            _axis("Z", "force/lift", product(_DYNAMIC_FORCE, forces[1]), ' frame="STABILITY"'),
+            _axis("Y", "force/side", product(_DYNAMIC_FORCE, forces[2]), ' frame="STABILITY"'),
+            _axis("ROLL", "moment/roll", product(_DYNAMIC_FORCE, span, moments[0])),
+            _axis("PITCH", "moment/pitch", product(_DYNAMIC_FORCE, chord, moments[1])),
+            _axis("YAW", "moment/yaw", product(_DYNAMIC_FORCE, span, moments[2])),
         ]
     )
     return f"""  <aerodynamics>
@@ -318,7 +318,7 @@ def _aerodynamics(numbers: ModelNumbers) -> str:
 
 {_lift_curve(numbers.aero, numbers.factors)}
 
-{written}
+{axes}
   </aerodynamics>"""
 
 
@@ -335,13 +335,13 @@ def _factor_property(name: str, factors: tuple[str, ...]) -> tuple[str, ...]:
     return (f"ident/{name}",) if name in factors else ()
 
 
-def _forces(a: AeroCoefficients, known: tuple[str, ...]) -> tuple[str, str, str]:
+def _force_terms(a: AeroCoefficients, factors: tuple[str, ...]) -> tuple[str, str, str]:
     """Return drag, lift and side force, each as a coefficient."""
-    apart = f"<difference> <p> aero/lift-linear </p> <v> {number(a.lift_at_least_drag)} </v> </difference>"
-    induced = (f"<p> {name} </p>" for name in _factor_property("induced-drag", known))
+    lift_difference = f"<difference> <p> aero/lift-linear </p> <v> {number(a.lift_at_least_drag)} </v> </difference>"
+    induced = (f"<p> {name} </p>" for name in _factor_property("induced-drag", factors))
     drag = total(
-        scaled(a.drag_min, *_factor_property("zero-lift-drag", known)),
-        product(f"<v> {number(a.drag_lift)} </v>", *induced, apart, apart),
+        scaled(a.drag_min, *_factor_property("zero-lift-drag", factors)),
+        product(f"<v> {number(a.drag_lift)} </v>", *induced, lift_difference, lift_difference),
         product(f"<v> {number(a.drag_elevator)} </v>", f"<abs> <p> {_ELEVATOR} </p> </abs>"),
         scaled(a.drag_elevator_2, _ELEVATOR, _ELEVATOR),
         scaled(a.drag_beta_2, _BETA, _BETA),
@@ -361,20 +361,20 @@ def _forces(a: AeroCoefficients, known: tuple[str, ...]) -> tuple[str, str, str]
     return drag, lift, side
 
 
-def _moments(a: AeroCoefficients, known: tuple[str, ...]) -> tuple[str, str, str]:
+def _moment_terms(a: AeroCoefficients, factors: tuple[str, ...]) -> tuple[str, str, str]:
     """Return rolling, pitching and yawing moment, each as a coefficient."""
     roll = total(
         scaled(a.roll_beta, _BETA),
-        scaled(a.roll_p, "aero/bi2vel", _RATE_P, *_factor_property("roll-damping", known)),
+        scaled(a.roll_p, "aero/bi2vel", _RATE_P, *_factor_property("roll-damping", factors)),
         scaled(a.roll_r, "aero/bi2vel", _RATE_R),
-        scaled(a.roll_aileron, _CONTROL, _AILERON, *_factor_property("aileron-power", known)),
+        scaled(a.roll_aileron, _CONTROL, _AILERON, *_factor_property("aileron-power", factors)),
         scaled(a.roll_rudder, _CONTROL, _RUDDER),
     )
     pitch = total(
         f"<v> {number(a.pitch_0)} </v>",
-        scaled(a.pitch_alpha, _ALPHA, *_factor_property("pitch-stiffness", known)),
-        scaled(a.pitch_q, "aero/ci2vel", _RATE_Q, *_factor_property("pitch-damping", known)),
-        scaled(a.pitch_elevator, _CONTROL, _ELEVATOR, *_factor_property("elevator-power", known)),
+        scaled(a.pitch_alpha, _ALPHA, *_factor_property("pitch-stiffness", factors)),
+        scaled(a.pitch_q, "aero/ci2vel", _RATE_Q, *_factor_property("pitch-damping", factors)),
+        scaled(a.pitch_elevator, _CONTROL, _ELEVATOR, *_factor_property("elevator-power", factors)),
     )
     yaw = total(
         scaled(a.yaw_beta, _BETA),
@@ -386,12 +386,12 @@ def _moments(a: AeroCoefficients, known: tuple[str, ...]) -> tuple[str, str, str
     return roll, pitch, yaw
 
 
-def _lift_curve(a: AeroCoefficients, known: tuple[str, ...]) -> str:
+def _lift_curve(a: AeroCoefficients, factors: tuple[str, ...]) -> str:
     """Return the lift by angle of attack: a straight line, and a flat plate beyond the stall."""
-    line = total(f"<v> {number(a.lift_0)} </v>", scaled(a.lift_alpha, _ALPHA, *_factor_property("lift-slope", known)))
+    line = total(f"<v> {number(a.lift_0)} </v>", scaled(a.lift_alpha, _ALPHA, *_factor_property("lift-slope", factors)))
     sine = f"<sin> <p> {_ALPHA} </p> </sin>"
     plate = product("<v> 2 </v>", sine, f"<abs> {sine} </abs>", f"<cos> <p> {_ALPHA} </p> </cos>")
-    apart = f"<difference> {plate} <p> aero/lift-linear </p> </difference>"
+    difference = f"<difference> {plate} <p> aero/lift-linear </p> </difference>"
     return f"""    <function name="aero/lift-linear">
       {line}
     </function>
@@ -405,22 +405,22 @@ def _lift_curve(a: AeroCoefficients, known: tuple[str, ...]) -> str:
       </table>
     </function>
     <function name="aero/lift-alpha">
-      {total("<p> aero/lift-linear </p>", product("<p> aero/separated </p>", apart))}
+      {total("<p> aero/lift-linear </p>", product("<p> aero/separated </p>", difference))}
     </function>"""
 
 
-def _separation_table(stall: float, sharpness: float) -> str:
+def _separation_table(stall_alpha: float, sharpness: float) -> str:
     """Return rows of the separated fraction of the flow by angle of attack, rad (Beard and McLain, 4.10).
 
     The fraction is exactly 0 in attached flow.
     """
     width = 10.0 / sharpness
-    steps = [stall - width + 0.02 * k for k in range(math.ceil(2.0 * width / 0.02) + 1)]
+    steps = [stall_alpha - width + 0.02 * k for k in range(math.ceil(2.0 * width / 0.02) + 1)]
     points = sorted({-math.pi, *(-step for step in steps), *steps, math.pi})
     rows = []
     for alpha in points:
-        inner, outer = math.exp(-sharpness * (alpha - stall)), math.exp(sharpness * (alpha + stall))
-        share = (1.0 + inner + outer) / ((1.0 + inner) * (1.0 + outer))
-        share = 0.0 if abs(alpha) <= stall - width + 1e-9 else min(1.0, share)
-        rows.append(f"          {alpha:.6f}  {share:.8f}")
+        inner, outer = math.exp(-sharpness * (alpha - stall_alpha)), math.exp(sharpness * (alpha + stall_alpha))
+        fraction = (1.0 + inner + outer) / ((1.0 + inner) * (1.0 + outer))
+        fraction = 0.0 if abs(alpha) <= stall_alpha - width + 1e-9 else min(1.0, fraction)
+        rows.append(f"          {alpha:.6f}  {fraction:.8f}")
     return "\n".join(rows)

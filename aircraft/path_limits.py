@@ -34,7 +34,7 @@ class PerformanceTable(NamedTuple):
     tan_max_bank: tangent of the bank limit.
     wind_speed: mean wind (m/s) at `wind_reference_amsl` (m).
     wind_to: direction towards which the wind blows, rad clockwise from north.
-    wind_gradient: increase per meter of altitude, 1/s.
+    wind_gradient: increase per metre of altitude, 1/s.
     gust_sigma: standard deviation of the gusts, m/s.
     amsl: (h,) m, increasing; altitudes of the two tables.
     climb, descent: (h,) rad, steepest angles relative to the air, positive in the direction of their name.
@@ -64,10 +64,10 @@ class Limits:
     envelope: performance of the aircraft in still air.
     airspeed: m/s.
     max_bank: rad, the tighter of scenario and aircraft.
-    wind: over the whole area.
+    wind: wind over the whole area.
     tracking: tracking error of the autopilot, None if it follows its path exactly.
     reserve_height: height above ground that is kept for downdrafts in addition to the clearance, m.
-    reserve_threats: the same around missiles' spheres, in all directions, and above and below zones, m.
+    reserve_threats: the same distance around missiles' spheres, in all directions, and above and below zones, m.
     reserve_climb: rate of climb that legs leave unused for downdrafts, m/s.
     reserve_above: distance below a maximum height above ground that is kept for updrafts, m.
     reserve_sink: rate of sink that legs leave unused for updrafts, m/s.
@@ -87,14 +87,15 @@ class Limits:
     reserve_climb: float = 0.0
     reserve_above: float = 0.0
     reserve_sink: float = 0.0
-    # Each is made once: a route asks for the same few speeds again and again.
+    # Each is made once, because a route needs the same few speeds many times.
     _tables: dict[float | None, PerformanceTable] = field(init=False, repr=False, compare=False, default_factory=dict)
 
     def slopes(self, course: float, amsl: float, airspeed: float | None = None) -> tuple[float, float]:
         """Return the steepest climb and dive over the ground on a course (rad) at an altitude (m), rad.
 
-        Both are positive, and 0 if the aircraft cannot make progress along the course.
         airspeed: m/s; None for the airspeed of the limits.
+
+        Both slopes are positive, and 0 if the aircraft cannot make progress along the course.
         """
         climb, dive = aircraft_slopes(self.performance(airspeed), course, amsl)
         return float(climb), float(dive)
@@ -120,7 +121,7 @@ class Limits:
     def climb_rates(self, waypoints: Floats) -> Floats:
         """Return the rate of climb (legs, 2) of each leg of a path (w, 3) at its start and at its end, m/s.
 
-        Negative in a descent; NaN if the wind does not let the aircraft hold the leg.
+        The rate is negative in a descent, and NaN if the wind does not let the aircraft hold the leg.
         """
         legs, table = zip(leg_courses(waypoints), leg_slopes(waypoints), strict=True), self.performance()
         return np.array(
@@ -142,15 +143,18 @@ class Limits:
         Climb and descent are NaN where `Envelope.air_angles` is NaN.
         """
         if airspeed not in self._tables:
-            self._tables[airspeed] = self._table(airspeed)
+            self._tables[airspeed] = self._make_table(airspeed)
         return self._tables[airspeed]
 
-    def _table(self, airspeed: float | None) -> PerformanceTable:
+    def _make_table(self, airspeed: float | None) -> PerformanceTable:
         speed, heights, wind = self.airspeed if airspeed is None else airspeed, self.envelope.amsl, self.wind
         equivalent = airspeed is None and self.tracking is not None
-        faster = [air_density_factor(float(amsl)) if equivalent else 1.0 for amsl in heights]
+        speed_factors = [air_density_factor(float(amsl)) if equivalent else 1.0 for amsl in heights]
         angles = np.array(
-            [self.envelope.air_angles(speed * more, float(amsl)) for more, amsl in zip(faster, heights, strict=True)]
+            [
+                self.envelope.air_angles(speed * factor, float(amsl))
+                for factor, amsl in zip(speed_factors, heights, strict=True)
+            ]
         )
         return PerformanceTable(
             airspeed=float(speed),
@@ -168,37 +172,44 @@ class Limits:
         )
 
 
-def derated(
-    table: PerformanceTable, climb_share: float, sink_share: float, unused_climb: float = 0.0, unused_sink: float = 0.0
+def derate(
+    table: PerformanceTable,
+    climb_fraction: float,
+    sink_fraction: float,
+    unused_climb: float = 0.0,
+    unused_sink: float = 0.0,
 ) -> PerformanceTable:
-    """Return the performance with fractions (0..1) of climb and descent, keeping these rates (m/s) unused.
+    """Return the performance with fractions (0..1) of climb and descent, and with these rates (m/s) unused.
 
     Negative angles, a loss of altitude, are unchanged. If the aircraft has no more than the unused rate, level flight
     remains.
 
     >>> nothing = np.zeros(2)
     >>> table = PerformanceTable(25.0, 0.58, 0.0, 0.0, 0.0, 0.0, 0.0, nothing, np.array([0.2, -0.1]), nothing)
-    >>> derated(table, 0.5, 1.0).climb.tolist(), derated(table, 0.9, 0.9, unused_climb=3.0).climb.round(3).tolist()
+    >>> derate(table, 0.5, 1.0).climb.tolist(), derate(table, 0.9, 0.9, unused_climb=3.0).climb.round(3).tolist()
     ([0.1, -0.1], [0.079, -0.1])
     """
     speeds = np.array([true_airspeed(table, float(amsl)) for amsl in table.amsl])
 
-    def left(angles: Floats, share: float, unused: float) -> Floats:
-        reduced = np.where(angles > 0.0, share * angles, angles)
-        if unused <= 0.0:
+    def reduce_angles(angles: Floats, fraction: float, unused_rate: float) -> Floats:
+        reduced = np.where(angles > 0.0, fraction * angles, angles)
+        if unused_rate <= 0.0:
             return _read_only(reduced)
-        most = np.arcsin(np.maximum(0.0, np.sin(angles) - unused / speeds))
-        return _read_only(np.where(reduced > 0.0, np.minimum(reduced, most), reduced))
+        max_angles = np.arcsin(np.maximum(0.0, np.sin(angles) - unused_rate / speeds))
+        return _read_only(np.where(reduced > 0.0, np.minimum(reduced, max_angles), reduced))
 
-    climb, descent = left(table.climb, climb_share, unused_climb), left(table.descent, sink_share, unused_sink)
+    climb, descent = (
+        reduce_angles(table.climb, climb_fraction, unused_climb),
+        reduce_angles(table.descent, sink_fraction, unused_sink),
+    )
     return table._replace(climb=climb, descent=descent)
 
 
-def within_rates(table: PerformanceTable, climb_rate: float, sink_rate: float) -> PerformanceTable:
+def limit_rates(table: PerformanceTable, climb_rate: float, sink_rate: float) -> PerformanceTable:
     """Return the performance limited to these climb and sink rates, m/s; inf for no limit.
 
     >>> table = PerformanceTable(25.0, 0.58, 0.0, 0.0, 0.0, 0.0, 0.0, *(np.full(2, 0.3) for _ in range(3)))
-    >>> slower = within_rates(table, 5.0, math.inf)
+    >>> slower = limit_rates(table, 5.0, math.inf)
     >>> slower.climb.round(3).tolist(), slower.descent.tolist()
     ([0.201, 0.201], [0.3, 0.3])
     """
@@ -245,10 +256,12 @@ def downwind(table: PerformanceTable) -> tuple[float, float]:
 
 
 @inlined
-def slopes_along(table: PerformanceTable, tail_share: float, cross_share: float, amsl: float) -> tuple[float, float]:
+def slopes_along(
+    table: PerformanceTable, tail_fraction: float, cross_fraction: float, amsl: float
+) -> tuple[float, float]:
     """Return the steepest climb and dive over the ground, rad.
 
-    tail_share, cross_share: fractions of the wind along and across the course.
+    tail_fraction, cross_fraction: fractions of the wind along and across the course.
     """
     count = table.amsl.size
     wind = wind_speed_at(table, amsl)
@@ -256,18 +269,18 @@ def slopes_along(table: PerformanceTable, tail_share: float, cross_share: float,
     while k + 2 < count and table.amsl[k + 1] <= amsl:
         k += 1
     # Written out: numba's np.interp of one number costs a microsecond.
-    share = min(1.0, max(0.0, (amsl - table.amsl[k]) / (table.amsl[k + 1] - table.amsl[k])))
-    climb = table.climb[k] + share * (table.climb[k + 1] - table.climb[k])
-    dive = table.descent[k] + share * (table.descent[k + 1] - table.descent[k])
+    fraction = min(1.0, max(0.0, (amsl - table.amsl[k]) / (table.amsl[k + 1] - table.amsl[k])))
+    climb = table.climb[k] + fraction * (table.climb[k + 1] - table.climb[k])
+    dive = table.descent[k] + fraction * (table.descent[k + 1] - table.descent[k])
     speed = true_airspeed(table, amsl)
-    up = ground_slope(climb, speed, wind * tail_share, wind * cross_share)
-    down = ground_slope(dive, speed, wind * tail_share, wind * cross_share)
-    if math.isnan(up) or math.isnan(down):
+    climb_slope = ground_slope(climb, speed, wind * tail_fraction, wind * cross_fraction)
+    dive_slope = ground_slope(dive, speed, wind * tail_fraction, wind * cross_fraction)
+    if math.isnan(climb_slope) or math.isnan(dive_slope):
         return 0.0, 0.0
     # No leg may descend from an altitude at which thin air makes it faster than its fastest level flight.
     if table.equivalent > 0.0 and climb < 0.0:
-        down = 0.0
-    return up, down
+        dive_slope = 0.0
+    return climb_slope, dive_slope
 
 
 @compiled_inline
@@ -288,18 +301,18 @@ def _turn_radius(
     wind, speed = wind_speed_at(table, amsl), true_airspeed(table, amsl)
     if wind == 0.0:
         # Without wind the speed is the same on every course.
-        fastest = speed
+        max_speed = speed
     else:
-        before = ground_speed(speed, wind * (ux * wx + uy * wy), wind * (ux * wy - uy * wx))
-        after = ground_speed(speed, wind * (vx * wx + vy * wy), wind * (vx * wy - vy * wx))
-        if math.isnan(before) or math.isnan(after):
+        speed_in = ground_speed(speed, wind * (ux * wx + uy * wy), wind * (ux * wy - uy * wx))
+        speed_out = ground_speed(speed, wind * (vx * wx + vy * wy), wind * (vx * wy - vy * wx))
+        if math.isnan(speed_in) or math.isnan(speed_out):
             return math.inf
-        fastest = max(before, after)
+        max_speed = max(speed_in, speed_out)
         # The highest ground speed is downwind, if the turn passes through that course.
         if side == 0.0 or (side * (ux * wy - uy * wx) > 0.0 and side * (wx * vy - wy * vx) > 0.0):
-            fastest = max(fastest, speed + wind)
-    fastest += table.gust_sigma
-    return fastest * fastest / (GRAVITY * table.tan_max_bank)
+            max_speed = max(max_speed, speed + wind)
+    max_speed += table.gust_sigma
+    return max_speed * max_speed / (GRAVITY * table.tan_max_bank)
 
 
 @compiled_inline
@@ -323,7 +336,8 @@ def corner_tangent(
 ) -> tuple[float, float]:
     """Return the tangent length of the fly-by arc between the unit courses u and v, and its radius, m.
 
-    R tan(theta/2) = R |sin| / (1 + cos); 0 without a turn, inf for a U-turn. w: `downwind`.
+    The tangent length R tan(theta/2) = R |sin theta| / (1 + cos theta) is 0 without a turn and inf for a U-turn.
+    w: `downwind`.
     """
     cross, dot = ux * vy - uy * vx, ux * vx + uy * vy
     if abs(cross) < 1e-9 and dot > 0.0:
@@ -345,8 +359,8 @@ def arc_slope(tan_in: float, tan_out: float, tangent: float, radius: float) -> f
     """
     if tangent <= 0.0 or radius <= 0.0 or math.isinf(tangent):
         return 0.0
-    half = math.atan(tangent / radius)
-    return 0.5 * (tan_in + tan_out) * tangent / (radius * half)
+    half_turn = math.atan(tangent / radius)
+    return 0.5 * (tan_in + tan_out) * tangent / (radius * half_turn)
 
 
 @compiled_inline
@@ -355,31 +369,35 @@ def fly_over_run(turn: float) -> float:
 
     turn: rad.
 
-    With overshoot angle phi, cos phi = (1 + cos turn)/2, the distance is sin turn + 2 sin phi; beyond its maximum the
-    maximum is returned, so that it never decreases with the angle.
+    The distance is sin turn + 2 sin phi, with the overshoot angle phi given by cos phi = (1 + cos turn)/2. For turns
+    beyond its maximum the maximum is returned, so that the result never decreases with the turn.
     """
     # The maximum of sin turn + 2 sin phi is 2 sqrt 2, at this angle.
-    sharpest = min(turn, math.acos(-1.0 / 3.0))
-    back = 0.5 * (1.0 + math.cos(sharpest))
-    return math.sin(sharpest) + 2.0 * math.sqrt(max(0.0, 1.0 - back * back))
+    angle = min(turn, math.acos(-1.0 / 3.0))
+    cos_overshoot = 0.5 * (1.0 + math.cos(angle))
+    return math.sin(angle) + 2.0 * math.sqrt(max(0.0, 1.0 - cos_overshoot * cos_overshoot))
 
 
 @compiled
 def turn_tangents(table: PerformanceTable, waypoints: Floats) -> Floats:
     """Return the tangent length of the fly-by arc at each waypoint, (w,) m; 0 at the ends.
 
-    waypoints: (w, 3). R tan(theta/2); inf for a U-turn, which has no tangent point.
+    waypoints: (w, 3).
+
+    The length is R tan(theta/2), and inf for a U-turn, which has no tangent point.
     """
     count = waypoints.shape[0]
-    out = np.zeros(count)
+    tangents = np.zeros(count)
     wx, wy = downwind(table)
     for i in range(1, count - 1):
         ux, uy = waypoints[i, 0] - waypoints[i - 1, 0], waypoints[i, 1] - waypoints[i - 1, 1]
         vx, vy = waypoints[i + 1, 0] - waypoints[i, 0], waypoints[i + 1, 1] - waypoints[i, 1]
-        u, v = math.sqrt(ux * ux + uy * uy), math.sqrt(vx * vx + vy * vy)
-        if u > 1e-6 and v > 1e-6:
-            out[i], _ = corner_tangent(table, ux / u, uy / u, vx / v, vy / v, waypoints[i, 2], wx, wy)
-    return out
+        length_in, length_out = math.sqrt(ux * ux + uy * uy), math.sqrt(vx * vx + vy * vy)
+        if length_in > 1e-6 and length_out > 1e-6:
+            tangents[i], _ = corner_tangent(
+                table, ux / length_in, uy / length_in, vx / length_out, vy / length_out, waypoints[i, 2], wx, wy
+            )
+    return tangents
 
 
 @compiled
@@ -397,13 +415,17 @@ def roll_reversal_length(
 
     radius_in, radius_out: radii of the two arcs, m.
 
-    u: the leg's unit course. w: `downwind`. 0 if the aircraft cannot make progress along the leg.
+    u: the leg's unit course. w: `downwind`.
+
+    The length is 0 if the aircraft cannot make progress along the leg.
     """
     wind = wind_speed_at(table, amsl)
     airspeed = true_airspeed(table, amsl)
     speed = ground_speed(airspeed, wind * (ux * wx + uy * wy), wind * (ux * wy - uy * wx)) + table.gust_sigma
     if math.isnan(speed):
         return 0.0
-    pull = speed * speed / GRAVITY
-    roll = math.atan(pull / radius_in) + math.atan(pull / radius_out) - math.atan(table.tan_max_bank)
-    return speed * ROLL_TIME * max(0.0, roll)
+    bank_length = speed * speed / GRAVITY
+    bank_change = (
+        math.atan(bank_length / radius_in) + math.atan(bank_length / radius_out) - math.atan(table.tan_max_bank)
+    )
+    return speed * ROLL_TIME * max(0.0, bank_change)

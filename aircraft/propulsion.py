@@ -21,7 +21,7 @@ class Propulsion(Protocol):
     """Interface of a kind of propulsion for `aircraft.model_writer`.
 
     direction: direction of the thrust in body axes.
-    place: point where it acts, m forward, right and below the center of gravity.
+    place: point where it acts, m forward, right and below the centre of gravity.
     """
 
     @property
@@ -130,8 +130,8 @@ class ElectricMotor:
 
     def thrust(self, throttle: float, airspeed: float, rho: float) -> float:
         """Return the thrust, N."""
-        found = self.propeller.thrust_at(self.speed(throttle, airspeed, rho), airspeed, rho)
-        return found if found > 0.0 else self.windmill * found
+        thrust = self.propeller.thrust_at(self.speed(throttle, airspeed, rho), airspeed, rho)
+        return thrust if thrust > 0.0 else self.windmill * thrust
 
     def power(self, throttle: float, airspeed: float, rho: float) -> float:
         """Return the power from the battery, W."""
@@ -142,20 +142,20 @@ class ElectricMotor:
         """Return the JSBSim functions."""
         factor = _factor_element(factors)
         k, r, i0 = self.emf, self.resistance, self.idle_current
-        by_speed = factor("motor-speed")
-        linear = f"<quotient> <v> {number(k * k / r)} </v> {product(by_speed, by_speed)} </quotient>"
-        losses = f"<quotient> <v> {number(k * i0)} </v> {by_speed} </quotient>"
-        driving = f"<quotient> {scaled(-k / r, 'motor/input-v')} {by_speed} </quotient>"
-        back = f"<quotient> {scaled(k, 'motor/propeller-rad_sec')} {by_speed} </quotient>"
+        speed_factor = factor("motor-speed")
+        linear = f"<quotient> <v> {number(k * k / r)} </v> {product(speed_factor, speed_factor)} </quotient>"
+        losses = f"<quotient> <v> {number(k * i0)} </v> {speed_factor} </quotient>"
+        drive = f"<quotient> {scaled(-k / r, 'motor/input-v')} {speed_factor} </quotient>"
+        back_emf = f"<quotient> {scaled(k, 'motor/propeller-rad_sec')} {speed_factor} </quotient>"
         return f"""    <property value="{number(self.volts)}"> motor/battery-v </property>
     <function name="motor/input-v"> {product("<p> motor/battery-v </p>", "<p> motor/throttle-norm </p>")} </function>
-{_parabola(self.propeller)}
+{_torque_xml(self.propeller)}
     <!-- Propeller speed with current flowing, and at none: the root of Q = KQ ((V - w KV) / R - i0), and of Q = -KQ i0.
          The current does not brake: of the two speeds the larger. -->
     <function name="motor/loss-n_m"> {losses} </function>
     <function name="motor/b"> {total("<p> motor/q1 </p>", linear)} </function>
     <function name="motor/driven-rad_sec">
-      {_root_xml("motor/b", total("<p> motor/q0 </p>", "<p> motor/loss-n_m </p>", driving))}
+      {_root_xml("motor/b", total("<p> motor/q0 </p>", "<p> motor/loss-n_m </p>", drive))}
     </function>
     <function name="motor/windmill-rad_sec">
       {_root_xml("motor/q1", total("<p> motor/q0 </p>", "<p> motor/loss-n_m </p>"))}
@@ -169,14 +169,14 @@ class ElectricMotor:
     <function name="motor/current-a">
       <max>
         {scaled(-1e6, "motor/braking")}
-        <quotient> <difference> <p> motor/input-v </p> {back} </difference> <v> {number(r)} </v> </quotient>
+        <quotient> <difference> <p> motor/input-v </p> {back_emf} </difference> <v> {number(r)} </v> </quotient>
       </max>
     </function>
     <function name="motor/battery-power-w"> {product("<p> motor/input-v </p>", "<p> motor/current-a </p>")} </function>
     <function name="motor/battery-current-a">
       {product("<p> motor/throttle-norm </p>", "<p> motor/current-a </p>")}
     </function>
-{_thrust_and_torque(self.propeller, self.windmill, factor)}"""
+{_thrust_and_torque_xml(self.propeller, self.windmill, factor)}"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -205,8 +205,8 @@ class FuelEngine:
 
     def thrust(self, throttle: float, airspeed: float, rho: float) -> float:
         """Return the thrust, N."""
-        found = self.propeller.thrust_at(self.speed(throttle, airspeed, rho), airspeed, rho)
-        return found if found > 0.0 else self.windmill * found
+        thrust = self.propeller.thrust_at(self.speed(throttle, airspeed, rho), airspeed, rho)
+        return thrust if thrust > 0.0 else self.windmill * thrust
 
     def power(self, throttle: float, airspeed: float, rho: float) -> float:
         """Return the heat of the fuel, W."""
@@ -216,23 +216,23 @@ class FuelEngine:
     def functions(self, factors: tuple[str, ...]) -> str:
         """Return the JSBSim functions."""
         factor = _factor_element(factors)
-        speed = factor("motor-speed")
-        parts = (speed, speed, "<p> motor/throttle-norm </p>", "<p> motor/rho-kg_m3 </p>")
-        rest = total("<p> motor/q0 </p>", f"<v> {number(self.friction)} </v>", scaled(-1.0, "motor/drive-n_m"))
+        speed_factor = factor("motor-speed")
+        factors_xml = (speed_factor, speed_factor, "<p> motor/throttle-norm </p>", "<p> motor/rho-kg_m3 </p>")
+        constant = total("<p> motor/q0 </p>", f"<v> {number(self.friction)} </v>", scaled(-1.0, "motor/drive-n_m"))
         heat = scaled(1.0 / self.efficiency, "motor/drive-n_m", "motor/propeller-rad_sec")
         return f"""    <!-- The engine's torque at this throttle and density; the air turns an idle one. -->
     <function name="motor/drive-n_m">
-      {product(f"<v> {number(self.torque / _SEA_LEVEL_DENSITY)} </v>", *parts)}
+      {product(f"<v> {number(self.torque / _SEA_LEVEL_DENSITY)} </v>", *factors_xml)}
     </function>
-{_parabola(self.propeller)}
+{_torque_xml(self.propeller)}
     <function name="motor/driven-rad_sec">
-      {_root_xml("motor/q1", rest)}
+      {_root_xml("motor/q1", constant)}
     </function>
     <function name="motor/propeller-rad_sec"> <max> <v> 0 </v> <p> motor/driven-rad_sec </p> </max> </function>
     <!-- Heat of the fuel, not electric power: there is no battery. -->
     <function name="motor/battery-power-w"> {heat} </function>
     <function name="motor/battery-current-a"> <product> <v> 0 </v> <p> motor/throttle-norm </p> </product> </function>
-{_thrust_and_torque(self.propeller, self.windmill, factor)}"""
+{_thrust_and_torque_xml(self.propeller, self.windmill, factor)}"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -270,20 +270,20 @@ class ActuatorDisc:
             if self.ducted
             else product(speed, "<p> motor/throttle-norm </p>")
         )
-        out = "<p> motor/exit-mps </p>"
-        first = out if self.ducted else total(out, air)
-        half = number(0.5 * self.area * self.coefficient)
-        pull = product(
-            f"<v> {half} </v>",
+        exit_air = "<p> motor/exit-mps </p>"
+        first_factor = exit_air if self.ducted else total(exit_air, air)
+        coefficient = number(0.5 * self.area * self.coefficient)
+        thrust = product(
+            f"<v> {coefficient} </v>",
             factor("thrust"),
             "<p> motor/rho-kg_m3 </p>",
-            first,
-            f"<difference> {out} {air} </difference>",
+            first_factor,
+            f"<difference> {exit_air} {air} </difference>",
         )
-        power = product(f"<v> {number(0.5 / self.efficiency)} </v>", "<p> motor/thrust-n </p>", total(out, air))
+        power = product(f"<v> {number(0.5 / self.efficiency)} </v>", "<p> motor/thrust-n </p>", total(exit_air, air))
         return f"""    <property value="{number(self.volts)}"> motor/battery-v </property>
     <function name="motor/exit-mps"> {exit_speed} </function>
-    <function name="motor/thrust-n"> <max> <v> 0 </v> {pull} </max> </function>
+    <function name="motor/thrust-n"> <max> <v> 0 </v> {thrust} </max> </function>
     <function name="motor/torque-n_m"> <product> <v> 0 </v> <p> motor/throttle-norm </p> </product> </function>
     <!-- Power of the air, T (V + v_e) / 2, by the efficiency. -->
     <function name="motor/battery-power-w"> {power} </function>
@@ -321,20 +321,20 @@ class ShaftPower:
         """
         factor = _factor_element(factors)
         d = self.diameter
-        speed = factor("motor-speed")
+        speed_factor = factor("motor-speed")
         shaft = product(
-            speed,
-            speed,
-            speed,
-            f"<max> <v> 0 </v> {_polynomial(self.shaft, '<p> motor/throttle-norm </p>')} </max>",
+            speed_factor,
+            speed_factor,
+            speed_factor,
+            f"<max> <v> 0 </v> {_polynomial_xml(self.shaft, '<p> motor/throttle-norm </p>')} </max>",
         )
-        pull = product(
+        thrust = product(
             f"<v> {number(d**4)} </v>",
             factor("thrust"),
             "<p> motor/rho-kg_m3 </p>",
             "<p> motor/turns-1_s </p>",
             "<p> motor/turns-1_s </p>",
-            _polynomial(self.thrust, "<p> motor/advance </p>"),
+            _polynomial_xml(self.thrust, "<p> motor/advance </p>"),
         )
         return f"""    <property value="{number(self.volts)}"> motor/battery-v </property>
     <function name="motor/shaft-power-w"> {shaft} </function>
@@ -361,7 +361,7 @@ class ShaftPower:
       <quotient> <p> motor/flow-mps </p> {scaled(d, "motor/advance")} </quotient>
     </function>
     <function name="motor/propeller-rad_sec"> {scaled(_RAD_PER_TURN, "motor/turns-1_s")} </function>
-    <function name="motor/thrust-n"> {pull} </function>
+    <function name="motor/thrust-n"> {thrust} </function>
     <function name="motor/torque-n_m">
       <quotient> <p> motor/shaft-power-w </p> <p> motor/propeller-rad_sec </p> </quotient>
     </function>
@@ -375,12 +375,12 @@ class ShaftPower:
 
         The rows go from J where CP is 0 down to a standing aircraft.
         """
-        high = next(k / 1000.0 for k in range(50, 3000) if _value(self.power, k / 1000.0) <= 0.0)
-        rows = [(0.0, high)]
+        max_ratio = next(k / 1000.0 for k in range(50, 3000) if _evaluate(self.power, k / 1000.0) <= 0.0)
+        rows = [(0.0, max_ratio)]
         # The root is steep where the power vanishes: use finer steps towards it.
         for k in range(1, 201):
-            j = high * (1.0 - (k / 200.0) ** 2 * 0.99)
-            loading = max(0.0, _value(self.power, j)) ** (1.0 / 3.0) / j
+            j = max_ratio * (1.0 - (k / 200.0) ** 2 * 0.99)
+            loading = max(0.0, _evaluate(self.power, j)) ** (1.0 / 3.0) / j
             if loading > rows[-1][0]:
                 rows.append((loading, j))
         return "\n".join(f"          {loading:.9f}  {j:.9f}" for loading, j in rows)
@@ -395,20 +395,20 @@ def _factor_element(factors: tuple[str, ...]) -> Callable[[str], str]:
     return lambda name: f"<p> ident/{name} </p>" if name in factors else "<v> 1 </v>"
 
 
-def _value(coefficients: tuple[float, ...], x: float) -> float:
+def _evaluate(coefficients: tuple[float, ...], x: float) -> float:
     return sum(value * x**k for k, value in enumerate(coefficients))
 
 
-def _polynomial(coefficients: tuple[float, ...], x: str) -> str:
+def _polynomial_xml(coefficients: tuple[float, ...], x: str) -> str:
     """Return a polynomial in an element, by Horner's method."""
-    *rest, last = coefficients
-    text = f"<v> {number(last)} </v>"
-    for value in reversed(rest):
+    *lower, highest = coefficients
+    text = f"<v> {number(highest)} </v>"
+    for value in reversed(lower):
         text = total(f"<v> {number(value)} </v>", product(x, text))
     return text
 
 
-def _parabola(propeller: Propeller) -> str:
+def _torque_xml(propeller: Propeller) -> str:
     """Return the propeller's torque Q = q2 w^2 + q1 w + q0 at its speed w, rad/s."""
     square, linear, constant = propeller.torque_parabola(1.0, 1.0)
     rho, air = "motor/rho-kg_m3", "motor/airspeed-mps"
@@ -420,14 +420,14 @@ def _parabola(propeller: Propeller) -> str:
 
 def _root_xml(linear: str, constant: str) -> str:
     """Return the larger root of ``motor/q2`` w^2 + linear w + constant; clip the discriminant at 0."""
-    inside = f"""<difference>
+    discriminant = f"""<difference>
               {product(f"<p> {linear} </p>", f"<p> {linear} </p>")}
               {product("<v> 4 </v>", "<p> motor/q2 </p>", constant)}
             </difference>"""
     return f"""<quotient>
         <difference>
           <sqrt> <max> <v> 0 </v>
-            {inside}
+            {discriminant}
           </max> </sqrt>
           <p> {linear} </p>
         </difference>
@@ -435,17 +435,17 @@ def _root_xml(linear: str, constant: str) -> str:
       </quotient>"""
 
 
-def _thrust_and_torque(propeller: Propeller, windmill: float, factor: Callable[[str], str]) -> str:
+def _thrust_and_torque_xml(propeller: Propeller, windmill: float, factor: Callable[[str], str]) -> str:
     d, (c0, c1, c2) = propeller.diameter, propeller.thrust
     braking = "<min> <v> 0 </v> <p> motor/pull-n </p> </min>"
     w, air = "motor/propeller-rad_sec", "motor/airspeed-mps"
-    pull = total(
+    thrust = total(
         scaled(c0 * d**4 / _RAD_PER_TURN**2, w, w),
         scaled(c1 * d**3 / _RAD_PER_TURN, air, w),
         scaled(c2 * d**2, air, air),
     )
     return f"""    <!-- T = rho n^2 D^4 CT(V / n D); below zero the idle propeller's drag. -->
-    <function name="motor/pull-n"> {product("<p> motor/rho-kg_m3 </p>", factor("thrust"), pull)} </function>
+    <function name="motor/pull-n"> {product("<p> motor/rho-kg_m3 </p>", factor("thrust"), thrust)} </function>
     <function name="motor/thrust-n">
       <sum>
         <max> <v> 0 </v> <p> motor/pull-n </p> </max>

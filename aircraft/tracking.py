@@ -77,7 +77,7 @@ class TrackingError:
         object.__setattr__(self, "record", record[0])
 
     def corner_acceptance(self, turn: float, ground_speed: float) -> float:
-        """Return the distance before a corner of this turn (rad) at which to turn at a ground speed (m/s), m."""
+        """Return the acceptance distance before a corner for a turn (rad) and a ground speed (m/s), m."""
         return float(_interpolate(np.ascontiguousarray(self.acceptance), self.airspeed, turn, ground_speed))
 
     def corner_excursion(self, turn: float, ground_speed: float) -> float:
@@ -117,13 +117,13 @@ def density_factor(amsl: float) -> float:
 def _interpolate(table: Floats, airspeed: float, turn: float, ground_speed: float) -> float:
     """Interpolate bilinearly in a table (turns, speeds); use its nearest edge outside it."""
     turns, speeds = table.shape
-    place = min(max(turn / _TURN_STEP_RAD, 0.0), turns - 1.0)
-    other = min(max((ground_speed / airspeed - _FIRST_SPEED_RATIO) / _SPEED_RATIO_STEP, 0.0), speeds - 1.0)
-    i, j = min(int(place), turns - 2), min(int(other), speeds - 2)
-    v, u = place - i, other - j
-    low = table[i, j] + u * (table[i, j + 1] - table[i, j])
-    high = table[i + 1, j] + u * (table[i + 1, j + 1] - table[i + 1, j])
-    return low + v * (high - low)
+    turn_position = min(max(turn / _TURN_STEP_RAD, 0.0), turns - 1.0)
+    speed_position = min(max((ground_speed / airspeed - _FIRST_SPEED_RATIO) / _SPEED_RATIO_STEP, 0.0), speeds - 1.0)
+    i, j = min(int(turn_position), turns - 2), min(int(speed_position), speeds - 2)
+    v, u = turn_position - i, speed_position - j
+    lower_value = table[i, j] + u * (table[i, j + 1] - table[i, j])
+    upper_value = table[i + 1, j] + u * (table[i + 1, j + 1] - table[i + 1, j])
+    return lower_value + v * (upper_value - lower_value)
 
 
 @inlined
@@ -160,17 +160,17 @@ MIN_CORRIDOR = 30.0
 CORRIDOR_RADII = 2.0
 
 
-def corridor_half_width(stated: float | None, acceptance_radius: float | None) -> float:
+def corridor_half_width(stated_half_width: float | None, acceptance_radius: float | None) -> float:
     """Return the half-width of the corridor around the legs of a path, m.
 
     It is stated by the scenario, or follows from the autopilot's acceptance radius.
-    stated: `[limits] corridor_m`, None if not stated.
+    stated_half_width: `[limits] corridor_m`, None if not stated.
     acceptance_radius: radius at which the autopilot accepts a waypoint unless the mission states another, m; None for
         guidance that flies corners as planned.
 
     >>> corridor_half_width(None, None), corridor_half_width(None, 90.0), corridor_half_width(12.0, 90.0)
     (30.0, 180.0, 12.0)
     """
-    if stated is not None:
-        return stated
+    if stated_half_width is not None:
+        return stated_half_width
     return max(MIN_CORRIDOR, CORRIDOR_RADII * (acceptance_radius or 0.0))

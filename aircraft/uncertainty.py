@@ -91,7 +91,7 @@ class Uncertainty:
 def read_uncertainty(folder: Path) -> Uncertainty | None:
     """Read the uncertainty next to the model in an aircraft's folder; return None if there is no file.
 
-    Raise FlightError, in one line, for a file that cannot be read or used.
+    Raises FlightError, in one line, for a file that cannot be read or used.
 
     >>> from aircraft.catalog import load_aircraft
     >>> read_uncertainty(load_aircraft("aerosonde").folder) is None
@@ -110,49 +110,57 @@ def read_uncertainty(folder: Path) -> Uncertainty | None:
     if not isinstance(source, str) or not source.strip():
         raise FlightError.at(str(file), "source", source, "a text is expected", shown=repr(source))
     _check_keys(table, file)
-    climb, descent = (math.radians(_number(table, key, file, 0.0, 45.0)) for key in ("climb_sd_deg", "descent_sd_deg"))
-    guessed = table.get("battery_guessed", False)
-    if not isinstance(guessed, bool):
-        raise FlightError.at(str(file), "battery_guessed", guessed, "true or false is expected", shown=repr(guessed))
+    climb, descent = (
+        math.radians(_read_number(table, key, file, 0.0, 45.0)) for key in ("climb_sd_deg", "descent_sd_deg")
+    )
+    is_battery_guessed = table.get("battery_guessed", False)
+    if not isinstance(is_battery_guessed, bool):
+        raise FlightError.at(
+            str(file),
+            "battery_guessed",
+            is_battery_guessed,
+            "true or false is expected",
+            shown=repr(is_battery_guessed),
+        )
     entries = table.get("quantity", [])
     if not isinstance(entries, list) or not all(isinstance(entry, dict) for entry in entries):
         raise FlightError.at(
             str(file), "quantity", entries, "[[quantity]] tables are expected", shown=repr(entries)[:60]
         )
-    quantities = tuple(_quantity(entry, file) for entry in entries)
+    quantities = tuple(_read_quantity(entry, file) for entry in entries)
     power = POWER_SD if file.name == FILES[1] else 0.0
     if "power_sd" in table:
-        power = _number(table, "power_sd", file, 0.0, 1.0)
+        power = _read_number(table, "power_sd", file, 0.0, 1.0)
     # Older folders do not state it.
-    fastest = _number(table, "fastest_sd_mps", file, 0.0, 100.0) if "fastest_sd_mps" in table else 0.0
-    return Uncertainty(source, climb, descent, quantities, power, guessed, fastest)
+    fastest = _read_number(table, "fastest_sd_mps", file, 0.0, 100.0) if "fastest_sd_mps" in table else 0.0
+    return Uncertainty(source, climb, descent, quantities, power, is_battery_guessed, fastest)
 
 
 def _check_keys(table: dict[str, Any], file: Path) -> None:
-    """Refuse a file without a deviation, which would mean certainty, or with an unknown key."""
-    known = _REQUIRED_KEYS | _OPTIONAL_KEYS | (_LOG_KEYS if file.name == FILES[0] else frozenset())
-    missing, unknown = sorted(_REQUIRED_KEYS - table.keys()), sorted(table.keys() - known)
-    near = did_you_mean(unknown[0], sorted(known - table.keys())) if unknown else ""
+    """Raise FlightError for a file without a deviation, which would mean certainty, or with an unknown key."""
+    known_keys = _REQUIRED_KEYS | _OPTIONAL_KEYS | (_LOG_KEYS if file.name == FILES[0] else frozenset())
+    missing, unknown = sorted(_REQUIRED_KEYS - table.keys()), sorted(table.keys() - known_keys)
+    suggestion = did_you_mean(unknown[0], sorted(known_keys - table.keys())) if unknown else ""
     # A misspelled key is missing as well; the spelling is the better message.
-    if missing and not near:
+    if missing and not suggestion:
         raise FlightError(f"{file}: missing {', '.join(missing)}", file=file, field=missing[0])
     if unknown:
-        message = f"{file}: unknown key {', '.join(unknown)}{near}"
+        message = f"{file}: unknown key {', '.join(unknown)}{suggestion}"
         raise FlightError(message, file=file, field=unknown[0], value=table[unknown[0]])
 
 
-def _number(table: dict[str, Any], key: str, file: Path, low: float, high: float) -> float:
-    """Return a number of a table. Raise FlightError for one that is missing or out of range."""
+def _read_number(table: dict[str, Any], key: str, file: Path, low: float, high: float) -> float:
+    """Return a number of a table. Raises FlightError for one that is missing or out of range."""
     value = table.get(key)
     if isinstance(value, bool) or not isinstance(value, int | float) or not low <= value <= high:
         raise FlightError.at(str(file), key, value, f"a number from {low:g} to {high:g} is expected", shown=repr(value))
     return float(value)
 
 
-def _quantity(entry: dict[str, Any], file: Path) -> UncertainQuantity:
+def _read_quantity(entry: dict[str, Any], file: Path) -> UncertainQuantity:
     name = entry.get("property")
     _check_name(name, str(file), "property")
-    estimate, sd = (_number(entry, key, file, low, 1e6) for key, low in (("estimate", -1e6), ("sd", 0.0)))
+    estimate, sd = (_read_number(entry, key, file, low, 1e6) for key, low in (("estimate", -1e6), ("sd", 0.0)))
     return UncertainQuantity(str(name), str(entry.get("unit", "factor")), estimate, sd, str(entry.get("reason", "")))
 
 
@@ -162,28 +170,29 @@ def _check_name(name: object, file: str, key: str, error: type[PlanflyError] = F
         raise error.at(file, key, name, f"a property {_PREFIX}NAME is expected", shown=repr(name))
 
 
-def uncertainty_text(known: Uncertainty) -> str:
+def uncertainty_text(uncertainty: Uncertainty) -> str:
     """Return the text of an ``uncertainty.toml``."""
     lines = [
         "# What is not known of this aircraft.  Each property is a factor in the model, 1 for the estimate.",
         "",
-        f'source = "{known.source}"',
-        f"climb_sd_deg = {math.degrees(known.climb):.2f}    # of the steepest climb at cruise, one standard deviation",
-        f"descent_sd_deg = {math.degrees(known.descent):.2f}  # of the steepest descent",
-        f"fastest_sd_mps = {known.fastest:.2f}  # of the fastest level flight",
-        f"power_sd = {known.power:.3g}  # of the power that flight takes, as a share",
+        f'source = "{uncertainty.source}"',
+        f"climb_sd_deg = {math.degrees(uncertainty.climb):.2f}    # of the steepest climb at cruise, one standard"
+        " deviation",
+        f"descent_sd_deg = {math.degrees(uncertainty.descent):.2f}  # of the steepest descent",
+        f"fastest_sd_mps = {uncertainty.fastest:.2f}  # of the fastest level flight",
+        f"power_sd = {uncertainty.power:.3g}  # of the power that flight takes, as a share",
     ]
-    if known.battery_guessed:
+    if uncertainty.battery_guessed:
         lines.append("battery_guessed = true  # no energy is judged until battery_wh is stated and this line is gone")
-    for one in known.quantities:
-        reason = one.reason.replace("\\", "/").replace('"', "'")
+    for quantity in uncertainty.quantities:
+        reason = quantity.reason.replace("\\", "/").replace('"', "'")
         lines += [
             "",
             "[[quantity]]",
-            f'property = "{one.name}"',
-            f'unit = "{one.unit}"',
-            f"estimate = {one.estimate:.6g}",
-            f"sd = {one.sd:.4g}",
+            f'property = "{quantity.name}"',
+            f'unit = "{quantity.unit}"',
+            f"estimate = {quantity.estimate:.6g}",
+            f"sd = {quantity.sd:.4g}",
             f'reason = "{reason}"',
         ]
     return "\n".join(lines) + "\n"
@@ -223,15 +232,15 @@ def draw_quantities(quantities: tuple[UncertainQuantity, ...], count: int = DRAW
     >>> bool(drawn.min() > 0.0), round(float(drawn.mean()), 1), round(float(drawn.std()), 1)
     (True, 1.0, 0.2)
     """
-    normal = np.random.default_rng(seed).standard_normal((count, len(quantities)))
-    values = np.empty_like(normal)
-    for k, one in enumerate(quantities):
-        if one.unit == "factor":
-            spread = math.sqrt(math.log1p((one.sd / one.estimate) ** 2))
-            values[:, k] = one.estimate * np.exp(spread * normal[:, k] - 0.5 * spread**2)
+    normals = np.random.default_rng(seed).standard_normal((count, len(quantities)))
+    values = np.empty_like(normals)
+    for k, quantity in enumerate(quantities):
+        if quantity.unit == "factor":
+            log_sd = math.sqrt(math.log1p((quantity.sd / quantity.estimate) ** 2))
+            values[:, k] = quantity.estimate * np.exp(log_sd * normals[:, k] - 0.5 * log_sd**2)
         else:
-            values[:, k] = one.estimate + one.sd * normal[:, k]
-    return Draws(tuple(one.name for one in quantities), values.round(6))
+            values[:, k] = quantity.estimate + quantity.sd * normals[:, k]
+    return Draws(tuple(quantity.name for quantity in quantities), values.round(6))
 
 
 def draws_text(draws: Draws) -> str:
@@ -241,7 +250,7 @@ def draws_text(draws: Draws) -> str:
 
 
 def read_draws(path: Path, error: type[PlanflyError] = FlightError) -> Draws:
-    """Read a ``draws.csv``. Raise the error, with the line, for one that cannot be read or used."""
+    """Read a ``draws.csv``. Raises the error, with the line, for one that cannot be read or used."""
     text = utf8_text(read_small_file(path, MAX_BYTES, "draws", error), path, error)
     reader = csv.reader(io.StringIO(text))
     try:
@@ -252,18 +261,18 @@ def read_draws(path: Path, error: type[PlanflyError] = FlightError) -> Draws:
     if len(rows) < 2:
         message = f"{path}: a line of properties and at least one of values are expected"
         raise error(message, file=path)
-    first, header = rows[0]
+    header_line, header = rows[0]
     names = tuple(name.strip() for name in header)
     for name in names:
-        _check_name(name, f"{path}:{first}", "property", error)
+        _check_name(name, f"{path}:{header_line}", "property", error)
     values = []
-    for number, row in rows[1:]:
+    for line_number, row in rows[1:]:
         try:
-            line = [float(value) for value in row]
+            numbers = [float(value) for value in row]
         except ValueError:
-            line = []
-        if len(line) != len(names) or not all(map(math.isfinite, line)):
+            numbers = []
+        if len(numbers) != len(names) or not all(map(math.isfinite, numbers)):
             allowed = f"{len(names)} finite numbers are expected"
-            raise error(f"{path}:{number}: {','.join(row)[:60]}: {allowed}", file=path, value=row, allowed=allowed)
-        values.append(line)
+            raise error(f"{path}:{line_number}: {','.join(row)[:60]}: {allowed}", file=path, value=row, allowed=allowed)
+        values.append(numbers)
     return Draws(names, np.array(values), str(path))

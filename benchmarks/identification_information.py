@@ -27,7 +27,7 @@ from aircraft.identification.drag import (
     FORCE_FLOOR,
     FORCE_THINNING,
     NUISANCES,
-    AlphaDoubt,
+    AlphaUncertainty,
     ForwardForces,
     drag_priors,
     forward_forces,
@@ -67,7 +67,7 @@ def flown_as(base: BaseModel, values: Floats, unknown: Floats) -> Floats:
     """Return sink (rad), power (W) and climb (rad) at cruise for these unknowns, including nuisance parameters."""
     own = int(_IS_DRAG_PARAMETER.sum())
     resistance, idle, voltage, elevator = unknown[own + 1 : own + 5]
-    motor = base.motor.changed(resistance=1.0 + resistance, idle=1.0 + idle)
+    motor = base.motor.with_factors(resistance=1.0 + resistance, idle=1.0 + idle)
     assert isinstance(motor, ElectricMotor)
     c = base.coefficients
     changed = replace(
@@ -99,8 +99,10 @@ def glide(base: BaseModel, values: Floats, seconds: float) -> ForwardForces:
     )
     c, pressure = base.coefficients, 0.5 * DENSITY * _CRUISE_MPS**2 * base.area
     lift = base.mass * GRAVITY / pressure * flat
-    doubt = AlphaDoubt()
-    tilts = pressure * lift * np.vstack([doubt.angle * flat, doubt.by_lift * (lift - doubt.middle)])
+    uncertainty = AlphaUncertainty()
+    tilts = (
+        pressure * lift * np.vstack([uncertainty.angle * flat, uncertainty.by_lift * (lift - uncertainty.mean_lift)])
+    )
     drags = -pressure * np.vstack([c.drag_zero * flat, c.drag_induced * np.square(lift - c.lift_least_drag)])
     del values
     return ForwardForces(signals, base, 0.0 * flat, tilts, drags, 0.0 * flat, base.motor.voltage)
@@ -171,7 +173,7 @@ def one_seed(seed: int) -> dict[str, Any]:
         records = [record for log in logs for record in flight_records(log, prior, servos)]
     estimate = estimate_model(records, base)
     signals = aligned_signals(records, estimate.clocks, base)
-    forces = forward_forces(signals, base, values, vane(signals, base, values), AlphaDoubt())
+    forces = forward_forces(signals, base, values, vane(signals, base, values), AlphaUncertainty())
     _, sds = drag_priors(with_current=False)
     unknown = np.concatenate([values[_IS_DRAG_PARAMETER], np.zeros(len(NUISANCES))])
     before, slopes = np.diag(1.0 / np.square(sds)), gradients(base, values, unknown)

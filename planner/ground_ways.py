@@ -73,16 +73,16 @@ class GroundWays:
     descent: Descent | None = None
 
 
-def _lock_arrays(made: ClimbOut | Descent, *names: str) -> None:
+def _lock_arrays(ground_way: ClimbOut | Descent, *names: str) -> None:
     for name in names:
-        array = np.array(getattr(made, name), dtype=np.float64)
+        array = np.array(getattr(ground_way, name), dtype=np.float64)
         array = array.reshape(-1, 3) if name in ("waypoints", "line_up") else array
         array.setflags(write=False)
-        object.__setattr__(made, name, array)
+        object.__setattr__(ground_way, name, array)
 
 
 # ----------------------------------------------------------------------
-# Their form in a plan's file.
+# File format.
 
 
 class _Table(BaseModel):
@@ -114,24 +114,24 @@ class GroundWaysFile(_Table):
 
     def ways(self) -> GroundWays:
         """Return the departure and the approach."""
-        up, down = self.climb, self.descent
+        climb_file, descent_file = self.climb, self.descent
         climb = descent = None
-        if up is not None:
+        if climb_file is not None:
             climb = ClimbOut(
-                np.array(up.home_east_north_amsl_m),
-                up.course_rad,
-                up.takeoff_amsl_m,
-                np.array(up.waypoints_east_north_amsl_m),
-                up.gradient,
+                np.array(climb_file.home_east_north_amsl_m),
+                climb_file.course_rad,
+                climb_file.takeoff_amsl_m,
+                np.array(climb_file.waypoints_east_north_amsl_m),
+                climb_file.gradient,
             )
-        if down is not None:
+        if descent_file is not None:
             descent = Descent(
-                np.array(down.waypoints_east_north_amsl_m),
-                np.array(down.line_up_east_north_amsl_m),
-                np.array(down.point_east_north_amsl_m),
-                down.course_rad,
-                down.slope,
-                down.go_around_m,
+                np.array(descent_file.waypoints_east_north_amsl_m),
+                np.array(descent_file.line_up_east_north_amsl_m),
+                np.array(descent_file.point_east_north_amsl_m),
+                descent_file.course_rad,
+                descent_file.slope,
+                descent_file.go_around_m,
             )
         return GroundWays(climb, descent)
 
@@ -145,21 +145,21 @@ def ground_ways_json(ways: GroundWays) -> dict[str, Any]:
     (['climb'], [[0.0, 600.0, 90.0]])
     """
     data: dict[str, Any] = {}
-    if (up := ways.climb) is not None:
+    if (climb := ways.climb) is not None:
         data["climb"] = {
-            "home_east_north_amsl_m": up.home.tolist(),
-            "course_rad": up.course,
-            "takeoff_amsl_m": up.up,
-            "waypoints_east_north_amsl_m": up.waypoints.tolist(),
-            "gradient": up.gradient,
+            "home_east_north_amsl_m": climb.home.tolist(),
+            "course_rad": climb.course,
+            "takeoff_amsl_m": climb.up,
+            "waypoints_east_north_amsl_m": climb.waypoints.tolist(),
+            "gradient": climb.gradient,
         }
-    if (down := ways.descent) is not None:
+    if (descent := ways.descent) is not None:
         data["descent"] = {
-            "waypoints_east_north_amsl_m": down.waypoints.tolist(),
-            "line_up_east_north_amsl_m": down.line_up.tolist(),
-            "point_east_north_amsl_m": down.point.tolist(),
-            "course_rad": down.course,
-            "slope": down.slope,
-            "go_around_m": down.go_around,
+            "waypoints_east_north_amsl_m": descent.waypoints.tolist(),
+            "line_up_east_north_amsl_m": descent.line_up.tolist(),
+            "point_east_north_amsl_m": descent.point.tolist(),
+            "course_rad": descent.course,
+            "slope": descent.slope,
+            "go_around_m": descent.go_around,
         }
     return data

@@ -20,7 +20,7 @@ from world.arrays import Floats, Ints
 from world.errors import MissionError
 from world.files import read_small_file
 from world.html_table import html_table
-from world.scenario import Scenario, fixed_ends, from_spec
+from world.scenario import Scenario, from_spec, with_absolute_ends
 from world.scenario_file import first_fault
 from world.terrain import Terrain
 
@@ -57,7 +57,7 @@ class Certificate:
     available_length: smallest length of a leg between its two turns, m; inf if only the fixed turn limit applies.
     clearance: smallest height above ground minus the required clearance, m.
     bounds: margin to map, floor and ceiling, m.
-    kill_distance: between the path and the surface of the nearest missile sphere, m; negative inside, inf without
+    kill_distance: distance of the path from the nearest missile sphere, m; negative inside, inf without
     missiles.
     zone_distance: outside exclusions and inside inclusions, horizontal or vertical, m; negative if a zone is violated,
     inf without zones.
@@ -95,7 +95,7 @@ class Plan:
     ended: "completed", or why the search ended early: "budget", "interrupted".
     flown_legs: number of legs at the beginning that were already flown under an earlier plan.
     ways: departure from the ground to the first waypoint and approach from the last; None for a plan that stays in the
-    air. If one that the scenario requires is not free, the certificate reports it.
+    air. If a departure or approach that the scenario requires is blocked, the certificate reports it.
     """
 
     scenario: Scenario
@@ -113,13 +113,13 @@ class Plan:
 
     def __post_init__(self) -> None:
         """Lock the arrays."""
-        for name, kind in (
+        for name, dtype in (
             ("waypoints", np.float64),
             ("violations", np.int64),
             ("objectives", np.float64),
             ("history", np.float64),
         ):
-            array = np.array(getattr(self, name), dtype=kind)
+            array = np.array(getattr(self, name), dtype=dtype)
             array.setflags(write=False)
             object.__setattr__(self, name, array)
 
@@ -221,8 +221,8 @@ def plan_json(plan: Plan) -> str:
         "safe": plan.safe,
         "waypoints_east_north_amsl_m": plan.waypoints.tolist(),
         **({} if plan.ways is None else {"ground_ways": ground_ways_json(plan.ways)}),
-        "violations": {item.name.lower(): int(plan.violations[item]) for item in Violation},
-        "objectives": {item.name.lower(): float(plan.objectives[item]) for item in Objective},
+        "violations": {column.name.lower(): int(plan.violations[column]) for column in Violation},
+        "objectives": {column.name.lower(): float(plan.objectives[column]) for column in Objective},
         "certificate": {
             "turn_margin_rad": certificate.turn,
             "turn_room_m": _or_none(certificate.available_length),
@@ -256,45 +256,49 @@ def parse_plan(
     Raises MissionError (or the scenario's own errors) with one line: file, field, value, allowed values.
     """
     try:
-        data = json.loads(text, parse_constant=_refuse_constant)
+        data = json.loads(text, parse_constant=_reject_constant)
     except (ValueError, RecursionError) as error:
         raise MissionError(f"{source}: not valid JSON: {error}", file=source) from error
     try:
-        file = _PlanFile.model_validate(data)
+        plan_file = _PlanFile.model_validate(data)
     except ValidationError as error:
         raise MissionError(**first_fault(error, data).at(source)) from error
-    _check_names(source, "violations", file.violations, [item.name.lower() for item in Violation])
-    _check_names(source, "objectives", file.objectives, [item.name.lower() for item in Objective])
-    waypoints = np.array(file.waypoints_east_north_amsl_m)
+    _check_names(source, "violations", plan_file.violations, [column.name.lower() for column in Violation])
+    _check_names(source, "objectives", plan_file.objectives, [column.name.lower() for column in Objective])
+    waypoints = np.array(plan_file.waypoints_east_north_amsl_m)
     # With another terrain the ends keep their planned altitudes.
-    given = file.scenario if terrain is None else fixed_ends(file.scenario, waypoints[0], waypoints[-1])
-    scenario = from_spec(given, source, base=base, terrain=terrain, ground=ground)
-    saved = file.certificate
-    certificate = Certificate(
-        turn=saved.turn_margin_rad,
-        available_length=_or_inf(saved.turn_room_m),
-        slope=saved.slope_margin_rad,
-        clearance=np.nan if saved.clearance_margin_m is None else saved.clearance_margin_m,
-        bounds=saved.bounds_margin_m,
-        kill_distance=_or_inf(saved.kill_distance_m),
-        zone_distance=_or_inf(saved.zone_distance_m),
-        headroom=_or_inf(saved.headroom_m),
-        problems=tuple(saved.problems),
+    scenario_spec = (
+        plan_file.scenario if terrain is None else with_absolute_ends(plan_file.scenario, waypoints[0], waypoints[-1])
     )
-    history = np.array([[np.nan if v is None else v for v in row] for row in file.history]).reshape(-1, 3)
+    scenario = from_spec(scenario_spec, source, base=base, terrain=terrain, ground=ground)
+    saved_certificate = plan_file.certificate
+    certificate = Certificate(
+        turn=saved_certificate.turn_margin_rad,
+        available_length=_or_inf(saved_certificate.turn_room_m),
+        slope=saved_certificate.slope_margin_rad,
+        clearance=np.nan if saved_certificate.clearance_margin_m is None else saved_certificate.clearance_margin_m,
+        bounds=saved_certificate.bounds_margin_m,
+        kill_distance=_or_inf(saved_certificate.kill_distance_m),
+        zone_distance=_or_inf(saved_certificate.zone_distance_m),
+        headroom=_or_inf(saved_certificate.headroom_m),
+        problems=tuple(saved_certificate.problems),
+    )
+    history = np.array([[np.nan if value is None else value for value in row] for row in plan_file.history]).reshape(
+        -1, 3
+    )
     return Plan(
         scenario=scenario,
         waypoints=waypoints,
-        violations=np.array([file.violations[item.name.lower()] for item in Violation]),
-        objectives=np.array([file.objectives[item.name.lower()] for item in Objective]),
+        violations=np.array([plan_file.violations[column.name.lower()] for column in Violation]),
+        objectives=np.array([plan_file.objectives[column.name.lower()] for column in Objective]),
         certificate=certificate,
-        seed=file.seed,
-        algorithm=file.algorithm,
-        evaluations=file.evaluations,
+        seed=plan_file.seed,
+        algorithm=plan_file.algorithm,
+        evaluations=plan_file.evaluations,
         history=history,
-        ended=file.ended,
-        flown_legs=file.flown_legs,
-        ways=None if file.ground_ways is None else file.ground_ways.ways(),
+        ended=plan_file.ended,
+        flown_legs=plan_file.flown_legs,
+        ways=None if plan_file.ground_ways is None else plan_file.ground_ways.ways(),
     )
 
 
@@ -318,25 +322,28 @@ def _or_inf(value: float | None) -> float:
     return np.inf if value is None else value
 
 
-def _refuse_constant(name: str) -> float:
+def _reject_constant(name: str) -> float:
     raise ValueError(f"{name} is not a number")
 
 
-def _check_names(source: str, field: str, given: dict[str, Any], wanted: Sequence[str]) -> None:
-    if sorted(given) != sorted(wanted):
-        raise MissionError.at(source, field, sorted(given), f"keys {sorted(wanted)} are expected")
+def _check_names(source: str, field: str, found_names: dict[str, Any], expected_names: Sequence[str]) -> None:
+    if sorted(found_names) != sorted(expected_names):
+        raise MissionError.at(source, field, sorted(found_names), f"keys {sorted(expected_names)} are expected")
 
 
 def plan_html(plan: Plan) -> str:
     """Return an HTML table of a plan for notebooks: its state, margins and failures."""
-    made = plan.certificate
+    certificate = plan.certificate
     rows = [
         ("waypoints", len(plan.waypoints)),
         ("length / straight line", f"{plan.objectives[Objective.LENGTH_RATIO]:.4f}"),
-        ("clearance to spare", f"{made.clearance:.1f} m"),
-        ("outside missiles' reach by", f"{made.kill_distance:.0f} m" if math.isfinite(made.kill_distance) else "none"),
-        ("turns and slopes to spare", f"{math.degrees(made.turn):.1f}°, {math.degrees(made.slope):.2f}°"),
+        ("clearance to spare", f"{certificate.clearance:.1f} m"),
+        (
+            "outside missiles' reach by",
+            f"{certificate.kill_distance:.0f} m" if math.isfinite(certificate.kill_distance) else "none",
+        ),
+        ("turns and slopes to spare", f"{math.degrees(certificate.turn):.1f}°, {math.degrees(certificate.slope):.2f}°"),
         ("algorithm, seed", f"{plan.algorithm}, {plan.seed}"),
-        *(("fails", problem) for problem in made.problems),
+        *(("fails", problem) for problem in certificate.problems),
     ]
     return html_table(f"Plan {plan.scenario.name}: {plan.state}", rows)

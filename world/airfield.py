@@ -24,7 +24,7 @@ from world.scenario_tables import (
 from world.terrain import Terrain
 from world.wind import Wind
 
-# Default launch length, m: the rail of a small catapult, the swing of an arm with two steps, a runway.  A catapult of
+# Default launch length, m: the rail of a small catapult, two steps and the swing of an arm, a runway.  A catapult of
 # 6 m at 12 degrees launched the Aerosonde without loss of height.
 _LAUNCH_LENGTH_M: dict[LaunchMethod, float] = {"catapult": 6.0, "hand": 2.0, "runway": 200.0}
 # Default launch incline, rad.
@@ -48,7 +48,7 @@ class Launch:
     """Launch of the aircraft at home.
 
     method: "catapult", "hand" or "runway".
-    course: rad clockwise from north; None for along the mission's first leg.
+    course: rad clockwise from north; None for the course of the mission's first leg.
     speed: ground speed at the end of the launch, m/s; None for the method's default, see `release_speed`.
     length: length of the rail, the throw or the runway, m; None for the method's default, see `run`.
     incline: angle of the launch above level, rad.
@@ -69,29 +69,29 @@ class Launch:
         """
         return _LAUNCH_LENGTH_M[self.method] if self.length is None else self.length
 
-    def release_speed(self, slowest: float) -> float:
+    def release_speed(self, min_speed: float) -> float:
         """Return the speed at the end of the launch, m/s; 0 for a runway, where only the motor accelerates.
 
-        slowest: slowest level flight, m/s.
+        min_speed: slowest level flight, m/s.
 
         >>> [Launch(method).release_speed(15.0) for method in ("catapult", "hand", "runway")]
         [18.0, 10.0, 0.0]
         """
         if self.speed is not None:
             return self.speed
-        return {"catapult": _CATAPULT_SPEED_RATIO * slowest, "hand": _THROW_SPEED_MPS, "runway": 0.0}[self.method]
+        return {"catapult": _CATAPULT_SPEED_RATIO * min_speed, "hand": _THROW_SPEED_MPS, "runway": 0.0}[self.method]
 
-    def acceleration(self, slowest: float) -> float:
+    def acceleration(self, min_speed: float) -> float:
         """Return the mean acceleration along the launch, v^2 / (2 L), m/s^2; 0 for a runway.
 
-        slowest: slowest level flight, m/s.
+        min_speed: slowest level flight, m/s.
 
         >>> Launch("catapult", speed=10.0, length=6.0).acceleration(15.0).__round__(2)
         8.33
         """
         if self.method == "runway":
             return 0.0
-        return self.release_speed(slowest) ** 2 / (2.0 * self.run)
+        return self.release_speed(min_speed) ** 2 / (2.0 * self.run)
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,7 +99,7 @@ class LandingStrip:
     """Landing strip of a mission.
 
     east, north: landing point, the centre of the strip, m on the map.
-    course: landing course, rad clockwise from north; None for into the wind, see `into`.
+    course: landing course, rad clockwise from north; None for a landing into the wind, see `landing_course`.
     length, width: size of the ground that is suitable for landing, m.
     approach: length of the straight final before the landing point, m.
     slope: glide slope of the final, rad below level.
@@ -114,14 +114,14 @@ class LandingStrip:
     approach: float | None = None
     slope: float | None = None
 
-    def into(self, wind: Wind, amsl: float) -> float | None:
+    def landing_course(self, wind: Wind, amsl: float) -> float | None:
         """Return the landing course, rad: the stated one, or into the wind at ``amsl`` (m AMSL).
 
         Returns None if no course is stated and there is no wind: then any course is suitable.
 
-        >>> LandingStrip(0.0, 0.0).into(Wind(5.0, 2.0, 0.0, "none", None, 100.0), 100.0)
+        >>> LandingStrip(0.0, 0.0).landing_course(Wind(5.0, 2.0, 0.0, "none", None, 100.0), 100.0)
         2.0
-        >>> LandingStrip(0.0, 0.0, course=1.0).into(Wind(5.0, 2.0, 0.0, "none", None, 100.0), 100.0)
+        >>> LandingStrip(0.0, 0.0, course=1.0).landing_course(Wind(5.0, 2.0, 0.0, "none", None, 100.0), 100.0)
         1.0
         """
         if self.course is not None:
@@ -132,18 +132,18 @@ class LandingStrip:
 def strip_slopes(ground: Terrain, strip: LandingStrip, course: float) -> tuple[float, float]:
     """Return the ground slope of a strip along a landing course (rad) and across it to the right, m per m.
 
-    Each is the mean slope between the two ends; NaN if the ground height at an end is not known.
+    Each is the mean slope between the two ends, or NaN if the ground height at an end is not known.
     """
-    found = []
+    slopes = []
     for heading, length in ((course, strip.length), (course + 0.5 * math.pi, max(_MIN_MEASURED_WIDTH_M, strip.width))):
-        away = 0.5 * length * np.array([-1.0, 1.0])
-        ends = ground.height(strip.east + away * math.sin(heading), strip.north + away * math.cos(heading))
-        found.append(float(ends[1] - ends[0]) / length)
-    return found[0], found[1]
+        offsets = 0.5 * length * np.array([-1.0, 1.0])
+        ends = ground.height(strip.east + offsets * math.sin(heading), strip.north + offsets * math.cos(heading))
+        slopes.append(float(ends[1] - ends[0]) / length)
+    return slopes[0], slopes[1]
 
 
 @dataclass(frozen=True, slots=True)
-class AskedReturns:
+class ReturnRequirements:
     """Requirements on returns, and the return settings of a planned mission.
 
     require: contains "rtl" if every return to launch must be safe, "glide" if the engine may fail anywhere, "go_around"
@@ -180,7 +180,7 @@ def make_home(
     if table is None:
         return None
     place = (float(start[0]), float(start[1])) if table.place == "start" else map_place(table, origin)
-    return _on_ground("home", place, source, ground, bounds)
+    return _place_on_ground("home", place, source, ground, bounds)
 
 
 def make_launch(table: LaunchTable | None) -> Launch | None:
@@ -202,7 +202,7 @@ def make_landing(
     if table is None:
         return None
     place = map_place(table, origin)
-    _on_ground("landing", place, source, ground, bounds)
+    _place_on_ground("landing", place, source, ground, bounds)
     course = None if isinstance(table.course_deg, str) else math.radians(table.course_deg)
     slope = None if table.slope_deg is None else math.radians(table.slope_deg)
     return LandingStrip(*place, course, table.length_m, table.width_m, table.approach_m, slope)
@@ -210,7 +210,7 @@ def make_landing(
 
 def make_returns(
     table: ReturnsTable | None, source: str, origin: GeoOrigin, ground: Terrain | None
-) -> AskedReturns | None:
+) -> ReturnRequirements | None:
     """Return the requirements and settings of returns that a table states, or None without a table.
 
     Raises ScenarioError for a rally point that is not above the ground, and for a height above ground where the ground
@@ -219,20 +219,22 @@ def make_returns(
     if table is None:
         return None
     points = []
-    for k, one in enumerate(table.rally or ()):
+    for k, rally_table in enumerate(table.rally or ()):
         key = f"returns.rally[{k}]"
-        points.append(map_position(one, key, source, origin, ground))
+        points.append(map_position(rally_table, key, source, origin, ground))
         check_above_ground(key, points[-1], source, ground)
-    return AskedReturns(tuple(table.require or ()), table.rtl_altitude_m, np.array(points), table.rtl_autoland)
+    return ReturnRequirements(tuple(table.require or ()), table.rtl_altitude_m, np.array(points), table.rtl_autoland)
 
 
-def _on_ground(key: str, place: tuple[float, float], source: str, ground: Terrain | None, bounds: Floats) -> Floats:
+def _place_on_ground(
+    key: str, place: tuple[float, float], source: str, ground: Terrain | None, bounds: Floats
+) -> Floats:
     """Return a place on the ground, m, (3,)."""
     check_in_area(key, np.array(place), source, bounds)
-    under = float(ground.height(*place)) if ground is not None else math.nan
-    if math.isnan(under):
+    ground_height = float(ground.height(*place)) if ground is not None else math.nan
+    if math.isnan(ground_height):
         message = (
             f"{source}: {key}: east {place[0]:.0f} m, north {place[1]:.0f} m: the elevation file knows no ground there"
         )
         raise ScenarioError(message, file=source, field=key)
-    return np.array([*place, under])
+    return np.array([*place, ground_height])

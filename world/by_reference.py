@@ -31,16 +31,16 @@ _NUMBERS: dict[Any, Any] = {
 class Reference(types.Type):
     """Numba's type of a pointer to the fields of a named tuple in memory."""
 
-    def __init__(self, held: Any) -> None:
+    def __init__(self, tuple_type: Any) -> None:
         """Point to this named tuple type, under a short name that keeps the names of compiled functions short."""
-        self.held = held
-        digest = hashlib.sha256(held.name.encode()).hexdigest()[:16]
-        super().__init__(f"{held.instance_class.__name__}_{digest}")
+        self.tuple_type = tuple_type
+        digest = hashlib.sha256(tuple_type.name.encode()).hexdigest()[:16]
+        super().__init__(f"{tuple_type.instance_class.__name__}_{digest}")
 
     @property
     def key(self) -> Any:
-        """Key by which numba compares two references."""
-        return self.held
+        """Key for numba's comparison of references."""
+        return self.tuple_type
 
 
 class _Layout(NamedTuple):
@@ -58,37 +58,39 @@ def by_reference(cls: _Class) -> _Class:
 
     >>> import numba
     >>> from world.airspace.zone_kernels import zone_records
-    >>> numba.typeof(zone_records([])).held.fields
+    >>> numba.typeof(zone_records([])).tuple_type.fields
     ('zones', 'edges')
     """
     members = {name: getattr(cls, name) for name in ("__doc__", "__module__", "__qualname__")}
     # A named tuple has no __dict__ to store the layout; its subclass has one.
-    made = type(cls.__name__, (cls,), members | {"_address": property(_address), "__getstate__": lambda _: None})
-    typeof_impl.register(made)(lambda value, _: _layout(value).reference)
-    return cast("_Class", made)
+    marked_class = type(
+        cls.__name__, (cls,), members | {"_address": property(_address), "__getstate__": lambda _: None}
+    )
+    typeof_impl.register(marked_class)(lambda value, _: _layout(value).reference)
+    return cast("_Class", marked_class)
 
 
 def _layout(value: Any) -> _Layout:
-    kept: dict[str, Any] = vars(value)
-    if "_layout" not in kept:
-        held = _by_value(typeof_impl.dispatch(tuple)(value, None))
-        kept["_layout"] = _Layout(Reference(held), _in_memory(held, value))
-    return kept["_layout"]
+    attributes: dict[str, Any] = vars(value)
+    if "_layout" not in attributes:
+        tuple_type = _value_type(typeof_impl.dispatch(tuple)(value, None))
+        attributes["_layout"] = _Layout(Reference(tuple_type), _in_memory(tuple_type, value))
+    return attributes["_layout"]
 
 
 def _address(value: Any) -> int:
     return ctypes.addressof(_layout(value).memory)
 
 
-def _by_value(kind: Any) -> Any:
+def _value_type(kind: Any) -> Any:
     """Return the type with references replaced by their named tuples, as they are laid out in memory."""
     if isinstance(kind, Reference):
-        return kind.held
+        return kind.tuple_type
     if isinstance(kind, types.Array):
         # Writable and read-only arrays share a kernel; copies in another process may be writable.
         return kind.copy(readonly=True)
     if _is_named(kind):
-        return types.BaseTuple.from_types([_by_value(member) for member in kind.types], kind.instance_class)
+        return types.BaseTuple.from_types([_value_type(member) for member in kind.types], kind.instance_class)
     return kind
 
 
@@ -104,31 +106,31 @@ def _in_memory(kind: Any, value: Any) -> Any:
     """Lay out a value of a numba type in memory, as ctypes data with an address."""
     if isinstance(kind, types.Array):
         # Numba's array structure: two owner pointers, both null, then these fields.
-        words = [0, 0, value.size, value.itemsize, value.ctypes.data, *value.shape, *value.strides]
-        return (ctypes.c_ssize_t * len(words))(*words)
+        array_fields = [0, 0, value.size, value.itemsize, value.ctypes.data, *value.shape, *value.strides]
+        return (ctypes.c_ssize_t * len(array_fields))(*array_fields)
     if isinstance(kind, types.Record):
         return (ctypes.c_uint8 * kind.size).from_buffer_copy(value.tobytes())
     if _is_tuple(kind):
-        parts = [_in_memory(member, one) for member, one in zip(kind.types, value, strict=True)]
+        parts = [_in_memory(member, member_value) for member, member_value in zip(kind.types, value, strict=True)]
         fields = [(f"field{k}", type(part)) for k, part in enumerate(parts)]
-        made: Any = type("Fields", (ctypes.Structure,), {"_fields_": fields})
-        return made(*parts)
+        structure: Any = type("Fields", (ctypes.Structure,), {"_fields_": fields})
+        return structure(*parts)
     return _NUMBERS[kind](value)
 
 
 def _member(kind: Reference, name: str) -> tuple[int, Any]:
     """Return the index and type of a field; the type is a pointer if the field's class is marked."""
-    number = kind.held.fields.index(name)
-    member = kind.held.types[number]
+    index = kind.tuple_type.fields.index(name)
+    member = kind.tuple_type.types[index]
     if _is_named(member) and hasattr(member.instance_class, "_address"):
-        return number, Reference(member)
-    return number, member
+        return index, Reference(member)
+    return index, member
 
 
 @register_model(Reference)
 class _Pointer(models.PrimitiveModel):
     def __init__(self, manager: Any, kind: Reference) -> None:
-        super().__init__(manager, kind, ir.PointerType(manager[kind.held].get_data_type()))
+        super().__init__(manager, kind, ir.PointerType(manager[kind.tuple_type].get_data_type()))
 
 
 @infer_getattr
@@ -136,16 +138,16 @@ class _Field(AttributeTemplate):
     key = Reference
 
     def generic_resolve(self, kind: Any, name: str) -> Any:  # type: ignore[override]  # numba names no argument
-        return _member(kind, name)[1] if name in kind.held.fields else None
+        return _member(kind, name)[1] if name in kind.tuple_type.fields else None
 
 
 @lower_getattr_generic(Reference)
 def _read_field(context: Any, builder: Any, kind: Reference, pointer: Any, name: str) -> Any:
-    number, member = _member(kind, name)
-    place = cgutils.gep_inbounds(builder, pointer, 0, number)
+    index, member = _member(kind, name)
+    field_pointer = cgutils.gep_inbounds(builder, pointer, 0, index)
     if isinstance(member, Reference):
-        return place
-    return impl_ret_borrowed(context, builder, member, context.unpack_value(builder, member, place))
+        return field_pointer
+    return impl_ret_borrowed(context, builder, member, context.unpack_value(builder, member, field_pointer))
 
 
 @unbox(Reference)
@@ -153,8 +155,8 @@ def _unbox_reference(kind: Reference, value: Any, c: Any) -> Any:
     pointer_type = c.context.get_value_type(kind)
     pointer = cgutils.alloca_once_value(c.builder, ir.Constant(pointer_type, None))
     address = c.pyapi.object_getattr_string(value, "_address")
-    failed = cgutils.is_null(c.builder, address)
-    with c.builder.if_then(c.builder.not_(failed)):
+    has_failed = cgutils.is_null(c.builder, address)
+    with c.builder.if_then(c.builder.not_(has_failed)):
         c.builder.store(c.builder.bitcast(c.pyapi.long_as_voidptr(address), pointer_type), pointer)
         c.pyapi.decref(address)
-    return NativeValue(c.builder.load(pointer), is_error=failed)
+    return NativeValue(c.builder.load(pointer), is_error=has_failed)

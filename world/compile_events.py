@@ -9,20 +9,20 @@ _callbacks: list[BeforeCompiling] = []
 
 
 @contextmanager
-def tell_before_compiling(told: BeforeCompiling) -> Iterator[None]:
-    """Call a function before each kernel that is compiled meanwhile, in any thread.
+def tell_before_compiling(callback: BeforeCompiling) -> Iterator[None]:
+    """Call a function before each kernel that is compiled within the block, in any thread.
 
-    Only the innermost is called.
+    Of nested callbacks only the innermost is called.
 
     >>> with tell_before_compiling(lambda: print("compiling")):
     ...     kernel_is_compiled()
     compiling
     """
-    _callbacks.append(told)
+    _callbacks.append(callback)
     try:
         yield
     finally:
-        _callbacks.remove(told)
+        _callbacks.remove(callback)
 
 
 def kernel_is_compiled() -> None:

@@ -19,7 +19,7 @@ class ElevationFormat(NamedTuple):
     begins: tuple[bytes, ...]
 
 
-# All formats: identified by the first four bytes of a file (two alone may be a height), or else by the suffix.
+# All formats: identified by the first four bytes of a file (two bytes may be a height), or else by the suffix.
 FORMATS = (
     ElevationFormat("a GeoTIFF", ".tif", (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+")),
     ElevationFormat("an SRTM .hgt", ".hgt", ()),

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from world.elevation_formats import MAX_TILES, SUFFIXES, VIRTUAL
 from world.errors import TerrainError
-from world.raster_file import RasterFile, is_ground, moved_grid
+from world.raster_file import RasterFile, is_ground, shift_grid
 
 # Largest size of the file of a virtual raster, bytes.
 _MAX_BYTES = 4 * 2**20
@@ -34,17 +34,17 @@ def tile_files(path: Path) -> list[Path] | None:
     Raises TerrainError for a folder without elevation files, and for a virtual raster that cannot be read.
     """
     if path.is_dir():
-        found = sorted(file for file in path.iterdir() if file.suffix.lower() in SUFFIXES and file.is_file())
-        if not found:
+        files = sorted(file for file in path.iterdir() if file.suffix.lower() in SUFFIXES and file.is_file())
+        if not files:
             raise TerrainError(f"{path}: a folder without an elevation file ({', '.join(SUFFIXES)})", file=path)
     elif path.suffix.lower() == VIRTUAL:
-        found = _virtual_files(path)
+        files = _virtual_files(path)
     else:
         return None
-    if len(found) > MAX_TILES:
+    if len(files) > MAX_TILES:
         allowed = f"at most {MAX_TILES} tiles are read; give a folder with those that are needed"
-        raise TerrainError.at(path, "tiles", len(found), allowed)
-    return found
+        raise TerrainError.at(path, "tiles", len(files), allowed)
+    return files
 
 
 def _virtual_files(path: Path) -> list[Path]:
@@ -66,10 +66,12 @@ def _virtual_files(path: Path) -> list[Path]:
     if root.tag != "VRTDataset" or not sources:
         raise TerrainError(f"{path}: not a virtual raster of other files: SourceFilename is missing", file=path)
     for element in root.iter():
-        computes = element.get("subClass") or (element.tag if element.tag in _ALTERING_ELEMENTS else None)
-        if computes is not None:
-            raise TerrainError(f"{path}: {computes} computes its pixels: only a mosaic of files is read", file=path)
-    found, folder = [], os.path.normpath(path.parent.absolute())
+        computing_element = element.get("subClass") or (element.tag if element.tag in _ALTERING_ELEMENTS else None)
+        if computing_element is not None:
+            raise TerrainError(
+                f"{path}: {computing_element} computes its pixels: only a mosaic of files is read", file=path
+            )
+    files, folder = [], os.path.normpath(path.parent.absolute())
     for element in sources:
         name = str(element.text).strip()
         if name.startswith("/vsi") or "://" in name or Path(name).suffix.lower() not in SUFFIXES:
@@ -79,11 +81,11 @@ def _virtual_files(path: Path) -> list[Path]:
         if not file.is_relative_to(folder):
             allowed = f"files in the folder of {path.name} or below are expected"
             raise TerrainError.at(path, "SourceFilename", name, allowed)
-        found.append(path.parent / file.relative_to(folder))
-    return sorted(set(found))
+        files.append(path.parent / file.relative_to(folder))
+    return sorted(set(files))
 
 
-def joined(tiles: Sequence[RasterFile], name: str) -> RasterFile:
+def join_tiles(tiles: Sequence[RasterFile], name: str) -> RasterFile:
     """Join tiles into one raster.  name: used in messages.
 
     Where tiles overlap, the first tile with data is used.  Raises TerrainError for tiles that are not on one grid.
@@ -91,7 +93,7 @@ def joined(tiles: Sequence[RasterFile], name: str) -> RasterFile:
     first = tiles[0]
     if len(tiles) == 1:
         return replace(first, name=name)
-    places = [_place(first, tile) for tile in tiles]
+    places = [_place_on_grid(first, tile) for tile in tiles]
     top, left = (min(place[k] for place in places) for k in (0, 1))
     rows = max(row + tile.shape[0] for (row, _), tile in zip(places, tiles, strict=True)) - top
     cols = max(col + tile.shape[1] for (_, col), tile in zip(places, tiles, strict=True)) - left
@@ -100,13 +102,15 @@ def joined(tiles: Sequence[RasterFile], name: str) -> RasterFile:
     def read(r0: int, r1: int, c0: int, c1: int) -> NDArray[np.float32]:
         block = np.full((r1 - r0, c1 - c0), np.nan, dtype=np.float32)
         for (row, col), tile in zip(starts, tiles, strict=True):
-            low, high = max(r0, row), min(r1, row + tile.shape[0])
-            west, east = max(c0, col), min(c1, col + tile.shape[1])
-            if low < high and west < east:
-                part = block[low - r0 : high - r0, west - c0 : east - c0]
-                empty = ~is_ground(part)
-                if empty.any():
-                    part[empty] = tile.read(low - row, high - row, west - col, east - col)[empty]
+            first_row, last_row = max(r0, row), min(r1, row + tile.shape[0])
+            first_col, last_col = max(c0, col), min(c1, col + tile.shape[1])
+            if first_row < last_row and first_col < last_col:
+                block_part = block[first_row - r0 : last_row - r0, first_col - c0 : last_col - c0]
+                is_empty = ~is_ground(block_part)
+                if is_empty.any():
+                    block_part[is_empty] = tile.read(first_row - row, last_row - row, first_col - col, last_col - col)[
+                        is_empty
+                    ]
         return block
 
     corners = np.concatenate([tile.corners for tile in tiles])
@@ -115,22 +119,22 @@ def joined(tiles: Sequence[RasterFile], name: str) -> RasterFile:
         first,
         name=name,
         shape=(rows, cols),
-        to_source=lambda lon, lat: _moved(first.to_source(lon, lat), -left, -top),
+        to_source=lambda lon, lat: _shift_pixels(first.to_source(lon, lat), -left, -top),
         to_place=lambda col, row: first.to_place(col + left, row + top),
         corners=corners,
         sha256=digest,
         read=read,
-        grid=moved_grid(first.grid, top, left),
+        grid=shift_grid(first.grid, top, left),
     )
 
 
-def _moved(
+def _shift_pixels(
     place: tuple[NDArray[np.float64], NDArray[np.float64]], cols: int, rows: int
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     return place[0] + cols, place[1] + rows
 
 
-def _place(first: RasterFile, tile: RasterFile) -> tuple[int, int]:
+def _place_on_grid(first: RasterFile, tile: RasterFile) -> tuple[int, int]:
     """Return row and column of a tile's first pixel on the grid of the first tile.  Raises TerrainError."""
     if tile.crs != first.crs:
         allowed = f"the reference system of {first.name} is expected: tiles lie on one grid"
@@ -138,12 +142,12 @@ def _place(first: RasterFile, tile: RasterFile) -> tuple[int, int]:
     rows, cols = tile.shape
     lon, lat = tile.to_place(np.array([0.0, cols - 1.0]), np.array([0.0, rows - 1.0]))
     col, row = first.to_source(lon, lat)
-    found = (round(float(row[0])), round(float(col[0])))
-    off = max(
-        math.hypot(col[0] - found[1], row[0] - found[0]),
-        math.hypot(col[1] - found[1] - (cols - 1), row[1] - found[0] - (rows - 1)),
+    position = (round(float(row[0])), round(float(col[0])))
+    offset = max(
+        math.hypot(col[0] - position[1], row[0] - position[0]),
+        math.hypot(col[1] - position[1] - (cols - 1), row[1] - position[0] - (rows - 1)),
     )
-    if not off <= OFF_GRID:
+    if not offset <= OFF_GRID:
         allowed = f"pixels on those of {first.name} are expected: resample them to one grid (gdalwarp)"
-        raise TerrainError(f"{tile.name}: {off:.3g} pixels off: {allowed}", file=tile.name, allowed=allowed)
-    return found
+        raise TerrainError(f"{tile.name}: {offset:.3g} pixels off: {allowed}", file=tile.name, allowed=allowed)
+    return position

@@ -72,9 +72,9 @@ class PlanflyError(Exception):
         >>> print(error, "|", error.field, "|", error.value)
         bind 127.0.0.1:70000: a port 0..65535 is expected | bind | 127.0.0.1:70000
         """
-        begin = f"{file}: " if str(file) else ""
-        what = argument if shown == "" else f"{argument} {value if shown is None else shown}"
-        error = cls(f"{begin}{what}: {allowed}", file=file, field=argument, value=value, allowed=allowed)
+        prefix = f"{file}: " if str(file) else ""
+        subject = argument if shown == "" else f"{argument} {value if shown is None else shown}"
+        error = cls(f"{prefix}{subject}: {allowed}", file=file, field=argument, value=value, allowed=allowed)
         error.argument = argument
         return error
 
@@ -114,7 +114,7 @@ class FlightError(PlanflyError):
 
 
 class CrashError(FlightError):
-    """Error for a controlling program that failed in flight, which is a failure of the machine, not bad input."""
+    """Error for a controlling program that failed in flight: a failure of the machine, not bad input."""
 
 
 class ParameterError(PlanflyError):
@@ -150,7 +150,7 @@ class ArgumentError(PlanflyError, ValueError):
 
 
 class MissingExtraError(PlanflyError, ImportError):
-    """Error for a feature that needs an extra of planfly that is not installed.
+    """Error for a feature whose extra of planfly is not installed.
 
     value: the extra's name.  allowed: the command that installs it.  name: the module that is missing.
     """

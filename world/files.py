@@ -39,8 +39,8 @@ class TextLine(NamedTuple):
         return f"{self.file}:{self.number}"
 
 
-def read_small_file(path: Path, most: int, kind: str, error: type[PlanflyError]) -> bytes:
-    """Return the bytes of a file of this kind, which has at most ``most`` bytes.
+def read_small_file(path: Path, max_bytes: int, kind: str, error: type[PlanflyError]) -> bytes:
+    """Return the bytes of a file of this kind, which has at most ``max_bytes`` bytes.
 
     Raises ``error``, in one line, for a file that is missing, larger or not readable.
 
@@ -50,15 +50,15 @@ def read_small_file(path: Path, most: int, kind: str, error: type[PlanflyError])
     world.errors.MissionError: missing.plan: cannot be read: No such file or directory
     """
     try:
-        return read_at_most(path, most, kind)
+        return read_at_most(path, max_bytes, kind)
     except OSError as problem:
         raise error(f"{path}: cannot be read: {problem.strerror}", file=path) from problem
     except ValueError as problem:
         raise error(f"{path}: {problem}", file=path) from None
 
 
-def read_at_most(path: Path, most: int, kind: str) -> bytes:
-    """Return the bytes of a file of this kind, which has at most ``most`` bytes.
+def read_at_most(path: Path, max_bytes: int, kind: str) -> bytes:
+    """Return the bytes of a file of this kind, which has at most ``max_bytes`` bytes.
 
     Raises OSError, and ValueError for a larger file and for anything but a plain file: a named pipe without a writer
     would block, and a device has no end.  A pipe of the shell (``/dev/stdin``, ``/dev/fd/63``) is read to its end.
@@ -68,15 +68,15 @@ def read_at_most(path: Path, most: int, kind: str) -> bytes:
     ValueError: not a plain file: a mission file is expected
     """
     status = path.stat()
-    if stat.S_ISREG(status.st_mode) and status.st_size > most:
-        raise ValueError(f"{status.st_size:,} bytes: a {kind} file has at most {most:,}")
-    given = stat.S_ISFIFO(status.st_mode) and str(path).startswith(("/dev/fd/", "/dev/stdin", "/proc/self/fd/"))
-    if not (stat.S_ISREG(status.st_mode) or stat.S_ISDIR(status.st_mode) or given):
+    if stat.S_ISREG(status.st_mode) and status.st_size > max_bytes:
+        raise ValueError(f"{status.st_size:,} bytes: a {kind} file has at most {max_bytes:,}")
+    is_shell_pipe = stat.S_ISFIFO(status.st_mode) and str(path).startswith(("/dev/fd/", "/dev/stdin", "/proc/self/fd/"))
+    if not (stat.S_ISREG(status.st_mode) or stat.S_ISDIR(status.st_mode) or is_shell_pipe):
         raise ValueError(f"not a plain file: a {kind} file is expected")
     with path.open("rb") as file:
-        data = file.read(most + 1)
-    if len(data) > most:
-        raise ValueError(f"more than {most:,} bytes: a {kind} file has no more")
+        data = file.read(max_bytes + 1)
+    if len(data) > max_bytes:
+        raise ValueError(f"more than {max_bytes:,} bytes: a {kind} file has no more")
     return data
 
 
@@ -92,7 +92,7 @@ def whole_path(path: Path) -> str:
         return str(path.absolute())
 
 
-def read_toml(path: Path, kind: str, most: int = 2**20) -> dict[str, Any]:
+def read_toml(path: Path, kind: str, max_bytes: int = 2**20) -> dict[str, Any]:
     """Read the table of a TOML file.
 
     Raises OSError, and ValueError as `read_at_most` and `toml_table` do.
@@ -101,7 +101,7 @@ def read_toml(path: Path, kind: str, most: int = 2**20) -> dict[str, Any]:
     Traceback (most recent call last):
     ValueError: not a plain file: a gains file is expected
     """
-    return toml_table(read_at_most(path, most, kind).decode("utf-8"))
+    return toml_table(read_at_most(path, max_bytes, kind).decode("utf-8"))
 
 
 def toml_table(text: str) -> dict[str, Any]:
@@ -124,7 +124,7 @@ def toml_table(text: str) -> dict[str, Any]:
 def utf8_text(data: bytes, path: Path, error: type[PlanflyError]) -> str:
     r"""Decode a file's bytes to text without a byte order mark.
 
-    Raise ``error`` with line and byte if not UTF-8.
+    Raises ``error``, with line and byte, if they are not UTF-8.
 
     >>> from world.errors import MissionError
     >>> utf8_text("\ufeffWind 3 m/s".encode(), Path("a.txt"), MissionError)
@@ -140,7 +140,7 @@ def utf8_text(data: bytes, path: Path, error: type[PlanflyError]) -> str:
         raise error(f"{path}:{line}: not a text file in UTF-8 (byte {problem.start})", file=path) from problem
 
 
-def did_you_mean(name: str, known: Iterable[str]) -> str:
+def did_you_mean(name: str, known_names: Iterable[str]) -> str:
     """Return the end of a message about an unknown name or key: the most similar known name, or "" without one.
 
     >>> did_you_mean("jaksboro", ["jacksboro", "tight"]), did_you_mean("valley", ["jacksboro", "tight"])
@@ -149,9 +149,9 @@ def did_you_mean(name: str, known: Iterable[str]) -> str:
     # Imported here, as most runs report no fault.
     from difflib import get_close_matches
 
-    by_folded = {one.casefold(): one for one in known}
-    near = get_close_matches(name.casefold(), by_folded, n=1)
-    return f": did you mean {by_folded[near[0]]!r}?" if near else ""
+    by_folded = {candidate.casefold(): candidate for candidate in known_names}
+    matches = get_close_matches(name.casefold(), by_folded, n=1)
+    return f": did you mean {by_folded[matches[0]]!r}?" if matches else ""
 
 
 # ----------------------------------------------------------------------
@@ -187,10 +187,10 @@ def write_whole(path: Path, data: str | bytes) -> None:
         raise OSError(error.errno, error.strerror, str(path)) from error
 
 
-def write_folder(path: Path, files: Mapping[str, bytes], stays: Iterable[str] | None = None) -> None:
+def write_folder(path: Path, files: Mapping[str, bytes], kept_names: Iterable[str] | None = None) -> None:
     """Make a folder with files by their paths within it, whole or not at all.
 
-    stays: names of what a folder that exists keeps if it is replaced; None replaces none.
+    kept_names: names of entries that an existing folder keeps when it is replaced; None to replace no folder.
     Raises OSError, which names the folder, and leaves nothing.
 
     >>> from tempfile import TemporaryDirectory
@@ -206,13 +206,13 @@ def write_folder(path: Path, files: Mapping[str, bytes], stays: Iterable[str] | 
             for name, content in files.items():
                 (temporary / name).parent.mkdir(parents=True, exist_ok=True)
                 (temporary / name).write_bytes(content)
-            if stays is not None and path.is_dir():
-                for name in stays:
+            if kept_names is not None and path.is_dir():
+                for name in kept_names:
                     (path / name).rename(temporary / name)
-                old = temporary.with_name(f"{temporary.name}.old")
-                path.rename(old)
+                replaced_folder = temporary.with_name(f"{temporary.name}.old")
+                path.rename(replaced_folder)
                 temporary.rename(path)
-                shutil.rmtree(old)
+                shutil.rmtree(replaced_folder)
             else:
                 temporary.rename(path)
     except OSError as error:
@@ -242,7 +242,7 @@ def temporary_folder(prefix: str) -> Iterator[Path]:
 
 
 def remove_temporary_folders(process: int) -> bool:
-    """Remove the folders of `temporary_folder` that a killed process has left.
+    """Remove the folders of `temporary_folder` that a killed process has left behind.
 
     Return True if there were none.
 
@@ -251,18 +251,18 @@ def remove_temporary_folders(process: int) -> bool:
     (False, False)
     """
     # The name pattern of `temporary_folder`.
-    there = Path(tempfile.gettempdir()).glob("planfly-*-*")
-    left = [folder for folder in there if folder.name.split("-")[-2] == str(process)]
-    for folder in left:
+    candidates = Path(tempfile.gettempdir()).glob("planfly-*-*")
+    remaining = [folder for folder in candidates if folder.name.split("-")[-2] == str(process)]
+    for folder in remaining:
         shutil.rmtree(folder, ignore_errors=True)
-    return not left
+    return not remaining
 
 
 @contextlib.contextmanager
 def hold(path: Path) -> Iterator[None]:
     """Lock an existing file or folder for this process.
 
-    Another process that tries to lock it is refused meanwhile.
+    Another process that tries to lock it within the block is refused.
     The system releases the lock when the process ends, in any way.  Raises PlanflyError if another process holds the
     lock, and OSError if the file cannot be opened.
 

@@ -137,8 +137,8 @@ def wkt_of(crs: str, *, with_height: bool = False) -> str:
     """
     from pyproj import CRS
 
-    found = CRS.from_user_input(crs)
-    return str((found.to_3d() if with_height else found).to_wkt())
+    system = CRS.from_user_input(crs)
+    return str((system.to_3d() if with_height else system).to_wkt())
 
 
 def is_geographic(crs: str) -> bool:
@@ -175,31 +175,31 @@ class PolyMap:
         out = _polymap_many(self.record, xs.ravel(), ys.ravel())
         return out[0].reshape(xs.shape), out[1].reshape(xs.shape)
 
-    def rows(self) -> Floats:
+    def to_rows(self) -> Floats:
         """Return the polynomial as rows of numbers, (2 + 2n, n), as stored in a log; `from_rows` reads them.
 
         Row 0 starts with the centre, row 1 with the half-widths; the coefficients of u and of v follow.
         """
-        one, size = self.record, int(self.record["size"])
+        record, size = self.record, int(self.record["size"])
         rows = np.zeros((2 + 2 * size, size))
-        rows[0, :2] = one["centre_x"], one["centre_y"]
-        rows[1, :2] = one["half_x"], one["half_y"]
-        rows[2:] = np.concatenate([one["u"][:size, :size], one["v"][:size, :size]])
+        rows[0, :2] = record["centre_x"], record["centre_y"]
+        rows[1, :2] = record["half_x"], record["half_y"]
+        rows[2:] = np.concatenate([record["u"][:size, :size], record["v"][:size, :size]])
         return rows
 
     @staticmethod
     def from_rows(rows: Floats, residual: float) -> "PolyMap":
-        """Make a map from the rows of `rows`; n is at most `MAX_TERMS`."""
+        """Make a map from the rows of `to_rows`; n is at most `MAX_TERMS`."""
         size = rows.shape[1]
-        return PolyMap(_record(rows[0, :2], rows[1, :2], rows[2 : 2 + size], rows[2 + size :]), residual)
+        return PolyMap(_make_record(rows[0, :2], rows[1, :2], rows[2 : 2 + size], rows[2 + size :]), residual)
 
 
-def _record(centre: Floats, half: Floats, u: Floats, v: Floats) -> PolyMapRecord:
+def _make_record(centre: Floats, half_widths: Floats, u: Floats, v: Floats) -> PolyMapRecord:
     """Make a record of `POLYMAP` with these (n, n) coefficients."""
     size = len(u)
     record = np.zeros(1, dtype=POLYMAP)[0]
     record["centre_x"], record["centre_y"] = centre
-    record["half_x"], record["half_y"] = half
+    record["half_x"], record["half_y"] = half_widths
     record["size"] = size
     record["u"][:size, :size], record["v"][:size, :size] = u, v
     return record
@@ -220,7 +220,7 @@ def fit_polymap(
     """
     (x0, x1), (y0, y1) = np.asarray(bounds, dtype=np.float64)
     centre = np.array([(x0 + x1) / 2, (y0 + y1) / 2])
-    half = np.array([max((x1 - x0) / 2, 1e-9), max((y1 - y0) / 2, 1e-9)])
+    half_widths = np.array([max((x1 - x0) / 2, 1e-9), max((y1 - y0) / 2, 1e-9)])
 
     def grid(count: int) -> tuple[Floats, Floats]:
         nodes = np.cos(np.pi * (np.arange(count) + 0.5) / count)
@@ -228,23 +228,25 @@ def fit_polymap(
         return u.ravel(), v.ravel()
 
     def targets(u: Floats, v: Floats) -> tuple[Floats, Floats]:
-        return function(centre[0] + half[0] * u, centre[1] + half[1] * v)
+        return function(centre[0] + half_widths[0] * u, centre[1] + half_widths[1] * v)
 
     nodes_u, nodes_v = grid(14)
     check_u, check_v = grid(23)
-    wanted, checked = targets(nodes_u, nodes_v), targets(check_u, check_v)
+    node_values, check_values = targets(nodes_u, nodes_v), targets(check_u, check_v)
     best: PolyMap | None = None
     for size in range(2, MAX_TERMS + 1):
         powers = [(i, j) for i, j in itertools.product(range(size), repeat=2) if i + j < size]
         basis = np.stack([nodes_u**i * nodes_v**j for i, j in powers], axis=1)
         blocks = np.zeros((2, size, size))
-        for block, values in zip(blocks, wanted, strict=True):
+        for block, values in zip(blocks, node_values, strict=True):
             solution = least_squares(basis, np.asarray(values, dtype=np.float64))
             for (i, j), coefficient in zip(powers, solution, strict=True):
                 block[i, j] = coefficient
-        record = _record(centre, half, *blocks)
-        got = _polymap_many(record, centre[0] + half[0] * check_u, centre[1] + half[1] * check_v)
-        residual = max(float(np.max(np.abs(got[k] - checked[k]))) for k in range(2))
+        record = _make_record(centre, half_widths, *blocks)
+        check_results = _polymap_many(
+            record, centre[0] + half_widths[0] * check_u, centre[1] + half_widths[1] * check_v
+        )
+        residual = max(float(np.max(np.abs(check_results[k] - check_values[k]))) for k in range(2))
         if best is None or residual < best.residual:
             best = PolyMap(record, residual)
         if residual <= tolerance:

@@ -18,9 +18,9 @@ from numpy.typing import NDArray
 from world.arrays import Floats
 from world.errors import TerrainError
 from world.frames import crs_transformer, height_unit, is_geographic, transform_points, wkt_of
-from world.raster_file import Grid, RasterFile, file_sha256, longitude_near, one_line, outline, refuse_few_pixels
+from world.raster_file import Grid, RasterFile, file_sha256, longitude_near, one_line, outline, require_min_pixels
 
-# Options of GDAL: read this file alone, no file next to it, and no file that is named in it.
+# Options of GDAL: read only this file, no file next to it, and no file that is named in it.
 GUARD: dict[str, Any] = {
     "GDAL_PAM_ENABLED": "NO",
     "GDAL_DISABLE_READDIR_ON_OPEN": "EMPTY_DIR",
@@ -28,7 +28,7 @@ GUARD: dict[str, Any] = {
     "CPL_VSIL_CURL_ALLOWED_EXTENSIONS": ".none",
     # Report the vertical part of the reference system too, for its unit and its datum.
     "GTIFF_REPORT_COMPD_CS": "YES",
-    # Cache for unpacked blocks, bytes; the default is a share of the machine's memory.
+    # Cache for unpacked blocks, bytes; the default is a fraction of the machine's memory.
     "GDAL_CACHEMAX": 16 * 2**20,
 }
 # Largest number of pixels of a block (128 MiB of float32): GDAL unpacks whole blocks, even for a small window.
@@ -46,13 +46,13 @@ _HORIZONTAL_TAG = re.compile(r"horiz|linear|planar|xy", re.IGNORECASE)
 
 def open_geotiff(file: Path, _name: str) -> RasterFile:
     """Open a GeoTIFF in any reference system, with heights in metres.  Raises TerrainError."""
-    return _open(file, "GTiff", "not a readable GeoTIFF file")
+    return _open_raster_file(file, "GTiff", "not a readable GeoTIFF file")
 
 
 def open_hgt(file: Path, _name: str) -> RasterFile:
     """Open an SRTM tile, whose name gives its position.  Raises TerrainError."""
     expected = "a name such as N46E008.hgt and the bytes of 1201 x 1201 or 3601 x 3601 heights are expected"
-    return _open(file, "SRTMHGT", f"not a readable SRTM tile: {expected}")
+    return _open_raster_file(file, "SRTMHGT", f"not a readable SRTM tile: {expected}")
 
 
 def _open_dataset(file: Path, driver: str) -> Any:
@@ -62,7 +62,7 @@ def _open_dataset(file: Path, driver: str) -> Any:
     return rasterio.open(os.fspath(file.resolve()), driver=driver)
 
 
-def _open(file: Path, driver: str, unreadable: str) -> RasterFile:
+def _open_raster_file(file: Path, driver: str, unreadable: str) -> RasterFile:
     import rasterio
     from rasterio.errors import NotGeoreferencedWarning, RasterioError
 
@@ -71,13 +71,13 @@ def _open(file: Path, driver: str, unreadable: str) -> RasterFile:
             # For a file without a place on Earth, GDAL would return columns and rows.
             warnings.simplefilter("error", NotGeoreferencedWarning)
             with _open_dataset(file, driver) as source:
-                _refuse_layout(file, source)
+                _check_layout(file, source)
                 shape, grid = (source.height, source.width), tuple(source.transform)[:6]
                 scale, crs = (source.scales[0], source.offsets[0]), _crs_of(file, driver, source)
                 unit = _unit_of(source.units[0] or "", {**source.tags(), **source.tags(1)}.items())
-                unwritten = driver == "GTiff" and source.nodata is None
+                may_have_gaps = driver == "GTiff" and source.nodata is None
     except NotGeoreferencedWarning:
-        _refuse_unplaced(file)
+        _raise_unplaced(file)
     except (RasterioError, ValueError, TypeError, OSError) as error:
         raise TerrainError(f"{file}: {unreadable}: {_first_error_line(error)}", file=file) from error
 
@@ -85,13 +85,13 @@ def _open(file: Path, driver: str, unreadable: str) -> RasterFile:
         try:
             with rasterio.Env(**GUARD), _open_dataset(file, driver) as source:
                 heights = _read_strips(source, (top, bottom, left, right), *scale)
-                if unwritten:
+                if may_have_gaps:
                     _clear_unwritten(source, heights, top, left)
                 return heights
         except (RasterioError, OSError) as error:
             raise TerrainError(f"{file}: cannot be read: {_first_error_line(error)}", file=file) from error
 
-    return _georeferenced(file, shape, grid, crs, unit, read)
+    return _make_raster_file(file, shape, grid, crs, unit, read)
 
 
 def _first_error_line(error: BaseException) -> str:
@@ -101,7 +101,7 @@ def _first_error_line(error: BaseException) -> str:
     return one_line(error)
 
 
-def _refuse_layout(file: Path, source: Any) -> None:
+def _check_layout(file: Path, source: Any) -> None:
     """Raise TerrainError unless the file has one band of real numbers in blocks that are small enough to unpack."""
     kind = np.dtype(source.dtypes[0]).kind
     if source.count != 1 or kind not in "iuf":
@@ -111,14 +111,14 @@ def _refuse_layout(file: Path, source: Any) -> None:
     if block > MAX_BLOCK_PIXELS:
         allowed = f"at most {MAX_BLOCK_PIXELS:,} are; tile the file"
         raise TerrainError.at(file, "pixels of a block, read whole", block, allowed, shown=f"{block:,}")
-    refuse_few_pixels(file, (source.height, source.width))
+    require_min_pixels(file, (source.height, source.width))
 
 
-def _refuse_unplaced(file: Path) -> NoReturn:
+def _raise_unplaced(file: Path) -> NoReturn:
     """Raise TerrainError for a file without georeferencing."""
-    beside = file.with_name(f"{file.name}.aux.xml")
-    unread = f" in the file itself; {beside.name} is not read" if beside.exists() else ""
-    raise TerrainError(f"{file}: no coordinate reference system and position are stated{unread}", file=file)
+    auxiliary_file = file.with_name(f"{file.name}.aux.xml")
+    unread_text = f" in the file itself; {auxiliary_file.name} is not read" if auxiliary_file.exists() else ""
+    raise TerrainError(f"{file}: no coordinate reference system and position are stated{unread_text}", file=file)
 
 
 def _crs_of(file: Path, driver: str, source: Any) -> str | None:
@@ -127,11 +127,11 @@ def _crs_of(file: Path, driver: str, source: Any) -> str | None:
 
     if source.crs is None:
         return None
-    found = source.crs.to_wkt(version="WKT2_2019")
+    wkt = source.crs.to_wkt(version="WKT2_2019")
     # GDAL drops the height axis of a three-dimensional system in a GeoTIFF 1.0 file, unless it takes EPSG's definition.
-    with rasterio.Env(GTIFF_SRS_SOURCE="EPSG"), _open_dataset(file, driver) as by_code:
-        has_height = "CS[ellipsoidal,3]" in by_code.crs.to_wkt(version="WKT2_2019")
-    return wkt_of(found, with_height=has_height)
+    with rasterio.Env(GTIFF_SRS_SOURCE="EPSG"), _open_dataset(file, driver) as epsg_source:
+        has_height = "CS[ellipsoidal,3]" in epsg_source.crs.to_wkt(version="WKT2_2019")
+    return wkt_of(wkt, with_height=has_height)
 
 
 def _unit_of(unit: str, tags: Iterable[tuple[str, str]]) -> str:
@@ -149,31 +149,38 @@ def _unit_of(unit: str, tags: Iterable[tuple[str, str]]) -> str:
     return unit
 
 
-def _georeferenced(file: Path, shape: tuple[int, int], grid: Grid, crs: str | None, unit: str, read: Any) -> RasterFile:
+def _make_raster_file(
+    file: Path, shape: tuple[int, int], grid: Grid, crs: str | None, unit: str, read: Any
+) -> RasterFile:
     """Return a raster file with its georeferencing; its heights must be in metres.  Raises TerrainError."""
     a, b, c, d, e, f = grid
     determinant = a * e - b * d
     if crs is None or determinant == 0.0:
-        _refuse_unplaced(file)
+        _raise_unplaced(file)
     try:
-        transformer, (stated, metres) = crs_transformer(crs), height_unit(crs)
+        transformer, (height_unit_name, unit_length) = crs_transformer(crs), height_unit(crs)
     except ValueError as error:
         raise TerrainError(f"{file}: its reference system cannot be read: {one_line(error)}", file=file) from error
-    if (unit or "m").lower() not in METRES or metres != 1.0:
-        raise TerrainError.at(file, "unit of heights", stated if metres != 1.0 else unit, "metres are expected")
+    if (unit or "m").lower() not in METRES or unit_length != 1.0:
+        raise TerrainError.at(
+            file, "unit of heights", height_unit_name if unit_length != 1.0 else unit, "metres are expected"
+        )
     rows, cols = shape
-    middle = a * cols / 2 + b * rows / 2 + c if is_geographic(crs) else math.nan
+    middle_longitude = a * cols / 2 + b * rows / 2 + c if is_geographic(crs) else math.nan
 
     def to_source(lon: Floats, lat: Floats) -> tuple[Floats, Floats]:
-        x, y = (np.asarray(one) for one in transform_points(transformer.transform, np.asarray(lon), np.asarray(lat)))
-        if not math.isnan(middle):
-            x = longitude_near(x, middle)
+        x, y = (
+            np.asarray(coordinates)
+            for coordinates in transform_points(transformer.transform, np.asarray(lon), np.asarray(lat))
+        )
+        if not math.isnan(middle_longitude):
+            x = longitude_near(x, middle_longitude)
         col, row = (e * (x - c) - b * (y - f)) / determinant, (a * (y - f) - d * (x - c)) / determinant
         return col - 0.5, row - 0.5
 
     def to_place(col: Floats, row: Floats) -> tuple[Floats, Floats]:
-        across, down = col + 0.5, row + 0.5
-        x, y = a * across + b * down + c, d * across + e * down + f
+        pixel_x, pixel_y = col + 0.5, row + 0.5
+        x, y = a * pixel_x + b * pixel_y + c, d * pixel_x + e * pixel_y + f
         lon, lat = transformer.transform(np.asarray(x), np.asarray(y), direction="INVERSE")
         return np.asarray(lon), np.asarray(lat)
 
@@ -193,9 +200,9 @@ def _read_strips(source: Any, window: tuple[int, int, int, int], scale: float, o
     """Return the heights of a window (top, bottom, left, right), read a few rows at a time; NaN without data."""
     top, bottom, left, right = window
     heights = np.empty((bottom - top, right - left), dtype=np.float32)
-    at_once = max(1, PIXELS_AT_ONCE // (right - left))
-    for row in range(top, bottom, at_once):
-        rows = min(at_once, bottom - row)
+    rows_at_once = max(1, PIXELS_AT_ONCE // (right - left))
+    for row in range(top, bottom, rows_at_once):
+        rows = min(rows_at_once, bottom - row)
         strip = source.read(1, window=((row, row + rows), (left, right)), masked=True)
         # Numbers in a damaged file may overflow.
         with np.errstate(all="ignore"):
@@ -207,17 +214,21 @@ def _clear_unwritten(source: Any, heights: NDArray[np.float32], top: int, left: 
     """Set missing blocks of a GeoTIFF to NaN, because GDAL reads 0 if the file has no value for missing data."""
     rows, cols = source.block_shapes[0]
     bottom, right = top + len(heights), left + heights.shape[1]
-    for down in range(top // rows, -(-bottom // rows)):
-        for across in range(left // cols, -(-right // cols)):
-            if _block_bytes(source, down, across) is None:
-                above, before = max(0, down * rows - top), max(0, across * cols - left)
-                heights[above : (down + 1) * rows - top, before : (across + 1) * cols - left] = np.nan
+    for block_row in range(top // rows, -(-bottom // rows)):
+        for block_column in range(left // cols, -(-right // cols)):
+            if _block_bytes(source, block_row, block_column) is None:
+                first_row, first_column = max(0, block_row * rows - top), max(0, block_column * cols - left)
+                heights[first_row : (block_row + 1) * rows - top, first_column : (block_column + 1) * cols - left] = (
+                    np.nan
+                )
 
 
-def _block_bytes(source: Any, down: int, across: int) -> tuple[int, int] | None:
+def _block_bytes(source: Any, block_row: int, block_column: int) -> tuple[int, int] | None:
     """Return the bytes [begin, end) of a block of an open GeoTIFF; None for a block that was never written."""
-    at, size = (source.get_tag_item(f"BLOCK_{what}_{across}_{down}", "TIFF", bidx=1) for what in ("OFFSET", "SIZE"))
-    return None if at is None or size is None else (int(at), int(at) + int(size))
+    offset, size = (
+        source.get_tag_item(f"BLOCK_{tag}_{block_column}_{block_row}", "TIFF", bidx=1) for tag in ("OFFSET", "SIZE")
+    )
+    return None if offset is None or size is None else (int(offset), int(offset) + int(size))
 
 
 def block_spans(file: Path, window: tuple[int, int, int, int]) -> Iterator[tuple[int, int]]:
@@ -229,9 +240,9 @@ def block_spans(file: Path, window: tuple[int, int, int, int]) -> Iterator[tuple
         return
     with rasterio.Env(**GUARD), _open_dataset(file, "GTiff") as source:
         rows, cols = source.block_shapes[0]
-        for down in range(top // rows, -(-bottom // rows)):
-            for across in range(left // cols, -(-right // cols)):
-                if (span := _block_bytes(source, down, across)) is not None:
+        for block_row in range(top // rows, -(-bottom // rows)):
+            for block_column in range(left // cols, -(-right // cols)):
+                if (span := _block_bytes(source, block_row, block_column)) is not None:
                     yield span
 
 

@@ -39,9 +39,9 @@ def signed_turns(waypoints: ArrayLike) -> Floats:
     [-1.5708]
     """
     legs = np.diff(np.asarray(waypoints, dtype=np.float64)[..., :2], axis=-2)
-    before, after = legs[..., :-1, :], legs[..., 1:, :]
-    cross = before[..., 0] * after[..., 1] - before[..., 1] * after[..., 0]
-    dot = before[..., 0] * after[..., 0] + before[..., 1] * after[..., 1]
+    legs_before, legs_after = legs[..., :-1, :], legs[..., 1:, :]
+    cross = legs_before[..., 0] * legs_after[..., 1] - legs_before[..., 1] * legs_after[..., 0]
+    dot = legs_before[..., 0] * legs_after[..., 0] + legs_before[..., 1] * legs_after[..., 1]
     # + 0.0 turns -0.0 into 0.0: atan2(0, -0.0) is pi, which would make a U-turn of a leg without length.
     return np.asarray(np.arctan2(0.0 - cross, dot + 0.0))
 
@@ -130,24 +130,24 @@ def sphere_window(a: Floats, b: Floats, centre: Floats, radius: float) -> tuple[
     inside (paper eq. 9: d <= R).
     """
     length2 = 0.0
-    along = 0.0
+    dot = 0.0
     start2 = 0.0
     for k in range(3):
         step = b[k] - a[k]
-        out = a[k] - centre[k]
+        offset = a[k] - centre[k]
         length2 += step * step
-        along += step * out
-        start2 += out * out
+        dot += step * offset
+        start2 += offset * offset
     if length2 == 0.0:
-        inside = 1.0 if start2 <= radius * radius else 0.0
-        return math.sqrt(start2), 0.0, inside
-    nearest = min(1.0, max(0.0, -along / length2))
-    closest2 = max(0.0, start2 + 2.0 * nearest * along + nearest * nearest * length2)
+        is_inside = 1.0 if start2 <= radius * radius else 0.0
+        return math.sqrt(start2), 0.0, is_inside
+    closest_fraction = min(1.0, max(0.0, -dot / length2))
+    closest2 = max(0.0, start2 + 2.0 * closest_fraction * dot + closest_fraction * closest_fraction * length2)
     if closest2 > radius * radius:
         return math.sqrt(closest2), 0.0, 0.0
-    middle = -along / length2
-    half = math.sqrt(max(0.0, middle * middle - (start2 - radius * radius) / length2))
-    return math.sqrt(closest2), max(0.0, middle - half), min(1.0, middle + half)
+    mid_fraction = -dot / length2
+    half_fraction = math.sqrt(max(0.0, mid_fraction * mid_fraction - (start2 - radius * radius) / length2))
+    return math.sqrt(closest2), max(0.0, mid_fraction - half_fraction), min(1.0, mid_fraction + half_fraction)
 
 
 @inlined
@@ -158,35 +158,43 @@ def segment_exposure(a: Floats, b: Floats, centre: Floats, radius: float, scale:
     of ds/(h^2+s^2)^2 is s/(2h^2(h^2+s^2)) + atan(s/h)/(2h^3).  The exposure follows the paper's eq. 9 and 10, as a
     density along the path instead of a sum over six points.
     """
-    _, enter, leave = sphere_window(a, b, centre, radius)
-    if leave <= enter:
+    _, begin_fraction, end_fraction = sphere_window(a, b, centre, radius)
+    if end_fraction <= begin_fraction:
         return 0.0, 0.0
     length2 = 0.0
-    along = 0.0
+    dot = 0.0
     start2 = 0.0
     for k in range(3):
         step = b[k] - a[k]
-        out = a[k] - centre[k]
+        offset = a[k] - centre[k]
         length2 += step * step
-        along += step * out
-        start2 += out * out
-    return leave - enter, window_exposure(enter, leave, length2, along, start2, scale)
+        dot += step * offset
+        start2 += offset * offset
+    return end_fraction - begin_fraction, window_exposure(begin_fraction, end_fraction, length2, dot, start2, scale)
 
 
 @inlined
-def window_exposure(enter: float, leave: float, length2: float, along: float, start2: float, scale: float) -> float:
+def window_exposure(
+    begin_fraction: float, end_fraction: float, length2: float, dot: float, start2: float, scale: float
+) -> float:
     """Return the mean over a segment of (scale/d)^4 between two of its fractions, which `segment_exposure` integrates.
 
-    length2: squared length.  along: step times (start - centre).  start2: squared distance of the start.
+    length2: squared length.  dot: step times (start - centre).  start2: squared distance of the start.
     """
     if length2 < 1e-12:
-        return (leave - enter) * scale**4 / max(start2, CLOSEST * CLOSEST) ** 2
+        return (end_fraction - begin_fraction) * scale**4 / max(start2, CLOSEST * CLOSEST) ** 2
     length = math.sqrt(length2)
-    middle = -along / length2
-    h = math.sqrt(max(CLOSEST * CLOSEST, start2 - middle * middle * length2))
-    s1, s2 = (enter - middle) * length, (leave - middle) * length
+    mid_fraction = -dot / length2
+    closest = math.sqrt(max(CLOSEST * CLOSEST, start2 - mid_fraction * mid_fraction * length2))
+    begin_distance, end_distance = (begin_fraction - mid_fraction) * length, (end_fraction - mid_fraction) * length
     # Closed form of the difference, as on a short, distant segment the values at the ends agree in nearly all digits.
-    piece = s2 - s1
-    first = piece * (h * h - s1 * s2) / ((h * h + s1 * s1) * (h * h + s2 * s2))
-    total = (first + math.atan2(h * piece, h * h + s1 * s2) / h) / (2.0 * h * h)
+    part_length = end_distance - begin_distance
+    rational_part = (
+        part_length
+        * (closest * closest - begin_distance * end_distance)
+        / ((closest * closest + begin_distance * begin_distance) * (closest * closest + end_distance * end_distance))
+    )
+    total = (
+        rational_part + math.atan2(closest * part_length, closest * closest + begin_distance * end_distance) / closest
+    ) / (2.0 * closest * closest)
     return scale**4 * total / length

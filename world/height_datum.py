@@ -39,12 +39,12 @@ class HeightDatum:
     sea_level: Callable[[Floats, Floats], Floats] | None = None
 
 
-def counts_from_ellipsoid(crs: str) -> bool:
+def is_above_ellipsoid(crs: str) -> bool:
     """Return True if a reference system's heights are above an ellipsoid.
 
-    False for a system without heights.
+    Return False for a system without heights.
 
-    >>> counts_from_ellipsoid("EPSG:4979"), counts_from_ellipsoid("EPSG:4326+5773"), counts_from_ellipsoid("EPSG:4326")
+    >>> is_above_ellipsoid("EPSG:4979"), is_above_ellipsoid("EPSG:4326+5773"), is_above_ellipsoid("EPSG:4326")
     (True, False, False)
     """
     from pyproj import CRS
@@ -71,7 +71,7 @@ def height_datum(crs: str | None, stated: StatedDatum | None) -> HeightDatum:
         )
     if stated in ("egm96", "egm2008"):
         return HeightDatum(f"{_MEAN_SEA_LEVEL} ({stated.upper()}, as stated)")
-    if stated == "ellipsoid" or (crs is not None and counts_from_ellipsoid(crs)):
+    if stated == "ellipsoid" or (crs is not None and is_above_ellipsoid(crs)):
         name, transformer = _geoid()
         return HeightDatum(f"{_MEAN_SEA_LEVEL}, converted from the ellipsoid by {name}", _undulation(transformer))
     if crs is not None and _is_depth(crs):
@@ -88,8 +88,8 @@ def _undulation(transformer: Any) -> Callable[[Floats, Floats], Floats]:
     """Return a function for the geoid's height above the ellipsoid: minus the converted ellipsoidal height 0."""
 
     def heights(lon: Floats, lat: Floats) -> Floats:
-        _, _, below = transformer.transform(lon, lat, np.zeros(np.shape(lon)))
-        return -np.asarray(below, dtype=np.float64)
+        _, _, negated_heights = transformer.transform(lon, lat, np.zeros(np.shape(lon)))
+        return -np.asarray(negated_heights, dtype=np.float64)
 
     return heights
 

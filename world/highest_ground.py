@@ -17,7 +17,7 @@ from world.terrain import Terrain, segment_clearance
 def highest_in_cells(terrain: Terrain, west: float, south: float, cell: float, rows: int, columns: int) -> Floats:
     """Return the highest ground (rows, columns) in square cells with their sides, m.
 
-    NaN if part of a cell has no data.
+    The height is NaN if part of the cell has no data.
     west, south: outer corner of the first cell, m.  cell: side of a cell, m.  Rows go north, columns east.
 
     >>> from world.terrain import gridded
@@ -35,28 +35,28 @@ def highest_in_cells(terrain: Terrain, west: float, south: float, cell: float, r
 @compiled
 def _fill_cells(heights: Heights, to_pixel: PolyMapRecord, west: float, south: float, cell: float, out: Floats) -> None:
     rows, columns = out.shape
-    a, b = np.zeros(3), np.zeros(3)
+    begin, end = np.zeros(3), np.zeros(3)
     for i in range(rows + 1):
         for j in range(columns + 1):
-            a[0], a[1] = west + j * cell, south + i * cell
+            begin[0], begin[1] = west + j * cell, south + i * cell
             if j < columns:
-                b[0], b[1] = west + (j + 1) * cell, a[1]
-                side = -segment_clearance(heights, to_pixel, a, b)[0]
-                _raise(out, i - 1, j, side)
-                _raise(out, i, j, side)
+                end[0], end[1] = west + (j + 1) * cell, begin[1]
+                side_height = -segment_clearance(heights, to_pixel, begin, end)[0]
+                _raise_cell(out, i - 1, j, side_height)
+                _raise_cell(out, i, j, side_height)
             if i < rows:
-                b[0], b[1] = a[0], south + (i + 1) * cell
-                side = -segment_clearance(heights, to_pixel, a, b)[0]
-                _raise(out, i, j - 1, side)
-                _raise(out, i, j, side)
+                end[0], end[1] = begin[0], south + (i + 1) * cell
+                side_height = -segment_clearance(heights, to_pixel, begin, end)[0]
+                _raise_cell(out, i, j - 1, side_height)
+                _raise_cell(out, i, j, side_height)
     for i in range(rows):
         for j in range(columns):
             if not math.isnan(out[i, j]):
-                _raise(out, i, j, _highest_pixel(heights, to_pixel, west + j * cell, south + i * cell, cell))
+                _raise_cell(out, i, j, _highest_pixel(heights, to_pixel, west + j * cell, south + i * cell, cell))
 
 
 @inner
-def _raise(out: Floats, i: int, j: int, height: float) -> None:
+def _raise_cell(out: Floats, i: int, j: int, height: float) -> None:
     """Raise cell (i, j) of `out` to a height if it is lower; ignore a cell outside the array, and keep NaN."""
     if 0 <= i < out.shape[0] and 0 <= j < out.shape[1] and (height > out[i, j] or math.isnan(height)):
         out[i, j] = height
@@ -64,9 +64,9 @@ def _raise(out: Floats, i: int, j: int, height: float) -> None:
 
 @inner
 def _highest_pixel(heights: Heights, to_pixel: PolyMapRecord, west: float, south: float, cell: float) -> float:
-    """Return the highest pixel in a cell that is straight in pixels, -inf without a pixel.
+    """Return the height of the highest pixel in a cell whose sides are straight in pixel coordinates.
 
-    NaN if one has no data.
+    It is -inf without a pixel in the cell, and NaN if one of them has no data.
     """
     col, row = polymap(to_pixel, west, south)
     east_col, east_row = polymap(to_pixel, west + cell, south)
@@ -77,13 +77,13 @@ def _highest_pixel(heights: Heights, to_pixel: PolyMapRecord, west: float, south
     last_row = math.floor(row + max(0.0, east_row) + max(0.0, north_row))
     first_col = math.ceil(col + min(0.0, east_col) + min(0.0, north_col))
     last_col = math.floor(col + max(0.0, east_col) + max(0.0, north_col))
-    best = -math.inf
+    max_height = -math.inf
     for i in range(max(0, first_row), min(heights.shape[0], last_row + 1)):
         for j in range(max(0, first_col), min(heights.shape[1], last_col + 1)):
-            across = ((j - col) * north_row - (i - row) * north_col) / area
-            up = ((i - row) * east_col - (j - col) * east_row) / area
-            if 0.0 <= across <= 1.0 and 0.0 <= up <= 1.0 and not best >= heights[i, j]:
-                best = float(heights[i, j])
-                if math.isnan(best):
-                    return best
-    return best
+            east_fraction = ((j - col) * north_row - (i - row) * north_col) / area
+            north_fraction = ((i - row) * east_col - (j - col) * east_row) / area
+            if 0.0 <= east_fraction <= 1.0 and 0.0 <= north_fraction <= 1.0 and not max_height >= heights[i, j]:
+                max_height = float(heights[i, j])
+                if math.isnan(max_height):
+                    return max_height
+    return max_height

@@ -65,7 +65,7 @@ def interrupt(number: int, _frame: FrameType | None = None) -> None:
 
 
 class uninterrupted:
-    """Context manager that completes its block, and raises a signal that arrives meanwhile at the end.
+    """Complete the block, and raise a signal that arrived meanwhile at its end.
 
     >>> import signal
     >>> try:
@@ -116,8 +116,8 @@ def remove_unfinished() -> bool:
     >>> remove_unfinished()
     True
     """
-    gone = [_remove(path) for path in tuple(_state.unfinished)]
-    return all(gone)
+    removed = [_remove(path) for path in tuple(_state.unfinished)]
+    return all(removed)
 
 
 def _remove(path: Path) -> bool:
@@ -152,11 +152,11 @@ def children_ignore_sigint() -> Iterator[None]:
         sys.warnoptions.append(_TRACKER_OPTION)
     # Started now, because the resource tracker unblocks the signal when it starts.
     resource_tracker.ensure_running()
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    previous_mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
         yield
     finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+        signal.pthread_sigmask(signal.SIG_SETMASK, previous_mask)
 
 
 def end_with_parent(in_service: threading.Event | None = None) -> None:
@@ -170,19 +170,19 @@ def end_with_parent(in_service: threading.Event | None = None) -> None:
     # Imported here, as few processes are children and --help must answer at once.
     import multiprocessing
 
-    signal.signal(signal.SIGTERM, _end)
+    signal.signal(signal.SIGTERM, _end_process)
     parent = multiprocessing.parent_process()
 
     def end_after_parent() -> None:
         if parent is not None:
             parent.join()
             if in_service is None or not in_service.is_set():
-                _end(signal.SIGTERM)
+                _end_process(signal.SIGTERM)
 
     threading.Thread(target=end_after_parent, daemon=True).start()
 
 
-def _end(number: int, _frame: FrameType | None = None) -> None:
+def _end_process(number: int, _frame: FrameType | None = None) -> None:
     remove_unfinished()
     os._exit(128 + number)
 
@@ -194,9 +194,9 @@ def end_children(children: Sequence["BaseProcess"], patience: float = CHILD_PATI
     """
     for child in children:
         child.terminate()
-    until = time.monotonic() + patience
+    deadline = time.monotonic() + patience
     for child in children:
-        child.join(max(0.0, until - time.monotonic()))
+        child.join(max(0.0, deadline - time.monotonic()))
     for child in children:
         if child.is_alive():
             child.kill()

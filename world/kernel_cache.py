@@ -31,20 +31,20 @@ def kernel_sources(root: Path) -> dict[str, bytes]:
     >>> "world/terrain.py" in files, "logs/views/report/page.py" in files
     (True, False)
     """
-    texts = {file.relative_to(root).as_posix(): file for name in PACKAGES for file in (root / name).rglob("*.py")}
-    contents = {name: file.read_bytes() for name, file in texts.items()}
-    waiting = [name for name, content in contents.items() if _KERNEL.search(content)]
-    found: dict[str, bytes] = {}
-    while waiting:
-        name = waiting.pop()
-        if name in contents and name not in found:
-            found[name] = contents[name]
-            waiting += _imported_paths(contents[name])
-    return found
+    files = {file.relative_to(root).as_posix(): file for name in PACKAGES for file in (root / name).rglob("*.py")}
+    contents = {name: file.read_bytes() for name, file in files.items()}
+    pending = [name for name, content in contents.items() if _KERNEL.search(content)]
+    sources: dict[str, bytes] = {}
+    while pending:
+        name = pending.pop()
+        if name in contents and name not in sources:
+            sources[name] = contents[name]
+            pending += _imported_paths(contents[name])
+    return sources
 
 
 def _imported_paths(content: bytes) -> list[str]:
-    """Return the paths of modules that a source may import, including names in packages, which may be modules."""
+    """Return the paths of modules that a source may import; an imported name may also be a module."""
     paths = []
     for module, names in _IMPORT.findall(content):
         path = module.decode().replace(".", "/")
@@ -97,20 +97,20 @@ def can_write(folder: Path) -> bool:
         return False
 
 
-def usable_folder(wanted: Path) -> Path | None:
-    """Return the wanted folder for compiled kernels if it can be written, or else a temporary folder.
+def usable_folder(preferred_folder: Path) -> Path | None:
+    """Return the preferred folder for compiled kernels if it can be written, or else a temporary folder.
 
     A temporary folder serves this process and its children, and is removed at exit.  Returns None if no folder can be
     written.
     """
-    if can_write(wanted):
-        return wanted
+    if can_write(preferred_folder):
+        return preferred_folder
     try:
         folder = Path(tempfile.mkdtemp(prefix="planfly-kernels-"))
     except OSError:
         return None
-    kept = contextlib.ExitStack()
-    kept.enter_context(unfinished(folder))
-    atexit.register(kept.close)
+    exit_stack = contextlib.ExitStack()
+    exit_stack.enter_context(unfinished(folder))
+    atexit.register(exit_stack.close)
     os.environ[VARIABLE] = str(folder)
     return folder

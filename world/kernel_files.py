@@ -38,8 +38,8 @@ class CheckedCacheFiles(IndexDataCacheFile):
         with contextlib.suppress(OSError):
             forms = self._load_index()
             if key not in forms:
-                taken = set(forms.values())
-                forms[key] = next(name for name in map(self._data_name, itertools.count(1)) if name not in taken)
+                used_names = set(forms.values())
+                forms[key] = next(name for name in map(self._data_name, itertools.count(1)) if name not in used_names)
                 self._save_index(forms)
             self._write(self._folder / forms[key], repr(key), data)
 
@@ -60,8 +60,8 @@ class CheckedCacheFiles(IndexDataCacheFile):
 def check_files(dispatcher: Any) -> None:
     """Let a kernel that numba caches use files with a digest."""
     cache = dispatcher._cache
-    plain = cache._cache_file
-    cache._cache_file = CheckedCacheFiles(cache.cache_path, cache._impl.filename_base, plain._source_stamp)
+    cache_file = cache._cache_file
+    cache._cache_file = CheckedCacheFiles(cache.cache_path, cache._impl.filename_base, cache_file._source_stamp)
 
 
 def _read(path: Path, label: str) -> Any:
@@ -70,8 +70,8 @@ def _read(path: Path, label: str) -> Any:
         content = path.read_bytes()
     except OSError:
         return None
-    stated, content = content[:_DIGEST_BYTES], content[_DIGEST_BYTES:]
-    return pickle.loads(content) if stated == _digest(label, content) else None
+    stated_digest, content = content[:_DIGEST_BYTES], content[_DIGEST_BYTES:]
+    return pickle.loads(content) if stated_digest == _digest(label, content) else None
 
 
 def _digest(label: str, content: bytes) -> bytes:

@@ -36,27 +36,27 @@ class CacheWriteLock:
     def register(self) -> None:
         """Listen to numba's events until this process ends."""
         listen: Any = event.register
-        listen("numba:compile", _BeginEndListener(lambda: None, self._take))
-        listen("numba:compiler_lock", _BeginEndListener(lambda: self._count(1), lambda: self._count(-1)))
+        listen("numba:compile", _BeginEndListener(lambda: None, self._acquire))
+        listen("numba:compiler_lock", _BeginEndListener(lambda: self._track_depth(1), lambda: self._track_depth(-1)))
 
-    def _count(self, step: int) -> None:
+    def _track_depth(self, step: int) -> None:
         """Track how often this thread has acquired the compiler, and release the lock when it releases the compiler."""
-        here = self._thread_state
-        here.depth = getattr(here, "depth", 0) + step
-        if step < 0 and here.depth < getattr(here, "taken_at", 0):
-            here.taken_at = 0
-            os.close(here.handle)
+        state = self._thread_state
+        state.depth = getattr(state, "depth", 0) + step
+        if step < 0 and state.depth < getattr(state, "taken_at", 0):
+            state.taken_at = 0
+            os.close(state.handle)
 
-    def _take(self) -> None:
+    def _acquire(self) -> None:
         """Acquire the lock; continue without it if the folder has no locks, or after `PATIENCE`."""
-        here = self._thread_state
-        if getattr(here, "taken_at", 0):
+        state = self._thread_state
+        if getattr(state, "taken_at", 0):
             return
         with contextlib.suppress(OSError):
-            here.handle = os.open(self._lock, os.O_RDWR | os.O_CREAT, 0o600)
-            here.taken_at = getattr(here, "depth", 0)
-            until = time.monotonic() + PATIENCE
-            while not lock_now(here.handle) and time.monotonic() < until:
+            state.handle = os.open(self._lock, os.O_RDWR | os.O_CREAT, 0o600)
+            state.taken_at = getattr(state, "depth", 0)
+            deadline = time.monotonic() + PATIENCE
+            while not lock_now(state.handle) and time.monotonic() < deadline:
                 time.sleep(0.002)
 
 

@@ -36,7 +36,7 @@ _settings.CACHE_DIR = str(_usable or WANTED)
 TEMPORARY = _usable not in (WANTED, None)
 
 
-class _Compiling(event.Listener):
+class _CompileListener(event.Listener):
     """Listener that reports when numba compiles a kernel that is not in its cache."""
 
     def on_start(self, event: Any) -> None:
@@ -47,7 +47,7 @@ class _Compiling(event.Listener):
         """Ignore the end of a compilation."""
 
 
-cast("Any", event).register("numba:compile", _Compiling())
+cast("Any", event).register("numba:compile", _CompileListener())
 if _usable is not None:
     CacheWriteLock(_usable).register()
 
@@ -86,7 +86,7 @@ def compiled_inline(kernel: _Kernel) -> _Kernel:
 
 
 def inner(kernel: _Kernel) -> _Kernel:
-    """Compile a function that other kernels call, without the wrapper that Python would call it by.
+    """Compile a function for calls by other kernels, without its Python wrapper.
 
     The wrapper takes a seventh of the time to compile a kernel.  Tests may still call the function: a wrapper is then
     compiled and kept separately.
@@ -102,7 +102,7 @@ def inlined(kernel: _Kernel) -> _Kernel:
     """Compile a function as `inner` does, and let LLVM inline it into the inner loops of the kernels that call it.
 
     A call passes seven numbers per array and increments its reference count, which is more work than many kernels do
-    themselves.  The planner's graded scores take a quarter longer with calls alone.  Inlined by numba
+    themselves.  The planner's graded scores take a quarter longer with calls only.  Inlined by numba
     (`inline="always"`) the function would run no faster, but each copy would be typed and translated again.
     """
     return cast("_Kernel", _InnerKernel(kernel, forceinline=True))
@@ -130,7 +130,7 @@ class _InnerKernel:
         return _compiled(vars(self)["__wrapped__"], no_cpython_wrapper=True, **self._options)
 
     @functools.cached_property
-    def _around(self) -> Any:
+    def _wrapper(self) -> Any:
         kernel = self
         return _compiled(lambda *given: kernel(*given))
 
@@ -140,7 +140,7 @@ class _InnerKernel:
 
     def __call__(self, *arguments: Any) -> Any:
         """Call it from Python through the wrapper; without a wrapper the process would crash."""
-        return self._around(*arguments)
+        return self._wrapper(*arguments)
 
 
 class _InnerType(numba.types.Dispatcher):  # type: ignore[misc]  # numba states no types
@@ -149,10 +149,10 @@ class _InnerType(numba.types.Dispatcher):  # type: ignore[misc]  # numba states 
     def get_call_type(self, context: Any, args: Any, kws: Any) -> Any:
         """Return numba's call type without literals.
 
-        Numba alone compiles a function again for each literal number.
+        Otherwise numba compiles a function again for each literal number.
         """
-        plain = tuple(numba.types.unliteral(given) for given in args)
-        return super().get_call_type(context, plain, {name: numba.types.unliteral(kws[name]) for name in kws})
+        plain_types = tuple(numba.types.unliteral(argument_type) for argument_type in args)
+        return super().get_call_type(context, plain_types, {name: numba.types.unliteral(kws[name]) for name in kws})
 
 
 register_model(_InnerType)(models.OpaqueModel)
@@ -189,11 +189,11 @@ def sort_few(values: NDArray[Any]) -> None:
     array([1., 2., 3.])
     """
     for k in range(1, values.size):
-        value, at = values[k], k
-        while at > 0 and values[at - 1] > value:
-            values[at] = values[at - 1]
-            at -= 1
-        values[at] = value
+        value, position = values[k], k
+        while position > 0 and values[position - 1] > value:
+            values[position] = values[position - 1]
+            position -= 1
+        values[position] = value
 
 
 def read_only(array: _Array) -> _Array:
@@ -213,7 +213,7 @@ def read_only(array: _Array) -> _Array:
 def record_dtype(*entries: str | tuple[Any, ...]) -> np.dtype[np.record]:
     """Make the type of a record whose fields are read and set as attributes, in Python and in compiled code.
 
-    entries: in order: the name of a number (float64), or (name, type) or (name, type, shape) as in numpy.
+    entries: fields in order, each the name of a float64, or (name, type) or (name, type, shape) as in numpy.
 
     >>> POINT = record_dtype("east", "north", ("leg", np.int64), ("velocity", np.float64, (3,)))
     >>> points = np.zeros(2, POINT)
@@ -224,8 +224,8 @@ def record_dtype(*entries: str | tuple[Any, ...]) -> np.dtype[np.record]:
     >>> points[1].tolist()[:3]
     (0.0, 4.0, 1)
     """
-    made = [(entry, np.float64) if isinstance(entry, str) else entry for entry in entries]
-    dtype: Any = np.dtype((np.record, np.dtype(made, align=True)))
+    fields = [(entry, np.float64) if isinstance(entry, str) else entry for entry in entries]
+    dtype: Any = np.dtype((np.record, np.dtype(fields, align=True)))
     return cast("np.dtype[np.record]", dtype)
 
 

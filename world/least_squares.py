@@ -35,14 +35,14 @@ def _least_squares(basis: Floats, values: Floats) -> Floats:
         for k in range(size):
             q[n, k] = basis[n, k]
         q[n, size] = values[n]
-    dependent = np.zeros(size, dtype=np.bool_)
-    longest = 0.0
+    is_dependent = np.zeros(size, dtype=np.bool_)
+    max_norm = 0.0
     for k in range(size):
-        longest = max(longest, _dot(basis, k, k))
+        max_norm = max(max_norm, _dot(basis, k, k))
     for k in range(size):
         norm = _dot(q, k, k)
-        dependent[k] = norm <= _DEPENDENT_NORM_RATIO * longest
-        if dependent[k]:
+        is_dependent[k] = norm <= _DEPENDENT_NORM_RATIO * max_norm
+        if is_dependent[k]:
             continue
         for j in range(k + 1, size + 1):
             r[k, j] = _dot(q, k, j) / norm
@@ -50,7 +50,7 @@ def _least_squares(basis: Floats, values: Floats) -> Floats:
                 q[n, j] -= r[k, j] * q[n, k]
     out = np.zeros(size)
     for k in range(size - 1, -1, -1):
-        if dependent[k]:
+        if is_dependent[k]:
             continue
         out[k] = r[k, size]
         for j in range(k + 1, size):
@@ -59,9 +59,9 @@ def _least_squares(basis: Floats, values: Floats) -> Floats:
 
 
 @inner
-def _dot(columns: Floats, one: int, other: int) -> float:
+def _dot(columns: Floats, first: int, second: int) -> float:
     """Return the dot product of two columns."""
     total = 0.0
     for n in range(columns.shape[0]):
-        total += columns[n, one] * columns[n, other]
+        total += columns[n, first] * columns[n, second]
     return total

@@ -29,15 +29,15 @@ def map_position(table: PointTable, key: str, source: str, origin: GeoOrigin, gr
     east, north = map_place(table, origin)
     if table.amsl_m is not None:
         return np.array([east, north, table.amsl_m])
-    under = float(ground.height(east, north)) if ground is not None else math.nan
-    if math.isnan(under):
+    ground_height = float(ground.height(east, north)) if ground is not None else math.nan
+    if math.isnan(ground_height):
         raise ScenarioError(
             f"{source}: {key}: east {east:.0f} m, north {north:.0f} m:"
             " no terrain there to count a height from; give amsl_m",
             file=source,
             field=key,
         )
-    return np.array([east, north, under + (table.height_m or 0.0)])
+    return np.array([east, north, ground_height + (table.height_m or 0.0)])
 
 
 def check_in_area(key: str, point: Floats, source: str, bounds: Floats) -> None:
@@ -63,9 +63,9 @@ def check_inside(
 
 def check_above_ground(key: str, point: Floats, source: str, ground: Terrain | None) -> None:
     """Raise ScenarioError for a point (3,) that is not above the terrain; unknown terrain raises no error."""
-    under = float(ground.height(point[0], point[1])) if ground is not None else math.nan
-    if point[2] <= under:
-        allowed = f"not above the terrain, which is at {under:.0f} m"
+    ground_height = float(ground.height(point[0], point[1])) if ground is not None else math.nan
+    if point[2] <= ground_height:
+        allowed = f"not above the terrain, which is at {ground_height:.0f} m"
         raise ScenarioError.at(source, key, float(point[2]), allowed, shown=f"{point[2]:.0f} m AMSL")
 
 
@@ -76,8 +76,10 @@ def make_threats(tables: list[ThreatTable], source: str, origin: GeoOrigin, grou
     """
     positions = np.zeros((len(tables), 3))
     for k, table in enumerate(tables):
-        on_ground = table if table.amsl_m is not None else table.model_copy(update={"height_m": table.height_m or 0.0})
-        positions[k] = map_position(on_ground, f"threats[{k}]", source, origin, ground)
+        placed_table = (
+            table if table.amsl_m is not None else table.model_copy(update={"height_m": table.height_m or 0.0})
+        )
+        positions[k] = map_position(placed_table, f"threats[{k}]", source, origin, ground)
     return Threats(
         names=tuple(threat_label(table.name or "", k) for k, table in enumerate(tables)),
         position=positions,

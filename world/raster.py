@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 from world.address_space import AddressSpaceError
 from world.arrays import Floats
 from world.elevation_formats import EMBEDDED, FORMATS, SUFFIXES
-from world.elevation_tiles import joined, tile_files
+from world.elevation_tiles import join_tiles, tile_files
 from world.errors import TerrainError
 from world.files import did_you_mean
 from world.frames import GeoOrigin, fit_polymap, to_geo, to_map
@@ -33,14 +33,14 @@ from world.raster_file import (
     longitude_near,
     one_line,
     outline,
-    refuse_few_pixels,
+    require_min_pixels,
 )
 from world.terrain import Terrain
 
-# Largest number of pixels of a window, or of a file that is read as one array; more are refused.
+# Largest number of pixels of a window, or of a file that is read as one array; more raise an error.
 MAX_PIXELS = 120_000_000
 # Folder of the embedded elevation files.
-_OWN_FILES = Path(__file__).parent / "elevation"
+_EMBEDDED_FOLDER = Path(__file__).parent / "elevation"
 # Errors that zipfile raises for a damaged file, among others.
 _UNZIP_ERRORS = (zipfile.BadZipFile, zlib.error, lzma.LZMAError)
 
@@ -59,7 +59,7 @@ def grid_in_degrees(
     Raises TerrainError for too few or too many pixels, and for edges that are not on the globe.
     """
     rows, cols = heights.shape
-    refuse_few_pixels(name, (rows, cols))
+    require_min_pixels(name, (rows, cols))
     if heights.size > MAX_PIXELS:
         allowed = f"at most {MAX_PIXELS:,} are read"
         raise TerrainError.at(name, "pixels", heights.size, allowed, shown=f"{heights.size:,}")
@@ -109,7 +109,7 @@ def open_npz(file: Path, name: str) -> RasterFile:
     return grid_in_degrees(file, name, heights, _edges(edges, heights.shape[0]))
 
 
-def _edges(stated: list[float], rows: int) -> tuple[float, float, float, float]:
+def _edges(stated_edges: list[float], rows: int) -> tuple[float, float, float, float]:
     """Return the west, east, south and north edges, deg, from a file's xmin, xmax, ymin, ymax.
 
     In the shipped tile of 344 rows, ymax, 36.44625, is the north edge.  Its ymin, 36.73292, is the north edge plus the
@@ -119,10 +119,10 @@ def _edges(stated: list[float], rows: int) -> tuple[float, float, float, float]:
     36.1983 N; the lake ends 0.2208 degrees south of it, and Norris Dam stands at 36.2242 N (both places:
     https://en.wikipedia.org/wiki/Cross_Mountain_(Tennessee), https://en.wikipedia.org/wiki/Norris_Dam).
     """
-    west, east = sorted(stated[:2])
-    south, north = sorted(stated[2:])
+    west, east = sorted(stated_edges[:2])
+    south, north = sorted(stated_edges[2:])
     if rows == _SHIPPED_TILE_ROWS and np.allclose(
-        stated, _SHIPPED_TILE_EDGES_DEG, rtol=0.0, atol=_SHIPPED_TILE_TOLERANCE_DEG
+        stated_edges, _SHIPPED_TILE_EDGES_DEG, rtol=0.0, atol=_SHIPPED_TILE_TOLERANCE_DEG
     ):
         south, north = south - (north - south), south
     return west, east, south, north
@@ -174,7 +174,7 @@ def open_raster(path: str, base: Path | None = None, datum: StatedDatum | None =
     (344, 403)
     """
     if path in EMBEDDED:
-        raster = open_npz(_OWN_FILES / EMBEDDED[path], path)
+        raster = open_npz(_EMBEDDED_FOLDER / EMBEDDED[path], path)
         return replace(raster, datum=_datum_of(raster, datum))
     if path.startswith("/vsi") or "://" in path:
         allowed = "only local files are read, not URLs or virtual file systems"
@@ -183,11 +183,11 @@ def open_raster(path: str, base: Path | None = None, datum: StatedDatum | None =
     files = tile_files(file) if file.exists() else None
     if files is not None:
         tiles = [open_raster(str(tile), None, datum) for tile in files]
-        return joined(tiles, f"{path} ({len(tiles)} tiles)" if len(tiles) > 1 else path)
+        return join_tiles(tiles, f"{path} ({len(tiles)} tiles)" if len(tiles) > 1 else path)
     if not file.is_file():
-        suffixes, known = _listed(SUFFIXES), ", ".join(sorted(EMBEDDED))
+        suffixes, names = _or_list(SUFFIXES), ", ".join(sorted(EMBEDDED))
         raise TerrainError(
-            f"{file}: terrain path: no such file (a {suffixes} file, or one of: {known}){did_you_mean(path, EMBEDDED)}",
+            f"{file}: terrain path: no such file (a {suffixes} file, or one of: {names}){did_you_mean(path, EMBEDDED)}",
             file=file,
         )
     try:
@@ -195,11 +195,18 @@ def open_raster(path: str, base: Path | None = None, datum: StatedDatum | None =
             head = handle.read(16)
     except OSError as error:
         raise TerrainError(f"{file}: cannot be read: {error.strerror}", file=file) from error
-    by_suffix = [one for one in FORMATS if not one.begins and one.suffix == file.suffix.lower()]
-    for one in (*(one for one in FORMATS if head.startswith(one.begins)), *by_suffix):
-        raster = _OPENERS[one.suffix](file, path)
+    suffix_formats = [
+        known_format
+        for known_format in FORMATS
+        if not known_format.begins and known_format.suffix == file.suffix.lower()
+    ]
+    for known_format in (
+        *(known_format for known_format in FORMATS if head.startswith(known_format.begins)),
+        *suffix_formats,
+    ):
+        raster = _OPENERS[known_format.suffix](file, path)
         return replace(raster, datum=_datum_of(raster, datum))
-    expected = _listed([one.name for one in FORMATS])
+    expected = _or_list([known_format.name for known_format in FORMATS])
     raise TerrainError(f"{file}: not an elevation file: {expected} is expected", file=file)
 
 
@@ -212,7 +219,7 @@ def open_tiles(paths: Sequence[str], base: Path | None = None, datum: StatedDatu
     'jacksboro and 1 more'
     """
     tiles = [open_raster(path, base, datum) for path in paths]
-    return tiles[0] if len(tiles) == 1 else joined(tiles, f"{paths[0]} and {len(paths) - 1} more")
+    return tiles[0] if len(tiles) == 1 else join_tiles(tiles, f"{paths[0]} and {len(paths) - 1} more")
 
 
 def _datum_of(raster: RasterFile, stated: StatedDatum | None) -> HeightDatum:
@@ -228,8 +235,8 @@ def _datum_of(raster: RasterFile, stated: StatedDatum | None) -> HeightDatum:
         ) from error
 
 
-def _listed(words: Sequence[str]) -> str:
-    return f"{', '.join(words[:-1])} or {words[-1]}"
+def _or_list(names: Sequence[str]) -> str:
+    return f"{', '.join(names[:-1])} or {names[-1]}"
 
 
 # ----------------------------------------------------------------------
@@ -259,7 +266,7 @@ def read_terrain(raster: RasterFile, origin: GeoOrigin, bounds: ArrayLike, buffe
     if not is_covered(raster, origin, box):
         raise TerrainError(
             f"{raster.name}: area east {box[0, 0]:.0f}..{box[0, 1]:.0f} m, north {box[1, 0]:.0f}..{box[1, 1]:.0f} m "
-            f"reaches beyond the tile, which covers {_tile_cover(raster, origin)}",
+            f"reaches beyond the tile, which covers {_tile_extent_text(raster, origin)}",
             file=raster.name,
             field="area",
             value=box.tolist(),
@@ -277,7 +284,7 @@ def read_terrain(raster: RasterFile, origin: GeoOrigin, bounds: ArrayLike, buffe
     heights[~is_ground(heights)] = np.nan
     _convert_to_sea_level(heights, raster, top, left)
     to_pixel = fit_polymap(
-        lambda e, n: _shifted(raster.to_source, origin, e, n, left, top),
+        lambda e, n: _window_pixels(raster.to_source, origin, e, n, left, top),
         box + np.array([-buffer, buffer]),
         PIXEL_TOLERANCE,
     )
@@ -285,13 +292,13 @@ def read_terrain(raster: RasterFile, origin: GeoOrigin, bounds: ArrayLike, buffe
         raise TerrainError(
             f"{raster.name}: the area is too large to map: {to_pixel.residual:.2g} pixels of error", file=raster.name
         )
-    middle = box.mean(axis=1)
-    col, row = to_pixel(middle[0] + np.array([0.0, 100.0, 0.0]), middle[1] + np.array([0.0, 0.0, 100.0]))
+    centre = box.mean(axis=1)
+    col, row = to_pixel(centre[0] + np.array([0.0, 100.0, 0.0]), centre[1] + np.array([0.0, 0.0, 100.0]))
     # Columns and rows per metre of the map; the pitch is the length of the shorter pixel side.
     per_metre = np.array([[col[1] - col[0], col[2] - col[0]], [row[1] - row[0], row[2] - row[0]]]) / 100.0
     pitch = float(np.min(np.linalg.norm(np.linalg.inv(per_metre), axis=0)))
     terrain = Terrain(heights, to_pixel, pitch, raster.name, raster.sha256, raster.datum.text)
-    _refuse_holes(terrain, box, per_metre)
+    _check_holes(terrain, box, per_metre)
     return terrain
 
 
@@ -319,29 +326,29 @@ def _convert_to_sea_level(heights: NDArray[np.float32], raster: RasterFile, top:
     if raster.datum.sea_level is None:
         return
     rows, cols = (begin + np.arange(size) for begin, size in zip((top, left), heights.shape, strict=True))
-    row, col = (np.linspace(every[0], every[-1], min(len(every), _SEA_LEVEL_SAMPLES)) for every in (rows, cols))
+    row, col = (np.linspace(axis[0], axis[-1], min(len(axis), _SEA_LEVEL_SAMPLES)) for axis in (rows, cols))
     across, down = np.meshgrid(col, row)
     lon, lat = raster.to_place(across.ravel(), down.ravel())
     level = raster.datum.sea_level(lon, lat)
     if not np.isfinite(level).all():
-        bad = int(np.argmin(np.isfinite(level)))
-        where = f"longitude {lon[bad]:.4f}, latitude {lat[bad]:.4f}"
-        raise TerrainError(f"{raster.name}: {where}: the geoid's height is not known there", file=raster.name)
-    lines = np.stack([np.interp(cols, col, line) for line in level.reshape(across.shape)])
-    at = np.interp(rows, row, np.arange(row.size))
-    above = np.minimum(at.astype(np.intp), row.size - 2)
-    share = (at - above)[:, None]
-    at_once = max(1, PIXELS_AT_ONCE // cols.size)
-    for first in range(0, rows.size, at_once):
-        part = slice(first, first + at_once)
-        upper, lower = lines[above[part]], lines[above[part] + 1]
-        heights[part] -= (upper + (lower - upper) * share[part]).astype(np.float32)
+        bad_index = int(np.argmin(np.isfinite(level)))
+        place = f"longitude {lon[bad_index]:.4f}, latitude {lat[bad_index]:.4f}"
+        raise TerrainError(f"{raster.name}: {place}: the geoid's height is not known there", file=raster.name)
+    sea_levels = np.stack([np.interp(cols, col, level_row) for level_row in level.reshape(across.shape)])
+    sample_row = np.interp(rows, row, np.arange(row.size))
+    upper_row = np.minimum(sample_row.astype(np.intp), row.size - 2)
+    fraction = (sample_row - upper_row)[:, None]
+    rows_at_once = max(1, PIXELS_AT_ONCE // cols.size)
+    for begin in range(0, rows.size, rows_at_once):
+        rows_part = slice(begin, begin + rows_at_once)
+        upper, lower = sea_levels[upper_row[rows_part]], sea_levels[upper_row[rows_part] + 1]
+        heights[rows_part] -= (upper + (lower - upper) * fraction[rows_part]).astype(np.float32)
 
 
-def _refuse_holes(terrain: Terrain, box: Floats, per_metre: Floats) -> None:
+def _check_holes(terrain: Terrain, box: Floats, per_metre: Floats) -> None:
     """Raise TerrainError if a pixel without data contributes to a height inside the box.
 
-    per_metre: (2, 2) columns and rows per metre of the map, in the center of the box.
+    per_metre: (2, 2) columns and rows per metre of the map, in the centre of the box.
     """
     rows, cols = np.nonzero(np.isnan(terrain.heights))
     if not rows.size:
@@ -349,16 +356,16 @@ def _refuse_holes(terrain: Terrain, box: Floats, per_metre: Floats) -> None:
     to_map_metres = np.linalg.inv(per_metre)
     # Each height is interpolated from the four pixels around it.
     footprint = np.abs(to_map_metres).sum(axis=1)[:, None]
-    for first in range(0, rows.size, _HOLES_PER_STEP):
-        part = slice(first, first + _HOLES_PER_STEP)
-        wanted = np.stack([cols[part], rows[part]]).astype(np.float64)
+    for begin in range(0, rows.size, _HOLES_PER_STEP):
+        part = slice(begin, begin + _HOLES_PER_STEP)
+        pixels = np.stack([cols[part], rows[part]]).astype(np.float64)
         # Newton's method with a constant slope: the map deviates from an affine map by only a few metres over the box.
-        place = np.repeat(box.mean(axis=1)[:, None], wanted.shape[1], axis=1)
+        positions = np.repeat(box.mean(axis=1)[:, None], pixels.shape[1], axis=1)
         for _ in range(8):
-            place += to_map_metres @ (wanted - np.stack(terrain.to_pixel(place[0], place[1])))
-        inside = ((place > box[:, :1] - footprint) & (place < box[:, 1:] + footprint)).all(axis=0)
-        if inside.any():
-            east, north = place[:, int(np.argmax(inside))]
+            positions += to_map_metres @ (pixels - np.stack(terrain.to_pixel(positions[0], positions[1])))
+        is_inside = ((positions > box[:, :1] - footprint) & (positions < box[:, 1:] + footprint)).all(axis=0)
+        if is_inside.any():
+            east, north = positions[:, int(np.argmax(is_inside))]
             raise TerrainError(
                 f"{terrain.source}: no data at east {east:.0f} m, north {north:.0f} m ({rows.size:,} of "
                 f"{terrain.heights.size:,} pixels in and about the area have none); choose an area with data",
@@ -374,11 +381,11 @@ def _outline_window(
     (w, e), (s, n) = box + np.array([-buffer, buffer])
     east = np.concatenate([w + ramp * (e - w), w + ramp * (e - w), np.full(41, w), np.full(41, e)])
     north = np.concatenate([np.full(41, s), np.full(41, n), s + ramp * (n - s), s + ramp * (n - s)])
-    col, row = _shifted(raster.to_source, origin, east, north, 0, 0)
+    col, row = _window_pixels(raster.to_source, origin, east, north, 0, 0)
     return float(col.min()), float(col.max()), float(row.min()), float(row.max())
 
 
-def _shifted(
+def _window_pixels(
     to_source: ToSource, origin: GeoOrigin, east: Floats, north: Floats, left: int, top: int
 ) -> tuple[Floats, Floats]:
     lat, lon = to_geo(origin, east, north)
@@ -396,14 +403,14 @@ def tile_bounds(raster: RasterFile, origin: GeoOrigin) -> Floats:
     [[-15000.0, 15000.0], [-15800.0, 15800.0]]
     """
     east, north = to_map(origin, raster.corners[:, 1], raster.corners[:, 0])
-    middle_e, middle_n = (east.min() + east.max()) / 2, (north.min() + north.max()) / 2
+    centre_e, centre_n = (east.min() + east.max()) / 2, (north.min() + north.max()) / 2
     half = np.array([(east.max() - east.min()) / 2, (north.max() - north.min()) / 2])
     rows, cols = raster.shape
-    for share in np.arange(0.995, 0.3, -0.005):
+    for fraction in np.arange(0.995, 0.3, -0.005):
         box = np.array(
             [
-                [middle_e - share * half[0], middle_e + share * half[0]],
-                [middle_n - share * half[1], middle_n + share * half[1]],
+                [centre_e - fraction * half[0], centre_e + fraction * half[0]],
+                [centre_n - fraction * half[1], centre_n + fraction * half[1]],
             ]
         )
         c0, c1, r0, r1 = _outline_window(raster, origin, box, 0.0)
@@ -422,6 +429,6 @@ def cover_text(raster: RasterFile) -> str:
     return f"latitude {lat.min():.3f}..{lat.max():.3f}, longitude {lon.min():.3f}..{lon.max():.3f}"
 
 
-def _tile_cover(raster: RasterFile, origin: GeoOrigin) -> str:
+def _tile_extent_text(raster: RasterFile, origin: GeoOrigin) -> str:
     east, north = to_map(origin, raster.corners[:, 1], raster.corners[:, 0])
     return f"east {east.min():.0f}..{east.max():.0f} m, north {north.min():.0f}..{north.max():.0f} m"

@@ -30,7 +30,7 @@ HIGHEST_GROUND_M = 9000.0
 class RasterFile:
     """Elevation file that was opened and checked; its heights are not read yet.
 
-    to_source: from longitude, latitude (deg) to fractional (col, row) of pixel centres; to_place: the inverse.
+    to_source: map from longitude, latitude (deg) to fractional (col, row) of pixel centres; to_place: its inverse.
     shape: (rows, cols).
     corners: (n, 2) longitude, latitude along the outline of the pixel centres, deg.
     grid: affine coefficients (a, b, c, d, e, f) from columns and rows of pixel corners to the reference
@@ -54,7 +54,7 @@ class RasterFile:
 
     @property
     def centre(self) -> GeoOrigin:
-        """The center of the tile, with a longitude in -180..180 even if the tile lies across the 180th meridian."""
+        """The centre of the tile, with a longitude in -180..180 even if the tile lies across the 180th meridian."""
         lat = (self.corners[:, 1].min() + self.corners[:, 1].max()) / 2
         lon = longitude_near(self.corners[:, 0], float(self.corners[0, 0]))
         return GeoOrigin(float(lat), float(longitude_near((lon.min() + lon.max()) / 2, 0.0)))
@@ -66,35 +66,35 @@ def is_ground(heights: NDArray[np.float32]) -> NDArray[np.bool_]:
     >>> is_ground(np.array([-9999.0, 480.0, np.nan], dtype=np.float32)).tolist()
     [False, True, False]
     """
-    found: NDArray[np.bool_] = (heights >= LOWEST_GROUND_M) & (heights <= HIGHEST_GROUND_M)
-    return found & ~np.isin(heights, UNSTATED_NODATA)
+    is_plausible: NDArray[np.bool_] = (heights >= LOWEST_GROUND_M) & (heights <= HIGHEST_GROUND_M)
+    return is_plausible & ~np.isin(heights, UNSTATED_NODATA)
 
 
-def longitude_near(lon: NDArray[np.float64] | float, middle: float) -> Floats:
-    """Shift longitudes (deg) to within 180 degrees of ``middle``; longitudes within that range are unchanged."""
-    return np.asarray(lon - 360.0 * np.round((np.asarray(lon) - middle) / 360.0))
+def longitude_near(lon: NDArray[np.float64] | float, centre: float) -> Floats:
+    """Shift longitudes (deg) to within 180 degrees of ``centre``; longitudes within that range are unchanged."""
+    return np.asarray(lon - 360.0 * np.round((np.asarray(lon) - centre) / 360.0))
 
 
 def outline(cols: int, rows: int) -> tuple[Floats, Floats]:
     """Return columns and rows, (84,) each, along the outline of a raster's pixel centres."""
     ramp = np.linspace(0.0, 1.0, 21)
-    zero, one = np.zeros(21), np.ones(21)
-    col = np.concatenate([ramp, ramp, zero, one]) * (cols - 1)
-    row = np.concatenate([zero, one, ramp, ramp]) * (rows - 1)
+    zeros, ones = np.zeros(21), np.ones(21)
+    col = np.concatenate([ramp, ramp, zeros, ones]) * (cols - 1)
+    row = np.concatenate([zeros, ones, ramp, ramp]) * (rows - 1)
     return col, row
 
 
-def moved_grid(grid: Grid, rows: int, cols: int) -> Grid:
+def shift_grid(grid: Grid, rows: int, cols: int) -> Grid:
     """Return the grid with its first pixel moved by ``rows`` and ``cols``.
 
-    >>> moved_grid((30.0, 0.0, 400.0, 0.0, -30.0, 900.0), 1, 2)
+    >>> shift_grid((30.0, 0.0, 400.0, 0.0, -30.0, 900.0), 1, 2)
     (30.0, 0.0, 460.0, 0.0, -30.0, 870.0)
     """
     a, b, c, d, e, f = grid
     return a, b, c + a * cols + b * rows, d, e, f + d * cols + e * rows
 
 
-def refuse_few_pixels(name: str | Path, shape: tuple[int, int]) -> None:
+def require_min_pixels(name: str | Path, shape: tuple[int, int]) -> None:
     """Raise TerrainError for too few rows or columns to interpolate heights."""
     if min(shape) < 2:
         raise TerrainError.at(name, "rows, columns", shape, "at least 2 x 2 pixels are expected")

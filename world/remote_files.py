@@ -30,42 +30,43 @@ from world.files import write_whole
 
 # Timeout for an answer, s.
 _ANSWER_TIMEOUT_S = 30.0
-# Least speed of an answer, bytes a second, and the time after which it is measured, s.
+# Lowest speed of an answer, bytes per second.
 _MIN_BYTES_PER_S = 10_000.0
+# Time after which the speed is measured, s.
 _SLOW_AFTER_S = 10.0
 # Number of attempts of a request.
 _MAX_ATTEMPTS = 3
-# Pause before the second attempt, s; it doubles with each further one.
+# Pause before the second attempt, s; it doubles with each further attempt.
 _PAUSE = 0.5
 # Number of bytes written in one step.
 _CHUNK_BYTES = 2**18
-# Largest size of a file, bytes; larger files are refused.  A GLO-30 tile has about 40 MB.
+# Largest size of a file, bytes; larger files are rejected.  A GLO-30 tile has about 40 MB.
 MAX_BYTES = 2**29
 # Status codes that mean that there is no such file; not 403, which proxies and request limits send, too.
 _ABSENT_STATUSES = (404, 410)
 # Status codes of temporary errors: the next attempt may succeed.
 _TEMPORARY_STATUSES = (408, 425, 429, 500, 502, 503, 504)
 
-Fetched = Callable[[int], None]
+OnBytes = Callable[[int], None]
 
 
 class _IncompleteAnswer(Exception):
-    """An answer does not contain what was requested; the message says why."""
+    """An answer does not contain the requested bytes; the message says why."""
 
 
 @dataclass(slots=True)
 class RemoteFile:
     """File on a server, and its copy.
 
-    size: bytes.  version: its ETag, or when it was changed; "" if the server states neither.
-    held: the parts that the copy holds, [begin, end), and the SHA-256 of each.
+    size: size in bytes.  version: its ETag or its time of change; "" if the server states neither.
+    parts: the parts that the copy holds, [begin, end), and the SHA-256 of each.
     """
 
     url: str
     size: int
     version: str
     copy: Path
-    held: dict[tuple[int, int], str] = field(default_factory=dict)
+    parts: dict[tuple[int, int], str] = field(default_factory=dict)
 
     def missing(self, begin: int, end: int) -> list[tuple[int, int]]:
         """Return the parts of [begin, end) that the copy does not hold yet.
@@ -73,25 +74,25 @@ class RemoteFile:
         >>> RemoteFile("", 100, "", Path("a"), {(10, 20): "", (30, 40): ""}).missing(15, 50)
         [(20, 30), (40, 50)]
         """
-        found = []
-        for low, high in [*sorted(self.held), (end, end)]:
-            if low > begin:
-                found.append((begin, min(low, end)))
-            begin = max(begin, high)
+        parts = []
+        for part_begin, part_end in [*sorted(self.parts), (end, end)]:
+            if part_begin > begin:
+                parts.append((begin, min(part_begin, end)))
+            begin = max(begin, part_end)
             if begin >= end:
                 break
-        return [(low, high) for low, high in found if low < high]
+        return [(part_begin, part_end) for part_begin, part_end in parts if part_begin < part_end]
 
-    def fetch(self, begin: int, end: int, fetched: Fetched = lambda _: None) -> None:
+    def fetch(self, begin: int, end: int, on_bytes: OnBytes = lambda _: None) -> None:
         """Fetch the missing parts of [begin, end).
 
-        fetched: called with the number of bytes of each chunk.
+        on_bytes: called with the number of bytes of each chunk.
         Raises TerrainError.
         """
-        for low, high in self.missing(begin, min(end, self.size)):
+        for part_begin, part_end in self.missing(begin, min(end, self.size)):
             for attempt in range(_MAX_ATTEMPTS):
                 try:
-                    self._get(low, high, fetched)
+                    self._fetch_part(part_begin, part_end, on_bytes)
                     break
                 except (_IncompleteAnswer, OSError, ValueError, http.client.HTTPException) as error:
                     if attempt == _MAX_ATTEMPTS - 1 or not _is_temporary(error):
@@ -100,42 +101,42 @@ class RemoteFile:
                         ) from error
                     time.sleep(_PAUSE * 2.0**attempt)
 
-    def _get(self, begin: int, end: int, fetched: Fetched) -> None:
+    def _fetch_part(self, begin: int, end: int, on_bytes: OnBytes) -> None:
         headers = {"Range": f"bytes={begin}-{end - 1}"} | ({"If-Range": self.version} if self.version else {})
-        with _open(self.url, headers) as answer:
+        with _open_url(self.url, headers) as answer:
             if answer.status == 200:
                 # A server without range requests sends the whole file; so does a server whose file has changed.
-                if _length(answer) != self.size or _version(answer) != self.version:
+                if _content_length(answer) != self.size or _version(answer) != self.version:
                     raise _IncompleteAnswer("it has changed since it was begun: try again")
                 begin, end = 0, self.size
             elif answer.headers.get("Content-Range") != f"bytes {begin}-{end - 1}/{self.size}":
                 raise _IncompleteAnswer(f"the server answers with {answer.headers.get('Content-Range')!r}")
             with self.copy.open("r+b") as file:
                 file.seek(begin)
-                at, digest, since, slow = begin, sha256(), time.monotonic(), False
-                # read1 returns what has come: a server that drips would hold up read for hours.
-                while at < end and not slow and (part := answer.read1(min(_CHUNK_BYTES, end - at))):
-                    file.write(part)
-                    digest.update(part)
-                    at += len(part)
-                    fetched(len(part))
-                    taken = time.monotonic() - since
-                    slow = taken > _SLOW_AFTER_S and at - begin < _MIN_BYTES_PER_S * taken
+                position, digest, start_time, is_slow = begin, sha256(), time.monotonic(), False
+                # read1 returns the bytes received so far, because read would wait for hours for a slow server.
+                while position < end and not is_slow and (chunk := answer.read1(min(_CHUNK_BYTES, end - position))):
+                    file.write(chunk)
+                    digest.update(chunk)
+                    position += len(chunk)
+                    on_bytes(len(chunk))
+                    elapsed = time.monotonic() - start_time
+                    is_slow = elapsed > _SLOW_AFTER_S and position - begin < _MIN_BYTES_PER_S * elapsed
                 file.flush()
                 # The bytes are on the disk before the notes list them, even if the power fails.
                 os.fsync(file.fileno())
-            if at > begin:
-                self.held[begin, at] = digest.hexdigest()
-                write_whole(_notes(self.copy), json.dumps([[*part, text] for part, text in self.held.items()]))
-            if slow and at < end:
+            if position > begin:
+                self.parts[begin, position] = digest.hexdigest()
+                write_whole(_notes_path(self.copy), json.dumps([[*chunk, text] for chunk, text in self.parts.items()]))
+            if is_slow and position < end:
                 raise _IncompleteAnswer(f"the server sends fewer than {_MIN_BYTES_PER_S:,.0f} bytes a second")
-            if at < end:
-                raise _IncompleteAnswer(f"{at - begin:,} of {end - begin:,} bytes came")
+            if position < end:
+                raise _IncompleteAnswer(f"{position - begin:,} of {end - begin:,} bytes came")
 
     def forget(self) -> None:
         """Start over with an empty copy.  Raises OSError."""
-        _notes(self.copy).unlink(missing_ok=True)
-        self.held = {}
+        _notes_path(self.copy).unlink(missing_ok=True)
+        self.parts = {}
         # A new file, so that another process that reads the old one can go on.
         with tempfile.NamedTemporaryFile(dir=self.copy.parent, delete=False) as file:
             os.truncate(file.fileno(), self.size)
@@ -150,8 +151,8 @@ def find_remote(url: str, folder: Path) -> RemoteFile | None:
     answer: http.client.HTTPResponse | None = None
     for attempt in range(_MAX_ATTEMPTS):
         try:
-            with _open(url, {}, "HEAD") as answer:
-                size, version = _length(answer), _version(answer)
+            with _open_url(url, {}, "HEAD") as answer:
+                size, version = _content_length(answer), _version(answer)
             break
         except urllib.error.HTTPError as error:
             if error.code in _ABSENT_STATUSES:
@@ -168,14 +169,14 @@ def find_remote(url: str, folder: Path) -> RemoteFile | None:
     key = sha256(f"{url}\0{version}\0{size}".encode()).hexdigest()[:16]
     copy = folder / key / url.rpartition("/")[2]
     copy.parent.mkdir(parents=True, exist_ok=True)
-    found = RemoteFile(url, size, version, copy)
+    remote = RemoteFile(url, size, version, copy)
     if not (copy.is_file() and copy.stat().st_size == size):
-        found.forget()
-    found.held = _read_notes(copy, size)
-    return found
+        remote.forget()
+    remote.parts = _read_notes(copy, size)
+    return remote
 
 
-def _open(url: str, headers: dict[str, str], method: str = "GET") -> http.client.HTTPResponse:
+def _open_url(url: str, headers: dict[str, str], method: str = "GET") -> http.client.HTTPResponse:
     request = urllib.request.Request(url, headers={"User-Agent": "planfly"} | headers, method=method)
     return _make_opener().open(request, timeout=_ANSWER_TIMEOUT_S)
 
@@ -185,10 +186,10 @@ class _TimedHead(http.client.HTTPConnection):
 
     def getresponse(self) -> http.client.HTTPResponse:
         """Return the answer once its head has come.  Raises OSError if it does not come in time."""
-        late = threading.Event()
+        is_late = threading.Event()
 
         def cut() -> None:
-            late.set()
+            is_late.set()
             with contextlib.suppress(OSError):
                 self.sock.shutdown(socket.SHUT_RDWR)
 
@@ -198,13 +199,13 @@ class _TimedHead(http.client.HTTPConnection):
         try:
             answer = super().getresponse()
         except (OSError, http.client.HTTPException) as error:
-            if late.is_set():
+            if is_late.is_set():
                 raise TimeoutError("timed out") from error
             raise
         finally:
             timer.cancel()
         # A head that is cut looks like a shorter one.
-        if late.is_set():
+        if is_late.is_set():
             answer.close()
             raise TimeoutError("timed out")
         return answer
@@ -249,17 +250,17 @@ def is_address(text: str) -> bool:
     """
     try:
         parts = urllib.parse.urlsplit(text)
-        named = bool(parts.hostname) and (parts.port is None or parts.port > 0)
+        has_host = bool(parts.hostname) and (parts.port is None or parts.port > 0)
         (parts.hostname or "").encode("idna")
     except ValueError:
         return False
-    plain = text.isascii() and text.isprintable() and " " not in text and "?" not in text and "#" not in text
-    return plain and named and parts.scheme in ("http", "https")
+    is_plain = text.isascii() and text.isprintable() and " " not in text and "?" not in text and "#" not in text
+    return is_plain and has_host and parts.scheme in ("http", "https")
 
 
-def _length(answer: http.client.HTTPResponse) -> int:
-    stated = answer.headers.get("Content-Length", "")
-    return int(stated) if stated.isdecimal() else 0
+def _content_length(answer: http.client.HTTPResponse) -> int:
+    length_text = answer.headers.get("Content-Length", "")
+    return int(length_text) if length_text.isdecimal() else 0
 
 
 def _version(answer: http.client.HTTPResponse) -> str:
@@ -279,23 +280,27 @@ def _error_text(error: Exception) -> str:
     return " ".join(str(getattr(reason, "strerror", None) or reason).split()) or type(error).__name__
 
 
-def _notes(copy: Path) -> Path:
+def _notes_path(copy: Path) -> Path:
     return copy.with_name(copy.name + ".held")
 
 
 def _read_notes(copy: Path, size: int) -> dict[tuple[int, int], str]:
     """Return the parts that a copy holds unchanged; an empty mapping if the notes are damaged."""
     try:
-        noted = json.loads(_notes(copy).read_text(encoding="ascii"))
-        parts = {(int(low), int(high)): str(digest) for low, high, digest in noted}
+        entries = json.loads(_notes_path(copy).read_text(encoding="ascii"))
+        parts = {(int(part_begin), int(part_end)): str(digest) for part_begin, part_end, digest in entries}
     except (OSError, ValueError, TypeError, OverflowError):
         return {}
     with copy.open("rb") as file:
 
-        def is_whole(low: int, high: int, digest: str) -> bool:
-            if not 0 <= low < high <= size:
+        def is_whole(part_begin: int, part_end: int, digest: str) -> bool:
+            if not 0 <= part_begin < part_end <= size:
                 return False
-            file.seek(low)
-            return sha256(file.read(high - low)).hexdigest() == digest
+            file.seek(part_begin)
+            return sha256(file.read(part_end - part_begin)).hexdigest() == digest
 
-        return {(low, high): digest for (low, high), digest in parts.items() if is_whole(low, high, digest)}
+        return {
+            (part_begin, part_end): digest
+            for (part_begin, part_end), digest in parts.items()
+            if is_whole(part_begin, part_end, digest)
+        }

@@ -10,11 +10,11 @@ from typing import Any
 
 import numpy as np
 
-from world.airfield import AskedReturns, LandingStrip, Launch, make_home, make_landing, make_launch, make_returns
+from world.airfield import LandingStrip, Launch, ReturnRequirements, make_home, make_landing, make_launch, make_returns
 from world.airspace.zone_files import FileZones, read_zone_files
 from world.airspace.zone_times import is_active, parse_span
 from world.airspace.zones import Zone
-from world.airspace.zones_on_map import FAR, check_ends, make_zones, near_zones
+from world.airspace.zones_on_map import MAX_ZONE_DISTANCE, check_ends, make_zones, near_zones
 from world.arrays import Floats
 from world.elevation_formats import EMBEDDED
 from world.errors import ScenarioError, TerrainError
@@ -44,7 +44,7 @@ from world.threats import Threats
 from world.wind import Wind
 
 # ----------------------------------------------------------------------
-# The scenario itself, from an embedded name, a file, a plan or a log.
+# The scenario, from an embedded name, a file, a plan or a log.
 
 # Width of terrain that is kept around the area, m: a flight may overshoot a corner at the map's edge.
 GROUND_BUFFER = 1000.0
@@ -91,7 +91,7 @@ class Scenario:
     home: Floats | None = None
     launch: Launch | None = None
     landing: LandingStrip | None = None
-    returns: AskedReturns | None = None
+    returns: ReturnRequirements | None = None
 
     def __post_init__(self) -> None:
         """Lock the arrays."""
@@ -102,27 +102,28 @@ class Scenario:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """Notes on zones that were changed or left out on reading, and on zones that are not active at the time."""
+        """Notes on zones changed or omitted on reading, and on inactive zones."""
         notes = list(self.spec.zone_notes or ())
-        timed = [table for table in self.spec.zones or () if table.times]
-        if timed and self.spec.at is None:
+        timed_tables = [table for table in self.spec.zones or () if table.times]
+        if timed_tables and self.spec.at is None:
             count = "1 zone has times of activity, and counts"
-            if len(timed) > 1:
-                count = f"{len(timed):,} zones have times of activity, and count"
+            if len(timed_tables) > 1:
+                count = f"{len(timed_tables):,} zones have times of activity, and count"
             notes.append(f"{count} at all times (--at applies them)")
-        elif timed:
-            span = " to ".join(f"{one:%Y-%m-%d %H:%M}" for one in parse_span(str(self.spec.at)))
-            off = len(self.spec.zones or ()) - len(self.zones)
-            are = "is" if off == 1 else "are"
+        elif timed_tables:
+            span = " to ".join(f"{time:%Y-%m-%d %H:%M}" for time in parse_span(str(self.spec.at)))
+            inactive_count = len(self.spec.zones or ()) - len(self.zones)
+            verb = "is" if inactive_count == 1 else "are"
             notes.append(
-                f"{off:,} of {len(timed):,} zones with times of activity {are} not active {span} UTC: left out"
+                f"{inactive_count:,} of {len(timed_tables):,} zones with times of activity {verb} not active {span}"
+                " UTC: left out"
             )
         return tuple(notes)
 
     def to_json(self) -> dict[str, Any]:
         """Return the scenario as plain JSON data; `from_spec` reads it back."""
-        stated = self.spec.model_copy(update={"flight": self.spec.flight.stated()})
-        return stated.model_dump(mode="json", exclude_none=True)
+        stated_spec = self.spec.model_copy(update={"flight": self.spec.flight.stated()})
+        return stated_spec.model_dump(mode="json", exclude_none=True)
 
 
 @cache
@@ -133,11 +134,11 @@ def embedded_scenarios() -> dict[str, ScenarioFile]:
     60.0
     """
     folder = resources.files("world") / "scenarios"
-    found = {}
-    for entry in sorted(folder.iterdir(), key=lambda item: (item.name != "jacksboro.toml", item.name)):
+    specs = {}
+    for entry in sorted(folder.iterdir(), key=lambda file: (file.name != "jacksboro.toml", file.name)):
         if entry.name.endswith(".toml"):
-            found[entry.name.removesuffix(".toml")] = parse_scenario(entry.read_text(encoding="utf-8"), entry.name)
-    return found
+            specs[entry.name.removesuffix(".toml")] = parse_scenario(entry.read_text(encoding="utf-8"), entry.name)
+    return specs
 
 
 def load_scenario(name_or_path: str, terrain: str | None = None) -> Scenario:
@@ -149,24 +150,24 @@ def load_scenario(name_or_path: str, terrain: str | None = None) -> Scenario:
     >>> scenario.start.tolist(), scenario.destination.tolist(), len(scenario.threats)
     ([0.0, 0.0, 75.0], [2600.0, 0.0, 75.0], 28)
     """
-    known = embedded_names()
-    if name_or_path in known:
+    names = embedded_names()
+    if name_or_path in names:
         entry = resources.files("world") / "scenarios" / f"{name_or_path}.toml"
         return from_spec(parse_scenario(entry.read_text(encoding="utf-8"), name_or_path), name_or_path, terrain=terrain)
     path = Path(name_or_path)
     try:
-        missing = not path.exists()
+        is_missing = not path.exists()
     except OSError:  # a name that is too long
-        missing = True
-    if missing:
-        near = did_you_mean(name_or_path, [*known, *_files_beside(path)])
-        said = f"{name_or_path}: no such file, and not an embedded scenario ({', '.join(known)}){near}"
-        raise ScenarioError(said, file=name_or_path)
+        is_missing = True
+    if is_missing:
+        suggestion = did_you_mean(name_or_path, [*names, *_scenario_files_near(path)])
+        message = f"{name_or_path}: no such file, and not an embedded scenario ({', '.join(names)}){suggestion}"
+        raise ScenarioError(message, file=name_or_path)
     spec = parse_scenario(read_scenario_text(path), str(path))
     return from_spec(spec, str(path), base=path.parent, terrain=terrain)
 
 
-def _files_beside(path: Path) -> list[str]:
+def _scenario_files_near(path: Path) -> list[str]:
     """Return the scenario files in the folder of a missing file, named as the missing file was."""
     try:
         return [str(file) for file in sorted(path.parent.glob("*.toml"))]
@@ -210,16 +211,16 @@ def from_spec(
     spec = spec if isinstance(spec, ScenarioFile) else check_scenario(spec, source)
     if spec.zones_file is not None:
         # Stored with the scenario's own zones, so that a log without the files makes the same scenario.
-        found = read_zone_files(spec.zones_file, source, base)
+        file_zones = read_zone_files(spec.zones_file, source, base)
         spec = spec.model_copy(update={"zones_file": None})
     else:
-        found = FileZones()
+        file_zones = FileZones()
     if terrain is not None:
         spec, base = _with_terrain(spec, terrain, source, base), None
     raster = None
     if spec.terrain.kind == "dem" and ground is None:
-        raster, table = _open_terrain(spec.terrain, source if terrain is None else "terrain", base)
-        spec = spec.model_copy(update={"terrain": table})
+        raster, terrain_table = _open_terrain(spec.terrain, source if terrain is None else "terrain", base)
+        spec = spec.model_copy(update={"terrain": terrain_table})
     if spec.origin is not None:
         origin = GeoOrigin(spec.origin.lat_deg, spec.origin.lon_deg)
     else:
@@ -234,16 +235,20 @@ def from_spec(
         if raster is not None:
             ground = read_terrain(raster, origin, bounds, GROUND_BUFFER)
         else:
-            ground = _made_terrain(spec.terrain, bounds)
+            ground = _make_terrain(spec.terrain, bounds)
     if ground is not None and spec.terrain.vertical_error_m is not None:
         ground = replace(ground, vertical_error=spec.terrain.vertical_error_m)
     spec = spec.model_copy(update={"flight": _with_whole_paths(spec.flight, base)})
     # Values taken from the tile are stored, so that a log without the tile makes the same scenario.
-    place = checked_table(lambda: OriginTable(lat_deg=origin.lat_deg, lon_deg=origin.lon_deg), f"{source}: origin")
-    area = spec.area or checked_table(
+    origin_table = checked_table(
+        lambda: OriginTable(lat_deg=origin.lat_deg, lon_deg=origin.lon_deg), f"{source}: origin"
+    )
+    area_table = spec.area or checked_table(
         lambda: AreaTable(east_m=bounds[0].tolist(), north_m=bounds[1].tolist()), f"{source}: area"
     )
-    spec = _with_file_zones(spec.model_copy(update={"origin": place, "area": area}), found, source, origin, bounds)
+    spec = _with_file_zones(
+        spec.model_copy(update={"origin": origin_table, "area": area_table}), file_zones, source, origin, bounds
+    )
     return _assemble(spec, source, origin, bounds, ground, external=external, replaced=terrain is not None)
 
 
@@ -271,18 +276,20 @@ def _with_terrain(spec: ScenarioFile, terrain: str, source: str, base: Path | No
 
 
 def _with_file_zones(
-    spec: ScenarioFile, found: FileZones, source: str, origin: GeoOrigin, bounds: Floats
+    spec: ScenarioFile, file_zones: FileZones, source: str, origin: GeoOrigin, bounds: Floats
 ) -> ScenarioFile:
     """Add the zones of other files to a scenario's own zones, if they are near."""
-    if not found.zones and not found.notes:
+    if not file_zones.zones and not file_zones.notes:
         return spec
-    near = near_zones(found.zones, source, origin, bounds)
-    notes = [*(spec.zone_notes or ()), *found.notes]
-    if far := len(found.zones) - len(near):
+    zones_nearby = near_zones(file_zones.zones, source, origin, bounds)
+    notes = [*(spec.zone_notes or ()), *file_zones.notes]
+    if far_count := len(file_zones.zones) - len(zones_nearby):
         notes.append(
-            f"{source}: {far:,} of {len(found.zones):,} zones lie more than {FAR / 1000.0:g} km from the area: left out"
+            f"{source}: {far_count:,} of {len(file_zones.zones):,} zones lie more than"
+            f" {MAX_ZONE_DISTANCE / 1000.0:g} km from the"
+            " area: left out"
         )
-    changes = {"zones": [*(spec.zones or ()), *near] or None, "zone_notes": notes or None}
+    changes = {"zones": [*(spec.zones or ()), *zones_nearby] or None, "zone_notes": notes or None}
     return spec.model_copy(update=changes)
 
 
@@ -304,9 +311,9 @@ def _open_terrain(table: TerrainTable, source: str, base: Path | None) -> tuple[
         raise TerrainError.from_error(error, source, "terrain.path", shown) from error
     if table.sha256 not in (None, raster.sha256):
         raise ScenarioError.at(source, "terrain.path", shown, "the file has changed since (its SHA-256 differs)")
-    whole = [path if path in EMBEDDED else whole_path(Path(base or "", path)) for path in paths]
-    found = whole if isinstance(table.path, list) else whole[0]
-    return raster, table.model_copy(update={"path": found, "sha256": raster.sha256})
+    whole_paths = [path if path in EMBEDDED else whole_path(Path(base or "", path)) for path in paths]
+    stored_path = whole_paths if isinstance(table.path, list) else whole_paths[0]
+    return raster, table.model_copy(update={"path": stored_path, "sha256": raster.sha256})
 
 
 def _assemble(
@@ -321,8 +328,8 @@ def _assemble(
 ) -> Scenario:
     area = spec.area
     floor = area.floor_amsl_m if area and area.floor_amsl_m is not None else -500.0
-    top = float(np.nanmax(ground.heights)) if ground is not None else 3000.0
-    ceiling = area.ceiling_amsl_m if area and area.ceiling_amsl_m is not None else top + 1000.0
+    max_ground = float(np.nanmax(ground.heights)) if ground is not None else 3000.0
+    ceiling = area.ceiling_amsl_m if area and area.ceiling_amsl_m is not None else max_ground + 1000.0
     start = map_position(spec.start, "start", source, origin, ground)
     destination = map_position(spec.destination, "destination", source, origin, ground)
     # If the terrain was replaced, the verdict reports ends below the new ground.
@@ -368,11 +375,11 @@ def _assemble(
     )
 
 
-def _made_terrain(table: TerrainTable, bounds: Floats) -> Terrain | None:
+def _make_terrain(table: TerrainTable, bounds: Floats) -> Terrain | None:
     if table.kind == "flat":
         return flat_terrain(bounds, float(table.amsl_m or 0.0), 5 * GROUND_BUFFER)
     if table.kind == "peaks":
-        peaks = [Peak(p.east_m, p.north_m, p.height_m, p.sigma_m) for p in table.peak or []]
+        peaks = [Peak(peak.east_m, peak.north_m, peak.height_m, peak.sigma_m) for peak in table.peak or []]
         return peaks_terrain(bounds, peaks, GROUND_BUFFER)
     return None
 
@@ -401,24 +408,24 @@ def over_terrain(scenario: Scenario, terrain: str) -> Scenario:
     >>> over_terrain(load_scenario("jacksboro"), "jacksboro").terrain.source
     'jacksboro'
     """
-    spec = fixed_ends(scenario.to_json(), scenario.start, scenario.destination)
+    spec = with_absolute_ends(scenario.to_json(), scenario.start, scenario.destination)
     return from_spec(spec, scenario.name, terrain=terrain, external=scenario.external)
 
 
-def fixed_ends(spec: dict[str, Any], start: Floats, destination: Floats) -> dict[str, Any]:
+def with_absolute_ends(spec: dict[str, Any], start: Floats, destination: Floats) -> dict[str, Any]:
     """Return a scenario's JSON data with its ends at the altitudes of these points (m AMSL).
 
     start, destination: (3,).  The altitude replaces a height above ground (`height_m`).
 
     >>> data = {"start": {"east_m": 0.0, "north_m": 0.0, "height_m": 50.0}, "destination": {"amsl_m": 300.0}}
-    >>> fixed_ends(data, np.array([0.0, 0.0, 250.0]), np.array([900.0, 0.0, 300.0]))["start"]
+    >>> with_absolute_ends(data, np.array([0.0, 0.0, 250.0]), np.array([900.0, 0.0, 300.0]))["start"]
     {'east_m': 0.0, 'north_m': 0.0, 'amsl_m': 250.0}
     """
     changed = dict(spec)
     for key, point in (("start", start), ("destination", destination)):
         if isinstance(spec.get(key), dict):
-            kept = {name: value for name, value in spec[key].items() if name != "height_m"}
-            changed[key] = kept | {"amsl_m": float(point[2])}
+            other_entries = {name: value for name, value in spec[key].items() if name != "height_m"}
+            changed[key] = other_entries | {"amsl_m": float(point[2])}
     return changed
 
 
@@ -457,22 +464,22 @@ def with_flight(scenario: Scenario, **changes: Any) -> Scenario:
     >>> with_flight(load_scenario("tight"), airspeed_mps=28.0, nav=None).flight.airspeed_mps
     28.0
     """
-    given = {key: value for key, value in changes.items() if value is not None}
-    kept = scenario.flight.model_dump() | ({"aircraft_by_default": None} if "aircraft" in given else {})
-    if "guidance" in given or "params" in given or "autopilot" in given:
-        # Parameters alone belong to the autopilot that the scenario names, if it has parameters.
-        taken = kept["autopilot_from"] is not None or kept["autopilot"] in (None, OWN_GUIDANCE)
-        named = bool(set(given) & {"guidance", "autopilot"}) or taken
-        kept |= {"guidance": None, "params": None, "autopilot_from": None}
-        kept |= {"autopilot": None, "px4_version": None} if named else {}
-    table = checked_table(lambda: FlightTable(**(kept | given)), f"{scenario.name}: flight")
+    changed = {key: value for key, value in changes.items() if value is not None}
+    entries = scenario.flight.model_dump() | ({"aircraft_by_default": None} if "aircraft" in changed else {})
+    if "guidance" in changed or "params" in changed or "autopilot" in changed:
+        # Parameters without an autopilot belong to the autopilot that the scenario names, if that has parameters.
+        has_parameters = entries["autopilot_from"] is not None or entries["autopilot"] in (None, OWN_GUIDANCE)
+        names_autopilot = bool(set(changed) & {"guidance", "autopilot"}) or has_parameters
+        entries |= {"guidance": None, "params": None, "autopilot_from": None}
+        entries |= {"autopilot": None, "px4_version": None} if names_autopilot else {}
+    table = checked_table(lambda: FlightTable(**(entries | changed)), f"{scenario.name}: flight")
     return replace(scenario, spec=scenario.spec.model_copy(update={"flight": table}), flight=table)
 
 
-def in_the_air(scenario: Scenario) -> Scenario:
+def without_ground_phases(scenario: Scenario) -> Scenario:
     """Return a scenario without launch and landing: its flights begin and end in the air.
 
-    >>> field = in_the_air(load_scenario("jacksboro-field"))
+    >>> field = without_ground_phases(load_scenario("jacksboro-field"))
     >>> field.launch, field.landing, "landing" in field.to_json()
     (None, None, False)
     """
@@ -493,14 +500,14 @@ def with_zones(scenario: Scenario, tables: Sequence[ZoneTable], source: str, not
     >>> [zone.name for zone in with_zones(load_scenario("tight"), [mast], "masts.geojson").zones]
     ['mast']
     """
-    before = len(scenario.spec.zones or ())
-    found = FileZones(list(tables), list(notes))
-    spec = _with_file_zones(scenario.spec, found, source, scenario.origin, scenario.bounds)
-    added = (spec.zones or [])[before:]
-    if before + len(added) > MAX_ZONES:
-        raise ScenarioError(f"{source}: {len(added):,} zones more: at most {MAX_ZONES:,} in all", file=source)
-    only = _active_zones(spec.model_copy(update={"zones": added}))
-    zones = make_zones(only, source, scenario.origin, scenario.terrain)
+    previous_count = len(scenario.spec.zones or ())
+    file_zones = FileZones(list(tables), list(notes))
+    spec = _with_file_zones(scenario.spec, file_zones, source, scenario.origin, scenario.bounds)
+    added_tables = (spec.zones or [])[previous_count:]
+    if previous_count + len(added_tables) > MAX_ZONES:
+        raise ScenarioError(f"{source}: {len(added_tables):,} zones more: at most {MAX_ZONES:,} in all", file=source)
+    active_tables = _active_zones(spec.model_copy(update={"zones": added_tables}))
+    zones = make_zones(active_tables, source, scenario.origin, scenario.terrain)
     ends = (("start", scenario.start), ("destination", scenario.destination))
     check_ends(zones, source, () if scenario.external else ends, scenario.terrain)
     return replace(scenario, spec=spec, zones=(*scenario.zones, *zones))
@@ -530,13 +537,13 @@ def with_threats(
     scenario: Scenario,
     added: Sequence[tuple[float, float, float, float]],
     source: str,
-    kept: Sequence[ThreatTable] = (),
+    existing: Sequence[ThreatTable] = (),
 ) -> Scenario:
     """Return a scenario with additional threats on the ground.
 
     added: east, north, kill radius and detection radius of each, m; a radius of 0 for no missile or radar.  The ratio
     of scale to radius is the median of the scenario's threats, or a quarter for kill and a third for detection.
-    source: name of the threats in messages.  kept: tables to insert before the added threats.
+    source: name of the threats in messages.  existing: tables to insert before the added threats.
     Raises ScenarioError for a threat that is not allowed in a scenario file.
 
     >>> more = with_threats(load_scenario("tight"), [(1300.0, 90.0, 20.0, 0.0)], "--threat")
@@ -544,20 +551,20 @@ def with_threats(
     ('pop-up 1', 20.0)
     """
 
-    def share(radius: Floats, scale: Floats, default: float) -> float:
-        armed = radius > 0.0
-        return float(np.median(scale[armed] / radius[armed])) if armed.any() else default
+    def scale_ratio(radius: Floats, scale: Floats, default: float) -> float:
+        has_radius = radius > 0.0
+        return float(np.median(scale[has_radius] / radius[has_radius])) if has_radius.any() else default
 
-    known = scenario.threats
-    kill_share = share(known.kill_radius, known.kill_scale, 1.0 / 4.0)
-    detection_share = share(known.detection_radius, known.detection_scale, 1.0 / 3.0)
-    tables = [*scenario.spec.threats, *kept]
-    for number, (east, north, kill, detection) in enumerate(added):
-        data: dict[str, Any] = {"name": f"pop-up {len(kept) + number + 1}", "east_m": east, "north_m": north}
+    threats = scenario.threats
+    kill_ratio = scale_ratio(threats.kill_radius, threats.kill_scale, 1.0 / 4.0)
+    detection_ratio = scale_ratio(threats.detection_radius, threats.detection_scale, 1.0 / 3.0)
+    tables = [*scenario.spec.threats, *existing]
+    for index, (east, north, kill, detection) in enumerate(added):
+        data: dict[str, Any] = {"name": f"pop-up {len(existing) + index + 1}", "east_m": east, "north_m": north}
         if kill != 0.0:
-            data |= {"kill_radius_m": kill, "kill_scale_m": kill * kill_share}
+            data |= {"kill_radius_m": kill, "kill_scale_m": kill * kill_ratio}
         if detection != 0.0:
-            data |= {"detection_radius_m": detection, "detection_scale_m": detection * detection_share}
+            data |= {"detection_radius_m": detection, "detection_scale_m": detection * detection_ratio}
         tables.append(checked_table(partial(ThreatTable, **data), source))
     spec = scenario.spec.model_copy(update={"threats": tables})
     return replace(scenario, spec=spec, threats=make_threats(tables, source, scenario.origin, scenario.terrain))

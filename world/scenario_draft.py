@@ -52,10 +52,10 @@ class Place(NamedTuple):
 class Draft:
     """Contents of a scenario file to begin with.
 
-    terrain: path as the file states it; None for flat ground at mean sea level.
+    terrain: path of the elevation file as the scenario states it; None for flat ground at mean sea level.
     start, destination: places at `height` m above ground.
     box: [[east0, east1], [north0, north1]] m about `origin`.  ceiling: m above mean sea level.
-    aircraft, autopilot, px4_version: as in [flight].  airspeed: cruise speed of the aircraft, m/s.
+    aircraft, autopilot, px4_version: see [flight].  airspeed: cruise speed of the aircraft, m/s.
     """
 
     name: str
@@ -92,73 +92,75 @@ def make_draft(
 ) -> Draft:
     """Lay out a scenario from one place to another.
 
-    height: height of both above ground, m.
-    raster: elevation file, None for flat ground.  terrain: its path as the scenario file states it.
-    The area extends about a third of the line's length to all sides of the straight line, within the elevation file,
-    and less if the file has no data there.
+    height: height of start and destination above ground, m.
+    raster: elevation file; None for flat ground.  terrain: path of that file as the scenario file states it.
+    The area extends about a third of the line's length beyond the line on all sides, clipped to the elevation file's
+    data.
     Raises ArgumentError for places that are outside the file, or too near to or too far from each other, and
     TerrainError if there is no data even near the line.
     """
     east, north = (float(value) for value in to_map(GeoOrigin(*start), destination.lat, destination.lon))
     length = math.hypot(east, north)
     if not _MIN_LENGTH_M <= length <= _MAX_LENGTH_M:
-        allowed = f"{_MIN_LENGTH_M:g} m to {_MAX_LENGTH_M / 1000.0:g} km from `start` are expected"
-        raise ArgumentError.of_argument("destination", destination, allowed, shown=_shown(destination, length))
-    middle = to_geo(GeoOrigin(*start), east / 2.0, north / 2.0)
-    origin = GeoOrigin(round(float(middle[0]), 5), round(float(middle[1]), 5))
+        problem = f"{_MIN_LENGTH_M:g} m to {_MAX_LENGTH_M / 1000.0:g} km from `start` are expected"
+        raise ArgumentError.of_argument("destination", destination, problem, shown=_place_text(destination, length))
+    midpoint = to_geo(GeoOrigin(*start), east / 2.0, north / 2.0)
+    origin = GeoOrigin(round(float(midpoint[0]), 5), round(float(midpoint[1]), 5))
     if abs(origin.lat_deg) > _MAX_LATITUDE_DEG:
-        allowed = f"a way that stays within {_MAX_LATITUDE_DEG:g} degrees of latitude is expected"
-        raise ArgumentError.of_argument("destination", destination, allowed, shown=_shown(destination))
-    ends = np.array([to_map(origin, *place) for place in (start, destination)])
-    widest = min(max(_MARGIN_FRACTION * length, _MIN_MARGIN_M), _MAX_MARGIN_M)
-    highest, box = 0.0, _box_about(ends, widest)
+        problem = f"a way that stays within {_MAX_LATITUDE_DEG:g} degrees of latitude is expected"
+        raise ArgumentError.of_argument("destination", destination, problem, shown=_place_text(destination))
+    endpoints = np.array([to_map(origin, *place) for place in (start, destination)])
+    margin = min(max(_MARGIN_FRACTION * length, _MIN_MARGIN_M), _MAX_MARGIN_M)
+    highest_ground, bounds = 0.0, _enclosing_box(endpoints, margin)
     if raster is not None:
-        box, highest = _ground_about(raster, origin, {"start": start, "destination": destination}, ends, widest)
-    ceiling = math.ceil((highest + height + _HEADROOM_M) / _CEILING_STEP_M) * _CEILING_STEP_M
-    box = np.stack([np.ceil(box[:, 0] / 10.0), np.floor(box[:, 1] / 10.0)], axis=1) * 10.0
+        bounds, highest_ground = _survey_ground(
+            raster, origin, {"start": start, "destination": destination}, endpoints, margin
+        )
+    ceiling = math.ceil((highest_ground + height + _HEADROOM_M) / _CEILING_STEP_M) * _CEILING_STEP_M
+    bounds = np.stack([np.ceil(bounds[:, 0] / 10.0), np.floor(bounds[:, 1] / 10.0)], axis=1) * 10.0
     return Draft(
-        name, terrain, start, destination, height, origin, box, ceiling, aircraft, airspeed, autopilot, px4_version
+        name, terrain, start, destination, height, origin, bounds, ceiling, aircraft, airspeed, autopilot, px4_version
     )
 
 
-def _ground_about(
-    raster: RasterFile, origin: GeoOrigin, places: Mapping[str, Place], ends: Floats, widest: float
+def _survey_ground(
+    raster: RasterFile, origin: GeoOrigin, places: Mapping[str, Place], endpoints: Floats, margin: float
 ) -> tuple[Floats, float]:
-    """Return the area (2, 2) about two places for which an elevation file has data, and its highest ground, m.
+    """Return an area (2, 2) around two places with elevation data, and its highest ground, m.
 
-    places: the two places by their keywords; ends: (2, 2) the same on the map, m.  widest: width of ground on all
+    places: the two places by their keywords; ends: (2, 2) the same on the map, m.  margin: width of ground on all
     sides, m.  Raises ArgumentError for a place that the file does not cover, and TerrainError.
     """
-    for share in _MARGIN_REDUCTIONS:
-        box = _within_file(_box_about(ends, share * widest), raster, origin)
-        for (keyword, place), end in zip(places.items(), ends, strict=True):
-            if not ((box[:, 0] + _EDGE_M <= end) & (end <= box[:, 1] - _EDGE_M)).all():
-                allowed = f"outside {raster.name} or within {_EDGE_M:g} m of its edge: it covers {cover_text(raster)}"
-                raise ArgumentError.of_argument(keyword, place, allowed, shown=_shown(place))
+    for fraction in _MARGIN_REDUCTIONS:
+        bounds = _clip_to_file(_enclosing_box(endpoints, fraction * margin), raster, origin)
+        for (keyword, place), end in zip(places.items(), endpoints, strict=True):
+            if not ((bounds[:, 0] + _EDGE_M <= end) & (end <= bounds[:, 1] - _EDGE_M)).all():
+                problem = f"outside {raster.name} or within {_EDGE_M:g} m of its edge: it covers {cover_text(raster)}"
+                raise ArgumentError.of_argument(keyword, place, problem, shown=_place_text(place))
         try:
-            return box, float(np.nanmax(read_terrain(raster, origin, box, 0.0).heights))
+            return bounds, float(np.nanmax(read_terrain(raster, origin, bounds, 0.0).heights))
         except TerrainError:
-            if share == _MARGIN_REDUCTIONS[-1]:
+            if fraction == _MARGIN_REDUCTIONS[-1]:
                 raise
     raise AssertionError
 
 
-def _box_about(ends: Floats, margin: float) -> Floats:
+def _enclosing_box(endpoints: Floats, margin: float) -> Floats:
     """Return the box (2, 2) about two places (2, 2) with a margin, m."""
-    return np.stack([ends.min(axis=0) - margin, ends.max(axis=0) + margin], axis=1)
+    return np.stack([endpoints.min(axis=0) - margin, endpoints.max(axis=0) + margin], axis=1)
 
 
-def _shown(place: Place, length: float | None = None) -> str:
-    there = f"{place.lat:g},{place.lon:g}"
-    return there if length is None else f"{there}, {length / 1000.0:,.3g} km away"
+def _place_text(place: Place, length: float | None = None) -> str:
+    position = f"{place.lat:g},{place.lon:g}"
+    return position if length is None else f"{position}, {length / 1000.0:,.3g} km away"
 
 
-def _within_file(box: Floats, raster: RasterFile, origin: GeoOrigin) -> Floats:
+def _clip_to_file(area: Floats, raster: RasterFile, origin: GeoOrigin) -> Floats:
     """Return a box (2, 2) cut to the area that the file covers."""
-    if is_covered(raster, origin, box):
-        return box
-    bounds = tile_bounds(raster, origin)
-    return np.stack([np.maximum(box[:, 0], bounds[:, 0]), np.minimum(box[:, 1], bounds[:, 1])], axis=1)
+    if is_covered(raster, origin, area):
+        return area
+    tile_area = tile_bounds(raster, origin)
+    return np.stack([np.maximum(area[:, 0], tile_area[:, 0]), np.minimum(area[:, 1], tile_area[:, 1])], axis=1)
 
 
 # ----------------------------------------------------------------------
@@ -188,16 +190,23 @@ def draft_text(draft: Draft) -> str:
     <BLANKLINE>
     """
     return "\n".join(
-        (_head(draft), _terrain(draft), _area_and_ends(draft), _limits(draft), _flight_tables(draft), _examples(draft))
+        (
+            _head_text(draft),
+            _terrain_text(draft),
+            _area_and_ends_text(draft),
+            _limits_text(draft),
+            _flight_text(draft),
+            _examples_text(draft),
+        )
     )
 
 
-def _text(value: str) -> str:
+def _toml(value: str) -> str:
     """Return a TOML string; JSON's escapes are valid in TOML."""
     return json.dumps(value, ensure_ascii=False)
 
 
-def _number(value: float) -> str:
+def _number_text(value: float) -> str:
     return f"{value:.8g}"
 
 
@@ -205,20 +214,22 @@ def _line(key: str, value: str, comment: str = "") -> str:
     return f"{f'{key} = {value}':<30}# {comment}" if comment else f"{key} = {value}"
 
 
-def _head(draft: Draft) -> str:
-    start, there = (f"{_number(place.lat)}, {_number(place.lon)}" for place in (draft.start, draft.destination))
+def _head_text(draft: Draft) -> str:
+    start, destination = (
+        f"{_number_text(place.lat)}, {_number_text(place.lon)}" for place in (draft.start, draft.destination)
+    )
     return f"""\
-# From {start} to {there}.  Lines that begin with "# " and a key are examples: take the "# " away.
+# From {start} to {destination}.  Lines that begin with "# " and a key are examples: take the "# " away.
 # All keys: docs/scenario-file.md of planfly.
-name = {_text(draft.name)}
+name = {_toml(draft.name)}
 
 [origin]                      # where east_m = north_m = 0: half way
-lat_deg = {_number(draft.origin.lat_deg)}
-lon_deg = {_number(draft.origin.lon_deg)}
+lat_deg = {_number_text(draft.origin.lat_deg)}
+lon_deg = {_number_text(draft.origin.lon_deg)}
 """
 
 
-def _terrain(draft: Draft) -> str:
+def _terrain_text(draft: Draft) -> str:
     if draft.terrain is None:
         return f"""\
 [terrain]
@@ -228,16 +239,16 @@ def _terrain(draft: Draft) -> str:
 # kind = "dem"
 {_line("# path", '"dem.tif"', "an elevation file, a folder of tiles, or a .vrt")}
 """
-    where = "the tile that planfly ships" if draft.terrain in EMBEDDED else "counted from this file's folder"
+    comment = "the tile that planfly ships" if draft.terrain in EMBEDDED else "counted from this file's folder"
     return f"""\
 [terrain]
 kind = "dem"
-{_line("path", _text(draft.terrain), where)}
+{_line("path", _toml(draft.terrain), comment)}
 {_line("# vertical_error_m", "5", "as its source states it: clearance is then also shown minus this")}
 """
 
 
-def _area_and_ends(draft: Draft) -> str:
+def _area_and_ends_text(draft: Draft) -> str:
     (east0, east1), (north0, north1) = (tuple(f"{value:.0f}" for value in side) for side in draft.box)
     ends = []
     for key, place, course in (
@@ -246,38 +257,38 @@ def _area_and_ends(draft: Draft) -> str:
     ):
         ends.append(f"""\
 [{key}]
-lat_deg = {_number(place.lat)}
-lon_deg = {_number(place.lon)}
-{_line("height_m", _number(draft.height), "above ground; amsl_m counts from mean sea level")}
+lat_deg = {_number_text(place.lat)}
+lon_deg = {_number_text(place.lon)}
+{_line("height_m", _number_text(draft.height), "above ground; amsl_m counts from mean sea level")}
 {_line("# course_deg", "0", course)}
 """)
     return f"""\
 [area]                        # where a path may lead, m from [origin]
 east_m = [{east0}, {east1}]
 north_m = [{north0}, {north1}]
-{_line("ceiling_amsl_m", _number(draft.ceiling), "above mean sea level")}
+{_line("ceiling_amsl_m", _number_text(draft.ceiling), "above mean sea level")}
 
 """ + "\n".join(ends)
 
 
-def _limits(draft: Draft) -> str:
+def _limits_text(draft: Draft) -> str:
     return f"""\
 [limits]                      # turns and slopes: what the aircraft can do, unless a number is given
-{_line("min_clearance_m", _number(draft.clearance), "above ground")}
-{_line("# max_height_m", _number(max(400.0, 2.0 * draft.height)), "above ground")}
+{_line("min_clearance_m", _number_text(draft.clearance), "above ground")}
+{_line("# max_height_m", _number_text(max(400.0, 2.0 * draft.height)), "above ground")}
 {_line("# max_turn_deg", "60", "at a waypoint")}
 {_line("# corridor_m", "60", "half width about the legs; by default what the autopilot needs")}
 """
 
 
-def _flight_tables(draft: Draft) -> str:
-    version = "" if draft.px4_version is None else f"\npx4_version = {_text(draft.px4_version)}"
+def _flight_text(draft: Draft) -> str:
+    version = "" if draft.px4_version is None else f"\npx4_version = {_toml(draft.px4_version)}"
     return f"""\
 [flight]
-{_line("aircraft", _text(draft.aircraft), "planfly aircraft lists them; a folder of your own")}
-{_line("autopilot", _text(draft.autopilot), '"ardupilot", "px4", or "planfly": planfly' + "'s own guidance")}{version}
+{_line("aircraft", _toml(draft.aircraft), "planfly aircraft lists them; a folder of your own")}
+{_line("autopilot", _toml(draft.autopilot), '"ardupilot", "px4", or "planfly": planfly' + "'s own guidance")}{version}
 {_line("# params", '"mine.param"', "its parameters, as a ground station saves them")}
-{_line("# airspeed_mps", _number(draft.airspeed), "equivalent, by planfly's guidance true; by default this")}
+{_line("# airspeed_mps", _number_text(draft.airspeed), "equivalent, by planfly's guidance true; by default this")}
 
 [wind]
 {_line("speed_mps", "0", "your forecast, 0 to 40")}
@@ -289,11 +300,11 @@ def _flight_tables(draft: Draft) -> str:
 """
 
 
-def _examples(draft: Draft) -> str:
+def _examples_text(draft: Draft) -> str:
     """Return the commented examples: a threat and a zone near the straight line, small enough to fly around."""
-    rounded = max(50.0, round(float(np.diff(draft.box, axis=1).min()) / 200.0) * 10.0)
+    radius = max(50.0, round(float(np.diff(draft.box, axis=1).min()) / 200.0) * 10.0)
     threat, zone = (
-        Place(*(float(x) for x in to_geo(draft.origin, *point))) for point in _example_places(draft, rounded)
+        Place(*(float(x) for x in to_geo(draft.origin, *point))) for point in _example_places(draft, radius)
     )
     return f"""\
 # A threat: a missile, a radar, or both; on the ground unless a height is given.
@@ -301,10 +312,10 @@ def _examples(draft: Draft) -> str:
 # name = "battery"
 # lat_deg = {threat.lat:.5f}
 # lon_deg = {threat.lon:.5f}
-{_line("# kill_radius_m", _number(rounded))}
-{_line("# kill_scale_m", _number(round(rounded / 4.0)), "how softly its reach ends")}
-{_line("# detection_radius_m", _number(2.0 * rounded))}
-{_line("# detection_scale_m", _number(round(rounded / 2.0)))}
+{_line("# kill_radius_m", _number_text(radius))}
+{_line("# kill_scale_m", _number_text(round(radius / 4.0)), "how softly its reach ends")}
+{_line("# detection_radius_m", _number_text(2.0 * radius))}
+{_line("# detection_scale_m", _number_text(round(radius / 2.0)))}
 
 # A zone to keep out of ("inclusion": to stay in); files of zones: zones_file = "airspace.geojson" above all tables.
 # [[zones]]
@@ -312,7 +323,7 @@ def _examples(draft: Draft) -> str:
 # kind = "exclusion"
 # lat_deg = {zone.lat:.5f}
 # lon_deg = {zone.lon:.5f}
-{_line("# radius_m", _number(rounded))}
+{_line("# radius_m", _number_text(radius))}
 {_line("# ceiling_agl_m", "300", "it may be flown over above this height above ground")}
 
 # What the way home is judged by.
@@ -323,8 +334,8 @@ def _examples(draft: Draft) -> str:
 
 def _example_places(draft: Draft, radius: float) -> tuple[tuple[float, float], tuple[float, float]]:
     """Return two places, one on either side of the straight line, a third of its length from each end, m."""
-    ends = np.array([to_map(draft.origin, *place) for place in (draft.start, draft.destination)])
-    along = ends[1] - ends[0]
-    aside = np.array([-along[1], along[0]]) / (math.hypot(*along) or 1.0) * radius * 0.5
-    first, second = ends[0] + along / 3.0 + aside, ends[1] - along / 3.0 - aside
+    endpoints = np.array([to_map(draft.origin, *place) for place in (draft.start, draft.destination)])
+    along = endpoints[1] - endpoints[0]
+    offset = np.array([-along[1], along[0]]) / (math.hypot(*along) or 1.0) * radius * 0.5
+    first, second = endpoints[0] + along / 3.0 + offset, endpoints[1] - along / 3.0 - offset
     return (float(first[0]), float(first[1])), (float(second[0]), float(second[1]))

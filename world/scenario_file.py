@@ -29,16 +29,16 @@ def parse_scenario(text: str, source: str) -> ScenarioFile:
         data = toml_table(text)
     # Not only TOMLDecodeError: also for a number of thousands of digits, and for deeply nested brackets.
     except ValueError as error:
-        raise ScenarioError(f"{source}: not valid TOML: {_line(error)}", file=source) from error
+        raise ScenarioError(f"{source}: not valid TOML: {_first_line(error)}", file=source) from error
     terrain = data.get("terrain")
     if isinstance(terrain, dict) and terrain.get("kind") == "none":
         raise ScenarioError(
             f'{source}: terrain.kind: "none": allowed are "dem", "peaks" and "flat"', file=source, field="terrain.kind"
         )
-    made = check_scenario(data, source)
-    if "aircraft" in made.flight.model_fields_set:
-        return made
-    return made.model_copy(update={"flight": made.flight.model_copy(update={"aircraft_by_default": True})})
+    spec = check_scenario(data, source)
+    if "aircraft" in spec.flight.model_fields_set:
+        return spec
+    return spec.model_copy(update={"flight": spec.flight.model_copy(update={"aircraft_by_default": True})})
 
 
 def check_scenario(data: Any, source: str) -> ScenarioFile:
@@ -87,9 +87,9 @@ class Fault(NamedTuple):
     text: str
 
     def at(self, source: str, part: str = "") -> dict[str, Any]:
-        """Return the arguments of a `PlanflyError`.  source: the file.
+        """Return the arguments of a `PlanflyError`.
 
-        Part: the part of the file with the fault.
+        source: the file.  part: the part of the file with the fault.
         """
         begin = f"{source}: {part}" if part else source
         message = f"{begin}: {self.text}"
@@ -110,11 +110,11 @@ def first_fault(error: ValidationError, data: Any = None, model: type[BaseModel]
     ...     print(first_fault(error))
     Fault(field='speed_mps', value=41.0, allowed='allowed 0..40', text='speed_mps: 41.0: allowed 0..40')
     """
-    found = error.errors(include_url=False)
+    faults = error.errors(include_url=False)
     # A misspelt key is reported as missing, too; the misspelling is the more useful message.
-    mistaken = [item for item in found if item["type"] == "extra_forbidden" and _near(item["loc"], model)]
-    first = (mistaken or found)[0]
-    keys = [str(part) for part in (first["loc"] if data is None else _keys_found(first["loc"], data))]
+    misspelt = [fault for fault in faults if fault["type"] == "extra_forbidden" and _suggestion(fault["loc"], model)]
+    first = (misspelt or faults)[0]
+    keys = [str(part) for part in (first["loc"] if data is None else _data_keys(first["loc"], data))]
     # A check of planfly raises its own error; use its message.
     message = str(first["ctx"]["error"]) if first["type"] == "value_error" else first["msg"]
     if first["type"] == "model_type":
@@ -124,26 +124,26 @@ def first_fault(error: ValidationError, data: Any = None, model: type[BaseModel]
     value = first.get("input")
     if isinstance(value, dict | list):
         value = None
-    shown = "" if isinstance(first.get("input"), dict | list) else f": {_shown(value)}"
+    shown = "" if isinstance(first.get("input"), dict | list) else f": {_shown_text(value)}"
     if first["type"] == "extra_forbidden":
-        message = f"unknown key{_near(first['loc'], model)}"
+        message = f"unknown key{_suggestion(first['loc'], model)}"
         shown = ""
     if first["type"] == "missing":
         value, shown = None, ""
         keys = [str(part) for part in first["loc"]]
-    more = f" (and {len(found) - 1} more)" if len({item["loc"][:2] for item in found}) > 1 else ""
-    named = ".".join(key if key.isprintable() else json.dumps(key) for key in keys)
+    remainder = f" (and {len(faults) - 1} more)" if len({fault["loc"][:2] for fault in faults}) > 1 else ""
+    field = ".".join(key if key.isprintable() else json.dumps(key) for key in keys)
     # A check of the whole file names its key itself.
-    begin = "" if not named and first["type"] == "value_error" else f"{named or 'file'}{shown}: "
-    return Fault(named, value, message, f"{begin}{message}{more}")
+    prefix = "" if not field and first["type"] == "value_error" else f"{field or 'file'}{shown}: "
+    return Fault(field, value, message, f"{prefix}{message}{remainder}")
 
 
-def _near(parts: Sequence[str | int], model: type[BaseModel] | None) -> str:
-    """Return the suggestion of a known key for an unknown one, in words."""
-    return "" if model is None else did_you_mean(str(parts[-1]), _keys_known(parts[:-1], model))
+def _suggestion(parts: Sequence[str | int], model: type[BaseModel] | None) -> str:
+    """Return a text that suggests a known key for an unknown one."""
+    return "" if model is None else did_you_mean(str(parts[-1]), _known_keys(parts[:-1], model))
 
 
-def _keys_known(parts: Sequence[str | int], model: type[BaseModel]) -> list[str]:
+def _known_keys(parts: Sequence[str | int], model: type[BaseModel]) -> list[str]:
     """Return the known keys of the tables at or below the first key of a place, or of the whole model."""
     table = model.model_fields.get(str(parts[0])) if parts else None
     if table is None:
@@ -151,32 +151,32 @@ def _keys_known(parts: Sequence[str | int], model: type[BaseModel]) -> list[str]
     tables = [table.annotation]
     keys: list[str] = []
     # The list grows during the loop, as a table's fields may be tables, in lists and unions.
-    for kind in tables:
-        tables += [arg for arg in get_args(kind) if arg not in tables]
-        if isinstance(kind, type) and issubclass(kind, BaseModel):
-            keys += kind.model_fields
-            inner = (field.annotation for field in kind.model_fields.values())
-            tables += [annotation for annotation in inner if annotation not in tables]
+    for table_type in tables:
+        tables += [argument for argument in get_args(table_type) if argument not in tables]
+        if isinstance(table_type, type) and issubclass(table_type, BaseModel):
+            keys += table_type.model_fields
+            field_annotations = (field.annotation for field in table_type.model_fields.values())
+            tables += [annotation for annotation in field_annotations if annotation not in tables]
     return keys
 
 
-def _keys_found(parts: tuple[str | int, ...], data: Any) -> list[str | int]:
-    """Return the parts of a place that are keys of the data, without the branches that pydantic names in unions."""
-    found = []
+def _data_keys(parts: tuple[str | int, ...], data: Any) -> list[str | int]:
+    """Return the parts of a place that are keys of the data; pydantic also names the branches of unions."""
+    keys = []
     for part in parts:
-        inside = range(len(data)) if isinstance(data, list) else data if isinstance(data, dict) else ()
-        if part in inside:
-            found.append(part)
+        known_keys = range(len(data)) if isinstance(data, list) else data if isinstance(data, dict) else ()
+        if part in known_keys:
+            keys.append(part)
             data = data[part]
-    return found
+    return keys
 
 
-def _shown(value: Any) -> str:
+def _shown_text(value: Any) -> str:
     if isinstance(value, float) and not math.isfinite(value):
         return str(value)
     text = json.dumps(value, default=str)
     return text if len(text) <= 60 else text[:57] + "..."
 
 
-def _line(error: BaseException) -> str:
+def _first_line(error: BaseException) -> str:
     return str(error).splitlines()[0]

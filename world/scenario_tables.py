@@ -1,4 +1,4 @@
-"""Tables of a scenario file as pydantic models: unknown keys, NaN and out-of-range values are refused.
+"""Tables of a scenario file as pydantic models: unknown keys, NaN and out-of-range values are rejected.
 
 The models mirror the TOML key for key.  `world.scenario_file` reads a file into them, and `world.scenario` turns them
 into a `Scenario`.
@@ -37,9 +37,9 @@ def within(low: float, high: float, *, above: bool = False, below: bool = False,
         # The comparisons are written so that NaN fails.
         if (low < value if above else low <= value) and (value < high if below else value <= high):
             return value
-        first, last = ("above " if above else ""), ("below " if below else "")
-        least, most = (x if isinstance(x, int) else f"{x:.12g}" for x in (low, high))
-        raise ValueError(f"allowed {first}{least}..{last}{most}{also}")
+        low_prefix, high_prefix = ("above " if above else ""), ("below " if below else "")
+        low_text, high_text = (bound if isinstance(bound, int) else f"{bound:.12g}" for bound in (low, high))
+        raise ValueError(f"allowed {low_prefix}{low_text}..{high_prefix}{high_text}{also}")
 
     return AfterValidator(check)
 
@@ -64,7 +64,7 @@ Angle = Annotated[float, within(0.0, 90.0, above=True, below=True, also=', or "a
 
 
 class ScenarioTable(BaseModel):
-    """A table of a scenario file: unknown keys are refused."""
+    """A table of a scenario file; unknown keys are rejected."""
 
     # Strict mode: otherwise pydantic accepts true, "5" and "yes" as numbers and booleans.  Each number has its own
     # range, which excludes NaN and the infinities.
@@ -82,29 +82,29 @@ MAX_RINGS = 1_000
 MAX_ZONES = 20_000
 
 
-def _latitude_first(corner: list[float]) -> list[float]:
+def _check_latitude(corner: list[float]) -> list[float]:
     """Return the corner; raise ValueError if its first number cannot be a latitude."""
     if not -89.0 <= corner[0] <= 89.0:
         raise ValueError(f"latitude {corner[0]:g}: allowed -89..89; a corner is [latitude, longitude]")
     return corner
 
 
-def _known_period(text: str) -> str:
+def _check_period(text: str) -> str:
     """Return the text; raise ValueError if it does not state a period of time."""
     parse_period(text)
     return text
 
 
-def _known_span(text: str) -> str:
+def _check_span(text: str) -> str:
     """Return the text; raise ValueError if it states neither a flight's start time nor its time span."""
     parse_span(text)
     return text
 
 
-_ZoneTime = Annotated[str, Field(min_length=1, max_length=100), AfterValidator(_known_period)]
+_ZoneTime = Annotated[str, Field(min_length=1, max_length=100), AfterValidator(_check_period)]
 _MetreCorner = Annotated[list[Metres], Field(min_length=2, max_length=2)]
 _Degrees = Annotated[float, within(-180.0, 180.0)]
-_DegreeCorner = Annotated[list[_Degrees], Field(min_length=2, max_length=2), AfterValidator(_latitude_first)]
+_DegreeCorner = Annotated[list[_Degrees], Field(min_length=2, max_length=2), AfterValidator(_check_latitude)]
 _MetreRing = Annotated[list[_MetreCorner], Field(max_length=MAX_CORNERS)]
 _DegreeRing = Annotated[list[_DegreeCorner], Field(max_length=MAX_CORNERS)]
 
@@ -116,7 +116,7 @@ class ZoneTable(ScenarioTable):
     rings_m, rings_deg: several rings, for a zone with holes or several parts: a point is inside the zone if an odd
     number of rings contain it.
     east_m, north_m or lat_deg, lon_deg, with radius_m: a cylinder.
-    floor, ceiling: above mean sea level or above ground; unbounded if neither is given.
+    floor_..., ceiling_...: heights above mean sea level or above ground; unbounded if neither is given.
     times: periods in which the zone is active, as `world.airspace.zone_times` reads them; None for always.
     """
 
@@ -138,14 +138,14 @@ class ZoneTable(ScenarioTable):
     times: Annotated[list[_ZoneTime], Field(min_length=1, max_length=1000)] | None = None
 
     @model_validator(mode="after")
-    def _one_shape(self) -> "ZoneTable":
+    def _check_shape(self) -> "ZoneTable":
         shapes = ("polygon_m", "polygon_deg", "rings_m", "rings_deg", "radius_m")
-        given = [key for key in shapes if getattr(self, key) is not None]
-        if len(given) != 1:
-            raise ValueError(f"polygon_m: give one of {', '.join(shapes)}, not {len(given)}")
+        stated_keys = [key for key in shapes if getattr(self, key) is not None]
+        if len(stated_keys) != 1:
+            raise ValueError(f"polygon_m: give one of {', '.join(shapes)}, not {len(stated_keys)}")
         corners = sum(map(len, self.rings_m or self.rings_deg or ()))
         if corners > MAX_CORNERS:
-            raise ValueError(f"{given[0]}: {corners:,} corners: at most {MAX_CORNERS:,} are allowed in one zone")
+            raise ValueError(f"{stated_keys[0]}: {corners:,} corners: at most {MAX_CORNERS:,} are allowed in one zone")
         metres = (self.east_m is not None, self.north_m is not None)
         degrees = (self.lat_deg is not None, self.lon_deg is not None)
         if self.radius_m is None:
@@ -156,7 +156,7 @@ class ZoneTable(ScenarioTable):
         return self
 
     @model_validator(mode="after")
-    def _one_band(self) -> "ZoneTable":
+    def _check_band(self) -> "ZoneTable":
         for side in ("floor", "ceiling"):
             if getattr(self, f"{side}_amsl_m") is not None and getattr(self, f"{side}_agl_m") is not None:
                 raise ValueError(f"{side}_agl_m: give {side}_amsl_m or {side}_agl_m, not both")
@@ -183,22 +183,22 @@ class PeakTable(ScenarioTable):
     sigma_m: Annotated[float, within(10.0, 100_000.0)]
 
 
-def _known_datum(datum: StatedDatum) -> StatedDatum:
+def _check_datum(datum: StatedDatum) -> StatedDatum:
     """Return the datum; raise ValueError unless it is a known name or a plausible height of mean sea level, m."""
     names = get_args(NamedDatum)
     if datum in names or (not isinstance(datum, str) and abs(datum) <= MAX_SEA_LEVEL):
         return datum
-    listed = ", ".join(f'"{name}"' for name in names)
-    raise ValueError(f"allowed {listed} or {-MAX_SEA_LEVEL:g}..{MAX_SEA_LEVEL:g} m")
+    allowed_names = ", ".join(f'"{name}"' for name in names)
+    raise ValueError(f"allowed {allowed_names} or {-MAX_SEA_LEVEL:g}..{MAX_SEA_LEVEL:g} m")
 
 
-def _file_or_tiles(path: object) -> object:
+def _check_paths(path: object) -> object:
     """Return the path; raise ValueError unless it is a file name or a list of file names.
 
-    A pydantic union alone would report one error for each of its members.
+    A pydantic union would report one error for each of its members.
     """
-    listed = path if isinstance(path, list) else [path]
-    if path is None or (1 <= len(listed) <= MAX_TILES and all(isinstance(one, str) and one for one in listed)):
+    paths = path if isinstance(path, list) else [path]
+    if path is None or (1 <= len(paths) <= MAX_TILES and all(isinstance(name, str) and name for name in paths)):
         return path
     raise ValueError(f"a file's name, or a list of 1 to {MAX_TILES}, is expected")
 
@@ -214,21 +214,21 @@ class TerrainTable(ScenarioTable):
     """
 
     kind: Literal["dem", "peaks", "flat", "none"]
-    path: Annotated[FilePath | list[FilePath] | None, BeforeValidator(_file_or_tiles)] = None
+    path: Annotated[FilePath | list[FilePath] | None, BeforeValidator(_check_paths)] = None
     peak: Annotated[list[PeakTable], Field(max_length=1000)] | None = None
     amsl_m: Amsl | None = None
     vertical_error_m: Annotated[float, within(0.0, 1000.0)] | None = None
-    height_datum: Annotated[str | float, AfterValidator(_known_datum)] | None = None
+    height_datum: Annotated[str | float, AfterValidator(_check_datum)] | None = None
     sha256: str | None = None
 
     @model_validator(mode="after")
-    def _kind_has_its_keys(self) -> "TerrainTable":
-        needs = {"dem": "path", "peaks": "peak", "flat": "amsl_m", "none": ""}[self.kind]
+    def _check_kind_keys(self) -> "TerrainTable":
+        needed_key = {"dem": "path", "peaks": "peak", "flat": "amsl_m", "none": ""}[self.kind]
         for key in ("path", "peak", "amsl_m"):
-            given = getattr(self, key) is not None
-            if key == needs and not given:
+            is_given = getattr(self, key) is not None
+            if key == needed_key and not is_given:
                 raise ValueError(f'{key}: missing; kind = "{self.kind}" needs it')
-            if key != needs and given:
+            if key != needed_key and is_given:
                 raise ValueError(f'{key}: not a key of kind = "{self.kind}"')
         if self.height_datum is not None and self.kind != "dem":
             raise ValueError(f'height_datum: not a key of kind = "{self.kind}"')
@@ -244,7 +244,7 @@ class AreaTable(ScenarioTable):
     floor_amsl_m: Amsl | None = None
 
     @model_validator(mode="after")
-    def _in_order(self) -> "AreaTable":
+    def _check_order(self) -> "AreaTable":
         for key in ("east_m", "north_m"):
             low, high = getattr(self, key)
             if not high - low >= 100.0:
@@ -260,7 +260,7 @@ class AreaTable(ScenarioTable):
         return self
 
 
-def _one_position(table: "PositionTable") -> None:
+def _check_one_position(table: "PositionTable") -> None:
     """Raise ValueError unless the position is given exactly once, in metres or in degrees."""
     metres = (table.east_m is not None, table.north_m is not None)
     degrees = (table.lat_deg is not None, table.lon_deg is not None)
@@ -284,8 +284,8 @@ class PointTable(PositionTable):
     height_m: Height | None = None
 
     @model_validator(mode="after")
-    def _one_form(self) -> "PointTable":
-        _one_position(self)
+    def _check_form(self) -> "PointTable":
+        _check_one_position(self)
         if self.amsl_m is not None and self.height_m is not None:
             raise ValueError("height_m: give amsl_m or height_m, not both")
         return self
@@ -297,7 +297,7 @@ class EndTable(PointTable):
     course_deg: Course | None = None
 
     @model_validator(mode="after")
-    def _has_height(self) -> "EndTable":
+    def _check_height(self) -> "EndTable":
         if self.amsl_m is None and self.height_m is None:
             raise ValueError("amsl_m: missing; give amsl_m or height_m")
         return self
@@ -313,7 +313,7 @@ class ThreatTable(PointTable):
     detection_scale_m: Radius | None = None
 
     @model_validator(mode="after")
-    def _pairs(self) -> "ThreatTable":
+    def _check_pairs(self) -> "ThreatTable":
         for kind in ("kill", "detection"):
             radius, scale = getattr(self, f"{kind}_radius_m"), getattr(self, f"{kind}_scale_m")
             if (radius is None) != (scale is None):
@@ -329,7 +329,7 @@ class LimitsTable(ScenarioTable):
     corridor_m: half width of the corridor about the legs; None for the width that the autopilot needs.
     surveys: "lines" to judge parallel lines as the photo lines of a survey and leave the turn-arounds to the autopilot,
     "path" to judge them as any other path; None for "lines" where the mission triggers its camera on them.
-    max_height_m: above ground; None for no limit.
+    max_height_m: largest height above ground; None for no limit.
     """
 
     max_turn_deg: Annotated[float, within(0.0, 180.0, above=True, also=', or "aircraft"')] | Literal["aircraft"] = (
@@ -343,7 +343,7 @@ class LimitsTable(ScenarioTable):
     surveys: Literal["lines", "path"] | None = None
 
     @model_validator(mode="after")
-    def _a_band_between(self) -> "LimitsTable":
+    def _check_height_band(self) -> "LimitsTable":
         if self.max_height_m is not None and self.max_height_m <= self.min_clearance_m:
             raise ValueError(
                 f"max_height_m: {self.max_height_m:g}: must be above min_clearance_m {self.min_clearance_m:g}"
@@ -410,9 +410,9 @@ class Steering(NamedTuple):
 
 
 class FlightTable(ScenarioTable):
-    """[flight].  A None was not stated; `steering` replaces it with its default.
+    """[flight].  None means not stated; `steering` gives the default.
 
-    autopilot: name of the autopilot; guidance alone means "planfly", params alone "ardupilot".
+    autopilot: name of the autopilot; if it is not stated, guidance implies "planfly", and params "ardupilot".
     autopilot_from: file that the autopilot was inferred from, see `planfly.workflow.file_autopilots`.
     params: file with the autopilot's parameters.
     px4_version: release of autopilot = "px4", as releases fly differently; None for the newest.
@@ -436,7 +436,7 @@ class FlightTable(ScenarioTable):
     battery_wh: Annotated[float, within(0.0, 100_000.0, above=True)] | None = None
 
     @model_validator(mode="after")
-    def _one_autopilot(self) -> "FlightTable":
+    def _check_autopilot(self) -> "FlightTable":
         autopilot = self.steering.autopilot
         if self.guidance is not None and autopilot != OWN_GUIDANCE:
             raise ValueError(f'guidance: not a key of autopilot = "{autopilot}"')
@@ -448,26 +448,28 @@ class FlightTable(ScenarioTable):
 
     @property
     def steering(self) -> Steering:
-        """Autopilot, guidance law and navigation.
+        """Autopilot, guidance law and navigation accuracy.
 
-        By default "perfect" for planfly's guidance, "gnss" for others.
+        The default accuracy is "perfect" for planfly's guidance, and "gnss" for other autopilots.
         """
-        implied = DEFAULT_AUTOPILOT
+        implied_autopilot = DEFAULT_AUTOPILOT
         if self.guidance is not None:
-            implied = OWN_GUIDANCE
+            implied_autopilot = OWN_GUIDANCE
         elif self.params is not None:
-            implied = "ardupilot"
-        autopilot = self.autopilot or implied
-        usual: Navigation = "perfect" if autopilot == OWN_GUIDANCE else "gnss"
-        return Steering(autopilot, self.guidance or "path", self.nav or usual)
+            implied_autopilot = "ardupilot"
+        autopilot = self.autopilot or implied_autopilot
+        default_nav: Navigation = "perfect" if autopilot == OWN_GUIDANCE else "gnss"
+        return Steering(autopilot, self.guidance or "path", self.nav or default_nav)
 
     def stated(self) -> "FlightTable":
         """Return the same flight with autopilot, release and navigation stated, as plans and logs store it."""
         autopilot, guidance, nav = self.steering
-        who: dict[str, str] = {"autopilot": autopilot} if autopilot != OWN_GUIDANCE else {"guidance": guidance}
+        autopilot_entries: dict[str, str] = (
+            {"autopilot": autopilot} if autopilot != OWN_GUIDANCE else {"guidance": guidance}
+        )
         if autopilot == _PX4:
-            who["px4_version"] = self.px4_version or NEWEST_PX4
-        return self.model_copy(update={**who, "nav": nav})
+            autopilot_entries["px4_version"] = self.px4_version or NEWEST_PX4
+        return self.model_copy(update={**autopilot_entries, "nav": nav})
 
 
 class WindTable(ScenarioTable):
@@ -481,26 +483,29 @@ class WindTable(ScenarioTable):
 
 
 class HomeTable(PositionTable):
-    """[home]: the place on the ground where the mission begins: a position, or place = "start" for below the start."""
+    """[home]: the place on the ground where the mission begins.
+
+    It is a position, or place = "start" for the ground below the start.
+    """
 
     place: Literal["start"] | None = None
 
     @model_validator(mode="before")
     @classmethod
-    def _on_ground(cls, data: Any) -> Any:
+    def _check_on_ground(cls, data: Any) -> Any:
         for key in ("amsl_m", "height_m"):
             if isinstance(data, dict) and key in data:
                 raise ValueError(f"{key}: home stands on the scenario's ground: its position is enough")
         return data
 
     @model_validator(mode="after")
-    def _one_place(self) -> "HomeTable":
-        stated = (self.east_m, self.north_m, self.lat_deg, self.lon_deg)
-        if self.place is None and all(value is None for value in stated):
+    def _check_place(self) -> "HomeTable":
+        coordinates = (self.east_m, self.north_m, self.lat_deg, self.lon_deg)
+        if self.place is None and all(value is None for value in coordinates):
             raise ValueError('position: missing; give place = "start", east_m and north_m, or lat_deg and lon_deg')
         if self.place is None:
-            _one_position(self)
-        elif any(value is not None for value in stated):
+            _check_one_position(self)
+        elif any(value is not None for value in coordinates):
             raise ValueError('place: give place = "start" or a position, not both')
         return self
 
@@ -513,7 +518,7 @@ STEEPEST_RUNWAY = 5.0
 class LaunchTable(ScenarioTable):
     """[launch]: the launch of the aircraft at home.
 
-    course_deg: clockwise from north; None for along the mission's first leg.
+    course_deg: clockwise from north; None for the course of the mission's first leg.
     speed_mps: speed at the end of the rail or throw.
     length_m, incline_deg: length of the rail, throw or runway, and its angle above level.
     A value that is not given takes the method's default (`world.airfield`).
@@ -527,13 +532,13 @@ class LaunchTable(ScenarioTable):
 
     @model_validator(mode="before")
     @classmethod
-    def _has_method(cls, data: Any) -> Any:
+    def _check_method(cls, data: Any) -> Any:
         if isinstance(data, dict) and "method" not in data:
             raise ValueError('method: missing; give "catapult", "hand" or "runway"')
         return data
 
     @model_validator(mode="after")
-    def _pushed(self) -> "LaunchTable":
+    def _check_launch_values(self) -> "LaunchTable":
         if self.method == "runway" and self.speed_mps is not None:
             raise ValueError(f"speed_mps: {self.speed_mps:g}: not of a runway, where the aircraft's own motor pulls")
         if self.method == "runway" and (self.incline_deg or 0.0) > STEEPEST_RUNWAY:
@@ -544,7 +549,7 @@ class LaunchTable(ScenarioTable):
 _OR_WIND = ', or "wind"'
 
 
-def _course_or_wind(value: Any) -> Any:
+def _check_course(value: Any) -> Any:
     if value != "wind" and (isinstance(value, bool) or not isinstance(value, int | float)):
         raise ValueError(f"allowed -360..360{_OR_WIND}")
     return value
@@ -553,7 +558,7 @@ def _course_or_wind(value: Any) -> Any:
 class LandingTable(PositionTable):
     """[landing]: the landing strip at the end of the mission.
 
-    course_deg: landing course, clockwise from north, or "wind" for into the wind.
+    course_deg: landing course, clockwise from north, or "wind" for a landing into the wind.
     length_m, width_m: size of the strip, which is centred on the landing point.
     approach_m: length of the straight final before the landing point.
     slope_deg: glide slope of the final, below level.
@@ -561,7 +566,7 @@ class LandingTable(PositionTable):
     """
 
     course_deg: Annotated[
-        Annotated[float, within(-360.0, 360.0, also=_OR_WIND)] | Literal["wind"], BeforeValidator(_course_or_wind)
+        Annotated[float, within(-360.0, 360.0, also=_OR_WIND)] | Literal["wind"], BeforeValidator(_check_course)
     ] = "wind"
     length_m: Annotated[float, within(20.0, 5000.0)] = 200.0
     width_m: Annotated[float, within(5.0, 500.0)] = 40.0
@@ -569,8 +574,8 @@ class LandingTable(PositionTable):
     slope_deg: Annotated[float, within(1.0, 20.0)] | None = None
 
     @model_validator(mode="after")
-    def _placed(self) -> "LandingTable":
-        _one_position(self)
+    def _check_position(self) -> "LandingTable":
+        _check_one_position(self)
         return self
 
 
@@ -578,13 +583,13 @@ class RallyTable(PointTable):
     """[returns] rally: a point that a return may fly to, at an altitude AMSL or a height above the ground there."""
 
     @model_validator(mode="after")
-    def _has_height(self) -> "RallyTable":
+    def _check_height(self) -> "RallyTable":
         if self.amsl_m is None and self.height_m is None:
             raise ValueError("amsl_m: missing; give amsl_m or height_m")
         return self
 
 
-def _autoland(value: Any) -> Any:
+def _check_autoland(value: Any) -> Any:
     """Return a value of RTL_AUTOLAND.
 
     Raise ValueError for any other, also for true and 1.0, which equal 1.
@@ -612,12 +617,12 @@ class ReturnsTable(ScenarioTable):
 
     require: list[ReturnDemand] | None = None
     rtl_altitude_m: Annotated[float, within(1.0, 9000.0)] | None = None
-    rtl_autoland: Annotated[Literal[1, 2, 3], BeforeValidator(_autoland)] | None = None
+    rtl_autoland: Annotated[Literal[1, 2, 3], BeforeValidator(_check_autoland)] | None = None
     rally: Annotated[list[RallyTable], Field(min_length=1, max_length=100)] | None = None
 
     @model_validator(mode="after")
-    def _says_something(self) -> "ReturnsTable":
-        if not self.require and all(one is None for one in (self.rtl_altitude_m, self.rtl_autoland, self.rally)):
+    def _check_contents(self) -> "ReturnsTable":
+        if not self.require and all(value is None for value in (self.rtl_altitude_m, self.rtl_autoland, self.rally)):
             raise ValueError("require: missing; give require, rtl_altitude_m, rtl_autoland or rally")
         if self.require is not None and len(set(self.require)) < len(self.require):
             raise ValueError(f"require: {', '.join(self.require)}: each is expected once")
@@ -646,7 +651,7 @@ class ScenarioFile(ScenarioTable):
     zones: Annotated[list[ZoneTable], Field(max_length=MAX_ZONES)] | None = None
     zones_file: FilePath | Annotated[list[FilePath], Field(max_length=100)] | None = None
     zone_notes: Annotated[list[str], Field(max_length=1000)] | None = None
-    at: Annotated[str, Field(max_length=100), AfterValidator(_known_span)] | None = None
+    at: Annotated[str, Field(max_length=100), AfterValidator(_check_span)] | None = None
     limits: LimitsTable = LimitsTable()
     planner: PlannerTable = PlannerTable()
     flight: FlightTable = FlightTable()
@@ -657,13 +662,13 @@ class ScenarioFile(ScenarioTable):
     returns: ReturnsTable | None = None
 
     @model_validator(mode="after")
-    def _area_where_there_is_no_tile(self) -> "ScenarioFile":
+    def _check_area(self) -> "ScenarioFile":
         if self.area is None and self.terrain.kind != "dem":
             raise ValueError(f'area: missing; terrain kind "{self.terrain.kind}" has no tile to take it from')
         return self
 
     @model_validator(mode="after")
-    def _home_where_there_is_a_field(self) -> "ScenarioFile":
+    def _check_home(self) -> "ScenarioFile":
         if self.home is None:
             for key in ("launch", "landing"):
                 if getattr(self, key) is not None:

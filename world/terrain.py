@@ -55,7 +55,7 @@ class Terrain:
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickle with a function that locks the raster again, as compiled code distinguishes writable arrays."""
-        return _locked, tuple(getattr(self, field.name) for field in fields(self))
+        return _make_locked, tuple(getattr(self, field.name) for field in fields(self))
 
     def height(self, east: ArrayLike, north: ArrayLike) -> Floats:
         """Return the ground height in m at map positions, any shape; NaN outside the raster or on nodata."""
@@ -65,14 +65,16 @@ class Terrain:
     def clearance(self, a: ArrayLike, b: ArrayLike) -> tuple[float, float]:
         """Return the smallest height above ground on the segment a-b, and the fraction of the segment there.
 
-        a, b: (3,) m.  Exact for the bilinear surface.  NaN if the segment leaves the raster or its data.
+        a, b: (3,) m.
+
+        It is exact for the bilinear surface, and NaN if the segment leaves the raster or its data.
         """
         start, end = np.asarray(a, dtype=np.float64), np.asarray(b, dtype=np.float64)
-        low, at = segment_clearance(self.heights, self.to_pixel.record, start, end)
-        return float(low), float(at)
+        clearance, fraction = segment_clearance(self.heights, self.to_pixel.record, start, end)
+        return float(clearance), float(fraction)
 
 
-def _locked(heights: Heights, *others: Any) -> Terrain:
+def _make_locked(heights: Heights, *others: Any) -> Terrain:
     heights.setflags(write=False)
     return Terrain(heights, *others)
 
@@ -81,7 +83,7 @@ def _locked(heights: Heights, *others: Any) -> Terrain:
 def pixel_height(heights: Heights, col: float, row: float) -> float:
     """Return the bilinear height at fractional pixel coordinates.
 
-    NaN over `EDGE` beyond the outer pixel centres.
+    It is NaN further than `EDGE` beyond the outer pixel centres.
     """
     rows, cols = heights.shape
     if not (-EDGE <= col <= cols - 1 + EDGE and -EDGE <= row <= rows - 1 + EDGE):
@@ -91,33 +93,33 @@ def pixel_height(heights: Heights, col: float, row: float) -> float:
     v = row - i
     u = col - j
     # Unsigned, so that numba does not check each index for being negative.
-    above, below, left, right = np.uintp(i), np.uintp(i + 1), np.uintp(j), np.uintp(j + 1)
-    top = heights[above, left] * (1.0 - u) + heights[above, right] * u
-    low = heights[below, left] * (1.0 - u) + heights[below, right] * u
-    return top * (1.0 - v) + low * v
+    upper_row, lower_row, left_col, right_col = np.uintp(i), np.uintp(i + 1), np.uintp(j), np.uintp(j + 1)
+    upper_height = heights[upper_row, left_col] * (1.0 - u) + heights[upper_row, right_col] * u
+    lower_height = heights[lower_row, left_col] * (1.0 - u) + heights[lower_row, right_col] * u
+    return upper_height * (1.0 - v) + lower_height * v
 
 
 @compiled
 def steepest_slopes(heights: Heights, pitch: float) -> Heights:
     """Return the steepest possible slope of the bilinear ground in each tile of `TILE` x `TILE` cells, m per m.
 
-    From the steps between pixels and their pitch (m).  NaN is ignored.
+    It follows from the steps between pixels and their pitch (m).  Pixels without data (NaN) are ignored.
     """
     rows, cols = heights.shape
-    out = np.zeros(((rows - 2) // TILE + 1, (cols - 2) // TILE + 1), dtype=np.float32)
+    tiles = np.zeros(((rows - 2) // TILE + 1, (cols - 2) // TILE + 1), dtype=np.float32)
     for i in range(rows - 1):
         for j in range(cols - 1):
-            across = max(abs(heights[i, j + 1] - heights[i, j]), abs(heights[i + 1, j + 1] - heights[i + 1, j]))
-            down = max(abs(heights[i + 1, j] - heights[i, j]), abs(heights[i + 1, j + 1] - heights[i, j + 1]))
-            steep = across * across + down * down
+            step_across = max(abs(heights[i, j + 1] - heights[i, j]), abs(heights[i + 1, j + 1] - heights[i + 1, j]))
+            step_down = max(abs(heights[i + 1, j] - heights[i, j]), abs(heights[i + 1, j + 1] - heights[i, j + 1]))
+            slope2 = step_across * step_across + step_down * step_down
             # False for NaN.
-            if steep > out[i // TILE, j // TILE]:
-                out[i // TILE, j // TILE] = steep
-    for i in range(out.shape[0]):
-        for j in range(out.shape[1]):
+            if slope2 > tiles[i // TILE, j // TILE]:
+                tiles[i // TILE, j // TILE] = slope2
+    for i in range(tiles.shape[0]):
+        for j in range(tiles.shape[1]):
             # Slightly more, to cover the rounding of single precision.
-            out[i, j] = math.sqrt(out[i, j]) / pitch * (1.0 + 1e-6)
-    return out
+            tiles[i, j] = math.sqrt(tiles[i, j]) / pitch * (1.0 + 1e-6)
+    return tiles
 
 
 @inlined
@@ -137,37 +139,37 @@ def _heights_many(heights: Heights, to_pixel: PolyMapRecord, east: Floats, north
 
 @compiled
 def segment_clearance(heights: Heights, to_pixel: PolyMapRecord, a: Floats, b: Floats) -> tuple[float, float]:
-    """Return the smallest height above the bilinear ground on a-b and its fraction.
+    """Return the smallest height above the bilinear ground on the segment a-b, and the fraction of the segment there.
 
-    (NaN, fraction) off the raster.
+    The height is NaN if the segment leaves the raster.
     """
     pieces = max(1, math.ceil(math.hypot(b[0] - a[0], b[1] - a[1]) / STRAIGHT_PIECE))
-    best = math.inf
-    best_at = 0.0
+    min_clearance = math.inf
+    min_fraction = 0.0
     col1, row1 = polymap(to_pixel, a[0], a[1])
     for piece in range(pieces):
-        f0 = piece / pieces
-        f1 = (piece + 1) / pieces
+        begin_fraction = piece / pieces
+        end_fraction = (piece + 1) / pieces
         col0, row0 = col1, row1
-        col1, row1 = polymap(to_pixel, a[0] + f1 * (b[0] - a[0]), a[1] + f1 * (b[1] - a[1]))
-        low, at = _piece_clearance(
-            heights, col0, row0, a[2] + f0 * (b[2] - a[2]), col1, row1, a[2] + f1 * (b[2] - a[2])
+        col1, row1 = polymap(to_pixel, a[0] + end_fraction * (b[0] - a[0]), a[1] + end_fraction * (b[1] - a[1]))
+        clearance, fraction = _piece_clearance(
+            heights, col0, row0, a[2] + begin_fraction * (b[2] - a[2]), col1, row1, a[2] + end_fraction * (b[2] - a[2])
         )
-        if math.isnan(low):
-            return math.nan, f0 + at * (f1 - f0)
-        if low < best:
-            best = low
-            best_at = f0 + at * (f1 - f0)
-    return best, best_at
+        if math.isnan(clearance):
+            return math.nan, begin_fraction + fraction * (end_fraction - begin_fraction)
+        if clearance < min_clearance:
+            min_clearance = clearance
+            min_fraction = begin_fraction + fraction * (end_fraction - begin_fraction)
+    return min_clearance, min_fraction
 
 
 @inlined
-def _next_crossing(start: float, step: float, t: float) -> float:
-    """Return the next fraction after t at which start + t * step is a whole number; inf if it never is."""
+def _next_crossing(start: float, step: float, fraction: float) -> float:
+    """Return the next fraction at which start + fraction * step is a whole number; inf if there is none."""
     if step == 0.0:
         return math.inf
-    here = start + t * step
-    line = math.floor(here + 1e-9) + 1.0 if step > 0.0 else math.ceil(here - 1e-9) - 1.0
+    position = start + fraction * step
+    line = math.floor(position + 1e-9) + 1.0 if step > 0.0 else math.ceil(position - 1e-9) - 1.0
     return (line - start) / step
 
 
@@ -177,37 +179,41 @@ def _piece_clearance(
 ) -> tuple[float, float]:
     """Return the smallest height above ground on a piece straight in pixels, and its fraction.
 
-    Off the data it returns (NaN, fraction).
+    The height is NaN if the piece leaves the data.
     col, row, up: coordinates of the two ends.  Within a cell the height above the bilinear ground is a parabola.
     """
     dc, dr, du = col1 - col0, row1 - row0, up1 - up0
-    t = 0.0
-    g0 = up0 - pixel_height(heights, col0, row0)
-    best, best_at = g0, 0.0
-    if math.isnan(g0):
+    begin = 0.0
+    begin_clearance = up0 - pixel_height(heights, col0, row0)
+    min_clearance, min_fraction = begin_clearance, 0.0
+    if math.isnan(begin_clearance):
         return math.nan, 0.0
-    while t < 1.0:
-        end = min(1.0, _next_crossing(col0, dc, t), _next_crossing(row0, dr, t))
-        if end <= t:
-            end = min(1.0, t + 1e-6)
-        mid = 0.5 * (t + end)
-        gm = up0 + mid * du - pixel_height(heights, col0 + mid * dc, row0 + mid * dr)
-        g1 = up0 + end * du - pixel_height(heights, col0 + end * dc, row0 + end * dr)
-        if math.isnan(gm) or math.isnan(g1):
+    while begin < 1.0:
+        end = min(1.0, _next_crossing(col0, dc, begin), _next_crossing(row0, dr, begin))
+        if end <= begin:
+            end = min(1.0, begin + 1e-6)
+        mid = 0.5 * (begin + end)
+        mid_clearance = up0 + mid * du - pixel_height(heights, col0 + mid * dc, row0 + mid * dr)
+        end_clearance = up0 + end * du - pixel_height(heights, col0 + end * dc, row0 + end * dr)
+        if math.isnan(mid_clearance) or math.isnan(end_clearance):
             return math.nan, mid
-        if g1 < best:
-            best, best_at = g1, end
+        if end_clearance < min_clearance:
+            min_clearance, min_fraction = end_clearance, end
         # The parabola through the three values; its vertex is used if it lies between them.
-        bend = 2.0 * (g0 - 2.0 * gm + g1)
-        if bend > 0.0:
-            x = (3.0 * g0 - 4.0 * gm + g1) / (2.0 * bend)
+        curvature = 2.0 * (begin_clearance - 2.0 * mid_clearance + end_clearance)
+        if curvature > 0.0:
+            x = (3.0 * begin_clearance - 4.0 * mid_clearance + end_clearance) / (2.0 * curvature)
             if 0.0 < x < 1.0:
-                low = g0 - (3.0 * g0 - 4.0 * gm + g1) * x + bend * x * x
-                if low < best:
-                    best, best_at = low, t + x * (end - t)
-        g0 = g1
-        t = end
-    return best, best_at
+                vertex_clearance = (
+                    begin_clearance
+                    - (3.0 * begin_clearance - 4.0 * mid_clearance + end_clearance) * x
+                    + curvature * x * x
+                )
+                if vertex_clearance < min_clearance:
+                    min_clearance, min_fraction = vertex_clearance, begin + x * (end - begin)
+        begin_clearance = end_clearance
+        begin = end
+    return min_clearance, min_fraction
 
 
 def gridded(function_heights: Floats, east: Floats, north: Floats, *, source: str, sha256: str, datum: str) -> Terrain:

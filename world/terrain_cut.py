@@ -20,7 +20,7 @@ from world.errors import TerrainError
 from world.files import write_whole
 from world.gdal_raster import block_spans, geotiff_bytes, open_geotiff
 from world.raster import MAX_PIXELS, open_raster
-from world.raster_file import RasterFile, is_ground, moved_grid
+from world.raster_file import RasterFile, is_ground, shift_grid
 from world.remote_files import RemoteFile, find_remote
 
 Floats = NDArray[Any]
@@ -39,7 +39,7 @@ _SYSTEM = "EPSG:4326+3855"
 _NODATA = -32768.0
 
 # Progress callback: the work done, the expected total, and a remark.
-Told = Callable[[float, float, str], None]
+CutProgress = Callable[[float, float, str], None]
 
 
 class Box(NamedTuple):
@@ -79,8 +79,8 @@ def cut_from_files(source: Path, box: Box, out: Path) -> CutTerrain:
     raster = open_raster(str(source))
     top, bottom, left, right = _window(raster, box)
     heights = raster.read(top, bottom, left, right)
-    _write(out, heights, moved_grid(raster.grid, top, left), raster.crs or "EPSG:4326")
-    return CutTerrain(out, (bottom - top, right - left), (raster.name,), (), _empty(heights), 0)
+    _write_geotiff(out, heights, shift_grid(raster.grid, top, left), raster.crs or "EPSG:4326")
+    return CutTerrain(out, (bottom - top, right - left), (raster.name,), (), _count_empty(heights), 0)
 
 
 def _window(raster: RasterFile, box: Box) -> tuple[int, int, int, int]:
@@ -89,8 +89,10 @@ def _window(raster: RasterFile, box: Box) -> tuple[int, int, int, int]:
     rows, cols = raster.shape
     if not (col.min() >= 0.0 and row.min() >= 0.0 and col.max() <= cols - 1 and row.max() <= rows - 1):
         south, west, north, east = box
-        said = f"latitude {south:.4f}..{north:.4f}, longitude {west:.4f}..{east:.4f}"
-        raise TerrainError(f"{raster.name}: does not cover {said}", file=raster.name, field="area", value=tuple(box))
+        area_text = f"latitude {south:.4f}..{north:.4f}, longitude {west:.4f}..{east:.4f}"
+        raise TerrainError(
+            f"{raster.name}: does not cover {area_text}", file=raster.name, field="area", value=tuple(box)
+        )
     top, left = max(0, math.floor(row.min()) - 1), max(0, math.floor(col.min()) - 1)
     return top, min(rows, math.ceil(row.max()) + 2), left, min(cols, math.ceil(col.max()) + 2)
 
@@ -104,16 +106,16 @@ def _outline(box: Box) -> tuple[Floats, Floats]:
     return lon, lat
 
 
-def _empty(heights: Heights) -> int:
+def _count_empty(heights: Heights) -> int:
     return int(heights.size - is_ground(heights).sum())
 
 
-def _write(out: Path, heights: Heights, grid: Sequence[float], crs: str) -> None:
+def _write_geotiff(out: Path, heights: Heights, grid: Sequence[float], crs: str) -> None:
     """Write a GeoTIFF atomically.  grid: affine coefficients from columns and rows to the reference system."""
     if heights.size > MAX_PIXELS:
         allowed = f"{heights.size:,} pixels; at most {MAX_PIXELS:,} are written"
         raise TerrainError(f"{out}: {allowed}", file=out, value=heights.size, allowed=allowed)
-    if _empty(heights) == heights.size:
+    if _count_empty(heights) == heights.size:
         raise TerrainError(f"{out}: no data in the area: the tiles have none there", file=out)
     stored = np.where(is_ground(heights), heights, np.float32(_NODATA))
     write_whole(out, geotiff_bytes(stored, tuple(grid), crs, _NODATA))
@@ -144,47 +146,47 @@ def degrees_of(box: Box) -> list[tuple[int, int]]:
     return [(lat, (lon + 180) % 360 - 180) for lat in lats for lon in lons]
 
 
-def cut_from_server(server: str, box: Box, out: Path, cache: Path, told: Told, *, sea: bool) -> CutTerrain:
+def cut_from_server(server: str, box: Box, out: Path, cache: Path, progress: CutProgress, *, sea: bool) -> CutTerrain:
     """Fetch the part of a server's tiles that covers an area, and write it as one GeoTIFF.
 
-    server: the address of the folder of tiles.  cache: folder for the fetched parts.  told: progress callback.
+    server: the address of the folder of tiles.  cache: folder for the fetched parts.  progress: progress callback.
     sea: True if degrees without a tile are sea, at 0 m; otherwise they have no data.
     Where tiles of different pitch meet (at latitudes of 50, 60, 70, 75, 80 and 85 degrees), the coarser tiles are
     interpolated to the grid of the finest tile.
     Raises TerrainError if the server cannot be reached or does not answer as expected.
     """
     # The edge of a tile is half a pixel off its degree: an area close to that edge needs the neighbouring tile, too.
-    wide = Box(box.south - 0.001, box.west - 0.001, box.north + 0.001, box.east + 0.001)
-    degrees = degrees_of(wide)
+    fetched_box = Box(box.south - 0.001, box.west - 0.001, box.north + 0.001, box.east + 0.001)
+    degrees = degrees_of(fetched_box)
     if len(degrees) > MAX_FETCHED:
         allowed = f"at most {MAX_FETCHED} are fetched: a smaller area is expected"
         raise TerrainError(f"{server}: {len(degrees)} tiles: {allowed}", file=server, allowed=allowed)
-    found = {}
-    for number, degree in enumerate(degrees):
+    remote_files = {}
+    for index, degree in enumerate(degrees):
         name = tile_name(*degree)
-        told(number, 10.0 * len(degrees), f"looking for {name}")
-        found[degree] = find_remote(f"{server.rstrip('/')}/{name}/{name}.tif", cache)
-    there = {degree: remote for degree, remote in found.items() if remote is not None}
-    if not there:
+        progress(index, 10.0 * len(degrees), f"looking for {name}")
+        remote_files[degree] = find_remote(f"{server.rstrip('/')}/{name}/{name}.tif", cache)
+    remotes = {degree: remote for degree, remote in remote_files.items() if remote is not None}
+    if not remotes:
         raise TerrainError(f"{server}: no tile of the area is there: open sea, or not such a server", file=server)
     fetched = 0
     tiles = []
-    for number, (degree, remote) in enumerate(there.items()):
+    for index, (degree, remote) in enumerate(remotes.items()):
 
-        def count(came: int, done: int = number, name: str = remote.copy.name) -> None:
+        def count(byte_count: int, tile_index: int = index, name: str = remote.copy.name) -> None:
             nonlocal fetched
-            fetched += came
-            told(len(there) + 9.0 * done, 10.0 * len(there), f"{name}: {fetched / 1e6:.1f} MB")
+            fetched += byte_count
+            progress(len(remotes) + 9.0 * tile_index, 10.0 * len(remotes), f"{name}: {fetched / 1e6:.1f} MB")
 
-        tiles.append(_placed(_fetch_tile(remote, wide, count), degree, box))
+        tiles.append(_place_tile(_fetch_tile(remote, fetched_box, count), degree, box))
     heights, grid = _merge_tiles(tiles, box)
-    absent = tuple(degree for degree, remote in found.items() if remote is None)
+    absent = tuple(degree for degree, remote in remote_files.items() if remote is None)
     if sea:
         _fill_sea(heights, grid, absent)
-    _write(out, heights, grid, _SYSTEM)
+    _write_geotiff(out, heights, grid, _SYSTEM)
     rows, cols = heights.shape
-    names = tuple(tile_name(*degree) for degree in there)
-    return CutTerrain(out, (rows, cols), names, absent, _empty(heights), fetched)
+    names = tuple(tile_name(*degree) for degree in remotes)
+    return CutTerrain(out, (rows, cols), names, absent, _count_empty(heights), fetched)
 
 
 def _fetch_tile(remote: RemoteFile, box: Box, count: Callable[[int], None]) -> RasterFile:
@@ -192,7 +194,7 @@ def _fetch_tile(remote: RemoteFile, box: Box, count: Callable[[int], None]) -> R
 
     A copy that cannot be read, for example after a power cut or because of a proxy, is fetched a second time.
     """
-    for is_last in (not remote.held, True):
+    for is_last in (not remote.parts, True):
         try:
             tile = _open_copy(remote, count, (_DIRECTORY_BYTES, remote.size) if is_last else (_DIRECTORY_BYTES,))
             window = _padded_window(tile, box)
@@ -268,21 +270,21 @@ class _PlacedTile(NamedTuple):
     dy: float
 
 
-def _placed(tile: RasterFile, degree: tuple[int, int], box: Box) -> _PlacedTile:
+def _place_tile(tile: RasterFile, degree: tuple[int, int], box: Box) -> _PlacedTile:
     """Place a tile on its degree, in the same turn of longitude as the area.  Raises TerrainError."""
-    dx, turn, west, other_turn, dy, north = tile.grid
-    if turn or other_turn or not dx > 0.0 > dy:
+    dx, column_skew, west, row_skew, dy, north = tile.grid
+    if column_skew or row_skew or not dx > 0.0 > dy:
         raise TerrainError(f"{tile.name}: a grid of longitudes and latitudes is expected", file=tile.name)
-    off = max(abs(north - degree[0] - 1.0), abs((west - degree[1] + 180.0) % 360.0 - 180.0))
+    offset = max(abs(north - degree[0] - 1.0), abs((west - degree[1] + 180.0) % 360.0 - 180.0))
     if (
-        off > _MAX_TILE_OFFSET_DEG
+        offset > _MAX_TILE_OFFSET_DEG
         or abs(dx * tile.shape[1] - 1.0) > _MAX_TILE_OFFSET_DEG
         or abs(-dy * tile.shape[0] - 1.0) > _MAX_TILE_OFFSET_DEG
     ):
         allowed = f"the degree from {degree[0]} N {degree[1]} E on is expected"
         raise TerrainError(f"{tile.name}: another place: {allowed}", file=tile.name, allowed=allowed)
-    turns = round(((box.west + box.east) / 2.0 - (west + dx * tile.shape[1] / 2.0)) / 360.0)
-    return _PlacedTile(tile, west + 360.0 * turns, north, dx, -dy)
+    turn_count = round(((box.west + box.east) / 2.0 - (west + dx * tile.shape[1] / 2.0)) / 360.0)
+    return _PlacedTile(tile, west + 360.0 * turn_count, north, dx, -dy)
 
 
 def _merge_tiles(tiles: list[_PlacedTile], box: Box) -> tuple[Heights, tuple[float, ...]]:
@@ -301,54 +303,57 @@ def _merge_tiles(tiles: list[_PlacedTile], box: Box) -> tuple[Heights, tuple[flo
     lon, lat = west + (np.arange(right - left) + 0.5) * finest.dx, north - (np.arange(bottom - top) + 0.5) * finest.dy
     heights = np.full((lat.size, lon.size), np.nan, dtype=np.float32)
     for tile in sorted(tiles, key=lambda tile: tile.dx):
-        _put(heights, lat, lon, tile)
+        _fill_from_tile(heights, lat, lon, tile)
     return heights, (finest.dx, 0.0, west, 0.0, -finest.dy, north)
 
 
-def _put(heights: Heights, lat: Floats, lon: Floats, tile: _PlacedTile) -> None:
+def _fill_from_tile(heights: Heights, lat: Floats, lon: Floats, tile: _PlacedTile) -> None:
     """Fill the empty places of a grid of latitudes and longitudes from a tile, interpolated between its pixels."""
     rows, cols = tile.raster.shape
     col, row = (lon - tile.west) / tile.dx - 0.5, (tile.north - lat) / tile.dy - 0.5
     # A tile of another pitch reaches half of its own pixel beyond the centres of its outermost pixels.
-    over, down = np.flatnonzero((col > -0.5) & (col < cols - 0.5)), np.flatnonzero((row > -0.5) & (row < rows - 0.5))
-    if not over.size or not down.size:
+    columns, rows_covered = (
+        np.flatnonzero((col > -0.5) & (col < cols - 0.5)),
+        np.flatnonzero((row > -0.5) & (row < rows - 0.5)),
+    )
+    if not columns.size or not rows_covered.size:
         return
     # Snap to the tile's own grid: heights there stay unchanged, and need no neighbouring pixel.
     col, row = (
-        np.where(np.abs(at - np.round(at)) < _PIXEL_TOLERANCE, np.round(at), at)
-        for at in (np.clip(col[over], 0.0, cols - 1.0), np.clip(row[down], 0.0, rows - 1.0))
+        np.where(np.abs(position - np.round(position)) < _PIXEL_TOLERANCE, np.round(position), position)
+        for position in (np.clip(col[columns], 0.0, cols - 1.0), np.clip(row[rows_covered], 0.0, rows - 1.0))
     )
     left, top = int(col[0]), int(row[0])
-    read = tile.raster.read(top, min(rows, int(row[-1]) + 2), left, min(cols, int(col[-1]) + 2))
-    read[~is_ground(read)] = np.nan
-    part = heights[down[0] : down[-1] + 1, over[0] : over[-1] + 1]
-    values = _between(read, row - top, col - left)
-    empty = np.isnan(part)
-    part[empty] = values[empty]
+    tile_heights = tile.raster.read(top, min(rows, int(row[-1]) + 2), left, min(cols, int(col[-1]) + 2))
+    tile_heights[~is_ground(tile_heights)] = np.nan
+    area_heights = heights[rows_covered[0] : rows_covered[-1] + 1, columns[0] : columns[-1] + 1]
+    values = _interpolate(tile_heights, row - top, col - left)
+    is_empty = np.isnan(area_heights)
+    area_heights[is_empty] = values[is_empty]
 
 
-def _between(read: Heights, row: Floats, col: Floats) -> Heights:
+def _interpolate(tile_heights: Heights, row: Floats, col: Floats) -> Heights:
     """Interpolate heights (m, n) bilinearly at rows (m,) and columns (n,)."""
     r0, c0 = np.floor(row).astype(int), np.floor(col).astype(int)
-    r1, c1 = np.minimum(r0 + 1, read.shape[0] - 1), np.minimum(c0 + 1, read.shape[1] - 1)
+    r1, c1 = np.minimum(r0 + 1, tile_heights.shape[0] - 1), np.minimum(c0 + 1, tile_heights.shape[1] - 1)
     v, u = (row - r0)[:, None], (col - c0)[None, :]
 
-    def weighed(one: Heights, other: Heights, share: Floats) -> Floats:
-        return np.where(share == 0.0, one, (1.0 - share) * one + share * other)
+    def blend(first: Heights, second: Heights, fraction: Floats) -> Floats:
+        return np.where(fraction == 0.0, first, (1.0 - fraction) * first + fraction * second)
 
-    upper = weighed(read[np.ix_(r0, c0)], read[np.ix_(r0, c1)], u)
-    lower = weighed(read[np.ix_(r1, c0)], read[np.ix_(r1, c1)], u)
-    return weighed(upper.astype(np.float32), lower.astype(np.float32), v).astype(np.float32)
+    upper = blend(tile_heights[np.ix_(r0, c0)], tile_heights[np.ix_(r0, c1)], u)
+    lower = blend(tile_heights[np.ix_(r1, c0)], tile_heights[np.ix_(r1, c1)], u)
+    return blend(upper.astype(np.float32), lower.astype(np.float32), v).astype(np.float32)
 
 
 def _fill_sea(heights: Heights, grid: Sequence[float], sea: Sequence[tuple[int, int]]) -> None:
     """Set missing heights to 0 m in the degrees ``sea``, which have no tile."""
     dx, _, west, _, dy, north = grid
     lon, lat = west + (np.arange(heights.shape[1]) + 0.5) * dx, north + (np.arange(len(heights)) + 0.5) * dy
-    for south, left in sea:
+    for south_degree, west_degree in sea:
         # Tiles reach half a pixel beyond their degree; one pixel is added.
-        over = np.abs((lon - left - 0.5 + 180.0) % 360.0 - 180.0) <= 0.5 + abs(dx)
-        down = np.abs(lat - south - 0.5) <= 0.5 + abs(dy)
-        part = heights[np.ix_(down, over)]
-        part[np.isnan(part)] = 0.0
-        heights[np.ix_(down, over)] = part
+        columns = np.abs((lon - west_degree - 0.5 + 180.0) % 360.0 - 180.0) <= 0.5 + abs(dx)
+        rows = np.abs(lat - south_degree - 0.5) <= 0.5 + abs(dy)
+        degree_heights = heights[np.ix_(rows, columns)]
+        degree_heights[np.isnan(degree_heights)] = 0.0
+        heights[np.ix_(rows, columns)] = degree_heights

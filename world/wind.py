@@ -72,7 +72,7 @@ class Wind:
 
     def strongest(self, amsl: Floats) -> float:
         """Return the highest mean wind speed at these altitudes (m AMSL), m/s."""
-        return max(math.hypot(*self.at(float(up))) for up in amsl)
+        return max(math.hypot(*self.at(float(altitude))) for altitude in amsl)
 
     def along(self, course: float, amsl: float) -> tuple[float, float]:
         """Return tailwind and crosswind (from the left positive) on a course (rad), m/s."""

@@ -25,7 +25,7 @@ _HEADING_SD_RAD = float(np.radians(3.0))
 _GUST_TIME_S = 11.5
 # Standard deviation of a mean wind, m/s.
 _WIND_SD_MPS = 30.0
-# Of this many samples one is used.
+# One of this many samples is used.
 _THINNING = 25
 
 
@@ -42,47 +42,47 @@ def airspeed_scale(signals: Signals, flow: Flow) -> tuple[float, float]:
     """
     from scipy.signal import lfilter
 
-    ahead, right = _through_air(signals, flow)
-    thin = signals.thinned(_THINNING, {"ahead": ahead, "right": right})
-    ahead, right = thin.extra["ahead"], thin.extra["right"]
-    north, east, _ = thin.velocity.T
-    stretches = list(zip(thin.edges[:-1], thin.edges[1:], strict=True))
+    north_air, east_air = _air_velocity(signals, flow)
+    thinned = signals.thinned(_THINNING, {"ahead": north_air, "right": east_air})
+    north_air, east_air = thinned.extra["ahead"], thinned.extra["right"]
+    north, east, _ = thinned.velocity.T
+    stretches = list(zip(thinned.edges[:-1], thinned.edges[1:], strict=True))
     # Wind is ground velocity minus air velocity; the heading's error rotates the latter. A gust is in the wind, in the
     # airspeed and its direction, and after a while in the ground velocity, since the aircraft drifts with it: a
     #     regressor with the gust in it would bias the scale. The regressor of the scale is therefore the mean airspeed
     #     along the flown course, smoothed over the time in which gusts change.
-    steady = np.empty((2, len(ahead)))
+    mean_air = np.empty((2, len(north_air)))
     for first, last in stretches:
         rows = slice(first, last)
-        ground, air = np.column_stack([north[rows], east[rows]]), np.column_stack([ahead[rows], right[rows]])
-        course = low_pass(ground - (ground - air).mean(axis=0), 1.0 / _GUST_TIME_S, thin.hertz)
+        ground, air = np.column_stack([north[rows], east[rows]]), np.column_stack([north_air[rows], east_air[rows]])
+        course = low_pass(ground - (ground - air).mean(axis=0), 1.0 / _GUST_TIME_S, thinned.hertz)
         length = np.maximum(1.0, np.hypot(*course.T))
-        steady[:, rows] = (thin.airspeed[rows].mean() / length)[np.newaxis, :] * course.T
-    columns = [(steady[0], steady[1]), (-steady[1], steady[0])]
+        mean_air[:, rows] = (thinned.airspeed[rows].mean() / length)[np.newaxis, :] * course.T
+    columns = [(mean_air[0], mean_air[1]), (-mean_air[1], mean_air[0])]
     for first, last in stretches:
-        one = np.zeros(len(ahead))
-        one[first:last] = 1.0
-        columns += [(one, 0.0 * one), (0.0 * one, one)]
-    keep = float(np.exp(-1.0 / (_GUST_TIME_S * thin.hertz)))
+        indicator = np.zeros(len(north_air))
+        indicator[first:last] = 1.0
+        columns += [(indicator, 0.0 * indicator), (0.0 * indicator, indicator)]
+    decay = float(np.exp(-1.0 / (_GUST_TIME_S * thinned.hertz)))
 
     def innovations(values: Floats) -> Floats:
         """Return the innovations of a process with correlation time `_GUST_TIME_S`, each stretch separately."""
-        made = np.empty_like(values)
+        filtered = np.empty_like(values)
         for first, last in stretches:
-            part = values[first:last]
-            made[first:last] = lfilter([1.0, -keep], [1.0], part, zi=np.array([-keep * part[0]]))[0]
-            made[first] = part[0] * np.sqrt(1.0 - keep * keep)
-        return made
+            stretch = values[first:last]
+            filtered[first:last] = lfilter([1.0, -decay], [1.0], stretch, zi=np.array([-decay * stretch[0]]))[0]
+            filtered[first] = stretch[0] * np.sqrt(1.0 - decay * decay)
+        return filtered
 
-    table = np.column_stack([np.concatenate([innovations(a), innovations(b)]) for a, b in columns])
-    measured = np.concatenate([innovations(north - ahead), innovations(east - right)])
+    regressors = np.column_stack([np.concatenate([innovations(a), innovations(b)]) for a, b in columns])
+    targets = np.concatenate([innovations(north - north_air), innovations(east - east_air)])
     sds = np.concatenate([[SCALE_SD, _HEADING_SD_RAD], np.full(2 * len(stretches), _WIND_SD_MPS)])
-    blocks = np.concatenate([thin.block, thin.block + thin.block.max() + 1])
-    fit = fit_with_prior(table, measured, np.zeros(len(sds)), sds, blocks)
+    blocks = np.concatenate([thinned.block, thinned.block + thinned.block.max() + 1])
+    fit = fit_with_prior(regressors, targets, np.zeros(len(sds)), sds, blocks)
     return 1.0 + float(fit.estimate[0]), float(np.hypot(_MIN_SD, np.sqrt(fit.covariance[0, 0])))
 
 
-def _through_air(signals: Signals, flow: Flow) -> tuple[Floats, Floats]:
+def _air_velocity(signals: Signals, flow: Flow) -> tuple[Floats, Floats]:
     """Return the velocity through the air (n,) to the north and to the east, m/s."""
     roll, pitch, yaw = signals.attitude.T
     u = signals.airspeed * np.cos(flow.alpha) * np.cos(flow.beta)

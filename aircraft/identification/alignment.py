@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from aircraft.identification.flight_record import GRID_HZ, FlightRecord, derivative, lagged, low_pass, shifted
+from aircraft.identification.flight_record import GRID_HZ, FlightRecord, apply_delay, apply_lag, derivative, low_pass
 from world.arrays import Floats, Ints
 
 
@@ -28,7 +28,7 @@ class Clocks:
     servo_lag: float = 0.05
 
     @property
-    def behind(self) -> float:
+    def total_lag(self) -> float:
         """Total lag of the accelerometers behind the gyros, s."""
         return self.lag + self.delay
 
@@ -71,41 +71,48 @@ class Signals:
 
         cutoff: Hz.
         """
-        made = np.empty_like(values)
+        smoothed = np.empty_like(values)
         for first, last in zip(self.edges[:-1], self.edges[1:], strict=True):
-            made[first:last] = low_pass(values[first:last], cutoff, self.hertz)
-        return made
+            smoothed[first:last] = low_pass(values[first:last], cutoff, self.hertz)
+        return smoothed
 
-    def thinned(self, every: int, extra: Mapping[str, Floats]) -> "Signals":
-        """Return every ``every``-th row, after low-pass filtering.
+    def thinned(self, step: int, extra: Mapping[str, Floats]) -> "Signals":
+        """Return every ``step``-th row, after low-pass filtering.
 
         extra: (n,) further columns to thin alike.
         """
-        edges, blocks, parts = [0], [], []
+        edges, blocks, pieces = [0], [], []
         columns = {name: getattr(self, name) for name in _SAMPLED_FIELDS} | dict(extra)
-        together = np.column_stack(list(columns.values()))
+        all_columns = np.column_stack(list(columns.values()))
         for first, last in zip(self.edges[:-1], self.edges[1:], strict=True):
-            parts.append(low_pass(together[first:last], 0.3 * self.hertz / every, self.hertz)[::every])
-            blocks.append(self.block[first:last:every])
+            pieces.append(low_pass(all_columns[first:last], 0.3 * self.hertz / step, self.hertz)[::step])
+            blocks.append(self.block[first:last:step])
             edges.append(edges[-1] + len(blocks[-1]))
         # Split into contiguous columns again, (n,) or (n, k).
-        whole, at = np.concatenate(parts), 0
-        joined: dict[str, Any] = {}
+        thinned_rows, column = np.concatenate(pieces), 0
+        own_columns: dict[str, Any] = {}
         for name, values in columns.items():
             width = 1 if values.ndim == 1 else values.shape[1]
-            joined[name] = np.ascontiguousarray(whole[:, at] if values.ndim == 1 else whole[:, at : at + width])
-            at += width
-        more = {name: joined.pop(name) for name in extra}
+            own_columns[name] = np.ascontiguousarray(
+                thinned_rows[:, column] if values.ndim == 1 else thinned_rows[:, column : column + width]
+            )
+            column += width
+        extra_columns = {name: own_columns.pop(name) for name in extra}
         return replace(
-            self, **joined, edges=tuple(edges), block=np.concatenate(blocks), hertz=self.hertz / every, extra=more
+            self,
+            **own_columns,
+            edges=tuple(edges),
+            block=np.concatenate(blocks),
+            hertz=self.hertz / step,
+            extra=extra_columns,
         )
 
     def delayed(self, values: Floats, delay: float) -> Floats:
         """Return values delayed by ``delay`` (s), each stretch separately."""
-        made = np.empty_like(values)
+        delayed_values = np.empty_like(values)
         for first, last in zip(self.edges[:-1], self.edges[1:], strict=True):
-            made[first:last] = shifted(values[first:last], delay)
-        return made
+            delayed_values[first:last] = apply_delay(values[first:last], delay)
+        return delayed_values
 
 
 # Fields of `Signals` with one row per sample.
@@ -136,36 +143,36 @@ def align(records: Sequence[FlightRecord], clocks: Sequence[Clocks], motor_lag: 
     motor_lag: s.
     """
     parts: dict[str, list[Floats]] = {}
-    edges, blocks, number = [0], [], 0
+    edges, blocks, block_count = [0], [], 0
     for record, clock in zip(records, clocks, strict=True):
 
-        def late(values: Floats, clock: Clocks = clock) -> Floats:
-            return shifted(lagged(values, clock.lag), clock.delay)
+        def delay_signal(values: Floats, clock: Clocks = clock) -> Floats:
+            return apply_delay(apply_lag(values, clock.lag), clock.delay)
 
-        rates = late(record.rates)
-        made = {
+        rates = delay_signal(record.rates)
+        aligned = {
             "acceleration": record.acceleration,
             "rates": rates,
             "rate_changes": derivative(rates),
-            "attitude": np.column_stack([late(np.unwrap(angle)) for angle in record.attitude.T]),
-            "velocity": late(record.velocity),
+            "attitude": np.column_stack([delay_signal(np.unwrap(angle)) for angle in record.attitude.T]),
+            "velocity": delay_signal(record.velocity),
             "wind": record.wind,
-            "airspeed": late(low_pass(record.airspeed, _AIRSPEED_CUTOFF_HZ)),
+            "airspeed": delay_signal(low_pass(record.airspeed, _AIRSPEED_CUTOFF_HZ)),
             "density": record.density,
-            "surfaces": late(lagged(record.controls[:, :3], clock.servo_lag)),
-            "throttle": late(lagged(record.controls[:, 3], motor_lag)),
+            "surfaces": delay_signal(apply_lag(record.controls[:, :3], clock.servo_lag)),
+            "throttle": delay_signal(apply_lag(record.controls[:, 3], motor_lag)),
             "current": record.current,
             "voltage": record.voltage,
         }
-        for name, values in made.items():
+        for name, values in aligned.items():
             parts.setdefault(name, []).append(values)
         edges.append(edges[-1] + len(record.time))
         seconds = BLOCK_METRES / float(record.airspeed.mean())
-        own = ((record.time - record.time[0]) // seconds).astype(np.int64)
-        blocks.append(own + number)
-        number += int(own[-1]) + 1
-    joined: dict[str, Any] = {name: np.concatenate(values) for name, values in parts.items()}
-    return Signals(**joined, edges=tuple(edges), block=np.concatenate(blocks))
+        record_blocks = ((record.time - record.time[0]) // seconds).astype(np.int64)
+        blocks.append(record_blocks + block_count)
+        block_count += int(record_blocks[-1]) + 1
+    columns: dict[str, Any] = {name: np.concatenate(values) for name, values in parts.items()}
+    return Signals(**columns, edges=tuple(edges), block=np.concatenate(blocks))
 
 
 def invert_first_order_lag(values: Floats, lag: float, hertz: float) -> Floats:
@@ -199,12 +206,12 @@ def find_clocks(misfit: Callable[[Clocks], float]) -> Clocks:
     from scipy.optimize import minimize
 
     def cost(values: Floats) -> float:
-        inside = np.clip(values, *_LIMITS_S)
-        return misfit(Clocks(*inside.tolist())) + 100.0 * float(np.abs(values - inside).sum())
+        clipped = np.clip(values, *_LIMITS_S)
+        return misfit(Clocks(*clipped.tolist())) + 100.0 * float(np.abs(values - clipped).sum())
 
     grid = [np.array([lag, _GRID_DELAY_S, servo]) for lag in _GRID_LAGS_S for servo in _GRID_SERVO_LAGS_S]
     start = min(grid, key=cost)
     simplex = np.vstack([start, *(start + step for step in _SIMPLEX_STEPS_S)])
     options = {"initial_simplex": simplex, "xatol": 1e-3, "fatol": 1e-4, "maxfev": 70}
-    found = minimize(cost, start, method="Nelder-Mead", options=options)
-    return Clocks(*np.clip(found.x, *_LIMITS_S).tolist())
+    result = minimize(cost, start, method="Nelder-Mead", options=options)
+    return Clocks(*np.clip(result.x, *_LIMITS_S).tolist())

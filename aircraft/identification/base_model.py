@@ -12,7 +12,7 @@ class Coefficients:
     Signs of the controls: trailing edge down, roll to the right, yaw to the left are positive.
 
     drag_zero, drag_induced: CD = drag_zero + drag_induced (CL - lift_least_drag)^2 + drag_elevator elevator, with CL
-        from the angle of attack alone.
+        from only the angle of attack.
     lift_...: lift.
     side_...: side force.
     roll_..., pitch_..., yaw_...: moments.

@@ -1,6 +1,6 @@
 """Estimate drag and thrust together, from forward acceleration and, if logged, the battery's current.
 
-Level flight alone shows only their difference; climbs, glides and other speeds show more, and the current shows most.
+Level flight shows only their difference; climbs, glides and other speeds show more, and the current shows most.
 Other uncertain properties of motor and accelerometer are estimated with them, within their ranges. Those that belong to
 the aircraft (its motor's resistance, the battery's voltage) are then folded into the parameters: the model has no place
 for them, and without them would fly with another thrust than the measured one.
@@ -19,7 +19,7 @@ from world.arrays import Floats
 
 # Cutoff below which forces are compared, Hz.
 FORCE_BAND = 1.0
-# Of this many samples one is used.
+# One of this many samples is used.
 FORCE_THINNING = 10
 # Other uncertain quantities, which the log hardly informs, with standard deviations; they are estimated with drag and
 # thrust.
@@ -32,7 +32,7 @@ NUISANCES = {
     "angle of attack": 1.0,
     "angle of attack by lift": 1.0,
 }
-# The last two are in standard deviations of `AlphaDoubt`.
+# The last two are in standard deviations of `AlphaUncertainty`.
 
 # True for quantities of the aircraft, False for quantities of its sensors.
 _IS_OF_AIRCRAFT = np.array([name.split()[0] in ("resistance", "idle", "voltage", "drag") for name in NUISANCES])
@@ -57,16 +57,16 @@ _MAX_LAST_STEP = 0.01
 
 
 @dataclass(frozen=True, slots=True)
-class AlphaDoubt:
+class AlphaUncertainty:
     """Uncertainty of the angle of attack from the lift curve.
 
-    angle: standard deviation at a lift coefficient, ``middle``, rad.
-    by_lift: standard deviation of its change with that coefficient, rad.
+    angle: standard deviation at the lift coefficient ``mean_lift``, rad.
+    by_lift: standard deviation of its change per unit of lift coefficient, rad.
     """
 
     angle: float = float(np.radians(0.3))
     by_lift: float = 0.02
-    middle: float = 0.6
+    mean_lift: float = 0.6
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,13 +97,18 @@ class ForwardForces:
 
     def _raw(self, unknown: Floats) -> tuple[Floats, Floats]:
         """Return both before the low-pass."""
-        zero_lift, induced, thrust, speed, torque, bias, resistance, idle, voltage, of_elevator, *tilts = unknown
-        motor = self.base.motor.changed(thrust, speed, torque, 1.0 + resistance, 1.0 + idle)
+        zero_lift, induced, thrust, speed, torque, bias, resistance, idle, voltage, elevator_drag, *tilts = unknown
+        motor = self.base.motor.with_factors(thrust, speed, torque, 1.0 + resistance, 1.0 + idle)
         signals = self.signals
-        pull, current = motor.thrust_and_current(
+        thrust_force, current = motor.thrust_and_current(
             signals.airspeed, signals.throttle, signals.density, self.volts * (1.0 + voltage)
         )
-        force = self.known + np.array([zero_lift, induced]) @ self.drags + (1.0 + of_elevator) * self.elevator + pull
+        force = (
+            self.known
+            + np.array([zero_lift, induced]) @ self.drags
+            + (1.0 + elevator_drag) * self.elevator
+            + thrust_force
+        )
         force = force + np.array(tilts) @ self.tilts
         return force / self.base.mass + bias, current
 
@@ -112,12 +117,12 @@ class ForwardForces:
         steps = _DIFFERENCE_STEP * np.eye(len(unknown))
         # One low-pass of all columns: a call costs far more than a column.
         forces, currents = zip(*(self._raw(unknown + step) for step in (0.0 * steps[0], *steps)), strict=True)
-        force, current = (self.signals.smooth(np.column_stack(one), FORCE_BAND) for one in (forces, currents))
+        force, current = (self.signals.smooth(np.column_stack(samples), FORCE_BAND) for samples in (forces, currents))
         return (force[:, 1:] - force[:, :1]) / _DIFFERENCE_STEP, (current[:, 1:] - current[:, :1]) / _DIFFERENCE_STEP
 
 
 def fit_drag(
-    signals: Signals, base: BaseModel, values: Floats, flow: Flow, doubt: AlphaDoubt | None = None
+    signals: Signals, base: BaseModel, values: Floats, flow: Flow, uncertainty: AlphaUncertainty | None = None
 ) -> tuple[Fit, Floats, Floats]:
     """Fit drag and motor; return the fit, the parameters' values (5,), and their covariance (5, 5).
 
@@ -125,21 +130,25 @@ def fit_drag(
     as the fit does with its own.
 
     values: (n,) of all parameters, of which the parameters of lift are used.
-    doubt: uncertainty of the lift curve.
+    uncertainty: uncertainty of the lift curve.
     """
-    forces = forward_forces(signals, base, values, flow, AlphaDoubt() if doubt is None else doubt)
-    thin = forces.signals
-    with_current = bool(np.isfinite(thin.current).all())
+    forces = forward_forces(signals, base, values, flow, AlphaUncertainty() if uncertainty is None else uncertainty)
+    thinned = forces.signals
+    with_current = bool(np.isfinite(thinned.current).all())
     means, sds = drag_priors(with_current=with_current)
-    # First the forces alone, then both: with the current from the start the first steps would diverge.
-    fit = _fit_from(forces, _Measurement(thin, with_current=False), means, sds)
+    # First only the forces, then both, because with the current from the start the first steps would diverge.
+    fit = _fit_from(forces, _Measurement(thinned, with_current=False), means, sds)
     if with_current:
-        fit = _fit_from(forces, _Measurement(thin, with_current=True), means, sds, fit.estimate)
+        fit = _fit_from(forces, _Measurement(thinned, with_current=True), means, sds, fit.estimate)
     force, _ = forces.predicted(fit.estimate)
-    goal = thin.smooth(thin.acceleration[:, 0], FORCE_BAND)
-    explained = 1.0 - float((goal - force).var() / goal.var())
-    five, turn = _fold_nuisances(forces, fit.estimate)
-    return Fit(fit.estimate, fit.covariance, force, goal - force, explained), five, turn @ fit.covariance @ turn.T
+    measured = thinned.smooth(thinned.acceleration[:, 0], FORCE_BAND)
+    explained = 1.0 - float((measured - force).var() / measured.var())
+    drag_values, jacobian = _fold_nuisances(forces, fit.estimate)
+    return (
+        Fit(fit.estimate, fit.covariance, force, measured - force, explained),
+        drag_values,
+        jacobian @ fit.covariance @ jacobian.T,
+    )
 
 
 def drag_priors(*, with_current: bool) -> tuple[Floats, Floats]:
@@ -155,24 +164,24 @@ def _fold_nuisances(forces: ForwardForces, unknown: Floats) -> tuple[Floats, Flo
 
     Least squares over the log's own flow and throttle. unknown: (p,) as fitted.
     """
-    own = int(_IS_DRAG_PARAMETER.sum())
-    folded = own + np.flatnonzero(_IS_OF_AIRCRAFT)
+    own_count = int(_IS_DRAG_PARAMETER.sum())
+    folded = own_count + np.flatnonzero(_IS_OF_AIRCRAFT)
     scale = FORCE_FLOOR / _CURRENT_FLOOR_A
 
-    def joined(force: Floats, current: Floats) -> Floats:
+    def stack_both(force: Floats, current: Floats) -> Floats:
         return np.concatenate([force, scale * current])
 
-    goal = joined(*forces.predicted(unknown))
-    alone = unknown.copy()
-    alone[folded] = 0.0
+    target = stack_both(*forces.predicted(unknown))
+    folded_unknown = unknown.copy()
+    folded_unknown[folded] = 0.0
     for _ in range(_MAX_FOLDING_STEPS):
-        columns = joined(*forces.slopes(alone))
-        left = goal - joined(*forces.predicted(alone))
-        alone[:own] += np.linalg.lstsq(columns[:, :own], left, rcond=None)[0]
-    turn = np.zeros((own, len(unknown)))
-    turn[:, :own] = np.eye(own)
-    turn[:, folded] = np.linalg.lstsq(columns[:, :own], columns[:, folded], rcond=None)[0]
-    return alone[:own], turn
+        columns = stack_both(*forces.slopes(folded_unknown))
+        residual = target - stack_both(*forces.predicted(folded_unknown))
+        folded_unknown[:own_count] += np.linalg.lstsq(columns[:, :own_count], residual, rcond=None)[0]
+    jacobian = np.zeros((own_count, len(unknown)))
+    jacobian[:, :own_count] = np.eye(own_count)
+    jacobian[:, folded] = np.linalg.lstsq(columns[:, :own_count], columns[:, folded], rcond=None)[0]
+    return folded_unknown[:own_count], jacobian
 
 
 class _Measurement:
@@ -185,47 +194,51 @@ class _Measurement:
 
 
 def _fit_from(
-    forces: ForwardForces, goal: _Measurement, means: Floats, sds: Floats, start: Floats | None = None
+    forces: ForwardForces, measurement: _Measurement, means: Floats, sds: Floats, start: Floats | None = None
 ) -> Fit:
     """Fit by Gauss-Newton steps from a start, each at most one standard deviation of the prior."""
-    now = means.copy() if start is None else start.copy()
+    estimate = means.copy() if start is None else start.copy()
     for _ in range(_MAX_STEPS):
-        force, current = forces.predicted(now)
-        rows, second = forces.slopes(now)
-        left, blocks = goal.force - force, goal.block
-        goals = left + rows @ now
-        if goal.current is not None:
+        force, current = forces.predicted(estimate)
+        slopes, current_slopes = forces.slopes(estimate)
+        force_residual, blocks = measurement.force - force, measurement.block
+        targets = force_residual + slopes @ estimate
+        if measurement.current is not None:
             # Weight both by the scatter of their residuals.
-            off = max(_CURRENT_FLOOR_A, float((goal.current - current).std()))
-            scale = max(FORCE_FLOOR, float(left.std())) / off
-            rows = np.vstack([rows, scale * second])
-            goals = np.concatenate([goals, scale * (goal.current - current + second @ now)])
+            current_scatter = max(_CURRENT_FLOOR_A, float((measurement.current - current).std()))
+            scale = max(FORCE_FLOOR, float(force_residual.std())) / current_scatter
+            slopes = np.vstack([slopes, scale * current_slopes])
+            targets = np.concatenate([targets, scale * (measurement.current - current + current_slopes @ estimate)])
             blocks = np.concatenate([blocks, blocks])
-        fit = fit_with_prior(rows, goals, means, sds, blocks, goal.floor)
-        step = np.clip(fit.estimate - now, -sds, sds)
-        now = now + step
+        fit = fit_with_prior(slopes, targets, means, sds, blocks, measurement.floor)
+        step = np.clip(fit.estimate - estimate, -sds, sds)
+        estimate = estimate + step
         if np.abs(step / sds).max() < _MAX_LAST_STEP:
             break
-    return Fit(now, fit.covariance, fit.predicted, fit.residual, fit.explained)
+    return Fit(estimate, fit.covariance, fit.predicted, fit.residual, fit.explained)
 
 
-def forward_forces(signals: Signals, base: BaseModel, values: Floats, flow: Flow, doubt: AlphaDoubt) -> ForwardForces:
+def forward_forces(
+    signals: Signals, base: BaseModel, values: Floats, flow: Flow, uncertainty: AlphaUncertainty
+) -> ForwardForces:
     """Return the part of the forward force from each unknown over the thinned signals.
 
-    values, doubt: see `fit_drag`.
+    values, uncertainty: see `fit_drag`.
     """
-    c, (slope, zero) = base.coefficients, lift_curve(base, values)
-    thin = signals.thinned(FORCE_THINNING, {"alpha": flow.alpha})
-    alpha, pressure = thin.extra["alpha"], pressure_of(thin, base)
+    coefficients, (slope, zero) = base.coefficients, lift_curve(base, values)
+    thinned = signals.thinned(FORCE_THINNING, {"alpha": flow.alpha})
+    alpha, pressure = thinned.extra["alpha"], pressure_of(thinned, base)
     lift = slope * alpha + zero
-    ahead, rise = -pressure * np.cos(alpha), lift - c.lift_least_drag
+    forward_pressure, lift_excess = -pressure * np.cos(alpha), lift - coefficients.lift_least_drag
     tilt = pressure * lift * np.cos(alpha)
     return ForwardForces(
-        signals=thin,
+        signals=thinned,
         base=base,
-        known=pressure * (lift + other_lift(thin, base)) * np.sin(alpha),
-        tilts=tilt * np.vstack([np.full(len(alpha), doubt.angle), doubt.by_lift * (lift - doubt.middle)]),
-        drags=ahead * np.vstack([np.full(len(alpha), c.drag_zero), c.drag_induced * np.square(rise)]),
-        elevator=ahead * c.drag_elevator * thin.surfaces[:, 0],
-        volts=voltage_of(thin, base),
+        known=pressure * (lift + other_lift(thinned, base)) * np.sin(alpha),
+        tilts=tilt
+        * np.vstack([np.full(len(alpha), uncertainty.angle), uncertainty.by_lift * (lift - uncertainty.mean_lift)]),
+        drags=forward_pressure
+        * np.vstack([np.full(len(alpha), coefficients.drag_zero), coefficients.drag_induced * np.square(lift_excess)]),
+        elevator=forward_pressure * coefficients.drag_elevator * thinned.surfaces[:, 0],
+        volts=voltage_of(thinned, base),
     )

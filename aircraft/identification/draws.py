@@ -17,11 +17,11 @@ _DRAWS_PER_AIRCRAFT = 20
 def draw_aircraft(estimate: Estimate, count: int = COUNT, seed: int = SEED) -> Floats:
     """Draw `aircraft.identification.parameters.PARAMETERS` jointly within their bounds, (count, n)."""
     generator = np.random.default_rng(seed)
-    low, high = np.array([parameter.bounds for parameter in PARAMETERS]).T
-    many = generator.multivariate_normal(
+    lower, upper = np.array([parameter.bounds for parameter in PARAMETERS]).T
+    samples = generator.multivariate_normal(
         estimate.values, estimate.covariance, _DRAWS_PER_AIRCRAFT * count, method="eigh"
     )
-    inside = many[((many >= low) & (many <= high)).all(axis=1)]
-    # For an estimate close to its bounds too few draws are within: clip the rest.
-    made = np.concatenate([inside, np.clip(many, low, high)])[:count]
-    return np.asarray(made)
+    within_bounds = samples[((samples >= lower) & (samples <= upper)).all(axis=1)]
+    # For an estimate close to its bounds too few draws are within; clipped draws follow them.
+    chosen = np.concatenate([within_bounds, np.clip(samples, lower, upper)])[:count]
+    return np.asarray(chosen)

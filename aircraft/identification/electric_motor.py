@@ -32,7 +32,7 @@ class ElectricMotor:
     voltage: float
     windmill: float = 1.0
 
-    def changed(
+    def with_factors(
         self, thrust: float = 1.0, speed: float = 1.0, torque: float = 1.0, resistance: float = 1.0, idle: float = 1.0
     ) -> "ElectricMotor":
         """Return a motor with factors on thrust, speed per volt, torque, resistance and idle current.
@@ -102,8 +102,8 @@ class ElectricMotor:
         return density * a, density * b * airspeed, density * c * airspeed * airspeed
 
 
-def _times(factor: float, three: tuple[float, float, float]) -> tuple[float, float, float]:
-    return factor * three[0], factor * three[1], factor * three[2]
+def _times(factor: float, coefficients: tuple[float, float, float]) -> tuple[float, float, float]:
+    return factor * coefficients[0], factor * coefficients[1], factor * coefficients[2]
 
 
 def _larger_root(a: Floats, b: Floats, c: Floats) -> Floats:

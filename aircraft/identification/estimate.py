@@ -17,11 +17,11 @@ import numpy as np
 from aircraft.identification.airspeed import SCALE_SD, with_airspeed_scale
 from aircraft.identification.alignment import Clocks, Signals, align, find_clocks, invert_first_order_lag
 from aircraft.identification.base_model import BaseModel
-from aircraft.identification.drag import FORCE_THINNING, AlphaDoubt, fit_drag
+from aircraft.identification.drag import FORCE_THINNING, AlphaUncertainty, fit_drag
 from aircraft.identification.fixed_parameters import HELD_FIXED, NOISE
 from aircraft.identification.flight_record import GRID_HZ, FlightRecord
 from aircraft.identification.flow import motor_of, vane
-from aircraft.identification.level import LEVEL_SD, levelled
+from aircraft.identification.level import LEVEL_SD, level_signals
 from aircraft.identification.lift import fit_lift
 from aircraft.identification.moments import AXES, MOMENT_THINNING, fit_moments
 from aircraft.identification.parameters import PARAMETERS, Group, prior_means, prior_sds
@@ -100,12 +100,12 @@ class Estimate:
         return np.sqrt(np.diag(self.covariance))
 
     def silent(self) -> tuple[str, ...]:
-        """Return the parameters that the logs hardly inform, one line each with the maneuver that would."""
-        shares = self.of_log().tolist()
+        """Return a line for each parameter that the logs hardly inform, with an informative maneuver."""
+        fractions = self.of_log().tolist()
         return tuple(
             f"{parameter.title}: stays the prior's; fly {parameter.show}"
-            for parameter, share in zip(PARAMETERS, shares, strict=True)
-            if share < SILENT
+            for parameter, fraction in zip(PARAMETERS, fractions, strict=True)
+            if fraction < SILENT
         )
 
     def of_log(self) -> Floats:
@@ -121,21 +121,23 @@ def estimate_model(records: Sequence[FlightRecord], base: BaseModel, *, dynamics
 
     dynamics: True to include the moments; otherwise only lift, drag and thrust, for logs too slow for the rest.
     """
-    slow = Clocks(servo_lag=base.servo_lag)
-    clocks = align_clocks(records, base) if dynamics else tuple(slow for _ in records)
+    default_clocks = Clocks(servo_lag=base.servo_lag)
+    clocks = align_clocks(records, base) if dynamics else tuple(default_clocks for _ in records)
     signals = aligned_signals(records, clocks, base)
     nominal = fit_all(signals, base, dynamics=dynamics)
-    shifts, hidden = {}, np.zeros(len(PARAMETERS))
-    for held in HELD_FIXED:
-        if held.applies(with_current=nominal.with_current):
-            changed, model = held.change(signals, base)
-            other = fit_all(changed, model, level=held.tilt(changed), dynamics=dynamics)
-            shifts[held.name] = other.values - nominal.values
-            hidden += _noise_bias(nominal, other) if held.name == NOISE else 0.0
+    shifts, noise_bias = {}, np.zeros(len(PARAMETERS))
+    for fixed in HELD_FIXED:
+        if fixed.applies(with_current=nominal.with_current):
+            shifted_signals, shifted_base = fixed.change(signals, base)
+            shifted_estimate = fit_all(
+                shifted_signals, shifted_base, level=fixed.tilt(shifted_signals), dynamics=dynamics
+            )
+            shifts[fixed.name] = shifted_estimate.values - nominal.values
+            noise_bias += _noise_bias(nominal, shifted_estimate) if fixed.name == NOISE else 0.0
     shifts |= _lift_shifts(signals, base, nominal)
     return replace(
         nominal,
-        values=nominal.values - hidden,
+        values=nominal.values - noise_bias,
         covariance=total_covariance(nominal.covariance, shifts),
         clocks=clocks,
         shifts=shifts,
@@ -151,18 +153,18 @@ def _noise_bias(nominal: Estimate, noisier: Estimate) -> Floats:
     1994, with the straight line of their extrapolants). An axis that keeps its prior under noise gives no estimate of
     the bias.
     """
-    made = np.zeros(len(PARAMETERS))
-    explained = {one.name: one.explained for one in noisier.equations}
+    bias = np.zeros(len(PARAMETERS))
+    explained = {equation.name: equation.explained for equation in noisier.equations}
     for axis in AXES if nominal.dynamics else ():
         if explained[_EQUATIONS[axis][0]] >= MIN_EXPLAINED:
-            own = np.array([parameter.group == axis for parameter in PARAMETERS])
-            made[own] = noisier.values[own] - nominal.values[own]
-    return made
+            is_in_axis = np.array([parameter.group == axis for parameter in PARAMETERS])
+            bias[is_in_axis] = noisier.values[is_in_axis] - nominal.values[is_in_axis]
+    return bias
 
 
 def aligned_signals(records: Sequence[FlightRecord], clocks: Sequence[Clocks], base: BaseModel) -> Signals:
     """Return all stretches on the clocks of their accelerometers, leveled, with wind-triangle airspeed."""
-    signals = levelled(align(records, clocks, base.motor_lag))
+    signals = level_signals(align(records, clocks, base.motor_lag))
     return with_airspeed_scale(signals, vane(signals, base, prior_means()))
 
 
@@ -187,7 +189,7 @@ def total_covariance(fitted: Floats, shifts: Mapping[str, Floats]) -> Floats:
 
 def align_clocks(records: Sequence[FlightRecord], base: BaseModel) -> tuple[Clocks, ...]:
     """Find the clocks of the stretches, common to one log, by `ALIGNED_SECONDS` of its longest stretch."""
-    found: dict[str, Clocks] = {}
+    clocks_by_source: dict[str, Clocks] = {}
     for source in {record.source: None for record in records}:
         longest = max((record for record in records if record.source == source), key=lambda record: record.seconds)
         part = longest.part(ALIGNED_SECONDS)
@@ -199,8 +201,8 @@ def align_clocks(records: Sequence[FlightRecord], base: BaseModel) -> tuple[Cloc
             fits = fit_moments(signals, base, alpha, beta, spread=10.0)
             return sum(_log_unexplained(fits[axis], clock.lag) for axis in AXES)
 
-        found[source] = find_clocks(misfit)
-    return tuple(found[record.source] for record in records)
+        clocks_by_source[source] = find_clocks(misfit)
+    return tuple(clocks_by_source[record.source] for record in records)
 
 
 def _log_unexplained(fit: Fit, lag: float) -> float:
@@ -210,10 +212,10 @@ def _log_unexplained(fit: Fit, lag: float) -> float:
     Therefore both are taken as they were before the lag.
     """
     hertz = GRID_HZ / MOMENT_THINNING
-    left, all_of_it = (
+    residual, total = (
         invert_first_order_lag(values, lag, hertz) for values in (fit.residual, fit.predicted + fit.residual)
     )
-    return float(np.log(left.var() / (all_of_it.var() + 1e-300) + 1e-6))
+    return float(np.log(residual.var() / (total.var() + 1e-300) + 1e-6))
 
 
 def fit_all(
@@ -227,24 +229,24 @@ def fit_all(
     values, covariance = prior_means(), np.diag(np.square(prior_sds()))
     fits: dict[Group, Fit] = {}
 
-    doubt: AlphaDoubt | None = None
+    uncertainty: AlphaUncertainty | None = None
 
-    def take(group: Group, estimate: Floats, spread: Floats) -> None:
-        own = np.array([parameter.group == group for parameter in PARAMETERS])
-        values[own] = estimate
-        covariance[np.ix_(own, own)] = spread
+    def store(group: Group, estimate: Floats, spread: Floats) -> None:
+        is_in_group = np.array([parameter.group == group for parameter in PARAMETERS])
+        values[is_in_group] = estimate
+        covariance[np.ix_(is_in_group, is_in_group)] = spread
 
     if lift is not None:
-        take("lift", lift, np.zeros((2, 2)))
+        store("lift", lift, np.zeros((2, 2)))
     for _ in range(_PASSES):
         flow = vane(signals, base, values)
         if lift is None:
             fits["lift"], curve, spread = fit_lift(signals, base, flow.lift, level)
-            take("lift", curve, spread)
-            doubt = alpha_doubt(fits["lift"], flow.lift)
+            store("lift", curve, spread)
+            uncertainty = alpha_uncertainty(fits["lift"], flow.lift)
             flow = vane(signals, base, values)
-        fits["drag"], five, spread = fit_drag(signals, base, values, flow, doubt)
-        take("drag", five, spread)
+        fits["drag"], drag_values, spread = fit_drag(signals, base, values, flow, uncertainty)
+        store("drag", drag_values, spread)
     moments = fit_moments(signals, base, flow.alpha, flow.beta, motor_of(base, values)) if dynamics else {}
     for axis, fit in moments.items():
         fits[axis] = fit
@@ -252,16 +254,16 @@ def fit_all(
             # Sensors are too noisy, or the model lacks a structure: keep the prior.
             continue
         count = sum(parameter.group == axis for parameter in PARAMETERS)
-        take(axis, fit.estimate[:count], fit.covariance[:count, :count])
+        store(axis, fit.estimate[:count], fit.covariance[:count, :count])
     equations = tuple(_equation(group, fit) for group, fit in fits.items())
-    known = bool(np.isfinite(signals.current).all())
-    return Estimate(values, covariance, (), equations, with_current=known, dynamics=dynamics)
+    has_current = bool(np.isfinite(signals.current).all())
+    return Estimate(values, covariance, (), equations, with_current=has_current, dynamics=dynamics)
 
 
-def alpha_doubt(fit: Fit, lift: Floats) -> AlphaDoubt:
+def alpha_uncertainty(fit: Fit, lift: Floats) -> AlphaUncertainty:
     """Return the uncertainty of the angle of attack from a fit of the lift curve and from the level."""
-    by_lift, angle = np.sqrt(np.diag(fit.covariance)).tolist()
-    return AlphaDoubt(float(np.hypot(angle, LEVEL_SD)), by_lift, float(lift.mean()))
+    slope_sd, offset_sd = np.sqrt(np.diag(fit.covariance)).tolist()
+    return AlphaUncertainty(float(np.hypot(offset_sd, LEVEL_SD)), slope_sd, float(lift.mean()))
 
 
 def _equation(group: Group, fit: Fit) -> Equation:
@@ -275,11 +277,11 @@ def _lift_shifts(signals: Signals, base: BaseModel, nominal: Estimate) -> dict[s
 
     They are along the two principal axes of the lift curve's uncertainty. That uncertainty itself is already included.
     """
-    sizes, axes = np.linalg.eigh(nominal.covariance[:2, :2])
-    made = {}
+    eigenvalues, axes = np.linalg.eigh(nominal.covariance[:2, :2])
+    shifts = {}
     for k in range(2):
-        lift = nominal.values[:2] + np.sqrt(max(0.0, float(sizes[k]))) * axes[:, k]
+        lift = nominal.values[:2] + np.sqrt(max(0.0, float(eigenvalues[k]))) * axes[:, k]
         shift = fit_all(signals, base, lift=lift, dynamics=nominal.dynamics).values - nominal.values
         nominal.covariance[:2, :2] -= np.outer(shift[:2], shift[:2])
-        made[f"lift curve, axis {k + 1}"] = shift
-    return made
+        shifts[f"lift curve, axis {k + 1}"] = shift
+    return shifts

@@ -19,7 +19,7 @@ class FixedParameter:
     """One quantity that is held fixed.
 
     name: name for people, with its standard deviation.
-    change: function for signals and model with the quantity one standard deviation higher.
+    change: function that returns signals and model with the quantity one standard deviation higher.
     level: change of the autopilot's level, rad.
     air: change of the vertical air velocity, m/s.
     of_current: True if it applies only to logs with the battery's current.
@@ -40,52 +40,52 @@ class FixedParameter:
         return with_current or not self.of_current
 
 
-def _further(value: float, share: float, least: float) -> float:
+def _move_one_sd(value: float, relative_sd: float, min_sd: float) -> float:
     """Return `value` moved away from 0 by one standard deviation.
 
-    share, least: standard deviation as a ratio to the value, and its smallest value.
+    relative_sd, min_sd: standard deviation as a ratio to the value, and its smallest value.
 
-    >>> _further(-2.0, 0.5, 0.1), _further(0.0, 0.5, 0.1)
+    >>> _move_one_sd(-2.0, 0.5, 0.1), _move_one_sd(0.0, 0.5, 0.1)
     (-3.0, 0.1)
     """
-    return value + float(np.copysign(max(share * abs(value), least), value))
+    return value + float(np.copysign(max(relative_sd * abs(value), min_sd), value))
 
 
-def _coefficient(name: str, share: float, least: float = 0.0) -> Callable[[Signals, BaseModel], Changed]:
+def _change_coefficient(name: str, relative_sd: float, min_sd: float = 0.0) -> Callable[[Signals, BaseModel], Changed]:
     def change(signals: Signals, base: BaseModel) -> Changed:
-        value = _further(getattr(base.coefficients, name), share, least)
+        value = _move_one_sd(getattr(base.coefficients, name), relative_sd, min_sd)
         return signals, replace(base, coefficients=replace(base.coefficients, **{name: value}))
 
     return change
 
 
-def _product_of_inertia(share: float, least: float) -> Callable[[Signals, BaseModel], Changed]:
+def _change_product_of_inertia(relative_sd: float, min_sd_ratio: float) -> Callable[[Signals, BaseModel], Changed]:
     """Return a change of the product of inertia.
 
-    share: standard deviation as a ratio to Ixz.
-    least: smallest standard deviation, as a ratio to the geometric mean of Ixx and Izz.
+    relative_sd: standard deviation as a ratio to Ixz.
+    min_sd_ratio: smallest standard deviation, as a ratio to the geometric mean of Ixx and Izz.
     """
 
     def change(signals: Signals, base: BaseModel) -> Changed:
         ixx, iyy, izz, ixz = base.inertia
-        changed = _further(ixz, share, least * float(np.sqrt(ixx * izz)))
-        return signals, replace(base, inertia=(ixx, iyy, izz, changed))
+        new_ixz = _move_one_sd(ixz, relative_sd, min_sd_ratio * float(np.sqrt(ixx * izz)))
+        return signals, replace(base, inertia=(ixx, iyy, izz, new_ixz))
 
     return change
 
 
-def _airspeed(signals: Signals, base: BaseModel) -> Changed:
+def _scale_airspeed(signals: Signals, base: BaseModel) -> Changed:
     return replace(signals, airspeed=signals.airspeed * (1.0 + signals.airspeed_sd)), base
 
 
-def _acceleration(axis: int, bias: float) -> Callable[[Signals, BaseModel], Changed]:
+def _bias_acceleration(axis: int, bias: float) -> Callable[[Signals, BaseModel], Changed]:
     def change(signals: Signals, base: BaseModel) -> Changed:
         return replace(signals, acceleration=signals.acceleration + bias * np.eye(3)[axis]), base
 
     return change
 
 
-def _noise(axes: tuple[int, ...]) -> Callable[[Signals, BaseModel], Changed]:
+def _double_noise(axes: tuple[int, ...]) -> Callable[[Signals, BaseModel], Changed]:
     """Return a change that doubles the noise power of the accelerometers.
 
     It shows the bias of the slopes: the noise that is present has the same effect again (Cook and Stefanski 1994,
@@ -93,31 +93,31 @@ def _noise(axes: tuple[int, ...]) -> Callable[[Signals, BaseModel], Changed]:
     """
 
     def change(signals: Signals, base: BaseModel) -> Changed:
-        made, draw = signals.acceleration.copy(), np.random.default_rng(1)
+        noisy, generator = signals.acceleration.copy(), np.random.default_rng(1)
 
-        def fast(values: Floats) -> float:
+        def noise_level(values: Floats) -> float:
             return float((values - signals.smooth(values, VANE_BAND)).std())
 
         for axis in axes:
-            white = draw.standard_normal(len(made))
-            made[:, axis] += fast(made[:, axis]) / fast(white) * white
-        return replace(signals, acceleration=made), base
+            white_noise = generator.standard_normal(len(noisy))
+            noisy[:, axis] += noise_level(noisy[:, axis]) / noise_level(white_noise) * white_noise
+        return replace(signals, acceleration=noisy), base
 
     return change
 
 
-def _late_force(seconds: float) -> Callable[[Signals, BaseModel], Changed]:
+def _delay_force(seconds: float) -> Callable[[Signals, BaseModel], Changed]:
     return lambda signals, base: (
         replace(signals, acceleration=signals.delayed(signals.acceleration, seconds)),
         base,
     )
 
 
-def _late_surfaces(seconds: float) -> Callable[[Signals, BaseModel], Changed]:
+def _delay_surfaces(seconds: float) -> Callable[[Signals, BaseModel], Changed]:
     return lambda signals, base: (replace(signals, surfaces=signals.delayed(signals.surfaces, seconds)), base)
 
 
-def _current(factor: float) -> Callable[[Signals, BaseModel], Changed]:
+def _scale_current(factor: float) -> Callable[[Signals, BaseModel], Changed]:
     return lambda signals, base: (replace(signals, current=signals.current * factor), base)
 
 
@@ -133,20 +133,22 @@ _LEVEL_SD_RAD = float(np.radians(0.2))
 # certain than the Aerosonde's (Beard and McLain, Small Unmanned Aircraft, second edition, table E.2), which gives the
 # smallest standard deviation.
 HELD_FIXED = (
-    FixedParameter("lift of the elevator (50 %)", _coefficient("lift_elevator", 0.5)),
-    FixedParameter("lift of the pitch rate (50 %)", _coefficient("lift_rate", 0.5)),
-    FixedParameter("side force of sideslip (30 %)", _coefficient("side_beta", 0.3)),
-    FixedParameter("side force of the rudder (50 %)", _coefficient("side_rudder", 0.5, 0.095)),
-    FixedParameter("side force of the ailerons (100 %)", _coefficient("side_aileron", 1.0, 0.075)),
-    FixedParameter("roll of the rudder (100 %)", _coefficient("roll_rudder", 1.0, 0.0024)),
-    FixedParameter("product of inertia (50 %)", _product_of_inertia(0.5, 0.05)),
-    FixedParameter("clock of the accelerometers (15 ms)", _late_force(0.015)),
-    FixedParameter("clock of the servos (15 ms)", _late_surfaces(0.015)),
-    FixedParameter("airspeed (as the wind triangle has it)", _airspeed),
+    FixedParameter("lift of the elevator (50 %)", _change_coefficient("lift_elevator", 0.5)),
+    FixedParameter("lift of the pitch rate (50 %)", _change_coefficient("lift_rate", 0.5)),
+    FixedParameter("side force of sideslip (30 %)", _change_coefficient("side_beta", 0.3)),
+    FixedParameter("side force of the rudder (50 %)", _change_coefficient("side_rudder", 0.5, 0.095)),
+    FixedParameter("side force of the ailerons (100 %)", _change_coefficient("side_aileron", 1.0, 0.075)),
+    FixedParameter("roll of the rudder (100 %)", _change_coefficient("roll_rudder", 1.0, 0.0024)),
+    FixedParameter("product of inertia (50 %)", _change_product_of_inertia(0.5, 0.05)),
+    FixedParameter("clock of the accelerometers (15 ms)", _delay_force(0.015)),
+    FixedParameter("clock of the servos (15 ms)", _delay_surfaces(0.015)),
+    FixedParameter("airspeed (as the wind triangle has it)", _scale_airspeed),
     # An error of the level also shows as a bias of the forward accelerometer, which is removed.
-    FixedParameter("level of the autopilot (0.2 deg)", _acceleration(0, _LEVEL_SD_RAD * 9.80665), level=_LEVEL_SD_RAD),
+    FixedParameter(
+        "level of the autopilot (0.2 deg)", _bias_acceleration(0, _LEVEL_SD_RAD * 9.80665), level=_LEVEL_SD_RAD
+    ),
     FixedParameter("mean vertical air (0.04 m/s)", _unchanged, air=0.04),
-    FixedParameter("downward accelerometer (0.03 m/s2)", _acceleration(2, 0.03)),
-    FixedParameter(NOISE, _noise((1, 2))),
-    FixedParameter("scale of the current (2 %)", _current(1.02), of_current=True),
+    FixedParameter("downward accelerometer (0.03 m/s2)", _bias_acceleration(2, 0.03)),
+    FixedParameter(NOISE, _double_noise((1, 2))),
+    FixedParameter("scale of the current (2 %)", _scale_current(1.02), of_current=True),
 )

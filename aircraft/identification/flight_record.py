@@ -52,9 +52,13 @@ class FlightRecord:
     def part(self, seconds: float) -> "FlightRecord":
         """Return the central part, at most ``seconds`` long."""
         rows = round(seconds * GRID_HZ)
-        first = max(0, (len(self.time) - rows) // 2)
-        cut = {one.name: getattr(self, one.name)[first : first + rows] for one in fields(self) if one.name != "source"}
-        return replace(self, **cut)
+        begin = max(0, (len(self.time) - rows) // 2)
+        columns = {
+            field.name: getattr(self, field.name)[begin : begin + rows]
+            for field in fields(self)
+            if field.name != "source"
+        }
+        return replace(self, **columns)
 
     @property
     def has_current(self) -> bool:
@@ -89,26 +93,26 @@ def low_pass(values: Floats, cutoff: float, hertz: float = GRID_HZ) -> Floats:
     return np.asarray(sosfiltfilt(sections, values, axis=0, padlen=length))
 
 
-def shifted(values: Floats, delay: float) -> Floats:
+def apply_delay(values: Floats, delay: float) -> Floats:
     """Delay (n,) or (n, k) by ``delay`` seconds with linear interpolation; a negative delay advances.
 
-    >>> shifted(np.arange(5.0), 0.02)
+    >>> apply_delay(np.arange(5.0), 0.02)
     array([0., 0., 1., 2., 3.])
     """
     rows = np.arange(len(values)) - delay * GRID_HZ
-    first = np.clip(np.floor(rows).astype(np.intp), 0, len(values) - 1)
-    second = np.clip(first + 1, 0, len(values) - 1)
-    share = np.clip(rows - first, 0.0, 1.0)
-    share = share[:, np.newaxis] if values.ndim == 2 else share
-    return np.asarray(values[first] * (1.0 - share) + values[second] * share)
+    lower_rows = np.clip(np.floor(rows).astype(np.intp), 0, len(values) - 1)
+    upper_rows = np.clip(lower_rows + 1, 0, len(values) - 1)
+    fraction = np.clip(rows - lower_rows, 0.0, 1.0)
+    fraction = fraction[:, np.newaxis] if values.ndim == 2 else fraction
+    return np.asarray(values[lower_rows] * (1.0 - fraction) + values[upper_rows] * fraction)
 
 
-def lagged(values: Floats, time_constant: float) -> Floats:
+def apply_lag(values: Floats, time_constant: float) -> Floats:
     """Return (n,) or (n, k) after a first-order lag with this time constant, s.
 
     It is exact for values held over a sample.
 
-    >>> lagged(np.array([0.0, 1.0, 1.0]), 0.0)
+    >>> apply_lag(np.array([0.0, 1.0, 1.0]), 0.0)
     array([0., 1., 1.])
     """
     if time_constant <= 1e-4:
@@ -119,9 +123,9 @@ def lagged(values: Floats, time_constant: float) -> Floats:
     # The input holds its mean over a sample: half of the last and half of this value.
     gain = 0.5 * (1.0 - decay)
     numerator, denominator = [gain, gain], [1.0, -decay]
-    start = values[:1] * (1.0 - gain)
-    made, _ = lfilter(numerator, denominator, values, axis=0, zi=start)
-    return np.asarray(made)
+    initial_state = values[:1] * (1.0 - gain)
+    lagged_values, _ = lfilter(numerator, denominator, values, axis=0, zi=initial_state)
+    return np.asarray(lagged_values)
 
 
 def derivative(values: Floats) -> Floats:

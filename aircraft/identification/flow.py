@@ -19,7 +19,7 @@ VANE_BAND = 8.0
 
 
 class Flow(NamedTuple):
-    """Angle of attack and sideslip, rad, and lift coefficient from the angle of attack alone, (n,) each."""
+    """Angle of attack and sideslip, rad, and lift coefficient from only the angle of attack, (n,) each."""
 
     alpha: Floats
     beta: Floats
@@ -38,7 +38,7 @@ def lift_curve(base: BaseModel, values: Floats) -> tuple[float, float]:
 def motor_of(base: BaseModel, values: Floats) -> Motor:
     """Return the motor with one set of values (n,)."""
     thrust, speed, torque = (float(values[INDEX[name]]) for name in ("thrust", "motor-speed", "propeller-torque"))
-    return base.motor.changed(thrust, speed, torque)
+    return base.motor.with_factors(thrust, speed, torque)
 
 
 def voltage_of(signals: Signals, base: BaseModel) -> Floats | float:
@@ -63,22 +63,25 @@ def vane(signals: Signals, base: BaseModel, values: Floats) -> Flow:
 
     values: (n,) of `aircraft.identification.parameters.PARAMETERS`, of which the parameters of lift and motor are used.
     """
-    c, (slope, zero) = base.coefficients, lift_curve(base, values)
-    pressure, other = pressure_of(signals, base), other_lift(signals, base)
+    coefficients, (slope, zero) = base.coefficients, lift_curve(base, values)
+    pressure, other_coefficient = pressure_of(signals, base), other_lift(signals, base)
     thrust, _ = motor_of(base, values).thrust_and_current(
         signals.airspeed, signals.throttle, signals.density, voltage_of(signals, base)
     )
     x = base.mass * signals.acceleration[:, 0] - thrust
     z = base.mass * signals.acceleration[:, 2]
-    alpha = (-z / pressure - zero - other) / slope
+    alpha = (-z / pressure - zero - other_coefficient) / slope
     for _ in range(2):
-        lift = (x * np.sin(alpha) - z * np.cos(alpha)) / pressure - other
+        lift = (x * np.sin(alpha) - z * np.cos(alpha)) / pressure - other_coefficient
         alpha = (lift - zero) / slope
     _, aileron, rudder = signals.surfaces.T
-    across = base.span / (2.0 * signals.airspeed)
-    turning = c.side_roll * signals.rates[:, 0] * across + c.side_yaw * signals.rates[:, 2] * across
-    side = base.mass * signals.acceleration[:, 1] / pressure - turning
-    beta = (side - c.side_aileron * aileron - c.side_rudder * rudder) / c.side_beta
+    span_factor = base.span / (2.0 * signals.airspeed)
+    rate_force = (
+        coefficients.side_roll * signals.rates[:, 0] * span_factor
+        + coefficients.side_yaw * signals.rates[:, 2] * span_factor
+    )
+    side = base.mass * signals.acceleration[:, 1] / pressure - rate_force
+    beta = (side - coefficients.side_aileron * aileron - coefficients.side_rudder * rudder) / coefficients.side_beta
     return Flow(*(signals.smooth(values, VANE_BAND) for values in (alpha, beta, lift)))
 
 
@@ -92,9 +95,9 @@ def attitude_alpha(signals: Signals, level: float = 0.0) -> Floats:
     north = signals.velocity[:, 0] - signals.wind[:, 0]
     east = signals.velocity[:, 1] - signals.wind[:, 1]
     down = signals.velocity[:, 2]
-    ahead = north * np.cos(yaw) + east * np.sin(yaw)
+    forward = north * np.cos(yaw) + east * np.sin(yaw)
     right = east * np.cos(yaw) - north * np.sin(yaw)
-    u = ahead * np.cos(pitch) - down * np.sin(pitch)
-    below = ahead * np.sin(pitch) + down * np.cos(pitch)
-    w = below * np.cos(roll) - right * np.sin(roll)
+    u = forward * np.cos(pitch) - down * np.sin(pitch)
+    down_component = forward * np.sin(pitch) + down * np.cos(pitch)
+    w = down_component * np.cos(roll) - right * np.sin(roll)
     return np.asarray(np.arctan2(w, u))

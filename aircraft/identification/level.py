@@ -24,25 +24,25 @@ def forward_excess(signals: Signals) -> list[float]:
     It is the mean over straight flight, from attitude and ground velocity. The excess is a level error or an
     accelerometer's bias; either would be taken for drag.
     """
-    found = []
+    excesses = []
     for first, last in zip(signals.edges[:-1], signals.edges[1:], strict=True):
         rows = slice(first, last)
         roll, pitch, yaw = signals.attitude[rows].T
         x, y, z = signals.acceleration[rows].T
         # Horizontal acceleration along the nose's heading.
-        ahead = x * np.cos(pitch) + (y * np.sin(roll) + z * np.cos(roll)) * np.sin(pitch)
+        forward = x * np.cos(pitch) + (y * np.sin(roll) + z * np.cos(roll)) * np.sin(pitch)
         change = np.gradient(signals.velocity[rows], 1.0 / signals.hertz, axis=0)
-        gained = change[:, 0] * np.cos(yaw) + change[:, 1] * np.sin(yaw)
-        straight = np.abs(roll) < _MAX_STRAIGHT_BANK_RAD
-        found.append(float((ahead - gained)[straight].mean()) if straight.any() else 0.0)
-    return found
+        speed_gain = change[:, 0] * np.cos(yaw) + change[:, 1] * np.sin(yaw)
+        is_straight = np.abs(roll) < _MAX_STRAIGHT_BANK_RAD
+        excesses.append(float((forward - speed_gain)[is_straight].mean()) if is_straight.any() else 0.0)
+    return excesses
 
 
-def levelled(signals: Signals) -> Signals:
+def level_signals(signals: Signals) -> Signals:
     """Return signals with the forward excess divided between the level and the accelerometer."""
-    share = LEVEL_SD**2 / (LEVEL_SD**2 + (FORWARD_SD / GRAVITY) ** 2)
+    level_fraction = LEVEL_SD**2 / (LEVEL_SD**2 + (FORWARD_SD / GRAVITY) ** 2)
     attitude, acceleration = signals.attitude.copy(), signals.acceleration.copy()
     for excess, first, last in zip(forward_excess(signals), signals.edges[:-1], signals.edges[1:], strict=True):
-        attitude[first:last, 1] += share * excess / GRAVITY
-        acceleration[first:last, 0] -= (1.0 - share) * excess
+        attitude[first:last, 1] += level_fraction * excess / GRAVITY
+        acceleration[first:last, 0] -= (1.0 - level_fraction) * excess
     return replace(signals, attitude=attitude, acceleration=acceleration)

@@ -24,17 +24,17 @@ def fit_lift(signals: Signals, base: BaseModel, lift: Floats, level: float = 0.0
     level: rad.
     """
     measured = signals.smooth(attitude_alpha(signals, level), LIFT_BAND)
-    smooth = signals.smooth(lift, LIFT_BAND)
+    smoothed = signals.smooth(lift, LIFT_BAND)
     c = base.coefficients
     slope_sd, offset_sd = prior_sds()[:2]
     # About the mean lift, where slope and angle are uncorrelated.
-    middle = float(smooth.mean())
-    columns = np.column_stack([smooth - middle, np.ones(len(smooth))])
+    mean_lift = float(smoothed.mean())
+    columns = np.column_stack([smoothed - mean_lift, np.ones(len(smoothed))])
     inverse = 1.0 / c.lift_alpha
-    mean = np.array([inverse, (middle - c.lift_zero) * inverse])
+    mean = np.array([inverse, (mean_lift - c.lift_zero) * inverse])
     fit = fit_with_prior(columns, measured, mean, np.array([slope_sd * inverse, offset_sd * inverse]), signals.block)
-    steep, angle = fit.estimate
-    slope = 1.0 / steep
-    made = np.array([slope / c.lift_alpha, middle - slope * angle - c.lift_zero])
-    turn = np.array([[-slope * slope / c.lift_alpha, 0.0], [slope * slope * angle, -slope]])
-    return fit, made, turn @ fit.covariance @ turn.T
+    inverse_slope, angle = fit.estimate
+    slope = 1.0 / inverse_slope
+    curve = np.array([slope / c.lift_alpha, mean_lift - slope * angle - c.lift_zero])
+    jacobian = np.array([[-slope * slope / c.lift_alpha, 0.0], [slope * slope * angle, -slope]])
+    return fit, curve, jacobian @ fit.covariance @ jacobian.T

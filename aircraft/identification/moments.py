@@ -19,7 +19,7 @@ AXES: tuple[Group, ...] = ("pitch", "roll", "yaw")
 
 # Cutoff below which moments are compared, Hz.
 MOMENT_BAND = 4.0
-# Of this many samples one is used.
+# One of this many samples is used.
 MOMENT_THINNING = 2
 # Standard deviation of the moment coefficient from an aircraft's asymmetry.
 _ASYMMETRY_SD = 0.01
@@ -39,22 +39,22 @@ def fit_moments(
     motor: motor whose torque rolls the aircraft; None for the base's motor.
     spread: factor on the priors' standard deviations.
     """
-    thin = signals.thinned(MOMENT_THINNING, {"alpha": alpha, "beta": beta})
-    pressure = pressure_of(thin, base)
-    turning = _required_moments(thin, base, base.motor if motor is None else motor)
-    terms = _moment_regressors(thin, base)
+    thinned = signals.thinned(MOMENT_THINNING, {"alpha": alpha, "beta": beta})
+    pressure = pressure_of(thinned, base)
+    required = _required_moments(thinned, base, base.motor if motor is None else motor)
+    terms = _moment_regressors(thinned, base)
     fits = {}
     ixx, iyy, izz, _ = base.inertia
     for axis, inertia, length in zip(AXES, (iyy, ixx, izz), (base.chord, base.span, base.span), strict=True):
-        known, *columns = terms[axis]
-        chosen = [parameter for parameter in PARAMETERS if parameter.group == axis]
-        means, sds = [parameter.prior for parameter in chosen], [parameter.sd for parameter in chosen]
+        known_part, *columns = terms[axis]
+        parameters = [parameter for parameter in PARAMETERS if parameter.group == axis]
+        means, sds = [parameter.prior for parameter in parameters], [parameter.sd for parameter in parameters]
         if axis != "pitch":
-            columns, means, sds = [*columns, np.ones(len(known))], [*means, 0.0], [*sds, _ASYMMETRY_SD]
+            columns, means, sds = [*columns, np.ones(len(known_part))], [*means, 0.0], [*sds, _ASYMMETRY_SD]
         scale = pressure * length / inertia
-        table = thin.smooth(np.column_stack([scale * column for column in columns]), MOMENT_BAND)
-        goal = thin.smooth(turning[axis] / inertia - scale * known, MOMENT_BAND)
-        fits[axis] = fit_with_prior(table, goal, np.array(means), spread * np.array(sds), thin.block)
+        regressors = thinned.smooth(np.column_stack([scale * column for column in columns]), MOMENT_BAND)
+        target = thinned.smooth(required[axis] / inertia - scale * known_part, MOMENT_BAND)
+        fits[axis] = fit_with_prior(regressors, target, np.array(means), spread * np.array(sds), thinned.block)
     return fits
 
 
@@ -79,13 +79,17 @@ def _moment_regressors(signals: Signals, base: BaseModel) -> dict[Group, list[Fl
     c = base.coefficients
     alpha, beta = signals.extra["alpha"], signals.extra["beta"]
     elevator, aileron, rudder = signals.surfaces.T
-    across, along = base.span / (2.0 * signals.airspeed), base.chord / (2.0 * signals.airspeed)
-    roll, pitch, yaw = signals.rates[:, 0] * across, signals.rates[:, 1] * along, signals.rates[:, 2] * across
-    one = np.ones(len(alpha))
+    span_factor, chord_factor = base.span / (2.0 * signals.airspeed), base.chord / (2.0 * signals.airspeed)
+    roll, pitch, yaw = (
+        signals.rates[:, 0] * span_factor,
+        signals.rates[:, 1] * chord_factor,
+        signals.rates[:, 2] * span_factor,
+    )
+    ones = np.ones(len(alpha))
     return {
         "pitch": [
-            c.pitch_zero * one,
-            one,
+            c.pitch_zero * ones,
+            ones,
             c.pitch_alpha * alpha,
             c.pitch_rate * pitch,
             c.pitch_elevator * elevator,
@@ -98,7 +102,7 @@ def _moment_regressors(signals: Signals, base: BaseModel) -> dict[Group, list[Fl
             c.roll_aileron * aileron,
         ],
         "yaw": [
-            0.0 * one,
+            0.0 * ones,
             c.yaw_beta * beta,
             c.yaw_roll * roll,
             c.yaw_yaw * yaw,

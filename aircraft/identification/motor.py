@@ -12,7 +12,7 @@ class Motor(Protocol):
     def voltage(self) -> float:
         """Battery voltage, V."""
 
-    def changed(
+    def with_factors(
         self, thrust: float = 1.0, speed: float = 1.0, torque: float = 1.0, resistance: float = 1.0, idle: float = 1.0
     ) -> Self:
         """Return a motor with factors on thrust, speed per volt, torque or power for a thrust, and losses."""

@@ -47,16 +47,16 @@ def performance(base: BaseModel, values: Floats, airspeed: float, density: float
     for _ in range(40):
         thrust, _ = _thrust(base, values, airspeed, throttle, density)
         alpha, drag = _flow(base, values, airspeed, density, thrust, level)
-        short = thrust * np.cos(alpha) < drag
-        low, high = np.where(short, throttle, low), np.where(short, high, throttle)
+        is_short = thrust * np.cos(alpha) < drag
+        low, high = np.where(is_short, throttle, low), np.where(is_short, high, throttle)
         throttle = 0.5 * (low + high)
-    _, amps = _thrust(base, values, airspeed, throttle, density)
+    _, current = _thrust(base, values, airspeed, throttle, density)
     return Performance(
         climb=_path_angle(base, values, airspeed, density, np.ones(count)),
         sink=-_path_angle(base, values, airspeed, density, np.full(count, idle)),
         drag=drag,
         throttle=throttle,
-        power=amps * base.motor.voltage,
+        power=current * base.motor.voltage,
     )
 
 
@@ -71,27 +71,30 @@ def fastest_level(base: BaseModel, values: Floats, density: float) -> Floats:
     """
     values = np.atleast_2d(values)
     count = len(values)
-    full, level = np.ones(count), np.zeros(count)
+    full_throttle, level = np.ones(count), np.zeros(count)
 
-    def spare(speed: Floats) -> Floats:
-        thrust, _ = _thrust(base, values, speed, full, density)
+    def excess_thrust(speed: Floats) -> Floats:
+        thrust, _ = _thrust(base, values, speed, full_throttle, density)
         alpha, drag = _flow(base, values, speed, density, thrust, level)
         return np.asarray(thrust * np.cos(alpha) - drag)
 
     # From above: on the back side of the power curve there is a slower speed at which thrust equals drag again.
-    high = np.full(count, _SPEED_RANGE_MPS[1])
-    low = high.copy()
+    high_speed = np.full(count, _SPEED_RANGE_MPS[1])
+    low_speed = high_speed.copy()
     for _ in range(200):
-        short = (spare(low) < 0.0) & (low > _SPEED_RANGE_MPS[0])
-        if not short.any():
+        is_short = (excess_thrust(low_speed) < 0.0) & (low_speed > _SPEED_RANGE_MPS[0])
+        if not is_short.any():
             break
-        high = np.where(short, low, high)
-        low = np.where(short, 0.97 * low, low)
+        high_speed = np.where(is_short, low_speed, high_speed)
+        low_speed = np.where(is_short, 0.97 * low_speed, low_speed)
     for _ in range(40):
-        middle = 0.5 * (low + high)
-        short = spare(middle) < 0.0
-        low, high = np.where(short, low, middle), np.where(short, middle, high)
-    return np.asarray(0.5 * (low + high))
+        middle_speed = 0.5 * (low_speed + high_speed)
+        is_short = excess_thrust(middle_speed) < 0.0
+        low_speed, high_speed = (
+            np.where(is_short, low_speed, middle_speed),
+            np.where(is_short, middle_speed, high_speed),
+        )
+    return np.asarray(0.5 * (low_speed + high_speed))
 
 
 def _path_angle(base: BaseModel, values: Floats, airspeed: float, density: float, throttle: Floats) -> Floats:
@@ -112,19 +115,21 @@ def _flow(
     pressure = 0.5 * density * airspeed * airspeed * base.area
     column = {name: values[:, k] for name, k in INDEX.items()}
     slope = c.lift_alpha * column["lift-slope"]
-    zero = c.lift_zero + column["lift-offset"]
+    lift_at_zero = c.lift_zero + column["lift-offset"]
     # The constant, the angle of attack and the elevator balance in pitch.
-    power = c.pitch_elevator * column["elevator-power"]
-    per_alpha = -c.pitch_alpha * column["pitch-stiffness"] / power
-    at_zero = -(c.pitch_zero + column["pitch-offset"]) / power
+    elevator_power = c.pitch_elevator * column["elevator-power"]
+    elevator_per_alpha = -c.pitch_alpha * column["pitch-stiffness"] / elevator_power
+    elevator_at_zero = -(c.pitch_zero + column["pitch-offset"]) / elevator_power
     alpha = np.zeros(len(values))
     weight = base.mass * GRAVITY
     for _ in range(6):
         lift = weight * np.cos(angle) - thrust * np.sin(alpha)
-        alpha = (lift / pressure - zero - c.lift_elevator * at_zero) / (slope + c.lift_elevator * per_alpha)
-    elevator = at_zero + per_alpha * alpha
-    lifting = zero + slope * alpha
-    induced = c.drag_induced * column["induced-drag"] * np.square(lifting - c.lift_least_drag)
+        alpha = (lift / pressure - lift_at_zero - c.lift_elevator * elevator_at_zero) / (
+            slope + c.lift_elevator * elevator_per_alpha
+        )
+    elevator = elevator_at_zero + elevator_per_alpha * alpha
+    lift_coefficient = lift_at_zero + slope * alpha
+    induced = c.drag_induced * column["induced-drag"] * np.square(lift_coefficient - c.lift_least_drag)
     drag = c.drag_zero * column["zero-lift-drag"] + induced
     return alpha, pressure * (drag + c.drag_elevator * elevator)
 
@@ -135,5 +140,5 @@ def _thrust(
     """Return thrust, N, and battery current, A, (m,)."""
     # Arrays over the draws replace the motor's constants: its formulas accept them unchanged.
     thrust, speed, torque = (values[:, INDEX[name]] for name in ("thrust", "motor-speed", "propeller-torque"))
-    many = base.motor.changed(thrust, speed, torque)  # type: ignore[arg-type]
-    return many.thrust_and_current(np.zeros(len(values)) + airspeed, throttle, np.full(len(values), density))
+    motors = base.motor.with_factors(thrust, speed, torque)  # type: ignore[arg-type]
+    return motors.thrust_and_current(np.zeros(len(values)) + airspeed, throttle, np.full(len(values), density))

@@ -34,7 +34,7 @@ class PropellerDisc:
     nominal: float
     power: float = 1.0
 
-    def changed(
+    def with_factors(
         self, thrust: float = 1.0, speed: float = 1.0, torque: float = 1.0, resistance: float = 1.0, idle: float = 1.0
     ) -> "PropellerDisc":
         """Return a disc with factors on thrust, exit speed, power for a thrust, and losses.
@@ -65,11 +65,11 @@ class PropellerDisc:
         (3.297, 9.62)
         """
         volts = self.voltage if voltage is None else voltage
-        full = self.exit_speed * volts / self.nominal
-        behind = airspeed + throttle * (full - airspeed) if self.ducted else throttle * full
-        first = behind if self.ducted else behind + airspeed
-        thrust = np.maximum(0.0, self.pull * density * first * (behind - airspeed))
-        power = self.power * (1.0 + self.losses) * 0.5 * thrust * (behind + airspeed)
+        full_exit_speed = self.exit_speed * volts / self.nominal
+        exit_speed = airspeed + throttle * (full_exit_speed - airspeed) if self.ducted else throttle * full_exit_speed
+        first_factor = exit_speed if self.ducted else exit_speed + airspeed
+        thrust = np.maximum(0.0, self.pull * density * first_factor * (exit_speed - airspeed))
+        power = self.power * (1.0 + self.losses) * 0.5 * thrust * (exit_speed + airspeed)
         return thrust, np.asarray(power / volts)
 
     def reaction(self, airspeed: Floats, throttle: Floats, density: Floats) -> Floats:

@@ -31,7 +31,7 @@ from planfly.workflow.airframe import load_airframe
 from planner.evaluation.certify import certify
 from planner.evaluation.encoding import ENCODINGS, Encoding
 from planner.optimisers.hypervolume import covering_order, hypervolume
-from planner.search.plan_front import Front, FrontTask, fitted_task, front_task, plan_front, seed_paths
+from planner.search.plan_front import Front, FrontTask, fit_margins, front_task, plan_front, seed_paths
 from world.arrays import Floats
 from world.scenario import Scenario, load_scenario
 
@@ -107,7 +107,7 @@ def _scenario(name: str) -> Scenario:
 def make_contest(scenario: Scenario, front: Front) -> Contest:
     """Make the contest of a problem, with the box of its default plan."""
     default = front.default
-    task = fitted_task(front_task(scenario, load_airframe(scenario).limits.surely()), default.plan.waypoints)
+    task = fit_margins(front_task(scenario, load_airframe(scenario).limits.surely()), default.plan.waypoints)
     space = task.problem.space
     straight = float(np.sqrt(((space.destination - space.start) ** 2).sum()))
     ends = np.stack([[end, end] for end in (space.start, space.destination)])

@@ -18,7 +18,7 @@ from planner.evaluation.paper_scores import paper_scores
 from planner.evaluation.problem import make_problem
 from planner.optimisers.preference import NO_GOAL, Level, ranks
 from planner.optimisers.umda import Umda
-from planner.search.search_state import CONSTRAINTS, DETECTION, HEIGHT, KILL, LENGTH, best_first, safe, score_table
+from planner.search.search_state import CONSTRAINTS, DETECTION, HEIGHT, KILL, LENGTH, are_safe, best_first, score_table
 from world.arrays import Floats, Ints
 from world.random_streams import PLANNER, stream
 from world.scenario import load_scenario
@@ -125,7 +125,7 @@ def searched(choice: Choice, threats: int, seed: int) -> tuple[bool, float]:
         best = best[best_first(best)[:1]]
         search.tell(scores)
     row = best[0] if choice.archive else search.scores[0]
-    return bool(safe(row)), float(row[LENGTH])
+    return bool(are_safe(row)), float(row[LENGTH])
 
 
 def measure(problems: Sequence[int], runs: int) -> None:

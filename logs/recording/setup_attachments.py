@@ -118,7 +118,7 @@ def pack_terrain(terrain: Terrain) -> dict[str, bytes]:
         sha256=terrain.sha256,
         datum=terrain.datum,
         vertical_error_m=terrain.vertical_error,
-        map_to_pixel=terrain.to_pixel.rows().tolist(),
+        map_to_pixel=terrain.to_pixel.to_rows().tolist(),
         map_residual_pixels=terrain.to_pixel.residual,
         parts=list(parts),
     )

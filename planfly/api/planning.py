@@ -18,7 +18,7 @@ from planfly.workflow.make_plan import make_plan
 from planfly.workflow.output_paths import file_target
 from planner.plan import Plan, plan_json, read_plan
 from planner.search.explain_failure import explain_failure
-from planner.search.replan import same_mission
+from planner.search.replan import check_same_mission
 from planner.search.search_state import StopCondition
 from world.errors import ScenarioError
 from world.files import write_whole
@@ -98,7 +98,7 @@ def replan(
     check_arguments(seed=options["seed"], budget=options["budget"], seconds=options["seconds"], at_leg=at_leg)
     world = _with_budget(named_scenario(scenario, options), options["budget"])
     flown = old if isinstance(old, Plan) else read_plan(Path(old))
-    same_mission(world, flown)
+    check_same_mission(world, flown)
     return _search_and_write(
         _with_new_threats(world, flown, threats), scenario, (flown, at_leg), options, out, overwrite
     )

@@ -15,7 +15,7 @@ from aircraft.catalog import Aircraft, read_aircraft
 from aircraft.identification.alignment import Clocks, Signals, align
 from aircraft.identification.flight_record import GRID_HZ, FlightRecord
 from aircraft.identification.flow import Flow, vane
-from aircraft.identification.level import levelled
+from aircraft.identification.level import level_signals
 from aircraft.identification.parameters import PARAMETERS, prior_means
 from flight.dynamics.fdm import Fdm
 from planfly.identification.folder import Identified
@@ -60,7 +60,7 @@ def replay_log(
     files: texts of the aircraft's folder by file name.
     """
     clock = found.estimate.clocks[-1]
-    signals = levelled(align(records, [Clocks(clock.lag, clock.delay, 0.0)] * len(records), 0.0))
+    signals = level_signals(align(records, [Clocks(clock.lag, clock.delay, 0.0)] * len(records), 0.0))
     signals = replace(signals, airspeed=signals.airspeed * found.estimate.airspeed[0])
     flow = vane(signals, found.numbers, found.estimate.values)
     with temporary_folder("planfly-replay-") as place:

@@ -57,7 +57,7 @@ from world.arrays import Floats
 from world.errors import PlanflyError
 from world.frames import to_geo
 from world.interruption import end_with_parent
-from world.scenario import Scenario, in_the_air
+from world.scenario import Scenario, without_ground_phases
 
 # Duration of a loiter in LOITER and GUIDED in one log, s: each lap of a loiter is laid out, and judged, separately.
 HELD = 900.0
@@ -203,7 +203,7 @@ class ServedFlights:
             items = (_loiter_item(begin, request.place),)
         mission = replace(request.mission, items=(begin, *items), source=MODE_NAMES[request.mode])
         # The aircraft is in the air, so there is no take-off, and it does not land.
-        setup = make_setup(in_the_air(served.scenario), self._airframe, mission, served.seed)
+        setup = make_setup(without_ground_phases(served.scenario), self._airframe, mission, served.seed)
         return PreparedFlight(setup, LocalMap.around(setup))
 
     def open_log(self, setup: FlightSetup, mode: int) -> "ServedLog":

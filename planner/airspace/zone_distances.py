@@ -29,7 +29,7 @@ MAX_SAMPLES = 20
 # Shortest length that is charged, m.
 MIN_CHARGED_LENGTH = 1.0
 # Bound on the height above unknown ground, m.
-UNKNOWN = 9000.0
+UNKNOWN_HEIGHT = 9000.0
 
 
 class AltitudeBand(NamedTuple):
@@ -60,76 +60,85 @@ def zone_excess(
     line = segment_between(a[0], a[1], b[0], b[1])
     total, required, records = 0.0, zones.required, zones.records
     for z in range(zones.inclusions):
-        wanted = required[z].horizontal + lateral
-        total += _inclusion_excess(records, z, line, wanted)
+        required_distance = required[z].horizontal + lateral
+        total += _inclusion_excess(records, z, line, required_distance)
         zone = records.zones[z]
         band = altitude_band(a[2], b[2], below, above)
         if zone.floor_above_ground or zone.ceiling_above_ground:
             band = _sampled_altitude_band(heights, to_pixel, pitch, a, b, 0.0, 1.0, below, above)
-        over = vertical_distance(zone, band) + required[z].vertical
-        total += max(0.0, over) * max(line.run, MIN_CHARGED_LENGTH) / 1000.0
-    widest = zones.max_horizontal + lateral
-    west, east = min(a[0], b[0]) - widest, max(a[0], b[0]) + widest
-    south, north = min(a[1], b[1]) - widest, max(a[1], b[1]) + widest
+        vertical_excess = vertical_distance(zone, band) + required[z].vertical
+        total += max(0.0, vertical_excess) * max(line.run, MIN_CHARGED_LENGTH) / 1000.0
+    max_margin = zones.max_horizontal + lateral
+    west, east = min(a[0], b[0]) - max_margin, max(a[0], b[0]) + max_margin
+    south, north = min(a[1], b[1]) - max_margin, max(a[1], b[1]) + max_margin
     for z in range(first_exclusion_near(zones, west), required.shape[0]):
         zone = records.zones[z]
         if zone.west > east:
             break
         if zone.east < west or zone.south > north or zone.north < south:
             continue
-        depth, first, last = penetration_depth(records, z, line, required[z].horizontal + lateral)
+        depth, first_fraction, last_fraction = penetration_depth(records, z, line, required[z].horizontal + lateral)
         if depth <= 0.0:
             continue
         rise = b[2] - a[2]
-        band = altitude_band(a[2] + first * rise, a[2] + last * rise, below, above)
+        band = altitude_band(a[2] + first_fraction * rise, a[2] + last_fraction * rise, below, above)
         if zone.floor_above_ground or zone.ceiling_above_ground:
-            band = _sampled_altitude_band(heights, to_pixel, pitch, a, b, first, last, below, above)
-        over = required[z].vertical - vertical_distance(zone, band)
-        total += max(0.0, min(depth, over)) * max((last - first) * line.run, MIN_CHARGED_LENGTH) / 1000.0
+            band = _sampled_altitude_band(heights, to_pixel, pitch, a, b, first_fraction, last_fraction, below, above)
+        vertical_excess = required[z].vertical - vertical_distance(zone, band)
+        total += (
+            max(0.0, min(depth, vertical_excess))
+            * max((last_fraction - first_fraction) * line.run, MIN_CHARGED_LENGTH)
+            / 1000.0
+        )
     return total
 
 
 @inner
-def penetration_depth(records: ZoneRecords, z: int, line: MapSegment, wanted: float) -> tuple[float, float, float]:
-    """Return the lateral shift that moves a line `wanted` m away from exclusion z, and its fractions abreast of z.
+def penetration_depth(
+    records: ZoneRecords, z: int, line: MapSegment, required_distance: float
+) -> tuple[float, float, float]:
+    """Return the shift that moves a line `required_distance` m away from exclusion z, and its fractions abreast of z.
 
     The shift is 0 m if the line already is that far away.
     """
-    reach = view_shape(records, z, line, wanted)
-    if not reach.inside and reach.distance >= wanted:
+    view = view_shape(records, z, line, required_distance)
+    if not view.inside and view.distance >= required_distance:
         return 0.0, 0.0, 0.0
-    if reach.inside or reach.distance == 0.0:
-        depth = wanted + max(0.0, min(reach.left, -reach.right))
+    if view.inside or view.distance == 0.0:
+        depth = required_distance + max(0.0, min(view.left, -view.right))
     else:
-        depth = wanted - reach.distance
+        depth = required_distance - view.distance
     per_metre = 1.0 / max(line.run, 1e-9)
-    first, last = (reach.first - wanted) * per_metre, (reach.last + wanted) * per_metre
-    return max(depth, 1e-9), min(1.0, max(0.0, first)), min(1.0, max(0.0, last))
+    first_fraction, last_fraction = (
+        (view.first - required_distance) * per_metre,
+        (view.last + required_distance) * per_metre,
+    )
+    return max(depth, 1e-9), min(1.0, max(0.0, first_fraction)), min(1.0, max(0.0, last_fraction))
 
 
 @inner
-def _inclusion_excess(records: ZoneRecords, z: int, line: MapSegment, wanted: float) -> float:
-    """Return how much a line's distance inside inclusion z falls short of `wanted` (m), times its length, m x km."""
-    reach = view_shape(records, z, line, wanted)
-    if reach.inside and reach.distance >= wanted:
+def _inclusion_excess(records: ZoneRecords, z: int, line: MapSegment, required_distance: float) -> float:
+    """Return a line's shortfall of distance inside inclusion z, integrated over its length, m x km."""
+    view = view_shape(records, z, line, required_distance)
+    if view.inside and view.distance >= required_distance:
         return 0.0
     samples = int(min(MAX_SAMPLES, 2.0 + line.run / OUTSIDE_PITCH))
     total = 0.0
     for k in range(samples):
-        along = line.run * k / (samples - 1)
-        east, north = line.east + along * line.course_east, line.north + along * line.course_north
-        total += max(0.0, wanted + edge_distance(records, z, east, north))
+        distance = line.run * k / (samples - 1)
+        east, north = line.east + distance * line.course_east, line.north + distance * line.course_north
+        total += max(0.0, required_distance + edge_distance(records, z, east, north))
     spacing = max(line.run, MIN_CHARGED_LENGTH) / samples
     # Between the samples the line may be nearer to the outline.
-    nearest = max(1e-9, wanted - reach.distance) if total == 0.0 else 0.0
-    return (total * spacing + nearest * MIN_CHARGED_LENGTH) / 1000.0
+    shortfall = max(1e-9, required_distance - view.distance) if total == 0.0 else 0.0
+    return (total * spacing + shortfall * MIN_CHARGED_LENGTH) / 1000.0
 
 
 @inlined
-def altitude_band(up: float, to_up: float, below: float, above: float) -> AltitudeBand:
+def altitude_band(begin_altitude: float, end_altitude: float, below: float, above: float) -> AltitudeBand:
     """Return the vertical range of a straight line over unknown ground; below, above: tracking error, m."""
-    lowest, highest = min(up, to_up) - below, max(up, to_up) + above
-    return AltitudeBand(lowest, highest, -UNKNOWN, UNKNOWN)
+    lowest, highest = min(begin_altitude, end_altitude) - below, max(begin_altitude, end_altitude) + above
+    return AltitudeBand(lowest, highest, -UNKNOWN_HEIGHT, UNKNOWN_HEIGHT)
 
 
 @inner
@@ -139,26 +148,26 @@ def _sampled_altitude_band(
     pitch: float,
     a: Floats,
     b: Floats,
-    first: float,
-    last: float,
+    first_fraction: float,
+    last_fraction: float,
     below: float,
     above: float,
 ) -> AltitudeBand:
     """Return the vertical range of a-b between two fractions of its length, with sampled heights above ground."""
     dx, dy, dz = b[0] - a[0], b[1] - a[1], b[2] - a[2]
-    plain = altitude_band(a[2] + first * dz, a[2] + last * dz, below, above)
-    column, row = polymap(to_pixel, a[0] + first * dx, a[1] + first * dy)
-    to_column, to_row = polymap(to_pixel, a[0] + last * dx, a[1] + last * dy)
-    samples = 2 + int((last - first) * math.sqrt(dx * dx + dy * dy) / pitch)
+    band = altitude_band(a[2] + first_fraction * dz, a[2] + last_fraction * dz, below, above)
+    column, row = polymap(to_pixel, a[0] + first_fraction * dx, a[1] + first_fraction * dy)
+    to_column, to_row = polymap(to_pixel, a[0] + last_fraction * dx, a[1] + last_fraction * dy)
+    samples = 2 + int((last_fraction - first_fraction) * math.sqrt(dx * dx + dy * dy) / pitch)
     lowest, highest = math.inf, -math.inf
     for k in range(samples):
-        share = k / (samples - 1)
-        ground = pixel_height(heights, column + share * (to_column - column), row + share * (to_row - row))
+        fraction = k / (samples - 1)
+        ground = pixel_height(heights, column + fraction * (to_column - column), row + fraction * (to_row - row))
         if math.isnan(ground):
-            return plain
-        over = a[2] + (first + share * (last - first)) * dz - ground
-        lowest, highest = min(lowest, over - below), max(highest, over + above)
-    return AltitudeBand(plain.lowest, plain.highest, lowest, highest)
+            return band
+        height = a[2] + (first_fraction + fraction * (last_fraction - first_fraction)) * dz - ground
+        lowest, highest = min(lowest, height - below), max(highest, height + above)
+    return AltitudeBand(band.lowest, band.highest, lowest, highest)
 
 
 @inlined
@@ -167,22 +176,22 @@ def vertical_distance(zone: Record, band: AltitudeBand) -> float:
 
     The distance is the smallest over the range for an exclusion, and the largest for an inclusion.
     """
-    under_low, under_high = band.lowest, band.highest
+    floor_lowest, floor_highest = band.lowest, band.highest
     if zone.floor_above_ground:
-        under_low, under_high = band.lowest_above_ground, band.highest_above_ground
-    over_low, over_high = band.lowest, band.highest
+        floor_lowest, floor_highest = band.lowest_above_ground, band.highest_above_ground
+    ceiling_lowest, ceiling_highest = band.lowest, band.highest
     if zone.ceiling_above_ground:
-        over_low, over_high = band.lowest_above_ground, band.highest_above_ground
-    far: float = max(zone.floor - under_high, over_low - zone.ceiling)
+        ceiling_lowest, ceiling_highest = band.lowest_above_ground, band.highest_above_ground
+    distance: float = max(zone.floor - floor_highest, ceiling_lowest - zone.ceiling)
     if not zone.exclusion:
-        far = max(zone.floor - under_low, over_high - zone.ceiling)
-    return far
+        distance = max(zone.floor - floor_lowest, ceiling_highest - zone.ceiling)
+    return distance
 
 
 # --- Margins to zones, for the certificate ---
 
 # Length of pieces near a zone, m: short enough for the heights to apply to the positions.
-CUT = 25.0
+MAX_PIECE_LENGTH = 25.0
 # Margin of a piece of a path. nearest: smallest distance outside an exclusion or inside an inclusion, horizontal or
 # vertical, m; negative if a zone is violated. satisfied: True if every zone's margin is satisfied. zone: the nearest
 # zone, with preference for a violated margin; -1 without a zone.
@@ -208,76 +217,84 @@ def measure_zone_margin(
     tracking error, m.
     """
     margin.nearest, margin.satisfied, margin.zone = math.inf, True, -1
-    records, widest = zones.records, max(lateral[0], lateral[1])
-    west, east = min(a[0], b[0]) - widest, max(a[0], b[0]) + widest
-    south, north = min(a[1], b[1]) - widest, max(a[1], b[1]) + widest
+    records, max_lateral = zones.records, max(lateral[0], lateral[1])
+    west, east = min(a[0], b[0]) - max_lateral, max(a[0], b[0]) + max_lateral
+    south, north = min(a[1], b[1]) - max_lateral, max(a[1], b[1]) + max_lateral
     run = math.hypot(b[0] - a[0], b[1] - a[1])
-    one, two, wide = a.copy(), b.copy(), lateral.copy()
+    piece_begin, piece_end, piece_lateral = a.copy(), b.copy(), lateral.copy()
     for z in range(zones.required.shape[0]):
-        need, zone = zones.required[z], records.zones[z]
-        wanted = max(need.horizontal, need.vertical)
-        far = max(wanted, min(margin.nearest, 1e9))
-        if zone.exclusion and box_distance(records, z, west, east, south, north) >= far:
+        required, zone = zones.required[z], records.zones[z]
+        max_required = max(required.horizontal, required.vertical)
+        search_distance = max(max_required, min(margin.nearest, 1e9))
+        if zone.exclusion and box_distance(records, z, west, east, south, north) >= search_distance:
             continue
-        grounded = zone.floor_above_ground or zone.ceiling_above_ground
+        uses_ground = zone.floor_above_ground or zone.ceiling_above_ground
         band = altitude_band(a[2], b[2], below, above)
-        if grounded:
+        if uses_ground:
             band = _exact_altitude_band(heights, depths, to_pixel, a, b, lateral, below, above)
-        away, over = _horizontal_distance(records, z, a, b, far + widest) - widest, vertical_distance(zone, band)
-        if _distance_to_violation(zone, away, over) >= far:
+        horizontal, vertical = (
+            _horizontal_distance(records, z, a, b, search_distance + max_lateral) - max_lateral,
+            vertical_distance(zone, band),
+        )
+        if _distance_to_violation(zone, horizontal, vertical) >= search_distance:
             continue
-        pieces = max(1, math.ceil(run / CUT))
+        pieces = max(1, math.ceil(run / MAX_PIECE_LENGTH))
         for k in range(pieces):
             for axis in range(3):
-                one[axis] = a[axis] + (b[axis] - a[axis]) * k / pieces
-                two[axis] = a[axis] + (b[axis] - a[axis]) * (k + 1) / pieces
+                piece_begin[axis] = a[axis] + (b[axis] - a[axis]) * k / pieces
+                piece_end[axis] = a[axis] + (b[axis] - a[axis]) * (k + 1) / pieces
             for end in range(2):
-                wide[end] = lateral[0] + (lateral[1] - lateral[0]) * (k + end) / pieces
-            band = altitude_band(one[2], two[2], below, above)
-            if grounded:
-                band = _exact_altitude_band(heights, depths, to_pixel, one, two, wide, below, above)
-            off = max(wide[0], wide[1])
-            away, over = _horizontal_distance(records, z, one, two, far + off) - off, vertical_distance(zone, band)
-            _update_margin(zone, need, z, away, over, margin)
+                piece_lateral[end] = lateral[0] + (lateral[1] - lateral[0]) * (k + end) / pieces
+            band = altitude_band(piece_begin[2], piece_end[2], below, above)
+            if uses_ground:
+                band = _exact_altitude_band(
+                    heights, depths, to_pixel, piece_begin, piece_end, piece_lateral, below, above
+                )
+            max_offset = max(piece_lateral[0], piece_lateral[1])
+            horizontal, vertical = (
+                _horizontal_distance(records, z, piece_begin, piece_end, search_distance + max_offset) - max_offset,
+                vertical_distance(zone, band),
+            )
+            _update_margin(zone, required, z, horizontal, vertical, margin)
 
 
 @inner
-def _update_margin(zone: Record, need: Record, z: int, away: float, over: float, margin: Record) -> None:
+def _update_margin(zone: Record, required: Record, z: int, horizontal: float, vertical: float, margin: Record) -> None:
     """Update the record with the distances of a piece from a zone."""
-    enough = away >= need.horizontal or over >= need.vertical
+    is_satisfied = horizontal >= required.horizontal or vertical >= required.vertical
     if not zone.exclusion:
-        enough = away >= need.horizontal and -over >= need.vertical
-    here = _distance_to_violation(zone, away, over)
+        is_satisfied = horizontal >= required.horizontal and -vertical >= required.vertical
+    distance = _distance_to_violation(zone, horizontal, vertical)
     # A zone whose margin is violated takes precedence over a nearer one.
-    if margin.satisfied != enough:
-        if not enough:
+    if margin.satisfied != is_satisfied:
+        if not is_satisfied:
             margin.zone = z
-    elif here < margin.nearest or margin.zone < 0:
+    elif distance < margin.nearest or margin.zone < 0:
         margin.zone = z
-    margin.satisfied = margin.satisfied and enough
-    margin.nearest = min(margin.nearest, here)
+    margin.satisfied = margin.satisfied and is_satisfied
+    margin.nearest = min(margin.nearest, distance)
 
 
 @inner
-def _distance_to_violation(zone: Record, away: float, over: float) -> float:
+def _distance_to_violation(zone: Record, horizontal: float, vertical: float) -> float:
     """Return the distance from violating a zone, given the horizontal and vertical distances, m."""
-    return max(away, over) if zone.exclusion else min(away, -over)
+    return max(horizontal, vertical) if zone.exclusion else min(horizontal, -vertical)
 
 
 @inner
-def _horizontal_distance(records: ZoneRecords, z: int, a: Floats, b: Floats, within: float) -> float:
+def _horizontal_distance(records: ZoneRecords, z: int, a: Floats, b: Floats, max_distance: float) -> float:
     """Return the smallest horizontal distance of a-b outside an exclusion or inside an inclusion, m; else negative.
 
-    Distances above `within` may be inf.
+    Distances above `max_distance` may be inf.
     """
     line = segment_between(a[0], a[1], b[0], b[1])
-    reach = view_shape(records, z, line, within)
+    view = view_shape(records, z, line, max_distance)
     if records.zones[z].exclusion:
-        if reach.inside or reach.distance == 0.0:
-            return -max(0.0, min(reach.left, -reach.right))
-        return reach.distance
-    if reach.inside and reach.distance > 0.0:
-        return reach.distance
+        if view.inside or view.distance == 0.0:
+            return -max(0.0, min(view.left, -view.right))
+        return view.distance
+    if view.inside and view.distance > 0.0:
+        return view.distance
     return -max(0.0, edge_distance(records, z, a[0], a[1]), edge_distance(records, z, b[0], b[1]))
 
 
@@ -293,18 +310,18 @@ def _exact_altitude_band(
     above: float,
 ) -> AltitudeBand:
     """Return the vertical range along a-b, also above the ground on a-b and within `lateral` (2,) m to both sides."""
-    plain = altitude_band(a[2], b[2], below, above)
+    band = altitude_band(a[2], b[2], below, above)
     run = max(1e-9, math.hypot(b[0] - a[0], b[1] - a[1]))
     ux, uy = (b[0] - a[0]) / run, (b[1] - a[1]) / run
-    one, two = a.copy(), b.copy()
+    offset_begin, offset_end = a.copy(), b.copy()
     lowest, highest = math.inf, -math.inf
     for side in (0.0, -1.0, 1.0):
-        for end, at, off in ((one, a, lateral[0]), (two, b, lateral[1])):
-            end[0], end[1], end[2] = at[0] + side * off * uy, at[1] - side * off * ux, at[2]
-        clearance, _ = segment_clearance(heights, to_pixel, one, two)
-        one[2], two[2] = -a[2], -b[2]
-        mirrored, _ = segment_clearance(depths, to_pixel, one, two)
+        for end, point, offset in ((offset_begin, a, lateral[0]), (offset_end, b, lateral[1])):
+            end[0], end[1], end[2] = point[0] + side * offset * uy, point[1] - side * offset * ux, point[2]
+        clearance, _ = segment_clearance(heights, to_pixel, offset_begin, offset_end)
+        offset_begin[2], offset_end[2] = -a[2], -b[2]
+        mirrored, _ = segment_clearance(depths, to_pixel, offset_begin, offset_end)
         if math.isnan(clearance) or math.isnan(mirrored):
-            return plain
+            return band
         lowest, highest = min(lowest, clearance - below), max(highest, above - mirrored)
-    return AltitudeBand(plain.lowest, plain.highest, lowest, highest)
+    return AltitudeBand(band.lowest, band.highest, lowest, highest)

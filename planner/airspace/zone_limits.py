@@ -2,7 +2,7 @@
 
 Each zone has a horizontal and a vertical margin. A fixed end that violates a margin reduces it for its zone. Exclusions
 are sorted from west to east, so that a kernel visits only those near a leg. Distances are computed in the axes of the
-line: along it from its beginning, and off to its left.
+line: along it from its beginning, and across it to the left.
 """
 
 import math
@@ -28,7 +28,7 @@ REQUIRED_MARGINS = record_dtype(("number", np.int64), "horizontal", "vertical", 
 
 @by_reference
 class ZonesWithMargins(NamedTuple):
-    """Zones in the order in which kernels visit them: the inclusions, then the exclusions from west to east.
+    """Zones in the kernels' order: the inclusions, then the exclusions from west to east.
 
     records: the zones. required: `REQUIRED_MARGINS` records (z,) with their margins.
     inclusions: number of inclusions.
@@ -53,7 +53,7 @@ class ZoneMargins(NamedTuple):
 
 
 def add_margins(zones: Sequence[Zone], ends: Floats, terrain: Terrain | None, margins: ZoneMargins) -> ZonesWithMargins:
-    """Return zones with the given margins, which are smaller for zones that have a fixed end within the margin.
+    """Return zones with the given margins, reduced for zones with a fixed end inside the margin.
 
     ends: (k, 3) m. An end inside an exclusion, or outside an inclusion, makes its margin 0.
 
@@ -64,11 +64,11 @@ def add_margins(zones: Sequence[Zone], ends: Floats, terrain: Terrain | None, ma
     >>> float(required["horizontal"][0]), float(required["vertical"][0])
     (4.0, 10.0)
     """
-    given = zone_records(zones)
-    order = np.lexsort((given.zones["west"], given.zones["exclusion"]))
-    records = ZoneRecords(given.zones[order], given.edges)
-    required: Records = np.zeros(len(order), REQUIRED_MARGINS)
-    required["number"], required["horizontal"], required["vertical"] = order, margins.horizontal, margins.vertical
+    unsorted = zone_records(zones)
+    indices = np.lexsort((unsorted.zones["west"], unsorted.zones["exclusion"]))
+    records = ZoneRecords(unsorted.zones[indices], unsorted.edges)
+    required: Records = np.zeros(len(indices), REQUIRED_MARGINS)
+    required["number"], required["horizontal"], required["vertical"] = indices, margins.horizontal, margins.vertical
     inclusions = int((~records.zones["exclusion"]).sum())
     required["furthest_east"][inclusions:] = np.maximum.accumulate(records.zones["east"][inclusions:])
     grounds = np.full(len(ends), np.nan) if terrain is None else terrain.height(ends[:, 0], ends[:, 1])
@@ -79,25 +79,27 @@ def add_margins(zones: Sequence[Zone], ends: Floats, terrain: Terrain | None, ma
 
 
 @compiled
-def _reduce_margins(records: ZoneRecords, ends: Floats, grounds: Floats, share: float, required: Records) -> None:
+def _reduce_margins(records: ZoneRecords, ends: Floats, grounds: Floats, fraction: float, required: Records) -> None:
     """Reduce margins to a fraction of the distances of the ends (k, 3).
 
     grounds: (k,) ground heights at the ends, m.
     """
     for z in range(required.shape[0]):
-        zone, need = records.zones[z], required[z]
+        zone, margin = records.zones[z], required[z]
         for k in range(ends.shape[0]):
-            away = edge_distance(records, z, ends[k, 0], ends[k, 1])
-            over = outside_band(zone, ends[k, 2], grounds[k])
+            horizontal_distance = edge_distance(records, z, ends[k, 0], ends[k, 1])
+            vertical_distance = outside_band(zone, ends[k, 2], grounds[k])
             if not zone.exclusion:
-                need.horizontal = min(need.horizontal, max(0.0, -share * away))
-                need.vertical = min(need.vertical, max(0.0, -share * over))
-            elif away < need.horizontal and not over >= need.vertical:
+                margin.horizontal = min(margin.horizontal, max(0.0, -fraction * horizontal_distance))
+                margin.vertical = min(margin.vertical, max(0.0, -fraction * vertical_distance))
+            elif horizontal_distance < margin.horizontal and not vertical_distance >= margin.vertical:
                 # Reduce the margin of which the larger part is available.
-                if away * need.vertical >= over * need.horizontal or math.isnan(over):
-                    need.horizontal = max(0.0, share * away)
+                if horizontal_distance * margin.vertical >= vertical_distance * margin.horizontal or math.isnan(
+                    vertical_distance
+                ):
+                    margin.horizontal = max(0.0, fraction * horizontal_distance)
                 else:
-                    need.vertical = max(0.0, share * over)
+                    margin.vertical = max(0.0, fraction * vertical_distance)
 
 
 @inner
@@ -122,7 +124,7 @@ class PlannerAirspace(NamedTuple):
 
     zones: exclusions and inclusions with their margins.
     max_height: maximum height above ground, inf for none.
-    buffer: margin below it, and start_buffer and destination_buffer at the ends.
+    buffer: margin below the maximum height; start_buffer, destination_buffer: margin at the ends.
     depths: negated heights of the ground, so that staying below the maximum height is a clearance problem as above the
     ground.
     """
@@ -146,18 +148,22 @@ def make_airspace(scenario: Scenario, margins: ZoneMargins, buffer: float) -> Pl
     >>> space.max_height, len(space.zones.required)
     (inf, 0)
     """
-    terrain, most = scenario.terrain, scenario.limits.max_height_m
+    terrain, max_height = scenario.terrain, scenario.limits.max_height_m
     ends = np.stack([scenario.start, scenario.destination])
     zones = add_margins(scenario.zones, ends, terrain, margins)
-    asked = most is not None or any(zone.above_ground for zone in scenario.zones)
+    needs_depths = max_height is not None or any(zone.above_ground for zone in scenario.zones)
     # If unused, a small array of the right type.
-    depths = -terrain.heights if terrain is not None and asked else np.zeros((2, 2), dtype=np.float32)
+    depths = -terrain.heights if terrain is not None and needs_depths else np.zeros((2, 2), dtype=np.float32)
     depths.setflags(write=False)
     buffers = [buffer, buffer]
-    if most is not None and terrain is not None:
-        left = most - (ends[:, 2] - terrain.height(ends[:, 0], ends[:, 1])) - 0.01
-        buffers = [buffer if one >= buffer else margins.share * max(0.0, float(one)) for one in left]
-    return PlannerAirspace(zones, math.inf if most is None else most, buffer, buffers[0], buffers[1], depths)
+    if max_height is not None and terrain is not None:
+        headrooms = max_height - (ends[:, 2] - terrain.height(ends[:, 0], ends[:, 1])) - 0.01
+        buffers = [
+            buffer if headroom >= buffer else margins.share * max(0.0, float(headroom)) for headroom in headrooms
+        ]
+    return PlannerAirspace(
+        zones, math.inf if max_height is None else max_height, buffer, buffers[0], buffers[1], depths
+    )
 
 
 def is_limited(airspace: PlannerAirspace) -> bool:
@@ -187,7 +193,7 @@ class ShapeView(NamedTuple):
     """Shape as seen from a line, m.
 
     inside: True if the line begins in the shape.
-    distance: from the line to the shape's outline, 0 if they meet; inf if beyond the requested limit.
+    distance: distance from the line to the shape's outline, 0 if they meet; inf if beyond the requested limit.
     right, left: extent of the shape across the line, negative to the right.
     first, last: extent of the shape along the line.
     """
@@ -211,64 +217,71 @@ def segment_between(ax: float, ay: float, bx: float, by: float) -> MapSegment:
 
 
 @inner
-def view_shape(records: ZoneRecords, z: int, line: MapSegment, within: float) -> ShapeView:
-    """Return the shape of zone z as seen from a line; distances above `within` (m) may be inf."""
+def view_shape(records: ZoneRecords, z: int, line: MapSegment, max_distance: float) -> ShapeView:
+    """Return the shape of zone z as seen from a line; distances above `max_distance` (m) may be inf."""
     zone = records.zones[z]
     if zone.round:
-        off_e, off_n = zone.centre_east - line.east, zone.centre_north - line.north
-        along = off_e * line.course_east + off_n * line.course_north
-        off = off_n * line.course_east - off_e * line.course_north
-        return _view_circle(along, off, zone.radius, line.run)
-    inside, distance2 = False, math.inf
+        east_offset, north_offset = zone.centre_east - line.east, zone.centre_north - line.north
+        along = east_offset * line.course_east + north_offset * line.course_north
+        across = north_offset * line.course_east - east_offset * line.course_north
+        return _view_circle(along, across, zone.radius, line.run)
+    is_inside, distance2 = False, math.inf
     right, left, first, last = math.inf, -math.inf, math.inf, -math.inf
     edges = records.edges
     for k in range(zone.first_edge, zone.last_edge):
         edge = edges[k]
-        off_e, off_n = edge.east - line.east, edge.north - line.north
-        along = off_e * line.course_east + off_n * line.course_north
-        off = off_n * line.course_east - off_e * line.course_north
-        off_e, off_n = edge.to_east - line.east, edge.to_north - line.north
-        to_along = off_e * line.course_east + off_n * line.course_north
-        to_off = off_n * line.course_east - off_e * line.course_north
-        right, left, first, last = min(right, off), max(left, off), min(first, along), max(last, along)
-        if (off > 0.0) != (to_off > 0.0):
-            crossing = along + (to_along - along) * off / (off - to_off)
-            inside = inside != (crossing > 0.0)
+        east_offset, north_offset = edge.east - line.east, edge.north - line.north
+        along = east_offset * line.course_east + north_offset * line.course_north
+        across = north_offset * line.course_east - east_offset * line.course_north
+        east_offset, north_offset = edge.to_east - line.east, edge.to_north - line.north
+        to_along = east_offset * line.course_east + north_offset * line.course_north
+        to_across = north_offset * line.course_east - east_offset * line.course_north
+        right, left, first, last = min(right, across), max(left, across), min(first, along), max(last, along)
+        if (across > 0.0) != (to_across > 0.0):
+            crossing = along + (to_along - along) * across / (across - to_across)
+            is_inside = is_inside != (crossing > 0.0)
             if 0.0 <= crossing <= line.run:
                 distance2 = 0.0
-        ahead, behind = min(along, to_along) > line.run + within, max(along, to_along) < -within
-        if ahead or behind or min(off, to_off) > within or max(off, to_off) < -within or distance2 == 0.0:
+        is_ahead, is_behind = min(along, to_along) > line.run + max_distance, max(along, to_along) < -max_distance
+        if (
+            is_ahead
+            or is_behind
+            or min(across, to_across) > max_distance
+            or max(across, to_across) < -max_distance
+            or distance2 == 0.0
+        ):
             continue
-        distance2 = min(distance2, _edge_distance2(along, off, to_along, to_off, line.run))
+        distance2 = min(distance2, _edge_distance2(along, across, to_along, to_across, line.run))
     distance = math.sqrt(distance2)
-    return ShapeView(inside, distance if distance <= within else math.inf, right, left, first, last)
+    return ShapeView(is_inside, distance if distance <= max_distance else math.inf, right, left, first, last)
 
 
 @inlined
-def _view_circle(along: float, off: float, radius: float, run: float) -> ShapeView:
+def _view_circle(along: float, across: float, radius: float, run: float) -> ShapeView:
     """Return a circle as seen from a line, given its centre in the line's axes."""
     gap = along - min(run, max(0.0, along))
-    nearest = math.sqrt(gap * gap + off * off) - radius
-    furthest = math.sqrt(max(abs(along), abs(along - run)) ** 2 + off * off) - radius
-    inside = along * along + off * off <= radius * radius
+    min_distance = math.sqrt(gap * gap + across * across) - radius
+    max_inside_distance = math.sqrt(max(abs(along), abs(along - run)) ** 2 + across * across) - radius
+    is_inside = along * along + across * across <= radius * radius
     # The line is outside, or inside, or crosses the outline.
-    distance = nearest if nearest > 0.0 else max(0.0, -furthest)
-    return ShapeView(inside, distance, off - radius, off + radius, along - radius, along + radius)
+    distance = min_distance if min_distance > 0.0 else max(0.0, -max_inside_distance)
+    return ShapeView(is_inside, distance, across - radius, across + radius, along - radius, along + radius)
 
 
 @inlined
-def _edge_distance2(along: float, off: float, to_along: float, to_off: float, run: float) -> float:
-    """Return the squared distance between the line and an edge that does not cross it, which is at an end of either."""
+def _edge_distance2(along: float, across: float, to_along: float, to_across: float, run: float) -> float:
+    """Return the squared distance between the line and an edge that does not cross it."""
+    # Two pieces that do not cross are nearest at an end of one of them.
     gap = along - min(run, max(0.0, along))
-    nearest = gap * gap + off * off
+    min_distance2 = gap * gap + across * across
     gap = to_along - min(run, max(0.0, to_along))
-    nearest = min(nearest, gap * gap + to_off * to_off)
-    step, rise = to_along - along, to_off - off
-    length2 = step * step + rise * rise
+    min_distance2 = min(min_distance2, gap * gap + to_across * to_across)
+    along_step, across_step = to_along - along, to_across - across
+    length2 = along_step * along_step + across_step * across_step
     # From the line's beginning, then from its end.
-    share = min(1.0, max(0.0, -(along * step + off * rise) / length2))
-    x, y = along + share * step, off + share * rise
-    nearest = min(nearest, x * x + y * y)
-    share = min(1.0, max(0.0, ((run - along) * step - off * rise) / length2))
-    x, y = along + share * step - run, off + share * rise
-    return min(nearest, x * x + y * y)
+    fraction = min(1.0, max(0.0, -(along * along_step + across * across_step) / length2))
+    x, y = along + fraction * along_step, across + fraction * across_step
+    min_distance2 = min(min_distance2, x * x + y * y)
+    fraction = min(1.0, max(0.0, ((run - along) * along_step - across * across_step) / length2))
+    x, y = along + fraction * along_step - run, across + fraction * across_step
+    return min(min_distance2, x * x + y * y)

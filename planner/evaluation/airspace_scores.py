@@ -35,7 +35,7 @@ AIRSPACE_PIECE = np.dtype(
     ],
     align=True,
 )
-# Sagitta of an arc over its chord, as a share of the radius.
+# Sagitta of an arc over its chord, as a fraction of the radius.
 _SAGITTA = 1.0 - math.cos(0.5 * ARC_STEP)
 # Maximum number of pieces of one arc.
 _MAX_PIECES = math.ceil(math.pi / ARC_STEP) + 2
@@ -66,7 +66,7 @@ def airspace_pieces(data: ProblemArrays, waypoints: Floats) -> Records:
         )
         out[k].of_corner, out[k].number, out[k].height = piece.of_corner, piece.number, -math.inf
         if space.max_height < math.inf:
-            out[k].height = _greatest_height(data, piece)
+            out[k].height = _max_height_above_ground(data, piece)
             ends = space.start_buffer, space.destination_buffer
             out[k].buffer = required_buffer(data, space.buffer, ends, piece.begin, piece.end)
     return out
@@ -75,46 +75,50 @@ def airspace_pieces(data: ProblemArrays, waypoints: Floats) -> Records:
 @inner
 def _pieces_without_tracking_error(data: ProblemArrays, waypoints: Floats) -> Records:
     """Return `TRACKED_PIECE` records for a path without tracking error, first its legs, then the chords of its arcs."""
-    last, radii = waypoints.shape[0] - 1, fly_by_radii(data, waypoints)
-    out = np.zeros(last + last * _MAX_PIECES, dtype=TRACKED_PIECE)
-    for i in range(last):
-        out[i].number = i
-        copy_into(out[i].begin, waypoints[i])
-        copy_into(out[i].end, waypoints[i + 1])
-    made = last
+    leg_count, radii = waypoints.shape[0] - 1, fly_by_radii(data, waypoints)
+    pieces = np.zeros(leg_count + leg_count * _MAX_PIECES, dtype=TRACKED_PIECE)
+    for i in range(leg_count):
+        pieces[i].number = i
+        copy_into(pieces[i].begin, waypoints[i])
+        copy_into(pieces[i].end, waypoints[i + 1])
+    piece_count = leg_count
     mirrored = waypoints.copy()
-    for i in range(last + 1):
+    for i in range(leg_count + 1):
         mirrored[i, 2] = -waypoints[i, 2]
-    for i in range(1, last):
+    for i in range(1, leg_count):
         blend = half_blend_length(data.aircraft, waypoints[i, 2])
-        low = blended_vertices(blend, waypoints[i - 1], waypoints[i], waypoints[i + 1], radii[i])
-        # The same for the mirrored path: an upper bound on the flown height.
-        high = blended_vertices(blend, mirrored[i - 1], mirrored[i], mirrored[i + 1], radii[i])
-        for k in range(max(1, low.shape[0] - 1)):
-            after, piece = min(k + 1, low.shape[0] - 1), out[made]
+        lower_vertices = blended_vertices(blend, waypoints[i - 1], waypoints[i], waypoints[i + 1], radii[i])
+        # The mirrored path gives an upper bound on the flown height.
+        upper_vertices = blended_vertices(blend, mirrored[i - 1], mirrored[i], mirrored[i + 1], radii[i])
+        for k in range(max(1, lower_vertices.shape[0] - 1)):
+            next_row, piece = min(k + 1, lower_vertices.shape[0] - 1), pieces[piece_count]
             piece.of_corner, piece.number = True, i
-            copy_into(piece.begin, low[k])
-            copy_into(piece.end, low[after])
-            piece.above = max(0.0, -high[k, 2] - low[k, 2], -high[after, 2] - low[after, 2])
+            copy_into(piece.begin, lower_vertices[k])
+            copy_into(piece.end, lower_vertices[next_row])
+            piece.above = max(
+                0.0,
+                -upper_vertices[k, 2] - lower_vertices[k, 2],
+                -upper_vertices[next_row, 2] - lower_vertices[next_row, 2],
+            )
             piece.lateral_begin, piece.lateral_end = radii[i] * _SAGITTA, radii[i] * _SAGITTA
-            made += 1
-    return out[:made]
+            piece_count += 1
+    return pieces[:piece_count]
 
 
 @inner
-def _greatest_height(data: ProblemArrays, piece: Record) -> float:
+def _max_height_above_ground(data: ProblemArrays, piece: Record) -> float:
     """Return the maximum height above ground along a piece and on both sides of it, m, or NaN off the terrain."""
     dx, dy = piece.end[0] - piece.begin[0], piece.end[1] - piece.begin[1]
-    run, greatest = max(1e-9, math.hypot(dx, dy)), -math.inf
+    run, max_height = max(1e-9, math.hypot(dx, dy)), -math.inf
     a, b = np.empty(3), np.empty(3)
     for side in (0.0, -1.0, 1.0):
-        for end, at, lateral in ((a, piece.begin, piece.lateral_begin), (b, piece.end, piece.lateral_end)):
-            end[0] = at[0] + side * lateral * dy / run
-            end[1] = at[1] - side * lateral * dx / run
-            end[2] = -(at[2] + piece.above)
+        for end, point, lateral in ((a, piece.begin, piece.lateral_begin), (b, piece.end, piece.lateral_end)):
+            end[0] = point[0] + side * lateral * dy / run
+            end[1] = point[1] - side * lateral * dx / run
+            end[2] = -(point[2] + piece.above)
         mirrored, _ = segment_clearance(data.airspace.depths, data.to_pixel, a, b)
-        greatest = math.nan if math.isnan(mirrored) or math.isnan(greatest) else max(greatest, -mirrored)
-    return greatest
+        max_height = math.nan if math.isnan(mirrored) or math.isnan(max_height) else max(max_height, -mirrored)
+    return max_height
 
 
 # --- Violations for the search ---
@@ -139,50 +143,61 @@ def add_airspace_violations(
 
     legs, corners, flown, lags: measurements of the path.
     """
-    zoned, topped = data.airspace.zones.required.shape[0] > 0, data.airspace.max_height < math.inf
+    has_zones, has_max_height = data.airspace.zones.required.shape[0] > 0, data.airspace.max_height < math.inf
     required = required_headroom(data)
     a, b = np.empty(3), np.empty(3)
-    last = legs.shape[0] - 1
+    last_leg = legs.shape[0] - 1
     across = float(data.tracking.across)
-    for i in range(last + 1):
-        before, after = float(flown[i].fly_by_offset), float(flown[i + 1].fly_by_offset)
+    for i in range(last_leg + 1):
+        offset_before, offset_after = float(flown[i].fly_by_offset), float(flown[i + 1].fly_by_offset)
         below, above = float(lags[i].max_below), -float(lags[i].min_below)
-        if topped:
+        if has_max_height:
             violations.terrain += _leg_excess_height(data, required, path[i], path[i + 1], legs[i], lags[i], across)
-        wide = max(before, after)
-        if zoned and _leg_zone_penetration(data, path[i], path[i + 1], across + wide, below, above) > 0.0:
-            first = min(1.0, ENDS / max(legs[i].run, 1e-6)) if i == 0 else 0.0
-            final = max(first, 1.0 - ENDS / max(legs[i].run, 1e-6)) if i == last else 1.0
-            for share, until, lateral in ((0.0, first, 0.0), (first, final, across), (final, 1.0, 0.0)):
-                if until > share:
-                    _cut_segment(path[i], path[i + 1], share, until, a, b)
+        max_offset = max(offset_before, offset_after)
+        if has_zones and _leg_zone_penetration(data, path[i], path[i + 1], across + max_offset, below, above) > 0.0:
+            first_fraction = min(1.0, ENDS / max(legs[i].run, 1e-6)) if i == 0 else 0.0
+            last_fraction = max(first_fraction, 1.0 - ENDS / max(legs[i].run, 1e-6)) if i == last_leg else 1.0
+            for fraction, end_fraction, lateral in (
+                (0.0, first_fraction, 0.0),
+                (first_fraction, last_fraction, across),
+                (last_fraction, 1.0, 0.0),
+            ):
+                if end_fraction > fraction:
+                    _cut_segment(path[i], path[i + 1], fraction, end_fraction, a, b)
                     violations.bounds += _leg_zone_penetration(data, a, b, lateral, below, above)
         else:
-            wide = 0.0
-        for width, length, share in ((before, corners[i].after, 0.0), (after, corners[i + 1].before, 1.0)):
-            if width <= 0.0:
+            max_offset = 0.0
+        for corner_offset, length, fraction in (
+            (offset_before, corners[i].after, 0.0),
+            (offset_after, corners[i + 1].before, 1.0),
+        ):
+            if corner_offset <= 0.0:
                 continue
-            part = min(1.0, length / max(legs[i].run, 1e-6))
-            _cut_segment(path[i], path[i + 1], max(0.0, share - part), min(1.0, share + part), a, b)
-            if zoned and wide > 0.0:
-                violations.bounds += _leg_zone_penetration(data, a, b, across + width, below, above)
-            if topped:
-                more = max(0.0, -lag_at(lags[i], share), -lag_at(lags[i], abs(share - part)))
-                violations.terrain += _swath_excess_height(data, required, a, b, across + width, more, math.inf)
+            corner_fraction = min(1.0, length / max(legs[i].run, 1e-6))
+            _cut_segment(
+                path[i], path[i + 1], max(0.0, fraction - corner_fraction), min(1.0, fraction + corner_fraction), a, b
+            )
+            if has_zones and max_offset > 0.0:
+                violations.bounds += _leg_zone_penetration(data, a, b, across + corner_offset, below, above)
+            if has_max_height:
+                extra_height = max(0.0, -lag_at(lags[i], fraction), -lag_at(lags[i], abs(fraction - corner_fraction)))
+                violations.terrain += _swath_excess_height(
+                    data, required, a, b, across + corner_offset, extra_height, math.inf
+                )
 
 
 @inner
-def airspace_excess(data: ProblemArrays, a: Floats, b: Floats, below: float, above: float, enough: float) -> float:
+def airspace_excess(data: ProblemArrays, a: Floats, b: Floats, below: float, above: float, max_excess: float) -> float:
     """Return the zone penetration and the excess height above ground of a leg, each integrated along the leg, m x km.
 
     below, above: vertical tracking error, m.
-    enough: value beyond which the integration stops.
+    max_excess: value beyond which the integration stops.
     """
     total, across = 0.0, float(data.tracking.across)
     if data.airspace.zones.required.shape[0] > 0:
         total += _leg_zone_penetration(data, a, b, across, below, above)
     if data.airspace.max_height < math.inf:
-        total += _swath_excess_height(data, required_headroom(data), a, b, across, above, enough - total)
+        total += _swath_excess_height(data, required_headroom(data), a, b, across, above, max_excess - total)
     return total
 
 
@@ -201,49 +216,55 @@ def _leg_excess_height(
     """Return a leg's excess over the maximum height above ground, height lag included, m x km."""
     if not data.tracking.has_error:
         return _swath_excess_height(data, required, a, b, 0.0, 0.0, math.inf)
-    total, one, two = 0.0, np.empty(3), np.empty(3)
+    total, begin, end = 0.0, np.empty(3), np.empty(3)
     for k in range(len(_LAG_CUTS)):
-        share = min(1.0, _LAG_CUTS[k] / max(1e-9, lag.decay))
-        until = min(1.0, _LAG_CUTS[k + 1] / max(1e-9, lag.decay)) if k + 1 < len(_LAG_CUTS) else 1.0
-        if until > share:
-            _cut_segment(a, b, share, until, one, two)
-            above = max(0.0, -lag_at(lag, share), -lag_at(lag, until))
-            total += _swath_excess_height(data, required, one, two, across, above, math.inf)
+        begin_fraction = min(1.0, _LAG_CUTS[k] / max(1e-9, lag.decay))
+        end_fraction = min(1.0, _LAG_CUTS[k + 1] / max(1e-9, lag.decay)) if k + 1 < len(_LAG_CUTS) else 1.0
+        if end_fraction > begin_fraction:
+            _cut_segment(a, b, begin_fraction, end_fraction, begin, end)
+            above = max(0.0, -lag_at(lag, begin_fraction), -lag_at(lag, end_fraction))
+            total += _swath_excess_height(data, required, begin, end, across, above, math.inf)
     return total
 
 
 @inner
 def _swath_excess_height(
-    data: ProblemArrays, required: RequiredClearance, a: Floats, b: Floats, lateral: float, above: float, enough: float
+    data: ProblemArrays,
+    required: RequiredClearance,
+    a: Floats,
+    b: Floats,
+    lateral: float,
+    above: float,
+    max_excess: float,
 ) -> float:
     """Return the largest excess over the maximum height, among a line and the lines offset to both sides, m x km.
 
-    If the excess is larger than `enough`, return a lower bound that is larger than `enough`, too.
+    If the excess is larger than `max_excess`, return a lower bound that is larger than `max_excess`, too.
     """
     run = max(1e-9, math.hypot(b[0] - a[0], b[1] - a[1]))
     east, north = lateral * (b[1] - a[1]) / run, -lateral * (b[0] - a[0]) / run
-    largest = 0.0
+    largest_excess = 0.0
     for side in (0.0, -1.0, 1.0):
         if side != 0.0 and lateral < _MIN_OFFSET:
             break
         x, y, x2, y2 = a[0] + side * east, a[1] + side * north, b[0] + side * east, b[1] + side * north
         ends = segment_pixels(data.to_pixel, x, y, x2, y2)
         depths, bounds = data.airspace.depths, data.slope_bounds
-        excess = terrain_excess(depths, bounds, required, above, ends, x, y, -a[2], x2, y2, -b[2], enough)
-        largest = max(largest, excess)
-        if largest > enough:
+        excess = terrain_excess(depths, bounds, required, above, ends, x, y, -a[2], x2, y2, -b[2], max_excess)
+        largest_excess = max(largest_excess, excess)
+        if largest_excess > max_excess:
             break
-    return largest
+    return largest_excess
 
 
 @inlined
 def _cut_segment(
-    a: Floats, b: Floats, share: float, until: float, one: Floats, two: Floats
+    a: Floats, b: Floats, begin_fraction: float, end_fraction: float, begin: Floats, end: Floats
 ) -> None:  # pragma: no cover
-    """Fill `one` and `two` with the ends of the part of a-b between two fractions of its length."""
+    """Fill `begin` and `end` with the ends of the part of a-b between two fractions of its length."""
     for axis in range(3):
-        one[axis] = a[axis] + share * (b[axis] - a[axis])
-        two[axis] = a[axis] + until * (b[axis] - a[axis])
+        begin[axis] = a[axis] + begin_fraction * (b[axis] - a[axis])
+        end[axis] = a[axis] + end_fraction * (b[axis] - a[axis])
 
 
 def airspace_counts(data: ProblemArrays, paths: Floats) -> Ints:
@@ -268,10 +289,10 @@ def airspace_counts(data: ProblemArrays, paths: Floats) -> Ints:
 
 @compiled
 def _count_pieces(data: ProblemArrays, paths: Floats) -> Ints:
-    number, waypoints, _ = paths.shape
-    counts = np.zeros(number, np.int64)
+    path_count, waypoints, _ = paths.shape
+    counts = np.zeros(path_count, np.int64)
     a, b = np.empty(3), np.empty(3)
-    for k in range(number):
+    for k in range(path_count):
         for i in range(waypoints - 1):
             for piece in range(POINTS):
                 for axis in range(3):

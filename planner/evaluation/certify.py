@@ -56,33 +56,37 @@ def kill_distance(data: ProblemArrays, waypoints: Floats) -> float:
     return float(missile_distance(data, np.array(waypoints, dtype=np.float64)))
 
 
-# How far inside its limit (negative: beyond), where, and what is wrong.
+# A fault: its margin to the limit (negative beyond it), its place and its description.
 _Fault = tuple[float, str, str]
 # Number of places that are named in addition to the worst.
-_NAMED = 6
+_MAX_NAMED_PLACES = 6
 
 
-def _worst_and_others(found: list[_Fault]) -> list[str]:
-    """Return a list with one line on the faults of one kind, the worst and its other places, or an empty list."""
-    if not found:
+def _summarise_faults(faults: list[_Fault]) -> list[str]:
+    """Return one line on faults of one kind, with the worst fault and the other places; no line without faults."""
+    if not faults:
         return []
-    (_, where, what), *others = sorted(found, key=lambda one: one[0])
-    named = ", ".join(name for _, name, _ in others[:_NAMED])
-    more = f", {len(others) - _NAMED} more" if len(others) > _NAMED else ""
-    return [f"{where}: {what}" + (f" (also {named}{more})" if others else "")]
+    (_, place, problem), *others = sorted(faults, key=lambda fault: fault[0])
+    other_places = ", ".join(name for _, name, _ in others[:_MAX_NAMED_PLACES])
+    remainder = f", {len(others) - _MAX_NAMED_PLACES} more" if len(others) > _MAX_NAMED_PLACES else ""
+    return [f"{place}: {problem}" + (f" (also {other_places}{remainder})" if others else "")]
 
 
 def _turn_margin(data: ProblemArrays, waypoints: Floats, problems: list[str]) -> float:
     """Return the smallest margin of a turn to its limit, rad, and append turns that are too sharp to `problems`."""
-    allowed = data.max_turn if data.legs_hold_turns else data.max_turn + ANGLE_MARGIN
-    wanted = 0.0 if data.legs_hold_turns else ANGLE_MARGIN
-    margins = allowed - turning_angles(with_courses(data, waypoints))
-    largest = math.degrees(allowed - wanted)
-    problems += _worst_and_others(
+    max_turn = data.max_turn if data.legs_hold_turns else data.max_turn + ANGLE_MARGIN
+    required_margin = 0.0 if data.legs_hold_turns else ANGLE_MARGIN
+    margins = max_turn - turning_angles(with_courses(data, waypoints))
+    max_turn_deg = math.degrees(max_turn - required_margin)
+    problems += _summarise_faults(
         [
-            (margin, f"waypoint {i}", f"turns {math.degrees(allowed - margin):.1f} deg, allowed {largest:.1f} deg")
+            (
+                margin,
+                f"waypoint {i}",
+                f"turns {math.degrees(max_turn - margin):.1f} deg, allowed {max_turn_deg:.1f} deg",
+            )
             for i, margin in enumerate(margins.tolist())
-            if margin < wanted - _EPSILON
+            if margin < required_margin - _EPSILON
         ]
     )
     return float(margins.min(initial=math.inf))
@@ -93,28 +97,28 @@ def _leg_length_margin(data: ProblemArrays, waypoints: Floats, problems: list[st
 
     Return inf if legs need not be as long as their turns.
     """
-    problems += _worst_and_others(
+    problems += _summarise_faults(
         [
-            (run, f"leg {i}", f"{run:.1f} m long, at least {CERTIFIED_LEG:g} m are wanted")
-            for i, run in enumerate(leg_runs(waypoints).tolist())
-            if run < CERTIFIED_LEG
+            (length, f"leg {i}", f"{length:.1f} m long, at least {CERTIFIED_LEG:g} m are wanted")
+            for i, length in enumerate(leg_runs(waypoints).tolist())
+            if length < CERTIFIED_LEG
         ]
     )
-    smallest = math.inf
-    found: list[_Fault] = []
+    min_margin = math.inf
+    faults: list[_Fault] = []
     if not data.legs_hold_turns:
-        return smallest
+        return min_margin
     lengths = turn_and_roll_lengths(data, waypoints)
-    for i, (run, need, roll) in enumerate(zip(leg_runs(waypoints), *lengths, strict=True)):
-        if need == 0.0:
+    for i, (length, turns, roll) in enumerate(zip(leg_runs(waypoints), *lengths, strict=True)):
+        if turns == 0.0:
             continue
-        smallest = min(smallest, float(run - need - roll))
-        settle = settling_length(float(need), float(run)) + roll
-        if need + settle > run + _EPSILON:
-            what = f"{run:.0f} m long, its turns need {need:.0f} m and {settle:.0f} m to settle"
-            found.append((float(run - need) - settle, f"leg {i}", what))
-    problems += _worst_and_others(found)
-    return smallest
+        min_margin = min(min_margin, float(length - turns - roll))
+        settling = settling_length(float(turns), float(length)) + roll
+        if turns + settling > length + _EPSILON:
+            description = f"{length:.0f} m long, its turns need {turns:.0f} m and {settling:.0f} m to settle"
+            faults.append((float(length - turns) - settling, f"leg {i}", description))
+    problems += _summarise_faults(faults)
+    return min_margin
 
 
 def _arc_slope_margin(data: ProblemArrays, waypoints: Floats, problems: list[str]) -> float:
@@ -123,47 +127,49 @@ def _arc_slope_margin(data: ProblemArrays, waypoints: Floats, problems: list[str
     An arc is shorter than the two pieces of leg that it replaces, so the same height change makes it steeper. Return
     inf if the arcs need no check.
     """
-    smallest = math.inf
+    min_margin = math.inf
     limits_are_fixed = not (math.isnan(data.max_climb) or math.isnan(data.max_dive))
     if not data.legs_hold_turns or data.fly_over or limits_are_fixed:
-        return smallest
+        return min_margin
     radii, tangents = fly_by_radii(data, waypoints), turn_tangents(data.aircraft, waypoints)
     rises = np.tan(leg_slopes(waypoints))
-    found: list[_Fault] = []
+    faults: list[_Fault] = []
     for i in range(1, len(waypoints) - 1):
         if tangents[i] <= 0.0 or radii[i] <= 0.0:
             continue
         slope = math.atan(arc_slope(rises[i - 1], rises[i], tangents[i], radii[i]))
         flat = np.array([0.0, 0.0, waypoints[i, 2]])
-        for before, after in ((i - 1, i), (i, i + 1)):
-            step = np.append((waypoints[after] - waypoints[before])[:2], waypoints[i, 2])
+        for begin, end in ((i - 1, i), (i, i + 1)):
+            step = np.append((waypoints[end] - waypoints[begin])[:2], waypoints[i, 2])
             climb, dive = slope_limits(data, flat, step)
-            inside = min(climb - slope, dive + slope)
-            smallest = min(smallest, inside + data.angle_margin)
-            if inside < -_EPSILON:
-                found.append((inside, f"turn at waypoint {i}", _slope_fault_text(slope, climb, dive, " along its arc")))
+            margin = min(climb - slope, dive + slope)
+            min_margin = min(min_margin, margin + data.angle_margin)
+            if margin < -_EPSILON:
+                faults.append(
+                    (margin, f"turn at waypoint {i}", _slope_fault_text(slope, climb, dive, " along its arc"))
+                )
                 break
-    problems += _worst_and_others(found)
-    return smallest
+    problems += _summarise_faults(faults)
+    return min_margin
 
 
 def _leg_slope_margin(data: ProblemArrays, waypoints: Floats, problems: list[str]) -> float:
     """Return the smallest slope margin of the legs, rad, and append legs that are too steep to `problems`."""
-    smallest = math.inf
+    min_margin = math.inf
     limits = leg_slope_limits(data, waypoints)
-    found: list[_Fault] = []
+    faults: list[_Fault] = []
     for i, (slope, climb, dive) in enumerate(zip(leg_slopes(waypoints), *limits, strict=True)):
-        inside = min(climb - slope, dive + slope)
-        smallest = min(smallest, inside + data.angle_margin)
-        if inside < -_EPSILON:
-            found.append((inside, f"leg {i}", _slope_fault_text(slope, climb, dive)))
-    problems += _worst_and_others(found)
-    return smallest
+        margin = min(climb - slope, dive + slope)
+        min_margin = min(min_margin, margin + data.angle_margin)
+        if margin < -_EPSILON:
+            faults.append((margin, f"leg {i}", _slope_fault_text(slope, climb, dive)))
+    problems += _summarise_faults(faults)
+    return min_margin
 
 
-def _slope_fault_text(slope: float, climb: float, dive: float, where: str = "") -> str:
+def _slope_fault_text(slope: float, climb: float, dive: float, place_text: str = "") -> str:
     verb, limit = ("climbs", climb) if slope > 0 else ("sinks", dive)
-    return f"{verb} {math.degrees(abs(slope)):.1f} deg{where}, allowed {math.degrees(limit):.1f} deg"
+    return f"{verb} {math.degrees(abs(slope)):.1f} deg{place_text}, allowed {math.degrees(limit):.1f} deg"
 
 
 def _clearance_margin(data: ProblemArrays, waypoints: Floats, problems: list[str]) -> float:
@@ -171,25 +177,27 @@ def _clearance_margin(data: ProblemArrays, waypoints: Floats, problems: list[str
 
     Return NaN if the path leaves the terrain.
     """
-    smallest = math.inf
-    low: dict[str, float] = {}
+    min_margin = math.inf
+    min_margins: dict[str, float] = {}
     for piece in heights_above_ground(data, waypoints):
         margin = float(piece["height"]) - data.clearance
-        smallest = math.nan if math.isnan(margin) or math.isnan(smallest) else min(smallest, margin)
+        min_margin = math.nan if math.isnan(margin) or math.isnan(min_margin) else min(min_margin, margin)
         if margin >= float(piece["buffer"]) - _EPSILON:
             continue
         name = f"turn at waypoint {piece['number']}" if piece["of_arc"] else f"leg {piece['number']}"
-        if math.isnan(margin) or not low.get(name, math.inf) <= margin:
-            low[name] = margin
-    wanted = f"{data.clearance:g} m and {data.buffer:.1f} m in reserve wanted"
-    off = [(0.0, name, "leaves the terrain that is known") for name, margin in low.items() if math.isnan(margin)]
-    over = [
-        (margin, name, f"{margin + data.clearance:.1f} m above ground at its lowest, {wanted}")
-        for name, margin in low.items()
+        if math.isnan(margin) or not min_margins.get(name, math.inf) <= margin:
+            min_margins[name] = margin
+    required_text = f"{data.clearance:g} m and {data.buffer:.1f} m in reserve wanted"
+    off_terrain = [
+        (0.0, name, "leaves the terrain that is known") for name, margin in min_margins.items() if math.isnan(margin)
+    ]
+    too_low = [
+        (margin, name, f"{margin + data.clearance:.1f} m above ground at its lowest, {required_text}")
+        for name, margin in min_margins.items()
         if not math.isnan(margin)
     ]
-    problems += [*_worst_and_others(off), *_worst_and_others(over)]
-    return smallest
+    problems += [*_summarise_faults(off_terrain), *_summarise_faults(too_low)]
+    return min_margin
 
 
 def _bounds_margin(data: ProblemArrays, waypoints: Floats, problems: list[str]) -> float:
@@ -197,10 +205,10 @@ def _bounds_margin(data: ProblemArrays, waypoints: Floats, problems: list[str]) 
 
     Append violations to `problems`.
     """
-    low = np.array([data.west, data.south, data.floor])
-    high = np.array([data.east, data.north, data.ceiling])
-    margins = np.minimum(waypoints - low, high - waypoints).min(axis=1)
-    problems += _worst_and_others(
+    min_corner = np.array([data.west, data.south, data.floor])
+    max_corner = np.array([data.east, data.north, data.ceiling])
+    margins = np.minimum(waypoints - min_corner, max_corner - waypoints).min(axis=1)
+    problems += _summarise_faults(
         [
             (float(margins[i]), f"waypoint {i}", f"{-margins[i]:.1f} m outside the area, floor or ceiling")
             for i in np.nonzero(margins < -_EPSILON)[0]
@@ -219,29 +227,35 @@ def _airspace_margins(problem: Problem, waypoints: Floats, problems: list[str]) 
         return math.inf, math.inf
     pieces = airspace_pieces(data, np.ascontiguousarray(waypoints))
     headroom = float((space.max_height - pieces["height"]).min())
-    near: dict[str, tuple[float, int]] = {}
-    high: dict[str, float] = {}
+    zone_faults: dict[str, tuple[float, int]] = {}
+    height_faults: dict[str, float] = {}
     for piece in pieces:
         name = f"turn at waypoint {piece['number']}" if piece["of_corner"] else f"leg {piece['number']}"
-        zone_margin, left = piece["zones"], float(space.max_height - piece["height"])
+        zone_margin, piece_headroom = piece["zones"], float(space.max_height - piece["height"])
         if not zone_margin["satisfied"]:
-            near[name] = min(near.get(name, (math.inf, 0)), (float(zone_margin["nearest"]), int(zone_margin["zone"])))
+            zone_faults[name] = min(
+                zone_faults.get(name, (math.inf, 0)), (float(zone_margin["nearest"]), int(zone_margin["zone"]))
+            )
         # NaN off the terrain is reported by the clearance.
-        if left < float(piece["buffer"]) - _EPSILON:
-            high[name] = min(high.get(name, math.inf), left)
-    for zone in dict.fromkeys(z for _, z in near.values()):
-        problems += _worst_and_others(
+        if piece_headroom < float(piece["buffer"]) - _EPSILON:
+            height_faults[name] = min(height_faults.get(name, math.inf), piece_headroom)
+    for zone in dict.fromkeys(z for _, z in zone_faults.values()):
+        problems += _summarise_faults(
             [
                 (distance, name, _zone_fault_text(problem, distance, z))
-                for name, (distance, z) in near.items()
+                for name, (distance, z) in zone_faults.items()
                 if z == zone
             ]
         )
-    wanted = f"{space.max_height:g} m allowed, {space.buffer:.1f} m in reserve wanted"
-    problems += _worst_and_others(
+    required_text = f"{space.max_height:g} m allowed, {space.buffer:.1f} m in reserve wanted"
+    problems += _summarise_faults(
         [
-            (left, name, f"{space.max_height - left:.1f} m above ground at its highest, {wanted}")
-            for name, left in high.items()
+            (
+                piece_headroom,
+                name,
+                f"{space.max_height - piece_headroom:.1f} m above ground at its highest, {required_text}",
+            )
+            for name, piece_headroom in height_faults.items()
         ]
     )
     return float(pieces["zones"]["nearest"].min()), headroom
@@ -253,6 +267,6 @@ def _zone_fault_text(problem: Problem, distance: float, z: int) -> str:
     zone = problem.scenario.zones[int(required["number"])]
     if distance < 0.0:
         return f"{-distance:.1f} m {'inside' if zone.kind == 'exclusion' else 'outside'} {zone.name}"
-    where = "from" if zone.kind == "exclusion" else "inside the edge of"
-    wanted = f"{required['horizontal']:g} m or {required['vertical']:g} m in height wanted"
-    return f"{distance:.1f} m {where} {zone.name}, {wanted}"
+    relation = "from" if zone.kind == "exclusion" else "inside the edge of"
+    required_text = f"{required['horizontal']:g} m or {required['vertical']:g} m in height wanted"
+    return f"{distance:.1f} m {relation} {zone.name}, {required_text}"

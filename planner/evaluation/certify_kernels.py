@@ -32,8 +32,8 @@ from world.terrain import segment_clearance
 # --- Pieces with tracking error ---
 
 
-# A piece of a leg, or of a leg near the corner at a waypoint, with its number: its ends; the lateral deviation of the
-# flight at both ends and its maximum; and the largest deviation below and above, m.
+# A piece of a leg, or of a leg near the corner at a waypoint, and the number of that leg or waypoint. It has two ends;
+# the lateral deviation of the flight at both ends and its maximum; and the largest deviation below and above, m.
 TRACKED_PIECE = np.dtype(
     [
         ("of_corner", np.bool_),
@@ -63,78 +63,78 @@ def tracked_pieces(data: ProblemArrays, waypoints: Floats) -> Records:
     measure_legs(waypoints, legs)
     measure_corners(data, wind, waypoints, legs, corners)
     measure_lags(data.tracking, data.aircraft, wind, waypoints, legs, lags)
-    out = np.zeros((count - 1) * (len(_CUTS) + 3) + 2 * count, dtype=TRACKED_PIECE)
-    made = 0
+    pieces = np.zeros((count - 1) * (len(_CUTS) + 3) + 2 * count, dtype=TRACKED_PIECE)
+    piece_count = 0
     for i in range(count - 1):
-        cuts, share = _piece_ends(lags[i].decay, legs[i].run), 0.0
-        for after in cuts:
-            if after <= share:
+        piece_ends, begin_fraction = _piece_ends(lags[i].decay, legs[i].run), 0.0
+        for end_fraction in piece_ends:
+            if end_fraction <= begin_fraction:
                 continue
-            piece = out[made]
-            _cut_piece(waypoints[i], waypoints[i + 1], share, after, piece)
+            piece = pieces[piece_count]
+            _cut_piece(waypoints[i], waypoints[i + 1], begin_fraction, end_fraction, piece)
             piece.number = i
             piece.lateral_begin, piece.lateral_end = (
                 _lateral_deviation(data, piece.begin, across),
                 _lateral_deviation(data, piece.end, across),
             )
-            _set_deviations(lags[i], share, after, piece)
+            _set_deviations(lags[i], begin_fraction, end_fraction, piece)
             piece.lateral = max(piece.lateral_begin, piece.lateral_end)
-            share = after
-            made += 1
+            begin_fraction = end_fraction
+            piece_count += 1
     for i in range(1, count - 1):
         if corners[i].excursion <= 0.0:
             continue
-        about = legs_about(waypoints[i - 1], waypoints[i], waypoints[i + 1], corners[i].before, corners[i].after)
-        wide = across + corners[i].excursion
+        corner_legs = legs_about(waypoints[i - 1], waypoints[i], waypoints[i + 1], corners[i].before, corners[i].after)
+        max_lateral = across + corners[i].excursion
         for k in range(2):
-            piece = out[made]
-            _cut_piece(about[k], about[k + 1], 0.0, 1.0, piece)
+            piece = pieces[piece_count]
+            _cut_piece(corner_legs[k], corner_legs[k + 1], 0.0, 1.0, piece)
             piece.of_corner, piece.number = True, i
-            piece.lateral_begin, piece.lateral_end, piece.lateral = wide, wide, wide
+            piece.lateral_begin, piece.lateral_end, piece.lateral = max_lateral, max_lateral, max_lateral
             if k == 0:
-                share = 1.0 - min(1.0, corners[i].before / max(1e-6, legs[i - 1].run))
-                _set_deviations(lags[i - 1], share, 1.0, piece)
+                begin_fraction = 1.0 - min(1.0, corners[i].before / max(1e-6, legs[i - 1].run))
+                _set_deviations(lags[i - 1], begin_fraction, 1.0, piece)
             else:
                 _set_deviations(lags[i], 0.0, min(1.0, corners[i].after / max(1e-6, legs[i].run)), piece)
-            made += 1
-    return out[:made]
+            piece_count += 1
+    return pieces[:piece_count]
 
 
 @inner
 def _piece_ends(decay: float, run: float) -> Floats:
-    """Return the fractions of a leg at which its pieces end, increasing; the last is 1."""
-    cuts = np.ones(len(_CUTS) + 3)
+    """Return the end fractions of a leg's pieces, increasing; the last is 1."""
+    fractions = np.ones(len(_CUTS) + 3)
     for k in range(len(_CUTS)):
-        cuts[k] = min(1.0, _CUTS[k] / max(1e-9, decay))
-    end = min(1.0, ENDS / max(1e-9, run))
-    cuts[len(_CUTS)], cuts[len(_CUTS) + 1] = end, 1.0 - end
-    sort_few(cuts)
-    return cuts
+        fractions[k] = min(1.0, _CUTS[k] / max(1e-9, decay))
+    end_zone = min(1.0, ENDS / max(1e-9, run))
+    fractions[len(_CUTS)], fractions[len(_CUTS) + 1] = end_zone, 1.0 - end_zone
+    sort_few(fractions)
+    return fractions
 
 
 @inner
-def _cut_piece(a: Floats, b: Floats, share: float, after: float, piece: Record) -> None:
-    """Fill the ends of a piece with the part of a-b between two fractions of its length."""
+def _cut_piece(a: Floats, b: Floats, begin_fraction: float, end_fraction: float, piece: Record) -> None:
+    """Set a piece's ends to the points of a-b at two fractions."""
     for axis in range(3):
-        piece.begin[axis] = a[axis] + share * (b[axis] - a[axis])
-        piece.end[axis] = a[axis] + after * (b[axis] - a[axis])
+        piece.begin[axis] = a[axis] + begin_fraction * (b[axis] - a[axis])
+        piece.end[axis] = a[axis] + end_fraction * (b[axis] - a[axis])
 
 
 @inner
-def _set_deviations(lag: Record, share: float, after: float, piece: Record) -> None:
-    """Fill the deviations below and above the leg of the piece between two fractions of the leg."""
-    one, two = lag_at(lag, share), lag_at(lag, after)
-    piece.below, piece.above = max(0.0, one, two), max(0.0, -one, -two)
+def _set_deviations(lag: Record, begin_fraction: float, end_fraction: float, piece: Record) -> None:
+    """Set a piece's deviations below and above the leg between two fractions of the leg."""
+    begin_lag, end_lag = lag_at(lag, begin_fraction), lag_at(lag, end_fraction)
+    piece.below, piece.above = max(0.0, begin_lag, end_lag), max(0.0, -begin_lag, -end_lag)
 
 
 @inner
-def _lateral_deviation(data: ProblemArrays, place: Floats, across: float) -> float:
+def _lateral_deviation(data: ProblemArrays, position: Floats, across: float) -> float:
     """Return the lateral deviation of the flight at a point of the path, which is smaller near the fixed ends, m."""
-    away = min(
-        math.hypot(place[0] - data.start[0], place[1] - data.start[1]),
-        math.hypot(place[0] - data.destination[0], place[1] - data.destination[1]),
+    end_distance = min(
+        math.hypot(position[0] - data.start[0], position[1] - data.start[1]),
+        math.hypot(position[0] - data.destination[0], position[1] - data.destination[1]),
     )
-    return across * min(1.0, away / ENDS)
+    return across * min(1.0, end_distance / ENDS)
 
 
 # --- Certified quantities ---
@@ -154,28 +154,28 @@ def missile_distance(data: ProblemArrays, waypoints: Floats) -> float:
 
     The flight is on the legs and arcs, or deviates from them by up to the tracking error.
     """
-    nearest = math.inf
+    min_distance = math.inf
     if data.tracking.has_error:
         for piece in tracked_pieces(data, waypoints):
             a, b = piece.begin.copy(), piece.end.copy()
-            for shift in (0.0, -piece.below, piece.above):
-                a[2], b[2] = piece.begin[2] + shift, piece.end[2] + shift
-                nearest = min(nearest, _segment_distance(data.threats, a, b, math.inf) - piece.lateral)
-        return nearest
-    last = waypoints.shape[0] - 1
-    for i in range(last):
-        nearest = _segment_distance(data.threats, waypoints[i], waypoints[i + 1], nearest)
+            for height_shift in (0.0, -piece.below, piece.above):
+                a[2], b[2] = piece.begin[2] + height_shift, piece.end[2] + height_shift
+                min_distance = min(min_distance, _segment_distance(data.threats, a, b, math.inf) - piece.lateral)
+        return min_distance
+    leg_count = waypoints.shape[0] - 1
+    for i in range(leg_count):
+        min_distance = _segment_distance(data.threats, waypoints[i], waypoints[i + 1], min_distance)
     radii = fly_by_radii(data, waypoints)
-    for i in range(1, last):
+    for i in range(1, leg_count):
         arc = fly_by_vertices(data.aircraft, waypoints[i - 1], waypoints[i], waypoints[i + 1], radii[i])
         for k in range(max(1, arc.shape[0] - 1)):
-            nearest = _segment_distance(data.threats, arc[k], arc[min(k + 1, arc.shape[0] - 1)], nearest)
-    return nearest
+            min_distance = _segment_distance(data.threats, arc[k], arc[min(k + 1, arc.shape[0] - 1)], min_distance)
+    return min_distance
 
 
 @inner
-def _segment_distance(threats: Records, a: Floats, b: Floats, nearest: float) -> float:
-    """Return the distance from a-b to the surface of the nearest missile sphere, or `nearest` if that is smaller."""
+def _segment_distance(threats: Records, a: Floats, b: Floats, min_distance: float) -> float:
+    """Return the distance from a-b to the nearest missile sphere, or `min_distance` if that is smaller."""
     dx, dy, dz = b[0] - a[0], b[1] - a[1], b[2] - a[2]
     length2 = dx * dx + dy * dy + dz * dz
     for k in range(threats.shape[0]):
@@ -184,11 +184,11 @@ def _segment_distance(threats: Records, a: Floats, b: Floats, nearest: float) ->
             continue
         x, y, z = a[0] - threat.east, a[1] - threat.north, a[2] - threat.up
         along = dx * x + dy * y + dz * z
-        f = min(1.0, max(0.0, -along / length2)) if length2 > 0.0 else 0.0
+        fraction = min(1.0, max(0.0, -along / length2)) if length2 > 0.0 else 0.0
         # From the closest point itself: a difference of squares loses digits.
-        x, y, z = x + f * dx, y + f * dy, z + f * dz
-        nearest = min(nearest, math.sqrt(x * x + y * y + z * z) - threat.kill_radius)
-    return nearest
+        x, y, z = x + fraction * dx, y + fraction * dy, z + fraction * dz
+        min_distance = min(min_distance, math.sqrt(x * x + y * y + z * z) - threat.kill_radius)
+    return min_distance
 
 
 @compiled
@@ -201,17 +201,17 @@ def with_courses(data: ProblemArrays, path: Floats) -> Floats:
     out = np.empty((count + 2, 3))
     for i in range(count):
         copy_into(out[i + 1], path[i])
-    for end, at, other, course, sign in (
+    for added_row, end_row, neighbour_row, course, sign in (
         (0, 0, 1, data.start_course, -1.0),
         (count + 1, count - 1, count - 2, data.destination_course, 1.0),
     ):
-        copy_into(out[end], path[at])
+        copy_into(out[added_row], path[end_row])
         if math.isnan(course):
             for axis in range(2):
-                out[end, axis] = 2.0 * path[at, axis] - path[other, axis]
+                out[added_row, axis] = 2.0 * path[end_row, axis] - path[neighbour_row, axis]
         else:
-            out[end, 0] += sign * 1e4 * math.sin(course)
-            out[end, 1] += sign * 1e4 * math.cos(course)
+            out[added_row, 0] += sign * 1e4 * math.sin(course)
+            out[added_row, 1] += sign * 1e4 * math.cos(course)
     return out
 
 
@@ -227,8 +227,8 @@ def turn_and_roll_lengths(data: ProblemArrays, waypoints: Floats) -> tuple[Float
     for i in range(count - 1):
         turns[i] = turn_length(data.fly_over, corners, i)
         if not data.fly_over:
-            up = min(waypoints[i, 2], waypoints[i + 1, 2])
-            rolls[i] = roll_length(data.aircraft, legs, corners, i, up, wind)
+            altitude = min(waypoints[i, 2], waypoints[i + 1, 2])
+            rolls[i] = roll_length(data.aircraft, legs, corners, i, altitude, wind)
     return turns, rolls
 
 
@@ -247,18 +247,18 @@ def heights_above_ground(data: ProblemArrays, waypoints: Floats) -> Records:
     """Return `CERTIFIED_PIECE` records for the legs of a path (w, 3), followed by those for its arcs or corners."""
     if data.tracking.has_error:
         return _tracked_heights(data, tracked_pieces(data, waypoints))
-    last = waypoints.shape[0] - 1
+    leg_count = waypoints.shape[0] - 1
     radii = fly_by_radii(data, waypoints)
-    out = np.zeros(last + last * _MAX_PIECES, dtype=CERTIFIED_PIECE)
-    for i in range(last):
-        _measure_piece(data, waypoints[i], waypoints[i + 1], False, i, out[i])
-    count = last
-    for i in range(1, last):
+    pieces = np.zeros(leg_count + leg_count * _MAX_PIECES, dtype=CERTIFIED_PIECE)
+    for i in range(leg_count):
+        _measure_piece(data, waypoints[i], waypoints[i + 1], False, i, pieces[i])
+    piece_count = leg_count
+    for i in range(1, leg_count):
         arc = fly_by_vertices(data.aircraft, waypoints[i - 1], waypoints[i], waypoints[i + 1], radii[i])
         for k in range(max(1, arc.shape[0] - 1)):
-            _measure_piece(data, arc[k], arc[min(k + 1, arc.shape[0] - 1)], True, i, out[count])
-            count += 1
-    return out[:count]
+            _measure_piece(data, arc[k], arc[min(k + 1, arc.shape[0] - 1)], True, i, pieces[piece_count])
+            piece_count += 1
+    return pieces[:piece_count]
 
 
 @inner
@@ -269,7 +269,7 @@ def _tracked_heights(data: ProblemArrays, pieces: Records) -> Records:
         piece = pieces[k]
         dx, dy = piece.end[0] - piece.begin[0], piece.end[1] - piece.begin[1]
         run = max(1e-9, math.hypot(dx, dy))
-        smallest = math.inf
+        min_height = math.inf
         for side in (0.0, -1.0, 1.0):
             a, b = piece.begin.copy(), piece.end.copy()
             for end, lateral in ((a, piece.lateral_begin), (b, piece.lateral_end)):
@@ -277,8 +277,8 @@ def _tracked_heights(data: ProblemArrays, pieces: Records) -> Records:
                 end[1] -= side * lateral * dx / run
                 end[2] -= piece.below
             height, _ = segment_clearance(data.heights, data.to_pixel, a, b)
-            smallest = math.nan if math.isnan(height) or math.isnan(smallest) else min(smallest, height)
-        out[k].of_arc, out[k].number, out[k].height = piece.of_corner, piece.number, smallest
+            min_height = math.nan if math.isnan(height) or math.isnan(min_height) else min(min_height, height)
+        out[k].of_arc, out[k].number, out[k].height = piece.of_corner, piece.number, min_height
         ends = data.start_buffer, data.destination_buffer
         out[k].buffer = required_buffer(data, data.buffer, ends, piece.begin, piece.end)
     return out
@@ -297,17 +297,15 @@ def required_buffer(
 ) -> float:
     """Return the buffer required on a piece, m, which grows with the distance from a fixed end.
 
-    buffer: away from the ends, m.
-    end_buffers: at the start and the destination, m.
-
-    The buffer grows half as fast as in
-    a search, which allows for the ground between the search's samples.
+    The buffer grows half as fast as in a search, which allows for the ground between the search's samples.
+    buffer: buffer away from the ends, m.
+    end_buffers: buffers at the start and the destination, m.
     """
     for end, end_buffer in ((data.start, end_buffers[0]), (data.destination, end_buffers[1])):
         if end_buffer < buffer:
             dx, dy, x, y = b[0] - a[0], b[1] - a[1], a[0] - end[0], a[1] - end[1]
             run2 = dx * dx + dy * dy
-            f = min(1.0, max(0.0, -(dx * x + dy * y) / run2)) if run2 > 0.0 else 0.0
-            away = math.sqrt((x + f * dx) ** 2 + (y + f * dy) ** 2)
-            buffer = min(buffer, end_buffer + 0.5 * data.buffer_growth * away)
+            fraction = min(1.0, max(0.0, -(dx * x + dy * y) / run2)) if run2 > 0.0 else 0.0
+            distance = math.sqrt((x + fraction * dx) ** 2 + (y + fraction * dy) ** 2)
+            buffer = min(buffer, end_buffer + 0.5 * data.buffer_growth * distance)
     return buffer

@@ -37,8 +37,9 @@ LEG = np.dtype([("east", np.float64), ("north", np.float64), ("run", np.float64)
 # the autopilot's settling included; and the largest distance of the flight from the legs.
 CORNER = np.dtype([(name, np.float64) for name in ("tangent", "radius", "before", "after", "excursion")])
 
-# Straight part of a leg between its two turns: this share of the leg, plus this length (m) or what small turns use.
+# Straight part of a leg between its two turns: fraction of the leg.
 SETTLING_SHARE = 0.05
+# Upper limit on its additional length, which is the length of small turns, m.
 SETTLING_LENGTH = 20.0
 
 
@@ -59,15 +60,15 @@ def measure_legs(path: Floats, legs: Records) -> None:
 def measure_corners(data: ProblemArrays, wind: Wind, path: Floats, legs: Records, corners: Records) -> None:
     """Fill `CORNER` records (w,) of a path (w, 3) whose legs are measured."""
     aircraft, tracking = data.aircraft, data.tracking
-    last: int = legs.shape[0]
-    for i in range(1, last):
+    leg_count: int = legs.shape[0]
+    for i in range(1, leg_count):
         ux, uy, vx, vy = legs[i - 1].east, legs[i - 1].north, legs[i].east, legs[i].north
-        turning = (ux != 0.0 or uy != 0.0) and (vx != 0.0 or vy != 0.0)
-        measure_corner(aircraft, tracking, wind, turning, ux, uy, vx, vy, path[i, 2], corners[i])
-    for i, prescribed in ((0, data.start_course), (last, data.destination_course)):
+        is_turning = (ux != 0.0 or uy != 0.0) and (vx != 0.0 or vy != 0.0)
+        measure_corner(aircraft, tracking, wind, is_turning, ux, uy, vx, vy, path[i, 2], corners[i])
+    for i, end_course in ((0, data.start_course), (leg_count, data.destination_course)):
         ux, uy, vx, vy = courses_at(data, legs, i)
-        turning = not math.isnan(prescribed) and legs[min(i, last - 1)].run > 0.0
-        measure_corner(aircraft, tracking, wind, turning, ux, uy, vx, vy, path[i, 2], corners[i])
+        is_turning = not math.isnan(end_course) and legs[min(i, leg_count - 1)].run > 0.0
+        measure_corner(aircraft, tracking, wind, is_turning, ux, uy, vx, vy, path[i, 2], corners[i])
 
 
 @inner
@@ -75,7 +76,7 @@ def measure_corner(
     aircraft: PerformanceTable,
     tracking: Record,
     wind: Wind,
-    turning: bool,
+    is_turning: bool,
     ux: float,
     uy: float,
     vx: float,
@@ -85,10 +86,10 @@ def measure_corner(
 ) -> None:
     """Fill the `CORNER` record of a turn between the unit courses u and v.
 
-    All values are 0 if `turning` is False.
+    All values are 0 if `is_turning` is False.
     """
     tangent, radius, excursion = 0.0, 0.0, 0.0
-    if turning:
+    if is_turning:
         tangent, radius = corner_tangent(aircraft, ux, uy, vx, vy, amsl, wind[0], wind[1])
     before, after = tangent, tangent
     if tracking.has_error and 0.0 < tangent < math.inf:
@@ -105,8 +106,8 @@ def measure_corner(
 def courses_at(data: ProblemArrays, legs: Records, i: int) -> tuple[float, float, float, float]:
     """Return the unit courses of the legs before and after waypoint i, or at an end the prescribed course."""
     last = legs.shape[0]
-    after, before = min(i, last - 1), max(i - 1, 0)
-    ux, uy, vx, vy = legs[before].east, legs[before].north, legs[after].east, legs[after].north
+    leg_after, leg_before = min(i, last - 1), max(i - 1, 0)
+    ux, uy, vx, vy = legs[leg_before].east, legs[leg_before].north, legs[leg_after].east, legs[leg_after].north
     if i == 0 and not math.isnan(data.start_course):
         ux, uy = math.sin(data.start_course), math.cos(data.start_course)
     if i == last and not math.isnan(data.destination_course):
@@ -115,12 +116,12 @@ def courses_at(data: ProblemArrays, legs: Records, i: int) -> tuple[float, float
 
 
 @compiled_inline
-def settling_length(need: float, run: float) -> float:
-    """Return the straight length of a leg in which its first turn settles before the second turn begins, m.
+def settling_length(turn_lengths: float, run: float) -> float:
+    """Return the straight length of a leg for settling between its two turns, m.
 
-    need: length of both turns, m.
+    turn_lengths: length of both turns, m.
     """
-    return SETTLING_SHARE * run + min(SETTLING_LENGTH, need)
+    return SETTLING_SHARE * run + min(SETTLING_LENGTH, turn_lengths)
 
 
 @inlined
@@ -135,8 +136,8 @@ def turn_length(fly_over: bool, corners: Records, i: int) -> float:
         return 0.0
     if math.isinf(corners[i].tangent):
         return math.inf
-    back: float = corners[i].radius * fly_over_run(2.0 * math.atan(corners[i].tangent / corners[i].radius))
-    return max(back, corners[i].after) if corners[i].excursion > 0.0 else back
+    return_length: float = corners[i].radius * fly_over_run(2.0 * math.atan(corners[i].tangent / corners[i].radius))
+    return max(return_length, corners[i].after) if corners[i].excursion > 0.0 else return_length
 
 
 @inner
@@ -145,8 +146,8 @@ def roll_length(aircraft: PerformanceTable, legs: Records, corners: Records, i: 
     if i == 0 or i == legs.shape[0] - 1 or corners[i].tangent <= 0.0 or corners[i + 1].tangent <= 0.0:
         return 0.0
     ux, uy = legs[i].east, legs[i].north
-    into, onward = legs[i - 1].east * uy - legs[i - 1].north * ux, ux * legs[i + 1].north - uy * legs[i + 1].east
-    if into * onward >= 0.0 or math.isinf(corners[i].tangent + corners[i + 1].tangent):
+    turn_in, turn_out = legs[i - 1].east * uy - legs[i - 1].north * ux, ux * legs[i + 1].north - uy * legs[i + 1].east
+    if turn_in * turn_out >= 0.0 or math.isinf(corners[i].tangent + corners[i + 1].tangent):
         return 0.0
     return roll_reversal_length(aircraft, ux, uy, amsl, corners[i].radius, corners[i + 1].radius, wind[0], wind[1])
 
@@ -165,37 +166,39 @@ def half_blend_length(aircraft: PerformanceTable, amsl: float) -> float:
 
 
 @inner
-def fly_by_vertices(aircraft: PerformanceTable, before: Floats, at: Floats, after: Floats, radius: float) -> Floats:
-    """Return vertices (k, 3) of the flown path past the waypoint `at`; see `blended_vertices`."""
-    return blended_vertices(half_blend_length(aircraft, at[2]), before, at, after, radius)
+def fly_by_vertices(
+    aircraft: PerformanceTable, previous: Floats, waypoint: Floats, next_waypoint: Floats, radius: float
+) -> Floats:
+    """Return vertices (k, 3) of the flown path past `waypoint`; see `blended_vertices`."""
+    return blended_vertices(half_blend_length(aircraft, waypoint[2]), previous, waypoint, next_waypoint, radius)
 
 
 @inner
-def blended_vertices(blend: float, before: Floats, at: Floats, after: Floats, radius: float) -> Floats:
-    """Return vertices (k, 3) of a path past the waypoint `at` that is nowhere higher than the flight.
+def blended_vertices(blend: float, previous: Floats, waypoint: Floats, next_waypoint: Floats, radius: float) -> Floats:
+    """Return vertices (k, 3) of a path past `waypoint` that is nowhere higher than the flight.
 
     The vertices are a point on the leg where the blend of slopes begins, the fly-by arc of this radius from tangent
     point to tangent point, and a point on the next leg where the blend ends. Height is linear along the arc; where the
     slope decreases, a parabola cuts the crest by change x half-length / 4, and the vertices are lowered by that.
     Without a radius, or where a leg is shorter than the tangent, the arc is the waypoint itself.
 
-    blend: from `half_blend_length`.
+    blend: half length of a blend (`half_blend_length`).
     """
-    run_before = math.hypot(at[0] - before[0], at[1] - before[1])
-    run_after = math.hypot(after[0] - at[0], after[1] - at[1])
+    run_before = math.hypot(waypoint[0] - previous[0], waypoint[1] - previous[1])
+    run_after = math.hypot(next_waypoint[0] - waypoint[0], next_waypoint[1] - waypoint[1])
     if run_before < 1e-6 or run_after < 1e-6:
-        return at.copy().reshape((1, 3))
-    turn = turning_angle(before[0], before[1], at[0], at[1], after[0], after[1])
+        return waypoint.copy().reshape((1, 3))
+    turn = turning_angle(previous[0], previous[1], waypoint[0], waypoint[1], next_waypoint[0], next_waypoint[1])
     tangent = radius * math.tan(0.5 * turn) if 1e-6 < turn < math.pi - 1e-6 else 0.0
     if tangent > min(run_before, run_after):
         tangent = 0.0
-    ux, uy = (at[0] - before[0]) / run_before, (at[1] - before[1]) / run_before
-    vx, vy = (after[0] - at[0]) / run_after, (after[1] - at[1]) / run_after
-    slope_in, slope_out = (at[2] - before[2]) / run_before, (after[2] - at[2]) / run_after
+    ux, uy = (waypoint[0] - previous[0]) / run_before, (waypoint[1] - previous[1]) / run_before
+    vx, vy = (next_waypoint[0] - waypoint[0]) / run_after, (next_waypoint[1] - waypoint[1]) / run_after
+    slope_in, slope_out = (waypoint[2] - previous[2]) / run_before, (next_waypoint[2] - waypoint[2]) / run_after
     chords = math.ceil(turn / ARC_STEP) if tangent > 0.0 else 0
     arc = radius * turn if chords > 0 else 0.0
-    low, high = at[2] - tangent * slope_in, at[2] + tangent * slope_out
-    slope = (high - low) / arc if chords > 0 else slope_out
+    begin_height, end_height = waypoint[2] - tangent * slope_in, waypoint[2] + tangent * slope_out
+    slope = (end_height - begin_height) / arc if chords > 0 else slope_out
     available_in, available_out = 0.5 * (run_before - tangent), 0.5 * (run_after - tangent)
     half_limit = 0.5 * arc if chords > 0 else min(available_in, available_out)
     available_in, available_out = min(available_in, half_limit), min(available_out, half_limit)
@@ -203,31 +206,45 @@ def blended_vertices(blend: float, before: Floats, at: Floats, after: Floats, ra
     half_out = min(abs(slope - slope_out) * blend, available_out) if chords > 0 else half_in
     deviation_in = 0.25 * max(0.0, slope_in - slope) * half_in
     deviation_out = 0.25 * max(0.0, slope - slope_out) * half_out
-    out = np.empty((chords + 3, 3))
-    _set_vertex(out, 0, at[0] - ux * (tangent + half_in), at[1] - uy * (tangent + half_in), low - half_in * slope_in)
+    vertices = np.empty((chords + 3, 3))
+    _set_vertex(
+        vertices,
+        0,
+        waypoint[0] - ux * (tangent + half_in),
+        waypoint[1] - uy * (tangent + half_in),
+        begin_height - half_in * slope_in,
+    )
     side = 1.0 if ux * vy - uy * vx >= 0.0 else -1.0
     for k in range(chords + 1):
-        f = k / chords if chords > 0 else 0.0
-        ahead, aside = radius * math.sin(f * turn) - tangent, side * radius * (1.0 - math.cos(f * turn))
-        lowered = deviation_in + f * (deviation_out - deviation_in)
-        east, north = at[0] + ux * ahead - uy * aside, at[1] + uy * ahead + ux * aside
-        _set_vertex(out, k + 1, east, north, low + f * (high - low) - lowered)
-    away = tangent + half_out
-    _set_vertex(out, chords + 2, at[0] + vx * away, at[1] + vy * away, high + half_out * slope_out)
-    return out
+        fraction = k / chords if chords > 0 else 0.0
+        along, offset = radius * math.sin(fraction * turn) - tangent, side * radius * (1.0 - math.cos(fraction * turn))
+        deviation = deviation_in + fraction * (deviation_out - deviation_in)
+        east, north = waypoint[0] + ux * along - uy * offset, waypoint[1] + uy * along + ux * offset
+        _set_vertex(vertices, k + 1, east, north, begin_height + fraction * (end_height - begin_height) - deviation)
+    end_distance = tangent + half_out
+    _set_vertex(
+        vertices,
+        chords + 2,
+        waypoint[0] + vx * end_distance,
+        waypoint[1] + vy * end_distance,
+        end_height + half_out * slope_out,
+    )
+    return vertices
 
 
 @inner
-def legs_about(before: Floats, at: Floats, after: Floats, length_before: float, length_after: float) -> Floats:
-    """Return the parts of both legs next to the waypoint `at`, of the given lengths (m), as vertices (3, 3)."""
-    out = np.empty((3, 3))
-    for row, other, length in ((0, before, length_before), (2, after, length_after)):
-        run = math.hypot(at[0] - other[0], at[1] - other[1])
-        share = min(1.0, length / max(run, 1e-6))
+def legs_about(
+    previous: Floats, waypoint: Floats, next_waypoint: Floats, length_before: float, length_after: float
+) -> Floats:
+    """Return the parts of both legs next to `waypoint`, of the given lengths (m), as vertices (3, 3)."""
+    vertices = np.empty((3, 3))
+    for row, neighbour, length in ((0, previous, length_before), (2, next_waypoint, length_after)):
+        run = math.hypot(waypoint[0] - neighbour[0], waypoint[1] - neighbour[1])
+        fraction = min(1.0, length / max(run, 1e-6))
         for axis in range(3):
-            out[row, axis] = at[axis] + share * (other[axis] - at[axis])
-    copy_into(out[1], at)
-    return out
+            vertices[row, axis] = waypoint[axis] + fraction * (neighbour[axis] - waypoint[axis])
+    copy_into(vertices[1], waypoint)
+    return vertices
 
 
 @inlined
@@ -241,25 +258,25 @@ def _set_vertex(out: Floats, row: int, east: float, north: float, up: float) -> 
 def fly_by_radii(data: ProblemArrays, path: Floats) -> Floats:
     """Return the radius of the fly-by arc at each waypoint, (w,) m; 0 at the ends and where the path goes straight on.
 
-    Where a number alone limits turns, a leg may be shorter than its two turns. Such arcs cannot be flown and have
-    radius 0: the corners are evaluated as drawn, and the simulated flight shows what the aircraft makes of them. A
+    Where only a number limits turns, a leg may be shorter than its two turns. Such arcs cannot be flown and have
+    radius 0: the corners are evaluated as drawn, and the simulated flight shows how the aircraft flies them. A
     fly-over turn passes outside its corner and has radius 0 too.
     """
     if data.fly_over:
         return np.zeros(path.shape[0])
     tangents = turn_tangents(data.aircraft, path)
     count = path.shape[0]
-    fits = np.ones(count, dtype=np.bool_)
+    arc_fits = np.ones(count, dtype=np.bool_)
     if not data.legs_hold_turns:
         for i in range(count - 1):
             if tangents[i] + tangents[i + 1] > math.hypot(path[i + 1, 0] - path[i, 0], path[i + 1, 1] - path[i, 1]):
-                fits[i] = False
-                fits[i + 1] = False
+                arc_fits[i] = False
+                arc_fits[i + 1] = False
     radii = np.zeros(count)
     for i in range(1, count - 1):
-        if not fits[i]:
+        if not arc_fits[i]:
             continue
         turn = turning_angle(path[i - 1, 0], path[i - 1, 1], path[i, 0], path[i, 1], path[i + 1, 0], path[i + 1, 1])
-        half = math.tan(0.5 * min(turn, math.pi - 1e-6))
-        radii[i] = tangents[i] / half if half > 1e-9 and not math.isinf(tangents[i]) else 0.0
+        half_turn_tangent = math.tan(0.5 * min(turn, math.pi - 1e-6))
+        radii[i] = tangents[i] / half_turn_tangent if half_turn_tangent > 1e-9 and not math.isinf(tangents[i]) else 0.0
     return radii

@@ -26,14 +26,14 @@ from world.by_reference import by_reference
 
 
 # A piece of a route shorter than this (m) takes the course of the piece before it.
-_SHORTEST_LEG = 1.0
+_MIN_PIECE_LENGTH = 1.0
 
 
 class WaypointFrames(NamedTuple):
     """One rotated frame for each of n inner waypoints.
 
     east, north: (n,) position where along and across are 0, m.
-    cosine, sine: (n,) of the angle from east to along, counter-clockwise.
+    cosine, sine: (n,) cosine and sine of the angle from east to along, counter-clockwise.
     edges: (n + 1,) limits along of the waypoints' intervals, m.
     """
 
@@ -76,10 +76,12 @@ def frames_along(route: Floats) -> WaypointFrames:
     lengths = np.hypot(steps[:, 0], steps[:, 1])
     edges = np.concatenate([[0.0], np.cumsum(lengths)])
     angles = np.arctan2(steps[:, 1], steps[:, 0])
-    some = np.flatnonzero(lengths >= _SHORTEST_LEG)
-    if some.size:
-        before = np.maximum.accumulate(np.where(lengths >= _SHORTEST_LEG, np.arange(len(lengths)), some[0]))
-        angles = angles[before]
+    rows_with_course = np.flatnonzero(lengths >= _MIN_PIECE_LENGTH)
+    if rows_with_course.size:
+        source_rows = np.maximum.accumulate(
+            np.where(lengths >= _MIN_PIECE_LENGTH, np.arange(len(lengths)), rows_with_course[0])
+        )
+        angles = angles[source_rows]
     cosine, sine = np.cos(angles), np.sin(angles)
     east, north = route[:-1, 0] - cosine * edges[:-1], route[:-1, 1] - sine * edges[:-1]
     return WaypointFrames(east, north, cosine, sine, edges)
@@ -88,8 +90,8 @@ def frames_along(route: Floats) -> WaypointFrames:
 def straight_frames(east: float, north: float, cosine: float, sine: float, edges: Floats) -> WaypointFrames:
     """Return the same frame for all waypoints: its origin (m), its angle from east, and n + 1 edges along (m)."""
     count = edges.size - 1
-    one = np.ones(count)
-    return WaypointFrames(east * one, north * one, cosine * one, sine * one, edges)
+    ones = np.ones(count)
+    return WaypointFrames(east * ones, north * ones, cosine * ones, sine * ones, edges)
 
 
 def sample_route(route: Floats, count: int) -> tuple[Floats, Floats]:
@@ -100,15 +102,15 @@ def sample_route(route: Floats, count: int) -> tuple[Floats, Floats]:
     ([0.0, 10.0, 20.0, 30.0, 40.0], [0.0, 10.0, 20.0, 30.0, 30.0], [0.0, 0.0, 0.0, 0.0, 10.0])
     """
     steps = np.diff(route, axis=0)
-    runs = np.concatenate([[0.0], np.cumsum(np.hypot(steps[:, 0], steps[:, 1]))])
-    along = np.linspace(0.0, runs[-1], count)
-    return np.column_stack([np.interp(along, runs, route[:, axis]) for axis in range(3)]), along
+    distances = np.concatenate([[0.0], np.cumsum(np.hypot(steps[:, 0], steps[:, 1]))])
+    along = np.linspace(0.0, distances[-1], count)
+    return np.column_stack([np.interp(along, distances, route[:, axis]) for axis in range(3)]), along
 
 
 # --- Encodings ---
 
-# Shortest polar step, as a share of the mean leg: a step of 0 has no direction.
-_SHORTEST = 0.05
+# Shortest polar step, as a fraction of the mean leg, because a step of 0 has no direction.
+_MIN_POLAR_STEP = 0.05
 # Half-width of the box along a route, in lengths of its pieces.
 HALF_WIDTH = 2.0
 
@@ -118,7 +120,7 @@ class RotatedFrame(NamedTuple):
     """The rotated frame: `along` from start to destination on the map, `across` to its left, `up` unchanged (eq. 12).
 
     east, north: origin, at the start, m.
-    cosine, sine: of the angle from east to the destination, counter-clockwise.
+    cosine, sine: cosine and sine of the angle from east to the destination, counter-clockwise.
     length: horizontal distance D from start to destination, m.
     """
 
@@ -161,8 +163,8 @@ def rotated_frame(start: Floats, destination: Floats) -> RotatedFrame:
 class Encoding:
     """A box and the mapping from its vectors to paths.
 
-    name: as scenarios and commands name it.
-    waypoints: w, of a path, start and destination included.
+    name: name of the encoding in scenarios and commands.
+    waypoints: number w of waypoints of a path, including start and destination.
     lower, upper: (d,) box, d = 3(w - 2), three numbers per waypoint in flying order.
     decode: (n, d) -> (n, w, 3) world m, start and destination included.
     frames: frames in which vectors are along, across and up of each inner waypoint; None for other encodings.
@@ -217,9 +219,9 @@ def rotated(space: Space, waypoints: int) -> Encoding:
     """Make the rotated encoding, with inner waypoint i in the i-th of w - 2 intervals of the axis (section III)."""
     frame = rotated_frame(space.start, space.destination)
     edges = np.linspace(0.0, frame.length, waypoints - 1)
-    left, right = _across_limits(frame, space, edges)
-    lower = np.column_stack([edges[:-1], left, np.full(waypoints - 2, space.up[0])])
-    upper = np.column_stack([edges[1:], right, np.full(waypoints - 2, space.up[1])])
+    min_across, max_across = _across_limits(frame, space, edges)
+    lower = np.column_stack([edges[:-1], min_across, np.full(waypoints - 2, space.up[0])])
+    upper = np.column_stack([edges[1:], max_across, np.full(waypoints - 2, space.up[1])])
 
     def decode(vectors: Floats) -> Floats:
         return _add_ends(space, frame.restore(vectors.reshape(len(vectors), waypoints - 2, 3)))
@@ -235,9 +237,11 @@ def route_encoding(space: Space, route: Floats) -> Encoding:
     """
     frames = frames_along(route)
     waypoints = len(route) + 1
-    aside = HALF_WIDTH * float(frames.edges[-1]) / (waypoints - 2)
-    lower = np.column_stack([frames.edges[:-1], np.full(waypoints - 2, -aside), np.full(waypoints - 2, space.up[0])])
-    upper = np.column_stack([frames.edges[1:], np.full(waypoints - 2, aside), np.full(waypoints - 2, space.up[1])])
+    half_width = HALF_WIDTH * float(frames.edges[-1]) / (waypoints - 2)
+    lower = np.column_stack(
+        [frames.edges[:-1], np.full(waypoints - 2, -half_width), np.full(waypoints - 2, space.up[0])]
+    )
+    upper = np.column_stack([frames.edges[1:], np.full(waypoints - 2, half_width), np.full(waypoints - 2, space.up[1])])
 
     def decode(vectors: Floats) -> Floats:
         return _add_ends(space, frames.restore(vectors.reshape(len(vectors), waypoints - 2, 3)))
@@ -267,26 +271,26 @@ def _across_limits(frame: RotatedFrame, space: Space, edges: Floats) -> tuple[Fl
         return np.full(edges.size - 1, -space.across), np.full(edges.size - 1, space.across)
     c, s = frame.cosine, frame.sine
     along = np.linspace(edges[:-1], edges[1:], 9, axis=1)
-    a, b = np.full(along.shape, -math.inf), np.full(along.shape, math.inf)
-    for (west, east), origin, share, slope in zip(space.bounds, frame[:2], (c, s), (-s, c), strict=True):
-        first, last = west - origin - share * along, east - origin - share * along
-        if abs(slope) > 1e-12:
-            a = np.maximum(a, np.minimum(first / slope, last / slope))
-            b = np.minimum(b, np.maximum(first / slope, last / slope))
-    low, high = a.min(axis=1), b.max(axis=1)
-    narrow = ~(high - low >= 1.0)
-    return np.where(narrow, -1.0, low), np.where(narrow, 1.0, high)
+    lower, upper = np.full(along.shape, -math.inf), np.full(along.shape, math.inf)
+    for (west, east), origin, along_factor, across_factor in zip(space.bounds, frame[:2], (c, s), (-s, c), strict=True):
+        lower_end, upper_end = west - origin - along_factor * along, east - origin - along_factor * along
+        if abs(across_factor) > 1e-12:
+            lower = np.maximum(lower, np.minimum(lower_end / across_factor, upper_end / across_factor))
+            upper = np.minimum(upper, np.maximum(lower_end / across_factor, upper_end / across_factor))
+    min_across, max_across = lower.min(axis=1), upper.max(axis=1)
+    is_narrow = ~(max_across - min_across >= 1.0)
+    return np.where(is_narrow, -1.0, min_across), np.where(is_narrow, 1.0, max_across)
 
 
 def cartesian(space: Space, waypoints: int) -> Encoding:
     """Make an encoding of each inner waypoint as absolute east, north, up, anywhere on the map."""
-    low = np.array([space.bounds[0, 0], space.bounds[1, 0], space.up[0]])
-    high = np.array([space.bounds[0, 1], space.bounds[1, 1], space.up[1]])
+    lower = np.array([space.bounds[0, 0], space.bounds[1, 0], space.up[0]])
+    upper = np.array([space.bounds[0, 1], space.bounds[1, 1], space.up[1]])
 
     def decode(vectors: Floats) -> Floats:
         return _add_ends(space, vectors.reshape(len(vectors), waypoints - 2, 3))
 
-    return Encoding("cartesian", waypoints, np.tile(low, waypoints - 2), np.tile(high, waypoints - 2), decode)
+    return Encoding("cartesian", waypoints, np.tile(lower, waypoints - 2), np.tile(upper, waypoints - 2), decode)
 
 
 def polar(space: Space, waypoints: int) -> Encoding:
@@ -312,15 +316,18 @@ def bearing(space: Space, waypoints: int) -> Encoding:
     return _step_encoding("bearing", space, waypoints, math.pi, turning=False)
 
 
-def _step_encoding(name: str, space: Space, waypoints: int, widest: float, *, turning: bool) -> Encoding:
+def _step_encoding(name: str, space: Space, waypoints: int, max_angle: float, *, turning: bool) -> Encoding:
     """Make an encoding by steps r, theta, up.
 
-    widest: limit of theta to either side, rad.
+    max_angle: limit of theta to either side, rad.
     turning: True if theta is relative to the previous step, False if relative to the direct line.
     """
     frame = rotated_frame(space.start, space.destination)
-    mean = frame.length / (waypoints - 1)
-    low, high = np.array([_SHORTEST * mean, -widest, space.up[0]]), np.array([2.0 * mean, widest, space.up[1]])
+    mean_leg = frame.length / (waypoints - 1)
+    lower, upper = (
+        np.array([_MIN_POLAR_STEP * mean_leg, -max_angle, space.up[0]]),
+        np.array([2.0 * mean_leg, max_angle, space.up[1]]),
+    )
 
     def decode(vectors: Floats) -> Floats:
         steps = vectors.reshape(len(vectors), waypoints - 2, 3)
@@ -329,7 +336,7 @@ def _step_encoding(name: str, space: Space, waypoints: int, widest: float, *, tu
         across = np.cumsum(steps[..., 0] * np.sin(course), axis=1)
         return _add_ends(space, frame.restore(np.stack([along, across, steps[..., 2]], axis=-1)))
 
-    return Encoding(name, waypoints, np.tile(low, waypoints - 2), np.tile(high, waypoints - 2), decode)
+    return Encoding(name, waypoints, np.tile(lower, waypoints - 2), np.tile(upper, waypoints - 2), decode)
 
 
 ENCODINGS: dict[str, Callable[[Space, int], Encoding]] = {

@@ -42,28 +42,28 @@ def front_values(data: ProblemArrays, energy: TravelCost | None, paths: Floats) 
     energy: the cost of energy, with any weight (`make_travel_cost`); if None, energy is NaN.
     """
     out = np.zeros((len(paths), len(Value)))
-    joules = SECONDS if energy is None else energy._replace(length=0.0, time=0.0, energy=1.0)
-    _fill(data, SECONDS, joules, np.ascontiguousarray(paths), out)
+    energy_only = SECONDS if energy is None else energy._replace(length=0.0, time=0.0, energy=1.0)
+    _fill(data, SECONDS, energy_only, np.ascontiguousarray(paths), out)
     if energy is None:
         out[:, Value.ENERGY] = np.nan
     return out
 
 
 @compiled
-def _fill(data: ProblemArrays, of_time: TravelCost, joules: TravelCost, paths: Floats, out: Floats) -> None:
+def _fill(data: ProblemArrays, time_cost: TravelCost, energy_cost: TravelCost, paths: Floats, out: Floats) -> None:
     for n in range(paths.shape[0]):
         path = paths[n]
-        lowest = math.inf
+        min_height = math.inf
         for i in range(path.shape[0] - 1):
             a, b = path[i], path[i + 1]
             dx, dy, dz = b[0] - a[0], b[1] - a[1], b[2] - a[2]
-            seconds = leg_cost(of_time, data.aircraft, a, b)
+            seconds = leg_cost(time_cost, data.aircraft, a, b)
             out[n, _LENGTH] += math.sqrt(dx * dx + dy * dy + dz * dz)
             out[n, _EXPOSURE] += seconds * _mean_detection(data, a, dx, dy, dz)
-            lowest = _min_height(data, a, dx, dy, dz, lowest)
+            min_height = _min_height(data, a, dx, dy, dz, min_height)
             out[n, _TIME] += seconds
-            out[n, _ENERGY] += leg_cost(joules, data.aircraft, a, b)
-        out[n, _CLEARANCE] = lowest
+            out[n, _ENERGY] += leg_cost(energy_cost, data.aircraft, a, b)
+        out[n, _CLEARANCE] = min_height
 
 
 @inner
@@ -73,42 +73,42 @@ def _mean_detection(data: ProblemArrays, a: Floats, dx: float, dy: float, dz: fl
     if length2 < 1e-12:
         return 0.0
     for k in range(data.threats.shape[0]):
-        unit: Record = data.threats[k]
-        radius = unit.detection_radius
+        threat: Record = data.threats[k]
+        radius = threat.detection_radius
         if radius <= 0.0:
             continue
-        x, y, z = a[0] - unit.east, a[1] - unit.north, a[2] - unit.up
-        along, start2 = dx * x + dy * y + dz * z, x * x + y * y + z * z
-        middle = -along / length2
-        inside = middle * middle - (start2 - radius * radius) / length2
-        if inside <= 0.0:
+        x, y, z = a[0] - threat.east, a[1] - threat.north, a[2] - threat.up
+        dot, start2 = dx * x + dy * y + dz * z, x * x + y * y + z * z
+        mid_fraction = -dot / length2
+        discriminant = mid_fraction * mid_fraction - (start2 - radius * radius) / length2
+        if discriminant <= 0.0:
             continue
-        half = math.sqrt(inside)
-        enter, leave = max(0.0, middle - half), min(1.0, middle + half)
-        if leave > enter:
-            total += window_exposure(enter, leave, length2, along, start2, unit.detection_scale)
+        half_fraction = math.sqrt(discriminant)
+        begin_fraction, end_fraction = max(0.0, mid_fraction - half_fraction), min(1.0, mid_fraction + half_fraction)
+        if end_fraction > begin_fraction:
+            total += window_exposure(begin_fraction, end_fraction, length2, dot, start2, threat.detection_scale)
     return total
 
 
 @inner
-def _min_height(data: ProblemArrays, a: Floats, dx: float, dy: float, dz: float, lowest: float) -> float:
+def _min_height(data: ProblemArrays, a: Floats, dx: float, dy: float, dz: float, min_height: float) -> float:
     """Return the minimum height above ground at samples of leg d from a and of earlier legs, m; -inf off the terrain.
 
-    lowest: minimum height of the legs before, m. Samples are skipped where, by the steepest slope nearby, the ground
-        cannot be closer.
+    min_height: minimum height of the legs before, m. Samples are skipped where the steepest slope nearby shows that the
+        ground cannot be closer.
     """
     run = math.sqrt(dx * dx + dy * dy)
     count = 1 + int(run / data.sample_pitch)
     tiles, k = data.slope_bounds.tiles, 0
     while True:
-        share = k / count
-        column, row = polymap(data.to_pixel, a[0] + share * dx, a[1] + share * dy)
-        height = a[2] + share * dz - pixel_height(data.heights, column, row)
-        if not height >= lowest:
-            lowest = -math.inf if math.isnan(height) else height
-        if k == count or lowest == -math.inf:
-            return lowest
+        fraction = k / count
+        column, row = polymap(data.to_pixel, a[0] + fraction * dx, a[1] + fraction * dy)
+        height = a[2] + fraction * dz - pixel_height(data.heights, column, row)
+        if not height >= min_height:
+            min_height = -math.inf if math.isnan(height) else height
+        if k == count or min_height == -math.inf:
+            return min_height
         i, j = min(max(int(row) // TILE, 0), tiles.shape[0] - 1), min(max(int(column) // TILE, 0), tiles.shape[1] - 1)
-        ahead = (height - lowest) / (tiles[i, j] * run + abs(dz) + 1e-9)
-        ahead = min(ahead, data.slope_bounds.tile_side / (run + 1e-9))
-        k = min(count, k + max(1, int(ahead * count)))
+        skip_fraction = (height - min_height) / (tiles[i, j] * run + abs(dz) + 1e-9)
+        skip_fraction = min(skip_fraction, data.slope_bounds.tile_side / (run + 1e-9))
+        k = min(count, k + max(1, int(skip_fraction * count)))

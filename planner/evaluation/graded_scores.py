@@ -41,7 +41,7 @@ from world.kernels import Record, Records, compiled, inlined, inner
 
 # A flown corner that departs from the legs by more than this (m) is always evaluated.
 CORNER_TOLERANCE = 30.0
-# Sagitta of an arc over its chord, as a share of its radius.
+# Sagitta of an arc over its chord, as a fraction of its radius.
 CHORD_RISE = 1.0 - math.cos(0.5 * ARC_STEP)
 # Departure of a flown corner from the legs, m: radius of its arc, and largest departures downwards and sideways.
 FLOWN_CORNER = np.dtype(
@@ -119,7 +119,7 @@ def score_legs(
     violations: Record,
     objectives: Record,
 ) -> None:
-    """Evaluate the first part, without ground, missiles and zones, and add its violations, as the later parts do.
+    """Score the legs and turns, the first part, and add their violations; ground, missiles and zones follow.
 
     objectives: the length ratio is filled; the kill exposure is 0 until `score_missiles`.
     """
@@ -143,7 +143,7 @@ def score_legs(
 def score_ground(
     data: ProblemArrays, limits: PrecomputedLimits, scratch: PathScratch, path: Floats, violations: Record
 ) -> None:
-    """Evaluate the second part: the ground below the legs."""
+    """Score the ground below the legs, the second part."""
     legs, terrain_legs = scratch.legs, scratch.terrain_legs
     sample_terrain(
         data.heights,
@@ -170,49 +170,64 @@ def score_missiles(
     violations: Record,
     objectives: Record,
 ) -> None:
-    """Evaluate the third part: missiles, and the ground below corners as flown."""
-    # Arrays are taken out of the data once: passing it on costs more than evaluating a leg.
+    """Score missiles, and the ground below corners as flown, the third part."""
+    # Take arrays out of the data once, because passing the data on costs more than evaluating a leg.
     heights, to_pixel, missiles = data.heights, data.to_pixel, data.missiles
     bounds, aircraft, required, margin = data.slope_bounds, data.aircraft, limits.required, data.kill_margin
     legs, corners, flown, extents = scratch.legs, scratch.corners, scratch.flown, scratch.extents
     terrain_legs, gaps, lags = scratch.terrain_legs, scratch.gaps, scratch.lags
     count, has_error = path.shape[0], data.tracking.has_error
-    length, kill = 0.0, 0.0
+    length, kill_sum = 0.0, 0.0
     for i in range(count - 1):
         x, y, z = path[i, 0], path[i, 1], path[i, 2]
         x2, y2, z2 = path[i + 1, 0], path[i + 1, 1], path[i + 1, 2]
-        within = max(flown[i].missile_distance, flown[i + 1].missile_distance)
+        gap_distance = max(flown[i].missile_distance, flown[i + 1].missile_distance)
         lag = lags[i]
-        dose, at_beginning, at_end = kill_density(
-            missiles, margin, within, x, y, z, x2, y2, z2, extents[i], extents[i + 1], lag.max_below, -lag.min_below
+        exposure, at_beginning, at_end = kill_density(
+            missiles,
+            margin,
+            gap_distance,
+            x,
+            y,
+            z,
+            x2,
+            y2,
+            z2,
+            extents[i],
+            extents[i + 1],
+            lag.max_below,
+            -lag.min_below,
         )
         gaps[i].at_beginning, gaps[i].at_end = at_beginning, at_end
-        kill += dose * legs[i].length
+        kill_sum += exposure * legs[i].length
         length += legs[i].length
     for i in range(1, count - 1):
-        drop, aside = flown[i].blend_deviation, flown[i].fly_by_offset
-        nearest = min(terrain_legs[i - 1].height_at_end, terrain_legs[i].height_at_beginning)
-        low = nearest < drop + required.steepest_loss * aside
-        close = drop + aside > CORNER_TOLERANCE or min(gaps[i - 1].at_end, gaps[i].at_beginning) < drop + aside
-        if drop + aside < 0.01 or not (low or close):
+        vertical_drop, lateral_offset = flown[i].blend_deviation, flown[i].fly_by_offset
+        min_height = min(terrain_legs[i - 1].height_at_end, terrain_legs[i].height_at_beginning)
+        is_near_ground = min_height < vertical_drop + required.steepest_loss * lateral_offset
+        is_near_missile = (
+            vertical_drop + lateral_offset > CORNER_TOLERANCE
+            or min(gaps[i - 1].at_end, gaps[i].at_beginning) < vertical_drop + lateral_offset
+        )
+        if vertical_drop + lateral_offset < 0.01 or not (is_near_ground or is_near_missile):
             continue
         if has_error:
             vertices = legs_about(path[i - 1], path[i], path[i + 1], corners[i].before, corners[i].after)
             below, above = _max_lag_near(lags[i], legs[i], corners[i])
-            more, spare = below + bounds.steepest * aside, margin + aside
+            extra_height, missile_margin = below + bounds.steepest * lateral_offset, margin + lateral_offset
         else:
             vertices = fly_by_vertices(aircraft, path[i - 1], path[i], path[i + 1], flown[i].radius)
-            below, above, more, spare = 0.0, 0.0, 0.0, margin
-        if low:
-            violations.terrain += _corner_depth(heights, bounds, to_pixel, required, more, vertices)
-        if close:
-            kill += _corner_exposure(missiles, spare, vertices, below, above)
-    objectives.kill_exposure = kill * POINTS * (count - 1) / length
+            below, above, extra_height, missile_margin = 0.0, 0.0, 0.0, margin
+        if is_near_ground:
+            violations.terrain += _corner_depth(heights, bounds, to_pixel, required, extra_height, vertices)
+        if is_near_missile:
+            kill_sum += _corner_exposure(missiles, missile_margin, vertices, below, above)
+    objectives.kill_exposure = kill_sum * POINTS * (count - 1) / length
 
 
 @inner
 def score_airspace(data: ProblemArrays, scratch: PathScratch, path: Floats, violations: Record) -> None:
-    """Evaluate the last part: zones and the maximum height above ground."""
+    """Score zones and the maximum height above ground, the last part."""
     if data.airspace.zones.required.shape[0] > 0 or data.airspace.max_height < math.inf:
         add_airspace_violations(data, path, scratch.legs, scratch.corners, scratch.flown, scratch.lags, violations)
 
@@ -226,7 +241,7 @@ def graded_scores(data: ProblemArrays, paths: Floats) -> tuple[Floats, Floats]:
     between paths of exactly equal length.
     """
     violations, objectives = np.zeros(len(paths), dtype=VIOLATIONS), np.zeros(len(paths), dtype=OBJECTIVES)
-    # A plan's own path cannot be written, which would make all of this another kernel.
+    # A plan's own path is read-only, which would compile another kernel.
     _score_paths(data, np.require(paths, requirements=["C", "W"]), violations, objectives)
     return as_columns(violations), as_columns(objectives)
 
@@ -243,7 +258,7 @@ def _score_paths(data: ProblemArrays, paths: Floats, violations: Records, object
 def _arc_radius(legs_hold_turns: bool, legs: Records, corners: Records, i: int) -> float:
     """Return the radius of the arc at waypoint i, m.
 
-    The radius is 0 if a number alone limits turns and a leg is too short for its two turns. The ends have no arc.
+    The radius is 0 if only a number limits turns and a leg is too short for its two turns. The ends have no arc.
     `planner.evaluation.corners.fly_by_radii` gives the radii of a whole path.
     """
     radius: float = corners[i].radius
@@ -251,9 +266,9 @@ def _arc_radius(legs_hold_turns: bool, legs: Records, corners: Records, i: int) 
         return 0.0
     if not legs_hold_turns:
         last = legs.shape[0]
-        before = corners[i - 1].tangent if i > 1 else 0.0
-        after = corners[i + 1].tangent if i < last - 1 else 0.0
-        if corners[i].tangent + before > legs[i - 1].run or corners[i].tangent + after > legs[i].run:
+        tangent_before = corners[i - 1].tangent if i > 1 else 0.0
+        tangent_after = corners[i + 1].tangent if i < last - 1 else 0.0
+        if corners[i].tangent + tangent_before > legs[i - 1].run or corners[i].tangent + tangent_after > legs[i].run:
             return 0.0
     return radius
 
@@ -274,8 +289,8 @@ def _measure_arcs(
     The flown corner departs from the legs downwards by the blend of slopes, and sideways by at most R(1/cos(theta/2) -
     1) plus the sagitta of a chord; it does so within the tangent and half the arc, or within the blend.
     """
-    start, first = path[0], path[1]
-    slope_out = (first[2] - start[2]) / max(legs[0].run, 1e-6)
+    start, second = path[0], path[1]
+    slope_out = (second[2] - start[2]) / max(legs[0].run, 1e-6)
     for i in range(1, legs.shape[0]):
         radius = 0.0 if fly_over else _arc_radius(legs_hold_turns, legs, corners, i)
         tangent = corners[i].tangent if radius > 0.0 else 0.0
@@ -283,11 +298,15 @@ def _measure_arcs(
         slope_out = (path[i + 1, 2] - path[i, 2]) / max(legs[i].run, 1e-6)
         crest = max(0.0, slope_in - slope_out)
         blend = half_blend_length(aircraft, path[i, 2])
-        aside = math.sqrt(radius * radius + tangent * tangent) - radius
-        aside += min(aside, radius * CHORD_RISE)
-        drop = 0.5 * tangent * crest + 0.25 * crest * crest * blend + aside * max(abs(slope_in), abs(slope_out))
-        flown[i].radius, flown[i].blend_deviation, flown[i].fly_by_offset = radius, drop, aside
-        flown[i].missile_distance = aside + drop if aside + drop <= CORNER_TOLERANCE else 0.0
+        lateral_offset = math.sqrt(radius * radius + tangent * tangent) - radius
+        lateral_offset += min(lateral_offset, radius * CHORD_RISE)
+        vertical_drop = (
+            0.5 * tangent * crest + 0.25 * crest * crest * blend + lateral_offset * max(abs(slope_in), abs(slope_out))
+        )
+        flown[i].radius, flown[i].blend_deviation, flown[i].fly_by_offset = radius, vertical_drop, lateral_offset
+        flown[i].missile_distance = (
+            lateral_offset + vertical_drop if lateral_offset + vertical_drop <= CORNER_TOLERANCE else 0.0
+        )
         extents[i] = 2.0 * tangent if tangent > 0.0 else abs(slope_in - slope_out) * blend
 
 
@@ -297,17 +316,17 @@ def _max_lag_near(lag: Record, leg: Record, corner: Record) -> tuple[float, floa
 
     lag, leg: records of the leg after the corner.
     """
-    here, settled = lag_at(lag, 0.0), lag_at(lag, min(1.0, corner.after / max(leg.run, 1e-6)))
-    return max(0.0, here, settled), max(0.0, -here, -settled)
+    begin_lag, settled_lag = lag_at(lag, 0.0), lag_at(lag, min(1.0, corner.after / max(leg.run, 1e-6)))
+    return max(0.0, begin_lag, settled_lag), max(0.0, -begin_lag, -settled_lag)
 
 
 @inlined
 def _measure_tracked(corners: Records, flown: Records, extents: Floats) -> None:
     """Fill `FLOWN_CORNER` records (w,) and extents (w,) of the inner waypoints of a path with tracking error."""
     for i in range(1, corners.shape[0] - 1):
-        aside = corners[i].excursion
-        flown[i].radius, flown[i].blend_deviation, flown[i].fly_by_offset = 0.0, 0.0, aside
-        flown[i].missile_distance = aside if aside <= CORNER_TOLERANCE else 0.0
+        excursion = corners[i].excursion
+        flown[i].radius, flown[i].blend_deviation, flown[i].fly_by_offset = 0.0, 0.0, excursion
+        flown[i].missile_distance = excursion if excursion <= CORNER_TOLERANCE else 0.0
         extents[i] = max(corners[i].before, corners[i].after)
 
 
@@ -317,16 +336,19 @@ def _corner_depth(
     slope_bounds: SlopeBounds,
     to_pixel: PolyMapRecord,
     required: RequiredClearance,
-    more: float,
+    extra_height: float,
     vertices: Floats,
 ) -> float:
-    """Return the depth below the required clearance plus `more` (m), integrated along a flown corner (k, 3), m x km."""
+    """Return the depth below the required clearance, integrated along a flown corner (k, 3), m x km.
+
+    extra_height: height in addition to the required clearance, m.
+    """
     total = 0.0
     for k in range(vertices.shape[0] - 1):
         x, y, z = vertices[k, 0], vertices[k, 1], vertices[k, 2]
         x2, y2, z2 = vertices[k + 1, 0], vertices[k + 1, 1], vertices[k + 1, 2]
         ends = segment_pixels(to_pixel, x, y, x2, y2)
-        total += terrain_excess(heights, slope_bounds, required, more, ends, x, y, z, x2, y2, z2, math.inf)
+        total += terrain_excess(heights, slope_bounds, required, extra_height, ends, x, y, z, x2, y2, z2, math.inf)
     return total
 
 
@@ -340,6 +362,6 @@ def _corner_exposure(missiles: MissileIndex, margin: float, vertices: Floats, be
     for k in range(vertices.shape[0] - 1):
         x, y, z = vertices[k, 0], vertices[k, 1], vertices[k, 2]
         x2, y2, z2 = vertices[k + 1, 0], vertices[k + 1, 1], vertices[k + 1, 2]
-        dose, _, _ = kill_density(missiles, margin, 0.0, x, y, z, x2, y2, z2, 0.0, 0.0, below, above)
-        total += dose * math.sqrt((x2 - x) ** 2 + (y2 - y) ** 2 + (z2 - z) ** 2)
+        exposure, _, _ = kill_density(missiles, margin, 0.0, x, y, z, x2, y2, z2, 0.0, 0.0, below, above)
+        total += exposure * math.sqrt((x2 - x) ** 2 + (y2 - y) ** 2 + (z2 - z) ** 2)
     return total

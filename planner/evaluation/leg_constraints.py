@@ -66,11 +66,11 @@ def clear_sums(sums: Record) -> None:
 
 
 @inlined
-def copy_point(place: Record, out: Record, size: int) -> None:
-    """Copy one point of each path to another."""
+def copy_point(source: Record, target: Record, size: int) -> None:
+    """Copy one point of each path into another record."""
     for b in range(size):
-        out.east[b], out.north[b], out.up[b] = place.east[b], place.north[b], place.up[b]
-        out.column[b], out.row[b] = place.column[b], place.row[b]
+        target.east[b], target.north[b], target.up[b] = source.east[b], source.north[b], source.up[b]
+        target.column[b], target.row[b] = source.column[b], source.row[b]
 
 
 @inlined
@@ -85,29 +85,29 @@ def subtract_points(end: Record, begin: Record, size: int, out: Record) -> None:
 
 
 @inlined
-def divide_legs(begin: Record, step: Record, share: float, size: int, out: Record) -> None:
+def divide_legs(begin: Record, step: Record, fraction: float, size: int, out: Record) -> None:
     """Fill the point of each path's leg at this fraction of the step from its beginning."""
     for b in range(size):
-        out.east[b] = begin.east[b] + share * step.east[b]
-        out.north[b] = begin.north[b] + share * step.north[b]
-        out.up[b] = begin.up[b] + share * step.up[b]
-        out.column[b] = begin.column[b] + share * step.column[b]
-        out.row[b] = begin.row[b] + share * step.row[b]
+        out.east[b] = begin.east[b] + fraction * step.east[b]
+        out.north[b] = begin.north[b] + fraction * step.north[b]
+        out.up[b] = begin.up[b] + fraction * step.up[b]
+        out.column[b] = begin.column[b] + fraction * step.column[b]
+        out.row[b] = begin.row[b] + fraction * step.row[b]
 
 
 @inlined
-def load_waypoints(to_pixel: PolyMapRecord, paths: Floats, begin: int, i: int, size: int, block: Record) -> None:
+def load_waypoints(to_pixel: PolyMapRecord, paths: Floats, first_path: int, i: int, size: int, block: Record) -> None:
     """Fill waypoint i of each path, and its pixel as `polymap` computes it, for all paths at once."""
     end, x, y, inner = block.end, block.x, block.y, block.inner
     east, north, up = end.east, end.north, end.up
     for b in range(size):
-        east[b] = paths[begin + b, i, 0]
-        north[b] = paths[begin + b, i, 1]
-        up[b] = paths[begin + b, i, 2]
-    middle_x, middle_y, half_x, half_y = to_pixel.centre_x, to_pixel.centre_y, to_pixel.half_x, to_pixel.half_y
+        east[b] = paths[first_path + b, i, 0]
+        north[b] = paths[first_path + b, i, 1]
+        up[b] = paths[first_path + b, i, 2]
+    centre_x, centre_y, half_x, half_y = to_pixel.centre_x, to_pixel.centre_y, to_pixel.half_x, to_pixel.half_y
     for b in range(size):
-        x[b] = (east[b] - middle_x) / half_x
-        y[b] = (north[b] - middle_y) / half_y
+        x[b] = (east[b] - centre_x) / half_x
+        y[b] = (north[b] - centre_y) / half_y
     _horner(to_pixel.u, to_pixel.size, size, x, y, inner, end.column)
     _horner(to_pixel.v, to_pixel.size, size, x, y, inner, end.row)
 
@@ -146,7 +146,7 @@ class PrecomputedLimits(NamedTuple):
     climb_slope, dive_slope: tangents that no leg may exceed, or, where the aircraft limits slopes, that every leg may
     use.
     slopes_by_aircraft: True if the aircraft limits slopes.
-    straight_distance: from start to destination in three dimensions, m.
+    straight_distance: distance from start to destination in three dimensions, m.
     required: clearance above ground.
     """
 
@@ -163,12 +163,12 @@ class PrecomputedLimits(NamedTuple):
 def precompute_limits(data: ProblemArrays) -> PrecomputedLimits:
     """Return the limits that hold for all paths of a problem."""
     climb, dive = data.max_climb, data.max_dive
-    by_aircraft = math.isnan(climb) or math.isnan(dive)
+    slopes_by_aircraft = math.isnan(climb) or math.isnan(dive)
     if math.isnan(climb):
         climb = _min_slope_limit(data, data.aircraft.climb)
     if math.isnan(dive):
         dive = _min_slope_limit(data, data.aircraft.descent)
-        # Where it cannot fly level no leg may lead, whatever its slope.
+        # No leg, whatever its slope, may lead to where the aircraft cannot fly level.
         if data.aircraft.equivalent > 0.0 and _min_slope_limit(data, data.aircraft.climb) < 0.0:
             dive = -1.0
     return PrecomputedLimits(
@@ -177,7 +177,7 @@ def precompute_limits(data: ProblemArrays) -> PrecomputedLimits:
         downwind(data.aircraft),
         math.tan(climb - data.angle_margin),
         math.tan(dive - data.angle_margin),
-        by_aircraft,
+        slopes_by_aircraft,
         _straight_distance(data.start, data.destination),
         required_clearance(data),
     )
@@ -209,20 +209,25 @@ def _straight_distance(start: Floats, destination: Floats) -> float:
 
 @inlined
 def _course_slope_limits(
-    data: ProblemArrays, ux: float, uy: float, low: float, high: float, wind: Wind
+    data: ProblemArrays, ux: float, uy: float, begin_altitude: float, end_altitude: float, wind: Wind
 ) -> tuple[float, float]:
     """Return the climb and dive limits on the unit course u between two altitudes, rad."""
     climb, dive = data.max_climb, data.max_dive
     if math.isnan(climb) or math.isnan(dive):
         wx, wy = wind
-        up, down = math.inf, math.inf
-        for part in (0.0, 0.5, 1.0):
-            one, two = slopes_along(data.aircraft, ux * wx + uy * wy, ux * wy - uy * wx, low + part * (high - low))
-            up, down = min(up, one), min(down, two)
+        aircraft_climb, aircraft_dive = math.inf, math.inf
+        for fraction in (0.0, 0.5, 1.0):
+            climb_angle, dive_angle = slopes_along(
+                data.aircraft,
+                ux * wx + uy * wy,
+                ux * wy - uy * wx,
+                begin_altitude + fraction * (end_altitude - begin_altitude),
+            )
+            aircraft_climb, aircraft_dive = min(aircraft_climb, climb_angle), min(aircraft_dive, dive_angle)
         if math.isnan(climb):
-            climb = up
+            climb = aircraft_climb
         if math.isnan(dive):
-            dive = down
+            dive = aircraft_dive
     return climb - data.angle_margin, dive - data.angle_margin
 
 
@@ -237,31 +242,37 @@ def slope_limits(data: ProblemArrays, a: Floats, b: Floats) -> tuple[float, floa
 
 @inlined
 def slope_excess(
-    data: ProblemArrays, limits: PrecomputedLimits, ux: float, uy: float, run: float, low: float, high: float
+    data: ProblemArrays,
+    limits: PrecomputedLimits,
+    ux: float,
+    uy: float,
+    run: float,
+    begin_altitude: float,
+    end_altitude: float,
 ) -> float:
-    """Return how much a leg exceeds its slope limit, in m of height per m of run; 0 if it does not (eq. 3-4).
+    """Return the excess of a leg's slope over its limit, m of height per m of run; 0 within the limit (eq. 3-4).
 
     ux, uy: unit vector along the leg's course.
     run: horizontal length, m.
-    low, high: altitudes of its start and end, m.
+    begin_altitude, end_altitude: altitudes of its start and end, m.
     """
-    rise = high - low
-    over = max(0.0, rise - limits.climb_slope * run, -rise - limits.dive_slope * run)
-    outside = min(low, high) < data.floor or max(low, high) > data.ceiling
-    if limits.slopes_by_aircraft and (over > 0.0 or outside):
-        climb, dive = _course_slope_limits(data, ux, uy, low, high, limits.wind)
-        over = max(0.0, rise - math.tan(climb) * run, -rise - math.tan(dive) * run)
-    return over / max(run, 1.0)
+    rise = end_altitude - begin_altitude
+    excess = max(0.0, rise - limits.climb_slope * run, -rise - limits.dive_slope * run)
+    is_outside = min(begin_altitude, end_altitude) < data.floor or max(begin_altitude, end_altitude) > data.ceiling
+    if limits.slopes_by_aircraft and (excess > 0.0 or is_outside):
+        climb, dive = _course_slope_limits(data, ux, uy, begin_altitude, end_altitude, limits.wind)
+        excess = max(0.0, rise - math.tan(climb) * run, -rise - math.tan(dive) * run)
+    return excess / max(run, 1.0)
 
 
 @inlined
-def _turn_excess(cosine: float, largest: float, ux: float, uy: float, vx: float, vy: float) -> float:
-    """Return how much the turn between two unit courses exceeds the limit, rad; 0 if it does not (eq. 1-2)."""
+def _turn_excess(cos_max_turn: float, max_turn: float, ux: float, uy: float, vx: float, vy: float) -> float:
+    """Return the excess of the turn between two unit courses over the limit, rad; 0 within the limit (eq. 1-2)."""
     dot = ux * vx + uy * vy
-    if dot >= cosine or (ux == 0.0 and uy == 0.0) or (vx == 0.0 and vy == 0.0):
+    if dot >= cos_max_turn or (ux == 0.0 and uy == 0.0) or (vx == 0.0 and vy == 0.0):
         return 0.0
     # Slightly above zero, so that an excess lost to rounding is counted.
-    return max(1e-12, math.atan2(abs(ux * vy - uy * vx), dot) - largest)
+    return max(1e-12, math.atan2(abs(ux * vy - uy * vx), dot) - max_turn)
 
 
 @inner
@@ -271,98 +282,105 @@ def add_leg_violations(
     path: Floats,
     legs: Records,
     corners: Records,
-    graded: bool,
+    by_amount: bool,
     violations: Record,
 ) -> None:
-    """Add turn, slope and bounds violations of a path (w, 3) to a `VIOLATIONS` record: counts, or amounts if graded.
+    """Add turn, slope and bounds violations of a path (w, 3) to a `VIOLATIONS` record.
 
     Where legs must hold their turns, each leg shorter than its two turns adds to turn (eq. 1-4, 7).
-    legs, corners: measurements of the path.
+    legs, corners: measurements of the path. by_amount: add the excess of each violation, not 1.
     """
-    # The order of these lines fixes the order of summation, and with it the last digit.
-    _add_turns(data, limits, legs, graded, violations)
-    _add_bounds(data, path, corners, graded, violations)
+    # The order of these lines fixes the order of summation, and so the last digit.
+    _add_turn_violations(data, limits, legs, by_amount, violations)
+    _add_bounds_violations(data, path, corners, by_amount, violations)
     if data.legs_hold_turns:
-        _add_turn_lengths(data, limits, path, legs, corners, graded, violations)
+        _add_leg_length_violations(data, limits, path, legs, corners, by_amount, violations)
     for i in range(legs.shape[0]):
         # Coincident waypoints have no course between them, and would hide two sharp turns.
-        violations.turn += max(0.0, MIN_LEG - legs[i].run) / 100.0 if graded else 0.0
+        violations.turn += max(0.0, MIN_LEG - legs[i].run) / 100.0 if by_amount else 0.0
         rise, run = path[i + 1, 2] - path[i, 2], legs[i].run
-        over = max(0.0, rise - limits.climb_slope * run, -rise - limits.dive_slope * run) / max(run, 1.0)
+        excess = max(0.0, rise - limits.climb_slope * run, -rise - limits.dive_slope * run) / max(run, 1.0)
         if limits.slopes_by_aircraft:
-            over = slope_excess(data, limits, legs[i].east, legs[i].north, run, path[i, 2], path[i + 1, 2])
-        violations.slope += _amount_or_count(over, graded)
+            excess = slope_excess(data, limits, legs[i].east, legs[i].north, run, path[i, 2], path[i + 1, 2])
+        violations.slope += _violation(excess, by_amount)
     if limits.slopes_by_aircraft and data.legs_hold_turns and not data.fly_over:
         for i in range(1, legs.shape[0]):
-            violations.slope += _amount_or_count(_arc_slope_excess(data, limits, path, i, legs, corners), graded)
+            violations.slope += _violation(_arc_slope_excess(data, limits, path, i, legs, corners), by_amount)
 
 
 @inlined
-def _add_turns(data: ProblemArrays, limits: PrecomputedLimits, legs: Records, graded: bool, violations: Record) -> None:
-    """Add the turns that are too sharp, and lastly the turns from and to the courses prescribed at the ends."""
-    largest, last = data.max_turn, legs.shape[0]
-    for i in range(1, last):
+def _add_turn_violations(
+    data: ProblemArrays, limits: PrecomputedLimits, legs: Records, by_amount: bool, violations: Record
+) -> None:
+    """Add turns that are too sharp, including those from and to prescribed end courses.
+
+    by_amount: add the excess, not 1.
+    """
+    max_turn, leg_count = data.max_turn, legs.shape[0]
+    for i in range(1, leg_count):
         ux, uy, vx, vy = legs[i - 1].east, legs[i - 1].north, legs[i].east, legs[i].north
-        violations.turn += _amount_or_count(_turn_excess(limits.cos_max_turn, largest, ux, uy, vx, vy), graded)
-    for i, prescribed in ((0, data.start_course), (last, data.destination_course)):
-        if not math.isnan(prescribed):
+        violations.turn += _violation(_turn_excess(limits.cos_max_turn, max_turn, ux, uy, vx, vy), by_amount)
+    for i, end_course in ((0, data.start_course), (leg_count, data.destination_course)):
+        if not math.isnan(end_course):
             ux, uy, vx, vy = courses_at(data, legs, i)
-            violations.turn += _amount_or_count(_turn_excess(limits.cos_max_turn, largest, ux, uy, vx, vy), graded)
+            violations.turn += _violation(_turn_excess(limits.cos_max_turn, max_turn, ux, uy, vx, vy), by_amount)
 
 
 @inlined
-def _add_bounds(data: ProblemArrays, path: Floats, corners: Records, graded: bool, violations: Record) -> None:
-    """Add the waypoints off the map (tracking error included), below the floor or above the ceiling (eq. 7)."""
+def _add_bounds_violations(
+    data: ProblemArrays, path: Floats, corners: Records, by_amount: bool, violations: Record
+) -> None:
+    """Add waypoints off the map (tracking error included), below the floor or above the ceiling (eq. 7)."""
     west, east, south, north = data.west, data.east, data.south, data.north
     floor, ceiling = data.floor, data.ceiling
     for i in range(path.shape[0]):
         x, y, z = path[i, 0], path[i, 1], path[i, 2]
-        aside = corners[i].excursion
-        outside = max(0.0, west - x + aside, x - east + aside, south - y + aside, y - north + aside)
-        outside = max(outside, floor - z, z - ceiling)
-        violations.bounds += _amount_or_count(outside, graded)
+        excursion = corners[i].excursion
+        excess = max(0.0, west - x + excursion, x - east + excursion, south - y + excursion, y - north + excursion)
+        excess = max(excess, floor - z, z - ceiling)
+        violations.bounds += _violation(excess, by_amount)
 
 
 @inlined
-def _add_turn_lengths(
+def _add_leg_length_violations(
     data: ProblemArrays,
     limits: PrecomputedLimits,
     path: Floats,
     legs: Records,
     corners: Records,
-    graded: bool,
+    by_amount: bool,
     violations: Record,
 ) -> None:
     """Add legs that are too short for their turns, the roll between the turns, and settling, in units of 100 m."""
     for i in range(legs.shape[0]):
-        need, run = turn_length(data.fly_over, corners, i), legs[i].run
-        short = need + settling_length(need, run) - run if need > 0.0 else 0.0
-        if short > -MAX_ROLL and not data.fly_over:
-            up = min(path[i, 2], path[i + 1, 2])
-            short += roll_length(data.aircraft, legs, corners, i, up, limits.wind)
-        violations.turn += _amount_or_count(min(10.0, max(0.0, short / 100.0)), graded)
+        needed_length, run = turn_length(data.fly_over, corners, i), legs[i].run
+        missing_length = needed_length + settling_length(needed_length, run) - run if needed_length > 0.0 else 0.0
+        if missing_length > -MAX_ROLL and not data.fly_over:
+            altitude = min(path[i, 2], path[i + 1, 2])
+            missing_length += roll_length(data.aircraft, legs, corners, i, altitude, limits.wind)
+        violations.turn += _violation(min(10.0, max(0.0, missing_length / 100.0)), by_amount)
 
 
 @inlined
 def _arc_slope_excess(
     data: ProblemArrays, limits: PrecomputedLimits, path: Floats, i: int, legs: Records, corners: Records
 ) -> float:
-    """Return how much the slope of the arc at waypoint i exceeds the aircraft's limits on both courses, m per m."""
+    """Return the excess of the slope of the arc at waypoint i over the aircraft's limits on both courses, m per m."""
     rise_in = (path[i, 2] - path[i - 1, 2]) / max(legs[i - 1].run, 1.0)
     rise_out = (path[i + 1, 2] - path[i, 2]) / max(legs[i].run, 1.0)
     slope = arc_slope(rise_in, rise_out, corners[i].tangent, corners[i].radius)
     if -limits.dive_slope <= slope <= limits.climb_slope:
         return 0.0
-    over = 0.0
+    excess = 0.0
     for leg in (i - 1, i):
         climb, dive = _course_slope_limits(data, legs[leg].east, legs[leg].north, path[i, 2], path[i, 2], limits.wind)
-        over = max(over, slope - math.tan(climb), -slope - math.tan(dive))
-    return over
+        excess = max(excess, slope - math.tan(climb), -slope - math.tan(dive))
+    return excess
 
 
 @inlined
-def _amount_or_count(over: float, graded: bool) -> float:
-    """Return the violation added for an excess `over`: the excess itself if graded, otherwise 1."""
-    if graded:
-        return over
-    return 1.0 if over > 0.0 else 0.0
+def _violation(excess: float, by_amount: bool) -> float:
+    """Return the violation of an excess: the excess itself if `by_amount`, otherwise 1; 0 without an excess."""
+    if by_amount:
+        return excess
+    return 1.0 if excess > 0.0 else 0.0

@@ -40,7 +40,7 @@ from world.geometry import CLOSEST
 from world.kernels import Record, Records, compiled, inlined, inner
 from world.terrain import EDGE
 
-# Points per leg (eq. 6).
+# Number of points per leg (eq. 6).
 POINTS = 6
 
 
@@ -49,10 +49,10 @@ def paper_scores(data: ProblemArrays, paths: Floats) -> tuple[Ints, Floats]:
 
     Returns violations (n, 4) by `planner.plan.Violation` and objectives (n, 4) by `planner.plan.Objective`.
     """
-    number, count, _ = paths.shape
-    violations, objectives = np.zeros(number, dtype=VIOLATIONS), np.zeros(number, dtype=OBJECTIVES)
+    path_count, waypoint_count, _ = paths.shape
+    violations, objectives = np.zeros(path_count, dtype=VIOLATIONS), np.zeros(path_count, dtype=OBJECTIVES)
     scratch = np.zeros(1, dtype=BLOCK_SCRATCH)
-    legs, corners = np.zeros(count - 1, dtype=LEG), np.zeros(count, dtype=CORNER)
+    legs, corners = np.zeros(waypoint_count - 1, dtype=LEG), np.zeros(waypoint_count, dtype=CORNER)
     _score_paths(data, paths, scratch, legs, corners, violations, objectives)
     return as_columns(violations).astype(np.int64), as_columns(objectives)
 
@@ -71,20 +71,20 @@ def _score_paths(
 
     scratch: a `BLOCK_SCRATCH` record (1,). legs, corners: scratch records of one path.
     """
-    number, block = paths.shape[0], scratch[0]
+    path_count, block = paths.shape[0], scratch[0]
     limits = precompute_limits(data)
-    by_numbers = _are_limits_fixed(data, limits)
-    for begin in range(0, number, BLOCK):
-        size = min(BLOCK, number - begin)
-        _score_block(data, limits, paths, begin, size, block)
+    has_fixed_limits = _are_limits_fixed(data, limits)
+    for first_path in range(0, path_count, BLOCK):
+        size = min(BLOCK, path_count - first_path)
+        _score_block(data, limits, paths, first_path, size, block)
         sums = block.sums
         for b in range(size):
-            violation, objective = violations[begin + b], objectives[begin + b]
-            if by_numbers:
+            violation, objective = violations[first_path + b], objectives[first_path + b]
+            if has_fixed_limits:
                 violation.turn, violation.slope = sums.turns[b], sums.slopes[b]
                 violation.bounds = sums.outside[b]
             else:
-                path = paths[begin + b]
+                path = paths[first_path + b]
                 measure_legs(path, legs)
                 if data.legs_hold_turns:
                     measure_corners(data, limits.wind, path, legs, corners)
@@ -104,25 +104,25 @@ def _are_limits_fixed(data: ProblemArrays, limits: PrecomputedLimits) -> bool:
 
 @inner
 def _score_block(
-    data: ProblemArrays, limits: PrecomputedLimits, paths: Floats, begin: int, size: int, block: Record
+    data: ProblemArrays, limits: PrecomputedLimits, paths: Floats, first_path: int, size: int, block: Record
 ) -> None:
     """Fill the sums of paths begin : begin + size.
 
     Each waypoint is mapped to the raster once; between waypoints a leg is taken as straight in pixels.
     """
-    last = paths.shape[1] - 1
+    leg_count = paths.shape[1] - 1
     clear_sums(block.sums)
-    load_waypoints(data.to_pixel, paths, begin, 0, size, block)
-    _add_bounds(data, size, block.end, block.sums)
-    for i in range(last):
+    load_waypoints(data.to_pixel, paths, first_path, 0, size, block)
+    _add_bounds_violations(data, size, block.end, block.sums)
+    for i in range(leg_count):
         copy_point(block.end, block.begin, size)
-        load_waypoints(data.to_pixel, paths, begin, i + 1, size, block)
-        _add_bounds(data, size, block.end, block.sums)
+        load_waypoints(data.to_pixel, paths, first_path, i + 1, size, block)
+        _add_bounds_violations(data, size, block.end, block.sums)
         subtract_points(block.end, block.begin, size, block.step)
         _add_leg(limits, size, i == 0, block)
         # Departure from the paper: eq. 6 never reaches the destination, which is the seventh point of the last leg
         # here.
-        for j in range(POINTS + (i == last - 1)):
+        for j in range(POINTS + (i == leg_count - 1)):
             divide_legs(block.begin, block.step, j * (1.0 / POINTS), size, block.point)
             _find_ground(data.heights, size, block)
             _add_terrain(limits.required, size, j < POINTS, block)
@@ -147,48 +147,48 @@ def _find_ground(heights: Heights, size: int, block: Record) -> None:
         index[b] = i * columns + j
         us[b] = column - j
         vs[b] = row - i
-    one, below = np.uintp(1), np.uintp(columns)
+    right_step, down_step = np.uintp(1), np.uintp(columns)
     for b in range(size):
         k = np.uintp(index[b])
         top_left[b] = flat[k]
-        top_right[b] = flat[k + one]
-        low_left[b] = flat[k + below]
-        low_right[b] = flat[k + below + one]
-    right, bottom = columns - 1 + EDGE, rows - 1 + EDGE
+        top_right[b] = flat[k + right_step]
+        low_left[b] = flat[k + down_step]
+        low_right[b] = flat[k + down_step + right_step]
+    max_column, max_row = columns - 1 + EDGE, rows - 1 + EDGE
     for b in range(size):
         u, v = us[b], vs[b]
-        top = top_left[b] * (1.0 - u) + top_right[b] * u
-        low = low_left[b] * (1.0 - u) + low_right[b] * u
-        ground[b] = top * (1.0 - v) + low * v
+        top_height = top_left[b] * (1.0 - u) + top_right[b] * u
+        bottom_height = low_left[b] * (1.0 - u) + low_right[b] * u
+        ground[b] = top_height * (1.0 - v) + bottom_height * v
     for b in range(size):
         column, row = point_column[b], point_row[b]
-        inside = (column >= -EDGE) & (column <= right) & (row >= -EDGE) & (row <= bottom)
-        ground[b] = ground[b] if inside else math.nan
+        is_on_raster = (column >= -EDGE) & (column <= max_column) & (row >= -EDGE) & (row <= max_row)
+        ground[b] = ground[b] if is_on_raster else math.nan
 
 
 @inlined
-def _add_terrain(required: RequiredClearance, size: int, inner: bool, block: Record) -> None:
+def _add_terrain(required: RequiredClearance, size: int, adds_height: bool, block: Record) -> None:
     """Add the points' terrain violations and heights above ground (eq. 5, 11)."""
     east, north, up = block.point.east, block.point.north, block.point.up
-    ground, need, below, height = block.ground, block.need, block.sums.below, block.sums.height
+    ground, required_height, below, height = block.ground, block.need, block.sums.below, block.sums.height
     for b in range(size):
-        need[b] = required.clearance + required.buffer
+        required_height[b] = required.clearance + required.buffer
     if not required.same_everywhere:
         for b in range(size):
-            need[b] = clearance_at(required, east[b], north[b])
+            required_height[b] = clearance_at(required, east[b], north[b])
     for b in range(size):
         # This form treats NaN as below.
-        below[b] += 0.0 if up[b] > ground[b] + need[b] else 1.0
-    if inner:
+        below[b] += 0.0 if up[b] > ground[b] + required_height[b] else 1.0
+    if adds_height:
         for b in range(size):
-            above = up[b] - ground[b]
-            height[b] += above if above > 0.0 else 0.0
+            height_above = up[b] - ground[b]
+            height[b] += height_above if height_above > 0.0 else 0.0
 
 
 @inlined
 def _find_nearby_units(threat_cells: ThreatCells, size: int, block: Record) -> None:
     """Fill the first entry and the length of each point's list of nearby units."""
-    # A cell is not bounded in height; it notes the heights its units reach.
+    # A cell is not bounded in height; it stores the heights that its units reach.
     west, south, per_metre = threat_cells.west, threat_cells.south, 1.0 / threat_cells.side
     columns, rows, cells = threat_cells.columns, threat_cells.rows, threat_cells.cells
     outside = columns * rows
@@ -196,14 +196,14 @@ def _find_nearby_units(threat_cells: ThreatCells, size: int, block: Record) -> N
     index, first, count = block.index, block.first, block.count
     for b in range(size):
         column, row = (east[b] - west) * per_metre, (north[b] - south) * per_metre
-        inside = (column >= 0.0) & (row >= 0.0) & (column < columns) & (row < rows)
-        at = int(row if inside else 0.0) * columns + int(column if inside else 0.0)
-        index[b] = at if inside else outside
+        is_inside = (column >= 0.0) & (row >= 0.0) & (column < columns) & (row < rows)
+        cell_index = int(row if is_inside else 0.0) * columns + int(column if is_inside else 0.0)
+        index[b] = cell_index if is_inside else outside
     for b in range(size):
         cell, z = cells[np.uintp(index[b])], up[b]
-        begin, entries, low, high = cell.first, cell.count, cell.lowest, cell.highest
-        first[b] = begin
-        count[b] = entries if (z >= low) & (z <= high) else 0
+        first_entry, entry_count, lowest, highest = cell.first, cell.count, cell.lowest, cell.highest
+        first[b] = first_entry
+        count[b] = entry_count if (z >= lowest) & (z <= highest) else 0
 
 
 @inlined
@@ -222,30 +222,32 @@ def _add_exposures(spheres: Records, units: Short, size: int, block: Record) -> 
     for b in range(size):
         active[open_paths] = b
         open_paths += one if count[b] > 0 else np.uintp(0)
-    turn = 0
+    round_number = 0
     while open_paths > 0:
-        left = np.uintp(0)
+        remaining_paths = np.uintp(0)
         for entry in range(open_paths):
-            lane = np.uintp(active[np.uintp(entry)])
-            sphere = spheres[np.uintp(units[np.uintp(first[lane] + turn)])]
-            dx, dy = east[lane] - sphere.east, north[lane] - sphere.north
-            dz = up[lane] - sphere.up
-            d2 = dx * dx + dy * dy + dz * dz
-            closest2 = d2 if d2 > CLOSEST * CLOSEST else CLOSEST * CLOSEST
-            share = 1.0 / (closest2 * closest2)
-            # By multiplication: a branch on the radius is unpredictable, and a misprediction costs more.
-            kill[lane] += sphere.kill_scale4 * share * (1.0 if d2 <= sphere.kill_radius2 else 0.0)
-            detection[lane] += sphere.detection_scale4 * share * (1.0 if d2 <= sphere.detection_radius2 else 0.0)
-            active[left] = np.int64(lane)
-            left += one if count[lane] > turn + 1 else np.uintp(0)
-        open_paths = left
-        turn += 1
+            path = np.uintp(active[np.uintp(entry)])
+            sphere = spheres[np.uintp(units[np.uintp(first[path] + round_number)])]
+            dx, dy = east[path] - sphere.east, north[path] - sphere.north
+            dz = up[path] - sphere.up
+            distance2 = dx * dx + dy * dy + dz * dz
+            closest2 = distance2 if distance2 > CLOSEST * CLOSEST else CLOSEST * CLOSEST
+            inverse4 = 1.0 / (closest2 * closest2)
+            # Multiply, because a branch on the radius is unpredictable and a misprediction costs more.
+            kill[path] += sphere.kill_scale4 * inverse4 * (1.0 if distance2 <= sphere.kill_radius2 else 0.0)
+            detection[path] += (
+                sphere.detection_scale4 * inverse4 * (1.0 if distance2 <= sphere.detection_radius2 else 0.0)
+            )
+            active[remaining_paths] = np.int64(path)
+            remaining_paths += one if count[path] > round_number + 1 else np.uintp(0)
+        open_paths = remaining_paths
+        round_number += 1
 
 
 @inlined
-def _add_leg(limits: PrecomputedLimits, size: int, first: bool, block: Record) -> None:
+def _add_leg(limits: PrecomputedLimits, size: int, is_first: bool, block: Record) -> None:
     """Add a leg's length, and count its slope and the turn into the leg if they exceed their limits (eq. 1-4, 8)."""
-    climb, dive, cosine = limits.climb_slope, limits.dive_slope, limits.cos_max_turn
+    climb, dive, cos_max_turn = limits.climb_slope, limits.dive_slope, limits.cos_max_turn
     east, north, up, runs = block.step.east, block.step.north, block.step.up, block.run
     east_before, north_before, run_before = block.east_before, block.north_before, block.run_before
     turns, slopes, lengths = block.sums.turns, block.sums.slopes, block.sums.length
@@ -256,11 +258,11 @@ def _add_leg(limits: PrecomputedLimits, size: int, first: bool, block: Record) -
     for b in range(size):
         rise, run = up[b], runs[b]
         slopes[b] += 1.0 if (rise - climb * run > 0.0) | (-rise - dive * run > 0.0) else 0.0
-    if not first:
+    if not is_first:
         for b in range(size):
             # A leg without a course makes no turn: both sides are 0.
             dot = east[b] * east_before[b] + north[b] * north_before[b]
-            turns[b] += 0.0 if dot >= cosine * (runs[b] * run_before[b]) else 1.0
+            turns[b] += 0.0 if dot >= cos_max_turn * (runs[b] * run_before[b]) else 1.0
     for b in range(size):
         east_before[b] = east[b]
         north_before[b] = north[b]
@@ -268,12 +270,12 @@ def _add_leg(limits: PrecomputedLimits, size: int, first: bool, block: Record) -
 
 
 @inlined
-def _add_bounds(data: ProblemArrays, size: int, place: Record, sums: Record) -> None:
+def _add_bounds_violations(data: ProblemArrays, size: int, waypoints: Record, sums: Record) -> None:
     """Count a waypoint that is off the map, below the floor or above the ceiling (eq. 7)."""
     west, east, south, north = data.west, data.east, data.south, data.north
     floor, ceiling = data.floor, data.ceiling
-    xs, ys, zs, outside = place.east, place.north, place.up, sums.outside
+    xs, ys, zs, outside_counts = waypoints.east, waypoints.north, waypoints.up, sums.outside
     for b in range(size):
         x, y, z = xs[b], ys[b], zs[b]
-        out = (x < west) | (x > east) | (y < south) | (y > north) | (z < floor) | (z > ceiling)
-        outside[b] += 1.0 if out else 0.0
+        is_outside = (x < west) | (x > east) | (y < south) | (y > north) | (z < floor) | (z > ceiling)
+        outside_counts[b] += 1.0 if is_outside else 0.0

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from aircraft.path_limits import Limits, PerformanceTable, derated, within_rates
+from aircraft.path_limits import Limits, PerformanceTable, derate, limit_rates
 from aircraft.tracking import no_tracking
 from planner.airspace.zone_limits import PlannerAirspace, ZoneMargins, make_airspace
 from planner.evaluation.encoding import Space
@@ -47,16 +47,16 @@ SPHERE = np.dtype(
     + [("padding", np.float64)]
 )
 # Violations and objectives of one path, in the order of `Violation` and `Objective`.
-VIOLATIONS = np.dtype([(item.name.lower(), np.float64) for item in Violation])
-OBJECTIVES = np.dtype([(item.name.lower(), np.float64) for item in Objective])
+VIOLATIONS = np.dtype([(column.name.lower(), np.float64) for column in Violation])
+OBJECTIVES = np.dtype([(column.name.lower(), np.float64) for column in Objective])
 
 
 @by_reference
 class SlopeBounds(NamedTuple):
     """Upper bounds on the slope of the ground, m per m.
 
-    steepest: anywhere.
-    tiles: within `tile_side` m of each tile of `world.terrain.TILE` pixels a side.
+    steepest: bound for the whole map.
+    tiles: bounds within `tile_side` m of each tile of `world.terrain.TILE` pixels a side.
     """
 
     steepest: float
@@ -72,7 +72,7 @@ class ProblemArrays(NamedTuple):
     to_pixel: map from positions to its pixels.
     threats: `THREAT` records (m,).
     spheres: `SPHERE` records (m,) of the same threats.
-    aircraft: its performance, reduced in turbulence.
+    aircraft: performance of the aircraft, reduced in turbulence.
     west, east, south, north: edges of the map. floor, ceiling: lowest and highest waypoint.
     start, destination: (3,) fixed ends.
     max_turn: largest course change.
@@ -80,14 +80,14 @@ class ProblemArrays(NamedTuple):
     fly_over: True if a turn begins at its waypoint, not before it.
     max_climb, max_dive: NaN if the aircraft limits them.
     angle_margin: margin to slope limits.
-    clearance: required above ground. buffer: additional height, and start_buffer and destination_buffer at the ends.
-    buffer_growth: away from an end that has less than the buffer, m per m.
-    kill_margin: required between the path and missile spheres.
-    sample_pitch: between samples of the terrain along a leg, in the graded scores.
+    clearance: required height above ground. buffer: additional height; start_buffer and destination_buffer at the ends.
+    buffer_growth: growth of the buffer away from an end that has less, m per m.
+    kill_margin: required distance between the path and missile spheres.
+    sample_pitch: spacing of terrain samples along a leg, in the graded scores.
     start_course, destination_course: NaN if none is prescribed.
     threat_cells: the threats by the points that they may reach.
     missiles: the missiles by position.
-    slope_bounds: of the ground.
+    slope_bounds: bounds on the slope of the ground.
     tracking: a record of `aircraft.tracking.TRACKING`, the autopilot's tracking error.
     airspace: zones and the maximum height above ground.
     travel: the cost that shortening reduces, which is a path's length, time or energy.
@@ -131,27 +131,27 @@ class ProblemArrays(NamedTuple):
 
 def threat_records(threats: Threats) -> Records:
     """Return threats of a scenario as `THREAT` records (m,)."""
-    out = np.zeros(len(threats.position), dtype=THREAT)
+    records = np.zeros(len(threats.position), dtype=THREAT)
     for axis, name in enumerate(("east", "north", "up")):
-        out[name] = threats.position[:, axis]
+        records[name] = threats.position[:, axis]
     for name in ("kill_radius", "kill_scale", "detection_radius", "detection_scale"):
-        out[name] = getattr(threats, name)
-    out.setflags(write=False)
-    return out
+        records[name] = getattr(threats, name)
+    records.setflags(write=False)
+    return records
 
 
 def sphere_records(threats: Records) -> Records:
     """Return `SPHERE` records (m,) of `THREAT` records."""
-    out = np.zeros(len(threats), dtype=SPHERE)
+    spheres = np.zeros(len(threats), dtype=SPHERE)
     for name in ("east", "north", "up"):
-        out[name] = threats[name]
+        spheres[name] = threats[name]
     for kind in ("kill", "detection"):
         radius = threats[f"{kind}_radius"]
         # A radius of 0 means no weapon, and no squared distance is below -1.
-        out[f"{kind}_radius2"] = np.where(radius > 0.0, radius * radius, -1.0)
-        out[f"{kind}_scale4"] = threats[f"{kind}_scale"] ** 4
-    out.setflags(write=False)
-    return out
+        spheres[f"{kind}_radius2"] = np.where(radius > 0.0, radius * radius, -1.0)
+        spheres[f"{kind}_scale4"] = threats[f"{kind}_scale"] ** 4
+    spheres.setflags(write=False)
+    return spheres
 
 
 def as_columns(records: Records) -> Floats:
@@ -170,13 +170,13 @@ GROWTH_SHARE = 0.5
 class RequiredClearance(NamedTuple):
     """The height above ground that a path requires at each point; lengths in m.
 
-    clearance: required everywhere. buffer: additional, away from the ends.
+    clearance: height required everywhere. buffer: additional height away from the ends.
     start_east, start_north, destination_east, destination_north: the ends.
     start_buffer, destination_buffer: buffer at the ends.
     same_everywhere: True if the ends have the full buffer.
     growth: slope of the required height due to the buffer, m per m.
     steepest_loss: fastest possible loss of height above the required height, m per m.
-    sample_pitch: between samples of the terrain.
+    sample_pitch: spacing of terrain samples.
     """
 
     clearance: float
@@ -237,12 +237,12 @@ def clearance_at(required: RequiredClearance, east: float, north: float) -> floa
     # Without branches, so that loops over many points become vector instructions: an end with the full buffer never
     # reduces it.
     dx, dy = east - required.start_east, north - required.start_north
-    keep = required.start_buffer + required.growth * math.sqrt(dx * dx + dy * dy)
+    buffer = required.start_buffer + required.growth * math.sqrt(dx * dx + dy * dy)
     dx, dy = east - required.destination_east, north - required.destination_north
-    other = required.destination_buffer + required.growth * math.sqrt(dx * dx + dy * dy)
-    keep = other if other < keep else keep
-    keep = keep if keep < required.buffer else required.buffer
-    return required.clearance + keep
+    destination_buffer = required.destination_buffer + required.growth * math.sqrt(dx * dx + dy * dy)
+    buffer = destination_buffer if destination_buffer < buffer else buffer
+    buffer = buffer if buffer < required.buffer else required.buffer
+    return required.clearance + buffer
 
 
 # --- Margins ---
@@ -268,11 +268,11 @@ SEARCH_ZONE_MARGIN = 15.0
 CERTIFIED_ZONE_MARGIN = 10.0
 # Largest margin of a search on either side of a band, as a fraction of the band between the certificate's limits.
 BAND_SHARE = 0.25
-# Share of the buffer available at a fixed end that the certificate requires.
+# Fraction of the buffer available at a fixed end that the certificate requires.
 CERTIFIED_END_SHARE = 0.75
-# Additional buffer per attempt after the first, m: the samples of the previous search missed ground.
+# Additional buffer per attempt after the first, m, because the samples of the previous search missed ground.
 ATTEMPT_BUFFER = 5.0
-# Share of the aircraft's steepest climb and dive that a plan uses; gusts take the rest.
+# Fraction of the aircraft's steepest climb and dive that a plan uses; the rest is reserved for gusts.
 TURBULENCE_SHARE = {"none": 1.0, "light": 0.9, "moderate": 0.8}
 # Margin of a search to the map's edges, m, if the fixed ends allow it.
 MAP_MARGIN = 10.0
@@ -306,22 +306,26 @@ def make_problem(scenario: Scenario, limits: Limits, attempt: int = 0) -> Proble
         raise ScenarioError(
             f"{scenario.name}: terrain: none given; a path is planned over terrain", file=scenario.name, field="terrain"
         )
-    for name in ("max_turn", "max_climb", "max_dive"):
-        value = getattr(limits, name)
+    for field in ("max_turn", "max_climb", "max_dive"):
+        value = getattr(limits, field)
         if value is not None and value <= ANGLE_MARGIN:
             allowed = 'a plan keeps 0.5 inside it; allowed: above 0.5, or "aircraft"'
             raise ScenarioError.at(
-                scenario.name, f"limits.{name}_deg", math.degrees(value), f"{allowed}", shown=f"{math.degrees(value):g}"
+                scenario.name,
+                f"limits.{field}_deg",
+                math.degrees(value),
+                f"{allowed}",
+                shown=f"{math.degrees(value):g}",
             )
     certified = _certified_arrays(scenario, limits, terrain)
     across, up = (certified.tracking.across, certified.tracking.up) if certified.tracking.has_error else (0.0, 0.0)
-    # Plus the rise of the ground across the tracking error; the certificate measures the ground there.
-    more = limits.reserve_height + up + across * certified.slope_bounds.steepest
-    buffer = SEARCH_BUFFER + attempt * ATTEMPT_BUFFER + more
+    # Include the rise of the ground across the tracking error, where the certificate measures the ground.
+    extra_buffer = limits.reserve_height + up + across * certified.slope_bounds.steepest
+    buffer = SEARCH_BUFFER + attempt * ATTEMPT_BUFFER + extra_buffer
     airspace = _search_airspace(scenario, certified, attempt, up, limits)
     if airspace.max_height < math.inf:
         buffer = min(buffer, _max_buffer(certified, certified.buffer))
-    search = _shrink(
+    search = _shrink_area(
         certified._replace(
             buffer=buffer,
             airspace=airspace,
@@ -337,17 +341,17 @@ def make_problem(scenario: Scenario, limits: Limits, attempt: int = 0) -> Proble
 
 def _certified_arrays(scenario: Scenario, limits: Limits, terrain: Terrain) -> ProblemArrays:
     """Return the arrays with the margins of the certificate."""
-    units = threat_records(scenario.threats)
+    threats = threat_records(scenario.threats)
     radius = np.maximum(scenario.threats.kill_radius, scenario.threats.detection_radius)
     tracking = no_tracking() if limits.tracking is None else limits.tracking.record
-    vertical, share = CERTIFIED_BUFFER + float(tracking.up), CERTIFIED_END_SHARE
-    buffer, beside = vertical + limits.reserve_height, vertical + limits.reserve_threats
+    vertical, end_fraction = CERTIFIED_BUFFER + float(tracking.up), CERTIFIED_END_SHARE
+    buffer, vertical_zone_margin = vertical + limits.reserve_height, vertical + limits.reserve_threats
     aircraft = _reduced_performance(scenario, limits)
     arrays = ProblemArrays(
         heights=terrain.heights,
         to_pixel=terrain.to_pixel.record,
-        threats=units,
-        spheres=sphere_records(units),
+        threats=threats,
+        spheres=sphere_records(threats),
         aircraft=aircraft,
         **_map_edges(scenario.bounds),
         start=scenario.start,
@@ -366,21 +370,21 @@ def _certified_arrays(scenario: Scenario, limits: Limits, terrain: Terrain) -> P
         sample_pitch=min(50.0, max(15.0, 0.4 * terrain.spacing)),
         start_course=_or_nan(scenario.start_course),
         destination_course=_or_nan(scenario.destination_course),
-        start_buffer=_end_buffer(terrain, limits, scenario.start, buffer, share),
-        destination_buffer=_end_buffer(terrain, limits, scenario.destination, buffer, share),
+        start_buffer=_end_buffer(terrain, limits, scenario.start, buffer, end_fraction),
+        destination_buffer=_end_buffer(terrain, limits, scenario.destination, buffer, end_fraction),
         buffer_growth=_buffer_growth(scenario, limits, aircraft),
         threat_cells=make_threat_cells(scenario.threats.position, radius, scenario.bounds),
-        missiles=make_missile_index(units),
+        missiles=make_missile_index(threats),
         slope_bounds=_make_slope_bounds(terrain),
         tracking=tracking,
         airspace=make_airspace(
             scenario,
-            _zone_margins(scenario, CERTIFIED_ZONE_MARGIN, beside, share),
+            _zone_margins(scenario, CERTIFIED_ZONE_MARGIN, vertical_zone_margin, end_fraction),
             vertical + limits.reserve_above,
         ),
         travel=LENGTH,
     )
-    return _shrink(arrays, float(tracking.across), float(tracking.up)) if tracking.has_error else arrays
+    return _shrink_area(arrays, float(tracking.across), float(tracking.up)) if tracking.has_error else arrays
 
 
 def _search_airspace(
@@ -394,35 +398,37 @@ def _search_airspace(
     )
 
 
-def _zone_margins(scenario: Scenario, horizontal: float, vertical: float, share: float) -> ZoneMargins:
+def _zone_margins(scenario: Scenario, horizontal: float, vertical: float, end_fraction: float) -> ZoneMargins:
     """Return the zone margins, m, changed by the scenario's `zone_margin_m`, which never reduces vertical margins."""
-    asked = scenario.planner.zone_margin_m
-    more = 0.0 if asked is None else asked - CERTIFIED_ZONE_MARGIN
-    return ZoneMargins(horizontal + more, vertical + max(0.0, more), share)
+    requested_margin = scenario.planner.zone_margin_m
+    extra_margin = 0.0 if requested_margin is None else requested_margin - CERTIFIED_ZONE_MARGIN
+    return ZoneMargins(horizontal + extra_margin, vertical + max(0.0, extra_margin), end_fraction)
 
 
-def _max_buffer(certified: ProblemArrays, at_edge: float) -> float:
+def _max_buffer(certified: ProblemArrays, certified_margin: float) -> float:
     """Return a search's largest margin to an edge of a band of heights above ground, m; inf without a maximum height.
 
-    at_edge: margin of the certificate, m.
+    certified_margin: margin of the certificate, m.
     """
     space = certified.airspace
-    between = space.max_height - certified.clearance - certified.buffer - space.buffer
-    return at_edge + BAND_SHARE * max(0.0, between)
+    band_height = space.max_height - certified.clearance - certified.buffer - space.buffer
+    return certified_margin + BAND_SHARE * max(0.0, band_height)
 
 
 def _reduced_performance(scenario: Scenario, limits: Limits) -> PerformanceTable:
     """Return the aircraft's performance, reduced for turbulence and within the rates that the autopilot demands."""
-    share, tracking = TURBULENCE_SHARE[scenario.wind.turbulence], limits.tracking
+    slope_fraction, tracking = TURBULENCE_SHARE[scenario.wind.turbulence], limits.tracking
     if tracking is None:
-        return derated(limits.performance(), share, share, limits.reserve_climb, limits.reserve_sink)
-    climb_share, sink_share = (min(share, own) for own in (tracking.own_climb_share, tracking.own_sink_share))
-    table = derated(limits.performance(), climb_share, sink_share, limits.reserve_climb, limits.reserve_sink)
-    return within_rates(table, tracking.climb_rate, tracking.sink_rate)
+        return derate(limits.performance(), slope_fraction, slope_fraction, limits.reserve_climb, limits.reserve_sink)
+    climb_fraction, sink_fraction = (
+        min(slope_fraction, own_fraction) for own_fraction in (tracking.own_climb_share, tracking.own_sink_share)
+    )
+    table = derate(limits.performance(), climb_fraction, sink_fraction, limits.reserve_climb, limits.reserve_sink)
+    return limit_rates(table, tracking.climb_rate, tracking.sink_rate)
 
 
 def _buffer_growth(scenario: Scenario, limits: Limits, aircraft: PerformanceTable) -> float:
-    """Return how fast the buffer may grow with the distance from an end, so that the aircraft can follow, m per m."""
+    """Return the growth of the buffer with the distance from an end that the aircraft can follow, m per m."""
     if not (limits.reserve_height or limits.reserve_above):
         return BUFFER_GROWTH
     slopes = [
@@ -443,11 +449,11 @@ def _or_nan(value: float | None) -> float:
     return math.nan if value is None else float(value)
 
 
-def _end_buffer(terrain: Terrain, limits: Limits, point: Floats, buffer: float, share: float = 1.0) -> float:
-    """Return the buffer at a fixed end, m: the full buffer, or a share of the height available there."""
-    above = float(point[2] - terrain.height(point[0], point[1]))
-    left = above - limits.min_clearance - 0.01
-    return buffer if left >= buffer else share * max(0.0, left)
+def _end_buffer(terrain: Terrain, limits: Limits, point: Floats, buffer: float, fraction: float = 1.0) -> float:
+    """Return the buffer at a fixed end, m: the full buffer, or a fraction of the height available there."""
+    height_above_ground = float(point[2] - terrain.height(point[0], point[1]))
+    available_height = height_above_ground - limits.min_clearance - 0.01
+    return buffer if available_height >= buffer else fraction * max(0.0, available_height)
 
 
 def _make_slope_bounds(terrain: Terrain) -> SlopeBounds:
@@ -456,30 +462,30 @@ def _make_slope_bounds(terrain: Terrain) -> SlopeBounds:
     # Each tile with its neighbours, so that the bound holds within a tile's side of any of its points.
     padded = np.pad(slopes, 1)
     shape = slopes.shape
-    around = np.max([padded[i : i + shape[0], j : j + shape[1]] for i in range(3) for j in range(3)], axis=0)
-    around.setflags(write=False)
-    return SlopeBounds(steepest, around, TILE * terrain.spacing)
+    neighbourhood_max = np.max([padded[i : i + shape[0], j : j + shape[1]] for i in range(3) for j in range(3)], axis=0)
+    neighbourhood_max.setflags(write=False)
+    return SlopeBounds(steepest, neighbourhood_max, TILE * terrain.spacing)
 
 
-def _shrink(data: ProblemArrays, lateral: float, height: float) -> ProblemArrays:
+def _shrink_area(data: ProblemArrays, lateral: float, height: float) -> ProblemArrays:
     """Return the arrays with map and heights shrunk by these margins (m), but with both fixed ends still inside."""
     ends = np.stack([data.start, data.destination])
-    low, high = ends.min(axis=0), ends.max(axis=0)
+    min_end, max_end = ends.min(axis=0), ends.max(axis=0)
     return data._replace(
-        west=min(data.west + lateral, max(data.west, float(low[0]))),
-        south=min(data.south + lateral, max(data.south, float(low[1]))),
-        east=max(data.east - lateral, min(data.east, float(high[0]))),
-        north=max(data.north - lateral, min(data.north, float(high[1]))),
-        floor=min(data.floor + height, max(data.floor, float(low[2]))),
-        ceiling=max(data.ceiling - height, min(data.ceiling, float(high[2]))),
+        west=min(data.west + lateral, max(data.west, float(min_end[0]))),
+        south=min(data.south + lateral, max(data.south, float(min_end[1]))),
+        east=max(data.east - lateral, min(data.east, float(max_end[0]))),
+        north=max(data.north - lateral, min(data.north, float(max_end[1]))),
+        floor=min(data.floor + height, max(data.floor, float(min_end[2]))),
+        ceiling=max(data.ceiling - height, min(data.ceiling, float(max_end[2]))),
     )
 
 
 def _make_space(scenario: Scenario, data: ProblemArrays) -> Space:
     """Return the search space; its heights begin at the minimum height that the ground allows."""
-    ends = min(scenario.start[2], scenario.destination[2])
-    low = min(max(data.floor, float(np.nanmin(data.heights)) + data.clearance), ends)
-    high = max(data.ceiling, low + 1.0)
-    up = (float(low), float(high))
+    lowest_end = min(scenario.start[2], scenario.destination[2])
+    min_height = min(max(data.floor, float(np.nanmin(data.heights)) + data.clearance), lowest_end)
+    max_height = max(data.ceiling, min_height + 1.0)
+    height_range = (float(min_height), float(max_height))
     bounds = np.array([[data.west, data.east], [data.south, data.north]])
-    return Space(scenario.start, scenario.destination, bounds, up, scenario.planner.across_m)
+    return Space(scenario.start, scenario.destination, bounds, height_range, scenario.planner.across_m)

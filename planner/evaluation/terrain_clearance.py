@@ -31,9 +31,9 @@ HEIGHT_LAG = np.dtype([(name, np.float64) for name in ("steady", "slant", "rest"
 
 
 @inlined
-def _left(lengths: float) -> float:
-    """Return share of a difference that remains after this many lag lengths: an upper bound on exp(-x)."""
-    # By four terms of exp(x): a library's exponential rounds differently on different machines.
+def _remaining_fraction(lengths: float) -> float:
+    """Return the fraction of a difference that remains after this many lag lengths, an upper bound on exp(-x)."""
+    # Four terms of exp(x), because a library's exponential rounds differently on different machines.
     return 1.0 / (1.0 + lengths * (1.0 + lengths * (0.5 + lengths / 6.0)))
 
 
@@ -42,27 +42,30 @@ def lag_length(
     tracking: Record, aircraft: PerformanceTable, east: float, north: float, amsl: float, wind: Wind
 ) -> float:
     """Return the distance (m) that the aircraft covers over the ground during the lag, on a unit course."""
-    (wx, wy), speed, airspeed = wind, wind_speed_at(aircraft, amsl), true_airspeed(aircraft, amsl)
-    along = ground_speed(airspeed, speed * (east * wx + north * wy), speed * (east * wy - north * wx))
+    (wx, wy), wind_speed, airspeed = wind, wind_speed_at(aircraft, amsl), true_airspeed(aircraft, amsl)
+    speed_over_ground = ground_speed(
+        airspeed, wind_speed * (east * wx + north * wy), wind_speed * (east * wy - north * wx)
+    )
     # A course that cannot be held against the wind has no plan either.
-    length: float = tracking.lag * (airspeed if math.isnan(along) else along)
+    length: float = tracking.lag * (airspeed if math.isnan(speed_over_ground) else speed_over_ground)
     return max(1e-6, length)
 
 
 @inlined
 def set_lag(tracking: Record, length: float, run: float, rise: float, below: float, lag: Record) -> float:
-    """Fill the `HEIGHT_LAG` record of a leg; returns the distance of the aircraft below its end, m.
+    """Fill the `HEIGHT_LAG` record of a leg, and return the distance of the aircraft below its end, m.
 
-    length: from `lag_length`. run, rise: of the leg. below: distance of the aircraft below its beginning, m.
+    length: lag length (`lag_length`). run, rise: length and rise of the leg. below: distance of the aircraft below its
+    beginning, m.
     """
     lag.steady, lag.slant = length * rise / max(run, 1e-6), 0.0
     if abs(rise) < tracking.step:
         lag.steady, lag.slant = 0.0, -rise
     lag.rest = below - lag.steady - lag.slant
     lag.decay = run / length
-    end: float = lag.steady + lag.rest * _left(lag.decay)
-    lag.max_below, lag.min_below = max(0.0, below, end, lag.slant), min(0.0, below, end, lag.slant)
-    return end
+    end_below: float = lag.steady + lag.rest * _remaining_fraction(lag.decay)
+    lag.max_below, lag.min_below = max(0.0, below, end_below, lag.slant), min(0.0, below, end_below, lag.slant)
+    return end_below
 
 
 @inner
@@ -78,9 +81,9 @@ def measure_lags(
 
 
 @inlined
-def lag_at(lag: Record, share: float) -> float:
+def lag_at(lag: Record, fraction: float) -> float:
     """Return the distance of the aircraft below a leg at a fraction of it, m; negative above."""
-    return lag.steady + lag.slant * (1.0 - share) + lag.rest * _left(share * lag.decay)
+    return lag.steady + lag.slant * (1.0 - fraction) + lag.rest * _remaining_fraction(fraction * lag.decay)
 
 
 # --- Terrain samples ---
@@ -91,7 +94,7 @@ Pixels = tuple[float, float, float, float]
 # Below this height above the required clearance (m) samples are spaced by the pitch; corners rely on it.
 NEAR_GROUND = 10.0
 # Violation of a sample where the ground is unknown, m.
-UNKNOWN = 1000.0
+UNKNOWN_GROUND_DEPTH = 1000.0
 # State of sampling a leg.
 TERRAIN_LEG = np.dtype(
     [
@@ -115,7 +118,7 @@ TERRAIN_LEG = np.dtype(
 
 
 @inlined
-def _sample(
+def _take_sample(
     heights: Heights,
     tiles: Heights,
     tile_side: float,
@@ -123,26 +126,26 @@ def _sample(
     column: float,
     row: float,
     up: float,
-    need: float,
-    later: float,
+    required_height: float,
+    max_further_height: float,
     run: float,
     rise: float,
     pitch: float,
 ) -> tuple[float, float]:
     """Return the height above the required clearance at a point of a line, and the step to the next sample.
 
-    tiles, tile_side: of `SlopeBounds`. growth: of `RequiredClearance`. need: required clearance. later: largest further
-    requirement elsewhere on the line, m. run, rise: of the whole line, m. pitch: spacing of samples near the ground, as
-    a fraction.
+    tiles, tile_side: see `SlopeBounds`. growth: see `RequiredClearance`. required_height: required clearance.
+    max_further_height: largest further requirement elsewhere on the line, m. run, rise: length and rise of the whole
+    line, m. pitch: spacing of samples near the ground, as a fraction.
     """
     ground = pixel_height(heights, column, row)
-    gap = up - ground - need if ground == ground else -UNKNOWN
+    gap = up - ground - required_height if ground == ground else -UNKNOWN_GROUND_DEPTH
     i, j = min(max(int(row) // TILE, 0), tiles.shape[0] - 1), min(max(int(column) // TILE, 0), tiles.shape[1] - 1)
     # Fastest loss of height above ground, m per length of the line.
-    fall = (tiles[np.uintp(i), np.uintp(j)] + growth) * run + abs(rise) + 1e-9
-    ahead, known = (gap - later - NEAR_GROUND) / fall, tile_side / (run + 1e-9)
-    ahead = ahead if ahead < known else known
-    return gap, ahead if ahead > pitch else pitch
+    max_fall = (tiles[np.uintp(i), np.uintp(j)] + growth) * run + abs(rise) + 1e-9
+    next_step, tile_step = (gap - max_further_height - NEAR_GROUND) / max_fall, tile_side / (run + 1e-9)
+    next_step = next_step if next_step < tile_step else tile_step
+    return gap, next_step if next_step > pitch else pitch
 
 
 @inlined
@@ -150,7 +153,7 @@ def terrain_excess(
     heights: Heights,
     slope_bounds: SlopeBounds,
     required: RequiredClearance,
-    more: float,
+    extra_height: float,
     ends: Pixels,
     ax: float,
     ay: float,
@@ -158,12 +161,12 @@ def terrain_excess(
     bx: float,
     by: float,
     bz: float,
-    enough: float,
+    max_excess: float,
 ) -> float:
     """Return the depth below the required clearance along a-b, summed over samples (m x km).
 
-    The sum ends where it exceeds `enough`.
-    more: additional height required here, m. ends: columns and rows of a and b.
+    The sum ends where it exceeds `max_excess`.
+    extra_height: additional height required here, m. ends: columns and rows of a and b.
     """
     column, row, last_column, last_row = ends
     column_step, row_step = last_column - column, last_row - row
@@ -171,42 +174,46 @@ def terrain_excess(
     run = math.sqrt((bx - ax) * (bx - ax) + (by - ay) * (by - ay))
     pitch = 1.0 / max(1.0, math.ceil(run / required.sample_pitch))
     tiles, tile_side, growth = slope_bounds.tiles, slope_bounds.tile_side, required.growth
-    need = required.clearance + required.buffer + more
+    required_height = required.clearance + required.buffer + extra_height
     scale = max(run, 1.0) * pitch / 1000.0
-    depth, f, deepest = 0.0, 0.0, enough / scale
+    depth, fraction, max_depth = 0.0, 0.0, max_excess / scale
     while True:
         if not required.same_everywhere:
-            need = clearance_at(required, ax + f * (bx - ax), ay + f * (by - ay)) + more
-        x, y, up = column + f * column_step, row + f * row_step, az + f * rise
-        gap, ahead = _sample(heights, tiles, tile_side, growth, x, y, up, need, 0.0, run, rise, pitch)
+            required_height = (
+                clearance_at(required, ax + fraction * (bx - ax), ay + fraction * (by - ay)) + extra_height
+            )
+        x, y, up = column + fraction * column_step, row + fraction * row_step, az + fraction * rise
+        gap, next_step = _take_sample(
+            heights, tiles, tile_side, growth, x, y, up, required_height, 0.0, run, rise, pitch
+        )
         depth -= gap if gap < 0.0 else 0.0
-        if f >= 1.0 or depth > deepest:
+        if fraction >= 1.0 or depth > max_depth:
             break
-        f = min(1.0, f + ahead)
+        fraction = min(1.0, fraction + next_step)
     return float(depth * max(run, 1.0) * pitch / 1000.0)
 
 
 @inlined
-def _begin_legs(
+def _start_sampling(
     to_pixel: PolyMapRecord, sample_pitch: float, path: Floats, legs: Records, extents: Floats, terrain_legs: Records
 ) -> None:
-    """Fill `TERRAIN_LEG` records (w - 1,) as they are before the first sample."""
+    """Fill `TERRAIN_LEG` records (w - 1,) with their state before the first sample."""
     start = path[0]
     column, row = polymap(to_pixel, start[0], start[1])
     for i in range(legs.shape[0]):
-        after_column, after_row = polymap(to_pixel, path[i + 1, 0], path[i + 1, 1])
+        end_column, end_row = polymap(to_pixel, path[i + 1, 0], path[i + 1, 1])
         run = legs[i].run
         pitch = 1.0 / max(1.0, math.ceil(run / sample_pitch))
         leg = terrain_legs[i]
         leg.column, leg.row = column, row
-        leg.column_step, leg.row_step = after_column - column, after_row - row
+        leg.column_step, leg.row_step = end_column - column, end_row - row
         leg.pitch, leg.share = pitch, 0.0
         # A sample represents the steps before and after it.
         per_metre = 1.0 / max(run, 1e-9)
         leg.beginning = extents[i] * per_metre + pitch
         leg.ending = 1.0 - extents[i + 1] * per_metre - pitch
         leg.depth, leg.height_at_beginning, leg.height_at_end = 0.0, math.inf, math.inf
-        column, row = after_column, after_row
+        column, row = end_column, end_row
 
 
 @inner
@@ -231,37 +238,53 @@ def sample_terrain(
     the next sample of a leg depends on the result of its last one.
     """
     count = legs.shape[0]
-    _begin_legs(to_pixel, required.sample_pitch, path, legs, extents, terrain_legs)
+    _start_sampling(to_pixel, required.sample_pitch, path, legs, extents, terrain_legs)
     for i in range(count):
         unfinished[i] = i
     tiles, tile_side, growth = slope_bounds.tiles, slope_bounds.tile_side, required.growth
-    need = required.clearance + required.buffer
+    required_height = required.clearance + required.buffer
     while count > 0:
-        left = 0
+        remaining_count = 0
         for entry in range(count):
             k = np.uintp(unfinished[entry])
             leg = terrain_legs[k]
-            f, pitch = leg.share, leg.pitch
+            fraction, pitch = leg.share, leg.pitch
             up, rise = path[k, 2], path[k + np.uintp(1), 2] - path[k, 2]
             if not required.same_everywhere:
                 dx, dy = path[k + np.uintp(1), 0] - path[k, 0], path[k + np.uintp(1), 1] - path[k, 1]
-                need = clearance_at(required, path[k, 0] + f * dx, path[k, 1] + f * dy)
-            x, y = leg.column + f * leg.column_step, leg.row + f * leg.row_step
-            below, later = 0.0, 0.0
+                required_height = clearance_at(required, path[k, 0] + fraction * dx, path[k, 1] + fraction * dy)
+            x, y = leg.column + fraction * leg.column_step, leg.row + fraction * leg.row_step
+            below, further_height = 0.0, 0.0
             if lags[k].max_below > 0.0:
-                below = max(0.0, lag_at(lags[k], f))
-                later = lags[k].max_below - below
-            gap, ahead = _sample(
-                heights, tiles, tile_side, growth, x, y, up + f * rise, need + below, later, legs[k].run, rise, pitch
+                below = max(0.0, lag_at(lags[k], fraction))
+                further_height = lags[k].max_below - below
+            gap, next_step = _take_sample(
+                heights,
+                tiles,
+                tile_side,
+                growth,
+                x,
+                y,
+                up + fraction * rise,
+                required_height + below,
+                further_height,
+                legs[k].run,
+                rise,
+                pitch,
             )
             leg.depth -= gap if gap < 0.0 else 0.0
-            here, there = gap if f <= leg.beginning else math.inf, gap if f >= leg.ending else math.inf
-            leg.height_at_beginning = here if here < leg.height_at_beginning else leg.height_at_beginning
-            leg.height_at_end = there if there < leg.height_at_end else leg.height_at_end
-            unfinished[left] = np.int64(k)
-            left += 1 if f < 1.0 else 0
-            leg.share = f + ahead if f + ahead < 1.0 else 1.0
-        count = left
+            gap_at_beginning, gap_at_end = (
+                gap if fraction <= leg.beginning else math.inf,
+                gap if fraction >= leg.ending else math.inf,
+            )
+            leg.height_at_beginning = (
+                gap_at_beginning if gap_at_beginning < leg.height_at_beginning else leg.height_at_beginning
+            )
+            leg.height_at_end = gap_at_end if gap_at_end < leg.height_at_end else leg.height_at_end
+            unfinished[remaining_count] = np.int64(k)
+            remaining_count += 1 if fraction < 1.0 else 0
+            leg.share = fraction + next_step if fraction + next_step < 1.0 else 1.0
+        count = remaining_count
     for i in range(legs.shape[0]):
         terrain_legs[i].depth *= max(legs[i].run, 1.0) * terrain_legs[i].pitch / 1000.0
 

@@ -22,13 +22,14 @@ Short = NDArray[np.int32]
 # --- Threats that reach a cell ---
 
 
-# Side of a cell as a share of the median radius, and the maximum number of cells.
+# Side of a cell, as a fraction of the median radius.
 CELL_SIDE = 0.2
+# Maximum number of cells.
 MAX_THREAT_CELLS = 300_000
 # Largest height (m) that a cell stores.
-HIGHEST_METRE = 2_000_000_000
-# Extension of the grid beyond the map, as a share of the map's sides.
-BEYOND = 0.1
+MAX_CELL_HEIGHT = 2_000_000_000
+# Extension of the grid beyond the map, as a fraction of the map's sides.
+GRID_EXTENSION = 0.1
 # A cell: first entry and number of its units in the list, and the lowest and highest heights (m) that any of them
 # reaches.
 THREAT_CELL = np.dtype(
@@ -41,9 +42,9 @@ class ThreatCells(NamedTuple):
     """Lists of units by the cells that they reach, for compiled functions.
 
     cells: `THREAT_CELL` records (c,), row by row; the last represents all points outside the grid and lists every unit.
-    units: of one cell after another, in increasing order.
-    west, south, side: of the grid and of its cells, m.
-    columns, rows: of the grid.
+    units: units of one cell after another, in increasing order.
+    west, south: edges of the grid, m. side: side of a cell, m.
+    columns, rows: number of columns and rows of the grid.
     """
 
     cells: Records
@@ -58,25 +59,30 @@ class ThreatCells(NamedTuple):
 def make_threat_cells(position: Floats, radius: Floats, bounds: Floats) -> ThreatCells:
     """Make lists of the units (m, 3) whose sphere, seen from above, meets a cell.
 
-    radius: (m,) of the spheres, m; 0 for none. bounds: (2, 2) map.
+    radius: (m,) radii of the spheres, m; 0 for none. bounds: (2, 2) map.
     """
-    low, high = bounds[:, 0], bounds[:, 1]
-    low, high = low - BEYOND * (high - low), high + BEYOND * (high - low)
-    size = high - low
+    min_corner, max_corner = bounds[:, 0], bounds[:, 1]
+    min_corner, max_corner = (
+        min_corner - GRID_EXTENSION * (max_corner - min_corner),
+        max_corner + GRID_EXTENSION * (max_corner - min_corner),
+    )
+    size = max_corner - min_corner
     side = math.sqrt(float(size[0] * size[1]) / MAX_THREAT_CELLS)
-    armed = radius[radius > 0.0]
-    if armed.size:
-        side = min(max(side, CELL_SIDE * float(np.median(armed))), float(size.max()))
+    positive_radii = radius[radius > 0.0]
+    if positive_radii.size:
+        side = min(max(side, CELL_SIDE * float(np.median(positive_radii))), float(size.max()))
     columns, rows = max(1, math.ceil(size[0] / side)), max(1, math.ceil(size[1] / side))
-    first, units = _lists(np.ascontiguousarray(position), radius, float(low[0]), float(low[1]), side, columns, rows)
+    first, units = _lists(
+        np.ascontiguousarray(position), radius, float(min_corner[0]), float(min_corner[1]), side, columns, rows
+    )
     # Whole metres, widened against rounding.
-    lowest = np.clip(np.floor(position[:, 2] - radius) - 1.0, -HIGHEST_METRE, HIGHEST_METRE).astype(np.int32)
-    highest = np.clip(np.ceil(position[:, 2] + radius) + 1.0, -HIGHEST_METRE, HIGHEST_METRE).astype(np.int32)
+    lowest = np.clip(np.floor(position[:, 2] - radius) - 1.0, -MAX_CELL_HEIGHT, MAX_CELL_HEIGHT).astype(np.int32)
+    highest = np.clip(np.ceil(position[:, 2] + radius) + 1.0, -MAX_CELL_HEIGHT, MAX_CELL_HEIGHT).astype(np.int32)
     cells = np.zeros(first.size - 1, dtype=THREAT_CELL)
     _fill_cells(first, units, lowest, highest, cells)
     for array in (cells, units):
         array.setflags(write=False)
-    return ThreatCells(cells, units, float(low[0]), float(low[1]), side, columns, rows)
+    return ThreatCells(cells, units, float(min_corner[0]), float(min_corner[1]), side, columns, rows)
 
 
 @compiled
@@ -86,9 +92,9 @@ def _fill_cells(first: Short, units: Short, lowest: Short, highest: Short, cells
         cell.first, cell.count = first[k], first[k + 1] - first[k]
         for entry in range(first[k], first[k + 1]):
             unit = units[entry]
-            fresh = entry == first[k]
-            cell.lowest = lowest[unit] if fresh else min(cell.lowest, lowest[unit])
-            cell.highest = highest[unit] if fresh else max(cell.highest, highest[unit])
+            is_first = entry == first[k]
+            cell.lowest = lowest[unit] if is_first else min(cell.lowest, lowest[unit])
+            cell.highest = highest[unit] if is_first else max(cell.highest, highest[unit])
 
 
 @compiled
@@ -98,9 +104,9 @@ def _lists(
     count = columns * rows
     first = np.zeros(count + 2, dtype=np.int32)
     units = np.empty(0, dtype=np.int32)
-    filled = first[:0].copy()
+    next_entries = first[:0].copy()
     # The first pass counts, the second fills.
-    for turn in range(2):
+    for pass_number in range(2):
         for k in range(position.shape[0]):
             if radius[k] <= 0.0:
                 continue
@@ -113,30 +119,31 @@ def _lists(
                     dx = max(0.0, col - x, x - col - 1.0)
                     if dx * dx + dy * dy <= r * r:
                         cell = row * columns + col
-                        if turn == 0:
+                        if pass_number == 0:
                             first[cell + 1] += 1
                         else:
-                            units[filled[cell]] = k
-                            filled[cell] += 1
-            if turn == 0:
+                            units[next_entries[cell]] = k
+                            next_entries[cell] += 1
+            if pass_number == 0:
                 first[count + 1] += 1
             else:
-                units[filled[count]] = k
-                filled[count] += 1
-        if turn == 0:
+                units[next_entries[count]] = k
+                next_entries[count] += 1
+        if pass_number == 0:
             for cell in range(count + 1):
                 first[cell + 1] += first[cell]
             units = np.empty(first[count + 1], dtype=np.int32)
-            filled = first.copy()
+            next_entries = first.copy()
     return first, units
 
 
 # --- Missiles near a segment ---
 
 
-# Maximum number of classes by radius, and mean number of missiles per cell.
+# Maximum number of classes by radius.
 MAX_CLASSES = 8
-MISSILES_A_CELL = 2.0
+# Mean number of missiles per cell.
+MISSILES_PER_CELL = 2.0
 # A missile: its position, kill radius and scale, m.
 MISSILE = np.dtype([(name, np.float64) for name in ("east", "north", "up", "radius", "scale")])
 # Missiles of similar radius, with a grid of their own: its west and south (m), cells per metre, columns and rows, first
@@ -158,9 +165,9 @@ MISSILE_CLASS = np.dtype(
 class MissileIndex(NamedTuple):
     """Missiles in the order of their grid cells, so that those near a segment are adjacent in memory.
 
-    missiles: `MISSILE` records (m,), of those with a radius.
+    missiles: `MISSILE` records (m,) of the missiles with a radius.
     classes: `MISSILE_CLASS` records (k,).
-    first: (c,) first missile of each cell, and after each class's cells the end of its last one.
+    first: (c,) first missile of each cell, and after each class's cells the end of its last cell.
     """
 
     missiles: Records
@@ -171,31 +178,33 @@ class MissileIndex(NamedTuple):
 def make_missile_index(threats: Records, side: float | None = None) -> MissileIndex:
     """Return the index of the missiles of records with fields east, north, up, kill_radius and kill_scale (m).
 
-    side: of a cell, m; None for `MISSILES_A_CELL` missiles per cell.
+    side: side of a cell, m; None for `MISSILES_PER_CELL` missiles per cell.
     """
-    armed = threats[threats["kill_radius"] > 0.0]
-    missiles = np.zeros(len(armed), dtype=MISSILE)
-    for name, source in zip(MISSILE.names or (), ("east", "north", "up", "kill_radius", "kill_scale"), strict=True):
-        missiles[name] = armed[source]
+    armed_threats = threats[threats["kill_radius"] > 0.0]
+    missiles = np.zeros(len(armed_threats), dtype=MISSILE)
+    for name, field in zip(MISSILE.names or (), ("east", "north", "up", "kill_radius", "kill_scale"), strict=True):
+        missiles[name] = armed_threats[field]
     # A class spans a factor of two; the last class takes all smaller radii.
-    largest = float(missiles["radius"].max(initial=1.0))
-    alike = np.minimum(MAX_CLASSES - 1, np.floor(np.log2(largest / missiles["radius"]))).astype(np.int64)
+    max_radius = float(missiles["radius"].max(initial=1.0))
+    class_numbers = np.minimum(MAX_CLASSES - 1, np.floor(np.log2(max_radius / missiles["radius"]))).astype(np.int64)
     ordered, classes, first = [missiles[:0]], [], [np.zeros(0, dtype=np.int64)]
-    cells, before = 0, 0
-    for number in np.unique(alike):
-        own = missiles[alike == number]
-        place = np.stack([own["east"], own["north"]], axis=1)
-        low, high = place.min(axis=0), place.max(axis=0)
-        area = float(np.prod(np.maximum(high - low, 1.0)))
-        per_metre = 1.0 / (math.sqrt(MISSILES_A_CELL * area / len(own)) if side is None else side)
-        columns, rows = (int(size * per_metre) + 1 for size in high - low)
-        steps = ((place - low) * per_metre).astype(np.int64)
+    cell_count, missile_count = 0, 0
+    for class_number in np.unique(class_numbers):
+        class_missiles = missiles[class_numbers == class_number]
+        positions = np.stack([class_missiles["east"], class_missiles["north"]], axis=1)
+        min_corner, max_corner = positions.min(axis=0), positions.max(axis=0)
+        area = float(np.prod(np.maximum(max_corner - min_corner, 1.0)))
+        per_metre = 1.0 / (math.sqrt(MISSILES_PER_CELL * area / len(class_missiles)) if side is None else side)
+        columns, rows = (int(size * per_metre) + 1 for size in max_corner - min_corner)
+        steps = ((positions - min_corner) * per_metre).astype(np.int64)
         cell = np.minimum(steps[:, 1], rows - 1) * columns + np.minimum(steps[:, 0], columns - 1)
         order = np.argsort(cell, kind="stable")
-        ordered.append(own[order])
-        first.append(before + np.searchsorted(cell[order], np.arange(columns * rows + 1)))
-        classes.append((low[0], low[1], per_metre, columns, rows, cells, own["radius"].max()))
-        cells, before = cells + columns * rows + 1, before + len(own)
+        ordered.append(class_missiles[order])
+        first.append(missile_count + np.searchsorted(cell[order], np.arange(columns * rows + 1)))
+        classes.append(
+            (min_corner[0], min_corner[1], per_metre, columns, rows, cell_count, class_missiles["radius"].max())
+        )
+        cell_count, missile_count = cell_count + columns * rows + 1, missile_count + len(class_missiles)
     arrays = np.concatenate(ordered), np.array(classes, dtype=MISSILE_CLASS), np.concatenate(first)
     for array in arrays:
         array.setflags(write=False)
@@ -206,106 +215,129 @@ def make_missile_index(threats: Records, side: float | None = None) -> MissileIn
 def kill_density(
     index: MissileIndex,
     margin: float,
-    within: float,
+    max_distance: float,
     ax: float,
     ay: float,
     az: float,
     bx: float,
     by: float,
     bz: float,
-    first: float,
-    last: float,
+    length_a: float,
+    length_b: float,
     below: float,
     above: float,
 ) -> tuple[float, float, float]:
     """Return the mean kill density over a-b with enlarged radii, and the distances to the nearest spheres, m.
 
-    first, last: lengths (m) at a and at b from which the two distances are measured; a distance is exact if below
-    `within`. below, above: vertical tracking error, m.
+    length_a, length_b: lengths (m) at a and at b from which the two distances are measured; a distance is exact if
+    below `max_distance`. below, above: vertical tracking error, m.
     """
     dx, dy, dz = bx - ax, by - ay, bz - az
     length2 = dx * dx + dy * dy + dz * dz
-    inverse, slant = 1.0 / length2 if length2 > 0.0 else 0.0, 1.0 / dy if abs(dy) > 1e-9 else 0.0
+    inverse, inverse_dy = 1.0 / length2 if length2 > 0.0 else 0.0, 1.0 / dy if abs(dy) > 1e-9 else 0.0
     missiles, starts = index.missiles, index.first
-    dose, near_a, near_b = 0.0, math.inf, math.inf
-    for number in range(index.classes.shape[0]):
-        kind = index.classes[number]
-        per_metre, columns, rows = kind.cells_per_metre, kind.columns, kind.rows
+    density, distance_a, distance_b = 0.0, math.inf, math.inf
+    for class_number in range(index.classes.shape[0]):
+        missile_class = index.classes[class_number]
+        per_metre, columns, rows = missile_class.cells_per_metre, missile_class.columns, missile_class.rows
         # Enlarged against rounding.
-        radius, side = kind.largest_radius + margin + within + 1e-6, 1.0 / per_metre
-        lowest = _cell((min(ay, by) - radius - kind.south) * per_metre, rows)
-        highest = _cell((max(ay, by) + radius - kind.south) * per_metre, rows)
-        for row in range(max(0, lowest), min(rows, highest + 1)):
+        radius, side = missile_class.largest_radius + margin + max_distance + 1e-6, 1.0 / per_metre
+        first_row = _cell_index((min(ay, by) - radius - missile_class.south) * per_metre, rows)
+        last_row = _cell_index((max(ay, by) + radius - missile_class.south) * per_metre, rows)
+        for row in range(max(0, first_row), min(rows, last_row + 1)):
             # The part of the segment that can be near missiles in this row of cells.
-            north = kind.south + row * side - ay
-            f, g = _part((north - radius) * slant, (north + side + radius) * slant) if slant != 0.0 else (0.0, 1.0)
-            x, x2 = ax + f * dx - kind.west, ax + g * dx - kind.west
-            x, x2 = (x, x2) if x < x2 else (x2, x)
-            left, right = _cell((x - radius) * per_metre, columns), _cell((x2 + radius) * per_metre, columns)
-            if right < 0 or left >= columns:
+            north = missile_class.south + row * side - ay
+            begin_fraction, end_fraction = (
+                _clip_fractions((north - radius) * inverse_dy, (north + side + radius) * inverse_dy)
+                if inverse_dy != 0.0
+                else (0.0, 1.0)
+            )
+            x, end_x = ax + begin_fraction * dx - missile_class.west, ax + end_fraction * dx - missile_class.west
+            x, end_x = (x, end_x) if x < end_x else (end_x, x)
+            first_column, last_column = (
+                _cell_index((x - radius) * per_metre, columns),
+                _cell_index((end_x + radius) * per_metre, columns),
+            )
+            if last_column < 0 or first_column >= columns:
                 continue
-            here = kind.first_cell + row * columns
-            for entry in range(starts[here + max(0, left)], starts[here + min(columns - 1, right) + 1]):
+            row_start = missile_class.first_cell + row * columns
+            for entry in range(
+                starts[row_start + max(0, first_column)], starts[row_start + min(columns - 1, last_column) + 1]
+            ):
                 missile = missiles[np.uintp(entry)]
                 x, y, z = ax - missile.east, ay - missile.north, az - missile.up
-                grown = missile.radius + margin
+                grown_radius = missile.radius + margin
                 if below > 0.0 or above > 0.0:
-                    z = _nearer(z, dz * min(1.0, max(0.0, -(dx * x + dy * y + dz * z) * inverse)), below, above)
+                    z = _shift_towards_missile(
+                        z, dz * min(1.0, max(0.0, -(dx * x + dy * y + dz * z) * inverse)), below, above
+                    )
                 along, start2 = dx * x + dy * y + dz * z, x * x + y * y + z * z
                 closest2 = _closest2(-along * inverse, 0.0, 1.0, along, start2, length2)
-                if closest2 < (grown + within) * (grown + within):
+                if closest2 < (grown_radius + max_distance) * (grown_radius + max_distance):
                     length = math.sqrt(length2)
-                    until, since = first / max(length, first), 1.0 - last / max(length, last)
-                    one = _closest2(-along * inverse, 0.0, until, along, start2, length2)
-                    two = _closest2(-along * inverse, since, 1.0, along, start2, length2)
-                    near_a, near_b = min(near_a, math.sqrt(one) - grown), min(near_b, math.sqrt(two) - grown)
-                    if closest2 < grown * grown:
-                        dose += _dose(along, start2, length2, grown, missile.scale)
-    return dose, near_a, near_b
+                    end_a, begin_b = length_a / max(length, length_a), 1.0 - length_b / max(length, length_b)
+                    distance2_a = _closest2(-along * inverse, 0.0, end_a, along, start2, length2)
+                    distance2_b = _closest2(-along * inverse, begin_b, 1.0, along, start2, length2)
+                    distance_a, distance_b = (
+                        min(distance_a, math.sqrt(distance2_a) - grown_radius),
+                        min(distance_b, math.sqrt(distance2_b) - grown_radius),
+                    )
+                    if closest2 < grown_radius * grown_radius:
+                        density += _sphere_density(along, start2, length2, grown_radius, missile.scale)
+    return density, distance_a, distance_b
 
 
 @inlined
-def _part(f: float, g: float) -> tuple[float, float]:
+def _clip_fractions(begin: float, end: float) -> tuple[float, float]:
     """Return two fractions of a line in increasing order, clipped to it."""
-    f, g = (f, g) if f < g else (g, f)
-    return f if f > 0.0 else 0.0, g if g < 1.0 else 1.0
+    begin, end = (begin, end) if begin < end else (end, begin)
+    return begin if begin > 0.0 else 0.0, end if end < 1.0 else 1.0
 
 
 @inlined
-def _nearer(z: float, rise: float, below: float, above: float) -> float:
+def _shift_towards_missile(z: float, rise: float, below: float, above: float) -> float:
     """Return the height of a segment's start above a missile (m), shifted towards it by the tracking error.
 
-    rise: of the segment up to its closest point.
+    rise: rise of the segment up to its closest point, m.
     """
-    over = z + rise
-    shift = min(over, below) if over > 0.0 else max(over, -above)
+    height = z + rise
+    shift = min(height, below) if height > 0.0 else max(height, -above)
     return z - shift
 
 
 @inlined
-def _cell(place: float, count: int) -> int:
+def _cell_index(position: float, count: int) -> int:
     """Return the index of the cell along one axis; -1 and `count` if outside."""
-    inside = place if place > -1.0 else -1.0
-    return math.floor(inside if inside < count else count)
+    clipped = position if position > -1.0 else -1.0
+    return math.floor(clipped if clipped < count else count)
 
 
 @inlined
-def _closest2(nearest: float, low: float, high: float, along: float, start2: float, length2: float) -> float:
-    """Return the squared distance from a point to the part low..high (fractions) of a segment.
+def _closest2(
+    closest_fraction: float, begin_fraction: float, end_fraction: float, along: float, start2: float, length2: float
+) -> float:
+    """Return the squared distance from a point to the part of a segment between two fractions.
 
-    nearest: fraction of the infinite line that is closest to the point. along, start2, length2: see `window_exposure`.
+    closest_fraction: fraction of the infinite line that is closest to the point. along, start2, length2: see
+    `window_exposure`.
     """
-    f = nearest if nearest < high else high
-    f = f if f > low else low
-    return max(0.0, start2 + f * (2.0 * along + f * length2))
+    fraction = closest_fraction if closest_fraction < end_fraction else end_fraction
+    fraction = fraction if fraction > begin_fraction else begin_fraction
+    return max(0.0, start2 + fraction * (2.0 * along + fraction * length2))
 
 
 @inlined
-def _dose(along: float, start2: float, length2: float, radius: float, scale: float) -> float:  # pragma: no cover
+def _sphere_density(
+    along: float, start2: float, length2: float, radius: float, scale: float
+) -> float:  # pragma: no cover
     """Return the mean kill density of a segment that enters a sphere; see `window_exposure`."""
     if length2 < 1e-12:
         return window_exposure(0.0, 1.0, length2, along, start2, scale)
-    middle = -along / length2
-    half = math.sqrt(max(0.0, middle * middle - (start2 - radius * radius) / length2))
-    enter, leave = max(0.0, middle - half), min(1.0, middle + half)
-    return window_exposure(enter, leave, length2, along, start2, scale) if leave > enter else 0.0
+    mid_fraction = -along / length2
+    half_fraction = math.sqrt(max(0.0, mid_fraction * mid_fraction - (start2 - radius * radius) / length2))
+    begin_fraction, end_fraction = max(0.0, mid_fraction - half_fraction), min(1.0, mid_fraction + half_fraction)
+    return (
+        window_exposure(begin_fraction, end_fraction, length2, along, start2, scale)
+        if end_fraction > begin_fraction
+        else 0.0
+    )

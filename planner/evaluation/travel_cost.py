@@ -26,12 +26,12 @@ from world.kernels import compiled, inner
 UP = 2
 # Half-step of the finite difference in height, m.
 HEIGHT_STEP = 2.0
-# Ground speed that is assumed on a leg that cannot be held, as a fraction of the airspeed, so that a search leaves it.
+# Ground speed assumed on a leg that is not flyable, as a fraction of the airspeed, so that a search avoids it.
 UNFLYABLE_SHARE = 0.01
 # Fractions of a leg for Simpson's rule.
-_SHARES = (0.0, 0.5, 1.0)
+_SIMPSON_FRACTIONS = (0.0, 0.5, 1.0)
 # Weights of Simpson's rule.
-_WEIGHTS = (1.0 / 6.0, 4.0 / 6.0, 1.0 / 6.0)
+_SIMPSON_WEIGHTS = (1.0 / 6.0, 4.0 / 6.0, 1.0 / 6.0)
 
 
 @by_reference
@@ -57,7 +57,7 @@ class TravelCost(NamedTuple):
 Objective = Literal["length", "time", "energy"]
 _NONE = np.zeros(0)
 _NONE.setflags(write=False)
-# Of a search that asks for length alone.
+# Cost of a search for the shortest path.
 LENGTH = TravelCost(1.0, 0.0, 0.0, _NONE, _NONE, _NONE, _NONE, _NONE)
 
 
@@ -85,40 +85,40 @@ def time_cost(table: PerformanceTable) -> TravelCost:
 def energy_cost(envelope: Envelope, table: PerformanceTable) -> TravelCost | None:
     """Return the cost of a path's energy, in m of level flight in still air.
 
-    None if the aircraft's power is unknown.
+    Return None if the aircraft's power is unknown.
     Power is as in `Envelope.power`: the parabola through idle at the steepest descent, level flight and full
-    throttle. At heights where there is no level flight it is that of the nearest with one.
+    throttle. At heights without level flight, it is the power at the nearest height with level flight.
     """
-    rows = np.array([_parabola(envelope, true_airspeed(table, float(amsl)), float(amsl)) for amsl in table.amsl])
-    known = np.isfinite(rows).all(axis=1)
-    if not known.any():
+    rows = np.array([_power_parabola(envelope, true_airspeed(table, float(amsl)), float(amsl)) for amsl in table.amsl])
+    is_known = np.isfinite(rows).all(axis=1)
+    if not is_known.any():
         return None
-    columns = [np.interp(table.amsl, table.amsl[known], rows[known, k]) for k in range(5)]
+    columns = [np.interp(table.amsl, table.amsl[is_known], rows[is_known, k]) for k in range(5)]
     for column in columns:
         column.setflags(write=False)
     return TravelCost(0.0, 0.0, float(table.airspeed / columns[0][0]), *columns)
 
 
-def _parabola(envelope: Envelope, airspeed: float, amsl: float) -> tuple[float, float, float, float, float]:
+def _power_parabola(envelope: Envelope, airspeed: float, amsl: float) -> tuple[float, float, float, float, float]:
     """Return the coefficients of power by the sine of the climb angle, and the bounds of this sine.
 
-    NaN if power is unknown.
+    All are NaN if power is unknown.
     """
     climb, descent = envelope.air_angles(airspeed, amsl)
-    low, high = -math.sin(descent), math.sin(climb)
+    min_sine, max_sine = -math.sin(descent), math.sin(climb)
     level = envelope.power(airspeed, amsl, 0.0)
-    if not (low < 0.0 < high and math.isfinite(level)):
+    if not (min_sine < 0.0 < max_sine and math.isfinite(level)):
         return (math.nan,) * 5
-    idle, full = envelope.power(airspeed, amsl, -0.5 * math.pi), envelope.power(airspeed, amsl, 0.5 * math.pi)
-    by_idle, by_full = (idle - level) / low, (full - level) / high
-    square = (by_full - by_idle) / (high - low)
-    return level, by_full - square * high, square, low, high
+    idle, full_throttle = envelope.power(airspeed, amsl, -0.5 * math.pi), envelope.power(airspeed, amsl, 0.5 * math.pi)
+    idle_slope, full_slope = (idle - level) / min_sine, (full_throttle - level) / max_sine
+    square = (full_slope - idle_slope) / (max_sine - min_sine)
+    return level, full_slope - square * max_sine, square, min_sine, max_sine
 
 
 class LegTime(NamedTuple):
-    """Time of a leg (s) and its derivatives by the leg (s/m); D of `leg_time`.
+    """Time of a leg (s), its derivatives by the leg (s/m), and D of `leg_time`.
 
-    Also returns True if the leg can be held.
+    is_flyable: True if the aircraft can hold the leg's course in the wind.
     """
 
     seconds: float
@@ -126,14 +126,14 @@ class LegTime(NamedTuple):
     by_north: float
     by_up: float
     root: float
-    held: bool
+    is_flyable: bool
 
 
 @inner
 def leg_time(dx: float, dy: float, dz: float, wind_east: float, wind_north: float, airspeed: float) -> LegTime:
-    """Return time of a leg (m) at an airspeed in a wind (m/s): the smaller positive T with |d - w T| = V T.
+    """Return the time of a leg (m) at an airspeed in a wind (m/s): the smaller positive T with |d - w T| = V T.
 
-    From |d|^2 - 2 T w.d - (V^2 - w^2) T^2 = 0: T = |d|^2 / (w.d + D), D^2 = (w.d)^2 + (V^2 - w^2) |d|^2, and its
+    It solves |d|^2 - 2 T w.d - (V^2 - w^2) T^2 = 0: T = |d|^2 / (w.d + D), D^2 = (w.d)^2 + (V^2 - w^2) |d|^2. Its
     derivative by d is (d - w T) / D.
     """
     length2 = max(1e-6, dx * dx + dy * dy + dz * dz)
@@ -150,7 +150,7 @@ def leg_time(dx: float, dy: float, dz: float, wind_east: float, wind_north: floa
     )
 
 
-class _At(NamedTuple):
+class _FlightConditions(NamedTuple):
     """Airspeed (m/s) and power coefficients at a height; see `TravelCost`."""
 
     airspeed: float
@@ -163,26 +163,26 @@ class _At(NamedTuple):
 
 
 @inner
-def _at_height(travel: TravelCost, table: PerformanceTable, amsl: float) -> _At:
+def _at_height(travel: TravelCost, table: PerformanceTable, amsl: float) -> _FlightConditions:
     """Return airspeed, wind and power at an altitude, m."""
     airspeed, wind = true_airspeed(table, amsl), wind_speed_at(table, amsl)
     if travel.energy == 0.0:
-        return _At(airspeed, wind, 0.0, 0.0, 0.0, -1.0, 1.0)
+        return _FlightConditions(airspeed, wind, 0.0, 0.0, 0.0, -1.0, 1.0)
     count, k = table.amsl.size, 0
     while k + 2 < count and table.amsl[k + 1] <= amsl:
         k += 1
-    share = 0.0
+    fraction = 0.0
     if count > 1:
-        share = min(1.0, max(0.0, (amsl - table.amsl[k]) / (table.amsl[k + 1] - table.amsl[k])))
+        fraction = min(1.0, max(0.0, (amsl - table.amsl[k]) / (table.amsl[k + 1] - table.amsl[k])))
     j = min(k + 1, count - 1)
-    return _At(
+    return _FlightConditions(
         airspeed,
         wind,
-        travel.level[k] + share * (travel.level[j] - travel.level[k]),
-        travel.linear[k] + share * (travel.linear[j] - travel.linear[k]),
-        travel.square[k] + share * (travel.square[j] - travel.square[k]),
-        travel.lowest[k] + share * (travel.lowest[j] - travel.lowest[k]),
-        travel.highest[k] + share * (travel.highest[j] - travel.highest[k]),
+        travel.level[k] + fraction * (travel.level[j] - travel.level[k]),
+        travel.linear[k] + fraction * (travel.linear[j] - travel.linear[k]),
+        travel.square[k] + fraction * (travel.square[j] - travel.square[k]),
+        travel.lowest[k] + fraction * (travel.lowest[j] - travel.lowest[k]),
+        travel.highest[k] + fraction * (travel.highest[j] - travel.highest[k]),
     )
 
 
@@ -190,34 +190,36 @@ def _at_height(travel: TravelCost, table: PerformanceTable, amsl: float) -> _At:
 def _timed_cost(
     travel: TravelCost, table: PerformanceTable, dx: float, dy: float, dz: float, amsl: float
 ) -> tuple[float, bool]:
-    """Return the cost of the time and the energy of a leg flown at one height, and whether the leg can be held."""
-    here, (wx, wy) = _at_height(travel, table, amsl), downwind(table)
-    time = leg_time(dx, dy, dz, here.wind * wx, here.wind * wy, here.airspeed)
+    """Return the cost of the time and the energy of a leg flown at one height, and True if the leg is flyable."""
+    conditions, (wx, wy) = _at_height(travel, table, amsl), downwind(table)
+    time = leg_time(dx, dy, dz, conditions.wind * wx, conditions.wind * wy, conditions.airspeed)
     cost = travel.time * time.seconds
     if travel.energy != 0.0:
-        sine = min(here.highest, max(here.lowest, dz / (here.airspeed * time.seconds)))
-        cost += travel.energy * time.seconds * (here.level + sine * (here.linear + here.square * sine))
-    return cost, time.held
+        sine = min(conditions.highest, max(conditions.lowest, dz / (conditions.airspeed * time.seconds)))
+        cost += (
+            travel.energy * time.seconds * (conditions.level + sine * (conditions.linear + conditions.square * sine))
+        )
+    return cost, time.is_flyable
 
 
 @inner
 def leg_cost(travel: TravelCost, table: PerformanceTable, a: NDArray[np.float64], b: NDArray[np.float64]) -> float:
-    """Return the cost of the leg a-b; inf if it cannot be held."""
+    """Return the cost of the leg a-b; inf if it is not flyable."""
     dx, dy, dz = b[0] - a[0], b[1] - a[1], b[2] - a[2]
     total = travel.length * math.sqrt(dx * dx + dy * dy + dz * dz)
     if travel.time == 0.0 and travel.energy == 0.0:
         return total
     for k in range(3):
-        cost, held = _timed_cost(travel, table, dx, dy, dz, a[2] + _SHARES[k] * dz)
-        if not held:
+        cost, is_flyable = _timed_cost(travel, table, dx, dy, dz, a[2] + _SIMPSON_FRACTIONS[k] * dz)
+        if not is_flyable:
             return math.inf
-        total += _WEIGHTS[k] * cost
+        total += _SIMPSON_WEIGHTS[k] * cost
     return total
 
 
 @compiled
 def path_cost(travel: TravelCost, table: PerformanceTable, path: Floats) -> float:
-    """Return the cost of a path (w, 3) world m, the sum over its legs; inf if a leg cannot be held.
+    """Return the cost of a path (w, 3) world m, the sum over its legs; inf if a leg is not flyable.
 
     >>> from planfly.workflow.airframe import load_airframe
     >>> from world.scenario import load_scenario
@@ -235,7 +237,7 @@ class LegModel(NamedTuple):
     """Scratch of `model_leg`: derivatives (2, 3) of a leg's cost by its ends, and its curvature (2, 3, 2, 3)."""
 
     slopes: Floats
-    bends: Floats
+    curvature: Floats
 
 
 @inner
@@ -246,83 +248,92 @@ def model_leg(travel: TravelCost, table: PerformanceTable, a: Floats, b: Floats,
     The curvature is the sum of the curvatures of the length, of the time at each height, and of the power, all convex;
     what couples height and course is left out, so that the matrix has no negative eigenvalue.
     """
-    slopes, bends = model.slopes, model.bends
-    slopes[:], bends[:] = 0.0, 0.0
+    slopes, curvature = model.slopes, model.curvature
+    slopes[:], curvature[:] = 0.0, 0.0
     dx, dy, dz = b[0] - a[0], b[1] - a[1], b[2] - a[2]
     length = max(1e-3, math.sqrt(dx * dx + dy * dy + dz * dz))
     (wx, wy), step = downwind(table), (dx, dy, dz)
-    bend = np.empty((3, 3))
-    _add_bends(bends, slopes, _length_bends(bend, step, length), travel.length, step, travel.length / length)
+    step_curvature = np.empty((3, 3))
+    _add_step_model(
+        curvature,
+        slopes,
+        _fill_length_curvature(step_curvature, step, length),
+        travel.length,
+        step,
+        travel.length / length,
+    )
     total = travel.length * length
     if travel.time == 0.0 and travel.energy == 0.0:
         return total
     for k in range(3):
-        share, weight = _SHARES[k], _WEIGHTS[k]
-        amsl = a[2] + share * dz
-        here = _at_height(travel, table, amsl)
-        time = leg_time(dx, dy, dz, here.wind * wx, here.wind * wy, here.airspeed)
-        # Cost as time x rate, plus what rises with the climb.
-        rate, rise, curve, cost = travel.time, 0.0, 0.0, travel.time * time.seconds
+        fraction, weight = _SIMPSON_FRACTIONS[k], _SIMPSON_WEIGHTS[k]
+        amsl = a[2] + fraction * dz
+        conditions = _at_height(travel, table, amsl)
+        time = leg_time(dx, dy, dz, conditions.wind * wx, conditions.wind * wy, conditions.airspeed)
+        # The cost is time x rate, plus a cost per metre of climb.
+        rate, climb_cost, power_curvature, cost = travel.time, 0.0, 0.0, travel.time * time.seconds
         if travel.energy != 0.0:
-            sine = dz / (here.airspeed * time.seconds)
-            inside = here.lowest < sine < here.highest
-            sine = min(here.highest, max(here.lowest, sine))
-            power = here.level + sine * (here.linear + here.square * sine)
+            sine = dz / (conditions.airspeed * time.seconds)
+            is_interior = conditions.lowest < sine < conditions.highest
+            sine = min(conditions.highest, max(conditions.lowest, sine))
+            power = conditions.level + sine * (conditions.linear + conditions.square * sine)
             cost += travel.energy * power * time.seconds
-            slope = here.linear + 2.0 * here.square * sine if inside else 0.0
+            slope = conditions.linear + 2.0 * conditions.square * sine if is_interior else 0.0
             rate += travel.energy * (power - slope * sine)
-            rise = travel.energy * slope / here.airspeed
-            if inside:
-                curve = max(0.0, travel.energy * 2.0 * here.square / (here.airspeed**2 * time.seconds))
+            climb_cost = travel.energy * slope / conditions.airspeed
+            if is_interior:
+                power_curvature = max(
+                    0.0, travel.energy * 2.0 * conditions.square / (conditions.airspeed**2 * time.seconds)
+                )
         total += weight * cost
         gradient = (time.by_east, time.by_north, time.by_up)
-        _time_bends(bend, time, here, wx, wy)
-        bend[UP, UP] += curve / max(1e-9, rate)
-        _add_bends(bends, slopes, bend, weight * rate, gradient, weight * rate)
-        slopes[0, UP] -= weight * rise
-        slopes[1, UP] += weight * rise
-        above, _ = _timed_cost(travel, table, dx, dy, dz, amsl + HEIGHT_STEP)
-        below, _ = _timed_cost(travel, table, dx, dy, dz, amsl - HEIGHT_STEP)
-        by_height = weight * (above - below) / (2.0 * HEIGHT_STEP)
-        convex = weight * max(0.0, above - 2.0 * cost + below) / HEIGHT_STEP**2
-        parts = (1.0 - share, share)
+        _fill_time_curvature(step_curvature, time, conditions, wx, wy)
+        step_curvature[UP, UP] += power_curvature / max(1e-9, rate)
+        _add_step_model(curvature, slopes, step_curvature, weight * rate, gradient, weight * rate)
+        slopes[0, UP] -= weight * climb_cost
+        slopes[1, UP] += weight * climb_cost
+        cost_above, _ = _timed_cost(travel, table, dx, dy, dz, amsl + HEIGHT_STEP)
+        cost_below, _ = _timed_cost(travel, table, dx, dy, dz, amsl - HEIGHT_STEP)
+        height_slope = weight * (cost_above - cost_below) / (2.0 * HEIGHT_STEP)
+        height_curvature = weight * max(0.0, cost_above - 2.0 * cost + cost_below) / HEIGHT_STEP**2
+        end_weights = (1.0 - fraction, fraction)
         for end in range(2):
-            slopes[end, UP] += parts[end] * by_height
-            for other in range(2):
-                bends[end, UP, other, UP] += convex * parts[end] * parts[other]
+            slopes[end, UP] += end_weights[end] * height_slope
+            for other_end in range(2):
+                curvature[end, UP, other_end, UP] += height_curvature * end_weights[end] * end_weights[other_end]
     return total
 
 
 @inner
-def _length_bends(bend: Floats, step: tuple[float, float, float], length: float) -> Floats:
+def _fill_length_curvature(curvature: Floats, step: tuple[float, float, float], length: float) -> Floats:
     """Fill the curvature (3, 3) of a leg's length by its step."""
     for axis in range(3):
-        for other in range(3):
-            same = 1.0 if axis == other else 0.0
-            bend[axis, other] = (same - step[axis] * step[other] / (length * length)) / length
-    return bend
+        for other_axis in range(3):
+            identity = 1.0 if axis == other_axis else 0.0
+            curvature[axis, other_axis] = (identity - step[axis] * step[other_axis] / (length * length)) / length
+    return curvature
 
 
 @inner
-def _time_bends(bend: Floats, time: LegTime, here: _At, wx: float, wy: float) -> None:
+def _fill_time_curvature(curvature: Floats, time: LegTime, conditions: _FlightConditions, wx: float, wy: float) -> None:
     """Fill the curvature (3, 3) of a leg's time: (1 - w g' - g w' - (V^2 - w^2) g g') / D, g its gradient."""
-    wind = (here.wind * wx, here.wind * wy, 0.0)
+    wind = (conditions.wind * wx, conditions.wind * wy, 0.0)
     gradient = (time.by_east, time.by_north, time.by_up)
-    rest = here.airspeed**2 - here.wind**2
+    speed2_difference = conditions.airspeed**2 - conditions.wind**2
     for axis in range(3):
-        for other in range(3):
-            value = 1.0 if axis == other else 0.0
-            if time.held:
-                value -= wind[axis] * gradient[other] + gradient[axis] * wind[other]
-                value -= rest * gradient[axis] * gradient[other]
-            bend[axis, other] = value / time.root
+        for other_axis in range(3):
+            value = 1.0 if axis == other_axis else 0.0
+            if time.is_flyable:
+                value -= wind[axis] * gradient[other_axis] + gradient[axis] * wind[other_axis]
+                value -= speed2_difference * gradient[axis] * gradient[other_axis]
+            curvature[axis, other_axis] = value / time.root
 
 
 @inner
-def _add_bends(
-    bends: Floats,
+def _add_step_model(
+    curvature: Floats,
     slopes: Floats,
-    bend: Floats,
+    step_curvature: Floats,
     factor: float,
     gradient: tuple[float, float, float],
     slope_factor: float,
@@ -331,8 +342,8 @@ def _add_bends(
     for axis in range(3):
         slopes[0, axis] -= slope_factor * gradient[axis]
         slopes[1, axis] += slope_factor * gradient[axis]
-        for other in range(3):
-            value = factor * bend[axis, other]
+        for other_axis in range(3):
+            value = factor * step_curvature[axis, other_axis]
             for end in range(2):
-                bends[end, axis, end, other] += value
-                bends[end, axis, 1 - end, other] -= value
+                curvature[end, axis, end, other_axis] += value
+                curvature[end, axis, 1 - end, other_axis] -= value

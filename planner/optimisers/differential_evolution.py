@@ -31,7 +31,7 @@ class DifferentialEvolution(BoxSearch):
     (n, c); empty before the first `tell`.
     """
 
-    _turn = 0
+    _generation = 0
 
     def tell(self, scores: Floats) -> None:
         """Take the scores (n, c) of the trial vectors, select the survivors, and make the next trial vectors."""
@@ -40,28 +40,28 @@ class DifferentialEvolution(BoxSearch):
         else:
             rows = self._target_rows()
             order = self._rank(np.concatenate([self.scores, scores]))
-            better = order[len(self.samples) :] <= order[rows]
-            self.samples[rows[better]] = self._asked[better]
-            self.scores[rows[better]] = scores[better]
-            self._turn += 1
+            is_better = order[len(self.samples) :] <= order[rows]
+            self.samples[rows[is_better]] = self._asked[is_better]
+            self.scores[rows[is_better]] = scores[is_better]
+            self._generation += 1
         self._asked = self._trial_vectors(self._target_rows())
 
     def _target_rows(self) -> Ints:
         """Return the target rows of this generation, which is one half of the population in turn."""
         count = len(self.samples)
-        return np.arange(self._half) if self._turn % 2 == 0 else np.arange(count - self._half, count)
+        return np.arange(self._half) if self._generation % 2 == 0 else np.arange(count - self._half, count)
 
     def _trial_vectors(self, rows: Ints) -> Floats:
         """Return trial vectors, with a + F (b - c) in most variables and the target's own value in the others."""
         count, size = self.samples.shape
-        picked = self._rng.integers(0, count, (3, rows.size))
-        a, b, c = (self.samples[index] for index in picked)
-        mixed = a + WEIGHT * (b - c)
-        crossed = self._rng.random((rows.size, size)) < CROSSOVER
-        crossed[np.arange(rows.size), self._rng.integers(0, size, rows.size)] = True
-        out = np.where(crossed, mixed, self.samples[rows])
+        picked_rows = self._rng.integers(0, count, (3, rows.size))
+        a, b, c = (self.samples[index] for index in picked_rows)
+        mutants = a + WEIGHT * (b - c)
+        is_crossed = self._rng.random((rows.size, size)) < CROSSOVER
+        is_crossed[np.arange(rows.size), self._rng.integers(0, size, rows.size)] = True
+        trials = np.where(is_crossed, mutants, self.samples[rows])
         # A variable outside the box is set halfway between the target and the bound: clipping would accumulate samples
         # on it.
-        parent = self.samples[rows]
-        out = np.where(out < self.lower, 0.5 * (parent + self.lower), out)
-        return np.where(out > self.upper, 0.5 * (parent + self.upper), out)
+        targets = self.samples[rows]
+        trials = np.where(trials < self.lower, 0.5 * (targets + self.lower), trials)
+        return np.where(trials > self.upper, 0.5 * (targets + self.upper), trials)

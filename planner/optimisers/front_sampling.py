@@ -28,9 +28,9 @@ from world.arrays import Floats, Ints
 # Number of solutions nearest to a mean that give its covariance.
 NEIGHBOURS = 6
 # Factor on their differences from the mean.
-REACH = 0.7
+DIFFERENCE_FACTOR = 0.7
 # Largest step of a block, as a fraction of the difference to the other solution.
-FURTHEST = 1.2
+MAX_BLOCK_STEP = 1.2
 # Fraction of the samples that take the whole step, and of the coordinates of a block's points that move.
 HALF = 0.5
 # Initial scale of the noise, as a fraction of each direction's length.
@@ -39,18 +39,18 @@ FIRST_SCALE = 0.1
 MIN_SCALE = 1e-4
 # Largest scale of the noise.
 MAX_SCALE = 0.5
-# Factor on the scale after a generation with more successes than `SUCCESS`.
-GROW = 1.15
+# Factor on the scale after a generation with more successes than `TARGET_SUCCESS`.
+GROWTH_FACTOR = 1.15
 # Factor on the scale after a generation with fewer successes.
-SHRINK = 0.9
+SHRINK_FACTOR = 0.9
 # Fraction of successful samples above which the scale grows.
-SUCCESS = 0.02
+TARGET_SUCCESS = 0.02
 # Maximum number of directions in the noise of a sample.
 USED_DIRECTIONS = 4
 # Exponent of 2 in the smallest factor of a sample on the common scale.
-LOW = -3
+MIN_EXPONENT = -3
 # Exponent of 2 in the largest factor of a sample on the common scale.
-HIGH = 2
+MAX_EXPONENT = 2
 
 
 class Kind(IntEnum):
@@ -69,7 +69,7 @@ class FrontSampling:
     directions: (k, d) directions of the noise, each as long as its largest deviation.
     reference: (m,) reference point; solutions with objectives beyond it are ignored.
     axes: number of variables of a point; the variables of neighbouring points are adjacent.
-    size: size of the archive. population: samples of a generation.
+    size: size of the archive. population: number of samples per generation.
 
     >>> unit = np.eye(2)
     >>> search = FrontSampling(np.zeros(2), np.ones(2), unit, np.full(2, 2.0), 1, 20, 40, np.random.default_rng(1))
@@ -105,24 +105,28 @@ class FrontSampling:
         means = self._rng.integers(len(self.vectors), size=self._population)
         self._kinds = kinds = self._rng.integers(len(Kind), size=self._population)
         samples = self.vectors[means]
-        near, in_block, noisy = kinds == Kind.NEAR, kinds >= Kind.BLOCK, kinds != Kind.BLOCK
-        samples[near] += self._draw_near_departures(means[near])
-        samples[in_block] += self._draw_block_departures(means[in_block])
-        samples[noisy] += self._draw_noise(self._scales[kinds[noisy], None])
+        is_near, is_in_block, is_noisy = kinds == Kind.NEAR, kinds >= Kind.BLOCK, kinds != Kind.BLOCK
+        samples[is_near] += self._draw_near_departures(means[is_near])
+        samples[is_in_block] += self._draw_block_departures(means[is_in_block])
+        samples[is_noisy] += self._draw_noise(self._scales[kinds[is_noisy], None])
         return np.clip(samples, self._lower, self._upper)
 
     def _draw_near_departures(self, means: Ints) -> Floats:
         """Draw departures (n, d) from means, with the covariance of the nearest solutions, relative to the box."""
-        number = min(NEIGHBOURS, len(self.vectors) - 1)
-        out = np.zeros((len(means), self._lower.size))
+        neighbour_count = min(NEIGHBOURS, len(self.vectors) - 1)
+        departures = np.zeros((len(means), self._lower.size))
         scaled = (self.vectors / (self._upper - self._lower).clip(1e-12)).T
         # Summed over the first axis: in sequence, with the same rounding on every machine.
-        away = ((scaled[:, means, None] - scaled[:, None, :]) ** 2).sum(axis=0)
-        near = np.argsort(away, axis=1, kind="stable")[:, 1 : number + 1]
-        weights = REACH * self._rng.standard_normal((len(means), number)) / np.sqrt(max(1, number))
-        for k in range(number):
-            out += weights[:, k, None] * (self.vectors[near[:, k]] - self.vectors[means])
-        return out
+        distances2 = ((scaled[:, means, None] - scaled[:, None, :]) ** 2).sum(axis=0)
+        nearest = np.argsort(distances2, axis=1, kind="stable")[:, 1 : neighbour_count + 1]
+        weights = (
+            DIFFERENCE_FACTOR
+            * self._rng.standard_normal((len(means), neighbour_count))
+            / np.sqrt(max(1, neighbour_count))
+        )
+        for k in range(neighbour_count):
+            departures += weights[:, k, None] * (self.vectors[nearest[:, k]] - self.vectors[means])
+        return departures
 
     def _draw_block_departures(self, means: Ints) -> Floats:
         """Draw departures (n, d) of a block of points towards their positions in another solution."""
@@ -131,46 +135,51 @@ class FrontSampling:
         lengths = rng.integers(1, points + 1, size=count)
         # Blocks may begin before the first point and end after the last, so that each point is equally often in one.
         begins, places = rng.integers(1 - lengths, points), np.arange(points)
-        within = (places >= begins[:, None]) & (places < (begins + lengths)[:, None])
-        taken = rng.random((count, 1, self._axes)) < HALF
-        taken |= ~taken.any(axis=2, keepdims=True)
-        shares = np.where(rng.random((count, 1)) < HALF, 1.0, rng.uniform(0.0, FURTHEST, (count, 1)))
-        moved = (within[:, :, None] & taken).reshape(count, -1)
-        return np.asarray(shares * moved * (self.vectors[others] - self.vectors[means]))
+        is_in_block = (places >= begins[:, None]) & (places < (begins + lengths)[:, None])
+        is_taken = rng.random((count, 1, self._axes)) < HALF
+        is_taken |= ~is_taken.any(axis=2, keepdims=True)
+        fractions = np.where(rng.random((count, 1)) < HALF, 1.0, rng.uniform(0.0, MAX_BLOCK_STEP, (count, 1)))
+        is_moved = (is_in_block[:, :, None] & is_taken).reshape(count, -1)
+        return np.asarray(fractions * is_moved * (self.vectors[others] - self.vectors[means]))
 
     def _draw_noise(self, scales: Floats) -> Floats:
         """Draw noise (n, d) along a few directions per sample, at scales (n, 1) times a random factor per sample."""
-        rng, count, total = self._rng, len(scales), len(self._directions)
-        used = min(USED_DIRECTIONS, total)
-        picked = rng.integers(total, size=(count, used))
-        factors = np.ldexp(rng.uniform(1.0, 2.0, (count, 1)), rng.integers(LOW, HIGH, (count, 1)))
-        sizes = scales * factors * rng.standard_normal((count, used))
-        sizes[:, 1:] *= rng.random((count, used - 1)) < HALF
-        out = np.zeros((count, self._lower.size))
-        for k in range(used):
-            out += sizes[:, k, None] * self._directions[picked[:, k]]
-        return out
+        rng, count, direction_count = self._rng, len(scales), len(self._directions)
+        used_count = min(USED_DIRECTIONS, direction_count)
+        picked = rng.integers(direction_count, size=(count, used_count))
+        factors = np.ldexp(rng.uniform(1.0, 2.0, (count, 1)), rng.integers(MIN_EXPONENT, MAX_EXPONENT, (count, 1)))
+        sizes = scales * factors * rng.standard_normal((count, used_count))
+        sizes[:, 1:] *= rng.random((count, used_count - 1)) < HALF
+        noise = np.zeros((count, self._lower.size))
+        for k in range(used_count):
+            noise += sizes[:, k, None] * self._directions[picked[:, k]]
+        return noise
 
     def tell(self, vectors: Floats, objectives: Floats, violations: Floats) -> None:
         """Take samples (n, d) with objectives (n, m) and violations (n, c), all 0 if the constraints are met."""
-        met = np.flatnonzero((violations <= 0.0).all(axis=1) & (objectives < self.reference).all(axis=1))
-        joined = np.zeros(len(vectors), dtype=bool)
-        if met.size:
-            values = np.concatenate([self.objectives, objectives[met]])
-            kept = self._archive_rows(values)
-            joined[met[kept[kept >= len(self.vectors)] - len(self.vectors)]] = True
-            self.vectors, self.objectives = np.concatenate([self.vectors, vectors[met]])[kept], values[kept]
+        feasible_rows = np.flatnonzero((violations <= 0.0).all(axis=1) & (objectives < self.reference).all(axis=1))
+        has_joined = np.zeros(len(vectors), dtype=bool)
+        if feasible_rows.size:
+            values = np.concatenate([self.objectives, objectives[feasible_rows]])
+            archive_rows = self._archive_rows(values)
+            has_joined[feasible_rows[archive_rows[archive_rows >= len(self.vectors)] - len(self.vectors)]] = True
+            self.vectors, self.objectives = (
+                np.concatenate([self.vectors, vectors[feasible_rows]])[archive_rows],
+                values[archive_rows],
+            )
         kinds, self._kinds = self._kinds, np.empty(0, dtype=np.int64)
         for kind in np.unique(kinds):
-            grows = joined[kinds == kind].mean() > SUCCESS
-            self._scales[kind] = np.clip(self._scales[kind] * (GROW if grows else SHRINK), MIN_SCALE, MAX_SCALE)
+            should_grow = has_joined[kinds == kind].mean() > TARGET_SUCCESS
+            self._scales[kind] = np.clip(
+                self._scales[kind] * (GROWTH_FACTOR if should_grow else SHRINK_FACTOR), MIN_SCALE, MAX_SCALE
+            )
 
     def _archive_rows(self, values: Floats) -> Ints:
         """Return the distinct non-dominated rows of objectives (n, m) that cover most of the hypervolume."""
         level = Level(tuple(range(values.shape[1])), (NO_GOAL,) * values.shape[1])
         front = np.flatnonzero(ranks(values, (level,)) == 0)
-        _, first = np.unique(values[front], axis=0, return_index=True)
-        front = front[np.sort(first)]
+        _, first_rows = np.unique(values[front], axis=0, return_index=True)
+        front = front[np.sort(first_rows)]
         if len(front) <= self._size:
             return front
         return np.asarray(front[covering_order(values[front], self.reference, self._size, self._rng)])

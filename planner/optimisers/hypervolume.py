@@ -16,7 +16,7 @@ Marks = NDArray[np.uint8]
 
 # Number of random points at which coverage is counted.
 PROBES = 4096
-# Their seed if no generator is given: the same points give the same choice.
+# Seed of these points if no generator is given, so that the same points give the same choice.
 SEED = 20
 
 
@@ -26,17 +26,17 @@ def hypervolume(points: Floats, reference: Floats) -> float:
     >>> hypervolume(np.array([[1.0, 3.0], [2.0, 1.0]]), np.array([4.0, 4.0]))  # 3 x 1 and 2 x 2 of it below
     7.0
     """
-    inside = points[(points < reference).all(axis=1)]
-    if not len(inside):
+    points_below = points[(points < reference).all(axis=1)]
+    if not len(points_below):
         return 0.0
-    if inside.shape[1] == 1:
-        return float(reference[0] - inside.min())
-    order = np.argsort(inside[:, -1], kind="stable")
-    heights = np.append(inside[order, -1], reference[-1])
+    if points_below.shape[1] == 1:
+        return float(reference[0] - points_below.min())
+    order = np.argsort(points_below[:, -1], kind="stable")
+    heights = np.append(points_below[order, -1], reference[-1])
     total = 0.0
     for k in range(len(order)):
         if heights[k + 1] > heights[k]:
-            slab = inside[order[: k + 1], :-1]
+            slab = points_below[order[: k + 1], :-1]
             total += float(heights[k + 1] - heights[k]) * hypervolume(_non_dominated(slab), reference[:-1])
     return total
 
@@ -44,9 +44,9 @@ def hypervolume(points: Floats, reference: Floats) -> float:
 def _non_dominated(points: Floats) -> Floats:
     """Return the distinct non-dominated points (n, m)."""
     points = np.unique(points, axis=0)
-    below = np.asarray((points[:, None, :] <= points[None, :, :]).all(axis=2))
+    is_below = np.asarray((points[:, None, :] <= points[None, :, :]).all(axis=2))
     # Each point is at or below itself.
-    return np.asarray(points[below.sum(axis=0) == 1])
+    return np.asarray(points[is_below.sum(axis=0) == 1])
 
 
 def covering_order(points: Floats, reference: Floats, count: int, rng: np.random.Generator | None = None) -> Ints:
@@ -61,55 +61,57 @@ def covering_order(points: Floats, reference: Floats, count: int, rng: np.random
     >>> covering_order(front, np.array([10.0, 10.0]), 3).tolist()
     [0, 1, 2]
     """
-    inside = np.flatnonzero((points < reference).all(axis=1))
-    if not inside.size:
+    rows_below = np.flatnonzero((points < reference).all(axis=1))
+    if not rows_below.size:
         return np.zeros(0, dtype=np.int64)
-    kept = np.ascontiguousarray(points[inside])
-    best, random = kept.min(axis=0), np.random.default_rng(SEED) if rng is None else rng
-    probes = best + random.random((PROBES, len(best))) * (reference - best)
-    firsts = dict.fromkeys(int(np.lexsort((kept.sum(axis=1), column))[0]) for column in kept.T)
-    chosen = _greedy(_covered(kept, np.ascontiguousarray(probes.T)), np.array(list(firsts)), min(count, len(kept)))
-    return np.asarray(inside[chosen], dtype=np.int64)
+    points_below = np.ascontiguousarray(points[rows_below])
+    best, generator = points_below.min(axis=0), np.random.default_rng(SEED) if rng is None else rng
+    probes = best + generator.random((PROBES, len(best))) * (reference - best)
+    best_rows = dict.fromkeys(int(np.lexsort((points_below.sum(axis=1), column))[0]) for column in points_below.T)
+    chosen = _greedy(
+        _covered(points_below, np.ascontiguousarray(probes.T)), np.array(list(best_rows)), min(count, len(points_below))
+    )
+    return np.asarray(rows_below[chosen], dtype=np.int64)
 
 
 @compiled
 def _covered(points: Floats, probes: Floats) -> Marks:
     """Return marks (n, p), 1 if points (n, m) are at or below probes (m, p)."""
-    out = np.ones((points.shape[0], probes.shape[1]), dtype=np.uint8)
+    marks = np.ones((points.shape[0], probes.shape[1]), dtype=np.uint8)
     for n in range(points.shape[0]):
         for k in range(points.shape[1]):
             for p in range(probes.shape[1]):
-                out[n, p] &= np.uint8(points[n, k] <= probes[k, p])
-    return out
+                marks[n, p] &= np.uint8(points[n, k] <= probes[k, p])
+    return marks
 
 
 @compiled
-def _greedy(covered: Marks, firsts: Ints, count: int) -> Ints:
-    """Return rows of marks (n, p), (count,), first `firsts` and then always the row that covers most uncovered probes.
+def _greedy(covered: Marks, first_rows: Ints, count: int) -> Ints:
+    """Return rows of marks (n, p), (count,): `first_rows`, then always the row that covers most uncovered probes.
 
     Among equal rows, the first is taken.
     The gain of a row only decreases as others are chosen, so that its last count is an upper bound, and few rows are
     counted again (Minoux, Optimization Techniques, Lecture Notes in Control and Information Sciences 7, 1978).
     """
     size, width = covered.shape
-    left, counted, gains = np.ones(width, dtype=np.uint8), np.full(size, -1), np.full(size, width)
+    uncovered, counted_at, gains = np.ones(width, dtype=np.uint8), np.full(size, -1), np.full(size, width)
     chosen = np.empty(count, dtype=np.int64)
-    for number in range(count):
-        row = firsts[number] if number < firsts.size else np.argmax(gains)
-        while number >= firsts.size and counted[row] < number:
-            gains[row], counted[row] = _count_common_marks(covered[row], left), number
+    for position in range(count):
+        row = first_rows[position] if position < first_rows.size else np.argmax(gains)
+        while position >= first_rows.size and counted_at[row] < position:
+            gains[row], counted_at[row] = _count_common_marks(covered[row], uncovered), position
             row = np.argmax(gains)
-        chosen[number] = row
+        chosen[position] = row
         gains[row] = -1
         for p in range(width):
-            left[p] &= 1 - covered[row, p]
+            uncovered[p] &= 1 - covered[row, p]
     return chosen
 
 
 @inner
-def _count_common_marks(some: Marks, others: Marks) -> int:
-    """Return the number of places (p,) at which both arrays have a mark."""
+def _count_common_marks(marks: Marks, other_marks: Marks) -> int:
+    """Return the number of places (p,) with a mark in both arrays."""
     total = 0
-    for p in range(some.size):
-        total += some[p] & others[p]
+    for p in range(marks.size):
+        total += marks[p] & other_marks[p]
     return total

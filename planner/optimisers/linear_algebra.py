@@ -60,12 +60,12 @@ def times_lower(rows: Floats, factor: Floats) -> Floats:
 @compiled
 def times_sparse(rows: Floats, basis: Floats) -> Floats:
     """Multiply rows (n, d) by a basis (d, k) whose entries are mostly 0."""
-    turned = rows.T.copy()
+    columns = rows.T.copy()
     out = np.zeros((basis.shape[1], rows.shape[0]))
     for k in range(basis.shape[1]):
         for d in range(basis.shape[0]):
             if basis[d, k] != 0.0:
-                _add_times(turned[d], basis[d, k], out[k])
+                _add_times(columns[d], basis[d, k], out[k])
     return out.T.copy()
 
 
@@ -81,26 +81,26 @@ def band_cholesky(matrix: Floats, out: Floats) -> None:
 
     Entry [i, k] of both belongs to row i and column i - k. Pivots are at least 1e-12 times their diagonal entry.
     """
-    size, wide = matrix.shape
+    size, width = matrix.shape
     for i in range(size):
-        for j in range(max(0, i - wide + 1), i + 1):
+        for j in range(max(0, i - width + 1), i + 1):
             total = matrix[i, i - j]
-            for k in range(max(0, i - wide + 1), j):
+            for k in range(max(0, i - width + 1), j):
                 total -= out[i, i - k] * out[j, j - k]
             out[i, i - j] = total / out[j, 0] if j < i else np.sqrt(max(total, 1e-12 * matrix[i, 0] + 1e-300))
 
 
 @inner
-def solve_band(factor: Floats, right: Floats, out: Floats) -> None:
+def solve_band(factor: Floats, right_side: Floats, out: Floats) -> None:
     """Solve a linear system, given the band factor (d, b) of its matrix, into `out` (d,)."""
-    size, wide = factor.shape
+    size, width = factor.shape
     for i in range(size):
-        total = right[i]
-        for k in range(max(0, i - wide + 1), i):
+        total = right_side[i]
+        for k in range(max(0, i - width + 1), i):
             total -= factor[i, i - k] * out[k]
         out[i] = total / factor[i, 0]
     for i in range(size - 1, -1, -1):
         total = out[i]
-        for k in range(i + 1, min(size, i + wide)):
+        for k in range(i + 1, min(size, i + width)):
             total -= factor[k, k - i] * out[k]
         out[i] = total / factor[i, 0]

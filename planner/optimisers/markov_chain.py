@@ -47,13 +47,13 @@ class MarkovChain(Umda):
 @compiled
 def fit_chain(rows: Floats, size: int, ridge: float) -> tuple[Floats, Floats]:
     """Fit for each group (g, size, size) the regression on the previous one, and the residuals' Cholesky factor."""
-    groups = rows.shape[1] // size
-    slope, spread = np.zeros((groups, size, size)), np.zeros((groups, size, size))
+    group_count = rows.shape[1] // size
+    slope, spread = np.zeros((group_count, size, size)), np.zeros((group_count, size, size))
     copy_into(spread[0].ravel(), cholesky(covariance(rows, 0, 0, size), ridge).ravel())
-    for g in range(1, groups):
-        before, here = (g - 1) * size, g * size
-        factor = cholesky(covariance(rows, before, before, size), ridge)
-        cross = covariance(rows, here, before, size)
+    for g in range(1, group_count):
+        previous_column, column = (g - 1) * size, g * size
+        factor = cholesky(covariance(rows, previous_column, previous_column, size), ridge)
+        cross = covariance(rows, column, previous_column, size)
         # slope = cross (L L^T)^-1, by forward and back substitution for each row.
         for i in range(size):
             for j in range(size):
@@ -65,25 +65,25 @@ def fit_chain(rows: Floats, size: int, ridge: float) -> tuple[Floats, Floats]:
                     cross[i, j] -= factor[k, j] * cross[i, k]
                 cross[i, j] /= factor[j, j]
         copy_into(slope[g].ravel(), cross.ravel())
-        rest = rows[:, here : here + size].copy()
+        residuals = rows[:, column : column + size].copy()
         for n in range(rows.shape[0]):
             for i in range(size):
                 for k in range(size):
-                    rest[n, i] -= cross[i, k] * rows[n, before + k]
-        copy_into(spread[g].ravel(), cholesky(covariance(rest, 0, 0, size), ridge).ravel())
+                    residuals[n, i] -= cross[i, k] * rows[n, previous_column + k]
+        copy_into(spread[g].ravel(), cholesky(covariance(residuals, 0, 0, size), ridge).ravel())
     return slope, spread
 
 
 @compiled
-def draw_chain(free: Floats, slope: Floats, spread: Floats) -> Floats:
+def draw_chain(normals: Floats, slope: Floats, spread: Floats) -> Floats:
     """Compute samples (n, g size) of the chain from independent standard normal numbers."""
-    groups, size, _ = slope.shape
-    out = np.zeros(free.shape)
-    for n in range(free.shape[0]):
-        for g in range(groups):
+    group_count, size, _ = slope.shape
+    out = np.zeros(normals.shape)
+    for n in range(normals.shape[0]):
+        for g in range(group_count):
             for i in range(size):
                 for k in range(size):
-                    out[n, g * size + i] += spread[g, i, k] * free[n, g * size + k]
+                    out[n, g * size + i] += spread[g, i, k] * normals[n, g * size + k]
                     if g > 0:
                         out[n, g * size + i] += slope[g, i, k] * out[n, (g - 1) * size + k]
     return out

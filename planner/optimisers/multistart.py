@@ -40,13 +40,13 @@ NARROWING = 0.9
 # Standard deviation at which a search has converged, as a fraction of the box.
 CONVERGED = 1e-10
 # Ratio of the largest to the smallest standard deviation at which a search has converged.
-LONGEST = 1e7
+MAX_DEVIATION_RATIO = 1e7
 
 
 class Gaussian:
     """Gaussian in the unit box, reflected at its sides, with the best point that it has found.
 
-    mean: (d,).  deviation: fraction of the box.  population: samples per generation.
+    mean: (d,).  deviation: fraction of the box.  population: number of samples per generation.
     scale: (d,) relative standard deviations of the variables at the start; None for equal ones.
     """
 
@@ -61,16 +61,16 @@ class Gaussian:
         self._step_rate = (effective + 2.0) / (size + effective + 5.0)
         self._damping = 1.0 + 2.0 * max(0.0, math.sqrt((effective - 1.0) / (size + 1.0)) - 1.0) + self._step_rate
         self._path_rate = (4.0 + effective / size) / (size + 4.0 + 2.0 * effective / size)
-        self._one_rate = 2.0 / ((size + 1.3) ** 2 + effective)
+        self._rank_one_rate = 2.0 / ((size + 1.3) ** 2 + effective)
         rate = 2.0 * (effective - 2.0 + 1.0 / effective) / ((size + 2.0) ** 2 + effective)
-        self._many_rate = min(1.0 - self._one_rate, rate)
-        self._length = math.sqrt(size) * (1.0 - 1.0 / (4.0 * size) + 1.0 / (21.0 * size**2))
+        self._rank_mu_rate = min(1.0 - self._rank_one_rate, rate)
+        self._expected_length = math.sqrt(size) * (1.0 - 1.0 / (4.0 * size) + 1.0 / (21.0 * size**2))
         self._matrix = np.diag(np.ones(size) if scale is None else scale**2)
         self._factor = cholesky(self._matrix, 0.0)
         self._step_path, self._path = np.zeros(size), np.zeros(size)
         self._draws: Floats = np.empty((0, size))
         self._generations = 0
-        self._blind, self._since_better = 0, 0
+        self._blind_evaluations, self._stalled_generations = 0, 0
         self.evaluations = 0
         self.done = False
         # The best point (d,) in the unit box and its scores (c,), once a generation has points of different rank.
@@ -86,54 +86,58 @@ class Gaussian:
     def draw(self, rng: np.random.Generator) -> Floats:
         """Draw a generation (population, d) in the unit box."""
         self._draws = rng.standard_normal((self.population, self.mean.size))
-        return reflected(self.mean + self.deviation * times_lower(self._draws, self._factor))
+        return reflect_into_box(self.mean + self.deviation * times_lower(self._draws, self._factor))
 
     def learn(self, points: Floats, scores: Floats, rank: Callable[[Floats], Ints], noise: Floats) -> None:
         """Take the scores (n, c) of the last generation (n, d).  noise: (n,) random numbers that break ties."""
         self.evaluations += len(points)
         ranks = rank(scores)
         if not ranks.any():
-            self._blind += len(points)
+            self._blind_evaluations += len(points)
             self.deviation *= 1.0 if self.best is None else NARROWING
-            self.done = self._blind >= (BLIND_START if self.best is None else BLIND)
+            self.done = self._blind_evaluations >= (BLIND_START if self.best is None else BLIND)
             return
-        self._blind = 0
+        self._blind_evaluations = 0
         order = np.lexsort((noise, ranks))
-        first = order[0]
-        self._since_better += 1
-        if self.best is None or rank(np.stack([self.best[1], scores[first]]))[1] == 0:
-            if self.best is None or not np.array_equal(self.best[1], scores[first]):
-                self._since_better = 0
-            self.best = points[first].copy(), scores[first].copy()
-        self._update(self._draws[order[: self.weights.size]])
+        best_row = order[0]
+        self._stalled_generations += 1
+        if self.best is None or rank(np.stack([self.best[1], scores[best_row]]))[1] == 0:
+            if self.best is None or not np.array_equal(self.best[1], scores[best_row]):
+                self._stalled_generations = 0
+            self.best = points[best_row].copy(), scores[best_row].copy()
+        self._update_distribution(self._draws[order[: self.weights.size]])
         spread = np.diag(self._factor)
         patience = 30 + round(60 * self.mean.size / self.population)
-        widest = self.deviation * math.sqrt(float(np.diag(self._matrix).max()))
+        max_deviation = self.deviation * math.sqrt(float(np.diag(self._matrix).max()))
         self.done = (
-            widest < CONVERGED or float(spread.max()) > LONGEST * float(spread.min()) or self._since_better > patience
+            max_deviation < CONVERGED
+            or float(spread.max()) > MAX_DEVIATION_RATIO * float(spread.min())
+            or self._stalled_generations > patience
         )
 
-    def _update(self, draws: Floats) -> None:
+    def _update_distribution(self, draws: Floats) -> None:
         """Move mean, deviation and covariance towards the better half's standard normal draws (m, d), best first."""
         self._generations += 1
         steps = times_lower(draws, self._factor)
         draw, step = (self.weights[:, None] * draws).sum(axis=0), (self.weights[:, None] * steps).sum(axis=0)
-        self.mean = reflected(self.mean + self.deviation * step)
+        self.mean = reflect_into_box(self.mean + self.deviation * step)
         rate = self._step_rate
         self._step_path = (1.0 - rate) * self._step_path + math.sqrt(rate * (2.0 - rate) * self._effective) * draw
         length = math.sqrt(float((self._step_path**2).sum()))
-        expected = self._length * math.sqrt(1.0 - (1.0 - rate) ** (2 * self._generations))
-        steady = float(length < (1.4 + 2.0 / (self.mean.size + 1.0)) * expected)
+        expected_length = self._expected_length * math.sqrt(1.0 - (1.0 - rate) ** (2 * self._generations))
+        is_steady = float(length < (1.4 + 2.0 / (self.mean.size + 1.0)) * expected_length)
         rate = self._path_rate
-        push = steady * math.sqrt(rate * (2.0 - rate) * self._effective)
-        self._path = (1.0 - rate) * self._path + push * step
-        size, half = self.mean.size, self.weights.size
-        many = covariance(np.sqrt(self.weights * half)[:, None] * steps, 0, 0, size)
-        one = np.outer(self._path, self._path) + (1.0 - steady) * rate * (2.0 - rate) * self._matrix
-        keep = 1.0 - self._one_rate - self._many_rate
-        self._matrix = keep * self._matrix + self._one_rate * one + self._many_rate * many
+        path_factor = is_steady * math.sqrt(rate * (2.0 - rate) * self._effective)
+        self._path = (1.0 - rate) * self._path + path_factor * step
+        size, parent_count = self.mean.size, self.weights.size
+        rank_mu_update = covariance(np.sqrt(self.weights * parent_count)[:, None] * steps, 0, 0, size)
+        rank_one_update = np.outer(self._path, self._path) + (1.0 - is_steady) * rate * (2.0 - rate) * self._matrix
+        decay = 1.0 - self._rank_one_rate - self._rank_mu_rate
+        self._matrix = (
+            decay * self._matrix + self._rank_one_rate * rank_one_update + self._rank_mu_rate * rank_mu_update
+        )
         self._factor = cholesky(self._matrix, 0.0)
-        self.deviation *= math.exp(min(1.0, self._step_rate / self._damping * (length / self._length - 1.0)))
+        self.deviation *= math.exp(min(1.0, self._step_rate / self._damping * (length / self._expected_length - 1.0)))
 
 
 class Multistart(BoxSearch):
@@ -184,8 +188,8 @@ class Multistart(BoxSearch):
         order = np.lexsort((noise, ranks))
         self._store_generation(self._asked[order], scores[order])
         if self._search is None:
-            half = self._to_unit_box(self._asked[order[: self._half]])
-            self._middle, spread = half.mean(axis=0), np.maximum(half.std(axis=0), WIDTHS[0])
+            better_half = self._to_unit_box(self._asked[order[: self._half]])
+            self._middle, spread = better_half.mean(axis=0), np.maximum(better_half.std(axis=0), WIDTHS[0])
             self._scale = spread / math.sqrt(float((spread**2).mean()))
             self._search = self._start_search()
         else:
@@ -210,9 +214,9 @@ class Multistart(BoxSearch):
     def _next_search(self, search: Gaussian) -> Gaussian:
         """Return the search that gets the next slice, after a slice of `search`."""
         self._spent[self._continued] += search.evaluations - self._slice_start
-        chosen = search if self._may_continue(search) else self._choose()
-        self._slice_start = chosen.evaluations
-        return chosen
+        next_search = search if self._may_continue(search) else self._choose_search()
+        self._slice_start = next_search.evaluations
+        return next_search
 
     def _may_continue(self, search: Gaussian) -> bool:
         """Return True if a search, at the end of a slice, is among the better half of the equally narrow searches.
@@ -223,17 +227,21 @@ class Multistart(BoxSearch):
         if search.best is None:
             return False
         search.curve.append((search.width, search.best[1]))
-        others = [other.curve for other in self._searches if other is not search and other.curve]
-        if search.done or not others or search.evaluations > MAX_SHARE * sum(self._spent.values()):
+        other_curves = [
+            other_search.curve for other_search in self._searches if other_search is not search and other_search.curve
+        ]
+        if search.done or not other_curves or search.evaluations > MAX_SHARE * sum(self._spent.values()):
             return False
-        if self._rank(np.stack([search.best[1], *(curve[-1][1] for curve in others)]))[0] == 0:
+        if self._rank(np.stack([search.best[1], *(curve[-1][1] for curve in other_curves)]))[0] == 0:
             return False
-        then = [next((scores for width, scores in curve if width <= search.width), None) for curve in others]
-        as_narrow = [scores for scores in then if scores is not None]
-        ranks = self._rank(np.stack([search.best[1], *as_narrow]))
-        return 2 * int((ranks[1:] < ranks[0]).sum()) <= len(as_narrow)
+        other_scores = [
+            next((scores for width, scores in curve if width <= search.width), None) for curve in other_curves
+        ]
+        equally_narrow = [scores for scores in other_scores if scores is not None]
+        ranks = self._rank(np.stack([search.best[1], *equally_narrow]))
+        return 2 * int((ranks[1:] < ranks[0]).sum()) <= len(equally_narrow)
 
-    def _choose(self) -> Gaussian:
+    def _choose_search(self) -> Gaussian:
         """Return the best waiting search or a new start, whichever kind has had fewer evaluations."""
         waiting = [search for search in self._searches if search.curve and not search.done]
         self._continued = bool(waiting) and self._spent[True] <= self._spent[False]
@@ -244,21 +252,21 @@ class Multistart(BoxSearch):
     def _start_search(self) -> Gaussian:
         """Start a new search, the first from the centre with a typical width, later ones with any width."""
         size = self.lower.size
-        least = min(self._population, 4 + int(3.0 * math.log(size)))
+        min_population = min(self._population, 4 + int(3.0 * math.log(size)))
         if not self._searches:
-            search = Gaussian(self._middle, FIRST_WIDTH, least, self._scale)
+            search = Gaussian(self._middle, FIRST_WIDTH, min_population, self._scale)
         else:
-            low, high = (math.log(width) for width in WIDTHS)
-            width = math.exp(self._rng.uniform(low, high))
+            min_log, max_log = (math.log(width) for width in WIDTHS)
+            width = math.exp(self._rng.uniform(min_log, max_log))
             mean = self._middle if self._rng.random() < FROM_MIDDLE else self._rng.random(size)
             # The size of generations grows with the number of starts.
-            most = max(1.0, min(self._population / least, 1.0 + len(self._searches) / 4.0))
-            search = Gaussian(mean, width, int(least * most ** self._rng.random()), self._scale)
+            growth = max(1.0, min(self._population / min_population, 1.0 + len(self._searches) / 4.0))
+            search = Gaussian(mean, width, int(min_population * growth ** self._rng.random()), self._scale)
         self._searches.append(search)
         return search
 
 
-def reflected(points: Floats) -> Floats:
+def reflect_into_box(points: Floats) -> Floats:
     """Return points (n, d) or (d,) reflected into the unit box at its sides."""
     folded = np.mod(points, 2.0)
     return np.where(folded > 1.0, 2.0 - folded, folded)

@@ -53,19 +53,21 @@ class NicheSampling:
         self._allowed = allowed
         self._rng = rng
 
-    def first(self, count: int, beyond: Floats | float = 0.0) -> Floats:
+    def first(self, count: int, extension: Floats | float = 0.0) -> Floats:
         """Draw samples (g, count, d), uniform in the boxes.
 
-        beyond: (d,) fraction of the box by which samples extend above it before they are clipped, for variables with
+        extension: (d,) fraction of the box by which samples extend above it before they are clipped, for variables with
         their best values at the upper bound, which uniform samples would hardly ever reach.
         """
         size = (len(self._lower), count, self._lower.shape[1])
-        top = self._upper + beyond * (self._upper - self._lower)
-        low, high = self._lower[:, None, :], top[:, None, :]
+        extended_upper = self._upper + extension * (self._upper - self._lower)
+        lower, upper = self._lower[:, None, :], extended_upper[:, None, :]
 
         def draw(groups: Ints) -> Floats:
-            spread = self._rng.random((groups.size, size[2]))
-            return np.asarray(np.minimum(low[groups, 0] + spread * (high - low)[groups, 0], self._upper[groups]))
+            fractions = self._rng.random((groups.size, size[2]))
+            return np.asarray(
+                np.minimum(lower[groups, 0] + fractions * (upper - lower)[groups, 0], self._upper[groups])
+            )
 
         return self._draw(size, draw, FIRST_REDRAWS)
 
@@ -77,61 +79,67 @@ class NicheSampling:
         rows: (g, n, d) with costs (g, n). deviation: (d,) standard deviations of new samples. max_cost: maximum cost of
         a selected sample. elite: (g, d), always selected.
         """
-        selected, numbers = _select(
+        selected, counts = _select(
             rows, costs, elite, CLEARING * deviation, max_cost, max(1, int(MAX_SELECTED_SHARE * count))
         )
         groups, parents = len(rows), selected.shape[1]
 
-        def draw(of: Ints) -> Floats:
-            parent = np.floor(self._rng.random(of.size) * numbers[of]).astype(np.int64)
-            drawn = selected[of, parent] + deviation * self._rng.standard_normal((of.size, rows.shape[2]))
-            return np.clip(drawn, self._lower[of], self._upper[of])
+        def draw(group_numbers: Ints) -> Floats:
+            parent = np.floor(self._rng.random(group_numbers.size) * counts[group_numbers]).astype(np.int64)
+            samples = selected[group_numbers, parent] + deviation * self._rng.standard_normal(
+                (group_numbers.size, rows.shape[2])
+            )
+            return np.clip(samples, self._lower[group_numbers], self._upper[group_numbers])
 
         out = self._draw((groups, count, rows.shape[2]), draw, REDRAWS)
-        old = np.arange(parents) < numbers[:, None]
-        out[:, :parents][old] = selected[old]
+        is_selected = np.arange(parents) < counts[:, None]
+        out[:, :parents][is_selected] = selected[is_selected]
         return out
 
     def _draw(self, size: tuple[int, int, int], draw: Callable[[Ints], Floats], redraws: int) -> Floats:
         """Draw samples of this shape with a function of the group numbers, and redraw infeasible samples."""
         groups = np.repeat(np.arange(size[0]), size[1])
-        out = draw(groups)
-        bad = np.flatnonzero(~self._allowed(out, groups))
+        samples = draw(groups)
+        infeasible = np.flatnonzero(~self._allowed(samples, groups))
         for _ in range(redraws):
-            if not bad.size:
+            if not infeasible.size:
                 break
-            again = draw(groups[bad])
-            out[bad] = again
-            bad = bad[~self._allowed(again, groups[bad])]
-        return out.reshape(size)
+            redrawn = draw(groups[infeasible])
+            samples[infeasible] = redrawn
+            infeasible = infeasible[~self._allowed(redrawn, groups[infeasible])]
+        return samples.reshape(size)
 
 
 @compiled
 def _select(
-    rows: Floats, costs: Floats, elite: Floats, clearing_radius: Floats, max_cost: float, number: int
+    rows: Floats, costs: Floats, elite: Floats, clearing_radius: Floats, max_cost: float, max_count: int
 ) -> tuple[Floats, Ints]:
     """Select samples (g, number, d) of each group, the elite first, and return them with their numbers (g,)."""
     groups, _, size = rows.shape
-    selected, numbers = np.zeros((groups, number, size)), np.ones(groups, dtype=np.int64)
+    selected, counts = np.zeros((groups, max_count, size)), np.ones(groups, dtype=np.int64)
     for g in range(groups):
         copy_into(selected[g, 0], elite[g])
         for k in np.argsort(costs[g], kind="mergesort"):
-            many = numbers[g]
-            if many == number or costs[g, k] == np.inf or (costs[g, k] > max_cost and many >= MIN_SELECTED):
+            selected_count = counts[g]
+            if (
+                selected_count == max_count
+                or costs[g, k] == np.inf
+                or (costs[g, k] > max_cost and selected_count >= MIN_SELECTED)
+            ):
                 break
-            if _is_distinct(rows[g, k], selected[g, :many], clearing_radius):
-                copy_into(selected[g, many], rows[g, k])
-                numbers[g] += 1
-    return selected, numbers
+            if _is_distinct(rows[g, k], selected[g, :selected_count], clearing_radius):
+                copy_into(selected[g, selected_count], rows[g, k])
+                counts[g] += 1
+    return selected, counts
 
 
 @inner
-def _is_distinct(row: Floats, others: Floats, clearing_radius: Floats) -> bool:
+def _is_distinct(row: Floats, other_rows: Floats, clearing_radius: Floats) -> bool:
     """Return True if a sample (d,) differs from each other one by at least `clearing_radius` in some variable."""
-    for n in range(others.shape[0]):
-        near = True
+    for n in range(other_rows.shape[0]):
+        is_near = True
         for d in range(row.size):
-            near = near and abs(row[d] - others[n, d]) < clearing_radius[d]
-        if near:
+            is_near = is_near and abs(row[d] - other_rows[n, d]) < clearing_radius[d]
+        if is_near:
             return False
     return True

@@ -61,46 +61,46 @@ def ranks(scores: Floats, levels: Sequence[Level]) -> Ints:
 def _rank_rows(table: Floats, widths: Ints) -> Ints:
     """Return the ranks (n,) of a table (c, n) whose levels have these widths."""
     count = table.shape[1]
-    total = np.zeros(count, dtype=np.int64)
+    row_ranks = np.zeros(count, dtype=np.int64)
     order, scratch = np.empty(count, dtype=np.int64), np.empty(count, dtype=np.int64)
     for k in range(count):
         order[k] = k
-    sorted_ = np.empty((table.shape[0], count))
-    below = np.empty(count, dtype=np.int64)
+    sorted_rows = np.empty((table.shape[0], count))
+    marks = np.empty(count, dtype=np.int64)
     # Groups of tied rows: the position in the order at which each begins, followed by the count.
-    begins, after = np.empty(count + 1, dtype=np.int64), np.empty(count + 1, dtype=np.int64)
-    begins[0], begins[1], groups = 0, count, 1
+    begins, next_begins = np.empty(count + 1, dtype=np.int64), np.empty(count + 1, dtype=np.int64)
+    begins[0], begins[1], group_count = 0, count, 1
     column = 0
     for width in widths:
-        distinct = 0
-        for g in range(groups):
+        next_group_count = 0
+        for g in range(group_count):
             begin, end = begins[g], begins[g + 1]
-            after[distinct] = begin
-            distinct += 1
+            next_begins[next_group_count] = begin
+            next_group_count += 1
             if end - begin == 1:
                 continue
             _merge_sort(table, column, width, order, scratch, begin, end)
             for c in range(width):
                 for k in range(begin, end):
-                    sorted_[c, k] = table[column + c, order[k]]
+                    sorted_rows[c, k] = table[column + c, order[k]]
             if width == 2 and end - begin > TREE_THRESHOLD:
-                _count_pairs(sorted_, begin, end, order, total)
+                _add_dominators_by_tree(sorted_rows, begin, end, order, row_ranks)
             else:
-                _count_any(sorted_, width, begin, end, order, below, total)
+                _add_dominators(sorted_rows, width, begin, end, order, marks, row_ranks)
             for k in range(begin + 1, end):
                 for c in range(width):
-                    if sorted_[c, k] != sorted_[c, k - 1]:
-                        after[distinct] = k
-                        distinct += 1
+                    if sorted_rows[c, k] != sorted_rows[c, k - 1]:
+                        next_begins[next_group_count] = k
+                        next_group_count += 1
                         break
-        after[distinct] = count
-        groups = distinct
-        begins, after = after, begins
+        next_begins[next_group_count] = count
+        group_count = next_group_count
+        begins, next_begins = next_begins, begins
         column += width
-        if groups == count:
+        if group_count == count:
             # No ties left for lower levels to decide.
             break
-    return total
+    return row_ranks
 
 
 @inner
@@ -108,29 +108,31 @@ def _merge_sort(table: Floats, column: int, width: int, order: Ints, scratch: In
     """Sort order[begin:end] lexicographically by `width` columns of the table: a stable merge sort."""
     for k in range(begin + 1, end):
         # Insertion sort of short runs.
-        low = begin + (k - begin) // INSERTION_RUN * INSERTION_RUN
-        row, at = order[k], k
-        while at > low and _precedes(table, column, width, row, order[at - 1]):
-            order[at] = order[at - 1]
-            at -= 1
-        order[at] = row
-    size = INSERTION_RUN
-    while size < end - begin:
-        for low in range(begin, end - size, 2 * size):
-            middle, high = low + size, min(low + 2 * size, end)
+        run_begin = begin + (k - begin) // INSERTION_RUN * INSERTION_RUN
+        row, position = order[k], k
+        while position > run_begin and _precedes(table, column, width, row, order[position - 1]):
+            order[position] = order[position - 1]
+            position -= 1
+        order[position] = row
+    run_length = INSERTION_RUN
+    while run_length < end - begin:
+        for run_begin in range(begin, end - run_length, 2 * run_length):
+            middle, run_end = run_begin + run_length, min(run_begin + 2 * run_length, end)
             if not _precedes(table, column, width, order[middle], order[middle - 1]):
                 continue
-            left, right = low, middle
-            for k in range(low, high):
-                if right >= high or (left < middle and not _precedes(table, column, width, order[right], order[left])):
+            left, right = run_begin, middle
+            for k in range(run_begin, run_end):
+                if right >= run_end or (
+                    left < middle and not _precedes(table, column, width, order[right], order[left])
+                ):
                     scratch[k] = order[left]
                     left += 1
                 else:
                     scratch[k] = order[right]
                     right += 1
-            for k in range(low, high):
+            for k in range(run_begin, run_end):
                 order[k] = scratch[k]
-        size *= 2
+        run_length *= 2
 
 
 @inner
@@ -143,29 +145,31 @@ def _precedes(table: Floats, column: int, width: int, a: int, b: int) -> bool:
 
 
 @inner
-def _count_any(rows: Floats, width: int, begin: int, end: int, order: Ints, below: Ints, total: Ints) -> None:
-    """Add the number of dominators of each row of a group to total.
+def _add_dominators(
+    rows: Floats, width: int, begin: int, end: int, order: Ints, scratch: Ints, row_ranks: Ints
+) -> None:
+    """Add the number of dominators of each row of a group to `row_ranks`.
 
     rows: (c, n), sorted, so that only earlier rows can dominate.
     """
     dominators = 0
     for k in range(begin + 1, end):
-        equal = True
+        is_equal = True
         for c in range(width):
-            equal = equal and rows[c, k] == rows[c, k - 1]
-        if not equal:
+            is_equal = is_equal and rows[c, k] == rows[c, k - 1]
+        if not is_equal:
             dominators = k - begin
             # No earlier row is larger in the first column.
             if width == 2:
                 dominators = _count_at_most(rows[1, begin:k], rows[1, k])
             elif width > 2:
-                less = below[: k - begin]
-                for j in range(less.size):
-                    less[j] = 1
+                marks = scratch[: k - begin]
+                for j in range(marks.size):
+                    marks[j] = 1
                 for c in range(1, width):
-                    _clear_above(rows[c, begin:k], rows[c, k], less)
-                dominators = _count_marks(less)
-        total[order[k]] += dominators
+                    _clear_above(rows[c, begin:k], rows[c, k], marks)
+                dominators = _count_marks(marks)
+        row_ranks[order[k]] += dominators
 
 
 @inner
@@ -213,26 +217,26 @@ def _rank_places(rows: Floats, begin: int, end: int) -> tuple[Ints, int]:
 
 
 @inner
-def _count_pairs(rows: Floats, begin: int, end: int, order: Ints, total: Ints) -> None:
-    """Add the number of dominators of each row of a group to total, in O(n log n), for many rows.
+def _add_dominators_by_tree(rows: Floats, begin: int, end: int, order: Ints, row_ranks: Ints) -> None:
+    """Add the number of dominators of each row of a group to `row_ranks`, in O(n log n), for many rows.
 
     Uses a Fenwick tree over the second of two columns.
     """
-    places, number = _rank_places(rows, begin, end)
-    tree = np.zeros(number + 1, dtype=np.int64)
+    places, place_count = _rank_places(rows, begin, end)
+    tree = np.zeros(place_count + 1, dtype=np.int64)
     k = begin
     while k < end:
-        first = k
+        group_begin = k
         place = places[k - begin]
         dominators = 0
-        at = place
-        while at > 0:
-            dominators += tree[at]
-            at -= at & -at
-        while k < end and rows[0, k] == rows[0, first] and rows[1, k] == rows[1, first]:
-            total[order[k]] += dominators
+        node = place
+        while node > 0:
+            dominators += tree[node]
+            node -= node & -node
+        while k < end and rows[0, k] == rows[0, group_begin] and rows[1, k] == rows[1, group_begin]:
+            row_ranks[order[k]] += dominators
             k += 1
-        at = place
-        while at <= number:
-            tree[at] += k - first
-            at += at & -at
+        node = place
+        while node <= place_count:
+            tree[node] += k - group_begin
+            node += node & -node

@@ -56,10 +56,10 @@ class Umda(BoxSearch):
     def tell(self, scores: Floats) -> None:
         """Take the scores (n, c) of the last samples of `ask`, select the better half, and draw the next samples."""
         samples = np.concatenate([self.samples, self._asked])
-        known = np.concatenate([self.scores, scores]) if len(self.scores) else scores
+        all_scores = np.concatenate([self.scores, scores]) if len(self.scores) else scores
         # Ties are broken by a seeded draw, not by age.
-        order = np.lexsort((self._rng.random(len(known)), self._rank(known)))[: self._half]
-        self.samples, self.scores = samples[order], known[order]
+        order = np.lexsort((self._rng.random(len(all_scores)), self._rank(all_scores)))[: self._half]
+        self.samples, self.scores = samples[order], all_scores[order]
         self._asked = self._sample(len(samples) - self._half)
 
     def _sample(self, count: int) -> Floats:
@@ -70,34 +70,34 @@ class Umda(BoxSearch):
             deviation = np.maximum(deviation, self._floor)
         if self._basis is None:
             return self._redraw_each(mean + deviation * self._rng.standard_normal((count, mean.size)), mean, deviation)
-        back = np.ascontiguousarray(self._basis.T)
+        inverse_basis = np.ascontiguousarray(self._basis.T)
         return self._redraw(
-            lambda rows: _project(mean + deviation * self._rng.standard_normal((rows, mean.size)), back), count
+            lambda rows: _project(mean + deviation * self._rng.standard_normal((rows, mean.size)), inverse_basis), count
         )
 
     def _redraw(self, draw: Callable[[int], Floats], count: int) -> Floats:
         """Draw samples with `draw`; samples outside the box are redrawn and finally clipped."""
-        out = draw(count)
-        rows = np.flatnonzero(((out < self.lower) | (out > self.upper)).any(axis=1))
+        samples = draw(count)
+        rows = np.flatnonzero(((samples < self.lower) | (samples > self.upper)).any(axis=1))
         for _ in range(REDRAWS):
             if rows.size == 0:
-                return out
-            again = draw(rows.size)
-            out[rows] = again
-            rows = rows[((again < self.lower) | (again > self.upper)).any(axis=1)]
-        return np.clip(out, self.lower, self.upper)
+                return samples
+            redrawn = draw(rows.size)
+            samples[rows] = redrawn
+            rows = rows[((redrawn < self.lower) | (redrawn > self.upper)).any(axis=1)]
+        return np.clip(samples, self.lower, self.upper)
 
-    def _redraw_each(self, drawn: Floats, mean: Floats, deviation: Floats) -> Floats:
+    def _redraw_each(self, samples: Floats, mean: Floats, deviation: Floats) -> Floats:
         """Redraw the values outside the box from independent Gaussians, and finally clip them."""
-        rows, columns = np.nonzero((drawn < self.lower) | (drawn > self.upper))
+        rows, columns = np.nonzero((samples < self.lower) | (samples > self.upper))
         for _ in range(REDRAWS):
             if rows.size == 0:
-                return drawn
-            again = mean[columns] + deviation[columns] * self._rng.standard_normal(columns.size)
-            drawn[rows, columns] = again
-            outside = (again < self.lower[columns]) | (again > self.upper[columns])
-            rows, columns = rows[outside], columns[outside]
-        return np.clip(drawn, self.lower, self.upper)
+                return samples
+            redrawn = mean[columns] + deviation[columns] * self._rng.standard_normal(columns.size)
+            samples[rows, columns] = redrawn
+            is_outside = (redrawn < self.lower[columns]) | (redrawn > self.upper[columns])
+            rows, columns = rows[is_outside], columns[is_outside]
+        return np.clip(samples, self.lower, self.upper)
 
 
 def _project(rows: Floats, basis: Floats) -> Floats:

@@ -21,13 +21,14 @@ Optimiser = Literal["umda", "emna", "chain", "differential", "waypoints"]
 class Algorithm:
     """Search method: its encoding and its extensions of the planner of Yang, Tang and Lozano (CEC 2014).
 
-    name, summary: as shown by commands and their help.
+    name, summary: texts in commands and their help.
     encoding: a name of `planner.evaluation.encoding.ENCODINGS`.
     graded: scores violations by amount along the whole path, and ranks kill exposure before length.
     smooth: draws first samples, and the marginals of UMDA, along the eigenvectors of the Brownian-bridge kernel.
     seeded: starts from grid routes, improved by a pattern search.
     tightened: finally moves all waypoints of the best path at once.
-    optimiser: from `planner.optimisers`; "waypoints" is `planner.search.generations.waypoint_generations`.
+    optimiser: name of an optimiser in `planner.optimisers`; "waypoints" is
+    `planner.search.generations.waypoint_generations`.
     """
 
     name: str
@@ -41,8 +42,8 @@ class Algorithm:
 
 
 ALGORITHMS: dict[str, Algorithm] = {
-    item.name: item
-    for item in (
+    algorithm.name: algorithm
+    for algorithm in (
         Algorithm(
             "fda-seeded",
             "the default: grid routes, past obstacles on other sides too, shortened; generations where none is safe",
@@ -143,7 +144,7 @@ def algorithm_lines() -> str:
       umda-smooth     UMDA in the rotated frame, graded violations, sampled in a smooth basis, no seeds
     """
     width = max(len(name) for name in ALGORITHMS)
-    return "\n".join(f"  {item.name:<{width}}  {item.summary}" for item in ALGORITHMS.values())
+    return "\n".join(f"  {algorithm.name:<{width}}  {algorithm.summary}" for algorithm in ALGORITHMS.values())
 
 
 def find_algorithm(name: str | None, source: str) -> Algorithm:
@@ -154,11 +155,11 @@ def find_algorithm(name: str | None, source: str) -> Algorithm:
     >>> find_algorithm(None, "example.toml").name, find_algorithm("umda-polar", "example.toml").encoding
     ('fda-seeded', 'polar')
     """
-    found = ALGORITHMS.get(DEFAULT if name is None else name)
-    if found is None:
-        allowed = f"not known; allowed: {', '.join(ALGORITHMS)}{did_you_mean(str(name), ALGORITHMS)}"
-        raise ScenarioError.at(source, "planner.algorithm", name, allowed, shown=f"{name!r}")
-    return found
+    algorithm = ALGORITHMS.get(DEFAULT if name is None else name)
+    if algorithm is None:
+        problem = f"not known; allowed: {', '.join(ALGORITHMS)}{did_you_mean(str(name), ALGORITHMS)}"
+        raise ScenarioError.at(source, "planner.algorithm", name, problem, shown=f"{name!r}")
+    return algorithm
 
 
 def limits_for(algorithm: Algorithm, limits: "Limits") -> "Limits":

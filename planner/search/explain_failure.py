@@ -29,9 +29,9 @@ from world.scenario import Scenario
 
 
 # Number of cells along the map's longer side.
-CELLS = 150
+CELL_COUNT = 150
 # Number of heights from the lowest to the highest allowed.
-HEIGHTS = 5
+HEIGHT_COUNT = 5
 # State of an open cell; the state of a cell closed by a zone is the index of the zone.
 _OPEN_CELL = -1
 # State of a cell closed by the ground.
@@ -50,7 +50,7 @@ class SeparatingZones(NamedTuple):
 
 
 def separating_zones(scenario: Scenario) -> SeparatingZones | None:
-    """Return the zones that separate start and destination, or None if no zones do, or if the ground alone does.
+    """Return the zones that separate start and destination, or None if no zones do, or if the ground does.
 
     A gap narrower than a cell is treated as closed. Missiles and the aircraft's climb are ignored.
 
@@ -61,35 +61,42 @@ def separating_zones(scenario: Scenario) -> SeparatingZones | None:
     terrain = scenario.terrain
     if terrain is None or not scenario.zones:
         return None
-    pitch = float(np.ptp(scenario.bounds, axis=1).max()) / CELLS
-    east, north = (np.arange(low + 0.5 * pitch, high, pitch) for low, high in scenario.bounds)
+    pitch = float(np.ptp(scenario.bounds, axis=1).max()) / CELL_COUNT
+    east, north = (np.arange(min_heights + 0.5 * pitch, high, pitch) for min_heights, high in scenario.bounds)
     ground = terrain.height(east[None, :], north[:, None])
-    low = np.maximum(ground + scenario.limits.min_clearance_m, scenario.floor)
-    top = np.full(ground.shape, scenario.ceiling)
+    min_heights = np.maximum(ground + scenario.limits.min_clearance_m, scenario.floor)
+    max_heights = np.full(ground.shape, scenario.ceiling)
     if scenario.limits.max_height_m is not None:
-        top = np.minimum(top, ground + scenario.limits.max_height_m)
-    cells = np.full((HEIGHTS, *ground.shape), _OPEN_CELL, dtype=np.int64)
-    cells[:, ~(low <= top)] = _GROUND_CELL
-    ends = [_cell_of(scenario, end, pitch, low, top) for end in (scenario.start, scenario.destination)]
+        max_heights = np.minimum(max_heights, ground + scenario.limits.max_height_m)
+    cells = np.full((HEIGHT_COUNT, *ground.shape), _OPEN_CELL, dtype=np.int64)
+    cells[:, ~(min_heights <= max_heights)] = _GROUND_CELL
+    ends = [_cell_of(scenario, end, pitch, min_heights, max_heights) for end in (scenario.start, scenario.destination)]
     if not _are_connected(cells, ends):
         return None
-    _close_cells(zone_records(scenario.zones), east, north, ground, low, top, cells)
+    _close_cells(zone_records(scenario.zones), east, north, ground, min_heights, max_heights, cells)
     for end in ends:
         cells[end] = _OPEN_CELL
     if _are_connected(cells, ends):
         return None
-    adjacent = [_grow_cells(_reachable_cells(cells == _OPEN_CELL, end)) for end in ends]
-    both = [set(cells[edge].tolist()) for edge in adjacent]
-    found = (both[0] & both[1]) or (both[0] | both[1])
-    return SeparatingZones(tuple(scenario.zones[z].name for z in sorted(found) if z >= 0), pitch)
+    adjacent_cells = [_grow_cells(_reachable_cells(cells == _OPEN_CELL, end)) for end in ends]
+    adjacent_zones = [set(cells[edge_cells].tolist()) for edge_cells in adjacent_cells]
+    separating = (adjacent_zones[0] & adjacent_zones[1]) or (adjacent_zones[0] | adjacent_zones[1])
+    return SeparatingZones(tuple(scenario.zones[z].name for z in sorted(separating) if z >= 0), pitch)
 
 
-def _cell_of(scenario: Scenario, end: Floats, pitch: float, low: Floats, top: Floats) -> tuple[int, int, int]:
+def _cell_of(
+    scenario: Scenario, end: Floats, pitch: float, min_heights: Floats, max_heights: Floats
+) -> tuple[int, int, int]:
     """Return height, row and column of the cell of a fixed end."""
     cell = ((end[:2] - scenario.bounds[:, 0]) / pitch).astype(np.int64)
-    column, row = (int(np.clip(at, 0, size - 1)) for at, size in zip(cell, (low.shape[1], low.shape[0]), strict=True))
-    share = (end[2] - low[row, column]) / max(float(top[row, column] - low[row, column]), 1e-6)
-    return int(np.clip(round(share * (HEIGHTS - 1)), 0, HEIGHTS - 1)), row, column
+    column, row = (
+        int(np.clip(index, 0, size - 1))
+        for index, size in zip(cell, (min_heights.shape[1], min_heights.shape[0]), strict=True)
+    )
+    fraction = (end[2] - min_heights[row, column]) / max(
+        float(max_heights[row, column] - min_heights[row, column]), 1e-6
+    )
+    return int(np.clip(round(fraction * (HEIGHT_COUNT - 1)), 0, HEIGHT_COUNT - 1)), row, column
 
 
 def _are_connected(cells: Ints, ends: list[tuple[int, int, int]]) -> bool:
@@ -98,7 +105,7 @@ def _are_connected(cells: Ints, ends: list[tuple[int, int, int]]) -> bool:
 
 
 def _reachable_cells(is_open: Flags, start: tuple[int, int, int]) -> Flags:
-    """Return the open cells that can be reached from a cell through their sides, or None if the cell is not open."""
+    """Flag the open cells that can be reached from a cell through their sides; none if the cell is not open."""
     reached = np.zeros_like(is_open)
     reached[start] = is_open[start]
     count = -1
@@ -108,32 +115,38 @@ def _reachable_cells(is_open: Flags, start: tuple[int, int, int]) -> Flags:
 
 
 def _grow_cells(cells: Flags) -> Flags:
-    """Return the given cells, and all cells that share a side with a given cell."""
+    """Flag the given cells, and all cells that share a side with a given cell."""
     grown = cells.copy()
     for axis in range(cells.ndim):
-        whole, one = np.moveaxis(grown, axis, 0), np.moveaxis(cells, axis, 0)
-        whole[1:] |= one[:-1]
-        whole[:-1] |= one[1:]
+        target, source = np.moveaxis(grown, axis, 0), np.moveaxis(cells, axis, 0)
+        target[1:] |= source[:-1]
+        target[:-1] |= source[1:]
     return grown
 
 
 @compiled
 def _close_cells(
-    records: ZoneRecords, east: Floats, north: Floats, ground: Floats, low: Floats, top: Floats, cells: Ints
+    records: ZoneRecords,
+    east: Floats,
+    north: Floats,
+    ground: Floats,
+    min_heights: Floats,
+    max_heights: Floats,
+    cells: Ints,
 ) -> None:
     """Store in open cells (heights, rows, columns) the first zone that closes them."""
     for z in range(records.zones.shape[0]):
         zone = records.zones[z]
         for i in range(north.size):
             for j in range(east.size):
-                near = zone.south <= north[i] <= zone.north and zone.west <= east[j] <= zone.east
-                inside = near and edge_distance(records, z, east[j], north[i]) <= 0.0
-                if zone.exclusion and not inside:
+                is_near = zone.south <= north[i] <= zone.north and zone.west <= east[j] <= zone.east
+                is_inside = is_near and edge_distance(records, z, east[j], north[i]) <= 0.0
+                if zone.exclusion and not is_inside:
                     continue
                 for k in range(cells.shape[0]):
-                    up = low[i, j] + (top[i, j] - low[i, j]) * k / (cells.shape[0] - 1)
-                    within = inside and not outside_band(zone, up, ground[i, j]) > 0.0
-                    if cells[k, i, j] == _OPEN_CELL and within == zone.exclusion:
+                    altitude = min_heights[i, j] + (max_heights[i, j] - min_heights[i, j]) * k / (cells.shape[0] - 1)
+                    is_within = is_inside and not outside_band(zone, altitude, ground[i, j]) > 0.0
+                    if cells[k, i, j] == _OPEN_CELL and is_within == zone.exclusion:
                         cells[k, i, j] = z
 
 
@@ -151,27 +164,28 @@ def closed_bands(problem: Problem) -> list[str]:
     []
     """
     data, lines = problem.certified, []
-    space, lowest = data.airspace, data.clearance + data.buffer
-    if lowest > space.max_height - space.buffer:
+    space, min_height = data.airspace, data.clearance + data.buffer
+    if min_height > space.max_height - space.buffer:
         lines.append(
             f"the band above ground is too narrow: from limits.min_clearance_m {data.clearance:g} m to"
             f" limits.max_height_m {space.max_height:g} m a plan needs margins of {data.buffer:.1f} m at the lower"
-            f" edge and {space.buffer:.1f} m at the upper, {lowest + space.buffer - space.max_height:.1f} m more than"
+            f" edge and {space.buffer:.1f} m at the upper, {min_height + space.buffer - space.max_height:.1f} m"
+            " more than"
             " available"
         )
-    for need in space.zones.required:
-        zone = problem.scenario.zones[int(need["number"])]
-        ceiling, floor, margin = zone.ceiling, zone.floor, float(need["vertical"])
+    for required in space.zones.required:
+        zone = problem.scenario.zones[int(required["number"])]
+        ceiling, floor, margin = zone.ceiling, zone.floor, float(required["vertical"])
         if zone.kind != "inclusion" or ceiling is None:
             continue
-        bottoms = {f"the clearance of {data.clearance:g} m": lowest} if ceiling.datum == "ground" else {}
+        bottoms = {f"the clearance of {data.clearance:g} m": min_height} if ceiling.datum == "ground" else {}
         if floor is not None and floor.datum == ceiling.datum:
             bottoms[f"its floor at {floor.height:g} m"] = floor.height + margin
-        name, bottom = max(bottoms.items(), key=lambda item: item[1], default=("", -math.inf))
-        if bottom > ceiling.height - margin:
+        name, bottom_height = max(bottoms.items(), key=lambda entry: entry[1], default=("", -math.inf))
+        if bottom_height > ceiling.height - margin:
             lines.append(
                 f"{zone.name} is too narrow a band: above {name} and below its ceiling at {ceiling.height:g} m a plan's"
-                f" margins take {bottom + margin - ceiling.height:.1f} m more than available"
+                f" margins take {bottom_height + margin - ceiling.height:.1f} m more than available"
             )
     return lines
 
@@ -187,20 +201,20 @@ def max_altitude(problem: Problem) -> tuple[float, str]:
     'the ceiling'
     """
     scenario: Scenario = problem.scenario
-    tops = [(float(problem.certified.ceiling), "the ceiling")]
-    for need in problem.certified.airspace.zones.required:
-        zone = scenario.zones[int(need["number"])]
+    limits = [(float(problem.certified.ceiling), "the ceiling")]
+    for required in problem.certified.airspace.zones.required:
+        zone = scenario.zones[int(required["number"])]
         if zone.kind == "inclusion" and zone.ceiling is not None and zone.ceiling.datum == "amsl":
-            tops.append((zone.ceiling.height - float(need["vertical"]), f"the ceiling of {zone.name}"))
-    return min(tops)
+            limits.append((zone.ceiling.height - float(required["vertical"]), f"the ceiling of {zone.name}"))
+    return min(limits)
 
 
 # --- Lines for the user ---
 
 # Number of points along the direct line.
-ALONG = 200
+POINTS_ALONG = 200
 # Number of points across the direct line.
-ACROSS = 400
+POINTS_ACROSS = 400
 # Maximum number of zones that are named.
 MAX_NAMES = 4
 # Maximum number of missiles that are named.
@@ -227,32 +241,32 @@ def explain_failure(plan: Plan, limits: Limits | None = None) -> list[str]:
     terrain and missiles together block every route 65 m from the start, at every height
     """
     scenario = plan.scenario
-    chosen = ALGORITHMS.get(plan.algorithm)
+    algorithm = ALGORITHMS.get(plan.algorithm)
     lines = _describe_walls(scenario)
     if limits is not None:
-        problem = make_problem(scenario, limits if chosen is None else limits_for(chosen, limits))
-        found = certify(problem, plan.waypoints)
-        if found.ok and found.kill_distance > 0.0 and not plan.violations.any():
+        problem = make_problem(scenario, limits if algorithm is None else limits_for(algorithm, limits))
+        certificate = certify(problem, plan.waypoints)
+        if certificate.ok and certificate.kill_distance > 0.0 and not plan.violations.any():
             # The search has found a path; the fault concerns the autopilot, and the certificate states it.
             return []
         lines += closed_bands(problem) or ([] if lines else _describe_margin_walls(problem))
-        lines += _proven_closure_text(problem)
-    closed = separating_zones(scenario)
-    if closed is not None:
-        names = ", ".join(closed.zones[:MAX_NAMES]) + (" and more" if len(closed.zones) > MAX_NAMES else "")
-        lines.append(f"zones block every route (gaps narrower than {closed.pitch:.0f} m count as closed): {names}")
-    is_open, entered = not lines, violated_zones(scenario, plan.waypoints)
-    if entered:
-        lines.append(f"the best path violates: {', '.join(entered[:MAX_NAMES])}")
+        lines += _describe_proven_closure(problem)
+    separating = separating_zones(scenario)
+    if separating is not None:
+        names = ", ".join(separating.zones[:MAX_NAMES]) + (" and more" if len(separating.zones) > MAX_NAMES else "")
+        lines.append(f"zones block every route (gaps narrower than {separating.pitch:.0f} m count as closed): {names}")
+    is_unexplained, violated_names = not lines, violated_zones(scenario, plan.waypoints)
+    if violated_names:
+        lines.append(f"the best path violates: {', '.join(violated_names[:MAX_NAMES])}")
     elif not lines:
-        violated = [item.name.lower() for item in Violation if plan.violations[item]]
-        if violated:
-            lines.append(f"no obstacle blocks every route; the best path fails by: {', '.join(violated)}")
-    if chosen is not None and chosen.encoding == "rotated" and chosen.seeded:
+        failed_constraints = [violation.name.lower() for violation in Violation if plan.violations[violation]]
+        if failed_constraints:
+            lines.append(f"no obstacle blocks every route; the best path fails by: {', '.join(failed_constraints)}")
+    if algorithm is not None and algorithm.encoding == "rotated" and algorithm.seeded:
         lines.append("routes that turn back or circle to climb were searched too, on a coarse lattice")
-        if is_open and chosen.optimiser == "waypoints" and scenario.planner.budget is None:
+        if is_unexplained and algorithm.optimiser == "waypoints" and scenario.planner.budget is None:
             lines.append("it is not proven that no path exists; --budget 1000000 searches for longer")
-    elif chosen is not None and chosen.encoding == "rotated":
+    elif algorithm is not None and algorithm.encoding == "rotated":
         lines.append(
             "paths in the rotated frame always advance along the line to the destination; "
             "a route that must turn back was not searched"
@@ -266,18 +280,19 @@ def _describe_walls(scenario: Scenario) -> list[str]:
     if terrain is None:
         return []
     lines: list[str] = []
-    for along, points in _lines_across(scenario):
-        lowest = terrain.height(points[:, 0], points[:, 1]) + scenario.limits.min_clearance_m
-        lowest = np.maximum(lowest, scenario.floor)
-        gaps = scenario.ceiling - lowest
+    for distance, points in _lines_across(scenario):
+        min_altitudes = terrain.height(points[:, 0], points[:, 1]) + scenario.limits.min_clearance_m
+        min_altitudes = np.maximum(min_altitudes, scenario.floor)
+        gaps = scenario.ceiling - min_altitudes
         if not (gaps > 0.0).any():
             lines.append(
-                f"terrain blocks every route {along:.0f} m from the start, across the whole map: its lowest point and "
-                f"the clearance take {np.nanmin(lowest):.0f} m, the ceiling is {scenario.ceiling:.0f} m"
+                f"terrain blocks every route {distance:.0f} m from the start, across the whole map: its lowest"
+                " point and "
+                f"the clearance take {np.nanmin(min_altitudes):.0f} m, the ceiling is {scenario.ceiling:.0f} m"
             )
             break
-        if not _leaves_a_gap(scenario, points[gaps > 0.0], lowest[gaps > 0.0]):
-            line = f"terrain and missiles together block every route {along:.0f} m from the start, at every height"
+        if not _has_gap(scenario, points[gaps > 0.0], min_altitudes[gaps > 0.0]):
+            line = f"terrain and missiles together block every route {distance:.0f} m from the start, at every height"
             lines.append(line)
             break
     return lines
@@ -286,13 +301,13 @@ def _describe_walls(scenario: Scenario) -> list[str]:
 def _lines_across(scenario: Scenario) -> Iterator[tuple[float, np.ndarray]]:
     """Yield lines across the map between the ends, each as its distance from the start, m, and points (n, 2)."""
     frame = rotated_frame(scenario.start, scenario.destination)
-    widest = float(np.hypot(*np.diff(scenario.bounds, axis=1)[:, 0]))
-    across = np.linspace(-widest, widest, ACROSS)
-    for along in np.linspace(0.0, frame.length, ALONG)[1:-1]:
-        points = frame.restore(np.column_stack([np.full(ACROSS, along), across, np.zeros(ACROSS)]))[:, :2]
-        inside = ((points >= scenario.bounds[:, 0]) & (points <= scenario.bounds[:, 1])).all(axis=1)
-        if inside.any():
-            yield float(along), points[inside]
+    half_width = float(np.hypot(*np.diff(scenario.bounds, axis=1)[:, 0]))
+    across = np.linspace(-half_width, half_width, POINTS_ACROSS)
+    for along in np.linspace(0.0, frame.length, POINTS_ALONG)[1:-1]:
+        points = frame.restore(np.column_stack([np.full(POINTS_ACROSS, along), across, np.zeros(POINTS_ACROSS)]))[:, :2]
+        is_on_map = ((points >= scenario.bounds[:, 0]) & (points <= scenario.bounds[:, 1])).all(axis=1)
+        if is_on_map.any():
+            yield float(along), points[is_on_map]
 
 
 def _describe_margin_walls(problem: Problem) -> list[str]:
@@ -300,55 +315,60 @@ def _describe_margin_walls(problem: Problem) -> list[str]:
     scenario, data = problem.scenario, problem.certified
     if scenario.terrain is None:
         return []
-    (top, name), reserve = max_altitude(problem), float(data.buffer)
+    (ceiling, name), margin = max_altitude(problem), float(data.buffer)
     length = math.dist(scenario.start[:2], scenario.destination[:2])
-    for along, points in _lines_across(scenario):
+    for distance, points in _lines_across(scenario):
         # Near the ends the margins are reduced.
-        if min(along, length - along) < reserve / max(1e-9, data.buffer_growth):
+        if min(distance, length - distance) < margin / max(1e-9, data.buffer_growth):
             continue
-        lowest = float(np.nanmin(scenario.terrain.height(points[:, 0], points[:, 1]))) + data.clearance
-        if lowest + reserve > top:
+        min_altitude = float(np.nanmin(scenario.terrain.height(points[:, 0], points[:, 1]))) + data.clearance
+        if min_altitude + margin > ceiling:
             return [
-                f"too little height is left {along:.0f} m from the start, across the whole map: its lowest point, the"
-                f" clearance and a margin of {reserve:.1f} m take {lowest + reserve:.0f} m, {name} allows"
-                f" {top:.0f} m"
+                f"too little height is left {distance:.0f} m from the start, across the whole map: its lowest"
+                " point, the"
+                f" clearance and a margin of {margin:.1f} m take {min_altitude + margin:.0f} m, {name} allows"
+                f" {ceiling:.0f} m"
             ]
     return []
 
 
-def _leaves_a_gap(scenario: Scenario, points: np.ndarray, lowest: np.ndarray) -> bool:
+def _has_gap(scenario: Scenario, points: np.ndarray, min_altitudes: np.ndarray) -> bool:
     """Return True if any height above any of the points (n, 2) is outside every kill sphere."""
     threats = scenario.threats
-    armed = threats.kill_radius > 0.0
-    position, radius = threats.position[armed], threats.kill_radius[armed]
-    for share in np.linspace(0.0, 1.0, 9):
-        up = lowest + share * (scenario.ceiling - lowest)
-        free = np.ones(len(points), dtype=np.bool_)
+    has_missile = threats.kill_radius > 0.0
+    position, radius = threats.position[has_missile], threats.kill_radius[has_missile]
+    for fraction in np.linspace(0.0, 1.0, 9):
+        altitudes = min_altitudes + fraction * (scenario.ceiling - min_altitudes)
+        is_free = np.ones(len(points), dtype=np.bool_)
         for centre, kill_radius in zip(position, radius, strict=True):
-            away = (points[:, 0] - centre[0]) ** 2 + (points[:, 1] - centre[1]) ** 2 + (up - centre[2]) ** 2
-            free &= away > kill_radius * kill_radius
-        if free.any():
+            distance2 = (points[:, 0] - centre[0]) ** 2 + (points[:, 1] - centre[1]) ** 2 + (altitudes - centre[2]) ** 2
+            is_free &= distance2 > kill_radius * kill_radius
+        if is_free.any():
             return True
     return math.isinf(scenario.ceiling)
 
 
-def _proven_closure_text(problem: Problem) -> list[str]:
-    """Return a line that names the missiles, or the altitude, that block every path, if that can be proven."""
+def _describe_proven_closure(problem: Problem) -> list[str]:
+    """Name the missiles, or the altitude, that block every path; no line if that is not proven."""
     data, ceiling = problem.certified, "the ceiling"
-    found, top = closing_missiles(data), highest_level_flight(data)
-    if found is None:
+    missiles, level_altitude = closing_missiles(data), highest_level_flight(data)
+    if missiles is None:
         return []
-    if top < data.ceiling:
-        ceiling = f"{max(top, 0.0):.0f} m, above which the aircraft cannot fly level at {data.aircraft.airspeed:g} m/s"
+    if level_altitude < data.ceiling:
+        ceiling = (
+            f"{max(level_altitude, 0.0):.0f} m, above which the aircraft cannot fly level at"
+            f" {data.aircraft.airspeed:g} m/s"
+        )
         for name, end in (("start", data.start), ("destination", data.destination)):
-            if end[2] > top:
+            if end[2] > level_altitude:
                 return [f"no path exists: the {name} is at {end[2]:.0f} m, higher than {ceiling}"]
-    if not found:
+    if not missiles:
         return [f"no path exists: the ground closes every way below {ceiling}"]
-    named = [problem.scenario.threats.names[k] for k in found[:MAX_CLOSING]]
-    more = f" and {len(found) - MAX_CLOSING} more" if len(found) > MAX_CLOSING else ""
+    names = [problem.scenario.threats.names[k] for k in missiles[:MAX_CLOSING]]
+    others = f" and {len(missiles) - MAX_CLOSING} more" if len(missiles) > MAX_CLOSING else ""
     return [
-        f"no path exists: {', '.join(named)}{more} close every way between ground, {ceiling} and the edges of the map;"
+        f"no path exists: {', '.join(names)}{others} close every way between ground, {ceiling} and the edges of the"
+        " map;"
         " without any one of them there may be one"
     ]
 
@@ -369,12 +389,13 @@ def violated_zones(scenario: Scenario, path: np.ndarray) -> list[str]:
     ground = np.full(len(points), math.nan)
     if scenario.terrain is not None:
         ground = scenario.terrain.height(points[:, 0], points[:, 1])
-    found = []
+    names = []
     for z, zone in enumerate(scenario.zones):
-        inside = (
-            edge_distance(records, z, east, north) <= 0.0 and not outside_band(records.zones[z], up, under) > 0.0
-            for (east, north, up), under in zip(points, ground, strict=True)
+        is_inside = (
+            edge_distance(records, z, east, north) <= 0.0
+            and not outside_band(records.zones[z], up, ground_height) > 0.0
+            for (east, north, up), ground_height in zip(points, ground, strict=True)
         )
-        if any(inside) if zone.kind == "exclusion" else not all(inside):
-            found.append(zone.name)
-    return found
+        if any(is_inside) if zone.kind == "exclusion" else not all(is_inside):
+            names.append(zone.name)
+    return names

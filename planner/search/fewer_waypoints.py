@@ -14,7 +14,7 @@ from world.arrays import Floats
 
 
 def drop_waypoints(plan: Plan, limits: Limits) -> Plan:
-    """Remove the waypoints that a plan's safety does not need, and return the plan, which is no longer than before.
+    """Remove the waypoints that a plan's safety does not need; the plan becomes no longer.
 
     The waypoints with the smallest detours are removed first. Distances to missiles stay at the distance that plans
     keep, or at the plan's own distance if that is smaller.
@@ -31,29 +31,31 @@ def drop_waypoints(plan: Plan, limits: Limits) -> Plan:
     """
     scenario = plan.scenario
     problem = make_problem(scenario, limits_for(find_algorithm(plan.algorithm, scenario.name), limits))
-    nearest = min(plan.certificate.kill_distance, CERTIFIED_KILL_MARGIN)
-    while (certified := _drop_one_waypoint(problem, plan.waypoints, nearest)) is not None:
-        waypoints, certificate = certified
-        counts, objectives = paper_scores(problem.certified, waypoints[None])
+    min_kill_distance = min(plan.certificate.kill_distance, CERTIFIED_KILL_MARGIN)
+    while (shorter := _drop_one_waypoint(problem, plan.waypoints, min_kill_distance)) is not None:
+        waypoints, certificate = shorter
+        violations, objectives = paper_scores(problem.certified, waypoints[None])
         plan = replace(
-            plan, waypoints=waypoints, certificate=certificate, violations=counts[0], objectives=objectives[0]
+            plan, waypoints=waypoints, certificate=certificate, violations=violations[0], objectives=objectives[0]
         )
     return plan
 
 
-def _drop_one_waypoint(problem: Problem, waypoints: Floats, nearest: float) -> tuple[Floats, Certificate] | None:
+def _drop_one_waypoint(
+    problem: Problem, waypoints: Floats, min_kill_distance: float
+) -> tuple[Floats, Certificate] | None:
     """Remove one waypoint of a path (w, 3), and return the path with its certificate, or None if this is impossible.
 
-    The path must be certified, and no nearer to a missile than `nearest` (m). The waypoint with the smallest detour is
-    tried first.
+    The path must be certified, and no nearer to a missile than `min_kill_distance` (m). The waypoint with the smallest
+    detour is tried first.
     """
     legs, chords = np.diff(waypoints, axis=0), waypoints[2:] - waypoints[:-2]
-    runs = np.linalg.norm(legs, axis=1)
-    detours = runs[:-1] + runs[1:] - np.linalg.norm(chords, axis=1)
+    lengths = np.linalg.norm(legs, axis=1)
+    detours = lengths[:-1] + lengths[1:] - np.linalg.norm(chords, axis=1)
     for i in 1 + np.argsort(detours, kind="stable"):
-        fewer = np.delete(waypoints, i, axis=0)
-        certificate = certify(problem, fewer)
-        samples, _ = paper_scores(problem.certified, fewer[None])
-        if certificate.ok and certificate.kill_distance >= nearest and not samples.any():
-            return fewer, certificate
+        remaining = np.delete(waypoints, i, axis=0)
+        certificate = certify(problem, remaining)
+        violations, _ = paper_scores(problem.certified, remaining[None])
+        if certificate.ok and certificate.kill_distance >= min_kill_distance and not violations.any():
+            return remaining, certificate
     return None

@@ -49,37 +49,39 @@ def path_generations(search: Search, population: int, generations: int, starts: 
     starts: vectors (s, d) around which the first population is sampled.
     """
     encoding, algorithm = search.encoding, search.algorithm
-    levels, before = _preference_levels(search), search.evaluations
+    levels, previous_evaluations = _preference_levels(search), search.evaluations
     initial = (
         first_samples(search.problem.space, encoding, population, starts, search.rng) if algorithm.smooth else None
     )
     optimiser = _make_optimiser(search, lambda scores: ranks(scores, levels), population, initial)
     optimiser.tell(search.evaluate(optimiser.ask()))
-    search.record()
-    bests = [_best_row(optimiser.scores)]
-    whole = population + generations * (population // 2)
+    search.record_history()
+    best_scores = [_best_row(optimiser.scores)]
+    full_evaluations = population + generations * (population // 2)
     for generation in range(generations):
         if search.must_end() or search.first_safe_found():
             break
-        share = SAFE_SHARE if search.best_is_safe() else SEARCH_SHARE
-        if algorithm.seeded and (_is_stagnant(bests) or search.evaluations >= before + share * whole):
+        max_fraction = SAFE_SHARE if search.best_is_safe() else SEARCH_SHARE
+        if algorithm.seeded and (
+            _is_stagnant(best_scores) or search.evaluations >= previous_evaluations + max_fraction * full_evaluations
+        ):
             break
         optimiser.tell(search.evaluate(optimiser.ask()))
-        search.record()
-        bests.append(_best_row(optimiser.scores))
+        search.record_history()
+        best_scores.append(_best_row(optimiser.scores))
         search.done += 1
-        search.report(generations - generation - 1)
+        search.report_progress(generations - generation - 1)
     return np.asarray(optimiser.samples[best_first(optimiser.scores)[0]])
 
 
 def _preference_levels(search: Search) -> tuple[Level, ...]:
     """Return the preference levels for ranking, with the goals of the scenario, if any."""
     goals = search.problem.scenario.planner.goals
-    length = NO_GOAL if goals.length_ratio is None else goals.length_ratio
-    kill = NO_GOAL if goals.kill_exposure is None else goals.kill_exposure
+    length_goal = NO_GOAL if goals.length_ratio is None else goals.length_ratio
+    kill_goal = NO_GOAL if goals.kill_exposure is None else goals.kill_exposure
     if search.algorithm.graded:
-        return CONSTRAINTS, Level((KILL,), (kill,)), Level((LENGTH,), (length,))
-    return CONSTRAINTS, Level((LENGTH, KILL), (length, kill)), Level((DETECTION, HEIGHT), (NO_GOAL, NO_GOAL))
+        return CONSTRAINTS, Level((KILL,), (kill_goal,)), Level((LENGTH,), (length_goal,))
+    return CONSTRAINTS, Level((LENGTH, KILL), (length_goal, kill_goal)), Level((DETECTION, HEIGHT), (NO_GOAL, NO_GOAL))
 
 
 def _best_row(scores: Floats) -> Floats:
@@ -102,13 +104,13 @@ def _make_optimiser(
     return Umda(lower, upper, rank, population, search.rng, initial=initial, basis=basis)
 
 
-def _is_stagnant(bests: list[Floats]) -> bool:
+def _is_stagnant(best_scores: list[Floats]) -> bool:
     """Return True if the last generations gained almost nothing."""
-    if len(bests) <= STALLED_GENERATIONS:
+    if len(best_scores) <= STALLED_GENERATIONS:
         return False
-    before, after = bests[-1 - STALLED_GENERATIONS], bests[-1]
-    same = np.array_equal(before[:LENGTH], after[:LENGTH]) and before[KILL] == after[KILL]
-    return bool(same and before[LENGTH] - after[LENGTH] < MIN_GAIN)
+    earlier, latest = best_scores[-1 - STALLED_GENERATIONS], best_scores[-1]
+    has_same_violations = np.array_equal(earlier[:LENGTH], latest[:LENGTH]) and earlier[KILL] == latest[KILL]
+    return bool(has_same_violations and earlier[LENGTH] - latest[LENGTH] < MIN_GAIN)
 
 
 # --- Single waypoints ---
@@ -154,7 +156,7 @@ FIRST_BOUNDS = (1.15, 1.3, 1.6, 2.5, math.inf)
 # Number of best candidates per interval whose paths are evaluated as a whole.
 BEST_PER_INTERVAL = 3
 # Every n-th interval is used for these paths.
-EVERY = 3
+INTERVAL_STEP = 3
 # Maximum evaluations of a pattern search on a generation's best path while no path is feasible.
 REPAIR_EVALUATIONS = 100
 
@@ -166,50 +168,50 @@ def waypoint_generations(search: Search, population: int, generations: int) -> N
     `SEEDED_GENERATIONS` with seeds.
     """
     encoding, space = search.encoding, search.problem.space
-    inner = encoding.waypoints - 2
+    inner_count = encoding.waypoints - 2
     frame = rotated_frame(space.start, space.destination)
-    lower, upper = encoding.lower.reshape(inner, 3), encoding.upper.reshape(inner, 3)
+    lower, upper = encoding.lower.reshape(inner_count, 3), encoding.upper.reshape(inner_count, 3)
     data = search.problem.search
     sampling = NicheSampling(lower, upper, lambda rows, _: free_points(data, frame.restore(rows)), search.rng)
-    seeded, first = search.algorithm.seeded, _first_candidate_count(search, population)
-    later = _later_candidate_count(first)
-    interval = frame.length / inner
+    is_seeded, first_count = search.algorithm.seeded, _first_candidate_count(search, population)
+    later_count = _later_candidate_count(first_count)
+    interval = frame.length / inner_count
     deviation = np.array([FIRST_ALONG * interval, FIRST_ACROSS * interval, FIRST_UP])
-    rows = sampling.first(first, np.array([0.0, 0.0, ABOVE_CEILING]))
+    rows = sampling.first(first_count, np.array([0.0, 0.0, ABOVE_CEILING]))
     if not len(search.archive.vectors):
         # The archive must contain a path whenever the search is stopped.
         search.evaluate(_as_vectors(rows[:, :1]))
-    steps = _limit_generations(search, generations)
-    slack_at_first = SEEDED_SLACK if seeded else FIRST_SLACK
-    for step in range(steps):
-        rows[:, 0] = search.archive.vectors[0].reshape(inner, 3)
-        slack = slack_at_first * (LAST_SLACK / slack_at_first) ** (step / max(1, steps - 1))
+    generation_count = _limit_generations(search, generations)
+    first_slack = SEEDED_SLACK if is_seeded else FIRST_SLACK
+    for generation in range(generation_count):
+        rows[:, 0] = search.archive.vectors[0].reshape(inner_count, 3)
+        slack = first_slack * (LAST_SLACK / first_slack) ** (generation / max(1, generation_count - 1))
         chains = _join_candidates(search, encoding.decode(_as_vectors(rows)), slack)
         rows = rows[:, : chains.cost.shape[1]]
         search.legs += chains.legs
-        search.evaluations += math.ceil(chains.legs / (inner + 1))
+        search.evaluations += math.ceil(chains.legs / (inner_count + 1))
         _evaluate_best(search, rows, chains)
-        search.record()
+        search.record_history()
         search.done += 1
-        search.report(steps - step - 1)
-        if search.must_end() or search.first_safe_found() or legs_left(search) <= 0:
+        search.report_progress(generation_count - generation - 1)
+        if search.must_end() or search.first_safe_found() or count_remaining_legs(search) <= 0:
             break
-        if step < steps - 1:
+        if generation < generation_count - 1:
             cost = chains.cost[1:-1]
-            elite = search.archive.vectors[0].reshape(inner, 3)
-            rows = sampling.next(rows, cost, later, deviation, float(cost.min()) * (1.0 + slack), elite)
+            elite = search.archive.vectors[0].reshape(inner_count, 3)
+            rows = sampling.next(rows, cost, later_count, deviation, float(cost.min()) * (1.0 + slack), elite)
             deviation = SHRINK * deviation
 
 
 def _first_candidate_count(search: Search, population: int) -> int:
     """Return the number of candidates per interval in the first generation of this population."""
-    most = int(math.sqrt(MAX_LEGS / (search.encoding.waypoints - 1)))
-    return max(2, min(int(population * (SEEDED_SHARE if search.algorithm.seeded else 1.0)), most))
+    max_count = int(math.sqrt(MAX_LEGS / (search.encoding.waypoints - 1)))
+    return max(2, min(int(population * (SEEDED_SHARE if search.algorithm.seeded else 1.0)), max_count))
 
 
-def _later_candidate_count(first: int) -> int:
+def _later_candidate_count(first_count: int) -> int:
     """Return the number of candidates per interval in later generations."""
-    return min(first, max(MIN_POPULATION, int(LATER_SHARE * first)))
+    return min(first_count, max(MIN_POPULATION, int(LATER_SHARE * first_count)))
 
 
 def _limit_generations(search: Search, generations: int) -> int:
@@ -217,25 +219,28 @@ def _limit_generations(search: Search, generations: int) -> int:
     return min(generations, SEEDED_GENERATIONS if search.algorithm.seeded else MAX_GENERATIONS)
 
 
-def legs_left(search: Search) -> int:
+def count_remaining_legs(search: Search) -> int:
     """Return the number of legs that the search may still evaluate."""
-    table = search.problem.scenario.planner
-    if table.budget is not None:
+    settings = search.problem.scenario.planner
+    if settings.budget is not None:
         return ALL_LEGS
-    return int(MAX_LEGS_SHARE * _legs_of_attempt(search)) - search.legs
+    return int(MAX_LEGS_SHARE * _count_attempt_legs(search)) - search.legs
 
 
 def may_try_again(search: Search) -> bool:
     """Return True if enough legs are left for another attempt."""
-    return legs_left(search) >= RETRY_SHARE * _legs_of_attempt(search)
+    return count_remaining_legs(search) >= RETRY_SHARE * _count_attempt_legs(search)
 
 
-def _legs_of_attempt(search: Search) -> int:
+def _count_attempt_legs(search: Search) -> int:
     """Return the number of legs between all candidates of all generations of the first attempt."""
-    table = search.problem.scenario.planner
-    first = _first_candidate_count(search, table.population)
-    squares = first**2 + max(0, _limit_generations(search, table.generations) - 1) * _later_candidate_count(first) ** 2
-    return (search.encoding.waypoints - 1) * squares
+    settings = search.problem.scenario.planner
+    first_count = _first_candidate_count(search, settings.population)
+    candidate_pairs = (
+        first_count**2
+        + max(0, _limit_generations(search, settings.generations) - 1) * _later_candidate_count(first_count) ** 2
+    )
+    return (search.encoding.waypoints - 1) * candidate_pairs
 
 
 def _as_vectors(rows: Floats) -> Floats:
@@ -249,19 +254,21 @@ def _join_candidates(search: Search, paths: Floats, slack: float) -> WaypointCha
     Without a bound almost every leg is evaluated; if few legs are left, only the first candidates are joined.
     """
     data, space = search.problem.search, search.problem.space
-    straight = math.dist(space.start, space.destination)
+    straight_length = math.dist(space.start, space.destination)
     candidates = np.ascontiguousarray(paths.transpose(1, 0, 2))
     bounds: tuple[float, ...] = FIRST_BOUNDS
     if len(search.archive.scores) and search.best_is_safe():
         bounds = (float(search.archive.scores[0, LENGTH]) * (1.0 + slack), *FIRST_BOUNDS)
-    legs, left = 0, legs_left(search)
+    legs, remaining_legs = 0, count_remaining_legs(search)
     for bound in bounds:
         if math.isinf(bound):
-            count = max(1, math.isqrt(int(OPEN_SHARE * max(0, left - legs)) // (len(candidates) - 1)))
-            candidates = np.ascontiguousarray(candidates[:, :count])
-        chains = waypoint_chains(data, candidates, bound * straight, search.pause, max(1, left - legs))
+            max_candidates = max(
+                1, math.isqrt(int(OPEN_SHARE * max(0, remaining_legs - legs)) // (len(candidates) - 1))
+            )
+            candidates = np.ascontiguousarray(candidates[:, :max_candidates])
+        chains = waypoint_chains(data, candidates, bound * straight_length, search.pause, max(1, remaining_legs - legs))
         legs += chains.legs
-        if chains.cost[1:-1].min() <= bound * straight < math.inf or legs >= left:
+        if chains.cost[1:-1].min() <= bound * straight_length < math.inf or legs >= remaining_legs:
             break
         search.pause()
     return chains._replace(legs=legs)
@@ -270,7 +277,7 @@ def _join_candidates(search: Search, paths: Floats, slack: float) -> WaypointCha
 def _evaluate_best(search: Search, rows: Floats, chains: WaypointChains) -> None:
     """Evaluate whole paths through some of the best candidates, and repair one path as long as no path is feasible."""
     chosen = set()
-    for i in range(1, len(chains.cost) - 1, EVERY):
+    for i in range(1, len(chains.cost) - 1, INTERVAL_STEP):
         for k in np.argsort(chains.cost[i], kind="stable")[:BEST_PER_INTERVAL]:
             if chains.cost[i, k] < math.inf:
                 chosen.add(tuple(chains.path_through(i, int(k))[1:-1].tolist()))
@@ -278,7 +285,7 @@ def _evaluate_best(search: Search, rows: Floats, chains: WaypointChains) -> None
         search.evaluate(_as_vectors(rows[:, :1]))
         return
     intervals = np.arange(len(rows))
-    vectors = np.array([rows[intervals, list(numbers)].ravel() for numbers in sorted(chosen)])
+    vectors = np.array([rows[intervals, list(candidate_numbers)].ravel() for candidate_numbers in sorted(chosen)])
     search.evaluate(vectors)
-    if not search.archive.feasible():
+    if not search.archive.is_feasible():
         search.improve(search.archive.vectors[0], REPAIR_EVALUATIONS)

@@ -21,25 +21,25 @@ from world.kernels import compiled, inner
 from world.wind import mean_wind_speed
 
 # Number of columns along the map's longer side.
-COLUMNS = 500
+COLUMN_COUNT = 500
 # Smallest side of a column, m.
 MIN_SIDE = 10.0
 # Maximum number of closed altitude ranges of a column; further ranges stay open.
-STRETCHES = 6
+MAX_RANGES = 6
 # Added to the altitude of the highest level flight, m: more than the error of its interpolation.
 ROUNDING = 1e-6
 
 
 def column_side(data: ProblemArrays) -> float:
     """Return the side of the columns, m; closed areas narrower than about this may be treated as open."""
-    return max(MIN_SIDE, max(data.east - data.west, data.north - data.south) / COLUMNS)
+    return max(MIN_SIDE, max(data.east - data.west, data.north - data.south) / COLUMN_COUNT)
 
 
 def is_closed(data: ProblemArrays, missiles: Flags | None = None, margin: float = 0.0) -> bool:
     """Return True if no path stays above the clearance, below the ceiling and outside all missiles.
 
-    missiles: (m,) True for the `data.threats` that are considered; None for all. margin: distance from their spheres,
-    m. Return False if nothing is proven.
+    missiles: (m,) True for the `data.threats` to consider; None for all. margin: distance from their spheres, m.
+    Return False if nothing is proven.
 
     >>> from planfly.workflow.airframe import load_airframe
     >>> from planner.evaluation.problem import make_problem
@@ -49,17 +49,22 @@ def is_closed(data: ProblemArrays, missiles: Flags | None = None, margin: float 
     >>> [is_closed(make_problem(one, load_airframe(one).limits).certified) for one in (scenario, guarded)]
     [False, True]
     """
-    used, top = np.ones(len(data.threats), dtype=np.bool_) if missiles is None else missiles, highest_level_flight(data)
-    if max(data.start[2], data.destination[2]) > top:
+    is_considered, max_altitude = (
+        np.ones(len(data.threats), dtype=np.bool_) if missiles is None else missiles,
+        highest_level_flight(data),
+    )
+    if max(data.start[2], data.destination[2]) > max_altitude:
         return True
-    return bool(_is_closed(data._replace(ceiling=min(data.ceiling, top)), used, column_side(data), margin))
+    return bool(
+        _is_closed(data._replace(ceiling=min(data.ceiling, max_altitude)), is_considered, column_side(data), margin)
+    )
 
 
 def highest_level_flight(data: ProblemArrays) -> float:
-    """Return the altitude above which the aircraft cannot hold its altitude, so that no waypoint may exceed it, m.
+    """Return the highest altitude of level flight, above which no waypoint may be, m.
 
-    Return inf without such an altitude, and in winds in which a course cannot be held. As in
-    `planner.evaluation.leg_constraints`, if both slope limits are the aircraft's own.
+    Return inf if no such altitude exists, or if the wind is too strong to hold a course. The limit applies only if
+    both slope limits are the aircraft's own, as in `planner.evaluation.leg_constraints`.
     """
     table = data.aircraft
     if not (math.isnan(data.max_climb) and math.isnan(data.max_dive) and table.equivalent > 0.0):
@@ -67,20 +72,20 @@ def highest_level_flight(data: ProblemArrays) -> float:
     # The table entries that affect slopes below the ceiling.
     count = int(np.searchsorted(table.amsl, data.ceiling)) + 1
     climb, amsl = table.climb[:count], table.amsl[:count]
-    level = np.flatnonzero(climb >= 0.0)
-    last = int(level[-1]) if level.size else -1
-    if last == climb.size - 1:
+    level_rows = np.flatnonzero(climb >= 0.0)
+    last_row = int(level_rows[-1]) if level_rows.size else -1
+    if last_row == climb.size - 1:
         return math.inf
-    top = -math.inf
-    if last >= 0:
-        share = climb[last] / (climb[last] - climb[last + 1])
-        top = float(amsl[last] + share * (amsl[last + 1] - amsl[last])) + ROUNDING
-    steepest = np.abs(np.concatenate([climb, table.descent[:count]])).max()
-    slowest = true_airspeed(table, max(top, data.floor)) * math.cos(steepest)
+    max_altitude = -math.inf
+    if last_row >= 0:
+        fraction = climb[last_row] / (climb[last_row] - climb[last_row + 1])
+        max_altitude = float(amsl[last_row] + fraction * (amsl[last_row + 1] - amsl[last_row])) + ROUNDING
+    max_slope = np.abs(np.concatenate([climb, table.descent[:count]])).max()
+    min_speed = true_airspeed(table, max(max_altitude, data.floor)) * math.cos(max_slope)
     wind = table.wind_speed, table.wind_gradient, table.wind_reference_amsl
-    strongest = max(mean_wind_speed(*wind, data.floor), mean_wind_speed(*wind, data.ceiling))
+    max_wind = max(mean_wind_speed(*wind, data.floor), mean_wind_speed(*wind, data.ceiling))
     # The comparison is False for an unknown slope (NaN).
-    return top if strongest < slowest else math.inf
+    return max_altitude if max_wind < min_speed else math.inf
 
 
 def closing_missiles(data: ProblemArrays) -> list[int] | None:
@@ -90,17 +95,17 @@ def closing_missiles(data: ProblemArrays) -> list[int] | None:
     """
     if not is_closed(data):
         return None
-    kept, size = np.flatnonzero(data.threats["kill_radius"] > 0.0), len(data.threats)
-    while size > 0:
-        first = 0
-        while first < len(kept):
-            without = np.delete(kept, slice(first, first + size))
-            if is_closed(data, _index_mask(without, len(data.threats))):
-                kept = without
+    remaining, group_size = np.flatnonzero(data.threats["kill_radius"] > 0.0), len(data.threats)
+    while group_size > 0:
+        begin = 0
+        while begin < len(remaining):
+            reduced = np.delete(remaining, slice(begin, begin + group_size))
+            if is_closed(data, _index_mask(reduced, len(data.threats))):
+                remaining = reduced
             else:
-                first += size
-        size //= 2
-    return [int(k) for k in kept]
+                begin += group_size
+        group_size //= 2
+    return [int(k) for k in remaining]
 
 
 def _index_mask(indices: Ints, count: int) -> Flags:
@@ -117,18 +122,31 @@ def _is_closed(data: ProblemArrays, missiles: Flags, side: float, margin: float)
         max(1, math.ceil((data.north - data.south) / side)),
     )
     # Closed altitude ranges of each column, ascending and disjoint: lower ends, upper ends, and their number.
-    low, high = np.empty((columns, rows, STRETCHES)), np.empty((columns, rows, STRETCHES))
-    count = np.zeros((columns, rows), dtype=np.int64)
+    range_bottoms, range_tops = np.empty((columns, rows, MAX_RANGES)), np.empty((columns, rows, MAX_RANGES))
+    range_counts = np.zeros((columns, rows), dtype=np.int64)
     for i in range(columns):
         for j in range(rows):
-            top = _lowest_ground(data, i, j, side) + data.clearance
-            low[i, j, 0], high[i, j, 0], count[i, j] = -math.inf, max(top, data.floor), 1
+            closed_below = _lowest_ground(data, i, j, side) + data.clearance
+            range_bottoms[i, j, 0], range_tops[i, j, 0], range_counts[i, j] = (
+                -math.inf,
+                max(closed_below, data.floor),
+                1,
+            )
     for k in range(missiles.size):
         if missiles[k] and data.threats[k].kill_radius > 0.0:
             missile = data.threats[k]
-            place = missile.east - data.west, missile.north - data.south
-            _close_sphere(place[0], place[1], missile.up, missile.kill_radius + margin, side, low, high, count)
-    return not _reaches_destination(data, side, low, high, count)
+            position = missile.east - data.west, missile.north - data.south
+            _close_sphere(
+                position[0],
+                position[1],
+                missile.up,
+                missile.kill_radius + margin,
+                side,
+                range_bottoms,
+                range_tops,
+                range_counts,
+            )
+    return not _reaches_destination(data, side, range_bottoms, range_tops, range_counts)
 
 
 @inner
@@ -143,68 +161,92 @@ def _lowest_ground(data: ProblemArrays, i: int, j: int, side: float) -> float:
     rows, columns = data.heights.shape
     if min(first_column, first_row) < 0.0 or last_column > columns - 1 or last_row > rows - 1:
         return -math.inf
-    lowest = math.inf
+    min_ground = math.inf
     for row in range(int(first_row), min(rows - 1, int(last_row) + 1) + 1):
         for column in range(int(first_column), min(columns - 1, int(last_column) + 1) + 1):
             height = data.heights[row, column]
             if math.isnan(height):
                 return -math.inf
-            lowest = min(lowest, height)
-    return lowest
+            min_ground = min(min_ground, height)
+    return min_ground
 
 
 @inner
 def _close_sphere(
-    east: float, north: float, up: float, radius: float, side: float, low: Floats, high: Floats, count: Ints
+    east: float,
+    north: float,
+    altitude: float,
+    radius: float,
+    side: float,
+    range_bottoms: Floats,
+    range_tops: Floats,
+    range_counts: Ints,
 ) -> None:
-    """Close the altitudes at which a whole column is inside a sphere.
+    """Close the altitudes of columns that are completely inside a sphere.
 
     east, north: distances from the map's corner, m.
     """
-    columns, rows = count.shape
-    first, last = max(0, math.floor((east - radius) / side)), min(columns - 1, math.floor((east + radius) / side))
-    bottom, top = max(0, math.floor((north - radius) / side)), min(rows - 1, math.floor((north + radius) / side))
-    for i in range(first, last + 1):
+    columns, rows = range_counts.shape
+    first_column, last_column = (
+        max(0, math.floor((east - radius) / side)),
+        min(columns - 1, math.floor((east + radius) / side)),
+    )
+    first_row, last_row = (
+        max(0, math.floor((north - radius) / side)),
+        min(rows - 1, math.floor((north + radius) / side)),
+    )
+    for i in range(first_column, last_column + 1):
         dx = abs((i + 0.5) * side - east) + 0.5 * side
-        for j in range(bottom, top + 1):
+        for j in range(first_row, last_row + 1):
             dy = abs((j + 0.5) * side - north) + 0.5 * side
-            left = radius * radius - dx * dx - dy * dy
-            if left > 0.0:
-                half = math.sqrt(left)
-                _close_range(low[i, j], high[i, j], count[i], j, up - half, up + half)
+            half_height2 = radius * radius - dx * dx - dy * dy
+            if half_height2 > 0.0:
+                half_height = math.sqrt(half_height2)
+                _close_range(
+                    range_bottoms[i, j],
+                    range_tops[i, j],
+                    range_counts[i],
+                    j,
+                    altitude - half_height,
+                    altitude + half_height,
+                )
 
 
 @inner
-def _close_range(low: Floats, high: Floats, count: Ints, j: int, begin: float, end: float) -> None:
+def _close_range(
+    range_bottoms: Floats, range_tops: Floats, range_counts: Ints, j: int, bottom: float, top: float
+) -> None:
     """Add an altitude range to the closed ranges of column j of a row.
 
     A range beyond the maximum number stays open.
     """
-    kept = 0
-    for k in range(count[j]):
-        if low[k] <= end and begin <= high[k]:
-            begin, end = min(begin, low[k]), max(end, high[k])
+    kept_count = 0
+    for k in range(range_counts[j]):
+        if range_bottoms[k] <= top and bottom <= range_tops[k]:
+            bottom, top = min(bottom, range_bottoms[k]), max(top, range_tops[k])
         else:
-            low[kept], high[kept] = low[k], high[k]
-            kept += 1
-    if kept == low.size:
-        count[j] = kept
+            range_bottoms[kept_count], range_tops[kept_count] = range_bottoms[k], range_tops[k]
+            kept_count += 1
+    if kept_count == range_bottoms.size:
+        range_counts[j] = kept_count
         return
-    at = kept
-    while at > 0 and low[at - 1] > begin:
-        low[at], high[at] = low[at - 1], high[at - 1]
-        at -= 1
-    low[at], high[at] = begin, end
-    count[j] = kept + 1
+    position = kept_count
+    while position > 0 and range_bottoms[position - 1] > bottom:
+        range_bottoms[position], range_tops[position] = range_bottoms[position - 1], range_tops[position - 1]
+        position -= 1
+    range_bottoms[position], range_tops[position] = bottom, top
+    range_counts[j] = kept_count + 1
 
 
 @inner
-def _reaches_destination(data: ProblemArrays, side: float, low: Floats, high: Floats, count: Ints) -> bool:
+def _reaches_destination(
+    data: ProblemArrays, side: float, range_bottoms: Floats, range_tops: Floats, range_counts: Ints
+) -> bool:
     """Return True if the destination can be reached from the start through open altitudes of adjacent columns.
 
     Open range s of a column is above its closed range s.
     """
-    columns, rows, stretches = low.shape
+    columns, rows, stretches = range_bottoms.shape
     ends = np.zeros(2, dtype=np.int64)
     for k in range(2):
         point = data.start if k == 0 else data.destination
@@ -212,31 +254,31 @@ def _reaches_destination(data: ProblemArrays, side: float, low: Floats, high: Fl
         j = min(rows - 1, max(0, math.floor((point[1] - data.south) / side)))
         # A fixed end may be below the clearance; then it is in the lowest open range.
         s = 0
-        while s + 1 < count[i, j] and low[i, j, s + 1] < point[2]:
+        while s + 1 < range_counts[i, j] and range_bottoms[i, j, s + 1] < point[2]:
             s += 1
         ends[k] = (i * rows + j) * stretches + s
-    seen = np.zeros(low.size, dtype=np.bool_)
-    stack = np.empty(low.size, dtype=np.int64)
+    is_visited = np.zeros(range_bottoms.size, dtype=np.bool_)
+    stack = np.empty(range_bottoms.size, dtype=np.int64)
     stack[0], size = ends[0], 1
-    seen[ends[0]] = True
+    is_visited[ends[0]] = True
     while size > 0:
         size -= 1
-        here = stack[size]
-        if here == ends[1]:
+        current = stack[size]
+        if current == ends[1]:
             return True
-        s, j, i = here % stretches, here // stretches % rows, here // (stretches * rows)
-        bottom = high[i, j, s]
-        top = low[i, j, s + 1] if s + 1 < count[i, j] else data.ceiling
+        s, j, i = current % stretches, current // stretches % rows, current // (stretches * rows)
+        bottom = range_tops[i, j, s]
+        top = range_bottoms[i, j, s + 1] if s + 1 < range_counts[i, j] else data.ceiling
         for step in range(4):
             x, y = i + (step == 0) - (step == 1), j + (step == 2) - (step == 3)
             if x < 0 or y < 0 or x >= columns or y >= rows:
                 continue
-            for t in range(count[x, y]):
-                begin = high[x, y, t]
-                end = low[x, y, t + 1] if t + 1 < count[x, y] else data.ceiling
-                there = (x * rows + y) * stretches + t
-                if max(bottom, begin) <= min(top, end) and not seen[there]:
-                    seen[there] = True
-                    stack[size] = there
+            for t in range(range_counts[x, y]):
+                neighbour_bottom = range_tops[x, y, t]
+                neighbour_top = range_bottoms[x, y, t + 1] if t + 1 < range_counts[x, y] else data.ceiling
+                neighbour = (x * rows + y) * stretches + t
+                if max(bottom, neighbour_bottom) <= min(top, neighbour_top) and not is_visited[neighbour]:
+                    is_visited[neighbour] = True
+                    stack[size] = neighbour
                     size += 1
     return False

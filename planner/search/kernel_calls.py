@@ -35,9 +35,9 @@ MAX_ROUTES = 2
 # Evaluations of a pattern search, and size of a set of objectives.
 FEW = 4
 # Offset of the path's middle point to the side, m.
-ASIDE = 300.0
+LATERAL_OFFSET = 300.0
 # Offset of the path's middle point upwards, m.
-ABOVE = 20.0
+VERTICAL_OFFSET = 20.0
 
 
 class _Task(NamedTuple):
@@ -60,8 +60,8 @@ def call_kernels(part: str, scenario: Scenario, limits: Limits) -> None:
     """
     problem = make_problem(scenario, limits)
     space = problem.space
-    aside = 0.5 * (space.start + space.destination) + [0.0, ASIDE, ABOVE]
-    path = resample(np.array([space.start, aside, space.destination]), WAYPOINTS)
+    middle = 0.5 * (space.start + space.destination) + [0.0, LATERAL_OFFSET, VERTICAL_OFFSET]
+    path = resample(np.array([space.start, middle, space.destination]), WAYPOINTS)
     _CALLS[part](_Task(problem, ENCODINGS["rotated"](space, WAYPOINTS), path))
 
 
@@ -80,14 +80,14 @@ def _shorten(task: _Task) -> None:
     shorten_path(task.problem.search, task.path)
 
 
-def _route(task: _Task) -> None:
+def _find_route(task: _Task) -> None:
     data, (frame, span) = task.problem.search, _frame_and_span(task)
-    found = grid_route(data, frame, make_grid(data, frame, span, STAGES))
-    for route in [found] if isinstance(found, GridRoute) else []:
+    best_route = grid_route(data, frame, make_grid(data, frame, span, STAGES))
+    for route in [best_route] if isinstance(best_route, GridRoute) else []:
         fit_waypoints(data, frame, route.points, WAYPOINTS)
 
 
-def _pass_sides(task: _Task) -> None:
+def _find_side_routes(task: _Task) -> None:
     data, (frame, span) = task.problem.search, _frame_and_span(task)
     grid = optimistic_grid(data, frame, span, STAGES, shrink=0.5, spread=0.2, ratio=0.5)
     side_routes(data, frame, grid, 2.0 * frame.length, MAX_ROUTES)
@@ -99,7 +99,7 @@ def _frame_and_span(task: _Task) -> tuple[RotatedFrame, tuple[float, float]]:
     return rotated_frame(space.start, space.destination), (float(lower[1::3].min()), float(upper[1::3].max()))
 
 
-def _score_as_the_paper(task: _Task) -> None:
+def _score_samples(task: _Task) -> None:
     paper_scores(task.problem.certified, task.path[None])
 
 
@@ -109,5 +109,5 @@ def _choose(task: _Task) -> None:
     covering_order(np.eye(FEW), np.full(FEW, 2.0), FEW)
 
 
-_PARTS = (_score, _certify, _shorten, _route, _pass_sides, _score_as_the_paper)
+_PARTS = (_score, _certify, _shorten, _find_route, _find_side_routes, _score_samples)
 _CALLS = {**dict(zip(PARTS, _PARTS, strict=True)), FRONT: _choose}

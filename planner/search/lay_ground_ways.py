@@ -28,10 +28,10 @@ from planner.search.pose_chains import (
     Spot,
     TurnLengths,
     arc_lengths,
-    chains,
-    fallen,
-    measure,
-    risen,
+    candidate_chains,
+    climb_altitudes,
+    descent_altitudes,
+    measure_path,
 )
 from world.airfield import STEEPEST_STRIP, LandingStrip, Launch, strip_slopes
 from world.arrays import Floats
@@ -131,11 +131,11 @@ def with_ground_ways(plan: Plan, limits: Limits, final: FinalLaw, climbed: Climb
     if plan.flown_legs:
         climb = climbed
     elif scenario.launch is not None:
-        climb, why = _find_climb_out(site, scenario.launch)
-        problems += [f"climb-out: {why}"] if why else []
+        climb, reason = _find_climb_out(site, scenario.launch)
+        problems += [f"climb-out: {reason}"] if reason else []
     if scenario.landing is not None:
-        descent, why = _find_descent(site, scenario.landing, final)
-        problems += [f"landing: {why}"] if why else []
+        descent, reason = _find_descent(site, scenario.landing, final)
+        problems += [f"landing: {reason}"] if reason else []
     certificate = replace(plan.certificate, problems=(*plan.certificate.problems, *problems))
     return replace(plan, ways=GroundWays(climb, descent), certificate=certificate)
 
@@ -148,8 +148,9 @@ def with_ground_ways(plan: Plan, limits: Limits, final: FinalLaw, climbed: Climb
 class _Site:
     """Plan, and the problems with which its departure and approach are certified.
 
-    low: problem of the parts below the required clearance; of its certificate only the distances from missiles and
-    zones are used.  radius: radius of the tightest turn, m.  turning: lengths that turns take of their legs.
+    low_problem: problem of the parts below the required clearance; of its certificate only the distances from missiles
+    and zones are used.
+    turn_radius: radius of the tightest turn, m.  turn_lengths: lengths that turns take of their legs.
     """
 
     plan: Plan
@@ -157,9 +158,9 @@ class _Site:
     home: Floats
     terrain: Terrain
     problem: Problem
-    low: Problem
-    radius: float
-    turning: TurnLengths
+    low_problem: Problem
+    turn_radius: float
+    turn_lengths: TurnLengths
 
     @property
     def scenario(self) -> Scenario:
@@ -168,71 +169,90 @@ class _Site:
     def slopes(self, course: float, amsl: float) -> tuple[float, float]:
         """Return the climb and dive slopes (m per m) for a course (rad) at an altitude (m AMSL)."""
         certified = aircraft_slopes(self.problem.certified.aircraft, course, amsl)
-        stated = (self.limits.max_climb, self.limits.max_dive)
-        found = []
-        for able, sure, most in zip(self.limits.slopes(course, amsl), certified, stated, strict=True):
-            slope = min(SHARE * math.tan(able), math.tan(max(0.0, sure - 1.1 * ANGLE_MARGIN)))
-            found.append(slope if most is None else min(slope, math.tan(max(0.0, most - 1.1 * ANGLE_MARGIN))))
-        return found[0], found[1]
+        stated_limits = (self.limits.max_climb, self.limits.max_dive)
+        slopes = []
+        for aircraft_slope, certified_slope, stated_limit in zip(
+            self.limits.slopes(course, amsl), certified, stated_limits, strict=True
+        ):
+            slope = min(SHARE * math.tan(aircraft_slope), math.tan(max(0.0, certified_slope - 1.1 * ANGLE_MARGIN)))
+            slopes.append(
+                slope if stated_limit is None else min(slope, math.tan(max(0.0, stated_limit - 1.1 * ANGLE_MARGIN)))
+            )
+        return slopes[0], slopes[1]
 
-    def least_length(self, rise: float, side: int) -> float:
+    def min_path_length(self, height_change: float, side: int) -> float:
         """Return the length of the shortest path that gains (side 0) or loses (side 1) a height, m."""
-        up = float(max(self.scenario.start[2], self.scenario.destination[2]))
-        steepest = max(self.slopes(course, up)[side] for course in np.arange(8) * (math.pi / 4.0))
-        return max(0.0, abs(rise)) / steepest if steepest > 0.0 else math.inf
+        altitude = float(max(self.scenario.start[2], self.scenario.destination[2]))
+        max_slope = max(self.slopes(course, altitude)[side] for course in np.arange(8) * (math.pi / 4.0))
+        return max(0.0, abs(height_change)) / max_slope if max_slope > 0.0 else math.inf
 
-    def certificate(self, chain: Floats, near: tuple[Floats, Floats]) -> Certificate:
-        """Return the certificate of a chain (n, 3).
+    def certify_chain(self, chain: Floats, ends: tuple[Floats, Floats]) -> Certificate:
+        """Certify a chain (n, 3).
 
-        near: two places, (3,) m; if a place is closer to the ground than required, less height is required near the
+        ends: two places, (3,) m; if a place is closer to the ground than required, less height is required near the
             place.
         """
         data = self.problem.certified
-        start, end = (min(data.buffer, 0.75 * max(0.0, self.above(place) - data.clearance - 0.01)) for place in near)
-        free = data._replace(
-            start=_read_only(near[0]),
-            destination=_read_only(near[1]),
-            start_buffer=start,
-            destination_buffer=end,
+        start_buffer, end_buffer = (
+            min(data.buffer, 0.75 * max(0.0, self.height_above_ground(place) - data.clearance - 0.01)) for place in ends
+        )
+        relaxed = data._replace(
+            start=_read_only(ends[0]),
+            destination=_read_only(ends[1]),
+            start_buffer=start_buffer,
+            destination_buffer=end_buffer,
             start_course=math.nan,
             destination_course=math.nan,
         )
-        return certify(replace(self.problem, certified=free), np.ascontiguousarray(chain))
+        return certify(replace(self.problem, certified=relaxed), np.ascontiguousarray(chain))
 
-    def above(self, place: Floats) -> float:
+    def height_above_ground(self, place: Floats) -> float:
         """Return the height of a place above ground, m."""
         return float(place[2] - self.terrain.height(place[0], place[1]))
 
-    def entered(self, chain: Sequence[Sequence[float]]) -> str:
+    def describe_obstacle(self, chain: Sequence[Sequence[float]]) -> str:
         """Describe the missile or zone that a chain low over the ground enters; "" if it enters none."""
-        found = certify(self.low, np.array(chain, dtype=np.float64))
-        if found.kill_distance <= 0.0:
-            return f"{-found.kill_distance:.0f} m inside a missile's reach"
-        return f"{max(0.0, -found.zone_distance):.0f} m beyond a zone's edge" if found.zone_distance <= 0.0 else ""
+        certificate = certify(self.low_problem, np.array(chain, dtype=np.float64))
+        if certificate.kill_distance <= 0.0:
+            return f"{-certificate.kill_distance:.0f} m inside a missile's reach"
+        return (
+            f"{max(0.0, -certificate.zone_distance):.0f} m beyond a zone's edge"
+            if certificate.zone_distance <= 0.0
+            else ""
+        )
 
 
 def _make_site(plan: Plan, limits: Limits, home: Floats, terrain: Terrain) -> _Site:
     scenario = plan.scenario
-    within = limits_for(find_algorithm(plan.algorithm, scenario.name), limits)
-    problem = make_problem(scenario, within)
+    algorithm_limits = limits_for(find_algorithm(plan.algorithm, scenario.name), limits)
+    problem = make_problem(scenario, algorithm_limits)
     # An inclusion with a floor begins above the field.
     zones = tuple(zone for zone in scenario.zones if zone.kind == "exclusion" or zone.floor is None)
-    low = make_problem(replace(scenario, zones=zones), within)
-    low = replace(low, certified=low.certified._replace(clearance=-1e5))
-    up = float(max(scenario.start[2], scenario.destination[2]))
-    radius = max(within.turn_radius(course, course + math.pi, up) for course in (0.0, 0.5 * math.pi))
-    turning = arc_lengths(radius)
-    if (tracking := within.tracking) is not None:
+    low_problem = make_problem(replace(scenario, zones=zones), algorithm_limits)
+    low_problem = replace(low_problem, certified=low_problem.certified._replace(clearance=-1e5))
+    altitude = float(max(scenario.start[2], scenario.destination[2]))
+    turn_radius = max(
+        algorithm_limits.turn_radius(course, course + math.pi, altitude) for course in (0.0, 0.5 * math.pi)
+    )
+    turn_lengths = arc_lengths(turn_radius)
+    if (tracking := algorithm_limits.tracking) is not None:
         # An estimate, as ground speeds depend on the course; the certificate decides.
-        share = 1.0 + _WIND_FRACTION * scenario.wind.speed / within.airspeed
-        before, after = (_turn_lengths_at(table, share) for table in (tracking.before, tracking.after))
-        turning = TurnLengths(*(tuple(map(max, own, arcs)) for own, arcs in zip((before, after), turning, strict=True)))
-    return _Site(plan, within, home, terrain, problem, low, radius, turning)
+        speed_ratio = 1.0 + _WIND_FRACTION * scenario.wind.speed / algorithm_limits.airspeed
+        lengths_before, lengths_after = (
+            _turn_lengths_at(table, speed_ratio) for table in (tracking.before, tracking.after)
+        )
+        turn_lengths = TurnLengths(
+            *(
+                tuple(map(max, error_lengths, arc_row))
+                for error_lengths, arc_row in zip((lengths_before, lengths_after), turn_lengths, strict=True)
+            )
+        )
+    return _Site(plan, algorithm_limits, home, terrain, problem, low_problem, turn_radius, turn_lengths)
 
 
-def _turn_lengths_at(table: Floats, share: float) -> list[float]:
+def _turn_lengths_at(table: Floats, speed_ratio: float) -> list[float]:
     """Interpolate a tracking error's table, (t,) m, at a ground speed as a fraction of the airspeed."""
-    return [float(np.interp(share, SPEED_SHARES, row)) for row in table]
+    return [float(np.interp(speed_ratio, SPEED_SHARES, row)) for row in table]
 
 
 def _read_only(place: Floats) -> Floats:
@@ -246,28 +266,28 @@ def _chain(spots: Sequence[Spot], heights: Floats) -> Floats:
     return np.column_stack([np.array(spots), heights])
 
 
-def _ground_profile(terrain: Terrain, begin: Spot, course: float, last: float) -> tuple[Floats, Floats]:
+def _ground_profile(terrain: Terrain, begin: Spot, course: float, length: float) -> tuple[Floats, Floats]:
     """Return distances from a place along a course, m, and the ground heights at those distances, m, NaN if unknown."""
-    run = np.arange(0.0, last + _GROUND_SPACING_M, _GROUND_SPACING_M)
-    east, north = begin[0] + run * math.sin(course), begin[1] + run * math.cos(course)
-    return run, terrain.height(east, north)
+    distances = np.arange(0.0, length + _GROUND_SPACING_M, _GROUND_SPACING_M)
+    east, north = begin[0] + distances * math.sin(course), begin[1] + distances * math.cos(course)
+    return distances, terrain.height(east, north)
 
 
-class _BestRefused:
-    """Best of the refused paths, and the number of refused paths."""
+class _BestRejected:
+    """Best rejected path, and the number of rejected paths."""
 
     def __init__(self) -> None:
-        self.tried, self._margin, self.problem = 0, -math.inf, ""
+        self.count, self._margin, self.problem = 0, -math.inf, ""
 
-    def add(self, found: Certificate | None) -> None:
-        """Include the certificate, if any, of a refused path; a path without a problem is in a missile's range."""
-        if found is None:
+    def add(self, certificate: Certificate | None) -> None:
+        """Count a rejected path; a path whose certificate has no problem is in a missile's range."""
+        if certificate is None:
             return
-        self.tried += 1
-        margin = min(found.clearance, found.kill_distance, found.zone_distance, found.bounds)
+        self.count += 1
+        margin = min(certificate.clearance, certificate.kill_distance, certificate.zone_distance, certificate.bounds)
         if not self.problem or margin > self._margin:
-            inside = f"{-found.kill_distance:.0f} m inside a missile's reach"
-            self._margin, self.problem = margin, found.problems[0] if found.problems else inside
+            reach_text = f"{-certificate.kill_distance:.0f} m inside a missile's reach"
+            self._margin, self.problem = margin, certificate.problems[0] if certificate.problems else reach_text
 
 
 # ----------------------------------------------------------------------
@@ -277,121 +297,152 @@ class _BestRefused:
 def _find_climb_out(site: _Site, launch: Launch) -> tuple[ClimbOut | None, str]:
     """Return the shortest accepted departure, or None and the reason."""
     data, target = site.problem.certified, site.plan.waypoints[0]
-    ground, goal = float(site.home[2]), float(target[2])
-    over = max(_MIN_TAKEOFF_HEIGHT_M, data.clearance + data.buffer + _CLEARANCE_EXCESS_M)
-    up = ground + over
-    launches, why = _find_launches(site, launch, over, max(up, goal))
+    home_altitude, start_altitude = float(site.home[2]), float(target[2])
+    takeoff_height = max(_MIN_TAKEOFF_HEIGHT_M, data.clearance + data.buffer + _CLEARANCE_EXCESS_M)
+    takeoff_altitude = home_altitude + takeoff_height
+    launches, reason = _find_launches(site, launch, takeoff_height, max(takeoff_altitude, start_altitude))
     if not launches:
-        return None, why
-    nearest = _BestRefused()
-    for laps in _lap_counts(site, goal - ground, 0):
-        for _, course, spots in sorted(_departure_paths(site, launches, laps), key=lambda one: one[0]):
-            found = _certify_climb_out(site, course, spots, up)
-            if isinstance(found, ClimbOut):
-                return found, ""
-            nearest.add(found)
-            if nearest.tried >= _MAX_CERTIFIED:
+        return None, reason
+    best_rejected = _BestRejected()
+    for laps in _lap_counts(site, start_altitude - home_altitude, 0):
+        for _, course, spots in sorted(_list_departures(site, launches, laps), key=lambda path: path[0]):
+            outcome = _make_climb_out(site, course, spots, takeoff_altitude)
+            if isinstance(outcome, ClimbOut):
+                return outcome, ""
+            best_rejected.add(outcome)
+            if best_rejected.count >= _MAX_CERTIFIED:
                 break
     courses = (
         "on its course" if launch.course is not None else f"on {len({launch.course for launch in launches})} courses"
     )
-    if not nearest.tried:
-        return None, f"no way launched {courses} is long enough to climb to the start, {goal - ground:.0f} m over home"
-    return None, f"none of {nearest.tried} ways launched {courses} is free; the nearest: {nearest.problem}"
+    if not best_rejected.count:
+        return (
+            None,
+            f"no way launched {courses} is long enough to climb to the start,"
+            f" {start_altitude - home_altitude:.0f} m over home",
+        )
+    return None, f"none of {best_rejected.count} ways launched {courses} is free; the nearest: {best_rejected.problem}"
 
 
-def _certify_climb_out(site: _Site, course: float, spots: list[Spot], up: float) -> ClimbOut | Certificate | None:
-    """Return the departure over these corners, its certificate if it is refused, or None if it cannot be flown.
+def _make_climb_out(
+    site: _Site, course: float, spots: list[Spot], takeoff_altitude: float
+) -> ClimbOut | Certificate | None:
+    """Return the departure over these corners, its certificate if it is rejected, or None if it cannot be flown.
 
-    up: altitude that the take-off climbs to, m AMSL.
+    takeoff_altitude: altitude that the take-off climbs to, m AMSL.
     """
-    onward, target = site.plan.waypoints[1:3], site.plan.waypoints[0]
-    goal, top = float(target[2]), max(up, float(target[2]))
-    found = None
-    for share in _SLOPE_FACTORS:
-        heights = risen(spots, float(site.home[2]), partial(_scaled_slope, site, share, 0, top), up, goal)
-        if heights[-1] < goal - 1e-6:
+    next_waypoints, first_waypoint = site.plan.waypoints[1:3], site.plan.waypoints[0]
+    goal_altitude, top_altitude = float(first_waypoint[2]), max(takeoff_altitude, float(first_waypoint[2]))
+    certificate = None
+    for slope_factor in _SLOPE_FACTORS:
+        heights = climb_altitudes(
+            spots,
+            float(site.home[2]),
+            partial(_scaled_slope, site, slope_factor, 0, top_altitude),
+            takeoff_altitude,
+            goal_altitude,
+        )
+        if heights[-1] < goal_altitude - 1e-6:
             break
-        chain = np.concatenate([_chain(spots, heights), onward])
-        found = site.certificate(chain, (target, chain[0]))
-        if found.ok and found.kill_distance > 0.0:
-            return ClimbOut(site.home, course, up, chain[1 : len(spots) - 1], site.slopes(course, top)[0])
-    return found
+        chain = np.concatenate([_chain(spots, heights), next_waypoints])
+        certificate = site.certify_chain(chain, (first_waypoint, chain[0]))
+        if certificate.ok and certificate.kill_distance > 0.0:
+            return ClimbOut(
+                site.home, course, takeoff_altitude, chain[1 : len(spots) - 1], site.slopes(course, top_altitude)[0]
+            )
+    return certificate
 
 
 class _Start(NamedTuple):
     """Launch: course (rad), place where the take-off is complete, and end of the first leg."""
 
     course: float
-    over: Spot
+    takeoff_end: Spot
     end: Spot
 
 
-def _find_launches(site: _Site, launch: Launch, over: float, high: float) -> tuple[list[_Start], str]:
-    """Return the launches that climb clear of ground, missiles and zones, or the reason why there are none.
+def _find_launches(site: _Site, launch: Launch, takeoff_height: float, altitude: float) -> tuple[list[_Start], str]:
+    """Return the launches that climb clear of ground, missiles and zones; if there are none, return the reason, too.
 
-    over: height above home up to which the launch climbs straight ahead, m.
-    high: altitude of the climb performance, m AMSL.
+    takeoff_height: height above home up to which the launch climbs straight ahead, m.
+    altitude: altitude of the climb performance, m AMSL.
     """
     courses = (
         [2.0 * math.pi * k / _LAUNCH_COURSE_COUNT for k in range(_LAUNCH_COURSE_COUNT)]
         if launch.course is None
         else [launch.course]
     )
-    home, found, best = (float(site.home[0]), float(site.home[1])), [], (-math.inf, "")
+    home, launches, best = (float(site.home[0]), float(site.home[1])), [], (-math.inf, "")
     for course in courses:
-        climb = site.slopes(course, high)[0]
+        climb = site.slopes(course, altitude)[0]
         if climb <= 0.0:
             continue
-        least = over / climb * _FIRST_LEG_FACTOR_AND_M[0] + _FIRST_LEG_FACTOR_AND_M[1]
-        for longer in _FIRST_LEG_FACTORS:
-            last = least * longer
-            run, low = _ground_profile(site.terrain, home, course, last)
-            height = climb * run
-            needed = np.minimum(site.problem.certified.clearance, _CLIMB_CLEARANCE_FRACTION * height)
-            room = (site.home[2] + height - low - needed)[run > _LAUNCH_RUN_M]
-            where = f"on {round(math.degrees(course)) % 360}°"
-            if not (room >= 0.0).all():
-                worst = float(np.nanmin(room)) if not np.isnan(room).all() else -math.inf
-                k = int(np.argmin(np.where(np.isnan(room), math.inf, room)))
-                at = float(run[run > _LAUNCH_RUN_M][k])
-                said = f"the nearest, {where}, is {-worst:.0f} m too low over the ground {at:.0f} m from home"
-                best = max(best, (worst, said))
+        min_length = takeoff_height / climb * _FIRST_LEG_FACTOR_AND_M[0] + _FIRST_LEG_FACTOR_AND_M[1]
+        for length_factor in _FIRST_LEG_FACTORS:
+            length = min_length * length_factor
+            distances, ground = _ground_profile(site.terrain, home, course, length)
+            heights = climb * distances
+            required = np.minimum(site.problem.certified.clearance, _CLIMB_CLEARANCE_FRACTION * heights)
+            margins = (site.home[2] + heights - ground - required)[distances > _LAUNCH_RUN_M]
+            direction = f"on {round(math.degrees(course)) % 360}°"
+            if not (margins >= 0.0).all():
+                worst_margin = float(np.nanmin(margins)) if not np.isnan(margins).all() else -math.inf
+                k = int(np.argmin(np.where(np.isnan(margins), math.inf, margins)))
+                distance = float(distances[distances > _LAUNCH_RUN_M][k])
+                reason = (
+                    f"the nearest, {direction}, is {-worst_margin:.0f} m too low over the ground"
+                    f" {distance:.0f} m from home"
+                )
+                best = max(best, (worst_margin, reason))
                 break
             east, north = math.sin(course), math.cos(course)
-            end = (home[0] + last * east, home[1] + last * north)
-            risen_at = _TAKEOFF_DONE_FRACTION * over / climb
-            ground = float(site.home[2])
-            entered = site.entered([(*home, ground), (*end, ground + climb * last)])
-            if entered:
-                best = max(best, (-1e6, f"{where} it is {entered}"))
+            end = (home[0] + length * east, home[1] + length * north)
+            takeoff_distance = _TAKEOFF_DONE_FRACTION * takeoff_height / climb
+            home_altitude = float(site.home[2])
+            obstacle = site.describe_obstacle([(*home, home_altitude), (*end, home_altitude + climb * length)])
+            if obstacle:
+                best = max(best, (-1e6, f"{direction} it is {obstacle}"))
                 break
-            found.append(_Start(course, (home[0] + risen_at * east, home[1] + risen_at * north), end))
-    whose = "the launch course leads" if launch.course is not None else f"none of {len(courses)} launch courses leads"
-    no = "" if launch.course is None else "not "
-    return found, f"{whose} {no}free of ground, missiles and zones at {SHARE:.0%} of the steepest climb: {best[1]}"
+            launches.append(
+                _Start(course, (home[0] + takeoff_distance * east, home[1] + takeoff_distance * north), end)
+            )
+    subject = "the launch course leads" if launch.course is not None else f"none of {len(courses)} launch courses leads"
+    negation = "" if launch.course is None else "not "
+    return (
+        launches,
+        f"{subject} {negation}free of ground, missiles and zones at {SHARE:.0%} of the steepest climb: {best[1]}",
+    )
 
 
-def _departure_paths(site: _Site, launches: Sequence[_Start], laps: int) -> Iterator[tuple[float, float, list[Spot]]]:
+def _list_departures(site: _Site, launches: Sequence[_Start], laps: int) -> Iterator[tuple[float, float, list[Spot]]]:
     """Yield the cost, launch course and corners of departures from home to the plan's first waypoint."""
-    first, asked = site.plan.waypoints[0], site.scenario.start_course
-    onward = float(leg_courses(site.plan.waypoints[:2])[0]) if asked is None else asked
-    end, home = (float(first[0]), float(first[1])), (float(site.home[0]), float(site.home[1]))
-    after = (float(site.plan.waypoints[1, 0]), float(site.plan.waypoints[1, 1]))
-    least = site.least_length(float(first[2] - site.home[2]), 0) + math.dist(end, after)
-    for course, over, begin in launches:
-        tail = site.scenario.wind.along(course, float(site.home[2]))[0]
-        for corners in chains(begin, course, end, onward, site.radius, laps):
+    target, start_course = site.plan.waypoints[0], site.scenario.start_course
+    next_course = float(leg_courses(site.plan.waypoints[:2])[0]) if start_course is None else start_course
+    end, home = (float(target[0]), float(target[1])), (float(site.home[0]), float(site.home[1]))
+    next_point = (float(site.plan.waypoints[1, 0]), float(site.plan.waypoints[1, 1]))
+    min_length = site.min_path_length(float(target[2] - site.home[2]), 0) + math.dist(end, next_point)
+    for course, takeoff_end, begin in launches:
+        tailwind = site.scenario.wind.along(course, float(site.home[2]))[0]
+        for corners in candidate_chains(begin, course, end, next_course, site.turn_radius, laps):
             spots = [home, begin, *corners, end]
-            way, before = measure([over, *spots[1:], after], site.turning), math.dist(home, over)
-            if way.fits and before + way.length >= least:
-                yield before + way.cost + (_TAILWIND_COST_M if tail > _MAX_TAILWIND_MPS else 0.0), course, spots
+            measures, takeoff_run = (
+                measure_path([takeoff_end, *spots[1:], next_point], site.turn_lengths),
+                math.dist(home, takeoff_end),
+            )
+            if measures.fits and takeoff_run + measures.length >= min_length:
+                yield (
+                    takeoff_run + measures.cost + (_TAILWIND_COST_M if tailwind > _MAX_TAILWIND_MPS else 0.0),
+                    course,
+                    spots,
+                )
 
 
-def _lap_counts(site: _Site, rise: float, side: int) -> list[int]:
+def _lap_counts(site: _Site, height_change: float, side: int) -> list[int]:
     """Return the numbers of laps with which to try to gain (side 0) or lose (side 1) a height, m, fewest first."""
-    most = math.ceil(site.least_length(rise, side) / _SLOPE_FACTORS[-1] / (4.0 * LAP_SIDE * site.radius))
-    return list(range(min(MAX_LAPS, most) + 1))
+    max_laps = math.ceil(
+        site.min_path_length(height_change, side) / _SLOPE_FACTORS[-1] / (4.0 * LAP_SIDE * site.turn_radius)
+    )
+    return list(range(min(MAX_LAPS, max_laps) + 1))
 
 
 # ----------------------------------------------------------------------
@@ -408,48 +459,53 @@ class _Final(NamedTuple):
     point: Floats
 
 
-def _find_descent(site: _Site, strip: LandingStrip, final: FinalLaw) -> tuple[Descent | None, str]:
+def _find_descent(site: _Site, strip: LandingStrip, final_law: FinalLaw) -> tuple[Descent | None, str]:
     """Return the first accepted approach, or None and the reason."""
-    field = float(site.terrain.height(strip.east, strip.north))
-    point = np.array([strip.east, strip.north, field])
-    into = strip.into(site.scenario.wind, field)
+    field_altitude = float(site.terrain.height(strip.east, strip.north))
+    point = np.array([strip.east, strip.north, field_altitude])
+    landing_course = strip.landing_course(site.scenario.wind, field_altitude)
     courses = (
-        [into]
-        if into is not None
+        [landing_course]
+        if landing_course is not None
         else [2.0 * math.pi * k / _LANDING_COURSE_COUNT for k in range(_LANDING_COURSE_COUNT)]
     )
     finals, reasons = [], []
     for course in courses:
-        rough = _strip_fault(site.terrain, strip, course)
-        if rough:
-            reasons.append(rough)
+        fault = _describe_strip_fault(site.terrain, strip, course)
+        if fault:
+            reasons.append(fault)
             continue
-        made, why = _find_finals(site, strip, course, point, final)
-        finals += made
-        reasons += [why] if not made else []
+        course_finals, reason = _find_finals(site, strip, course, point, final_law)
+        finals += course_finals
+        reasons += [reason] if not course_finals else []
     if not finals:
         return None, reasons[0]
-    why = ""
-    for one in finals[:_MAX_FINALS]:
-        corners, why = _path_to_line_up(site, one)
+    reason = ""
+    for candidate in finals[:_MAX_FINALS]:
+        corners, reason = _find_path_to_line_up(site, candidate)
         if corners is None:
             continue
-        go_around = _min_go_around_height(site, one)
+        go_around = _min_go_around_height(site, candidate)
         if go_around is None:
-            why = f"no height would do for a go-around on {round(math.degrees(one.course)) % 360}°"
+            reason = f"no height would do for a go-around on {round(math.degrees(candidate.course)) % 360}°"
             continue
-        return Descent(corners, one.line_up, point, one.course, one.height / one.length, go_around), ""
-    return None, why
+        return Descent(
+            corners, candidate.line_up, point, candidate.course, candidate.height / candidate.length, go_around
+        ), ""
+    return None, reason
 
 
-def _strip_fault(terrain: Terrain, strip: LandingStrip, course: float) -> str:
+def _describe_strip_fault(terrain: Terrain, strip: LandingStrip, course: float) -> str:
     """Describe the fault of a strip's ground; "" if it is suitable."""
-    for name, slope in zip(("along", "across"), strip_slopes(terrain, strip, course), strict=True):
+    for direction, slope in zip(("along", "across"), strip_slopes(terrain, strip, course), strict=True):
         if math.isnan(slope):
             return "the ground of the strip is not known to its ends"
         if abs(slope) > STEEPEST_STRIP:
-            on = f"on {round(math.degrees(course)) % 360}°"
-            return f"the strip slopes by {abs(slope):.0%} {name} it {on}; at most {STEEPEST_STRIP:.0%} can be landed on"
+            course_text = f"on {round(math.degrees(course)) % 360}°"
+            return (
+                f"the strip slopes by {abs(slope):.0%} {direction} it {course_text};"
+                f" at most {STEEPEST_STRIP:.0%} can be landed on"
+            )
     return ""
 
 
@@ -457,107 +513,135 @@ def _find_finals(
     site: _Site, strip: LandingStrip, course: float, point: Floats, law: FinalLaw
 ) -> tuple[list[_Final], str]:
     """Return the unobstructed flyable finals on a course, the shallowest and shortest first, or the reason for none."""
-    field = float(point[2])
-    tail = site.scenario.wind.along(course, field)[0]
-    able = GLIDE_SHARE * math.tan(site.limits.slopes(course, field, law.airspeed(tail, field))[1])
+    field_altitude = float(point[2])
+    tailwind = site.scenario.wind.along(course, field_altitude)[0]
+    max_slope = GLIDE_SHARE * math.tan(
+        site.limits.slopes(course, field_altitude, law.airspeed(tailwind, field_altitude))[1]
+    )
     lengths = _FINAL_LENGTHS_M if strip.approach is None else (strip.approach,)
     slopes = _FINAL_SLOPES_RAD if strip.slope is None else (strip.slope,)
-    pairs = sorted(((a, s) for a in lengths for s in slopes), key=lambda one: (one[1] > _PX4_MAX_SLOPE_RAD, one))
-    found, why = list[_Final](), (-math.inf, "")
+    pairs = sorted(
+        ((final_length, final_slope) for final_length in lengths for final_slope in slopes),
+        key=lambda pair: (pair[1] > _PX4_MAX_SLOPE_RAD, pair),
+    )
+    finals, best = list[_Final](), (-math.inf, "")
     for length, slope in pairs:
         height = length * math.tan(slope)
-        flown = law.slope(height, length, tail, field)
-        if flown > able:
-            steep, most = math.degrees(math.atan(flown)), math.degrees(math.atan(able))
-            why = max(why, (-1e6, f"a glide of {steep:.1f}° is steeper than the {most:.1f}° that can be flown there"))
+        flown_slope = law.slope(height, length, tailwind, field_altitude)
+        if flown_slope > max_slope:
+            flown_deg, max_deg = math.degrees(math.atan(flown_slope)), math.degrees(math.atan(max_slope))
+            best = max(
+                best,
+                (-1e6, f"a glide of {flown_deg:.1f}° is steeper than the {max_deg:.1f}° that can be flown there"),
+            )
             continue
-        made = _Final(course, length, height, _line_up_points(site, point, course, length, height), point)
-        margin, blocked = _obstacle_on(site, made)
-        if blocked:
-            why = max(why, (margin, f"a final of {length:.0f} m at {math.degrees(slope):.1f}° {blocked}"))
+        final = _Final(course, length, height, _line_up_points(site, point, course, length, height), point)
+        margin, obstacle = _check_final(site, final)
+        if obstacle:
+            best = max(best, (margin, f"a final of {length:.0f} m at {math.degrees(slope):.1f}° {obstacle}"))
         else:
-            found.append(made)
-    return found, f"on {round(math.degrees(course)) % 360}° {why[1]}"
+            finals.append(final)
+    return finals, f"on {round(math.degrees(course)) % 360}° {best[1]}"
 
 
 def _line_up_points(site: _Site, point: Floats, course: float, length: float, height: float) -> Floats:
-    away = np.array([length + max(_MIN_LINE_UP_M, _LINE_UP_RADII * site.radius), length])
-    east, north = point[0] - away * math.sin(course), point[1] - away * math.cos(course)
+    distances = np.array([length + max(_MIN_LINE_UP_M, _LINE_UP_RADII * site.turn_radius), length])
+    east, north = point[0] - distances * math.sin(course), point[1] - distances * math.cos(course)
     return np.column_stack([east, north, np.full(2, point[2] + height)])
 
 
-def _obstacle_on(site: _Site, final: _Final) -> tuple[float, str]:
+def _check_final(site: _Site, final: _Final) -> tuple[float, str]:
     """Return a final's margin to its obstacle, m, negative if blocked, and the obstacle's description, or ""."""
     begin, point = final.line_up[1], final.point
-    run, low = _ground_profile(site.terrain, (float(begin[0]), float(begin[1])), final.course, final.length)
-    over = final.height * (1.0 - run / final.length)
-    room = float(point[2]) + over - low - np.minimum(_MAX_GLIDE_CLEARANCE_M, _GLIDE_CLEARANCE_FRACTION * over)
-    asked = room[run <= final.length - _GROUND_CONTACT_ZONE_M]
-    if np.isnan(asked).any():
+    distances, ground = _ground_profile(site.terrain, (float(begin[0]), float(begin[1])), final.course, final.length)
+    heights = final.height * (1.0 - distances / final.length)
+    margins = (
+        float(point[2]) + heights - ground - np.minimum(_MAX_GLIDE_CLEARANCE_M, _GLIDE_CLEARANCE_FRACTION * heights)
+    )
+    judged_margins = margins[distances <= final.length - _GROUND_CONTACT_ZONE_M]
+    if np.isnan(judged_margins).any():
         return -math.inf, "leads over ground that is not known"
-    if asked.min(initial=0.0) < 0.0:
-        return float(asked.min()), f"is {-float(asked.min()):.0f} m too low over the ground"
-    entered = site.entered([begin.tolist(), [float(point[0]), float(point[1]), float(begin[2])]])
-    entered = entered or site.entered([[*begin[:2].tolist(), float(point[2])], point.tolist()])
-    if entered:
-        return -math.inf, f"is {entered}"
-    above = np.array([point[0], point[1], begin[2]])
-    chain = np.concatenate([final.line_up, above[None]])
-    found = site.certificate(chain, (chain[0], chain[0]))
-    if not found.ok:
-        return min(found.clearance, 0.0) - 1.0, f"is not free: {found.problems[0]}"
-    return 0.0, "" if found.kill_distance > 0.0 else "is inside a missile's reach"
+    if judged_margins.min(initial=0.0) < 0.0:
+        return float(judged_margins.min()), f"is {-float(judged_margins.min()):.0f} m too low over the ground"
+    obstacle = site.describe_obstacle([begin.tolist(), [float(point[0]), float(point[1]), float(begin[2])]])
+    obstacle = obstacle or site.describe_obstacle([[*begin[:2].tolist(), float(point[2])], point.tolist()])
+    if obstacle:
+        return -math.inf, f"is {obstacle}"
+    point_above = np.array([point[0], point[1], begin[2]])
+    chain = np.concatenate([final.line_up, point_above[None]])
+    certificate = site.certify_chain(chain, (chain[0], chain[0]))
+    if not certificate.ok:
+        return min(certificate.clearance, 0.0) - 1.0, f"is not free: {certificate.problems[0]}"
+    return 0.0, "" if certificate.kill_distance > 0.0 else "is inside a missile's reach"
 
 
-def _path_to_line_up(site: _Site, final: _Final) -> tuple[Floats | None, str]:
+def _find_path_to_line_up(site: _Site, final: _Final) -> tuple[Floats | None, str]:
     """Return corners (n, 3) of the shortest path from the plan's end to a line-up, or None and the reason."""
-    path, goal = site.plan.waypoints, float(final.line_up[0, 2])
-    last, high = path[-1], float(path[-1, 2])
-    asked = site.scenario.destination_course
-    course = float(leg_courses(path[-2:])[0]) if asked is None else asked
-    begin, end = (float(last[0]), float(last[1])), (float(final.line_up[0, 0]), float(final.line_up[0, 1]))
-    before = path[-3:-1]
-    flown = [(float(one[0]), float(one[1])) for one in before]
-    after = (float(final.line_up[1, 0]), float(final.line_up[1, 1]))
-    nearest = _BestRefused()
-    above = np.array([final.point[0], final.point[1], goal])
-    side = int(goal < high)
-    aside = math.dist(flown[-1], begin) + math.dist(end, after)
-    aside += sum(math.dist(a, b) for a, b in pairwise(flown))
-    least = site.least_length(high - goal, side) + aside
-    for laps in _lap_counts(site, high - goal, side):
-        ways = [[begin, *corners, end] for corners in chains(begin, course, end, final.course, site.radius, laps)]
-        measured = [(measure([*flown, *spots, after], site.turning), spots) for spots in ways]
-        fitting = [(way.cost, spots) for way, spots in measured if way.fits and way.length >= least]
+    waypoints, line_up_altitude = site.plan.waypoints, float(final.line_up[0, 2])
+    last_waypoint, end_altitude = waypoints[-1], float(waypoints[-1, 2])
+    destination_course = site.scenario.destination_course
+    course = float(leg_courses(waypoints[-2:])[0]) if destination_course is None else destination_course
+    begin, end = (
+        (float(last_waypoint[0]), float(last_waypoint[1])),
+        (float(final.line_up[0, 0]), float(final.line_up[0, 1])),
+    )
+    previous_waypoints = waypoints[-3:-1]
+    previous_spots = [(float(waypoint[0]), float(waypoint[1])) for waypoint in previous_waypoints]
+    glide_start = (float(final.line_up[1, 0]), float(final.line_up[1, 1]))
+    best_rejected = _BestRejected()
+    point_above = np.array([final.point[0], final.point[1], line_up_altitude])
+    side = int(line_up_altitude < end_altitude)
+    extra_length = math.dist(previous_spots[-1], begin) + math.dist(end, glide_start)
+    extra_length += sum(math.dist(a, b) for a, b in pairwise(previous_spots))
+    min_length = site.min_path_length(end_altitude - line_up_altitude, side) + extra_length
+    for laps in _lap_counts(site, end_altitude - line_up_altitude, side):
+        paths = [
+            [begin, *corners, end]
+            for corners in candidate_chains(begin, course, end, final.course, site.turn_radius, laps)
+        ]
+        measured = [(measure_path([*previous_spots, *spots, glide_start], site.turn_lengths), spots) for spots in paths]
+        fitting = [
+            (measures.cost, spots) for measures, spots in measured if measures.fits and measures.length >= min_length
+        ]
         for _, spots in sorted(fitting):
-            for share in _SLOPE_FACTORS:
-                heights = _approach_altitudes(site, spots, share, high, goal)
-                if abs(heights[0] - high) > 1e-6 or abs(heights[-1] - goal) > 1e-6:
+            for slope_factor in _SLOPE_FACTORS:
+                heights = _approach_altitudes(site, spots, slope_factor, end_altitude, line_up_altitude)
+                if abs(heights[0] - end_altitude) > 1e-6 or abs(heights[-1] - line_up_altitude) > 1e-6:
                     break
-                chain = np.concatenate([before, _chain(spots, heights), final.line_up[1:], above[None]])
-                found = site.certificate(chain, (last, last))
-                if found.ok and found.kill_distance > 0.0:
-                    return chain[len(before) + 1 : len(before) + len(spots) - 1], ""
-                nearest.add(found)
-            if nearest.tried >= _MAX_CERTIFIED:
+                chain = np.concatenate(
+                    [previous_waypoints, _chain(spots, heights), final.line_up[1:], point_above[None]]
+                )
+                certificate = site.certify_chain(chain, (last_waypoint, last_waypoint))
+                if certificate.ok and certificate.kill_distance > 0.0:
+                    return chain[len(previous_waypoints) + 1 : len(previous_waypoints) + len(spots) - 1], ""
+                best_rejected.add(certificate)
+            if best_rejected.count >= _MAX_CERTIFIED:
                 break
-    where = f"from the destination to the final on {round(math.degrees(final.course)) % 360}°"
-    if not nearest.tried:
-        return None, f"no way {where} is long enough for its turns and {high - goal:.0f} m of descent"
+    route_text = f"from the destination to the final on {round(math.degrees(final.course)) % 360}°"
+    if not best_rejected.count:
+        return (
+            None,
+            f"no way {route_text} is long enough for its turns and {end_altitude - line_up_altitude:.0f} m of descent",
+        )
     remedy = "a higher destination (height_m) or another strip may have one"
-    return None, f"none of {nearest.tried} ways {where} is free: {remedy}; the nearest: {nearest.problem}"
+    return (
+        None,
+        f"none of {best_rejected.count} ways {route_text} is free: {remedy}; the nearest: {best_rejected.problem}",
+    )
 
 
-def _approach_altitudes(site: _Site, spots: list[Spot], share: float, high: float, goal: float) -> Floats:
+def _approach_altitudes(
+    site: _Site, spots: list[Spot], slope_factor: float, begin_altitude: float, end_altitude: float
+) -> Floats:
     """Return the altitudes of a path between two altitudes at a fraction of its slope limits, (n,) m AMSL."""
-    top = max(high, goal)
-    climb, dive = (partial(_scaled_slope, site, share, side, top) for side in (0, 1))
-    return fallen(spots, high, climb, dive, goal)
+    top_altitude = max(begin_altitude, end_altitude)
+    climb, dive = (partial(_scaled_slope, site, slope_factor, side, top_altitude) for side in (0, 1))
+    return descent_altitudes(spots, begin_altitude, climb, dive, end_altitude)
 
 
-def _scaled_slope(site: _Site, share: float, side: int, amsl: float, course: float) -> float:
+def _scaled_slope(site: _Site, factor: float, side: int, altitude: float, course: float) -> float:
     """Return a fraction of the climb (side 0) or dive (1) slope on a course, m per m."""
-    return share * site.slopes(course, amsl)[side]
+    return factor * site.slopes(course, altitude)[side]
 
 
 def _min_go_around_height(site: _Site, final: _Final) -> float | None:
@@ -565,42 +649,49 @@ def _min_go_around_height(site: _Site, final: _Final) -> float | None:
 
     It climbs straight ahead from the landing point at `SHARE` of the steepest climb, then flies back to the line-up.
     """
-    home, field = float(site.home[2]), float(final.point[2])
+    home_altitude, field_altitude = float(site.home[2]), float(final.point[2])
     target = final.line_up[0]
     # Above the line-up: an aircraft that aborts above the go-around height turns at once, between the hills.
-    first = max(
+    min_height = max(
         _MIN_GO_AROUND_HEIGHT_M,
-        field - home + _MIN_GO_AROUND_HEIGHT_M,
-        float(target[2]) - home + _GO_AROUND_CLEARANCE_M,
+        field_altitude - home_altitude + _MIN_GO_AROUND_HEIGHT_M,
+        float(target[2]) - home_altitude + _GO_AROUND_CLEARANCE_M,
     )
     for height in np.arange(
-        math.ceil(first / _GO_AROUND_STEP_M) * _GO_AROUND_STEP_M, _MAX_GO_AROUND_HEIGHT_M, _GO_AROUND_STEP_M
+        math.ceil(min_height / _GO_AROUND_STEP_M) * _GO_AROUND_STEP_M, _MAX_GO_AROUND_HEIGHT_M, _GO_AROUND_STEP_M
     ).tolist():
-        top = home + height
-        climb = site.slopes(final.course, top)[0]
+        top_altitude = home_altitude + height
+        climb = site.slopes(final.course, top_altitude)[0]
         if climb <= 0.0:
             return None
-        run, low = _ground_profile(
-            site.terrain, (float(final.point[0]), float(final.point[1])), final.course, (top - field) / climb
+        distances, ground = _ground_profile(
+            site.terrain,
+            (float(final.point[0]), float(final.point[1])),
+            final.course,
+            (top_altitude - field_altitude) / climb,
         )
-        room = (field + climb * run - low)[run > _LAUNCH_RUN_M]
-        turned = np.array(
-            [final.point[0] + run[-1] * math.sin(final.course), final.point[1] + run[-1] * math.cos(final.course), top]
+        margins = (field_altitude + climb * distances - ground)[distances > _LAUNCH_RUN_M]
+        turn_point = np.array(
+            [
+                final.point[0] + distances[-1] * math.sin(final.course),
+                final.point[1] + distances[-1] * math.cos(final.course),
+                top_altitude,
+            ]
         )
-        if (room >= 0.0).all() and _return_clearance(site, turned, target) >= _GO_AROUND_CLEARANCE_M:
+        if (margins >= 0.0).all() and _return_clearance(site, turn_point, target) >= _GO_AROUND_CLEARANCE_M:
             return float(height)
     return None
 
 
-def _return_clearance(site: _Site, turned: Floats, target: Floats) -> float:
+def _return_clearance(site: _Site, turn_point: Floats, target: Floats) -> float:
     """Return the minimum height above ground on the way from a go-around back to the line-up, m; -inf if unknown."""
-    run = float(leg_runs(np.stack([turned, target]))[0])
-    share = np.linspace(0.0, 1.0, max(2, math.ceil(run / _GROUND_SPACING_M)))
-    east, north = (turned[k] + share * (target[k] - turned[k]) for k in range(2))
-    if target[2] > turned[2]:
-        climb = site.slopes(math.atan2(target[0] - turned[0], target[1] - turned[1]), float(target[2]))[0]
-        up = np.minimum(target[2], turned[2] + max(0.0, climb) * run * share)
+    length = float(leg_runs(np.stack([turn_point, target]))[0])
+    fractions = np.linspace(0.0, 1.0, max(2, math.ceil(length / _GROUND_SPACING_M)))
+    east, north = (turn_point[k] + fractions * (target[k] - turn_point[k]) for k in range(2))
+    if target[2] > turn_point[2]:
+        climb = site.slopes(math.atan2(target[0] - turn_point[0], target[1] - turn_point[1]), float(target[2]))[0]
+        altitudes = np.minimum(target[2], turn_point[2] + max(0.0, climb) * length * fractions)
     else:
-        up = turned[2] + share * (target[2] - turned[2])
-    room = up - site.terrain.height(east, north)
-    return -math.inf if np.isnan(room).any() else float(room.min())
+        altitudes = turn_point[2] + fractions * (target[2] - turn_point[2])
+    heights = altitudes - site.terrain.height(east, north)
+    return -math.inf if np.isnan(heights).any() else float(heights.min())

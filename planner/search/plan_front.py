@@ -57,25 +57,25 @@ SLACK = 1.25
 # Fractions of the search margins beyond the certificate's margins, tried in this order.
 MARGINS = (0.5, 0.1, 0.0)
 # Minimum number of solutions that the search keeps.
-ARCHIVE = 100
+MIN_ARCHIVE_SIZE = 100
 # Number of solutions that the search keeps per requested plan.
-KEPT = 2
+SOLUTIONS_PER_PLAN = 2
 # Samples per generation.
 POPULATION = 120
 # Number of generations.
 GENERATIONS = 400
 # Largest deviation of the noise along, as a fraction of an interval.
-ALONG = 0.3
+NOISE_ALONG = 0.3
 # Largest deviation of the noise across, as a fraction of the straight line.
-ACROSS = 0.1
+NOISE_ACROSS = 0.1
 # Largest deviation of the noise up, as a fraction of the height range.
-UP = 0.3
+NOISE_UP = 0.3
 # Reference point: length and time or energy relative to the default plan.
-MOST_LENGTH = 1.5
+MAX_LENGTH_RATIO = 1.5
 # Reference point: exposure relative to the default plan.
-MOST_EXPOSURE = 1.5
+MAX_EXPOSURE_RATIO = 1.5
 # Exposure used in place of the default plan's exposure if that is lower, s.
-LEAST_EXPOSURE = 1.0
+MIN_EXPOSURE = 1.0
 # Noticeable gains: a plan that gains no more than these amounts over another plan in any objective is not a separate
 # choice. With these amounts fronts of 20 plans cover as much as without (`benchmarks.planning.fronts`); with twice the
 # amounts there were 17 plans for `jacksboro`.
@@ -105,9 +105,9 @@ class Front:
 
     Of any two plans at least one gains more than `noticed_amounts` over the other in some objective.
 
-    asked: maximum number of plans, as requested.
+    asked: requested maximum number of plans.
     fourth: fourth objective, after length, exposure and clearance: "time" or "energy".
-    default: the shortest plan, found by the planner alone, and its values.
+    default: the default planner's plan, which is the shortest, and its values.
     reference: (4,) reference point of the hypervolume, clearance negated; plans beyond it are ignored.
     evaluations: paths evaluated, without the default plan's evaluations.
     refused: number of other plans that were not safe once they were completed.
@@ -123,11 +123,11 @@ class Front:
 
     def objectives(self) -> Floats:
         """Return the objectives (n, 4) of the plans; smaller is better for all of them."""
-        return np.array([_objective_row(one, self.fourth) for one in self.plans]).reshape(-1, 4)
+        return np.array([_objective_row(plan, self.fourth) for plan in self.plans]).reshape(-1, 4)
 
 
-def _objective_row(one: FrontPlan, fourth: str) -> list[float]:
-    return [one.length, one.exposure, -one.clearance, one.time if fourth == "time" else one.energy]
+def _objective_row(plan: FrontPlan, fourth: str) -> list[float]:
+    return [plan.length, plan.exposure, -plan.clearance, plan.time if fourth == "time" else plan.energy]
 
 
 def plan_front(
@@ -165,17 +165,17 @@ def plan_front(
     if default is None:
         default = finish(plan_path(scenario, limits, seed=seed, progress=progress, stop=stop))
     path = with_waypoints(default.waypoints, waypoints or 0)
-    task = fitted_task(task, path)
+    task = fit_margins(task, path)
     first = _with_values(task, default)
     reference = reference_point(task, first)
     if not default.safe or len(path) == 2:
         # A path of two waypoints has no inner waypoint to move.
         return Front((first,) if default.safe else (), count, task.fourth, first, reference, 0)
-    size = max(ARCHIVE, KEPT * count)
+    size = max(MIN_ARCHIVE_SIZE, SOLUTIONS_PER_PLAN * count)
     search = make_sampling(task, len(path), reference, size, stream(seed, PLANNER))
     evaluations = _search(task, search, path, progress, stop, generations)
     chosen, refused = _certify_distinct(task, search, count, first, replace(default, evaluations=evaluations), finish)
-    plans = tuple(sorted(chosen, key=lambda one: one.length))
+    plans = tuple(sorted(chosen, key=lambda plan: plan.length))
     return Front(plans, count, task.fourth, first, reference, evaluations, refused)
 
 
@@ -203,15 +203,15 @@ class FrontTask(NamedTuple):
         return front_values(self.problem.search, self.energy, paths)
 
     def scores(self, paths: Floats) -> tuple[Floats, Floats]:
-        """Return objectives (n, 4), and violations (n, 5) of four graded constraints and of the exposure to missiles.
+        """Return objectives (n, 4), and violations (n, 5): four graded constraints and the exposure to missiles.
 
-        Objectives are infinite if a constraint is violated: they are not needed then, and take most of the time.
+        Objectives are infinite if a constraint is violated, because computing them takes most of the time.
         """
         violations, graded = graded_scores(self.scored, paths)
-        every = np.concatenate([violations, graded[:, Objective.KILL_EXPOSURE, None]], axis=1)
-        out, met = np.full((len(paths), 4), np.inf), (every <= 0.0).all(axis=1)
-        out[met] = self.objectives(self.values(paths[met]))
-        return out, every
+        all_violations = np.concatenate([violations, graded[:, Objective.KILL_EXPOSURE, None]], axis=1)
+        objectives, is_feasible = np.full((len(paths), 4), np.inf), (all_violations <= 0.0).all(axis=1)
+        objectives[is_feasible] = self.objectives(self.values(paths[is_feasible]))
+        return objectives, all_violations
 
     def objectives(self, values: Floats) -> Floats:
         """Convert values (n, 5) to the objectives length, exposure, negated clearance, and time or energy, (n, 4)."""
@@ -234,29 +234,31 @@ class FrontTask(NamedTuple):
 
 def front_task(scenario: Scenario, limits: Limits) -> FrontTask:
     """Make the problem of a scenario with several objectives, with the margins of the default planner's search."""
-    chosen = find_algorithm(None, scenario.name)
-    problem = make_problem(scenario, limits_for(chosen, limits))
-    table = problem.search.aircraft
-    energy = energy_cost(limits.envelope, table)
+    algorithm = find_algorithm(None, scenario.name)
+    problem = make_problem(scenario, limits_for(algorithm, limits))
+    aircraft = problem.search.aircraft
+    energy = energy_cost(limits.envelope, aircraft)
     by_energy = energy is not None and scenario.planner.objective != "time"
-    travel = energy if energy is not None and by_energy else time_cost(table)
+    travel = energy if energy is not None and by_energy else time_cost(aircraft)
     frame = rotated_frame(problem.space.start, problem.space.destination)
     scored = _with_margins(problem, MARGINS[0])
     return FrontTask(problem, scored, frame, energy, "energy" if by_energy else "time", travel)
 
 
-def _with_margins(problem: Problem, share: float) -> ProblemArrays:
-    """Return the problem with margins between the certificate's (share 0) and the search's (share 1)."""
+def _with_margins(problem: Problem, fraction: float) -> ProblemArrays:
+    """Return the problem with margins between the certificate's (fraction 0) and the search's (fraction 1)."""
     search, certified = problem.search, problem.certified
-    names = ("buffer", "start_buffer", "destination_buffer", "kill_margin")
-    least = {name: getattr(certified, name) for name in names}
-    return search._replace(**{name: low + share * (getattr(search, name) - low) for name, low in least.items()})
+    field_names = ("buffer", "start_buffer", "destination_buffer", "kill_margin")
+    certified_margins = {name: getattr(certified, name) for name in field_names}
+    return search._replace(
+        **{name: margin + fraction * (getattr(search, name) - margin) for name, margin in certified_margins.items()}
+    )
 
 
-def fitted_task(task: FrontTask, default: Floats) -> FrontTask:
-    """Return the task with margins that the default path (w, 3) has, so that others may pass equally narrow gaps."""
-    for share in MARGINS:
-        task = task._replace(scored=_with_margins(task.problem, share))
+def fit_margins(task: FrontTask, default: Floats) -> FrontTask:
+    """Reduce the task's margins to those of the default path (w, 3), so that others may pass equally narrow gaps."""
+    for fraction in MARGINS:
+        task = task._replace(scored=_with_margins(task.problem, fraction))
         if (task.scores(default[None])[1] <= 0.0).all():
             break
     return task
@@ -268,16 +270,16 @@ def reference_point(task: FrontTask, default: FrontPlan) -> Floats:
     It is 1.5 times the default plan's length, exposure and time or energy, and the required clearance.
     """
     length, exposure, _, fourth = _objective_row(default, task.fourth)
-    most = max(LEAST_EXPOSURE, MOST_EXPOSURE * exposure)
-    required = -task.problem.certified.clearance
-    return np.array([MOST_LENGTH * length, most, required, MOST_LENGTH * fourth])
+    max_exposure = max(MIN_EXPOSURE, MAX_EXPOSURE_RATIO * exposure)
+    negated_clearance = -task.problem.certified.clearance
+    return np.array([MAX_LENGTH_RATIO * length, max_exposure, negated_clearance, MAX_LENGTH_RATIO * fourth])
 
 
 def _with_values(task: FrontTask, plan: Plan) -> FrontPlan:
     """Return a plan with its values; the clearance is taken from the certificate."""
     row = task.values(np.array(plan.waypoints)[None])[0]
-    required = task.problem.certified.clearance
-    clearance = plan.certificate.clearance + required
+    required_clearance = task.problem.certified.clearance
+    clearance = plan.certificate.clearance + required_clearance
     return FrontPlan(plan, row[Value.LENGTH], row[Value.EXPOSURE], clearance, row[Value.TIME], row[Value.ENERGY])
 
 
@@ -288,22 +290,22 @@ def seed_paths(task: FrontTask, default: Floats) -> Iterator[Floats]:
     """Yield paths (w, 3) for various preferences, from the default path (w, 3) and routes past the obstacles."""
     yield default
     count = len(default)
-    routes = [default, *(resample(route, count) for route in _routes(task, default))]
-    for wanted in _preferred_problems(task):
+    routes = [default, *(resample(route, count) for route in _list_routes(task, default))]
+    for preferred in _preferred_problems(task):
         for route in routes:
-            path, _ = shorten_path(wanted, route)
+            path, _ = shorten_path(preferred, route)
             # Shorten again from equal legs, as for the default plan.
-            path, _ = shorten_path(wanted, resample(path, count))
+            path, _ = shorten_path(preferred, resample(path, count))
             yield path
 
 
-def _routes(task: FrontTask, default: Floats) -> list[Floats]:
-    """Return routes (k, 3) on other sides of the obstacles, or no routes among zones, which routes ignore."""
+def _list_routes(task: FrontTask, default: Floats) -> list[Floats]:
+    """Return routes (k, 3) on other sides of the obstacles; none among zones, which routes ignore."""
     data, frame = task.problem.search, task.frame
     if is_limited(data.airspace):
         return []
-    half = 0.5 * SLACK * frame.length
-    grid = optimistic_grid(data, frame, (-half, half), STAGES, shrink=SHRINK, spread=SPREAD, ratio=RATIO)
+    half_width = 0.5 * SLACK * frame.length
+    grid = optimistic_grid(data, frame, (-half_width, half_width), STAGES, shrink=SHRINK, spread=SPREAD, ratio=RATIO)
     bound = SLACK * float(np.sqrt((np.diff(default, axis=0) ** 2).sum(axis=1)).sum())
     return [frame.restore(route.points) for route in side_routes(data, frame, grid, bound, MAX_ROUTES)]
 
@@ -311,16 +313,16 @@ def _routes(task: FrontTask, default: Floats) -> list[Floats]:
 def _preferred_problems(task: FrontTask) -> Iterator[ProblemArrays]:
     """Yield variants of the problem with a larger clearance, with radars as obstacles, and with another cost."""
     data, scenario = task.problem.search, task.problem.scenario
-    at_ends = np.stack([[end, end] for end in (data.start, data.destination)])
-    spare = max(0.0, float(task.values(at_ends)[:, Value.CLEARANCE].min()) - data.clearance)
-    radars = RADAR_SHARES if (scenario.threats.detection_radius > 0.0).any() else RADAR_SHARES[:1]
-    for radar in radars:
-        units = threat_records(scenario.threats).copy()
-        units["kill_radius"] = np.maximum(units["kill_radius"], radar * units["detection_radius"])
-        index = make_missile_index(units)
-        for share in CLEARANCE_SHARES:
-            more = max(data.buffer, share * spare)
-            stricter = data._replace(missiles=index, buffer=more)
+    end_legs = np.stack([[end, end] for end in (data.start, data.destination)])
+    spare_height = max(0.0, float(task.values(end_legs)[:, Value.CLEARANCE].min()) - data.clearance)
+    radar_fractions = RADAR_SHARES if (scenario.threats.detection_radius > 0.0).any() else RADAR_SHARES[:1]
+    for radar_fraction in radar_fractions:
+        threats = threat_records(scenario.threats).copy()
+        threats["kill_radius"] = np.maximum(threats["kill_radius"], radar_fraction * threats["detection_radius"])
+        missiles = make_missile_index(threats)
+        for clearance_fraction in CLEARANCE_SHARES:
+            buffer = max(data.buffer, clearance_fraction * spare_height)
+            stricter = data._replace(missiles=missiles, buffer=buffer)
             yield stricter
             yield stricter._replace(travel=task.travel)
 
@@ -360,45 +362,54 @@ def make_sampling(
     task: FrontTask, waypoints: int, reference: Floats, size: int, rng: np.random.Generator
 ) -> FrontSampling:
     """Make the estimation of distribution for paths of `waypoints` waypoints, with an archive of `size` solutions."""
-    data, frame, inner = task.problem.search, task.frame, waypoints - 2
+    data, frame, inner_count = task.problem.search, task.frame, waypoints - 2
     corners = np.array([[x, y, 0.0] for x in (data.west, data.east) for y in (data.south, data.north)])
     rotated = frame.rotate(corners)
     low = np.array([rotated[:, 0].min(), rotated[:, 1].min(), data.floor])
     high = np.array([rotated[:, 0].max(), rotated[:, 1].max(), data.ceiling])
-    scales = np.array([ALONG * frame.length / (inner + 1), ACROSS * frame.length, UP * (high[2] - low[2])])
+    scales = np.array(
+        [NOISE_ALONG * frame.length / (inner_count + 1), NOISE_ACROSS * frame.length, NOISE_UP * (high[2] - low[2])]
+    )
     return FrontSampling(
-        np.tile(low, inner), np.tile(high, inner), directions(inner, scales), reference, 3, size, POPULATION, rng
+        np.tile(low, inner_count),
+        np.tile(high, inner_count),
+        directions(inner_count, scales),
+        reference,
+        3,
+        size,
+        POPULATION,
+        rng,
     )
 
 
-def directions(inner: int, scales: Floats) -> Floats:
+def directions(inner_count: int, scales: Floats) -> Floats:
     """Return noise directions (k, 3 inner), smooth modes of the whole path and bumps of up to four waypoints.
 
     scales: (3,) largest deviations along, across and up.
     """
-    modes, deviations = bridge_modes(inner)
+    modes, deviations = bridge_modes(inner_count)
     waves = (modes * deviations / np.abs(modes[:, 0]).max()).T
     bumps = [
-        np.where((np.arange(inner) >= begin) & (np.arange(inner) < begin + width), 1.0, 0.0)
+        np.where((np.arange(inner_count) >= begin) & (np.arange(inner_count) < begin + width), 1.0, 0.0)
         for width in (1, 2, 4)
-        for begin in range(max(1, inner - width + 1))
+        for begin in range(max(1, inner_count - width + 1))
     ]
     shapes = np.array([*waves, *bumps])
-    out = np.zeros((len(shapes), 3, inner, 3))
+    out = np.zeros((len(shapes), 3, inner_count, 3))
     for axis in range(3):
         out[:, axis, :, axis] = shapes * scales[axis]
-    return out.reshape(3 * len(shapes), 3 * inner)
+    return out.reshape(3 * len(shapes), 3 * inner_count)
 
 
 def noticed_amounts(default: FrontPlan, fourth: str) -> Floats:
     """Return the noticeable gains (4,) of the objectives relative to a default plan."""
-    length, exposure, _, last = _objective_row(default, fourth)
-    least = NOTICED_EXPOSURE * max(LEAST_EXPOSURE, exposure)
-    return np.array([NOTICED * length, least, NOTICED_CLEARANCE, NOTICED * last])
+    length, exposure, _, fourth_value = _objective_row(default, fourth)
+    exposure_gain = NOTICED_EXPOSURE * max(MIN_EXPOSURE, exposure)
+    return np.array([NOTICED * length, exposure_gain, NOTICED_CLEARANCE, NOTICED * fourth_value])
 
 
 def distinct_rows(objectives: Floats, amounts: Floats) -> list[int]:
-    """Return the indices of objectives (n, m), in order, that gain more than an amount (m,) over all rows taken before.
+    """Return the indices of objectives (n, m) that gain more than `amounts` (m,) over every row taken before.
 
     The additive epsilon-dominance of Laumanns, Thiele, Deb and Zitzler (Evolutionary Computation 10, 2002): a row is
     left out if a row taken before is worse by no more than the amounts in every objective.
@@ -406,11 +417,11 @@ def distinct_rows(objectives: Floats, amounts: Floats) -> list[int]:
     >>> distinct_rows(np.array([[1.0, 9.0], [1.1, 8.9], [2.0, 5.0], [9.0, 4.9]]), np.array([0.5, 0.5]))
     [0, 2]
     """
-    taken: list[int] = []
+    taken_rows: list[int] = []
     for row, values in enumerate(objectives):
-        if not (objectives[taken] <= values + amounts).all(axis=1).any():
-            taken.append(row)
-    return taken
+        if not (objectives[taken_rows] <= values + amounts).all(axis=1).any():
+            taken_rows.append(row)
+    return taken_rows
 
 
 def _certify_distinct(
@@ -425,34 +436,36 @@ def _certify_distinct(
 
     Each plan is certified and completed. first: the completed default plan, which is included if no plan is better.
     """
-    amounts, found = noticed_amounts(first, task.fourth), dict[int, FrontPlan]()
-    left = np.arange(len(search.vectors))
+    amounts, plans = noticed_amounts(first, task.fourth), dict[int, FrontPlan]()
+    remaining_rows = np.arange(len(search.vectors))
     while True:
-        ranked = left[covering_order(search.objectives[left], search.reference, len(left))]
-        order = ranked[distinct_rows(search.objectives[ranked], amounts)][:count].tolist()
-        for row in order:
-            if row not in found:
+        ranked_rows = remaining_rows[
+            covering_order(search.objectives[remaining_rows], search.reference, len(remaining_rows))
+        ]
+        rows = ranked_rows[distinct_rows(search.objectives[ranked_rows], amounts)][:count].tolist()
+        for row in rows:
+            if row not in plans:
                 path = task.paths(search.vectors[row][None])[0]
-                found[row] = _with_values(task, finish(_make_plan(task, path, template)))
-        refused = [row for row in order if not found[row].plan.safe]
+                plans[row] = _with_values(task, finish(_make_plan(task, path, template)))
+        rejected_rows = [row for row in rows if not plans[row].plan.safe]
         chosen: list[FrontPlan] = []
-        if not refused:
-            chosen = _noticeable_undominated([*(found[row] for row in order), first], task.fourth, amounts)
-            refused = [row for row in order if not any(one is found[row] for one in chosen)]
-        if not refused:
-            return chosen[:count], sum(not one.plan.safe for one in found.values())
-        left = np.setdiff1d(left, refused)
+        if not rejected_rows:
+            chosen = _drop_dominated([*(plans[row] for row in rows), first], task.fourth, amounts)
+            rejected_rows = [row for row in rows if not any(plan is plans[row] for plan in chosen)]
+        if not rejected_rows:
+            return chosen[:count], sum(not plan.plan.safe for plan in plans.values())
+        remaining_rows = np.setdiff1d(remaining_rows, rejected_rows)
 
 
-def _noticeable_undominated(found: list[FrontPlan], fourth: str, amounts: Floats) -> list[FrontPlan]:
-    """Return the plans that are undominated by the values of their certificates, and have a noticeable gain."""
-    rows = np.array([_objective_row(one, fourth) for one in found])
-    order = np.arange(len(rows))
+def _drop_dominated(plans: list[FrontPlan], fourth: str, amounts: Floats) -> list[FrontPlan]:
+    """Return the plans with a noticeable gain that are not dominated by the values of their certificates."""
+    objectives = np.array([_objective_row(plan, fourth) for plan in plans])
+    indices = np.arange(len(objectives))
     # Of equal plans the first is kept.
-    less = (rows[:, None] < rows[None]).any(axis=2) | (order[:, None] < order)
-    beaten = ((rows[:, None] <= rows[None]).all(axis=2) & less).any(axis=0)
-    best = np.flatnonzero(~beaten)
-    return [found[k] for k in best[distinct_rows(rows[best], amounts)].tolist()]
+    is_better = (objectives[:, None] < objectives[None]).any(axis=2) | (indices[:, None] < indices)
+    is_dominated = ((objectives[:, None] <= objectives[None]).all(axis=2) & is_better).any(axis=0)
+    undominated_rows = np.flatnonzero(~is_dominated)
+    return [plans[k] for k in undominated_rows[distinct_rows(objectives[undominated_rows], amounts)].tolist()]
 
 
 def _make_plan(task: FrontTask, path: Floats, template: Plan) -> Plan:

@@ -19,7 +19,7 @@ from planner.plan import Certificate, Plan
 from planner.search.algorithms import find_algorithm, limits_for
 from planner.search.generations import may_try_again, path_generations, waypoint_generations
 from planner.search.infeasibility_proof import is_closed
-from planner.search.search_cheapest import search_cheapest, wanted_cost
+from planner.search.search_cheapest import objective_cost, search_cheapest
 from planner.search.search_state import (
     Archive,
     Improved,
@@ -36,7 +36,7 @@ from planner.search.seeds import (
     search_turning_back,
     shorten_best,
     starting_vectors,
-    straight_line,
+    try_straight_line,
 )
 from world.arrays import Floats
 from world.errors import ScenarioError
@@ -96,28 +96,40 @@ def plan_path(
     If no feasible path is found, the certificate of the plan states the problems. Raises ScenarioError for options that
     cannot work.
     """
-    chosen = find_algorithm(algorithm or scenario.planner.algorithm, scenario.name)
+    found_algorithm = find_algorithm(algorithm or scenario.planner.algorithm, scenario.name)
     _check_options(scenario, limits.airspeed)
-    problem = make_problem(scenario, limits_for(chosen, limits))
-    cost = wanted_cost(scenario, limits, problem)
-    encoding = ENCODINGS[chosen.encoding](problem.space, scenario.planner.waypoints)
+    problem = make_problem(scenario, limits_for(found_algorithm, limits))
+    cost = objective_cost(scenario, limits, problem)
+    encoding = ENCODINGS[found_algorithm.encoding](problem.space, scenario.planner.waypoints)
     # A path is never further from missile spheres than its own ends.
-    ends = min(kill_distance(problem.certified, np.stack([end, end])) for end in (scenario.start, scenario.destination))
-    wanted = min(CERTIFIED_KILL_MARGIN, ends - 1e-6)
-    search = Search(problem, chosen, encoding, stream(seed, PLANNER), progress, stop, first_safe, wanted, improved)
+    end_distance = min(
+        kill_distance(problem.certified, np.stack([end, end])) for end in (scenario.start, scenario.destination)
+    )
+    required_distance = min(CERTIFIED_KILL_MARGIN, end_distance - 1e-6)
+    search = Search(
+        problem,
+        found_algorithm,
+        encoding,
+        stream(seed, PLANNER),
+        progress,
+        stop,
+        first_safe,
+        required_distance,
+        improved,
+    )
     waypoints, certificate = search_cheapest(search, _search_repeatedly(search, previous), cost)
-    counts, objectives = paper_scores(problem.certified, waypoints[None])
+    violations, objectives = paper_scores(problem.certified, waypoints[None])
     return Plan(
         scenario=scenario,
         waypoints=waypoints,
-        violations=counts[0],
+        violations=violations[0],
         objectives=objectives[0],
         certificate=certificate,
         seed=seed,
-        algorithm=chosen.name,
+        algorithm=found_algorithm.name,
         evaluations=search.evaluations,
         history=np.array(search.history).reshape(-1, 3),
-        ended=search.ended,
+        ended=search.end_reason,
     )
 
 
@@ -127,20 +139,20 @@ def _search_repeatedly(search: Search, previous: Floats | None) -> tuple[Floats,
     if is_limited(search.problem.search.airspace):
         attempts = min(attempts, MAX_ATTEMPTS_AMONG_ZONES)
     best: tuple[Floats, Certificate] | None = None
-    for number in range(attempts):
-        if number > 0:
-            _prepare_retry(search, number)
+    for attempt in range(attempts):
+        if attempt > 0:
+            _prepare_retry(search, attempt)
         try:
-            _attempt(search, number, previous)
+            _run_attempt(search, attempt, previous)
         except SearchEnded:
-            search.record()
-        found = search.best_path()
+            search.record_history()
+        result = search.best_path()
         # A later attempt replaces an earlier result only if it is better.
-        if best is None or (found[1].ok, found[1].kill_distance) > (best[1].ok, best[1].kill_distance):
-            best = found
-        if number == 0 and not search.is_closed and may_turn_back(search, best[1]):
+        if best is None or (result[1].ok, result[1].kill_distance) > (best[1].ok, best[1].kill_distance):
+            best = result
+        if attempt == 0 and not search.is_closed and may_turn_back(search, best[1]):
             best = search_turning_back(search, best)
-        if search.finished(best[1]) or search.is_closed or search.must_end() or not may_try_again(search):
+        if search.meets_goal(best[1]) or search.is_closed or search.must_end() or not may_try_again(search):
             break
     if best is None:  # pragma: no cover - the loop always runs
         raise ScenarioError(
@@ -161,85 +173,86 @@ def _check_options(scenario: Scenario, airspeed: float) -> None:
             " course can be flown",
             shown=f"{scenario.wind.speed:g}",
         )
-    table = scenario.planner
-    if table.population * 3 * table.waypoints > MAX_NUMBERS:
+    settings = scenario.planner
+    if settings.population * 3 * settings.waypoints > MAX_NUMBERS:
         raise ScenarioError(
-            f"{scenario.name}: planner.population: {table.population} of {table.waypoints} waypoints: "
+            f"{scenario.name}: planner.population: {settings.population} of {settings.waypoints} waypoints: "
             f"too large; allowed: population x 3 x waypoints up to {MAX_NUMBERS:,}",
             file=scenario.name,
             field="planner.population",
         )
-    if table.budget is not None and table.budget < table.population:
-        allowed = f"at least the population, {table.population}, is evaluated"
-        raise ScenarioError.at(scenario.name, "planner.budget", table.budget, f"{allowed}")
+    if settings.budget is not None and settings.budget < settings.population:
+        allowed = f"at least the population, {settings.population}, is evaluated"
+        raise ScenarioError.at(scenario.name, "planner.budget", settings.budget, f"{allowed}")
     threats = scenario.threats
-    for name, end in (("start", scenario.start), ("destination", scenario.destination)):
+    for field, end in (("start", scenario.start), ("destination", scenario.destination)):
         outside = np.sqrt(((threats.position - end) ** 2).sum(axis=1)) - threats.kill_radius
         inside = np.flatnonzero((threats.kill_radius > 0.0) & (outside <= 0.0))
         if inside.size:
-            unit = int(inside[0])
+            missile = int(inside[0])
             raise ScenarioError(
-                f"{scenario.name}: {name}: {-outside[unit]:.0f} m inside the kill radius of {threats.names[unit]} "
-                f"({threats.kill_radius[unit]:.0f} m): no path from there is safe",
+                f"{scenario.name}: {field}: {-outside[missile]:.0f} m inside the kill radius of"
+                f" {threats.names[missile]} "
+                f"({threats.kill_radius[missile]:.0f} m): no path from there is safe",
                 file=scenario.name,
-                field=name,
+                field=field,
             )
 
 
-def _prepare_retry(search: Search, number: int) -> None:
+def _prepare_retry(search: Search, attempt: int) -> None:
     """Increase the clearance buffer, pass missiles more closely, and re-evaluate the archive."""
-    search.problem = with_narrow_margins(make_problem(search.problem.scenario, search.problem.limits, number))
+    search.problem = with_narrow_margins(make_problem(search.problem.scenario, search.problem.limits, attempt))
     vectors = search.archive.vectors
     search.archive = Archive(vectors[:0], no_scores())
     search.evaluate(vectors)
 
 
-def _attempt(search: Search, number: int, previous: Floats | None) -> None:
+def _run_attempt(search: Search, attempt: int, previous: Floats | None) -> None:
     """Search once, from the first population to the last generation."""
-    table = search.problem.scenario.planner
-    grids, growth = ATTEMPTS[number]
-    population, algorithm = table.population * growth, search.algorithm
-    if algorithm.seeded and number == 0 and straight_line(search):
-        search.record()
-        search.report(0)
+    settings = search.problem.scenario.planner
+    grids, population_factor = ATTEMPTS[attempt]
+    population, algorithm = settings.population * population_factor, search.algorithm
+    if algorithm.seeded and attempt == 0 and try_straight_line(search):
+        search.record_history()
+        search.report_progress(0)
         return
-    starts = starting_vectors(search, grids, previous, again=number > 0)
+    starts = starting_vectors(search, grids, previous, is_retry=attempt > 0)
     if len(search.archive.scores) and (search.first_safe_found() or search.must_end()):
-        search.record()
+        search.record_history()
         return
     if algorithm.seeded:
         # Without a safe path the first attempt has tried other sides with the margins of later attempts, too.
-        if number == 0 or search.has_safe():
+        if attempt == 0 or search.has_safe():
             search_other_sides(search)
-        if number == 0 and not search.has_safe() and is_closed(search.problem.certified):
+        if attempt == 0 and not search.has_safe() and is_closed(search.problem.certified):
             search.is_closed = True
-            search.record()
-            search.report(0)
+            search.record_history()
+            search.report_progress(0)
             return
-    last = None
+    last_vector = None
     if algorithm.optimiser == "waypoints":
         # With a safe path and other sides tried, generations would shorten it by only 1e-4.
         if not (algorithm.seeded and search.has_safe()):
-            waypoint_generations(search, population, table.generations)
+            waypoint_generations(search, population, settings.generations)
     else:
-        last = path_generations(search, population, table.generations, starts)
-    if algorithm.tightened and search.ended == "completed":
-        _finish(search, last)
+        last_vector = path_generations(search, population, settings.generations, starts)
+    if algorithm.tightened and search.end_reason == "completed":
+        _finish_search(search, last_vector)
 
 
-def _finish(search: Search, last: Floats | None) -> None:
+def _finish_search(search: Search, last_vector: Floats | None) -> None:
     """Shorten or tighten the best path, and the result of the generations, if any, (d,)."""
-    if search.shortens:
-        if last is not None:
-            search.shorten(search.encoding.decode(last[None])[0])
+    if search.can_shorten:
+        if last_vector is not None:
+            search.shorten(search.encoding.decode(last_vector[None])[0])
         shorten_best(search)
     if search.shortest is None:
         # The result of the generations may take another route than the improved seed.
-        if last is not None:
-            search.tighten(last, LAST_ROUNDS, 0.5, LAST_SEARCH)
+        if last_vector is not None:
+            search.tighten(last_vector, LAST_ROUNDS, 0.5, LAST_SEARCH)
         for scale in LAST_MOVES:
             if search.must_end():
                 break
             search.tighten(search.archive.vectors[0], LAST_ROUNDS, scale, LAST_SEARCH)
-    search.record()
-    search.report(0)
+    search.record_history()
+    search.report_progress(0)

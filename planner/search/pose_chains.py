@@ -1,8 +1,8 @@
 """Construct paths of a few straight legs from one place and course to another, also with laps.
 
-The legs of a path must hold its turns, and the path must gain or lose a height.  `chains` lists horizontal candidates,
-`measure` computes their lengths and checks that the legs hold the turns, and `risen` and `fallen` give the altitudes of
-the corners.
+The legs of a path must hold its turns, and the path must gain or lose a height.  `candidate_chains` lists horizontal
+candidates, `measure_path` computes their lengths and checks that the legs hold the turns, and `climb_altitudes` and
+`descent_altitudes` give the altitudes of the corners.
 """
 
 import math
@@ -45,37 +45,39 @@ LAP_SIDE = 5.5
 MAX_LAPS = 8
 
 
-def chains(begin: Spot, course: float, end: Spot, end_course: float, radius: float, laps: int) -> Iterator[list[Spot]]:
-    """Yield lists of corners between two places, either empty or with one near the start and one or two before the end.
+def candidate_chains(
+    begin: Spot, course: float, end: Spot, end_course: float, turn_radius: float, laps: int
+) -> Iterator[list[Spot]]:
+    """Yield lists of corners between two places: none, or one near the start and up to two before the end.
 
     course, end_course: course of the leg before the beginning, and of the leg after the end, rad.
-    radius: radius of the tightest turn, m.  laps: number of laps before these corners.
+    turn_radius: radius of the tightest turn, m.  laps: number of laps before these corners.
     """
-    heads: list[list[Spot]] = [[]]
+    lap_chains: list[list[Spot]] = [[]]
     if laps:
-        heads = [_lap_corners(begin, course, side * LAP_SIDE * radius, laps) for side in (1.0, -1.0)]
-    befores = [_move(end, end_course, -share * radius) for share in _LAST_LEG_RADII]
-    tails: list[list[Spot]] = [[], *([before] for before in befores)]
-    bases = [
-        [_move(before, end_course + turn, share * radius), before]
-        for before in befores[1:3]
+        lap_chains = [_lap_corners(begin, course, side * LAP_SIDE * turn_radius, laps) for side in (1.0, -1.0)]
+    last_corners = [_move(end, end_course, -radii * turn_radius) for radii in _LAST_LEG_RADII]
+    short_ends: list[list[Spot]] = [[], *([last_corner] for last_corner in last_corners)]
+    base_ends = [
+        [_move(last_corner, end_course + turn, radii * turn_radius), last_corner]
+        for last_corner in last_corners[1:3]
         for turn in _BASE_LEG_TURNS_RAD
-        for share in _BASE_LEG_RADII
+        for radii in _BASE_LEG_RADII
     ]
-    firsts = [
-        [_move(begin, 2.0 * math.pi * k / _FIRST_DIRECTION_COUNT, share * radius)]
-        for share in _FIRST_LEG_RADII
+    first_corners = [
+        [_move(begin, 2.0 * math.pi * k / _FIRST_DIRECTION_COUNT, radii * turn_radius)]
+        for radii in _FIRST_LEG_RADII
         for k in range(_FIRST_DIRECTION_COUNT)
     ]
-    for head in heads:
-        for tail in (*tails, *bases):
-            yield [*head, *tail]
-        for first in firsts:
-            for tail in tails:
-                yield [*head, *first, *tail]
-        for first in firsts[1 : 3 * _FIRST_DIRECTION_COUNT : 2]:
-            for tail in bases:
-                yield [*head, *first, *tail]
+    for lap_corners in lap_chains:
+        for end_corners in (*short_ends, *base_ends):
+            yield [*lap_corners, *end_corners]
+        for first_corner in first_corners:
+            for end_corners in short_ends:
+                yield [*lap_corners, *first_corner, *end_corners]
+        for first_corner in first_corners[1 : 3 * _FIRST_DIRECTION_COUNT : 2]:
+            for end_corners in base_ends:
+                yield [*lap_corners, *first_corner, *end_corners]
 
 
 def _lap_corners(begin: Spot, course: float, side: float, laps: int) -> list[Spot]:
@@ -87,8 +89,8 @@ def _lap_corners(begin: Spot, course: float, side: float, laps: int) -> list[Spo
     return [ahead, corner, back, begin] * laps
 
 
-def _move(spot: Spot, course: float, run: float) -> Spot:
-    return spot[0] + run * math.sin(course), spot[1] + run * math.cos(course)
+def _move(spot: Spot, course: float, distance: float) -> Spot:
+    return spot[0] + distance * math.sin(course), spot[1] + distance * math.cos(course)
 
 
 class TurnLengths(NamedTuple):
@@ -97,99 +99,103 @@ class TurnLengths(NamedTuple):
     before: tuple[float, ...]
     after: tuple[float, ...]
 
-    def of(self, turn: float) -> tuple[float, float]:
+    def lengths(self, turn: float) -> tuple[float, float]:
         """Return the lengths before and after the corner of a turn (rad), m."""
-        place = min(turn / STEP, len(self.before) - 1.001)
-        k = int(place)
-        u = place - k
+        position = min(turn / STEP, len(self.before) - 1.001)
+        k = int(position)
+        fraction = position - k
         return (
-            self.before[k] + u * (self.before[k + 1] - self.before[k]),
-            self.after[k] + u * (self.after[k + 1] - self.after[k]),
+            self.before[k] + fraction * (self.before[k + 1] - self.before[k]),
+            self.after[k] + fraction * (self.after[k + 1] - self.after[k]),
         )
 
 
 def arc_lengths(radius: float) -> TurnLengths:
     """Return the turn lengths of arcs of the given radius (m), which are the lengths of their tangents.
 
-    >>> [round(length) for length in arc_lengths(150.0).of(math.radians(90.0))]
+    >>> [round(length) for length in arc_lengths(150.0).lengths(math.radians(90.0))]
     [150, 150]
     """
     tangents = tuple(radius * math.tan(0.5 * STEP * k) for k in range(STEPS))
     return TurnLengths(tangents, tangents)
 
 
-class Measured(NamedTuple):
+class PathMeasures(NamedTuple):
     """Horizontal measures of a path.
 
     length: m.  cost: length plus a cost of sharp turns, as their arcs are shorter, and so steeper, than the legs.
-    sharpest: sharpest turn, rad.
-    fullest: largest fraction of a leg that its turns take up.
+    max_turn: sharpest turn, rad.
+    max_fraction: largest fraction of a leg that its turns take up.
     """
 
     length: float
     cost: float
-    sharpest: float
-    fullest: float
+    max_turn: float
+    max_fraction: float
 
     @property
     def fits(self) -> bool:
         """True if no turn is too sharp, and each leg is long enough for the turns at its ends."""
-        return self.sharpest <= SHARPEST and self.fullest <= TURN_SHARE
+        return self.max_turn <= SHARPEST and self.max_fraction <= TURN_SHARE
 
 
-def measure(spots: Sequence[Spot], turning: TurnLengths) -> Measured:
-    """Measure a path with plain numbers, because it is called for tens of thousands of paths.
+def measure_path(spots: Sequence[Spot], turn_lengths: TurnLengths) -> PathMeasures:
+    """Measure a path; with plain numbers for speed, as tens of thousands of paths are measured.
 
-    >>> measure([(0.0, 0.0), (0.0, 1000.0), (1000.0, 1000.0)], arc_lengths(150.0)).fits
+    >>> measure_path([(0.0, 0.0), (0.0, 1000.0), (1000.0, 1000.0)], arc_lengths(150.0)).fits
     True
-    >>> measure([(0.0, 0.0), (0.0, 1000.0), (1000.0, 1000.0)], arc_lengths(990.0)).fits
+    >>> measure_path([(0.0, 0.0), (0.0, 1000.0), (1000.0, 1000.0)], arc_lengths(990.0)).fits
     False
     """
-    length = sharpest = fullest = turns = taken = east = north = run = 0.0
+    length = max_turn = max_fraction = squared_turns = length_taken = east = north = leg_length = 0.0
     for k in range(len(spots) - 1):
         to_east, to_north = spots[k + 1][0] - spots[k][0], spots[k + 1][1] - spots[k][1]
-        to_run = math.hypot(to_east, to_north)
-        if to_run < 1.0:
-            return Measured(length, math.inf, math.pi, math.inf)
+        to_length = math.hypot(to_east, to_north)
+        if to_length < 1.0:
+            return PathMeasures(length, math.inf, math.pi, math.inf)
         if k:
             turn = abs(math.atan2(east * to_north - north * to_east, east * to_east + north * to_north))
-            sharpest, turns = max(sharpest, turn), turns + turn * turn
-            before, after = turning.of(turn)
-            fullest, taken = max(fullest, (taken + before) / run), after
-        length, east, north, run = length + to_run, to_east, to_north, to_run
-    fullest = max(fullest, taken / run) if run else math.inf
-    return Measured(length, length + _TURN_COST_M * turns, sharpest, fullest)
+            max_turn, squared_turns = max(max_turn, turn), squared_turns + turn * turn
+            before, after = turn_lengths.lengths(turn)
+            max_fraction, length_taken = max(max_fraction, (length_taken + before) / leg_length), after
+        length, east, north, leg_length = length + to_length, to_east, to_north, to_length
+    max_fraction = max(max_fraction, length_taken / leg_length) if leg_length else math.inf
+    return PathMeasures(length, length + _TURN_COST_M * squared_turns, max_turn, max_fraction)
 
 
-def risen(spots: Sequence[Spot], low: float, climb: Slope, floor: float, end: float) -> Floats:
-    """Return the altitudes at n places of a path that climbs as steeply as allowed, (n,) m.
+def climb_altitudes(
+    spots: Sequence[Spot], begin_altitude: float, climb: Slope, min_altitude: float, end_altitude: float
+) -> Floats:
+    """Return the altitudes of a path that climbs as steeply as allowed, at its n places, (n,) m.
 
-    low: altitude at the first place, m.
-    floor: minimum altitude except at the end, m.
-    end: final altitude, which is not exceeded, m; the last altitude is lower if the path is too short.
+    begin_altitude: altitude at the first place, m.
+    min_altitude: minimum altitude except at the end, m.
+    end_altitude: final altitude, which is not exceeded, m; the last altitude is lower if the path is too short.
 
-    >>> risen([(0.0, 0.0), (0.0, 500.0), (0.0, 1500.0)], 0.0, lambda course: 0.1, 20.0, 100.0).tolist()
+    >>> climb_altitudes([(0.0, 0.0), (0.0, 500.0), (0.0, 1500.0)], 0.0, lambda course: 0.1, 20.0, 100.0).tolist()
     [20.0, 50.0, 100.0]
     """
     points = np.array(spots)
-    rises = [climb(course) * run for course, run in zip(leg_courses(points), leg_runs(points), strict=True)]
-    reached = low + np.concatenate([[0.0], np.cumsum(rises)])
-    heights = np.maximum(floor, np.minimum(reached, end))
-    heights[-1] = min(end, reached[-1])
-    return heights
+    climbs = [climb(course) * run for course, run in zip(leg_courses(points), leg_runs(points), strict=True)]
+    reachable = begin_altitude + np.concatenate([[0.0], np.cumsum(climbs)])
+    altitudes = np.maximum(min_altitude, np.minimum(reachable, end_altitude))
+    altitudes[-1] = min(end_altitude, reachable[-1])
+    return altitudes
 
 
-def fallen(spots: Sequence[Spot], high: float, climb: Slope, dive: Slope, end: float) -> Floats:
-    """Return the altitudes at n places of a path between two altitudes that descends late or climbs early, (n,) m.
+def descent_altitudes(
+    spots: Sequence[Spot], begin_altitude: float, climb: Slope, dive: Slope, end_altitude: float
+) -> Floats:
+    """Return the altitudes of a path that descends late or climbs early, at its n places, (n,) m.
 
     The first or the last altitude differs from the requested one if the path is too short.
 
-    >>> fallen([(0.0, 0.0), (0.0, 500.0), (0.0, 1500.0)], 200.0, lambda _: 0.1, lambda _: 0.1, 50.0).tolist()
+    >>> descent_altitudes([(0.0, 0.0), (0.0, 500.0), (0.0, 1500.0)], 200.0, lambda _: 0.1, lambda _: 0.1, 50.0).tolist()
     [200.0, 150.0, 50.0]
     """
     points = np.array(spots)
-    if end > high:
-        return risen(spots, high, climb, high, end)
-    falls = [dive(course) * run for course, run in zip(leg_courses(points), leg_runs(points), strict=True)]
-    left = end + np.concatenate([np.cumsum(falls[::-1])[::-1], [0.0]])
-    return np.minimum(high, left)
+    if end_altitude > begin_altitude:
+        return climb_altitudes(spots, begin_altitude, climb, begin_altitude, end_altitude)
+    descents = [dive(course) * run for course, run in zip(leg_courses(points), leg_runs(points), strict=True)]
+    reachable = end_altitude + np.concatenate([np.cumsum(descents[::-1])[::-1], [0.0]])
+    return np.minimum(begin_altitude, reachable)

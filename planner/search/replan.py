@@ -20,8 +20,7 @@ from world.errors import MissionError
 from world.geometry import leg_courses, leg_runs
 from world.scenario import Scenario
 
-# A function that completes a plan, given a search that plans a changed scenario, or within other limits, in the same
-# way.
+# A function that completes a plan. It is given a search that plans a changed scenario, or within other limits.
 Settle = Callable[[Plan, Search], Plan]
 
 # Minimum number of waypoints of the path ahead; with fewer it cannot avoid anything.
@@ -63,53 +62,66 @@ def replan(
     Raises MissionError for a leg that the old plan does not have or that begins in a missile's kill sphere or violates
     a zone, and for a plan of another mission; ScenarioError as `plan_path`.
     """
-    count = len(old.waypoints)
-    if not 0 <= leg < count - 1:
-        raise MissionError.of_argument("at_leg", leg, f"the plan has legs 0..{count - 2}", file=scenario.name)
-    same_mission(scenario, old)
+    waypoint_count = len(old.waypoints)
+    if not 0 <= leg < waypoint_count - 1:
+        raise MissionError.of_argument("at_leg", leg, f"the plan has legs 0..{waypoint_count - 2}", file=scenario.name)
+    check_same_mission(scenario, old)
     _check_first_waypoint(scenario, old, leg)
-    rest = with_waypoints(old.waypoints[leg:], max(MIN_WAYPOINTS, count - leg))
+    remaining_path = with_waypoints(old.waypoints[leg:], max(MIN_WAYPOINTS, waypoint_count - leg))
     course = scenario.start_course if leg == 0 else float(leg_courses(old.waypoints)[leg - 1])
-    table = scenario.planner.model_copy(update={"waypoints": len(rest)})
-    ahead = replace(scenario, start=rest[0], start_course=course, planner=table)
+    settings = scenario.planner.model_copy(update={"waypoints": len(remaining_path)})
+    remaining_scenario = replace(scenario, start=remaining_path[0], start_course=course, planner=settings)
 
-    def search(asked: Scenario, within: Limits) -> Plan:
+    def search(changed_scenario: Scenario, changed_limits: Limits) -> Plan:
         # A search with another number of waypoints cannot start from the old plan.
-        previous = rest if asked.planner.waypoints == len(rest) else None
-        return plan_path(asked, within, seed=seed, algorithm=algorithm, progress=progress, stop=stop, previous=previous)
+        previous = remaining_path if changed_scenario.planner.waypoints == len(remaining_path) else None
+        return plan_path(
+            changed_scenario,
+            changed_limits,
+            seed=seed,
+            algorithm=algorithm,
+            progress=progress,
+            stop=stop,
+            previous=previous,
+        )
 
-    searches = SharedBudget(search)
-    made = searches(ahead, limits)
+    budget = SharedBudget(search)
+    new_plan = budget(remaining_scenario, limits)
     if settle is not None:
-        made = searches.total(settle(made, searches))
-    waypoints = np.concatenate([old.waypoints[:leg], made.waypoints])
-    within = limits_for(find_algorithm(made.algorithm, scenario.name), limits)
-    counts, objectives = paper_scores(make_problem(scenario, within).certified, waypoints[None])
+        new_plan = budget.total(settle(new_plan, budget))
+    waypoints = np.concatenate([old.waypoints[:leg], new_plan.waypoints])
+    algorithm_limits = limits_for(find_algorithm(new_plan.algorithm, scenario.name), limits)
+    violations, objectives = paper_scores(make_problem(scenario, algorithm_limits).certified, waypoints[None])
     return replace(
-        made, scenario=scenario, waypoints=waypoints, violations=counts[0], objectives=objectives[0], flown_legs=leg
+        new_plan,
+        scenario=scenario,
+        waypoints=waypoints,
+        violations=violations[0],
+        objectives=objectives[0],
+        flown_legs=leg,
     )
 
 
-def same_mission(scenario: Scenario, old: Plan) -> None:
+def check_same_mission(scenario: Scenario, old: Plan) -> None:
     """Raise MissionError if the ends of a plan differ from the scenario's ends.
 
     >>> from planfly.workflow.airframe import load_airframe
     >>> from world.scenario import load_scenario
     >>> scenario = load_scenario("hard-07")
     >>> plan = plan_path(scenario, load_airframe(scenario).limits, seed=1)
-    >>> same_mission(scenario, plan)
-    >>> same_mission(load_scenario("tight"), plan)
+    >>> check_same_mission(scenario, plan)
+    >>> check_same_mission(load_scenario("tight"), plan)
     Traceback (most recent call last):
     world.errors.MissionError: tight: start: 742 m from that of the plan; it is another mission's
     """
-    for name, planned, asked in (
+    for name, planned, required in (
         ("start", old.waypoints[0], scenario.start),
         ("destination", old.waypoints[-1], scenario.destination),
     ):
-        away = math.dist(planned, asked)
-        if away > 1.0:
+        distance = math.dist(planned, required)
+        if distance > 1.0:
             raise MissionError(
-                f"{scenario.name}: {name}: {away:.0f} m from that of the plan; it is another mission's",
+                f"{scenario.name}: {name}: {distance:.0f} m from that of the plan; it is another mission's",
                 file=scenario.name,
                 field=name,
             )
@@ -118,20 +130,20 @@ def same_mission(scenario: Scenario, old: Plan) -> None:
 def _check_first_waypoint(scenario: Scenario, old: Plan, leg: int) -> None:
     """Raise MissionError if the new plan would begin within a missile's kill radius, or where it violates a zone."""
     threats = scenario.threats
-    inside = threats.kill_radius - np.sqrt(((threats.position - old.waypoints[leg]) ** 2).sum(axis=1))
-    unit = int(np.argmax(np.where(threats.kill_radius > 0.0, inside, -math.inf))) if len(inside) else -1
-    if unit >= 0 and threats.kill_radius[unit] > 0.0 and inside[unit] >= 0.0:
+    depths = threats.kill_radius - np.sqrt(((threats.position - old.waypoints[leg]) ** 2).sum(axis=1))
+    missile = int(np.argmax(np.where(threats.kill_radius > 0.0, depths, -math.inf))) if len(depths) else -1
+    if missile >= 0 and threats.kill_radius[missile] > 0.0 and depths[missile] >= 0.0:
         raise MissionError(
-            f"{scenario.name}: leg {leg}: waypoint {leg}, where it begins, is {inside[unit]:.0f} m inside the kill "
-            f"radius of {threats.names[unit]} ({threats.kill_radius[unit]:.0f} m): no path from there is safe",
+            f"{scenario.name}: leg {leg}: waypoint {leg}, where it begins, is {depths[missile]:.0f} m inside the kill "
+            f"radius of {threats.names[missile]} ({threats.kill_radius[missile]:.0f} m): no path from there is safe",
             file=scenario.name,
             field="leg",
             value=leg,
         )
     forbidden = violated_zones(scenario, old.waypoints[[leg, leg]])
     if forbidden:
-        begins = f"waypoint {leg}, where it begins, violates {forbidden[0]}"
-        message = f"{scenario.name}: leg {leg}: {begins}: no path from there does"
+        begin_text = f"waypoint {leg}, where it begins, violates {forbidden[0]}"
+        message = f"{scenario.name}: leg {leg}: {begin_text}: no path from there does"
         raise MissionError(message, file=scenario.name, field="leg", value=leg)
 
 

@@ -51,10 +51,10 @@ EXTRA_MARGINS = ((0.1, 0.0), (2.0, math.radians(0.2)), (2.0, math.radians(0.6)))
 # ignores.
 SHARES = (1.0, 0.75, 0.5, 0.25, 0.1)
 
-_Found = tuple[Floats, Certificate]
+_CertifiedPath = tuple[Floats, Certificate]
 
 
-def wanted_cost(scenario: Scenario, limits: Limits, problem: Problem) -> TravelCost:
+def objective_cost(scenario: Scenario, limits: Limits, problem: Problem) -> TravelCost:
     """Return the cost that a scenario's plan minimises. Raises ScenarioError for energy if the power is unknown."""
     objective = scenario.planner.objective or "length"
     cost = make_travel_cost(objective, limits.envelope, problem.search.aircraft)
@@ -64,25 +64,25 @@ def wanted_cost(scenario: Scenario, limits: Limits, problem: Problem) -> TravelC
     return cost
 
 
-def search_cheapest(search: Search, found: _Found, cost: TravelCost) -> _Found:
+def search_cheapest(search: Search, shortest: _CertifiedPath, cost: TravelCost) -> _CertifiedPath:
     """Return the cheapest path and its certificate, or the shortest path if no equally safe path costs less."""
-    by_length = cost.time == 0.0 and cost.energy == 0.0
-    if by_length or not search.finished(found[1]):
-        return found
+    is_by_length = cost.time == 0.0 and cost.energy == 0.0
+    if is_by_length or not search.meets_goal(shortest[1]):
+        return shortest
     data = search.problem.search._replace(travel=cost)
-    cheapest = found
+    cheapest = shortest
     with suppress(SearchEnded):
-        for start in _start_paths(search, found[0]):
+        for start in _start_paths(search, shortest[0]):
             if search.must_end():
                 return cheapest
             cheapest = _choose_cheaper(search, data, start, cheapest)
     for _ in range(MAX_REPEATS):
-        before = _cost_or_inf(data, cheapest[0])
+        previous_cost = _cost_or_inf(data, cheapest[0])
         for start in (resample(cheapest[0], len(cheapest[0])), cheapest[0]):
             if search.must_end():
                 return cheapest
             cheapest = _choose_cheaper(search, data, start, cheapest)
-        if _cost_or_inf(data, cheapest[0]) > (1.0 - MIN_GAIN) * before:
+        if _cost_or_inf(data, cheapest[0]) > (1.0 - MIN_GAIN) * previous_cost:
             break
     return cheapest
 
@@ -112,24 +112,24 @@ def _start_paths(search: Search, shortest: Floats) -> Iterator[Floats]:
             yield resample(frame.restore(route.points), count)
 
 
-def _choose_cheaper(search: Search, data: ProblemArrays, start: Floats, best: _Found) -> _Found:
+def _choose_cheaper(search: Search, data: ProblemArrays, start: Floats, best: _CertifiedPath) -> _CertifiedPath:
     """Return the cheaper of the best path and the result of shortening a start (w, 3)."""
     path = start
-    for extra_margin, angle in EXTRA_MARGINS:
-        stricter = data._replace(angle_margin=data.angle_margin + angle)
+    for extra_margin, slope_margin in EXTRA_MARGINS:
+        stricter = data._replace(angle_margin=data.angle_margin + slope_margin)
         try:
-            path, made = shorten_path(stricter, path, extra_margin=extra_margin, pause=search.pause)
+            path, evaluations = shorten_path(stricter, path, extra_margin=extra_margin, pause=search.pause)
         except SearchEnded:
             return best
-        search.evaluations += made
-        limit = _cost_or_inf(data, best[0])
-        if not _cost_or_inf(data, path) < limit:
+        search.evaluations += evaluations
+        best_cost = _cost_or_inf(data, best[0])
+        if not _cost_or_inf(data, path) < best_cost:
             return best
-        for share in SHARES if is_limited(data.airspace) else SHARES[:1]:
-            part = np.ascontiguousarray(best[0] + share * (path - best[0]))
-            certificate = certify(search.problem, part)
-            if search.finished(certificate) and _cost_or_inf(data, part) < limit:
+        for fraction in SHARES if is_limited(data.airspace) else SHARES[:1]:
+            candidate = np.ascontiguousarray(best[0] + fraction * (path - best[0]))
+            certificate = certify(search.problem, candidate)
+            if search.meets_goal(certificate) and _cost_or_inf(data, candidate) < best_cost:
                 if search.improved is not None:
-                    search.improved(part)
-                return part, certificate
+                    search.improved(candidate)
+                return candidate, certificate
     return best

@@ -52,14 +52,14 @@ def no_scores() -> Floats:
     return np.empty((0, SCORE_COLUMNS))
 
 
-def violated(scores: Floats) -> Flags:
+def are_violated(scores: Floats) -> Flags:
     """Flag the scores (..., 8) of paths that violate a constraint, (...,)."""
     return np.asarray(scores[..., : len(Violation)].any(axis=-1))
 
 
-def safe(scores: Floats) -> Flags:
+def are_safe(scores: Floats) -> Flags:
     """Flag the scores (..., 8) of paths without violations and without exposure to missiles, (...,)."""
-    return np.asarray(~violated(scores) & ~(scores[..., KILL] > 0.0))
+    return np.asarray(~are_violated(scores) & ~(scores[..., KILL] > 0.0))
 
 
 def best_first(scores: Floats) -> Ints:
@@ -102,7 +102,7 @@ def with_narrow_margins(problem: Problem) -> Problem:
 
 
 class SearchEnded(Exception):
-    """Raised within a search when it is asked to stop; the search's archive contains the results."""
+    """Raised within a search to stop it; the search's archive contains the results."""
 
 
 @dataclass(slots=True)
@@ -112,30 +112,30 @@ class Archive:
     vectors: Floats
     scores: Floats
 
-    def feasible(self) -> bool:
+    def is_feasible(self) -> bool:
         """Return True if the best path meets the constraints; False if the archive is empty."""
-        return len(self.scores) > 0 and not violated(self.scores[0])
+        return len(self.scores) > 0 and not are_violated(self.scores[0])
 
-    def take(self, vectors: Floats, scores: Floats) -> None:
+    def insert(self, vectors: Floats, scores: Floats) -> None:
         """Insert new rows in rank order; among equals, older rows stay first.
 
         Once any row is feasible, infeasible rows are dropped, because there can be thousands of them to rank. A full
         archive accepts only rows better than its last.
         """
-        fit = ~violated(scores)
-        if self.feasible():
+        is_kept = ~are_violated(scores)
+        if self.is_feasible():
             if len(self.scores) == ARCHIVE_SIZE:
                 last = self.scores[-1]
                 shorter = (scores[:, KILL] == last[KILL]) & (scores[:, LENGTH] < last[LENGTH])
-                fit &= shorter | (scores[:, KILL] < last[KILL])
-            if not fit.any():
+                is_kept &= shorter | (scores[:, KILL] < last[KILL])
+            if not is_kept.any():
                 return
-        elif fit.any():
+        elif is_kept.any():
             self.vectors, self.scores = self.vectors[:0], self.scores[:0]
-        every = np.concatenate([self.scores, scores[fit] if fit.any() else scores])
-        all_vectors = np.concatenate([self.vectors, vectors[fit] if fit.any() else vectors])
-        order = best_first(every)[:ARCHIVE_SIZE]
-        self.vectors, self.scores = all_vectors[order], every[order]
+        all_scores = np.concatenate([self.scores, scores[is_kept] if is_kept.any() else scores])
+        all_vectors = np.concatenate([self.vectors, vectors[is_kept] if is_kept.any() else vectors])
+        order = best_first(all_scores)[:ARCHIVE_SIZE]
+        self.vectors, self.scores = all_vectors[order], all_scores[order]
 
 
 @dataclass(slots=True)
@@ -145,7 +145,7 @@ class Search:
     problem: the problem with the margins of the current attempt.
     algorithm, encoding, rng: settings and random generator of the search.
     progress: called with generations done, generations in total, and a short text.
-    stop: called after each generation and each start; a returned text ends the search and gives the reason.
+    stop_condition: called after each generation and each start; a returned text ends the search and gives the reason.
     first_safe: True to end with the first safe path.
     required_distance: distance (m) from missiles that the certificate of a finished path requires.
     improved: called with each path (w, 3) that meets the constraints and is better than all earlier ones.
@@ -153,7 +153,7 @@ class Search:
     evaluations: paths evaluated, or equivalent work.
     legs: legs evaluated between candidates for single waypoints.
     done: generations done.
-    ended: reason why the search ended.
+    end_reason: reason why the search ended.
     history: per generation, length ratio, kill exposure and violations of the best path.
     certificates: certificates by the path's vector.
     shortest: the shortest finished path (w, 3) from shortening and its certificate; its waypoints need not lie in their
@@ -168,7 +168,7 @@ class Search:
     encoding: Encoding
     rng: np.random.Generator
     progress: SearchProgress | None
-    stop: StopCondition | None
+    stop_condition: StopCondition | None
     first_safe: bool
     required_distance: float
     improved: Improved | None = None
@@ -176,7 +176,7 @@ class Search:
     evaluations: int = 0
     legs: int = 0
     done: int = 0
-    ended: str = "completed"
+    end_reason: str = "completed"
     history: list[tuple[float, float, float]] = field(default_factory=list)
     certificates: dict[bytes, Certificate] = field(default_factory=dict)
     shortest: tuple[Floats, Certificate] | None = None
@@ -204,10 +204,10 @@ class Search:
 
         Raises SearchEnded if asked to stop.
         """
-        at_once, scores = max(1, WAYPOINTS_AT_ONCE // self.encoding.waypoints), no_scores()
-        for first in range(0, len(vectors), at_once):
-            scores = np.concatenate([scores, self.score(vectors[first : first + at_once])])
-            if len(scores) < len(vectors) and self.asked_to_end():
+        batch_size, scores = max(1, WAYPOINTS_AT_ONCE // self.encoding.waypoints), no_scores()
+        for begin in range(0, len(vectors), batch_size):
+            scores = np.concatenate([scores, self.score(vectors[begin : begin + batch_size])])
+            if len(scores) < len(vectors) and self.should_stop():
                 break
         self._archive_and_count(vectors[: len(scores)], scores)
         if len(scores) < len(vectors):
@@ -220,7 +220,7 @@ class Search:
         A search of whole paths that has no result yet continues for some pauses, until it finds its first route. If it
         finds no route within those pauses, the straight line is its result.
         """
-        if not self.asked_to_end():
+        if not self.should_stop():
             return
         if not len(self.archive.scores):
             self.grace -= 1
@@ -233,49 +233,49 @@ class Search:
         """Return the straight line as a vector (1, d) of the rotated encoding."""
         encoding, space = self.encoding, self.problem.space
         edges = encoding.lower[0::3], encoding.upper[0::3]
-        share = 0.5 * (edges[0] + edges[1]) / edges[1][-1]
-        path = space.start + np.concatenate([[0.0], share, [1.0]])[:, None] * (space.destination - space.start)
+        fractions = 0.5 * (edges[0] + edges[1]) / edges[1][-1]
+        path = space.start + np.concatenate([[0.0], fractions, [1.0]])[:, None] * (space.destination - space.start)
         return rotated_vectors(space, encoding, path[None])
 
-    def asked_to_end(self) -> bool:
-        """Return True if the stop condition asks the search to end, and store the reason."""
-        reason = self.stop() if self.stop is not None else ""
-        self.ended = reason or self.ended
+    def should_stop(self) -> bool:
+        """Ask the stop condition, and record its reason if it says to stop."""
+        reason = self.stop_condition() if self.stop_condition is not None else ""
+        self.end_reason = reason or self.end_reason
         return bool(reason)
 
     def _archive_and_count(self, vectors: Floats, scores: Floats) -> None:
         """Add evaluated vectors to the number of evaluations and to the archive."""
         self.evaluations += len(vectors)
-        before = self.archive.vectors[:1]
-        self.archive.take(vectors, scores)
-        best = self.archive.vectors[:1]
-        if self.improved is None or not self.archive.feasible() or np.array_equal(before, best):
+        old_best = self.archive.vectors[:1]
+        self.archive.insert(vectors, scores)
+        new_best = self.archive.vectors[:1]
+        if self.improved is None or not self.archive.is_feasible() or np.array_equal(old_best, new_best):
             return
         ratio = self.archive.scores[0][LENGTH]
         if self.shortest is None or ratio * self._straight_length() < path_length(self.shortest[0]):
-            self.improved(self.encoding.decode(best)[0])
+            self.improved(self.encoding.decode(new_best)[0])
 
     def improve(self, vector: Floats, max_evaluations: int) -> Floats:
         """Improve a vector (d,) by a pattern search, archive the result, and return the best scores (8,)."""
-        left = min(max_evaluations, self._evaluation_budget() - self.evaluations)
-        if left < 2:
+        limit = min(max_evaluations, self._evaluation_budget() - self.evaluations)
+        if limit < 2:
             return np.asarray(self.evaluate(vector[None])[0])
-        found, made = search_patterns(self.problem.search, self.encoding, vector, int(left), self.asked_to_end)
-        scores = self.evaluate(found)
+        vectors, evaluations = search_patterns(self.problem.search, self.encoding, vector, int(limit), self.should_stop)
+        scores = self.evaluate(vectors)
         # The pattern search has already included these vectors in its evaluations.
-        self.evaluations += made - len(found)
+        self.evaluations += evaluations - len(vectors)
         return np.asarray(scores[0])
 
     def tighten(self, vector: Floats, rounds: int, scale: float, max_evaluations: int) -> Floats:
         """Move all waypoints of a vector (d,) at once, then `improve` it, and return the best scores (8,)."""
         if self._evaluation_budget() - self.evaluations < TIGHTENING_EVALUATIONS:
             return self.improve(vector, max_evaluations)
-        moved, made = tighten(self.problem.search, self.encoding, vector, rounds, scale)
-        self.evaluations += made
+        moved, evaluations = tighten(self.problem.search, self.encoding, vector, rounds, scale)
+        self.evaluations += evaluations
         return self.improve(moved, max_evaluations)
 
     @property
-    def shortens(self) -> bool:
+    def can_shorten(self) -> bool:
         """True if shortening may move waypoints out of their intervals; False among zones, which shortening ignores."""
         return self.algorithm.tightened and not is_limited(self.problem.search.airspace)
 
@@ -285,25 +285,25 @@ class Search:
         attempts = [(margin, False, 0.0) for margin in EXTRA_MARGINS]
         if data.legs_hold_turns:
             attempts += [(margin, True, 0.0) for margin in CORNER_MARGINS]
-        attempts += [(EXTRA_MARGINS[-1], False, angle) for angle in SLOPE_MARGINS]
+        attempts += [(EXTRA_MARGINS[-1], False, slope_margin) for slope_margin in SLOPE_MARGINS]
         first, certificate = path, None
-        for extra_margin, corners_too, angle in attempts:
+        for extra_margin, corners_too, slope_margin in attempts:
             path = first if corners_too else path
-            if angle > 0.0 and not (certificate and self._violates_only_slopes(certificate)):
+            if slope_margin > 0.0 and not (certificate and self._violates_only_slopes(certificate)):
                 return False
             if self._evaluation_budget() - self.evaluations < MAX_MODELS:
                 self.budget_exhausted = True
                 return False
             # Keep the same problem if possible: a new one must be laid out in memory for kernels again.
-            stricter = data._replace(angle_margin=data.angle_margin + angle) if angle > 0.0 else data
-            path, made = shorten_path(
-                stricter, path, extra_margin=extra_margin, corners_too=corners_too, pause=self.pause
+            stricter_data = data._replace(angle_margin=data.angle_margin + slope_margin) if slope_margin > 0.0 else data
+            path, evaluations = shorten_path(
+                stricter_data, path, extra_margin=extra_margin, corners_too=corners_too, pause=self.pause
             )
-            self.evaluations += made
+            self.evaluations += evaluations
             if self.has_safe() and path_length(path) >= self.length_ratio() * self._straight_length():
                 return False
             certificate = certify(self.problem, path)
-            if self.finished(certificate):
+            if self.meets_goal(certificate):
                 self.shortest = path, certificate
                 if self.improved is not None:
                     self.improved(path)
@@ -314,27 +314,27 @@ class Search:
 
     def _violates_only_slopes(self, certificate: Certificate) -> bool:
         """Return True if a path violates the slope limits and nothing else."""
-        others = certificate.turn, certificate.clearance, certificate.bounds, certificate.zone_distance
-        keeps_off = certificate.kill_distance >= self.required_distance and certificate.headroom >= 0.0
-        return certificate.slope < self.problem.certified.angle_margin and keeps_off and min(others) >= 0.0
+        other_margins = certificate.turn, certificate.clearance, certificate.bounds, certificate.zone_distance
+        keeps_distance = certificate.kill_distance >= self.required_distance and certificate.headroom >= 0.0
+        return certificate.slope < self.problem.certified.angle_margin and keeps_distance and min(other_margins) >= 0.0
 
     def must_end(self) -> bool:
-        """Return True if the search must end now: stopped, or out of budget."""
+        """Return True if the search is stopped or its budget is exhausted, and record the reason."""
         if self.budget_exhausted or self.evaluations >= self._evaluation_budget():
-            self.ended = "budget"
-        elif self.stop is not None:
-            self.ended = self.stop() or "completed"
-        return self.ended != "completed"
+            self.end_reason = "budget"
+        elif self.stop_condition is not None:
+            self.end_reason = self.stop_condition() or "completed"
+        return self.end_reason != "completed"
 
     def best_is_safe(self) -> bool:
         """Return True if the archive's best path violates nothing and is exposed to no missile."""
-        return bool(safe(self.archive.scores[0]))
+        return bool(are_safe(self.archive.scores[0]))
 
     def first_safe_found(self) -> bool:
         """Return True if the search should end with the first safe path, and one is finished."""
-        if not self.first_safe or (self.shortest is None and not self.archive.feasible()):
+        if not self.first_safe or (self.shortest is None and not self.archive.is_feasible()):
             return False
-        return self.shortest is not None or self.finished(self.best_certified()[1])
+        return self.shortest is not None or self.meets_goal(self.best_certified()[1])
 
     def has_safe(self) -> bool:
         """Return True if a path is known that violates nothing and is exposed to no missile."""
@@ -351,7 +351,7 @@ class Search:
         shortest = float(path_length(self.shortest[0])) / self._straight_length()
         return min(ratio, shortest) if self.best_is_safe() else shortest
 
-    def finished(self, certificate: Certificate) -> bool:
+    def meets_goal(self, certificate: Certificate) -> bool:
         """Return True if this certificate meets the goal of the search."""
         return certificate.ok and certificate.kill_distance >= self.required_distance
 
@@ -359,24 +359,26 @@ class Search:
         budget = self.problem.scenario.planner.budget
         return math.inf if budget is None else budget
 
-    def record(self) -> None:
+    def record_history(self) -> None:
         """Append the best path to the history."""
         best = self.archive.scores[0]
         violations = best[: len(Violation)]
         count = np.count_nonzero(violations) if self.algorithm.graded else violations.sum()
-        safe_one = self.shortest is not None
-        row = (self.length_ratio(), 0.0, 0.0) if safe_one else (best[LENGTH], best[KILL], float(count))
+        has_shortened = self.shortest is not None
+        row = (self.length_ratio(), 0.0, 0.0) if has_shortened else (best[LENGTH], best[KILL], float(count))
         self.history.append(row)
 
-    def report(self, left: int) -> None:
-        """Report progress, with `left` as the number of generations that may follow."""
+    def report_progress(self, remaining_generations: int) -> None:
+        """Report progress, with `remaining_generations` as the number of generations that may follow."""
         if self.progress is not None:
             best = self.archive.scores[0]
             remark = f"length ratio {self.length_ratio():.4f}, kill exposure {best[KILL]:.3g}"
             if self.shortest is not None:
                 remark = f"length ratio {self.length_ratio():.4f}, kill exposure 0"
-            none_yet = self.shortest is None and violated(best)
-            self.progress(self.done, self.done + left, "no feasible path yet" if none_yet else remark)
+            is_infeasible = self.shortest is None and are_violated(best)
+            self.progress(
+                self.done, self.done + remaining_generations, "no feasible path yet" if is_infeasible else remark
+            )
 
     def best_certified(self) -> tuple[Floats, Certificate]:
         """Return the first path of the archive that is certified with the full kill margin, and its certificate.
@@ -384,20 +386,20 @@ class Search:
         Otherwise return the certified path furthest from missiles, or the first path if none is certified. A search
         that is asked to end examines only the first few.
         """
-        first: tuple[Floats, Certificate] | None = None
-        exposed: tuple[Floats, Certificate] | None = None
-        for number, vector in enumerate(self.archive.vectors):
-            if number >= CERTIFICATES_AT_ONCE and self.asked_to_end():
+        first_path: tuple[Floats, Certificate] | None = None
+        furthest_path: tuple[Floats, Certificate] | None = None
+        for index, vector in enumerate(self.archive.vectors):
+            if index >= CERTIFICATES_AT_ONCE and self.should_stop():
                 break
             path = np.ascontiguousarray(self.encoding.decode(vector[None])[0])
-            certificate = self._certificate(vector, path)
+            certificate = self._certify_vector(vector, path)
             if certificate.ok and certificate.kill_distance >= CERTIFIED_KILL_MARGIN:
                 return path, certificate
-            first = first or (path, certificate)
-            furthest = -math.inf if exposed is None else exposed[1].kill_distance
-            if certificate.ok and certificate.kill_distance > furthest:
-                exposed = (path, certificate)
-        result = exposed or first
+            first_path = first_path or (path, certificate)
+            max_distance = -math.inf if furthest_path is None else furthest_path[1].kill_distance
+            if certificate.ok and certificate.kill_distance > max_distance:
+                furthest_path = (path, certificate)
+        result = furthest_path or first_path
         if result is None:  # pragma: no cover - an archive is never empty after an attempt
             raise ScenarioError(
                 f"{self.problem.scenario.name}: planner: nothing was evaluated",
@@ -408,17 +410,17 @@ class Search:
 
     def best_path(self) -> tuple[Floats, Certificate]:
         """Return the shorter of the archive's certified path and the shortened path, and its certificate."""
-        found = self.best_certified()
+        best = self.best_certified()
         if self.shortest is None or (
-            self.finished(found[1]) and path_length(found[0]) <= path_length(self.shortest[0])
+            self.meets_goal(best[1]) and path_length(best[0]) <= path_length(self.shortest[0])
         ):
-            return found
+            return best
         return self.shortest
 
-    def _certificate(self, vector: Floats, path: Floats) -> Certificate:
-        """Return the certificate of a vector's path from a cache, because it is the same in all attempts."""
+    def _certify_vector(self, vector: Floats, path: Floats) -> Certificate:
+        """Return the certificate of a vector's path, cached because it is the same in all attempts."""
         key = vector.tobytes()
-        known = self.certificates.get(key)
-        if known is None:
-            known = self.certificates[key] = certify(self.problem, path)
-        return known
+        certificate = self.certificates.get(key)
+        if certificate is None:
+            certificate = self.certificates[key] = certify(self.problem, path)
+        return certificate

@@ -23,7 +23,7 @@ from planner.evaluation.encoding import (
     sample_route,
 )
 from planner.plan import Certificate
-from planner.search.search_state import Search, SearchEnded, best_first, safe, with_narrow_margins
+from planner.search.search_state import Search, SearchEnded, are_safe, best_first, with_narrow_margins
 from planner.seeding.airspace_grids import airspace_routes
 from planner.seeding.grids import GridRoute, grid_routes
 from planner.seeding.lattice import MAX_EXPANDED, ceiling_route, lattice_route, make_lattice, turning_step
@@ -46,81 +46,81 @@ MAX_FOLLOWED = 2
 MAX_FOLLOWED_AGAIN = 3
 
 
-def straight_line(search: Search) -> bool:
+def try_straight_line(search: Search) -> bool:
     """Return True if the straight line is a safe path, so that no shorter path exists and the search is finished."""
     if search.encoding.name != "rotated":
         return False
     vectors = search.straight_vectors()
     scores = search.score(vectors)
-    if not safe(scores[0]):
+    if not are_safe(scores[0]):
         return False
     search.evaluate(vectors)
-    return search.finished(search.best_certified()[1])
+    return search.meets_goal(search.best_certified()[1])
 
 
 def starting_vectors(
-    search: Search, grids: tuple[tuple[int, int], ...], previous: Floats | None, *, again: bool = False
+    search: Search, grids: tuple[tuple[int, int], ...], previous: Floats | None, *, is_retry: bool = False
 ) -> Floats:
-    """Return the start vectors of a search, the seed that is best after improvement and the previous path, (n, d).
+    """Return the start vectors of a search, (n, d): the seed that is best after improvement, and the previous path.
 
     The marginals of several routes at once describe none of them, so only one seed is used. It is used in its form
     before the improvement: afterwards it is so close to every limit that hardly any sample around it is feasible.
-    again: True if an earlier attempt has failed; then, among zones, grids that are not finer than another one are left
-    out and only the best routes are followed.
+    is_retry: True if an earlier attempt has failed; then, among zones, grids that are no finer than another grid are
+    skipped, and only the best routes are followed.
     """
     encoding, space, waypoints = search.encoding, search.problem.space, search.encoding.waypoints
     if encoding.name != "rotated" or (not search.algorithm.seeded and previous is None):
         return np.empty((0, encoding.lower.size))
     frame, starts = rotated_frame(space.start, space.destination), list(search.archive.vectors[:1])
-    older = [] if previous is None else list(rotated_vectors(space, encoding, previous[None]))
-    starts += older
+    previous_vectors = [] if previous is None else list(rotated_vectors(space, encoding, previous[None]))
+    starts += previous_vectors
     improved_scores = [search.improve(vector, SEED_SEARCH) for vector in starts]
     airspace = search.problem.search.airspace
-    effort = BAND_EFFORT if math.isfinite(airspace.max_height) else 1
-    limited = is_limited(airspace)
+    effort_factor = BAND_EFFORT if math.isfinite(airspace.max_height) else 1
+    is_among_zones = is_limited(airspace)
     # Among zones `search_other_sides` does not apply: the first attempt follows all routes.
-    followed = math.inf if limited else MAX_FOLLOWED
-    if search.shortens and search.algorithm.optimiser == "waypoints":
-        followed = 0
-    for number, route in enumerate(_routes(search, grids, again) if search.algorithm.seeded else ()):
-        if search.must_end() or search.first_safe_found() or (number >= followed and search.best_is_safe()):
+    max_followed = math.inf if is_among_zones else MAX_FOLLOWED
+    if search.can_shorten and search.algorithm.optimiser == "waypoints":
+        max_followed = 0
+    for index, route in enumerate(_list_routes(search, grids, is_retry) if search.algorithm.seeded else ()):
+        if search.must_end() or search.first_safe_found() or (index >= max_followed and search.best_is_safe()):
             break
-        if limited and again and number >= MAX_FOLLOWED_AGAIN:
+        if is_among_zones and is_retry and index >= MAX_FOLLOWED_AGAIN:
             break
         path = fit_waypoints(search.problem.search, frame, route.points, waypoints)
         starts.append(rotated_vectors(space, encoding, path[None])[0])
-        improved_scores.append(search.improve(starts[-1], SEED_SEARCH * effort))
+        improved_scores.append(search.improve(starts[-1], SEED_SEARCH * effort_factor))
     if not starts:
         return np.empty((0, encoding.lower.size))
     order = best_first(np.array(improved_scores))
-    return np.array([starts[order[0]], *older])
+    return np.array([starts[order[0]], *previous_vectors])
 
 
-def _routes(search: Search, grids: tuple[tuple[int, int], ...], again: bool) -> list[GridRoute]:
+def _list_routes(search: Search, grids: tuple[tuple[int, int], ...], is_retry: bool) -> list[GridRoute]:
     """Return the routes of the grids, ordered by their quickly fitted paths, best first.
 
-    Each fitted path is archived as soon as it is found. again: as in `starting_vectors`.
+    Each fitted path is archived as soon as it is found. is_retry: as in `starting_vectors`.
     """
     encoding, space, data = search.encoding, search.problem.space, search.problem.search
     if search.progress is not None:
         search.progress(search.done, search.done + search.problem.scenario.planner.generations, "grid routes")
     frame = rotated_frame(space.start, space.destination)
     span = (float(encoding.lower[1::3].min()), float(encoding.upper[1::3].max()))
-    found, scores = [], []
-    followed_free = search.shortens and search.algorithm.optimiser == "waypoints" and not search.first_safe
-    limited = is_limited(data.airspace)
+    candidates, scores = [], []
+    shortens_routes = search.can_shorten and search.algorithm.optimiser == "waypoints" and not search.first_safe
+    is_among_zones = is_limited(data.airspace)
     routes = (
-        airspace_routes(data, frame, span, grids, search.pause, finer_only=again)
-        if limited
+        airspace_routes(data, frame, span, grids, search.pause, finer_only=is_retry)
+        if is_among_zones
         else grid_routes(data, frame, span, grids, search.pause)
     )
     for route in routes:
-        if followed_free and search.has_safe():
+        if shortens_routes and search.has_safe():
             search.shorten(resample(frame.restore(route.points), encoding.waypoints))
             if search.must_end():
                 break
             continue
-        found.append(route)
+        candidates.append(route)
         path = fit_waypoints(data, frame, route.points, encoding.waypoints, QUICK_FIT)
         vectors = rotated_vectors(space, encoding, path[None])
         scores.append(search.evaluate(vectors)[0])
@@ -128,9 +128,9 @@ def _routes(search: Search, grids: tuple[tuple[int, int], ...], again: bool) -> 
             scores[-1] = search.improve(vectors[0], QUICK_SEARCH)
         if search.must_end() or search.first_safe_found():
             break
-    if not found:
+    if not candidates:
         return []
-    return [found[k] for k in best_first(np.array(scores))]
+    return [candidates[k] for k in best_first(np.array(scores))]
 
 
 # --- Other sides of the obstacles ---
@@ -144,14 +144,14 @@ GRIDS = ((50, 0.2, 2.0 / 3.0), (50, 0.5, 2.0 / 3.0))
 # gain.
 FINER_GRIDS = ((80, 0.3, 0.5), (80, 0.7, 1.0))
 # Excess over the straight line above which a path is long, as a fraction.
-LONG_WAY = 0.06
+LONG_PATH_EXCESS = 0.06
 # Steps of routes at the altitude of the ceiling, m; they are tried together with the finer grids, as they may turn
 # back.
 CEILING_STEPS = (250.0, 150.0, 100.0)
 # Depths to which routes at the ceiling may enter missiles' spheres, m.
-CEILING_CLOSER = (15.0, 40.0)
+CEILING_DEPTHS = (15.0, 40.0)
 # Average distance from an earlier path below which a path is not tried again, m.
-SAME_PATH = 20.0
+SAME_PATH_DISTANCE = 20.0
 # Maximum number of routes per grid.
 MAX_ROUTES = 8
 # Maximum cost of a route relative to the best path. With few courses, grid routes are some percent too long.
@@ -171,57 +171,59 @@ def search_other_sides(search: Search) -> None:
     if not len(search.archive.scores):
         # A search needs a result, even if the grids have no route.
         search.evaluate(search.straight_vectors())
-    if search.shortens and search.has_safe():
+    if search.can_shorten and search.has_safe():
         shorten_best(search)
     length = search.length_ratio() if search.has_safe() else MAX_DETOUR
     if is_limited(search.problem.search.airspace) or length < 1.0 + MIN_DETOUR:
         return
-    tried = _try_grids(search, GRIDS)
-    if not search.has_safe() or search.length_ratio() > 1.0 + LONG_WAY:
-        tried += _try_grids(search, FINER_GRIDS) + _try_ceiling(search)
+    tried_paths = _try_grids(search, GRIDS)
+    if not search.has_safe() or search.length_ratio() > 1.0 + LONG_PATH_EXCESS:
+        tried_paths += _try_grids(search, FINER_GRIDS) + _try_ceiling(search)
     if not search.has_safe():
-        _try_narrow_margins(search, tried)
+        _try_narrow_margins(search, tried_paths)
 
 
 def _try_grids(search: Search, grids: tuple[tuple[int, float, float], ...]) -> list[Floats]:
     """Shorten the routes on other sides that these grids propose, and return the routes as paths (w, 3)."""
     encoding, space, data = search.encoding, search.problem.space, search.problem.search
-    frame, straight = rotated_frame(space.start, space.destination), math.dist(space.start, space.destination)
+    frame, straight_length = rotated_frame(space.start, space.destination), math.dist(space.start, space.destination)
     span = (float(encoding.lower[1::3].min()), float(encoding.upper[1::3].max()))
-    tried: list[Floats] = []
+    tried_paths: list[Floats] = []
     for stages, shrink, ratio in grids:
         grid = optimistic_grid(data, frame, span, stages, shrink=shrink, spread=SPREAD, ratio=ratio)
-        bound = straight * (SLACK * search.length_ratio() if search.has_safe() else MAX_DETOUR)
+        bound = straight_length * (SLACK * search.length_ratio() if search.has_safe() else MAX_DETOUR)
         for route in side_routes(data, frame, grid, bound, MAX_ROUTES, search.pause):
             if search.must_end():
-                return tried
-            tried.append(resample(frame.restore(route.points), encoding.waypoints))
-            search.shorten(tried[-1])
-    return tried
+                return tried_paths
+            tried_paths.append(resample(frame.restore(route.points), encoding.waypoints))
+            search.shorten(tried_paths[-1])
+    return tried_paths
 
 
 def _try_ceiling(search: Search) -> list[Floats]:
     """Shorten routes at the altitude of the ceiling, one for each step and depth, and return them as paths (w, 3)."""
     data, space = search.problem.search, search.problem.space
     frame = rotated_frame(space.start, space.destination)
-    tried: list[Floats] = []
-    for step, closer in itertools.product(CEILING_STEPS, CEILING_CLOSER):
+    tried_paths: list[Floats] = []
+    for step, depth in itertools.product(CEILING_STEPS, CEILING_DEPTHS):
         if search.must_end():
             break
-        route = ceiling_route(data, frame, step, closer, search.pause)
+        route = ceiling_route(data, frame, step, depth, search.pause)
         if not len(route):
             continue
         path = resample(route, search.encoding.waypoints)
-        if all(np.sqrt(((path - other) ** 2).sum(axis=1)).mean() > SAME_PATH for other in tried):
-            tried.append(path)
+        if all(
+            np.sqrt(((path - tried_path) ** 2).sum(axis=1)).mean() > SAME_PATH_DISTANCE for tried_path in tried_paths
+        ):
+            tried_paths.append(path)
             search.shorten(path)
-    return tried
+    return tried_paths
 
 
 def _try_narrow_margins(search: Search, paths: list[Floats]) -> None:
     """Shorten paths (w, 3) with narrow margins, because no path is safe with the usual margins."""
-    usual = search.problem
-    search.problem = with_narrow_margins(usual)
+    usual_problem = search.problem
+    search.problem = with_narrow_margins(usual_problem)
     try:
         for path in paths:
             if search.must_end():
@@ -229,7 +231,7 @@ def _try_narrow_margins(search: Search, paths: list[Floats]) -> None:
             search.shorten(path)
     finally:
         # A search that is asked to end leaves by an exception.
-        search.problem = usual
+        search.problem = usual_problem
 
 
 def shorten_best(search: Search) -> None:
@@ -238,10 +240,10 @@ def shorten_best(search: Search) -> None:
     for _ in range(MAX_REPEATS):
         if search.shortest is None or search.must_end():
             return
-        before = path_length(search.shortest[0])
+        previous_length = path_length(search.shortest[0])
         search.shorten(resample(search.shortest[0], search.encoding.waypoints))
         search.shorten(search.shortest[0])
-        if path_length(search.shortest[0]) > (1.0 - MIN_GAIN) * before:
+        if path_length(search.shortest[0]) > (1.0 - MIN_GAIN) * previous_length:
             return
 
 
@@ -271,102 +273,105 @@ def may_turn_back(search: Search, certificate: Certificate) -> bool:
     """Return True if the straight frame has no safe path, or only a long one, so that a path may have to turn back."""
     if not search.algorithm.seeded or search.encoding.name != "rotated" or search.must_end():
         return False
-    if not search.finished(certificate):
+    if not search.meets_goal(certificate):
         return True
     return search.length_ratio() > LONG_DETOUR
 
 
-def search_turning_back(search: Search, found: tuple[Floats, Certificate]) -> tuple[Floats, Certificate]:
-    """Search for a path along a route that may turn back; return the better of it and `found`, with certificate."""
+def search_turning_back(search: Search, best: tuple[Floats, Certificate]) -> tuple[Floats, Certificate]:
+    """Search for a path along a route that may turn back; return the better of it and `best`, with its certificate."""
     data, space = search.problem.search, search.problem.space
     frame, step = rotated_frame(space.start, space.destination), turning_step(data)
-    lattices, left = [make_lattice(data, frame, share * step) for share in STEPS], MAX_EXPANDED
-    for number, share in enumerate(STEPS):
+    lattices, remaining_states = (
+        [make_lattice(data, frame, step_fraction * step) for step_fraction in STEPS],
+        MAX_EXPANDED,
+    )
+    for index, step_fraction in enumerate(STEPS):
         # If memory limits the step, a smaller step gives the same lattice again.
-        if left <= 0 or search.must_end() or lattices[number] in lattices[:number]:
+        if remaining_states <= 0 or search.must_end() or lattices[index] in lattices[:index]:
             break
         try:
-            route, seen = lattice_route(data, frame, share * step, search.pause, left)
+            route, expanded = lattice_route(data, frame, step_fraction * step, search.pause, remaining_states)
         except SearchEnded:
             break
-        left -= seen
+        remaining_states -= expanded
         if not len(route):
             continue
-        already_safe = search.finished(found[1])
-        if already_safe and path_length(route) > MAX_ROUTE_SHARE * path_length(found[0]):
+        is_safe = search.meets_goal(best[1])
+        if is_safe and path_length(route) > MAX_ROUTE_SHARE * path_length(best[0]):
             break
-        path, certificate, shortened = _search_along(search, route)
-        if search.finished(certificate) and (not already_safe or path_length(path) < path_length(found[0])):
-            return (path, certificate) if shortened else _follow_shortened(search, (path, certificate))
-        if not already_safe and (certificate.ok, certificate.kill_distance) > (found[1].ok, found[1].kill_distance):
-            found = path, certificate
-    return found
+        path, certificate, is_shortened = _search_along(search, route)
+        if search.meets_goal(certificate) and (not is_safe or path_length(path) < path_length(best[0])):
+            return (path, certificate) if is_shortened else _follow_shortened(search, (path, certificate))
+        if not is_safe and (certificate.ok, certificate.kill_distance) > (best[1].ok, best[1].kill_distance):
+            best = path, certificate
+    return best
 
 
-def _follow_shortened(search: Search, found: tuple[Floats, Certificate]) -> tuple[Floats, Certificate]:
-    """Return the best path along the shortened, unsafe form of `found` if it is shorter; otherwise return `found`."""
-    if not search.shortens:
-        return found
+def _follow_shortened(search: Search, best: tuple[Floats, Certificate]) -> tuple[Floats, Certificate]:
+    """Return the best path along the shortened, unsafe form of `best` if it is shorter; otherwise return `best`."""
+    if not search.can_shorten:
+        return best
     for extra_margin in FOLLOWED_MARGINS:
         if search.must_end():
             break
-        path = resample(found[0], search.encoding.waypoints)
-        route, made = shorten_path(search.problem.search, path, extra_margin=extra_margin, corners_too=True)
-        search.evaluations += made
+        path = resample(best[0], search.encoding.waypoints)
+        route, evaluations = shorten_path(search.problem.search, path, extra_margin=extra_margin, corners_too=True)
+        search.evaluations += evaluations
         path, certificate, _ = _search_along(search, route)
-        if search.finished(certificate) and path_length(path) < path_length(found[0]):
-            found = path, certificate
-    return found
+        if search.meets_goal(certificate) and path_length(path) < path_length(best[0]):
+            best = path, certificate
+    return best
 
 
 def _search_along(search: Search, route: Floats) -> tuple[Floats, Certificate, bool]:
     """Return the best path in a frame along a route (k, 3), its certificate, and True if shortening has made it."""
     waypoints = search.encoding.waypoints
-    pieces, _ = sample_route(route, waypoints - 1)
-    encoding = route_encoding(search.problem.space, pieces[:, :2])
-    inner = Search(
+    piece_ends, _ = sample_route(route, waypoints - 1)
+    encoding = route_encoding(search.problem.space, piece_ends[:, :2])
+    inner_search = Search(
         search.problem,
         search.algorithm,
         encoding,
         search.rng,
         search.progress,
-        search.stop,
+        search.stop_condition,
         search.first_safe,
         search.required_distance,
         search.improved,
         evaluations=search.evaluations,
     )
-    path = fit_points(inner.problem.search, frames_of(encoding), _candidate_points(route, encoding), CLOSE_FIT)
+    path = fit_points(inner_search.problem.search, frames_of(encoding), _candidate_points(route, encoding), CLOSE_FIT)
     vector = np.clip(frames_of(encoding).rotate(path[1:-1]).ravel(), encoding.lower, encoding.upper)
     with suppress(SearchEnded):
-        _improve_along(inner, vector, (path, route))
-    search.evaluations, search.ended = inner.evaluations, inner.ended
-    return *inner.best_path(), inner.shortest is not None
+        _improve_along(inner_search, vector, (path, route))
+    search.evaluations, search.end_reason = inner_search.evaluations, inner_search.end_reason
+    return *inner_search.best_path(), inner_search.shortest is not None
 
 
-def _improve_along(inner: Search, vector: Floats, routes: tuple[Floats, ...]) -> None:
+def _improve_along(search: Search, vector: Floats, routes: tuple[Floats, ...]) -> None:
     """Improve the path of a vector (d,), then shorten the path and the routes (k, 3), which may be better."""
-    inner.evaluate(vector[None])
+    search.evaluate(vector[None])
     for _ in range(FIRST_SEARCHES):
-        if inner.must_end() or inner.first_safe_found():
+        if search.must_end() or search.first_safe_found():
             return
-        inner.improve(inner.archive.vectors[0], FIRST_SEARCH)
+        search.improve(search.archive.vectors[0], FIRST_SEARCH)
     for scale in MOVES:
-        if inner.must_end() or inner.first_safe_found():
+        if search.must_end() or search.first_safe_found():
             return
-        inner.tighten(inner.archive.vectors[0], ROUNDS, scale, LATER_SEARCH)
-    if inner.shortens:
+        search.tighten(search.archive.vectors[0], ROUNDS, scale, LATER_SEARCH)
+    if search.can_shorten:
         for route in routes:
-            inner.shorten(resample(route, inner.encoding.waypoints))
-        shorten_best(inner)
+            search.shorten(resample(route, search.encoding.waypoints))
+        shorten_best(search)
 
 
 def _candidate_points(route: Floats, encoding: Encoding) -> Floats:
     """Return candidate points for each waypoint in its frame, on its piece of a route (k, 3), (w - 2, k, 3)."""
     count = encoding.waypoints - 2
-    dense, _ = sample_route(route, count * (CLOSE_FIT.candidates + 1) + 1)
-    rows = np.arange(count)[:, None] * (CLOSE_FIT.candidates + 1) + 1 + np.arange(CLOSE_FIT.candidates)
+    dense_points, _ = sample_route(route, count * (CLOSE_FIT.candidates + 1) + 1)
+    point_rows = np.arange(count)[:, None] * (CLOSE_FIT.candidates + 1) + 1 + np.arange(CLOSE_FIT.candidates)
     frames = frames_of(encoding)
-    points = frames.rotate(dense[rows].transpose(1, 0, 2)).transpose(1, 0, 2)
+    points = frames.rotate(dense_points[point_rows].transpose(1, 0, 2)).transpose(1, 0, 2)
     points[..., 0] = np.clip(points[..., 0], frames.edges[:-1, None], frames.edges[1:, None])
     return points

@@ -14,26 +14,26 @@ Search = Callable[[Scenario, Limits], Plan]
 class SharedBudget:
     """A search that may be repeated for the same plan, in another scenario or within other limits.
 
-    Each search has the rest of the scenario's budget of evaluations. If less than a population is left, no search is
-    made.
+    Each search has the remaining evaluations of the scenario's budget. If fewer than a population remain, there is no
+    further search.
     """
 
     def __init__(self, search: Search) -> None:
-        """Begin with no evaluations spent."""
-        self._search, self._made = search, list[Plan]()
-        self._ended = "completed"
+        """Start with the full budget."""
+        self._search, self._plans = search, list[Plan]()
+        self._end_reason = "completed"
 
     def __call__(self, scenario: Scenario, limits: Limits) -> Plan:
         """Return the plan of a new search, or of the last search if the budget does not allow another search."""
-        table = scenario.planner
-        if table.budget is None:
-            return self._keep(self._search(scenario, limits))
-        left = table.budget - self._spent()
-        if self._made and left < table.population:
-            self._ended = "budget"
-            return self._made[-1]
-        within = replace(scenario, planner=table.model_copy(update={"budget": left}))
-        return self._keep(replace(self._search(within, limits), scenario=scenario))
+        settings = scenario.planner
+        if settings.budget is None:
+            return self._store(self._search(scenario, limits))
+        remaining = settings.budget - self._count_evaluations()
+        if self._plans and remaining < settings.population:
+            self._end_reason = "budget"
+            return self._plans[-1]
+        limited_scenario = replace(scenario, planner=settings.model_copy(update={"budget": remaining}))
+        return self._store(replace(self._search(limited_scenario, limits), scenario=scenario))
 
     def total(self, plan: Plan) -> Plan:
         """Return the final plan with the evaluations of all searches.
@@ -41,14 +41,14 @@ class SharedBudget:
         A plan that is not safe gets the end reason of the first search that did not complete, as a complete search
         might have found a safe plan.
         """
-        ended = plan.ended if plan.safe or plan.ended != "completed" else self._ended
-        return replace(plan, evaluations=self._spent(), ended=ended)
+        end_reason = plan.ended if plan.safe or plan.ended != "completed" else self._end_reason
+        return replace(plan, evaluations=self._count_evaluations(), ended=end_reason)
 
-    def _spent(self) -> int:
-        return sum(one.evaluations for one in self._made)
+    def _count_evaluations(self) -> int:
+        return sum(plan.evaluations for plan in self._plans)
 
-    def _keep(self, plan: Plan) -> Plan:
-        self._made.append(plan)
-        if self._ended == "completed":
-            self._ended = plan.ended
+    def _store(self, plan: Plan) -> Plan:
+        self._plans.append(plan)
+        if self._end_reason == "completed":
+            self._end_reason = plan.ended
         return plan

@@ -17,7 +17,7 @@ from planner.evaluation.encoding import RotatedFrame
 from planner.evaluation.leg_constraints import slope_limits
 from planner.evaluation.problem import ProblemArrays, clearance_at, required_clearance, required_headroom
 from planner.seeding.grids import (
-    EXPECTED,
+    EXPECTED_COST_RATIO,
     KILL_COST,
     LAYERS_PER_STEP,
     SIDEWAYS,
@@ -44,7 +44,8 @@ COLUMN = np.dtype([("ground", np.float64), ("lowest", np.float64), ("highest", n
 class AirspaceGrid(NamedTuple):
     """One resolution: positions across (m from the line) at stages + 1 positions along, and layers of height.
 
-    pitch: between layers, m. The first layer is at the lowest allowed height if `follows`, otherwise at `floor` (m).
+    pitch: spacing of the layers, m. The first layer is at the lowest allowed height if `follows`, otherwise at `floor`
+    (m).
     gentle: True if changes of course have a cost and slopes stay below the steepest.
     """
 
@@ -57,7 +58,7 @@ class AirspaceGrid(NamedTuple):
     gentle: bool = False
 
 
-class _Passage(NamedTuple):
+class _ClosedHeights(NamedTuple):
     """Heights closed to a step, from low to high, m; low > high for none."""
 
     low: float
@@ -83,52 +84,52 @@ def _fill_column(
         column.highest = min(data.ceiling, ground - clearance_at(required_headroom(data), east, north))
     zones = data.airspace.zones
     for z in range(zones.inclusions):
-        zone, need = zones.records.zones[z], zones.required[z]
-        column.lowest = max(column.lowest, zone.floor + need.vertical + (ground if zone.floor_above_ground else 0.0))
-        top = zone.ceiling - need.vertical + (ground if zone.ceiling_above_ground else 0.0)
-        column.highest = min(column.highest, top)
+        zone, margin = zones.records.zones[z], zones.required[z]
+        column.lowest = max(column.lowest, zone.floor + margin.vertical + (ground if zone.floor_above_ground else 0.0))
+        zone_top = zone.ceiling - margin.vertical + (ground if zone.ceiling_above_ground else 0.0)
+        column.highest = min(column.highest, zone_top)
 
 
 @inner
-def _closed_heights(zones: ZonesWithMargins, line: MapSegment, lateral: float, ground: float) -> _Passage:
+def _closed_heights(zones: ZonesWithMargins, line: MapSegment, lateral: float, ground: float) -> _ClosedHeights:
     """Return the heights that zones close to a horizontal step.
 
     lateral: tracking error to add to the zones' margins, m.
     """
     low, high = math.inf, -math.inf
     for z in range(zones.inclusions):
-        wanted = zones.required[z].horizontal + lateral
-        reach = view_shape(zones.records, z, line, wanted)
-        if not reach.inside or reach.distance < wanted:
-            return _Passage(-math.inf, math.inf)
-    widest = zones.max_horizontal + lateral
+        required_distance = zones.required[z].horizontal + lateral
+        view = view_shape(zones.records, z, line, required_distance)
+        if not view.inside or view.distance < required_distance:
+            return _ClosedHeights(-math.inf, math.inf)
+    max_margin = zones.max_horizontal + lateral
     to_east, to_north = line.east + line.run * line.course_east, line.north + line.run * line.course_north
-    west, east = min(line.east, to_east) - widest, max(line.east, to_east) + widest
-    south, north = min(line.north, to_north) - widest, max(line.north, to_north) + widest
+    west, east = min(line.east, to_east) - max_margin, max(line.east, to_east) + max_margin
+    south, north = min(line.north, to_north) - max_margin, max(line.north, to_north) + max_margin
     for z in range(first_exclusion_near(zones, west), zones.required.shape[0]):
-        zone, need = zones.records.zones[z], zones.required[z]
+        zone, margin = zones.records.zones[z], zones.required[z]
         if zone.west > east:
             break
         if zone.east < west or zone.south > north or zone.north < south:
             continue
-        depth, _, _ = penetration_depth(zones.records, z, line, need.horizontal + lateral)
+        depth, _, _ = penetration_depth(zones.records, z, line, margin.horizontal + lateral)
         if depth > 0.0:
-            low = min(low, zone.floor - need.vertical + (ground if zone.floor_above_ground else 0.0))
-            high = max(high, zone.ceiling + need.vertical + (ground if zone.ceiling_above_ground else 0.0))
-    return _Passage(low, high)
+            low = min(low, zone.floor - margin.vertical + (ground if zone.floor_above_ground else 0.0))
+            high = max(high, zone.ceiling + margin.vertical + (ground if zone.ceiling_above_ground else 0.0))
+    return _ClosedHeights(low, high)
 
 
 @inner
-def _step_slopes(data: ProblemArrays, frame: RotatedFrame, step: float, amsl: float, share: float) -> Floats:
+def _step_slopes(data: ProblemArrays, frame: RotatedFrame, step: float, amsl: float, fraction: float) -> Floats:
     """Return the tangents of a fraction of the climb and dive limits of each step at a height (m), (sideways, 2)."""
-    out, a, b = np.zeros((2 * SIDEWAYS + 1, 2)), np.zeros(3), np.zeros(3)
+    slopes, a, b = np.zeros((2 * SIDEWAYS + 1, 2)), np.zeros(3), np.zeros(3)
     a[0], a[1] = frame.east, frame.north
     a[2], b[2] = amsl, amsl
     for side in range(-SIDEWAYS, SIDEWAYS + 1):
         b[0], b[1] = position_of(frame, step, side * step)
         climb, dive = slope_limits(data, a, b)
-        out[side + SIDEWAYS, 0], out[side + SIDEWAYS, 1] = share * math.tan(climb), share * math.tan(dive)
-    return out
+        slopes[side + SIDEWAYS, 0], slopes[side + SIDEWAYS, 1] = fraction * math.tan(climb), fraction * math.tan(dive)
+    return slopes
 
 
 @inner
@@ -138,35 +139,35 @@ def _set_cell_costs(
     obstacles: Records,
     along: float,
     extra: Floats,
-    low: int,
-    high: int,
+    first_across: int,
+    last_across: int,
     price: Floats,
 ) -> None:
-    """Fill the cost per m of a stage's cells (low..high, layers), inf for a cell that no path may enter."""
-    near, aside2 = np.empty(obstacles.shape[0], dtype=np.int64), np.empty(obstacles.shape[0])
-    for y in range(low, high + 1):
+    """Fill the cost per m of a stage's cells (across, layers), inf for a cell that no path may enter."""
+    near_obstacles, horizontal2 = np.empty(obstacles.shape[0], dtype=np.int64), np.empty(obstacles.shape[0])
+    for y in range(first_across, last_across + 1):
         column, count = columns[y], 0
         for k in range(obstacles.shape[0]):
             obstacle = obstacles[k]
-            aside2[count] = (along - obstacle.along) ** 2 + (grid.across[y] - obstacle.across) ** 2
-            if aside2[count] < obstacle.radius * obstacle.radius:
-                near[count] = k
+            horizontal2[count] = (along - obstacle.along) ** 2 + (grid.across[y] - obstacle.across) ** 2
+            if horizontal2[count] < obstacle.radius * obstacle.radius:
+                near_obstacles[count] = k
                 count += 1
-        first = column.lowest if grid.follows else grid.floor
-        middle, half = 0.5 * (column.lowest + column.highest), 0.5 * (column.highest - column.lowest)
+        first_height = column.lowest if grid.follows else grid.floor
+        mid_height, half_height = 0.5 * (column.lowest + column.highest), 0.5 * (column.highest - column.lowest)
         for z in range(grid.layers):
-            up = first + z * grid.pitch
-            if not column.lowest <= up <= column.highest:
+            height = first_height + z * grid.pitch
+            if not column.lowest <= height <= column.highest:
                 price[y, z] = math.inf
                 continue
             price[y, z] = 1.0 + extra[y]
             if grid.follows:
-                price[y, z] += EDGE_COST * ((up - middle) / max(half, 1e-6)) ** 2
+                price[y, z] += EDGE_COST * ((height - mid_height) / max(half_height, 1e-6)) ** 2
             for n in range(count):
-                obstacle = obstacles[near[n]]
-                away2 = aside2[n] + (up - obstacle.up) ** 2
-                if away2 < obstacle.radius * obstacle.radius:
-                    price[y, z] += KILL_COST * (3.0 - 2.0 * math.sqrt(away2) / obstacle.radius)
+                obstacle = obstacles[near_obstacles[n]]
+                distance2 = horizontal2[n] + (height - obstacle.up) ** 2
+                if distance2 < obstacle.radius * obstacle.radius:
+                    price[y, z] += KILL_COST * (3.0 - 2.0 * math.sqrt(distance2) / obstacle.radius)
 
 
 @inner
@@ -175,68 +176,71 @@ def _relax_stage(
     frame: RotatedFrame,
     grid: AirspaceGrid,
     stage: int,
-    before: Records,
+    previous_columns: Records,
     columns: Records,
     cost: Floats,
     price: Floats,
-    after: Floats,
-    parents_before: Codes,
+    next_cost: Floats,
+    previous_parents: Codes,
     parents: Codes,
 ) -> None:
     """Relax one stage, from the costs before it to the costs after it, (across, layers) each, and store parent cells.
 
-    before, columns: `COLUMN` records (across,) of the previous stage and of this one. parents_before: parents of the
-    previous stage. Changes of course are counted along the cheapest route to a cell only, so the result is not exactly
-    the optimum.
+    previous_columns, columns: `COLUMN` records (across,) of the previous stage and of this one. previous_parents:
+    parents of the previous stage. Changes of course are counted along the cheapest route to a cell only, so the result
+    is not exactly the optimum.
     """
-    step, wide, zones = frame.length / grid.stages, grid.across.size, data.airspace.zones
+    step, width, zones = frame.length / grid.stages, grid.across.size, data.airspace.zones
     # No tracking error at a fixed end.
     lateral = 0.0 if stage in (1, grid.stages) else float(data.tracking.across)
-    turn_cost, share = (TURN_COST * step, SLOPE_SHARE) if grid.gentle else (0.0, 1.0)
-    slopes = _step_slopes(data, frame, step, 0.5 * (data.start[2] + data.destination[2]), share)
-    for y in range(wide):
+    turn_cost, slope_fraction = (TURN_COST * step, SLOPE_SHARE) if grid.gentle else (0.0, 1.0)
+    slopes = _step_slopes(data, frame, step, 0.5 * (data.start[2] + data.destination[2]), slope_fraction)
+    for y in range(width):
         if not np.isfinite(cost[y]).any():
             continue
         east, north = position_of(frame, (stage - 1) * step, grid.across[y])
-        first = before[y].lowest if grid.follows else grid.floor
+        first_height = previous_columns[y].lowest if grid.follows else grid.floor
         for side in range(-SIDEWAYS, SIDEWAYS + 1):
-            to = y + side
-            if not 0 <= to < wide or columns[to].lowest > columns[to].highest:
+            target = y + side
+            if not 0 <= target < width or columns[target].lowest > columns[target].highest:
                 continue
-            to_first = columns[to].lowest if grid.follows else grid.floor
+            target_first_height = columns[target].lowest if grid.follows else grid.floor
             run = step * math.sqrt(1.0 + side * side)
-            to_east, to_north = position_of(frame, stage * step, grid.across[to])
-            closed = _Passage(math.inf, -math.inf)
+            to_east, to_north = position_of(frame, stage * step, grid.across[target])
+            closed_heights = _ClosedHeights(math.inf, -math.inf)
             if zones.required.shape[0] > 0:
                 leg = segment_between(east, north, to_east, to_north)
-                closed = _closed_heights(zones, leg, lateral, before[y].ground)
+                closed_heights = _closed_heights(zones, leg, lateral, previous_columns[y].ground)
             climb, dive = slopes[side + SIDEWAYS, 0] * run, slopes[side + SIDEWAYS, 1] * run
             for z in range(grid.layers):
                 if cost[y, z] == math.inf:
                     continue
-                up = first + z * grid.pitch
-                turned = 0 if stage == 1 else side - (y - parents_before[y, z] // grid.layers)
-                here = cost[y, z] + turn_cost * turned * turned
-                lowest = max(0, math.ceil((up - dive - to_first) / grid.pitch))
-                highest = min(grid.layers - 1, math.floor((up + climb - to_first) / grid.pitch))
-                for z2 in range(lowest, highest + 1):
-                    # A step is no shorter than a level one: most cost too much even so, and need no root.
-                    if here + run * price[to, z2] >= after[to, z2]:
+                height = first_height + z * grid.pitch
+                course_change = 0 if stage == 1 else side - (y - previous_parents[y, z] // grid.layers)
+                base_cost = cost[y, z] + turn_cost * course_change * course_change
+                lowest_layer = max(0, math.ceil((height - dive - target_first_height) / grid.pitch))
+                highest_layer = min(grid.layers - 1, math.floor((height + climb - target_first_height) / grid.pitch))
+                for next_z in range(lowest_layer, highest_layer + 1):
+                    # A step is at least as long as a level step; most cost too much even then, and need no square root.
+                    if base_cost + run * price[target, next_z] >= next_cost[target, next_z]:
                         continue
-                    rise = to_first + z2 * grid.pitch - up
-                    if max(up, up + rise) > closed.low and min(up, up + rise) < closed.high:
+                    rise = target_first_height + next_z * grid.pitch - height
+                    if (
+                        max(height, height + rise) > closed_heights.low
+                        and min(height, height + rise) < closed_heights.high
+                    ):
                         continue
-                    total = here + math.sqrt(run * run + rise * rise) * price[to, z2]
-                    if total < after[to, z2]:
-                        after[to, z2] = total
-                        parents[to, z2] = y * grid.layers + z
+                    total = base_cost + math.sqrt(run * run + rise * rise) * price[target, next_z]
+                    if total < next_cost[target, next_z]:
+                        next_cost[target, next_z] = total
+                        parents[target, next_z] = y * grid.layers + z
 
 
 class AirspaceSearch(NamedTuple):
     """A search for the cheapest route over a grid, which can be continued.
 
     obstacles: `OBSTACLE` records. columns: `COLUMN` records (stages + 1, across). cells: (stages + 1, across, layers),
-    the parent of each cell, as across x layers. cost, after, price: (across, layers) of the last stage reached, and
+    the parent of each cell, as across x layers. cost, next_cost, price: (across, layers) of the last stage reached, and
     scratch. home: index across of both ends. stage: the last one reached.
     """
 
@@ -244,13 +248,13 @@ class AirspaceSearch(NamedTuple):
     columns: Records
     cells: Codes
     cost: Floats
-    after: Floats
+    next_cost: Floats
     price: Floats
     home: int
     stage: int
 
 
-# Cells of a grid that are reached between two calls of `pause`: some 20 ms at most.
+# Number of cells reached between two calls of `pause`: some 20 ms at most.
 CELLS_AT_ONCE = 100_000
 
 
@@ -280,20 +284,20 @@ def cheapest_airspace_route(
 @compiled
 def begin_airspace_route(data: ProblemArrays, frame: RotatedFrame, grid: AirspaceGrid) -> AirspaceSearch:
     """Return a new search at the start."""
-    stages, wide, step = grid.stages, grid.across.size, frame.length / grid.stages
+    stages, width, step = grid.stages, grid.across.size, frame.length / grid.stages
     home = int(np.argmin(np.abs(grid.across)))
-    columns = np.zeros((stages + 1, wide), dtype=COLUMN)
-    for y in range(wide):
+    columns = np.zeros((stages + 1, width), dtype=COLUMN)
+    for y in range(width):
         _fill_column(data, frame, grid, 0.0, grid.across[y], columns[0, y])
-    cost = np.full((wide, grid.layers), math.inf)
+    cost = np.full((width, grid.layers), math.inf)
     cost[home, _nearest_layer(grid, columns[0, home], data.start[2])] = 0.0
     return AirspaceSearch(
         find_obstacles(data, frame, step),
         columns,
-        np.full((stages + 1, wide, grid.layers), -1, dtype=np.int32),
+        np.full((stages + 1, width, grid.layers), -1, dtype=np.int32),
         cost,
-        np.full((wide, grid.layers), math.inf),
-        np.full((wide, grid.layers), math.inf),
+        np.full((width, grid.layers), math.inf),
+        np.full((width, grid.layers), math.inf),
         home,
         0,
     )
@@ -307,28 +311,28 @@ def continue_airspace_route(
     extra: Floats,
     bound: float,
     search: AirspaceSearch,
-    more: int,
+    max_stages: int,
 ) -> AirspaceSearch:
-    """Continue a search by up to `more` stages, or until no route leads on, and return it."""
-    stages, wide, step = grid.stages, grid.across.size, frame.length / grid.stages
-    obstacles, columns, cells, cost, after, price, home, reached = search
-    last_stage, ahead = min(stages, reached + more), np.empty(wide)
-    for stage in range(reached + 1, last_stage + 1):
-        along, low, high = stage * step, wide, -1
-        for y in range(wide):
+    """Continue a search by up to `max_stages` stages, or until no route leads on, and return it."""
+    stages, width, step = grid.stages, grid.across.size, frame.length / grid.stages
+    obstacles, columns, cells, cost, next_cost, price, home, reached_stage = search
+    last_stage, goal_distances = min(stages, reached_stage + max_stages), np.empty(width)
+    for stage in range(reached_stage + 1, last_stage + 1):
+        along, first, last = stage * step, width, -1
+        for y in range(width):
             if cost[y].min() < math.inf:
-                low, high = min(low, y), max(high, y)
-        if low > high:
-            # No cell of the stage before is reached, and so none of the last.
+                first, last = min(first, y), max(last, y)
+        if first > last:
+            # No cell of the previous stage is reached, so the last stage cannot be reached either.
             last_stage = stages
             break
-        low, high = max(0, low - SIDEWAYS), min(wide - 1, high + SIDEWAYS)
-        for y in range(low, high + 1):
+        first, last = max(0, first - SIDEWAYS), min(width - 1, last + SIDEWAYS)
+        for y in range(first, last + 1):
             _fill_column(data, frame, grid, along, grid.across[y], columns[stage, y])
-        _set_cell_costs(grid, columns[stage], obstacles, along, extra[stage], low, high, price)
+        _set_cell_costs(grid, columns[stage], obstacles, along, extra[stage], first, last, price)
         if stage == stages:
             price[home, _nearest_layer(grid, columns[stage, home], data.destination[2])] = 1.0
-        after[:] = math.inf
+        next_cost[:] = math.inf
         _relax_stage(
             data,
             frame,
@@ -338,17 +342,17 @@ def continue_airspace_route(
             columns[stage],
             cost,
             price,
-            after,
+            next_cost,
             cells[stage - 1],
             cells[stage],
         )
-        distance_to_goal(wide, home, stages - stage, step, 1.0, ahead)
-        for y in range(low, high + 1):
+        distance_to_goal(width, home, stages - stage, step, 1.0, goal_distances)
+        for y in range(first, last + 1):
             for z in range(grid.layers):
-                if ahead[y] == math.inf or after[y, z] + ahead[y] > bound:
-                    after[y, z] = math.inf
-        cost, after = after, cost
-    return AirspaceSearch(obstacles, columns, cells, cost, after, price, home, last_stage)
+                if goal_distances[y] == math.inf or next_cost[y, z] + goal_distances[y] > bound:
+                    next_cost[y, z] = math.inf
+        cost, next_cost = next_cost, cost
+    return AirspaceSearch(obstacles, columns, cells, cost, next_cost, price, home, last_stage)
 
 
 @compiled
@@ -363,33 +367,37 @@ def end_airspace_route(
         return np.empty((0, 3)), math.inf
     points = np.empty((stages + 1, 3))
     for stage in range(stages, -1, -1):
-        first = columns[stage, y].lowest if grid.follows else grid.floor
-        points[stage, 0], points[stage, 1], points[stage, 2] = stage * step, grid.across[y], first + z * grid.pitch
+        first_height = columns[stage, y].lowest if grid.follows else grid.floor
+        points[stage, 0], points[stage, 1], points[stage, 2] = (
+            stage * step,
+            grid.across[y],
+            first_height + z * grid.pitch,
+        )
         if stage > 0:
-            code = search.cells[stage, y, z]
-            y, z = code // grid.layers, code % grid.layers
+            parent = search.cells[stage, y, z]
+            y, z = parent // grid.layers, parent % grid.layers
     return points, total
 
 
 @inner
-def _nearest_layer(grid: AirspaceGrid, column: Record, amsl: float) -> int:
+def _nearest_layer(grid: AirspaceGrid, column: Record, height: float) -> int:
     """Return the index of the layer nearest to a height, m."""
-    first = column.lowest if grid.follows else grid.floor
-    return min(grid.layers - 1, max(0, round((amsl - first) / grid.pitch)))
+    first_height = column.lowest if grid.follows else grid.floor
+    return min(grid.layers - 1, max(0, round((height - first_height) / grid.pitch)))
 
 
 # --- Grids and routes ---
 
 # Factor on the number of stages of a grid without zones: hills and gaps need short steps.
-FINER = 2
-# Bound on the cost of a first route, relative to the first route on the previous grid. A finer grid's may cost a little
-# more, for it is freer to turn; the bound spares work and does not change the route.
-FINER_COST = 1.05
+STAGE_FACTOR = 2
+# Bound on the cost of a first route, relative to the first route on the previous grid. A route on a finer grid may cost
+# a little more, as it is freer to turn; the bound saves work and does not change the route.
+FINER_COST_RATIO = 1.05
 # Minimum number of layers of a band of heights above ground.
 MIN_LAYERS = 8
 # Maximum number of layers of a band of heights above ground.
 MAX_LAYERS = 24
-# Minimum pitch of layers that do not follow the ground, as a share of the step along.
+# Minimum pitch of layers that do not follow the ground, as a fraction of the step along.
 MIN_PITCH = 0.05
 # Maximum number of cells of a grid: stages x across x layers.
 MAX_CELLS = 1_200_000
@@ -401,26 +409,28 @@ def airspace_grid(data: ProblemArrays, frame: RotatedFrame, span: tuple[float, f
     span: limits across, m.
     """
     level = np.array([*data.destination[:2], data.start[2]])
-    gentlest = math.tan(max(0.0, min(slope_limits(data, np.array(data.start), level))))
+    gentler_slope = math.tan(max(0.0, min(slope_limits(data, np.array(data.start), level))))
     space = data.airspace
-    band = space.max_height - space.buffer - data.clearance - data.buffer
-    low = max(data.floor, float(np.nanmin(data.heights)) + data.clearance)
-    follows = math.isfinite(band)
+    band_height = space.max_height - space.buffer - data.clearance - data.buffer
+    min_height = max(data.floor, float(np.nanmin(data.heights)) + data.clearance)
+    follows_ground = math.isfinite(band_height)
     while True:
         step = frame.length / stages
         across = np.arange(-math.floor(-span[0] / step), math.floor(span[1] / step) + 1) * step
-        pitch = max(1.0, gentlest * step / LAYERS_PER_STEP)
-        if follows:
-            layers = min(MAX_LAYERS, max(MIN_LAYERS, math.ceil(band / pitch) + 1))
+        pitch = max(1.0, gentler_slope * step / LAYERS_PER_STEP)
+        if follows_ground:
+            layers = min(MAX_LAYERS, max(MIN_LAYERS, math.ceil(band_height / pitch) + 1))
             # Near an end with smaller buffers the band is wider.
-            widest = space.max_height - data.clearance
-            pitch = max(1.0, band) / (layers - 1)
-            layers = max(layers, min(2 * MAX_LAYERS, math.ceil(widest / pitch) + 1))
+            max_band_height = space.max_height - data.clearance
+            pitch = max(1.0, band_height) / (layers - 1)
+            layers = max(layers, min(2 * MAX_LAYERS, math.ceil(max_band_height / pitch) + 1))
         else:
             pitch = max(pitch, MIN_PITCH * step)
-            layers = max(1, math.floor((data.ceiling - low) / pitch) + 1)
+            layers = max(1, math.floor((data.ceiling - min_height) / pitch) + 1)
         if stages <= 8 or (stages + 1) * across.size * layers <= MAX_CELLS:
-            return AirspaceGrid(stages, np.asarray(across, np.float64), layers, pitch, follows, low, gentle=True)
+            return AirspaceGrid(
+                stages, np.asarray(across, np.float64), layers, pitch, follows_ground, min_height, gentle=True
+            )
         stages = max(8, int(stages / 1.2))
 
 
@@ -433,29 +443,36 @@ def airspace_routes(
     *,
     finer_only: bool = False,
 ) -> Iterator[GridRoute]:
-    """Yield routes for each grid (stages, number of different routes), with `FINER` times its stages.
+    """Yield routes for each grid (stages, number of different routes), with `STAGE_FACTOR` times its stages.
 
     Routes of gentle grids are easier to fly. The first grid is also searched without that restriction, because narrow
     gaps can require steep or curved routes. pause: as in `cheapest_airspace_route`.
-    finer_only: True to leave out grids that `MAX_CELLS` makes no finer than an earlier grid.
+    finer_only: True to skip grids that `MAX_CELLS` makes no finer than an earlier grid.
     """
-    expected, finest = EXPECTED * math.dist(data.start, data.destination), 0
-    for number, (stages, each) in enumerate(grids):
-        grid = airspace_grid(data, frame, span, FINER * stages)
-        if finer_only and grid.stages <= finest:
+    expected_cost, max_stages = EXPECTED_COST_RATIO * math.dist(data.start, data.destination), 0
+    for index, (stages, route_count) in enumerate(grids):
+        grid = airspace_grid(data, frame, span, STAGE_FACTOR * stages)
+        if finer_only and grid.stages <= max_stages:
             continue
-        finest = max(finest, grid.stages)
-        if number == 0:
-            route = _find_route(data, frame, grid._replace(gentle=False), (), expected, pause)
+        max_stages = max(max_stages, grid.stages)
+        if index == 0:
+            route = _find_route(data, frame, grid._replace(gentle=False), (), expected_cost, pause)
             if route is not None:
                 yield route
-        used: tuple[GridRoute, ...] = ()
-        for _ in range(each):
-            route = _find_route(data, frame, grid, used, math.inf if used else FINER_COST * expected, pause)
+        earlier_routes: tuple[GridRoute, ...] = ()
+        for _ in range(route_count):
+            route = _find_route(
+                data,
+                frame,
+                grid,
+                earlier_routes,
+                math.inf if earlier_routes else FINER_COST_RATIO * expected_cost,
+                pause,
+            )
             if route is None:
                 break
-            expected = expected if used else route.cost
-            used = (*used, route)
+            expected_cost = expected_cost if earlier_routes else route.cost
+            earlier_routes = (*earlier_routes, route)
             yield route
 
 
@@ -463,16 +480,16 @@ def _find_route(
     data: ProblemArrays,
     frame: RotatedFrame,
     grid: AirspaceGrid,
-    used: tuple[GridRoute, ...],
-    expected: float,
+    earlier_routes: tuple[GridRoute, ...],
+    expected_cost: float,
     pause: Callable[[], None],
 ) -> GridRoute | None:
     """Return the cheapest route over a grid away from used routes, or None.
 
-    expected: first bound to try.
+    expected_cost: first bound to try.
     """
-    extra = proximity_cost(np.linspace(0.0, frame.length, grid.stages + 1), grid.across, used)
-    for bound in (expected, math.inf):
+    extra = proximity_cost(np.linspace(0.0, frame.length, grid.stages + 1), grid.across, earlier_routes)
+    for bound in (expected_cost, math.inf):
         points, cost = cheapest_airspace_route(data, frame, grid, extra, bound, pause)
         if len(points):
             return GridRoute(points, float(cost))

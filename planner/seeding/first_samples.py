@@ -10,7 +10,7 @@ import numpy as np
 from planner.evaluation.encoding import Encoding, Space
 from world.arrays import Floats
 
-# Share of a seeded first population that is sampled around the seeds.
+# Fraction of a seeded first population that is sampled around the seeds.
 AROUND_SEEDS = 1.0
 # Smallest spread around a seed, as a fraction of the unseeded spread; sampled log-uniformly.
 MIN_SPREAD = 0.003
@@ -21,8 +21,8 @@ MAX_SPREAD = 0.3
 def bridge_modes(inner: int) -> tuple[Floats, Floats]:
     """Return eigenvectors (inner, inner) and deviations (inner,) of the kernel min(s, t) - s t at equal steps.
 
-    In closed form: the inverse of the kernel is the second difference, so the eigenvectors are sines. Deviations are
-    relative to the deviation of the first mode.
+    They have a closed form: the inverse of the kernel is the second difference, so the eigenvectors are sines.
+    Deviations are relative to the deviation of the first mode.
     """
     k = np.arange(1, inner + 1)
     modes = np.sqrt(2.0 / (inner + 1)) * np.sin(np.pi * np.outer(k, k) / (inner + 1))
@@ -47,31 +47,33 @@ def first_samples(
 
     starts: vectors (s, d) to start from; without starts, the paths are drawn around the straight line.
     """
-    inner = encoding.waypoints - 2
-    modes, deviations = bridge_modes(inner)
-    lower, upper = encoding.lower.reshape(inner, 3), encoding.upper.reshape(inner, 3)
+    inner_count = encoding.waypoints - 2
+    modes, deviations = bridge_modes(inner_count)
+    lower, upper = encoding.lower.reshape(inner_count, 3), encoding.upper.reshape(inner_count, 3)
     spread = np.array([1.0, 0.25 * np.median(upper[:, 1] - lower[:, 1]), 0.25 * (space.up[1] - space.up[0])])
     # The entries of a bridge mode decrease with the number of waypoints; its middle should move by the spread.
-    spread[1:] *= np.sqrt((inner + 1) / 2.0)
+    spread[1:] *= np.sqrt((inner_count + 1) / 2.0)
 
     def bridges(count: int) -> Floats:
         """Return smooth displacements (count, inner, 2) of across and up."""
-        weights = rng.normal(size=(count, inner, 2)) * deviations[:, None] * spread[1:]
+        weights = rng.normal(size=(count, inner_count, 2)) * deviations[:, None] * spread[1:]
         return np.asarray(np.einsum("nka,ik->nia", weights, modes, optimize=False))
 
-    out = np.empty((population, inner, 3))
-    share = np.linspace(0.0, 1.0, inner + 2)[1:-1, None]
-    out[..., 0] = rng.uniform(lower[:, 0], upper[:, 0], (population, inner))
+    out = np.empty((population, inner_count, 3))
+    fraction = np.linspace(0.0, 1.0, inner_count + 2)[1:-1, None]
+    out[..., 0] = rng.uniform(lower[:, 0], upper[:, 0], (population, inner_count))
     out[..., 1] = 0.0
-    heights = space.start[2] * (1.0 - share) + space.destination[2] * share
+    heights = space.start[2] * (1.0 - fraction) + space.destination[2] * fraction
     out[..., 2] = heights[:, 0] + rng.uniform(0.0, 1.0, (population, 1)) * np.maximum(0.0, space.up[1] - heights[:, 0])
     out[..., 1:] += bridges(population)
     if len(starts):
-        near = min(population, max(len(starts), int(AROUND_SEEDS * population)))
-        picked = starts[np.arange(near) % len(starts)].reshape(near, inner, 3)
-        scale = np.exp(rng.uniform(np.log(MIN_SPREAD), np.log(MAX_SPREAD), (near, 1, 1)))
+        around_count = min(population, max(len(starts), int(AROUND_SEEDS * population)))
+        seeds = starts[np.arange(around_count) % len(starts)].reshape(around_count, inner_count, 3)
+        scale = np.exp(rng.uniform(np.log(MIN_SPREAD), np.log(MAX_SPREAD), (around_count, 1, 1)))
         scale[: len(starts)] = 0.0
-        out[:near] = picked
-        out[:near, :, 1:] += scale * bridges(near)
-        out[:near, :, :1] += scale * rng.normal(size=(near, inner, 1)) * (upper[:, :1] - lower[:, :1])
+        out[:around_count] = seeds
+        out[:around_count, :, 1:] += scale * bridges(around_count)
+        out[:around_count, :, :1] += (
+            scale * rng.normal(size=(around_count, inner_count, 1)) * (upper[:, :1] - lower[:, :1])
+        )
     return np.clip(out.reshape(population, -1), encoding.lower, encoding.upper)

@@ -1,9 +1,9 @@
 """Constrain the heights and slopes of flown corners in shortening, with derivatives by the waypoints.
 
-Round the end of a ridge a flight cuts its corners over higher ground than there is below the legs.  Without tracking
-error it is on the chords of fly-by arcs; with it, it is within a distance of the legs before and after the waypoint, to
-both sides.  These are the places that a certificate measures; samples of them are taken here.  An arc is shorter than
-the legs it replaces, and steeper: a way that climbs in circles has to climb less on them.
+Around the end of a ridge a flight cuts its corners over higher ground than there is below the legs.  Without tracking
+error the flight is on the chords of fly-by arcs; with tracking error it is within a distance of the legs before and
+after the waypoint, on both sides.  A certificate measures these places; samples of them are taken here.  An arc is
+shorter than the legs it replaces, and steeper, so a path that climbs in circles must climb less on its arcs.
 """
 
 import math
@@ -22,21 +22,22 @@ from world.frames import polymap
 from world.kernels import Records, inner
 from world.terrain import pixel_height
 
-# Samples of a corner: with tracking error along two legs, on both sides of each.
+# Number of samples along each of a corner's two legs and on each side, with tracking error.
 ON_LEG = 4
+# Number of samples of a corner.
 SAMPLES = 4 * ON_LEG
 # Smallest distance between a sampled corner and its legs, m.
 MIN_DEPARTURE = 2.0
 # Largest height of a sampled corner above the required height, m.
 NEAR_GROUND = 60.0
-# The largest turn that is sampled, rad: at a half turn the tangent is infinite.
+# Largest turn that is sampled, rad, because at half a turn the tangent is infinite.
 MAX_TURN = 3.0
 # Half-step of finite differences of the ground, m.
 GROUND_STEP = 8.0
 # Half-step of finite differences of the place of a sample, m.
 CORNER_STEP = 0.5
 # Slope of an arc, as a fraction of the slope limit, below which it is not constrained.
-STEEP = 0.8
+STEEP_FRACTION = 0.8
 # Length of an arc in addition to the length for its climb or descent, m.
 ARC_MARGIN = 1.0
 # The same as a fraction of the additional margin.
@@ -46,9 +47,10 @@ ARC_SHARE = 0.4
 class FlownCorners(NamedTuple):
     """Corners of a path of w waypoints that are flown near the ground.
 
-    radii: (w,) of their turns, m; 0 for the others. lowered: (w, 2) what is flown below the legs before and after, m.
-    steep_radii: (w,) of the arcs that are almost as steep as can be flown; 0 for the others. slopes: (w, 2) tangents of
-    the steepest climb and dive there. slope_margin: of arcs, m of length.
+    radii: (w,) radii of their turns, m; 0 for other corners. lowered: (w, 2) depth of the flight below the legs before
+    and after, m.
+    steep_radii: (w,) radii of the arcs that are almost as steep as can be flown, m; 0 for other arcs. slopes: (w, 2)
+    tangents of the steepest climb and dive there. slope_margin: margin of arcs, m of length.
     """
 
     radii: Floats
@@ -79,41 +81,41 @@ def corners_near_ground(
     margin: additional margin, m.
     """
     count = path.shape[0]
-    found, point = no_corners(count, margin), np.empty(3)
-    lowered = found.lowered
+    flown, point = no_corners(count, margin), np.empty(3)
+    lowered = flown.lowered
     if data.fly_over:
-        return found
+        return flown
     if data.legs_hold_turns and limits.slopes_by_aircraft:
-        _find_steep_arcs(data, path, corners, found)
+        _find_steep_arcs(data, path, corners, flown)
     radii = fly_by_radii(data, path)
     for i in range(1, count - 1):
         radius = corners[i].radius if data.tracking.has_error else radii[i]
         if not 0.0 < radius < math.inf:
             continue
-        before, after = _run(path[i - 1], path[i]), _run(path[i], path[i + 1])
+        length_in, length_out = _horizontal_length(path[i - 1], path[i]), _horizontal_length(path[i], path[i + 1])
         if data.tracking.has_error:
             if corners[i].excursion < MIN_DEPARTURE:
                 continue
-            begin = 1.0 - min(1.0, corners[i].before / before)
-            lowered[i, 0] += max(0.0, lag_at(lags[i - 1], begin), lag_at(lags[i - 1], 1.0))
-            lowered[i, 1] += max(0.0, lag_at(lags[i], 0.0), lag_at(lags[i], min(1.0, corners[i].after / after)))
+            begin_fraction = 1.0 - min(1.0, corners[i].before / length_in)
+            lowered[i, 0] += max(0.0, lag_at(lags[i - 1], begin_fraction), lag_at(lags[i - 1], 1.0))
+            lowered[i, 1] += max(0.0, lag_at(lags[i], 0.0), lag_at(lags[i], min(1.0, corners[i].after / length_out)))
         else:
             corner_point(data, path[i - 1], path[i], path[i + 1], radius, SAMPLES // 2, point)
-            if _run(point, path[i]) < MIN_DEPARTURE:
+            if _horizontal_length(point, path[i]) < MIN_DEPARTURE:
                 continue
-            change = abs((path[i, 2] - path[i - 1, 2]) / before - (path[i + 1, 2] - path[i, 2]) / after)
-            lower = 0.25 * change * change * half_blend_length(data.aircraft, path[i, 2])
-            lowered[i, 0] += lower
-            lowered[i, 1] += lower
+            slope_change = abs((path[i, 2] - path[i - 1, 2]) / length_in - (path[i + 1, 2] - path[i, 2]) / length_out)
+            lowering = 0.25 * slope_change * slope_change * half_blend_length(data.aircraft, path[i, 2])
+            lowered[i, 0] += lowering
+            lowered[i, 1] += lowering
         for k in range(SAMPLES):
             corner_point(data, path[i - 1], path[i], path[i + 1], radius, k, point)
             if height_above_required(data, limits, point) < lowered[i, leg_of(k)] + NEAR_GROUND:
-                found.radii[i] = radius
-    return found
+                flown.radii[i] = radius
+    return flown
 
 
 @inner
-def _find_steep_arcs(data: ProblemArrays, path: Floats, corners: Records, found: FlownCorners) -> None:
+def _find_steep_arcs(data: ProblemArrays, path: Floats, corners: Records, flown: FlownCorners) -> None:
     """Fill the radii and slope limits of the arcs whose slopes are close to the limits on one of their courses."""
     flat, step = np.zeros(3), np.zeros(3)
     for i in range(1, path.shape[0] - 1):
@@ -123,27 +125,38 @@ def _find_steep_arcs(data: ProblemArrays, path: Floats, corners: Records, found:
         flat[2] = path[i, 2]
         for leg in (i - 1, i):
             step[0], step[1], step[2] = path[leg + 1, 0] - path[leg, 0], path[leg + 1, 1] - path[leg, 1], path[i, 2]
-            up, down = slope_limits(data, flat, step)
-            climb, dive = min(climb, math.tan(up)), min(dive, math.tan(down))
-        found.slopes[i, 0], found.slopes[i, 1] = climb, dive
+            climb_limit, dive_limit = slope_limits(data, flat, step)
+            climb, dive = min(climb, math.tan(climb_limit)), min(dive, math.tan(dive_limit))
+        flown.slopes[i, 0], flown.slopes[i, 1] = climb, dive
         radius = corners[i].radius
         arc = radius * min(MAX_TURN, 2.0 * math.atan(corners[i].tangent / radius))
-        for sign, steepest in ((1.0, climb), (-1.0, dive)):
-            if arc_room(path[i - 1], path[i], path[i + 1], radius, sign, steepest) < (1.0 - STEEP) * arc:
-                found.steep_radii[i] = radius
+        for sign, max_slope in ((1.0, climb), (-1.0, dive)):
+            if arc_room(path[i - 1], path[i], path[i + 1], radius, sign, max_slope) < (1.0 - STEEP_FRACTION) * arc:
+                flown.steep_radii[i] = radius
 
 
 @inner
-def arc_room(before: Floats, at: Floats, after: Floats, radius: float, sign: float, steepest: float) -> float:
-    """Return the arc's length past the waypoint `at` minus the length of its climb (sign 1) or descent (-1), m.
+def arc_room(
+    previous: Floats, waypoint: Floats, next_waypoint: Floats, radius: float, sign: float, max_slope: float
+) -> float:
+    """Return the arc's length past `waypoint` minus the length of its climb (sign 1) or descent (-1), m.
 
-    Slopes are those of `aircraft.path_limits.arc_slope`; steepest: tangent of the maximum slope.
+    Slopes are those of `aircraft.path_limits.arc_slope`; max_slope: tangent of the maximum slope.
     """
-    run, on = _run(before, at), _run(at, after)
-    ux, uy, vx, vy = at[0] - before[0], at[1] - before[1], after[0] - at[0], after[1] - at[1]
+    length_in, length_out = _horizontal_length(previous, waypoint), _horizontal_length(waypoint, next_waypoint)
+    ux, uy, vx, vy = (
+        waypoint[0] - previous[0],
+        waypoint[1] - previous[1],
+        next_waypoint[0] - waypoint[0],
+        next_waypoint[1] - waypoint[1],
+    )
     turn = min(MAX_TURN, math.atan2(abs(ux * vy - uy * vx), ux * vx + uy * vy))
-    rise = radius * math.tan(0.5 * turn) * ((at[2] - before[2]) / run + (after[2] - at[2]) / on)
-    return radius * turn - sign * rise / steepest
+    rise = (
+        radius
+        * math.tan(0.5 * turn)
+        * ((waypoint[2] - previous[2]) / length_in + (next_waypoint[2] - waypoint[2]) / length_out)
+    )
+    return radius * turn - sign * rise / max_slope
 
 
 @inner
@@ -153,7 +166,7 @@ def leg_of(sample: int) -> int:
 
 
 @inner
-def _run(a: Floats, b: Floats) -> float:
+def _horizontal_length(a: Floats, b: Floats) -> float:
     return max(1e-3, math.hypot(b[0] - a[0], b[1] - a[1]))
 
 
@@ -167,72 +180,81 @@ def height_above_required(data: ProblemArrays, limits: PrecomputedLimits, point:
 
 @inner
 def corner_point(
-    data: ProblemArrays, before: Floats, at: Floats, after: Floats, radius: float, sample: int, out: Floats
+    data: ProblemArrays,
+    previous: Floats,
+    waypoint: Floats,
+    next_waypoint: Floats,
+    radius: float,
+    sample: int,
+    out: Floats,
 ) -> None:
-    """Fill `out` (3,) with the position of a sample of the corner at the waypoint `at`, whose turn has this radius, m.
+    """Fill `out` (3,) with the position of a sample of the corner at `waypoint`, whose turn has this radius, m.
 
     Heights are those of the legs, or of the arc between its tangent points, and not lowered.
     """
-    run, on = _run(before, at), _run(at, after)
-    ux, uy = (at[0] - before[0]) / run, (at[1] - before[1]) / run
-    vx, vy = (after[0] - at[0]) / on, (after[1] - at[1]) / on
-    climb, on_climb = (at[2] - before[2]) / run, (after[2] - at[2]) / on
+    length_in, length_out = _horizontal_length(previous, waypoint), _horizontal_length(waypoint, next_waypoint)
+    ux, uy = (waypoint[0] - previous[0]) / length_in, (waypoint[1] - previous[1]) / length_in
+    vx, vy = (next_waypoint[0] - waypoint[0]) / length_out, (next_waypoint[1] - waypoint[1]) / length_out
+    slope_in, slope_out = (waypoint[2] - previous[2]) / length_in, (next_waypoint[2] - waypoint[2]) / length_out
     cross = ux * vy - uy * vx
     turn = min(MAX_TURN, math.atan2(abs(cross), ux * vx + uy * vy))
     if data.tracking.has_error:
         speed = math.sqrt(radius * GRAVITY * data.aircraft.tan_max_bank)
-        aside, length_before, length_after = corner_deviation(data.tracking, turn, speed)
+        offset, length_before, length_after = corner_deviation(data.tracking, turn, speed)
         tangent = radius * math.tan(0.5 * turn)
-        side = aside if sample % 2 == 0 else -aside
-        share = (sample // 2 % ON_LEG) / (ON_LEG - 1.0)
+        side = offset if sample % 2 == 0 else -offset
+        fraction = (sample // 2 % ON_LEG) / (ON_LEG - 1.0)
         if leg_of(sample) == 0:
-            ahead = -share * min(run, max(tangent, length_before))
-            out[0], out[1] = at[0] + ux * ahead - uy * side, at[1] + uy * ahead + ux * side
-            out[2] = at[2] + ahead * climb
+            along = -fraction * min(length_in, max(tangent, length_before))
+            out[0], out[1] = waypoint[0] + ux * along - uy * side, waypoint[1] + uy * along + ux * side
+            out[2] = waypoint[2] + along * slope_in
         else:
-            ahead = share * min(on, max(tangent, length_after))
-            out[0], out[1] = at[0] + vx * ahead - vy * side, at[1] + vy * ahead + vx * side
-            out[2] = at[2] + ahead * on_climb
+            along = fraction * min(length_out, max(tangent, length_after))
+            out[0], out[1] = waypoint[0] + vx * along - vy * side, waypoint[1] + vy * along + vx * side
+            out[2] = waypoint[2] + along * slope_out
         return
-    share = (sample + 1.0) / (SAMPLES + 1.0)
+    fraction = (sample + 1.0) / (SAMPLES + 1.0)
     tangent, side = radius * math.tan(0.5 * turn), 1.0 if cross >= 0.0 else -1.0
     # The middles of the chords are this far from the centre; the arc is further.
-    inside = radius * math.cos(0.5 * ARC_STEP)
-    ahead, aside = inside * math.sin(share * turn) - tangent, side * (radius - inside * math.cos(share * turn))
-    out[0], out[1] = at[0] + ux * ahead - uy * aside, at[1] + uy * ahead + ux * aside
-    out[2] = at[2] - tangent * climb + share * tangent * (climb + on_climb)
+    chord_radius = radius * math.cos(0.5 * ARC_STEP)
+    along, offset = (
+        chord_radius * math.sin(fraction * turn) - tangent,
+        side * (radius - chord_radius * math.cos(fraction * turn)),
+    )
+    out[0], out[1] = waypoint[0] + ux * along - uy * offset, waypoint[1] + uy * along + ux * offset
+    out[2] = waypoint[2] - tangent * slope_in + fraction * tangent * (slope_in + slope_out)
 
 
 @inner
 def corner_slopes(
-    data: ProblemArrays, corner: Floats, radius: float, sample: int, up: Floats, point: Floats, slopes: Floats
+    data: ProblemArrays, corner: Floats, radius: float, sample: int, gradient: Floats, point: Floats, slopes: Floats
 ) -> None:
-    """Fill the derivatives (3, 3), by a corner's waypoints (3, 3), of a value with the gradient `up` (3,) at a sample.
+    """Fill the derivatives (3, 3) of a value by a corner's waypoints (3, 3), given its gradient (3,) at a sample.
 
     point: scratch memory, (3,).
     """
     for row in range(3):
         for axis in range(3):
-            place, slopes[row, axis] = corner[row, axis], 0.0
+            coordinate, slopes[row, axis] = corner[row, axis], 0.0
             for sign in (1.0, -1.0):
-                corner[row, axis] = place + sign * CORNER_STEP
+                corner[row, axis] = coordinate + sign * CORNER_STEP
                 corner_point(data, corner[0], corner[1], corner[2], radius, sample, point)
                 for k in range(3):
-                    slopes[row, axis] += sign * up[k] * point[k] / (2.0 * CORNER_STEP)
-            corner[row, axis] = place
+                    slopes[row, axis] += sign * gradient[k] * point[k] / (2.0 * CORNER_STEP)
+            corner[row, axis] = coordinate
 
 
 @inner
-def arc_room_slopes(corner: Floats, radius: float, sign: float, steepest: float, slopes: Floats) -> None:
+def arc_room_slopes(corner: Floats, radius: float, sign: float, max_slope: float, slopes: Floats) -> None:
     """Fill the derivatives (3, 3) of `arc_room` by the waypoints of a corner (3, 3)."""
     for row in range(3):
         for axis in range(3):
-            place, slopes[row, axis] = corner[row, axis], 0.0
-            for way in (1.0, -1.0):
-                corner[row, axis] = place + way * CORNER_STEP
-                room = arc_room(corner[0], corner[1], corner[2], radius, sign, steepest)
-                slopes[row, axis] += way * room / (2.0 * CORNER_STEP)
-            corner[row, axis] = place
+            coordinate, slopes[row, axis] = corner[row, axis], 0.0
+            for direction in (1.0, -1.0):
+                corner[row, axis] = coordinate + direction * CORNER_STEP
+                value = arc_room(corner[0], corner[1], corner[2], radius, sign, max_slope)
+                slopes[row, axis] += direction * value / (2.0 * CORNER_STEP)
+            corner[row, axis] = coordinate
 
 
 @inner

@@ -34,7 +34,7 @@ KILL_COST = 40.0
 COARSE = 250.0
 # Enlargement of the spheres, as a fraction of a step.
 COARSE_GROWTH = 0.15
-# Share of a step around a cell over which the highest ground is taken.
+# Fraction of a step around a cell over which the highest ground is taken.
 GROUND_SPREAD = 0.4
 # A threat in the rotated frame, with the radius that routes avoid, m.
 OBSTACLE = np.dtype(
@@ -46,10 +46,10 @@ OBSTACLE = np.dtype(
 class Grid(NamedTuple):
     """One resolution: number of stages along, positions across (m from the line) and layers of height (m).
 
-    shrink: share of a step by which kill spheres are reduced; 0 for none. Routes on such a grid may have to be
+    shrink: fraction of a step by which kill spheres are reduced; 0 for none. Routes on such a grid may have to be
     shortened to be safe, but pass gaps between its cells.
-    spread: share of a step around a cell over which the highest ground is taken.
-    ratio: spacing across as a share of a step; below 1 the grid has more courses and resolves finer gaps.
+    spread: fraction of a step around a cell over which the highest ground is taken.
+    ratio: spacing across as a fraction of a step; below 1 the grid has more courses and resolves finer gaps.
     """
 
     stages: int
@@ -89,14 +89,14 @@ def _min_height(
 ) -> float:
     """Return the minimum height in a cell, the highest ground of 3 x 3 samples plus the clearance; inf outside the map.
 
-    steps: steps between the samples; 0 along for the middle sample alone.
+    steps: steps between the samples; a step of 0 along the frame leaves only the middle sample.
     """
     east, north = position_of(frame, along, across)
     if not (data.west <= east <= data.east and data.south <= north <= data.north):
         return math.inf
     column, row = polymap(data.to_pixel, east, north)
     spread = 0 if steps.columns_along == 0.0 and steps.rows_along == 0.0 else 1
-    worst = -math.inf
+    highest_ground = -math.inf
     for i in range(-spread, spread + 1):
         for j in range(-spread, spread + 1):
             ground = pixel_height(
@@ -106,8 +106,8 @@ def _min_height(
             )
             if math.isnan(ground):
                 return math.inf
-            worst = max(worst, ground)
-    return worst + clearance_at(required, east, north)
+            highest_ground = max(highest_ground, ground)
+    return highest_ground + clearance_at(required, east, north)
 
 
 @inner
@@ -131,43 +131,45 @@ def find_obstacles(data: ProblemArrays, frame: RotatedFrame, step: float, shrink
     growth = COARSE_GROWTH * step if step > COARSE else 0.0
     if shrink > 0.0:
         growth = -shrink * step
-    out = np.zeros(data.threats.shape[0], dtype=OBSTACLE)
+    obstacles = np.zeros(data.threats.shape[0], dtype=OBSTACLE)
     count = 0
     for k in range(data.threats.shape[0]):
         threat = data.threats[k]
         if threat.kill_radius <= 0.0:
             continue
         east, north = threat.east - frame.east, threat.north - frame.north
-        out[count].along = frame.cosine * east + frame.sine * north
-        out[count].across = frame.cosine * north - frame.sine * east
-        out[count].up = threat.up
-        out[count].radius = threat.kill_radius + (data.kill_margin + growth)
+        obstacles[count].along = frame.cosine * east + frame.sine * north
+        obstacles[count].across = frame.cosine * north - frame.sine * east
+        obstacles[count].up = threat.up
+        obstacles[count].radius = threat.kill_radius + (data.kill_margin + growth)
         count += 1
-    return out[:count]
+    return obstacles[:count]
 
 
 @inner
-def _add_kill_cost(obstacles: Records, along: float, grid: Grid, low: int, high: int, price: Floats) -> None:
-    """Add the cost per m inside kill spheres, increasing inwards, to a stage's cells (layers, low..high)."""
+def _add_kill_cost(
+    obstacles: Records, along: float, grid: Grid, first_across: int, last_across: int, price: Floats
+) -> None:
+    """Add the cost per m inside kill spheres, increasing inwards, to a range across of a stage's cells."""
     across, layers = grid.across, grid.layers
     pitch = across[1] - across[0] if across.size > 1 else 1.0
     for k in range(obstacles.shape[0]):
         obstacle = obstacles[k]
         radius = obstacle.radius
-        ahead2 = (along - obstacle.along) ** 2
-        if ahead2 >= radius * radius:
+        along2 = (along - obstacle.along) ** 2
+        if along2 >= radius * radius:
             continue
-        half = math.sqrt(radius * radius - ahead2)
-        first = max(low, math.ceil((obstacle.across - half - across[0]) / pitch))
-        last = min(high, math.floor((obstacle.across + half - across[0]) / pitch))
+        half_width = math.sqrt(radius * radius - along2)
+        first_y = max(first_across, math.ceil((obstacle.across - half_width - across[0]) / pitch))
+        last_y = min(last_across, math.floor((obstacle.across + half_width - across[0]) / pitch))
         for z in range(layers.size):
-            flat2 = ahead2 + (layers[z] - obstacle.up) ** 2
-            if flat2 >= radius * radius:
+            plane_distance2 = along2 + (layers[z] - obstacle.up) ** 2
+            if plane_distance2 >= radius * radius:
                 continue
-            for y in range(first, last + 1):
-                d2 = flat2 + (across[y] - obstacle.across) ** 2
-                if d2 < radius * radius:
-                    price[z, y] += KILL_COST * (3.0 - 2.0 * math.sqrt(d2) / radius)
+            for y in range(first_y, last_y + 1):
+                distance2 = plane_distance2 + (across[y] - obstacle.across) ** 2
+                if distance2 < radius * radius:
+                    price[z, y] += KILL_COST * (3.0 - 2.0 * math.sqrt(distance2) / radius)
 
 
 @inner
@@ -179,23 +181,23 @@ def set_cell_costs(
     obstacles: Records,
     grid: Grid,
     extra: Floats,
-    low: int,
-    high: int,
+    first_across: int,
+    last_across: int,
     price: Floats,
 ) -> None:
-    """Fill the cost per m of a stage's cells (layers, low..high), inf for a cell too close to the ground."""
+    """Fill the cost per m of a range across of a stage's cells, inf for a cell too close to the ground."""
     across, layers = grid.across, grid.layers
     step = frame.length / grid.stages
     steps = _pixel_steps(data, frame, stage * step, grid.spread * step if stage < grid.stages else 0.0)
-    for y in range(low, high + 1):
+    for y in range(first_across, last_across + 1):
         # The destination is fixed, whatever its clearance.
         if stage == grid.stages and across[y] == 0.0:
-            lowest = -math.inf
+            min_height = -math.inf
         else:
-            lowest = _min_height(data, required, frame, stage * step, across[y], steps)
+            min_height = _min_height(data, required, frame, stage * step, across[y], steps)
         for z in range(layers.size):
-            price[z, y] = 1.0 + extra[stage, y] if layers[z] >= lowest else math.inf
-    _add_kill_cost(obstacles, stage * step, grid, low, high, price)
+            price[z, y] = 1.0 + extra[stage, y] if layers[z] >= min_height else math.inf
+    _add_kill_cost(obstacles, stage * step, grid, first_across, last_across, price)
 
 
 # --- Dynamic programme over stages ---
@@ -215,7 +217,7 @@ SPAN = np.dtype([("first", np.int64), ("last", np.int64)], align=True)
 def layers_per_step(data: ProblemArrays, frame: RotatedFrame, step: float, layers: Floats, ratio: float) -> Records:
     """Return `STEP_LAYERS` records (sideways, layers) of the climb and descent of each step by course and height."""
     pitch = layers[1] - layers[0] if layers.size > 1 else 1.0
-    out = np.zeros((2 * SIDEWAYS + 1, layers.size), dtype=STEP_LAYERS)
+    step_layers = np.zeros((2 * SIDEWAYS + 1, layers.size), dtype=STEP_LAYERS)
     a, b = np.zeros(3), np.zeros(3)
     for side in range(-SIDEWAYS, SIDEWAYS + 1):
         run = step * math.sqrt(1.0 + (side * ratio) ** 2)
@@ -225,24 +227,24 @@ def layers_per_step(data: ProblemArrays, frame: RotatedFrame, step: float, layer
             a[2] = layers[z]
             b[2] = layers[z]
             climb, dive = slope_limits(data, a, b)
-            out[side + SIDEWAYS, z].climb = max(0, math.floor(math.tan(climb) * run / pitch))
-            out[side + SIDEWAYS, z].sink = max(0, math.floor(math.tan(dive) * run / pitch))
-    return out
+            step_layers[side + SIDEWAYS, z].climb = max(0, math.floor(math.tan(climb) * run / pitch))
+            step_layers[side + SIDEWAYS, z].sink = max(0, math.floor(math.tan(dive) * run / pitch))
+    return step_layers
 
 
 @inner
 def relax(
     cost: Floats,
     price: Floats,
-    after: Floats,
+    next_cost: Floats,
     parents: Codes,
     start: int,
     end: int,
-    priced: int,
+    price_start: int,
     count: int,
     length: float,
 ) -> None:
-    """Relax `count` adjacent cells to as many cells of the next stage, with cell costs from `priced`.
+    """Relax `count` adjacent cells to as many cells of the next stage, with cell costs from `price_start`.
 
     All arrays are flat.
     """
@@ -250,16 +252,16 @@ def relax(
         # Unsigned indices (numba checks signed ones for wrap-around) and no branches: this innermost loop is
         # vectorised.
         i, j = np.uintp(start) + np.uintp(k), np.uintp(end) + np.uintp(k)
-        total = cost[i] + length * price[np.uintp(priced) + np.uintp(k)]
-        better = total < after[j]
-        after[j] = total if better else after[j]
-        parents[j] = start + k if better else parents[j]
+        total = cost[i] + length * price[np.uintp(price_start) + np.uintp(k)]
+        is_better = total < next_cost[j]
+        next_cost[j] = total if is_better else next_cost[j]
+        parents[j] = start + k if is_better else parents[j]
 
 
 @inner
 def relax_stage(
     cost: Floats,
-    after: Floats,
+    next_cost: Floats,
     parents: Codes,
     spans: Records,
     step_layers: Records,
@@ -270,71 +272,88 @@ def relax_stage(
 ) -> None:
     """Relax one stage, from the costs before it to the costs after it, (layers, across) each, and store parent cells.
 
-    spans: `SPAN` records (layers,) of the cells with a finite cost before. pitch: between layers, m.
+    spans: `SPAN` records (layers,) of the cells with a finite cost before. pitch: spacing of the layers, m.
     """
-    high, wide = cost.shape
-    flat, flat_after, flat_parents, flat_price = cost.ravel(), after.ravel(), parents.ravel(), price.ravel()
-    for z in range(high):
+    layer_count, width = cost.shape
+    flat_cost, flat_next_cost, flat_parents, flat_price = (
+        cost.ravel(),
+        next_cost.ravel(),
+        parents.ravel(),
+        price.ravel(),
+    )
+    for z in range(layer_count):
         first, last = spans[z].first, spans[z].last
         if first > last:
             continue
         for side in range(-SIDEWAYS, SIDEWAYS + 1):
-            a, b = max(first, -side), min(last, wide - 1 - side) + 1
-            if a >= b:
+            begin, end = max(first, -side), min(last, width - 1 - side) + 1
+            if begin >= end:
                 continue
             limit = step_layers[side + SIDEWAYS, z]
-            bottom, top = max(0, z - limit.sink), min(high - 1, z + limit.climb)
-            for z2 in range(bottom, top + 1):
-                length = math.sqrt(step * step * (1.0 + (side * ratio) ** 2) + ((z2 - z) * pitch) ** 2)
-                here, there = z * wide + a, z2 * wide + a + side
-                relax(flat, flat_price, flat_after, flat_parents, here, there, there, b - a, length)
+            bottom, top = max(0, z - limit.sink), min(layer_count - 1, z + limit.climb)
+            for next_z in range(bottom, top + 1):
+                length = math.sqrt(step * step * (1.0 + (side * ratio) ** 2) + ((next_z - z) * pitch) ** 2)
+                source, target = z * width + begin, next_z * width + begin + side
+                relax(flat_cost, flat_price, flat_next_cost, flat_parents, source, target, target, end - begin, length)
 
 
 @inner
-def distance_to_goal(columns: int, home: int, left: int, step: float, ratio: float, out: Floats) -> None:
-    """Return the shortest horizontal distance from each position across to the destination, `left` stages away, m."""
+def distance_to_goal(columns: int, home: int, remaining_stages: int, step: float, ratio: float, out: Floats) -> None:
+    """Fill the shortest horizontal distance from each position across to the destination, m."""
     for y in range(columns):
-        aside = abs(y - home)
-        if aside > SIDEWAYS * left:
+        offset = abs(y - home)
+        if offset > SIDEWAYS * remaining_stages:
             out[y] = math.inf
             continue
-        k = aside // left if left > 0 else 0
-        straight, more = (k + 1) * left - aside, aside - k * left
-        far, further = math.sqrt(1.0 + (k * ratio) ** 2), math.sqrt(1.0 + ((k + 1) * ratio) ** 2)
-        out[y] = step * (straight * far + more * further)
+        k = offset // remaining_stages if remaining_stages > 0 else 0
+        narrow_count, wide_count = (k + 1) * remaining_stages - offset, offset - k * remaining_stages
+        narrow_length, wide_length = math.sqrt(1.0 + (k * ratio) ** 2), math.sqrt(1.0 + ((k + 1) * ratio) ** 2)
+        out[y] = step * (narrow_count * narrow_length + wide_count * wide_length)
 
 
 @inner
-def prune(after: Floats, spans: Records, ahead: Floats, rises: Floats, bound: float, low: int, high: int) -> None:
-    """Drop cells low..high from which no route reaches the destination within the bound, and fill the remaining spans.
+def prune(
+    next_cost: Floats,
+    spans: Records,
+    goal_distances: Floats,
+    rises: Floats,
+    bound: float,
+    first_across: int,
+    last_across: int,
+) -> None:
+    """Drop cells without a route to the destination within the bound, and fill the remaining spans.
 
-    spans: `SPAN` records (layers,) to fill. ahead: (across,) horizontal distance to the destination, m. rises:
+    spans: `SPAN` records (layers,) to fill. goal_distances: (across,) horizontal distance to the destination, m. rises:
     (layers,) height difference to it, m.
     """
-    for z in range(after.shape[0]):
-        spans[z].first, spans[z].last = after.shape[1], -1
+    for z in range(next_cost.shape[0]):
+        spans[z].first, spans[z].last = next_cost.shape[1], -1
         rise2 = rises[z] * rises[z]
-        for y in range(low, high + 1):
-            left = bound - after[z, y]
-            if left >= 0.0 and left * left >= ahead[y] * ahead[y] + rise2 and after[z, y] < math.inf:
+        for y in range(first_across, last_across + 1):
+            remaining_cost = bound - next_cost[z, y]
+            if (
+                remaining_cost >= 0.0
+                and remaining_cost * remaining_cost >= goal_distances[y] * goal_distances[y] + rise2
+                and next_cost[z, y] < math.inf
+            ):
                 spans[z].first = min(spans[z].first, y)
                 spans[z].last = y
             else:
-                after[z, y] = math.inf
+                next_cost[z, y] = math.inf
 
 
 class GridSearch(NamedTuple):
     """A search for the cheapest route over a grid, which can be continued; arrays are (layers, across).
 
-    parents: (stages + 1, layers, across).  cost, after: of the last stage reached, and scratch; price: cost per m,
-    scratch.  spans: `SPAN` records (layers,) of the cells with a finite cost.  stage: the last one reached.
+    parents: (stages + 1, layers, across).  cost: costs of the last stage reached.  next_cost: scratch.  price: cost per
+    m, scratch.  spans: `SPAN` records (layers,) of the cells with a finite cost.  stage: the last one reached.
     """
 
     step_layers: Records
     obstacles: Records
     parents: Codes
     cost: Floats
-    after: Floats
+    next_cost: Floats
     price: Floats
     spans: Records
     start: int
@@ -343,7 +362,7 @@ class GridSearch(NamedTuple):
     stage: int
 
 
-# Cells of a grid that are reached between two calls of `pause`: some 10 ms.
+# Number of cells reached between two calls of `pause`: some 10 ms.
 CELLS_AT_ONCE = 150_000
 
 
@@ -358,7 +377,7 @@ def cheapest_route(
     """Return `ROUTE_CELL` records (stages + 1,) of the cheapest route over a grid, and its cost.
 
     Return no records if there is no route.
-    extra: (stages + 1, across) added to the cost per m. bound: upper limit on the cost; more expensive routes are not
+    extra: (stages + 1, across), added to the cost per m. bound: upper limit on the cost; more expensive routes are not
     searched. pause: called after every `CELLS_AT_ONCE` cells; an exception raised there stops the search.
     """
     stages = max(1, CELLS_AT_ONCE // (grid.across.size * grid.layers.size))
@@ -373,22 +392,22 @@ def cheapest_route(
 @compiled
 def begin_route(data: ProblemArrays, frame: RotatedFrame, grid: Grid) -> GridSearch:
     """Return a new search at the start."""
-    stages, wide, high = grid.stages, grid.across.size, grid.layers.size
+    stages, width, layer_count = grid.stages, grid.across.size, grid.layers.size
     step = frame.length / stages
     home, start = int(np.argmin(np.abs(grid.across))), int(np.argmin(np.abs(grid.layers - data.start[2])))
     goal = int(np.argmin(np.abs(grid.layers - data.destination[2])))
-    cost = np.full((high, wide), np.inf)
+    cost = np.full((layer_count, width), np.inf)
     cost[start, home] = 0.0
-    spans = np.zeros(high, dtype=SPAN)
-    for z in range(high):
-        spans[z].first, spans[z].last = (home, home) if z == start else (wide, -1)
+    spans = np.zeros(layer_count, dtype=SPAN)
+    for z in range(layer_count):
+        spans[z].first, spans[z].last = (home, home) if z == start else (width, -1)
     return GridSearch(
         layers_per_step(data, frame, step, grid.layers, grid.ratio),
         find_obstacles(data, frame, step, grid.shrink),
-        np.empty((stages + 1, high, wide), dtype=np.int32),
+        np.empty((stages + 1, layer_count, width), dtype=np.int32),
         cost,
-        np.full((high, wide), np.inf),
-        np.full((high, wide), np.inf),
+        np.full((layer_count, width), np.inf),
+        np.full((layer_count, width), np.inf),
         spans,
         start,
         home,
@@ -399,31 +418,37 @@ def begin_route(data: ProblemArrays, frame: RotatedFrame, grid: Grid) -> GridSea
 
 @compiled
 def continue_route(
-    data: ProblemArrays, frame: RotatedFrame, grid: Grid, extra: Floats, bound: float, search: GridSearch, more: int
+    data: ProblemArrays,
+    frame: RotatedFrame,
+    grid: Grid,
+    extra: Floats,
+    bound: float,
+    search: GridSearch,
+    max_stages: int,
 ) -> GridSearch:
-    """Continue a search by up to `more` stages, or until no route leads on, and return it."""
-    stages, wide, high = grid.stages, grid.across.size, grid.layers.size
+    """Continue a search by up to `max_stages` stages, or until no route leads on, and return it."""
+    stages, width, layer_count = grid.stages, grid.across.size, grid.layers.size
     step = frame.length / stages
-    pitch = grid.layers[1] - grid.layers[0] if high > 1 else 1.0
+    pitch = grid.layers[1] - grid.layers[0] if layer_count > 1 else 1.0
     required = required_clearance(data)
-    step_layers, obstacles, parents, cost, after, price, spans, start, home, goal, reached = search
-    rises, ahead = grid.layers - grid.layers[goal], np.empty(wide)
-    last_stage = min(stages, reached + more)
-    for stage in range(reached + 1, last_stage + 1):
-        low, last = wide, -1
-        for z in range(high):
-            low, last = min(low, spans[z].first), max(last, spans[z].last)
-        low, last = max(0, low - SIDEWAYS), min(wide - 1, last + SIDEWAYS)
-        if low > last:
+    step_layers, obstacles, parents, cost, next_cost, price, spans, start, home, goal, reached_stage = search
+    rises, goal_distances = grid.layers - grid.layers[goal], np.empty(width)
+    last_stage = min(stages, reached_stage + max_stages)
+    for stage in range(reached_stage + 1, last_stage + 1):
+        first, last = width, -1
+        for z in range(layer_count):
+            first, last = min(first, spans[z].first), max(last, spans[z].last)
+        first, last = max(0, first - SIDEWAYS), min(width - 1, last + SIDEWAYS)
+        if first > last:
             last_stage = stages
             break
-        set_cell_costs(data, required, frame, stage, obstacles, grid, extra, low, last, price)
-        after[:, low : last + 1] = np.inf
-        relax_stage(cost, after, parents[stage], spans, step_layers, price, step, pitch, grid.ratio)
-        distance_to_goal(wide, home, stages - stage, step, grid.ratio, ahead)
-        prune(after, spans, ahead, rises, bound, low, last)
-        cost, after = after, cost
-    return GridSearch(step_layers, obstacles, parents, cost, after, price, spans, start, home, goal, last_stage)
+        set_cell_costs(data, required, frame, stage, obstacles, grid, extra, first, last, price)
+        next_cost[:, first : last + 1] = np.inf
+        relax_stage(cost, next_cost, parents[stage], spans, step_layers, price, step, pitch, grid.ratio)
+        distance_to_goal(width, home, stages - stage, step, grid.ratio, goal_distances)
+        prune(next_cost, spans, goal_distances, rises, bound, first, last)
+        cost, next_cost = next_cost, cost
+    return GridSearch(step_layers, obstacles, parents, cost, next_cost, price, spans, start, home, goal, last_stage)
 
 
 @compiled
@@ -441,34 +466,33 @@ def trace_back(parents: Codes, layer: int, across: int) -> Records:
 
     parents: (stages + 1, layers, across).
     """
-    wide = parents.shape[2]
+    width = parents.shape[2]
     cells = np.zeros(parents.shape[0], dtype=ROUTE_CELL)
     for stage in range(parents.shape[0] - 1, -1, -1):
         cells[stage].across = across
         cells[stage].layer = layer
         if stage > 0:
             parent = parents[stage, layer, across]
-            layer, across = parent // wide, parent % wide
+            layer, across = parent // width, parent % width
     return cells
 
 
 # --- Grids and routes ---
 
-# Pitch of the layers as a share of the step along: the gentler slope limit's climb per step over LAYERS_PER_STEP,
-# within these limits.
+# Layers that the gentler slope limit climbs per step along; the limits of the pitch below apply.
 LAYERS_PER_STEP = 2.5
 # Smallest pitch of the layers, as a fraction of the step along.
-LOW_LAYER = 0.05
+MIN_LAYER_PITCH = 0.05
 # Largest pitch of the layers, as a fraction of the step along.
-HIGH_LAYER = 0.12
+MAX_LAYER_PITCH = 0.12
 # Maximum number of cells of a grid: stages x across x layers.
 MAX_CELLS = 1_200_000
 # Expected cost of the first route over the straight line; with few courses, grid routes are too long by about this.
-EXPECTED = 1.12
+EXPECTED_COST_RATIO = 1.12
 # Distance from an earlier route within which a route costs up to twice as much, m.
-APART = 800.0
+ROUTE_SPACING = 800.0
 # The same in steps, if that is larger.
-APART_STEPS = 3.0
+ROUTE_SPACING_STEPS = 3.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -484,18 +508,24 @@ def make_grid(data: ProblemArrays, frame: RotatedFrame, span: tuple[float, float
 
     span: limits across, m. The number of stages is reduced where the grid would become too large.
     """
-    low, high = max(data.floor, float(np.nanmin(data.heights))), data.ceiling
+    lowest, highest = max(data.floor, float(np.nanmin(data.heights))), data.ceiling
     level = np.array([*data.destination[:2], data.start[2]])
-    share = math.tan(max(0.0, min(slope_limits(data, np.array(data.start), level))))
-    share = min(HIGH_LAYER, max(LOW_LAYER, share / LAYERS_PER_STEP))
+    gentler_slope = math.tan(max(0.0, min(slope_limits(data, np.array(data.start), level))))
+    pitch_ratio = min(MAX_LAYER_PITCH, max(MIN_LAYER_PITCH, gentler_slope / LAYERS_PER_STEP))
     while True:
         step = frame.length / stages
-        layer = share * step
-        below, above = math.floor(-span[0] / step), math.floor(span[1] / step)
-        across = np.arange(-below, above + 1) * step
-        up = np.arange(math.ceil((low - data.start[2]) / layer), math.floor((high - data.start[2]) / layer) + 1)
-        if stages <= 4 or (stages + 1) * across.size * max(1, up.size) <= MAX_CELLS:
-            return Grid(stages, np.asarray(across, np.float64), np.asarray(data.start[2] + up * layer, np.float64))
+        layer_pitch = pitch_ratio * step
+        right_count, left_count = math.floor(-span[0] / step), math.floor(span[1] / step)
+        across = np.arange(-right_count, left_count + 1) * step
+        layer_numbers = np.arange(
+            math.ceil((lowest - data.start[2]) / layer_pitch), math.floor((highest - data.start[2]) / layer_pitch) + 1
+        )
+        if stages <= 4 or (stages + 1) * across.size * max(1, layer_numbers.size) <= MAX_CELLS:
+            return Grid(
+                stages,
+                np.asarray(across, np.float64),
+                np.asarray(data.start[2] + layer_numbers * layer_pitch, np.float64),
+            )
         stages = max(4, int(stages / 1.2))
 
 
@@ -503,21 +533,21 @@ def grid_route(
     data: ProblemArrays,
     frame: RotatedFrame,
     grid: Grid,
-    used: tuple[GridRoute, ...] = (),
-    expected: float = math.inf,
+    earlier_routes: tuple[GridRoute, ...] = (),
+    expected_cost: float = math.inf,
     pause: Callable[[], None] = lambda: None,
 ) -> GridRoute | None:
     """Return the cheapest route over a grid, or None if terrain and ceiling block every route.
 
-    used: earlier routes, near which the cost is higher, so that the next route takes another side. expected: cost bound
-    to try first, such as the cost on a coarser grid; a search without a bound follows if it fails. pause: as in
-    `cheapest_route`.
+    earlier_routes: earlier routes, near which the cost is higher, so that the next route takes another side.
+    expected_cost: cost bound to try first, such as the cost on a coarser grid; a search without a bound follows if it
+    fails. pause: as in `cheapest_route`.
     """
     if grid.layers.size == 0:
         return None
     along = np.linspace(0.0, frame.length, grid.stages + 1)
-    extra = proximity_cost(along, grid.across, used)
-    for bound in (expected, math.inf):
+    extra = proximity_cost(along, grid.across, earlier_routes)
+    for bound in (expected_cost, math.inf):
         cells, cost = cheapest_route(data, frame, grid, extra, bound, pause)
         if cells.size:
             points = np.column_stack([along, grid.across[cells["across"]], grid.layers[cells["layer"]]])
@@ -527,11 +557,11 @@ def grid_route(
     return None
 
 
-def proximity_cost(along: Floats, across: Floats, used: tuple[GridRoute, ...]) -> Floats:
+def proximity_cost(along: Floats, across: Floats, earlier_routes: tuple[GridRoute, ...]) -> Floats:
     """Return the additional cost per m near earlier routes, at positions along (s,) and across (y,), m, as (s, y)."""
     extra = np.zeros((along.size, across.size))
-    width = max(APART, APART_STEPS * along[-1] / (along.size - 1))
-    for route in used:
+    width = max(ROUTE_SPACING, ROUTE_SPACING_STEPS * along[-1] / (along.size - 1))
+    for route in earlier_routes:
         stage_across = np.interp(along, route.points[:, 0], route.points[:, 1])
         extra += np.maximum(0.0, 1.0 - np.abs(across[None, :] - stage_across[:, None]) / width)
     return extra
@@ -545,16 +575,16 @@ def grid_routes(
     pause: Callable[[], None] = lambda: None,
 ) -> Iterator[GridRoute]:
     """Yield routes for each grid (stages, number of different routes). pause: as in `cheapest_route`."""
-    expected = EXPECTED * math.dist(data.start, data.destination)
-    for stages, each in grids:
+    expected_cost = EXPECTED_COST_RATIO * math.dist(data.start, data.destination)
+    for stages, route_count in grids:
         grid = make_grid(data, frame, span, stages)
-        used: tuple[GridRoute, ...] = ()
-        for _ in range(each):
+        earlier_routes: tuple[GridRoute, ...] = ()
+        for _ in range(route_count):
             # A second route costs more than the first.
-            route = grid_route(data, frame, grid, used, math.inf if used else expected, pause)
+            route = grid_route(data, frame, grid, earlier_routes, math.inf if earlier_routes else expected_cost, pause)
             if route is None:
                 break
-            if not used:
-                expected = route.cost
-            used = (*used, route)
+            if not earlier_routes:
+                expected_cost = route.cost
+            earlier_routes = (*earlier_routes, route)
             yield route

@@ -35,14 +35,15 @@ Bytes = NDArray[np.int8]
 
 # Steps to the eight neighbours, along and across, in the order of their courses.
 _STEPS = np.array([[1, 0], [1, 1], [0, 1], [-1, 1], [-1, 0], [-1, -1], [0, -1], [1, -1]])
-# Cost per 45 degrees of turn, as a share of a step: among routes of equal length prefers the one with the fewest turns.
+# Cost per 45 degrees of turn, as a fraction of a step, so that of equally long routes the one with fewest turns is
+# best.
 TURN_COST = 0.1
 # A step is closed if its cost exceeds its length by this factor.
-CLOSED = 1.05
+MAX_COST_RATIO = 1.05
 # Status of a step.
 _UNKNOWN = 0
 _FREE = 1
-_SHUT = 2
+_CLOSED = 2
 # Parent of a state of the start.
 _FIRST = -1
 # A point of a route: steps along and across from the start, and its layer.
@@ -53,8 +54,9 @@ LATTICE_CELL = np.dtype([("along", np.int64), ("across", np.int64), ("layer", np
 class Lattice(NamedTuple):
     """Points in the rotated frame and layers of height.
 
-    step: between points, m. behind, right: points behind the start and to its right. along, across: number of points.
-    goal: index along of the destination. low: height of the first layer, m. pitch: between layers, m.
+    step: spacing of the points, m. behind, right: points behind the start and to its right. along, across: number of
+    points.
+    goal: index along of the destination. low: height of the first layer, m. pitch: spacing of the layers, m.
     layers: number of layers. start_layer, goal_layer: layers of the ends.
     """
 
@@ -83,23 +85,23 @@ def _set_position(frame: RotatedFrame, lattice: Lattice, along: int, across: int
 @compiled
 def _climb_layers(data: ProblemArrays, frame: RotatedFrame, lattice: Lattice) -> Codes:
     """Return the maximum climb and descent (8, 2) of a step on each course, in layers."""
-    out, a, b = np.zeros((8, 2), dtype=np.int64), np.zeros(3), np.zeros(3)
+    layers, a, b = np.zeros((8, 2), dtype=np.int64), np.zeros(3), np.zeros(3)
     _set_position(frame, lattice, lattice.behind, lattice.right, lattice.start_layer, a)
     for course in range(8):
-        aside, ahead = _STEPS[course, 1], _STEPS[course, 0]
-        _set_position(frame, lattice, lattice.behind + ahead, lattice.right + aside, lattice.start_layer, b)
+        step_across, step_along = _STEPS[course, 1], _STEPS[course, 0]
+        _set_position(frame, lattice, lattice.behind + step_along, lattice.right + step_across, lattice.start_layer, b)
         run = math.hypot(b[0] - a[0], b[1] - a[1])
         climb, dive = slope_limits(data, a, b)
-        out[course, 0] = max(0, math.floor(math.tan(climb) * run / lattice.pitch))
-        out[course, 1] = max(0, math.floor(math.tan(dive) * run / lattice.pitch))
-    return out
+        layers[course, 0] = max(0, math.floor(math.tan(climb) * run / lattice.pitch))
+        layers[course, 1] = max(0, math.floor(math.tan(dive) * run / lattice.pitch))
+    return layers
 
 
 class _StateTable(NamedTuple):
     """State of the search, with a cost (m), parent and closed flag per state, and a feasible flag per step.
 
-    parents: one more than the parent's number; 0 for a state that is not reached, whose cost is not set, and `_FIRST`
-    for one of the start. rises: (8, 2) maximum climb and descent in layers. steps: by cell, course and rise.
+    parents: the parent's number plus 1; 0 for a state that is not reached, whose cost is not set, and `_FIRST` for a
+    state of the start. rises: (8, 2) maximum climb and descent in layers. steps: by cell, course and rise.
     """
 
     cost: Floats
@@ -117,53 +119,60 @@ def _expand_state(
     lattice: Lattice,
     table: _StateTable,
     state: int,
-    courses: int,
+    max_turn: int,
     open_states: list[tuple[float, int]],
 ) -> None:
     """Expand a state by relaxing its successors, and push each with its cost plus its distance to the goal."""
     rises, course, cell = table.rises, state % 8, state // 8
-    layer, place = cell % lattice.layers, cell // lattice.layers
-    along, across = place // lattice.across, place % lattice.across
-    sinks = np.max(rises[:, 1])
-    width = np.max(rises[:, 0]) + sinks + 1
+    layer, position = cell % lattice.layers, cell // lattice.layers
+    along, across = position // lattice.across, position % lattice.across
+    max_descent = np.max(rises[:, 1])
+    width = np.max(rises[:, 0]) + max_descent + 1
     a, b, goal = np.empty(3), np.empty(3), np.empty(3)
     _set_position(frame, lattice, along, across, layer, a)
     _set_position(frame, lattice, lattice.goal, lattice.right, lattice.goal_layer, goal)
-    for turn in range(-courses, courses + 1):
-        to = (course + turn) % 8
-        next_along, next_across = along + _STEPS[to, 0], across + _STEPS[to, 1]
+    for turn in range(-max_turn, max_turn + 1):
+        next_course = (course + turn) % 8
+        next_along, next_across = along + _STEPS[next_course, 0], across + _STEPS[next_course, 1]
         if not (0 <= next_along < lattice.along and 0 <= next_across < lattice.across):
             continue
-        lowest, highest = max(0, layer - rises[to, 1]), min(lattice.layers - 1, layer + rises[to, 0])
-        for next_layer in range(lowest, highest + 1):
-            code = ((next_along * lattice.across + next_across) * lattice.layers + next_layer) * 8 + to
+        lowest_layer, highest_layer = (
+            max(0, layer - rises[next_course, 1]),
+            min(lattice.layers - 1, layer + rises[next_course, 0]),
+        )
+        for next_layer in range(lowest_layer, highest_layer + 1):
+            next_state = ((next_along * lattice.across + next_across) * lattice.layers + next_layer) * 8 + next_course
             _set_position(frame, lattice, next_along, next_across, next_layer, b)
             length = math.sqrt((b[0] - a[0]) ** 2 + (b[1] - a[1]) ** 2 + (b[2] - a[2]) ** 2)
             total = table.cost[state] + length + TURN_COST * lattice.step * abs(turn)
-            if table.done[code] or (table.parents[code] != 0 and total >= table.cost[code]):
+            if table.done[next_state] or (table.parents[next_state] != 0 and total >= table.cost[next_state]):
                 continue
             # The feasibility of a step does not depend on the course before it.
-            number = (cell * 8 + to) * width + next_layer - layer + sinks
-            if table.steps[number] == _UNKNOWN:
-                free = _is_inside(data, b) and leg_cost(data, limits, a, b, CLOSED * length) <= CLOSED * length
-                table.steps[number] = _FREE if free else _SHUT
-            if table.steps[number] == _FREE:
-                table.cost[code], table.parents[code] = total, state + 1
-                away = math.sqrt((b[0] - goal[0]) ** 2 + (b[1] - goal[1]) ** 2 + (b[2] - goal[2]) ** 2)
-                heapq.heappush(open_states, (total + away, code))
+            step_index = (cell * 8 + next_course) * width + next_layer - layer + max_descent
+            if table.steps[step_index] == _UNKNOWN:
+                is_free = (
+                    _is_inside(data, b)
+                    and leg_cost(data, limits, a, b, MAX_COST_RATIO * length) <= MAX_COST_RATIO * length
+                )
+                table.steps[step_index] = _FREE if is_free else _CLOSED
+            if table.steps[step_index] == _FREE:
+                table.cost[next_state], table.parents[next_state] = total, state + 1
+                goal_distance = math.sqrt((b[0] - goal[0]) ** 2 + (b[1] - goal[1]) ** 2 + (b[2] - goal[2]) ** 2)
+                heapq.heappush(open_states, (total + goal_distance, next_state))
 
 
 class LatticeSearch(NamedTuple):
     """A search that can be continued, with its state and the open list in heap order.
 
-    costs, states: (k,) of the open list. seen: number of states expanded. found: the goal state, or -1.
+    costs, states: (k,) of the open list. expanded_count: number of states expanded. goal_state: the goal's state once
+    it is reached, or -1.
     """
 
     table: _StateTable
     costs: Floats
     states: Codes
-    seen: int
-    found: int
+    expanded_count: int
+    goal_state: int
 
 
 def begin_lattice_search(data: ProblemArrays, frame: RotatedFrame, lattice: Lattice) -> LatticeSearch:
@@ -171,7 +180,7 @@ def begin_lattice_search(data: ProblemArrays, frame: RotatedFrame, lattice: Latt
     rises = _climb_layers(data, frame, lattice)
     size = lattice.along * lattice.across * lattice.layers * 8
     width = int(rises.max(axis=0).sum()) + 1
-    # Made by NumPy, large arrays of zeros take memory only where they are written to: mostly a small part of them.
+    # Large arrays of zeros from NumPy take memory only where they are written to, mostly a small part.
     table = _StateTable(
         np.empty(size),
         np.zeros(size, dtype=np.int32),
@@ -186,9 +195,9 @@ def begin_lattice_search(data: ProblemArrays, frame: RotatedFrame, lattice: Latt
 @compiled
 def _start_states(data: ProblemArrays, frame: RotatedFrame, lattice: Lattice, table: _StateTable) -> Codes:
     """Mark the states of the start as reached, and return them, (k,)."""
-    first = ((lattice.behind * lattice.across + lattice.right) * lattice.layers + lattice.start_layer) * 8
-    prescribed = _nearest_course(frame, data.start_course)
-    states = np.arange(first, first + 8) if prescribed < 0 else np.array([first + prescribed])
+    first_state = ((lattice.behind * lattice.across + lattice.right) * lattice.layers + lattice.start_layer) * 8
+    start_course = _nearest_course(frame, data.start_course)
+    states = np.arange(first_state, first_state + 8) if start_course < 0 else np.array([first_state + start_course])
     for state in states:
         table.cost[state], table.parents[state] = 0.0, _FIRST
     return states
@@ -196,33 +205,38 @@ def _start_states(data: ProblemArrays, frame: RotatedFrame, lattice: Lattice, ta
 
 @compiled
 def continue_lattice_search(
-    data: ProblemArrays, frame: RotatedFrame, lattice: Lattice, courses: int, search: LatticeSearch, max_expansions: int
+    data: ProblemArrays,
+    frame: RotatedFrame,
+    lattice: Lattice,
+    max_turn: int,
+    search: LatticeSearch,
+    max_expansions: int,
 ) -> LatticeSearch:
     """Continue a search by up to `max_expansions` expansions, and return it.
 
     The search has failed if its open list is empty.
-    courses: largest turn per step, in units of 45 degrees.
+    max_turn: largest turn per step, in units of 45 degrees.
     """
-    limits, table, seen = precompute_limits(data), search.table, search.seen
-    last = (lattice.goal * lattice.across + lattice.right) * lattice.layers + lattice.goal_layer
-    wanted = _nearest_course(frame, data.destination_course)
+    limits, table, expanded_count = precompute_limits(data), search.table, search.expanded_count
+    goal_cell = (lattice.goal * lattice.across + lattice.right) * lattice.layers + lattice.goal_layer
+    goal_course = _nearest_course(frame, data.destination_course)
     # The open list is stored in heap order and needs no sorting.
     open_states = [(search.costs[k], search.states[k]) for k in range(search.states.size)]
-    found = -1
-    while len(open_states) > 0 and seen < search.seen + max_expansions:
+    goal_state = -1
+    while len(open_states) > 0 and expanded_count < search.expanded_count + max_expansions:
         _, state = heapq.heappop(open_states)
         if table.done[state]:
             continue
         table.done[state] = True
-        seen += 1
-        if state // 8 == last and (wanted < 0 or abs((state % 8 - wanted + 4) % 8 - 4) <= courses):
-            found = state
+        expanded_count += 1
+        if state // 8 == goal_cell and (goal_course < 0 or abs((state % 8 - goal_course + 4) % 8 - 4) <= max_turn):
+            goal_state = state
             break
-        _expand_state(data, limits, frame, lattice, table, state, courses, open_states)
+        _expand_state(data, limits, frame, lattice, table, state, max_turn, open_states)
     costs, states = np.empty(len(open_states)), np.empty(len(open_states), dtype=np.int64)
     for k in range(len(open_states)):
         costs[k], states[k] = open_states[k]
-    return LatticeSearch(table, costs, states, seen, found)
+    return LatticeSearch(table, costs, states, expanded_count, goal_state)
 
 
 @inner
@@ -242,19 +256,19 @@ def _is_inside(data: ProblemArrays, point: Floats) -> bool:
 
 
 @compiled
-def trace_route(parents: Numbers, found: int, lattice: Lattice) -> Records:
+def trace_route(parents: Numbers, goal_state: int, lattice: Lattice) -> Records:
     """Return `LATTICE_CELL` records from the start to a state."""
-    count, state = 0, found
+    count, state = 0, goal_state
     while state >= 0:
         count, state = count + 1, parents[state] - 1
     cells = np.zeros(count, dtype=LATTICE_CELL)
-    state = found
+    state = goal_state
     for k in range(count - 1, -1, -1):
         cell = state // 8
-        place = cell // lattice.layers
+        position = cell // lattice.layers
         cells[k].layer = cell % lattice.layers
-        cells[k].along = place // lattice.across - lattice.behind
-        cells[k].across = place % lattice.across - lattice.right
+        cells[k].along = position // lattice.across - lattice.behind
+        cells[k].across = position % lattice.across - lattice.right
         state = parents[state] - 1
     return cells
 
@@ -268,17 +282,17 @@ def simplify_route(data: ProblemArrays, points: Floats) -> Floats:
     limits = precompute_limits(data)
     out = np.empty(points.shape)
     copy_into(out[0], points[0])
-    count, here, last = 1, 0, points.shape[0] - 1
-    while here < last:
-        to = here + 1
-        for k in range(last, here + 1, -1):
-            a, b = points[here], points[k]
+    count, current, last_point = 1, 0, points.shape[0] - 1
+    while current < last_point:
+        next_point = current + 1
+        for k in range(last_point, current + 1, -1):
+            a, b = points[current], points[k]
             length = math.sqrt((b[0] - a[0]) ** 2 + (b[1] - a[1]) ** 2 + (b[2] - a[2]) ** 2)
-            if leg_cost(data, limits, a, b, CLOSED * length) <= CLOSED * length:
-                to = k
+            if leg_cost(data, limits, a, b, MAX_COST_RATIO * length) <= MAX_COST_RATIO * length:
+                next_point = k
                 break
-        here = to
-        copy_into(out[count], points[here])
+        current = next_point
+        copy_into(out[count], points[current])
         count += 1
     return out[:count]
 
@@ -304,12 +318,12 @@ def turning_step(data: ProblemArrays) -> float:
     """Return the length of a leg between two right-angled turns to the same side, m, including settling."""
     if not data.legs_hold_turns:
         return MIN_STEP
-    long = MAX_STEP
-    square = np.array([[0.0, 0.0], [long, 0.0], [long, long], [0.0, long]]) + data.start[:2]
+    side = MAX_STEP
+    square = np.array([[0.0, 0.0], [side, 0.0], [side, side], [0.0, side]]) + data.start[:2]
     path = np.column_stack([square, np.full(4, data.start[2])])
     turns, rolls = turn_and_roll_lengths(data, path)
-    need = float(turns[1] + rolls[1])
-    return min(MAX_STEP, max(MIN_STEP, need + settling_length(need, 1.1 * need)))
+    turn_length = float(turns[1] + rolls[1])
+    return min(MAX_STEP, max(MIN_STEP, turn_length + settling_length(turn_length, 1.1 * turn_length)))
 
 
 def make_lattice(data: ProblemArrays, frame: RotatedFrame, step: float) -> Lattice:
@@ -320,45 +334,45 @@ def make_lattice(data: ProblemArrays, frame: RotatedFrame, step: float) -> Latti
     corners = [(e, n, 0.0) for e in (data.west, data.east) for n in (data.south, data.north)]
     low, high = frame.rotate(corners)[:, :2].min(axis=0), frame.rotate(corners)[:, :2].max(axis=0)
     level = np.array([*data.destination[:2], data.start[2]])
-    gentlest = math.tan(max(0.01, min(slope_limits(data, np.array(data.start), level))))
-    bottom = max(data.floor, float(np.nanmin(data.heights)) + data.clearance)
+    gentler_slope = math.tan(max(0.01, min(slope_limits(data, np.array(data.start), level))))
+    min_height = max(data.floor, float(np.nanmin(data.heights)) + data.clearance)
     stages = max(1, math.ceil(frame.length / step))
     while True:
         step = frame.length / stages
-        pitch = gentlest * step / LAYERS_PER_STEP
+        pitch = gentler_slope * step / LAYERS_PER_STEP
         behind, right = math.floor(-low[0] / step), math.floor(-low[1] / step)
         along, across = behind + math.floor(high[0] / step) + 1, right + math.floor(high[1] / step) + 1
-        below = max(0, math.floor((data.start[2] - bottom) / pitch))
-        layers = below + max(0, math.floor((data.ceiling - data.start[2]) / pitch)) + 1
+        layers_below = max(0, math.floor((data.start[2] - min_height) / pitch))
+        layers = layers_below + max(0, math.floor((data.ceiling - data.start[2]) / pitch)) + 1
         if stages == 1 or along * across * layers * 8 <= MAX_LATTICE_STATES:
             break
         stages -= 1
-    goal_layer = min(layers - 1, max(0, round((data.destination[2] - data.start[2]) / pitch) + below))
-    start = data.start[2] - below * pitch
-    return Lattice(step, behind, right, along, across, behind + stages, start, pitch, layers, below, goal_layer)
+    goal_layer = min(layers - 1, max(0, round((data.destination[2] - data.start[2]) / pitch) + layers_below))
+    start = data.start[2] - layers_below * pitch
+    return Lattice(step, behind, right, along, across, behind + stages, start, pitch, layers, layers_below, goal_layer)
 
 
 def cheapest_lattice_route(
     data: ProblemArrays,
     frame: RotatedFrame,
     lattice: Lattice,
-    courses: int,
+    max_turn: int,
     max_states: int,
     pause: Callable[[], None] = lambda: None,
 ) -> tuple[Records, int]:
     """Return `LATTICE_CELL` records of the cheapest route, empty without a route, and the number of expanded states.
 
-    courses: largest turn per step, in units of 45 degrees. max_states: maximum number of expanded states.
+    max_turn: largest turn per step, in units of 45 degrees. max_states: maximum number of expanded states.
     """
     search = begin_lattice_search(data, frame, lattice)
-    while search.found < 0 and len(search.states) and search.seen < max_states:
+    while search.goal_state < 0 and len(search.states) and search.expanded_count < max_states:
         search = continue_lattice_search(
-            data, frame, lattice, courses, search, min(STATES_AT_ONCE, max_states - search.seen)
+            data, frame, lattice, max_turn, search, min(STATES_AT_ONCE, max_states - search.expanded_count)
         )
         pause()
-    if search.found < 0:
-        return np.zeros(0, dtype=LATTICE_CELL), search.seen
-    return trace_route(search.table.parents, search.found, lattice), search.seen
+    if search.goal_state < 0:
+        return np.zeros(0, dtype=LATTICE_CELL), search.expanded_count
+    return trace_route(search.table.parents, search.goal_state, lattice), search.expanded_count
 
 
 def lattice_route(
@@ -375,32 +389,32 @@ def lattice_route(
     """
     lattice = make_lattice(data, frame, step)
     # Turns of up to 90 degrees where the limits allow them; with eight courses 45 degrees is the minimum.
-    courses = 2 if data.max_turn >= math.radians(90.0) else 1
-    cells, seen = cheapest_lattice_route(data, frame, lattice, courses, max_states, pause)
+    max_turn = 2 if data.max_turn >= math.radians(90.0) else 1
+    cells, expanded_count = cheapest_lattice_route(data, frame, lattice, max_turn, max_states, pause)
     if not len(cells):
-        return np.empty((0, 3)), seen
-    places = np.column_stack([cells["along"], cells["across"]]) * lattice.step
-    up = lattice.low + cells["layer"] * lattice.pitch
-    points = frame.restore(np.column_stack([places, up]))
+        return np.empty((0, 3)), expanded_count
+    positions = np.column_stack([cells["along"], cells["across"]]) * lattice.step
+    heights = lattice.low + cells["layer"] * lattice.pitch
+    points = frame.restore(np.column_stack([positions, heights]))
     points[0], points[-1] = data.start, data.destination
-    return np.asarray(simplify_route(data, np.ascontiguousarray(points))), seen
+    return np.asarray(simplify_route(data, np.ascontiguousarray(points))), expanded_count
 
 
 def ceiling_route(
-    data: ProblemArrays, frame: RotatedFrame, step: float, closer: float, pause: Callable[[], None] = lambda: None
+    data: ProblemArrays, frame: RotatedFrame, step: float, depth: float, pause: Callable[[], None] = lambda: None
 ) -> Floats:
     """Return world points (k, 3) of a route at the height of the ceiling, where spheres on the ground are smallest.
 
-    It climbs to the ceiling at its start and leaves it at its destination, however steeply: a lattice of a single layer
-    is searched in milliseconds. Return (0, 3) points without a route.
+    It climbs to the ceiling at its start and leaves it at its destination, however steeply, because a lattice of one
+    layer is searched in milliseconds. Return (0, 3) points without a route.
 
     step: m.
-    closer: depth to which the route may enter missiles' spheres, m.
-    pause: as in `lattice_route`.
+    depth: depth to which the route may enter missiles' spheres, m.
+    pause: see `lattice_route`.
     """
     start, destination = (np.array([*end[:2], data.ceiling]) for end in (data.start, data.destination))
     for end in (start, destination):
-        # As those of a scenario: to compiled code, arrays that are not locked are of another type.
+        # Locked like a scenario's ends, because to compiled code an unlocked array has another type.
         end.setflags(write=False)
-    level = data._replace(start=start, destination=destination, floor=data.ceiling, kill_margin=-closer)
-    return lattice_route(level, frame, step, pause)[0]
+    level_data = data._replace(start=start, destination=destination, floor=data.ceiling, kill_margin=-depth)
+    return lattice_route(level_data, frame, step, pause)[0]

@@ -38,39 +38,40 @@ BOUNDS_PRICE = 1.0
 # Price of exposure, length ratio per unit of exposure.
 EXPOSURE_PRICE = 5.0
 # Price of any exposure at all: a sphere that is barely entered has almost none.
-EXPOSED = 0.002
+ANY_EXPOSURE_PRICE = 0.002
 # Initial step along, as a fraction of the interval between waypoints.
 FIRST_ALONG = 0.2
 # Initial step across, as a fraction of the interval between waypoints.
 FIRST_ACROSS = 0.15
 # Initial step up, m.
 FIRST_UP = 25.0
-# Smallest step of a move, as a share of its initial step.
+# Smallest step of a move, as a fraction of its initial step.
 MIN_STEP = 0.002
 
 
-# Evaluations between two questions whether to end: some 20 ms at most.
+# Number of evaluations between two calls of `must_end`: some 20 ms at most.
 EVALUATIONS_AT_ONCE = 150
 
 
 class _State(NamedTuple):
-    """A search as far as it has come; vectors are (d,).
+    """State of a search; vectors are (d,).
 
-    here: with the lowest merit, which is `best`. feasible: the best feasible one (inf if none), of merit `shortest`.
-    before: where the round began. steps: (k,) of the moves. move: the next of the round; alive: whether any has been
-    tried in it. made: evaluations. ended: True if no move is left.
+    best_vector, best_merit: vector with the lowest merit. feasible_vector, feasible_merit: best feasible vector; inf if
+    there is none. round_start: vector at the beginning of the round. steps: (k,) steps of the moves. move: next move of
+    the round. has_moved: True if a move was tried in the round. evaluations: number of evaluations. is_done: True if no
+    move is left.
     """
 
-    here: Floats
-    best: float
-    feasible: Floats
-    shortest: float
-    before: Floats
+    best_vector: Floats
+    best_merit: float
+    feasible_vector: Floats
+    feasible_merit: float
+    round_start: Floats
     steps: Floats
     move: int
-    alive: bool
-    made: int
-    ended: bool
+    has_moved: bool
+    evaluations: int
+    is_done: bool
 
 
 class _Box(NamedTuple):
@@ -98,60 +99,63 @@ def search_patterns(
 ) -> tuple[Floats, int]:
     """Shorten a path of the rotated encoding.
 
+    Return vectors (k, d) and the number of evaluations. The vectors are the best feasible vector, if any, and the
+    vector with the lowest merit, if that is another one.
     vector: (d,). evaluations: maximum number. must_end: called after every `EVALUATIONS_AT_ONCE` evaluations; True
-    ends the search with its present result. Return the best vectors (k, d), which are the best feasible vector, if any,
-    and the vector with the lowest merit, and the number of evaluations made.
+    ends the search with its present result.
     """
     frames = frames_of(encoding)
-    inner = encoding.waypoints - 2
-    span = float(frames.edges[-1]) / inner
-    moves, axes = _triangular_basis(inner)
-    steps = np.array([FIRST_ALONG * span, FIRST_ACROSS * span, FIRST_UP])[axes]
+    inner_count = encoding.waypoints - 2
+    interval = float(frames.edges[-1]) / inner_count
+    moves, axes = _triangular_basis(inner_count)
+    steps = np.array([FIRST_ALONG * interval, FIRST_ACROSS * interval, FIRST_UP])[axes]
     start = np.array(vector, dtype=np.float64)
-    box, first = _Box(encoding.lower, encoding.upper), steps.copy()
+    box, initial_steps = _Box(encoding.lower, encoding.upper), steps.copy()
     state: _State = _begin_search(data, frames, start, steps)
-    while not state.ended:
-        until = min(evaluations, state.made + EVALUATIONS_AT_ONCE)
-        state = _continue_search(data, frames, box, moves, first, state, until, evaluations)
-        if not state.ended and must_end():
+    while not state.is_done:
+        pause_count = min(evaluations, state.evaluations + EVALUATIONS_AT_ONCE)
+        state = _continue_search(data, frames, box, moves, initial_steps, state, pause_count, evaluations)
+        if not state.is_done and must_end():
             break
-    if state.shortest <= state.best:
-        vectors = [state.feasible]
-    elif math.isinf(state.feasible[0]):
-        vectors = [state.here]
+    if state.feasible_merit <= state.best_merit:
+        vectors = [state.feasible_vector]
+    elif math.isinf(state.feasible_vector[0]):
+        vectors = [state.best_vector]
     else:
-        vectors = [state.feasible, state.here]
-    return np.array(vectors), int(state.made)
+        vectors = [state.feasible_vector, state.best_vector]
+    return np.array(vectors), int(state.evaluations)
 
 
 def merits(scores: Floats) -> Floats:
     """Return the merits (n,) of scores (n, 8) by `planner.plan.Violation` and `Objective`, for minimisation."""
     prices = np.array([TURN_PRICE, SLOPE_PRICE, TERRAIN_PRICE, BOUNDS_PRICE])
     count = len(prices)
-    ratio, exposure = scores[:, count + Objective.LENGTH_RATIO], scores[:, count + Objective.KILL_EXPOSURE]
-    violated = (scores[:, :count] * prices).sum(axis=1)
-    return np.asarray(ratio + violated + EXPOSURE_PRICE * exposure + EXPOSED * (exposure > 0.0))
+    length_ratio, exposure = scores[:, count + Objective.LENGTH_RATIO], scores[:, count + Objective.KILL_EXPOSURE]
+    violation_price = (scores[:, :count] * prices).sum(axis=1)
+    return np.asarray(
+        length_ratio + violation_price + EXPOSURE_PRICE * exposure + ANY_EXPOSURE_PRICE * (exposure > 0.0)
+    )
 
 
 @cache
-def _triangular_basis(inner: int) -> tuple[Floats, Ints]:
+def _triangular_basis(inner_count: int) -> tuple[Floats, Ints]:
     """Return triangular moves with half-widths of 1, 2, 4, ... waypoints, (k, 3 inner), and the axis of each, (k,)."""
-    rows: list[Floats] = []
+    moves: list[Floats] = []
     axes: list[int] = []
-    place = np.arange(inner, dtype=np.float64)
+    positions = np.arange(inner_count, dtype=np.float64)
     width = 1
-    while width <= max(1, inner // 2):
-        for centre in np.arange(0.0, inner, max(1.0, width / 2)):
-            triangle = np.maximum(0.0, 1.0 - np.abs(place - centre) / width)
+    while width <= max(1, inner_count // 2):
+        for centre in np.arange(0.0, inner_count, max(1.0, width / 2)):
+            triangle = np.maximum(0.0, 1.0 - np.abs(positions - centre) / width)
             for axis in range(3):
                 if axis == 0 and width > 1:
                     continue
-                move = np.zeros((inner, 3))
+                move = np.zeros((inner_count, 3))
                 move[:, axis] = triangle
-                rows.append(move.ravel())
+                moves.append(move.ravel())
                 axes.append(axis)
         width *= 2
-    return np.array(rows), np.array(axes)
+    return np.array(moves), np.array(axes)
 
 
 @inner
@@ -169,70 +173,83 @@ def _evaluate_merit(
     frames: WaypointFrames,
     vector: Floats,
     candidate: _Candidate,
-    best: float,
-    shortest: float,
+    best_merit: float,
+    feasible_merit: float,
 ) -> tuple[float, bool]:
     """Return the length ratio plus priced violations, and True if the path is feasible.
 
     Each part of the evaluation only adds to the merit. The evaluation therefore ends as soon as the merit reaches
-    `best`, and `shortest` if the path is still feasible; the returned merit is then a lower bound.
+    `best_merit`, and `feasible_merit` if the path is still feasible; the returned merit is then a lower bound.
     """
-    path, inner, scratch = candidate.path, vector.reshape((vector.size // 3, 3)), candidate.scratch
-    for i in range(inner.shape[0]):
-        along, across = inner[i, 0], inner[i, 1]
+    path, waypoints, scratch = candidate.path, vector.reshape((vector.size // 3, 3)), candidate.scratch
+    for i in range(waypoints.shape[0]):
+        along, across = waypoints[i, 0], waypoints[i, 1]
         path[i + 1, 0] = frames.east[i] + frames.cosine[i] * along - frames.sine[i] * across
         path[i + 1, 1] = frames.north[i] + frames.sine[i] * along + frames.cosine[i] * across
-        path[i + 1, 2] = inner[i, 2]
+        path[i + 1, 2] = waypoints[i, 2]
     violations, objectives = candidate.violations[0], candidate.objectives[0]
     violations.turn, violations.slope, violations.terrain, violations.bounds = 0.0, 0.0, 0.0, 0.0
     score_legs(data, limits, scratch, path, violations, objectives)
-    merit, feasible = _violation_price(violations, objectives)
-    if merit >= best and (merit >= shortest or not feasible):
-        return merit, feasible
+    merit, is_feasible = _merit_of_scores(violations, objectives)
+    if merit >= best_merit and (merit >= feasible_merit or not is_feasible):
+        return merit, is_feasible
     score_ground(data, limits, scratch, path, violations)
-    merit, feasible = _violation_price(violations, objectives)
-    if merit >= best and (merit >= shortest or not feasible):
-        return merit, feasible
+    merit, is_feasible = _merit_of_scores(violations, objectives)
+    if merit >= best_merit and (merit >= feasible_merit or not is_feasible):
+        return merit, is_feasible
     score_missiles(data, limits, scratch, path, violations, objectives)
-    merit, feasible = _violation_price(violations, objectives)
-    if merit >= best and (merit >= shortest or not feasible):
-        return merit, feasible
+    merit, is_feasible = _merit_of_scores(violations, objectives)
+    if merit >= best_merit and (merit >= feasible_merit or not is_feasible):
+        return merit, is_feasible
     score_airspace(data, scratch, path, violations)
-    return _violation_price(violations, objectives)
+    return _merit_of_scores(violations, objectives)
 
 
 @inner
-def _violation_price(violations: Record, objectives: Record) -> tuple[float, bool]:
-    price, feasible = EXPOSURE_PRICE * objectives.kill_exposure, True
+def _merit_of_scores(violations: Record, objectives: Record) -> tuple[float, bool]:
+    price, is_feasible = EXPOSURE_PRICE * objectives.kill_exposure, True
     if objectives.kill_exposure > 0.0:
-        price += EXPOSED
-        feasible = False
+        price += ANY_EXPOSURE_PRICE
+        is_feasible = False
     price += TURN_PRICE * violations.turn
     price += SLOPE_PRICE * violations.slope
     price += TERRAIN_PRICE * violations.terrain
     price += BOUNDS_PRICE * violations.bounds
-    feasible = feasible and violations.turn == 0.0 and violations.slope == 0.0
-    feasible = feasible and violations.terrain == 0.0 and violations.bounds == 0.0
-    return objectives.length_ratio + price, feasible
+    is_feasible = is_feasible and violations.turn == 0.0 and violations.slope == 0.0
+    is_feasible = is_feasible and violations.terrain == 0.0 and violations.bounds == 0.0
+    return objectives.length_ratio + price, is_feasible
 
 
 @compiled
 def _begin_search(data: ProblemArrays, frames: WaypointFrames, start: Floats, steps: Floats) -> _State:
     """Return a new search at a vector (d,), with moves of the initial steps (k,), which the search modifies."""
     limits, candidate = precompute_limits(data), _make_candidate(data, start.size // 3 + 2)
-    best, fit = _evaluate_merit(data, limits, frames, start, candidate, math.inf, math.inf)
-    feasible = np.full(start.size, np.inf)
-    if fit:
-        copy_into(feasible, start)
-    return _State(start, best, feasible, best if fit else math.inf, start.copy(), steps, 0, False, 1, False)
+    best_merit, is_feasible = _evaluate_merit(data, limits, frames, start, candidate, math.inf, math.inf)
+    feasible_vector = np.full(start.size, np.inf)
+    if is_feasible:
+        copy_into(feasible_vector, start)
+    return _State(
+        start,
+        best_merit,
+        feasible_vector,
+        best_merit if is_feasible else math.inf,
+        start.copy(),
+        steps,
+        0,
+        False,
+        1,
+        False,
+    )
 
 
 @inner
-def _fill_trial(box: _Box, moves: Floats, k: int, steps: Floats, before: Floats, here: Floats, trial: Floats) -> None:
+def _fill_trial(
+    box: _Box, moves: Floats, k: int, steps: Floats, round_start: Floats, vector: Floats, trial: Floats
+) -> None:
     """Fill a trial (d,) with the vector after move k, or after the round's whole displacement if there is no move k."""
-    for d in range(here.size):
-        step = steps[k] * moves[k, d] if k < moves.shape[0] else here[d] - before[d]
-        trial[d] = min(box.upper[d], max(box.lower[d], here[d] + step))
+    for d in range(vector.size):
+        step = steps[k] * moves[k, d] if k < moves.shape[0] else vector[d] - round_start[d]
+        trial[d] = min(box.upper[d], max(box.lower[d], vector[d] + step))
 
 
 @compiled
@@ -241,43 +258,65 @@ def _continue_search(
     frames: WaypointFrames,
     box: _Box,
     moves: Floats,
-    first: Floats,
+    initial_steps: Floats,
     state: _State,
-    until: int,
+    pause_count: int,
     max_evaluations: int,
 ) -> _State:
-    """Continue a search, with moves (k, d) of initial steps `first` (k,), for at least `max_evaluations`."""
-    here, best, feasible, shortest, before, steps, move, alive, made, _ = state
-    limits, candidate, trial = precompute_limits(data), _make_candidate(data, here.size // 3 + 2), here.copy()
-    while made < max_evaluations:
+    """Continue a search with moves (k, d) until `pause_count` evaluations, or to its end at `max_evaluations`.
+
+    initial_steps: (k,) initial steps of the moves.
+    """
+    best_vector, best_merit, feasible_vector, feasible_merit, round_start, steps, move, has_moved, evaluations, _ = (
+        state
+    )
+    limits, candidate, trial = (
+        precompute_limits(data),
+        _make_candidate(data, best_vector.size // 3 + 2),
+        best_vector.copy(),
+    )
+    while evaluations < max_evaluations:
         if move == 0:
-            alive = False
-            copy_into(before, here)
+            has_moved = False
+            copy_into(round_start, best_vector)
         # The last trial of a round repeats the displacement of the whole round (pattern move).
         for k in range(move, moves.shape[0] + 1):
-            if made >= until and made < max_evaluations:
-                return _State(here, best, feasible, shortest, before, steps, k, alive, made, False)
-            if made >= max_evaluations or (k < moves.shape[0] and abs(steps[k]) < MIN_STEP * first[k]):
+            if evaluations >= pause_count and evaluations < max_evaluations:
+                return _State(
+                    best_vector,
+                    best_merit,
+                    feasible_vector,
+                    feasible_merit,
+                    round_start,
+                    steps,
+                    k,
+                    has_moved,
+                    evaluations,
+                    False,
+                )
+            if evaluations >= max_evaluations or (k < moves.shape[0] and abs(steps[k]) < MIN_STEP * initial_steps[k]):
                 continue
-            better = False
+            is_better = False
             for _ in range(2):
-                _fill_trial(box, moves, k, steps, before, here, trial)
-                merit, fit = _evaluate_merit(data, limits, frames, trial, candidate, best, shortest)
-                made += 1
-                if fit and merit < shortest:
-                    shortest = merit
-                    copy_into(feasible, trial)
-                if merit < best:
-                    best, better = merit, True
-                    copy_into(here, trial)
+                _fill_trial(box, moves, k, steps, round_start, best_vector, trial)
+                merit, is_feasible = _evaluate_merit(data, limits, frames, trial, candidate, best_merit, feasible_merit)
+                evaluations += 1
+                if is_feasible and merit < feasible_merit:
+                    feasible_merit = merit
+                    copy_into(feasible_vector, trial)
+                if merit < best_merit:
+                    best_merit, is_better = merit, True
+                    copy_into(best_vector, trial)
                     break
                 if k == moves.shape[0]:
                     break
                 steps[k] = -steps[k]
             if k < moves.shape[0]:
-                steps[k] *= 1.5 if better else 0.5
-                alive = True
+                steps[k] *= 1.5 if is_better else 0.5
+                has_moved = True
         move = 0
-        if not alive:
+        if not has_moved:
             break
-    return _State(here, best, feasible, shortest, before, steps, 0, alive, made, True)
+    return _State(
+        best_vector, best_merit, feasible_vector, feasible_merit, round_start, steps, 0, has_moved, evaluations, True
+    )

@@ -44,21 +44,21 @@ ROUNDS = 9
 STEPS = 5
 # Number of halvings per step.
 HALVINGS = 5
-# A round ends with a step that moves no waypoint further than this, m.
-STILL = 0.05
+# A round ends after a step that moves no waypoint further than this, m.
+MIN_MOVE = 0.05
 
 
 @inner
 def _newton_step(
-    path: Floats, low: Floats, high: Floats, model: LagrangianModel, factor: Floats, step: Floats
+    path: Floats, min_corner: Floats, max_corner: Floats, model: LagrangianModel, factor: Floats, step: Floats
 ) -> float:
     """Fill the Newton step (n,) from a path within its box, and return the largest component of the step, m."""
     size = step.size
     for row in range(size):
         model.band[row, 0] += DAMPING
-        place, axis = path[1 + row // 3, row % 3], row % 3
+        coordinate, axis = path[1 + row // 3, row % 3], row % 3
         downhill = -model.gradient[row]
-        if (place <= low[axis] and downhill < 0.0) or (place >= high[axis] and downhill > 0.0):
+        if (coordinate <= min_corner[axis] and downhill < 0.0) or (coordinate >= max_corner[axis] and downhill > 0.0):
             # At an active bound of the box: remove the coordinate from the system.
             model.gradient[row] = 0.0
             for k in range(1, BAND):
@@ -67,14 +67,14 @@ def _newton_step(
                     model.band[row + k, k] = 0.0
     band_cholesky(model.band, factor)
     solve_band(factor, model.gradient, step)
-    furthest = 0.0
+    max_move = 0.0
     for row in range(size):
         step[row] = -step[row]
-        furthest = max(furthest, abs(step[row]))
-    if furthest > MAX_STEP:
+        max_move = max(max_move, abs(step[row]))
+    if max_move > MAX_STEP:
         for row in range(size):
-            step[row] *= MAX_STEP / furthest
-    return min(furthest, MAX_STEP)
+            step[row] *= MAX_STEP / max_move
+    return min(max_move, MAX_STEP)
 
 
 class Shortening(NamedTuple):
@@ -94,8 +94,8 @@ def begin_shortening(
 ) -> Shortening:
     """Return a new shortening of a path (w, 3) m, before its first round.
 
-    samples: of the ground on each leg. extra_margin: additional margin to spheres and ground, m. corners_too: see
-    `active_constraints`.
+    samples: number of ground samples on each leg. extra_margin: additional margin to spheres and ground, m.
+    corners_too: see `active_constraints`.
     """
     active = active_constraints(data, path, samples, extra_margin, corners_too)
     return Shortening(path.copy(), active, np.zeros(constraint_count(active)), 0, 0, corners_too)
@@ -113,31 +113,33 @@ class _Descent(NamedTuple):
 
 
 @compiled
-def continue_shortening(data: ProblemArrays, under_way: Shortening, extra_margin: float, max_rounds: int) -> Shortening:
+def continue_shortening(
+    data: ProblemArrays, shortening: Shortening, extra_margin: float, max_rounds: int
+) -> Shortening:
     """Continue a shortening by up to `max_rounds` rounds, and return it."""
-    here, active, multipliers, number, made, corners_too = under_way
-    limits, size = precompute_limits(data), 3 * (here.shape[0] - 2)
+    path, active, multipliers, round_number, models, corners_too = shortening
+    limits, size = precompute_limits(data), 3 * (path.shape[0] - 2)
     descent = _Descent(
         np.array([data.west, data.south, data.floor]),
         np.array([data.east, data.north, data.ceiling]),
         LagrangianModel(np.zeros(size), np.zeros((size, BAND)), np.zeros((4, 3))),
         np.zeros((size, BAND)),
         np.zeros(size),
-        here.copy(),
+        path.copy(),
     )
-    last = min(ROUNDS, number + max_rounds)
-    while number < last:
-        if number > 0:
-            renewed = active_constraints(data, here, active.samples, extra_margin, corners_too)
-            multipliers = carry_multipliers(active, multipliers, renewed)
-            active = renewed
-        penalty = FIRST_PENALTY * (LAST_PENALTY / FIRST_PENALTY) ** (number / (ROUNDS - 1))
+    last_round = min(ROUNDS, round_number + max_rounds)
+    while round_number < last_round:
+        if round_number > 0:
+            new_active = active_constraints(data, path, active.samples, extra_margin, corners_too)
+            multipliers = carry_multipliers(active, multipliers, new_active)
+            active = new_active
+        penalty = FIRST_PENALTY * (LAST_PENALTY / FIRST_PENALTY) ** (round_number / (ROUNDS - 1))
         values = np.zeros(multipliers.size)
-        made += _descend(data, limits, active, here, multipliers, values, penalty, descent)
+        models += _descend(data, limits, active, path, multipliers, values, penalty, descent)
         for k in range(values.size):
             multipliers[k] = max(0.0, multipliers[k] - penalty * values[k])
-        number += 1
-    return Shortening(here, active, multipliers, number, made, corners_too)
+        round_number += 1
+    return Shortening(path, active, multipliers, round_number, models, corners_too)
 
 
 @inner
@@ -145,37 +147,41 @@ def _descend(
     data: ProblemArrays,
     limits: PrecomputedLimits,
     active: ActiveConstraints,
-    here: Floats,
+    path: Floats,
     multipliers: Floats,
     values: Floats,
     penalty: float,
     descent: _Descent,
 ) -> int:
-    """Minimise over a path (w, 3) in place, fill the constraints' final values, and return the number of models."""
-    low, high, model, step, trial = descent.low, descent.high, descent.model, descent.step, descent.trial
-    merit, made = lagrangian(data, limits, active, here, multipliers, values, penalty, model), 1
+    """Minimise the merit of a path (w, 3) in place, fill the final constraint values, and return the model count."""
+    min_corner, max_corner, model, step, trial = descent.low, descent.high, descent.model, descent.step, descent.trial
+    merit, models = lagrangian(data, limits, active, path, multipliers, values, penalty, model), 1
     for _ in range(STEPS):
-        furthest, share, better = _newton_step(here, low, high, model, descent.factor, step), 1.0, False
+        max_move, step_fraction, is_better = (
+            _newton_step(path, min_corner, max_corner, model, descent.factor, step),
+            1.0,
+            False,
+        )
         for _ in range(HALVINGS):
             for row in range(step.size):
                 axis = row % 3
-                place = here[1 + row // 3, axis] + share * step[row]
-                trial[1 + row // 3, axis] = min(high[axis], max(low[axis], place))
-            found = lagrangian(data, limits, active, trial, multipliers, values, penalty, model)
-            made += 1
-            if found < merit:
-                better = True
+                coordinate = path[1 + row // 3, axis] + step_fraction * step[row]
+                trial[1 + row // 3, axis] = min(max_corner[axis], max(min_corner[axis], coordinate))
+            trial_merit = lagrangian(data, limits, active, trial, multipliers, values, penalty, model)
+            models += 1
+            if trial_merit < merit:
+                is_better = True
                 break
-            share *= 0.5
-        if not better:
+            step_fraction *= 0.5
+        if not is_better:
             break
-        merit = found
-        for row in range(here.shape[0]):
-            copy_into(here[row], trial[row])
-        if share * furthest < STILL:
+        merit = trial_merit
+        for row in range(path.shape[0]):
+            copy_into(path[row], trial[row])
+        if step_fraction * max_move < MIN_MOVE:
             break
-    lagrangian(data, limits, active, here, multipliers, values, penalty, model)
-    return made + 1
+    lagrangian(data, limits, active, path, multipliers, values, penalty, model)
+    return models + 1
 
 
 # --- Shortening a path ---
@@ -218,17 +224,17 @@ def shorten_path(
     >>> path.shape, bool(np.array_equal(path[-1], scenario.destination))
     ((10, 3), True)
     """
-    mean = math.dist(path[0], path[-1]) / (len(path) - 1)
-    samples = int(min(MAX_SAMPLES, max(MIN_SAMPLES, math.ceil(mean / SAMPLE_PITCH))))
+    mean_length = math.dist(path[0], path[-1]) / (len(path) - 1)
+    samples = int(min(MAX_SAMPLES, max(MIN_SAMPLES, math.ceil(mean_length / SAMPLE_PITCH))))
     rounds = max(1, PAIRS_AT_ONCE // (len(path) * max(1, len(data.missiles.missiles))))
     start = np.array(path, dtype=np.float64)
     # A grid's route ends at the height of a layer.
     start[0], start[-1] = data.start, data.destination
-    under_way: Shortening = begin_shortening(data, start, samples, extra_margin, corners_too)
-    while under_way.rounds < ROUNDS:
-        under_way = continue_shortening(data, under_way, extra_margin, min(ROUNDS, rounds))
+    shortening: Shortening = begin_shortening(data, start, samples, extra_margin, corners_too)
+    while shortening.rounds < ROUNDS:
+        shortening = continue_shortening(data, shortening, extra_margin, min(ROUNDS, rounds))
         pause()
-    return under_way.path, int(under_way.models)
+    return shortening.path, int(shortening.models)
 
 
 def resample(route: Floats, count: int) -> Floats:
@@ -237,6 +243,6 @@ def resample(route: Floats, count: int) -> Floats:
     >>> resample(np.array([[0.0, 0.0, 5.0], [30.0, 40.0, 5.0], [30.0, 90.0, 5.0]]), 5).tolist()
     [[0.0, 0.0, 5.0], [15.0, 20.0, 5.0], [30.0, 40.0, 5.0], [30.0, 65.0, 5.0], [30.0, 90.0, 5.0]]
     """
-    runs = np.concatenate([[0.0], np.cumsum(np.sqrt((np.diff(route, axis=0) ** 2).sum(axis=1)))])
-    at = np.linspace(0.0, runs[-1], count)
-    return np.column_stack([np.interp(at, runs, route[:, axis]) for axis in range(3)])
+    distances = np.concatenate([[0.0], np.cumsum(np.sqrt((np.diff(route, axis=0) ** 2).sum(axis=1)))])
+    positions = np.linspace(0.0, distances[-1], count)
+    return np.column_stack([np.interp(positions, distances, route[:, axis]) for axis in range(3)])

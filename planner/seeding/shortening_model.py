@@ -4,7 +4,7 @@ The method of multipliers of Hestenes and Powell, in the form for inequalities o
 Hestenes and Powell applied to convex programming", Journal of Optimization Theory and Applications 12, 1973): a
 constraint c >= 0 with multiplier m adds (max(0, m - p c)^2 - m^2) / 2 p to the length, and m becomes max(0, m - p c).
 Constraints are distances from missiles, heights above ground, slopes, turns, and lengths of legs against their turns;
-where it is asked for, heights and slopes of flown corners too (`planner.seeding.flown_corners`).
+and, if requested, heights and slopes of flown corners (`planner.seeding.flown_corners`).
 Their coefficients are computed once per round (`ActiveConstraints`). The curvature of the constraints is left out of
 the Hessian; a constraint couples at most four consecutive waypoints, so the Hessian is banded.
 """
@@ -53,7 +53,7 @@ from world.terrain import pixel_height
 
 
 # A sphere constrains the legs that come within this distance of its surface, m.
-NEAR = 250.0
+NEARBY_DISTANCE = 250.0
 # Smallest turn, rad; smaller turns are measured at it.
 MIN_TURN = 0.2
 # Largest turn whose tangent of half the turn is taken, rad.
@@ -104,24 +104,26 @@ def active_constraints(
     measure_corners(data, limits.wind, path, legs, corners)
     if data.tracking.has_error:
         measure_lags(data.tracking, data.aircraft, limits.wind, path, legs, lags)
-    low, climb, dive, roll = np.zeros(count), np.zeros(count), np.zeros(count), np.zeros(count)
+    extra_heights, climb, dive, roll = np.zeros(count), np.zeros(count), np.zeros(count), np.zeros(count)
     for i in range(count):
-        steepest, deepest = slope_limits(data, path[i], path[i + 1])
-        climb[i], dive[i] = math.tan(steepest), math.tan(deepest)
-        low[i] = extra_margin + lags[i].max_below
+        max_climb, max_dive = slope_limits(data, path[i], path[i + 1])
+        climb[i], dive[i] = math.tan(max_climb), math.tan(max_dive)
+        extra_heights[i] = extra_margin + lags[i].max_below
         if data.legs_hold_turns and not data.fly_over:
-            up = min(path[i, 2], path[i + 1, 2])
-            roll[i] = roll_length(data.aircraft, legs, corners, i, up, limits.wind)
+            altitude = min(path[i, 2], path[i + 1, 2])
+            roll[i] = roll_length(data.aircraft, legs, corners, i, altitude, limits.wind)
     before, after = np.zeros(count + 1), np.zeros(count + 1)
     if data.legs_hold_turns:
         _fill_turn_lengths(data, limits, path, legs, before, after)
     pairs, distances = _find_near_missiles(data, path, corners, lags, extra_margin)
     flown = no_corners(path.shape[0], extra_margin)
-    turns = data.legs_hold_turns, TURN_MARGIN
+    turn_settings = data.legs_hold_turns, TURN_MARGIN
     if corners_too:
         flown = corners_near_ground(data, limits, path, corners, lags, extra_margin)
-        turns = data.legs_hold_turns, max(TURN_MARGIN, 2.0 * extra_margin)
-    return ActiveConstraints(pairs, distances, samples, low, climb, dive, before, after, roll, *turns, flown)
+        turn_settings = data.legs_hold_turns, max(TURN_MARGIN, 2.0 * extra_margin)
+    return ActiveConstraints(
+        pairs, distances, samples, extra_heights, climb, dive, before, after, roll, *turn_settings, flown
+    )
 
 
 @inner
@@ -141,13 +143,13 @@ def _fill_turn_lengths(
             sine = math.sin(turn) if cross >= 0.0 else -math.sin(turn)
             vx, vy = ux * math.cos(turn) - uy * sine, uy * math.cos(turn) + ux * sine
         measure_corner(data.aircraft, data.tracking, limits.wind, True, ux, uy, vx, vy, path[i, 2], corners[0])
-        share = math.tan(0.5 * min(turn, MAX_TURN))
+        half_turn_tangent = math.tan(0.5 * min(turn, MAX_TURN))
         before[i], after[i] = (
-            min(MAX_TURN_LENGTH, corners[0].before) / share,
-            min(MAX_TURN_LENGTH, corners[0].after) / share,
+            min(MAX_TURN_LENGTH, corners[0].before) / half_turn_tangent,
+            min(MAX_TURN_LENGTH, corners[0].after) / half_turn_tangent,
         )
         if data.fly_over:
-            before[i], after[i] = 0.0, min(MAX_TURN_LENGTH, turn_length(True, corners, 0)) / share
+            before[i], after[i] = 0.0, min(MAX_TURN_LENGTH, turn_length(True, corners, 0)) / half_turn_tangent
 
 
 @inner
@@ -163,24 +165,24 @@ def _find_near_missiles(
             ax, ay, az = path[i, 0] - missile.east, path[i, 1] - missile.north, path[i, 2] - missile.up
             dx, dy, dz = path[i + 1, 0] - path[i, 0], path[i + 1, 1] - path[i, 1], path[i + 1, 2] - path[i, 2]
             length2 = max(1e-6, dx * dx + dy * dy + dz * dz)
-            share = min(1.0, max(0.0, -(ax * dx + ay * dy + az * dz) / length2))
-            away = math.sqrt((ax + share * dx) ** 2 + (ay + share * dy) ** 2 + (az + share * dz) ** 2)
-            if away > missile.radius + data.kill_margin + NEAR:
+            fraction = min(1.0, max(0.0, -(ax * dx + ay * dy + az * dz) / length2))
+            distance = math.sqrt((ax + fraction * dx) ** 2 + (ay + fraction * dy) ** 2 + (az + fraction * dz) ** 2)
+            if distance > missile.radius + data.kill_margin + NEARBY_DISTANCE:
                 continue
             length = math.sqrt(length2)
-            aside = 0.0
-            if share * length < corners[i].after:
-                aside = corners[i].excursion
-            if (1.0 - share) * length < corners[i + 1].before:
-                aside = max(aside, corners[i + 1].excursion)
-            lag = max(lags[i].max_below, -lags[i].min_below) * abs(az + share * dz) / max(away, 1.0)
+            excursion = 0.0
+            if fraction * length < corners[i].after:
+                excursion = corners[i].excursion
+            if (1.0 - fraction) * length < corners[i + 1].before:
+                excursion = max(excursion, corners[i + 1].excursion)
+            lag = max(lags[i].max_below, -lags[i].min_below) * abs(az + fraction * dz) / max(distance, 1.0)
             pairs.append((i, k))
-            distances.append(missile.radius + data.kill_margin + extra_margin + aside + lag)
-    out, wanted = np.zeros((len(pairs), 2), dtype=np.int64), np.zeros(len(pairs))
+            distances.append(missile.radius + data.kill_margin + extra_margin + excursion + lag)
+    pair_array, required_distances = np.zeros((len(pairs), 2), dtype=np.int64), np.zeros(len(pairs))
     for p in range(len(pairs)):
-        out[p, 0], out[p, 1] = pairs[p]
-        wanted[p] = distances[p]
-    return out, wanted
+        pair_array[p, 0], pair_array[p, 1] = pairs[p]
+        required_distances[p] = distances[p]
+    return pair_array, required_distances
 
 
 @inner
@@ -193,19 +195,23 @@ def constraint_count(active: ActiveConstraints) -> int:
 @inner
 def carry_multipliers(old: ActiveConstraints, multipliers: Floats, new: ActiveConstraints) -> Floats:
     """Return the multipliers for new active constraints; a new pair of leg and missile starts with 0."""
-    out, many, before = np.zeros(constraint_count(new)), new.pairs.shape[0], old.pairs.shape[0]
-    copy_into(out[many:], multipliers[before:])
+    new_multipliers, pair_count, old_pair_count = (
+        np.zeros(constraint_count(new)),
+        new.pairs.shape[0],
+        old.pairs.shape[0],
+    )
+    copy_into(new_multipliers[pair_count:], multipliers[old_pair_count:])
     k = 0
-    for p in range(many):
+    for p in range(pair_count):
         # Both are sorted by missile and leg.
-        while k < before and (
+        while k < old_pair_count and (
             old.pairs[k, 1] < new.pairs[p, 1]
             or (old.pairs[k, 1] == new.pairs[p, 1] and old.pairs[k, 0] < new.pairs[p, 0])
         ):
             k += 1
-        if k < before and old.pairs[k, 0] == new.pairs[p, 0] and old.pairs[k, 1] == new.pairs[p, 1]:
-            out[p] = multipliers[k]
-    return out
+        if k < old_pair_count and old.pairs[k, 0] == new.pairs[p, 0] and old.pairs[k, 1] == new.pairs[p, 1]:
+            new_multipliers[p] = multipliers[k]
+    return new_multipliers
 
 
 # --- The model ---
@@ -232,24 +238,24 @@ class LagrangianModel(NamedTuple):
 
 @inner
 def _add_constraint(
-    value: float, first: int, points: int, multiplier: float, penalty: float, model: LagrangianModel
+    value: float, first_waypoint: int, waypoint_count: int, multiplier: float, penalty: float, model: LagrangianModel
 ) -> float:
-    """Add a constraint on `points` waypoints from waypoint `first` to the model, and return its share of the merit.
+    """Add a constraint on consecutive waypoints to the model, and return its contribution to the merit.
 
     The derivatives of the constraint with respect to these waypoints are in `model.slopes`.
     """
-    push = multiplier - penalty * value
-    if not push > 0.0:
+    new_multiplier = multiplier - penalty * value
+    if not new_multiplier > 0.0:
         return -multiplier * multiplier / (2.0 * penalty)
-    size, begin = model.gradient.size, 3 * (first - 1)
-    for a in range(3 * points):
+    size, begin = model.gradient.size, 3 * (first_waypoint - 1)
+    for a in range(3 * waypoint_count):
         row = begin + a
         if 0 <= row < size:
-            model.gradient[row] -= push * model.slopes[a // 3, a % 3]
+            model.gradient[row] -= new_multiplier * model.slopes[a // 3, a % 3]
             for b in range(a + 1):
                 if begin + b >= 0:
                     model.band[row, a - b] += penalty * model.slopes[a // 3, a % 3] * model.slopes[b // 3, b % 3]
-    return (push * push - multiplier * multiplier) / (2.0 * penalty)
+    return (new_multiplier * new_multiplier - multiplier * multiplier) / (2.0 * penalty)
 
 
 @inner
@@ -271,20 +277,20 @@ def _add_length(path: Floats, model: LagrangianModel) -> float:
             if b < size:
                 model.gradient[b + axis] += unit[axis]
         for axis in range(3):
-            for other in range(3):
-                bend = ((1.0 if axis == other else 0.0) - unit[axis] * unit[other]) / length
-                if a >= 0 and other <= axis:
-                    model.band[a + axis, axis - other] += bend
-                if b < size and other <= axis:
-                    model.band[b + axis, axis - other] += bend
+            for other_axis in range(3):
+                curvature = ((1.0 if axis == other_axis else 0.0) - unit[axis] * unit[other_axis]) / length
+                if a >= 0 and other_axis <= axis:
+                    model.band[a + axis, axis - other_axis] += curvature
+                if b < size and other_axis <= axis:
+                    model.band[b + axis, axis - other_axis] += curvature
                 if a >= 0 and b < size:
-                    model.band[b + axis, 3 + axis - other] -= bend
+                    model.band[b + axis, 3 + axis - other_axis] -= curvature
     return total
 
 
 @inner
 def _add_travel_cost(data: ProblemArrays, path: Floats, model: LagrangianModel) -> float:
-    """Add the path's cost to the model, if the cost is not length alone, and return the cost, m."""
+    """Add the path's cost to the model, if the cost is not only length, and return the cost, m."""
     total, size, leg = 0.0, model.gradient.size, LegModel(np.zeros((2, 3)), np.zeros((2, 3, 2, 3)))
     for i in range(path.shape[0] - 1):
         total += model_leg(data.travel, data.aircraft, path[i], path[i + 1], leg)
@@ -295,7 +301,7 @@ def _add_travel_cost(data: ProblemArrays, path: Floats, model: LagrangianModel) 
                 model.gradient[row] += leg.slopes[a // 3, a % 3]
                 for b in range(a + 1):
                     if begin + b >= 0:
-                        model.band[row, a - b] += leg.bends[a // 3, a % 3, b // 3, b % 3]
+                        model.band[row, a - b] += leg.curvature[a // 3, a % 3, b // 3, b % 3]
     return total
 
 
@@ -309,22 +315,22 @@ def _add_missiles(
     penalty: float,
     model: LagrangianModel,
 ) -> float:
-    """Add the distances of legs from missiles, which are the first constraints, and return their share of the merit."""
+    """Add the distances of legs from missiles, the first constraints, and return their contribution to the merit."""
     merit, slopes, missiles = 0.0, model.slopes, data.missiles.missiles
     for p in range(active.pairs.shape[0]):
         i, missile = active.pairs[p, 0], missiles[active.pairs[p, 1]]
         ax, ay, az = path[i, 0] - missile.east, path[i, 1] - missile.north, path[i, 2] - missile.up
         dx, dy, dz = path[i + 1, 0] - path[i, 0], path[i + 1, 1] - path[i, 1], path[i + 1, 2] - path[i, 2]
         length2 = max(1e-6, dx * dx + dy * dy + dz * dz)
-        share = min(1.0, max(0.0, -(ax * dx + ay * dy + az * dz) / length2))
-        ax, ay, az = ax + share * dx, ay + share * dy, az + share * dz
-        away = max(1e-3, math.sqrt(ax * ax + ay * ay + az * az))
-        first = slopes[0]
-        first[0], first[1], first[2] = ax / away, ay / away, az / away
+        fraction = min(1.0, max(0.0, -(ax * dx + ay * dy + az * dz) / length2))
+        ax, ay, az = ax + fraction * dx, ay + fraction * dy, az + fraction * dz
+        distance = max(1e-3, math.sqrt(ax * ax + ay * ay + az * az))
+        first_slopes = slopes[0]
+        first_slopes[0], first_slopes[1], first_slopes[2] = ax / distance, ay / distance, az / distance
         for axis in range(3):
-            slopes[1, axis] = share * slopes[0, axis]
-            slopes[0, axis] *= 1.0 - share
-        values[p] = away - active.distances[p]
+            slopes[1, axis] = fraction * slopes[0, axis]
+            slopes[0, axis] *= 1.0 - fraction
+        values[p] = distance - active.distances[p]
         merit += _add_constraint(values[p], i, 2, multipliers[p], penalty, model)
     return merit
 
@@ -339,28 +345,28 @@ def _add_ground(
     values: Floats,
     penalty: float,
     model: LagrangianModel,
-    at: int,
+    first_number: int,
 ) -> float:
-    """Add one ground-clearance constraint for each leg sample, numbered from `at`.
+    """Add one ground-clearance constraint for each leg sample, numbered from `first_number`.
 
     Its value is the height above the required clearance, m. Parameters and result are those of `_add_missiles`.
     """
     merit, slopes, heights, to_pixel = 0.0, model.slopes, data.heights, data.to_pixel
     for i in range(path.shape[0] - 1):
         for k in range(active.samples):
-            share = (k + 1.0) / (active.samples + 1.0)
-            x = path[i, 0] + share * (path[i + 1, 0] - path[i, 0])
-            y = path[i, 1] + share * (path[i + 1, 1] - path[i, 1])
-            z = path[i, 2] + share * (path[i + 1, 2] - path[i, 2])
+            fraction = (k + 1.0) / (active.samples + 1.0)
+            x = path[i, 0] + fraction * (path[i + 1, 0] - path[i, 0])
+            y = path[i, 1] + fraction * (path[i + 1, 1] - path[i, 1])
+            z = path[i, 2] + fraction * (path[i + 1, 2] - path[i, 2])
             column, row = polymap(to_pixel, x, y)
             value = z - pixel_height(heights, column, row) - clearance_at(limits.required, x, y) - active.low[i]
-            number = at + i * active.samples + k
+            number = first_number + i * active.samples + k
             values[number] = value
             if multipliers[number] - penalty * value > 0.0:
                 ground_slopes(data, x, y, slopes[0])
                 for axis in range(3):
-                    slopes[1, axis] = share * slopes[0, axis]
-                    slopes[0, axis] *= 1.0 - share
+                    slopes[1, axis] = fraction * slopes[0, axis]
+                    slopes[0, axis] *= 1.0 - fraction
             merit += _add_constraint(value, i, 2, multipliers[number], penalty, model)
     return merit
 
@@ -375,19 +381,19 @@ def _add_corners(
     values: Floats,
     penalty: float,
     model: LagrangianModel,
-    at: int,
+    first_number: int,
 ) -> float:
     """Add the heights of flown corners above the required height, and the lengths of steep arcs.
 
-    Constraints are numbered from `at`. Parameters and result are those of `_add_missiles`.
+    Constraints are numbered from `first_number`. Parameters and result are those of `_add_missiles`.
     """
-    merit, point, up, corner = 0.0, np.empty(3), np.empty(3), np.empty((3, 3))
+    merit, point, ground_gradient, corner = 0.0, np.empty(3), np.empty(3), np.empty((3, 3))
     for i in range(1, path.shape[0] - 1):
         radius = flown.radii[i]
         for k in range(3):
             copy_into(corner[k], path[i - 1 + k])
         for k in range(SAMPLES):
-            number = at + i * SAMPLES + k
+            number = first_number + i * SAMPLES + k
             values[number] = NEAR_GROUND
             if radius <= 0.0:
                 continue
@@ -395,19 +401,19 @@ def _add_corners(
             value = height_above_required(data, limits, point) - flown.lowered[i, leg_of(k)]
             values[number] = value
             if multipliers[number] - penalty * value > 0.0:
-                ground_slopes(data, point[0], point[1], up)
-                corner_slopes(data, corner, radius, k, up, point, model.slopes)
+                ground_slopes(data, point[0], point[1], ground_gradient)
+                corner_slopes(data, corner, radius, k, ground_gradient, point, model.slopes)
             merit += _add_constraint(value, i - 1, 3, multipliers[number], penalty, model)
         for k in range(2):
-            number, radius = at + path.shape[0] * SAMPLES + 2 * i + k, flown.steep_radii[i]
+            number, radius = first_number + path.shape[0] * SAMPLES + 2 * i + k, flown.steep_radii[i]
             values[number] = NEAR_GROUND
             if radius <= 0.0:
                 continue
-            sign, steepest = 1.0 - 2.0 * k, flown.slopes[i, k]
-            value = arc_room(corner[0], corner[1], corner[2], radius, sign, steepest) - flown.slope_margin
+            sign, max_slope = 1.0 - 2.0 * k, flown.slopes[i, k]
+            value = arc_room(corner[0], corner[1], corner[2], radius, sign, max_slope) - flown.slope_margin
             values[number] = value
             if multipliers[number] - penalty * value > 0.0:
-                arc_room_slopes(corner, radius, sign, steepest, model.slopes)
+                arc_room_slopes(corner, radius, sign, max_slope, model.slopes)
             merit += _add_constraint(value, i - 1, 3, multipliers[number], penalty, model)
     return merit
 
@@ -420,7 +426,7 @@ def _add_slopes(
     values: Floats,
     penalty: float,
     model: LagrangianModel,
-    at: int,
+    first_number: int,
 ) -> float:
     """Add the slope margins of legs, as m of height, and their lengths above the minimum; see `_add_ground`."""
     merit, slopes = 0.0, model.slopes
@@ -430,11 +436,11 @@ def _add_slopes(
         for kind in range(3):
             tangent = active.climb[i] if kind == 0 else active.dive[i] if kind == 1 else 1.0
             sign = -1.0 if kind == 0 else 1.0 if kind == 1 else 0.0
-            second = slopes[1]
-            second[0], second[1], second[2] = tangent * dx / run, tangent * dy / run, sign
+            second_slopes = slopes[1]
+            second_slopes[0], second_slopes[1], second_slopes[2] = tangent * dx / run, tangent * dy / run, sign
             for axis in range(3):
                 slopes[0, axis] = -slopes[1, axis]
-            number = at + 3 * i + kind
+            number = first_number + 3 * i + kind
             values[number] = tangent * run + sign * rise - (SHORTEST_LEG if kind == 2 else SLOPE_MARGIN)
             merit += _add_constraint(values[number], i, 2, multipliers[number], penalty, model)
     return merit
@@ -449,11 +455,15 @@ def _add_turns(
     values: Floats,
     penalty: float,
     model: LagrangianModel,
-    at: int,
+    first_number: int,
 ) -> float:
     """Add turn margins, and the lengths of legs that remain between their turns; see `_add_ground`."""
     merit, slopes, count = 0.0, model.slopes, path.shape[0] - 1
-    turn, of_before, of_after = np.zeros(count + 1), np.zeros((count + 1, 2)), np.zeros((count + 1, 2))
+    turn, before_derivatives, after_derivatives = (
+        np.zeros(count + 1),
+        np.zeros((count + 1, 2)),
+        np.zeros((count + 1, 2)),
+    )
     for i in range(count + 1):
         ux, uy = math.sin(data.start_course), math.cos(data.start_course)
         vx, vy = math.sin(data.destination_course), math.cos(data.destination_course)
@@ -466,39 +476,49 @@ def _add_turns(
         cross = ux * vy - uy * vx
         turn[i] = math.atan2(abs(cross), ux * vx + uy * vy)
         side, u2, v2 = 1.0 if cross >= 0.0 else -1.0, max(1.0, ux * ux + uy * uy), max(1.0, vx * vx + vy * vy)
-        of_before[i, 0], of_before[i, 1] = side * uy / u2, -side * ux / u2
-        of_after[i, 0], of_after[i, 1] = -side * vy / v2, side * vx / v2
+        before_derivatives[i, 0], before_derivatives[i, 1] = side * uy / u2, -side * ux / u2
+        after_derivatives[i, 0], after_derivatives[i, 1] = -side * vy / v2, side * vx / v2
         slopes[:] = 0.0
-        _add_turn_derivatives(of_before[i], of_after[i], -TURN_LENGTH, slopes[:3])
-        values[at + i] = TURN_LENGTH * (data.max_turn - turn[i])
-        merit += _add_constraint(values[at + i], i - 1, 3, multipliers[at + i], penalty, model)
+        _add_turn_derivatives(before_derivatives[i], after_derivatives[i], -TURN_LENGTH, slopes[:3])
+        values[first_number + i] = TURN_LENGTH * (data.max_turn - turn[i])
+        merit += _add_constraint(values[first_number + i], i - 1, 3, multipliers[first_number + i], penalty, model)
     if not active.turns_in_legs:
         return merit
     for i in range(count):
-        number = at + count + 1 + i
+        number = first_number + count + 1 + i
         dx, dy = path[i + 1, 0] - path[i, 0], path[i + 1, 1] - path[i, 1]
         run = max(1e-3, math.sqrt(dx * dx + dy * dy))
-        one, two = math.tan(0.5 * min(MAX_TURN, turn[i])), math.tan(0.5 * min(MAX_TURN, turn[i + 1]))
-        need = active.after[i] * one + active.before[i + 1] * two + active.roll[i]
+        begin_tangent, end_tangent = math.tan(0.5 * min(MAX_TURN, turn[i])), math.tan(0.5 * min(MAX_TURN, turn[i + 1]))
+        needed_length = active.after[i] * begin_tangent + active.before[i + 1] * end_tangent + active.roll[i]
         slopes[:] = 0.0
-        for axis, part in ((0, dx / run), (1, dy / run)):
-            slopes[1, axis], slopes[2, axis] = -(1.0 - SETTLING_SHARE) * part, (1.0 - SETTLING_SHARE) * part
-        _add_turn_derivatives(of_before[i], of_after[i], -0.5 * active.after[i] * (1.0 + one * one), slopes[:3])
+        for axis, component in ((0, dx / run), (1, dy / run)):
+            slopes[1, axis], slopes[2, axis] = -(1.0 - SETTLING_SHARE) * component, (1.0 - SETTLING_SHARE) * component
         _add_turn_derivatives(
-            of_before[i + 1], of_after[i + 1], -0.5 * active.before[i + 1] * (1.0 + two * two), slopes[1:]
+            before_derivatives[i],
+            after_derivatives[i],
+            -0.5 * active.after[i] * (1.0 + begin_tangent * begin_tangent),
+            slopes[:3],
         )
-        values[number] = (1.0 - SETTLING_SHARE) * run - need - min(SETTLING_LENGTH, need) - active.turn_margin
+        _add_turn_derivatives(
+            before_derivatives[i + 1],
+            after_derivatives[i + 1],
+            -0.5 * active.before[i + 1] * (1.0 + end_tangent * end_tangent),
+            slopes[1:],
+        )
+        values[number] = (
+            (1.0 - SETTLING_SHARE) * run - needed_length - min(SETTLING_LENGTH, needed_length) - active.turn_margin
+        )
         merit += _add_constraint(values[number], i - 1, 4, multipliers[number], penalty, model)
     return merit
 
 
 @inner
-def _add_turn_derivatives(of_before: Floats, of_after: Floats, factor: float, slopes: Floats) -> None:
+def _add_turn_derivatives(before_derivatives: Floats, after_derivatives: Floats, factor: float, slopes: Floats) -> None:
     """Add the derivatives of a turn by its two legs, times a factor, to its derivatives by waypoints (3, 3)."""
     for axis in range(2):
-        slopes[0, axis] -= factor * of_before[axis]
-        slopes[1, axis] += factor * (of_before[axis] - of_after[axis])
-        slopes[2, axis] += factor * of_after[axis]
+        slopes[0, axis] -= factor * before_derivatives[axis]
+        slopes[1, axis] += factor * (before_derivatives[axis] - after_derivatives[axis])
+        slopes[2, axis] += factor * after_derivatives[axis]
 
 
 @inner
@@ -514,15 +534,15 @@ def lagrangian(
 ) -> float:
     """Return the augmented length or cost of a path (w, 3), m, and fill the constraints' values and the model."""
     model.gradient[:], model.band[:] = 0.0, 0.0
-    at = active.pairs.shape[0]
-    by_length = data.travel.time == 0.0 and data.travel.energy == 0.0
-    merit = _add_length(path, model) if by_length else _add_travel_cost(data, path, model)
+    first_number = active.pairs.shape[0]
+    is_by_length = data.travel.time == 0.0 and data.travel.energy == 0.0
+    merit = _add_length(path, model) if is_by_length else _add_travel_cost(data, path, model)
     merit += _add_missiles(data, active, path, multipliers, values, penalty, model)
-    merit += _add_ground(data, limits, active, path, multipliers, values, penalty, model, at)
-    at += active.samples * (path.shape[0] - 1)
-    merit += _add_slopes(active, path, multipliers, values, penalty, model, at)
-    at += 3 * (path.shape[0] - 1)
-    merit += _add_turns(data, active, path, multipliers, values, penalty, model, at)
-    at += 2 * path.shape[0] - 1
-    merit += _add_corners(data, limits, active.flown, path, multipliers, values, penalty, model, at)
+    merit += _add_ground(data, limits, active, path, multipliers, values, penalty, model, first_number)
+    first_number += active.samples * (path.shape[0] - 1)
+    merit += _add_slopes(active, path, multipliers, values, penalty, model, first_number)
+    first_number += 3 * (path.shape[0] - 1)
+    merit += _add_turns(data, active, path, multipliers, values, penalty, model, first_number)
+    first_number += 2 * path.shape[0] - 1
+    merit += _add_corners(data, limits, active.flown, path, multipliers, values, penalty, model, first_number)
     return merit

@@ -1,4 +1,4 @@
-"""Find routes that pass obstacles on other sides than the cheapest route, one per choice of sides.
+"""Find routes that pass obstacles on other sides than the cheapest route does, one per choice of sides.
 
 Two passes of dynamic programming over the same grid, from the start and from the destination, meet in every cell, and
 the sum of their costs is the cost of the cheapest route through it. The smallest sum to the left of an obstacle belongs
@@ -50,21 +50,21 @@ PASSING = np.dtype(
 class GridCosts(NamedTuple):
     """Costs of the cheapest partial routes over a grid, (stages + 1, layers, across); inf above the bound.
 
-    reached: from the start; parents: the previous cell, as layer x width + across.
-    left: to the destination; successors: the next cell.
+    reached: cost from the start; parents: the previous cell, as layer x width + across.
+    remaining: cost to the destination; successors: the next cell.
     """
 
     reached: Floats
     parents: Codes
-    left: Floats
+    remaining: Floats
     successors: Codes
 
 
 @inner
 def _relax_stage_back(
-    left: Floats,
+    remaining: Floats,
     price: Floats,
-    before: Floats,
+    previous_remaining: Floats,
     successors: Codes,
     spans: Records,
     step_layers: Records,
@@ -76,38 +76,53 @@ def _relax_stage_back(
 
     spans: `SPAN` records (layers,) of the cells before it that are within the bound.
     """
-    high, wide = left.shape
-    flat, flat_before, flat_successors, flat_price = left.ravel(), before.ravel(), successors.ravel(), price.ravel()
-    for z in range(high):
+    layer_count, width = remaining.shape
+    flat_remaining, flat_previous, flat_successors, flat_price = (
+        remaining.ravel(),
+        previous_remaining.ravel(),
+        successors.ravel(),
+        price.ravel(),
+    )
+    for z in range(layer_count):
         first, last = spans[z].first, spans[z].last
         if first > last:
             continue
         for side in range(-SIDEWAYS, SIDEWAYS + 1):
-            a, b = max(first, -side), min(last, wide - 1 - side) + 1
-            if a >= b:
+            begin, end = max(first, -side), min(last, width - 1 - side) + 1
+            if begin >= end:
                 continue
             limit = step_layers[side + SIDEWAYS, z]
-            bottom, top = max(0, z - limit.sink), min(high - 1, z + limit.climb)
-            for z2 in range(bottom, top + 1):
-                length = math.sqrt(step * step * (1.0 + (side * ratio) ** 2) + ((z2 - z) * pitch) ** 2)
-                here, after = z * wide + a, z2 * wide + a + side
-                relax(flat, flat_price, flat_before, flat_successors, after, here, after, b - a, length)
+            bottom, top = max(0, z - limit.sink), min(layer_count - 1, z + limit.climb)
+            for next_z in range(bottom, top + 1):
+                length = math.sqrt(step * step * (1.0 + (side * ratio) ** 2) + ((next_z - z) * pitch) ** 2)
+                source, target = z * width + begin, next_z * width + begin + side
+                relax(
+                    flat_remaining,
+                    flat_price,
+                    flat_previous,
+                    flat_successors,
+                    target,
+                    source,
+                    target,
+                    end - begin,
+                    length,
+                )
 
 
 @inner
-def _drop_unbounded(reached: Floats, left: Floats, spans: Records, bound: float) -> None:
+def _drop_cells_above_bound(reached: Floats, remaining: Floats, spans: Records, bound: float) -> None:
     """Drop cells (layers, across) of one stage through which no route is within the bound."""
     for z in range(reached.shape[0]):
         for y in range(spans[z].first, spans[z].last + 1):
-            if not reached[z, y] + left[z, y] <= bound:
-                left[z, y] = math.inf
+            if not reached[z, y] + remaining[z, y] <= bound:
+                remaining[z, y] = math.inf
 
 
 class SideSearch(NamedTuple):
     """A search for the costs of partial routes, first from the start, then from the destination; it can be continued.
 
     price: cost per m of the cells, (stages + 1, layers, across). spans: `SPAN` records (stages + 1, layers) of the
-    cells within the bound. done: stages that are done, of those there and back; twice the grid's once it has ended.
+    cells within the bound. done: number of completed stages, forwards and then backwards; twice the grid's at the end.
     """
 
     costs: GridCosts
@@ -120,7 +135,7 @@ class SideSearch(NamedTuple):
     done: int
 
 
-# Cells of a grid that are reached between two calls of `pause`: some 10 ms.
+# Number of cells reached between two calls of `pause`: some 10 ms.
 CELLS_AT_ONCE = 100_000
 
 
@@ -142,17 +157,17 @@ def grid_costs(
 @compiled
 def begin_grid_costs(data: ProblemArrays, frame: RotatedFrame, grid: Grid) -> SideSearch:
     """Return a new search at the start."""
-    stages, wide, high = grid.stages, grid.across.size, grid.layers.size
+    stages, width, layer_count = grid.stages, grid.across.size, grid.layers.size
     step = frame.length / stages
-    shape = (stages + 1, high, wide)
+    shape = (stages + 1, layer_count, width)
     home, start = int(np.argmin(np.abs(grid.across))), int(np.argmin(np.abs(grid.layers - data.start[2])))
-    reached, left = np.full(shape, np.inf), np.full(shape, np.inf)
-    spans = np.zeros((stages + 1, high), dtype=SPAN)
-    for z in range(high):
-        spans[0, z].first, spans[0, z].last = (home, home) if z == start else (wide, -1)
+    reached, remaining = np.full(shape, np.inf), np.full(shape, np.inf)
+    spans = np.zeros((stages + 1, layer_count), dtype=SPAN)
+    for z in range(layer_count):
+        spans[0, z].first, spans[0, z].last = (home, home) if z == start else (width, -1)
     reached[0, start, home] = 0.0
     return SideSearch(
-        GridCosts(reached, np.zeros(shape, dtype=np.int32), left, np.zeros(shape, dtype=np.int32)),
+        GridCosts(reached, np.zeros(shape, dtype=np.int32), remaining, np.zeros(shape, dtype=np.int32)),
         layers_per_step(data, frame, step, grid.layers, grid.ratio),
         find_obstacles(data, frame, step, grid.shrink),
         np.full(shape, np.inf),
@@ -165,51 +180,51 @@ def begin_grid_costs(data: ProblemArrays, frame: RotatedFrame, grid: Grid) -> Si
 
 @compiled
 def continue_grid_costs(
-    data: ProblemArrays, frame: RotatedFrame, grid: Grid, bound: float, search: SideSearch, more: int
+    data: ProblemArrays, frame: RotatedFrame, grid: Grid, bound: float, search: SideSearch, max_stages: int
 ) -> SideSearch:
-    """Continue a search by up to `more` stages, or end it if no route leads on, and return it."""
-    stages, wide, high = grid.stages, grid.across.size, grid.layers.size
+    """Continue a search by up to `max_stages` stages, or end it if no route leads on, and return it."""
+    stages, width, layer_count = grid.stages, grid.across.size, grid.layers.size
     step, required = frame.length / stages, required_clearance(data)
-    pitch = grid.layers[1] - grid.layers[0] if high > 1 else 1.0
+    pitch = grid.layers[1] - grid.layers[0] if layer_count > 1 else 1.0
     costs, step_layers, obstacles, price, spans, home, goal, done = search
-    reached, parents, left, successors = costs
-    rises, ahead, extra = grid.layers - grid.layers[goal], np.empty(wide), np.zeros((stages + 1, wide))
-    until = min(2 * stages, done + more)
-    for number in range(done, until):
-        stage = number + 1
+    reached, parents, remaining, successors = costs
+    rises, goal_distances, extra = grid.layers - grid.layers[goal], np.empty(width), np.zeros((stages + 1, width))
+    end = min(2 * stages, done + max_stages)
+    for step_number in range(done, end):
+        stage = step_number + 1
         if stage <= stages:
-            low, last = wide, -1
-            for z in range(high):
-                low, last = min(low, spans[stage - 1, z].first), max(last, spans[stage - 1, z].last)
-            low, last = max(0, low - SIDEWAYS), min(wide - 1, last + SIDEWAYS)
-            if low > last:
-                until = 2 * stages
+            first, last = width, -1
+            for z in range(layer_count):
+                first, last = min(first, spans[stage - 1, z].first), max(last, spans[stage - 1, z].last)
+            first, last = max(0, first - SIDEWAYS), min(width - 1, last + SIDEWAYS)
+            if first > last:
+                end = 2 * stages
                 break
-            set_cell_costs(data, required, frame, stage, obstacles, grid, extra, low, last, price[stage])
-            before, here = reached[stage - 1], reached[stage]
+            set_cell_costs(data, required, frame, stage, obstacles, grid, extra, first, last, price[stage])
+            previous, current = reached[stage - 1], reached[stage]
             relax_stage(
-                before, here, parents[stage], spans[stage - 1], step_layers, price[stage], step, pitch, grid.ratio
+                previous, current, parents[stage], spans[stage - 1], step_layers, price[stage], step, pitch, grid.ratio
             )
-            distance_to_goal(wide, home, stages - stage, step, grid.ratio, ahead)
-            prune(reached[stage], spans[stage], ahead, rises, bound, low, last)
+            distance_to_goal(width, home, stages - stage, step, grid.ratio, goal_distances)
+            prune(reached[stage], spans[stage], goal_distances, rises, bound, first, last)
             continue
-        if number == stages:
-            left[stages, goal, home] = 0.0
-        stage = 2 * stages - 1 - number
-        after, here = left[stage + 1], left[stage]
+        if step_number == stages:
+            remaining[stages, goal, home] = 0.0
+        stage = 2 * stages - 1 - step_number
+        next_costs, current = remaining[stage + 1], remaining[stage]
         _relax_stage_back(
-            after, price[stage + 1], here, successors[stage], spans[stage], step_layers, step, pitch, grid.ratio
+            next_costs, price[stage + 1], current, successors[stage], spans[stage], step_layers, step, pitch, grid.ratio
         )
-        _drop_unbounded(reached[stage], left[stage], spans[stage], bound)
-    return SideSearch(costs, step_layers, obstacles, price, spans, home, goal, until)
+        _drop_cells_above_bound(reached[stage], remaining[stage], spans[stage], bound)
+    return SideSearch(costs, step_layers, obstacles, price, spans, home, goal, end)
 
 
 @inlined
-def side_of(aside: float, above: float) -> int:
-    """Return the side on which a point lies, from its offsets to the left of an obstacle's centre and above it."""
-    if abs(aside) >= abs(above):
-        return LEFT if aside >= 0.0 else RIGHT
-    return OVER if above > 0.0 else UNDER
+def side_of(lateral_offset: float, vertical_offset: float) -> int:
+    """Return the side of a point, given its offsets to the left of an obstacle's centre and above it, m."""
+    if abs(lateral_offset) >= abs(vertical_offset):
+        return LEFT if lateral_offset >= 0.0 else RIGHT
+    return OVER if vertical_offset > 0.0 else UNDER
 
 
 @compiled
@@ -218,59 +233,66 @@ def cheapest_passings(costs: GridCosts, grid: Grid, obstacles: Records, step: fl
 
     A route passes an obstacle at the stage nearest to its centre; obstacles beyond the ends have none.
     """
-    out = np.zeros((obstacles.shape[0], 4), dtype=PASSING)
+    passings = np.zeros((obstacles.shape[0], 4), dtype=PASSING)
     for k in range(obstacles.shape[0]):
         obstacle, stage = obstacles[k], round(obstacles[k].along / step)
         for side in range(4):
-            out[k, side].cost = math.inf
+            passings[k, side].cost = math.inf
         if not 0 < stage < grid.stages:
             continue
         for z in range(grid.layers.size):
             for y in range(grid.across.size):
-                cost = costs.reached[stage, z, y] + costs.left[stage, z, y]
+                cost = costs.reached[stage, z, y] + costs.remaining[stage, z, y]
                 if cost == math.inf:
                     continue
-                best = out[k, side_of(grid.across[y] - obstacle.across, grid.layers[z] - obstacle.up)]
-                if cost < best.cost:
-                    best.cost, best.stage, best.layer, best.across = cost, stage, z, y
-    return out
+                passing = passings[k, side_of(grid.across[y] - obstacle.across, grid.layers[z] - obstacle.up)]
+                if cost < passing.cost:
+                    passing.cost, passing.stage, passing.layer, passing.across = cost, stage, z, y
+    return passings
 
 
 @compiled
 def route_through(costs: GridCosts, stage: int, layer: int, across: int) -> Records:
     """Return `ROUTE_CELL` records (stages + 1,) of the cheapest route through a cell."""
-    last, wide = costs.successors.shape[0] - 1, costs.successors.shape[2]
+    last, width = costs.successors.shape[0] - 1, costs.successors.shape[2]
     cells = np.zeros(last + 1, dtype=ROUTE_CELL)
-    before = trace_back(costs.parents[: stage + 1], layer, across)
-    for here in range(stage + 1):
-        cells[here] = before[here]
-    for here in range(stage, last):
-        after = costs.successors[here, layer, across]
-        layer, across = after // wide, after % wide
-        cells[here + 1].layer, cells[here + 1].across = layer, across
+    previous_cells = trace_back(costs.parents[: stage + 1], layer, across)
+    for index in range(stage + 1):
+        cells[index] = previous_cells[index]
+    for index in range(stage, last):
+        next_cell = costs.successors[index, layer, across]
+        layer, across = next_cell // width, next_cell % width
+        cells[index + 1].layer, cells[index + 1].across = layer, across
     return cells
 
 
 # --- Routes of different sides ---
 
 # Routes with a mean lateral distance below this are the same route, m.
-SAME_WAY = 100.0
+SAME_ROUTE_DISTANCE = 100.0
 
 
 def sides_passed(points: Floats, obstacles: Records) -> Ints:
-    """Return the sides on which a route's points (s, 3) along, across, up pass obstacles, (k,); -1 beyond its ends.
+    """Return the sides on which a route (s, 3) along, across, up passes obstacles, (k,); -1 beyond its ends.
 
     Routes with the same sides can be deformed into each other without touching an obstacle. Routes with different sides
     are assumed not to be, although a route over a sphere on the ground can be moved to either side.
     """
     step = points[1, 0] - points[0, 0]
     stages = np.rint(obstacles["along"] / step).astype(np.int64)
-    beyond = (stages <= 0) | (stages >= len(points) - 1)
-    at = points[np.clip(stages, 0, len(points) - 1)]
-    aside, above = at[:, 1] - obstacles["across"], at[:, 2] - obstacles["up"]
-    level = np.where(aside >= 0.0, LEFT, RIGHT)
-    sides = np.where(np.abs(aside) >= np.abs(above), level, np.where(above > 0.0, OVER, UNDER))
-    return np.where(beyond, -1, sides)
+    is_beyond_end = (stages <= 0) | (stages >= len(points) - 1)
+    nearest_points = points[np.clip(stages, 0, len(points) - 1)]
+    lateral_offsets, vertical_offsets = (
+        nearest_points[:, 1] - obstacles["across"],
+        nearest_points[:, 2] - obstacles["up"],
+    )
+    horizontal_sides = np.where(lateral_offsets >= 0.0, LEFT, RIGHT)
+    sides = np.where(
+        np.abs(lateral_offsets) >= np.abs(vertical_offsets),
+        horizontal_sides,
+        np.where(vertical_offsets > 0.0, OVER, UNDER),
+    )
+    return np.where(is_beyond_end, -1, sides)
 
 
 def side_routes(
@@ -295,15 +317,15 @@ def side_routes(
     passings = passings[np.isfinite(passings["cost"])]
     along = np.linspace(0.0, frame.length, grid.stages + 1)
     routes: list[GridRoute] = []
-    known: set[bytes] = set()
+    known_sides: set[bytes] = set()
     for passing in passings[np.argsort(passings["cost"], kind="stable")]:
         cells = route_through(costs, passing["stage"], passing["layer"], passing["across"])
         points = np.column_stack([along, grid.across[cells["across"]], grid.layers[cells["layer"]]])
         sides = sides_passed(points, obstacles).tobytes()
-        if sides in known:
+        if sides in known_sides:
             continue
-        known.add(sides)
-        if any(np.abs(points[:, 1] - route.points[:, 1]).mean() < SAME_WAY for route in routes):
+        known_sides.add(sides)
+        if any(np.abs(points[:, 1] - route.points[:, 1]).mean() < SAME_ROUTE_DISTANCE for route in routes):
             continue
         routes.append(GridRoute(points, float(passing["cost"])))
         if len(routes) == max_routes:
@@ -325,16 +347,16 @@ def optimistic_grid(
 
     Its highest layer is the ceiling, where spheres on the ground are smallest.
     """
-    square = make_grid(data, frame, span, stages)
-    step = ratio * frame.length / square.stages
+    square_grid = make_grid(data, frame, span, stages)
+    step = ratio * frame.length / square_grid.stages
     across = np.arange(math.ceil(span[0] / step), math.floor(span[1] / step) + 1) * step
-    layers, start = square.layers, data.start[2]
+    layers, start = square_grid.layers, data.start[2]
     if data.ceiling > start and layers.size > 1:
         pitch = (data.ceiling - start) / math.ceil((data.ceiling - start) / (layers[1] - layers[0]))
         layers = (
             start
             + np.arange(-math.floor((start - layers[0]) / pitch), round((data.ceiling - start) / pitch) + 1) * pitch
         )
-    return square._replace(
+    return square_grid._replace(
         across=np.asarray(across, np.float64), layers=layers, shrink=shrink, spread=spread, ratio=ratio
     )

@@ -24,11 +24,11 @@ from world.terrain import pixel_height
 
 # Cost, in m of path, per rad above the turn limit, or per 100 m by which a leg is too short for its turn.
 TURN_COST = 2e4
-# Share of a leg that each of its two turns may take.
+# Fraction of a leg that each of its two turns may take.
 TURN_SHARE = 0.475
 # Legs evaluated between two calls of `pause`: at most some 20 ms on a slow processor.
 LEGS_AT_ONCE = 2_500
-# More legs than there can be.
+# Larger than any number of legs.
 ALL_LEGS = 2**62
 # Progress: direction, next waypoint and candidate, and number of legs evaluated.
 _CURSOR = np.dtype([(name, np.int64) for name in ("step", "waypoint", "candidate", "legs")])
@@ -46,7 +46,7 @@ class _Sweeps(NamedTuple):
 class WaypointChains(NamedTuple):
     """Best paths through candidates (w, k).
 
-    cost: of the best path through each, in m of path; inf if none is within the bound.
+    cost: cost of the best path through each, in m of path; inf if none is within the bound.
     before, after: (w, k) previous and next candidate on that path.
     legs: number of legs evaluated.
     """
@@ -77,21 +77,21 @@ def waypoint_chains(
     """Return the best paths through candidates (w, k, 3) world m; only the first candidate of each end is used.
 
     bound: upper limit on the cost of a path, m; pruning by it saves time. pause: called after every `LEGS_AT_ONCE`
-    legs; an exception raised there stops the work. max_legs: there are no paths where more have to be evaluated.
+    legs; an exception raised there stops the work. max_legs: if more legs have to be evaluated, no path is returned.
     """
-    count, wide, _ = candidates.shape
-    legs = np.zeros((count - 1, wide, wide))
-    forward, backward = np.full((count, wide), np.inf), np.full((count, wide), np.inf)
+    count, width, _ = candidates.shape
+    legs = np.zeros((count - 1, width, width))
+    forward, backward = np.full((count, width), np.inf), np.full((count, width), np.inf)
     forward[0, 0], backward[-1, 0] = 0.0, 0.0
-    before, after = np.zeros((count, wide), dtype=np.int64), np.zeros((count, wide), dtype=np.int64)
+    before, after = np.zeros((count, width), dtype=np.int64), np.zeros((count, width), dtype=np.int64)
     sweeps, cursor = _Sweeps(forward, before, backward, after), np.zeros(1, dtype=_CURSOR)
     cursor["step"], cursor["waypoint"] = 1, 1
-    done = 0
-    while not _advance(data, candidates, legs, bound, sweeps, cursor, min(LEGS_AT_ONCE, max_legs - done)):
+    evaluated_legs = 0
+    while not _advance(data, candidates, legs, bound, sweeps, cursor, min(LEGS_AT_ONCE, max_legs - evaluated_legs)):
         pause()
-        done = int(cursor["legs"][0])
-        if done >= max_legs:
-            return WaypointChains(np.full((count, wide), np.inf), before, after, done)
+        evaluated_legs = int(cursor["legs"][0])
+        if evaluated_legs >= max_legs:
+            return WaypointChains(np.full((count, width), np.inf), before, after, evaluated_legs)
     return WaypointChains(_costs_through(data, candidates, bound, sweeps), before, after, int(cursor["legs"][0]))
 
 
@@ -103,28 +103,44 @@ def _advance(
 
     legs: (w - 1, k, k) costs, filled on demand; a lower bound is negative. cursor: a `_CURSOR` record (1,).
     """
-    count, wide, _ = candidates.shape
+    count, width, _ = candidates.shape
     limits, corners = precompute_limits(data), np.zeros(1, dtype=CORNER)
-    at, lower_bounds = cursor[0], np.empty(wide)
-    begun = at.legs
-    while at.waypoint >= 0:
-        i, step = at.waypoint, at.step
+    position, lower_bounds = cursor[0], np.empty(width)
+    previous_legs = position.legs
+    while position.waypoint >= 0:
+        waypoint, step = position.waypoint, position.step
         cost, link = (sweeps.forward, sweeps.before) if step > 0 else (sweeps.backward, sweeps.after)
-        open_ends = np.flatnonzero(cost[i - step] < np.inf)
-        while at.candidate < (wide if 0 < i < count - 1 else 1):
-            if at.legs - begun >= max_legs:
+        open_ends = np.flatnonzero(cost[waypoint - step] < np.inf)
+        while position.candidate < (width if 0 < waypoint < count - 1 else 1):
+            if position.legs - previous_legs >= max_legs:
                 return False
-            k = at.candidate
+            candidate = position.candidate
             # Lower bound on the cost of the rest of a path through this candidate.
-            rest = _distance(candidates[i, k], candidates[-1][0]) if step > 0 else sweeps.forward[i, k]
-            at.legs += _extend_paths(
-                data, limits, candidates, i, k, step, cost, link, bound - rest, legs, open_ends, lower_bounds, corners
+            remaining_cost = (
+                _distance(candidates[waypoint, candidate], candidates[-1][0])
+                if step > 0
+                else sweeps.forward[waypoint, candidate]
             )
-            at.candidate += 1
-        at.candidate = 0
-        at.waypoint += step
-        if at.waypoint == count:
-            at.waypoint, at.step = count - 2, -1
+            position.legs += _extend_paths(
+                data,
+                limits,
+                candidates,
+                waypoint,
+                candidate,
+                step,
+                cost,
+                link,
+                bound - remaining_cost,
+                legs,
+                open_ends,
+                lower_bounds,
+                corners,
+            )
+            position.candidate += 1
+        position.candidate = 0
+        position.waypoint += step
+        if position.waypoint == count:
+            position.waypoint, position.step = count - 2, -1
     return True
 
 
@@ -164,36 +180,42 @@ def _extend_paths(
     max_cost: upper limit on the cost of a partial path. open_ends: candidates of the previous waypoint with partial
     paths. lower_bounds, corners: scratch.
     """
-    last, evaluated, here = i - step, 0, candidates[i, k]
+    previous, evaluated, point = i - step, 0, candidates[i, k]
     if not max_cost > 0.0 or open_ends.size == 0:
         return 0
     for m in range(open_ends.size):
         # A leg costs at least its length.
-        lower_bounds[m] = cost[last, open_ends[m]] + _distance(candidates[last, open_ends[m]], here)
+        lower_bounds[m] = cost[previous, open_ends[m]] + _distance(candidates[previous, open_ends[m]], point)
     while True:
         # Best lower bound first: a leg without violations ends the search.
         m = _lowest_index(lower_bounds, open_ends.size)
-        j, cheapest = open_ends[m], lower_bounds[m]
-        if not cheapest < min(cost[i, k], max_cost):
+        j, lower_bound = open_ends[m], lower_bounds[m]
+        if not lower_bound < min(cost[i, k], max_cost):
             return evaluated
         lower_bounds[m] = np.inf
-        turn = 0.0
-        if 0 < last < candidates.shape[0] - 1:
-            beyond = candidates[last - step, link[last, j]]
-            a, c = (beyond, here) if step > 0 else (here, beyond)
-            turn = _corner_cost(data, limits, a, candidates[last, j], c, corners)
-        if not cheapest + turn < min(cost[i, k], max_cost):
+        turn_cost = 0.0
+        if 0 < previous < candidates.shape[0] - 1:
+            far_point = candidates[previous - step, link[previous, j]]
+            a, c = (far_point, point) if step > 0 else (point, far_point)
+            turn_cost = _corner_cost(data, limits, a, candidates[previous, j], c, corners)
+        if not lower_bound + turn_cost < min(cost[i, k], max_cost):
             continue
-        first, second = (j, k) if step > 0 else (k, j)
-        leg = legs[min(i, last), first, second]
+        first_candidate, second_candidate = (j, k) if step > 0 else (k, j)
+        leg = legs[min(i, previous), first_candidate, second_candidate]
         if leg <= 0.0:
             evaluated += 1 if leg == 0.0 else 0
-            if not cost[last, j] - leg + turn < min(cost[i, k], max_cost):
+            if not cost[previous, j] - leg + turn_cost < min(cost[i, k], max_cost):
                 continue
-            enough = min(cost[i, k], max_cost) - cost[last, j] - turn + ROUNDING
-            leg = leg_cost(data, limits, candidates[min(i, last), first], candidates[max(i, last), second], enough)
-            legs[min(i, last), first, second] = leg if leg <= enough else -leg
-        total = cost[last, j] + leg + turn
+            max_leg_cost = min(cost[i, k], max_cost) - cost[previous, j] - turn_cost + ROUNDING
+            leg = leg_cost(
+                data,
+                limits,
+                candidates[min(i, previous), first_candidate],
+                candidates[max(i, previous), second_candidate],
+                max_leg_cost,
+            )
+            legs[min(i, previous), first_candidate, second_candidate] = leg if leg <= max_leg_cost else -leg
+        total = cost[previous, j] + leg + turn_cost
         if total < min(cost[i, k], max_cost):
             cost[i, k], link[i, k] = total, j
 
@@ -216,16 +238,16 @@ def _distance(a: Floats, b: Floats) -> float:
 def _corner_cost(
     data: ProblemArrays, limits: PrecomputedLimits, a: Floats, b: Floats, c: Floats, corners: Records
 ) -> float:
-    """Return the cost of the turn at b between a and c, which is its excess over the limit and the lack of leg length.
+    """Return the cost of the turn at b between a and c, for its excess over the limit and for missing leg length.
 
     corners: scratch, one record.
     """
     ux, uy, vx, vy = b[0] - a[0], b[1] - a[1], c[0] - b[0], c[1] - b[1]
-    run, onward = math.sqrt(ux * ux + uy * uy), math.sqrt(vx * vx + vy * vy)
-    if run == 0.0 or onward == 0.0:
+    first_length, second_length = math.sqrt(ux * ux + uy * uy), math.sqrt(vx * vx + vy * vy)
+    if first_length == 0.0 or second_length == 0.0:
         return TURN_COST
     turn = math.atan2(abs(ux * vy - uy * vx), ux * vx + uy * vy)
-    over = max(0.0, turn - data.max_turn)
+    excess = max(0.0, turn - data.max_turn)
     if data.legs_hold_turns:
         corner = corners[0]
         measure_corner(
@@ -233,16 +255,18 @@ def _corner_cost(
             data.tracking,
             limits.wind,
             True,
-            ux / run,
-            uy / run,
-            vx / onward,
-            vy / onward,
+            ux / first_length,
+            uy / first_length,
+            vx / second_length,
+            vy / second_length,
             b[2],
             corner,
         )
-        short = max(0.0, corner.before - TURN_SHARE * run) + max(0.0, corner.after - TURN_SHARE * onward)
-        over += min(10.0, short / 100.0)
-    return TURN_COST * over
+        missing_length = max(0.0, corner.before - TURN_SHARE * first_length) + max(
+            0.0, corner.after - TURN_SHARE * second_length
+        )
+        excess += min(10.0, missing_length / 100.0)
+    return TURN_COST * excess
 
 
 @compiled
@@ -259,7 +283,7 @@ def free_points(data: ProblemArrays, points: Floats) -> Flags:
     [True, False, False]
     """
     required = required_clearance(data)
-    out = np.zeros(points.shape[0], dtype=np.bool_)
+    is_free = np.zeros(points.shape[0], dtype=np.bool_)
     for k in range(points.shape[0]):
         x, y, z = points[k, 0], points[k, 1], points[k, 2]
         if not (data.west <= x <= data.east and data.south <= y <= data.north):
@@ -268,6 +292,6 @@ def free_points(data: ProblemArrays, points: Floats) -> Flags:
         # This form treats NaN as not free.
         if not z > pixel_height(data.heights, column, row) + clearance_at(required, x, y):
             continue
-        dose, _, _ = kill_density(data.missiles, data.kill_margin, 0.0, x, y, z, x, y, z, 0.0, 0.0, 0.0, 0.0)
-        out[k] = dose == 0.0
-    return out
+        exposure, _, _ = kill_density(data.missiles, data.kill_margin, 0.0, x, y, z, x, y, z, 0.0, 0.0, 0.0, 0.0)
+        is_free[k] = exposure == 0.0
+    return is_free

@@ -21,34 +21,35 @@ from planner.seeding.grids import KILL_COST
 from world.arrays import Floats, Ints
 from world.kernels import compiled, inner
 
-# Cost of depth (per m x km) and of slope excess (per unit), in m of path.
+# Cost of depth, in m of path per m x km.
 DEPTH_COST = 2e4
+# Cost of slope excess, in m of path per unit of slope.
 SLOPE_COST = 1e6
-# Added to what is enough of a leg's cost, m: more than a difference of costs can be off by.
+# Added to the upper limit of a leg's cost, m: more than the rounding error of a difference of costs.
 ROUNDING = 1e-3
 
 
 @inner
-def leg_cost(data: ProblemArrays, limits: PrecomputedLimits, a: Floats, b: Floats, enough: float) -> float:
+def leg_cost(data: ProblemArrays, limits: PrecomputedLimits, a: Floats, b: Floats, max_cost: float) -> float:
     """Return the cost of one leg, its length and its violations, in m of path.
 
-    If the cost exceeds `enough`, the evaluation ends and returns a lower bound that exceeds `enough`.
+    If the cost exceeds `max_cost`, the evaluation ends and returns a lower bound that exceeds `max_cost`.
     """
     dx, dy = b[0] - a[0], b[1] - a[1]
     run = math.sqrt(dx * dx + dy * dy)
     length = math.sqrt(dx * dx + dy * dy + (b[2] - a[2]) ** 2)
     ux, uy = (dx / run, dy / run) if run > 0.0 else (0.0, 0.0)
-    steep = slope_excess(data, limits, ux, uy, run, a[2], b[2])
-    total = length + SLOPE_COST * steep
-    if total > enough:
+    excess_slope = slope_excess(data, limits, ux, uy, run, a[2], b[2])
+    total = length + SLOPE_COST * excess_slope
+    if total > max_cost:
         return total
     ends = segment_pixels(data.to_pixel, a[0], a[1], b[0], b[1])
-    below = _max_depth_below_leg(data, limits, ux, uy, run, a[2], b[2]) if data.tracking.has_error else 0.0
+    depth_below = _max_depth_below_leg(data, limits, ux, uy, run, a[2], b[2]) if data.tracking.has_error else 0.0
     total += DEPTH_COST * terrain_excess(
         data.heights,
         data.slope_bounds,
         limits.required,
-        max(0.0, below),
+        max(0.0, depth_below),
         ends,
         a[0],
         a[1],
@@ -56,11 +57,11 @@ def leg_cost(data: ProblemArrays, limits: PrecomputedLimits, a: Floats, b: Float
         b[0],
         b[1],
         b[2],
-        (enough - total + ROUNDING) / DEPTH_COST,
+        (max_cost - total + ROUNDING) / DEPTH_COST,
     )
-    if total > enough:
+    if total > max_cost:
         return total
-    kill, _, _ = kill_density(
+    exposure, _, _ = kill_density(
         data.missiles,
         data.kill_margin,
         0.0,
@@ -72,16 +73,16 @@ def leg_cost(data: ProblemArrays, limits: PrecomputedLimits, a: Floats, b: Float
         b[2],
         0.0,
         0.0,
-        max(0.0, below),
-        max(0.0, -below),
+        max(0.0, depth_below),
+        max(0.0, -depth_below),
     )
-    if kill > 0.0:
-        total += KILL_COST * length * min(1.0, 0.1 + kill)
-    if total > enough:
+    if exposure > 0.0:
+        total += KILL_COST * length * min(1.0, 0.1 + exposure)
+    if total > max_cost:
         return total
     if data.airspace.zones.required.shape[0] > 0 or data.airspace.max_height < math.inf:
-        deepest = (enough - total + ROUNDING) / DEPTH_COST
-        total += DEPTH_COST * airspace_excess(data, a, b, max(0.0, below), max(0.0, -below), deepest)
+        max_depth = (max_cost - total + ROUNDING) / DEPTH_COST
+        total += DEPTH_COST * airspace_excess(data, a, b, max(0.0, depth_below), max(0.0, -depth_below), max_depth)
     return total
 
 
@@ -113,7 +114,7 @@ def _choose(data: ProblemArrays, candidates: Floats) -> tuple[Ints, int]:
     limits = precompute_limits(data)
     lower_bounds, evaluated = np.empty(width), 0
     for i in range(1, count):
-        after = np.full(width, np.inf)
+        next_cost = np.full(width, np.inf)
         for k in range(width if i < count - 1 else 1):
             b = candidates[i, k]
             for j in range(width):
@@ -123,16 +124,16 @@ def _choose(data: ProblemArrays, candidates: Floats) -> tuple[Ints, int]:
             # Best lower bound first: a leg without violations ends the search.
             while True:
                 j = int(np.argmin(lower_bounds))
-                if lower_bounds[j] >= after[k]:
+                if lower_bounds[j] >= next_cost[k]:
                     break
                 lower_bounds[j] = np.inf
                 evaluated += 1
-                enough = after[k] - cost[j] + ROUNDING
-                total = cost[j] + leg_cost(data, limits, candidates[i - 1, j], b, enough)
-                if total < after[k]:
-                    after[k] = total
+                max_cost = next_cost[k] - cost[j] + ROUNDING
+                total = cost[j] + leg_cost(data, limits, candidates[i - 1, j], b, max_cost)
+                if total < next_cost[k]:
+                    next_cost[k] = total
                     parents[i, k] = j
-        cost = after
+        cost = next_cost
     out = np.zeros(count, dtype=np.int64)
     for i in range(count - 1, 0, -1):
         out[i - 1] = parents[i, out[i]]
@@ -143,9 +144,9 @@ def _choose(data: ProblemArrays, candidates: Floats) -> tuple[Ints, int]:
 class WaypointFit:
     """Effort of fitting waypoints to a route.
 
-    candidates: along each interval.
+    candidates: number of candidates along each interval.
     lifts: heights above the route, m.
-    rounds: of moves of each waypoint.
+    rounds: number of moves of each waypoint.
     diagonal: True if moves lead to all 26 neighbours, not just the 6 along the axes.
     """
 
@@ -173,17 +174,17 @@ def fit_waypoints(
 ) -> Floats:
     """Return waypoints (w, 3) world m along a route (s, 3) in rotated axes, one per interval."""
     edges = np.linspace(0.0, frame.length, waypoints - 1)
-    span = edges[1] - edges[0]
-    shares = np.linspace(0.1, 0.9, fit.candidates)
-    along = edges[:-1, None] + shares * span
+    interval = edges[1] - edges[0]
+    fractions = np.linspace(0.1, 0.9, fit.candidates)
+    along = edges[:-1, None] + fractions * interval
     points = np.stack([along, *(np.interp(along, route[:, 0], route[:, axis]) for axis in (1, 2))], axis=-1)
     return fit_points(data, straight_frames(*frame[:4], edges), points, fit)
 
 
 def fit_points(data: ProblemArrays, frames: WaypointFrames, points: Floats, fit: WaypointFit = CLOSE_FIT) -> Floats:
     """Choose waypoints among candidates (w - 2, k, 3) in their frames, move them locally, and return them, (w, 3) m."""
-    inner, width, _ = points.shape
-    candidates = np.zeros((inner + 2, width * len(fit.lifts), 3))
+    inner_count, width, _ = points.shape
+    candidates = np.zeros((inner_count + 2, width * len(fit.lifts), 3))
     candidates[1:-1] = np.tile(points, (1, len(fit.lifts), 1))
     candidates[1:-1, :, 2] += np.repeat(fit.lifts, width)
     chosen, _ = _pick_candidates(data, frames, candidates)
@@ -195,7 +196,7 @@ def fit_points(data: ProblemArrays, frames: WaypointFrames, points: Floats, fit:
 def tighten(data: ProblemArrays, encoding: Encoding, vector: Floats, rounds: int, scale: float) -> tuple[Floats, int]:
     """Shorten a path of the rotated encoding by moves of all its waypoints at once, evaluating single legs.
 
-    vector: (d,). scale: of the initial moves, relative to `FIRST_MOVES`. Turns are not evaluated. Returns the new
+    vector: (d,). scale: initial moves relative to `FIRST_MOVES`. Turns are not evaluated. Returns the new
     vector and the equivalent number of path evaluations.
     """
     frames = frames_of(encoding)
@@ -208,7 +209,7 @@ def tighten(data: ProblemArrays, encoding: Encoding, vector: Floats, rounds: int
 def _move_waypoints(
     data: ProblemArrays,
     frames: WaypointFrames,
-    chosen: Floats,
+    waypoints: Floats,
     steps: Floats,
     rounds: int,
     moves: Floats,
@@ -220,17 +221,17 @@ def _move_waypoints(
     """
     legs = 0
     low, high = frames.edges[:-1, None], frames.edges[1:, None]
-    span = frames.edges[-1] / (len(chosen) - 2)
-    moves = moves * [span, span, 1.0]
+    interval = frames.edges[-1] / (len(waypoints) - 2)
+    moves = moves * [interval, interval, 1.0]
     for _ in range(rounds):
-        candidates = np.repeat(chosen[:, None, :], len(steps), axis=1)
+        candidates = np.repeat(waypoints[:, None, :], len(steps), axis=1)
         candidates[1:-1] += steps * moves
         candidates[1:-1, :, 0] = np.clip(candidates[1:-1, :, 0], low, high)
         candidates[1:-1, :, 2] = np.clip(candidates[1:-1, :, 2], data.floor, data.ceiling)
-        chosen, more = _pick_candidates(data, frames, candidates)
-        legs += more
+        waypoints, leg_count = _pick_candidates(data, frames, candidates)
+        legs += leg_count
         moves = moves * shrink
-    return chosen, legs
+    return waypoints, legs
 
 
 def _pick_candidates(data: ProblemArrays, frames: WaypointFrames, candidates: Floats) -> tuple[Floats, int]:
@@ -247,5 +248,5 @@ def _restore_world(frames: WaypointFrames, candidates: Floats) -> Floats:
     """Return the world positions of candidates (w, c, 3); an end is in the frame of the waypoint next to it."""
     rows = np.clip(np.arange(len(candidates)) - 1, 0, len(candidates) - 3)
     east, north, cosine, sine = (values[rows] for values in frames[:4])
-    of_rows = WaypointFrames(east, north, cosine, sine, frames.edges)
-    return np.asarray(of_rows.restore(candidates.transpose(1, 0, 2)).transpose(1, 0, 2))
+    row_frames = WaypointFrames(east, north, cosine, sine, frames.edges)
+    return np.asarray(row_frames.restore(candidates.transpose(1, 0, 2)).transpose(1, 0, 2))

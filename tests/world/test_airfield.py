@@ -119,10 +119,10 @@ def test_the_acceleration_of_a_launch() -> None:
 
 def test_a_strip_without_a_course_is_landed_on_into_the_wind() -> None:
     wind = Wind(5.0, from_course=2.0, gradient=-0.01, reference_amsl=100.0)
-    assert LandingStrip(0.0, 0.0).into(wind, 100.0) == 2.0
-    assert LandingStrip(0.0, 0.0, course=0.5).into(wind, 100.0) == 0.5
+    assert LandingStrip(0.0, 0.0).landing_course(wind, 100.0) == 2.0
+    assert LandingStrip(0.0, 0.0, course=0.5).landing_course(wind, 100.0) == 0.5
     # At 700 m AMSL nothing is left of it.
-    assert LandingStrip(0.0, 0.0).into(wind, 700.0) is None
+    assert LandingStrip(0.0, 0.0).landing_course(wind, 700.0) is None
 
 
 # What is appended to the small file, and what the line must say.

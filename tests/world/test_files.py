@@ -103,7 +103,7 @@ def test_toml_is_a_table_or_one_line(tmp_path: Path) -> None:
             read_toml(file, "gains")
     file.write_text("a = 1000000", encoding="utf-8")
     with pytest.raises(ValueError, match="11 bytes: a gains file has at most 10"):
-        read_toml(file, "gains", most=10)
+        read_toml(file, "gains", max_bytes=10)
 
 
 @pytest.mark.parametrize("error", [MissionError, ScenarioError])

@@ -98,11 +98,11 @@ def test_polynomial_says_how_wrong_it_is() -> None:
 
 def test_polynomial_goes_through_the_rows_of_a_log_bit_for_bit() -> None:
     copy = fit_polymap(lambda x, y: (np.sin(x / 900.0) * y, x - y), [[-500.0, 1500.0], [0.0, 800.0]], 1e-9)
-    rows = copy.rows()
+    rows = copy.to_rows()
     size = rows.shape[1]
     assert rows.shape == (2 + 2 * size, size)
     again = PolyMap.from_rows(rows, copy.residual)
-    assert np.array_equal(again.rows(), rows)
+    assert np.array_equal(again.to_rows(), rows)
     x, y = np.random.default_rng(8).uniform(0.0, 800.0, (2, 50))
     assert np.array_equal(np.stack(again(x, y)), np.stack(copy(x, y)))
 

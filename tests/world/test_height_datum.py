@@ -12,7 +12,7 @@ import rasterio
 from rasterio import Affine
 
 from world.errors import ScenarioError, TerrainError
-from world.height_datum import UNSTATED, counts_from_ellipsoid
+from world.height_datum import UNSTATED, is_above_ellipsoid
 from world.raster import open_raster, read_terrain
 from world.scenario import Scenario, load_scenario
 
@@ -88,7 +88,7 @@ def scenario_over(file: Path, crs: str, datum: str) -> Scenario:
 
 @pytest.mark.parametrize("crs", SYSTEMS)
 def test_ellipsoidal_systems_are_refused_where_no_grid_is_at_hand_and_others_are_read(crs: str, tmp_path: Path) -> None:
-    assert counts_from_ellipsoid(crs) == SYSTEMS[crs]
+    assert is_above_ellipsoid(crs) == SYSTEMS[crs]
     file = tmp_path / "hill.tif"
     write_tile(file, crs)
     if SYSTEMS[crs]:

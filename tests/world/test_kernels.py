@@ -58,9 +58,9 @@ def _add_twice(values: np.ndarray, out: np.ndarray) -> None:
 def test_what_python_calls_inner_functions_by_is_kept_of_each() -> None:
     for kernel, product in ((_twice, 10.0), (_thrice, 15.0)):
         assert kernel(5.0) == product
-        del vars(kernel)["_around"]
+        del vars(kernel)["_wrapper"]
         assert kernel(5.0) == product
-        around: Any = vars(kernel)["_around"]
+        around: Any = vars(kernel)["_wrapper"]
         assert sum(around.stats.cache_hits.values()) == 1
 
 
@@ -231,7 +231,7 @@ def test_a_kernel_of_kernels_is_compiled_once_for_all_literal_numbers_and_can_be
 def test_what_stands_behind_a_pointer_lies_as_compiled_code_has_it() -> None:
     context = cpu_target.target_context
     reference = numba.typeof(_sites())
-    laid_out = context.get_abi_sizeof(context.get_data_type(reference.held))
+    laid_out = context.get_abi_sizeof(context.get_data_type(reference.tuple_type))
     assert ctypes.sizeof(_layout(_sites()).memory) == laid_out
 
 

@@ -272,7 +272,7 @@ def test_files_beside_are_ignored(tmp_path: Path) -> None:
     (tmp_path / "t.tfw").write_text("0.5\n0\n0\n-0.5\n1\n2\n", encoding="utf-8")
     after = read_window(path)
     assert np.array_equal(before.heights, after.heights)
-    assert np.array_equal(before.to_pixel.rows(), after.to_pixel.rows())
+    assert np.array_equal(before.to_pixel.to_rows(), after.to_pixel.to_rows())
 
 
 def test_stored_scale_and_offset_count(tmp_path: Path) -> None:

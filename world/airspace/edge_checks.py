@@ -31,29 +31,29 @@ def check_edges(rings: Sequence[Sequence[Sequence[float]]], *, closed: bool = Tr
     if count**2 <= MAX_EDGE_PAIRS:
         return
     edges, _ = _edges(rings, closed)
-    tree, step, found = shapely.STRtree(edges), max(1, MAX_EDGE_PAIRS // count), 0
+    tree, step, pair_count = shapely.STRtree(edges), max(1, MAX_EDGE_PAIRS // count), 0
     for begin in range(0, count, step):
-        found += tree.query(edges[begin : begin + step]).shape[1]
-        if found > MAX_EDGE_PAIRS:
+        pair_count += tree.query(edges[begin : begin + step]).shape[1]
+        if pair_count > MAX_EDGE_PAIRS:
             raise ValueError(f"too many edges at the same place: at most {MAX_EDGE_PAIRS:,} pairs are allowed")
 
 
-def count_crossings(rings: Sequence[Sequence[Sequence[float]]], most: int, *, closed: bool = True) -> int:
-    """Return the number of pairs of edges that meet outside a corner that they share; stop counting above ``most``.
+def count_crossings(rings: Sequence[Sequence[Sequence[float]]], max_count: int, *, closed: bool = True) -> int:
+    """Return the number of pairs of edges that meet outside a shared corner; stop counting above ``max_count``.
 
     >>> count_crossings([[(0.0, 0.0), (2.0, 2.0), (2.0, 0.0), (0.0, 2.0)]], 9)  # a bow tie
     1
     """
     edges, following = _edges(rings, closed)
-    tree, step, found = shapely.STRtree(edges), max(1, MAX_EDGE_PAIRS // len(edges)), 0
+    tree, step, crossing_count = shapely.STRtree(edges), max(1, MAX_EDGE_PAIRS // len(edges)), 0
     for begin in range(0, len(edges), step):
         first, second = tree.query(edges[begin : begin + step], predicate="intersects")
         first += begin
-        apart = (first < second) & (following[first] != second) & (following[second] != first)
-        found += int(apart.sum())
-        if found > most:
+        is_crossing = (first < second) & (following[first] != second) & (following[second] != first)
+        crossing_count += int(is_crossing.sum())
+        if crossing_count > max_count:
             break
-    return found
+    return crossing_count
 
 
 def _edges(rings: Sequence[Sequence[Sequence[float]]], closed: bool) -> tuple[Any, Any]:

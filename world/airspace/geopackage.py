@@ -37,25 +37,25 @@ def geopackage_features(path: Path, source: str) -> Iterator[tuple[str, dict[str
             for table, column, system in tables:
                 quoted = '"' + str(table).replace('"', '""') + '"'
                 cursor = database.execute(f"select * from {quoted}")  # a table name from the file, quoted
-                names = [one[0] for one in cursor.description]
-                code = _code_of(database, system)
+                names = [entry[0] for entry in cursor.description]
+                code = _crs_code(database, system)
                 for number, row in enumerate(cursor, 1):
-                    where = f"{table} row {number}"
+                    location = f"{table} row {number}"
                     columns = dict(zip(names, row, strict=True))
-                    shape = _shape(columns.pop(column, None), code, f"{source}: {where}")
-                    yield where, {"type": "Feature", "properties": _plain_columns(columns), "geometry": shape}
+                    shape = _read_shape(columns.pop(column, None), code, f"{source}: {location}")
+                    yield location, {"type": "Feature", "properties": _plain_columns(columns), "geometry": shape}
     except sqlite3.Error as error:
         raise ScenarioError(f"{source}: cannot be read as a GeoPackage: {error}", file=source) from error
 
 
-def _code_of(database: sqlite3.Connection, system: int) -> str:
+def _crs_code(database: sqlite3.Connection, system: int) -> str:
     """Return a table's coordinate reference system for PROJ; "" for longitude and latitude on WGS84."""
-    found = database.execute(
+    system_row = database.execute(
         "select organization, organization_coordsys_id, definition from gpkg_spatial_ref_sys where srs_id = ?", [system]
     ).fetchone()
-    if found is None or str(found[0]).upper() in ("NONE", ""):
+    if system_row is None or str(system_row[0]).upper() in ("NONE", ""):
         return ""
-    organization, number, definition = found
+    organization, number, definition = system_row
     if str(organization).upper() == "EPSG":
         return "" if number == _WGS84_CODE else f"EPSG:{number}"
     return str(definition)
@@ -63,12 +63,12 @@ def _code_of(database: sqlite3.Connection, system: int) -> str:
 
 def _plain_columns(columns: dict[str, Any]) -> dict[str, Any]:
     """Return the columns with text or numbers, and the zone's name under the key of the other formats."""
-    kept = {key: value for key, value in columns.items() if isinstance(value, str | int | float)}
-    name = next((value for key, value in kept.items() if key.lower() in ("name", "identifier", "title")), None)
-    return kept if name is None else kept | {"name": str(name)}
+    plain = {key: value for key, value in columns.items() if isinstance(value, str | int | float)}
+    name = next((value for key, value in plain.items() if key.lower() in ("name", "identifier", "title")), None)
+    return plain if name is None else plain | {"name": str(name)}
 
 
-def _shape(blob: Any, code: str, source: str) -> dict[str, Any]:
+def _read_shape(blob: Any, code: str, source: str) -> dict[str, Any]:
     allowed = "a polygon, a multipolygon or a point is expected"
     try:
         if blob[:2] != b"GP":
@@ -84,14 +84,14 @@ def _shape(blob: Any, code: str, source: str) -> dict[str, Any]:
             raise ScenarioError(f"{source}: coordinate system: {error}", file=source) from error
         to_degrees = partial(transformer.transform, direction="INVERSE")
         shape = shapely.transform(shape, lambda xy: np.column_stack(transform_points(to_degrees, xy[:, 0], xy[:, 1])))
-    found: dict[str, Any] = shapely.geometry.mapping(shape)
-    return _with_lists(found)
+    geometry: dict[str, Any] = shapely.geometry.mapping(shape)
+    return _with_lists(geometry)
 
 
-def _with_lists(found: dict[str, Any]) -> dict[str, Any]:
+def _with_lists(geometry: dict[str, Any]) -> dict[str, Any]:
     """Replace the tuples in a mapping of shapely by lists, as in JSON."""
 
-    def lists(value: Any) -> Any:
-        return [lists(one) for one in value] if isinstance(value, tuple | list) else value
+    def to_lists(value: Any) -> Any:
+        return [to_lists(element) for element in value] if isinstance(value, tuple | list) else value
 
-    return {"type": found["type"], "coordinates": lists(found.get("coordinates", []))}
+    return {"type": geometry["type"], "coordinates": to_lists(geometry.get("coordinates", []))}

@@ -18,7 +18,7 @@ from world.errors import ScenarioError
 from world.frames import GeoOrigin, to_geo, to_map
 from world.scenario_tables import MAX_CORNERS
 
-# m.
+# Length of a nautical mile, m.
 NAUTICAL_MILE = 1852.0
 # Largest distance between an arc and its chords, m.
 ARC_BEND = 1.0
@@ -75,29 +75,32 @@ def openair_zones(text: str, source: str) -> Iterator[tuple[str, dict[str, Any] 
     [('line 1 (CTR)', 9260.0, 762.0)]
     """
     block: _Block | None = None
-    for number, raw in enumerate(text.splitlines(), 1):
-        line = _clean_line(raw)
-        word, _, rest = line.partition(" ")
-        word, rest = word.upper(), rest.strip()
-        if word == "AC":
+    for number, raw_line in enumerate(text.splitlines(), 1):
+        line = _clean_line(raw_line)
+        command, _, argument_text = line.partition(" ")
+        command, argument_text = command.upper(), argument_text.strip()
+        if command == "AC":
             if block is not None:
                 yield _finish_block(block, source)
-            block = _Block(number, rest.upper())
-        elif word in _COMMANDS:
+            block = _Block(number, argument_text.upper())
+        elif command in _COMMANDS:
             if block is None:
                 raise ScenarioError(
-                    f"{source}: line {number}: {word}: no airspace has begun: an AC is missing before it", file=source
+                    f"{source}: line {number}: {command}: no airspace has begun: an AC is missing before it",
+                    file=source,
                 )
             try:
-                _COMMANDS[word](block, rest)
+                _COMMANDS[command](block, argument_text)
             except ValueError as error:
                 allowed = str(error)
-                message = f"{source}: line {number}: {word} {rest[:40]!r}: {allowed}"
-                raise ScenarioError(message, file=source, field=word, value=rest, allowed=allowed) from error
-        elif word.startswith("D"):
-            known = ", ".join(name for name in _COMMANDS if name.startswith("D"))
-            message = f"{source}: line {number}: {word[:10]!r}: unknown; shapes are {known}"
-            raise ScenarioError(message, file=source, field=word, allowed=known)
+                message = f"{source}: line {number}: {command} {argument_text[:40]!r}: {allowed}"
+                raise ScenarioError(
+                    message, file=source, field=command, value=argument_text, allowed=allowed
+                ) from error
+        elif command.startswith("D"):
+            shape_commands = ", ".join(name for name in _COMMANDS if name.startswith("D"))
+            message = f"{source}: line {number}: {command[:10]!r}: unknown; shapes are {shape_commands}"
+            raise ScenarioError(message, file=source, field=command, allowed=shape_commands)
     if block is not None:
         yield _finish_block(block, source)
 
@@ -115,25 +118,25 @@ def _clean_line(line: str) -> str:
 
 def _finish_block(block: _Block, source: str) -> tuple[str, dict[str, Any] | str]:
     name = "".join(character for character in block.name if character.isprintable())[:80]
-    where = f"line {block.line}" + (f" ({name})" if name else "")
+    location = f"line {block.line}" + (f" ({name})" if name else "")
     label = ", ".join(part for part in (block.airspace_class, block.kind) if part)
     if block.airspace_class in _FREE_CLASSES and block.kind in _FREE_TYPES:
-        return where, f"class {label}, open to all"
+        return location, f"class {label}, open to all"
     entries: dict[str, Any] = {"name": f"{name or f'line {block.line}'} ({label})"[:100]}
-    entries |= published_entries(block.limits, f"{source}: {where}")
+    entries |= published_entries(block.limits, f"{source}: {location}")
     if block.times:
         entries["times"] = block.times
     shapes = [bool(block.corners), bool(block.airway), block.circle is not None]
     if not any((*shapes, block.name, block.limits)):
-        return where, "without name, limits and shape"
+        return location, "without name, limits and shape"
     if sum(shapes) != 1:
         allowed = "one shape is expected: corners and arcs, a circle, or an airway"
-        raise ScenarioError(f"{source}: {where}: {allowed}", file=source, allowed=allowed)
+        raise ScenarioError(f"{source}: {location}: {allowed}", file=source, allowed=allowed)
     if block.circle is not None:
         (lat, lon), radius = block.circle
-        return where, entries | {"lat_deg": lat, "lon_deg": lon, "radius_m": radius}
-    rings = [block.corners] if block.corners else _airway_rings(block, f"{source}: {where}")
-    return where, entries | {"rings_deg": [[list(corner) for corner in ring] for ring in rings]}
+        return location, entries | {"lat_deg": lat, "lon_deg": lon, "radius_m": radius}
+    rings = [block.corners] if block.corners else _airway_rings(block, f"{source}: {location}")
+    return location, entries | {"rings_deg": [[list(corner) for corner in ring] for ring in rings]}
 
 
 def _airway_rings(block: _Block, source: str) -> list[list[_Place]]:
@@ -146,7 +149,7 @@ def _airway_rings(block: _Block, source: str) -> list[list[_Place]]:
         outline = band_outline(list(zip(east.tolist(), north.tolist(), strict=True)), block.width)
     except ValueError as error:
         raise ScenarioError(f"{source}: DY: {error}", file=source, field="DY", allowed=str(error)) from error
-    lat, lon = to_geo(origin, [at[0] for at in outline], [at[1] for at in outline])
+    lat, lon = to_geo(origin, [corner[0] for corner in outline], [corner[1] for corner in outline])
     return [list(zip(lat.tolist(), lon.tolist(), strict=True))]
 
 
@@ -159,32 +162,32 @@ def _read_times(block: _Block, text: str) -> None:
         block.times.append(BY_NOTAM)
         return
     period = "/".join(OPEN if end.strip().upper() == "NONE" else end.strip() for end in text.split("/"))
-    found = parse_period(period)
-    block.times.append(BY_NOTAM if found is None else found.text())
+    parsed = parse_period(period)
+    block.times.append(BY_NOTAM if parsed is None else parsed.text())
 
 
 def _limit_reader(key: str) -> Callable[[_Block, str], None]:
     def read(block: _Block, text: str) -> None:
         if key in block.limits:
             raise ValueError("an airspace has one lower limit (AL) and one upper limit (AH)")
-        if (found := _altitude(text, key)) is not None:
-            block.limits[key] = found
+        if (limit := _parse_limit(text, key)) is not None:
+            block.limits[key] = limit
 
     return read
 
 
-def _altitude(text: str, key: str) -> dict[str, Any] | None:
+def _parse_limit(text: str, key: str) -> dict[str, Any] | None:
     """Return a limit in openAIP's form, or None if unlimited."""
     if text.upper() in ("GND", "SFC", "SURFACE", "0") and key == "lowerLimit":
         return None
     if text.upper() in ("UNL", "UNLIM", "UNLTD", "UNLIMITED") and key == "upperLimit":
         return None
-    if (level := _LEVEL.fullmatch(text)) is not None:
-        return {"value": float(level[1]), "unit": "FL", "referenceDatum": "STD"}
-    found = _ALTITUDE.fullmatch(text)
-    if found is None:
+    if (level_match := _LEVEL.fullmatch(text)) is not None:
+        return {"value": float(level_match[1]), "unit": "FL", "referenceDatum": "STD"}
+    match = _ALTITUDE.fullmatch(text)
+    if match is None:
         raise ValueError("a height is expected: 2500ft AMSL, 300m AGL, FL95, GND, UNL")
-    value, unit, datum = float(found[1]), found[2].upper(), found[3].upper()
+    value, unit, datum = float(match[1]), match[2].upper(), match[3].upper()
     reference = "GND" if datum in _ABOVE_GROUND else "STD" if datum == "STD" else "MSL"
     return {"value": value, "unit": "M" if unit == "M" else "FT", "referenceDatum": reference}
 
@@ -192,52 +195,57 @@ def _altitude(text: str, key: str) -> dict[str, Any] | None:
 def _read_variable(block: _Block, text: str) -> None:
     name, _, value = (part.strip() for part in text.partition("="))
     if name.upper() == "X":
-        block.centre = _place(value)
+        block.centre = _parse_place(value)
     elif name.upper() == "D":
         if value not in ("+", "-"):
             raise ValueError("allowed D=+ (clockwise) or D=-")
         block.clockwise = value == "+"
     elif name.upper() == "W":
-        block.width = _length(value)
+        block.width = _parse_length(value)
 
 
 def _read_corner(block: _Block, text: str) -> None:
-    _add_corners(block.corners, [_place(text)])
+    _add_corners(block.corners, [_parse_place(text)])
 
 
 def _read_circle(block: _Block, text: str) -> None:
     if block.circle is not None:
         raise ValueError("an airspace has one circle")
-    block.circle = _centre(block), _length(text)
+    block.circle = _required_centre(block), _parse_length(text)
 
 
-def _arc_by_bearings(block: _Block, text: str) -> None:
+def _read_arc_by_bearings(block: _Block, text: str) -> None:
     parts = text.split(",")
     if len(parts) != 3:
         raise ValueError("radius, first and last bearing are expected: 5, 270, 290")
-    radius, first, last = _length(parts[0]), _number(parts[1]), _number(parts[2])
-    _add_corners(block.corners, _arc(_centre(block), (radius, radius), first, last, block.clockwise))
+    radius, first_bearing, last_bearing = _parse_length(parts[0]), _parse_number(parts[1]), _parse_number(parts[2])
+    _add_corners(
+        block.corners,
+        _arc_places(_required_centre(block), (radius, radius), first_bearing, last_bearing, block.clockwise),
+    )
 
 
-def _arc_by_points(block: _Block, text: str) -> None:
-    found = [_place(match[0]) for match in _COORDINATE.finditer(text)]
-    if len(found) != 2:
+def _read_arc_by_points(block: _Block, text: str) -> None:
+    ends = [_parse_place(match[0]) for match in _COORDINATE.finditer(text)]
+    if len(ends) != 2:
         raise ValueError("two points are expected: 39:36:40N 119:46:10W, 39:29:09N 119:36:10W")
-    centre = _centre(block)
-    (first, near), (last, far) = (_polar(centre, place) for place in found)
+    centre = _required_centre(block)
+    (first_bearing, first_radius), (last_bearing, last_radius) = (
+        _bearing_and_distance(centre, place) for place in ends
+    )
     # The end points are kept as stated, even if they do not agree with the centre.
-    arc = _arc(centre, (near, far), first, last, block.clockwise)
-    _add_corners(block.corners, [found[0], *arc[1:-1], found[1]])
+    arc = _arc_places(centre, (first_radius, last_radius), first_bearing, last_bearing, block.clockwise)
+    _add_corners(block.corners, [ends[0], *arc[1:-1], ends[1]])
 
 
 def _read_airway(block: _Block, text: str) -> None:
-    _add_corners(block.airway, [_place(text)])
+    _add_corners(block.airway, [_parse_place(text)])
 
 
-def _add_corners(corners: list[_Place], more: list[_Place]) -> None:
-    if len(corners) + len(more) > MAX_CORNERS:
+def _add_corners(corners: list[_Place], added_corners: list[_Place]) -> None:
+    if len(corners) + len(added_corners) > MAX_CORNERS:
         raise ValueError(f"more corners than a zone may have: at most {MAX_CORNERS:,}")
-    corners += more
+    corners += added_corners
 
 
 def _text_reader(name: str) -> Callable[[_Block, str], None]:
@@ -255,8 +263,8 @@ _COMMANDS: dict[str, Callable[[_Block, str], None]] = {
     "AH": _limit_reader("upperLimit"),
     "V": _read_variable,
     "DP": _read_corner,
-    "DA": _arc_by_bearings,
-    "DB": _arc_by_points,
+    "DA": _read_arc_by_bearings,
+    "DB": _read_arc_by_points,
     "DC": _read_circle,
     "DY": _read_airway,
 }
@@ -266,7 +274,7 @@ _COMMANDS: dict[str, Callable[[_Block, str], None]] = {
 # Numbers, places and arcs.
 
 
-def _number(text: str) -> float:
+def _parse_number(text: str) -> float:
     try:
         value = float(text)
     except ValueError:
@@ -276,61 +284,63 @@ def _number(text: str) -> float:
     return value
 
 
-def _length(text: str) -> float:
+def _parse_length(text: str) -> float:
     """Parse a length in nautical miles; return it in m."""
-    length = _number(text)
+    length = _parse_number(text)
     if length > MAX_LENGTH_NMI:
         raise ValueError(f"allowed 0..{MAX_LENGTH_NMI:g} nautical miles")
     return length * NAUTICAL_MILE
 
 
-def _place(text: str) -> _Place:
+def _parse_place(text: str) -> _Place:
     """Parse a latitude and longitude, degrees."""
-    found = _COORDINATE.fullmatch(text.strip())
-    if found is None:
+    match = _COORDINATE.fullmatch(text.strip())
+    if match is None:
         raise ValueError("a place is expected: 45:40:30N 014:18:20E, or 45:40.500N 014:18.333E")
-    lat = _degrees(found["lat"], 90.0) * (-1.0 if found["ns"].upper() == "S" else 1.0)
-    lon = _degrees(found["lon"], 180.0) * (-1.0 if found["ew"].upper() == "W" else 1.0)
+    lat = _parse_degrees(match["lat"], 90.0) * (-1.0 if match["ns"].upper() == "S" else 1.0)
+    lon = _parse_degrees(match["lon"], 180.0) * (-1.0 if match["ew"].upper() == "W" else 1.0)
     return lat, lon
 
 
-def _degrees(text: str, most: float) -> float:
-    parts = [_number(part) for part in text.split(":")]
+def _parse_degrees(text: str, max_degrees: float) -> float:
+    parts = [_parse_number(part) for part in text.split(":")]
     if len(parts) > 3 or any(part > 60.0 for part in parts[1:]):
         raise ValueError("degrees, minutes and seconds of 60 at most are expected")
     angle = sum(part / 60.0**k for k, part in enumerate(parts))
-    if angle > most:
-        raise ValueError(f"allowed 0..{most:g} degrees")
+    if angle > max_degrees:
+        raise ValueError(f"allowed 0..{max_degrees:g} degrees")
     return angle
 
 
-def _centre(block: _Block) -> _Place:
+def _required_centre(block: _Block) -> _Place:
     if block.centre is None:
         raise ValueError("no centre before it (V X=)")
     return block.centre
 
 
-def _polar(centre: _Place, place: _Place) -> tuple[float, float]:
+def _bearing_and_distance(centre: _Place, place: _Place) -> tuple[float, float]:
     """Return the bearing, degrees, and distance, m, of a place from a centre."""
     east, north = to_map(GeoOrigin(*centre), *place)
     return math.degrees(math.atan2(east, north)), math.hypot(east, north)
 
 
-def _arc(centre: _Place, radii: Sequence[float], first: float, last: float, clockwise: bool) -> list[_Place]:
+def _arc_places(
+    centre: _Place, radii: Sequence[float], first_bearing: float, last_bearing: float, clockwise: bool
+) -> list[_Place]:
     """Return places along an arc, including its ends.
 
     The radius changes linearly from the first to the second, m.
     """
-    turn = (last - first) % 360.0 if clockwise else -((first - last) % 360.0)
+    turn = (last_bearing - first_bearing) % 360.0 if clockwise else -((first_bearing - last_bearing) % 360.0)
     turn = turn or (360.0 if clockwise else -360.0)
-    largest = max(*radii, ARC_BEND)
-    piece = math.degrees(2.0 * math.acos(1.0 - min(0.3, ARC_BEND / largest)))
-    count = max(1, math.ceil(abs(turn) / piece))
-    shares = [k / count for k in range(count + 1)]
+    max_radius = max(*radii, ARC_BEND)
+    chord_angle = math.degrees(2.0 * math.acos(1.0 - min(0.3, ARC_BEND / max_radius)))
+    count = max(1, math.ceil(abs(turn) / chord_angle))
+    fractions = [k / count for k in range(count + 1)]
     # Distances and bearings from the centre are measured on a map with its origin there.
-    turned = [math.radians(first + share * turn) for share in shares]
-    away = [radii[0] + share * (radii[1] - radii[0]) for share in shares]
-    east = [far * math.sin(angle) for far, angle in zip(away, turned, strict=True)]
-    north = [far * math.cos(angle) for far, angle in zip(away, turned, strict=True)]
+    bearings = [math.radians(first_bearing + fraction * turn) for fraction in fractions]
+    distances = [radii[0] + fraction * (radii[1] - radii[0]) for fraction in fractions]
+    east = [distance * math.sin(bearing) for distance, bearing in zip(distances, bearings, strict=True)]
+    north = [distance * math.cos(bearing) for distance, bearing in zip(distances, bearings, strict=True)]
     lat, lon = to_geo(GeoOrigin(*centre), east, north)
     return list(zip(lat.tolist(), lon.tolist(), strict=True))

@@ -64,19 +64,21 @@ def ed269_zones(data: Mapping[str, Any], source: str) -> Iterator[_FoundZone]:
     """
     key = "features" if "features" in data else "UASZoneList"
     for k, feature in enumerate(_features(data)):
-        where = f"{key}[{k}]"
+        location = f"{key}[{k}]"
         volumes = feature.get("geometry") if isinstance(feature, dict) else None
         if not isinstance(volumes, list) or not volumes:
-            raise _value_error(source, where, "geometry", "a list of volumes is expected")
-        name = _name(feature.get("name")) or _name(feature.get("identifier")) or f"zone {k + 1}"
-        where += f" ({name})"
+            raise _value_error(source, location, "geometry", "a list of volumes is expected")
+        name = _one_line_name(feature.get("name")) or _one_line_name(feature.get("identifier")) or f"zone {k + 1}"
+        location += f" ({name})"
         if (restriction := _upper_word(feature.get("restriction"))) == _NO_RESTRICTION:
-            yield where, restriction
+            yield location, restriction
             continue
-        stated = {"times": times} if (times := _times(feature.get("applicability"), f"{source}: {where}")) else {}
+        time_entries = (
+            {"times": times} if (times := _times(feature.get("applicability"), f"{source}: {location}")) else {}
+        )
         for number, volume in enumerate(volumes, 1):
             label = f"{name} {number}/{len(volumes)}" if len(volumes) > 1 else name
-            yield where, {**_ed269_volume(volume, f"{source}: {where}"), "name": label, **stated}
+            yield location, {**_ed269_volume(volume, f"{source}: {location}"), "name": label, **time_entries}
 
 
 def _features(data: Mapping[str, Any]) -> Any:
@@ -89,7 +91,9 @@ def _ed269_volume(volume: Any, source: str) -> dict[str, Any]:
         raise _value_error(source, "", "horizontalProjection", "a polygon or a circle is expected")
     unit = volume.get("uomDimensions")
     limits = {
-        f"{side}Limit": _limit(volume.get(f"{side}Limit"), unit, volume.get(f"{side}VerticalReference"), side, source)
+        f"{side}Limit": _parse_limit(
+            volume.get(f"{side}Limit"), unit, volume.get(f"{side}VerticalReference"), side, source
+        )
         for side in ("lower", "upper")
     }
     entries = published_entries(limits, source)
@@ -101,36 +105,38 @@ def _ed269_volume(volume: Any, source: str) -> dict[str, Any]:
     raise _value_error(source, "", "horizontalProjection.type", "allowed Polygon, Circle")
 
 
-def ed318_zones(feature: Mapping[str, Any], where: str, number: int, source: str) -> Iterator[_FoundZone]:
+def ed318_zones(feature: Mapping[str, Any], location: str, index: int, source: str) -> Iterator[_FoundZone]:
     """Yield the entries of each layer of an ED-318 feature, in the form of `ed269_zones`.
 
-    where: place of the feature in the file, for messages.  number: index of the feature, from 0.
+    location: place of the feature in the file, for messages.  index: index of the feature, from 0.
     """
     properties = _zone_properties(feature["properties"])
-    name = _name(properties.get("name")) or _name(properties.get("identifier")) or f"zone {number + 1}"
-    where = f"{where} ({name})"
+    name = _one_line_name(properties.get("name")) or _one_line_name(properties.get("identifier")) or f"zone {index + 1}"
+    location = f"{location} ({name})"
     if (restriction := _upper_word(properties["type"])) == _NO_RESTRICTION:
-        yield where, restriction
+        yield location, restriction
         return
     applicability = properties.get("limitedApplicability")
     if applicability is None and any(properties.get(key) for key in _PERIOD_KEYS):
         applicability = [{**properties, "schedule": [properties]}]
-    times = _times(applicability, f"{source}: {where}")
-    stated = {"times": times} if times else {}
-    own = properties.get("verticalLayer")
+    times = _times(applicability, f"{source}: {location}")
+    time_entries = {"times": times} if times else {}
+    vertical_layer = properties.get("verticalLayer")
     geometries = list(_geometries(feature.get("geometry")))
     for k, geometry in enumerate(geometries, 1):
         label = f"{name} {k}/{len(geometries)}" if len(geometries) > 1 else name
-        for entries in _ed318_layer(geometry, own if isinstance(own, dict) else properties, f"{source}: {where}"):
-            yield where, {**entries, "name": label, **stated}
+        for entries in _ed318_layer(
+            geometry, vertical_layer if isinstance(vertical_layer, dict) else properties, f"{source}: {location}"
+        ):
+            yield location, {**entries, "name": label, **time_entries}
 
 
 def _geometries(geometry: Any) -> Iterator[Any]:
     """Yield a geometry, or the geometries of a collection."""
-    inner = geometry.get("geometries") if isinstance(geometry, dict) else None
-    if isinstance(inner, list):
-        for one in inner:
-            yield from _geometries(one)
+    parts = geometry.get("geometries") if isinstance(geometry, dict) else None
+    if isinstance(parts, list):
+        for part in parts:
+            yield from _geometries(part)
     else:
         yield geometry
 
@@ -145,7 +151,7 @@ def _ed318_layer(geometry: Any, default_layer: Mapping[str, Any], source: str) -
     layer = layer if isinstance(layer, dict) else default_layer
     unit = layer.get("uom") or layer.get("UOM") or "m"
     limits = {
-        f"{side}Limit": _limit(layer.get(side), unit, layer.get(f"{side}Reference"), side, source)
+        f"{side}Limit": _parse_limit(layer.get(side), unit, layer.get(f"{side}Reference"), side, source)
         for side in ("lower", "upper")
     }
     entries = published_entries(limits, source)
@@ -169,7 +175,7 @@ def _ed318_layer(geometry: Any, default_layer: Mapping[str, Any], source: str) -
 # Parts that both formats share: limits, shapes, names and times of activity.
 
 
-def _limit(value: Any, unit: Any, datum: Any, side: str, source: str) -> dict[str, Any] | None:
+def _parse_limit(value: Any, unit: Any, datum: Any, side: str, source: str) -> dict[str, Any] | None:
     """Return a limit in openAIP's form, or None if unlimited."""
     if value is None or value == "":
         return None
@@ -209,12 +215,16 @@ def _circle(centre: Any, radius: Any, source: str) -> dict[str, float]:
         ) from error
 
 
-def _name(value: Any) -> str:
+def _one_line_name(value: Any) -> str:
     """Return a name in one line; of several texts, the first English text, or else the first text."""
     if isinstance(value, list):
-        texts = [one for one in value if isinstance(one, dict) and isinstance(one.get("text"), str)]
-        english = [one for one in texts if str(one.get("lang")).startswith("en")]
-        value = (english or texts or [{"text": ""}])[0]["text"]
+        texts = [
+            text_entry
+            for text_entry in value
+            if isinstance(text_entry, dict) and isinstance(text_entry.get("text"), str)
+        ]
+        english_texts = [text_entry for text_entry in texts if str(text_entry.get("lang")).startswith("en")]
+        value = (english_texts or texts or [{"text": ""}])[0]["text"]
     if not isinstance(value, str):
         return ""
     return "".join(character for character in value if character.isprintable()).strip()[:80]
@@ -228,17 +238,17 @@ def _times(applicability: Any, source: str) -> list[str]:
     """Return the periods in which a zone applies, in the form of a [[zones]] table; empty for always."""
     if applicability is None:
         return []
-    if not isinstance(applicability, list) or not all(isinstance(one, dict) for one in applicability):
+    if not isinstance(applicability, list) or not all(isinstance(entry, dict) for entry in applicability):
         raise _value_error(source, "", "applicability", "a list of periods is expected")
     periods: list[Period] = []
-    for one in applicability:
+    for entry in applicability:
         try:
-            start = _moment(one.get("startDateTime"), _EARLIEST_UTC_SHIFT)
-            end = _moment(one.get("endDateTime"), _LATEST_UTC_SHIFT)
-            if _upper_word(one.get("permanent")) == "YES":
+            start = _parse_moment(entry.get("startDateTime"), _EARLIEST_UTC_SHIFT)
+            end = _parse_moment(entry.get("endDateTime"), _LATEST_UTC_SHIFT)
+            if _upper_word(entry.get("permanent")) == "YES":
                 start = end = None
-            schedule = one.get("schedule") or one.get("dailyPeriod") or [{}]
-            periods += [_daily(start, end, daily) for daily in schedule]
+            schedule = entry.get("schedule") or entry.get("dailyPeriod") or [{}]
+            periods += [_daily_period(start, end, day_entry) for day_entry in schedule]
         except (AttributeError, KeyError, TypeError, ValueError, OverflowError) as error:
             allowed = "dates and times by ISO 8601, and days MON to SUN or ANY, are expected"
             raise _value_error(source, "", "applicability", allowed) from error
@@ -247,50 +257,50 @@ def _times(applicability: Any, source: str) -> list[str]:
     return [period.text() for period in periods]
 
 
-def _moment(value: Any, unknown: timedelta) -> datetime | None:
-    """Return a date and time in UTC; add `unknown`, the extreme offset, to a time that states no offset."""
+def _parse_moment(value: Any, extreme_offset: timedelta) -> datetime | None:
+    """Return a date and time in UTC; add `extreme_offset` to a time that states no offset."""
     if value is None or value == "":
         return None
-    found = datetime.fromisoformat(value)
-    return found.replace(tzinfo=UTC) + unknown if found.tzinfo is None else parse_time(value)
+    moment = datetime.fromisoformat(value)
+    return moment.replace(tzinfo=UTC) + extreme_offset if moment.tzinfo is None else parse_time(value)
 
 
-def _daily(start: datetime | None, end: datetime | None, daily: Mapping[str, Any]) -> Period:
+def _daily_period(start: datetime | None, end: datetime | None, daily: Mapping[str, Any]) -> Period:
     """Convert one entry of a schedule.
 
     Sunrise and sunset, and hours without a UTC offset, give the whole day.
     """
     stated_days = daily.get("day") or []
-    named = [_upper_word(day) for day in ([stated_days] if isinstance(stated_days, str) else stated_days)]
-    days = frozenset() if "ANY" in named else frozenset(WEEKDAYS.index(day) for day in named)
-    stated = [daily.get(key) for key in ("startTime", "endTime")]
-    first, last = _minutes(stated[0]), _minutes(stated[1], up=True)
-    if first is None or last is None:
+    day_names = [_upper_word(day) for day in ([stated_days] if isinstance(stated_days, str) else stated_days)]
+    days = frozenset() if "ANY" in day_names else frozenset(WEEKDAYS.index(day) for day in day_names)
+    times = [daily.get(key) for key in ("startTime", "endTime")]
+    first_minute, last_minute = _minute_of_day(times[0]), _minute_of_day(times[1], rounds_up=True)
+    if first_minute is None or last_minute is None:
         # A day in another time zone overlaps the previous and the next day in UTC.
-        steps = (-1, 0, 1) if any(stated) else (0,)
-        return Period(start, end, frozenset((day + step) % 7 for day in days for step in steps))
-    shift, first = divmod(first, 24 * 60)
-    last -= shift * 24 * 60
-    if not 0 <= last <= 24 * 60:
-        last %= 24 * 60
-    return Period(start, end, frozenset((day + shift) % 7 for day in days), first, last)
+        steps = (-1, 0, 1) if any(times) else (0,)
+        return Period(start, end, frozenset((day + day_step) % 7 for day in days for day_step in steps))
+    day_shift, first_minute = divmod(first_minute, 24 * 60)
+    last_minute -= day_shift * 24 * 60
+    if not 0 <= last_minute <= 24 * 60:
+        last_minute %= 24 * 60
+    return Period(start, end, frozenset((day + day_shift) % 7 for day in days), first_minute, last_minute)
 
 
-def _minutes(value: Any, *, up: bool = False) -> int | None:
+def _minute_of_day(value: Any, *, rounds_up: bool = False) -> int | None:
     """Return the UTC minute of the named day, negative on the day before it, or None if unknown.
 
-    up: round a part of a minute up.
+    rounds_up: round a part of a minute up.
     """
     if value is None or value == "":
         return None
-    found = datetime.fromisoformat(f"2000-01-01T{value}")
-    offset = found.utcoffset()
+    time = datetime.fromisoformat(f"2000-01-01T{value}")
+    offset = time.utcoffset()
     if offset is None:
         return None
-    begun = up and (found.second or found.microsecond)
-    return found.hour * 60 + found.minute + bool(begun) - int(offset.total_seconds() // 60)
+    has_fraction = rounds_up and (time.second or time.microsecond)
+    return time.hour * 60 + time.minute + bool(has_fraction) - int(offset.total_seconds() // 60)
 
 
-def _value_error(source: str, where: str, field: str, allowed: str) -> ScenarioError:
-    label = f"{source}: {where}" if where else source
+def _value_error(source: str, location: str, field: str, allowed: str) -> ScenarioError:
+    label = f"{source}: {location}" if location else source
     return ScenarioError(f"{label}: {field}: {allowed}", file=source, field=field, allowed=allowed)

@@ -71,7 +71,7 @@ def zone_entries(properties: Mapping[str, Any], source: str) -> dict[str, Any]:
         if value is None:
             continue
         if key in _LIMITS:
-            entries |= _limit(value, key, properties.get("kind"), source)
+            entries |= _limit_entry(value, key, properties.get("kind"), source)
         elif key in _SCENARIO_KEYS:
             entries[key] = value
         elif key.lower().startswith(_SCENARIO_KEY_PREFIXES):
@@ -97,16 +97,21 @@ def published_entries(limits: Mapping[str, Any], source: str) -> dict[str, Any]:
     {'kind': 'exclusion', 'floor_amsl_m': 304.8, 'published': True, 'no_band': True}
     """
     lower, upper = limits.get("lowerLimit"), limits.get("upperLimit")
-    low, high = _comparable_limit(lower), _comparable_limit(upper)
-    if high is not None and (high[1] <= 0.0 or low == high):
+    comparable_lower, comparable_upper = _comparable_limit(lower), _comparable_limit(upper)
+    if comparable_upper is not None and (comparable_upper[1] <= 0.0 or comparable_lower == comparable_upper):
         entries = zone_entries({**limits, "upperLimit": None}, source)
-        if high[1] <= 0.0:
+        if comparable_upper[1] <= 0.0:
             entries = {key: value for key, value in entries.items() if not key.startswith("floor")}
         return {**entries, PUBLISHED: True, NO_BAND: True}
-    if low is None or high is None or low[0] != high[0] or low < high:
+    if (
+        comparable_lower is None
+        or comparable_upper is None
+        or comparable_lower[0] != comparable_upper[0]
+        or comparable_lower < comparable_upper
+    ):
         return {**zone_entries(limits, source), PUBLISHED: True}
-    turned = {**limits, "lowerLimit": upper, "upperLimit": lower}
-    return {**zone_entries(turned, source), PUBLISHED: True, UPSIDE_DOWN: True}
+    swapped = {**limits, "lowerLimit": upper, "upperLimit": lower}
+    return {**zone_entries(swapped, source), PUBLISHED: True, UPSIDE_DOWN: True}
 
 
 def _comparable_limit(limit: Any) -> tuple[bool, float] | None:
@@ -121,7 +126,7 @@ def _comparable_limit(limit: Any) -> tuple[bool, float] | None:
 
 def _faa_limits(properties: Mapping[str, Any], source: str) -> dict[str, Any]:
     """Convert limits in the FAA's form to openAIP's form."""
-    found = {}
+    limits = {}
     for side, key in _FAA_LIMIT_KEYS.items():
         if (value := properties.get(f"{side}_VAL")) is None:
             continue
@@ -131,11 +136,11 @@ def _faa_limits(properties: Mapping[str, Any], source: str) -> dict[str, Any]:
             raise ScenarioError.at(source, f"{side}_VAL", value, "a number is expected", shown="") from error
         if height != _FAA_NOT_APPLICABLE:
             unit, datum = properties.get(f"{side}_UOM"), properties.get(f"{side}_CODE")
-            found[key] = {"value": height, "unit": unit, "referenceDatum": datum}
-    return found
+            limits[key] = {"value": height, "unit": unit, "referenceDatum": datum}
+    return limits
 
 
-def _limit(value: Any, key: str, kind: Any, source: str) -> dict[str, float]:
+def _limit_entry(value: Any, key: str, kind: Any, source: str) -> dict[str, float]:
     """Convert a limit in openAIP's form to a table entry; empty for the ground as a floor."""
     if not isinstance(value, dict):
         allowed = "a table of value, unit and referenceDatum is expected"
@@ -150,17 +155,17 @@ def _limit(value: Any, key: str, kind: Any, source: str) -> dict[str, float]:
     if not isinstance(datum, int | str) or datum not in _DATUMS:
         allowed = f"allowed {', '.join(map(str, _DATUMS))}"
         raise ScenarioError.at(source, f"{key}.referenceDatum", datum, allowed, shown="")
-    side, metres, counted = _LIMITS[key], round(height * _UNITS[unit], 3), _DATUMS[datum]
-    if counted == "agl" and metres <= 0.0:
+    side, metres, datum_name = _LIMITS[key], round(height * _UNITS[unit], 3), _DATUMS[datum]
+    if datum_name == "agl" and metres <= 0.0:
         if side == "floor":
             return {}
         raise ScenarioError.at(source, key, value, "above 0 is expected: nothing lies below the ground", shown="")
     if _UNITS[unit] == _UNITS["FL"]:
-        counted = "standard"
-    if counted in _INEXACT_DATUMS:
-        words, below, above = _INEXACT_DATUMS[counted]
+        datum_name = "standard"
+    if datum_name in _INEXACT_DATUMS:
+        datum_text, below, above = _INEXACT_DATUMS[datum_name]
         if kind == "inclusion":
-            allowed = f"{words} bounds no inclusion; give a height in metres above mean sea level"
+            allowed = f"{datum_text} bounds no inclusion; give a height in metres above mean sea level"
             raise ScenarioError.at(source, key, value, allowed, shown="")
-        counted, metres = "amsl", metres + (above if side == "ceiling" else -below)
-    return {f"{side}_{counted}_m": min(_HIGHEST_AMSL_M, max(_LOWEST_AMSL_M, metres))}
+        datum_name, metres = "amsl", metres + (above if side == "ceiling" else -below)
+    return {f"{side}_{datum_name}_m": min(_HIGHEST_AMSL_M, max(_LOWEST_AMSL_M, metres))}

@@ -15,7 +15,7 @@ from world.airspace.openair import is_openair, openair_zones
 from world.airspace.uas_zones import ed269_zones, ed318_zones, is_ed269, is_ed318
 from world.airspace.zone_entries import NO_BAND, PUBLISHED, UPSIDE_DOWN, zone_entries
 from world.airspace.zone_suffixes import GEOPACKAGE, SUFFIXES
-from world.airspace.zones import holes_lie_inside, mended_rings
+from world.airspace.zones import holes_lie_inside, repair_rings
 from world.errors import ScenarioError
 from world.scenario_file import checked_table
 from world.scenario_tables import MAX_ZONES, ZoneTable
@@ -40,7 +40,7 @@ def geojson_zones(text: str, source: str) -> Iterator[Found]:
     [('geometry (zone 1)', 'zone 1', 4)]
     """
     try:
-        data = json.loads(text, parse_constant=_no_number)
+        data = json.loads(text, parse_constant=_reject_constant)
     except (ValueError, RecursionError) as error:
         raise ScenarioError(f"{source}: not valid JSON: {str(error).splitlines()[0]}", file=source) from error
     if not isinstance(data, dict):
@@ -54,19 +54,19 @@ def geojson_zones(text: str, source: str) -> Iterator[Found]:
         features = data.get("features")
         if not isinstance(features, list):
             raise ScenarioError(f"{source}: features: a list is expected", file=source, field="features")
-        named = [(f"features[{k}]", feature) for k, feature in enumerate(features)]
+        features_by_place = [(f"features[{k}]", feature) for k, feature in enumerate(features)]
     elif kind == "Feature":
-        named = [("feature", data)]
+        features_by_place = [("feature", data)]
     else:
-        named = [("geometry", {"type": "Feature", "geometry": data})]
-    for k, (where, feature) in enumerate(named):
+        features_by_place = [("geometry", {"type": "Feature", "geometry": data})]
+    for k, (location, feature) in enumerate(features_by_place):
         if is_ed318(feature):
-            yield from ed318_zones(feature, where, k, source)
+            yield from ed318_zones(feature, location, k, source)
         else:
-            yield _geojson_zone(feature, where, k, source)
+            yield _geojson_zone(feature, location, k, source)
 
 
-def _no_number(name: str) -> float:
+def _reject_constant(name: str) -> float:
     raise ValueError(f"{name} is no number of JSON")
 
 
@@ -83,16 +83,16 @@ def _check_crs(data: dict[str, Any], source: str) -> None:
         )
 
 
-def _geojson_zone(feature: Any, where: str, number: int, source: str) -> tuple[str, dict[str, Any]]:
+def _geojson_zone(feature: Any, location: str, index: int, source: str) -> tuple[str, dict[str, Any]]:
     if not isinstance(feature, dict) or feature.get("type") != "Feature":
-        raise ScenarioError(f"{source}: {where}: a Feature is expected", file=source, field=where)
+        raise ScenarioError(f"{source}: {location}: a Feature is expected", file=source, field=location)
     properties, geometry = feature.get("properties"), feature.get("geometry")
     properties = properties if isinstance(properties, dict) else {}
-    name = properties.get("name") or f"zone {number + 1}"
+    name = properties.get("name") or f"zone {index + 1}"
     if isinstance(name, str):
         # Latvia's file has a tab before a name.
         name = " ".join(name.split())
-    label = f"{where} ({name})" if isinstance(name, str) and name.isprintable() else where
+    label = f"{location} ({name})" if isinstance(name, str) and name.isprintable() else location
     geometry = geometry if isinstance(geometry, dict) else {}
     kind = geometry.get("type")
     coordinates: Any = geometry.get("coordinates")
@@ -123,10 +123,10 @@ def _geojson_zone(feature: Any, where: str, number: int, source: str) -> tuple[s
 def _check_holes(parts: list[list[list[tuple[float, float]]]], source: str) -> None:
     """Raise ScenarioError if a hole of a polygon lies outside its outline."""
     try:
-        inside = all(holes_lie_inside(part) for part in parts if part)
+        is_inside = all(holes_lie_inside(part) for part in parts if part)
     except ValueError as error:
         raise ScenarioError(f"{source}: coordinates: {error}", file=source, field="coordinates") from error
-    if not inside:
+    if not is_inside:
         message = f"{source}: coordinates: a hole lies outside its outline"
         raise ScenarioError(message, file=source, field="coordinates")
 
@@ -174,25 +174,25 @@ def kml_zones(text: str, source: str) -> Iterator[Found]:
         root = ElementTree.fromstring(text)  # entities were refused above
     except (ElementTree.ParseError, ValueError) as error:
         raise ScenarioError(f"{source}: not valid XML: {str(error).splitlines()[0]}", file=source) from error
-    if _tag(root) != "kml":
+    if _tag_name(root) != "kml":
         raise ScenarioError(f"{source}: a <kml> element is expected", file=source)
-    for number, placemark in enumerate((element for element in root.iter() if _tag(element) == "Placemark"), 1):
+    for number, placemark in enumerate((element for element in root.iter() if _tag_name(element) == "Placemark"), 1):
         name = _kml_text(placemark, "name") or f"zone {number}"
         label = f"Placemark {number}" + (f" ({name})" if name.isprintable() else "")
         yield label, {"name": name, **_kml_zone(placemark, f"{source}: {label}")}
 
 
-def _tag(element: _Element) -> str:
+def _tag_name(element: _Element) -> str:
     return element.tag.rpartition("}")[2]
 
 
 def _descendants(element: _Element, tag: str) -> list[_Element]:
-    return [child for child in element.iter() if _tag(child) == tag]
+    return [child for child in element.iter() if _tag_name(child) == tag]
 
 
 def _kml_text(element: _Element, tag: str) -> str:
     """Return the text of an element's direct child with this tag, or "" without one."""
-    return next(((child.text or "").strip() for child in element if _tag(child) == tag), "")
+    return next(((child.text or "").strip() for child in element if _tag_name(child) == tag), "")
 
 
 def _kml_zone(placemark: _Element, source: str) -> dict[str, Any]:
@@ -203,13 +203,13 @@ def _kml_zone(placemark: _Element, source: str) -> dict[str, Any]:
             raise ScenarioError(
                 f"{source}: a Polygon is expected, or a Point with radius_m in its ExtendedData", file=source
             )
-        ((lon, lat, _),) = _coordinates(points[0], source)[:1] or [(math.nan, math.nan, 0.0)]
+        ((lon, lat, _),) = _positions(points[0], source)[:1] or [(math.nan, math.nan, 0.0)]
         return entries | {"lat_deg": lat, "lon_deg": lon}
     rings, ceilings = [], set()
     for polygon in polygons:
         corners = []
         for boundary in (*_descendants(polygon, "outerBoundaryIs"), *_descendants(polygon, "innerBoundaryIs")):
-            ring = _coordinates(boundary, source)
+            ring = _positions(boundary, source)
             rings.append([[lat, lon] for lon, lat, _ in ring])
             corners += ring
         ceilings.add(_ceiling(polygon, [up for _, _, up in corners], source))
@@ -218,11 +218,11 @@ def _kml_zone(placemark: _Element, source: str) -> dict[str, Any]:
             f"{source}: its polygons have different heights: give each a placemark of its own", file=source
         )
     key, height = ceilings.pop()
-    stated = any(side in entries for side in ("ceiling_amsl_m", "ceiling_agl_m"))
-    return {"rings_deg": rings, **({key: height} if key and not stated else {}), **entries}
+    states_ceiling = any(side in entries for side in ("ceiling_amsl_m", "ceiling_agl_m"))
+    return {"rings_deg": rings, **({key: height} if key and not states_ceiling else {}), **entries}
 
 
-def _ceiling(polygon: _Element, ups: list[float], source: str) -> tuple[str, float]:
+def _ceiling(polygon: _Element, heights: list[float], source: str) -> tuple[str, float]:
     """Return the key of a polygon's ceiling and its height, m; ("", 0) without a ceiling."""
     mode = _kml_text(polygon, "altitudeMode") or "clampToGround"
     if mode == "clampToGround":
@@ -235,43 +235,45 @@ def _ceiling(polygon: _Element, ups: list[float], source: str) -> tuple[str, flo
     if _kml_text(polygon, "extrude") not in ("1", "true"):
         message = f"{source}: altitudeMode {mode} without extrude: a sheet in the air holds no airspace"
         raise ScenarioError(message, file=source, field="altitudeMode", value=mode)
-    if not ups or max(ups) - min(ups) > _LEVEL_TOLERANCE_M:
+    if not heights or max(heights) - min(heights) > _LEVEL_TOLERANCE_M:
         raise ScenarioError(f"{source}: its corners have different heights: a zone has a level ceiling", file=source)
-    return key, ups[0]
+    return key, heights[0]
 
 
-def _coordinates(element: _Element, source: str) -> list[tuple[float, float, float]]:
+def _positions(element: _Element, source: str) -> list[tuple[float, float, float]]:
     """Return longitude, latitude and height of an element's positions."""
     out = []
     for coordinates in _descendants(element, "coordinates"):
         for position in (coordinates.text or "").split():
             try:
-                lon, lat, *rest = (float(part) for part in position.split(","))
+                lon, lat, *altitudes = (float(part) for part in position.split(","))
             except ValueError as error:
                 allowed = "lon,lat or lon,lat,up is expected"
                 message = f"{source}: coordinates {position[:40]!r}: {allowed}"
                 raise ScenarioError(
                     message, file=source, field="coordinates", value=position, allowed=allowed
                 ) from error
-            out.append((lon, lat, rest[0] if rest else 0.0))
+            out.append((lon, lat, altitudes[0] if altitudes else 0.0))
     return out
 
 
 def _extended_data(placemark: _Element, source: str) -> dict[str, Any]:
     """Return the entries of a placemark's ExtendedData: Data with a value, and SimpleData."""
-    stated = {str(one.get("name")): _kml_text(one, "value") for one in _descendants(placemark, "Data")}
-    stated |= {str(one.get("name")): (one.text or "").strip() for one in _descendants(placemark, "SimpleData")}
-    found: dict[str, Any] = {}
-    for key, value in stated.items():
+    texts = {str(element.get("name")): _kml_text(element, "value") for element in _descendants(placemark, "Data")}
+    texts |= {
+        str(element.get("name")): (element.text or "").strip() for element in _descendants(placemark, "SimpleData")
+    }
+    entries: dict[str, Any] = {}
+    for key, value in texts.items():
         if key in _NUMERIC_KEYS:
             try:
-                found[key] = float(value)
+                entries[key] = float(value)
             except ValueError as error:
                 shown = repr(value[:40])
                 raise ScenarioError.at(source, key, value, "a number is expected", shown=shown) from error
         elif value:
-            found[key] = value
-    return found
+            entries[key] = value
+    return entries
 
 
 # ----------------------------------------------------------------------
@@ -288,9 +290,9 @@ FORMATS: dict[str, Reader] = {
     ".txt": openair_zones,
 }
 # Notes about repairs to authorities' files.
-_CROSSED = "outlines that cross themselves are taken as the area they enclose"
+_SELF_CROSSING = "outlines that cross themselves are taken as the area they enclose"
 _EMPTY = "outlines that enclose no area are left out"
-_TURNED = "lower and upper limits that stand the wrong way round are swapped"
+_SWAPPED = "lower and upper limits that stand the wrong way round are swapped"
 _NO_BAND = "upper limits of 0, or equal to the lower one, are taken for none: no ceiling"
 # Maximum size of a file, bytes.
 MAX_BYTES = 64 * 2**20
@@ -325,19 +327,21 @@ def read_zone_files(files: str | Sequence[str], source: str, base: Path | None) 
     source: name of the scenario in messages.  base: folder of relative paths.  Raises ScenarioError as
     `read_zone_file` does, and for more zones than a scenario may have.
     """
-    found = FileZones()
+    all_zones = FileZones()
     for file in [files] if isinstance(files, str) else files:
-        more = read_zone_file(Path(base or "", file), f"{source}: zones_file: {file}", MAX_ZONES - len(found.zones))
-        found.zones += more.zones
-        found.notes += more.notes
-    return found
+        file_zones = read_zone_file(
+            Path(base or "", file), f"{source}: zones_file: {file}", MAX_ZONES - len(all_zones.zones)
+        )
+        all_zones.zones += file_zones.zones
+        all_zones.notes += file_zones.notes
+    return all_zones
 
 
-def read_zone_file(path: Path, source: str, most: int = MAX_ZONES) -> FileZones:
+def read_zone_file(path: Path, source: str, max_zones: int = MAX_ZONES) -> FileZones:
     """Read the zones of a file, in the format of its suffix.
 
-    source: name of the file in messages.  most: maximum number of zones.  Raises ScenarioError for a file that cannot
-    be read, for more zones than ``most``, and for an invalid zone.
+    source: name of the file in messages.  max_zones: maximum number of zones.  Raises ScenarioError for a file that
+    cannot be read, for more zones than ``max_zones``, and for an invalid zone.
 
     >>> import tempfile
     >>> with tempfile.TemporaryDirectory() as folder:
@@ -353,68 +357,68 @@ def read_zone_file(path: Path, source: str, most: int = MAX_ZONES) -> FileZones:
         allowed = f"a file of zones is {', '.join(SUFFIXES[:-1])} or {SUFFIXES[-1]}"
         message = f"{source}: suffix {path.suffix!r}: {allowed}"
         raise ScenarioError(message, file=source, field="suffix", value=path.suffix, allowed=allowed)
-    read, free = FileZones(), Counter[str]()
-    mended: dict[str, list[str]] = {_CROSSED: [], _TURNED: [], _NO_BAND: [], _EMPTY: []}
+    file_zones, unrestricted = FileZones(), Counter[str]()
+    repaired_names: dict[str, list[str]] = {_SELF_CROSSING: [], _SWAPPED: [], _NO_BAND: [], _EMPTY: []}
     corners = crossings = 0
-    for where, entries in _read_format(path, suffix, source):
+    for location, entries in _read_format(path, suffix, source):
         if isinstance(entries, str):
-            free[entries] += 1
+            unrestricted[entries] += 1
             continue
-        if len(read.zones) >= most:
+        if len(file_zones.zones) >= max_zones:
             message = f"{source}: too many zones: at most {MAX_ZONES:,} in all files"
             raise ScenarioError(message, file=source, field="zones", allowed=f"at most {MAX_ZONES:,}")
         corners += sum(map(len, entries.get("rings_deg", ())))
         if corners > MAX_FILE_CORNERS:
             allowed = f"at most {MAX_FILE_CORNERS:,}"
             raise ScenarioError(f"{source}: too many corners: {allowed}", file=source, allowed=allowed)
-        done, repaired = _repair_outline(entries, MAX_CROSSINGS - crossings, f"{source}: {where}")
-        crossings += repaired
-        for one in done:
-            mended[one].append(str(entries["name"]))
-        if _EMPTY in done:
+        outline_notes, crossing_count = _repair_outline(entries, MAX_CROSSINGS - crossings, f"{source}: {location}")
+        crossings += crossing_count
+        for note in outline_notes:
+            repaired_names[note].append(str(entries["name"]))
+        if _EMPTY in outline_notes:
             continue
         if entries.get("rings_deg") == []:
-            raise ScenarioError(f"{source}: {where}: its outline encloses no area", file=source, field="rings_deg")
-        read.zones.append(_table(entries, f"{source}: {where}"))
-    if not read.zones and not free and not mended[_EMPTY]:
+            raise ScenarioError(f"{source}: {location}: its outline encloses no area", file=source, field="rings_deg")
+        file_zones.zones.append(_zone_table(entries, f"{source}: {location}"))
+    if not file_zones.zones and not unrestricted and not repaired_names[_EMPTY]:
         raise ScenarioError(f"{source}: there is no zone in it", file=source)
-    for reason, count in free.items():
-        keep = "1 zone keeps" if count == 1 else f"{count:,} zones keep"
-        read.notes.append(f"{source}: {keep} nobody out: {reason}")
-    for words, names in mended.items():
+    for reason, count in unrestricted.items():
+        subject = "1 zone keeps" if count == 1 else f"{count:,} zones keep"
+        file_zones.notes.append(f"{source}: {subject} nobody out: {reason}")
+    for note_text, names in repaired_names.items():
         if names:
-            more = f", {len(names) - 5:,} more" if len(names) > 5 else ""
-            read.notes.append(f"{source}: {words}: {', '.join(names[:5])}{more}")
-    return read
+            remainder = f", {len(names) - 5:,} more" if len(names) > 5 else ""
+            file_zones.notes.append(f"{source}: {note_text}: {', '.join(names[:5])}{remainder}")
+    return file_zones
 
 
-def _repair_outline(entries: dict[str, Any], most: int, source: str) -> tuple[list[str], int]:
+def _repair_outline(entries: dict[str, Any], max_crossings: int, source: str) -> tuple[list[str], int]:
     """Repair the outline of an authority's zone; return the notes about it and the number of its crossings.
 
-    Leave other zones as they are.  most: maximum number of crossings; more raise ScenarioError.
+    Leave other zones as they are.  Raises ScenarioError for more crossings than ``max_crossings``.
     """
     published = entries.pop(PUBLISHED, False)
-    words = [said for mark, said in ((UPSIDE_DOWN, _TURNED), (NO_BAND, _NO_BAND)) if entries.pop(mark, False)]
+    notes = [note for flag, note in ((UPSIDE_DOWN, _SWAPPED), (NO_BAND, _NO_BAND)) if entries.pop(flag, False)]
     if not published or "rings_deg" not in entries:
-        return words, 0
+        return notes, 0
     try:
-        repaired = mended_rings(entries["rings_deg"], most)
+        repaired = repair_rings(entries["rings_deg"], max_crossings)
     except ValueError as error:
         raise ScenarioError(f"{source}: {error}", file=source, field="rings_deg", allowed=str(error)) from error
     if repaired is None:
-        return words, 0
+        return notes, 0
     entries["rings_deg"], crossings = repaired
-    return [*words, _CROSSED if entries["rings_deg"] else _EMPTY], crossings
+    return [*notes, _SELF_CROSSING if entries["rings_deg"] else _EMPTY], crossings
 
 
 def _read_format(path: Path, suffix: str, source: str) -> Iterator[Found]:
     """Yield the zones of a file in the format of its suffix."""
     if suffix == GEOPACKAGE:
         _check_size(path, source)
-        for k, (where, feature) in enumerate(geopackage_features(path, source)):
-            yield _geojson_zone(feature, where, k, source)
+        for k, (location, feature) in enumerate(geopackage_features(path, source)):
+            yield _geojson_zone(feature, location, k, source)
         return
-    yield from FORMATS[suffix](_text(path, source, openair=FORMATS[suffix] is openair_zones), source)
+    yield from FORMATS[suffix](_read_text(path, source, openair=FORMATS[suffix] is openair_zones), source)
 
 
 def _check_size(path: Path, source: str) -> None:
@@ -426,7 +430,7 @@ def _check_size(path: Path, source: str) -> None:
         )
 
 
-def _text(path: Path, source: str, *, openair: bool) -> str:
+def _read_text(path: Path, source: str, *, openair: bool) -> str:
     """Return the text of a file; an OpenAir file that is not UTF-8 is read as Latin-1."""
     try:
         _check_size(path, source)
@@ -441,5 +445,5 @@ def _text(path: Path, source: str, *, openair: bool) -> str:
         raise ScenarioError(f"{source}: cannot be read: {error.strerror}", file=source) from error
 
 
-def _table(entries: dict[str, Any], source: str) -> ZoneTable:
+def _zone_table(entries: dict[str, Any], source: str) -> ZoneTable:
     return checked_table(lambda: ZoneTable.model_validate(entries), source)

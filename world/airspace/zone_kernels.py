@@ -52,14 +52,14 @@ def zone_records(zones: Sequence[Zone]) -> ZoneRecords:
     >>> float(records.zones[0].north), len(records.edges)
     (700.0, 0)
     """
-    out: Records = np.zeros(len(zones), ZONE)
-    first = 0
+    records: Records = np.zeros(len(zones), ZONE)
+    edge_count = 0
     rings: list[Ring] = []
-    for record, zone in zip(out, zones, strict=True):
+    for record, zone in zip(records, zones, strict=True):
         record.exclusion = zone.kind == "exclusion"
         record.floor, record.floor_above_ground = _level(zone.floor, -math.inf)
         record.ceiling, record.ceiling_above_ground = _level(zone.ceiling, math.inf)
-        record.first_edge = first
+        record.first_edge = edge_count
         shape = zone.shape
         if isinstance(shape, Cylinder):
             record.round, record.radius = True, shape.radius
@@ -68,37 +68,37 @@ def zone_records(zones: Sequence[Zone]) -> ZoneRecords:
             record.south, record.north = shape.north - shape.radius, shape.north + shape.radius
         else:
             rings += shape.rings
-            first += sum(map(len, shape.rings))
-        record.last_edge = first
+            edge_count += sum(map(len, shape.rings))
+        record.last_edge = edge_count
     edges = _edges(rings)
-    _set_boxes(out, edges)
-    for array in (out, edges):
+    _set_boxes(records, edges)
+    for array in (records, edges):
         array.setflags(write=False)
-    return ZoneRecords(out, edges)
+    return ZoneRecords(records, edges)
 
 
 def _set_boxes(zones: Records, edges: Records) -> None:
     """Set the boxes of polygons from their edges."""
-    made = np.flatnonzero(~zones["round"])
-    if made.size:
+    polygons = np.flatnonzero(~zones["round"])
+    if polygons.size:
         # Every polygon has edges, and the edges of a polygon are consecutive.
-        starts = zones["first_edge"][made]
-        for low, high, name in (("west", "east", "east"), ("south", "north", "north")):
-            zones[low][made] = np.minimum.reduceat(edges[name], starts)
-            zones[high][made] = np.maximum.reduceat(edges[name], starts)
+        starts = zones["first_edge"][polygons]
+        for min_name, max_name, coordinate in (("west", "east", "east"), ("south", "north", "north")):
+            zones[min_name][polygons] = np.minimum.reduceat(edges[coordinate], starts)
+            zones[max_name][polygons] = np.maximum.reduceat(edges[coordinate], starts)
 
 
 def _edges(rings: list[Ring]) -> Records:
     """Return (e,) of `EDGE` from every corner of the rings to the next corner of its ring."""
     corners = np.array([corner for ring in rings for corner in ring], dtype=np.float64).reshape(-1, 2)
-    after = np.roll(corners, -1, axis=0)
+    next_corners = np.roll(corners, -1, axis=0)
     sizes = np.array([len(ring) for ring in rings], dtype=np.int64)
     ends = np.cumsum(sizes)
-    after[ends - 1] = corners[ends - sizes]
-    made: Records = np.zeros(len(corners), EDGE)
-    made["east"], made["north"] = corners.T
-    made["to_east"], made["to_north"] = after.T
-    return made
+    next_corners[ends - 1] = corners[ends - sizes]
+    edges: Records = np.zeros(len(corners), EDGE)
+    edges["east"], edges["north"] = corners.T
+    edges["to_east"], edges["to_north"] = next_corners.T
+    return edges
 
 
 def _level(level: ZoneLevel | None, absent: float) -> tuple[float, bool]:
@@ -118,12 +118,12 @@ def box_distance(records: ZoneRecords, z: int, west: float, east: float, south: 
 def distance_to_edge(edge: Record, east: float, north: float) -> float:
     """Return the horizontal distance from a place to one edge, m."""
     step_e, step_n = edge.to_east - edge.east, edge.to_north - edge.north
-    off_e, off_n = east - edge.east, north - edge.north
-    share = (off_e * step_e + off_n * step_n) / (step_e * step_e + step_n * step_n)
-    share = min(1.0, max(0.0, share))
-    off_e -= share * step_e
-    off_n -= share * step_n
-    return math.sqrt(off_e * off_e + off_n * off_n)
+    east_offset, north_offset = east - edge.east, north - edge.north
+    fraction = (east_offset * step_e + north_offset * step_n) / (step_e * step_e + step_n * step_n)
+    fraction = min(1.0, max(0.0, fraction))
+    east_offset -= fraction * step_e
+    north_offset -= fraction * step_n
+    return math.sqrt(east_offset * east_offset + north_offset * north_offset)
 
 
 @inner
@@ -134,41 +134,41 @@ def nearest_edge(records: ZoneRecords, z: int, east: float, north: float) -> tup
     """
     zone = records.zones[z]
     if zone.round:
-        out = math.sqrt((east - zone.centre_east) ** 2 + (north - zone.centre_north) ** 2)
-        return float(out - zone.radius), -1
-    nearest2, nearest = math.inf, zone.first_edge
-    inside = False
+        centre_distance = math.sqrt((east - zone.centre_east) ** 2 + (north - zone.centre_north) ** 2)
+        return float(centre_distance - zone.radius), -1
+    min_distance2, nearest = math.inf, zone.first_edge
+    is_inside = False
     for k in range(zone.first_edge, zone.last_edge):
         edge = records.edges[k]
         step_e, step_n = edge.to_east - edge.east, edge.to_north - edge.north
-        off_e, off_n = east - edge.east, north - edge.north
-        share = (off_e * step_e + off_n * step_n) / (step_e * step_e + step_n * step_n)
-        share = min(1.0, max(0.0, share))
-        off_e -= share * step_e
-        off_n -= share * step_n
-        away2 = off_e * off_e + off_n * off_n
-        if away2 < nearest2:
-            nearest2, nearest = away2, k
+        east_offset, north_offset = east - edge.east, north - edge.north
+        fraction = (east_offset * step_e + north_offset * step_n) / (step_e * step_e + step_n * step_n)
+        fraction = min(1.0, max(0.0, fraction))
+        east_offset -= fraction * step_e
+        north_offset -= fraction * step_n
+        distance2 = east_offset * east_offset + north_offset * north_offset
+        if distance2 < min_distance2:
+            min_distance2, nearest = distance2, k
         # Ray casting to the east: an edge includes its lower end and excludes its upper end.
         if (edge.north > north) != (edge.to_north > north) and edge.east + step_e * (
             north - edge.north
         ) / step_n > east:
-            inside = not inside
-    return (-math.sqrt(nearest2) if inside else math.sqrt(nearest2)), nearest
+            is_inside = not is_inside
+    return (-math.sqrt(min_distance2) if is_inside else math.sqrt(min_distance2)), nearest
 
 
 @compiled
 def edge_distance(records: ZoneRecords, z: int, east: float, north: float) -> float:
     """Return the horizontal distance from a place to the outline of zone z, m; negative inside its shape."""
-    away, _ = nearest_edge(records, z, east, north)
-    return away
+    distance, _ = nearest_edge(records, z, east, north)
+    return distance
 
 
 @compiled_inline
 def outside_band(zone: Record, up: float, ground: float) -> float:
     """Return the height below a zone's floor or above its ceiling, m.
 
-    Negative between them, to the nearer one.
+    It is negative between them: minus the distance to the nearer one.
     zone: a record of `ZONE`.  up: m above mean sea level.  ground: height of the ground there, NaN if not known; the
     result is then NaN for a zone with levels above ground.
     """
@@ -180,56 +180,57 @@ def outside_band(zone: Record, up: float, ground: float) -> float:
 
 
 @inner
-def inside_share(
-    records: ZoneRecords, z: int, ax: float, ay: float, bx: float, by: float, first: float, last: float
+def inside_fraction(
+    records: ZoneRecords, z: int, ax: float, ay: float, bx: float, by: float, begin_fraction: float, end_fraction: float
 ) -> float:
-    """Return the fraction of the segment a-b inside the shape of zone z, within its part from ``first`` to ``last``.
+    """Return the fraction of the segment a-b inside the shape of zone z, within a part of the segment.
 
-    first, last: fractions of the segment, 0 and 1 for all of it.  Exact: entries and exits alternate, so that the sum
-    of the exit fractions minus the sum of the entry fractions, each clipped to first and last, is the fraction inside.
-    A segment along an edge is outside if it is to the right of the edge, and inside if it is to the left.
+    begin_fraction, end_fraction: the part of the segment, 0 and 1 for all of it.  Exact: entries and exits alternate,
+    so that the sum of the exit fractions minus the sum of the entry fractions, each clipped to the part, is the
+    fraction inside. A segment along an edge is outside if it is to the right of the edge, and inside if it is to the
+    left.
     """
     zone = records.zones[z]
     dx, dy = bx - ax, by - ay
     if zone.round:
-        off_e, off_n = ax - zone.centre_east, ay - zone.centre_north
-        run2, along = dx * dx + dy * dy, dx * off_e + dy * off_n
-        beside = off_e * off_e + off_n * off_n - zone.radius * zone.radius
+        east_offset, north_offset = ax - zone.centre_east, ay - zone.centre_north
+        run2, dot = dx * dx + dy * dy, dx * east_offset + dy * north_offset
+        power = east_offset * east_offset + north_offset * north_offset - zone.radius * zone.radius
         if run2 == 0.0:
-            return last - first if beside <= 0.0 else 0.0
-        square = along * along - run2 * beside
-        if square <= 0.0:
+            return end_fraction - begin_fraction if power <= 0.0 else 0.0
+        discriminant = dot * dot - run2 * power
+        if discriminant <= 0.0:
             return 0.0
-        half = math.sqrt(square) / run2
-        enter = min(last, max(first, -along / run2 - half))
-        leave = min(last, max(first, -along / run2 + half))
-        return float(leave - enter)
+        half_fraction = math.sqrt(discriminant) / run2
+        entry = min(end_fraction, max(begin_fraction, -dot / run2 - half_fraction))
+        leave = min(end_fraction, max(begin_fraction, -dot / run2 + half_fraction))
+        return float(leave - entry)
     if dx == 0.0 and dy == 0.0:
-        return last - first if edge_distance(records, z, ax, ay) <= 0.0 else 0.0
+        return end_fraction - begin_fraction if edge_distance(records, z, ax, ay) <= 0.0 else 0.0
     inside = 0.0
     for k in range(zone.first_edge, zone.last_edge):
         edge = records.edges[k]
         # Signed distances of the two ends of the edge to the left of the segment's line, times the segment's length.
-        before = dx * (edge.north - ay) - dy * (edge.east - ax)
-        after = dx * (edge.to_north - ay) - dy * (edge.to_east - ax)
-        if (before > 0.0) == (after > 0.0):
+        begin_side = dx * (edge.north - ay) - dy * (edge.east - ax)
+        end_side = dx * (edge.to_north - ay) - dy * (edge.to_east - ax)
+        if (begin_side > 0.0) == (end_side > 0.0):
             continue
         step_e, step_n = edge.to_east - edge.east, edge.to_north - edge.north
         # The inside is to the left of the edge: the segment enters where the edge crosses its line from left to right,
         # and leaves where the edge crosses from right to left.
-        share = ((edge.east - ax) * step_n - (edge.north - ay) * step_e) / (dx * step_n - dy * step_e)
-        share = min(last, max(first, share))
-        inside += -share if before > 0.0 else share
+        fraction = ((edge.east - ax) * step_n - (edge.north - ay) * step_e) / (dx * step_n - dy * step_e)
+        fraction = min(end_fraction, max(begin_fraction, fraction))
+        inside += -fraction if begin_side > 0.0 else fraction
     return max(0.0, inside)
 
 
 @inlined
-def _between(edge: Record, ax: float, ay: float, dx: float, dy: float, run2: float) -> tuple[float, float]:
+def _corner_distance2(edge: Record, ax: float, ay: float, dx: float, dy: float, run2: float) -> tuple[float, float]:
     """Return the squared distance from an edge's first corner to the segment, and its fraction of the segment."""
-    share = ((edge.east - ax) * dx + (edge.north - ay) * dy) / run2 if run2 > 0.0 else 0.0
-    share = min(1.0, max(0.0, share))
-    off_e, off_n = ax + share * dx - edge.east, ay + share * dy - edge.north
-    return off_e * off_e + off_n * off_n, share
+    fraction = ((edge.east - ax) * dx + (edge.north - ay) * dy) / run2 if run2 > 0.0 else 0.0
+    fraction = min(1.0, max(0.0, fraction))
+    east_offset, north_offset = ax + fraction * dx - edge.east, ay + fraction * dy - edge.north
+    return east_offset * east_offset + north_offset * north_offset, fraction
 
 
 @inner
@@ -243,25 +244,25 @@ def segment_distance(records: ZoneRecords, z: int, ax: float, ay: float, bx: flo
     dx, dy = bx - ax, by - ay
     run2 = dx * dx + dy * dy
     if zone.round:
-        share = ((zone.centre_east - ax) * dx + (zone.centre_north - ay) * dy) / run2 if run2 > 0.0 else 0.0
-        share = min(1.0, max(0.0, share))
-        return max(0.0, edge_distance(records, z, ax + share * dx, ay + share * dy)), share
+        fraction = ((zone.centre_east - ax) * dx + (zone.centre_north - ay) * dy) / run2 if run2 > 0.0 else 0.0
+        fraction = min(1.0, max(0.0, fraction))
+        return max(0.0, edge_distance(records, z, ax + fraction * dx, ay + fraction * dy)), fraction
     from_a, from_b = edge_distance(records, z, ax, ay), edge_distance(records, z, bx, by)
     if from_a <= 0.0:
         return 0.0, 0.0
     if from_b <= 0.0:
         return 0.0, 1.0
-    best, best_at = (from_a, 0.0) if from_a <= from_b else (from_b, 1.0)
+    min_distance, min_fraction = (from_a, 0.0) if from_a <= from_b else (from_b, 1.0)
     for k in range(zone.first_edge, zone.last_edge):
         edge = records.edges[k]
-        away2, share = _between(edge, ax, ay, dx, dy, run2)
-        if away2 < best * best:
-            best, best_at = math.sqrt(away2), share
-        before = dx * (edge.north - ay) - dy * (edge.east - ax)
-        after = dx * (edge.to_north - ay) - dy * (edge.to_east - ax)
-        if (before > 0.0) != (after > 0.0):
+        distance2, fraction = _corner_distance2(edge, ax, ay, dx, dy, run2)
+        if distance2 < min_distance * min_distance:
+            min_distance, min_fraction = math.sqrt(distance2), fraction
+        begin_side = dx * (edge.north - ay) - dy * (edge.east - ax)
+        end_side = dx * (edge.to_north - ay) - dy * (edge.to_east - ax)
+        if (begin_side > 0.0) != (end_side > 0.0):
             step_e, step_n = edge.to_east - edge.east, edge.to_north - edge.north
-            share = ((edge.east - ax) * step_n - (edge.north - ay) * step_e) / (dx * step_n - dy * step_e)
-            if 0.0 <= share <= 1.0:
-                return 0.0, share
-    return best, best_at
+            fraction = ((edge.east - ax) * step_n - (edge.north - ay) * step_e) / (dx * step_n - dy * step_e)
+            if 0.0 <= fraction <= 1.0:
+                return 0.0, fraction
+    return min_distance, min_fraction

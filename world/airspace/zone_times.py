@@ -31,7 +31,7 @@ _DAY = timedelta(days=1)
 class Period:
     """One period, in UTC.
 
-    start, end: None if unknown.  days: of the week, 0 for Monday; empty for all.
+    start, end: None if unknown.  days: days of the week, 0 for Monday; empty for all.
     first, last: minutes of the day, None for the whole day; a last that is not after the first is on the next day.
     """
 
@@ -47,7 +47,7 @@ class Period:
         >>> Period(days=frozenset({5, 6}), first=420, last=1200).text()
         '../.. SAT,SUN 07:00/20:00'
         """
-        parts = ["/".join(OPEN if one is None else f"{one:%Y-%m-%dT%H:%M}Z" for one in (self.start, self.end))]
+        parts = ["/".join(OPEN if moment is None else f"{moment:%Y-%m-%dT%H:%M}Z" for moment in (self.start, self.end))]
         if self.days:
             parts.append(",".join(WEEKDAYS[day] for day in sorted(self.days)))
         if self.first is not None and self.last is not None:
@@ -64,22 +64,22 @@ def parse_period(text: str) -> Period | None:
     if text.upper() == BY_NOTAM:
         return None
     allowed = 'allowed "START/END [DAYS] [HH:MM/HH:MM]" in UTC, .. for an open end, or "BY NOTAM"'
-    span, *rest = text.split()
+    span, *fields = text.split()
     ends = span.split("/")
-    if len(ends) != 2 or len(rest) > 2:
+    if len(ends) != 2 or len(fields) > 2:
         raise ValueError(f"{text[:60]!r}: {allowed}")
     try:
-        start, end = (None if one == OPEN else _parse_part(one) for one in ends)
+        start, end = (None if end_text == OPEN else _parse_part(end_text) for end_text in ends)
         days: frozenset[int] = frozenset()
-        if rest and ":" not in rest[0]:
-            days = frozenset(WEEKDAYS.index(day) for day in rest.pop(0).upper().split(","))
+        if fields and ":" not in fields[0]:
+            days = frozenset(WEEKDAYS.index(day) for day in fields.pop(0).upper().split(","))
         first = last = None
-        if rest:
-            hours = _HOURS.fullmatch(rest.pop(0))
+        if fields:
+            hours = _HOURS.fullmatch(fields.pop(0))
             if hours is None:
                 raise ValueError
             first, last = (int(hours[k]) * 60 + int(hours[k + 1]) for k in (1, 3))
-        if rest or max(first or 0, last or 0) > 24 * 60:
+        if fields or max(first or 0, last or 0) > 24 * 60:
             raise ValueError
     except ValueError:
         raise ValueError(f"{text[:60]!r}: {allowed}") from None
@@ -96,15 +96,15 @@ def parse_time(text: str) -> datetime:
     >>> parse_time("2026-05-01T24:00+02:00").isoformat()
     '2026-05-01T22:00:00+00:00'
     """
-    whole = re.sub(r"T24:00(:00(\.0+)?)?", "T00:00", text)
+    text_at_midnight = re.sub(r"T24:00(:00(\.0+)?)?", "T00:00", text)
     try:
-        found = datetime.fromisoformat(whole)
+        moment = datetime.fromisoformat(text_at_midnight)
     except ValueError:
         raise ValueError("a time by ISO 8601 is expected, as 2026-05-01T10:00+02:00") from None
-    if found.tzinfo is None:
+    if moment.tzinfo is None:
         raise ValueError("no offset from UTC: write Z, or +02:00")
     try:
-        return (found + (_DAY if whole != text else timedelta())).astimezone(UTC)
+        return (moment + (_DAY if text_at_midnight != text else timedelta())).astimezone(UTC)
     except OverflowError as error:
         raise ValueError("out of range") from error
 
@@ -152,13 +152,15 @@ def _overlaps(period: Period, begin: datetime, finish: datetime) -> bool:
     finish = finish if period.end is None else min(finish, period.end)
     if begin > finish:
         return False
-    first, last = (0, 24 * 60) if period.first is None or period.last is None else (period.first, period.last)
-    last += 24 * 60 if last <= first else 0
+    first_minute, last_minute = (
+        (0, 24 * 60) if period.first is None or period.last is None else (period.first, period.last)
+    )
+    last_minute += 24 * 60 if last_minute <= first_minute else 0
     # Start two days earlier, because evening hours may continue past midnight.
     day = datetime.combine(begin.date(), time(), UTC) - 2 * _DAY
     while day <= finish:
-        meets = day + timedelta(minutes=first) <= finish and day + timedelta(minutes=last) >= begin
-        if meets and (not period.days or day.weekday() in period.days):
+        is_within = day + timedelta(minutes=first_minute) <= finish and day + timedelta(minutes=last_minute) >= begin
+        if is_within and (not period.days or day.weekday() in period.days):
             return True
         day += _DAY
     return False

@@ -111,26 +111,26 @@ def make_polygon(rings: Sequence[Sequence[tuple[float, float]]]) -> Polygon:
     return Polygon(tuple(_orient_ring(ring, depth) for ring, depth in zip(cleaned, depths, strict=True)))
 
 
-def _check_area(inside: float) -> None:
-    if not inside >= MIN_AREA:
-        raise ValueError(f"nothing inside: {inside:.3g} m2; at least {MIN_AREA:g} m2 are needed")
+def _check_area(area: float) -> None:
+    if not area >= MIN_AREA:
+        raise ValueError(f"nothing inside: {area:.3g} m2; at least {MIN_AREA:g} m2 are needed")
 
 
-def _rings_cross(one: shapely.Polygon, other: shapely.Polygon) -> bool:
+def _rings_cross(first: shapely.Polygon, second: shapely.Polygon) -> bool:
     """Return True if two rings cross or share a stretch of an edge; touching at a corner is allowed."""
-    return bool(one.overlaps(other)) or float(one.exterior.intersection(other.exterior).length) > 0.0
+    return bool(first.overlaps(second)) or float(first.exterior.intersection(second.exterior).length) > 0.0
 
 
 def _clean_ring(ring: Sequence[tuple[float, float]]) -> Ring:
     if not all(math.isfinite(value) for corner in ring for value in corner):
         raise ValueError("a corner is not a number")
     corners = [(float(east), float(north)) for east, north in ring]
-    kept = corners[:1] + [corner for before, corner in pairwise(corners) if corner != before]
-    if len(kept) > 1 and kept[-1] == kept[0]:
-        kept.pop()
-    if len(kept) < 3:
-        raise ValueError(f"{len(kept)} corners: at least three different ones are needed")
-    return tuple(kept)
+    distinct = corners[:1] + [corner for previous, corner in pairwise(corners) if corner != previous]
+    if len(distinct) > 1 and distinct[-1] == distinct[0]:
+        distinct.pop()
+    if len(distinct) < 3:
+        raise ValueError(f"{len(distinct)} corners: at least three different ones are needed")
+    return tuple(distinct)
 
 
 def _orient_ring(ring: Ring, depth: int) -> Ring:
@@ -181,71 +181,77 @@ def band_outline(corners: Sequence[tuple[float, float]], width: float) -> list[t
 
 # Buffer around the area of a repaired outline, degrees (about 0.1 m).  It connects parts that touch only in points, so
 # that rounding on a map cannot separate them.
-MENDED_BY = 1e-6
+REPAIR_MARGIN_DEG = 1e-6
 
 
-def mended_rings(
-    rings: Sequence[Sequence[Sequence[float]]], most: int = MAX_CROSSINGS
+def repair_rings(
+    rings: Sequence[Sequence[Sequence[float]]], max_crossings: int = MAX_CROSSINGS
 ) -> tuple[list[list[list[float]]], int] | None:
     """Repair rings that cross; return the rings of the enclosed area and the number of edge crossings.
 
     The rings are empty for an outline of no area.
 
     rings: rings of [latitude, longitude], the outline first.  A ring that is not inside another one is a part of the
-    area, not a hole; a ring of fewer than three different corners is dropped.  The area grows by `MENDED_BY` on all
-    sides.  Returns None if there is nothing to repair.  Raises ValueError for more crossings than ``most``, and for too
-    many corners or edges (`check_edges`).
+    area, not a hole; a ring of fewer than three different corners is dropped.  The area grows by `REPAIR_MARGIN_DEG` on
+    all sides.  Returns None if there is nothing to repair.  Raises ValueError for more crossings than
+    ``max_crossings``, and for too many corners or edges (`check_edges`).
 
-    >>> made, crossings = mended_rings([[[0, 0], [2, 2], [2, 0], [0, 2]]])
+    >>> made, crossings = repair_rings([[[0, 0], [2, 2], [2, 0], [0, 2]]])
     >>> len(made), crossings  # both halves of a bow tie, joined in the middle
     (1, 1)
-    >>> mended_rings([[[0, 0], [2, 0], [2, 2]]]) is None
+    >>> repair_rings([[[0, 0], [2, 0], [2, 2]]]) is None
     True
     """
-    if not all(math.isfinite(x) for ring in rings for at in ring for x in at):
+    if not all(math.isfinite(value) for ring in rings for point in ring for value in point):
         return None
     if any(len(set(map(tuple, ring))) < 3 for ring in rings):
-        whole = [[list(at) for at in ring] for ring in rings if len(set(map(tuple, ring))) > 2]
-        again = mended_rings(whole, most) if whole else None
-        return (whole, 0) if again is None else again
+        proper_rings = [[list(point) for point in ring] for ring in rings if len(set(map(tuple, ring))) > 2]
+        repaired = repair_rings(proper_rings, max_crossings) if proper_rings else None
+        return (proper_rings, 0) if repaired is None else repaired
     check_edges(rings)
     if shapely.Polygon(rings[0], rings[1:]).is_valid:
         return None
-    crossings = count_crossings(rings, most)
-    if crossings > most:
+    crossings = count_crossings(rings, max_crossings)
+    if crossings > max_crossings:
         raise ValueError(f"more crossings than can be repaired: at most {MAX_CROSSINGS:,} in a file")
-    made = _enclosed([shapely.Polygon(ring) for ring in rings])
-    grown = made.buffer(MENDED_BY, join_style="mitre") if made.area > 0.0 else made
-    parts = [one for one in shapely.get_parts(grown) if isinstance(one, shapely.Polygon) and not one.is_empty]
+    area = _enclosed_area([shapely.Polygon(ring) for ring in rings])
+    grown_area = area.buffer(REPAIR_MARGIN_DEG, join_style="mitre") if area.area > 0.0 else area
+    parts = [
+        candidate
+        for candidate in shapely.get_parts(grown_area)
+        if isinstance(candidate, shapely.Polygon) and not candidate.is_empty
+    ]
     return [
         [list(corner) for corner in ring.coords[:-1]] for part in parts for ring in (part.exterior, *part.interiors)
     ], crossings
 
 
-def _enclosed(rings: Sequence[shapely.Polygon]) -> shapely.Geometry:
-    """Return the area of rings, each repaired alone.
+def _enclosed_area(rings: Sequence[shapely.Polygon]) -> shapely.Geometry:
+    """Return the area of rings, each repaired separately.
 
     A ring inside an odd number of others is a hole in them.
-    A ring inside another one may extend beyond it by `MENDED_BY`; of two identical rings neither is inside the other.
-    A ring that crosses another one, touches it from outside or is separate from it is a part of the area.
+    A ring inside another one may extend beyond it by `REPAIR_MARGIN_DEG`; of two identical rings neither is inside the
+    other. A ring that crosses another one, touches it from outside or is separate from it is a part of the area.
     """
-    made = shapely.make_valid(np.array(rings), method="structure", keep_collapsed=False)
-    made = made[shapely.area(made) > 0.0]
-    grown = shapely.buffer(made, MENDED_BY, join_style="mitre")
-    held = {(int(outer), int(inner)) for outer, inner in shapely.STRtree(made).query(grown, predicate="covers").T}
-    within: list[list[int]] = [[] for _ in made]
-    for outer, inner in held:
-        if (inner, outer) not in held:
-            within[inner].append(outer)
-    holes: list[list[int]] = [[] for _ in made]
-    for inner, outers in enumerate(within):
+    areas = shapely.make_valid(np.array(rings), method="structure", keep_collapsed=False)
+    areas = areas[shapely.area(areas) > 0.0]
+    grown_areas = shapely.buffer(areas, REPAIR_MARGIN_DEG, join_style="mitre")
+    coverings = {
+        (int(outer), int(inner)) for outer, inner in shapely.STRtree(areas).query(grown_areas, predicate="covers").T
+    }
+    containing: list[list[int]] = [[] for _ in areas]
+    for outer, inner in coverings:
+        if (inner, outer) not in coverings:
+            containing[inner].append(outer)
+    holes: list[list[int]] = [[] for _ in areas]
+    for inner, outers in enumerate(containing):
         if len(outers) % 2:
             for outer in outers:
                 holes[outer].append(inner)
     parts = [
-        shapely.difference(made[k], shapely.union_all(made[holes[k]]))
-        for k in range(len(made))
-        if not len(within[k]) % 2
+        shapely.difference(areas[k], shapely.union_all(areas[holes[k]]))
+        for k in range(len(areas))
+        if not len(containing[k]) % 2
     ]
     return shapely.union_all(parts)
 

@@ -44,17 +44,17 @@ def ring_on_map(origin: GeoOrigin, corners: Sequence[Sequence[float]]) -> list[t
     step_lat = np.roll(lat, -1) - lat
     step_lon = (np.roll(lon, -1) - lon + 180.0) % 360.0 - 180.0
     east, north = to_map(origin, lat, lon)
-    middle = to_map(origin, lat + 0.5 * step_lat, lon + 0.5 * step_lon)
-    off = np.hypot(middle[0] - 0.5 * (east + np.roll(east, -1)), middle[1] - 0.5 * (north + np.roll(north, -1)))
+    midpoints = to_map(origin, lat + 0.5 * step_lat, lon + 0.5 * step_lon)
+    bends = np.hypot(midpoints[0] - 0.5 * (east + np.roll(east, -1)), midpoints[1] - 0.5 * (north + np.roll(north, -1)))
     # The bend of a piece is proportional to the square of its length.
-    pieces = np.clip(np.ceil(np.sqrt(off / EDGE_BEND)), 1, _MAX_PIECES).astype(int)
+    pieces = np.clip(np.ceil(np.sqrt(bends / EDGE_BEND)), 1, _MAX_PIECES).astype(int)
     if pieces.sum() > MAX_CORNERS:
         raise ValueError(f"edges too long: {pieces.sum():,} corners on the map; at most {MAX_CORNERS:,} are allowed")
     lats, lons = [], []
     for k, count in enumerate(pieces.tolist()):
-        shares = np.arange(count) / count
-        lats.append(lat[k] + shares * step_lat[k])
-        lons.append(lon[k] + shares * step_lon[k])
+        fractions = np.arange(count) / count
+        lats.append(lat[k] + fractions * step_lat[k])
+        lons.append(lon[k] + fractions * step_lon[k])
     east, north = to_map(origin, np.concatenate(lats), np.concatenate(lons))
     return list(zip(east.tolist(), north.tolist(), strict=True))
 
@@ -81,7 +81,7 @@ def make_zones(tables: Sequence[ZoneTable], source: str, origin: GeoOrigin, grou
     for k, table in enumerate(tables):
         label = f"{source}: zones[{k}] ({table.name})"
         try:
-            shape = _shape(table, origin)
+            shape = _make_shape(table, origin)
             corners = add_corners(corners, shape)
         except ValueError as error:
             raise ScenarioError(f"{label}: {error}", file=source, field=f"zones[{k}]") from error
@@ -97,50 +97,57 @@ def make_zones(tables: Sequence[ZoneTable], source: str, origin: GeoOrigin, grou
 
 
 # Distance from the area beyond which zones are left out, m; a flight within its area comes nowhere near them.
-FAR = 20_000.0
+MAX_ZONE_DISTANCE = 20_000.0
 # Length of a degree of latitude, m.
 _DEGREE_LENGTH_M = 111_000.0
 
 
 def near_zones(tables: Sequence[ZoneTable], source: str, origin: GeoOrigin, bounds: Floats) -> list[ZoneTable]:
-    """Return the zones of a file that a flight may meet: inclusions, and exclusions within `FAR` of the area.
+    """Return zones of a file that a flight may meet: inclusions, and exclusions within `MAX_ZONE_DISTANCE` of the area.
 
     source: name of the file in messages.  bounds: (2, 2) m, west and east, south and north of the area.
-    Raises ScenarioError for an invalid shape among the zones left out; `make_zones` checks the others.
+    Raises ScenarioError for an invalid shape among the omitted zones; `make_zones` checks the others.
     """
-    near = []
+    zones_nearby = []
     for k, table in enumerate(tables):
         if table.kind == "inclusion" or _is_near(table, origin, bounds):
-            near.append(table)
+            zones_nearby.append(table)
             continue
         try:
-            _check_far(table)
+            _check_rings(table)
         except ValueError as error:
             raise ScenarioError(f"{source}: zones[{k}] ({table.name}): {error}", file=source, field="zones") from error
-    return near
+    return zones_nearby
 
 
-def _check_far(table: ZoneTable) -> None:
+def _check_rings(table: ZoneTable) -> None:
     """Raise ValueError for rings in degrees that are not a polygon, without projecting them on the map."""
     rings = table.rings_deg if table.polygon_deg is None else [table.polygon_deg]
     if rings and rings[0]:
-        middle = rings[0][0][1]
-        about = [[(lat, (lon - middle + 180.0) % 360.0 - 180.0) for lat, lon in ring] for ring in rings]
-        make_polygon([[(lon * _DEGREE_LENGTH_M, lat * _DEGREE_LENGTH_M) for lat, lon in ring] for ring in about])
+        centre_longitude = rings[0][0][1]
+        centred_rings = [
+            [(lat, (lon - centre_longitude + 180.0) % 360.0 - 180.0) for lat, lon in ring] for ring in rings
+        ]
+        make_polygon(
+            [[(lon * _DEGREE_LENGTH_M, lat * _DEGREE_LENGTH_M) for lat, lon in ring] for ring in centred_rings]
+        )
 
 
 def _is_near(table: ZoneTable, origin: GeoOrigin, bounds: Floats) -> bool:
-    reach, corners = FAR, table.rings_deg if table.polygon_deg is None else [table.polygon_deg]
+    reach, corners = MAX_ZONE_DISTANCE, table.rings_deg if table.polygon_deg is None else [table.polygon_deg]
     if table.lat_deg is not None and table.lon_deg is not None:
-        reach, corners = FAR + (table.radius_m or 0.0), [[[table.lat_deg, table.lon_deg]]]
-    places = np.array([corner for ring in corners or [] for corner in ring], dtype=np.float64)
-    if not len(places):
+        reach, corners = MAX_ZONE_DISTANCE + (table.radius_m or 0.0), [[[table.lat_deg, table.lon_deg]]]
+    positions = np.array([corner for ring in corners or [] for corner in ring], dtype=np.float64)
+    if not len(positions):
         return True
-    spans = zip(to_map(origin, places[:, 0], places[:, 1]), bounds, strict=True)
-    return all(at.min() <= high + reach and at.max() >= low - reach for at, (low, high) in spans)
+    spans = zip(to_map(origin, positions[:, 0], positions[:, 1]), bounds, strict=True)
+    return all(
+        coordinates.min() <= max_coordinate + reach and coordinates.max() >= min_coordinate - reach
+        for coordinates, (min_coordinate, max_coordinate) in spans
+    )
 
 
-def _shape(table: ZoneTable, origin: GeoOrigin) -> Polygon | Cylinder:
+def _make_shape(table: ZoneTable, origin: GeoOrigin) -> Polygon | Cylinder:
     if table.radius_m is not None:
         east, north = table.east_m, table.north_m
         if east is None or north is None:
@@ -167,33 +174,33 @@ def check_ends(zones: Sequence[Zone], source: str, ends: Sequence[tuple[str, Flo
     """
     records = zone_records(zones)
     for key, point in ends:
-        broken = _first_broken(zones, records, point, ground)
-        if broken is not None:
-            side = "inside the exclusion" if broken.kind == "exclusion" else "outside the inclusion"
-            raise ScenarioError.at(source, "zones", broken.name, f"{key} lies {side}")
+        zone = _first_violated(zones, records, point, ground)
+        if zone is not None:
+            side = "inside the exclusion" if zone.kind == "exclusion" else "outside the inclusion"
+            raise ScenarioError.at(source, "zones", zone.name, f"{key} lies {side}")
 
 
-def zone_broken_at(zones: Sequence[Zone], point: Floats, ground: Terrain | None) -> Zone | None:
+def first_violated_zone(zones: Sequence[Zone], point: Floats, ground: Terrain | None) -> Zone | None:
     """Return the first zone that a position (3,) m violates, or None.
 
     Unknown ground is treated as within the band.
 
     >>> from world.airspace.zones import Cylinder
     >>> mast = Zone("mast", "exclusion", Cylinder(0.0, 0.0, 200.0), ceiling=ZoneLevel(300.0, "amsl"))
-    >>> [zone_broken_at([mast], np.array([0.0, 0.0, up]), None) is mast for up in (290.0, 310.0)]
+    >>> [first_violated_zone([mast], np.array([0.0, 0.0, up]), None) is mast for up in (290.0, 310.0)]
     [True, False]
     """
-    return _first_broken(zones, zone_records(zones), point, ground)
+    return _first_violated(zones, zone_records(zones), point, ground)
 
 
-def _first_broken(zones: Sequence[Zone], records: ZoneRecords, point: Floats, ground: Terrain | None) -> Zone | None:
+def _first_violated(zones: Sequence[Zone], records: ZoneRecords, point: Floats, ground: Terrain | None) -> Zone | None:
     east, north, up = (float(value) for value in point)
-    under = math.nan if ground is None else float(ground.height(east, north))
+    ground_height = math.nan if ground is None else float(ground.height(east, north))
     for k, zone in enumerate(zones):
-        away = edge_distance(records, k, east, north)
-        off = outside_band(records.zones[k], up, under)
-        inside = away <= 0.0 and not off > 0.0
-        if inside == (zone.kind == "exclusion"):
+        distance = edge_distance(records, k, east, north)
+        height_outside = outside_band(records.zones[k], up, ground_height)
+        is_inside = distance <= 0.0 and not height_outside > 0.0
+        if is_inside == (zone.kind == "exclusion"):
             return zone
     return None
 
@@ -232,17 +239,17 @@ def zone_parts(zone: Zone) -> list[tuple[Floats, ...]]:
         return [zone_rings(zone)]
     rings = list(zip(zone_rings(zone), map(is_hole, zone.shape.rings), strict=True))
     # Smallest first: a hole belongs to the smallest outline around it.
-    outlines = sorted((ring for ring, hole in rings if not hole), key=_ring_area)
-    shapes = zone_records([Zone("", "exclusion", Polygon((_without_last(ring),))) for ring in outlines])
+    outlines = sorted((ring for ring, is_ring_hole in rings if not is_ring_hole), key=_ring_area)
+    shapes = zone_records([Zone("", "exclusion", Polygon((_open_ring(ring),))) for ring in outlines])
     parts: list[list[Floats]] = [[ring] for ring in outlines]
-    for ring, hole in rings:
-        if hole:
-            about = (k for k in range(len(outlines)) if edge_distance(shapes, k, *ring[0]) <= 0.0)
-            parts[next(about)].append(ring)
+    for ring, is_ring_hole in rings:
+        if is_ring_hole:
+            outer = (k for k in range(len(outlines)) if edge_distance(shapes, k, *ring[0]) <= 0.0)
+            parts[next(outer)].append(ring)
     return [tuple(part) for part in parts]
 
 
-def _without_last(ring: Floats) -> Ring:
+def _open_ring(ring: Floats) -> Ring:
     return tuple((east, north) for east, north in ring[:-1].tolist())
 
 
@@ -250,23 +257,23 @@ def _ring_area(ring: Floats) -> float:
     return abs(float((ring[:-1, 0] * ring[1:, 1] - ring[1:, 0] * ring[:-1, 1]).sum()))
 
 
-def level_heights(level: ZoneLevel | None, ground: Floats, absent: float) -> Floats:
+def level_heights(level: ZoneLevel | None, ground: Floats, default: float) -> Floats:
     """Return the altitudes (n,) of a floor or a ceiling over ground (n,), m AMSL.
 
-    `absent` if the level is None.
+    default: altitude if the level is None, m AMSL.
 
     >>> level_heights(ZoneLevel(120.0, "ground"), np.array([10.0, 30.0]), 0.0).tolist()
     [130.0, 150.0]
     """
     if level is None:
-        return np.full(len(ground), absent)
+        return np.full(len(ground), default)
     return ground + level.height if level.datum == "ground" else np.full(len(ground), level.height)
 
 
-def zone_walls(zone: Zone, terrain: Terrain | None, low: float, top: float) -> list[Floats]:
+def zone_walls(zone: Zone, terrain: Terrain | None, default_floor: float, default_ceiling: float) -> list[Floats]:
     """Return rings (k, 2, 3) of the walls of a zone: lower and upper end of each corner, m.
 
-    low, top: default floor and ceiling, m AMSL.  A floor below the ground is raised to it.
+    default_floor, default_ceiling: default floor and ceiling, m AMSL.  A floor below the ground is raised to it.
 
     >>> zone = Zone("mast", "exclusion", Cylinder(0.0, 500.0, 200.0), ceiling=ZoneLevel(120.0, "amsl"))
     >>> zone_walls(zone, None, 0.0, 900.0)[0][0].tolist()
@@ -274,9 +281,9 @@ def zone_walls(zone: Zone, terrain: Terrain | None, low: float, top: float) -> l
     """
     walls = []
     for ring in zone_rings(zone):
-        ground = np.full(len(ring), low) if terrain is None else terrain.height(ring[:, 0], ring[:, 1])
-        ground = np.where(np.isfinite(ground), ground, low)
-        foot = np.maximum(level_heights(zone.floor, ground, -np.inf), ground)
-        head = np.maximum(level_heights(zone.ceiling, ground, top), foot)
-        walls.append(np.stack([np.column_stack([ring, foot]), np.column_stack([ring, head])], axis=1))
+        ground = np.full(len(ring), default_floor) if terrain is None else terrain.height(ring[:, 0], ring[:, 1])
+        ground = np.where(np.isfinite(ground), ground, default_floor)
+        bottom = np.maximum(level_heights(zone.floor, ground, -np.inf), ground)
+        top = np.maximum(level_heights(zone.ceiling, ground, default_ceiling), bottom)
+        walls.append(np.stack([np.column_stack([ring, bottom]), np.column_stack([ring, top])], axis=1))
     return walls

@@ -5,7 +5,7 @@ import pytest
 
 from aircraft.identification.alignment import align, invert_first_order_lag
 from aircraft.identification.estimate import _log_unexplained, align_clocks
-from aircraft.identification.flight_record import GRID_HZ, lagged
+from aircraft.identification.flight_record import GRID_HZ, apply_lag
 from aircraft.identification.regression import Fit
 from tests.aircraft.identification.flown_truth import flown_truth
 from tests.instrumented_flights import drawn_sensors
@@ -14,7 +14,7 @@ from tests.instrumented_flights import drawn_sensors
 def test_accelerometers_are_found_to_be_as_late_as_they_were_made() -> None:
     sensors = drawn_sensors(3)
     (clock, *_) = flown_truth().estimate.clocks
-    assert clock.behind == pytest.approx(sensors.lag + sensors.delay, abs=0.012)
+    assert clock.total_lag == pytest.approx(sensors.lag + sensors.delay, abs=0.012)
     # The servo's own lag, and what the pulses wait at 25 Hz before they are seen.
     assert 0.04 < clock.servo_lag < 0.09
 
@@ -44,7 +44,7 @@ def test_what_a_lag_took_is_put_back() -> None:
     """A swing of 1 Hz behind 0.05 s is smaller by the root of 1 + (2 pi 0.05)^2, and led it is itself again."""
     time = np.arange(0.0, 20.0, 1.0 / GRID_HZ)
     swing = np.sin(2.0 * np.pi * time)
-    late = lagged(swing, 0.05)
+    late = apply_lag(swing, 0.05)
     middle = slice(200, -200)
     assert np.abs(late[middle]).max() == pytest.approx(1.0 / np.hypot(1.0, 2.0 * np.pi * 0.05), rel=0.01)
     assert invert_first_order_lag(late, 0.05, GRID_HZ)[middle] == pytest.approx(swing[middle], abs=0.02)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from aircraft.catalog import load_aircraft
-from aircraft.identification.drag import AlphaDoubt, drag_priors, forward_forces
+from aircraft.identification.drag import AlphaUncertainty, drag_priors, forward_forces
 from aircraft.identification.flow import Flow
 from aircraft.identification.parameters import prior_means
 from planfly.identification.base_numbers import base_model
@@ -29,7 +29,7 @@ def test_the_forward_force_is_lift_drag_and_thrust_summed_by_hand() -> None:
     alpha, elevator, speed, density = 0.07, -0.1, 25.0, 1.2
     signals = steady(surfaces=(elevator, 0.0, 0.0), airspeed=speed, density=density)
     flat = np.full(len(signals.airspeed), alpha)
-    forces = forward_forces(signals, base, prior_means(), Flow(flat, 0.0 * flat, 0.0 * flat), AlphaDoubt())
+    forces = forward_forces(signals, base, prior_means(), Flow(flat, 0.0 * flat, 0.0 * flat), AlphaUncertainty())
     # Zero-lift drag 1.2, induced drag 0.8, thrust 0.9 times the base's; then all but the elevator's drag as it is.
     unknown = np.array([1.2, 0.8, 0.9, 1.0, 1.0, 0.02, 0.0, 0.0, 0.0, 0.5, 0.0, 0.0])
     found, _ = forces.predicted(unknown)
@@ -48,7 +48,7 @@ def test_a_steeper_flow_tilts_the_lift_forward() -> None:
     base = base_model(load_aircraft("aerosonde"))
     signals = steady()
     flat = np.zeros(len(signals.airspeed))
-    forces = forward_forces(signals, base, prior_means(), Flow(flat, flat, flat), AlphaDoubt(middle=0.23))
+    forces = forward_forces(signals, base, prior_means(), Flow(flat, flat, flat), AlphaUncertainty(mean_lift=0.23))
     nothing, one = np.array([1.0] * 5 + [0.0] * 7), np.array([1.0] * 5 + [0.0] * 5 + [1.0, 0.0])
     off = forces.predicted(one)[0] - forces.predicted(nothing)[0]
     lift = 0.5 * 1.2 * 25.0**2 * 0.55 * 0.23

@@ -1,12 +1,12 @@
 import numpy as np
 import pytest
 
-from aircraft.identification.flight_record import GRID_HZ, derivative, lagged, low_pass, shifted
+from aircraft.identification.flight_record import GRID_HZ, apply_delay, apply_lag, derivative, low_pass
 
 
 def test_a_lag_answers_a_step_as_its_time_constant_says() -> None:
     time = np.arange(200) / GRID_HZ
-    answer = lagged((time > 0.5).astype(float), 0.2)
+    answer = apply_lag((time > 0.5).astype(float), 0.2)
     after = time > 0.55
     assert answer[after] == pytest.approx(1.0 - np.exp(-(time[after] - 0.51) / 0.2), abs=0.01)
 
@@ -14,7 +14,7 @@ def test_a_lag_answers_a_step_as_its_time_constant_says() -> None:
 def test_a_delay_moves_what_happens_to_later() -> None:
     time = np.arange(500) / GRID_HZ
     wave = np.sin(2.0 * time)
-    moved = shifted(wave, 0.13)
+    moved = apply_delay(wave, 0.13)
     assert moved[20:-20] == pytest.approx(np.sin(2.0 * (time - 0.13))[20:-20], abs=1e-3)
 
 

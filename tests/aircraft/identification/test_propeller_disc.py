@@ -38,13 +38,13 @@ def test_it_does_not_brake_and_does_not_turn_the_aircraft() -> None:
 
 def test_factors_change_what_they_name() -> None:
     thrust, current = at(ZAGI, 15.0, 0.9)
-    more, taken = at(ZAGI.changed(thrust=1.2, torque=1.5), 15.0, 0.9)
+    more, taken = at(ZAGI.with_factors(thrust=1.2, torque=1.5), 15.0, 0.9)
     assert (more, taken) == (pytest.approx(1.2 * thrust), pytest.approx(1.2 * 1.5 * current))
     # As fast at 0.9 of the throttle as before at 0.9 x 1.1 of it.
-    assert at(ZAGI.changed(speed=1.1), 15.0, 0.9) == pytest.approx(at(ZAGI, 15.0, 0.99))
+    assert at(ZAGI.with_factors(speed=1.1), 15.0, 0.9) == pytest.approx(at(ZAGI, 15.0, 0.99))
     # Two thirds of the air's power are lost: half as much again of that is a fifth of all.
-    assert at(ZAGI.changed(resistance=1.5), 15.0, 0.9)[1] == pytest.approx(1.2 * current)
-    assert at(ZAGI.changed(idle=3.0), 15.0, 0.9) == (thrust, current)
+    assert at(ZAGI.with_factors(resistance=1.5), 15.0, 0.9)[1] == pytest.approx(1.2 * current)
+    assert at(ZAGI.with_factors(idle=3.0), 15.0, 0.9) == (thrust, current)
 
 
 def test_a_weaker_battery_turns_it_slower_and_another_one_is_wound_for() -> None:

@@ -26,7 +26,7 @@ from flight.autopilots.planfly.autopilot import PlanflyGuidance
 from flight.autopilots.program import ProgramAutopilot
 from flight.autopilots.px4 import parameters as px4_parameters
 from flight.autopilots.px4.autopilot import Px4
-from world.airfield import AskedReturns
+from world.airfield import ReturnRequirements
 from world.errors import ScenarioError
 from world.scenario import Scenario, load_scenario, with_flight
 
@@ -66,7 +66,7 @@ def test_a_scenario_names_its_autopilot() -> None:
 def test_what_a_scenario_asks_of_its_returns_and_a_file_denies_is_refused(tmp_path: Path) -> None:
     """One of the two is wrong, and nobody but a person knows which."""
     file = tmp_path / "mine.parm"
-    asking = replace(load_scenario("tight"), returns=AskedReturns((), 180.0, np.zeros((0, 3))))
+    asking = replace(load_scenario("tight"), returns=ReturnRequirements((), 180.0, np.zeros((0, 3))))
     for stated, refused in (("RTL_ALTITUDE 180", False), ("RTL_ALTITUDE 181", True), ("ALT_HOLD_RTL 12000", True)):
         file.write_text(f"{stated}\n", encoding="utf-8")
         scenario = with_flight(asking, autopilot="ardupilot", params=str(file))

@@ -17,7 +17,7 @@ from logs.verdict.summary import headline, summary_lines
 from logs.verdict.verdict import Verdict
 from tests.logs.verdict.judging import leg, missile, waypoint
 from tests.synthetic import make_setup
-from world.airfield import AskedReturns
+from world.airfield import ReturnRequirements
 
 
 def failed(rule: str, place: Place, margin: float, **numbers: float) -> Finding:
@@ -107,7 +107,7 @@ def test_who_flew_is_said_with_the_parameters_that_decide_most() -> None:
 
 def test_what_px4_has_no_parameter_for_is_not_used() -> None:
     setup = make_setup(((0.0, 0.0, 100.0), (900.0, 0.0, 100.0)))
-    asked = replace(setup.scenario, returns=AskedReturns(("rtl",), None, np.zeros((0, 3)), 2))
+    asked = replace(setup.scenario, returns=ReturnRequirements(("rtl",), None, np.zeros((0, 3)), 2))
     levels = (LevelAnswer("autopilot", True, "flyable"),)
     not_used = []
     for autopilot in (ArduPlane(ArduPilotParameters.defaults()), Px4(Px4Parameters.defaults())):

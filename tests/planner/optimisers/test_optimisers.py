@@ -6,7 +6,7 @@ import pytest
 from planner.optimisers.differential_evolution import DifferentialEvolution
 from planner.optimisers.emna import Emna
 from planner.optimisers.markov_chain import MarkovChain, draw_chain, fit_chain
-from planner.optimisers.multistart import Multistart, reflected
+from planner.optimisers.multistart import Multistart, reflect_into_box
 from planner.optimisers.preference import Level, ranks
 from planner.optimisers.umda import Umda
 
@@ -105,7 +105,9 @@ def test_a_chain_keeps_the_covariance_of_neighbours_but_not_of_others() -> None:
 
 
 def test_points_beyond_the_box_are_reflected_at_its_sides() -> None:
-    np.testing.assert_allclose(reflected(np.array([0.3, -0.3, 1.2, 2.4, -1.7])), [0.3, 0.3, 0.8, 0.4, 0.3], atol=1e-12)
+    np.testing.assert_allclose(
+        reflect_into_box(np.array([0.3, -0.3, 1.2, 2.4, -1.7])), [0.3, 0.3, 0.8, 0.4, 0.3], atol=1e-12
+    )
 
 
 def test_many_starts_leave_what_is_worth_nothing_and_share_their_evaluations() -> None:

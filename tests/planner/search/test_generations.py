@@ -99,9 +99,9 @@ def test_waypoints_stay_in_their_intervals(scenario: Scenario, limits: Limits) -
 
 def test_a_stop_ends_after_the_generation_under_way(scenario: Scenario, limits: Limits) -> None:
     search = waypoint_search(scenario, limits)
-    search.stop = lambda: "interrupted" if search.done >= 2 else ""
+    search.stop_condition = lambda: "interrupted" if search.done >= 2 else ""
     waypoint_generations(search, 40, 8)
-    assert (search.done, search.ended) == (2, "interrupted")
+    assert (search.done, search.end_reason) == (2, "interrupted")
 
 
 def counted_legs(monkeypatch: pytest.MonkeyPatch) -> list[tuple[int, int]]:

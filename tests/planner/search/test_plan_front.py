@@ -9,7 +9,7 @@ from aircraft.path_limits import Limits
 from planfly.terminal.plan_answers import fewer_line
 from planner.plan import Plan, plan_json
 from planner.search import plan_front as fronts
-from planner.search.plan_front import Front, fitted_task, front_task, noticed_amounts, plan_front
+from planner.search.plan_front import Front, fit_margins, front_task, noticed_amounts, plan_front
 from world.scenario import Scenario
 
 GENERATIONS = 4
@@ -133,7 +133,7 @@ def test_a_path_that_breaks_a_constraint_has_no_objectives(scenario: Scenario, l
 def test_the_search_keeps_more_solutions_than_plans_are_asked_for(
     scenario: Scenario, limits: Limits, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(fronts, "ARCHIVE", 1)
+    monkeypatch.setattr(fronts, "MIN_ARCHIVE_SIZE", 1)
     assert len(plan_front(scenario, limits, 6, seed=3, generations=2).plans) > 2
 
 
@@ -146,7 +146,7 @@ def test_margins_are_halved_and_given_up_where_the_default_plan_does_not_keep_th
     under = np.array(path)
     under[1:-1, 2] = 0.0
     for given, share in ((path, 0.5), (under, 0.0)):
-        scored = fitted_task(task, given).scored
+        scored = fit_margins(task, given).scored
         for name in ("kill_margin", "buffer", "start_buffer", "destination_buffer"):
             low, high = getattr(certified, name), getattr(search, name)
             assert getattr(scored, name) == pytest.approx((1.0 - share) * low + share * high)

@@ -30,7 +30,7 @@ def test_among_zones_there_are_two_attempts_at_most(
         made.append(number)
         search.evaluate(search.straight_vectors())
 
-    monkeypatch.setattr(plan_path_module, "_attempt", attempt)
+    monkeypatch.setattr(plan_path_module, "_run_attempt", attempt)
     zone = {"name": "it", "kind": "exclusion", "east_m": 3000, "north_m": 0, "radius_m": 500}
     missile = {"east_m": 3000, "north_m": 0, "kill_radius_m": 500, "kill_scale_m": 100}
     for obstacles, attempts in (({"zones": [zone], "threats": []}, 2), ({"threats": [missile]}, 3)):

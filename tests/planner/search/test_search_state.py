@@ -25,10 +25,10 @@ from planner.search.search_state import (
     LENGTH,
     Search,
     SearchEnded,
+    are_safe,
+    are_violated,
     best_first,
-    safe,
     score_table,
-    violated,
 )
 from planner.seeding import (
     airspace_grids,
@@ -60,8 +60,8 @@ def test_best_first_by_constraints_then_exposure_then_length() -> None:
 
 
 def test_each_row_is_violated_or_safe_or_neither() -> None:
-    assert violated(SCORES).tolist() == [True, False, False, False, True]
-    assert safe(SCORES).tolist() == [False, False, True, False, False]
+    assert are_violated(SCORES).tolist() == [True, False, False, False, True]
+    assert are_safe(SCORES).tolist() == [False, False, True, False, False]
 
 
 # ----------------------------------------------------------------------
@@ -222,7 +222,7 @@ def test_a_search_without_a_result_goes_on_for_some_pauses(
         search.pause()
     with pytest.raises(SearchEnded):
         search.pause()
-    assert search.ended == "over"
+    assert search.end_reason == "over"
     line = encoding.decode(search.archive.vectors)[0]
     np.testing.assert_allclose(line[[0, -1]], [scenario.start, scenario.destination])
     shares = (line - line[0]) @ (line[-1] - line[0]) / np.linalg.norm(line[-1] - line[0]) ** 2

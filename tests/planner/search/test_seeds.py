@@ -18,7 +18,13 @@ from planner.plan import Certificate
 from planner.search.algorithms import ALGORITHMS
 from planner.search.plan_path import plan_path
 from planner.search.search_state import Search
-from planner.search.seeds import MIN_DETOUR, search_other_sides, search_turning_back, starting_vectors, straight_line
+from planner.search.seeds import (
+    MIN_DETOUR,
+    search_other_sides,
+    search_turning_back,
+    starting_vectors,
+    try_straight_line,
+)
 from planner.seeding.grids import GridRoute
 from tests.instances import random_scenario
 from tests.soak import some
@@ -44,7 +50,7 @@ def test_the_straight_line_is_an_answer_only_where_nothing_stands_in_it(
     for threats, clear in (([], True), (None, False)):
         scenario = small(terrain=FLAT) if threats is None else small(terrain=FLAT, threats=threats)
         search = search_of(scenario, make_limits(scenario))
-        assert straight_line(search) == clear
+        assert try_straight_line(search) == clear
         assert len(search.archive.vectors) == int(clear)
 
 
@@ -108,14 +114,14 @@ def test_among_zones_a_later_attempt_follows_the_best_routes_alone(
     for again in (False, True):
         search = search_of(scenario, make_limits(scenario))
         route = GridRoute(np.array([[0.0, 0.0, 150.0], [6000.0, 0.0, 150.0]]), 6000.0)
-        monkeypatch.setattr(seeds_module, "_routes", lambda *_, route=route: [route] * 7)
+        monkeypatch.setattr(seeds_module, "_list_routes", lambda *_, route=route: [route] * 7)
         improved: list[int] = []
         monkeypatch.setattr(
             Search,
             "improve",
             lambda self, *_, improved=improved: improved.append(0) or self.evaluate(straight(self))[0],
         )
-        starting_vectors(search, GRIDS, None, again=again)
+        starting_vectors(search, GRIDS, None, is_retry=again)
         followed.append(len(improved))
     assert followed == [7, 3]
 

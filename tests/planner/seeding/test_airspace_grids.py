@@ -12,10 +12,10 @@ from planner.evaluation.encoding import rotated_frame
 from planner.evaluation.problem import SEARCH_BUFFER, SEARCH_ZONE_MARGIN, ProblemArrays, make_problem
 from planner.seeding import airspace_grids
 from planner.seeding.airspace_grids import (
-    FINER,
     MAX_CELLS,
     MIN_LAYERS,
     SLOPE_SHARE,
+    STAGE_FACTOR,
     AirspaceGrid,
     airspace_grid,
     airspace_routes,
@@ -196,7 +196,7 @@ def test_routes_of_one_grid_take_both_sides(
     data = arrays(small, make_limits, zones=[zone])
     routes = list(airspace_routes(data, rotated_frame(data.start, data.destination), SPAN, ((20, 2),)))
     # One where the grid is not gentle, and two where it is.
-    assert [len(route.points) for route in routes] == [20 * FINER + 1] * 3
+    assert [len(route.points) for route in routes] == [20 * STAGE_FACTOR + 1] * 3
     routes = routes[1:]
     middles = [float(np.interp(3000.0, route.points[:, 0], route.points[:, 1])) for route in routes]
     assert middles[0] < -800.0

@@ -11,7 +11,7 @@ from planner.evaluation.encoding import ENCODINGS, Encoding, rotated_vectors
 from planner.evaluation.graded_scores import graded_scores
 from planner.evaluation.problem import Problem, make_problem
 from planner.plan import Objective
-from planner.search.search_state import score_table, violated
+from planner.search.search_state import are_violated, score_table
 from planner.seeding import pattern_search
 from planner.seeding.pattern_search import merits, search_patterns
 from world.arrays import Floats
@@ -81,7 +81,7 @@ def test_evaluations_that_end_early_change_no_result(task: str, most: int, reque
     def measure(vectors: Floats) -> tuple[float, bool]:
         scores = score_table(*graded_scores(problem.search, encoding.decode(vectors[None])))
         exposed = scores[0, 4 + Objective.KILL_EXPOSURE] > 0.0
-        return float(merits(scores)[0]), not (violated(scores)[0] or exposed)
+        return float(merits(scores)[0]), not (are_violated(scores)[0] or exposed)
 
     moves, axes = pattern_search._triangular_basis(6)
     span = float(np.linalg.norm(problem.space.destination[:2] - problem.space.start[:2])) / 6

@@ -14,7 +14,7 @@ from planner.seeding.flown_corners import SAMPLES
 from planner.seeding.shortening import resample
 from planner.seeding.shortening_model import (
     BAND,
-    NEAR,
+    NEARBY_DISTANCE,
     ActiveConstraints,
     LagrangianModel,
     active_constraints,
@@ -43,7 +43,7 @@ def test_the_missiles_near_each_leg_are_those_within_reach_of_it() -> None:
             away = np.sqrt(((path[i] + shares * (path[i + 1] - path[i]) - place) ** 2).sum(axis=1)).min()
             room = away - missile["radius"] - data.kill_margin
             # Within what the points on a leg lie apart it may be either.
-            assert abs(room - NEAR) < 1.0 or ((i, k) in pairs) == (room < NEAR)
+            assert abs(room - NEARBY_DISTANCE) < 1.0 or ((i, k) in pairs) == (room < NEARBY_DISTANCE)
     assert len(pairs) > 10
 
 

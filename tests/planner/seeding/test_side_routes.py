@@ -91,7 +91,7 @@ def test_a_route_through_a_cell_costs_what_was_said_and_leads_from_end_to_end(da
     frame = rotated_frame(data.start, data.destination)
     costs = grid_costs(data, frame, GRID, math.inf)
     cells, best = cheapest_route(data, frame, GRID, np.zeros((7, 5)), math.inf)
-    assert costs.left[0, 0, 2] == pytest.approx(best)
+    assert costs.remaining[0, 0, 2] == pytest.approx(best)
     assert costs.reached[6, 0, 2] == pytest.approx(best)
     through = route_through(costs, 3, int(cells["layer"][3]), int(cells["across"][3]))
     # Of ways that cost the same either may be taken.

@@ -10,7 +10,7 @@ from world.airspace.zone_kernels import (
     ZoneRecords,
     box_distance,
     edge_distance,
-    inside_share,
+    inside_fraction,
     outside_band,
     segment_distance,
     zone_records,
@@ -67,7 +67,7 @@ def test_the_distance_of_a_segment_and_its_share_inside_are_shapelys() -> None:
             at = edge_distance(records, z, ax + share * (bx - ax), ay + share * (by - ay))
             assert at == pytest.approx(away, abs=1e-6) if away > 0.0 else at <= 1e-6
             inside = line.intersection(shape).length / line.length
-            assert inside_share(records, z, ax, ay, bx, by, 0.0, 1.0) == pytest.approx(inside, abs=1e-9)
+            assert inside_fraction(records, z, ax, ay, bx, by, 0.0, 1.0) == pytest.approx(inside, abs=1e-9)
             met += 0.0 < inside < 1.0
     assert met > 150
 
@@ -77,10 +77,10 @@ def test_a_part_of_a_segment_counts_by_itself() -> None:
     # From 50 m west of the square to 50 m east of it: inside from a quarter to 0.45, and from 0.55 to 0.75.
     way = (-50.0, 50.0, 150.0, 50.0)
     for (first, last), wanted in {(0.0, 1.0): 0.4, (0.3, 0.5): 0.15, (0.46, 0.54): 0.0, (0.6, 0.7): 0.1}.items():
-        assert inside_share(records, 0, *way, first, last) == pytest.approx(wanted, abs=1e-12)
+        assert inside_fraction(records, 0, *way, first, last) == pytest.approx(wanted, abs=1e-12)
     # A way that ends on the outline, and one through a corner.
-    assert inside_share(records, 0, -50.0, 50.0, 0.0, 50.0, 0.0, 1.0) == pytest.approx(0.0, abs=1e-12)
-    assert inside_share(records, 0, -20.0, -20.0, 30.0, 30.0, 0.0, 1.0) == pytest.approx(0.6, abs=1e-12)
+    assert inside_fraction(records, 0, -50.0, 50.0, 0.0, 50.0, 0.0, 1.0) == pytest.approx(0.0, abs=1e-12)
+    assert inside_fraction(records, 0, -20.0, -20.0, 30.0, 30.0, 0.0, 1.0) == pytest.approx(0.6, abs=1e-12)
 
 
 def test_a_cylinder_by_plain_sums() -> None:
@@ -88,13 +88,13 @@ def test_a_cylinder_by_plain_sums() -> None:
     assert edge_distance(records, 0, 10.0, 90.0) == pytest.approx(20.0)
     assert edge_distance(records, 0, 10.0, 60.0) == pytest.approx(-10.0)
     # 30 m beside the centre a chord is 80 m long.
-    assert inside_share(records, 0, -90.0, 50.0, 110.0, 50.0, 0.0, 1.0) == pytest.approx(0.4)
-    assert inside_share(records, 0, -90.0, 71.0, 110.0, 71.0, 0.0, 1.0) == 0.0
+    assert inside_fraction(records, 0, -90.0, 50.0, 110.0, 50.0, 0.0, 1.0) == pytest.approx(0.4)
+    assert inside_fraction(records, 0, -90.0, 71.0, 110.0, 71.0, 0.0, 1.0) == 0.0
     assert segment_distance(records, 0, -90.0, 75.0, 110.0, 75.0) == pytest.approx((5.0, 0.5))
     assert segment_distance(records, 0, -90.0, 65.0, 110.0, 65.0)[0] == 0.0
     # On the spot, inside and outside.
-    assert inside_share(records, 0, 10.0, 69.9, 10.0, 69.9, 0.0, 1.0) == 1.0
-    assert inside_share(records, 0, 10.0, 70.1, 10.0, 70.1, 0.0, 1.0) == 0.0
+    assert inside_fraction(records, 0, 10.0, 69.9, 10.0, 69.9, 0.0, 1.0) == 1.0
+    assert inside_fraction(records, 0, 10.0, 70.1, 10.0, 70.1, 0.0, 1.0) == 0.0
     assert segment_distance(records, 0, 10.0, 71.0, 10.0, 71.0)[0] == pytest.approx(1.0)
 
 

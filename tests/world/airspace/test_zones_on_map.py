@@ -8,7 +8,7 @@ import pytest
 from tests.world.made.made_scenario import SMALL, made_spec, refused, with_fault
 from tests.world.test_scenario_tables import SQUARE, zone
 from world.airspace.zones import Cylinder, Polygon, Zone, ZoneLevel
-from world.airspace.zones_on_map import EDGE_BEND, ring_on_map, zone_broken_at
+from world.airspace.zones_on_map import EDGE_BEND, first_violated_zone, ring_on_map
 from world.errors import ScenarioError
 from world.frames import GeoOrigin, to_geo, to_map
 from world.scenario import Scenario, from_spec, load_scenario
@@ -159,8 +159,8 @@ def test_which_zone_a_place_violates() -> None:
         (0.0, 501.0, 200.0): field,
     }
     for place, wanted in cases.items():
-        assert zone_broken_at([mast, field], np.array(place), None) is wanted
+        assert first_violated_zone([mast, field], np.array(place), None) is wanted
     # Over unknown ground a place counts as within a band above ground: an exclusion's, and an inclusion's.
     for kind, wanted in (("exclusion", True), ("inclusion", False)):
         low = Zone("low", kind, Cylinder(0.0, 0.0, 50.0), None, ZoneLevel(9.0, "ground"))
-        assert (zone_broken_at([low], np.zeros(3), None) is low) == wanted
+        assert (first_violated_zone([low], np.zeros(3), None) is low) == wanted

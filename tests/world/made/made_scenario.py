@@ -57,7 +57,7 @@ def same_scenario(a: Scenario, b: Scenario) -> bool:
         same = same and asked[0] == asked[1]
         arrays.append((a.returns.rally, b.returns.rally))
     if a.terrain is not None and b.terrain is not None:
-        arrays += [(a.terrain.heights, b.terrain.heights), (a.terrain.to_pixel.rows(), b.terrain.to_pixel.rows())]
+        arrays += [(a.terrain.heights, b.terrain.heights), (a.terrain.to_pixel.to_rows(), b.terrain.to_pixel.to_rows())]
     return same and all(np.array_equal(x, y) for x, y in arrays)
 
 
