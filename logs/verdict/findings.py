@@ -158,7 +158,7 @@ def undecided_findings(findings: Iterable[Finding]) -> tuple[Finding, ...]:
     >>> undecided_findings([slope]) == (slope,)
     True
     """
-    return tuple(item for item in findings if item.ok is None and item.check in _UNDECIDED)
+    return tuple(finding for finding in findings if finding.ok is None and finding.check in _UNDECIDED)
 
 
 def closest_to_limit(findings: Iterable[Finding]) -> Finding | None:
@@ -235,14 +235,16 @@ def _rounded_or_none(value: float | None) -> float | None:
     return round(float(value), 6) + 0.0  # no -0.0
 
 
-def badness(item: Finding) -> tuple[int, float]:
+def badness(finding: Finding) -> tuple[int, float]:
     """Return a sort key that puts the worst finding first: failed, not judged, passed, and within each by margin.
 
     >>> near, far = (make_finding("slope", Place("leg", 1), ok=True, reason="", margin=m) for m in (4.0, 9.0))
     >>> badness(near) < badness(far)
     True
     """
-    return (0 if item.ok is False else 1 if item.ok is None else 2), 0.0 if item.margin is None else item.margin
+    return (
+        0 if finding.ok is False else 1 if finding.ok is None else 2
+    ), 0.0 if finding.margin is None else finding.margin
 
 
 def reason_of(faults: Sequence[Message], facts: Sequence[str] = ()) -> str:

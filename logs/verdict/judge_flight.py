@@ -73,9 +73,9 @@ def judge_flight(
         return judge_unflown(whole, ended, log_complete=log_complete)
     in_air, aligned = flown_phases(whole, track)
     findings = flown_findings(in_air, aligned, ended, log_complete)
-    complete = all(item.ok is True for item in findings if item.rule == "completion")
+    complete = all(finding.ok is True for finding in findings if finding.rule == "completion")
     unjudged = undecided_text(findings)
-    flyable = complete and not unjudged and not any(item.ok is False for item in findings)
+    flyable = complete and not unjudged and not any(finding.ok is False for finding in findings)
     findings = with_suggestions(in_air, aligned, findings)
     findings = with_passing_suggestions(findings, None if reference is None else reference.tried)
     levels = _level_answers(whole, findings, flyable, reference)
@@ -104,19 +104,23 @@ def _level_answers(
     levels, source = [], requirements.setup.envelope.source
     if requirements.envelope:
         predicted = (*deciding_items(requirements.setup), *geometric_findings(requirements, flown))
-        fails = any(item.ok is False for item in predicted)
+        fails = any(finding.ok is False for finding in predicted)
         passes = not fails and not undecided_findings(predicted)
-        differing = _disagreements("geometry", {(item.rule, item.place): item.ok for item in predicted}, flown)
+        differing = _disagreements(
+            "geometry", {(finding.rule, finding.place): finding.ok for finding in predicted}, flown
+        )
         said = headline(predicted, passes, source)
         levels.append(LevelAnswer("geometry", passes, said, differing, undecided=not passes and not fails))
     if requirements.envelope and reference is not None and reference.airframe is not None:
         airframe = reference.airframe
-        passed = {(item.rule, item.place): (item.rule, item.place) not in airframe.failed for item in flown}
+        passed = {
+            (finding.rule, finding.place): (finding.rule, finding.place) not in airframe.failed for finding in flown
+        }
         differing = _disagreements("airframe", passed, flown)
         # What is not flyable although nothing of it failed was left open.
         unsure = not airframe.flyable and not airframe.failed
         levels.append(LevelAnswer("airframe", airframe.flyable, airframe.headline, differing, undecided=unsure))
-    undecided = bool(undecided_findings(flown)) and not any(item.ok is False for item in flown)
+    undecided = bool(undecided_findings(flown)) and not any(finding.ok is False for finding in flown)
     own = LevelAnswer(flown_level(requirements.setup), flyable, headline(flown, flyable, source), undecided=undecided)
     return (*levels, own)
 
@@ -125,7 +129,7 @@ def _disagreements(
     level: str, outcomes: Mapping[tuple[str, Place], bool | None], flown: tuple[Finding, ...]
 ) -> tuple[Disagreement, ...]:
     """Return the disagreements between a level and the flight, in the order of the level's findings."""
-    judged = {(item.rule, item.place): item.ok for item in flown}
+    judged = {(finding.rule, finding.place): finding.ok for finding in flown}
     out = []
     for (rule, place), there in outcomes.items():
         here = judged.get((rule, place))

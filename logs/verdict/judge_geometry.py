@@ -43,7 +43,7 @@ def deciding_items(setup: FlightSetup) -> list[Finding]:
     """
     asked = setup.plan is None or setup.autopilot.refuses
     found = mission_findings(setup) if asked else []
-    return [item for item in found if item.ok is False or undecided_findings([item])]
+    return [finding for finding in found if finding.ok is False or undecided_findings([finding])]
 
 
 def geometric_findings(requirements: RouteRequirements, flown: Sequence[Finding] | None = None) -> tuple[Finding, ...]:
@@ -95,7 +95,7 @@ def _run_rules(
 
     def asked(rule: Rule, judge: Judge) -> Sequence[Finding]:
         if rule.of_route and flown is not None:
-            return [item for item in flown if item.rule == rule.name]
+            return [finding for finding in flown if finding.rule == rule.name]
         return judge(requirements, aligned, geometric=geometric)
 
     findings: tuple[Finding, ...] = tuple(
@@ -129,23 +129,25 @@ def _other_side_findings(requirements: RouteRequirements, findings: Sequence[Fin
         return []
     sides = [
         {
-            (item.rule, item.place): item
+            (finding.rule, finding.place): finding
             for name in _RULES_OF_PLACE
             if (judge := RULES[name].judge) is not None
-            for item in judge(side, None, geometric=True)
-            if item.ok is False
+            for finding in judge(side, None, geometric=True)
+            if finding.ok is False
         }
         for side in (route_requirements(setup), route_requirements(setup.turned_to_other_side()))
     ]
-    failed = {(item.rule, item.place) for item in findings if item.ok is False}
+    failed = {(finding.rule, finding.place) for finding in findings if finding.ok is False}
     where = ", ".join(place_text(requirements.waypoint(int(i))) for i in corners)
     out = []
     for key in (sides[0].keys() ^ sides[1].keys()) - failed:
-        item = sides[0].get(key) or sides[1][key]
+        finding = sides[0].get(key) or sides[1][key]
         brief = f"a reversal of the course at {where} may turn to either side, and one side fails"
-        fault = message(brief, f": {item.reason}")
-        out.append(make_finding(item.rule, item.place, ok=None, reason=fault.text, faults=[fault], check=NOT_FLOWN))
-    return sorted(out, key=lambda item: (item.rule, str(item.place)))
+        fault = message(brief, f": {finding.reason}")
+        out.append(
+            make_finding(finding.rule, finding.place, ok=None, reason=fault.text, faults=[fault], check=NOT_FLOWN)
+        )
+    return sorted(out, key=lambda finding: (finding.rule, str(finding.place)))
 
 
 def one_per_stop(findings: Sequence[Finding]) -> tuple[Finding, ...]:
@@ -159,12 +161,12 @@ def one_per_stop(findings: Sequence[Finding]) -> tuple[Finding, ...]:
     [3]
     """
     worst: dict[tuple[object, ...], Finding] = {}
-    for k, item in enumerate(findings):
-        place = item.place
+    for k, finding in enumerate(findings):
+        place = finding.place
         known = place.kind in ("leg", "waypoint") and place.number is not None
-        key = (item.rule, item.check, place.kind, place.number, place.item, place.to_item) if known else (k,)
-        if key not in worst or badness(item) < badness(worst[key]):
-            worst[key] = item
+        key = (finding.rule, finding.check, place.kind, place.number, place.item, place.to_item) if known else (k,)
+        if key not in worst or badness(finding) < badness(worst[key]):
+            worst[key] = finding
     return tuple(worst.values())
 
 
@@ -178,12 +180,12 @@ def with_suggestions(
     out, first = [], requirements.setup.route.return_from
     last = min(requirements.legs, requirements.setup.route.return_until)
     back = {requirements.leg(i) for i in range(first, last)} if first >= 0 else set()
-    for item in findings:
-        suggest = RULES[item.rule].suggest
-        asked = item.ok is False or (item.ok is None and item.check == UNKNOWN_AIRCRAFT)
-        if asked and suggest is not None and item.place not in back:
-            item = replace(item, suggestions=suggest(requirements, aligned, item))
-        out.append(item)
+    for finding in findings:
+        suggest = RULES[finding.rule].suggest
+        asked = finding.ok is False or (finding.ok is None and finding.check == UNKNOWN_AIRCRAFT)
+        if asked and suggest is not None and finding.place not in back:
+            finding = replace(finding, suggestions=suggest(requirements, aligned, finding))
+        out.append(finding)
     return tuple(out)
 
 
@@ -207,8 +209,8 @@ def with_passing_suggestions(
         return findings
     passed = {(one.rule, one.place): one.suggestions for one in tried}
     return tuple(
-        replace(item, suggestions=passed.get((item.rule, item.place), ())) if item.ok is False else item
-        for item in findings
+        replace(finding, suggestions=passed.get((finding.rule, finding.place), ())) if finding.ok is False else finding
+        for finding in findings
     )
 
 
@@ -244,7 +246,7 @@ def judge_geometry(setup: FlightSetup, requirements: RouteRequirements | None = 
         *([_infeasible_finding(setup.plan)] if setup.plan is not None and not setup.plan.feasible else []),
     )
     complete = setup.plan is None or setup.plan.feasible
-    unjudged, fails = undecided_text(findings), any(item.ok is False for item in findings)
+    unjudged, fails = undecided_text(findings), any(finding.ok is False for finding in findings)
     flyable = complete and not unjudged and not fails
     said = headline(findings, flyable, setup.envelope.source)
     levels = (LevelAnswer("geometry", flyable, said, undecided=bool(unjudged) and not fails),)
@@ -284,7 +286,7 @@ def judge_unflown(requirements: RouteRequirements, ended: str, *, log_complete: 
         "completion", FLIGHT, ok=False, reason=reason_of(faults), faults=faults, method="nothing was flown"
     )
     predicted = geometric_findings(requirements)
-    passes = not any(item.ok is False for item in predicted)
+    passes = not any(finding.ok is False for finding in predicted)
     findings = (*with_suggestions(requirements, None, predicted), stopped)
     levels = (
         LevelAnswer("geometry", passes, headline(predicted, passes)),
@@ -352,10 +354,10 @@ def _infeasible_finding(plan: Plan) -> Finding:
 
 
 def _plan_lines(findings: list[Finding], plan: Plan, conditions: Conditions | None) -> tuple[str, ...]:
-    failed = [item for item in findings if item.ok is False and item.rule != "completion"]
+    failed = [finding for finding in findings if finding.ok is False and finding.rule != "completion"]
     first, more = headline(findings, False), []
     if failed:
-        text = ", ".join(f"{item.rule} ({item.reason})" for item in failed)
+        text = ", ".join(f"{finding.rule} ({finding.reason})" for finding in failed)
         first = f"not flyable: no feasible plan was found: {text}"
         more = ["Nothing was flown", *(f"Problem: {problem}" for problem in plan.certificate.problems)]
     said = [] if conditions is None else [*condition_lines(conditions), autopilot_line(conditions, flown=False)]

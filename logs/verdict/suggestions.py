@@ -59,7 +59,9 @@ _HORIZONTAL_SHIFTS: tuple[tuple[Quantity, str, float], ...] = (
 _VERTICAL_SHIFTS: tuple[tuple[Quantity, str, float], ...] = (("height", "up", 1.0), ("descent", "up", -1.0))
 
 
-def pass_zone(requirements: RouteRequirements, aligned: AlignedTrack | None, item: Finding) -> tuple[Suggestion, ...]:
+def pass_zone(
+    requirements: RouteRequirements, aligned: AlignedTrack | None, finding: Finding
+) -> tuple[Suggestion, ...]:
     """Suggest passing a zone further to one side, or higher or lower; the smallest change first.
 
     item: the finding on the violated zone.
@@ -67,12 +69,12 @@ def pass_zone(requirements: RouteRequirements, aligned: AlignedTrack | None, ite
     If the planned path violates the zone, the shift of its violating legs includes how much deeper the flight went.  If
     only the flight violates the zone, the violating legs of the flight are shifted.
     """
-    z, facts = item.place.index, {fact.what: fact.value for fact in item.facts}
+    z, facts = finding.place.index, {fact.what: fact.value for fact in finding.facts}
     if z is None or "entry leg" not in facts:
         return ()
     first, last = int(facts["entry leg"]), int(facts["exit leg"])
     record, terrain = zone_records([requirements.airspace.zones[z]]), requirements.setup.scenario.terrain
-    planned, flown = item.planned or 0.0, item.flown or 0.0
+    planned, flown = finding.planned or 0.0, finding.flown or 0.0
     if aligned is not None and planned <= ROUNDING_M:
         moves, deeper = flown_moves(aligned, first, last), 0.0
     else:
@@ -86,7 +88,9 @@ def pass_zone(requirements: RouteRequirements, aligned: AlignedTrack | None, ite
             if shift is not None:
                 best = (
                     shift,
-                    Change(what, item.place, None, float(math.ceil(shift + deeper + SUGGESTION_LENGTH_MARGIN_M)), "m"),
+                    Change(
+                        what, finding.place, None, float(math.ceil(shift + deeper + SUGGESTION_LENGTH_MARGIN_M)), "m"
+                    ),
                 )
         if best is not None:
             found.append(best)
@@ -130,24 +134,26 @@ def _smallest_first(alternatives: list[_Sized]) -> tuple[Suggestion, ...]:
     return tuple(suggestion for _, suggestion in sorted(helpful, key=lambda sized: sized[0]))
 
 
-def ease_slope(requirements: RouteRequirements, _aligned: AlignedTrack | None, item: Finding) -> tuple[Suggestion, ...]:
+def ease_slope(
+    requirements: RouteRequirements, _aligned: AlignedTrack | None, finding: Finding
+) -> tuple[Suggestion, ...]:
     """Suggest a gentler slope, a longer leg or another speed for one leg; the smallest relative change first.
 
     If the aircraft is not known well enough, suggest a flight that measures its ability.
     """
-    leg = item.place.index
+    leg = finding.place.index
     if leg is None:
         return ()
-    if item.check == UNKNOWN_AIRCRAFT:
+    if finding.check == UNKNOWN_AIRCRAFT:
         what: Quantity = "full throttle" if requirements.slopes[leg] > 0.0 else "no throttle"
-        return ((Change(what, item.place, None, MIN_EVIDENCE_FLIGHT_S, "s"),),)
+        return ((Change(what, finding.place, None, MIN_EVIDENCE_FLIGHT_S, "s"),),)
     limit, source = slope_limit(requirements, leg)
     planned = abs(float(requirements.slopes[leg]))
     rise = abs(float(requirements.points[leg + 1, 2] - requirements.points[leg, 2]))
     run = float(requirements.runs[leg])
-    if planned <= limit and item.flown is not None:
+    if planned <= limit and finding.flown is not None:
         # The geometry passes and the flight failed: the slope that was flown is the limit.
-        limit = min(limit, abs(math.radians(item.flown)))
+        limit = min(limit, abs(math.radians(finding.flown)))
     allowed = limit - SUGGESTION_ANGLE_MARGIN_RAD
     if allowed <= 0.0 or planned <= allowed:
         return _gentler_arc(requirements, leg)
@@ -183,9 +189,11 @@ def _gentler_arc(requirements: RouteRequirements, leg: int) -> tuple[Suggestion,
     return (tuple(changes),) if changes else ()
 
 
-def ease_turn(requirements: RouteRequirements, _aligned: AlignedTrack | None, item: Finding) -> tuple[Suggestion, ...]:
+def ease_turn(
+    requirements: RouteRequirements, _aligned: AlignedTrack | None, finding: Finding
+) -> tuple[Suggestion, ...]:
     """Suggest a gentler turn, longer legs or a lower speed; the smallest relative change first."""
-    i = item.place.index
+    i = finding.place.index
     if i is None:
         return ()
     limit, source = turn_limit(requirements, i)
@@ -320,10 +328,12 @@ def _whole_metres(metres: float) -> float:
     return float(round(metres))
 
 
-def pass_threat(requirements: RouteRequirements, aligned: AlignedTrack | None, item: Finding) -> tuple[Suggestion, ...]:
+def pass_threat(
+    requirements: RouteRequirements, aligned: AlignedTrack | None, finding: Finding
+) -> tuple[Suggestion, ...]:
     """Suggest passing a missile's sphere further away."""
-    m = item.place.index
-    if m is None or item.place.kind != "missile":
+    m = finding.place.index
+    if m is None or finding.place.kind != "missile":
         return ()
     threats = requirements.setup.scenario.threats
     one = slice(m, m + 1)
@@ -332,52 +342,54 @@ def pass_threat(requirements: RouteRequirements, aligned: AlignedTrack | None, i
     if aligned is not None and len(aligned.track) > 1:
         nearest = min(nearest, path_spheres(aligned.track.position, aligned.track.time, *spheres).closest[0])
     away = _whole_metres(threats.kill_radius[m] - nearest + SUGGESTION_LENGTH_MARGIN_M)
-    return ((Change("distance", item.place, None, away, "m"),),)
+    return ((Change("distance", finding.place, None, away, "m"),),)
 
 
 def fly_higher(
-    _requirements: RouteRequirements, _aligned: AlignedTrack | None, item: Finding
+    _requirements: RouteRequirements, _aligned: AlignedTrack | None, finding: Finding
 ) -> tuple[Suggestion, ...]:
     """Suggest flying a leg higher above the ground."""
-    if item.limit is None or item.margin is None:
+    if finding.limit is None or finding.margin is None:
         return ()
-    short = -item.margin + SUGGESTION_LENGTH_MARGIN_M
-    if item.planned is not None:
+    short = -finding.margin + SUGGESTION_LENGTH_MARGIN_M
+    if finding.planned is not None:
         # A flight that ended early did not reach the lowest place.
-        short = max(short, item.limit - item.planned + SUGGESTION_LENGTH_MARGIN_M)
+        short = max(short, finding.limit - finding.planned + SUGGESTION_LENGTH_MARGIN_M)
     return (
-        ((Change("height", item.place, None, _whole_metres(short), "m"),),)
+        ((Change("height", finding.place, None, _whole_metres(short), "m"),),)
         if short > SUGGESTION_LENGTH_MARGIN_M
         else ()
     )
 
 
-def fly_lower(_requirements: RouteRequirements, _aligned: AlignedTrack | None, item: Finding) -> tuple[Suggestion, ...]:
+def fly_lower(
+    _requirements: RouteRequirements, _aligned: AlignedTrack | None, finding: Finding
+) -> tuple[Suggestion, ...]:
     """Suggest flying a leg lower above the ground."""
-    heights = [height for height in (item.planned, item.flown) if height is not None]
-    if item.place.kind != "leg" or item.limit is None or not heights or not max(heights) > item.limit:
+    heights = [height for height in (finding.planned, finding.flown) if height is not None]
+    if finding.place.kind != "leg" or finding.limit is None or not heights or not max(heights) > finding.limit:
         return ()
-    high = _whole_metres(max(heights) - item.limit + SUGGESTION_LENGTH_MARGIN_M)
-    return ((Change("descent", item.place, None, high, "m"),),)
+    high = _whole_metres(max(heights) - finding.limit + SUGGESTION_LENGTH_MARGIN_M)
+    return ((Change("descent", finding.place, None, high, "m"),),)
 
 
 def stay_inside(
-    _requirements: RouteRequirements, _aligned: AlignedTrack | None, item: Finding
+    _requirements: RouteRequirements, _aligned: AlignedTrack | None, finding: Finding
 ) -> tuple[Suggestion, ...]:
     """Suggest bringing the path further inside the area."""
-    if item.margin is None or not item.margin < 0.0:
+    if finding.margin is None or not finding.margin < 0.0:
         return ()
-    return ((Change("inset", FLIGHT, None, _whole_metres(-item.margin + SUGGESTION_LENGTH_MARGIN_M), "m"),),)
+    return ((Change("inset", FLIGHT, None, _whole_metres(-finding.margin + SUGGESTION_LENGTH_MARGIN_M), "m"),),)
 
 
 def use_less_energy(
-    requirements: RouteRequirements, _aligned: AlignedTrack | None, item: Finding
+    requirements: RouteRequirements, _aligned: AlignedTrack | None, finding: Finding
 ) -> tuple[Suggestion, ...]:
     """Suggest a shorter flight, or a larger battery or tank."""
-    used = item.planned if item.flown is None else item.flown
-    if used is None or item.limit is None or item.margin is None or used <= item.limit:
+    used = finding.planned if finding.flown is None else finding.flown
+    if used is None or finding.limit is None or finding.margin is None or used <= finding.limit:
         return ()
-    more = used / item.limit
+    more = used / finding.limit
     envelope = requirements.setup.envelope
     store: Quantity = "battery" if envelope.volts or not envelope.power_level.size else "tank"
     shorter = Change("duration", FLIGHT, None, float(math.ceil(100.0 * (1.0 - 1.0 / more))), "%")
@@ -385,38 +397,40 @@ def use_less_energy(
     return (shorter,), (larger,)
 
 
-def fly_faster(requirements: RouteRequirements, _aligned: AlignedTrack | None, item: Finding) -> tuple[Suggestion, ...]:
+def fly_faster(
+    requirements: RouteRequirements, _aligned: AlignedTrack | None, finding: Finding
+) -> tuple[Suggestion, ...]:
     """Suggest a higher airspeed, above the stall."""
-    if item.limit is None:
+    if finding.limit is None:
         return ()
     leg = int(np.argmin(requirements.route.airspeed))
     now = float(requirements.setup.route.airspeed[leg])
     wanted = (
         math.ceil(
-            10.0 * item.limit * (1.0 + SUGGESTION_SPEED_MARGIN_FRACTION) / _true_airspeed_ratio(requirements, leg)
+            10.0 * finding.limit * (1.0 + SUGGESTION_SPEED_MARGIN_FRACTION) / _true_airspeed_ratio(requirements, leg)
         )
         / 10.0
     )
-    return ((Change("airspeed", item.place, now, wanted, "m/s"),),) if wanted > now else ()
+    return ((Change("airspeed", finding.place, now, wanted, "m/s"),),) if wanted > now else ()
 
 
 def fly_level_speed(
-    requirements: RouteRequirements, _aligned: AlignedTrack | None, item: Finding
+    requirements: RouteRequirements, _aligned: AlignedTrack | None, finding: Finding
 ) -> tuple[Suggestion, ...]:
     """Suggest an airspeed at which level flight is possible at the leg's altitude.
 
     If the maximum airspeed is uncertain, suggest only airspeeds that are certainly possible.
     """
-    leg = item.place.index
-    if leg is None or item.limit is None or item.margin is None:
+    leg = finding.place.index
+    if leg is None or finding.limit is None or finding.margin is None:
         return ()
     commanded = float(requirements.setup.route.airspeed[leg])
     up = float(max(requirements.points[leg, 2], requirements.points[leg + 1, 2]))
     envelope = requirements.setup.envelope
-    known = envelope.surely() if item.check == UNKNOWN_AIRCRAFT else envelope
+    known = envelope.surely() if finding.check == UNKNOWN_AIRCRAFT else envelope
     low, high = (speed / _true_airspeed_ratio(requirements, leg) for speed in known.level_speeds(up))
     if low <= commanded <= high:
         return ()
     low = math.ceil(10.0 * low * (1.0 + SUGGESTION_SPEED_MARGIN_FRACTION)) / 10.0
     high = math.floor(10.0 * high * (1.0 - SUGGESTION_SPEED_MARGIN_FRACTION)) / 10.0
-    return ((Change("airspeed", item.place, commanded, low, "m/s", most=high),),)
+    return ((Change("airspeed", finding.place, commanded, low, "m/s", most=high),),)

@@ -57,23 +57,23 @@ def undecided_text(findings: Sequence[Finding]) -> str:
     """
     open_findings = undecided_findings(findings)
     ways = [
-        f"{'the turn-around on' if item.place.kind == 'leg' else 'the circle at'} {place_text(item.place)}"
-        for item in open_findings
-        if item.check == UNKNOWN_WAY
+        f"{'the turn-around on' if finding.place.kind == 'leg' else 'the circle at'} {place_text(finding.place)}"
+        for finding in open_findings
+        if finding.check == UNKNOWN_WAY
     ]
     circles = f"where {' and '.join(ways[:_NAMED])} is flown, only a flight tells" if ways else ""
-    known = _unknown_aircraft_text([item for item in open_findings if item.check == UNKNOWN_AIRCRAFT])
-    beside = [item.brief for item in open_findings if item.check in APART_FROM_FLIGHT]
-    items = [item.brief for item in open_findings if item.check == NOT_FLOWN]
+    known = _unknown_aircraft_text([finding for finding in open_findings if finding.check == UNKNOWN_AIRCRAFT])
+    beside = [finding.brief for finding in open_findings if finding.check in APART_FROM_FLIGHT]
+    items = [finding.brief for finding in open_findings if finding.check == NOT_FLOWN]
     more = [f"{len(items) - _NAMED} more items"] if len(items) > _NAMED else []
     return "; ".join(filter(None, [known, circles, *items[:_NAMED], *more, *beside]))
 
 
 def _unknown_aircraft_text(every: Sequence[Finding]) -> str:
     """Describe the findings for which the aircraft is not known well enough; return "" if there are none."""
-    found = [item for item in every if item.rule == "slope"]
+    found = [finding for finding in every if finding.rule == "slope"]
     if len(found) < len(every):
-        speeds = sum(item.rule == "speed" for item in every)
+        speeds = sum(finding.rule == "speed" for finding in every)
         subjects = [
             f"{name}{'s' if count > 1 or name == 'slope' else ''} on {count} leg{'s' if count > 1 else ''}"
             for name, count in (("slope", len(found)), ("airspeed", speeds))
@@ -88,7 +88,7 @@ def _unknown_aircraft_text(every: Sequence[Finding]) -> str:
         return ""
     if len(found) > _NAMED:
         return f"slopes on {len(found)} legs are within what is not known of the aircraft"
-    places = [place_text(item.place) + ("," if item.place.to_item is not None else "") for item in found]
+    places = [place_text(finding.place) + ("," if finding.place.to_item is not None else "") for finding in found]
     slopes, are = ("slopes", "are") if len(found) > 1 else ("slope", "is")
     return f"{slopes} on {' and '.join(places)} {are} within what is not known of the aircraft"
 
@@ -110,14 +110,14 @@ def first_failed(findings: Sequence[Finding]) -> Finding | None:
 def _failed_by_urgency(findings: Sequence[Finding]) -> list[Finding]:
     """Return the failed findings sorted by urgency, and then by the order of the rules."""
     order = {name: k for k, name in enumerate(RULE_WORDS)}
-    failed = (item for item in findings if item.ok is False)
-    return sorted(failed, key=lambda item: (-RULE_WORDS[item.rule].urgency, order[item.rule]))
+    failed = (finding for finding in findings if finding.ok is False)
+    return sorted(failed, key=lambda finding: (-RULE_WORDS[finding.rule].urgency, order[finding.rule]))
 
 
 def _unjudged_text(findings: Sequence[Finding], rule: RuleWords) -> str:
     """Describe which findings of a rule were not judged; return "" if all were judged."""
-    mine = [item for item in findings if item.rule == rule.name]
-    silent = sum(item.ok is None for item in mine)
+    mine = [finding for finding in findings if finding.rule == rule.name]
+    silent = sum(finding.ok is None for finding in mine)
     if not silent:
         return ""
     return f"{rule.unjudged} not judged" + ("" if silent == len(mine) else f" on {silent} {rule.unjudged_of}")
@@ -126,8 +126,8 @@ def _unjudged_text(findings: Sequence[Finding], rule: RuleWords) -> str:
 def _near_miss_notes(findings: Sequence[Finding]) -> list[str]:
     """Name each threat that the aircraft missed by less than its navigation error."""
     out = []
-    for item in findings:
-        facts = {fact.what: fact.value for fact in item.facts if item.rule == "threat" and item.ok}
+    for finding in findings:
+        facts = {fact.what: fact.value for fact in finding.facts if finding.rule == "threat" and finding.ok}
         if facts.get("nearest", math.inf) < facts.get("navigation error", 0.0):
             out.append(f"a missile missed by {facts['nearest']:.1f} m, less than the navigation error")
     return out
@@ -135,7 +135,7 @@ def _near_miss_notes(findings: Sequence[Finding]) -> list[str]:
 
 def _headline_findings(failed: list[Finding]) -> list[Finding]:
     """Return at most four failed findings, the worst of each rule before the second worst of any rule."""
-    margins = [0.0 if item.margin is None else item.margin for item in failed]
+    margins = [0.0 if finding.margin is None else finding.margin for finding in failed]
     by_margin = sorted(range(len(failed)), key=margins.__getitem__)
     count: dict[str, int] = {}
     rank = {}
@@ -145,10 +145,10 @@ def _headline_findings(failed: list[Finding]) -> list[Finding]:
     return [failed[k] for k in sorted(chosen)]
 
 
-def _phrase(item: Finding) -> str:
+def _phrase(finding: Finding) -> str:
     """Describe a failed finding in a few words."""
-    words = RULE_WORDS[item.rule]
-    return words.phrase(words.word, item)
+    words = RULE_WORDS[finding.rule]
+    return words.phrase(words.word, finding)
 
 
 def summary_lines(
@@ -170,23 +170,23 @@ def summary_lines(
     lines += _parameter_lines(setup, flown=level == "flown")
     lines += _ignored_settings_lines(setup)
     silent: dict[str, str] = {}
-    for item in findings:
-        if item.ok is None and RULE_WORDS[item.rule].explained:
-            silent.setdefault(item.rule, item.reason)
+    for finding in findings:
+        if finding.ok is None and RULE_WORDS[finding.rule].explained:
+            silent.setdefault(finding.rule, finding.reason)
     lines += [f"Not judged: {RULE_WORDS[rule].title} ({reason})" for rule, reason in silent.items()]
     # These are the autopilot's own limits, which say nothing about the aircraft.
     lines += [
-        f"PX4 would not take it: {item.reason}"
-        for item in findings
-        if item.rule == "mission" and item.ok is None and item.check != NOT_FLOWN
+        f"PX4 would not take it: {finding.reason}"
+        for finding in findings
+        if finding.rule == "mission" and finding.ok is None and finding.check != NOT_FLOWN
     ]
     lack = missing_ends_text(setup.mission, setup.autopilot.mission_checks) if setup.autopilot.refuses else ""
-    if lack and not any(item.rule == "mission" for item in findings):
+    if lack and not any(finding.rule == "mission" for finding in findings):
         lines.append(f"PX4 would not take it: {lack}")
     lines += [
-        f"{RULE_WORDS[item.rule].title.capitalize()}: {item.reason}"
-        for item in findings
-        if RULE_WORDS[item.rule].warns and item.ok is None
+        f"{RULE_WORDS[finding.rule].title.capitalize()}: {finding.reason}"
+        for finding in findings
+        if RULE_WORDS[finding.rule].warns and finding.ok is None
     ]
     lines += _terrain_error_lines(findings, setup)
     if setup.notes:
@@ -261,9 +261,9 @@ def _terrain_error_lines(findings: Sequence[Finding], setup: FlightSetup) -> lis
     """Subtract the terrain's stated error, if any, from the lowest clearance."""
     error = None if setup.scenario.terrain is None else setup.scenario.terrain.vertical_error
     heights = [
-        item.planned if item.flown is None else item.flown
-        for item in findings
-        if item.rule == "clearance" and item.planned is not None
+        finding.planned if finding.flown is None else finding.flown
+        for finding in findings
+        if finding.rule == "clearance" and finding.planned is not None
     ]
     if error is None or not heights:
         return []

@@ -101,7 +101,7 @@ class Verdict:
         >>> verdict.flies, replace(verdict, complete=False).flies
         (True, False)
         """
-        apart = all(item.check in APART_FROM_FLIGHT for item in undecided_findings(self.findings))
+        apart = all(finding.check in APART_FROM_FLIGHT for finding in undecided_findings(self.findings))
         return self.flyable or (self.complete and self.undecided and apart)
 
     @property

@@ -103,8 +103,8 @@ def _unjudged_lines(findings: Sequence[Finding]) -> list[str]:
     """Return a line for each rule that was not judged, with the reason and, if partial, the numbers."""
     lines = []
     for rule in RULE_WORDS.values():
-        rule_findings = [item for item in findings if item.rule == rule.name]
-        unjudged = [item for item in rule_findings if item.ok is None]
+        rule_findings = [finding for finding in findings if finding.rule == rule.name]
+        unjudged = [finding for finding in rule_findings if finding.ok is None]
         if not unjudged:
             continue
         where = "" if len(unjudged) == len(rule_findings) else f" on {len(unjudged)} of {len(rule_findings)}"
@@ -236,12 +236,12 @@ def judge_imported_flight(setup: FlightSetup, track: Track, *, log_complete: boo
     findings = _merge_findings([_stretch_findings(setup, legs) for legs in flown])
     ends = [rule.judge_imported_end for rule in RULES.values() if rule.judge_imported_end is not None]
     findings = (*findings, *(judge(setup, flown, log_complete) for judge in ends))
-    failed = any(item.ok is False for item in findings)
+    failed = any(finding.ok is False for finding in findings)
     unjudged = "; ".join(
         filter(None, [_missing_part_text(findings, source.missing), _unseen_text(flown), _uncertainty_text(findings)])
     )
     flyable = bool(flown) and not failed and not unjudged
-    complete = not unjudged and all(item.ok is True for item in findings if item.rule == "completion")
+    complete = not unjudged and all(finding.ok is True for finding in findings if finding.rule == "completion")
     answer = [headline(findings, flyable).replace("flyable", "flown as planned", 1)] if failed or not unjudged else []
     answer_text = "; ".join([*answer, *filter(None, [unjudged])])
     own = LevelAnswer(setup.autopilot.level, flyable, answer_text, undecided=bool(unjudged) and not failed)
@@ -267,7 +267,7 @@ def _missing_part_text(findings: Sequence[Finding], missing: MissingItems | None
     """Describe which items or which part of the flight the log lacks; return "" if it lacks none."""
     if missing is not None:
         return missing_text(missing)
-    parts = [item.reason for item in findings if item.rule == "completion" and item.ok is None]
+    parts = [finding.reason for finding in findings if finding.rule == "completion" and finding.ok is None]
     return f"not judged from end to end: {parts[0]}" if parts else ""
 
 
@@ -304,7 +304,7 @@ def _stretch_findings(setup: FlightSetup, legs: FlownLegs) -> list[Finding]:
         if legs.partial:
             judged = _check_unreached(judged, legs)
         out.append(_at_route_place(judged, legs.first, setup))
-    return [*out, *_findings_without_data(setup, {item.rule for item in out})]
+    return [*out, *_findings_without_data(setup, {finding.rule for finding in out})]
 
 
 def _findings_without_data(setup: FlightSetup, found: set[str]) -> list[Finding]:
@@ -319,12 +319,12 @@ def _findings_without_data(setup: FlightSetup, found: set[str]) -> list[Finding]
     return out
 
 
-def _check_data(setup: FlightSetup, legs: FlownLegs, item: Finding) -> Finding:
+def _check_data(setup: FlightSetup, legs: FlownLegs, finding: Finding) -> Finding:
     """Return a finding, marked as not judged if the log lacks the data that its rule needs."""
     source = setup.source
     if source is None:
-        return item
-    reason, needs = "", RULES[item.rule].log
+        return finding
+    reason, needs = "", RULES[finding.rule].log
     for quantity in needs.quantities:
         if quantity not in source.holds:
             reason = f"the log holds no {_LABELS[quantity]}"
@@ -337,10 +337,10 @@ def _check_data(setup: FlightSetup, legs: FlownLegs, item: Finding) -> Finding:
         if reason:
             break
     if reason:
-        return _mark_unjudged(item, reason)
-    if not source.aircraft_known and needs.aircraft and item.limit_source != "scenario":
-        return _mark_unjudged(item, _UNNAMED_TEXT, measured=bool(item.ok))
-    return item
+        return _mark_unjudged(finding, reason)
+    if not source.aircraft_known and needs.aircraft and finding.limit_source != "scenario":
+        return _mark_unjudged(finding, _UNNAMED_TEXT, measured=bool(finding.ok))
+    return finding
 
 
 def _missing_values_text(legs: FlownLegs, quantity: Quantity) -> str:
@@ -353,66 +353,68 @@ def _missing_values_text(legs: FlownLegs, quantity: Quantity) -> str:
     return f"the log holds no {_LABELS[quantity]} at {int(bad.sum())} rows from {time[0]:.1f} s to {time[-1]:.1f} s"
 
 
-def _mark_unjudged(item: Finding, why: str, *, measured: bool = False) -> Finding:
+def _mark_unjudged(finding: Finding, why: str, *, measured: bool = False) -> Finding:
     """Return a finding marked as not judged, with the reason; keep its measurements if `measured`."""
-    reason = f"{why}; {item.reason}" if measured else why
-    facts = item.facts if measured else ()
-    return replace(item, ok=None, reason=reason, brief=why, placed=False, margin=None, facts=facts, suggestions=())
+    reason = f"{why}; {finding.reason}" if measured else why
+    facts = finding.facts if measured else ()
+    return replace(finding, ok=None, reason=reason, brief=why, placed=False, margin=None, facts=facts, suggestions=())
 
 
-def _check_gaps(item: Finding, legs: FlownLegs) -> Finding:
+def _check_gaps(finding: Finding, legs: FlownLegs) -> Finding:
     """Mark a passed finding as not judged if the log has a pause in its leg."""
-    if item.ok is not True or item.place.index is None or item.place.kind not in ("leg", "waypoint"):
-        return item
+    if finding.ok is not True or finding.place.index is None or finding.place.kind not in ("leg", "waypoint"):
+        return finding
     track, rows = legs.aligned.track, legs.aligned.rows
-    first = item.place.index if item.place.kind == "leg" else max(0, item.place.index - 1)
-    last = min(len(rows) - 1, item.place.index + 1)
+    first = finding.place.index if finding.place.kind == "leg" else max(0, finding.place.index - 1)
+    last = min(len(rows) - 1, finding.place.index + 1)
     start, end = float(track.time[rows[first]]), float(track.time[rows[last]])
     for gap in gaps_between(legs, start, end):
-        if item.place.kind == "leg" or RULES[item.rule].log.no_gap:
+        if finding.place.kind == "leg" or RULES[finding.rule].log.no_gap:
             why = f"the log has no rows from {gap.start:.1f} s to {gap.end:.1f} s"
-            return _mark_unjudged(item, why, measured=True)
-    return item
+            return _mark_unjudged(finding, why, measured=True)
+    return finding
 
 
-def _check_unreached(item: Finding, legs: FlownLegs) -> Finding:
+def _check_unreached(finding: Finding, legs: FlownLegs) -> Finding:
     """Mark the unreached last waypoint as not judged, and findings on the leg before it as partial."""
     leg, waypoint = legs.requirements.legs - 1, legs.requirements.legs
-    unreached = item.place.kind == "waypoint" and item.place.index == waypoint
-    of_leg = item.place.kind == "leg" and item.place.index == leg
+    unreached = finding.place.kind == "waypoint" and finding.place.index == waypoint
+    of_leg = finding.place.kind == "leg" and finding.place.index == leg
     if unreached:
-        return _mark_unjudged(item, stretch_end_text(legs.stretch))
-    if of_leg and RULES[item.rule].log.full_leg:
+        return _mark_unjudged(finding, stretch_end_text(legs.stretch))
+    if of_leg and RULES[finding.rule].log.full_leg:
         return (
-            _mark_unjudged(item, f"flown in part: {stretch_end_text(legs.stretch)}") if item.ok is not False else item
+            _mark_unjudged(finding, f"flown in part: {stretch_end_text(legs.stretch)}")
+            if finding.ok is not False
+            else finding
         )
-    return item
+    return finding
 
 
-def _at_route_place(item: Finding, first: int, setup: FlightSetup) -> Finding:
+def _at_route_place(finding: Finding, first: int, setup: FlightSetup) -> Finding:
     """Return a finding at its place on the whole route."""
-    place = item.place
+    place = finding.place
     if not first or place.index is None or place.kind not in ("leg", "waypoint"):
-        return item
+        return finding
     index = place.index + first
-    return replace(item, place=replace(place, index=index))
+    return replace(finding, place=replace(place, index=index))
 
 
 def _merge_findings(stretches: Sequence[Sequence[Finding]]) -> tuple[Finding, ...]:
     """Merge the findings of all stretches: one per rule, place and check, a failure before a pass."""
     found: dict[tuple[str, Place, str], Finding] = {}
     for findings in stretches:
-        for item in findings:
-            key = (item.rule, item.place, item.check)
+        for finding in findings:
+            key = (finding.rule, finding.place, finding.check)
             known = found.get(key)
-            if known is None or _precedence(item) > _precedence(known):
-                found[key] = item
-    rules = list(dict.fromkeys(item.rule for item in found.values()))
-    return tuple(item for rule in rules for item in found.values() if item.rule == rule)
+            if known is None or _precedence(finding) > _precedence(known):
+                found[key] = finding
+    rules = list(dict.fromkeys(finding.rule for finding in found.values()))
+    return tuple(finding for rule in rules for finding in found.values() if finding.rule == rule)
 
 
-def _precedence(item: Finding) -> int:
-    return {False: 2, True: 1, None: 0}[item.ok]
+def _precedence(finding: Finding) -> int:
+    return {False: 2, True: 1, None: 0}[finding.ok]
 
 
 def _leg_ends(setup: FlightSetup, flown: Sequence[FlownLegs]) -> tuple[float, ...]:

@@ -10,17 +10,17 @@ from world.arrays import Floats
 from world.threats import Threats
 
 
-def violated_legs(requirements: RouteRequirements, item: Finding) -> tuple[int, ...]:
+def violated_legs(requirements: RouteRequirements, finding: Finding) -> tuple[int, ...]:
     """Return the legs of the planned path on which a failed finding of a threat, zone or area applies."""
-    path, place = requirements.path, item.place
+    path, place = requirements.path, finding.place
     scenario = requirements.setup.scenario
     if place.kind in ("missile", "radar") and place.index is not None:
         near = _sphere_segments(path.points, scenario.threats, place.index, missile=place.kind == "missile")
         return tuple(np.unique(path.legs[near]).tolist())
-    facts = {fact.what: fact.value for fact in item.facts}
+    facts = {fact.what: fact.value for fact in finding.facts}
     if "entry leg" in facts and "exit leg" in facts:
         return tuple(range(int(facts["entry leg"]), int(facts["exit leg"]) + 1))
-    if item.rule == "bounds":
+    if finding.rule == "bounds":
         (west, east), (south, north) = scenario.bounds.tolist()
         low, high = np.array([west, south, scenario.floor]), np.array([east, north, scenario.ceiling])
         beyond = np.asarray(((path.points < low - ROUNDING_M) | (path.points > high + ROUNDING_M)).any(axis=1))

@@ -67,7 +67,7 @@ def fence_findings(
         _zone_finding(requirements, z, planned[z], None if flown is None else flown[z])
         for z in np.flatnonzero(met).tolist()
     ]
-    if not any(item.ok is False for item in touched):
+    if not any(finding.ok is False for finding in touched):
         touched.insert(0, _compliance_finding(requirements, planned, flown))
     return out + touched
 

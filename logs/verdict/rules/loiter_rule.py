@@ -81,13 +81,13 @@ def fold_loiters(
     kept: list[Finding | None] = list(findings)
     # Indexed by rule and place: a mission of jumps has hundreds of loiters, and each thousands of findings.
     positions: dict[tuple[str, Place], list[int]] = {}
-    for k, item in enumerate(findings):
-        positions.setdefault((item.rule, item.place), []).append(k)
+    for k, finding in enumerate(findings):
+        positions.setdefault((finding.rule, finding.place), []).append(k)
 
     def left(rules: Sequence[str], places: Sequence[Place]) -> list[tuple[int, Finding]]:
         """Return positions and findings of these rules at these places, in order, without replaced findings."""
         every = sorted(k for rule in rules for place in places for k in positions.get((rule, place), ()))
-        return [(k, item) for k in every if (item := kept[k]) is not None and item.rule in rules]
+        return [(k, finding) for k in every if (finding := kept[k]) is not None and finding.rule in rules]
 
     for circle in circles(requirements):
         # If the mission ends on its loiter, that end is on it too.
@@ -101,10 +101,10 @@ def fold_loiters(
         legs = [requirements.leg(leg) for leg in range(circle.first, circle.last)]
         for rule in ("slope", "speed", "clearance", "corridor"):
             rule_findings = left((rule,), legs)
-            if at_once and any(item.ok is not None for _, item in rule_findings):
+            if at_once and any(finding.ok is not None for _, finding in rule_findings):
                 # The loiter was left before the other legs: only the flown ones are judged.
-                for k, item in rule_findings:
-                    kept[k] = item if item.ok is not None else None
+                for k, finding in rule_findings:
+                    kept[k] = finding if finding.ok is not None else None
                 rule_findings = [one for one in rule_findings if one[1].ok is not None]
             if len(rule_findings) > 1:
                 at_worst, worst = min(rule_findings, key=lambda one: badness(one[1]))
@@ -147,7 +147,7 @@ def _loiter_finding(
     inner = slice(circle.first, circle.last + 1)
     known = bool(np.isfinite(requirements.turn_limit[inner]).all())
     tightest = float(requirements.tightest[inner].max()) if known else math.nan
-    bad = [item for item in at if item.ok is False]
+    bad = [finding for finding in at if finding.ok is False]
     at_middle = requirements.setup.autopilot.loiter_rules.at_middle
     own = _uses_parameter_radius(requirements, circle)
     if at_middle and (own if aligned is None else _has_reached(requirements, aligned, circle)):
@@ -182,7 +182,7 @@ def _loiter_finding(
         ):
             faults.append(message(f"flown with {mean:.0f} m where {circle.radius:.0f} m is asked for"))
     ok: bool | None = not (faults or bad)
-    if ok and any(item.ok is None for item in at):
+    if ok and any(finding.ok is None for finding in at):
         ok = None
         facts.append("the flight did not get to its end")
     if ok and open_text:
@@ -237,7 +237,7 @@ def _held_bank(requirements: RouteRequirements, circle: Circle, tightest: float,
     The bank is the largest mean over a second.  Without a flight or a measurement, it is the bank needed to hold the
     loiter, up to the autopilot's limit.
     """
-    measured = [fact.value for item in at for fact in item.facts if fact.what == "bank"]
+    measured = [fact.value for finding in at for fact in finding.facts if fact.what == "bank"]
     if measured:
         return math.radians(max(measured))
     needed = math.atan(math.tan(requirements.limits.max_bank) * tightest / circle.radius)
@@ -279,7 +279,7 @@ def _small_radius_faults(requirements: RouteRequirements, circle: Circle, tighte
 def _unheld_corners_message(circle: Circle, bad: list[Finding]) -> Message:
     """Describe how many corners were not held, and the worst corner."""
     worst = min(bad, key=badness)
-    corners = len({item.place for item in bad})
+    corners = len({finding.place for finding in bad})
     count = f"{corners} of {circle.last - circle.first + 1} corners not held, as "
     return Message(f"{count}{place_text(worst.place)}: {worst.reason}", f"{count}{_corner_text(worst.place)}")
 

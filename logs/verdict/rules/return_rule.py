@@ -216,15 +216,20 @@ def without_style(
     places |= {requirements.leg(i) for i in legs}
     corner = requirements.waypoint(first)
     kept = [
-        item
-        for item in findings
-        if not ((item.rule in _LEG_RULES and item.place in places) or (item.rule == "turn" and item.place == corner))
+        finding
+        for finding in findings
+        if not (
+            (finding.rule in _LEG_RULES and finding.place in places)
+            or (finding.rule == "turn" and finding.place == corner)
+        )
     ]
-    if aligned is None or not any(item.rule == "return" and item.place != FLIGHT and item.ok for item in kept):
+    if aligned is None or not any(
+        finding.rule == "return" and finding.place != FLIGHT and finding.ok for finding in kept
+    ):
         return tuple(kept)
     # All of the return is on some leg; a drawn leg without any part of it was not flown.
     unflown = {requirements.leg(i) for i in legs if not aligned.flew(i)}
-    return tuple(item for item in kept if item.ok is not None or item.place not in unflown)
+    return tuple(finding for finding in kept if finding.ok is not None or finding.place not in unflown)
 
 
 RULE = Rule(

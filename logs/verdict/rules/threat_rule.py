@@ -53,7 +53,7 @@ def threat_findings(
                 place = Place(side, m, name=table.name or "")
                 where = "" if side == "radar" else _nearest_place_text(requirements, aligned, visit, float(radii[m]))
                 touched.append(_sphere_finding(place, _sphere_visit(plan, m), visit, float(radii[m]), where))
-    if not any(item.place.kind == "missile" for item in touched):
+    if not any(finding.place.kind == "missile" for finding in touched):
         error = position_error(requirements.setup)
         touched.insert(0, _no_entry_finding(len(threats), nearest, name, error, aligned is not None or geometric))
     return touched
