@@ -106,17 +106,17 @@ def _airspeed_source(scenario: Scenario, autopilot: Autopilot) -> AirspeedSource
 
 def setup_conditions(setup: FlightSetup) -> Conditions:
     """Return the conditions of the verdict on a flight, or on a mission that is not flown."""
-    found = conditions_of(setup.scenario, setup.aircraft, setup.airspeed, setup.autopilot)
-    found = replace(found, navigation=setup.nav, zones=len(airspace_of(setup).zones))
+    conditions = conditions_of(setup.scenario, setup.aircraft, setup.airspeed, setup.autopilot)
+    conditions = replace(conditions, navigation=setup.nav, zones=len(airspace_of(setup).zones))
     source = setup.source
     if source is None:
-        return found
-    flown = found.airspeed_source == "aircraft" and "airspeed" in source.holds
+        return conditions
+    has_flown_airspeed = conditions.airspeed_source == "aircraft" and "airspeed" in source.holds
     if not source.aircraft_known:
-        found = replace(found, aircraft="", mass_kg=None, aircraft_named=False)
+        conditions = replace(conditions, aircraft="", mass_kg=None, aircraft_named=False)
     return replace(
-        found,
-        airspeed_source="flight" if flown else found.airspeed_source,
+        conditions,
+        airspeed_source="flight" if has_flown_airspeed else conditions.airspeed_source,
         turbulence=None,
         navigation=None,
         autopilot=source.program or "not stated",
@@ -177,18 +177,18 @@ _SAME_LINE_DISTANCE_M = 1.0
 def corridor_line(setup: FlightSetup) -> str:
     """Describe the width and origin of a corridor that the scenario does not state.
 
-    Warn if the corridor is wider than the gap between legs, because a flight within it may then have been off its lines
-    all the time.  Return "" if the corridor is stated, or if a survey's cross-track errors are judged line by line.
+    Warn if the corridor is wider than the gap between legs, because a flight within it may then never have been on its
+    lines.  Return "" if the corridor is stated, or if a survey's cross-track errors are judged line by line.
     """
-    half, radius = setup.corridor, setup.autopilot.acceptance_radius or 0.0
+    half_width, radius = setup.corridor, setup.autopilot.acceptance_radius or 0.0
     if setup.scenario.limits.corridor_m is not None or surveys_of(setup):
         return ""
     origin = "planfly's default"
-    if CORRIDOR_RADII * radius >= half:
+    if CORRIDOR_RADII * radius >= half_width:
         origin = f"{CORRIDOR_RADII:g} times {setup.autopilot.title}'s acceptance radius of {radius:.0f} m"
-    line = f"Corridor: {half:.0f} m to either side of the legs, {origin} ([limits] corridor_m states one)"
+    line = f"Corridor: {half_width:.0f} m to either side of the legs, {origin} ([limits] corridor_m states one)"
     gap = least_gap(setup.route.waypoints)
-    if gap is None or gap[0] >= half:
+    if gap is None or gap[0] >= half_width:
         return line
     metres, leg = gap
     return (
@@ -210,19 +210,19 @@ def least_gap(waypoints: NDArray[np.float64]) -> tuple[float, int] | None:
     >>> least_gap(lines[:3]) is None
     True
     """
-    found: list[tuple[float, int]] = []
+    gaps: list[tuple[float, int]] = []
     for k in range(len(waypoints) - 3):
-        (start, end), (back, on) = waypoints[k : k + 2, :2], waypoints[k + 2 : k + 4, :2]
-        one, other = end - start, on - back
-        run, length = float(np.hypot(*one)), float(np.hypot(*other))
-        if run <= 0.0 or length <= 0.0:
+        (start, end), (other_start, other_end) = waypoints[k : k + 2, :2], waypoints[k + 2 : k + 4, :2]
+        leg_vector, other_vector = end - start, other_end - other_start
+        leg_length, other_length = float(np.hypot(*leg_vector)), float(np.hypot(*other_vector))
+        if leg_length <= 0.0 or other_length <= 0.0:
             continue
-        along = one / run
-        if abs(float(along @ other)) / length < math.cos(_PARALLEL_ANGLE_RAD):
+        direction = leg_vector / leg_length
+        if abs(float(direction @ other_vector)) / other_length < math.cos(_PARALLEL_ANGLE_RAD):
             continue
-        reach = sorted((float((back - start) @ along), float((on - start) @ along)))
-        if min(run, reach[1]) - max(0.0, reach[0]) >= 0.5 * min(run, length):
-            middle = 0.5 * (back + on) - start
-            found.append((abs(float(along[0] * middle[1] - along[1] * middle[0])), k))
+        overlap = sorted((float((other_start - start) @ direction), float((other_end - start) @ direction)))
+        if min(leg_length, overlap[1]) - max(0.0, overlap[0]) >= 0.5 * min(leg_length, other_length):
+            offset = 0.5 * (other_start + other_end) - start
+            gaps.append((abs(float(direction[0] * offset[1] - direction[1] * offset[0])), k))
     # A line that is flown twice is not a survey.
-    return min((one for one in found if one[0] >= _SAME_LINE_DISTANCE_M), default=None)
+    return min((leg_vector for leg_vector in gaps if leg_vector[0] >= _SAME_LINE_DISTANCE_M), default=None)

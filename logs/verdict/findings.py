@@ -51,7 +51,7 @@ class Finding:
     placed: True if the reason begins with the place.
     check: name of the check, for a rule with several checks; `UNKNOWN_AIRCRAFT`, `UNKNOWN_WAY`, `NOT_FLOWN`,
         `GROUND_WAY` or `UNKNOWN_RETURN` if the finding is undecided for that reason; "" otherwise.
-    facts: further measured numbers that are not faults.
+    facts: other measured numbers, which are not faults.
     at_least: True if values of at least the limit pass, False if values of at most the limit pass.
     """
 
@@ -98,8 +98,8 @@ class Finding:
         """The value that is compared with the limit: the flown value, or the planned value if it has the margin."""
         if self.flown is None or self.planned is None or self.limit is None or self.margin is None:
             return self.planned if self.flown is None else self.flown
-        off = {value: abs(abs(value - self.limit) - abs(self.margin)) for value in (self.flown, self.planned)}
-        return min(off, key=lambda value: off[value])
+        errors = {value: abs(abs(value - self.limit) - abs(self.margin)) for value in (self.flown, self.planned)}
+        return min(errors, key=lambda value: errors[value])
 
     @property
     def limit_text(self) -> str:
@@ -114,7 +114,7 @@ class Finding:
         """Return texts of the value and of the passing values, with enough digits that a failing value differs."""
         value, limit = self.value, self.effective_limit
         if value is None or limit is None:
-            texts = ["" if one is None else quantity_text(one, self.unit) for one in (value, limit)]
+            texts = ["" if number is None else quantity_text(number, self.unit) for number in (value, limit)]
         else:
             texts = list(compared_texts(value, limit, self.unit))
         return texts[0], f"{self.limit_sign} {texts[1]}" if texts[1] else ""
@@ -142,13 +142,13 @@ class Message:
     placed: bool = False
 
 
-def message(brief: str, more: str = "", *, placed: bool = False) -> Message:
+def message(brief: str, rest: str = "", *, placed: bool = False) -> Message:
     """Make a message from its brief first part and the rest.
 
     >>> message("overshoots its arc by 8 m", " (at most 5 m)").text
     'overshoots its arc by 8 m (at most 5 m)'
     """
-    return Message(brief + more, brief, placed)
+    return Message(brief + rest, brief, placed)
 
 
 def undecided_findings(findings: Iterable[Finding]) -> tuple[Finding, ...]:
@@ -172,8 +172,14 @@ def closest_to_limit(findings: Iterable[Finding]) -> Finding | None:
     >>> closest_to_limit([wide, close]) is close, closest_to_limit([wide, failed, close]) is failed
     (True, True)
     """
-    judged = (one for one in findings if one.ok is False or (one.ok is True and one.margin is not None))
-    return min(judged, key=lambda one: (one.ok is True, math.inf if one.margin is None else one.margin), default=None)
+    judged = (
+        finding for finding in findings if finding.ok is False or (finding.ok is True and finding.margin is not None)
+    )
+    return min(
+        judged,
+        key=lambda finding: (finding.ok is True, math.inf if finding.margin is None else finding.margin),
+        default=None,
+    )
 
 
 def make_finding(
@@ -248,12 +254,12 @@ def badness(finding: Finding) -> tuple[int, float]:
 
 
 def reason_of(faults: Sequence[Message], facts: Sequence[str] = ()) -> str:
-    """Join faults, followed by the facts in brackets; without faults, join the facts alone.
+    """Join faults, followed by the facts in brackets; without faults, join only the facts.
 
     >>> reason_of([message("bank 40.0° beyond 35.0°")], ["turns 62.0°", "radius 76 m"])
     'bank 40.0° beyond 35.0° (turns 62.0°; radius 76 m)'
     """
-    known = "; ".join(facts)
+    facts_text = "; ".join(facts)
     if not faults:
-        return known
-    return "; ".join(fault.text for fault in faults) + (f" ({known})" if known else "")
+        return facts_text
+    return "; ".join(fault.text for fault in faults) + (f" ({facts_text})" if facts_text else "")

@@ -28,10 +28,10 @@ def name_event(noun: str, finding: Finding) -> str:
 
 def name_shortfall(noun: str, finding: Finding) -> str:
     """Compare the flown value, or else the planned value, with a minimum."""
-    low, limit = finding.value, finding.effective_limit
-    if low is None or limit is None or low >= limit:
+    value, limit = finding.value, finding.effective_limit
+    if value is None or limit is None or value >= limit:
         return name_reason(noun, finding)
-    return _with_place(noun, finding, " < ".join(compared_texts(low, limit, finding.unit)))
+    return _with_place(noun, finding, " < ".join(compared_texts(value, limit, finding.unit)))
 
 
 def name_excess(noun: str, finding: Finding) -> str:
@@ -63,9 +63,9 @@ def name_zone(noun: str, finding: Finding) -> str:
 
 def name_missile(_noun: str, finding: Finding) -> str:
     """Name the missile and the time inside its sphere; a missile without a name is "threat 3 (missile)"."""
-    where = place_text(finding.place)
-    named = f"threat {where}" if finding.place.name else where
-    return f"{named} ({max(finding.flown or 0.0, finding.planned or 0.0):.1f} s inside)"
+    place = place_text(finding.place)
+    name = f"threat {place}" if finding.place.name else place
+    return f"{name} ({max(finding.flown or 0.0, finding.planned or 0.0):.1f} s inside)"
 
 
 def name_photo_line(noun: str, finding: Finding) -> str:

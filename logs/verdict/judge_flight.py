@@ -12,7 +12,7 @@ from logs.verdict.conditions import setup_conditions
 from logs.verdict.findings import Finding, undecided_findings
 from logs.verdict.imported.judge_imported_flight import judge_imported_flight
 from logs.verdict.judge_geometry import (
-    deciding_items,
+    blocking_item_findings,
     flown_findings,
     flown_level,
     geometric_findings,
@@ -103,14 +103,14 @@ def _level_answers(
     """
     levels, source = [], requirements.setup.envelope.source
     if requirements.envelope:
-        predicted = (*deciding_items(requirements.setup), *geometric_findings(requirements, flown))
+        predicted = (*blocking_item_findings(requirements.setup), *geometric_findings(requirements, flown))
         fails = any(finding.ok is False for finding in predicted)
         passes = not fails and not undecided_findings(predicted)
         differing = _disagreements(
             "geometry", {(finding.rule, finding.place): finding.ok for finding in predicted}, flown
         )
-        said = headline(predicted, passes, source)
-        levels.append(LevelAnswer("geometry", passes, said, differing, undecided=not passes and not fails))
+        headline_text = headline(predicted, passes, source)
+        levels.append(LevelAnswer("geometry", passes, headline_text, differing, undecided=not passes and not fails))
     if requirements.envelope and reference is not None and reference.airframe is not None:
         airframe = reference.airframe
         passed = {
@@ -118,11 +118,13 @@ def _level_answers(
         }
         differing = _disagreements("airframe", passed, flown)
         # What is not flyable although nothing of it failed was left open.
-        unsure = not airframe.flyable and not airframe.failed
-        levels.append(LevelAnswer("airframe", airframe.flyable, airframe.headline, differing, undecided=unsure))
+        is_undecided = not airframe.flyable and not airframe.failed
+        levels.append(LevelAnswer("airframe", airframe.flyable, airframe.headline, differing, undecided=is_undecided))
     undecided = bool(undecided_findings(flown)) and not any(finding.ok is False for finding in flown)
-    own = LevelAnswer(flown_level(requirements.setup), flyable, headline(flown, flyable, source), undecided=undecided)
-    return (*levels, own)
+    own_answer = LevelAnswer(
+        flown_level(requirements.setup), flyable, headline(flown, flyable, source), undecided=undecided
+    )
+    return (*levels, own_answer)
 
 
 def _disagreements(
@@ -130,9 +132,9 @@ def _disagreements(
 ) -> tuple[Disagreement, ...]:
     """Return the disagreements between a level and the flight, in the order of the level's findings."""
     judged = {(finding.rule, finding.place): finding.ok for finding in flown}
-    out = []
-    for (rule, place), there in outcomes.items():
-        here = judged.get((rule, place))
-        if there is not None and here is not None and there != here:
-            out.append(Disagreement(rule, place, level, there, here))
-    return tuple(out)
+    disagreements = []
+    for (rule, place), passes_there in outcomes.items():
+        passes_here = judged.get((rule, place))
+        if passes_there is not None and passes_here is not None and passes_there != passes_here:
+            disagreements.append(Disagreement(rule, place, level, passes_there, passes_here))
+    return tuple(disagreements)

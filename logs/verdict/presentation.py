@@ -71,17 +71,17 @@ class Presentation:
         """The findings that leave the verdict undecided."""
         return undecided_findings(self.findings)
 
-    def worth_listing(self, most: int) -> list[tuple[int, Finding]]:
-        """List failed and undecided findings, then each rule's finding closest to its limit, with their numbers.
+    def worth_listing(self, max_open: int) -> list[tuple[int, Finding]]:
+        """List failed and undecided findings, then each rule's closest finding to its limit, each with its number.
 
-        most: maximum number of failed and undecided findings.
+        max_open: maximum number of failed and undecided findings.
         """
-        is_open = {id(item) for item in self.undecided}
+        is_open = {id(finding) for finding in self.undecided}
         closest = {id(rule.closest) for rule in self.rules}
         numbered = list(enumerate(self.findings))
-        first = [(k, finding) for k, finding in numbered if finding.ok is False or id(finding) in is_open]
-        rest = [(k, finding) for k, finding in numbered if finding.ok is True and id(finding) in closest]
-        return [*first[:most], *rest]
+        open_findings = [(k, finding) for k, finding in numbered if finding.ok is False or id(finding) in is_open]
+        closest_findings = [(k, finding) for k, finding in numbered if finding.ok is True and id(finding) in closest]
+        return [*open_findings[:max_open], *closest_findings]
 
 
 def findings_by_rule(findings: Sequence[Finding]) -> tuple[RuleFindings, ...]:

@@ -9,7 +9,7 @@ from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.places import FLIGHT
 from logs.verdict.rule import LogNeeds, Rule
-from logs.verdict.suggestions import stay_inside
+from logs.verdict.suggestions import suggest_staying_inside
 from logs.verdict.tolerances import ROUNDING_M
 from logs.verdict.wording import place_text
 from world.arrays import Floats
@@ -75,6 +75,6 @@ RULE = Rule(
     tolerances=("ROUNDING_M",),
     judge=bounds_findings,
     whole=True,
-    suggest=stay_inside,
+    suggest=suggest_staying_inside,
     log=LogNeeds(("heights",)),
 )

@@ -12,7 +12,7 @@ from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.places import FLIGHT
 from logs.verdict.rule import LogNeeds, Rule
-from logs.verdict.suggestions import fly_higher
+from logs.verdict.suggestions import suggest_flying_higher
 from logs.verdict.tolerances import (
     BELOW_HOME_M,
     CLEARANCE_TOLERANCE_M,
@@ -275,6 +275,6 @@ RULE = Rule(
     name="clearance",
     tolerances=("BELOW_HOME_M", "CLEARANCE_TOLERANCE_M", "GROUND_LEG_CLEARANCE_M", "HOME_ERROR_M", "FIELD_RADIUS_M"),
     judge=clearance_findings,
-    suggest=fly_higher,
+    suggest=suggest_flying_higher,
     log=LogNeeds(("heights",)),
 )

@@ -8,7 +8,7 @@ from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.places import FLIGHT
 from logs.verdict.rule import LogNeeds, Rule
-from logs.verdict.suggestions import use_less_energy
+from logs.verdict.suggestions import suggest_using_less_energy
 from logs.verdict.tolerances import ENERGY_RESERVE_FRACTION, UNDECIDED_FRACTION
 
 
@@ -106,6 +106,6 @@ RULE = Rule(
     tolerances=("ENERGY_RESERVE_FRACTION", "UNDECIDED_FRACTION"),
     judge=energy_findings,
     whole=True,
-    suggest=use_less_energy,
+    suggest=suggest_using_less_energy,
     log=LogNeeds(("battery",), aircraft=True),
 )

@@ -17,7 +17,7 @@ from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.measures.zone_visits import path_zones
 from logs.verdict.places import FLIGHT, MISSION
 from logs.verdict.rule import LogNeeds, Rule
-from logs.verdict.suggestions import pass_zone
+from logs.verdict.suggestions import suggest_passing_zone
 from logs.verdict.tolerances import ROUNDING_M
 from logs.verdict.wording import place_text
 from world.airspace.zone_kernels import ZoneRecords, zone_records
@@ -189,6 +189,6 @@ RULE = Rule(
     name="fence",
     tolerances=("ROUNDING_M",),
     judge=fence_findings,
-    suggest=pass_zone,
+    suggest=suggest_passing_zone,
     log=LogNeeds(("heights",)),
 )

@@ -15,7 +15,7 @@ from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.places import FLIGHT
 from logs.verdict.rule import LogNeeds, Rule
-from logs.verdict.suggestions import fly_lower
+from logs.verdict.suggestions import suggest_flying_lower
 from logs.verdict.tolerances import HEIGHT_TOLERANCE_M
 from world.arrays import Floats
 from world.terrain import Terrain
@@ -157,6 +157,6 @@ RULE = Rule(
     name="height",
     tolerances=("HEIGHT_TOLERANCE_M",),
     judge=height_findings,
-    suggest=fly_lower,
+    suggest=suggest_flying_lower,
     log=LogNeeds(("heights",), planned_heights=True),
 )

@@ -9,7 +9,7 @@ from logs.verdict.measures.slopes import LegFit, SlopeMeasure, measure_slope
 from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.places import Place
 from logs.verdict.rule import LogNeeds, Rule
-from logs.verdict.suggestions import ease_slope
+from logs.verdict.suggestions import suggest_gentler_slope
 from logs.verdict.tolerances import (
     ABILITY_SIGMAS,
     ABILITY_TOLERANCE_RAD,
@@ -316,6 +316,6 @@ RULE = Rule(
         ),
     ),
     judge=slope_findings,
-    suggest=ease_slope,
+    suggest=suggest_gentler_slope,
     log=LogNeeds(("heights",), planned_heights=True, aircraft=True, full_leg=True),
 )

@@ -11,7 +11,7 @@ from logs.verdict.measures.slopes import measure_ability, steady_rows
 from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.places import FLIGHT
 from logs.verdict.rule import LogNeeds, Rule
-from logs.verdict.suggestions import fly_level_speed
+from logs.verdict.suggestions import suggest_level_flight_speed
 from logs.verdict.tolerances import (
     GUST_DURATION_S,
     GUST_SIGMAS,
@@ -302,6 +302,6 @@ RULE = Rule(
         ),
     ),
     judge=speed_findings,
-    suggest=fly_level_speed,
+    suggest=suggest_level_flight_speed,
     log=LogNeeds(("airspeed",), aircraft=True, full_leg=True),
 )

@@ -20,7 +20,7 @@ from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.places import FLIGHT
 from logs.verdict.rule import LogNeeds, Rule
-from logs.verdict.suggestions import fly_faster
+from logs.verdict.suggestions import suggest_flying_faster
 from logs.verdict.tolerances import GUST_SPEED_FRACTION, STALL_AVERAGING_TIME_S, STALL_TOLERANCE_MPS
 from world.arrays import Floats
 from world.wind import W20
@@ -154,6 +154,6 @@ RULE = Rule(
     tolerances=("STALL_AVERAGING_TIME_S", "STALL_TOLERANCE_MPS", "GUST_SPEED_FRACTION"),
     judge=stall_findings,
     whole=True,
-    suggest=fly_faster,
+    suggest=suggest_flying_faster,
     log=LogNeeds(("airspeed", "attitude"), aircraft=True, listed=True),
 )

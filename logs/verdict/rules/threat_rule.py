@@ -13,7 +13,7 @@ from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.places import FLIGHT, Place
 from logs.verdict.rule import LogNeeds, Rule
-from logs.verdict.suggestions import pass_threat
+from logs.verdict.suggestions import suggest_wider_berth
 from logs.verdict.wording import place_text_within
 from world.arrays import Floats
 from world.threats import Threats, threat_label
@@ -174,6 +174,6 @@ RULE = Rule(
     name="threat",
     tolerances=("NAVIGATION_SIGMAS", "SPHERE_FAR_DIAGONALS", "SPHERE_STAY_TOLERANCE_S"),
     judge=threat_findings,
-    suggest=pass_threat,
+    suggest=suggest_wider_berth,
     log=LogNeeds(("heights",)),
 )

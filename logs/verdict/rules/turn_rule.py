@@ -12,7 +12,7 @@ from logs.verdict.measures.route_requirements import RouteRequirements, turn_lim
 from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.measures.turns import TurnMeasure, measure_turns
 from logs.verdict.rule import LogNeeds, Rule
-from logs.verdict.suggestions import ease_turn
+from logs.verdict.suggestions import suggest_gentler_turn
 from logs.verdict.tolerances import (
     BANK_TOLERANCE_RAD,
     CORNER_CUT_FRACTION,
@@ -281,6 +281,6 @@ RULE = Rule(
         ),
     ),
     judge=turn_findings,
-    suggest=ease_turn,
+    suggest=suggest_gentler_turn,
     log=LogNeeds(aircraft=True, no_gap=True),
 )
