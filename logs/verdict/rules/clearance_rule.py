@@ -229,13 +229,13 @@ def _flown_clearance(
         # The first leg includes what came before it, the last leg what came after.
         first = 0 if leg == 0 else int(aligned.rows[leg])
         last = len(aligned.track) - 1 if leg + 1 == requirements.legs else int(aligned.rows[leg + 1])
-        span = aligned.low[first:last]
+        span = aligned.clearance[first:last]
         known = np.isfinite(span)
         if known.any():
             row, limit = requirement.least(span, np.asarray(aligned.track.position[first:last], dtype=np.float64))
             k = first + row
-            least = float(aligned.low[k])
-            reason = f"{least:.1f} m above ground {_when_and_where(aligned, k, float(aligned.low_at[k]))}"
+            least = float(aligned.clearance[k])
+            reason = f"{least:.1f} m above ground {_when_and_where(aligned, k, float(aligned.clearance_fraction[k]))}"
             ok = least >= limit - CLEARANCE_TOLERANCE_M
         if not known.all():
             k = first + int(np.argmin(known))

@@ -35,13 +35,13 @@ def departure_findings(
         k = int(np.argmax(bank > MAX_CONTROLLED_BANK_RAD))
         faults.append(message(f"bank {math.degrees(bank[k]):.0f}° at {track.time[k]:.1f} s"))
     faults += slow
-    if (aligned.low <= 0.0).any():
-        k = int(np.argmax(aligned.low <= 0.0))
-        time = track.time[k] + aligned.low_at[k] * (track.time[k + 1] - track.time[k])
+    if (aligned.clearance <= 0.0).any():
+        k = int(np.argmax(aligned.clearance <= 0.0))
+        time = track.time[k] + aligned.clearance_fraction[k] * (track.time[k + 1] - track.time[k])
         faults.append(
             message(
                 f"ground contact at {time:.1f} s on {place_text(requirements.leg(aligned.leg_at(k)))}",
-                f", {aligned.where(k, float(aligned.low_at[k]))}",
+                f", {aligned.where(k, float(aligned.clearance_fraction[k]))}",
             )
         )
     least = -_max_finite(-track.airspeed.astype(np.float64))
