@@ -348,7 +348,7 @@ def _check_data(setup: FlightSetup, legs: FlownLegs, finding: Finding) -> Findin
     if reason:
         return _mark_unjudged(finding, reason)
     if not source.aircraft_known and needs.aircraft and finding.limit_source != "scenario":
-        return _mark_unjudged(finding, _UNNAMED_TEXT, measured=bool(finding.ok))
+        return _mark_unjudged(finding, _UNNAMED_TEXT, keep_measurements=bool(finding.ok))
     return finding
 
 
@@ -382,7 +382,7 @@ def _check_gaps(finding: Finding, legs: FlownLegs) -> Finding:
     for gap in gaps_between(legs, start, end):
         if finding.place.kind == "leg" or RULES[finding.rule].log.no_gap:
             reason = f"the log has no rows from {gap.start:.1f} s to {gap.end:.1f} s"
-            return _mark_unjudged(finding, reason, measured=True)
+            return _mark_unjudged(finding, reason, keep_measurements=True)
     return finding
 
 

@@ -140,7 +140,7 @@ def worst_returns(world: ReturnWorld, starts: ReturnStarts, returns: Returns) ->
     if not drawn:
         return ()
     targets = [return_range.worst.target for return_range in drawn]
-    _, paths = fly_home(world, starts.at(rows), targets, keep=True)
+    _, paths = fly_home(world, starts.at(rows), targets, keep_paths=True)
     return tuple(
         WorstReturn(drawn_range, path, _failure_place(world, drawn_range.worst, path))
         for drawn_range, path in zip(drawn, paths, strict=True)

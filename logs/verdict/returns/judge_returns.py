@@ -416,7 +416,7 @@ def judge_returns(
     interval: float,
     fly_again: FlyAgain | None = None,
     max_flights: int = MAX_AGAIN,
-    advance: Callable[[float, float], None] = lambda done, total_count: None,
+    advance: Callable[[float, float], None] = lambda done, total: None,
 ) -> Returns:
     """Simulate and judge the return from each start.
 
