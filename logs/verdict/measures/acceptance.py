@@ -191,7 +191,7 @@ def _reduced_route(route: Route, waypoints: NDArray[np.int64]) -> Route:
     )
 
 
-def step(requirements: RouteRequirements, leg: int) -> float | None:
+def step_height(requirements: RouteRequirements, leg: int) -> float | None:
     """Return the height (m, positive) of the step that a leg belongs to, or None above `NEGLIGIBLE_STEP_M`.
 
     The leg exceeds its slope limit.  A sequence of legs that is too steep overall and includes this leg is one step:
