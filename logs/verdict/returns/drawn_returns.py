@@ -50,7 +50,7 @@ class WorstReturn:
     at: Floats
 
     @property
-    def one(self) -> ReturnFlown:
+    def flown(self) -> ReturnFlown:
         """The return itself."""
         return self.found.worst
 

@@ -131,7 +131,7 @@ def return_lines(setup: FlightSetup, drawn: DrawnReturns) -> list[MapLine]:
         name = f"{segment[0].time:.0f} to {segment[-1].time:.0f} s: {way_text(kind)}"
         lines.append(_line(setup, name, [ret.start for ret in segment], "returns to launch", f"return-{kind}"))
     for number, worst in enumerate(drawn.worst, 1):
-        ret = worst.one
+        ret = worst.flown
         name = f"{number}: from {ret.time:.0f} s to {ret.target.name}: {outcome_text(ret, limit)}"
         lines.append(_line(setup, name, worst.way, "the worst returns", "return-way"))
     for reach, glides in drawn.by_reach:
