@@ -86,7 +86,7 @@ def _begins_mission(following: MissionItem | None, items: Mapping[int, MissionIt
 def _is_same_mission(first: LoggedItems, second: LoggedItems) -> bool:
     """Return True if two missions are the same: all items, or the announced number and common items, are equal.
 
-    Home, item 0, is the same in all missions flown from a place: it alone in common is no evidence.
+    Home, item 0, is the same in all missions flown from a place, so a common home is no evidence.
     """
     first_items = {item.seq: item for item in first.items}
     common = [item for item in second.items if item.seq in first_items]

@@ -99,7 +99,7 @@ def open_log(path: Path) -> "RawLog":
 
 
 def log_format(path: Path, head: bytes) -> LogFormat:
-    """Return the format of a file, by its first bytes and its suffix, or by its suffix alone.
+    """Return the format of a file, by its first bytes and its suffix, or by only its suffix.
 
     Raises LogError if neither is known, and for a dataflash log as text.
 

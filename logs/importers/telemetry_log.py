@@ -78,41 +78,41 @@ class TelemetryReader:
 
     def messages(self) -> Iterator[tuple[float, Any]]:
         """Yield time of reception (s since 1970) and message, in the order of the file."""
-        at, end, reading, piece = 0, len(self.data), True, PIECE
-        while at + _STAMP.size + _V1_FRAME <= end:
-            if at >= piece:
+        position, end, reading, piece = 0, len(self.data), True, PIECE
+        while position + _STAMP.size + _V1_FRAME <= end:
+            if position >= piece:
                 self.let_go()
-                piece = at + PIECE
-            length = self._length(at)
+                piece = position + PIECE
+            length = self._length(position)
             if length == 0:
                 self.places += reading
                 self.size += 1
-                at += 1
+                position += 1
                 reading = False
                 continue
-            if at + length > end:
+            if position + length > end:
                 self.cut = True
                 break
             reading = True
-            if self._number(at) in self.wanted:
-                stamp = _STAMP.unpack_from(self.data, at)[0] * 1e-6
-                message = self._decode(bytes(self.data[at + _STAMP.size : at + length]))
+            if self._number(position) in self.wanted:
+                stamp = _STAMP.unpack_from(self.data, position)[0] * 1e-6
+                message = self._decode(bytes(self.data[position + _STAMP.size : position + length]))
                 if message is None:
                     self.unreadable += 1
                 else:
                     yield stamp, message
-            at += length
+            position += length
 
     def damage(self) -> Damage:
         """Return the damage found so far."""
         return Damage(self.places, self.size, self.cut, self.unreadable)
 
-    def _length(self, at: int) -> int:
+    def _length(self, position: int) -> int:
         """Return the length of the record at a place, its time included, bytes; 0 if none begins there."""
-        stamp = _STAMP.unpack_from(self.data, at)[0]
+        stamp = _STAMP.unpack_from(self.data, position)[0]
         if not _EARLIEST_US <= stamp <= _LATEST_US:
             return 0
-        packet = at + _STAMP.size
+        packet = position + _STAMP.size
         magic, payload = self.data[packet], self.data[packet + 1]
         if magic == _V1:
             return _STAMP.size + _V1_FRAME + payload
@@ -121,8 +121,8 @@ class TelemetryReader:
             return _STAMP.size + _V2_FRAME + payload + signature
         return 0
 
-    def _number(self, at: int) -> int:
-        packet = at + _STAMP.size
+    def _number(self, position: int) -> int:
+        packet = position + _STAMP.size
         if self.data[packet] == _V1:
             return self.data[packet + 5]
         return self.data[packet + 7] | self.data[packet + 8] << 8 | self.data[packet + 9] << 16
@@ -331,8 +331,8 @@ class _Messages:
     def _series(self) -> Iterable[tuple[str, LogSeries | None]]:
         place = self._table("GLOBAL_POSITION_INT", ("lat", "lon", "alt", "vy", "vx", "vz"))
         if place is not None:
-            known = (place.values[:, :2] != 0.0).any(axis=1)
-            place = LogSeries(place.source, place.time[known], place.values[known]) if known.any() else None
+            is_known = (place.values[:, :2] != 0.0).any(axis=1)
+            place = LogSeries(place.source, place.time[is_known], place.values[is_known]) if is_known.any() else None
         if place is not None:
             scaled = place.values * np.array([1e-7, 1e-7, 1e-3, 0.01, 0.01, -0.01])
             # To the nearest 1e-7 degrees, which is what was sent.
@@ -407,25 +407,25 @@ class _Messages:
     def _missions(self) -> Iterable[LoggedMission]:
         """Yield missions from items as uploaded, or as downloaded by a station."""
         rows: list[Item] = []
-        total, begins = 0, False
+        total, begins_mission = 0, False
         for time, message in self._items:
             kind = message.get_type()
             if getattr(message, "mission_type", _MISSION_TYPE) != _MISSION_TYPE:
                 continue
             if kind == "MISSION_COUNT":
-                total, begins = message.count, True
+                total, begins_mission = message.count, True
             elif kind in ("MISSION_ITEM", "MISSION_ITEM_INT"):
-                rows.append(Item(time, total, _item(message, scaled=kind == "MISSION_ITEM_INT"), begins))
-                begins = False
-        px4 = any(one.autopilot == _PX4 for _, one in self._own["HEARTBEAT"])
+                rows.append(Item(time, total, _item(message, scaled=kind == "MISSION_ITEM_INT"), begins_mission))
+                begins_mission = False
+        px4 = any(heartbeat.autopilot == _PX4 for _, heartbeat in self._own["HEARTBEAT"])
         for logged in gather_items(rows):
-            made = (_px4_mission if px4 else logged_mission)(logged, self._source, "mission items")
-            if made is not None:
-                yield replace(made, mission=self._with_home(made.mission))
+            readable = (_px4_mission if px4 else logged_mission)(logged, self._source, "mission items")
+            if readable is not None:
+                yield replace(readable, mission=self._with_home(readable.mission))
 
     def _with_home(self, mission: Mission) -> Mission:
         """Replace home by the vehicle's home, as an uploaded mission has only the station's assumption."""
-        heard = [one for _, one in self._own["HOME_POSITION"] if one.latitude or one.longitude]
+        heard = [message for _, message in self._own["HOME_POSITION"] if message.latitude or message.longitude]
         if not heard:
             return mission
         home = heard[-1]

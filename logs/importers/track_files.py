@@ -296,7 +296,7 @@ def read_kml(path: Path) -> RawLog:
             else:
                 rows.append(row)
     if len(rows) < 2:
-        lines = sum(_name(one) == "LineString" for one in root.iter())
+        lines = sum(_name(element) == "LineString" for element in root.iter())
         why = f"; its {lines} lines have no times" if lines else ""
         raise LogError(f"{path}: {len(rows)} places with a time (gx:Track): at least 2 are expected{why}", file=path)
     table = np.array(rows)

@@ -1,4 +1,4 @@
-"""Read, check and rebuild a flight log from the log alone.
+"""Read, check and rebuild a flight from only its log.
 
 A recorded verdict is returned unchanged, for comparison; no code relies on it.
 """

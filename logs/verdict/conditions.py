@@ -139,32 +139,37 @@ def flown_lines(conditions: Conditions) -> list[str]:
     return [*condition_lines(conditions), autopilot_line(conditions, flown=True)]
 
 
-def _aircraft_line(made: Conditions) -> str:
+def _aircraft_line(conditions: Conditions) -> str:
     speed = (
-        f"{made.airspeed_mps:.3g} m/s {made.airspeed_kind} airspeed ({_AIRSPEED_SOURCE_TEXTS[made.airspeed_source]})"
+        f"{conditions.airspeed_mps:.3g} m/s {conditions.airspeed_kind} airspeed"
+        f" ({_AIRSPEED_SOURCE_TEXTS[conditions.airspeed_source]})"
     )
-    if not made.aircraft:
+    if not conditions.aircraft:
         return f"Aircraft: nobody named one (--aircraft names yours), so none of its limits are judged; {speed}"
-    mass = "" if made.mass_kg is None else f", {made.mass_kg:.3g} kg"
-    line = f"Aircraft: {made.aircraft}{mass}, {speed}"
-    if made.aircraft_named:
+    mass = "" if conditions.mass_kg is None else f", {conditions.mass_kg:.3g} kg"
+    line = f"Aircraft: {conditions.aircraft}{mass}, {speed}"
+    if conditions.aircraft_named:
         return line
     return f"{line}; nobody named an aircraft, so it is the default (--aircraft names yours)"
 
 
-def _world_line(made: Conditions) -> str:
-    blows = "no wind"
-    if made.wind_mps is None:
-        blows = "wind from each direction"
-    elif made.wind_mps > 0.0:
-        blows = f"wind {made.wind_mps:.3g} m/s from {made.wind_from_deg:.0f} degrees"
+def _world_line(conditions: Conditions) -> str:
+    wind_text = "no wind"
+    if conditions.wind_mps is None:
+        wind_text = "wind from each direction"
+    elif conditions.wind_mps > 0.0:
+        wind_text = f"wind {conditions.wind_mps:.3g} m/s from {conditions.wind_from_deg:.0f} degrees"
     turbulence = ""
-    if made.turbulence is not None:
-        turbulence = ", no turbulence" if made.turbulence == "none" else f", {made.turbulence} turbulence"
-    navigation = "" if made.navigation is None else f"; navigation {_NAVIGATION_TEXTS[made.navigation]}"
-    ground = "no terrain" if made.terrain is None else f"terrain {made.terrain}, heights above {made.height_datum}"
-    zones = "" if not made.zones else "; 1 zone" if made.zones == 1 else f"; {made.zones:,} zones"
-    return f"Conditions: {blows}{turbulence}{navigation}; {ground}{zones}"
+    if conditions.turbulence is not None:
+        turbulence = ", no turbulence" if conditions.turbulence == "none" else f", {conditions.turbulence} turbulence"
+    navigation = "" if conditions.navigation is None else f"; navigation {_NAVIGATION_TEXTS[conditions.navigation]}"
+    ground = (
+        "no terrain"
+        if conditions.terrain is None
+        else f"terrain {conditions.terrain}, heights above {conditions.height_datum}"
+    )
+    zones = "" if not conditions.zones else "; 1 zone" if conditions.zones == 1 else f"; {conditions.zones:,} zones"
+    return f"Conditions: {wind_text}{turbulence}{navigation}; {ground}{zones}"
 
 
 # Legs are side by side if their courses are parallel or opposite within this angle, and at least half of the shorter

@@ -47,7 +47,7 @@ def judge_flight(
     flight that never began, so its route is judged at the level "geometric".
 
     ended: "completed", or the reason why the flight ended early.  log_complete: True if the record has its end.
-    envelope: True to apply the aircraft's envelope as well as the evidence of the flight, False for the flight alone.
+    envelope: True to apply the aircraft's envelope as well as the evidence of the flight, False for only the evidence.
     reference: results of reference flights.  requirements: the setup's route requirements if already known.
 
     >>> from aircraft.catalog import find_aircraft
@@ -68,17 +68,17 @@ def judge_flight(
     """
     if setup.source is not None:
         return judge_imported_flight(setup, track, log_complete=log_complete)
-    whole = requirements or route_requirements(setup, envelope=envelope)
+    whole_requirements = requirements or route_requirements(setup, envelope=envelope)
     if not len(track):
-        return judge_unflown(whole, ended, log_complete=log_complete)
-    in_air, aligned = flown_phases(whole, track)
+        return judge_unflown(whole_requirements, ended, log_complete=log_complete)
+    in_air, aligned = flown_phases(whole_requirements, track)
     findings = flown_findings(in_air, aligned, ended, log_complete)
     complete = all(finding.ok is True for finding in findings if finding.rule == "completion")
     unjudged = undecided_text(findings)
     flyable = complete and not unjudged and not any(finding.ok is False for finding in findings)
     findings = with_suggestions(in_air, aligned, findings)
     findings = with_passing_suggestions(findings, None if reference is None else reference.tried)
-    levels = _level_answers(whole, findings, flyable, reference)
+    levels = _level_answers(whole_requirements, findings, flyable, reference)
     deciding = None if reference is None or flyable else reference.deciding
     conditions = setup_conditions(setup)
     lines = summary_lines(findings, setup, "flown", levels, conditions, deciding)

@@ -72,8 +72,8 @@ def flown_findings(
     ended: "completed", or the reason why the flight ended early.
     log_complete: True if the record has its end.
     """
-    ends = [rule.judge_end for rule in RULES.values() if rule.judge_end is not None]
-    at_end = tuple(finding for judge in ends for finding in judge(requirements, aligned, ended, log_complete))
+    end_judges = [rule.judge_end for rule in RULES.values() if rule.judge_end is not None]
+    at_end = tuple(finding for judge in end_judges for finding in judge(requirements, aligned, ended, log_complete))
     return (*blocking_item_findings(requirements.setup), *_run_rules(requirements, aligned, at_end, geometric=False))
 
 

@@ -237,8 +237,8 @@ def judge_imported_flight(setup: FlightSetup, track: Track, *, log_complete: boo
         raise ValueError("a flight without a source was not imported")
     flown = [legs for stretch in source.stretches if (legs := flown_legs(setup, track, stretch)) is not None]
     findings = _merge_findings([_stretch_findings(setup, legs) for legs in flown])
-    ends = [rule.judge_imported_end for rule in RULES.values() if rule.judge_imported_end is not None]
-    findings = (*findings, *(judge(setup, flown, log_complete) for judge in ends))
+    end_judges = [rule.judge_imported_end for rule in RULES.values() if rule.judge_imported_end is not None]
+    findings = (*findings, *(judge(setup, flown, log_complete) for judge in end_judges))
     failed = any(finding.ok is False for finding in findings)
     unjudged = "; ".join(
         filter(None, [_missing_part_text(findings, source.missing), _unseen_text(flown), _uncertainty_text(findings)])

@@ -1,6 +1,6 @@
 """Show the instruments of a recorded flight at one time, as lines of text for a terminal.
 
-A frame depends on log and time alone: the same log and time give the same lines, whatever the clock.
+A frame depends only on log and time: the same log and time give the same lines, whatever the clock.
 """
 
 import bisect
