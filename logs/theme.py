@@ -247,7 +247,7 @@ def with_variables(drawn: str) -> str:
     """
     names = {text: f"ground-{k}" for k, text in reversed(list(enumerate(GROUND)))}
     names |= {colour(name): name for name in reversed((*PAGE, *LOOKS))}
-    return _HEX.sub(lambda found: f"var(--{names[found[0]]})" if found[0] in names else found[0], drawn)
+    return _HEX.sub(lambda match: f"var(--{names[match[0]]})" if match[0] in names else match[0], drawn)
 
 
 # Pixels of a page to a point of print, and plotly.js' names of markers.

@@ -54,18 +54,18 @@ def steady_clock(time: Floats, usual: float = 0.1) -> SteadyClock:
         jump = _first_late_row(behind, moved[begin:], latest)
         if jump < 0:
             break
-        at = begin + jump
+        start_row = begin + jump
         jumps.append(float(latest[jump - 1]))
-        moved[at:] += latest[jump - 1] + usual - moved[at]
-        begin = at
+        moved[start_row:] += latest[jump - 1] + usual - moved[start_row]
+        begin = start_row
     return SteadyClock(moved, tuple(jumps))
 
 
 def _first_late_row(behind: Ints, time: Floats, latest: Floats) -> int:
     """Return the first row after which enough rows (or all to the end) are late to show a jump; -1 if there is none."""
     for k in behind.tolist():
-        until = min(k + ROWS_BEHIND, time.size)
-        if until - k >= min(ROWS_BEHIND, 2) and (time[k:until] < latest[k - 1] - BEHIND).all():
+        end_row = min(k + ROWS_BEHIND, time.size)
+        if end_row - k >= min(ROWS_BEHIND, 2) and (time[k:end_row] < latest[k - 1] - BEHIND).all():
             return int(k)
     return -1
 
@@ -137,9 +137,9 @@ def clean_places(series: LogSeries, earlier_jumps: tuple[float, ...] = ()) -> Pl
     ([0.0, 1.0, 2.0, 3.0, 4.0, 9.0], 1, 1, (Gap(start=4.0, end=9.0),))
     """
     time, values = series.time, series.values
-    good = _usable_rows(time, values)
-    unusable = int(good.size - good.sum())
-    time, values = time[good], values[good]
+    is_usable = _usable_rows(time, values)
+    unusable = int(is_usable.size - is_usable.sum())
+    time, values = time[is_usable], values[is_usable]
     order = np.argsort(time, kind="stable")
     # Rows that came after a row of a later time.
     unordered = int((time < np.maximum.accumulate(time)).sum()) if time.size else 0
@@ -149,11 +149,11 @@ def clean_places(series: LogSeries, earlier_jumps: tuple[float, ...] = ()) -> Pl
     time, values = time[fresh], values[fresh]
     out = _glitch_rows(time, values)
     time, values = time[~out], values[~out]
-    near = _is_in_main_group(time)
-    time, shifts = _without_jumps(time[near], values[near])
-    held = time < LATEST
-    time, values = time[held], values[near][held]
-    unusable += near.size - time.size
+    is_near = _is_in_main_group(time)
+    time, shifts = _without_jumps(time[is_near], values[is_near])
+    is_in_range = time < LATEST
+    time, values = time[is_in_range], values[is_near][is_in_range]
+    unusable += is_near.size - time.size
     jumps = tuple(sorted((*earlier_jumps, *(start for start, _ in shifts))))
     faults = RowFaults(doubled, unordered, unusable, int(out.sum()), jumps)
     lat, lon, up = values.T if len(values) else np.zeros((3, 0))
@@ -165,9 +165,9 @@ def find_gaps(time: Floats) -> tuple[Gap, ...]:
     if time.size < 2:
         return ()
     steps = np.diff(time)
-    most = max(LONGEST_STEP, USUAL_STEPS * float(np.median(steps)))
+    max_step = max(LONGEST_STEP, USUAL_STEPS * float(np.median(steps)))
     # The tolerance covers rounding: a second between rows is no gap.
-    return tuple(Gap(float(time[k]), float(time[k + 1])) for k in np.flatnonzero(steps > most + 1e-6))
+    return tuple(Gap(float(time[k]), float(time[k + 1])) for k in np.flatnonzero(steps > max_step + 1e-6))
 
 
 def metres_between(lat: Floats, lon: Floats) -> Floats:
@@ -182,9 +182,9 @@ def _usable_rows(time: Floats, values: Floats) -> Flags:
     with np.errstate(invalid="ignore"):
         placed = (np.abs(lat) <= 90.0) & (np.abs(lon) <= 180.0) & ((lat != 0.0) | (lon != 0.0))
         # A log without altitudes has none in any row; otherwise a row without altitude is unusable.
-        high = ~np.isfinite(up) | ((up > _MIN_ALTITUDE_M) & (up < _MAX_ALTITUDE_M))
-        known = np.isfinite(up) if np.isfinite(up).any() else np.ones(up.size, bool)
-        return np.asarray((time >= 0.0) & (time < 1e9) & placed & high & known)
+        has_valid_altitude = ~np.isfinite(up) | ((up > _MIN_ALTITUDE_M) & (up < _MAX_ALTITUDE_M))
+        is_known = np.isfinite(up) if np.isfinite(up).any() else np.ones(up.size, bool)
+        return np.asarray((time >= 0.0) & (time < 1e9) & placed & has_valid_altitude & is_known)
 
 
 def _glitch_rows(time: Floats, values: Floats) -> Flags:
@@ -195,9 +195,9 @@ def _glitch_rows(time: Floats, values: Floats) -> Flags:
     lat, lon, up = values.T
     steps = np.diff(time)
     speed = metres_between(lat, lon) / np.maximum(steps, 1e-3)
-    most = GLITCH_SPEED + GLITCH_TIMES * float(np.median(speed))
+    max_speed = GLITCH_SPEED + GLITCH_TIMES * float(np.median(speed))
     rise = np.abs(np.diff(up)) / np.maximum(steps, 1e-3)
-    leaps = np.flatnonzero((speed > most) | (np.nan_to_num(rise) > most))
+    leaps = np.flatnonzero((speed > max_speed) | (np.nan_to_num(rise) > max_speed))
     k = 0
     while k < leaps.size:
         # Away with one leap and back with a later one.
@@ -205,7 +205,7 @@ def _glitch_rows(time: Floats, values: Floats) -> Flags:
         for back in leaps[k + 1 :].tolist():
             if back - begin > GLITCH_ROWS:
                 break
-            if _is_reachable(time, values, begin, back + 1, most):
+            if _is_reachable(time, values, begin, back + 1, max_speed):
                 out[begin + 1 : back + 1] = True
                 k = int(np.searchsorted(leaps, back))
                 break
@@ -218,12 +218,12 @@ def _glitch_rows(time: Floats, values: Floats) -> Flags:
     return out
 
 
-def _is_reachable(time: Floats, values: Floats, one: int, other: int, most: float) -> bool:
-    pair = [one, other]
-    away = float(metres_between(values[pair, 0], values[pair, 1])[0])
-    rise = abs(float(values[other, 2] - values[one, 2]))
-    seconds = float(time[other] - time[one])
-    return max(away, 0.0 if math.isnan(rise) else rise) <= most * seconds
+def _is_reachable(time: Floats, values: Floats, first: int, second: int, max_speed: float) -> bool:
+    pair = [first, second]
+    distance = float(metres_between(values[pair, 0], values[pair, 1])[0])
+    rise = abs(float(values[second, 2] - values[first, 2]))
+    seconds = float(time[second] - time[first])
+    return max(distance, 0.0 if math.isnan(rise) else rise) <= max_speed * seconds
 
 
 def _is_in_main_group(time: Floats) -> Flags:
@@ -239,15 +239,15 @@ def _without_jumps(time: Floats, values: Floats) -> tuple[Floats, tuple[tuple[fl
     if time.size < 20:
         return time, ()
     steps = np.diff(time)
-    away = metres_between(values[:, 0], values[:, 1])
+    distances = metres_between(values[:, 0], values[:, 1])
     usual = float(np.median(steps))
     for k in np.flatnonzero(steps > max(JUMP, 2.0 * JUMP_STEPS * usual)).tolist():
         around = slice(max(0, k - 5), k + 6)
         ordinary = steps[around] <= JUMP_STEPS * usual
         if ordinary.sum() < 4:
             continue
-        speed = float((away[around][ordinary] / steps[around][ordinary]).min())
-        if speed > MOVING and away[k] <= speed * JUMP_STEPS * usual:
+        speed = float((distances[around][ordinary] / steps[around][ordinary]).min())
+        if speed > MOVING and distances[k] <= speed * JUMP_STEPS * usual:
             shifts.append((float(time[k + 1]), float(steps[k] - usual)))
     moved = time.copy()
     for start, seconds in shifts:

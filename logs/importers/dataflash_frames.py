@@ -115,13 +115,13 @@ class MessageFormat(NamedTuple):
     @property
     def dtype(self) -> np.dtype[np.void]:
         """Type of the body of a message."""
-        return np.dtype([(name, FIELDS[one][0]) for name, one in zip(self.columns, self.letters, strict=True)])
+        return np.dtype([(name, FIELDS[letter][0]) for name, letter in zip(self.columns, self.letters, strict=True)])
 
     @property
     def scales(self) -> dict[str, int]:
         """Factors of the scaled fields, by name."""
-        named = zip(self.columns, self.letters, strict=True)
-        return {name: FIELDS[one][1] for name, one in named if FIELDS[one][1] != 1}
+        letters_by_name = zip(self.columns, self.letters, strict=True)
+        return {name: FIELDS[letter][1] for name, letter in letters_by_name if FIELDS[letter][1] != 1}
 
 
 def _text(value: bytes) -> str:
@@ -185,9 +185,9 @@ class Dataflash:
 
     def messages(self, name: str) -> Messages:
         """Return all messages of a name; an empty object if there are none."""
-        for number, known in self.formats.items():
-            if known.name == name and number in self.starts:
-                return _columns(self.data, self.starts[number], known, self.let_go)
+        for number, message_format in self.formats.items():
+            if message_format.name == name and number in self.starts:
+                return _columns(self.data, self.starts[number], message_format, self.let_go)
         return Messages(np.zeros(0, np.int64), np.zeros(0, np.dtype([])), {})
 
 
@@ -205,23 +205,24 @@ def index_dataflash(data: Bytes, names: Collection[str], let_go: Callable[[], No
     formats: dict[int, MessageFormat] = {}
     unreadable = 0
     for start in first.at.tolist():
-        found = _format(bytes(data[start + HEADER : start + _FMT_LENGTH]))
-        if found is None:
+        message_format = _format(bytes(data[start + HEADER : start + _FMT_LENGTH]))
+        if message_format is None:
             unreadable += 1
         else:
-            formats.setdefault(found.number, found)
-    wanted = np.zeros(256, np.bool_)
-    wanted[[number for number, known in formats.items() if known.name in names]] = True
-    second = _find_messages(data, wanted, let_go)
-    order = np.argsort(second.kinds, kind="stable")
-    numbers, firsts = np.unique(second.kinds[order], return_index=True)
+            formats.setdefault(message_format.number, message_format)
+    is_requested = np.zeros(256, np.bool_)
+    is_requested[[number for number, entry in formats.items() if entry.name in names]] = True
+    messages_found = _find_messages(data, is_requested, let_go)
+    order = np.argsort(messages_found.kinds, kind="stable")
+    numbers, firsts = np.unique(messages_found.kinds[order], return_index=True)
     # Without messages numpy returns one empty part.
     starts = {
-        int(number): found for number, found in zip(numbers, np.split(second.at[order], firsts[1:]), strict=False)
+        int(number): message_format
+        for number, message_format in zip(numbers, np.split(messages_found.at[order], firsts[1:]), strict=False)
     }
-    held = tuple(known.name for number, known in formats.items() if second.counts[number])
-    damage = Damage(int(second.places), int(second.size), bool(second.cut), unreadable)
-    return Dataflash(data, starts, formats, held, damage, let_go)
+    held_names = tuple(entry.name for number, entry in formats.items() if messages_found.counts[number])
+    damage = Damage(int(messages_found.places), int(messages_found.size), bool(messages_found.cut), unreadable)
+    return Dataflash(data, starts, formats, held_names, damage, let_go)
 
 
 class _FoundMessages(NamedTuple):
@@ -235,20 +236,20 @@ class _FoundMessages(NamedTuple):
     cut: bool
 
 
-def _find_messages(data: Bytes, wanted: NDArray[np.bool_], let_go: Callable[[], None]) -> _FoundMessages:
+def _find_messages(data: Bytes, is_requested: NDArray[np.bool_], let_go: Callable[[], None]) -> _FoundMessages:
     state, lengths, counts = np.zeros(6, np.int64), np.zeros(256, np.int64), np.zeros(256, np.int64)
     state[_READING], lengths[FMT] = 1, _FMT_LENGTH
-    at, kinds = [np.zeros(0, np.int64)], [np.zeros(0, np.uint8)]
-    for until in pieces(data.size, let_go):
-        found = _walk_messages(read_only(data), until, state, lengths, counts, HEADER, FMT, TRAILING, wanted)
-        at.append(found[0])
-        kinds.append(found[1])
+    starts, kinds = [np.zeros(0, np.int64)], [np.zeros(0, np.uint8)]
+    for end in pieces(data.size, let_go):
+        piece = _walk_messages(read_only(data), end, state, lengths, counts, HEADER, FMT, TRAILING, is_requested)
+        starts.append(piece[0])
+        kinds.append(piece[1])
     places, size, behind = int(state[_PLACES]), int(state[_LOST]), int(state[_BEHIND])
     if not state[_READING] and behind and data.size - behind < TRAILING:
         # The rest of the last page is no damage.
         places -= 1
         size -= min(size, data.size - HEADER + 1 - behind)
-    return _FoundMessages(np.concatenate(at), np.concatenate(kinds), counts, places, size, bool(state[_CUT]))
+    return _FoundMessages(np.concatenate(starts), np.concatenate(kinds), counts, places, size, bool(state[_CUT]))
 
 
 def _format(body: bytes) -> MessageFormat | None:
@@ -256,28 +257,28 @@ def _format(body: bytes) -> MessageFormat | None:
     if len(body) < _FMT_LENGTH - HEADER:
         return None
     number, length, *texts = struct.unpack("<BB4s16s64s", body)
-    name, letters, columns = (_text(one) for one in texts)
+    name, letters, columns = (_text(text) for text in texts)
     names = tuple(columns.split(",")) if columns else ()
-    known = set(letters) <= FIELDS.keys() and len(names) == len(letters)
-    if not known or len(set(names)) < len(names) or "" in names:
+    is_valid = set(letters) <= FIELDS.keys() and len(names) == len(letters)
+    if not is_valid or len(set(names)) < len(names) or "" in names:
         return None
-    made = MessageFormat(number, name, length, names, letters)
-    return made if made.dtype.itemsize + HEADER == length else None
+    message_format = MessageFormat(number, name, length, names, letters)
+    return message_format if message_format.dtype.itemsize + HEADER == length else None
 
 
-def _columns(data: Bytes, starts: Ints, known: MessageFormat, let_go: Callable[[], None]) -> Messages:
-    starts = starts[starts + known.length <= len(data)]
-    dtype = known.dtype
+def _columns(data: Bytes, starts: Ints, message_format: MessageFormat, let_go: Callable[[], None]) -> Messages:
+    starts = starts[starts + message_format.length <= len(data)]
+    dtype = message_format.dtype
     rows = np.zeros(0, dtype)
     if len(starts) and dtype.itemsize:
         windows = np.lib.stride_tricks.sliding_window_view(data, dtype.itemsize)
         rows = np.empty(len(starts), dtype)
         first = 0
-        for until in pieces(data.size, let_go):
-            last = int(np.searchsorted(starts, until))
+        for end in pieces(data.size, let_go):
+            last = int(np.searchsorted(starts, end))
             rows[first:last] = windows[starts[first:last] + HEADER].view(dtype)[:, 0]
             first = last
-    return Messages(starts, rows, known.scales)
+    return Messages(starts, rows, message_format.scales)
 
 
 # Indices into the state of a walk: the next byte,
@@ -297,21 +298,21 @@ _CUT = 5
 @compiled
 def _walk_messages(
     data: Bytes,
-    until: int,
+    stop: int,
     state: Ints,
     lengths: Ints,
     counts: Ints,
     header: int,
     fmt: int,
     trailing: int,
-    wanted: NDArray[np.bool_],
+    is_requested: NDArray[np.bool_],
 ) -> tuple[Ints, Bytes]:
-    """Return starts and types of requested messages before byte `until`, continuing from and updating `state`."""
-    at, kinds = np.empty(1024, np.int64), np.empty(1024, np.uint8)
+    """Return starts and types of requested messages before byte `stop`, continuing from and updating `state`."""
+    starts, kinds = np.empty(1024, np.int64), np.empty(1024, np.uint8)
     count, end = 0, data.size
     places, size, k, behind = state[_PLACES], state[_LOST], state[_AT], state[_BEHIND]
     reading, cut = state[_READING] == 1, state[_CUT] == 1
-    while k + header <= end and k < until:
+    while k + header <= end and k < stop:
         length = 0
         if data[k] == 0xA3 and data[k + 1] == 0x95:
             length = lengths[data[k + 2]]
@@ -326,13 +327,13 @@ def _walk_messages(
             continue
         kind = data[k + 2]
         counts[kind] += 1
-        if wanted[kind]:
-            if count == at.size:
-                more_at, more_kinds = np.empty(2 * count, np.int64), np.empty(2 * count, np.uint8)
-                copy_into(more_at, at)
+        if is_requested[kind]:
+            if count == starts.size:
+                more_starts, more_kinds = np.empty(2 * count, np.int64), np.empty(2 * count, np.uint8)
+                copy_into(more_starts, starts)
                 copy_into(more_kinds, kinds)
-                at, kinds = more_at, more_kinds
-            at[count], kinds[count] = k, kind
+                starts, kinds = more_starts, more_kinds
+            starts[count], kinds[count] = k, kind
             count += 1
         if kind == fmt and after <= end:
             lengths[data[k + header]] = data[k + header + 1]
@@ -341,4 +342,4 @@ def _walk_messages(
         reading = True
     state[_PLACES], state[_LOST], state[_AT], state[_BEHIND] = places, size, k, behind
     state[_READING], state[_CUT] = reading, cut
-    return at[:count], kinds[:count]
+    return starts[:count], kinds[:count]

@@ -58,11 +58,11 @@ def dataflash_missions(commands: Messages, time: Floats, origins: Messages, sour
         rows.append(Item(stamp, int(total) if 0.0 <= total <= _MAX_ITEMS else 0, item))
     notes = () if framed else ("the log states no frames: heights are taken as above home",)
     for logged in gather_items(rows):
-        made = logged_mission(logged, source, "CMD")
-        if made is not None:
-            mission = made.mission
+        readable = logged_mission(logged, source, "CMD")
+        if readable is not None:
+            mission = readable.mission
             home = mission.home if mission.home is not None else logged_home(origins)
-            yield replace(made, mission=replace(mission, home=home, warnings=(*mission.warnings, *notes)))
+            yield replace(readable, mission=replace(mission, home=home, warnings=(*mission.warnings, *notes)))
 
 
 def logged_home(origins: Messages) -> Home | None:
@@ -73,8 +73,8 @@ def logged_home(origins: Messages) -> Home | None:
     if not len(homes):
         return None
     lat, lon, up = (float(homes.column(name)[-1]) for name in ("Lat", "Lng", "Alt"))
-    known = np.isfinite([lat, lon, up]).all() and abs(lat) <= 90.0 and abs(lon) <= 180.0 and (lat, lon) != (0.0, 0.0)
-    return Home(on_grid(lat), on_grid(lon), up) if known else None
+    is_valid = np.isfinite([lat, lon, up]).all() and abs(lat) <= 90.0 and abs(lon) <= 180.0 and (lat, lon) != (0.0, 0.0)
+    return Home(on_grid(lat), on_grid(lon), up) if is_valid else None
 
 
 FORMAT = "ArduPilot dataflash log"
@@ -170,45 +170,45 @@ class _Reader:
     def _messages(self, name: str) -> Messages:
         """Return the messages of a name, of the first instance if there are several."""
         if name not in self._cache:
-            found = self._index.messages(name)
+            messages = self._index.messages(name)
             for column in ("I", "C", "Inst", "Instance"):
                 # Earlier releases have a mode number or a counter under these names, which are no instances.
-                if name in _WITH_INSTANCES and found.has(column) and found.rows.dtype[column].kind in "ui":
-                    number = found.rows[column]
-                    found = found.only(number == number.min())
-            self._cache[name] = found
+                if name in _WITH_INSTANCES and messages.has(column) and messages.rows.dtype[column].kind in "ui":
+                    number = messages.rows[column]
+                    messages = messages.only(number == number.min())
+            self._cache[name] = messages
         return self._cache[name]
 
     def _clock_shifts(self) -> tuple[NDArray[np.int64], Floats, tuple[float, ...]]:
         """Return the shifts of the log's clock: from which byte on, by how much (s), and when."""
-        times, at = [], []
+        times, starts = [], []
         for name in ("POS", "ATT", "GPS", "MODE"):
-            found = self._messages(name)
-            if found.has("TimeUS") or found.has("TimeMS"):
-                times.append(_raw_time(found))
-                at.append(found.at)
+            messages = self._messages(name)
+            if messages.has("TimeUS") or messages.has("TimeMS"):
+                times.append(_raw_time(messages))
+                starts.append(messages.at)
         if not times:
             return np.zeros(0, np.int64), np.zeros(0), ()
-        order = np.argsort(np.concatenate(at), kind="stable")
-        places, raw = np.concatenate(at)[order], np.concatenate(times)[order]
-        good = np.isfinite(raw)
-        steady = steady_clock(raw[good])
-        return places[good], steady.time - raw[good], steady.jumps
+        order = np.argsort(np.concatenate(starts), kind="stable")
+        places, raw = np.concatenate(starts)[order], np.concatenate(times)[order]
+        is_finite = np.isfinite(raw)
+        steady = steady_clock(raw[is_finite])
+        return places[is_finite], steady.time - raw[is_finite], steady.jumps
 
-    def _time(self, found: Messages) -> Floats:
+    def _time(self, messages: Messages) -> Floats:
         places, moved, jumps = self._clock
-        raw = _raw_time(found)
+        raw = _raw_time(messages)
         if not jumps:
             return raw
-        return np.asarray(raw + moved[np.clip(np.searchsorted(places, found.at), 0, len(moved) - 1)])
+        return np.asarray(raw + moved[np.clip(np.searchsorted(places, messages.at), 0, len(moved) - 1)])
 
     def _table(self, name: str, columns: Iterable[str], scale: float = 1.0) -> LogSeries | None:
         columns = tuple(columns)
-        found = self._messages(name)
-        if not found.has(*columns) or not (found.has("TimeUS") or found.has("TimeMS")):
+        messages = self._messages(name)
+        if not messages.has(*columns) or not (messages.has("TimeUS") or messages.has("TimeMS")):
             return None
-        values = np.stack([found.column(column) for column in columns], axis=1)
-        return LogSeries(name, self._time(found), values * scale)
+        values = np.stack([messages.column(column) for column in columns], axis=1)
+        return LogSeries(name, self._time(messages), values * scale)
 
     def _series(self) -> Iterable[tuple[str, LogSeries | None]]:
         yield "position", self._position()
@@ -221,9 +221,9 @@ class _Reader:
 
     def _first(self, choices: Iterable[tuple[str, tuple[str, ...]]], scale: float = 1.0) -> LogSeries | None:
         for name, columns in choices:
-            found = self._table(name, columns, scale)
-            if found is not None and len(found.time):
-                return found
+            table = self._table(name, columns, scale)
+            if table is not None and len(table.time):
+                return table
         return None
 
     def _position(self) -> LogSeries | None:
@@ -231,19 +231,19 @@ class _Reader:
         if own is not None:
             return own
         gps = self._messages("GPS")
-        found = self._first((("GPS", ("Lat", "Lng", "Alt")),))
-        if found is None or not gps.has("Status"):
-            return found
+        position = self._first((("GPS", ("Lat", "Lng", "Alt")),))
+        if position is None or not gps.has("Status"):
+            return position
         # Without a 3-D fix there is no altitude.
         fixed = gps.column("Status") >= 3
-        return LogSeries("GPS", found.time[fixed], found.values[fixed])
+        return LogSeries("GPS", position.time[fixed], position.values[fixed])
 
     def _velocity(self) -> LogSeries | None:
         """Return east, north, up."""
         for name in ("XKF1", "NKF1", "EKF1"):
-            found = self._table(name, ("VE", "VN", "VD"))
-            if found is not None and len(found.time):
-                return LogSeries(name, found.time, found.values * np.array([1.0, 1.0, -1.0]))
+            velocity = self._table(name, ("VE", "VN", "VD"))
+            if velocity is not None and len(velocity.time):
+                return LogSeries(name, velocity.time, velocity.values * np.array([1.0, 1.0, -1.0]))
         gps = self._table("GPS", ("Spd", "GCrs", "VZ"))
         if gps is None:
             return None
@@ -252,22 +252,24 @@ class _Reader:
         return LogSeries("GPS", gps.time, np.stack([speed * np.sin(course), speed * np.cos(course), -down], axis=1))
 
     def _wind(self) -> LogSeries | None:
-        found = self._first([(name, ("VWE", "VWN")) for name in ("XKF2", "NKF2", "EKF2")])
+        wind = self._first([(name, ("VWE", "VWN")) for name in ("XKF2", "NKF2", "EKF2")])
         # Without an estimate the wind stays zero.
-        return found if found is not None and np.any(found.values) else None
+        return wind if wind is not None and np.any(wind.values) else None
 
     def _airspeed(self) -> LogSeries | None:
         """Return true airspeed, converted from ArduPilot's equivalent airspeed."""
         sensor = self._messages("ARSP")
-        found = self._table("ARSP", ("Airspeed",))
-        if found is not None and sensor.has("U"):
+        airspeed = self._table("ARSP", ("Airspeed",))
+        if airspeed is not None and sensor.has("U"):
             used = sensor.column("U") > 0
-            found = LogSeries("ARSP", found.time[used], found.values[used]) if used.any() else None
-        if found is None or not len(found.time):
-            found = self._first((("CTUN", ("As",)),)) if self._messages("CTUN").has("AsT") else None
-        if found is None or not len(found.time) or not np.any(found.values):
+            airspeed = LogSeries("ARSP", airspeed.time[used], airspeed.values[used]) if used.any() else None
+        if airspeed is None or not len(airspeed.time):
+            airspeed = self._first((("CTUN", ("As",)),)) if self._messages("CTUN").has("AsT") else None
+        if airspeed is None or not len(airspeed.time) or not np.any(airspeed.values):
             return None
-        return LogSeries(found.source, found.time, found.values * self._true_by_equivalent(found.time)[:, None])
+        return LogSeries(
+            airspeed.source, airspeed.time, airspeed.values * self._true_by_equivalent(airspeed.time)[:, None]
+        )
 
     def _true_by_equivalent(self, time: Floats) -> Floats:
         ratio = self._table("CTUN", ("E2T",))
@@ -283,11 +285,11 @@ class _Reader:
 
     def _battery(self) -> LogSeries | None:
         """Return current and used energy."""
-        found = self._table("BAT", ("Curr", "EnrgTot"))
-        if found is None or not len(found.time):
-            found = self._table("CURR", ("Curr", "EnrgTot"))
-        if found is not None and len(found.time):
-            return found if np.any(found.values) else None
+        battery = self._table("BAT", ("Curr", "EnrgTot"))
+        if battery is None or not len(battery.time):
+            battery = self._table("CURR", ("Curr", "EnrgTot"))
+        if battery is not None and len(battery.time):
+            return battery if np.any(battery.values) else None
         for name in ("BAT", "CURR"):
             volts = self._table(name, ("Volt", "Curr"))
             if volts is not None and len(volts.time) and np.any(volts.values[:, 1]):
@@ -298,9 +300,9 @@ class _Reader:
 
     def _throttle(self) -> LogSeries | None:
         for column in ("ThO", "ThrOut"):
-            found = self._table("CTUN", (column,), 0.01)
-            if found is not None and len(found.time):
-                return found
+            throttle = self._table("CTUN", (column,), 0.01)
+            if throttle is not None and len(throttle.time):
+                return throttle
         return None
 
     def _heights(self) -> Iterable[HeightSource]:
@@ -317,44 +319,46 @@ class _Reader:
                 yield HeightSource("BARO.Alt (above where it was switched on)", "unstated", baro)
 
     def _modes(self) -> Iterable[ModeChange]:
-        found = self._messages("MODE")
-        column = "ModeNum" if found.has("ModeNum") else "Mode"
-        if not found.has(column) or found.rows.dtype[column].kind == "S":
+        messages = self._messages("MODE")
+        column = "ModeNum" if messages.has("ModeNum") else "Mode"
+        if not messages.has(column) or messages.rows.dtype[column].kind == "S":
             return
-        for time, number in zip(self._time(found).tolist(), found.rows[column].tolist(), strict=True):
+        for time, number in zip(self._time(messages).tolist(), messages.rows[column].tolist(), strict=True):
             name, automatic = plane_mode(int(number))
             yield ModeChange(time, name, automatic)
 
     def _missions(self) -> Iterable[LoggedMission]:
-        found = self._messages("CMD")
-        time = self._time(found) if len(found) else np.zeros(0)
-        return dataflash_missions(found, time, self._messages("ORGN"), self._source)
+        commands = self._messages("CMD")
+        time = self._time(commands) if len(commands) else np.zeros(0)
+        return dataflash_missions(commands, time, self._messages("ORGN"), self._source)
 
     def _parameters(self) -> dict[str, float]:
-        found = self._messages("PARM")
-        if not found.has("Name", "Value"):
+        messages = self._messages("PARM")
+        if not messages.has("Name", "Value"):
             return {}
-        values = zip(found.texts("Name"), found.column("Value").tolist(), strict=True)
+        values = zip(messages.texts("Name"), messages.column("Value").tolist(), strict=True)
         return {name: value for name, value in values if name and math.isfinite(value)}
 
     def _events(self) -> Iterable[tuple[float, str]]:
-        found = self._messages("MSG")
-        if found.has("Message"):
-            yield from zip(self._time(found).tolist(), found.texts("Message"), strict=True)
+        messages = self._messages("MSG")
+        if messages.has("Message"):
+            yield from zip(self._time(messages).tolist(), messages.texts("Message"), strict=True)
 
     def _program(self) -> tuple[str, VehicleKind]:
         return program_and_vehicle([text for _, text in self._events()], self._messages("VER"))
 
     def _utc_start(self) -> float:
-        found = self._messages("GPS")
+        messages = self._messages("GPS")
         for weeks, millis in (("GWk", "GMS"), ("Week", "TimeMS")):
-            if found.has(weeks, millis, "TimeUS"):
+            if messages.has(weeks, millis, "TimeUS"):
                 # Without a fix a receiver may report a wrong week.
-                good = (found.column(weeks) > 1000) & (found.column("Status") >= 3 if found.has("Status") else True)
-                if good.any():
-                    k = int(np.argmax(good))
-                    seconds = found.column(weeks)[k] * _WEEK_S + found.column(millis)[k] * 1e-3
-                    return float(_GPS_EPOCH_S - _LEAP_SECONDS_S + seconds - self._time(found)[k])
+                has_fix = (messages.column(weeks) > 1000) & (
+                    messages.column("Status") >= 3 if messages.has("Status") else True
+                )
+                if has_fix.any():
+                    k = int(np.argmax(has_fix))
+                    seconds = messages.column(weeks)[k] * _WEEK_S + messages.column(millis)[k] * 1e-3
+                    return float(_GPS_EPOCH_S - _LEAP_SECONDS_S + seconds - self._time(messages)[k])
         return math.nan
 
 
@@ -385,8 +389,8 @@ _READ = (
 _WITH_INSTANCES = frozenset({"GPS", "BARO", "ARSP", "BAT", "XKF1", "XKF2", "NKF1", "NKF2", "EKF1", "EKF2"})
 
 
-def _raw_time(found: Messages) -> Floats:
+def _raw_time(messages: Messages) -> Floats:
     """Return times of messages as they are written, s; before 2015 they were milliseconds."""
-    if found.has("TimeUS"):
-        return found.column("TimeUS") * 1e-6
-    return found.column("TimeMS") * 1e-3
+    if messages.has("TimeUS"):
+        return messages.column("TimeUS") * 1e-6
+    return messages.column("TimeMS") * 1e-3

@@ -113,18 +113,18 @@ def _stretches(start: float, end: float, modes: Sequence[ModeChange], last: floa
     open_end = last - end < IN_THE_AIR
     if not modes:
         return [MissionStretch(start, end, "", "log" if open_end else "landed")]
-    found = []
+    stretches = []
     ordered = sorted(modes, key=lambda mode: mode.time)
     for k, mode in enumerate(ordered):
-        until = ordered[k + 1].time if k + 1 < len(ordered) else float("inf")
-        begin, stop = max(start, mode.time), min(end, until)
+        mode_end = ordered[k + 1].time if k + 1 < len(ordered) else float("inf")
+        begin, stop = max(start, mode.time), min(end, mode_end)
         if not mode.automatic or stop <= begin:
             continue
-        if until <= end:
-            found.append(MissionStretch(begin, stop, mode.name, "mode", ordered[k + 1].name))
+        if mode_end <= end:
+            stretches.append(MissionStretch(begin, stop, mode.name, "mode", ordered[k + 1].name))
         else:
-            found.append(MissionStretch(begin, stop, mode.name, "log" if open_end else "landed"))
-    return found
+            stretches.append(MissionStretch(begin, stop, mode.name, "log" if open_end else "landed"))
+    return stretches
 
 
 def _mission_at(stretch: MissionStretch, missions: Sequence[LoggedMission]) -> int:
@@ -211,9 +211,10 @@ def make_flight(raw: RawLog, number: int | None = None) -> LoggedFlight:
     ([('AUTO', 'log')], ('velocity', 'attitude'))
     """
     if raw.vehicle in _REFUSED:
-        named = f" ({raw.program})" if raw.program else ""
+        program_text = f" ({raw.program})" if raw.program else ""
         raise LogError(
-            f"{raw.source}: {_REFUSED[raw.vehicle]} log{named}: flights of aeroplanes are judged", file=raw.source
+            f"{raw.source}: {_REFUSED[raw.vehicle]} log{program_text}: flights of aeroplanes are judged",
+            file=raw.source,
         )
     series = raw.series["position"]
     if len(series.time) > _MAX_ROWS:
@@ -223,7 +224,9 @@ def make_flight(raw: RawLog, number: int | None = None) -> LoggedFlight:
     if not spans:
         raise LogError(f"{raw.source}: no flight in it: {_reason_without_flight(places)}", file=raw.source)
     last = float(places.time[-1])
-    modes = [type(one)(float(places.on_clock(np.array([one.time]))[0]), one.name, one.automatic) for one in raw.modes]
+    modes = [
+        type(mode)(float(places.on_clock(np.array([mode.time]))[0]), mode.name, mode.automatic) for mode in raw.modes
+    ]
     parts = flight_parts(spans, modes, raw.missions, last)
     chosen = choose_part(parts)
     if number is not None:
@@ -236,8 +239,10 @@ def make_flight(raw: RawLog, number: int | None = None) -> LoggedFlight:
 
 def _reason_without_flight(places: Places) -> str:
     if places.time.size < 2:
-        bad = places.faults.unusable
-        return f"{places.time.size} usable places" + (f", {bad:,} without a place or a time" if bad else "")
+        unusable_count = places.faults.unusable
+        return f"{places.time.size} usable places" + (
+            f", {unusable_count:,} without a place or a time" if unusable_count else ""
+        )
     return f"in {places.time[-1] - places.time[0]:.0f} s it never went faster than a person for long"
 
 
@@ -280,22 +285,28 @@ def _interpolate_at(series: LogSeries | None, name: str, time: Floats, places: P
     out = np.full((time.size, width), math.nan)
     if series is None:
         return out
-    good = np.isfinite(series.time) & np.isfinite(series.values).all(axis=1) & (np.abs(series.values) < 1e7).all(axis=1)
-    own = places.on_clock(series.time[good])
-    order = np.argsort(own, kind="stable")
-    own, values = own[order], series.values[good][order]
-    fresh = np.concatenate([[True], np.diff(own) > 0.0]) if own.size else np.zeros(0, bool)
-    own, values = own[fresh], values[fresh]
-    if own.size < 2:
+    is_valid = (
+        np.isfinite(series.time) & np.isfinite(series.values).all(axis=1) & (np.abs(series.values) < 1e7).all(axis=1)
+    )
+    series_time = places.on_clock(series.time[is_valid])
+    order = np.argsort(series_time, kind="stable")
+    series_time, values = series_time[order], series.values[is_valid][order]
+    fresh = np.concatenate([[True], np.diff(series_time) > 0.0]) if series_time.size else np.zeros(0, bool)
+    series_time, values = series_time[fresh], values[fresh]
+    if series_time.size < 2:
         return out
-    near = max(_MAX_INTERPOLATED_STEP_S, _MAX_INTERPOLATED_STEPS * float(np.median(np.diff(own))))
-    after = np.clip(np.searchsorted(own, time), 1, own.size - 1)
-    within = (own[after] - own[after - 1] <= near) & (time >= own[0] - near) & (time <= own[-1] + near)
-    exact = np.isclose(own[after], time, atol=1e-9) | np.isclose(own[after - 1], time, atol=1e-9)
+    max_gap = max(_MAX_INTERPOLATED_STEP_S, _MAX_INTERPOLATED_STEPS * float(np.median(np.diff(series_time))))
+    after = np.clip(np.searchsorted(series_time, time), 1, series_time.size - 1)
+    is_covered = (
+        (series_time[after] - series_time[after - 1] <= max_gap)
+        & (time >= series_time[0] - max_gap)
+        & (time <= series_time[-1] + max_gap)
+    )
+    exact = np.isclose(series_time[after], time, atol=1e-9) | np.isclose(series_time[after - 1], time, atol=1e-9)
     if name == "attitude":
         values = np.unwrap(values, axis=0)
     for k in range(width):
-        out[:, k] = np.where(within | exact, np.interp(time, own, values[:, k]), math.nan)
+        out[:, k] = np.where(is_covered | exact, np.interp(time, series_time, values[:, k]), math.nan)
     if name == "attitude":
         # Wrap roll and pitch into -pi..pi, and yaw into 0..2 pi.
         out[:, :2] = np.remainder(out[:, :2] + math.pi, 2.0 * math.pi) - math.pi
@@ -329,15 +340,15 @@ def with_flown_heights(mission: Mission, lat: Floats, lon: Floats, up: Floats) -
     >>> [item.alt for item in flown.items]
     [900.0, 1500.0]
     """
-    known = np.isfinite(up)
-    heights = up[known] if known.any() else np.zeros(len(up))
-    lat, lon = (lat[known], lon[known]) if known.any() else (lat, lon)
+    is_known = np.isfinite(up)
+    heights = up[is_known] if is_known.any() else np.zeros(len(up))
+    lat, lon = (lat[is_known], lon[is_known]) if is_known.any() else (lat, lon)
     items = []
     for item in mission.items:
         if item.has_position and heights.size:
             east = ((lon - item.lon_deg + 180.0) % 360.0 - 180.0) * np.cos(np.radians(item.lat_deg))
-            away = np.hypot((lat - item.lat_deg) * DEGREE, east * DEGREE)
-            items.append(replace(item, alt=round(float(heights[int(np.argmin(away))]), 2)))
+            distances = np.hypot((lat - item.lat_deg) * DEGREE, east * DEGREE)
+            items.append(replace(item, alt=round(float(heights[int(np.argmin(distances))]), 2)))
         else:
             items.append(item)
     return replace(mission, items=tuple(items))
@@ -410,7 +421,7 @@ def track_of_flight(flight: LoggedFlight, origin: GeoOrigin) -> Track:
     controls = np.full((count, 4), math.nan)
     controls[:, THROTTLE] = flight.columns["throttle"][:, 0]
     current, energy = flight.columns["battery"].T
-    known = energy[np.isfinite(energy)]
+    known_energy = energy[np.isfinite(energy)]
     none = np.full(count, math.nan)
     return Track(
         time=flight.time,
@@ -425,7 +436,7 @@ def track_of_flight(flight: LoggedFlight, origin: GeoOrigin) -> Track:
         wind=wind,
         load_factor=none,
         current=current,
-        energy=energy - known[0] if known.size else energy,
+        energy=energy - known_energy[0] if known_energy.size else energy,
         leg=np.zeros(count, dtype=np.int32),
         cross_track=none,
         height_error=none,

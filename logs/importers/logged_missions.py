@@ -47,56 +47,56 @@ def gather_items(rows: Iterable[Item]) -> list[LoggedItems]:
     >>> [(start, total, len(items)) for start, total, items in gather_items(logged)]
     [(1.0, 3, 3)]
     """
-    found: list[tuple[float, dict[int, MissionItem]]] = []
+    missions: list[tuple[float, dict[int, MissionItem]]] = []
     # The last announced number of items, for each mission.
     totals: list[int] = []
     ordered = list(rows)
-    for k, (time, total, item, begins) in enumerate(ordered):
+    for k, (time, total, item, begins_mission) in enumerate(ordered):
         following = ordered[k + 1].item if k + 1 < len(ordered) else None
         if (
-            not found
-            or begins
-            or (item.seq == 0 and len(found[-1][1]) > 1 and _begins_mission(following, found[-1][1]))
+            not missions
+            or begins_mission
+            or (item.seq == 0 and len(missions[-1][1]) > 1 and _begins_mission(following, missions[-1][1]))
         ):
-            found.append((time, {}))
-        elif item.seq in found[-1][1] and not _is_same_item(found[-1][1][item.seq], item):
-            found.append((time, dict(found[-1][1])))
-        found[-1][1][item.seq] = item
-        if len(totals) < len(found):
+            missions.append((time, {}))
+        elif item.seq in missions[-1][1] and not _is_same_item(missions[-1][1][item.seq], item):
+            missions.append((time, dict(missions[-1][1])))
+        missions[-1][1][item.seq] = item
+        if len(totals) < len(missions):
             totals.append(0)
         totals[-1] = total or totals[-1]
     out: list[LoggedItems] = []
-    for (start, items), total in zip(found, totals, strict=True):
+    for (start, items), total in zip(missions, totals, strict=True):
         logged = LoggedItems(start, total, tuple(items[seq] for seq in sorted(items)))
         if out and _is_same_mission(out[-1], logged):
-            both = {item.seq: item for item in (*out[-1].items, *logged.items)}
-            out[-1] = LoggedItems(out[-1].time, total or out[-1].total, tuple(both[seq] for seq in sorted(both)))
+            merged = {item.seq: item for item in (*out[-1].items, *logged.items)}
+            out[-1] = LoggedItems(out[-1].time, total or out[-1].total, tuple(merged[seq] for seq in sorted(merged)))
         else:
             out.append(logged)
     return out
 
 
-def _begins_mission(following: MissionItem | None, known: Mapping[int, MissionItem]) -> bool:
+def _begins_mission(following: MissionItem | None, items: Mapping[int, MissionItem]) -> bool:
     """Return True if the item after an item 0 shows a new mission: item 1, or an unknown or changed one."""
     if following is None or following.seq == 0:
         return False
-    return following.seq == 1 or following.seq not in known or not _is_same_item(known[following.seq], following)
+    return following.seq == 1 or following.seq not in items or not _is_same_item(items[following.seq], following)
 
 
-def _is_same_mission(one: LoggedItems, other: LoggedItems) -> bool:
+def _is_same_mission(first: LoggedItems, second: LoggedItems) -> bool:
     """Return True if two missions are the same: all items, or the announced number and common items, are equal.
 
-    Home, item 0, is the same in all missions flown from a place: it alone in common is no evidence.
+    Home, item 0, is the same in all missions flown from a place, so a common home is no evidence.
     """
-    known = {item.seq: item for item in one.items}
-    common = [item for item in other.items if item.seq in known]
-    whole = len(common) == len(one.items) == len(other.items)
-    announced = one.total == other.total > 0 and any(item.seq > 0 for item in common)
-    return (whole or announced) and all(_is_same_item(known[item.seq], item) for item in common)
+    first_items = {item.seq: item for item in first.items}
+    common = [item for item in second.items if item.seq in first_items]
+    is_whole = len(common) == len(first.items) == len(second.items)
+    is_announced = first.total == second.total > 0 and any(item.seq > 0 for item in common)
+    return (is_whole or is_announced) and all(_is_same_item(first_items[item.seq], item) for item in common)
 
 
-def _is_same_item(one: MissionItem, other: MissionItem) -> bool:
-    return _content(one) == _content(other)
+def _is_same_item(first: MissionItem, second: MissionItem) -> bool:
+    return _content(first) == _content(second)
 
 
 def _content(item: MissionItem) -> tuple[object, ...]:
@@ -118,7 +118,7 @@ def logged_mission(logged: LoggedItems, source: str, origin: str) -> LoggedMissi
     (3, 4)
     """
     home: Home | None = None
-    kept, warnings = [], []
+    items, warnings = [], []
     for item in logged.items:
         problem = item_problem(item)
         if problem is not None:
@@ -129,13 +129,13 @@ def logged_mission(logged: LoggedItems, source: str, origin: str) -> LoggedMissi
             else:
                 warnings.append("item 0: home at 0, 0, which is no position: left out; the mission has no home")
         else:
-            kept.append(item)
+            items.append(item)
     if logged.total and not any(item.seq == 0 for item in logged.items):
         warnings.append(f"item 0, which is home, of {logged.total} is not in the log")
     # Both mission files keep number 0 for home.
-    shift = 1 if kept and kept[0].seq == 0 else 0
+    shift = 1 if items and items[0].seq == 0 else 0
     end = max(logged.total - 1, logged.items[-1].seq) + shift
-    mission = Mission(home, shifted(kept, shift), warnings=tuple(warnings), source=f"{source}: {origin}")
+    mission = Mission(home, shifted(items, shift), warnings=tuple(warnings), source=f"{source}: {origin}")
     return without_gaps(LoggedMission(logged.time, mission, origin), logged.total, end)
 
 
@@ -148,8 +148,8 @@ def px4_items(items: Iterable[MissionItem]) -> tuple[MissionItem, ...]:
     [(1, 22)]
     """
     vertical = Command.NAV_VTOL_TAKEOFF
-    made = (replace(one, command=int(Command.NAV_TAKEOFF)) if one.command == vertical else one for one in items)
-    return shifted(made, 1)
+    changed = (replace(item, command=int(Command.NAV_TAKEOFF)) if item.command == vertical else item for item in items)
+    return shifted(changed, 1)
 
 
 def without_gaps(logged: LoggedMission, total: int, end: int) -> LoggedMission | None:
@@ -158,14 +158,14 @@ def without_gaps(logged: LoggedMission, total: int, end: int) -> LoggedMission |
     total: announced number of items, 0 if not known.  end: number of its last item, as far as known.
     None for a whole mission of fewer than two items; an incomplete mission may be left without any item.
     """
-    held = {item.seq for item in logged.mission.items}
-    missing = tuple(sorted(set(range(1, end + 1)) - held))
+    numbers = {item.seq for item in logged.mission.items}
+    missing = tuple(sorted(set(range(1, end + 1)) - numbers))
     if not missing:
-        return logged if len(held) > 1 else None
+        return logged if len(numbers) > 1 else None
     run = _longest_run(logged.mission.items)
     first, last = (run[0].seq, run[-1].seq) if run else (0, 0)
-    found = MissingItems(missing, total, first, last, end)
-    return replace(logged, mission=replace(logged.mission, items=tuple(run)), missing=found)
+    missing_items = MissingItems(missing, total, first, last, end)
+    return replace(logged, mission=replace(logged.mission, items=tuple(run)), missing=missing_items)
 
 
 def _longest_run(items: Sequence[MissionItem]) -> Sequence[MissionItem]:
@@ -180,9 +180,9 @@ def _longest_run(items: Sequence[MissionItem]) -> Sequence[MissionItem]:
 
 def _before_jump_out(run: Sequence[MissionItem]) -> Sequence[MissionItem]:
     """Return the items of a run before the first jump to an item outside it."""
-    at = {float(item.seq): k for k, item in enumerate(run)}
+    indices = {float(item.seq): k for k, item in enumerate(run)}
     end = len(run)
-    jumps = [(at.get(item.params[0], end), k) for k, item in enumerate(run) if item.command == Command.DO_JUMP]
+    jumps = [(indices.get(item.params[0], end), k) for k, item in enumerate(run) if item.command == Command.DO_JUMP]
     # The farthest targets first: items cut off by one jump may be the targets of the next.
     for target, k in sorted(jumps, reverse=True):
         if target >= end:

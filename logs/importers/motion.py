@@ -92,8 +92,8 @@ def first_on_ground(position: Samples, velocity: Samples) -> tuple[float, float,
         return None
     time, place = position.time, position.values
     speed = np.interp(time, velocity.time, np.linalg.norm(velocity.values, axis=1), left=np.inf, right=np.inf)
-    known = (np.abs(place[:, :2]) <= [90.0, 180.0]).all(axis=1) & (place[:, :2] != 0.0).any(axis=1)
-    standing = np.flatnonzero(known & (speed < _STANDING_SPEED_MPS))
+    is_valid = (np.abs(place[:, :2]) <= [90.0, 180.0]).all(axis=1) & (place[:, :2] != 0.0).any(axis=1)
+    standing = np.flatnonzero(is_valid & (speed < _STANDING_SPEED_MPS))
     if not len(standing):
         return None
     lat, lon, height = place[standing[0]].tolist()
@@ -102,8 +102,8 @@ def first_on_ground(position: Samples, velocity: Samples) -> tuple[float, float,
 
 def rising(time: Floats, values: Floats) -> Samples:
     """Sort rows by time, without repeated times and rows that are no numbers."""
-    good = np.isfinite(time) & np.isfinite(values).all(axis=1)
-    time, values = time[good], values[good]
+    is_finite = np.isfinite(time) & np.isfinite(values).all(axis=1)
+    time, values = time[is_finite], values[is_finite]
     order = np.argsort(time, kind="stable")
     time, values = time[order], values[order]
     keep = np.concatenate([[True], np.diff(time) > 0.0]) if len(time) else np.zeros(0, np.bool_)

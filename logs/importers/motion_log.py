@@ -95,48 +95,48 @@ class _Dataflash:
 
     def _messages(self, name: str) -> Messages:
         """Return the series of the first instance if there are several."""
-        found = self._index.messages(name)
+        messages = self._index.messages(name)
         for column in _INSTANCES:
-            if name in ("IMU", "XKF1", "XKF2", "NKF1", "NKF2", "ARSP", "BAT") and found.has(column):
-                number = found.rows[column]
-                found = found.only(number == number.min()) if number.dtype.kind in "ui" else found
-        return found
+            if name in ("IMU", "XKF1", "XKF2", "NKF1", "NKF2", "ARSP", "BAT") and messages.has(column):
+                number = messages.rows[column]
+                messages = messages.only(number == number.min()) if number.dtype.kind in "ui" else messages
+        return messages
 
     def _first(self, choices: Iterable[tuple[str, tuple[str, ...]]], scale: float = 1.0) -> Samples:
         for name, columns in choices:
-            found = self._messages(name)
+            messages = self._messages(name)
             # Logs of older releases have fewer outputs.
-            held = [column for column in columns if found.has("TimeUS", column)]
-            if not held or (name != "RCOU" and len(held) < len(columns)):
+            held_columns = [column for column in columns if messages.has("TimeUS", column)]
+            if not held_columns or (name != "RCOU" and len(held_columns) < len(columns)):
                 continue
-            values = np.zeros((len(found), len(columns)))
+            values = np.zeros((len(messages), len(columns)))
             for k, column in enumerate(columns):
-                if column in held:
-                    values[:, k] = found.column(column)
-            return rising(found.column("TimeUS") * 1e-6, values * scale)
+                if column in held_columns:
+                    values[:, k] = messages.column(column)
+            return rising(messages.column("TimeUS") * 1e-6, values * scale)
         return Samples(np.zeros(0), np.zeros((0, 1)))
 
     def _airspeed(self) -> Samples:
-        found = self._messages("ARSP")
-        if not found.has("TimeUS", "Airspeed"):
+        messages = self._messages("ARSP")
+        if not messages.has("TimeUS", "Airspeed"):
             return Samples(np.zeros(0), np.zeros((0, 1)))
-        used = found.column("U") > 0 if found.has("U") else np.ones(len(found), np.bool_)
-        return rising(found.column("TimeUS")[used] * 1e-6, found.column("Airspeed")[used, np.newaxis])
+        used = messages.column("U") > 0 if messages.has("U") else np.ones(len(messages), np.bool_)
+        return rising(messages.column("TimeUS")[used] * 1e-6, messages.column("Airspeed")[used, np.newaxis])
 
     def _modes(self) -> list[tuple[float, int]]:
-        found = self._messages("MODE")
-        column = "ModeNum" if found.has("ModeNum") else "Mode"
-        if not found.has("TimeUS", column) or found.rows.dtype[column].kind == "S":
+        messages = self._messages("MODE")
+        column = "ModeNum" if messages.has("ModeNum") else "Mode"
+        if not messages.has("TimeUS", column) or messages.rows.dtype[column].kind == "S":
             return []
         return list(
-            zip((found.column("TimeUS") * 1e-6).tolist(), found.column(column).astype(int).tolist(), strict=True)
+            zip((messages.column("TimeUS") * 1e-6).tolist(), messages.column(column).astype(int).tolist(), strict=True)
         )
 
     def _parameters(self) -> dict[str, float]:
-        found = self._messages("PARM")
-        if not found.has("Name", "Value"):
+        messages = self._messages("PARM")
+        if not messages.has("Name", "Value"):
             return {}
-        values = zip(found.texts("Name"), found.column("Value").tolist(), strict=True)
+        values = zip(messages.texts("Name"), messages.column("Value").tolist(), strict=True)
         return {name: value for name, value in values if math.isfinite(value)}
 
     def _home(self, velocity: Samples) -> tuple[float, float, float] | None:

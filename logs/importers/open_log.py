@@ -82,10 +82,10 @@ def open_log(path: Path) -> "RawLog":
             head = file.read(_HEAD)
         if not head:
             raise LogError(f"{path}: empty: a log is expected", file=path)
-        known = log_format(path, head)
-        if known.extra:
-            need_extra(known.extra, f"{path}: reading {known.suffixes[0]} needs")
-        module, function = known.reader.split(".")
+        log_type = log_format(path, head)
+        if log_type.extra:
+            need_extra(log_type.extra, f"{path}: reading {log_type.suffixes[0]} needs")
+        module, function = log_type.reader.split(".")
         read: Reader = getattr(import_module(f"logs.importers.{module}"), function)
         # Invalid numbers of a damaged log are left out later, and reported.
         with np.errstate(all="ignore"):
@@ -99,7 +99,7 @@ def open_log(path: Path) -> "RawLog":
 
 
 def log_format(path: Path, head: bytes) -> LogFormat:
-    """Return the format of a file, by its first bytes and its suffix, or by its suffix alone.
+    """Return the format of a file, by its first bytes and its suffix, or by only its suffix.
 
     Raises LogError if neither is known, and for a dataflash log as text.
 
@@ -108,10 +108,10 @@ def log_format(path: Path, head: bytes) -> LogFormat:
     """
     if re.search(_AS_TEXT, head, re.IGNORECASE):
         raise LogError(f"{path}: a dataflash log as text: the .BIN that it was made of is read", file=path)
-    fitting = [known for known in FORMATS if re.search(known.content, head, re.DOTALL | re.IGNORECASE)]
-    named = [known for known in FORMATS if path.suffix.lower() in known.suffixes]
-    if not fitting and not named:
-        names = ", ".join(known.name for known in FORMATS)
+    by_content = [log_type for log_type in FORMATS if re.search(log_type.content, head, re.DOTALL | re.IGNORECASE)]
+    by_suffix = [log_type for log_type in FORMATS if path.suffix.lower() in log_type.suffixes]
+    if not by_content and not by_suffix:
+        names = ", ".join(log_type.name for log_type in FORMATS)
         message = f"not a log that is known (it starts with {head[:8]!r}): {names} is expected"
         raise LogError(f"{path}: {message}", file=path)
-    return next((known for known in named if known in fitting), (fitting or named)[0])
+    return next((log_type for log_type in by_suffix if log_type in by_content), (by_content or by_suffix)[0])

@@ -48,8 +48,8 @@ class MessageFormats:
         """Add a topic of this format.  Raises LogError for more fields than a log may have."""
         self._total += self.fields(name)
         if self._total > MAX_FIELDS:
-            words = f"the formats of its messages come to more than {MAX_FIELDS:,} fields"
-            raise LogError(f"{self._source}: not a PX4 log that can be read: {words}", file=self._source)
+            reason = f"the formats of its messages come to more than {MAX_FIELDS:,} fields"
+            raise LogError(f"{self._source}: not a PX4 log that can be read: {reason}", file=self._source)
 
     def fields(self, name: str) -> int:
         """Return the number of fields of a format, including nested ones; more than `MAX_FIELDS` if recursive."""
@@ -73,5 +73,5 @@ class MessageFormats:
 def _types(fields: str) -> Iterator[tuple[str, int]]:
     """Yield type and number of each field; for an array its length."""
     for field in fields.split(";"):
-        if found := _FIELD.match(field):
-            yield found[1], int(found[2] or 1)
+        if match := _FIELD.match(field):
+            yield match[1], int(match[2] or 1)

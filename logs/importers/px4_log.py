@@ -70,14 +70,14 @@ def open_topics(path: Path, names: list[str]) -> "Topics":
     try:
         # pyulog reports errors on the terminal.
         with contextlib.redirect_stdout(io.StringIO()), path.open("rb") as file:
-            found = ULog(_Steps(file, str(path)), names, disable_str_exceptions=True)
+            log = ULog(_Steps(file, str(path)), names, disable_str_exceptions=True)
     except (AddressSpaceError, LogError):
         raise
     except MemoryError:
         raise LogError(f"{path}: its stated size does not fit into memory", file=path) from None
     except Exception as error:  # of any kind: the library raises errors of struct, its own and plain ones
         raise LogError(f"{path}: not a PX4 log that can be read: {_one_line(error)}", file=path) from error
-    return Topics(found, str(path), _damage_of(path))
+    return Topics(log, str(path), _damage_of(path))
 
 
 class _Steps:
@@ -122,8 +122,8 @@ def find_damage(data: Bytes, let_go: Callable[[], None] = lambda: None) -> Damag
     """
     state = np.zeros(5, np.int64)
     state[_AT], state[_READING] = _HEADER, 1
-    for until in pieces(data.size, let_go):
-        _walk_records(read_only(data), until, state, np.frombuffer(_LETTERS, np.uint8))
+    for end in pieces(data.size, let_go):
+        _walk_records(read_only(data), end, state, np.frombuffer(_LETTERS, np.uint8))
     cut = bool(state[_CUT]) or int(state[_AT]) < data.size
     return Damage(int(state[_PLACES]), int(state[_LOST]), cut)
 
@@ -146,21 +146,21 @@ _CUT = 4
 
 
 @compiled
-def _walk_records(data: Bytes, until: int, state: Ints, letters: Bytes) -> None:
+def _walk_records(data: Bytes, stop: int, state: Ints, letters: Bytes) -> None:
     """Continue a walk from its state up to a byte."""
-    known = np.zeros(256, np.bool_)
+    is_known_letter = np.zeros(256, np.bool_)
     for letter in letters:
-        known[letter] = True
+        is_known_letter[letter] = True
     k, places, size, reading, cut = state[_AT], state[_PLACES], state[_LOST], state[_READING], state[_CUT]
-    while k + 3 <= data.size and k < until and not cut:
+    while k + 3 <= data.size and k < stop and not cut:
         length = data[k] + 256 * data[k + 1]
         after = k + 3 + length
-        if known[data[k + 2]] and after > data.size:
+        if is_known_letter[data[k + 2]] and after > data.size:
             # Only what a cut record would be: nothing else can follow it.
             cut = 1
             break
-        follows = after + 3 > data.size or known[data[after + 2]]
-        if known[data[k + 2]] and follows:
+        follows = after + 3 > data.size or is_known_letter[data[after + 2]]
+        if is_known_letter[data[k + 2]] and follows:
             k = after
             reading = 1
         else:
@@ -190,9 +190,9 @@ class Topics:
     def __init__(self, log: ULog, source: str, damage: Damage) -> None:
         self._log, self._source, self._damage = log, source, damage
         self._instances: dict[str, list[dict[str, Any]]] = {}
-        for one in sorted(log.data_list, key=lambda data: int(data.multi_id)):
-            if "timestamp" in one.data and len(one.data["timestamp"]):
-                self._instances.setdefault(one.name, []).append(one.data)
+        for data in sorted(log.data_list, key=lambda data: int(data.multi_id)):
+            if "timestamp" in data.data and len(data.data["timestamp"]):
+                self._instances.setdefault(data.name, []).append(data.data)
         self._data = {name: instances[0] for name, instances in self._instances.items()}
 
     def log(self) -> RawLog:
@@ -211,7 +211,7 @@ class Topics:
             modes=tuple(self._modes()),
             missions=tuple(self._missions()),
             parameters=self.parameters(),
-            events=tuple((one.timestamp * 1e-6, str(one.message)) for one in self._log.logged_messages),
+            events=tuple((message.timestamp * 1e-6, str(message.message)) for message in self._log.logged_messages),
             utc_start=self._utc_start(),
             damage=replace(self._damage, places=self._damage.places + len(self._log.dropouts)),
         )
@@ -240,40 +240,42 @@ class Topics:
 
     def _gps(self) -> LogSeries | None:
         for topic in ("vehicle_gps_position", "sensor_gps"):
-            found = self.table(topic, ("latitude_deg", "longitude_deg", "altitude_msl_m"))
-            if found is not None:
-                return found
-            whole = self.table(topic, ("lat", "lon", "alt"))
-            if whole is not None:
-                return LogSeries(topic, whole.time, np.round(whole.values * np.array([1e-7, 1e-7, 1e-3]), 7))
+            position = self.table(topic, ("latitude_deg", "longitude_deg", "altitude_msl_m"))
+            if position is not None:
+                return position
+            scaled_position = self.table(topic, ("lat", "lon", "alt"))
+            if scaled_position is not None:
+                return LogSeries(
+                    topic, scaled_position.time, np.round(scaled_position.values * np.array([1e-7, 1e-7, 1e-3]), 7)
+                )
         return None
 
     def _velocity(self) -> LogSeries | None:
-        found = self.table("vehicle_local_position", ("vy", "vx", "vz"))
-        if found is None:
-            found = self.table("vehicle_global_position", ("vel_e", "vel_n", "vel_d"))
-        if found is None:
+        velocity = self.table("vehicle_local_position", ("vy", "vx", "vz"))
+        if velocity is None:
+            velocity = self.table("vehicle_global_position", ("vel_e", "vel_n", "vel_d"))
+        if velocity is None:
             return None
-        return LogSeries(found.source, found.time, found.values * np.array([1.0, 1.0, -1.0]))
+        return LogSeries(velocity.source, velocity.time, velocity.values * np.array([1.0, 1.0, -1.0]))
 
     def attitude(self) -> LogSeries | None:
         """Return roll, pitch and yaw (n, 3), rad; None if not logged."""
-        found = self.table("vehicle_attitude", ("q[0]", "q[1]", "q[2]", "q[3]"))
-        if found is None:
+        quaternions = self.table("vehicle_attitude", ("q[0]", "q[1]", "q[2]", "q[3]"))
+        if quaternions is None:
             return self.table("vehicle_attitude", ("roll", "pitch", "yaw"))
-        w, x, y, z = found.values.T
+        w, x, y, z = quaternions.values.T
         roll = np.arctan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y))
         pitch = np.arcsin(np.clip(2.0 * (w * y - z * x), -1.0, 1.0))
         yaw = np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
-        return LogSeries(found.source, found.time, np.stack([roll, pitch, yaw], axis=1))
+        return LogSeries(quaternions.source, quaternions.time, np.stack([roll, pitch, yaw], axis=1))
 
     def _airspeed(self) -> LogSeries | None:
         for topic in ("airspeed_validated", "airspeed"):
-            found = self.table(topic, ("true_airspeed_m_s",))
-            if found is not None:
-                good = np.isfinite(found.values[:, 0])
-                if good.any() and np.any(found.values[good]):
-                    return LogSeries(topic, found.time[good], found.values[good])
+            airspeed = self.table(topic, ("true_airspeed_m_s",))
+            if airspeed is not None:
+                is_finite = np.isfinite(airspeed.values[:, 0])
+                if is_finite.any() and np.any(airspeed.values[is_finite]):
+                    return LogSeries(topic, airspeed.time[is_finite], airspeed.values[is_finite])
         return None
 
     def battery(self) -> LogSeries | None:
@@ -284,29 +286,30 @@ class Topics:
         """
         chosen = []
         for data in self._instances.get("battery_status", []):
-            found = _table("battery_status", data, (("voltage_v", "current_a"),))
-            if found is None or ("connected" in data and not np.any(data["connected"])):
+            status = _table("battery_status", data, (("voltage_v", "current_a"),))
+            if status is None or ("connected" in data and not np.any(data["connected"])):
                 continue
             kind = float(data["source"][0]) if "source" in data else 0.0
-            good = np.isfinite(found.time) & np.isfinite(found.values).all(axis=1)
-            chosen.append((kind, LogSeries(found.source, found.time[good], found.values[good])))
+            is_finite = np.isfinite(status.time) & np.isfinite(status.values).all(axis=1)
+            chosen.append((kind, LogSeries(status.source, status.time[is_finite], status.values[is_finite])))
         batteries = [series for kind, series in chosen if kind == chosen[0][0]]
-        if not batteries or not all((one.values[:, 1] > 0.0).any() for one in batteries):
+        if not batteries or not all((series.values[:, 1] > 0.0).any() for series in batteries):
             return None
         first = batteries[0]
         volts, amps = (
-            np.array([np.interp(first.time, one.time, one.values[:, k]) for one in batteries]) for k in range(2)
+            np.array([np.interp(first.time, series.time, series.values[:, k]) for series in batteries])
+            for k in range(2)
         )
         return LogSeries(first.source, first.time, np.stack([volts.mean(axis=0), amps.sum(axis=0)], axis=1))
 
     def _battery(self) -> LogSeries | None:
-        found = self.battery()
-        if found is None:
+        battery = self.battery()
+        if battery is None:
             return None
-        step = np.clip(np.diff(found.time, prepend=found.time[0]), 0.0, 10.0)
-        current = np.maximum(found.values[:, 1], 0.0)
-        energy = np.cumsum(current * found.values[:, 0] * step) / 3600.0
-        return LogSeries(found.source, found.time, np.stack([current, energy], axis=1))
+        step = np.clip(np.diff(battery.time, prepend=battery.time[0]), 0.0, 10.0)
+        current = np.maximum(battery.values[:, 1], 0.0)
+        energy = np.cumsum(current * battery.values[:, 0] * step) / 3600.0
+        return LogSeries(battery.source, battery.time, np.stack([current, energy], axis=1))
 
     def _heights(self) -> Iterable[HeightSource]:
         gps = self._gps()
@@ -346,25 +349,25 @@ class Topics:
         total = self._mission_length(float(stamps[-1]) if items else math.inf)
         if not items and not total:
             return
-        held = px4_items([items[seq] for seq in sorted(items)])
-        mission = Mission(self.home(), held, source=f"{self._source}: mission items")
-        found = LoggedMission(float(stamps[0]) * 1e-6, mission, "navigator_mission_item")
-        made = without_gaps(found, total, max([total, *(item.seq for item in held[-1:])]))
-        if made is not None:
-            yield made
+        flown_items = px4_items([items[seq] for seq in sorted(items)])
+        mission = Mission(self.home(), flown_items, source=f"{self._source}: mission items")
+        logged = LoggedMission(float(stamps[0]) * 1e-6, mission, "navigator_mission_item")
+        without_missing = without_gaps(logged, total, max([total, *(item.seq for item in flown_items[-1:])]))
+        if without_missing is not None:
+            yield without_missing
 
     def _items(self) -> dict[int, MissionItem]:
         """Return the items by number, from 0; items that were never current are not in the log."""
         data = self._data.get("navigator_mission_item", {})
-        wanted = ("sequence_current", "nav_cmd", "latitude", "longitude", "altitude")
+        columns = ("sequence_current", "nav_cmd", "latitude", "longitude", "altitude")
         items: dict[int, MissionItem] = {}
-        if not all(name in data for name in wanted):
+        if not all(name in data for name in columns):
             return items
         count = len(data["timestamp"])
         relative = data.get("altitude_is_relative", np.zeros(count))
         radius = data.get("acceptance_radius", np.zeros(count))
         for k in range(count):
-            number, command, lat, lon, up = (float(data[name][k]) for name in wanted)
+            number, command, lat, lon, up = (float(data[name][k]) for name in columns)
             # Check before conversion: garbage may be too large for any degrees.
             placed = abs(lat) <= 90.0 and abs(lon) <= 180.0 and math.isfinite(up)
             if not (placed and 0.0 <= number < _MAX_ITEMS and math.isfinite(command)):
@@ -388,18 +391,20 @@ class Topics:
 
     def home(self) -> Home | None:
         """Return the last home; None if not logged."""
-        found = self.table("home_position", ("lat", "lon", "alt"))
-        if found is None:
+        positions = self.table("home_position", ("lat", "lon", "alt"))
+        if positions is None:
             return None
-        placed = found.values[np.isfinite(found.values).all(axis=1) & (np.abs(found.values) < _PLACE).all(axis=1)]
+        placed = positions.values[
+            np.isfinite(positions.values).all(axis=1) & (np.abs(positions.values) < _PLACE).all(axis=1)
+        ]
         return Home(on_grid(placed[-1, 0]), on_grid(placed[-1, 1]), float(placed[-1, 2])) if len(placed) else None
 
     def parameters(self) -> dict[str, float]:
         """Return the parameters by name, with the last value of changed ones, without values that are no numbers."""
-        known = dict(self._log.initial_parameters)
-        known |= {name: value for _, name, value in self._log.changed_parameters}
+        values = dict(self._log.initial_parameters)
+        values |= {name: value for _, name, value in self._log.changed_parameters}
         # A damaged parameter may be a text.
-        numbers = {str(name): float(value) for name, value in known.items() if isinstance(value, int | float)}
+        numbers = {str(name): float(value) for name, value in values.items() if isinstance(value, int | float)}
         return {name: value for name, value in numbers.items() if math.isfinite(value)}
 
     def program(self) -> str:
@@ -415,7 +420,7 @@ class Topics:
             data = self._data.get(topic, {})
             if "time_utc_usec" in data:
                 stamps = np.asarray(data["time_utc_usec"], dtype=np.float64)
-                good = np.flatnonzero(stamps > 0.0)
-                if good.size:
-                    return float((stamps[good[0]] - float(data["timestamp"][good[0]])) * 1e-6)
+                valid_rows = np.flatnonzero(stamps > 0.0)
+                if valid_rows.size:
+                    return float((stamps[valid_rows[0]] - float(data["timestamp"][valid_rows[0]])) * 1e-6)
         return math.nan

@@ -120,15 +120,15 @@ def read_px4_motion(path: Path, digest: str) -> MotionLog:
 
 
 def _samples(topics: Topics, topic: str, *choices: tuple[str, ...]) -> Samples:
-    found = topics.table(topic, *choices)
-    return NONE if found is None else rising(found.time, found.values)
+    table = topics.table(topic, *choices)
+    return NONE if table is None else rising(table.time, table.values)
 
 
 def _inertial(topics: Topics) -> Samples:
     force, rates = tuple(f"accelerometer_m_s2[{k}]" for k in range(3)), tuple(f"gyro_rad[{k}]" for k in range(3))
-    both = _samples(topics, "sensor_combined", force + rates)
-    if len(both.time):
-        return both
+    samples = _samples(topics, "sensor_combined", force + rates)
+    if len(samples.time):
+        return samples
     three = tuple(f"xyz[{k}]" for k in range(3))
     forces, turning = (_samples(topics, name, three) for name in ("vehicle_acceleration", "vehicle_angular_velocity"))
     if len(forces.time) < 2 or len(turning.time) < 2:
@@ -142,9 +142,9 @@ def _inertial(topics: Topics) -> Samples:
 def _wind(topics: Topics) -> Samples:
     """Return the wind vector, north and east, in the direction of the air's motion."""
     for topic in ("wind", "wind_estimate"):
-        found = _samples(topics, topic, ("windspeed_north", "windspeed_east"))
-        if len(found.time):
-            return found
+        wind = _samples(topics, topic, ("windspeed_north", "windspeed_east"))
+        if len(wind.time):
+            return wind
     return NONE
 
 
@@ -153,8 +153,8 @@ def _airspeed(topics: Topics) -> tuple[Samples, Samples]:
     true = "true_airspeed_m_s"
     # Calibrated since 1.12, equivalent until then: equal at these speeds.
     choices = [(speed, true) for speed in ("calibrated_airspeed_m_s", "equivalent_airspeed_m_s")]
-    found = topics.table("airspeed_validated", *choices)
-    if found is None:
+    validated = topics.table("airspeed_validated", *choices)
+    if validated is None:
         return NONE, NONE
     # From 1 on sensors; 0 and below, and 4 (synthetic), are no measurements.
     for name in ("airspeed_source", "selected_airspeed_index"):
@@ -164,8 +164,8 @@ def _airspeed(topics: Topics) -> tuple[Samples, Samples]:
             measured = (number >= 1.0) & (number <= 3.0)
             break
     else:
-        measured = np.ones(len(found.time), np.bool_)
-    time, values = found.time[measured], found.values[measured]
+        measured = np.ones(len(validated.time), np.bool_)
+    time, values = validated.time[measured], validated.values[measured]
     moving = values[:, 0] > 1.0
     ratio = values[moving, 1:] / values[moving, :1]
     return rising(time, values[:, :1]), rising(time[moving], ratio)
@@ -179,8 +179,8 @@ def _hover_periods(topics: Topics) -> Iterable[tuple[float, float]]:
     plane = kinds.values[:, 0] == _FIXED_WING
     if kinds.values.shape[1] > 1:
         plane &= kinds.values[:, 1] == 0.0
-    ends = np.append(kinds.time[1:], np.inf)
-    for begin, end, flying in zip(kinds.time.tolist(), ends.tolist(), plane.tolist(), strict=True):
+    end_times = np.append(kinds.time[1:], np.inf)
+    for begin, end, flying in zip(kinds.time.tolist(), end_times.tolist(), plane.tolist(), strict=True):
         if not flying:
             yield begin, end
 
@@ -193,8 +193,8 @@ def _controls(topics: Topics, parameters: Mapping[str, float]) -> tuple[Samples,
     """
     servos, motors = _actuators(topics, "actuator_servos", _SERVOS), _actuators(topics, "actuator_motors", _MOTORS)
     # An unused servo has NaN.
-    known = np.isfinite(servos.values).any(axis=1) & _armed_times(topics, servos.time)
-    servos = Samples(servos.time[known], servos.values[known])
+    is_known = np.isfinite(servos.values).any(axis=1) & _armed_times(topics, servos.time)
+    servos = Samples(servos.time[is_known], servos.values[is_known])
     if len(servos.time) < 2 or len(motors.time) < 2:
         # Roll, pitch, yaw and throttle before the mixer.
         old = _samples(topics, "actuator_controls_0", tuple(f"control[{k}]" for k in range(4)))
@@ -209,7 +209,7 @@ def _controls(topics: Topics, parameters: Mapping[str, float]) -> tuple[Samples,
         used = servos.values[np.isfinite(servos.values[:, k]), k]
         moves = len(used) > 0 and float(np.ptp(used)) > _FLAP_MOVE_TOLERANCE
         if kind in _MODELLED:
-            _refuse_flaperon(topics, parameters, k)
+            _check_flaperon(topics, parameters, k)
             scales[:, k] = [parameters.get(f"CA_SV_CS{k}_TRQ_{axis}", 0.0) for axis in _AXES]
             elevons = elevons or kind in _ELEVONS
             servos.values[:, k] -= parameters.get(f"CA_SV_CS{k}_TRIM", 0.0)
@@ -248,23 +248,23 @@ def _forward_motors(topics: Topics, airframe: int, parameters: Mapping[str, floa
     return list(range(count)) or np.flatnonzero(np.isfinite(motors.values).any(axis=0)).tolist()
 
 
-def _refuse_flaperon(topics: Topics, parameters: Mapping[str, float], surface: int) -> None:
+def _check_flaperon(topics: Topics, parameters: Mapping[str, float], surface: int) -> None:
     """Raise LogError for a surface that flaps or spoilers move as well, if they are moved."""
     for name, (title, topic) in _ALSO_MOVE.items():
-        share = parameters.get(f"CA_SV_CS{surface}_{name}", 0.0)
+        deflection_ratio = parameters.get(f"CA_SV_CS{surface}_{name}", 0.0)
         setpoints = _samples(topics, topic, ("normalized_setpoint",)).values
-        if len(setpoints) and abs(share) * float(np.ptp(setpoints)) > _FLAP_MOVE_TOLERANCE:
+        if len(setpoints) and abs(deflection_ratio) * float(np.ptp(setpoints)) > _FLAP_MOVE_TOLERANCE:
             message = f"of a surface that {title} move in flight, and no model is estimated for that"
-            raise _refusal(topics, f"CA_SV_CS{surface}_{name}", share, message)
+            raise _refusal(topics, f"CA_SV_CS{surface}_{name}", deflection_ratio, message)
 
 
 def _actuators(topics: Topics, topic: str, size: int) -> Samples:
     """Return (n, size) of one topic, sorted by time; NaN for unused or stopped actuators."""
-    found = topics.table(topic, tuple(f"control[{k}]" for k in range(size)))
-    if found is None:
+    table = topics.table(topic, tuple(f"control[{k}]" for k in range(size)))
+    if table is None:
         return Samples(np.zeros(0), np.zeros((0, size)))
-    steps = rising(found.time, np.arange(len(found.time), dtype=np.float64)[:, np.newaxis])
-    return Samples(steps.time, found.values[steps.values[:, 0].astype(np.intp)])
+    steps = rising(table.time, np.arange(len(table.time), dtype=np.float64)[:, np.newaxis])
+    return Samples(steps.time, table.values[steps.values[:, 0].astype(np.intp)])
 
 
 def _armed_times(topics: Topics, time: Floats) -> Flags:

@@ -78,41 +78,41 @@ class TelemetryReader:
 
     def messages(self) -> Iterator[tuple[float, Any]]:
         """Yield time of reception (s since 1970) and message, in the order of the file."""
-        at, end, reading, piece = 0, len(self.data), True, PIECE
-        while at + _STAMP.size + _V1_FRAME <= end:
-            if at >= piece:
+        position, end, reading, piece = 0, len(self.data), True, PIECE
+        while position + _STAMP.size + _V1_FRAME <= end:
+            if position >= piece:
                 self.let_go()
-                piece = at + PIECE
-            length = self._length(at)
+                piece = position + PIECE
+            length = self._length(position)
             if length == 0:
                 self.places += reading
                 self.size += 1
-                at += 1
+                position += 1
                 reading = False
                 continue
-            if at + length > end:
+            if position + length > end:
                 self.cut = True
                 break
             reading = True
-            if self._number(at) in self.wanted:
-                stamp = _STAMP.unpack_from(self.data, at)[0] * 1e-6
-                message = self._decode(bytes(self.data[at + _STAMP.size : at + length]))
+            if self._number(position) in self.wanted:
+                stamp = _STAMP.unpack_from(self.data, position)[0] * 1e-6
+                message = self._decode(bytes(self.data[position + _STAMP.size : position + length]))
                 if message is None:
                     self.unreadable += 1
                 else:
                     yield stamp, message
-            at += length
+            position += length
 
     def damage(self) -> Damage:
         """Return the damage found so far."""
         return Damage(self.places, self.size, self.cut, self.unreadable)
 
-    def _length(self, at: int) -> int:
+    def _length(self, position: int) -> int:
         """Return the length of the record at a place, its time included, bytes; 0 if none begins there."""
-        stamp = _STAMP.unpack_from(self.data, at)[0]
+        stamp = _STAMP.unpack_from(self.data, position)[0]
         if not _EARLIEST_US <= stamp <= _LATEST_US:
             return 0
-        packet = at + _STAMP.size
+        packet = position + _STAMP.size
         magic, payload = self.data[packet], self.data[packet + 1]
         if magic == _V1:
             return _STAMP.size + _V1_FRAME + payload
@@ -121,8 +121,8 @@ class TelemetryReader:
             return _STAMP.size + _V2_FRAME + payload + signature
         return 0
 
-    def _number(self, at: int) -> int:
-        packet = at + _STAMP.size
+    def _number(self, position: int) -> int:
+        packet = position + _STAMP.size
         if self.data[packet] == _V1:
             return self.data[packet + 5]
         return self.data[packet + 7] | self.data[packet + 8] << 8 | self.data[packet + 9] << 16
@@ -184,9 +184,9 @@ class SystemMessages:
         self._boots.append(math.nan if boot is None else boot * 1e-3)
         fields = NUMBERS.get(name)
         if fields is None:
-            kept = self._named.setdefault(name, [])
-            if len(kept) < _MAX_MESSAGES:
-                kept.append((number, message))
+            messages = self._named.setdefault(name, [])
+            if len(messages) < _MAX_MESSAGES:
+                messages.append((number, message))
             return
         rows = self._rows.setdefault(name, array("d"))
         rows.append(number)
@@ -207,14 +207,14 @@ class SystemMessages:
         A message without its own time gets the time of the message before it, plus the difference of their receptions.
         """
         stamps, time = np.array(self._stamps), np.array(self._boots)
-        known = np.flatnonzero(np.isfinite(time))
-        if not known.size:
+        known_rows = np.flatnonzero(np.isfinite(time))
+        if not known_rows.size:
             offset = float(stamps[0]) if stamps.size else math.nan
             return BootClock(offset, (), stamps - offset)
-        offset = float(stamps[known[0]] - time[known[0]])
-        steady = steady_clock(time[known])
-        time[known] = steady.time
-        before = known[np.clip(np.searchsorted(known, np.arange(time.size), side="right") - 1, 0, None)]
+        offset = float(stamps[known_rows[0]] - time[known_rows[0]])
+        steady = steady_clock(time[known_rows])
+        time[known_rows] = steady.time
+        before = known_rows[np.clip(np.searchsorted(known_rows, np.arange(time.size), side="right") - 1, 0, None)]
         unknown = ~np.isfinite(time)
         time[unknown] = time[before[unknown]] + (stamps - stamps[before])[unknown]
         return BootClock(offset, steady.jumps, time)
@@ -270,7 +270,11 @@ def read_telemetry(path: Path) -> RawLog:
         systems.setdefault(message.get_srcSystem(), SystemMessages()).add(stamp, message)
         if message.get_type() in _MISSION_MESSAGES and len(items) < _MAX_ITEMS:
             items.append((stamp, message))
-    vehicles = [found for found in systems.values() if any(_is_vehicle(one) for _, one in found.named("HEARTBEAT"))]
+    vehicles = [
+        messages
+        for messages in systems.values()
+        if any(_is_vehicle(heartbeat) for _, heartbeat in messages.named("HEARTBEAT"))
+    ]
     if not vehicles:
         raise LogError(f"{path}: no HEARTBEAT of a vehicle: nothing says what flew", file=path)
     # Of several vehicles take the one with the most messages.
@@ -321,14 +325,14 @@ class _Messages:
         rows = self._found.table(name)
         if not len(rows):
             return None
-        wanted = [1 + NUMBERS[name].index(column) for column in columns]
-        return LogSeries(name, self._times[rows[:, 0].astype(np.int64)], rows[:, wanted])
+        column_numbers = [1 + NUMBERS[name].index(column) for column in columns]
+        return LogSeries(name, self._times[rows[:, 0].astype(np.int64)], rows[:, column_numbers])
 
     def _series(self) -> Iterable[tuple[str, LogSeries | None]]:
         place = self._table("GLOBAL_POSITION_INT", ("lat", "lon", "alt", "vy", "vx", "vz"))
         if place is not None:
-            known = (place.values[:, :2] != 0.0).any(axis=1)
-            place = LogSeries(place.source, place.time[known], place.values[known]) if known.any() else None
+            is_known = (place.values[:, :2] != 0.0).any(axis=1)
+            place = LogSeries(place.source, place.time[is_known], place.values[is_known]) if is_known.any() else None
         if place is not None:
             scaled = place.values * np.array([1e-7, 1e-7, 1e-3, 0.01, 0.01, -0.01])
             # To the nearest 1e-7 degrees, which is what was sent.
@@ -351,14 +355,14 @@ class _Messages:
         yield "battery", self._battery()
 
     def _gps_place(self) -> LogSeries | None:
-        found = self._table("GPS_RAW_INT", ("lat", "lon", "alt", "fix_type"))
-        if found is None:
+        table = self._table("GPS_RAW_INT", ("lat", "lon", "alt", "fix_type"))
+        if table is None:
             return None
-        fixed = found.values[:, 3] >= 3
+        fixed = table.values[:, 3] >= 3
         if not fixed.any():
             return None
-        scaled = np.round(found.values[fixed, :3] * np.array([1e-7, 1e-7, 1e-3]), 7)
-        return LogSeries("GPS_RAW_INT", found.time[fixed], scaled)
+        scaled = np.round(table.values[fixed, :3] * np.array([1e-7, 1e-7, 1e-3]), 7)
+        return LogSeries("GPS_RAW_INT", table.time[fixed], scaled)
 
     def _wind(self) -> LogSeries | None:
         own = self._table("WIND", ("direction", "speed"))
@@ -370,16 +374,16 @@ class _Messages:
         return covered if covered is not None and np.any(covered.values) else None
 
     def _battery(self) -> LogSeries | None:
-        found = self._table("BATTERY_STATUS", ("current_battery", "energy_consumed"))
-        if found is not None and (found.values >= 0.0).all() and np.any(found.values[:, 1]):
-            return LogSeries(found.source, found.time, found.values * np.array([0.01, 1.0 / 36.0]))
-        found = self._table("SYS_STATUS", ("current_battery", "voltage_battery"))
-        if found is None or (found.values[:, 0] < 0.0).any() or not np.any(found.values[:, 0]):
+        table = self._table("BATTERY_STATUS", ("current_battery", "energy_consumed"))
+        if table is not None and (table.values >= 0.0).all() and np.any(table.values[:, 1]):
+            return LogSeries(table.source, table.time, table.values * np.array([0.01, 1.0 / 36.0]))
+        table = self._table("SYS_STATUS", ("current_battery", "voltage_battery"))
+        if table is None or (table.values[:, 0] < 0.0).any() or not np.any(table.values[:, 0]):
             return None
-        current, volts = found.values[:, 0] * 0.01, found.values[:, 1] * 1e-3
-        step = np.clip(np.diff(found.time, prepend=found.time[0]), 0.0, 10.0)
+        current, volts = table.values[:, 0] * 0.01, table.values[:, 1] * 1e-3
+        step = np.clip(np.diff(table.time, prepend=table.time[0]), 0.0, 10.0)
         return LogSeries(
-            found.source, found.time, np.stack([current, np.cumsum(current * volts * step) / 3600.0], axis=1)
+            table.source, table.time, np.stack([current, np.cumsum(current * volts * step) / 3600.0], axis=1)
         )
 
     def _heights(self) -> Iterable[HeightSource]:
@@ -403,25 +407,25 @@ class _Messages:
     def _missions(self) -> Iterable[LoggedMission]:
         """Yield missions from items as uploaded, or as downloaded by a station."""
         rows: list[Item] = []
-        total, begins = 0, False
+        total, begins_mission = 0, False
         for time, message in self._items:
             kind = message.get_type()
             if getattr(message, "mission_type", _MISSION_TYPE) != _MISSION_TYPE:
                 continue
             if kind == "MISSION_COUNT":
-                total, begins = message.count, True
+                total, begins_mission = message.count, True
             elif kind in ("MISSION_ITEM", "MISSION_ITEM_INT"):
-                rows.append(Item(time, total, _item(message, scaled=kind == "MISSION_ITEM_INT"), begins))
-                begins = False
-        px4 = any(one.autopilot == _PX4 for _, one in self._own["HEARTBEAT"])
+                rows.append(Item(time, total, _item(message, scaled=kind == "MISSION_ITEM_INT"), begins_mission))
+                begins_mission = False
+        px4 = any(heartbeat.autopilot == _PX4 for _, heartbeat in self._own["HEARTBEAT"])
         for logged in gather_items(rows):
-            made = (_px4_mission if px4 else logged_mission)(logged, self._source, "mission items")
-            if made is not None:
-                yield replace(made, mission=self._with_home(made.mission))
+            readable = (_px4_mission if px4 else logged_mission)(logged, self._source, "mission items")
+            if readable is not None:
+                yield replace(readable, mission=self._with_home(readable.mission))
 
     def _with_home(self, mission: Mission) -> Mission:
         """Replace home by the vehicle's home, as an uploaded mission has only the station's assumption."""
-        heard = [one for _, one in self._own["HOME_POSITION"] if one.latitude or one.longitude]
+        heard = [message for _, message in self._own["HOME_POSITION"] if message.latitude or message.longitude]
         if not heard:
             return mission
         home = heard[-1]
@@ -429,16 +433,16 @@ class _Messages:
         return Mission(place, mission.items, warnings=mission.warnings, source=mission.source)
 
     def _parameters(self) -> dict[str, float]:
-        found: dict[str, float] = {}
-        for _, one in self._own.get("PARAM_VALUE", []):
-            name = _text(one.param_id)
-            if name and math.isfinite(one.param_value):
-                found[name] = float(one.param_value)
-        return found
+        values: dict[str, float] = {}
+        for _, message in self._own.get("PARAM_VALUE", []):
+            name = _text(message.param_id)
+            if name and math.isfinite(message.param_value):
+                values[name] = float(message.param_value)
+        return values
 
     def _program(self, beat: Any) -> str:
-        for _, one in self._own.get("STATUSTEXT", []):
-            text = _text(one.text)
+        for _, message in self._own.get("STATUSTEXT", []):
+            text = _text(message.text)
             if "Ardu" in text and " V" in text:
                 return text
         return _NAMES.get(beat.autopilot, "")

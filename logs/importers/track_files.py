@@ -59,7 +59,7 @@ def _bytes_of(path: Path) -> bytes:
     try:
         with zipfile.ZipFile(path) as archive:
             # Google Earth has one, doc.kml, and reads the first of several (OGC 12-007, "KMZ").
-            entry = next((one for one in archive.infolist() if one.filename.lower().endswith(".kml")), None)
+            entry = next((info for info in archive.infolist() if info.filename.lower().endswith(".kml")), None)
             if entry is None:
                 raise LogError(f"{path}: a zipped file without a .kml in it", file=path)
             with archive.open(entry) as file:
@@ -92,12 +92,12 @@ def read_gpx(path: Path) -> RawLog:
     """Read a track.  Raises LogError for one without points that have times."""
     text = track_text(path, xml=True)
     try:
-        found = gpxpy.parse(text)
+        gpx = gpxpy.parse(text)
     except (gpxpy.gpx.GPXException, ValueError) as error:
         raise LogError(
             f"{path}: not a GPX file that can be read: {' '.join(str(error).split())[:120]}", file=path
         ) from error
-    points = [point for track in found.tracks for segment in track.segments for point in segment.points]
+    points = [point for track in gpx.tracks for segment in track.segments for point in segment.points]
     timed = [point for point in points if point.time is not None]
     if len(timed) < 2:
         raise LogError(
@@ -112,21 +112,21 @@ def read_gpx(path: Path) -> RawLog:
     return RawLog(
         source=str(path),
         format=GPX,
-        program=str(found.creator or ""),
+        program=str(gpx.creator or ""),
         vehicle="unknown",
         series={"position": LogSeries("trkpt", stamps - start, values)},
         heights=(),
         datum="unstated",
-        missions=tuple(_routes(found, str(path))),
+        missions=tuple(_routes(gpx, str(path))),
         clock="start",
         utc_start=start,
         damage=Damage(unreadable=len(points) - len(timed)),
     )
 
 
-def _routes(found: gpxpy.gpx.GPX, source: str) -> list[LoggedMission]:
-    made = []
-    for route in found.routes:
+def _routes(gpx: gpxpy.gpx.GPX, source: str) -> list[LoggedMission]:
+    missions = []
+    for route in gpx.routes:
         heights = all(point.elevation is not None for point in route.points)
         items = tuple(
             MissionItem(
@@ -142,8 +142,8 @@ def _routes(found: gpxpy.gpx.GPX, source: str) -> list[LoggedMission]:
         )
         if len(items) > 1:
             mission = Mission(None, items, source=f"{source}: route {route.name or ''}".rstrip())
-            made.append(LoggedMission(0.0, mission, "route", heights))
-    return made
+            missions.append(LoggedMission(0.0, mission, "route", heights))
+    return missions
 
 
 # ----------------------------------------------------------------------
@@ -195,8 +195,8 @@ def read_igc(path: Path) -> RawLog:
     )
 
 
-def _degrees(whole: str, minutes: str, thousandths: str, side: str) -> float:
-    value = int(whole) + (int(minutes) + int(thousandths) / 1000.0) / 60.0
+def _degrees(degrees: str, minutes: str, thousandths: str, side: str) -> float:
+    value = int(degrees) + (int(minutes) + int(thousandths) / 1000.0) / 60.0
     return -value if side in "SW" else value
 
 
@@ -206,14 +206,14 @@ def _fixes(lines: list[str]) -> tuple[list[tuple[float, float, float, float, flo
     for line in lines:
         if not line.startswith("B"):
             continue
-        found = _FIX.match(line)
-        if found is None:
+        match = _FIX.match(line)
+        if match is None:
             unreadable += 1
             continue
-        hour, minute, second, *rest = found.groups()
-        lat, lon = _degrees(*rest[:4]), _degrees(*rest[4:8])
-        gnss = float(rest[10]) if rest[8] == "A" else math.nan
-        rows.append((int(hour) * 3600.0 + int(minute) * 60.0 + int(second), lat, lon, float(rest[9]), gnss))
+        hour, minute, second, *fields = match.groups()
+        lat, lon = _degrees(*fields[:4]), _degrees(*fields[4:8])
+        gnss = float(fields[10]) if fields[8] == "A" else math.nan
+        rows.append((int(hour) * 3600.0 + int(minute) * 60.0 + int(second), lat, lon, float(fields[9]), gnss))
     return rows, unreadable
 
 
@@ -227,9 +227,9 @@ def _unwrap_midnight(time: np.ndarray) -> np.ndarray:
 def _midnight(lines: list[str]) -> float:
     """Return the beginning of the day, s since 1970; NaN if the file states none."""
     for line in lines:
-        found = _DATE.match(line)
-        if found:
-            day, month, year = (int(part) for part in found.groups())
+        match = _DATE.match(line)
+        if match:
+            day, month, year = (int(part) for part in match.groups())
             if 1 <= month <= 12 and 1 <= day <= 31:
                 return float(calendar.timegm((1900 + year if year >= 80 else 2000 + year, month, day, 0, 0, 0)))
     return math.nan
@@ -244,17 +244,17 @@ def _datum(lines: list[str]) -> VerticalDatum:
 
 
 def _recorder(lines: list[str]) -> str:
-    named = next((line for line in lines if line.startswith("HFFTY")), "")
-    return named.partition(":")[2].strip()
+    recorder_line = next((line for line in lines if line.startswith("HFFTY")), "")
+    return recorder_line.partition(":")[2].strip()
 
 
 def _task(lines: list[str], source: str) -> tuple[LoggedMission, ...]:
     """Return the declared task; take-off and landing places at its ends are left out if they are 0."""
     points = []
     for line in lines:
-        found = _TASK_POINT.match(line)
-        if found:
-            lat, lon = _degrees(*found.groups()[:4]), _degrees(*found.groups()[4:])
+        match = _TASK_POINT.match(line)
+        if match:
+            lat, lon = _degrees(*match.groups()[:4]), _degrees(*match.groups()[4:])
             if (lat, lon) != (0.0, 0.0):
                 points.append((lat, lon))
     # Take-off and landing are places of the glider on the ground, not part of the task.
@@ -296,7 +296,7 @@ def read_kml(path: Path) -> RawLog:
             else:
                 rows.append(row)
     if len(rows) < 2:
-        lines = sum(_name(one) == "LineString" for one in root.iter())
+        lines = sum(_name(element) == "LineString" for element in root.iter())
         why = f"; its {lines} lines have no times" if lines else ""
         raise LogError(f"{path}: {len(rows)} places with a time (gx:Track): at least 2 are expected{why}", file=path)
     table = np.array(rows)

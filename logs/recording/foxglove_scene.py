@@ -90,8 +90,8 @@ def body_rotation(attitude: ArrayLike) -> Floats:
     the angles are roll, -pitch and pi/2 - yaw about forward, left and up.
     """
     roll, pitch, yaw = np.moveaxis(np.asarray(attitude, dtype=np.float64), -1, 0)
-    half = (0.5 * roll, -0.5 * pitch, 0.5 * (0.5 * math.pi - yaw))
-    (cr, sr), (cp, sp), (cy, sy) = ((np.cos(angle), np.sin(angle)) for angle in half)
+    half_angles = (0.5 * roll, -0.5 * pitch, 0.5 * (0.5 * math.pi - yaw))
+    (cr, sr), (cp, sp), (cy, sy) = ((np.cos(angle), np.sin(angle)) for angle in half_angles)
     return np.stack(
         [
             sr * cp * cy - cr * sp * sy,
@@ -104,53 +104,58 @@ def body_rotation(attitude: ArrayLike) -> Floats:
 
 
 def log_message(time_ns: int, text: str, level: str, name: str = "planfly") -> Log:
-    """Return one event as a message; level: a key of `LEVELS`.  name: source of the message."""
+    """Return one event as a message.  level: a key of `LEVELS`.  name: source of the message."""
     return Log(timestamp=timestamp(time_ns), level=LEVELS[level], message=text, name=name)
 
 
 def terrain_scene(time_ns: int, scenario: Scenario) -> bytes:
-    """Draw the ground of the area as a coloured mesh of at most `MAX_VERTICES` a side."""
+    """Draw the ground of the area as a coloured mesh of at most `MAX_VERTICES` vertices a side."""
     entity = _entity(time_ns, "terrain")
     mesh = b"" if scenario.terrain is None else _mesh(scenario.terrain, scenario.bounds)
     return length_delimited(2, entity.SerializeToString(deterministic=True) + mesh)
 
 
-def _ground(terrain: Terrain, bounds: Floats) -> tuple[Floats, Floats, NDArray[np.bool_]]:
+def _terrain_mesh(terrain: Terrain, bounds: Floats) -> tuple[Floats, Floats, NDArray[np.bool_]]:
     """Return corners (n, m, 3) of the mesh, colours (n, m, 3), and flags (n, m) of known corners."""
 
-    def axis(low: float, high: float) -> Floats:
-        return np.linspace(low, high, int(np.clip((high - low) / terrain.spacing, 2, MAX_VERTICES)))
+    def axis(min_value: float, max_value: float) -> Floats:
+        return np.linspace(
+            min_value, max_value, int(np.clip((max_value - min_value) / terrain.spacing, 2, MAX_VERTICES))
+        )
 
     east, north = axis(*bounds[0]), axis(*bounds[1])
-    ground_e, ground_n = np.meshgrid(east, north)
-    up = terrain.height(ground_e, ground_n)
-    known = np.isfinite(up)
-    low, high = float(np.min(up, where=known, initial=np.inf)), float(np.max(up, where=known, initial=-np.inf))
-    share = np.where(known, (up - low) / max(high - low, 1.0), 0.0)
-    points = np.stack([ground_e, ground_n, np.where(known, up, low)], axis=-1)
-    return points, _LOW + share[..., None] * (_HIGH - _LOW), known
+    mesh_east, mesh_north = np.meshgrid(east, north)
+    up = terrain.height(mesh_east, mesh_north)
+    is_known = np.isfinite(up)
+    min_value, max_value = (
+        float(np.min(up, where=is_known, initial=np.inf)),
+        float(np.max(up, where=is_known, initial=-np.inf)),
+    )
+    fraction = np.where(is_known, (up - min_value) / max(max_value - min_value, 1.0), 0.0)
+    points = np.stack([mesh_east, mesh_north, np.where(is_known, up, min_value)], axis=-1)
+    return points, _LOW + fraction[..., None] * (_HIGH - _LOW), is_known
 
 
 def terrain_points(scenario: Scenario) -> tuple[Floats, Floats]:
     """Return the known corners of the terrain mesh (n, 3), m, and their colours (n, 3), 0..1."""
     if scenario.terrain is None:
         return np.zeros((0, 3)), np.zeros((0, 3))
-    points, colours, known = _ground(scenario.terrain, scenario.bounds)
-    return points[known], colours[known]
+    points, colours, is_known = _terrain_mesh(scenario.terrain, scenario.bounds)
+    return points[is_known], colours[is_known]
 
 
 def _mesh(terrain: Terrain, bounds: Floats) -> bytes:
     """Return the encoded triangles field of the ground's entity; empty if no ground is known."""
-    ground, colours, known = _ground(terrain, bounds)
-    if not known.any():
+    ground, colours, is_known = _terrain_mesh(terrain, bounds)
+    if not is_known.any():
         return b""
     up = ground[..., 2]
-    number = np.arange(up.size).reshape(up.shape)
-    sw, se, nw, ne = number[:-1, :-1], number[:-1, 1:], number[1:, :-1], number[1:, 1:]
+    vertex_numbers = np.arange(up.size).reshape(up.shape)
+    sw, se, nw, ne = vertex_numbers[:-1, :-1], vertex_numbers[:-1, 1:], vertex_numbers[1:, :-1], vertex_numbers[1:, 1:]
     corners = np.stack([sw, se, ne, sw, ne, nw], axis=-1).reshape(-1, 6)
-    whole = known.ravel()[corners].all(axis=1)
+    has_known_corners = is_known.ravel()[corners].all(axis=1)
     mesh = TriangleListPrimitive(pose=_pose((0.0, 0.0, 0.0)), color=_colour(theme.rgba("terrain")))
-    mesh.indices.extend(corners[whole].ravel().tolist())
+    mesh.indices.extend(corners[has_known_corners].ravel().tolist())
     points = ground.reshape(-1, 3)
     # Round to 2^-4 m and 2^-7 of a colour: the mesh is for display only, and takes a quarter of the bytes.
     rgba = np.hstack([np.round(colours.reshape(-1, 3) * 128.0) / 128.0, np.ones((len(points), 1))])
@@ -164,27 +169,29 @@ def threats_scene(time_ns: int, threats: Threats, terrain: Terrain | None) -> by
     """Draw the spheres of missiles and radars, and their names above the ground around them."""
     entity = _entity(time_ns, "threats")
     for k, name in enumerate(threats.names):
-        centre = threats.position[k]
+        center = threats.position[k]
         for radius, colour in ((threats.kill_radius[k], _KILL), (threats.detection_radius[k], _DETECTION)):
             if radius > 0.0:
-                side = 2.0 * float(radius)
-                entity.spheres.add(pose=_pose(centre), size=Vector3(x=side, y=side, z=side), color=_colour(colour))
-        entity.texts.append(_name(_above_ground(centre, terrain), name))
+                diameter = 2.0 * float(radius)
+                entity.spheres.add(
+                    pose=_pose(center), size=Vector3(x=diameter, y=diameter, z=diameter), color=_colour(colour)
+                )
+        entity.texts.append(_label(_label_position(center, terrain), name))
     return _update(entity)
 
 
-def _above_ground(place: Floats, terrain: Terrain | None) -> Floats:
+def _label_position(place: Floats, terrain: Terrain | None) -> Floats:
     """Return a position for a name, at least `_LABEL_HEIGHT_M` above the highest known ground within `_NEAR`."""
     east, north, up = (float(value) for value in place)
-    top = up
+    top_altitude = up
     if terrain is not None:
         steps = np.linspace(-_NEAR, _NEAR, 9)
-        near = terrain.height(*np.meshgrid(east + steps, north + steps))
-        top = float(np.max(near, where=np.isfinite(near), initial=up))
-    return np.array([east, north, top + _LABEL_HEIGHT_M])
+        nearby_heights = terrain.height(*np.meshgrid(east + steps, north + steps))
+        top_altitude = float(np.max(nearby_heights, where=np.isfinite(nearby_heights), initial=up))
+    return np.array([east, north, top_altitude + _LABEL_HEIGHT_M])
 
 
-def _name(place: Floats, name: str) -> TextPrimitive:
+def _label(place: Floats, name: str) -> TextPrimitive:
     return TextPrimitive(
         pose=_pose(place), billboard=True, font_size=14.0, scale_invariant=True, color=_colour(_TRACK), text=name
     )
@@ -200,7 +207,7 @@ def plan_scene(time_ns: int, waypoints: Floats, items: Sequence[int]) -> bytes:
         entity.spheres.add(pose=_pose(point), size=Vector3(x=40.0, y=40.0, z=40.0), color=_colour(_PLAN))
     for number, (point, item) in enumerate(zip(waypoints, items, strict=True)):
         text = f"{number} (item {item})" if item >= 0 else str(number)
-        entity.texts.append(_name(point + np.array([0.0, 0.0, _LABEL_HEIGHT_M]), text))
+        entity.texts.append(_label(point + np.array([0.0, 0.0, _LABEL_HEIGHT_M]), text))
     return _update(entity)
 
 
@@ -250,16 +257,16 @@ def _points(points: Floats) -> Iterable[Point3]:
 def zones_scene(time_ns: int, scenario: Scenario, waypoints: Floats) -> bytes:
     """Draw names and edges of zones, from ground or floor to the ceiling or to above the path."""
     entity = _entity(time_ns, "zones")
-    low, top = float(waypoints[:, 2].min()), float(waypoints[:, 2].max()) + 50.0
+    min_altitude, max_altitude = float(waypoints[:, 2].min()), float(waypoints[:, 2].max()) + 50.0
     for zone in scenario.zones:
-        walls = zone_walls(zone, scenario.terrain, low, top)
+        walls = zone_walls(zone, scenario.terrain, min_altitude, max_altitude)
         for wall in walls:
             step = max(1, (len(wall) - 1) // MAX_POSTS)
             for path in (wall[:, 0], wall[:, 1], *wall[:-1:step]):
                 edge = _line(_KEEP_OUT if zone.kind == "exclusion" else _STAY_IN)
                 edge.points.extend(_points(path))
                 entity.lines.append(edge)
-        entity.texts.append(_name(_above_ground(walls[0][0, 1], scenario.terrain), zone.name))
+        entity.texts.append(_label(_label_position(walls[0][0, 1], scenario.terrain), zone.name))
     return _update(entity)
 
 
@@ -269,12 +276,12 @@ def returns_scene(time_ns: int, drawn: DrawnReturns, terrain: Terrain | None) ->
     The coloured line lies below the path, so that plan and track stay visible.
     """
     entity = _entity(time_ns, "returns")
-    for kind, ones in drawn.by_kind:
-        points = np.array([one.start for one in ones]) - np.array([0.0, 0.0, _PATH_OFFSET_M])
+    for kind, segment in drawn.by_kind:
+        points = np.array([ret.start for ret in segment]) - np.array([0.0, 0.0, _PATH_OFFSET_M])
         _add_line(entity, f"return-{kind}", points, 6.0)
     for number, worst in enumerate(drawn.worst, 1):
         _add_line(entity, "return-way", worst.way)
-        entity.texts.append(_name(worst.at + np.array([0.0, 0.0, _LABEL_HEIGHT_M]), f"return {number}"))
+        entity.texts.append(_label(worst.at + np.array([0.0, 0.0, _LABEL_HEIGHT_M]), f"return {number}"))
     footprint = drawn.glides.footprint
     if footprint is not None and terrain is not None:
         for band in footprint.bands():
@@ -288,8 +295,8 @@ def _add_parts(entity: SceneEntity, role: str, parts: Sequence[Part], terrain: T
     for part in parts:
         for ring in part:
             up = terrain.height(ring[:, 0], ring[:, 1])
-            known = np.isfinite(up)
-            _add_line(entity, role, np.column_stack([ring, up + _OUTLINE_HEIGHT_M])[known])
+            is_known = np.isfinite(up)
+            _add_line(entity, role, np.column_stack([ring, up + _OUTLINE_HEIGHT_M])[is_known])
 
 
 def _add_line(entity: SceneEntity, role: str, points: Floats, thickness: float = 3.0) -> None:
@@ -371,7 +378,7 @@ def aircraft_glb() -> bytes:
         surface = {"baseColorFactor": list(colour), "metallicFactor": 0.0, "roughnessFactor": 0.9}
         materials.append({"pbrMetallicRoughness": surface, "doubleSided": True})
         pieces += data
-    about: dict[str, Any] = {
+    document: dict[str, Any] = {
         "asset": {"version": "2.0", "generator": "planfly"},
         "scene": 0,
         "scenes": [{"nodes": [0]}],
@@ -382,7 +389,7 @@ def aircraft_glb() -> bytes:
         "bufferViews": views,
         "buffers": [{"byteLength": len(pieces)}],
     }
-    text = json.dumps(about, separators=(",", ":")).encode()
+    text = json.dumps(document, separators=(",", ":")).encode()
     text += b" " * (-len(text) % 4)
     chunks = b"".join(struct.pack("<I4s", len(data), kind) + data for kind, data in ((_JSON, text), (_BIN, pieces)))
     return struct.pack("<4sII", b"glTF", 2, 12 + len(chunks)) + chunks

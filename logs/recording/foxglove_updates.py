@@ -23,8 +23,8 @@ from logs.recording.state_channel import (
     Encoded,
     as_bytes,
     fill_doubles,
-    fill_submessage,
-    submessage,
+    fill_submessages,
+    submessage_dtype,
     tagged_doubles,
 )
 from world.arrays import Floats, Ints
@@ -41,7 +41,7 @@ from world.threats import Threats
 EVERY = 2
 # Greatest number of points of one message.
 MAX_POINTS = 96
-# Number of points that are left when a message has reached the greatest number.
+# Number of points to which a message is thinned when it has reached the greatest number.
 THINNED = 64
 
 
@@ -64,28 +64,30 @@ class TrackSoFar:
         self._points[self._count] = position
         self._count += 1
         if self._count > MAX_POINTS:
-            self._points[:THINNED] = thinned(self._points, THINNED)
+            self._points[:THINNED] = thin_line(self._points, THINNED)
             self._count = THINNED
         return self._points[: self._count]
 
 
-def thinned(points: Floats, wanted: int) -> Floats:
-    """Thin points (n, 3) to ``wanted`` points that keep the shape of the line and its ends.
+def thin_line(points: Floats, point_count: int) -> Floats:
+    """Thin points (n, 3) to ``point_count`` points that keep the shape of the line and its ends.
 
     >>> corner = np.array([[0.0, 0.0, 0.0], [5.0, 0.0, 0.0], [10.0, 0.0, 0.0], [10.0, 9.0, 0.0]])
-    >>> thinned(corner, 3)[:, :2].tolist()
+    >>> thin_line(corner, 3)[:, :2].tolist()
     [[0.0, 0.0], [10.0, 0.0], [10.0, 9.0]]
     """
-    while len(points) > wanted:
-        before, here, after = points[:-2], points[1:-1], points[2:]
-        way = after - before
-        share = np.clip(((here - before) * way).sum(axis=1) / np.maximum((way**2).sum(axis=1), 1e-9), 0.0, 1.0)
-        off = ((before + share[:, None] * way - here) ** 2).sum(axis=1)
-        going = np.zeros(len(points), dtype=bool)
-        for k in np.argsort(off, kind="stable")[: len(points) - wanted].tolist():
-            # Drop only one of two neighbours: the distance of the other one changes.
-            going[k + 1] = not (going[k] or going[k + 2])
-        points = points[~going]
+    while len(points) > point_count:
+        previous, inner, following = points[:-2], points[1:-1], points[2:]
+        chord = following - previous
+        fraction = np.clip(
+            ((inner - previous) * chord).sum(axis=1) / np.maximum((chord**2).sum(axis=1), 1e-9), 0.0, 1.0
+        )
+        distance_square = ((previous + fraction[:, None] * chord - inner) ** 2).sum(axis=1)
+        is_dropped = np.zeros(len(points), dtype=bool)
+        for k in np.argsort(distance_square, kind="stable")[: len(points) - point_count].tolist():
+            # Drop only one of two neighbours, because that changes the distance of the other.
+            is_dropped[k + 1] = not (is_dropped[k] or is_dropped[k + 2])
+        points = points[~is_dropped]
     return points
 
 
@@ -111,41 +113,41 @@ class FlightEvents:
         }
 
     def take(self, log_times: Ints, position: Floats, leg: Floats) -> Iterator[MessageRecords]:
-        """Yield messages of rows; log_times: (n,) ns.  position: (n, 3).  leg: (n,) the active one."""
+        """Yield messages of rows.  log_times: (n,) ns.  position: (n, 3) m.  leg: (n,) the active leg."""
         if not len(log_times):
             return
         for k in np.flatnonzero(np.diff(leg, prepend=self._leg) != 0).tolist():
-            yield self._message(int(log_times[k]), self._leg_text(int(leg[k])), "info")
+            yield self._event_record(int(log_times[k]), self._leg_text(int(leg[k])), "info")
         self._leg = int(leg[-1])
         slots = log_times // _CHECK_INTERVAL_NS
-        looked = np.flatnonzero(np.diff(slots, prepend=self._slot) > 0)
+        checked_rows = np.flatnonzero(np.diff(slots, prepend=self._slot) > 0)
         self._slot = int(slots[-1])
-        if not len(self._threats.names) or not looked.size:
+        if not len(self._threats.names) or not checked_rows.size:
             return
         with np.errstate(over="ignore", invalid="ignore"):
-            off = position[looked, None, :] - self._threats.position
-            distance = np.sqrt((off**2).sum(axis=2))
+            offsets = position[checked_rows, None, :] - self._threats.position
+            distance = np.sqrt((offsets**2).sum(axis=2))
         reaches = (self._threats.kill_radius, self._threats.detection_radius)
-        for (kind, before), radius in zip(self._inside.items(), reaches, strict=True):
-            inside = (distance < radius) & (radius > 0.0)
-            changed = np.diff(inside, axis=0, prepend=before[None, :])
-            for row, threat in np.argwhere(changed).tolist():
-                yield self._threat(int(log_times[looked[row]]), kind, threat, bool(inside[row, threat]))
-            self._inside[kind] = inside[-1]
+        for (kind, was_inside), radius in zip(self._inside.items(), reaches, strict=True):
+            is_inside = (distance < radius) & (radius > 0.0)
+            has_changed = np.diff(is_inside, axis=0, prepend=was_inside[None, :])
+            for row, threat in np.argwhere(has_changed).tolist():
+                yield self._threat_record(int(log_times[checked_rows[row]]), kind, threat, bool(is_inside[row, threat]))
+            self._inside[kind] = is_inside[-1]
 
     def _leg_text(self, leg: int) -> str:
         items = self._route.items
-        to = leg + 1
-        if not 0 <= to < len(items):
+        waypoint = leg + 1
+        if not 0 <= waypoint < len(items):
             return f"leg {leg}"
-        return f"leg {leg}, to waypoint {to}" + (f" (item {items[to]})" if items[to] >= 0 else "")
+        return f"leg {leg}, to waypoint {waypoint}" + (f" (item {items[waypoint]})" if items[waypoint] >= 0 else "")
 
-    def _threat(self, time: int, kind: str, threat: int, entered: bool) -> MessageRecords:
+    def _threat_record(self, time: int, kind: str, threat: int, has_entered: bool) -> MessageRecords:
         name, level = self._threats.names[threat], "warning" if kind == "missile range" else "info"
-        text = f"inside the {kind} of {name}" if entered else f"out of the {kind} of {name}"
-        return self._message(time, text, level if entered else "info")
+        text = f"inside the {kind} of {name}" if has_entered else f"out of the {kind} of {name}"
+        return self._event_record(time, text, level if has_entered else "info")
 
-    def _message(self, time: int, text: str, level: str) -> MessageRecords:
+    def _event_record(self, time: int, text: str, level: str) -> MessageRecords:
         message = log_message(time, text, level, NAME).SerializeToString(deterministic=True)
         return single_record(self._channel, time, message)
 
@@ -162,16 +164,16 @@ _POINT = np.dtype(
 _TYPES = {"f": PackedElementField.FLOAT32, "u": PackedElementField.UINT8}
 
 
-def _bytes(role: str) -> Colour:
+def _colour_bytes(role: str) -> Colour:
     red, green, blue, opacity = (round(255.0 * part) for part in theme.rgba(role, dark=True))
     return red, green, blue, opacity
 
 
-_PLAN = _bytes("planned")
-_TRACK = _bytes("flown")
-_AIRCRAFT = _bytes("highlight")
-_KILL = _bytes("missile")
-_DETECTION = _bytes("radar")
+_PLAN = _colour_bytes("planned")
+_TRACK = _colour_bytes("flown")
+_AIRCRAFT = _colour_bytes("highlight")
+_KILL = _colour_bytes("missile")
+_DETECTION = _colour_bytes("radar")
 # Distance between points of a line, m.
 _POINT_SPACING_M = 30.0
 # Greatest number of points of a line.
@@ -229,26 +231,30 @@ def track_cloud(time_ns: int, positions: Floats) -> bytes:
 def aircraft_cloud(time_ns: int) -> bytes:
     """Return the model of the aircraft as points, in its own frame."""
     first, second, third = (corner[:, None, :] for corner in np.moveaxis(model_corners().astype(np.float64), 1, 0))
-    shares = [
+    weights = [
         (i / _SIDE_INTERVALS, j / _SIDE_INTERVALS)
         for i in range(_SIDE_INTERVALS + 1)
         for j in range(_SIDE_INTERVALS + 1 - i)
     ]
-    a, b = (np.array(column)[None, :, None] for column in zip(*shares, strict=True))
-    points = (a * first + b * second + (1.0 - a - b) * third).reshape(-1, 3)
+    first_weight, second_weight = (np.array(column)[None, :, None] for column in zip(*weights, strict=True))
+    points = (first_weight * first + second_weight * second + (1.0 - first_weight - second_weight) * third).reshape(
+        -1, 3
+    )
     return cloud(time_ns, AIRCRAFT, np.unique(np.round(points, 2), axis=0), _AIRCRAFT)
 
 
 def threats_cloud(time_ns: int, threats: Threats) -> bytes:
     """Return the spheres of missiles and radars as evenly distributed points."""
     k = np.arange(_SPHERE_POINTS) + 0.5
-    up, turn = 1.0 - 2.0 * k / _SPHERE_POINTS, math.pi * (1.0 + math.sqrt(5.0)) * k
-    sphere = np.stack([np.sqrt(1.0 - up**2) * np.cos(turn), np.sqrt(1.0 - up**2) * np.sin(turn), up], axis=1)
+    height, angle = 1.0 - 2.0 * k / _SPHERE_POINTS, math.pi * (1.0 + math.sqrt(5.0)) * k
+    sphere = np.stack(
+        [np.sqrt(1.0 - height**2) * np.cos(angle), np.sqrt(1.0 - height**2) * np.sin(angle), height], axis=1
+    )
     points, shades = [np.zeros((0, 3))], [np.zeros((0, 4), dtype=np.uint8)]
     for radii, colour in ((threats.kill_radius, _KILL), (threats.detection_radius, _DETECTION)):
-        for centre, radius in zip(threats.position, radii, strict=True):
+        for center, radius in zip(threats.position, radii, strict=True):
             if radius > 0.0:
-                points.append(centre + float(radius) * sphere)
+                points.append(center + float(radius) * sphere)
                 shades.append(np.tile(np.array(colour, dtype=np.uint8), (_SPHERE_POINTS, 1)))
     return cloud(time_ns, MAP, np.concatenate(points), np.concatenate(shades))
 
@@ -256,9 +262,9 @@ def threats_cloud(time_ns: int, threats: Threats) -> bytes:
 def along(waypoints: Floats) -> Floats:
     """Return points at even distances on the legs between waypoints (w, 3), including the waypoints."""
     lengths = np.sqrt((np.diff(waypoints, axis=0) ** 2).sum(axis=1))
-    step = max(_POINT_SPACING_M, float(lengths.sum()) / _MAX_SAMPLES)
+    spacing = max(_POINT_SPACING_M, float(lengths.sum()) / _MAX_SAMPLES)
     legs = [
-        np.linspace(start, end, max(1, math.ceil(length / step)), endpoint=False)
+        np.linspace(start, end, max(1, math.ceil(length / spacing)), endpoint=False)
         for start, end, length in zip(waypoints[:-1], waypoints[1:], lengths.tolist(), strict=True)
     ]
     return np.concatenate([*legs, waypoints[-1:]])
@@ -279,7 +285,7 @@ _XYZW = "xyzw"
 _GEO = ("latitude", "longitude", "altitude")
 # Least time between messages with the points of the track, s.
 _MIN_CLOUD_INTERVAL_S = 10.0
-# Ratio of successive times of these messages, which limits their number.
+# Least ratio of successive times of these messages, which limits their number.
 _CLOUD_RATIO = 1.05
 # Constant parts of the messages after their timestamps, in protobuf's encoding.
 _TRANSFORM_NAMES = FrameTransform(parent_frame_id=scene.MAP, child_frame_id=scene.AIRCRAFT).SerializeToString(
@@ -288,8 +294,8 @@ _TRANSFORM_NAMES = FrameTransform(parent_frame_id=scene.MAP, child_frame_id=scen
 _TRANSFORM = np.dtype(
     [
         ("names", np.uint8, (len(_TRANSFORM_NAMES),)),
-        ("translation", submessage(_XYZ)),
-        ("rotation", submessage(_XYZW)),
+        ("translation", submessage_dtype(_XYZ)),
+        ("rotation", submessage_dtype(_XYZW)),
     ]
 )
 _FIX_NAMES = LocationFix(frame_id=scene.AIRCRAFT).SerializeToString(deterministic=True)
@@ -305,11 +311,11 @@ def transform_messages(channel: int, log_times: Ints, position: Floats, attitude
     with np.errstate(over="ignore", invalid="ignore"):
         translation = np.round(position * 1024.0) / 1024.0
     rotation = np.round(scene.body_rotation(attitude) * 2.0**20) / 2.0**20
-    out: Encoded = np.zeros(len(log_times), dtype=_TRANSFORM)
-    out["names"] = np.frombuffer(_TRANSFORM_NAMES, np.uint8)
-    fill_submessage(out["translation"], FrameTransform.TRANSLATION_FIELD_NUMBER, _XYZ, translation)
-    fill_submessage(out["rotation"], FrameTransform.ROTATION_FIELD_NUMBER, _XYZW, rotation)
-    return stamped_records(log_times, channel, FrameTransform.TIMESTAMP_FIELD_NUMBER, as_bytes(out))
+    messages: Encoded = np.zeros(len(log_times), dtype=_TRANSFORM)
+    messages["names"] = np.frombuffer(_TRANSFORM_NAMES, np.uint8)
+    fill_submessages(messages["translation"], FrameTransform.TRANSLATION_FIELD_NUMBER, _XYZ, translation)
+    fill_submessages(messages["rotation"], FrameTransform.ROTATION_FIELD_NUMBER, _XYZW, rotation)
+    return stamped_records(log_times, channel, FrameTransform.TIMESTAMP_FIELD_NUMBER, as_bytes(messages))
 
 
 def fix_messages(channel: int, log_times: Ints, origin: GeoOrigin, position: Floats) -> MessageRecords:
@@ -319,10 +325,10 @@ def fix_messages(channel: int, log_times: Ints, origin: GeoOrigin, position: Flo
     """
     east, north, up = position.T
     lat, lon = to_geo(origin, east, north)
-    out: Encoded = np.zeros(len(log_times), dtype=_FIX)
-    out["names"] = np.frombuffer(_FIX_NAMES, np.uint8)
-    fill_doubles(out, _GEO, np.stack([lat, lon, up], axis=1))
-    return stamped_records(log_times, channel, LocationFix.TIMESTAMP_FIELD_NUMBER, as_bytes(out))
+    messages: Encoded = np.zeros(len(log_times), dtype=_FIX)
+    messages["names"] = np.frombuffer(_FIX_NAMES, np.uint8)
+    fill_doubles(messages, _GEO, np.stack([lat, lon, up], axis=1))
+    return stamped_records(log_times, channel, LocationFix.TIMESTAMP_FIELD_NUMBER, as_bytes(messages))
 
 
 class Poses:
@@ -342,18 +348,18 @@ class Poses:
 
         log_times: (n,) ns, of whole seconds.  position, attitude: (n, 3).
         """
-        good = np.flatnonzero(np.isfinite(position).all(axis=1) & np.isfinite(attitude).all(axis=1))
-        slots = log_times[good] // _SLOT_NS
-        chosen = good[_changes(slots, self._slot)]
-        if good.size:
-            self._tail = position[good[-1:]]
-        if not chosen.size:
+        good_rows = np.flatnonzero(np.isfinite(position).all(axis=1) & np.isfinite(attitude).all(axis=1))
+        slots = log_times[good_rows] // _SLOT_NS
+        chosen_rows = good_rows[_changes(slots, self._slot)]
+        if good_rows.size:
+            self._tail = position[good_rows[-1:]]
+        if not chosen_rows.size:
             return
         self._slot = int(slots[-1])
-        chosen_times = log_times[chosen]
-        yield transform_messages(self._channels[TF_TOPIC], chosen_times, position[chosen], attitude[chosen])
+        chosen_times = log_times[chosen_rows]
+        yield transform_messages(self._channels[TF_TOPIC], chosen_times, position[chosen_rows], attitude[chosen_rows])
         seconds = chosen_times // SECOND_NS
-        starts = chosen[_changes(seconds, self._second)]
+        starts = chosen_rows[_changes(seconds, self._second)]
         if not starts.size:
             return
         self._second = int(seconds[-1])
@@ -368,20 +374,20 @@ class Poses:
             time = (log_time - EPOCH_NS) / SECOND_NS
             if time >= self._next_cloud:
                 self._next_cloud = max(time + _MIN_CLOUD_INTERVAL_S, time * _CLOUD_RATIO)
-                yield self._cloud(log_time, [*self._path[:-1], firsts[: k + 1]])
+                yield self._track_cloud_record(log_time, [*self._path[:-1], firsts[: k + 1]])
 
     def whole(self, log_time: int) -> Iterator[MessageRecords]:
         """Yield the track up to the newest row, a point a second, at ``log_time`` (ns): as a line and as points."""
         parts = [*self._path, self._tail]
         path = scene.track_scene(log_time, np.concatenate([np.zeros((0, 3)), *parts]))
         yield single_record(self._channels[TRACK_TOPIC], log_time, path)
-        yield self._cloud(log_time, parts)
+        yield self._track_cloud_record(log_time, parts)
 
-    def _cloud(self, log_time: int, parts: list[Floats]) -> MessageRecords:
+    def _track_cloud_record(self, log_time: int, parts: list[Floats]) -> MessageRecords:
         points = track_cloud(log_time, np.concatenate([np.zeros((0, 3)), *parts]))
         return single_record(self._channels[TRACK_POINTS], log_time, points)
 
 
-def _changes(values: Ints, before: int) -> Ints:
-    """Return the indices at which non-decreasing values change, starting from ``before``."""
-    return np.flatnonzero(np.diff(values, prepend=before) > 0)
+def _changes(values: Ints, previous: int) -> Ints:
+    """Return the indices at which non-decreasing values change, starting from ``previous``."""
+    return np.flatnonzero(np.diff(values, prepend=previous) > 0)

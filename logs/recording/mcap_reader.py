@@ -7,7 +7,7 @@ returned data are complete, in order and without a hole.
 
 Any container that the format allows is read: with chunks or without, compressed by zstd, lz4 or not, with or without
 an index, statistics, a summary and CRCs, with unknown kinds of records, and with surplus bytes in a record.  A
-CRC of 0 means that its writer left it out (mcap.dev, "MCAP Format Specification").  Messages outside chunks, which have
+CRC of 0 means that its writer omitted it (mcap.dev, "MCAP Format Specification").  Messages outside chunks, which have
 no CRC of their own, are accepted only if the end of the data section confirms that it is complete.
 """
 
@@ -57,101 +57,102 @@ class Container:
     problem: str = ""
 
 
-def read_chunks(file: BinaryIO, found: Container) -> Iterator[bytes]:
-    """Yield the records inside each whole chunk, and the others, as bytes, and fill ``found`` meanwhile.
+def read_chunks(file: BinaryIO, container: Container) -> Iterator[bytes]:
+    """Yield the records in each whole chunk and outside chunks, as bytes, and fill ``container`` meanwhile.
 
-    file: positioned after the magic at the start.  Damage raises no error; `Container.problem` describes it.
+    file: file positioned after the magic at its start.  Damage raises no error; `Container.problem` describes it.
     """
     try:
-        yield from _read(file, found)
+        yield from _read_sections(file, container)
     except _Damage as damage:
-        found.problem = str(damage)
+        container.problem = str(damage)
 
 
-def _read(file: BinaryIO, found: Container) -> Iterator[bytes]:
+def _read_sections(file: BinaryIO, container: Container) -> Iterator[bytes]:
     crc = zlib.crc32(MAGIC)
     total = 0
-    ended = vouched = False
-    loose = bytearray()
+    has_end = is_checked = False
+    loose_records = bytearray()
     while True:
-        at = file.tell()
-        head, content = _record(file, at)
-        opcode = head[0]
-        if loose and (opcode not in _OUTSIDE_CHUNKS or len(loose) >= _PIECE_BYTES):
-            yield bytes(loose)
-            loose.clear()
+        position = file.tell()
+        frame, content = _read_record(file, position)
+        opcode = frame[0]
+        if loose_records and (opcode not in _OUTSIDE_CHUNKS or len(loose_records) >= _PIECE_BYTES):
+            yield bytes(loose_records)
+            loose_records.clear()
         if opcode in _OUTSIDE_CHUNKS:
-            if not vouched:
-                _check_data_section(file, crc, at)
-                vouched = True
-            loose += head + content
+            if not is_checked:
+                _check_data_section(file, crc, position)
+                is_checked = True
+            loose_records += frame + content
         elif opcode == Opcode.CHUNK:
-            data = _chunk(content, at)
+            data = _read_chunk(content, position)
             total += len(data)
             if total > RECORD_LIMIT + _MAX_GROWTH_RATIO * file.tell():
                 raise _Damage(
-                    f"chunks grow to {total:,} bytes at byte {at:,} of the file: more than {_MAX_GROWTH_RATIO}-fold"
+                    f"chunks grow to {total:,} bytes at byte {position:,} of the file:"
+                    f" more than {_MAX_GROWTH_RATIO}-fold"
                 )
             yield data
         elif opcode == Opcode.ATTACHMENT:
-            _attachment(content, at, found)
+            _read_attachment(content, position, container)
         elif opcode == Opcode.DATA_END:
-            _data_end(content, at, crc)
-            ended = True
+            _check_data_end(content, position, crc)
+            has_end = True
             break
         elif opcode == Opcode.FOOTER:
             break
         elif opcode == 0:
-            raise _Damage(f"the record at byte {at:,} is of no kind")
-        crc = zlib.crc32(content, zlib.crc32(head, crc))
-    if not ended:
+            raise _Damage(f"the record at byte {position:,} is of no kind")
+        crc = zlib.crc32(content, zlib.crc32(frame, crc))
+    if not has_end:
         raise _Damage("the data section has no end record")
     _check_summary(file)
 
 
-def _check_data_section(file: BinaryIO, crc: int, at: int) -> None:
-    """Check that the data section has its end and its CRC; the part from byte ``at`` on is read again."""
-    back = file.tell()
-    file.seek(at)
+def _check_data_section(file: BinaryIO, crc: int, start: int) -> None:
+    """Check that the data section has its end and its CRC; the part from byte ``start`` on is read again."""
+    resume_position = file.tell()
+    file.seek(start)
     try:
         while True:
-            here = file.tell()
-            head, content = _record(file, here)
-            if head[0] in (Opcode.DATA_END, Opcode.FOOTER):
+            position = file.tell()
+            frame, content = _read_record(file, position)
+            if frame[0] in (Opcode.DATA_END, Opcode.FOOTER):
                 break
-            crc = zlib.crc32(content, zlib.crc32(head, crc))
-        if head[0] == Opcode.DATA_END:
-            _data_end(content, here, crc)
+            crc = zlib.crc32(content, zlib.crc32(frame, crc))
+        if frame[0] == Opcode.DATA_END:
+            _check_data_end(content, position, crc)
     except _Damage as damage:
-        raise _Damage(f"the records outside chunks, from byte {at:,} on, cannot be checked: {damage}") from None
-    file.seek(back)
+        raise _Damage(f"the records outside chunks, from byte {start:,} on, cannot be checked: {damage}") from None
+    file.seek(resume_position)
 
 
-def _record(file: BinaryIO, at: int) -> tuple[bytes, bytes]:
-    head = file.read(FRAME.size)
-    if len(head) < FRAME.size:
-        raise _Damage(f"the file ends at byte {at + len(head):,}, before its end record")
-    _, length = FRAME.unpack(head)
+def _read_record(file: BinaryIO, position: int) -> tuple[bytes, bytes]:
+    frame = file.read(FRAME.size)
+    if len(frame) < FRAME.size:
+        raise _Damage(f"the file ends at byte {position + len(frame):,}, before its end record")
+    _, length = FRAME.unpack(frame)
     if length > RECORD_LIMIT:
-        raise _Damage(f"the record at byte {at:,} declares {length:,} bytes: at most {RECORD_LIMIT:,} are read")
+        raise _Damage(f"the record at byte {position:,} declares {length:,} bytes: at most {RECORD_LIMIT:,} are read")
     content = file.read(length)
     if len(content) < length:
-        raise _Damage(f"the file ends at byte {at + len(head) + len(content):,}, inside a record")
-    return head, content
+        raise _Damage(f"the file ends at byte {position + len(frame) + len(content):,}, inside a record")
+    return frame, content
 
 
 def records(data: bytes) -> Iterator[tuple[int, int, bytes]]:
     """Yield opcode, offset and content of each record in a chunk.  Raises ValueError if one does not fit."""
-    at = 0
-    while at < len(data):
-        if at + FRAME.size > len(data):
+    position = 0
+    while position < len(data):
+        if position + FRAME.size > len(data):
             raise ValueError("a record reaches beyond its chunk")
-        opcode, length = FRAME.unpack_from(data, at)
-        end = at + FRAME.size + length
+        opcode, length = FRAME.unpack_from(data, position)
+        end = position + FRAME.size + length
         if end > len(data):
             raise ValueError("a record reaches beyond its chunk")
-        yield opcode, at, data[at + FRAME.size : end]
-        at = end
+        yield opcode, position, data[position + FRAME.size : end]
+        position = end
 
 
 def record_stream(content: bytes) -> ReadDataStream:
@@ -159,63 +160,64 @@ def record_stream(content: bytes) -> ReadDataStream:
     return ReadDataStream(BytesIO(content))
 
 
-def _chunk(content: bytes, at: int) -> bytes:
+def _read_chunk(content: bytes, position: int) -> bytes:
     try:
         chunk = Chunk.read(record_stream(content))
     except PARSE_ERRORS as error:
-        raise _Damage(f"the chunk at byte {at:,} cannot be read") from error
+        raise _Damage(f"the chunk at byte {position:,} cannot be read") from error
     size = chunk.uncompressed_size
     if size > RECORD_LIMIT:
-        raise _Damage(f"the chunk at byte {at:,} declares {size:,} bytes: at most {RECORD_LIMIT:,} are read")
+        raise _Damage(f"the chunk at byte {position:,} declares {size:,} bytes: at most {RECORD_LIMIT:,} are read")
     if chunk.compression not in ("zstd", "lz4", ""):
         raise _Damage(
-            f"the chunk at byte {at:,} is compressed with {chunk.compression[:20]!r}: zstd, lz4 or none is expected"
+            f"the chunk at byte {position:,} is compressed with {chunk.compression[:20]!r}:"
+            " zstd, lz4 or none is expected"
         )
     try:
-        data = _decompressed(chunk, size)
+        data = _decompress(chunk, size)
     except (zstandard.ZstdError, RuntimeError, EOFError) as error:
-        raise _Damage(f"the chunk at byte {at:,} cannot be decompressed") from error
+        raise _Damage(f"the chunk at byte {position:,} cannot be decompressed") from error
     if len(data) != size:
-        raise _Damage(f"the chunk at byte {at:,} does not decompress to the {size:,} bytes that it declares")
+        raise _Damage(f"the chunk at byte {position:,} does not decompress to the {size:,} bytes that it declares")
     if chunk.uncompressed_crc not in (0, zlib.crc32(data)):
-        raise _Damage(f"the chunk at byte {at:,} is damaged (its CRC differs)")
+        raise _Damage(f"the chunk at byte {position:,} is damaged (its CRC differs)")
     return data
 
 
-def _decompressed(chunk: Chunk, size: int) -> bytes:
-    """Return the bytes of a chunk, at most one more than ``size``: decompress() would trust the size in the frame."""
+def _decompress(chunk: Chunk, size: int) -> bytes:
+    """Decompress at most ``size`` + 1 bytes of a chunk; decompress() would trust the size in the frame."""
     if chunk.compression == "zstd":
         reader = zstandard.ZstdDecompressor(max_window_size=2**27).stream_reader(chunk.data, read_across_frames=True)
         return reader.read(size + 1)
     if chunk.compression == "lz4" and chunk.data:
-        found = lz4.frame.LZ4FrameDecompressor().decompress(chunk.data, max_length=size + 1)
-        return found
+        data = lz4.frame.LZ4FrameDecompressor().decompress(chunk.data, max_length=size + 1)
+        return data
     return chunk.data
 
 
-def _attachment(content: bytes, at: int, found: Container) -> None:
+def _read_attachment(content: bytes, position: int, container: Container) -> None:
     try:
         attachment = Attachment.read(record_stream(content))
     except PARSE_ERRORS as error:
-        raise _Damage(f"the attachment at byte {at:,} cannot be read") from error
+        raise _Damage(f"the attachment at byte {position:,} cannot be read") from error
     # Two times, three lengths with their contents; then the CRC, and perhaps unused bytes.
     lengths = (len(attachment.name.encode()), len(attachment.media_type.encode()), len(attachment.data))
     end = 32 + sum(lengths)
     if int.from_bytes(content[end : end + 4], "little") not in (0, zlib.crc32(content[:end])):
-        raise _Damage(f"the attachment at byte {at:,} is damaged (its CRC differs)")
-    if attachment.name in found.attachments:
-        raise _Damage(f"the attachment at byte {at:,} has the name of an earlier one")
-    found.attachments[attachment.name] = attachment.data
-    found.media[attachment.name] = (attachment.media_type, attachment.log_time)
+        raise _Damage(f"the attachment at byte {position:,} is damaged (its CRC differs)")
+    if attachment.name in container.attachments:
+        raise _Damage(f"the attachment at byte {position:,} has the name of an earlier one")
+    container.attachments[attachment.name] = attachment.data
+    container.media[attachment.name] = (attachment.media_type, attachment.log_time)
 
 
-def _data_end(content: bytes, at: int, crc: int) -> None:
+def _check_data_end(content: bytes, position: int, crc: int) -> None:
     try:
-        stated = DataEnd.read(record_stream(content)).data_section_crc
+        stated_crc = DataEnd.read(record_stream(content)).data_section_crc
     except PARSE_ERRORS as error:
-        raise _Damage(f"the end record at byte {at:,} cannot be read") from error
+        raise _Damage(f"the end record at byte {position:,} cannot be read") from error
     # A writer may leave the CRC out and write 0; chunks and attachments have their own CRC.
-    if stated not in (0, crc):
+    if stated_crc not in (0, crc):
         raise _Damage("the data section is damaged (its CRC differs)")
 
 
@@ -223,16 +225,16 @@ def _check_summary(file: BinaryIO) -> None:
     """Check the CRC of the summary, which is only an index, and the magic at the end of the file."""
     crc = 0
     while True:
-        at = file.tell()
-        head, content = _record(file, at)
-        if head[0] == Opcode.FOOTER:
+        position = file.tell()
+        frame, content = _read_record(file, position)
+        if frame[0] == Opcode.FOOTER:
             break
-        crc = zlib.crc32(content, zlib.crc32(head, crc))
+        crc = zlib.crc32(content, zlib.crc32(frame, crc))
     try:
         footer = Footer.read(record_stream(content))
     except PARSE_ERRORS as error:
-        raise _Damage(f"the footer at byte {at:,} cannot be read") from error
-    if footer.summary_crc not in (0, zlib.crc32(content[:16], zlib.crc32(head, crc))):
+        raise _Damage(f"the footer at byte {position:,} cannot be read") from error
+    if footer.summary_crc not in (0, zlib.crc32(content[:16], zlib.crc32(frame, crc))):
         raise _Damage("the summary is damaged (its CRC differs)")
     if file.read(len(MAGIC) + 1) != MAGIC:
         raise _Damage("the file does not end as an MCAP file does")

@@ -93,7 +93,7 @@ class _ChunkIndex(NamedTuple):
 
     def record(self) -> bytes:
         """Return its chunk index record."""
-        offsets = b"".join(_OFFSET.pack(channel, at) for channel, at in self.offsets)
+        offsets = b"".join(_OFFSET.pack(channel, position) for channel, position in self.offsets)
         times = _CHUNK_INDEX.pack(self.content_start, self.content_end, self.at, self.length, len(offsets))
         sizes = _SIZES.pack(self.compressed, self.size)
         content = times + offsets + self.index_length.to_bytes(8, "little") + _COMPRESSION + sizes
@@ -154,22 +154,22 @@ class ContainerWriter:
         Its schemas and channels become schemas and channels of this file.
         """
         index: dict[int, list[tuple[int, int]]] = {}
-        for opcode, at, content in records(data):
+        for opcode, position, content in records(data):
             if opcode == Opcode.SCHEMA:
                 schema = Schema.read(record_stream(content))
                 self._schemas.setdefault(f"{schema.id}", schema)
             elif opcode == Opcode.CHANNEL:
                 channel = Channel.read(record_stream(content))
-                if all(channel.id != known.id for known in self._channels):
+                if all(channel.id != existing.id for existing in self._channels):
                     self._channels.append(channel)
             elif opcode == Opcode.MESSAGE:
                 number, _, log_time = _MESSAGE.unpack_from(content)
-                index.setdefault(number, []).append((log_time, at))
-        parts, channels, at = [], [], 0
+                index.setdefault(number, []).append((log_time, position))
+        parts, channels, position = [], [], 0
         for number, pairs in sorted(index.items()):
             parts.append(_message_index(number, np.array(pairs, dtype=np.uint64)))
-            channels.append(ChannelIndex(number, at, len(pairs)))
-            at += len(parts[-1])
+            channels.append(ChannelIndex(number, position, len(pairs)))
+            position += len(parts[-1])
         times = [log_time for pairs in index.values() for log_time, _ in pairs]
         start, end = (min(times), max(times)) if times else (0, 0)
         self.chunk(ChunkContent(data, b"".join(parts), tuple(channels), start, end))
@@ -178,18 +178,20 @@ class ContainerWriter:
         """Write a chunk."""
         data = self._compressor.compress(content.records)
         size = len(content.records)
-        head = _CHUNK.pack(content.start, content.end, size, zlib.crc32(content.records)) + _COMPRESSION
-        head += len(data).to_bytes(8, "little")
-        length = FRAME.size + len(head) + len(data)
-        behind = self._at + length
-        offsets = tuple((item.channel, behind + item.offset) for item in content.channels)
-        for item in content.channels:
-            self._counts[item.channel] += item.messages
+        header = _CHUNK.pack(content.start, content.end, size, zlib.crc32(content.records)) + _COMPRESSION
+        header += len(data).to_bytes(8, "little")
+        length = FRAME.size + len(header) + len(data)
+        index_start = self._at + length
+        offsets = tuple(
+            (channel_index.channel, index_start + channel_index.offset) for channel_index in content.channels
+        )
+        for channel_index in content.channels:
+            self._counts[channel_index.channel] += channel_index.messages
         self._chunks.append(
             _ChunkIndex(content.start, content.end, self._at, length, offsets, len(content.index), len(data), size)
         )
         frame = FRAME.pack(Opcode.CHUNK, length - FRAME.size)
-        self._put(b"".join((frame, head, data, content.index)))
+        self._put(b"".join((frame, header, data, content.index)))
 
     @property
     def last_time(self) -> int:
@@ -209,8 +211,8 @@ class ContainerWriter:
         ]
         summary = b""
         offsets = b""
-        for opcode, members in groups:
-            group = b"".join(members)
+        for opcode, group_records in groups:
+            group = b"".join(group_records)
             if group:
                 offsets += _bytes(SummaryOffset(opcode, start + len(summary), len(group)))
             summary += group
@@ -237,19 +239,19 @@ class ContainerWriter:
         try:
             self._file.flush()
         except OSError as error:
-            raise _named(error, self._file) from error
+            raise _with_file_name(error, self._file) from error
 
     def _put(self, data: bytes) -> None:
         try:
             self._file.write(data)
         except OSError as error:
-            raise _named(error, self._file) from error
+            raise _with_file_name(error, self._file) from error
         self._crc = zlib.crc32(data, self._crc)
         self._at += len(data)
 
 
-def _named(error: OSError, file: BinaryIO) -> OSError:
-    """Add the name of the file to an error while writing (such as a full disk), which lacks it."""
+def _with_file_name(error: OSError, file: BinaryIO) -> OSError:
+    """Add the file's name to an error while writing, such as a full disk, which has none."""
     return OSError(error.errno, error.strerror, getattr(file, "name", None))
 
 
@@ -261,8 +263,8 @@ def _bytes(record: McapRecord) -> bytes:
 
 def _message_index(channel: int, pairs: Index) -> bytes:
     data = np.ascontiguousarray(pairs, dtype="<u8").tobytes()
-    head = channel.to_bytes(2, "little") + len(data).to_bytes(4, "little")
-    return FRAME.pack(Opcode.MESSAGE_INDEX, _PAIRS_HEAD + len(data)) + head + data
+    header = channel.to_bytes(2, "little") + len(data).to_bytes(4, "little")
+    return FRAME.pack(Opcode.MESSAGE_INDEX, _PAIRS_HEAD + len(data)) + header + data
 
 
 # ----------------------------------------------------------------------
@@ -335,32 +337,32 @@ class Layout:
 
 
 @inner
-def _put(out: Bytes, at: int, value: int, size: int) -> int:
+def _put(out: Bytes, position: int, value: int, size: int) -> int:
     """Write a little-endian number of ``size`` bytes, and return the position of its end."""
     for k in range(size):
-        out[at + k] = (value >> (8 * k)) & 0xFF
-    return at + size
+        out[position + k] = (value >> (8 * k)) & 0xFF
+    return position + size
 
 
 @inner
-def _put_varint(out: Bytes, at: int, value: int) -> int:
+def _put_varint(out: Bytes, position: int, value: int) -> int:
     while value > 127:
-        out[at] = (value & 127) | 128
+        out[position] = (value & 127) | 128
         value >>= 7
-        at += 1
-    out[at] = value
-    return at + 1
+        position += 1
+    out[position] = value
+    return position + 1
 
 
 @compiled
-def _put_head(out: Bytes, at: int, size: int, channel: int, log_time: int) -> int:
+def _put_head(out: Bytes, position: int, size: int, channel: int, log_time: int) -> int:
     """Write the frame and header of a message record; ``size`` is the size of the message."""
-    out[at] = MESSAGE_OPCODE
-    at = _put(out, at + 1, MESSAGE_HEADER + size, 8)
-    at = _put(out, at, channel, 2)
-    at = _put(out, at, 0, 4)
-    at = _put(out, at, log_time, 8)
-    return _put(out, at, log_time, 8)
+    out[position] = MESSAGE_OPCODE
+    position = _put(out, position + 1, MESSAGE_HEADER + size, 8)
+    position = _put(out, position, channel, 2)
+    position = _put(out, position, 0, 4)
+    position = _put(out, position, log_time, 8)
+    return _put(out, position, log_time, 8)
 
 
 @compiled
@@ -370,22 +372,22 @@ def _stamped(log_times: Ints, channel: int, tag: int, bodies: Bytes) -> tuple[By
     out = np.empty(count * (FRAME_SIZE + MESSAGE_HEADER + 14 + body_size), dtype=np.uint8)
     offsets = np.zeros(count + 1, dtype=np.int64)
     timestamp = np.empty(16, dtype=np.uint8)
-    at = 0
+    position = 0
     for k in range(count):
         log_time = log_times[k]
         timestamp[0] = 0x08
         size = _put_varint(timestamp, 1, log_time // SECOND_NS)
         timestamp[size] = 0x10
         size = _put_varint(timestamp, size + 1, log_time % SECOND_NS)
-        at = _put_head(out, at, 2 + size + body_size, channel, log_time)
-        out[at], out[at + 1] = tag, size
-        at += 2
-        copy_into(out[at : at + size], timestamp[:size])
-        at += size
-        copy_into(out[at : at + body_size], bodies[k])
-        at += body_size
-        offsets[k + 1] = at
-    return out[:at], offsets
+        position = _put_head(out, position, 2 + size + body_size, channel, log_time)
+        out[position], out[position + 1] = tag, size
+        position += 2
+        copy_into(out[position : position + size], timestamp[:size])
+        position += size
+        copy_into(out[position : position + body_size], bodies[k])
+        position += body_size
+        offsets[k + 1] = position
+    return out[:position], offsets
 
 
 def stamped_records(log_times: Ints, channel: int, timestamp_field: int, bodies: Bytes) -> MessageRecords:
@@ -402,8 +404,8 @@ def stamped_records(log_times: Ints, channel: int, timestamp_field: int, bodies:
 def single_record(channel: int, log_time: int, data: bytes) -> MessageRecords:
     """Return the record of one message with the bytes ``data``."""
     out = np.empty(FRAME_SIZE + MESSAGE_HEADER + len(data), dtype=np.uint8)
-    at = _put_head(out, 0, len(data), channel, log_time)
-    out[at:] = np.frombuffer(data, np.uint8)
+    position = _put_head(out, 0, len(data), channel, log_time)
+    out[position:] = np.frombuffer(data, np.uint8)
     return MessageRecords(channel, np.array([log_time]), np.array([0, len(out)]), out)
 
 
@@ -413,7 +415,7 @@ def _order(
 ) -> tuple[Entries, Ints]:
     """Merge rows and other messages by time; return all messages (n,) and the first of each chunk.
 
-    At equal times a row comes last.  The first messages end with n.
+    At equal times a row comes last.  The array of first messages ends with n.
     """
     count = len(row_times) + len(others)
     merged = np.empty(count, dtype=ENTRY)
@@ -451,29 +453,29 @@ def _fill(entries: Entries, rows: Bytes, blob: Bytes, front: Bytes) -> Bytes:
         total += entries[k].length
     out = np.empty(total, dtype=np.uint8)
     copy_into(out[: len(front)], front)
-    at, row = len(front), 0
+    position, row = len(front), 0
     for k in range(len(entries)):
         length, source = entries[k].length, entries[k].source
         if source == FROM_ROWS:
-            copy_into(out[at : at + length], rows[row])
+            copy_into(out[position : position + length], rows[row])
             row += 1
         else:
-            copy_into(out[at : at + length], blob[source : source + length])
-        at += length
+            copy_into(out[position : position + length], blob[source : source + length])
+        position += length
     return out
 
 
 @compiled
-def _index(entries: Entries, firsts: Ints, front: int, most: int) -> tuple[Bytes, Chunks, ChannelIndexes]:
+def _index(entries: Entries, firsts: Ints, front: int, max_channel: int) -> tuple[Bytes, Chunks, ChannelIndexes]:
     """Return the message index records of each chunk by channel, and the tables of `Layout`.
 
-    most: highest channel number.
+    max_channel: highest channel number.
     """
     count = len(firsts) - 1
-    out = np.empty(len(entries) * _INDEX_ENTRY + count * (most + 1) * _INDEX_HEAD, dtype=np.uint8)
+    out = np.empty(len(entries) * _INDEX_ENTRY + count * (max_channel + 1) * _INDEX_HEAD, dtype=np.uint8)
     chunks = np.zeros(count, dtype=CHUNK)
-    channels = np.zeros((count, most + 1), dtype=CHANNEL_INDEX)
-    at, start = 0, 0
+    channels = np.zeros((count, max_channel + 1), dtype=CHANNEL_INDEX)
+    position, start = 0, 0
     for c in range(count):
         chunk, first, stop = chunks[c], firsts[c], firsts[c + 1]
         size = front if c == 0 else 0
@@ -483,23 +485,23 @@ def _index(entries: Entries, firsts: Ints, front: int, most: int) -> tuple[Bytes
         chunk.start, chunk.stop = start, start + size
         chunk.first_ns, chunk.last_ns = entries[first].log_time, entries[stop - 1].log_time
         start += size
-        chunk.index_start = at
-        for channel in range(most + 1):
+        chunk.index_start = position
+        for channel in range(max_channel + 1):
             index = channels[c, channel]
             if index.messages == 0:
                 continue
-            index.offset = at - chunk.index_start
+            index.offset = position - chunk.index_start
             length = index.messages * _INDEX_ENTRY
-            out[at] = _INDEX_OPCODE
-            at = _put(out, at + 1, 6 + length, 8)
-            at = _put(out, at, channel, 2)
-            at = _put(out, at, length, 4)
+            out[position] = _INDEX_OPCODE
+            position = _put(out, position + 1, 6 + length, 8)
+            position = _put(out, position, channel, 2)
+            position = _put(out, position, length, 4)
             for k in range(first, stop):
                 if entries[k].channel == channel:
-                    at = _put(out, at, entries[k].log_time, 8)
-                    at = _put(out, at, entries[k].offset, 8)
-        chunk.index_stop = at
-    return out[:at], chunks, channels
+                    position = _put(out, position, entries[k].log_time, 8)
+                    position = _put(out, position, entries[k].offset, 8)
+        chunk.index_stop = position
+    return out[:position], chunks, channels
 
 
 def lay_out(
@@ -510,14 +512,14 @@ def lay_out(
     rows: (n, size) records of the channel ``row_channel``, at ``row_times`` (ns); at equal times a row comes last.
     front: bytes before the first message.  A message of more than ``limit`` bytes gets its own chunk.
     """
-    most = max([row_channel, *(item.channel for item in others)])
-    blob = np.concatenate([np.zeros(0, np.uint8), *(item.blob for item in others)])
+    max_channel = max([row_channel, *(messages.channel for messages in others)])
+    blob = np.concatenate([np.zeros(0, np.uint8), *(messages.blob for messages in others)])
     merged, firsts = _order(row_times, rows.shape[1], row_channel, _entries(others), len(front), limit)
     if not len(merged):
         none = np.zeros(0, np.uint8)
-        return Layout(none, none, np.zeros(0, CHUNK), np.zeros((0, most + 1), CHANNEL_INDEX))
+        return Layout(none, none, np.zeros(0, CHUNK), np.zeros((0, max_channel + 1), CHANNEL_INDEX))
     records = _fill(merged, rows, blob, np.frombuffer(front, np.uint8))
-    index, chunks, channels = _index(merged, firsts, len(front), most)
+    index, chunks, channels = _index(merged, firsts, len(front), max_channel)
     return Layout(records, index, chunks, channels)
 
 
@@ -526,28 +528,28 @@ def _entries(others: list[MessageRecords]) -> Entries:
 
     Their offsets are not set yet.
     """
-    found: Entries = np.zeros(sum(len(item.log_times) for item in others), dtype=ENTRY)
+    entries: Entries = np.zeros(sum(len(messages.log_times) for messages in others), dtype=ENTRY)
     first, start = 0, 0
-    for item in others:
-        part = found[first : first + len(item.log_times)]
-        part["source"] = item.offsets[:-1] + start
-        part["length"] = np.diff(item.offsets)
-        part["channel"] = item.channel
-        part["log_time"] = item.log_times
+    for messages in others:
+        part = entries[first : first + len(messages.log_times)]
+        part["source"] = messages.offsets[:-1] + start
+        part["length"] = np.diff(messages.offsets)
+        part["channel"] = messages.channel
+        part["log_time"] = messages.log_times
         first += len(part)
-        start += len(item.blob)
-    return found[np.argsort(found["log_time"], kind="stable")]
+        start += len(messages.blob)
+    return entries[np.argsort(entries["log_time"], kind="stable")]
 
 
 @compiled
-def last_log_time(times: Floats, newest: int, epoch: int, longest: float) -> int:
+def last_log_time(times: Floats, newest: int, epoch: int, max_time: float) -> int:
     """Return the log time (ns) of the last of ``times`` (s).
 
-    newest: log time before the first.  Returns `OUT_OF_RANGE` if a time is not in 0..longest, and `NOT_INCREASING` if
+    newest: log time before the first.  Returns `OUT_OF_RANGE` if a time is not in 0..max_time, and `NOT_INCREASING` if
     a time is not later than the time before it.
     """
     for k in range(len(times)):
-        if not 0.0 <= times[k] < longest:
+        if not 0.0 <= times[k] < max_time:
             return OUT_OF_RANGE
         log_time = int(np.rint(times[k] * 1e9)) + epoch
         if log_time <= newest:

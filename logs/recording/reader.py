@@ -1,4 +1,4 @@
-"""Read, check and rebuild a flight log from the log alone.
+"""Read, check and rebuild a flight from only its log.
 
 A recorded verdict is returned unchanged, for comparison; no code relies on it.
 """
@@ -128,9 +128,13 @@ def _messages(data: bytes, schemas: dict[int, Schema], channels: dict[int, LogCh
         elif opcode == Opcode.CHANNEL:
             channel = Channel.read(record_stream(content))
             if channel.id not in channels:
-                known = schemas[channel.schema_id]
+                message_schema = schemas[channel.schema_id]
                 channels[channel.id] = LogChannel(
-                    channel.topic, channel.message_encoding, known.name, known.encoding, known.data
+                    channel.topic,
+                    channel.message_encoding,
+                    message_schema.name,
+                    message_schema.encoding,
+                    message_schema.data,
                 )
         elif opcode == Opcode.MESSAGE:
             message = MessageRecord.read(record_stream(content), len(content))
@@ -219,24 +223,24 @@ class _MessageCollector:
     def add(self, data: bytes) -> None:
         """Take the records of one chunk.  Raises one of `PARSE_ERRORS` or DecodeError."""
         self.chunks += 1
-        at = 0
-        while at < len(data):
-            opcode, length = FRAME.unpack_from(data, at)
-            start = at + FRAME_SIZE
+        position = 0
+        while position < len(data):
+            opcode, length = FRAME.unpack_from(data, position)
+            start = position + FRAME_SIZE
             end = start + length
             if end > len(data):
                 raise ValueError("a record reaches beyond its chunk")
             if opcode == 0:
                 raise ValueError("a record of no kind")
             if opcode == Opcode.MESSAGE:
-                at = self._message(data, at, start, end)
+                position = self._message(data, position, start, end)
                 continue
             if opcode == Opcode.SCHEMA:
                 schema = Schema.read(record_stream(data[start:end]))
                 self._schemas[schema.id] = schema.name
             elif opcode == Opcode.CHANNEL:
                 self._channel(Channel.read(record_stream(data[start:end])))
-            at = end
+            position = end
 
     def _channel(self, channel: Channel) -> None:
         if channel.id in self._channels:
@@ -248,14 +252,14 @@ class _MessageCollector:
             self._state_channel = channel.id
             self._matcher = RowMatcher(channel.id)
 
-    def _message(self, data: bytes, at: int, start: int, end: int) -> int:
-        """Take the message at ``at``, or all successive state rows from there; return the next position."""
+    def _message(self, data: bytes, position: int, start: int, end: int) -> int:
+        """Take the message at ``position``, or all successive state rows from there; return the next position."""
         channel, _, log_time, _ = _MESSAGE.unpack_from(data, start)
         if channel == self._state_channel and self._matcher is not None:
-            matched = self._matcher.match(data, at)
+            matched = self._matcher.match(data, position)
             if len(matched):
                 self.parts.append(matched)
-                return at + len(matched) * RECORD.itemsize
+                return position + len(matched) * RECORD.itemsize
             self.parts.append(parse_row(data[start + MESSAGE_HEADER : end], self._parser))
         elif self._channels.get(channel) == (EVENT_TOPIC, LOG_NAME):
             message = Log.FromString(data[start + MESSAGE_HEADER : end])
@@ -285,46 +289,46 @@ def read_log(path: Path | str) -> FlightLog:
     (True, 'completed', 366, 'aerosonde')
     """
     path = Path(path)
-    found = Container()
+    container = Container()
     messages = _MessageCollector()
     try:
         if path.exists() and not path.is_file():
             raise LogError(f"{path}: not a file: a flight log (.mcap) is expected", file=path)
         with path.open("rb") as file:
             _check_magic(file.read(len(MAGIC)), path)
-            for data in read_chunks(file, found):
+            for data in read_chunks(file, container):
                 try:
                     messages.add(data)
                 except (*PARSE_ERRORS, DecodeError):
-                    found.problem = f"chunk {messages.chunks} holds records that cannot be read"
+                    container.problem = f"chunk {messages.chunks} holds records that cannot be read"
                     break
     except OSError as error:
         raise LogError(f"{path}: cannot be read: {error.strerror}", file=path) from error
-    if not messages.chunks and (found.problem or SETUP_FILE in found.attachments):
-        raise LogError(f"{path}: holds no complete chunk: {found.problem or 'an empty log'}", file=path)
-    if SETUP_FILE not in found.attachments and found.problem:
-        raise LogError(f"{path}: holds no setup: {found.problem}", file=path)
-    stored = unpack_setup(found.attachments, str(path))
-    rows, fault = _good_rows(messages.rows(), len(stored.setup.route.waypoints))
+    if not messages.chunks and (container.problem or SETUP_FILE in container.attachments):
+        raise LogError(f"{path}: holds no complete chunk: {container.problem or 'an empty log'}", file=path)
+    if SETUP_FILE not in container.attachments and container.problem:
+        raise LogError(f"{path}: holds no setup: {container.problem}", file=path)
+    stored_setup = unpack_setup(container.attachments, str(path))
+    rows, fault = _usable_rows(messages.rows(), len(stored_setup.setup.route.waypoints))
     if not len(rows):
         raise LogError(
-            f"{path}: holds no complete second of flight: {fault or found.problem or 'an empty log'}", file=path
+            f"{path}: holds no complete second of flight: {fault or container.problem or 'an empty log'}", file=path
         )
-    ended, wrong = _result(found.attachments, len(rows))
-    verdict, garbled = _verdict(found.attachments)
-    reference, unread = _reference(found.attachments)
-    lost = fault or found.problem
-    recovered = not lost and RECOVERY_FILE in found.attachments
-    lost = _loss(found.attachments[RECOVERY_FILE]) if recovered else lost or wrong or garbled or unread
+    ended, wrong = _result(container.attachments, len(rows))
+    verdict, garbled = _verdict(container.attachments)
+    reference, unread = _reference(container.attachments)
+    lost = fault or container.problem
+    recovered = not lost and RECOVERY_FILE in container.attachments
+    lost = _loss(container.attachments[RECOVERY_FILE]) if recovered else lost or wrong or garbled or unread
     track = decode_rows(rows)
     return FlightLog(
         source=str(path),
-        setup=stored.setup,
+        setup=stored_setup.setup,
         track=track,
         events=tuple(sorted(messages.events, key=lambda event: event.time)),
         ended=ended,
         recorded_verdict=verdict,
-        versions=stored.versions,
+        versions=stored_setup.versions,
         complete=not lost,
         problem=f"recovered: {lost}" if recovered else lost,
         end_time=float(track.time[-1]),
@@ -338,32 +342,32 @@ def _check_magic(magic: bytes, path: Path) -> None:
         raise LogError(f"{path}: empty: a flight log (.mcap) is expected", file=path)
     if magic != MAGIC:
         if is_imported_log(path):
-            way = f"`planfly import {path}` makes the flight log that is expected"
-            raise LogError(f"{path}: another program's log: {way}", file=path)
+            advice = f"`planfly import {path}` makes the flight log that is expected"
+            raise LogError(f"{path}: another program's log: {advice}", file=path)
         raise LogError(f"{path}: not an MCAP file (it starts with {magic!r}): a flight log is expected", file=path)
 
 
-def _good_rows(rows: StateRecords, waypoints: int) -> tuple[StateRecords, str]:
-    """Return the rows before the first that cannot follow the one before it, and the fault of that row."""
+def _usable_rows(rows: StateRecords, waypoints: int) -> tuple[StateRecords, str]:
+    """Return the rows before the first invalid row, and the fault of that row, "" if all rows are valid."""
     state = rows["state"]
     time = state["time_s"]
-    good = np.isfinite(time) & (time >= 0.0) & (time < LATEST)
-    good[1:] &= time[1:] > time[:-1]
-    numbered = state["row"] == np.arange(len(rows), dtype=np.uint32)
-    legs = (state["leg_index"] >= 0) & (state["leg_index"] < waypoints)
-    for test, fault in (
-        (numbered, "rows are missing"),
-        (good, "time does not increase"),
-        (legs, "the leg does not exist"),
+    is_increasing = np.isfinite(time) & (time >= 0.0) & (time < LATEST)
+    is_increasing[1:] &= time[1:] > time[:-1]
+    is_numbered = state["row"] == np.arange(len(rows), dtype=np.uint32)
+    has_leg = (state["leg_index"] >= 0) & (state["leg_index"] < waypoints)
+    for is_valid, fault in (
+        (is_numbered, "rows are missing"),
+        (is_increasing, "time does not increase"),
+        (has_leg, "the leg does not exist"),
     ):
-        if not test.all():
-            first = int(np.argmin(test & numbered & good & legs))
+        if not is_valid.all():
+            first = int(np.argmin(is_valid & is_numbered & is_increasing & has_leg))
             return rows[:first], f"{fault} at state message {first}"
     return rows, ""
 
 
 def _result(attachments: dict[str, bytes], rows: int) -> tuple[str | None, str]:
-    """Return how the flight ended, and any fault of that record."""
+    """Return the recorded end of the flight, and any fault of its record."""
     if RESULT_FILE not in attachments:
         return None, "the recording stopped before the flight had ended"
     data = _object(attachments[RESULT_FILE])

@@ -131,7 +131,7 @@ class Recorder:
             self._file.close()
             raise
         self._poses = Poses(setup.scenario.origin, self._channels)
-        self._noted = FlightEvents(setup, self._channels[EVENT_TOPIC])
+        self._flight_events = FlightEvents(setup, self._channels[EVENT_TOPIC])
 
     def __enter__(self) -> "Recorder":
         """Return the recorder itself."""
@@ -171,17 +171,17 @@ class Recorder:
             raise ValueError(f"rows from {times[0]} s on: times must increase by at least 1 ns a row")
         self._newest_ns = newest
         # Keep every n-th row, from the first row of the flight.
-        kept = rows[-self._received % self._every :: self._every]
+        recorded_rows = rows[-self._received % self._every :: self._every]
         self._received += len(rows)
         self._skipped = rows[-1:] if (self._received - 1) % self._every else None
-        if len(kept):
-            self._append(kept)
+        if len(recorded_rows):
+            self._append(recorded_rows)
 
     def _append(self, rows: Rows) -> None:
         self._pending.append(rows)
-        before, self._last_ns = self._last_ns, round(rows["time"][-1] * 1e9) + EPOCH_NS
-        if self._last_ns // self._batch_ns > before // self._batch_ns:
-            self._emit(self._last_ns // SECOND_NS * SECOND_NS)
+        previous_ns, self._last_ns = self._last_ns, round(rows["time"][-1] * 1e9) + EPOCH_NS
+        if self._last_ns // self._batch_ns > previous_ns // self._batch_ns:
+            self._write_pending(self._last_ns // SECOND_NS * SECOND_NS)
 
     @property
     def size(self) -> int:
@@ -194,7 +194,7 @@ class Recorder:
         In a live flight, a killed process then loses less than a second.  Chunks end at each flush, so the bytes of the
         file (not its rows) depend on the times of the calls.
         """
-        self._emit(self._last_ns + 1)
+        self._write_pending(self._last_ns + 1)
 
     def event(self, time: float, text: str, level: str = "info") -> None:
         """Record an event at ``time`` (s); level: debug, info, warning, error or fatal.  Raises ValueError."""
@@ -217,7 +217,7 @@ class Recorder:
         if self._skipped is not None:
             self._append(self._skipped)
             self._skipped = None
-        self._emit(None)
+        self._write_pending(None)
         end = max(self._last_ns, EPOCH_NS)
         self._write([*self._poses.whole(end)])
         if returns is not None:
@@ -266,7 +266,7 @@ class Recorder:
         return self._channels[topic]
 
     def _add_scene(self, topic: str, update: bytes) -> None:
-        """Add a scene that a viewer shows from the start of the flight, although it is known only at the end."""
+        """Add a scene that is known only at the end, but is shown from the start of the flight."""
         self._write([single_record(self._scene_channel(topic), EPOCH_NS, update)])
         self._writer.flush()
 
@@ -274,7 +274,7 @@ class Recorder:
         """Write pending rows and events, the summary and the end of the file."""
         self._open = False
         try:
-            self._emit(None)
+            self._write_pending(None)
             self._writer.finish()
         finally:
             self._file.close()
@@ -282,21 +282,18 @@ class Recorder:
     def _attach(self, name: str, data: bytes, log_time: int) -> None:
         self._writer.attach(name, media_type(name), data, log_time)
 
-    def _emit(self, until: int | None) -> None:
-        """Write the pending rows and events before ``until``, in chunks of at most a second.
-
-        until: ns; None for all.
-        """
+    def _write_pending(self, end_ns: int | None) -> None:
+        """Write the pending rows and events before ``end_ns``, or all if it is None, in chunks of at most a second."""
         rows = join_rows(self._pending)
         log_times = times_ns(rows["time"])
-        stop = len(rows) if until is None else int(np.searchsorted(log_times, until))
+        stop = len(rows) if end_ns is None else int(np.searchsorted(log_times, end_ns))
         self._pending = [rows[stop:]] if stop < len(rows) else []
-        events = [item for item in self._events if until is None or item.log_times[0] < until]
-        self._events = [item for item in self._events if until is not None and item.log_times[0] >= until]
+        events = [event for event in self._events if end_ns is None or event.log_times[0] < end_ns]
+        self._events = [event for event in self._events if end_ns is not None and event.log_times[0] >= end_ns]
         rows, log_times = rows[:stop], log_times[:stop]
-        shown = self._poses.take(log_times, rows["position"], rows["attitude"])
-        noted = self._noted.take(log_times, rows["position"], rows["leg"])
-        self._write([*shown, *noted, *events], rows, log_times)
+        pose_records = self._poses.take(log_times, rows["position"], rows["attitude"])
+        event_records = self._flight_events.take(log_times, rows["position"], rows["leg"])
+        self._write([*pose_records, *event_records, *events], rows, log_times)
         self._writer.flush()
 
     def _write(self, others: list[MessageRecords], rows: Rows = _NO_ROWS, log_times: Ints = _NO_TIMES) -> None:
@@ -337,5 +334,5 @@ def thin_track(track: Track, every: int) -> Track:
     """
     if every <= 1 or not len(track):
         return track
-    kept = np.union1d(np.arange(0, len(track), every), [len(track) - 1])
-    return Track(*(getattr(track, name)[kept] for name in COLUMNS))
+    recorded_rows = np.union1d(np.arange(0, len(track), every), [len(track) - 1])
+    return Track(*(getattr(track, name)[recorded_rows] for name in COLUMNS))

@@ -28,8 +28,8 @@ class Recovered:
 def recover_log(path: Path) -> Recovered | None:
     """Rebuild a log up to its first damage; return None for a complete log.
 
-    Chunks and attachments before the damage are kept unchanged.  The result of the flight and the verdict are left out,
-    as they may refer to lost rows.  Raises LogError for a file without a flight, as `read_log` does.
+    Chunks and attachments before the damage are kept unchanged.  The result of the flight and the verdict are omitted,
+    because they may refer to lost rows.  Raises LogError for a file without a flight, as `read_log` does.
 
     >>> import tempfile
     >>> from logs.recording.example_log import write_example_log
@@ -44,12 +44,12 @@ def recover_log(path: Path) -> Recovered | None:
     log = read_log(path)
     if log.complete:
         return None
-    found, chunks = _whole_chunks(path)
-    out = io.BytesIO()
-    writer = ContainerWriter(out, PROFILE)
-    for name, data in found.attachments.items():
+    container, chunks = _whole_chunks(path)
+    file = io.BytesIO()
+    writer = ContainerWriter(file, PROFILE)
+    for name, data in container.attachments.items():
         if name not in (RESULT_FILE, VERDICT_FILE, RECOVERY_FILE):
-            media, stamp = found.media[name]
+            media, stamp = container.media[name]
             writer.attach(name, media, data, stamp)
     for chunk in chunks:
         try:
@@ -61,11 +61,11 @@ def recover_log(path: Path) -> Recovered | None:
     text = (json.dumps(note, indent=1) + "\n").encode()
     writer.attach(RECOVERY_FILE, media_type(RECOVERY_FILE), text, writer.last_time)
     writer.finish()
-    return Recovered(out.getvalue(), log)
+    return Recovered(file.getvalue(), log)
 
 
 def _whole_chunks(path: Path) -> tuple[Container, list[bytes]]:
-    found = Container()
+    container = Container()
     with path.open("rb") as file:
         file.seek(len(MAGIC))
-        return found, list(read_chunks(file, found))
+        return container, list(read_chunks(file, container))

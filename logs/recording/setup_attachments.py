@@ -147,7 +147,7 @@ def unpack_terrain(attachments: dict[str, bytes], source: str) -> Terrain:
     heights = np.empty((file.rows, file.cols), dtype=np.float32)
     for name, (first, last) in zip(file.parts, blocks, strict=True):
         heights[first:last] = _unpack(attachments[name], last - first, file.cols, f"{source}: {name}")
-    rows = _coefficients(file.map_to_pixel, source)
+    rows = _check_coefficients(file.map_to_pixel, source)
     return Terrain(
         heights=heights,
         to_pixel=PolyMap.from_rows(rows, file.map_residual_pixels),
@@ -184,11 +184,11 @@ def _unpack(data: bytes, rows: int, cols: int, where: str) -> NDArray[Any]:
     return np.cumsum(bits, axis=1, dtype=np.uint32).astype("<u4").view("<f4")
 
 
-def _coefficients(rows: list[list[float]], source: str) -> NDArray[np.float64]:
+def _check_coefficients(rows: list[list[float]], source: str) -> NDArray[np.float64]:
     size = len(rows[0])
     if len(rows) != 2 + 2 * size or any(len(row) != size for row in rows) or size < 2:
-        found = f"{len(rows)} rows of {size}"
-        raise LogError.at(f"{source}: {TERRAIN_FILE}", "map_to_pixel", found, "2 + 2n rows of n are expected")
+        shape_text = f"{len(rows)} rows of {size}"
+        raise LogError.at(f"{source}: {TERRAIN_FILE}", "map_to_pixel", shape_text, "2 + 2n rows of n are expected")
     if not (math.fabs(rows[1][0]) > 0.0 and math.fabs(rows[1][1]) > 0.0):
         shown = f"half-widths {rows[1][:2]}"
         raise LogError.at(f"{source}: {TERRAIN_FILE}", "map_to_pixel", rows[1][:2], "not above 0", shown=shown)
@@ -266,13 +266,13 @@ def package_versions() -> dict[str, str]:
 
 
 def _find_versions() -> dict[str, str]:
-    found = {"python": platform.python_version()}
+    versions = {"python": platform.python_version()}
     for name in _PACKAGES:
         try:
-            found[name] = metadata.version(name)
+            versions[name] = metadata.version(name)
         except metadata.PackageNotFoundError:
             continue
-    return found
+    return versions
 
 
 def pack_setup(setup: FlightSetup) -> dict[str, bytes]:
@@ -281,14 +281,14 @@ def pack_setup(setup: FlightSetup) -> dict[str, bytes]:
     The same setup and packages give the same bytes.
     """
     attachments = {
-        SCENARIO_FILE: _json(setup.scenario.to_json()),
+        SCENARIO_FILE: _json_bytes(setup.scenario.to_json()),
         MISSION_FILE: mission_text(setup.mission, "waypoints").encode(),
     }
     if setup.plan is not None:
         attachments[PLAN_FILE] = plan_json(setup.plan).encode()
     if setup.scenario.terrain is not None:
         attachments |= pack_terrain(setup.scenario.terrain)
-    stored = setup.autopilot.store()
+    stored_autopilot = setup.autopilot.store()
     file = _Setup(
         aircraft=setup.aircraft,
         airspeed_mps=setup.airspeed,
@@ -296,14 +296,14 @@ def pack_setup(setup: FlightSetup) -> dict[str, bytes]:
         battery_wh=setup.battery,
         seed=setup.seed,
         external=setup.scenario.external,
-        guidance=stored.guidance,
+        guidance=stored_autopilot.guidance,
         nav=setup.nav,
         guidance_hz=setup.guidance_hz,
         fdm_hz=setup.fdm_hz,
-        parameters=None if stored.parameters is None else parameters_table(stored.parameters),
-        program=None if stored.program is None else ProgramTable.of(stored.program),
+        parameters=None if stored_autopilot.parameters is None else parameters_table(stored_autopilot.parameters),
+        program=None if stored_autopilot.program is None else ProgramTable.of(stored_autopilot.program),
         autopilot=stored_name(setup.autopilot),
-        autopilot_version=stored.version or None,
+        autopilot_version=stored_autopilot.version or None,
         source=setup.source,
         mission=MissionTable.of(setup.mission),
         route=RouteTable.of(setup.route),
@@ -316,7 +316,7 @@ def pack_setup(setup: FlightSetup) -> dict[str, bytes]:
     }
     if not file.mission.survey_plans:
         unstated["mission"] = {"survey_plans"}
-    return {SETUP_FILE: _json(file.model_dump(by_alias=True, exclude=unstated)), **attachments}
+    return {SETUP_FILE: _json_bytes(file.model_dump(by_alias=True, exclude=unstated)), **attachments}
 
 
 def unpack_setup(attachments: dict[str, bytes], source: str) -> StoredSetup:
@@ -375,7 +375,7 @@ def _autopilot(file: _Setup, where: str) -> Autopilot:
         raise LogError.at(where, "autopilot", file.autopilot, "not an autopilot of this version") from error
 
 
-def _json(data: Any) -> bytes:
+def _json_bytes(data: Any) -> bytes:
     return (json.dumps(_finite_or_text(data), indent=1, allow_nan=False) + "\n").encode()
 
 
@@ -406,7 +406,7 @@ def _scenario(attachments: dict[str, bytes], source: str, terrain: Terrain | Non
         spec = json.loads(_text(attachments, SCENARIO_FILE, source))
     except (ValueError, RecursionError) as error:
         raise LogError(f"{where}: not valid JSON: {error}", file=where) from error
-    _refuse_outside_terrain(spec, terrain, where)
+    _check_terrain_is_stored(spec, terrain, where)
     try:
         return from_spec(spec, where, ground=terrain, external=external)
     except PlanflyError as error:
@@ -420,15 +420,15 @@ def _plan(attachments: dict[str, bytes], source: str, terrain: Terrain | None) -
         data = json.loads(text)
     except (ValueError, RecursionError) as error:
         raise LogError(f"{where}: not valid JSON: {error}", file=where) from error
-    _refuse_outside_terrain(data.get("scenario") if isinstance(data, dict) else None, terrain, where)
+    _check_terrain_is_stored(data.get("scenario") if isinstance(data, dict) else None, terrain, where)
     try:
         return parse_plan(text, where, ground=terrain)
     except PlanflyError as error:
         raise LogError.from_error(error) from error
 
 
-def _refuse_outside_terrain(spec: Any, terrain: Terrain | None, where: str) -> None:
-    """Raise LogError for a log that would make its reader open an elevation file."""
+def _check_terrain_is_stored(spec: Any, terrain: Terrain | None, where: str) -> None:
+    """Raise LogError if reading the log would open an elevation file."""
     table = spec.get("terrain") if isinstance(spec, dict) else None
     kind = table.get("kind") if isinstance(table, dict) else None
     if terrain is None and kind != "none":

@@ -55,9 +55,9 @@ class SetupModel(BaseModel):
         return LogError(f"{file}: {key}: {message}", file=file, field=key)
 
 
-def _made(kind: type[Made], table: SetupModel, **changed: Any) -> Made:
+def _from_table(kind: type[Made], table: SetupModel, **replaced: Any) -> Made:
     """Make a dataclass from the values of a table, with some values replaced."""
-    return kind(**(dict(table) | changed))
+    return kind(**(dict(table) | replaced))
 
 
 class _Item(SetupModel):
@@ -92,7 +92,7 @@ class _SurveyPlan(SetupModel):
 
     def plan(self) -> SurveyPlan:
         """Return the plan of the table."""
-        return _made(SurveyPlan, self, camera=None if self.camera is None else _made(Camera, self.camera))
+        return _from_table(SurveyPlan, self, camera=None if self.camera is None else _from_table(Camera, self.camera))
 
 
 class MissionTable(SetupModel):
@@ -110,10 +110,10 @@ class MissionTable(SetupModel):
     def mission(self) -> Mission:
         """Return the mission of the table."""
         lists = {"items": self.items, "fences": self.fences, "rally": self.rally}
-        items = {name: tuple(_made(MissionItem, item) for item in found) for name, found in lists.items()}
+        items = {name: tuple(_from_table(MissionItem, item) for item in table) for name, table in lists.items()}
         plans = tuple(plan.plan() for plan in self.survey_plans)
-        home = None if self.home is None else _made(Home, self.home)
-        return _made(Mission, self, home=home, survey_plans=plans, **items)
+        home = None if self.home is None else _from_table(Home, self.home)
+        return _from_table(Mission, self, home=home, survey_plans=plans, **items)
 
 
 class RouteTable(SetupModel):
@@ -165,13 +165,13 @@ class RouteTable(SetupModel):
         if self.straight_to >= len(waypoints):
             raise self.fault(file, "straight_to", f"{self.straight_to}: a waypoint, or -1")
         heights = {field: getattr(self, field) for field in ("takeoff_ground", "landing_ground")}
-        known = {field: math.nan if height is None else height for field, height in heights.items()}
+        ground_heights = {field: math.nan if height is None else height for field, height in heights.items()}
         circle = None if self.return_to is None else ReturnCircle(*self.return_to)
         items = np.array(self.items, dtype=np.int64)
         stops = np.array(self.stops, dtype=np.int64)
-        above = np.array([math.nan if height is None else height for height in self.above_ground])
-        columns = {"waypoints": waypoints, "items": items, "stops": stops, "above_ground": above}
-        return _made(Route, self, return_to=circle, **columns, **known)
+        above_ground = np.array([math.nan if height is None else height for height in self.above_ground])
+        columns = {"waypoints": waypoints, "items": items, "stops": stops, "above_ground": above_ground}
+        return _from_table(Route, self, return_to=circle, **columns, **ground_heights)
 
 
 class EnvelopeTable(SetupModel):
@@ -212,14 +212,14 @@ class EnvelopeTable(SetupModel):
         shapes |= {field: [heights] for field in ("level_speed_min", "level_speed_max")}
         powers = ("power_idle", "power_level", "power_full")
         # Logs from before power was recorded have none.
-        unknown = {} if self.power_level else {field: np.zeros((0, 0)) for field in powers}
-        shapes |= {field: [speeds, heights] for field in powers if not unknown}
+        empty_powers = {} if self.power_level else {field: np.zeros((0, 0)) for field in powers}
+        shapes |= {field: [speeds, heights] for field in powers if not empty_powers}
         for field, shape in shapes.items():
             values = getattr(self, field)
-            found = [len(values), *({len(row) for row in values} if len(shape) == 2 else ())]
-            if found != shape:
-                raise self.fault(file, field, f"shape {found}: {shape} is expected")
-        return _made(Envelope, self, **unknown)
+            found_shape = [len(values), *({len(row) for row in values} if len(shape) == 2 else ())]
+            if found_shape != shape:
+                raise self.fault(file, field, f"shape {found_shape}: {shape} is expected")
+        return _from_table(Envelope, self, **empty_powers)
 
 
 class ParametersTable(SetupModel):
@@ -258,4 +258,4 @@ class ProgramTable(SetupModel):
 
     def program(self) -> AutopilotProgram:
         """Return the autopilot of the table."""
-        return _made(AutopilotProgram, self)
+        return _from_table(AutopilotProgram, self)

@@ -43,33 +43,36 @@ def tagged_doubles(names: Sequence[str]) -> list[tuple[str, str]]:
     return [field for name in names for field in ((f"tag_{name}", "u1"), (name, "<f8"))]
 
 
-def submessage(names: Sequence[str]) -> np.dtype[np.void]:
-    """Return the type of a message of doubles within another: tag, size, and the tagged doubles."""
+def submessage_dtype(names: Sequence[str]) -> np.dtype[np.void]:
+    """Return the numpy type of a submessage of doubles: tag, size, and the tagged doubles."""
     return np.dtype([("tag", "u1"), ("size", "u1"), *tagged_doubles(names)])
 
 
 def fill_doubles(out: Encoded, names: Sequence[str], values: Floats) -> None:
-    """Write the doubles (n, m) and their tags into ``out`` (n,); names: of the fields 1 to m."""
-    for number, (name, column) in enumerate(zip(names, values.T, strict=True), 1):
-        out[f"tag_{name}"], out[name] = number << 3 | _FIXED64, column
+    """Write values (n, m) and their tags into ``out``, (n,).  names: names of the fields with numbers 1 to m."""
+    for field_number, (name, column) in enumerate(zip(names, values.T, strict=True), 1):
+        out[f"tag_{name}"], out[name] = field_number << 3 | _FIXED64, column
 
 
-def fill_submessage(out: Encoded, number: int, names: Sequence[str], values: Floats) -> None:
-    """Write messages of doubles into ``out``, (n,) of `submessage`, as the field ``number`` of other messages."""
-    out["tag"], out["size"] = number << 3 | _LENGTH_DELIMITED, out.dtype.itemsize - 2
+def fill_submessages(out: Encoded, field_number: int, names: Sequence[str], values: Floats) -> None:
+    """Fill ``out``, an array (n,) of type `submessage_dtype`, with a submessage of doubles per row of values (n, m).
+
+    field_number: field number of the submessage in its parent message.
+    """
+    out["tag"], out["size"] = field_number << 3 | _LENGTH_DELIMITED, out.dtype.itemsize - 2
     fill_doubles(out, names, values)
 
 
-def repeated_submessages(number: int, names: Sequence[str], values: Floats) -> bytes:
-    """Encode rows (n, m) as a repeated field of messages of m doubles each."""
-    out: Encoded = np.zeros(len(values), dtype=submessage(names))
-    fill_submessage(out, number, names, values)
-    return out.tobytes()
+def repeated_submessages(field_number: int, names: Sequence[str], values: Floats) -> bytes:
+    """Encode rows of values (n, m) as a repeated field of submessages of m doubles each."""
+    messages: Encoded = np.zeros(len(values), dtype=submessage_dtype(names))
+    fill_submessages(messages, field_number, names, values)
+    return messages.tobytes()
 
 
-def length_delimited(number: int, data: bytes) -> bytes:
-    """Encode the bytes of a message as the field ``number`` of another message."""
-    size, head = len(data), bytearray([number << 3 | _LENGTH_DELIMITED])
+def length_delimited(field_number: int, data: bytes) -> bytes:
+    """Encode the bytes of a submessage as the field ``field_number`` of its parent message."""
+    size, head = len(data), bytearray([field_number << 3 | _LENGTH_DELIMITED])
     while size > 127:
         head.append(size & 127 | 128)
         size >>= 7
@@ -121,11 +124,11 @@ class StateField(NamedTuple):
 
 def _fields() -> tuple[StateField, ...]:
     """Return all fields of the message after `row`, in order."""
-    found = []
+    fields = []
     for source, names in COLUMN_NAMES.items():
         kind = "<f8" if source in _DOUBLES else "<i4" if source == "leg" else "<f4"
-        found += [StateField(name, kind, source, None if len(names) == 1 else k) for k, name in enumerate(names)]
-    return tuple(found)
+        fields += [StateField(name, kind, source, None if len(names) == 1 else k) for k, name in enumerate(names)]
+    return tuple(fields)
 
 
 FIELDS = _fields()
@@ -188,15 +191,15 @@ def schema_of(descriptor: "Descriptor") -> bytes:
 
     def visit(file: "FileDescriptor") -> None:
         if file.name not in files:
-            for needed in file.dependencies:
-                visit(needed)
+            for dependency in file.dependencies:
+                visit(dependency)
             files[file.name] = file
 
     visit(descriptor.file)
-    out = descriptor_pb2.FileDescriptorSet()
+    file_set = descriptor_pb2.FileDescriptorSet()
     for file in files.values():
-        file.CopyToProto(out.file.add())
-    return out.SerializeToString(deterministic=True)
+        file.CopyToProto(file_set.file.add())
+    return file_set.SerializeToString(deterministic=True)
 
 
 def times_ns(time: NDArray[np.float64]) -> NDArray[np.int64]:
@@ -255,7 +258,7 @@ def decode_rows(records: StateRecords) -> Track:
 def parse_row(data: bytes, parser: "type[Message]") -> StateRecords:
     """Read one message in any layout that protobuf allows, as (1,) of `RECORD`.
 
-    Raises google.protobuf.message.DecodeError.
+    Raises google.protobuf.message.DecodeError for an invalid message.
     """
     message = parser.FromString(data)
     record = _TEMPLATE.copy()
@@ -266,7 +269,7 @@ def parse_row(data: bytes, parser: "type[Message]") -> StateRecords:
 
 @compiled
 def _count_matching(raw: Bytes, columns: NDArray[np.int64], expected: Bytes) -> int:
-    """Count the records (rows of bytes) from the first that have the expected bytes in these columns."""
+    """Count the leading records (rows of bytes) that have the expected bytes in these columns."""
     for row in range(len(raw)):
         for k in range(len(columns)):
             if raw[row, columns[k]] != expected[k]:
@@ -292,5 +295,5 @@ class RowMatcher:
         """Return the successive records with this layout from ``offset`` on, (n,) of `RECORD`."""
         count = (len(data) - offset) // RECORD.itemsize
         raw = np.frombuffer(data, np.uint8, count * RECORD.itemsize, offset).reshape(count, RECORD.itemsize)
-        found = _count_matching(raw, self._columns, self._expected)
-        return raw[:found].reshape(-1).view(RECORD)
+        count_matching = _count_matching(raw, self._columns, self._expected)
+        return raw[:count_matching].reshape(-1).view(RECORD)

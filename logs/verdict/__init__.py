@@ -1,1 +1,1 @@
-"""The verdict: findings of each rule, from the mission alone and from the flown track."""
+"""The verdict: findings of each rule, from only the mission and from the flown track."""

@@ -106,17 +106,17 @@ def _airspeed_source(scenario: Scenario, autopilot: Autopilot) -> AirspeedSource
 
 def setup_conditions(setup: FlightSetup) -> Conditions:
     """Return the conditions of the verdict on a flight, or on a mission that is not flown."""
-    found = conditions_of(setup.scenario, setup.aircraft, setup.airspeed, setup.autopilot)
-    found = replace(found, navigation=setup.nav, zones=len(airspace_of(setup).zones))
+    conditions = conditions_of(setup.scenario, setup.aircraft, setup.airspeed, setup.autopilot)
+    conditions = replace(conditions, navigation=setup.nav, zones=len(airspace_of(setup).zones))
     source = setup.source
     if source is None:
-        return found
-    flown = found.airspeed_source == "aircraft" and "airspeed" in source.holds
+        return conditions
+    has_flown_airspeed = conditions.airspeed_source == "aircraft" and "airspeed" in source.holds
     if not source.aircraft_known:
-        found = replace(found, aircraft="", mass_kg=None, aircraft_named=False)
+        conditions = replace(conditions, aircraft="", mass_kg=None, aircraft_named=False)
     return replace(
-        found,
-        airspeed_source="flight" if flown else found.airspeed_source,
+        conditions,
+        airspeed_source="flight" if has_flown_airspeed else conditions.airspeed_source,
         turbulence=None,
         navigation=None,
         autopilot=source.program or "not stated",
@@ -139,32 +139,37 @@ def flown_lines(conditions: Conditions) -> list[str]:
     return [*condition_lines(conditions), autopilot_line(conditions, flown=True)]
 
 
-def _aircraft_line(made: Conditions) -> str:
+def _aircraft_line(conditions: Conditions) -> str:
     speed = (
-        f"{made.airspeed_mps:.3g} m/s {made.airspeed_kind} airspeed ({_AIRSPEED_SOURCE_TEXTS[made.airspeed_source]})"
+        f"{conditions.airspeed_mps:.3g} m/s {conditions.airspeed_kind} airspeed"
+        f" ({_AIRSPEED_SOURCE_TEXTS[conditions.airspeed_source]})"
     )
-    if not made.aircraft:
+    if not conditions.aircraft:
         return f"Aircraft: nobody named one (--aircraft names yours), so none of its limits are judged; {speed}"
-    mass = "" if made.mass_kg is None else f", {made.mass_kg:.3g} kg"
-    line = f"Aircraft: {made.aircraft}{mass}, {speed}"
-    if made.aircraft_named:
+    mass = "" if conditions.mass_kg is None else f", {conditions.mass_kg:.3g} kg"
+    line = f"Aircraft: {conditions.aircraft}{mass}, {speed}"
+    if conditions.aircraft_named:
         return line
     return f"{line}; nobody named an aircraft, so it is the default (--aircraft names yours)"
 
 
-def _world_line(made: Conditions) -> str:
-    blows = "no wind"
-    if made.wind_mps is None:
-        blows = "wind from each direction"
-    elif made.wind_mps > 0.0:
-        blows = f"wind {made.wind_mps:.3g} m/s from {made.wind_from_deg:.0f} degrees"
+def _world_line(conditions: Conditions) -> str:
+    wind_text = "no wind"
+    if conditions.wind_mps is None:
+        wind_text = "wind from each direction"
+    elif conditions.wind_mps > 0.0:
+        wind_text = f"wind {conditions.wind_mps:.3g} m/s from {conditions.wind_from_deg:.0f} degrees"
     turbulence = ""
-    if made.turbulence is not None:
-        turbulence = ", no turbulence" if made.turbulence == "none" else f", {made.turbulence} turbulence"
-    navigation = "" if made.navigation is None else f"; navigation {_NAVIGATION_TEXTS[made.navigation]}"
-    ground = "no terrain" if made.terrain is None else f"terrain {made.terrain}, heights above {made.height_datum}"
-    zones = "" if not made.zones else "; 1 zone" if made.zones == 1 else f"; {made.zones:,} zones"
-    return f"Conditions: {blows}{turbulence}{navigation}; {ground}{zones}"
+    if conditions.turbulence is not None:
+        turbulence = ", no turbulence" if conditions.turbulence == "none" else f", {conditions.turbulence} turbulence"
+    navigation = "" if conditions.navigation is None else f"; navigation {_NAVIGATION_TEXTS[conditions.navigation]}"
+    ground = (
+        "no terrain"
+        if conditions.terrain is None
+        else f"terrain {conditions.terrain}, heights above {conditions.height_datum}"
+    )
+    zones = "" if not conditions.zones else "; 1 zone" if conditions.zones == 1 else f"; {conditions.zones:,} zones"
+    return f"Conditions: {wind_text}{turbulence}{navigation}; {ground}{zones}"
 
 
 # Legs are side by side if their courses are parallel or opposite within this angle, and at least half of the shorter
@@ -177,18 +182,18 @@ _SAME_LINE_DISTANCE_M = 1.0
 def corridor_line(setup: FlightSetup) -> str:
     """Describe the width and origin of a corridor that the scenario does not state.
 
-    Warn if the corridor is wider than the gap between legs, because a flight within it may then have been off its lines
-    all the time.  Return "" if the corridor is stated, or if a survey's cross-track errors are judged line by line.
+    Warn if the corridor is wider than the gap between legs, because a flight within it may then never have been on its
+    lines.  Return "" if the corridor is stated, or if a survey's cross-track errors are judged line by line.
     """
-    half, radius = setup.corridor, setup.autopilot.acceptance_radius or 0.0
+    half_width, radius = setup.corridor, setup.autopilot.acceptance_radius or 0.0
     if setup.scenario.limits.corridor_m is not None or surveys_of(setup):
         return ""
     origin = "planfly's default"
-    if CORRIDOR_RADII * radius >= half:
+    if CORRIDOR_RADII * radius >= half_width:
         origin = f"{CORRIDOR_RADII:g} times {setup.autopilot.title}'s acceptance radius of {radius:.0f} m"
-    line = f"Corridor: {half:.0f} m to either side of the legs, {origin} ([limits] corridor_m states one)"
+    line = f"Corridor: {half_width:.0f} m to either side of the legs, {origin} ([limits] corridor_m states one)"
     gap = least_gap(setup.route.waypoints)
-    if gap is None or gap[0] >= half:
+    if gap is None or gap[0] >= half_width:
         return line
     metres, leg = gap
     return (
@@ -210,19 +215,19 @@ def least_gap(waypoints: NDArray[np.float64]) -> tuple[float, int] | None:
     >>> least_gap(lines[:3]) is None
     True
     """
-    found: list[tuple[float, int]] = []
+    gaps: list[tuple[float, int]] = []
     for k in range(len(waypoints) - 3):
-        (start, end), (back, on) = waypoints[k : k + 2, :2], waypoints[k + 2 : k + 4, :2]
-        one, other = end - start, on - back
-        run, length = float(np.hypot(*one)), float(np.hypot(*other))
-        if run <= 0.0 or length <= 0.0:
+        (start, end), (other_start, other_end) = waypoints[k : k + 2, :2], waypoints[k + 2 : k + 4, :2]
+        leg_vector, other_vector = end - start, other_end - other_start
+        leg_length, other_length = float(np.hypot(*leg_vector)), float(np.hypot(*other_vector))
+        if leg_length <= 0.0 or other_length <= 0.0:
             continue
-        along = one / run
-        if abs(float(along @ other)) / length < math.cos(_PARALLEL_ANGLE_RAD):
+        direction = leg_vector / leg_length
+        if abs(float(direction @ other_vector)) / other_length < math.cos(_PARALLEL_ANGLE_RAD):
             continue
-        reach = sorted((float((back - start) @ along), float((on - start) @ along)))
-        if min(run, reach[1]) - max(0.0, reach[0]) >= 0.5 * min(run, length):
-            middle = 0.5 * (back + on) - start
-            found.append((abs(float(along[0] * middle[1] - along[1] * middle[0])), k))
+        overlap = sorted((float((other_start - start) @ direction), float((other_end - start) @ direction)))
+        if min(leg_length, overlap[1]) - max(0.0, overlap[0]) >= 0.5 * min(leg_length, other_length):
+            offset = 0.5 * (other_start + other_end) - start
+            gaps.append((abs(float(direction[0] * offset[1] - direction[1] * offset[0])), k))
     # A line that is flown twice is not a survey.
-    return min((one for one in found if one[0] >= _SAME_LINE_DISTANCE_M), default=None)
+    return min((leg_vector for leg_vector in gaps if leg_vector[0] >= _SAME_LINE_DISTANCE_M), default=None)

@@ -51,7 +51,7 @@ class Finding:
     placed: True if the reason begins with the place.
     check: name of the check, for a rule with several checks; `UNKNOWN_AIRCRAFT`, `UNKNOWN_WAY`, `NOT_FLOWN`,
         `GROUND_WAY` or `UNKNOWN_RETURN` if the finding is undecided for that reason; "" otherwise.
-    facts: further measured numbers that are not faults.
+    facts: other measured numbers, which are not faults.
     at_least: True if values of at least the limit pass, False if values of at most the limit pass.
     """
 
@@ -98,8 +98,8 @@ class Finding:
         """The value that is compared with the limit: the flown value, or the planned value if it has the margin."""
         if self.flown is None or self.planned is None or self.limit is None or self.margin is None:
             return self.planned if self.flown is None else self.flown
-        off = {value: abs(abs(value - self.limit) - abs(self.margin)) for value in (self.flown, self.planned)}
-        return min(off, key=lambda value: off[value])
+        errors = {value: abs(abs(value - self.limit) - abs(self.margin)) for value in (self.flown, self.planned)}
+        return min(errors, key=lambda value: errors[value])
 
     @property
     def limit_text(self) -> str:
@@ -114,7 +114,7 @@ class Finding:
         """Return texts of the value and of the passing values, with enough digits that a failing value differs."""
         value, limit = self.value, self.effective_limit
         if value is None or limit is None:
-            texts = ["" if one is None else quantity_text(one, self.unit) for one in (value, limit)]
+            texts = ["" if number is None else quantity_text(number, self.unit) for number in (value, limit)]
         else:
             texts = list(compared_texts(value, limit, self.unit))
         return texts[0], f"{self.limit_sign} {texts[1]}" if texts[1] else ""
@@ -142,13 +142,13 @@ class Message:
     placed: bool = False
 
 
-def message(brief: str, more: str = "", *, placed: bool = False) -> Message:
+def message(brief: str, rest: str = "", *, placed: bool = False) -> Message:
     """Make a message from its brief first part and the rest.
 
     >>> message("overshoots its arc by 8 m", " (at most 5 m)").text
     'overshoots its arc by 8 m (at most 5 m)'
     """
-    return Message(brief + more, brief, placed)
+    return Message(brief + rest, brief, placed)
 
 
 def undecided_findings(findings: Iterable[Finding]) -> tuple[Finding, ...]:
@@ -158,7 +158,7 @@ def undecided_findings(findings: Iterable[Finding]) -> tuple[Finding, ...]:
     >>> undecided_findings([slope]) == (slope,)
     True
     """
-    return tuple(item for item in findings if item.ok is None and item.check in _UNDECIDED)
+    return tuple(finding for finding in findings if finding.ok is None and finding.check in _UNDECIDED)
 
 
 def closest_to_limit(findings: Iterable[Finding]) -> Finding | None:
@@ -172,8 +172,14 @@ def closest_to_limit(findings: Iterable[Finding]) -> Finding | None:
     >>> closest_to_limit([wide, close]) is close, closest_to_limit([wide, failed, close]) is failed
     (True, True)
     """
-    judged = (one for one in findings if one.ok is False or (one.ok is True and one.margin is not None))
-    return min(judged, key=lambda one: (one.ok is True, math.inf if one.margin is None else one.margin), default=None)
+    judged = (
+        finding for finding in findings if finding.ok is False or (finding.ok is True and finding.margin is not None)
+    )
+    return min(
+        judged,
+        key=lambda finding: (finding.ok is True, math.inf if finding.margin is None else finding.margin),
+        default=None,
+    )
 
 
 def make_finding(
@@ -235,23 +241,25 @@ def _rounded_or_none(value: float | None) -> float | None:
     return round(float(value), 6) + 0.0  # no -0.0
 
 
-def badness(item: Finding) -> tuple[int, float]:
+def badness(finding: Finding) -> tuple[int, float]:
     """Return a sort key that puts the worst finding first: failed, not judged, passed, and within each by margin.
 
     >>> near, far = (make_finding("slope", Place("leg", 1), ok=True, reason="", margin=m) for m in (4.0, 9.0))
     >>> badness(near) < badness(far)
     True
     """
-    return (0 if item.ok is False else 1 if item.ok is None else 2), 0.0 if item.margin is None else item.margin
+    return (
+        0 if finding.ok is False else 1 if finding.ok is None else 2
+    ), 0.0 if finding.margin is None else finding.margin
 
 
 def reason_of(faults: Sequence[Message], facts: Sequence[str] = ()) -> str:
-    """Join faults, followed by the facts in brackets; without faults, join the facts alone.
+    """Join faults, followed by the facts in brackets; without faults, join only the facts.
 
     >>> reason_of([message("bank 40.0° beyond 35.0°")], ["turns 62.0°", "radius 76 m"])
     'bank 40.0° beyond 35.0° (turns 62.0°; radius 76 m)'
     """
-    known = "; ".join(facts)
+    facts_text = "; ".join(facts)
     if not faults:
-        return known
-    return "; ".join(fault.text for fault in faults) + (f" ({known})" if known else "")
+        return facts_text
+    return "; ".join(fault.text for fault in faults) + (f" ({facts_text})" if facts_text else "")

@@ -9,75 +9,75 @@ from logs.verdict.wording import compared_texts, place_text, shortened
 HeadlinePhrase = Callable[[str, Finding], str]
 
 
-def _with_place(noun: str, item: Finding, text: str) -> str:
+def _with_place(noun: str, finding: Finding, text: str) -> str:
     """Join a rule's noun, its place (unless the place is the whole flight), and a text in brackets."""
-    if item.place.kind == "flight":
+    if finding.place.kind == "flight":
         return f"{noun} ({text})"
-    return f"{noun} {'at' if item.place.kind == 'waypoint' else 'on'} {place_text(item.place)} ({text})"
+    return f"{noun} {'at' if finding.place.kind == 'waypoint' else 'on'} {place_text(finding.place)} ({text})"
 
 
-def name_reason(noun: str, item: Finding) -> str:
+def name_reason(noun: str, finding: Finding) -> str:
     """Name the place and the reason in brief."""
-    return _with_place(noun, item, shortened(item.brief))
+    return _with_place(noun, finding, shortened(finding.brief))
 
 
-def name_event(noun: str, item: Finding) -> str:
+def name_event(noun: str, finding: Finding) -> str:
     """Name the brief reason of an event that ends the flight, without its place."""
-    return f"{noun} ({shortened(item.brief)})"
+    return f"{noun} ({shortened(finding.brief)})"
 
 
-def name_shortfall(noun: str, item: Finding) -> str:
+def name_shortfall(noun: str, finding: Finding) -> str:
     """Compare the flown value, or else the planned value, with a minimum."""
-    low, limit = item.value, item.effective_limit
-    if low is None or limit is None or low >= limit:
-        return name_reason(noun, item)
-    return _with_place(noun, item, " < ".join(compared_texts(low, limit, item.unit)))
+    value, limit = finding.value, finding.effective_limit
+    if value is None or limit is None or value >= limit:
+        return name_reason(noun, finding)
+    return _with_place(noun, finding, " < ".join(compared_texts(value, limit, finding.unit)))
 
 
-def name_excess(noun: str, item: Finding) -> str:
+def name_excess(noun: str, finding: Finding) -> str:
     """Compare the worse of planned and flown value with the limit, or name the reason if both are within the limit."""
-    values = [value for value in (item.flown, item.planned) if value is not None]
+    values = [value for value in (finding.flown, finding.planned) if value is not None]
     worst = max(values, key=abs, default=None)
-    limit = item.effective_limit
+    limit = finding.effective_limit
     if limit is None or worst is None or abs(worst) <= abs(limit):
-        return name_reason(noun, item)
+        return name_reason(noun, finding)
     sign = " > " if worst > 0.0 else " < "
-    return _with_place(noun, item, sign.join(compared_texts(worst, limit, item.unit)))
+    return _with_place(noun, finding, sign.join(compared_texts(worst, limit, finding.unit)))
 
 
-def name_circle(noun: str, item: Finding) -> str:
+def name_circle(noun: str, finding: Finding) -> str:
     """Compare the radius of a circle that is too small with the minimum radius."""
-    limit = item.effective_limit
-    if item.planned is None or limit is None or item.planned >= limit:
-        return name_excess(noun, item)
-    return _with_place(noun, item, f"radius {' < '.join(compared_texts(item.planned, limit, item.unit))}")
+    limit = finding.effective_limit
+    if finding.planned is None or limit is None or finding.planned >= limit:
+        return name_excess(noun, finding)
+    return _with_place(noun, finding, f"radius {' < '.join(compared_texts(finding.planned, limit, finding.unit))}")
 
 
-def name_zone(noun: str, item: Finding) -> str:
+def name_zone(noun: str, finding: Finding) -> str:
     """Name a violated zone and the depth of the violation."""
-    if not item.place.name:
-        return name_excess(noun, item)
-    depth = max(item.flown or 0.0, item.planned or 0.0)
-    return f"{place_text(item.place)} violated ({depth:.1f} m beyond it)"
+    if not finding.place.name:
+        return name_excess(noun, finding)
+    depth = max(finding.flown or 0.0, finding.planned or 0.0)
+    return f"{place_text(finding.place)} violated ({depth:.1f} m beyond it)"
 
 
-def name_missile(_noun: str, item: Finding) -> str:
+def name_missile(_noun: str, finding: Finding) -> str:
     """Name the missile and the time inside its sphere; a missile without a name is "threat 3 (missile)"."""
-    where = place_text(item.place)
-    named = f"threat {where}" if item.place.name else where
-    return f"{named} ({max(item.flown or 0.0, item.planned or 0.0):.1f} s inside)"
+    place = place_text(finding.place)
+    name = f"threat {place}" if finding.place.name else place
+    return f"{name} ({max(finding.flown or 0.0, finding.planned or 0.0):.1f} s inside)"
 
 
-def name_photo_line(noun: str, item: Finding) -> str:
+def name_photo_line(noun: str, finding: Finding) -> str:
     """Phrase the shortfall of a photo line: its usable share, or its photos' overlap, against the required minimum."""
-    return name_shortfall(item.check or noun, item)
+    return name_shortfall(finding.check or noun, finding)
 
 
-def name_missed_waypoint(_noun: str, item: Finding) -> str:
+def name_missed_waypoint(_noun: str, finding: Finding) -> str:
     """Name a missed waypoint and the distance at which it was passed."""
-    if item.flown is not None and item.brief != item.reason:
-        return f"{place_text(item.place)} {item.brief}"
-    limit = item.effective_limit
-    if item.flown is None or limit is None or item.flown <= limit:
-        return f"{place_text(item.place)} missed"
-    return f"{place_text(item.place)} missed ({' > '.join(compared_texts(item.flown, limit, item.unit))})"
+    if finding.flown is not None and finding.brief != finding.reason:
+        return f"{place_text(finding.place)} {finding.brief}"
+    limit = finding.effective_limit
+    if finding.flown is None or limit is None or finding.flown <= limit:
+        return f"{place_text(finding.place)} missed"
+    return f"{place_text(finding.place)} missed ({' > '.join(compared_texts(finding.flown, limit, finding.unit))})"

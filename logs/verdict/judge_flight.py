@@ -12,7 +12,7 @@ from logs.verdict.conditions import setup_conditions
 from logs.verdict.findings import Finding, undecided_findings
 from logs.verdict.imported.judge_imported_flight import judge_imported_flight
 from logs.verdict.judge_geometry import (
-    deciding_items,
+    blocking_item_findings,
     flown_findings,
     flown_level,
     geometric_findings,
@@ -47,7 +47,7 @@ def judge_flight(
     flight that never began, so its route is judged at the level "geometric".
 
     ended: "completed", or the reason why the flight ended early.  log_complete: True if the record has its end.
-    envelope: True to apply the aircraft's envelope as well as the evidence of the flight, False for the flight alone.
+    envelope: True to apply the aircraft's envelope as well as the evidence of the flight, False for only the evidence.
     reference: results of reference flights.  requirements: the setup's route requirements if already known.
 
     >>> from aircraft.catalog import find_aircraft
@@ -68,17 +68,17 @@ def judge_flight(
     """
     if setup.source is not None:
         return judge_imported_flight(setup, track, log_complete=log_complete)
-    whole = requirements or route_requirements(setup, envelope=envelope)
+    whole_requirements = requirements or route_requirements(setup, envelope=envelope)
     if not len(track):
-        return judge_unflown(whole, ended, log_complete=log_complete)
-    in_air, aligned = flown_phases(whole, track)
+        return judge_unflown(whole_requirements, ended, log_complete=log_complete)
+    in_air, aligned = flown_phases(whole_requirements, track)
     findings = flown_findings(in_air, aligned, ended, log_complete)
-    complete = all(item.ok is True for item in findings if item.rule == "completion")
+    complete = all(finding.ok is True for finding in findings if finding.rule == "completion")
     unjudged = undecided_text(findings)
-    flyable = complete and not unjudged and not any(item.ok is False for item in findings)
+    flyable = complete and not unjudged and not any(finding.ok is False for finding in findings)
     findings = with_suggestions(in_air, aligned, findings)
     findings = with_passing_suggestions(findings, None if reference is None else reference.tried)
-    levels = _level_answers(whole, findings, flyable, reference)
+    levels = _level_answers(whole_requirements, findings, flyable, reference)
     deciding = None if reference is None or flyable else reference.deciding
     conditions = setup_conditions(setup)
     lines = summary_lines(findings, setup, "flown", levels, conditions, deciding)
@@ -103,32 +103,38 @@ def _level_answers(
     """
     levels, source = [], requirements.setup.envelope.source
     if requirements.envelope:
-        predicted = (*deciding_items(requirements.setup), *geometric_findings(requirements, flown))
-        fails = any(item.ok is False for item in predicted)
+        predicted = (*blocking_item_findings(requirements.setup), *geometric_findings(requirements, flown))
+        fails = any(finding.ok is False for finding in predicted)
         passes = not fails and not undecided_findings(predicted)
-        differing = _disagreements("geometry", {(item.rule, item.place): item.ok for item in predicted}, flown)
-        said = headline(predicted, passes, source)
-        levels.append(LevelAnswer("geometry", passes, said, differing, undecided=not passes and not fails))
+        differing = _disagreements(
+            "geometry", {(finding.rule, finding.place): finding.ok for finding in predicted}, flown
+        )
+        headline_text = headline(predicted, passes, source)
+        levels.append(LevelAnswer("geometry", passes, headline_text, differing, undecided=not passes and not fails))
     if requirements.envelope and reference is not None and reference.airframe is not None:
         airframe = reference.airframe
-        passed = {(item.rule, item.place): (item.rule, item.place) not in airframe.failed for item in flown}
+        passed = {
+            (finding.rule, finding.place): (finding.rule, finding.place) not in airframe.failed for finding in flown
+        }
         differing = _disagreements("airframe", passed, flown)
         # What is not flyable although nothing of it failed was left open.
-        unsure = not airframe.flyable and not airframe.failed
-        levels.append(LevelAnswer("airframe", airframe.flyable, airframe.headline, differing, undecided=unsure))
-    undecided = bool(undecided_findings(flown)) and not any(item.ok is False for item in flown)
-    own = LevelAnswer(flown_level(requirements.setup), flyable, headline(flown, flyable, source), undecided=undecided)
-    return (*levels, own)
+        is_undecided = not airframe.flyable and not airframe.failed
+        levels.append(LevelAnswer("airframe", airframe.flyable, airframe.headline, differing, undecided=is_undecided))
+    undecided = bool(undecided_findings(flown)) and not any(finding.ok is False for finding in flown)
+    own_answer = LevelAnswer(
+        flown_level(requirements.setup), flyable, headline(flown, flyable, source), undecided=undecided
+    )
+    return (*levels, own_answer)
 
 
 def _disagreements(
     level: str, outcomes: Mapping[tuple[str, Place], bool | None], flown: tuple[Finding, ...]
 ) -> tuple[Disagreement, ...]:
     """Return the disagreements between a level and the flight, in the order of the level's findings."""
-    judged = {(item.rule, item.place): item.ok for item in flown}
-    out = []
-    for (rule, place), there in outcomes.items():
-        here = judged.get((rule, place))
-        if there is not None and here is not None and there != here:
-            out.append(Disagreement(rule, place, level, there, here))
-    return tuple(out)
+    judged = {(finding.rule, finding.place): finding.ok for finding in flown}
+    disagreements = []
+    for (rule, place), passes_there in outcomes.items():
+        passes_here = judged.get((rule, place))
+        if passes_there is not None and passes_here is not None and passes_there != passes_here:
+            disagreements.append(Disagreement(rule, place, level, passes_there, passes_here))
+    return tuple(disagreements)

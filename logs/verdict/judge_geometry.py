@@ -32,18 +32,18 @@ from planner.plan import Plan, Violation
 
 
 def mission_findings(setup: FlightSetup) -> list[Finding]:
-    """Return findings on the mission's items alone, for any autopilot."""
-    return [item for rule in RULES.values() if rule.judge_items is not None for item in rule.judge_items(setup)]
+    """Return the findings on mission items, for any autopilot."""
+    return [finding for rule in RULES.values() if rule.judge_items is not None for finding in rule.judge_items(setup)]
 
 
-def deciding_items(setup: FlightSetup) -> list[Finding]:
-    """Return the findings on a mission's items alone that fail or leave the verdict undecided.
+def blocking_item_findings(setup: FlightSetup) -> list[Finding]:
+    """Return the findings on mission items that fail or leave the verdict undecided.
 
-    Items of a plan come from planfly, so only PX4's requirements on them are judged.
+    planfly wrote the items of a plan itself, so for a plan only PX4's requirements are checked.
     """
-    asked = setup.plan is None or setup.autopilot.refuses
-    found = mission_findings(setup) if asked else []
-    return [item for item in found if item.ok is False or undecided_findings([item])]
+    items_are_judged = setup.plan is None or setup.autopilot.refuses
+    findings = mission_findings(setup) if items_are_judged else []
+    return [finding for finding in findings if finding.ok is False or undecided_findings([finding])]
 
 
 def geometric_findings(requirements: RouteRequirements, flown: Sequence[Finding] | None = None) -> tuple[Finding, ...]:
@@ -55,13 +55,13 @@ def geometric_findings(requirements: RouteRequirements, flown: Sequence[Finding]
 
 
 def place_findings(requirements: RouteRequirements) -> tuple[Finding, ...]:
-    """Return the findings of `geometric_findings` on legs, corners, threats or zones, without those on the whole."""
+    """Return the findings of `geometric_findings` on legs, corners, threats and zones, not on the route as a whole."""
     return _run_rules(requirements, None, (), geometric=True, whole=False)
 
 
 def track_findings(requirements: RouteRequirements, aligned: AlignedTrack | None) -> tuple[Finding, ...]:
-    """Return findings on a flown track, judged by its route and the aircraft's envelope, except on how it ended."""
-    return (*deciding_items(requirements.setup), *_run_rules(requirements, aligned, (), geometric=False))
+    """Return findings on a flown track, judged by its route and the aircraft's envelope, without its end."""
+    return (*blocking_item_findings(requirements.setup), *_run_rules(requirements, aligned, (), geometric=False))
 
 
 def flown_findings(
@@ -72,9 +72,9 @@ def flown_findings(
     ended: "completed", or the reason why the flight ended early.
     log_complete: True if the record has its end.
     """
-    ends = [rule.judge_end for rule in RULES.values() if rule.judge_end is not None]
-    at_end = tuple(item for judge in ends for item in judge(requirements, aligned, ended, log_complete))
-    return (*deciding_items(requirements.setup), *_run_rules(requirements, aligned, at_end, geometric=False))
+    end_judges = [rule.judge_end for rule in RULES.values() if rule.judge_end is not None]
+    at_end = tuple(finding for judge in end_judges for finding in judge(requirements, aligned, ended, log_complete))
+    return (*blocking_item_findings(requirements.setup), *_run_rules(requirements, aligned, at_end, geometric=False))
 
 
 def _run_rules(
@@ -93,16 +93,16 @@ def _run_rules(
     flown: as in `geometric_findings`.
     """
 
-    def asked(rule: Rule, judge: Judge) -> Sequence[Finding]:
+    def rule_findings(rule: Rule, judge: Judge) -> Sequence[Finding]:
         if rule.of_route and flown is not None:
-            return [item for item in flown if item.rule == rule.name]
+            return [finding for finding in flown if finding.rule == rule.name]
         return judge(requirements, aligned, geometric=geometric)
 
     findings: tuple[Finding, ...] = tuple(
-        item
+        finding
         for rule in RULES.values()
         if rule.judge is not None and (whole or not rule.whole)
-        for item in asked(rule, rule.judge)
+        for finding in rule_findings(rule, rule.judge)
     )
     findings = (*findings, *at_end)
     for rule in RULES.values():
@@ -129,27 +129,29 @@ def _other_side_findings(requirements: RouteRequirements, findings: Sequence[Fin
         return []
     sides = [
         {
-            (item.rule, item.place): item
+            (finding.rule, finding.place): finding
             for name in _RULES_OF_PLACE
             if (judge := RULES[name].judge) is not None
-            for item in judge(side, None, geometric=True)
-            if item.ok is False
+            for finding in judge(side, None, geometric=True)
+            if finding.ok is False
         }
         for side in (route_requirements(setup), route_requirements(setup.turned_to_other_side()))
     ]
-    failed = {(item.rule, item.place) for item in findings if item.ok is False}
-    where = ", ".join(place_text(requirements.waypoint(int(i))) for i in corners)
-    out = []
+    failed = {(finding.rule, finding.place) for finding in findings if finding.ok is False}
+    places = ", ".join(place_text(requirements.waypoint(int(i))) for i in corners)
+    findings_of_one_side = []
     for key in (sides[0].keys() ^ sides[1].keys()) - failed:
-        item = sides[0].get(key) or sides[1][key]
-        brief = f"a reversal of the course at {where} may turn to either side, and one side fails"
-        fault = message(brief, f": {item.reason}")
-        out.append(make_finding(item.rule, item.place, ok=None, reason=fault.text, faults=[fault], check=NOT_FLOWN))
-    return sorted(out, key=lambda item: (item.rule, str(item.place)))
+        finding = sides[0].get(key) or sides[1][key]
+        brief = f"a reversal of the course at {places} may turn to either side, and one side fails"
+        fault = message(brief, f": {finding.reason}")
+        findings_of_one_side.append(
+            make_finding(finding.rule, finding.place, ok=None, reason=fault.text, faults=[fault], check=NOT_FLOWN)
+        )
+    return sorted(findings_of_one_side, key=lambda finding: (finding.rule, str(finding.place)))
 
 
 def one_per_stop(findings: Sequence[Finding]) -> tuple[Finding, ...]:
-    """Keep only each rule's worst finding of those at the corners of one stop, and of those at its legs.
+    """Keep only each rule's worst finding at the corners of a stop, and its worst finding at the legs of a stop.
 
     >>> from logs.verdict.places import Place
     >>> legs = [Place("leg", k, to_item=4, number=2) for k in (2, 3, 4)]
@@ -159,38 +161,38 @@ def one_per_stop(findings: Sequence[Finding]) -> tuple[Finding, ...]:
     [3]
     """
     worst: dict[tuple[object, ...], Finding] = {}
-    for k, item in enumerate(findings):
-        place = item.place
-        known = place.kind in ("leg", "waypoint") and place.number is not None
-        key = (item.rule, item.check, place.kind, place.number, place.item, place.to_item) if known else (k,)
-        if key not in worst or badness(item) < badness(worst[key]):
-            worst[key] = item
+    for k, finding in enumerate(findings):
+        place = finding.place
+        has_stop = place.kind in ("leg", "waypoint") and place.number is not None
+        key = (finding.rule, finding.check, place.kind, place.number, place.item, place.to_item) if has_stop else (k,)
+        if key not in worst or badness(finding) < badness(worst[key]):
+            worst[key] = finding
     return tuple(worst.values())
 
 
 def with_suggestions(
     requirements: RouteRequirements, aligned: AlignedTrack | None, findings: Sequence[Finding]
 ) -> tuple[Finding, ...]:
-    """Return findings with ``suggestions`` for failed or undecided findings that a change of the plan could fix.
+    """Add ``suggestions`` to failed or undecided findings that a change of the plan could fix.
 
-    Findings on the legs of a return to launch get none, because the autopilot chooses its path.
+    Findings on the legs of a return to launch get no suggestions, because the autopilot chooses its path.
     """
-    out, first = [], requirements.setup.route.return_from
-    last = min(requirements.legs, requirements.setup.route.return_until)
-    back = {requirements.leg(i) for i in range(first, last)} if first >= 0 else set()
-    for item in findings:
-        suggest = RULES[item.rule].suggest
-        asked = item.ok is False or (item.ok is None and item.check == UNKNOWN_AIRCRAFT)
-        if asked and suggest is not None and item.place not in back:
-            item = replace(item, suggestions=suggest(requirements, aligned, item))
-        out.append(item)
-    return tuple(out)
+    results, first_leg = [], requirements.setup.route.return_from
+    last_leg = min(requirements.legs, requirements.setup.route.return_until)
+    return_legs = {requirements.leg(i) for i in range(first_leg, last_leg)} if first_leg >= 0 else set()
+    for finding in findings:
+        suggest = RULES[finding.rule].suggest
+        needs_suggestion = finding.ok is False or (finding.ok is None and finding.check == UNKNOWN_AIRCRAFT)
+        if needs_suggestion and suggest is not None and finding.place not in return_legs:
+            finding = replace(finding, suggestions=suggest(requirements, aligned, finding))
+        results.append(finding)
+    return tuple(results)
 
 
 def with_passing_suggestions(
     findings: tuple[Finding, ...], tried: Sequence[TriedSuggestions] | None
 ) -> tuple[Finding, ...]:
-    """Replace the suggestions of failed findings by those that passed their trials; keep all if ``tried`` is None.
+    """Keep only suggestions of failed findings that passed their trials; keep all suggestions if ``tried`` is None.
 
     >>> from logs.verdict.places import Change, Place
     >>> higher = ((Change("height", Place("leg", 2), None, 12.0, "m"),),)
@@ -205,10 +207,10 @@ def with_passing_suggestions(
         return tuple(findings)
     if tried is None:
         return findings
-    passed = {(one.rule, one.place): one.suggestions for one in tried}
+    passed = {(suggested.rule, suggested.place): suggested.suggestions for suggested in tried}
     return tuple(
-        replace(item, suggestions=passed.get((item.rule, item.place), ())) if item.ok is False else item
-        for item in findings
+        replace(finding, suggestions=passed.get((finding.rule, finding.place), ())) if finding.ok is False else finding
+        for finding in findings
     )
 
 
@@ -244,10 +246,10 @@ def judge_geometry(setup: FlightSetup, requirements: RouteRequirements | None = 
         *([_infeasible_finding(setup.plan)] if setup.plan is not None and not setup.plan.feasible else []),
     )
     complete = setup.plan is None or setup.plan.feasible
-    unjudged, fails = undecided_text(findings), any(item.ok is False for item in findings)
+    unjudged, fails = undecided_text(findings), any(finding.ok is False for finding in findings)
     flyable = complete and not unjudged and not fails
-    said = headline(findings, flyable, setup.envelope.source)
-    levels = (LevelAnswer("geometry", flyable, said, undecided=bool(unjudged) and not fails),)
+    headline_text = headline(findings, flyable, setup.envelope.source)
+    levels = (LevelAnswer("geometry", flyable, headline_text, undecided=bool(unjudged) and not fails),)
     conditions = setup_conditions(setup)
     return Verdict(
         findings,
@@ -284,7 +286,7 @@ def judge_unflown(requirements: RouteRequirements, ended: str, *, log_complete: 
         "completion", FLIGHT, ok=False, reason=reason_of(faults), faults=faults, method="nothing was flown"
     )
     predicted = geometric_findings(requirements)
-    passes = not any(item.ok is False for item in predicted)
+    passes = not any(finding.ok is False for finding in predicted)
     findings = (*with_suggestions(requirements, None, predicted), stopped)
     levels = (
         LevelAnswer("geometry", passes, headline(predicted, passes)),
@@ -318,18 +320,18 @@ def judge_plan_only(plan: Plan, conditions: Conditions | None = None) -> Verdict
     findings = []
     for rule, margin, violation, unit, factor in margins:
         count = int(plan.violations[violation])
-        bad = bool(count) or margin < 0.0
+        is_exceeded = bool(count) or margin < 0.0
         if rule == "turn":
-            bad = bad or plan.certificate.available_length < 0.0
-        known = math.isfinite(margin)
-        reason = f"least margin {margin * factor:.2f} {unit}" if known else "no margin is known"
-        if bad:
+            is_exceeded = is_exceeded or plan.certificate.available_length < 0.0
+        is_known = math.isfinite(margin)
+        reason = f"least margin {margin * factor:.2f} {unit}" if is_known else "no margin is known"
+        if is_exceeded:
             reason = f"the plan's {rule} limit is exceeded, {reason}" + (f", {count} violations" if count else "")
         findings.append(
             make_finding(
                 rule,
                 PLAN,
-                ok=False if bad else (True if known else None),
+                ok=False if is_exceeded else (True if is_known else None),
                 reason=reason,
                 source="plan",
                 margin=margin * factor,
@@ -352,11 +354,11 @@ def _infeasible_finding(plan: Plan) -> Finding:
 
 
 def _plan_lines(findings: list[Finding], plan: Plan, conditions: Conditions | None) -> tuple[str, ...]:
-    failed = [item for item in findings if item.ok is False and item.rule != "completion"]
-    first, more = headline(findings, False), []
+    failed = [finding for finding in findings if finding.ok is False and finding.rule != "completion"]
+    first, further_lines = headline(findings, False), []
     if failed:
-        text = ", ".join(f"{item.rule} ({item.reason})" for item in failed)
+        text = ", ".join(f"{finding.rule} ({finding.reason})" for finding in failed)
         first = f"not flyable: no feasible plan was found: {text}"
-        more = ["Nothing was flown", *(f"Problem: {problem}" for problem in plan.certificate.problems)]
+        further_lines = ["Nothing was flown", *(f"Problem: {problem}" for problem in plan.certificate.problems)]
     said = [] if conditions is None else [*condition_lines(conditions), autopilot_line(conditions, flown=False)]
-    return (first, *said, *more)
+    return (first, *said, *further_lines)

@@ -41,7 +41,7 @@ def junit_text(verdicts: Mapping[str, Presentation]) -> str:
 def junit_error_text(name: str, message: str) -> str:
     """Write the text of the file for a plan or a flight that could not be judged: one case, an error.
 
-    name: of the plan or flight.  message: the reason in a line.
+    name: name of the plan or flight.  message: the reason in one line.
     """
     root = ElementTree.Element("testsuites")
     suite = ElementTree.SubElement(
@@ -65,18 +65,18 @@ def _answer_case(verdict: Presentation) -> ElementTree.Element:
 
 
 def _finding_cases(findings: tuple[Finding, ...]) -> list[ElementTree.Element]:
-    seen: Counter[tuple[str, str]] = Counter()
+    counts: Counter[tuple[str, str]] = Counter()
     cases = []
     for finding in findings:
         place = _without_control_characters(finding.where)
-        seen[finding.rule, place] += 1
+        counts[finding.rule, place] += 1
         # Names of cases must be unique.
-        number = seen[finding.rule, place]
+        number = counts[finding.rule, place]
         name = place if number == 1 else f"{place} ({number})"
         case = ElementTree.Element("testcase", classname=f"planfly.{finding.rule}", name=name)
         if finding.ok is False:
-            said = _without_control_characters(f"{rule_word(finding.rule)}: {finding.reason}")
-            failure = ElementTree.SubElement(case, "failure", message=said)
+            message = _without_control_characters(f"{rule_word(finding.rule)}: {finding.reason}")
+            failure = ElementTree.SubElement(case, "failure", message=message)
             if finding.suggestions:
                 failure.text = _without_control_characters(f"would pass: {finding.suggestion}")
         elif finding.ok is None:
@@ -89,4 +89,4 @@ def _finding_cases(findings: tuple[Finding, ...]) -> list[ElementTree.Element]:
 
 def _without_control_characters(text: str, keep: str = "") -> str:
     """Replace each character that XML 1.0 does not permit with a space."""
-    return "".join(letter if letter.isprintable() or letter in keep else " " for letter in text)
+    return "".join(character if character.isprintable() or character in keep else " " for character in text)

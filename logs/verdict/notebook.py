@@ -9,5 +9,7 @@ def verdict_html(verdict: Presentation) -> str:
     rows: list[tuple[str, ...]] = []
     for rule in verdict.rules:
         rows.append((rule.words.title, rule.count_text, "", ""))
-        rows += [("", one.where, one.reason, one.suggestion) for one in rule.findings if one.ok is False]
+        rows += [
+            ("", finding.where, finding.reason, finding.suggestion) for finding in rule.findings if finding.ok is False
+        ]
     return html_table(verdict.headline, rows, ("rule", "result", "reason", "would pass"))

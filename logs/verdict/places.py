@@ -138,7 +138,7 @@ class AirframeAnswer(DocumentConfig):
 
 @dataclass(frozen=True, slots=True)
 class DecidingParameter(DocumentConfig):
-    """Autopilot parameter that decides: with another value of it alone the flight passes.
+    """Autopilot parameter that decides: the flight passes with another value of only this parameter.
 
     name: the autopilot's own name.
     current: value as flown, in ``unit``.

@@ -21,12 +21,16 @@ class RuleFindings:
     @property
     def failed(self) -> tuple[Finding, ...]:
         """The failed findings, the worst first."""
-        return tuple(sorted((item for item in self.findings if item.ok is False), key=lambda item: item.margin or 0.0))
+        return tuple(
+            sorted(
+                (finding for finding in self.findings if finding.ok is False), key=lambda finding: finding.margin or 0.0
+            )
+        )
 
     @property
     def judged(self) -> int:
         """Number of findings that were judged."""
-        return sum(item.ok is not None for item in self.findings)
+        return sum(finding.ok is not None for finding in self.findings)
 
     @property
     def closest(self) -> Finding | None:
@@ -67,17 +71,17 @@ class Presentation:
         """The findings that leave the verdict undecided."""
         return undecided_findings(self.findings)
 
-    def worth_listing(self, most: int) -> list[tuple[int, Finding]]:
-        """List failed and undecided findings, then each rule's finding closest to its limit, with their numbers.
+    def worth_listing(self, max_open: int) -> list[tuple[int, Finding]]:
+        """List failed and undecided findings, then each rule's closest finding to its limit, each with its number.
 
-        most: maximum number of failed and undecided findings.
+        max_open: maximum number of failed and undecided findings.
         """
-        is_open = {id(item) for item in self.undecided}
+        is_open = {id(finding) for finding in self.undecided}
         closest = {id(rule.closest) for rule in self.rules}
         numbered = list(enumerate(self.findings))
-        first = [(k, item) for k, item in numbered if item.ok is False or id(item) in is_open]
-        rest = [(k, item) for k, item in numbered if item.ok is True and id(item) in closest]
-        return [*first[:most], *rest]
+        open_findings = [(k, finding) for k, finding in numbered if finding.ok is False or id(finding) in is_open]
+        closest_findings = [(k, finding) for k, finding in numbered if finding.ok is True and id(finding) in closest]
+        return [*open_findings[:max_open], *closest_findings]
 
 
 def findings_by_rule(findings: Sequence[Finding]) -> tuple[RuleFindings, ...]:
@@ -91,6 +95,6 @@ def findings_by_rule(findings: Sequence[Finding]) -> tuple[RuleFindings, ...]:
     [[1, 0]]
     """
     grouped: dict[str, list[Finding]] = {name: [] for name in RULE_WORDS}
-    for item in findings:
-        grouped[item.rule].append(item)
+    for finding in findings:
+        grouped[finding.rule].append(finding)
     return tuple(RuleFindings(RULE_WORDS[name], tuple(group)) for name, group in grouped.items() if group)

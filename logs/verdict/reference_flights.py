@@ -53,7 +53,7 @@ def parse_reference_flights(text: str | bytes, source: str) -> ReferenceFlights:
     except ValidationError as error:
         raise LogError(**first_fault(error).at(source)) from error
     rules = [rule for rule, _ in file.airframe.failed] if file.airframe is not None else []
-    rules += [one.rule for one in (file.deciding, *(file.tried or ())) if one is not None]
+    rules += [entry.rule for entry in (file.deciding, *(file.tried or ())) if entry is not None]
     unknown = [rule for rule in rules if rule not in RULE_WORDS]
     if unknown:
         raise LogError(f"{source}: {unknown[0]!r} is no rule", file=source, field="rule", value=unknown[0])

@@ -28,7 +28,7 @@ class Judge(Protocol):
         """Return the rule's findings, in the order of the route."""
 
 
-# Judges a mission's items alone, for any autopilot.
+# Judges only a mission's items, for any autopilot.
 ItemsJudge = Callable[[FlightSetup], list[Finding]]
 # Judges how a flight ended and whether its record is complete.
 EndJudge = Callable[[RouteRequirements, AlignedTrack | None, str, bool], list[Finding]]

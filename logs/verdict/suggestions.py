@@ -59,59 +59,67 @@ _HORIZONTAL_SHIFTS: tuple[tuple[Quantity, str, float], ...] = (
 _VERTICAL_SHIFTS: tuple[tuple[Quantity, str, float], ...] = (("height", "up", 1.0), ("descent", "up", -1.0))
 
 
-def pass_zone(requirements: RouteRequirements, aligned: AlignedTrack | None, item: Finding) -> tuple[Suggestion, ...]:
+def suggest_passing_zone(
+    requirements: RouteRequirements, aligned: AlignedTrack | None, finding: Finding
+) -> tuple[Suggestion, ...]:
     """Suggest passing a zone further to one side, or higher or lower; the smallest change first.
 
-    item: the finding on the violated zone.
+    finding: the finding on the violated zone.
 
-    If the planned path violates the zone, the shift of its violating legs includes how much deeper the flight went.  If
-    only the flight violates the zone, the violating legs of the flight are shifted.
+    If the planned path violates the zone, its violating legs are shifted, by the flight's extra depth as well.  If only
+    the flight violates the zone, the violating legs of the flight are shifted.
     """
-    z, facts = item.place.index, {fact.what: fact.value for fact in item.facts}
-    if z is None or "entry leg" not in facts:
+    zone_index, facts = finding.place.index, {fact.what: fact.value for fact in finding.facts}
+    if zone_index is None or "entry leg" not in facts:
         return ()
-    first, last = int(facts["entry leg"]), int(facts["exit leg"])
-    record, terrain = zone_records([requirements.airspace.zones[z]]), requirements.setup.scenario.terrain
-    planned, flown = item.planned or 0.0, item.flown or 0.0
+    first_leg, last_leg = int(facts["entry leg"]), int(facts["exit leg"])
+    record, terrain = zone_records([requirements.airspace.zones[zone_index]]), requirements.setup.scenario.terrain
+    planned, flown = finding.planned or 0.0, finding.flown or 0.0
     if aligned is not None and planned <= ROUNDING_M:
-        moves, deeper = flown_moves(aligned, first, last), 0.0
+        moves, extra_depth = flown_moves(aligned, first_leg, last_leg), 0.0
     else:
-        moves, deeper = planned_moves(requirements, first, last), max(0.0, flown - planned)
-    near = moves[(moves["leg"] >= first) & (moves["leg"] <= last)]
-    found = []
-    for ways in (_HORIZONTAL_SHIFTS, _VERTICAL_SHIFTS):
+        moves, extra_depth = planned_moves(requirements, first_leg, last_leg), max(0.0, flown - planned)
+    leg_moves = moves[(moves["leg"] >= first_leg) & (moves["leg"] <= last_leg)]
+    changes = []
+    for shifts in (_HORIZONTAL_SHIFTS, _VERTICAL_SHIFTS):
         best: tuple[float, Change] | None = None
-        for what, axis, sign in ways:
-            shift = _smallest_shift(near, record, terrain, axis, sign, math.inf if best is None else best[0])
+        for direction, axis, sign in shifts:
+            shift = _smallest_shift(leg_moves, record, terrain, axis, sign, math.inf if best is None else best[0])
             if shift is not None:
                 best = (
                     shift,
-                    Change(what, item.place, None, float(math.ceil(shift + deeper + SUGGESTION_LENGTH_MARGIN_M)), "m"),
+                    Change(
+                        direction,
+                        finding.place,
+                        None,
+                        float(math.ceil(shift + extra_depth + SUGGESTION_LENGTH_MARGIN_M)),
+                        "m",
+                    ),
                 )
         if best is not None:
-            found.append(best)
-    return tuple((change,) for _, change in sorted(found, key=lambda one: one[0]))
+            changes.append(best)
+    return tuple((change,) for _, change in sorted(changes, key=lambda sized: sized[0]))
 
 
 def _smallest_shift(
-    moves: Records, record: ZoneRecords, terrain: Terrain | None, axis: str, sign: float, most: float
+    moves: Records, zone: ZoneRecords, terrain: Terrain | None, axis: str, sign: float, max_shift: float
 ) -> float | None:
-    """Return the smallest shift (m) in one direction that ends a violation; None if above ``most`` or not found.
+    """Return the smallest shift (m) in one direction that ends a violation, or None if none below ``max_shift`` does.
 
     A path at some depth beyond a limit needs a shift of at least that depth, so shifting by the depth at each step
     misses no smaller shift.  Ground that rises faster than the step may be missed.
     """
-    shift, shifted = 0.0, np.array(moves)
+    shift, shifted_moves = 0.0, np.array(moves)
     for _ in range(ZONE_SUGGESTION_TRIAL_COUNT):
-        visit = path_zones(shifted, record, terrain)[0]
+        visit = path_zones(shifted_moves, zone, terrain)[0]
         if visit.unknown:
             return None
         if visit.depth <= DEPTH_PRECISION:
             return shift
         shift += float(visit.depth)
-        if shift >= most:
+        if shift >= max_shift:
             return None
-        shifted[axis] = moves[axis] + sign * shift
+        shifted_moves[axis] = moves[axis] + sign * shift
     return None
 
 
@@ -119,8 +127,7 @@ def _smallest_shift(
 _Sized = tuple[float, Suggestion]
 
 
-# Largest relative change that is suggested: more than ten times the plan is no advice (a leg of 84 km instead of 326
-# m).
+# Largest suggested relative change: ten times the planned value is no advice (a leg of 84 km instead of 326 m).
 _MAX_RELATIVE_CHANGE = 9.0
 
 
@@ -130,128 +137,144 @@ def _smallest_first(alternatives: list[_Sized]) -> tuple[Suggestion, ...]:
     return tuple(suggestion for _, suggestion in sorted(helpful, key=lambda sized: sized[0]))
 
 
-def ease_slope(requirements: RouteRequirements, _aligned: AlignedTrack | None, item: Finding) -> tuple[Suggestion, ...]:
+def suggest_gentler_slope(
+    requirements: RouteRequirements, _aligned: AlignedTrack | None, finding: Finding
+) -> tuple[Suggestion, ...]:
     """Suggest a gentler slope, a longer leg or another speed for one leg; the smallest relative change first.
 
     If the aircraft is not known well enough, suggest a flight that measures its ability.
     """
-    leg = item.place.index
+    leg = finding.place.index
     if leg is None:
         return ()
-    if item.check == UNKNOWN_AIRCRAFT:
+    if finding.check == UNKNOWN_AIRCRAFT:
         what: Quantity = "full throttle" if requirements.slopes[leg] > 0.0 else "no throttle"
-        return ((Change(what, item.place, None, MIN_EVIDENCE_FLIGHT_S, "s"),),)
+        return ((Change(what, finding.place, None, MIN_EVIDENCE_FLIGHT_S, "s"),),)
     limit, source = slope_limit(requirements, leg)
     planned = abs(float(requirements.slopes[leg]))
     rise = abs(float(requirements.points[leg + 1, 2] - requirements.points[leg, 2]))
     run = float(requirements.runs[leg])
-    if planned <= limit and item.flown is not None:
+    if planned <= limit and finding.flown is not None:
         # The geometry passes and the flight failed: the slope that was flown is the limit.
-        limit = min(limit, abs(math.radians(item.flown)))
+        limit = min(limit, abs(math.radians(finding.flown)))
     allowed = limit - SUGGESTION_ANGLE_MARGIN_RAD
     if allowed <= 0.0 or planned <= allowed:
         return _gentler_arc(requirements, leg)
     place, sign = requirements.leg(leg), 1.0 if requirements.slopes[leg] >= 0.0 else -1.0
-    gentler, longer = run * math.tan(allowed), rise / math.tan(allowed)
+    gentler_rise, longer_length = run * math.tan(allowed), rise / math.tan(allowed)
     alternatives: list[_Sized] = []
-    if gentler >= MIN_SUGGESTED_RISE_M:
-        change = Change("rise", place, sign * rise, sign * math.floor(gentler), "m")
-        alternatives.append((1.0 - gentler / rise, (change,)))
+    if gentler_rise >= MIN_SUGGESTED_RISE_M:
+        change = Change("rise", place, sign * rise, sign * math.floor(gentler_rise), "m")
+        alternatives.append((1.0 - gentler_rise / rise, (change,)))
     speed = _slope_speed(requirements, leg, planned + SUGGESTION_ANGLE_MARGIN_RAD) if source == "aircraft" else None
     if speed is not None:
-        now = float(requirements.setup.route.airspeed[leg])
-        alternatives.append((abs(speed - now) / now, (Change("airspeed", place, now, speed, "m/s"),)))
+        current_speed = float(requirements.setup.route.airspeed[leg])
+        alternatives.append(
+            (abs(speed - current_speed) / current_speed, (Change("airspeed", place, current_speed, speed, "m/s"),))
+        )
     # A leg that goes straight up has no length to compare with.
-    relative = longer / run - 1.0 if run >= MIN_LEG_LENGTH_M else _MAX_RELATIVE_CHANGE
-    alternatives.append((relative, (Change("length", place, run, float(math.ceil(longer)), "m"),)))
+    relative = longer_length / run - 1.0 if run >= MIN_LEG_LENGTH_M else _MAX_RELATIVE_CHANGE
+    alternatives.append((relative, (Change("length", place, run, float(math.ceil(longer_length)), "m"),)))
     return _smallest_first(alternatives)
 
 
 def _gentler_arc(requirements: RouteRequirements, leg: int) -> tuple[Suggestion, ...]:
-    """Suggest gentler legs on either side of a fly-by arc that is too steep although the legs are not."""
+    """Suggest gentler legs before and after a fly-by arc that is too steep although neither leg is."""
     steep = steep_arc(requirements, leg)
     if steep is None:
         return ()
-    share = math.tan(math.atan(steep.limit) - SUGGESTION_ANGLE_MARGIN_RAD) / abs(steep.tangent)
+    slope_ratio = math.tan(math.atan(steep.limit) - SUGGESTION_ANGLE_MARGIN_RAD) / abs(steep.tangent)
     changes = []
     for k in (leg, leg + 1):
-        rise = share * float(requirements.points[k + 1, 2] - requirements.points[k, 2])
+        rise = slope_ratio * float(requirements.points[k + 1, 2] - requirements.points[k, 2])
         # A leg of opposite slope makes the arc flatter, and is kept.
         if rise * steep.tangent > 0.0:
-            wanted = math.copysign(math.floor(abs(rise)), rise)
-            changes.append(Change("rise", requirements.leg(k), None, wanted, "m"))
+            requested_rise = math.copysign(math.floor(abs(rise)), rise)
+            changes.append(Change("rise", requirements.leg(k), None, requested_rise, "m"))
     return (tuple(changes),) if changes else ()
 
 
-def ease_turn(requirements: RouteRequirements, _aligned: AlignedTrack | None, item: Finding) -> tuple[Suggestion, ...]:
+def suggest_gentler_turn(
+    requirements: RouteRequirements, _aligned: AlignedTrack | None, finding: Finding
+) -> tuple[Suggestion, ...]:
     """Suggest a gentler turn, longer legs or a lower speed; the smallest relative change first."""
-    i = item.place.index
-    if i is None:
+    corner = finding.place.index
+    if corner is None:
         return ()
-    limit, source = turn_limit(requirements, i)
-    planned = abs(float(requirements.turns[i]))
+    limit, source = turn_limit(requirements, corner)
+    planned = abs(float(requirements.turns[corner]))
     if planned <= limit or limit <= SUGGESTION_ANGLE_MARGIN_RAD:
         return ()
-    place, allowed = requirements.waypoint(i), limit - SUGGESTION_ANGLE_MARGIN_RAD
+    place, allowed = requirements.waypoint(corner), limit - SUGGESTION_ANGLE_MARGIN_RAD
     alternatives: list[_Sized] = []
-    if source == "aircraft" and math.isfinite(requirements.before[i]):
-        speed = _turn_speed(requirements, i)
+    if source == "aircraft" and math.isfinite(requirements.before[corner]):
+        speed = _turn_speed(requirements, corner)
         if speed is not None:
-            now = float(max(requirements.setup.route.airspeed[i - 1 : i + 1]))
-            alternatives.append((1.0 - speed / now, (Change("airspeed", place, now, speed, "m/s"),)))
-        alternatives += _longer_legs(requirements, i)
-    degrees = _gentler_turn(requirements, i, allowed)
+            current_speed = float(max(requirements.setup.route.airspeed[corner - 1 : corner + 1]))
+            alternatives.append(
+                (1.0 - speed / current_speed, (Change("airspeed", place, current_speed, speed, "m/s"),))
+            )
+        alternatives += _longer_legs(requirements, corner)
+    degrees = _gentler_turn(requirements, corner, allowed)
     if degrees > 0.0:
         change = Change("turn", place, math.degrees(planned), degrees, "deg")
         alternatives.append((1.0 - allowed / planned, (change,)))
     return _smallest_first(alternatives)
 
 
-def _longer_legs(requirements: RouteRequirements, i: int) -> list[_Sized]:
-    """Suggest legs at a waypoint long enough for its turn and the neighbouring turns; return [] if they already are."""
-    before = (
-        requirements.before[i] + requirements.after[i - 1] + requirements.reversal[i - 1] + SUGGESTION_LENGTH_MARGIN_M
+def _longer_legs(requirements: RouteRequirements, corner: int) -> list[_Sized]:
+    """Suggest longer legs at a waypoint, to fit its turn and the neighbouring turns; return [] if all turns fit."""
+    needed_before = (
+        requirements.before[corner]
+        + requirements.after[corner - 1]
+        + requirements.reversal[corner - 1]
+        + SUGGESTION_LENGTH_MARGIN_M
     )
-    after = requirements.after[i] + requirements.before[i + 1] + requirements.reversal[i] + SUGGESTION_LENGTH_MARGIN_M
+    needed_after = (
+        requirements.after[corner]
+        + requirements.before[corner + 1]
+        + requirements.reversal[corner]
+        + SUGGESTION_LENGTH_MARGIN_M
+    )
     changes = []
-    grown = 0.0
-    for leg, needed in ((i - 1, before), (i, after)):
+    relative_growth = 0.0
+    for leg, needed in ((corner - 1, needed_before), (corner, needed_after)):
         run = float(requirements.runs[leg])
         if math.isfinite(needed) and needed > run:
             changes.append(Change("length", requirements.leg(leg), run, float(math.ceil(needed)), "m"))
-            grown = max(grown, needed / run - 1.0)
-    return [(grown, tuple(changes))] if changes else []
+            relative_growth = max(relative_growth, needed / run - 1.0)
+    return [(relative_growth, tuple(changes))] if changes else []
 
 
-def _gentler_turn(requirements: RouteRequirements, i: int, allowed: float) -> float:
-    """Return the largest turn up to ``allowed`` (rad) that passes, in steps of 0.1 degrees; 0 if none passes.
+def _gentler_turn(requirements: RouteRequirements, corner: int, allowed: float) -> float:
+    """Return the largest passing turn up to ``allowed`` (rad), in degrees in steps of 0.1; 0 if none passes.
 
     The route after the waypoint is rotated with the turn.  In wind the next turns change with their courses, and so
     does the length available to this turn.
     """
-    first, last = max(0, i - 2), min(len(requirements.points), i + 3)
+    first_point, end_point = max(0, corner - 2), min(len(requirements.points), corner + 3)
     route = requirements.route
-    near = replace(
+    nearby_route = replace(
         route,
-        waypoints=route.waypoints[first:last],
-        airspeed=route.airspeed[first : last - 1],
+        waypoints=route.waypoints[first_point:end_point],
+        airspeed=route.airspeed[first_point : end_point - 1],
         **{
-            name: getattr(route, name)[first:last]
+            name: getattr(route, name)[first_point:end_point]
             for name in ("acceptance", "fly_over", "items", "arcs", "above_ground")
         },
     )
-    tables, at = performance_tables(near, requirements.limits), i - first
+    tables, local_corner = performance_tables(nearby_route, requirements.limits), corner - first_point
     for _ in range(SUGGESTION_TRIAL_COUNT):
         degrees = math.floor(10.0 * math.degrees(allowed)) / 10.0
         if degrees <= 0.0:
             return 0.0
-        points = np.array(requirements.points[first:last])
-        change = math.copysign(math.radians(degrees), requirements.turns[i]) - float(requirements.turns[i])
+        points = np.array(requirements.points[first_point:end_point])
+        change = math.copysign(math.radians(degrees), requirements.turns[corner]) - float(requirements.turns[corner])
         cos, sin = math.cos(change), math.sin(change)
-        onward = points[at + 1 :, :2] - points[at, :2]
-        points[at + 1 :, :2] = points[at, :2] + onward @ np.array([[cos, -sin], [sin, cos]])
-        turning = turn_requirements(replace(near, waypoints=points), tables)
-        limit, _ = tighter_turn(requirements, i, float(turning.limit[at]))
+        next_points = points[local_corner + 1 :, :2] - points[local_corner, :2]
+        points[local_corner + 1 :, :2] = points[local_corner, :2] + next_points @ np.array([[cos, -sin], [sin, cos]])
+        trial = turn_requirements(replace(nearby_route, waypoints=points), tables)
+        limit, _ = tighter_turn(requirements, corner, float(trial.limit[local_corner]))
         if limit >= math.radians(degrees):
             return degrees
         allowed = min(allowed, limit) - SUGGESTION_ANGLE_MARGIN_RAD
@@ -263,55 +286,59 @@ def _true_airspeed_ratio(requirements: RouteRequirements, leg: int) -> float:
     return float(requirements.route.airspeed[leg] / requirements.setup.route.airspeed[leg])
 
 
-def _level_speeds(requirements: RouteRequirements, amsl: float, now: float, factor: float) -> list[float]:
-    """Return the airspeeds to command for level flight at an altitude, m/s, the nearest to ``now`` first.
+def _level_speeds(requirements: RouteRequirements, amsl: float, current_speed: float, factor: float) -> list[float]:
+    """Return the airspeeds to command for level flight at an altitude, m/s, the nearest to ``current_speed`` first.
 
     factor: ratio of true airspeed to commanded airspeed.
     """
     envelope = requirements.setup.envelope
-    low, high = envelope.level_speeds(amsl)
-    low, high = (
-        max(low * MIN_SUGGESTED_SPEED_RATIO, float(envelope.airspeed[0])),
-        min(high, float(envelope.airspeed[-1])),
+    min_speed, max_speed = envelope.level_speeds(amsl)
+    min_speed, max_speed = (
+        max(min_speed * MIN_SUGGESTED_SPEED_RATIO, float(envelope.airspeed[0])),
+        min(max_speed, float(envelope.airspeed[-1])),
     )
-    low, high = low / factor, high / factor
+    min_speed, max_speed = min_speed / factor, max_speed / factor
     steps = (
-        np.arange(math.ceil(low / SUGGESTION_SPEED_STEP_MPS), math.floor(high / SUGGESTION_SPEED_STEP_MPS) + 1)
+        np.arange(
+            math.ceil(min_speed / SUGGESTION_SPEED_STEP_MPS), math.floor(max_speed / SUGGESTION_SPEED_STEP_MPS) + 1
+        )
         * SUGGESTION_SPEED_STEP_MPS
     )
-    return sorted((float(v) for v in steps), key=lambda v: (abs(v - now), v))
+    return sorted((float(speed) for speed in steps), key=lambda speed: (abs(speed - current_speed), speed))
 
 
 def _slope_speed(requirements: RouteRequirements, leg: int, slope: float) -> float | None:
-    """Return the airspeed nearest to the command at which the aircraft can hold a slope on a leg, or None."""
-    course, side = float(requirements.courses[leg]), 0 if requirements.slopes[leg] >= 0.0 else 1
-    heights = (float(requirements.points[leg, 2]), float(requirements.points[leg + 1, 2]))
+    """Return the airspeed nearest to the commanded one at which the aircraft holds a slope on a leg, or None."""
+    course, direction = float(requirements.courses[leg]), 0 if requirements.slopes[leg] >= 0.0 else 1
+    altitudes = (float(requirements.points[leg, 2]), float(requirements.points[leg + 1, 2]))
     factor = _true_airspeed_ratio(requirements, leg)
 
     def passes(speed: float) -> bool:
         table = requirements.limits.performance(speed * factor)
-        return min(aircraft_slopes(table, course, up)[side] for up in heights) >= slope
+        return min(aircraft_slopes(table, course, altitude)[direction] for altitude in altitudes) >= slope
 
     commanded = float(requirements.setup.route.airspeed[leg])
-    return first_that_passes(_level_speeds(requirements, max(heights), commanded, factor), passes)
+    return first_that_passes(_level_speeds(requirements, max(altitudes), commanded, factor), passes)
 
 
-def _turn_speed(requirements: RouteRequirements, i: int) -> float | None:
-    """Return the highest airspeed below the command at which the turn at a waypoint fits its legs, or None."""
-    now = float(max(requirements.setup.route.airspeed[i - 1 : i + 1]))
+def _turn_speed(requirements: RouteRequirements, corner: int) -> float | None:
+    """Return the highest airspeed below the commanded one at which a waypoint's turn fits its legs, or None."""
+    current_speed = float(max(requirements.setup.route.airspeed[corner - 1 : corner + 1]))
     available = min(
-        available_lengths(requirements.runs, requirements.before, requirements.after, requirements.reversal, i)
+        available_lengths(requirements.runs, requirements.before, requirements.after, requirements.reversal, corner)
     )
-    factor = _true_airspeed_ratio(requirements, i)
-    up = float(requirements.points[i, 2])
+    factor = _true_airspeed_ratio(requirements, corner)
+    altitude = float(requirements.points[corner, 2])
 
     def fits(speed: float) -> bool:
         table = requirements.limits.performance(speed * factor)
-        radius = turn_radius_between(table, requirements.courses[i - 1], requirements.courses[i], up)
-        used = turn_lengths(abs(float(requirements.turns[i])), radius, bool(requirements.setup.route.fly_over[i]))
-        return max(used) + SUGGESTION_LENGTH_MARGIN_M <= available
+        radius = turn_radius_between(table, requirements.courses[corner - 1], requirements.courses[corner], altitude)
+        lengths = turn_lengths(
+            abs(float(requirements.turns[corner])), radius, bool(requirements.setup.route.fly_over[corner])
+        )
+        return max(lengths) + SUGGESTION_LENGTH_MARGIN_M <= available
 
-    slower = [speed for speed in _level_speeds(requirements, up, now, factor) if speed < now]
+    slower = [speed for speed in _level_speeds(requirements, altitude, current_speed, factor) if speed < current_speed]
     return first_that_passes(sorted(slower, reverse=True), fits)
 
 
@@ -320,103 +347,115 @@ def _whole_metres(metres: float) -> float:
     return float(round(metres))
 
 
-def pass_threat(requirements: RouteRequirements, aligned: AlignedTrack | None, item: Finding) -> tuple[Suggestion, ...]:
+def suggest_wider_berth(
+    requirements: RouteRequirements, aligned: AlignedTrack | None, finding: Finding
+) -> tuple[Suggestion, ...]:
     """Suggest passing a missile's sphere further away."""
-    m = item.place.index
-    if m is None or item.place.kind != "missile":
+    missile = finding.place.index
+    if missile is None or finding.place.kind != "missile":
         return ()
     threats = requirements.setup.scenario.threats
-    one = slice(m, m + 1)
-    spheres = (threats.position[one], threats.kill_radius[one], threats.kill_scale[one])
+    only = slice(missile, missile + 1)
+    spheres = (threats.position[only], threats.kill_radius[only], threats.kill_scale[only])
     nearest = path_spheres(requirements.path.points, requirements.path.times, *spheres).closest[0]
     if aligned is not None and len(aligned.track) > 1:
         nearest = min(nearest, path_spheres(aligned.track.position, aligned.track.time, *spheres).closest[0])
-    away = _whole_metres(threats.kill_radius[m] - nearest + SUGGESTION_LENGTH_MARGIN_M)
-    return ((Change("distance", item.place, None, away, "m"),),)
+    extra_distance = _whole_metres(threats.kill_radius[missile] - nearest + SUGGESTION_LENGTH_MARGIN_M)
+    return ((Change("distance", finding.place, None, extra_distance, "m"),),)
 
 
-def fly_higher(
-    _requirements: RouteRequirements, _aligned: AlignedTrack | None, item: Finding
+def suggest_flying_higher(
+    _requirements: RouteRequirements, _aligned: AlignedTrack | None, finding: Finding
 ) -> tuple[Suggestion, ...]:
     """Suggest flying a leg higher above the ground."""
-    if item.limit is None or item.margin is None:
+    if finding.limit is None or finding.margin is None:
         return ()
-    short = -item.margin + SUGGESTION_LENGTH_MARGIN_M
-    if item.planned is not None:
+    shortfall = -finding.margin + SUGGESTION_LENGTH_MARGIN_M
+    if finding.planned is not None:
         # A flight that ended early did not reach the lowest place.
-        short = max(short, item.limit - item.planned + SUGGESTION_LENGTH_MARGIN_M)
+        shortfall = max(shortfall, finding.limit - finding.planned + SUGGESTION_LENGTH_MARGIN_M)
     return (
-        ((Change("height", item.place, None, _whole_metres(short), "m"),),)
-        if short > SUGGESTION_LENGTH_MARGIN_M
+        ((Change("height", finding.place, None, _whole_metres(shortfall), "m"),),)
+        if shortfall > SUGGESTION_LENGTH_MARGIN_M
         else ()
     )
 
 
-def fly_lower(_requirements: RouteRequirements, _aligned: AlignedTrack | None, item: Finding) -> tuple[Suggestion, ...]:
+def suggest_flying_lower(
+    _requirements: RouteRequirements, _aligned: AlignedTrack | None, finding: Finding
+) -> tuple[Suggestion, ...]:
     """Suggest flying a leg lower above the ground."""
-    heights = [height for height in (item.planned, item.flown) if height is not None]
-    if item.place.kind != "leg" or item.limit is None or not heights or not max(heights) > item.limit:
+    heights = [height for height in (finding.planned, finding.flown) if height is not None]
+    if finding.place.kind != "leg" or finding.limit is None or not heights or not max(heights) > finding.limit:
         return ()
-    high = _whole_metres(max(heights) - item.limit + SUGGESTION_LENGTH_MARGIN_M)
-    return ((Change("descent", item.place, None, high, "m"),),)
+    excess = _whole_metres(max(heights) - finding.limit + SUGGESTION_LENGTH_MARGIN_M)
+    return ((Change("descent", finding.place, None, excess, "m"),),)
 
 
-def stay_inside(
-    _requirements: RouteRequirements, _aligned: AlignedTrack | None, item: Finding
+def suggest_staying_inside(
+    _requirements: RouteRequirements, _aligned: AlignedTrack | None, finding: Finding
 ) -> tuple[Suggestion, ...]:
     """Suggest bringing the path further inside the area."""
-    if item.margin is None or not item.margin < 0.0:
+    if finding.margin is None or not finding.margin < 0.0:
         return ()
-    return ((Change("inset", FLIGHT, None, _whole_metres(-item.margin + SUGGESTION_LENGTH_MARGIN_M), "m"),),)
+    return ((Change("inset", FLIGHT, None, _whole_metres(-finding.margin + SUGGESTION_LENGTH_MARGIN_M), "m"),),)
 
 
-def use_less_energy(
-    requirements: RouteRequirements, _aligned: AlignedTrack | None, item: Finding
+def suggest_using_less_energy(
+    requirements: RouteRequirements, _aligned: AlignedTrack | None, finding: Finding
 ) -> tuple[Suggestion, ...]:
     """Suggest a shorter flight, or a larger battery or tank."""
-    used = item.planned if item.flown is None else item.flown
-    if used is None or item.limit is None or item.margin is None or used <= item.limit:
+    energy = finding.planned if finding.flown is None else finding.flown
+    if energy is None or finding.limit is None or finding.margin is None or energy <= finding.limit:
         return ()
-    more = used / item.limit
+    ratio = energy / finding.limit
     envelope = requirements.setup.envelope
-    store: Quantity = "battery" if envelope.volts or not envelope.power_level.size else "tank"
-    shorter = Change("duration", FLIGHT, None, float(math.ceil(100.0 * (1.0 - 1.0 / more))), "%")
-    larger = Change(store, FLIGHT, None, math.ceil(100.0 * more) / 100.0, "1")
+    storage: Quantity = "battery" if envelope.volts or not envelope.power_level.size else "tank"
+    shorter = Change("duration", FLIGHT, None, float(math.ceil(100.0 * (1.0 - 1.0 / ratio))), "%")
+    larger = Change(storage, FLIGHT, None, math.ceil(100.0 * ratio) / 100.0, "1")
     return (shorter,), (larger,)
 
 
-def fly_faster(requirements: RouteRequirements, _aligned: AlignedTrack | None, item: Finding) -> tuple[Suggestion, ...]:
+def suggest_flying_faster(
+    requirements: RouteRequirements, _aligned: AlignedTrack | None, finding: Finding
+) -> tuple[Suggestion, ...]:
     """Suggest a higher airspeed, above the stall."""
-    if item.limit is None:
+    if finding.limit is None:
         return ()
     leg = int(np.argmin(requirements.route.airspeed))
-    now = float(requirements.setup.route.airspeed[leg])
-    wanted = (
+    current_speed = float(requirements.setup.route.airspeed[leg])
+    requested_speed = (
         math.ceil(
-            10.0 * item.limit * (1.0 + SUGGESTION_SPEED_MARGIN_FRACTION) / _true_airspeed_ratio(requirements, leg)
+            10.0 * finding.limit * (1.0 + SUGGESTION_SPEED_MARGIN_FRACTION) / _true_airspeed_ratio(requirements, leg)
         )
         / 10.0
     )
-    return ((Change("airspeed", item.place, now, wanted, "m/s"),),) if wanted > now else ()
+    return (
+        ((Change("airspeed", finding.place, current_speed, requested_speed, "m/s"),),)
+        if requested_speed > current_speed
+        else ()
+    )
 
 
-def fly_level_speed(
-    requirements: RouteRequirements, _aligned: AlignedTrack | None, item: Finding
+def suggest_level_flight_speed(
+    requirements: RouteRequirements, _aligned: AlignedTrack | None, finding: Finding
 ) -> tuple[Suggestion, ...]:
     """Suggest an airspeed at which level flight is possible at the leg's altitude.
 
     If the maximum airspeed is uncertain, suggest only airspeeds that are certainly possible.
     """
-    leg = item.place.index
-    if leg is None or item.limit is None or item.margin is None:
+    leg = finding.place.index
+    if leg is None or finding.limit is None or finding.margin is None:
         return ()
     commanded = float(requirements.setup.route.airspeed[leg])
-    up = float(max(requirements.points[leg, 2], requirements.points[leg + 1, 2]))
+    altitude = float(max(requirements.points[leg, 2], requirements.points[leg + 1, 2]))
     envelope = requirements.setup.envelope
-    known = envelope.surely() if item.check == UNKNOWN_AIRCRAFT else envelope
-    low, high = (speed / _true_airspeed_ratio(requirements, leg) for speed in known.level_speeds(up))
-    if low <= commanded <= high:
+    certain_envelope = envelope.surely() if finding.check == UNKNOWN_AIRCRAFT else envelope
+    min_speed, max_speed = (
+        speed / _true_airspeed_ratio(requirements, leg) for speed in certain_envelope.level_speeds(altitude)
+    )
+    if min_speed <= commanded <= max_speed:
         return ()
-    low = math.ceil(10.0 * low * (1.0 + SUGGESTION_SPEED_MARGIN_FRACTION)) / 10.0
-    high = math.floor(10.0 * high * (1.0 - SUGGESTION_SPEED_MARGIN_FRACTION)) / 10.0
-    return ((Change("airspeed", item.place, commanded, low, "m/s", most=high),),)
+    min_speed = math.ceil(10.0 * min_speed * (1.0 + SUGGESTION_SPEED_MARGIN_FRACTION)) / 10.0
+    max_speed = math.floor(10.0 * max_speed * (1.0 - SUGGESTION_SPEED_MARGIN_FRACTION)) / 10.0
+    return ((Change("airspeed", finding.place, commanded, min_speed, "m/s", most=max_speed),),)

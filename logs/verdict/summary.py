@@ -29,21 +29,25 @@ _LEVELS = {
 
 
 def headline(findings: Sequence[Finding], flyable: bool, source: str = "") -> str:
-    """Write the first line: the answer, and which findings failed, were not judged or narrowly passed.
+    """Write the first line: the answer, and the findings that failed, were not judged or narrowly passed.
 
     source: the source of the aircraft's model, if the model is uncertain.
     """
-    whose = [f"an aircraft from {source}"] if source else []
+    source_notes = [f"an aircraft from {source}"] if source else []
     if flyable:
-        silent = [_unjudged_text(findings, rule) for rule in RULE_WORDS.values() if rule.unjudged]
-        return "; ".join(["flyable", *filter(None, silent), *_near_miss_notes(findings), *whose])
+        unjudged = [_unjudged_text(findings, rule) for rule in RULE_WORDS.values() if rule.unjudged]
+        return "; ".join(["flyable", *filter(None, unjudged), *_near_miss_notes(findings), *source_notes])
     failed = _failed_by_urgency(findings)
     if not failed and (open_text := undecided_text(findings)):
-        return "; ".join([f"not judged in full: {open_text}", *whose])
-    named = _headline_findings(failed)
-    more = len(failed) - len(named)
-    text = "not flyable: " + ", ".join(_phrase(item) for item in named) + (f", +{more} more" if more else "")
-    return "; ".join([text, *whose])
+        return "; ".join([f"not judged in full: {open_text}", *source_notes])
+    named_findings = _headline_findings(failed)
+    unnamed_count = len(failed) - len(named_findings)
+    text = (
+        "not flyable: "
+        + ", ".join(_headline_phrase(item) for item in named_findings)
+        + (f", +{unnamed_count} more" if unnamed_count else "")
+    )
+    return "; ".join([text, *source_notes])
 
 
 def undecided_text(findings: Sequence[Finding]) -> str:
@@ -56,41 +60,41 @@ def undecided_text(findings: Sequence[Finding]) -> str:
     'slopes on leg 0, to item 1, and leg 1, to item 2, are within what is not known of the aircraft'
     """
     open_findings = undecided_findings(findings)
-    ways = [
-        f"{'the turn-around on' if item.place.kind == 'leg' else 'the circle at'} {place_text(item.place)}"
-        for item in open_findings
-        if item.check == UNKNOWN_WAY
+    paths = [
+        f"{'the turn-around on' if finding.place.kind == 'leg' else 'the circle at'} {place_text(finding.place)}"
+        for finding in open_findings
+        if finding.check == UNKNOWN_WAY
     ]
-    circles = f"where {' and '.join(ways[:_NAMED])} is flown, only a flight tells" if ways else ""
-    known = _unknown_aircraft_text([item for item in open_findings if item.check == UNKNOWN_AIRCRAFT])
-    beside = [item.brief for item in open_findings if item.check in APART_FROM_FLIGHT]
-    items = [item.brief for item in open_findings if item.check == NOT_FLOWN]
-    more = [f"{len(items) - _NAMED} more items"] if len(items) > _NAMED else []
-    return "; ".join(filter(None, [known, circles, *items[:_NAMED], *more, *beside]))
+    path_text = f"where {' and '.join(paths[:_NAMED])} is flown, only a flight tells" if paths else ""
+    aircraft_text = _unknown_aircraft_text([finding for finding in open_findings if finding.check == UNKNOWN_AIRCRAFT])
+    other_briefs = [finding.brief for finding in open_findings if finding.check in APART_FROM_FLIGHT]
+    item_briefs = [finding.brief for finding in open_findings if finding.check == NOT_FLOWN]
+    rest_texts = [f"{len(item_briefs) - _NAMED} more items"] if len(item_briefs) > _NAMED else []
+    return "; ".join(filter(None, [aircraft_text, path_text, *item_briefs[:_NAMED], *rest_texts, *other_briefs]))
 
 
-def _unknown_aircraft_text(every: Sequence[Finding]) -> str:
+def _unknown_aircraft_text(undecided: Sequence[Finding]) -> str:
     """Describe the findings for which the aircraft is not known well enough; return "" if there are none."""
-    found = [item for item in every if item.rule == "slope"]
-    if len(found) < len(every):
-        speeds = sum(item.rule == "speed" for item in every)
+    slopes = [finding for finding in undecided if finding.rule == "slope"]
+    if len(slopes) < len(undecided):
+        speed_count = sum(finding.rule == "speed" for finding in undecided)
         subjects = [
             f"{name}{'s' if count > 1 or name == 'slope' else ''} on {count} leg{'s' if count > 1 else ''}"
-            for name, count in (("slope", len(found)), ("airspeed", speeds))
+            for name, count in (("slope", len(slopes)), ("airspeed", speed_count))
             if count
         ]
-        subjects += ["energy"] if len(found) + speeds < len(every) else []
-        one = len(subjects) == 1 and (subjects == ["energy"] or speeds == 1)
-        are = "is" if one else "are"
+        subjects += ["energy"] if len(slopes) + speed_count < len(undecided) else []
+        is_singular = len(subjects) == 1 and (subjects == ["energy"] or speed_count == 1)
+        verb = "is" if is_singular else "are"
         listed = " and ".join(filter(None, [", ".join(subjects[:-1]), subjects[-1]]))
-        return f"{listed} {are} within what is not known of the aircraft"
-    if not found:
+        return f"{listed} {verb} within what is not known of the aircraft"
+    if not slopes:
         return ""
-    if len(found) > _NAMED:
-        return f"slopes on {len(found)} legs are within what is not known of the aircraft"
-    places = [place_text(item.place) + ("," if item.place.to_item is not None else "") for item in found]
-    slopes, are = ("slopes", "are") if len(found) > 1 else ("slope", "is")
-    return f"{slopes} on {' and '.join(places)} {are} within what is not known of the aircraft"
+    if len(slopes) > _NAMED:
+        return f"slopes on {len(slopes)} legs are within what is not known of the aircraft"
+    places = [place_text(finding.place) + ("," if finding.place.to_item is not None else "") for finding in slopes]
+    noun, verb = ("slopes", "are") if len(slopes) > 1 else ("slope", "is")
+    return f"{noun} on {' and '.join(places)} {verb} within what is not known of the aircraft"
 
 
 def first_failed(findings: Sequence[Finding]) -> Finding | None:
@@ -110,45 +114,47 @@ def first_failed(findings: Sequence[Finding]) -> Finding | None:
 def _failed_by_urgency(findings: Sequence[Finding]) -> list[Finding]:
     """Return the failed findings sorted by urgency, and then by the order of the rules."""
     order = {name: k for k, name in enumerate(RULE_WORDS)}
-    failed = (item for item in findings if item.ok is False)
-    return sorted(failed, key=lambda item: (-RULE_WORDS[item.rule].urgency, order[item.rule]))
+    failed = (finding for finding in findings if finding.ok is False)
+    return sorted(failed, key=lambda finding: (-RULE_WORDS[finding.rule].urgency, order[finding.rule]))
 
 
 def _unjudged_text(findings: Sequence[Finding], rule: RuleWords) -> str:
     """Describe which findings of a rule were not judged; return "" if all were judged."""
-    mine = [item for item in findings if item.rule == rule.name]
-    silent = sum(item.ok is None for item in mine)
-    if not silent:
+    rule_findings = [finding for finding in findings if finding.rule == rule.name]
+    unjudged_count = sum(finding.ok is None for finding in rule_findings)
+    if not unjudged_count:
         return ""
-    return f"{rule.unjudged} not judged" + ("" if silent == len(mine) else f" on {silent} {rule.unjudged_of}")
+    return f"{rule.unjudged} not judged" + (
+        "" if unjudged_count == len(rule_findings) else f" on {unjudged_count} {rule.unjudged_of}"
+    )
 
 
 def _near_miss_notes(findings: Sequence[Finding]) -> list[str]:
     """Name each threat that the aircraft missed by less than its navigation error."""
-    out = []
-    for item in findings:
-        facts = {fact.what: fact.value for fact in item.facts if item.rule == "threat" and item.ok}
+    notes = []
+    for finding in findings:
+        facts = {fact.what: fact.value for fact in finding.facts if finding.rule == "threat" and finding.ok}
         if facts.get("nearest", math.inf) < facts.get("navigation error", 0.0):
-            out.append(f"a missile missed by {facts['nearest']:.1f} m, less than the navigation error")
-    return out
+            notes.append(f"a missile missed by {facts['nearest']:.1f} m, less than the navigation error")
+    return notes
 
 
 def _headline_findings(failed: list[Finding]) -> list[Finding]:
     """Return at most four failed findings, the worst of each rule before the second worst of any rule."""
-    margins = [0.0 if item.margin is None else item.margin for item in failed]
+    margins = [0.0 if finding.margin is None else finding.margin for finding in failed]
     by_margin = sorted(range(len(failed)), key=margins.__getitem__)
-    count: dict[str, int] = {}
+    counts: dict[str, int] = {}
     rank = {}
     for k in by_margin:
-        rank[k] = count[failed[k].rule] = count.get(failed[k].rule, 0) + 1
+        rank[k] = counts[failed[k].rule] = counts.get(failed[k].rule, 0) + 1
     chosen = sorted(range(len(failed)), key=lambda k: (rank[k], k))[:_NAMED]
     return [failed[k] for k in sorted(chosen)]
 
 
-def _phrase(item: Finding) -> str:
+def _headline_phrase(finding: Finding) -> str:
     """Describe a failed finding in a few words."""
-    words = RULE_WORDS[item.rule]
-    return words.phrase(words.word, item)
+    rule = RULE_WORDS[finding.rule]
+    return rule.phrase(rule.word, finding)
 
 
 def summary_lines(
@@ -163,30 +169,30 @@ def summary_lines(
 
     levels: answers of all levels; the verdict's own is last and has the headline.
     """
-    *others, own = levels
-    lines = [own.headline, *_airframe_or_autopilot_lines(levels, deciding, setup)]
+    *others, own_answer = levels
+    lines = [own_answer.headline, *_airframe_or_autopilot_lines(levels, deciding, setup)]
     lines.append(f"Start: {setup.started}" if setup.started else "Start: not stated")
     lines += [*condition_lines(conditions), autopilot_line(conditions, flown=level == "flown")]
     lines += _parameter_lines(setup, flown=level == "flown")
     lines += _ignored_settings_lines(setup)
-    silent: dict[str, str] = {}
-    for item in findings:
-        if item.ok is None and RULE_WORDS[item.rule].explained:
-            silent.setdefault(item.rule, item.reason)
-    lines += [f"Not judged: {RULE_WORDS[rule].title} ({reason})" for rule, reason in silent.items()]
+    reasons: dict[str, str] = {}
+    for finding in findings:
+        if finding.ok is None and RULE_WORDS[finding.rule].explained:
+            reasons.setdefault(finding.rule, finding.reason)
+    lines += [f"Not judged: {RULE_WORDS[rule].title} ({reason})" for rule, reason in reasons.items()]
     # These are the autopilot's own limits, which say nothing about the aircraft.
     lines += [
-        f"PX4 would not take it: {item.reason}"
-        for item in findings
-        if item.rule == "mission" and item.ok is None and item.check != NOT_FLOWN
+        f"PX4 would not take it: {finding.reason}"
+        for finding in findings
+        if finding.rule == "mission" and finding.ok is None and finding.check != NOT_FLOWN
     ]
-    lack = missing_ends_text(setup.mission, setup.autopilot.mission_checks) if setup.autopilot.refuses else ""
-    if lack and not any(item.rule == "mission" for item in findings):
-        lines.append(f"PX4 would not take it: {lack}")
+    missing_ends = missing_ends_text(setup.mission, setup.autopilot.mission_checks) if setup.autopilot.refuses else ""
+    if missing_ends and not any(finding.rule == "mission" for finding in findings):
+        lines.append(f"PX4 would not take it: {missing_ends}")
     lines += [
-        f"{RULE_WORDS[item.rule].title.capitalize()}: {item.reason}"
-        for item in findings
-        if RULE_WORDS[item.rule].warns and item.ok is None
+        f"{RULE_WORDS[finding.rule].title.capitalize()}: {finding.reason}"
+        for finding in findings
+        if RULE_WORDS[finding.rule].warns and finding.ok is None
     ]
     lines += _terrain_error_lines(findings, setup)
     if setup.notes:
@@ -208,13 +214,13 @@ def _airframe_or_autopilot_lines(
     answers = {level.name: level.flyable for level in levels}
     if answers.get("autopilot") is not False or not answers.get("airframe") or levels[-1].undecided:
         return []
-    whose = "" if setup.autopilot.parameters is None else " with these parameters"
+    parameters_note = "" if setup.autopilot.parameters is None else " with these parameters"
     # Other parameters are flown by the law, whoever flew.
     by_law = setup.autopilot.program is not None
-    why = "" if by_law or not whose else ": no single parameter that was tried would pass"
+    reason = "" if by_law or not parameters_note else ": no single parameter that was tried would pass"
     if deciding is not None:
-        why = f": {deciding_text(deciding)}{', by the simulated flight' if by_law else ''}"
-    return [f"The aircraft can, {setup.autopilot.title}{whose} cannot{why}"]
+        reason = f": {deciding_text(deciding)}{', by the simulated flight' if by_law else ''}"
+    return [f"The aircraft can, {setup.autopilot.title}{parameters_note} cannot{reason}"]
 
 
 def _parameter_lines(setup: FlightSetup, *, flown: bool) -> list[str]:
@@ -228,23 +234,23 @@ def _parameter_lines(setup: FlightSetup, *, flown: bool) -> list[str]:
     misfits = [f"Parameters that do not fit: {'; '.join(parameters.misfits)}"] if parameters.misfits else []
     if not flown and all(len(name) <= LONGEST_NAME for name in parameters.unused):
         return misfits
-    names = {origin: len(parameters.by_origin(origin)) for origin in ("file", "aircraft", "default")}
+    counts = {origin: len(parameters.by_origin(origin)) for origin in ("file", "aircraft", "default")}
     # A name that is too long is a mistake in the file, and the others belong to other hardware.
-    by_length = sorted(parameters.unused, key=lambda name: len(name) <= LONGEST_NAME)
+    longest_first = sorted(parameters.unused, key=lambda name: len(name) <= LONGEST_NAME)
     unused = [
         name if len(name) <= LONGEST_NAME else f"{name} (longer than {LONGEST_NAME} characters)"
-        for name in by_length[:_NAMED]
+        for name in longest_first[:_NAMED]
     ]
-    more = len(parameters.unused) - len(unused)
-    said = f"; not used: {', '.join(unused)}{f', +{more} more' if more else ''}" if unused else ""
-    returns = [name for name in parameters.not_flown if name in parameters.by_origin("file")]
-    said += f"; read, not flown: {', '.join(returns)}" if returns else ""
-    said += f"; beyond {setup.autopilot.title}'s documented ranges, flown: {', '.join(parameters.beyond)}" * bool(
+    unnamed_count = len(parameters.unused) - len(unused)
+    notes = f"; not used: {', '.join(unused)}{f', +{unnamed_count} more' if unnamed_count else ''}" if unused else ""
+    not_flown = [name for name in parameters.not_flown if name in parameters.by_origin("file")]
+    notes += f"; read, not flown: {', '.join(not_flown)}" if not_flown else ""
+    notes += f"; beyond {setup.autopilot.title}'s documented ranges, flown: {', '.join(parameters.beyond)}" * bool(
         parameters.beyond
     )
     return [
-        f"Parameters: {names['file']} of the file, {names['aircraft']} of the aircraft,"
-        f" {names['default']} {setup.autopilot.title}'s defaults{said}",
+        f"Parameters: {counts['file']} of the file, {counts['aircraft']} of the aircraft,"
+        f" {counts['default']} {setup.autopilot.title}'s defaults{notes}",
         *misfits,
     ]
 
@@ -258,18 +264,19 @@ def _ignored_settings_lines(setup: FlightSetup) -> list[str]:
 
 
 def _terrain_error_lines(findings: Sequence[Finding], setup: FlightSetup) -> list[str]:
-    """Subtract the terrain's stated error, if any, from the lowest clearance."""
+    """Return a line with the lowest clearance less the terrain's stated error, or no line without that error."""
     error = None if setup.scenario.terrain is None else setup.scenario.terrain.vertical_error
-    heights = [
-        item.planned if item.flown is None else item.flown
-        for item in findings
-        if item.rule == "clearance" and item.planned is not None
+    clearances = [
+        finding.planned if finding.flown is None else finding.flown
+        for finding in findings
+        if finding.rule == "clearance" and finding.planned is not None
     ]
-    if error is None or not heights:
+    if error is None or not clearances:
         return []
-    low, required = min(heights), setup.scenario.limits.min_clearance_m
+    lowest, required = min(clearances), setup.scenario.limits.min_clearance_m
     return [
-        f"Terrain's stated error: {error:g} m; the lowest clearance is {low:.1f} m, {low - error:.1f} m less that error"
+        f"Terrain's stated error: {error:g} m; the lowest clearance is {lowest:.1f} m,"
+        f" {lowest - error:.1f} m less that error"
         f" ({required:g} m are required)"
     ]
 
@@ -278,7 +285,7 @@ def _agreement_text(other: LevelAnswer) -> str:
     """Describe where the verdict and another level agree or differ."""
     differing = other.disagreements
     if not differing:
-        geometry = other.name == "geometry"
-        return "flight and geometry agree on every finding that both have" if geometry else "both flights agree"
-    more = f", +{len(differing) - _NAMED} more" if len(differing) > _NAMED else ""
-    return "; ".join(map(disagreement_text, differing[:_NAMED])) + more
+        is_geometry = other.name == "geometry"
+        return "flight and geometry agree on every finding that both have" if is_geometry else "both flights agree"
+    rest_text = f", +{len(differing) - _NAMED} more" if len(differing) > _NAMED else ""
+    return "; ".join(map(disagreement_text, differing[:_NAMED])) + rest_text

@@ -29,8 +29,8 @@ def least_change(changes: Sequence[Candidate], passes: Callable[[Candidate], boo
     >>> tried
     [50, 20, 30]
     """
-    fails, works = -1, len(changes)
-    while works - fails > 1:
-        middle = (fails + works) // 2
-        fails, works = (fails, middle) if passes(changes[middle]) else (middle, works)
-    return changes[works] if works < len(changes) else None
+    failing, passing = -1, len(changes)
+    while passing - failing > 1:
+        middle = (failing + passing) // 2
+        failing, passing = (failing, middle) if passes(changes[middle]) else (middle, passing)
+    return changes[passing] if passing < len(changes) else None

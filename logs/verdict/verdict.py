@@ -76,8 +76,8 @@ class Verdict:
         """
         if self.undecided:
             return "not judged in full"
-        yes = "flown as planned" if self.imported else "flyable"
-        return yes if self.flyable else f"not {yes}" if self.complete else "incomplete"
+        success = "flown as planned" if self.imported else "flyable"
+        return success if self.flyable else f"not {success}" if self.complete else "incomplete"
 
     @property
     def state(self) -> str:
@@ -101,8 +101,8 @@ class Verdict:
         >>> verdict.flies, replace(verdict, complete=False).flies
         (True, False)
         """
-        apart = all(item.check in APART_FROM_FLIGHT for item in undecided_findings(self.findings))
-        return self.flyable or (self.complete and self.undecided and apart)
+        is_apart_from_flight = all(finding.check in APART_FROM_FLIGHT for finding in undecided_findings(self.findings))
+        return self.flyable or (self.complete and self.undecided and is_apart_from_flight)
 
     @property
     def headline(self) -> str:
@@ -149,8 +149,8 @@ class Verdict:
         numbers = ("planned", "flown", "limit", "tolerance", "margin")
         names = (*numbers, "unit", "limit_source", "method", "ok", "reason")
         rows = [
-            [one.rule, one.place.kind, one.place.index, *(getattr(one, name) for name in names)]
-            for one in self.findings
+            [finding.rule, finding.place.kind, finding.place.index, *(getattr(finding, name) for name in names)]
+            for finding in self.findings
         ]
         frame = pd.DataFrame(rows, columns=["rule", "place", "index", *names])
         return frame.astype(dict.fromkeys(numbers, float))

@@ -152,19 +152,22 @@ def suggestions_text(suggestions: tuple[Suggestion, ...]) -> str:
     return ", or ".join(map(suggestion_text, suggestions))
 
 
-# Phrase for how a level judges, which follows "passes" or "fails".
+# How each level judges, as a phrase after "passes" or "fails".
 _LEVEL_PHRASES = {"geometry": "by geometry", "airframe": "with planfly's guidance", "autopilot": "with the autopilot"}
 
 
-def disagreement_text(one: Disagreement) -> str:
+def disagreement_text(disagreement: Disagreement) -> str:
     """State that another level and the verdict judge a place differently.
 
     >>> disagreement_text(Disagreement("speed", Place("leg", 0), "geometry", there=True, here=False))
     'speed at leg 0 passes by geometry and fails in flight'
     """
     verbs = {True: "passes", False: "fails"}
-    where = f"{one.rule} at {place_text_within(one.place)}"
-    return f"{where} {verbs[one.there]} {_LEVEL_PHRASES[one.level]} and {verbs[one.here]} in flight"
+    where = f"{disagreement.rule} at {place_text_within(disagreement.place)}"
+    return (
+        f"{where} {verbs[disagreement.there]} {_LEVEL_PHRASES[disagreement.level]}"
+        f" and {verbs[disagreement.here]} in flight"
+    )
 
 
 def deciding_text(deciding: DecidingParameter) -> str:
@@ -173,34 +176,34 @@ def deciding_text(deciding: DecidingParameter) -> str:
     >>> deciding_text(DecidingParameter("TECS_HDEM_TCONST", 3.0, 1.2, "s", "clearance", Place("leg", 4), -8.2))
     'TECS_HDEM_TCONST 3 puts it 8 m low on leg 4; 1.2 would pass'
     """
-    where, off = place_text(deciding.place), deciding.off
-    does = f"fails {deciding.rule} at {where}"
-    if off is not None and deciding.rule == "corridor":
-        does = f"takes it {abs(off):.0f} m off {where}"
-    elif off is not None:
-        does = f"puts it {abs(off):.0f} m {'low' if off < 0.0 else 'high'} on {where}"
-    return f"{deciding.name} {deciding.current:g} {does}; {deciding.passing:g} would pass"
+    where, error = place_text(deciding.place), deciding.off
+    effect = f"fails {deciding.rule} at {where}"
+    if error is not None and deciding.rule == "corridor":
+        effect = f"takes it {abs(error):.0f} m off {where}"
+    elif error is not None:
+        effect = f"puts it {abs(error):.0f} m {'low' if error < 0.0 else 'high'} on {where}"
+    return f"{deciding.name} {deciding.current:g} {effect}; {deciding.passing:g} would pass"
 
 
-def gentle_launch_text(found: float, trigger: tuple[float, str]) -> str:
+def gentle_launch_text(acceleration: float, trigger: tuple[float, str]) -> str:
     """State that a launch accelerates too little to start the motor.
 
-    found: acceleration of the launch, m/s^2.
+    acceleration: acceleration of the launch, m/s^2.
     trigger: acceleration that starts the motor, m/s^2, and the name of its parameter.
 
     >>> gentle_launch_text(8.33, (15.0, "TKOFF_THR_MINACC"))
     'the launch accelerates at 8.3 m/s², less than TKOFF_THR_MINACC 15'
     """
-    return f"the launch accelerates at {found:.1f} m/s², less than {trigger[1]} {trigger[0]:g}"
+    return f"the launch accelerates at {acceleration:.1f} m/s², less than {trigger[1]} {trigger[0]:g}"
 
 
-def shortened(text: str) -> str:
-    """Return a statement cut to the maximum length in a headline.
+def shortened(statement: str) -> str:
+    """Cut a statement to the maximum length in a headline.
 
     >>> shortened("bank 80° at 3.0 s"), len(shortened("m" * 200))
     ('bank 80° at 3.0 s', 80)
     """
-    return text if len(text) <= _MAX_STATEMENT_LENGTH else text[: _MAX_STATEMENT_LENGTH - 3] + "..."
+    return statement if len(statement) <= _MAX_STATEMENT_LENGTH else statement[: _MAX_STATEMENT_LENGTH - 3] + "..."
 
 
 def quantity_text(value: float, unit: str) -> str:

@@ -77,20 +77,20 @@ def _slopes(axes: Any, aircraft: Aircraft, envelope: Envelope) -> None:
 
 
 def _level_speeds(axes: Any, aircraft: Aircraft, envelope: Envelope) -> None:
-    low, high = envelope.level_speed_min, envelope.level_speed_max
-    axes.fill_betweenx(envelope.amsl, low, high, color=theme.colour("planned"), alpha=0.2, linewidth=0)
+    min_speeds, max_speeds = envelope.level_speed_min, envelope.level_speed_max
+    axes.fill_betweenx(envelope.amsl, min_speeds, max_speeds, color=theme.colour("planned"), alpha=0.2, linewidth=0)
     axes.plot(
-        low,
+        min_speeds,
         envelope.amsl,
         color=theme.colour("limit"),
         linestyle="--",
         linewidth=1.3,
         label="slowest: elevator full up",
     )
-    axes.plot(high, envelope.amsl, color=theme.colour("second"), linewidth=1.3, label="fastest: full throttle")
+    axes.plot(max_speeds, envelope.amsl, color=theme.colour("second"), linewidth=1.3, label="fastest: full throttle")
     _shade_guidance_speeds(axes, aircraft)
-    span = float(np.nanmax(high) - np.nanmin(low))
-    axes.set_xlim(float(np.nanmin(low)) - 0.08 * span, float(np.nanmax(high)) + 0.08 * span)
+    span = float(np.nanmax(max_speeds) - np.nanmin(min_speeds))
+    axes.set_xlim(float(np.nanmin(min_speeds)) - 0.08 * span, float(np.nanmax(max_speeds)) + 0.08 * span)
     _frame(axes, "level flight", "airspeed (m/s)", "height AMSL (m)")
     _legend_above(axes, "", 2)
 
@@ -186,9 +186,9 @@ def _roots(axes: Any, modes: Mapping[float, Sequence[Mode]], *, all_modes: bool)
     """Draw the upper half of the root plane: all modes, or only the slow ones near the origin."""
     slow = {"phugoid", "spiral", "roll-spiral"}
     labelled: set[str] = set()
-    for speed, found in modes.items():
+    for speed, speed_modes in modes.items():
         fastest = speed == max(modes)
-        for mode in found:
+        for mode in speed_modes:
             if not all_modes and mode.name not in slow:
                 continue
             # Markers are filled at the highest airspeed, to show the direction of the root locus.
@@ -206,8 +206,8 @@ def _roots(axes: Any, modes: Mapping[float, Sequence[Mode]], *, all_modes: bool)
     slow_or_fast = f"from {min(modes):g} m/s (hollow) to {max(modes):g} m/s (filled)" if modes else ""
     title = f"modes {slow_or_fast}" if all_modes else "the slow ones, nearer"
     _frame(axes, title, "real part (1/s): right of 0 is unstable", "imaginary part (rad/s)")
-    low, high = axes.get_xlim()
-    axes.set_xlim(low - 0.05 * (high - low), high + 0.05 * (high - low))
+    min_x, max_x = axes.get_xlim()
+    axes.set_xlim(min_x - 0.05 * (max_x - min_x), max_x + 0.05 * (max_x - min_x))
     axes.xaxis.set_major_locator(MaxNLocator(6))
     axes.set_ylim(-0.04 * axes.get_ylim()[1], None)
     axes.legend(loc="best")
@@ -249,8 +249,8 @@ def _answer(axes: Any, step: StepResponse, row: int) -> None:
     name, unit, factor = _ROWS[step.quantities[row]]
     values = factor * step.change[:, row]
     axes.axhline(0.0, color=theme.colour("rim"), linewidth=0.6)
-    held = min(step.held, float(step.time[-1]) - 1.0)
-    axes.axvspan(1.0, 1.0 + held, color=theme.colour("commanded"), alpha=0.12, linewidth=0)
+    hold_time = min(step.held, float(step.time[-1]) - 1.0)
+    axes.axvspan(1.0, 1.0 + hold_time, color=theme.colour("commanded"), alpha=0.12, linewidth=0)
     axes.plot(step.time, values, color=theme.colour("flown"), linewidth=1.1)
     axes.set_xlim(0.0, float(step.time[-1]))
     axes.set_title(f"change of {name} ({unit})", fontsize=8.5, pad=3.0)
@@ -272,9 +272,9 @@ def _legend_above(axes: Any, title: str, columns: int) -> None:
     """Write the legend in the upper part of the panel, and raise the axis limit to keep lines clear of it."""
     legend = axes.legend(title=title or None, loc="upper right", ncols=columns, columnspacing=1.2, handlelength=1.8)
     renderer = axes.figure.canvas.get_renderer()
-    share = (axes.bbox.y1 - legend.get_window_extent(renderer).y0) / axes.bbox.height
-    low, high = axes.get_ylim()
-    axes.set_ylim(low, low + (high - low) / (1.0 - share))
+    legend_fraction = (axes.bbox.y1 - legend.get_window_extent(renderer).y0) / axes.bbox.height
+    min_y, max_y = axes.get_ylim()
+    axes.set_ylim(min_y, min_y + (max_y - min_y) / (1.0 - legend_fraction))
 
 
 def _shade_guidance_speeds(axes: Any, aircraft: Aircraft) -> None:
@@ -292,6 +292,6 @@ def _frame(axes: Any, title: str, x: str, y: str) -> None:
 
 
 def _title(figure: Figure, title: str, subtitle: str) -> None:
-    high = figure.get_figheight()
-    figure.text(0.06, 1.0 - 0.28 / high, title, fontsize=12, fontweight="bold", va="center")
-    figure.text(0.06, 1.0 - 0.55 / high, subtitle, fontsize=8.5, color=theme.colour("quiet"), va="center")
+    height = figure.get_figheight()
+    figure.text(0.06, 1.0 - 0.28 / height, title, fontsize=12, fontweight="bold", va="center")
+    figure.text(0.06, 1.0 - 0.55 / height, subtitle, fontsize=8.5, color=theme.colour("quiet"), va="center")

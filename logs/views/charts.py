@@ -113,10 +113,10 @@ class Panel:
             for edge in (layer.y, layer.low):
                 finite = edge[np.isfinite(edge)] if edge is not None else np.zeros(0)
                 values += [float(finite.min()), float(finite.max())] if finite.size else []
-        low, high = (min(values), max(values)) if values else (0.0, 1.0)
-        widening = max(0.0, self.min_span - (high - low)) / 2
-        margin = 0.08 * (high - low + 2 * widening)
-        return low - widening - margin, high + widening + margin
+        min_value, max_value = (min(values), max(values)) if values else (0.0, 1.0)
+        widening = max(0.0, self.min_span - (max_value - min_value)) / 2
+        margin = 0.08 * (max_value - min_value + 2 * widening)
+        return min_value - widening - margin, max_value + widening + margin
 
 
 @dataclass(frozen=True, slots=True)
@@ -163,14 +163,14 @@ class Chart:
         return (float(values.min()), float(values.max())) if values.size else (0.0, 1.0)
 
 
-def series(name: str, role: str, along: Floats, values: ArrayLike, **more: Any) -> Layer:
+def series(name: str, role: str, along: Floats, values: ArrayLike, **options: Any) -> Layer:
     """Return a line over a long axis, thinned without losing a peak.
 
     along, values: (t,).
     """
     column = np.asarray(values, dtype=np.float64)
     rows = outline_rows(column, BLOCKS)
-    return Layer("line", name, role, along[rows], column[rows], **more)
+    return Layer("line", name, role, along[rows], column[rows], **options)
 
 
 def filled_series(name: str, role: str, along: Floats, values: ArrayLike) -> Layer:
@@ -192,12 +192,12 @@ def parted(parts: Sequence[Floats]) -> tuple[Floats, Floats]:
     return together[:, 0], together[:, 1]
 
 
-def held_band(held: NDArray[np.bool_], along: Floats, span: tuple[float, float]) -> Layer:
+def held_band(is_held: NDArray[np.bool_], along: Floats, span: tuple[float, float]) -> Layer:
     """Return a layer that shades, over the full height, where a control is held at its limit on a long axis (t,)."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], held, [False]]).astype(np.int8)))
-    starts, ends = along[edges[::2]], along[edges[1::2] - 1]
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], is_held, [False]]).astype(np.int8)))
+    starts, band_ends = along[edges[::2]], along[edges[1::2] - 1]
     gap = np.full(len(starts), np.nan)
-    x = np.column_stack([starts, ends, ends]).ravel()
+    x = np.column_stack([starts, band_ends, band_ends]).ravel()
     y = np.column_stack([np.full(len(starts), span[1]), np.full(len(starts), span[1]), gap]).ravel()
     return Layer("band", "held at its limit", "held", x, y, np.full(len(x), span[0]), quiet=True)
 
@@ -217,13 +217,13 @@ def outline_rows(values: ArrayLike, count: int) -> Indices:
     if column.size <= 2 * count:
         return np.arange(column.size)
     edges = np.linspace(0, column.size, count + 1).astype(np.intp)
-    starts, ends = edges[:-1], edges[1:]
+    starts, block_ends = edges[:-1], edges[1:]
     rows = starts[:, None] + np.arange(np.diff(edges).max())
     blocks = column[np.minimum(rows, column.size - 1)]
-    known = (rows < ends[:, None]) & np.isfinite(blocks)
+    is_known = (rows < block_ends[:, None]) & np.isfinite(blocks)
     # A block without known values keeps its first row.
-    lowest = starts + np.where(known, blocks, np.inf).argmin(axis=1)
-    highest = starts + np.where(known, blocks, -np.inf).argmax(axis=1)
+    lowest = starts + np.where(is_known, blocks, np.inf).argmin(axis=1)
+    highest = starts + np.where(is_known, blocks, -np.inf).argmax(axis=1)
     return np.unique(np.concatenate([[0, column.size - 1], lowest, highest]))
 
 
@@ -282,7 +282,7 @@ def chart_json(chart: Chart) -> Json:
         "shared": chart.shared,
         "timed": chart.timed,
         "tall": chart.tall,
-        "marks": [[round(value, 3), words] for value, words in chart.marks],
+        "marks": [[round(value, 3), text] for value, text in chart.marks],
         "panels": [panel_json(panel) for panel in chart.shown_panels()],
     }
 
@@ -303,14 +303,14 @@ def panel_json(panel: Panel) -> Json:
 
 
 def _layer_json(layer: Layer) -> Json:
-    found: Json = {"kind": layer.kind, "name": layer.name, "role": layer.role}
+    document: Json = {"kind": layer.kind, "name": layer.name, "role": layer.role}
     if layer.flight is None:
-        found |= {"x": numbers(layer.x, telling_digits(layer.x)), "y": numbers(layer.y, telling_digits(layer.y))}
+        document |= {"x": numbers(layer.x, telling_digits(layer.x)), "y": numbers(layer.y, telling_digits(layer.y))}
     if layer.low is not None:
-        found["low"] = numbers(layer.low, telling_digits(layer.low))
+        document["low"] = numbers(layer.low, telling_digits(layer.low))
     rarer: Json = {"dashed": layer.dashed, "quiet": layer.quiet, "legend": layer.legend, "words": list(layer.words)}
     rarer = {word: value for word, value in rarer.items() if value}
-    return found | rarer | ({} if layer.flight is None else {"flight": layer.flight})
+    return document | rarer | ({} if layer.flight is None else {"flight": layer.flight})
 
 
 @dataclass(frozen=True, slots=True)
@@ -323,14 +323,14 @@ class LegendEntry:
 
 def legend_entries(panels: Sequence[Panel]) -> tuple[LegendEntry, ...]:
     """Return one entry for each name of the panels' layers, in order, and then the limits, as lines without values."""
-    found: dict[str, list[Layer]] = {}
+    layers_by_name: dict[str, list[Layer]] = {}
     for panel in panels:
         for layer in panel.layers:
             if layer.name and np.isfinite(layer.y).any():
-                found.setdefault(layer.legend or layer.name, []).append(layer)
+                layers_by_name.setdefault(layer.legend or layer.name, []).append(layer)
     for panel in panels:
         for label, _ in panel.limits:
             if label:
                 none = np.zeros(0)
-                found.setdefault(label, []).append(Layer("line", label, "limit", none, none))
-    return tuple(LegendEntry(text, tuple(layers)) for text, layers in found.items())
+                layers_by_name.setdefault(label, []).append(Layer("line", label, "limit", none, none))
+    return tuple(LegendEntry(text, tuple(layers)) for text, layers in layers_by_name.items())

@@ -35,7 +35,7 @@ def both_on_map(flights: tuple[NamedFlight, NamedFlight]) -> MapChart:
     winds = [
         NamedWind(flight.setup.scenario.wind, flight.name, role) for flight, role in zip(flights, ROLES, strict=True)
     ]
-    a, b = (replace(named.wind, seed=None) for named in winds)
+    a, b = (replace(named_wind.wind, seed=None) for named_wind in winds)
     return map_chart(
         with_fence_zones(first.setup).scenario,
         "two flights from above",
@@ -135,10 +135,10 @@ def refly_charts(again: Reflight) -> dict[str, Chart]:
         flown, model = factor * getattr(again.flown, name), factor * getattr(again.model, name)
         if not np.isfinite(flown).any():
             continue
-        both = (series("flown", "flown", along, flown), series("simulated", "other", along, model))
+        lines = (series("flown", "flown", along, flown), series("simulated", "other", along, model))
         difference = (filled_series("flown less simulated", "difference", along, flown - model),)
         panels = (
-            Panel(title, unit, both, min_span=span),
+            Panel(title, unit, lines, min_span=span),
             Panel("difference", unit, difference, limits=(("", 0.0),), min_span=0.5 * span),
         )
         heading = f"{shorten(again.setup.scenario.name, 40)}: flown, and by the model {again.setup.aircraft}"

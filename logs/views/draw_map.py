@@ -100,20 +100,22 @@ def draw_ground(figure: Figure, axes: Any, terrain: Terrain | None, column: floa
     if not np.isfinite(heights).any():
         figure.text(s="no terrain\nhere", **note)
         return []
-    low, high = float(np.nanmin(heights)), float(np.nanmax(heights))
-    flat = high - low < 1.0
+    min_height, max_height = float(np.nanmin(heights)), float(np.nanmax(heights))
+    is_level = max_height - min_height < 1.0
     colours = LinearSegmentedColormap.from_list("ground", theme.GROUND)
-    norm = Normalize(low - 0.5, high + 0.5) if flat else Normalize(low, high)
+    norm = Normalize(min_height - 0.5, max_height + 0.5) if is_level else Normalize(min_height, max_height)
     picture = colours(norm(heights))
-    picture[..., :3] *= 1.0 if flat else relief(heights, float(north[1] - north[0]), high - low)[..., None]
+    picture[..., :3] *= (
+        1.0 if is_level else relief(heights, float(north[1] - north[0]), max_height - min_height)[..., None]
+    )
     picture[np.isnan(heights)] = theme.rgba("unknown")
     extent = (*east_range, *north_range)
     axes.imshow(picture, extent=extent, origin="lower", interpolation="bilinear", zorder=1, aspect="equal")
-    if flat:
-        figure.text(s=f"level ground,\n{low:.0f} m AMSL", **note)
+    if is_level:
+        figure.text(s=f"level ground,\n{min_height:.0f} m AMSL", **note)
         return []
-    step = nice_step(high - low, 10)
-    levels = np.arange(np.ceil(low / step) * step, high, step)
+    step = nice_step(max_height - min_height, 10)
+    levels = np.arange(np.ceil(min_height / step) * step, max_height, step)
     lines = axes.contour(
         east, north, heights, levels=levels, colors=theme.colour("contour"), linewidths=0.45, alpha=0.75, zorder=2
     )
@@ -142,7 +144,8 @@ def draw_compass(figure: Figure, winds: Sequence[NamedWind], column: float, lege
     total = float(figure.get_figheight())
     side = 1.0
     notes = [
-        (_wind_text(named), theme.colour(named.role) if len(winds) > 1 else theme.colour("ink")) for named in winds
+        (_wind_text(named_wind), theme.colour(named_wind.role) if len(winds) > 1 else theme.colour("ink"))
+        for named_wind in winds
     ]
     lines = sum(text.count("\n") + 1 for text, _ in notes)
     base = max(1.35, max(0.2, legend + 0.04) + _LINE * (lines + len(notes) - 1))
@@ -152,12 +155,12 @@ def draw_compass(figure: Figure, winds: Sequence[NamedWind], column: float, lege
     dial.add_patch(Circle((0, 0), 1.0, fill=False, edgecolor=theme.colour("rim"), linewidth=0.8))
     dial.text(0, 1.05, "N", ha="center", va="bottom", fontsize=8.5, fontweight="bold")
     dial.plot([0, 0], [0.82, 1.0], color=theme.colour("ink"), linewidth=1.2)
-    blowing = [named for named in winds if named.wind.speed > 0.0]
-    for k, named in enumerate(blowing):
-        east, north = np.sin(named.wind.from_course), np.cos(named.wind.from_course)
+    blowing = [named_wind for named_wind in winds if named_wind.wind.speed > 0.0]
+    for k, named_wind in enumerate(blowing):
+        east, north = np.sin(named_wind.wind.from_course), np.cos(named_wind.wind.from_course)
         # The second arrow is dashed and shorter, so that both show if they overlap.
         arrow: dict[str, Any] = {"arrowstyle": "-|>", "linewidth": 1.8, "shrinkA": 0, "shrinkB": 0}
-        arrow |= {"color": theme.colour(named.role), "linestyle": (0, (3, 1.5)) if k else "-"}
+        arrow |= {"color": theme.colour(named_wind.role), "linestyle": (0, (3, 1.5)) if k else "-"}
         length = 0.8 - 0.25 * k
         dial.annotate("", (-length * east, -length * north), (length * east, length * north), arrowprops=arrow)
     if not blowing:
@@ -169,9 +172,9 @@ def draw_compass(figure: Figure, winds: Sequence[NamedWind], column: float, lege
         top -= _LINE * (text.count("\n") + 2)
 
 
-def _wind_text(named: NamedWind) -> str:
-    wind = named.wind
-    note = f"{shorten(named.name, 22)}:\n" if named.name else ""
+def _wind_text(named_wind: NamedWind) -> str:
+    wind = named_wind.wind
+    note = f"{shorten(named_wind.name, 22)}:\n" if named_wind.name else ""
     if wind.speed > 0.0:
         note += f"wind {wind.speed:.1f} m/s\nfrom {round(np.degrees(wind.from_course)) % 360:03d}°"
     else:

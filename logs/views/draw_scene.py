@@ -65,9 +65,9 @@ class Projection:
         out, side = math.cos(self.azimuth), math.sin(self.azimuth)
         across = -side * e + out * n
         toward = out * e + side * n
-        high = self.stretch * u
+        height = self.stretch * u
         sin, cos = math.sin(_ELEVATION), math.cos(_ELEVATION)
-        return np.stack([across, cos * high - sin * toward, sin * high + cos * toward], axis=-1)
+        return np.stack([across, cos * height - sin * toward, sin * height + cos * toward], axis=-1)
 
     @property
     def toward(self) -> Floats:
@@ -110,8 +110,8 @@ def draw_scene(view: SceneView) -> Figure:
 def _widened(bounds: Floats) -> Floats:
     """Widen the bounds of a narrow scene, (2, 2) m, to the smallest allowed ratio of the sides."""
     sides = np.ptp(bounds, axis=1)
-    more = 0.5 * np.maximum(_MIN_SIDE_RATIO * sides.max() - sides, 0.0)
-    return np.asarray(bounds + np.stack([-more, more], axis=1))
+    widening = 0.5 * np.maximum(_MIN_SIDE_RATIO * sides.max() - sides, 0.0)
+    return np.asarray(bounds + np.stack([-widening, widening], axis=1))
 
 
 def _projection(route: Floats, bounds: Floats, stretch: float, narrow: bool) -> Projection:
@@ -129,8 +129,8 @@ def _compass_name(azimuth: float) -> str:
 
 
 def _frame(setup: FlightSetup, projection: Projection, bounds: Floats, grid: GroundGrid | None) -> tuple[Figure, Any]:
-    low = float(np.nanmin(grid.heights)) if grid is not None else float(setup.route.waypoints[:, 2].min())
-    corners = np.array([[e, n, low] for e in bounds[0] for n in bounds[1]])
+    min_altitude = float(np.nanmin(grid.heights)) if grid is not None else float(setup.route.waypoints[:, 2].min())
+    corners = np.array([[e, n, min_altitude] for e in bounds[0] for n in bounds[1]])
     threats = setup.scenario.threats
     tops = threats.position + np.maximum(threats.kill_radius, threats.detection_radius)[:, None] * np.array([0, 0, 1.0])
     drawn = [projection.project(corners), projection.project(setup.route.waypoints), projection.project(tops)]
@@ -139,18 +139,20 @@ def _frame(setup: FlightSetup, projection: Projection, bounds: Floats, grid: Gro
         surface = projection.project(np.stack([e, n, grid.heights], axis=-1)).reshape(-1, 3)
         drawn.append(surface[np.isfinite(surface).all(axis=1)])
     together = np.vstack(drawn)[:, :2]
-    least, most = together.min(axis=0), together.max(axis=0)
-    padding = 0.03 * float((most - least).max())
-    least, most = least - padding, most + padding
-    wide = WIDTH - _LEFT - _RIGHT
+    min_corner, max_corner = together.min(axis=0), together.max(axis=0)
+    padding = 0.03 * float((max_corner - min_corner).max())
+    min_corner, max_corner = min_corner - padding, max_corner + padding
+    figure_width = WIDTH - _LEFT - _RIGHT
     # Add space above and below a flat scene.
-    short = max(0.0, 3.0 / wide * (most[0] - least[0]) - (most[1] - least[1]))
-    least[1], most[1] = least[1] - 0.5 * short, most[1] + 0.5 * short
-    tall = float(np.clip(wide * (most[1] - least[1]) / (most[0] - least[0]), 3.0, 8.0))
-    total = tall + _TOP + _BOTTOM
+    missing_height = max(0.0, 3.0 / figure_width * (max_corner[0] - min_corner[0]) - (max_corner[1] - min_corner[1]))
+    min_corner[1], max_corner[1] = min_corner[1] - 0.5 * missing_height, max_corner[1] + 0.5 * missing_height
+    figure_height = float(
+        np.clip(figure_width * (max_corner[1] - min_corner[1]) / (max_corner[0] - min_corner[0]), 3.0, 8.0)
+    )
+    total = figure_height + _TOP + _BOTTOM
     figure = new_figure(total)
-    axes = figure.add_axes((_LEFT / WIDTH, _BOTTOM / total, wide / WIDTH, tall / total))
-    axes.set(xlim=(least[0], most[0]), ylim=(least[1], most[1]), facecolor=theme.colour("sky"))
+    axes = figure.add_axes((_LEFT / WIDTH, _BOTTOM / total, figure_width / WIDTH, figure_height / total))
+    axes.set(xlim=(min_corner[0], max_corner[0]), ylim=(min_corner[1], max_corner[1]), facecolor=theme.colour("sky"))
     axes.set_aspect("equal", adjustable="box")
     axes.set(xticks=[], yticks=[])
     for spine in axes.spines.values():
@@ -182,12 +184,14 @@ def _ground_surface(axes: Any, projection: Projection, grid: GroundGrid | None, 
     )
     slope_e, slope_n = projection.stretch * up_east, projection.stretch * up_north
     lit = (0.5 * slope_e - 0.5 * slope_n + 0.8) / np.sqrt(1.14 * (1.0 + slope_e**2 + slope_n**2))
-    low, high = float(np.nanmin(grid.heights)), float(np.nanmax(grid.heights))
-    colours = LinearSegmentedColormap.from_list("ground", theme.GROUND)((grid.heights - low) / max(high - low, 1.0))
+    min_height, max_height = float(np.nanmin(grid.heights)), float(np.nanmax(grid.heights))
+    colours = LinearSegmentedColormap.from_list("ground", theme.GROUND)(
+        (grid.heights - min_height) / max(max_height - min_height, 1.0)
+    )
     colours[..., :3] *= np.clip(0.55 + 0.5 * lit, 0.35, 1.0)[..., None]
     faces = 0.25 * (colours[:-1, :-1] + colours[:-1, 1:] + colours[1:, 1:] + colours[1:, :-1]).reshape(-1, 4)
-    good = np.isfinite(cells).all(axis=(1, 2))
-    order = np.flatnonzero(good)[np.argsort(cells[good][:, :, 2].mean(axis=1), kind="stable")]
+    is_known = np.isfinite(cells).all(axis=(1, 2))
+    order = np.flatnonzero(is_known)[np.argsort(cells[is_known][:, :, 2].mean(axis=1), kind="stable")]
     # Draw edges in the colour of the cells, to close the seams left by antialiasing.
     axes.add_collection(
         PolyCollection(
@@ -212,8 +216,8 @@ def _threats(axes: Any, projection: Projection, setup: FlightSetup, failed: Fail
     # Stretched dome of radius 1: far half of its outline, and near half of its base.
     tall = math.hypot(math.sin(_ELEVATION), projection.stretch * math.cos(_ELEVATION))
     round_it = np.linspace(0.0, 2.0 * math.pi, 97)
-    high = np.where(round_it < math.pi, tall, math.sin(_ELEVATION)) * np.sin(round_it)
-    shape = np.column_stack([np.cos(round_it), high])
+    vertical = np.where(round_it < math.pi, tall, math.sin(_ELEVATION)) * np.sin(round_it)
+    shape = np.column_stack([np.cos(round_it), vertical])
     looks: tuple[tuple[str, Floats, dict[str, Any]], ...] = (
         ("missile", threats.kill_radius, {"facecolor": theme.rgba("missile", theme.LOOKS["missile"].fill)}),
         ("radar", threats.detection_radius, {"facecolor": "none", "linestyle": (0, (4, 2.5))}),
@@ -235,10 +239,10 @@ def _threats(axes: Any, projection: Projection, setup: FlightSetup, failed: Fail
 def _zones(axes: Any, projection: Projection, setup: FlightSetup) -> list[Any]:
     """Draw walls of the zones, from ground or floor to the ceiling, or to above the path."""
     zones, route = setup.scenario.zones, setup.route.waypoints
-    low, top = float(route[:, 2].min()), float(route[:, 2].max()) + 50.0
+    min_altitude, max_altitude = float(route[:, 2].min()), float(route[:, 2].max()) + 50.0
     for zone in zones:
         fill = theme.rgba("zone", 0.10 if zone.kind == "exclusion" else 0.03)
-        for wall in zone_walls(zone, setup.scenario.terrain, low, top):
+        for wall in zone_walls(zone, setup.scenario.terrain, min_altitude, max_altitude):
             drawn = projection.project(wall)[:, :, :2]
             sides = np.concatenate([drawn[:-1], drawn[1:, ::-1]], axis=1)
             axes.add_collection(PolyCollection(list(sides), facecolor=fill, edgecolor="none", zorder=3.2))
@@ -264,8 +268,8 @@ def _hidden(projection: Projection, terrain: Terrain | None, points: Floats) -> 
     if terrain is None:
         return hidden
     for distance in np.geomspace(2.0 * terrain.spacing, 15_000.0, 70):
-        there = points + distance * projection.toward
-        hidden |= terrain.height(there[:, 0], there[:, 1]) > there[:, 2]
+        sight_points = points + distance * projection.toward
+        hidden |= terrain.height(sight_points[:, 0], sight_points[:, 1]) > sight_points[:, 2]
     return hidden
 
 
@@ -280,15 +284,15 @@ def _draw_paths(
 ) -> list[Any]:
     _, samples = route_samples(route, max(float(route_distance(route)[-1]) / 600.0, 1.0))
     if terrain is not None:
-        under = terrain.height(route[:, 0], route[:, 1])
-        feet = np.column_stack([route[:, :2], np.where(np.isfinite(under), under, route[:, 2])])
+        ground = terrain.height(route[:, 0], route[:, 1])
+        feet = np.column_stack([route[:, :2], np.where(np.isfinite(ground), ground, route[:, 2])])
         poles = np.stack([projection.project(route)[:, :2], projection.project(feet)[:, :2]], axis=1)
         axes.add_collection(LineCollection(list(poles), colors=theme.colour("pole"), linewidths=0.7, zorder=4))
     for leg in failed.legs:
-        ends = projection.project(route[leg : leg + 2])
+        leg_points = projection.project(route[leg : leg + 2])
         axes.plot(
-            ends[:, 0],
-            ends[:, 1],
+            leg_points[:, 0],
+            leg_points[:, 1],
             color=theme.colour("fail"),
             linewidth=9.0,
             alpha=0.9,
@@ -333,8 +337,8 @@ def _draw_path(
     hidden = _hidden(projection, terrain, points)
     open_part = np.where(hidden[:, None], np.nan, projected[:, :2])
     # Include the neighbours of hidden rows, so that the two parts meet.
-    near = hidden | np.roll(hidden, 1) | np.roll(hidden, -1)
-    shut_part = np.where(near[:, None], projected[:, :2], np.nan)
+    is_near_hidden = hidden | np.roll(hidden, 1) | np.roll(hidden, -1)
+    shut_part = np.where(is_near_hidden[:, None], projected[:, :2], np.nan)
     axes.plot(*open_part.T, color=colour, linewidth=width, zorder=order, solid_capstyle="round")
     axes.plot(*shut_part.T, color=colour, linewidth=0.5 * width, alpha=0.6, linestyle=(0, (2, 1.5)), zorder=order)
 
@@ -356,8 +360,8 @@ def _draw_labels(
             write(str(k), corners[k], "number", "fail" if k in failed.waypoints else "waypoint")
     threats = setup.scenario.threats
     entered = failed.threat_names()
-    named = list(zip(threats.names, projection.project(threats.position), strict=True))
+    labels = list(zip(threats.names, projection.project(threats.position), strict=True))
     # Entered spheres first: they get the best places.
-    for k in sorted(range(min(len(named), _MAX_NAMES)), key=lambda k: k not in entered):
-        name, point = named[k]
+    for k in sorted(range(min(len(labels), _MAX_NAMES)), key=lambda k: k not in entered):
+        name, point = labels[k]
         write(shorten(name, 20), point, "number" if k in entered else "name", "fail" if k in entered else "ink")

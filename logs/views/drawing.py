@@ -141,25 +141,25 @@ def svg_bytes(figure: Figure) -> bytes:
     return _rendered(figure, "svg", {"Date": None, "Creator": None})
 
 
-def page_svg(figure: Figure, words: str) -> str:
+def page_svg(figure: Figure, description: str) -> str:
     """Return the figure as a page element, in the light and dark colours of the page (`theme.css_variables`).
 
-    words: description for readers who cannot see the figure.
+    description: description for readers who cannot see the figure.
 
     >>> page_svg(new_figure(2.0), "nothing")[:62]
     '<svg role="img" aria-label="nothing" viewBox="0 0 720 144" xml'
     """
     text = svg_bytes(figure).decode("utf-8")
     text = text[text.index("<svg") :]
-    opening, rest = text.split(">", 1)
+    opening, body = text.split(">", 1)
     box = re.search(r'viewBox="[^"]*"', opening)
     names = re.findall(r'xmlns(?::\w+)?="[^"]*"', opening)
     # Remove the unused names of groups: they would be duplicates in a page of several pictures.
-    drawn = re.sub(r'<g id="[^"]*"', "<g", re.sub(r"<metadata>.*?</metadata>", "", rest, flags=re.DOTALL))
+    drawn = re.sub(r'<g id="[^"]*"', "<g", re.sub(r"<metadata>.*?</metadata>", "", body, flags=re.DOTALL))
     # Make the used names unique to the picture.
-    own = f"p{zlib.crc32(words.encode()):x}-"
+    own = f"p{zlib.crc32(description.encode()):x}-"
     drawn = re.sub(r'( id="|href="#|url\(#)', rf"\g<1>{own}", drawn)
-    head = " ".join(['<svg role="img"', f'aria-label="{escape(words)}"', box[0] if box else "", *sorted(names)])
+    head = " ".join(['<svg role="img"', f'aria-label="{escape(description)}"', box[0] if box else "", *sorted(names)])
     return f"{head}>{theme.with_variables(drawn)}".rstrip()
 
 
@@ -265,9 +265,9 @@ def shares_legend(panels: Sequence[Panel]) -> bool:
 
 
 def _draw_panel(axes: Any, chart: Chart, panel: Panel, *, numbered: bool) -> None:
-    low, high = chart.shown_reach()
+    min_x, max_x = chart.shown_reach()
     if chart.shared:
-        axes.set_xlim(low, max(high, low + 1e-3))
+        axes.set_xlim(min_x, max(max_x, min_x + 1e-3))
         axes.xaxis.set_major_locator(MultipleLocator(nice_step(float(np.ptp(axes.get_xlim())), 14)))
         _draw_marks(axes, chart.marks, numbered=numbered and chart.legend == "beside")
     else:
@@ -278,8 +278,13 @@ def _draw_panel(axes: Any, chart: Chart, panel: Panel, *, numbered: bool) -> Non
     draw_layers(axes, panel)
     write_labels(axes, panel)
     if panel.note:
-        at: dict[str, Any] = {"xycoords": "axes fraction", "textcoords": "offset points", "ha": "right", "fontsize": 7}
-        axes.annotate(panel.note, (1.0, 1.0), (0, 3), color=theme.colour("limit"), **at)
+        text_options: dict[str, Any] = {
+            "xycoords": "axes fraction",
+            "textcoords": "offset points",
+            "ha": "right",
+            "fontsize": 7,
+        }
+        axes.annotate(panel.note, (1.0, 1.0), (0, 3), color=theme.colour("limit"), **text_options)
     axes.set_ylabel(panel.label if chart.inches > 2.0 else "\n".join(_title_lines(panel)))
     axes.yaxis.set_label_coords(-_LABEL / (WIDTH * axes.get_position().width), 0.5)
     axes.grid(visible=True, axis="both" if chart.shared else "y")
@@ -287,8 +292,8 @@ def _draw_panel(axes: Any, chart: Chart, panel: Panel, *, numbered: bool) -> Non
 
 
 def _title_lines(panel: Panel) -> list[str]:
-    words = textwrap.wrap(panel.title.replace(" +", "\N{NO-BREAK SPACE}+"), 13)
-    lines = [line.replace("\N{NO-BREAK SPACE}", " ") for line in words]
+    wrapped = textwrap.wrap(panel.title.replace(" +", "\N{NO-BREAK SPACE}+"), 13)
+    lines = [line.replace("\N{NO-BREAK SPACE}", " ") for line in wrapped]
     if not panel.unit:
         return lines
     unit = f"({panel.unit})"
@@ -303,30 +308,36 @@ def _draw_marks(axes: Any, marks: Sequence[tuple[float, str]], *, numbered: bool
         axes.axvline(value, color=theme.colour("rim"), linewidth=0.6, alpha=0.7, zorder=1)
     if not numbered or not marks:
         return
-    low, high = axes.get_xlim()
+    min_x, max_x = axes.get_xlim()
     last = -math.inf
-    ends = [value for value, _ in marks[1:]] + [high]
-    at: dict[str, Any] = {"xycoords": ("data", "axes fraction"), "textcoords": "offset points", "ha": "center"}
-    for (value, words), end in zip(marks, ends, strict=True):
+    mark_ends = [value for value, _ in marks[1:]] + [max_x]
+    text_options: dict[str, Any] = {
+        "xycoords": ("data", "axes fraction"),
+        "textcoords": "offset points",
+        "ha": "center",
+    }
+    for (value, mark_text), end in zip(marks, mark_ends, strict=True):
         middle = 0.5 * (value + end)
-        if middle - last < 0.022 * (high - low):
+        if middle - last < 0.022 * (max_x - min_x):
             continue
-        text = words if last == -math.inf else words.removeprefix("leg ")
-        axes.annotate(text, (middle, 1.0), (0, 3), color=theme.colour("quiet"), annotation_clip=False, fontsize=7, **at)
+        text = mark_text if last == -math.inf else mark_text.removeprefix("leg ")
+        axes.annotate(
+            text, (middle, 1.0), (0, 3), color=theme.colour("quiet"), annotation_clip=False, fontsize=7, **text_options
+        )
         last = middle
 
 
 def _number_places(axes: Any, panel: Panel) -> None:
     """Label the horizontal axis with waypoints or legs, with failing ones in the colour of failures."""
-    at = np.unique(np.concatenate([layer.x for layer in panel.layers]))
+    places = np.unique(np.concatenate([layer.x for layer in panel.layers]))
     failing = {float(x) for layer in panel.layers if layer.kind == "rings" for x in layer.x}
-    step = -(-len(at) // _MAX_TICKS)
-    ticks = sorted({*at[::step].tolist(), *sorted(failing)[:_MAX_TICKS]})
+    step = -(-len(places) // _MAX_TICKS)
+    ticks = sorted({*places[::step].tolist(), *sorted(failing)[:_MAX_TICKS]})
     axes.set_xticks(ticks, [f"{tick:.0f}" for tick in ticks])
     for text, tick in zip(axes.get_xticklabels(), ticks, strict=True):
         if tick in failing:
             text.set(color=theme.colour("fail"), fontweight="bold")
-    axes.set_xlim(at[0] - 0.8, at[-1] + 0.8)
+    axes.set_xlim(places[0] - 0.8, places[-1] + 0.8)
 
 
 # Layers.
@@ -349,8 +360,8 @@ def draw_layers(axes: Any, panel: Panel, above: float = 2.0) -> None:
         )
     for k, layer in enumerate(panel.layers):
         # Draw bands below the limits, and all other layers above them.
-        low = layer.kind in ("band", "area") and layer.role != "terrain"
-        order = above + (0.0 if low else 1.0) + 0.9 * k / len(panel.layers)
+        is_background = layer.kind in ("band", "area") and layer.role != "terrain"
+        order = above + (0.0 if is_background else 1.0) + 0.9 * k / len(panel.layers)
         _DRAWERS[layer.kind](
             axes, layer, theme.LOOKS[layer.role], zorder=order, label=layer.legend or layer.name or None
         )
@@ -361,7 +372,7 @@ def _dashes(look: theme.Look, dashed: bool = False) -> Any:
     return (0, tuple(part / max(look.width, 0.1) for part in pattern)) if pattern else "-"
 
 
-def _draw_line(axes: Any, layer: Layer, look: theme.Look, **more: Any) -> None:
+def _draw_line(axes: Any, layer: Layer, look: theme.Look, **options: Any) -> None:
     blot = layer.role == "failing-leg" and np.hypot(np.ptp(layer.x), np.ptp(layer.y)) < 0.02 * np.ptp(axes.get_xlim())
     cap = "round" if blot or layer.role in ("planned", "inside") else "butt"
     (line,) = axes.plot(
@@ -372,22 +383,22 @@ def _draw_line(axes: Any, layer: Layer, look: theme.Look, **more: Any) -> None:
         linestyle=_dashes(look, layer.dashed),
         solid_capstyle=cap,
         solid_joinstyle="round",
-        **more,
+        **options,
     )
     if look.halo:
         rim = patheffects.Stroke(linewidth=look.width + 1.2, foreground=theme.colour("paper"), alpha=0.8)
         line.set_path_effects([rim, patheffects.Normal()])
 
 
-def _draw_band(axes: Any, layer: Layer, look: theme.Look, **more: Any) -> None:
-    low = layer.low if layer.low is not None else np.zeros(len(layer.y))
-    known = np.isfinite(layer.x) & np.isfinite(layer.y) & np.isfinite(low)
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], known, [False]]).astype(np.int8)))
+def _draw_band(axes: Any, layer: Layer, look: theme.Look, **options: Any) -> None:
+    lower_edge = layer.low if layer.low is not None else np.zeros(len(layer.y))
+    is_known = np.isfinite(layer.x) & np.isfinite(layer.y) & np.isfinite(lower_edge)
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], is_known, [False]]).astype(np.int8)))
     sides = [
-        np.column_stack([np.append(layer.x[a:b], layer.x[a:b][::-1]), np.append(layer.y[a:b], low[a:b][::-1])])
+        np.column_stack([np.append(layer.x[a:b], layer.x[a:b][::-1]), np.append(layer.y[a:b], lower_edge[a:b][::-1])])
         for a, b in zip(edges[::2], edges[1::2], strict=True)
     ]
-    axes.add_collection(PolyCollection(sides, **_area_look(look), **more))
+    axes.add_collection(PolyCollection(sides, **_area_look(look), **options))
 
 
 def _area_look(look: theme.Look) -> dict[str, Any]:
@@ -401,34 +412,34 @@ def _area_look(look: theme.Look) -> dict[str, Any]:
     }
 
 
-def _draw_area(axes: Any, layer: Layer, look: theme.Look, **more: Any) -> None:
+def _draw_area(axes: Any, layer: Layer, look: theme.Look, **options: Any) -> None:
     """Draw all rings as one path, so that holes stay open."""
     points = np.column_stack([layer.x, layer.y])
     gaps = np.flatnonzero(np.isnan(layer.x))
     rings = [ring[np.isfinite(ring[:, 0])] for ring in np.split(points, gaps)]
     shape = Path.make_compound_path(*(Path(ring, closed=True) for ring in rings))
-    axes.add_patch(PathPatch(shape, **_area_look(look), **more))
+    axes.add_patch(PathPatch(shape, **_area_look(look), **options))
 
 
-def _draw_bars(axes: Any, layer: Layer, look: theme.Look, **more: Any) -> None:
-    axes.bar(layer.x, layer.y, width=0.62, color=look.light, **more)
+def _draw_bars(axes: Any, layer: Layer, look: theme.Look, **options: Any) -> None:
+    axes.bar(layer.x, layer.y, width=0.62, color=look.light, **options)
 
 
-def _draw_dots(axes: Any, layer: Layer, look: theme.Look, **more: Any) -> None:
-    axes.plot(layer.x, layer.y, **_dot_look(look, len(layer.x)), **more)
+def _draw_dots(axes: Any, layer: Layer, look: theme.Look, **options: Any) -> None:
+    axes.plot(layer.x, layer.y, **_dot_look(look, len(layer.x)), **options)
 
 
 def _dot_look(look: theme.Look, count: int = 1) -> dict[str, Any]:
     size = 3.0 if count > _MAX_TICKS and look.size == 5.5 else look.size
-    found: dict[str, Any] = {"marker": _MARKERS[look.marker], "linestyle": "", "markersize": size, "color": look.light}
+    style: dict[str, Any] = {"marker": _MARKERS[look.marker], "linestyle": "", "markersize": size, "color": look.light}
     if look.face:
-        return found | {"mfc": theme.colour(look.face), "mec": look.light, "mew": look.width}
+        return style | {"mfc": theme.colour(look.face), "mec": look.light, "mew": look.width}
     faint = look.size < 3.0
-    return found | {"mew": 0.0 if faint else 0.8, "alpha": look.fill if faint else 1.0}
+    return style | {"mew": 0.0 if faint else 0.8, "alpha": look.fill if faint else 1.0}
 
 
-def _draw_rings(axes: Any, layer: Layer, look: theme.Look, **more: Any) -> None:
-    axes.plot(layer.x, layer.y, **_ring_look(look), **more)
+def _draw_rings(axes: Any, layer: Layer, look: theme.Look, **options: Any) -> None:
+    axes.plot(layer.x, layer.y, **_ring_look(look), **options)
 
 
 def _ring_look(look: theme.Look) -> dict[str, Any]:
@@ -444,8 +455,8 @@ def _ring_look(look: theme.Look) -> dict[str, Any]:
     }
 
 
-def _draw_dashes(axes: Any, layer: Layer, look: theme.Look, **more: Any) -> None:
-    axes.hlines(layer.y, layer.x - 0.42, layer.x + 0.42, color=look.light, linewidth=2.0, **more)
+def _draw_dashes(axes: Any, layer: Layer, look: theme.Look, **options: Any) -> None:
+    axes.hlines(layer.y, layer.x - 0.42, layer.x + 0.42, color=look.light, linewidth=2.0, **options)
 
 
 _DRAWERS: dict[str, Any] = {

@@ -57,8 +57,8 @@ def flown_moments(track: Track, count: int = _MAX_DOTS) -> FlownMoments:
     speed = track.airspeed[rows].astype(np.float64)
     roll, _, _ = track.attitude[rows].T
     bank = np.degrees(np.abs(roll.astype(np.float64)))
-    good = np.isfinite(speed) & np.isfinite(angle) & np.isfinite(bank)
-    return FlownMoments(speed[good], angle[good], bank[good])
+    is_finite = np.isfinite(speed) & np.isfinite(angle) & np.isfinite(bank)
+    return FlownMoments(speed[is_finite], angle[is_finite], bank[is_finite])
 
 
 def envelope_chart(setup: FlightSetup, track: Track | None) -> Chart:
@@ -74,22 +74,24 @@ def envelope_chart(setup: FlightSetup, track: Track | None) -> Chart:
     slopes, banks = [], []
     for line, dashed in zip(envelope_lines(setup), (False, True), strict=False):
         for name, role, angle in (("climb", "steady-limit", line.climb), ("descent", "second", line.descent)):
-            named = f"steepest {name} at {line.amsl} m"
-            slopes.append(Layer("line", named, role, line.airspeed, angle, dashed=dashed))
+            line_name = f"steepest {name} at {line.amsl} m"
+            slopes.append(Layer("line", line_name, role, line.airspeed, angle, dashed=dashed))
     if track is not None and len(track):
         flown = flown_moments(track)
         slopes.append(Layer("dots", "flown, moment by moment", "moment", flown.airspeed, flown.angle))
         banks.append(Layer("dots", "flown, moment by moment", "moment", flown.airspeed, flown.bank))
-    legs, asked = np.degrees(leg_slopes(setup.shown_waypoints)), np.asarray(setup.route.airspeed)
-    slopes.append(Layer("dots", "legs as planned (over the ground)", "planned-leg", asked, legs))
-    low, high = float(setup.envelope.airspeed[0]), float(setup.envelope.airspeed[-1])
-    reach = (low - 0.5, high + 0.5)
-    ends = np.array(reach)
+    legs, commanded = np.degrees(leg_slopes(setup.shown_waypoints)), np.asarray(setup.route.airspeed)
+    slopes.append(Layer("dots", "legs as planned (over the ground)", "planned-leg", commanded, legs))
+    min_speed, max_speed = float(setup.envelope.airspeed[0]), float(setup.envelope.airspeed[-1])
+    reach = (min_speed - 0.5, max_speed + 0.5)
+    reach_ends = np.array(reach)
     planned, aircraft = (float(np.degrees(bank)) for bank in (setup.max_bank, setup.envelope.max_bank))
     limits = [("limit of planned turns; corrections may bank beyond it", min(planned, aircraft), False)]
     if abs(aircraft - min(planned, aircraft)) > 0.1:
         limits.append(("the aircraft's bank limit", aircraft, True))
-    banks += [Layer("line", name, "steady-limit", ends, np.full(2, value), dashed=dash) for name, value, dash in limits]
+    banks += [
+        Layer("line", name, "steady-limit", reach_ends, np.full(2, value), dashed=dash) for name, value, dash in limits
+    ]
     top = max([value for _, value, _ in limits] + [float(layer.y.max()) for layer in banks if layer.y.size])
     panels = (
         Panel("path angle through the air", "°", tuple(slopes)),

@@ -68,15 +68,15 @@ def failures(verdict: Verdict | None, waypoint_count: int) -> Failures:
 
 def _rules_at(failed: list[Finding], kind: PlaceKind, count: int) -> dict[int, tuple[str, ...]]:
     """Return the rules that failed at the first `count` places of a kind, by number of the place."""
-    found: dict[int, list[str]] = {}
+    rules_by_place: dict[int, list[str]] = {}
     for finding in failed:
         place = finding.place
         if place.kind == kind and place.index is not None and place.index < count:
-            rules = found.setdefault(place.index, [])
+            rules = rules_by_place.setdefault(place.index, [])
             word = rule_word(finding.rule)
             if word not in rules:
                 rules.append(word)
-    return {number: tuple(rules) for number, rules in sorted(found.items())}
+    return {number: tuple(rules) for number, rules in sorted(rules_by_place.items())}
 
 
 def stop_rows(stops: Sequence[int]) -> list[int]:
@@ -97,10 +97,10 @@ def route_distance(waypoints: Floats) -> Floats:
 
 def route_samples(waypoints: Floats, step: float) -> tuple[Floats, Floats]:
     """Return distance (s,) m and position (s, 3) m of waypoints and points between, at most `step` apart."""
-    at = route_distance(waypoints)
-    count = max(2, int(np.ceil(at[-1] / step)) + 1) if at[-1] > 0.0 else 2
-    distance = np.union1d(np.linspace(0.0, at[-1], count), at)
-    return distance, np.column_stack([np.interp(distance, at, waypoints[:, axis]) for axis in range(3)])
+    waypoint_distances = route_distance(waypoints)
+    count = max(2, int(np.ceil(waypoint_distances[-1] / step)) + 1) if waypoint_distances[-1] > 0.0 else 2
+    distance = np.union1d(np.linspace(0.0, waypoint_distances[-1], count), waypoint_distances)
+    return distance, np.column_stack([np.interp(distance, waypoint_distances, waypoints[:, axis]) for axis in range(3)])
 
 
 def paths_differ(a: Floats, b: Floats, tolerance: float) -> bool:
@@ -118,9 +118,9 @@ def _farthest(points: Floats, path: Floats) -> float:
     farthest = 0.0
     for point in points:
         dot = ((point - start) * step).sum(axis=1)
-        share = np.clip(np.divide(dot, length2, out=np.zeros_like(dot), where=length2 > 0.0), 0.0, 1.0)
-        near = start + share[:, None] * step
-        farthest = max(farthest, float(np.sqrt(((near - point) ** 2).sum(axis=1).min())))
+        fraction = np.clip(np.divide(dot, length2, out=np.zeros_like(dot), where=length2 > 0.0), 0.0, 1.0)
+        nearest_point = start + fraction[:, None] * step
+        farthest = max(farthest, float(np.sqrt(((nearest_point - point) ** 2).sum(axis=1).min())))
     return farthest
 
 
@@ -130,14 +130,14 @@ def track_distance(waypoints: Floats, track: Track) -> Floats:
     A row is projected onto its active leg and held between that leg's ends; a row without a position keeps the
     distance reached before it.
     """
-    at = route_distance(waypoints)
+    waypoint_distances = route_distance(waypoints)
     leg = np.clip(track.leg.astype(np.intp), 0, len(waypoints) - 2)
     start, end = waypoints[leg, :2], waypoints[leg + 1, :2]
     step = end - start
     length2 = (step**2).sum(axis=1)
     dot = ((track.position[:, :2] - start) * step).sum(axis=1)
-    share = np.divide(dot, length2, out=np.zeros_like(dot), where=length2 > 0.0)
-    distance = at[leg] + np.clip(share, 0.0, 1.0) * np.sqrt(length2)
+    fraction = np.divide(dot, length2, out=np.zeros_like(dot), where=length2 > 0.0)
+    distance = waypoint_distances[leg] + np.clip(fraction, 0.0, 1.0) * np.sqrt(length2)
     return np.asarray(np.maximum.accumulate(np.where(np.isfinite(distance), distance, 0.0)))
 
 
@@ -166,6 +166,6 @@ def inside_threats(failed: Failures, threats: Threats, track: Track) -> NDArray[
     """Return flags (t,) of the rows of the track inside a sphere whose rule fails."""
     inside = np.zeros(len(track), dtype=bool)
     for place in failed.threats:
-        away = track.position - threats.position[place.index or 0]
-        inside |= (away**2).sum(axis=1) < radius_of(threats, place) ** 2
+        offsets = track.position - threats.position[place.index or 0]
+        inside |= (offsets**2).sum(axis=1) < radius_of(threats, place) ** 2
     return inside

@@ -34,12 +34,12 @@ def _named(front: Front) -> list[_Named]:
     rows = front.objectives()
     names = ("shortest", "least exposed", "highest above ground", f"least {front.fourth}")
     roles = ("front-shortest", "front-unseen", "front-high", "front-sparing")
-    found: dict[int, _Named] = {}
+    named_plans: dict[int, _Named] = {}
     for k, (name, role) in enumerate(zip(names, roles, strict=True)):
         if np.ptp(rows[:, k]) > 0.0 or k == 0:
             row = int(np.argmin(rows[:, k]))
-            found.setdefault(row, _Named(row, name, role))
-    return list(found.values())
+            named_plans.setdefault(row, _Named(row, name, role))
+    return list(named_plans.values())
 
 
 def front_map(front: Front) -> MapChart:
@@ -47,20 +47,20 @@ def front_map(front: Front) -> MapChart:
 
     The best in each objective are numbered and stand out.
     """
-    scenario, named = front.plans[0].plan.scenario, _named(front)
-    marked = {one.row for one in named}
+    scenario, named_plans = front.plans[0].plan.scenario, _named(front)
+    marked = {plan.row for plan in named_plans}
     layers, labels = [], []
-    for row, one in enumerate(front.plans):
+    for row, plan in enumerate(front.plans):
         if row not in marked:
-            path = one.plan.waypoints
+            path = plan.plan.waypoints
             layers.append(Layer("line", "other plans", "front-other", path[:, 0], path[:, 1], quiet=True))
-    for best in named:
-        path = front.plans[best.row].plan.waypoints
-        name = f"{best.row + 1}: {best.name}"
-        layers.append(Layer("line", name, best.role, path[:, 0], path[:, 1], quiet=True))
+    for named_plan in named_plans:
+        path = front.plans[named_plan.row].plan.waypoints
+        name = f"{named_plan.row + 1}: {named_plan.name}"
+        layers.append(Layer("line", name, named_plan.role, path[:, 0], path[:, 1], quiet=True))
         middle = path[len(path) // 2]
-        labels.append(Label(str(best.row + 1), float(middle[0]), float(middle[1]), "number", best.role))
-    ways = [one.plan.waypoints for one in front.plans]
+        labels.append(Label(str(named_plan.row + 1), float(middle[0]), float(middle[1]), "number", named_plan.role))
+    ways = [plan.plan.waypoints for plan in front.plans]
     shortest = ways[0]
     return world_map(
         scenario,
@@ -75,24 +75,29 @@ def front_map(front: Front) -> MapChart:
 
 def front_chart(front: Front) -> Chart:
     """Return exposure, height above ground, and energy or time of each plan over its length."""
-    named, plans = _named(front), front.plans
-    along = np.array([one.length for one in plans]) / 1e3
-    rest = np.setdiff1d(np.arange(len(plans)), [one.row for one in named])
+    named_plans, plans = _named(front), front.plans
+    along = np.array([plan.length for plan in plans]) / 1e3
+    other_rows = np.setdiff1d(np.arange(len(plans)), [plan.row for plan in named_plans])
     columns = [
-        ("exposure to radars", "s", np.array([one.exposure for one in plans])),
-        ("height above ground", "m", np.array([one.clearance for one in plans])),
-        ("energy", "Wh", np.array([one.energy for one in plans]) / _WATT_HOUR),
-        ("time of flight", "s", np.array([one.time for one in plans])),
+        ("exposure to radars", "s", np.array([plan.exposure for plan in plans])),
+        ("height above ground", "m", np.array([plan.clearance for plan in plans])),
+        ("energy", "Wh", np.array([plan.energy for plan in plans]) / _WATT_HOUR),
+        ("time of flight", "s", np.array([plan.time for plan in plans])),
     ]
     panels = []
     for title, unit, values in columns:
-        layers = [Layer("dots", "other plans", "front-other", along[rest], values[rest])] if len(rest) else []
+        layers = (
+            [Layer("dots", "other plans", "front-other", along[other_rows], values[other_rows])]
+            if len(other_rows)
+            else []
+        )
         layers += [
-            Layer("dots", f"{one.row + 1}: {one.name}", one.role, along[[one.row]], values[[one.row]]) for one in named
+            Layer("dots", f"{plan.row + 1}: {plan.name}", plan.role, along[[plan.row]], values[[plan.row]])
+            for plan in named_plans
         ]
         labels = tuple(
             Label(str(row + 1), float(along[row]), float(values[row]), "number")
-            for row in [*(one.row for one in named), *rest]
+            for row in [*(plan.row for plan in named_plans), *other_rows]
             if math.isfinite(values[row])
         )
         panels.append(Panel(title, unit, tuple(layers), min_span=LEAST_SPAN, labels=labels))

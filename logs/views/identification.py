@@ -22,14 +22,14 @@ def equation_chart(equation: Equation) -> Chart:
     """
     unit, factor = _SHOWN[equation.unit]
     time = np.arange(len(equation.measured)) / equation.hertz
-    both = (
+    lines = (
         series("measured", "flown", time, factor * equation.measured),
         series("predicted", "other", time, factor * equation.predicted),
     )
-    left = filled_series("difference", "difference", time, factor * (equation.measured - equation.predicted))
+    residual = filled_series("difference", "difference", time, factor * (equation.measured - equation.predicted))
     panels = (
-        Panel(equation.name, unit, both, min_span=0.1),
-        Panel("measured less predicted", unit, (left,), limits=(("", 0.0),), min_span=0.1),
+        Panel(equation.name, unit, lines, min_span=0.1),
+        Panel("measured less predicted", unit, (residual,), limits=(("", 0.0),), min_span=0.1),
     )
     return Chart(f"{equation.name}, R² {equation.explained:.3f}", "time of all stretches", "s", panels)
 

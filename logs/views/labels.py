@@ -47,8 +47,8 @@ class LabelPlacer:
             self.lines = np.vstack([self.lines, points])
             return
         along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])
-        at = np.arange(0.0, along[-1] + spacing, spacing)
-        sampled = np.column_stack([np.interp(at, along, points[:, axis]) for axis in (0, 1)])
+        sample_distances = np.arange(0.0, along[-1] + spacing, spacing)
+        sampled = np.column_stack([np.interp(sample_distances, along, points[:, axis]) for axis in (0, 1)])
         self.lines = np.vstack([self.lines, sampled])
 
     def place(
@@ -113,8 +113,8 @@ class LabelPlacer:
     def _lead(self, box: Box, x: float, y: float, color: str, width: float) -> None:
         """Draw a thin line from under a label to its point."""
         middle = (0.5 * (box[0] + box[2]), 0.5 * (box[1] + box[3]))
-        ends = self.axes.transData.inverted().transform([middle, (x, y)])
-        self.axes.plot(ends[:, 0], ends[:, 1], "-", color=color, linewidth=width, zorder=8.9, gid="leader")
+        line_ends = self.axes.transData.inverted().transform([middle, (x, y)])
+        self.axes.plot(line_ends[:, 0], line_ends[:, 1], "-", color=color, linewidth=width, zorder=8.9, gid="leader")
 
     def _pixels(self, east: ArrayLike, north: ArrayLike) -> Floats:
         points = np.column_stack([np.asarray(east, dtype=np.float64), np.asarray(north, dtype=np.float64)])
@@ -124,9 +124,9 @@ class LabelPlacer:
     def _box(x: float, y: float, width: float, height: float, distance: float, direction: tuple[int, int]) -> Box:
         dx, dy = direction
         # A diagonal label approaches the point with its corner, so it may stand closer.
-        near = distance * (0.7 if dx and dy else 1.0)
-        middle_x = x + dx * (near + 0.5 * width)
-        middle_y = y + dy * (near + 0.5 * height)
+        offset = distance * (0.7 if dx and dy else 1.0)
+        middle_x = x + dx * (offset + 0.5 * width)
+        middle_y = y + dy * (offset + 0.5 * height)
         return (
             middle_x - 0.5 * width,
             middle_y - 0.5 * height,

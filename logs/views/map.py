@@ -203,12 +203,12 @@ def map_extent(scenario: Scenario, route: Floats | None, ways: Sequence[Floats])
         points.append(route[:, :2])
     points += [way[np.isfinite(way).all(axis=1), :2] for way in ways]
     together = np.vstack(points)
-    low, high = together.min(axis=0), together.max(axis=0)
-    padding = (_MISSION_RIM if scenario.external else _RIM) * float((high - low).max())
-    low, high = low - padding, high + padding
-    width, height = (high - low).tolist()
+    min_corner, max_corner = together.min(axis=0), together.max(axis=0)
+    padding = (_MISSION_RIM if scenario.external else _RIM) * float((max_corner - min_corner).max())
+    min_corner, max_corner = min_corner - padding, max_corner + padding
+    width, height = (max_corner - min_corner).tolist()
     grown = np.array([max(width, height / _ASPECTS[1]), max(height, width * _ASPECTS[0])])
-    middle = 0.5 * (low + high)
+    middle = 0.5 * (min_corner + max_corner)
     (west, south), (east, north) = (middle - 0.5 * grown).tolist(), (middle + 0.5 * grown).tolist()
     return (west, east), (south, north)
 
@@ -255,8 +255,8 @@ def _inside(scenario: Scenario, track: Track, failed: Failures) -> list[Layer]:
 def _waypoints(route: Floats, stops: Sequence[int], failed: Failures, words: Sequence[str]) -> list[Layer]:
     first = stop_rows(stops)
     dots = "waypoint" if len(first) <= _MAX_DOTS else "waypoint-small"
-    said = tuple(words[k] for k in first) if words else ()
-    layers = [Layer("dots", "waypoint, numbered", dots, route[first, 0], route[first, 1], words=said)]
+    texts = tuple(words[k] for k in first) if words else ()
+    layers = [Layer("dots", "waypoint, numbered", dots, route[first, 0], route[first, 1], words=texts)]
     if failed.waypoints:
         east, north = route[list(failed.waypoints), :2].T
         layers.append(Layer("rings", "waypoint that fails a rule", "fail", east, north, quiet=True))

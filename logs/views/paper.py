@@ -67,8 +67,8 @@ def draw_paths(scenario: Scenario, algorithm: str, paths: Sequence[PaperPath]) -
     with clean_style():
         figure, axes, around = _map(scenario, title, _LEGEND)
         handles: list[Any] = []
-        for good, look, label in ((True, _LOOKS[0], "safe"), (False, _LOOKS[1], "not safe")):
-            chosen = [path for path in paths if path.safe == good]
+        for is_safe, look, label in ((True, _LOOKS[0], "safe"), (False, _LOOKS[1], "not safe")):
+            chosen = [path for path in paths if path.safe == is_safe]
             for path in chosen:
                 axes.plot(*path.waypoints[:, :2].T, linewidth=1.3, alpha=0.85, zorder=5, **look)
                 axes.plot(*path.waypoints[1:-1, :2].T, ".", color=look["color"], markersize=3.0, zorder=5.1)
@@ -114,9 +114,9 @@ def _map(scenario: Scenario, title: str, legend: float) -> tuple[Figure, Any, li
 
     legend: height of the legend, inches.
     """
-    low, high = scenario.bounds[:, 0], scenario.bounds[:, 1]
-    padding = 0.02 * float((high - low).max())
-    (west, south), (east, north) = (low - padding).tolist(), (high + padding).tolist()
+    min_corner, max_corner = scenario.bounds[:, 0], scenario.bounds[:, 1]
+    padding = 0.02 * float((max_corner - min_corner).max())
+    (west, south), (east, north) = (min_corner - padding).tolist(), (max_corner + padding).tolist()
     figure, axes = map_frame((west, east), (south, north), legend)
     axes.set(xlabel="east (km)", ylabel="north (km)")
     axes.set_title(title, fontweight="bold")
@@ -132,11 +132,13 @@ def _ends(axes: Any, scenario: Scenario, paths: Sequence[Floats]) -> list[Any]:
     placer = LabelPlacer(axes)
     for path in paths:
         placer.avoid(path[:, 0], path[:, 1])
-    ends = (("start", scenario.start), ("destination", scenario.destination))
-    panel = Panel("north", "m", tuple(Layer("dots", name, name, at[:1], at[1:2]) for name, at in ends))
+    endpoints = (("start", scenario.start), ("destination", scenario.destination))
+    panel = Panel(
+        "north", "m", tuple(Layer("dots", name, name, position[:1], position[1:2]) for name, position in endpoints)
+    )
     draw_layers(axes, panel, above=6.0)
-    for name, at in ends:
-        write_label(placer, Label(name, float(at[0]), float(at[1]), "end"))
+    for name, position in endpoints:
+        write_label(placer, Label(name, float(position[0]), float(position[1]), "end"))
     return [legend_handle(entry) for entry in legend_entries([panel])]
 
 
@@ -164,8 +166,8 @@ def draw_convergence(histories: Mapping[int, Mapping[str, Sequence[Floats]]]) ->
             for (name, searches), look in zip(groups.items(), _LOOKS, strict=False):
                 _draw_progress(upper, lower, searches, look)
                 names = names if name in names else [*names, name]
-            most = max(len(searches) for searches in groups.values())
-            upper.set(ylim=(-0.04 * most, 1.06 * most), title=f"{threats} threats")
+            max_count = max(len(searches) for searches in groups.values())
+            upper.set(ylim=(-0.04 * max_count, 1.06 * max_count), title=f"{threats} threats")
             upper.yaxis.set_major_locator(MaxNLocator(integer=True, nbins=6))
             upper.tick_params(labelbottom=False)
             lower.set(xlabel="generation")
@@ -205,16 +207,16 @@ def _draw_progress(upper: Any, lower: Any, histories: Sequence[Floats], look: Ma
     generation = np.arange(length)
     upper.plot(generation, safe.sum(axis=0), linewidth=1.6, **look)
     ratios = np.where(safe, length_ratio, np.nan)
-    known = safe.any(axis=0)
-    if not known.any():
+    is_known = safe.any(axis=0)
+    if not is_known.any():
         return
-    columns = ratios[:, known]
+    columns = ratios[:, is_known]
     lower.fill_between(
-        generation[known],
+        generation[is_known],
         np.nanmin(columns, axis=0),
         np.nanmax(columns, axis=0),
         color=look["color"],
         alpha=0.13,
         linewidth=0,
     )
-    lower.plot(generation[known], np.nanmedian(columns, axis=0), linewidth=1.6, **look)
+    lower.plot(generation[is_known], np.nanmedian(columns, axis=0), linewidth=1.6, **look)

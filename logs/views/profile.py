@@ -65,39 +65,45 @@ def profile_chart(
     if route is None:
         route = np.vstack([scenario.start, scenario.destination])
     track = track if track is not None and len(track) else None
-    at = route_distance(route)
-    distance, points = route_samples(route, max(float(at[-1]) / _SAMPLES, 1.0))
+    waypoint_distances = route_distance(route)
+    distance, points = route_samples(route, max(float(waypoint_distances[-1]) / _SAMPLES, 1.0))
     ground = ground_under(scenario, points)
     if above_ground is not None and ground is not None and len(above_ground) == len(route):
-        points[:, 2] = _planned_altitudes(at, route, above_ground, distance, points[:, 2], ground, scenario)
-    low, high = _altitude_limits(scenario, route, track, ground)
-    plane = PathPlane(distance / 1000.0, points, ground, low, high)
+        points[:, 2] = _planned_altitudes(
+            waypoint_distances, route, above_ground, distance, points[:, 2], ground, scenario
+        )
+    min_altitude, max_altitude = _altitude_limits(scenario, route, track, ground)
+    plane = PathPlane(distance / 1000.0, points, ground, min_altitude, max_altitude)
     failed = failures(verdict, len(route))
     stops = range(len(route)) if stops is None else stops
     first = stop_rows(stops)
     zones, zone_names = zone_bands(scenario.zones, plane)
     cuts, cut_names = threat_cuts(scenario.threats, plane, frozenset(failed.threat_names()))
     flown, entered = _flown(scenario, route, track, failed, plane)
-    layers = [*zones, *cuts, *ground_bands(scenario, plane), *_failing_legs(at, route, failed)]
+    layers = [*zones, *cuts, *ground_bands(scenario, plane), *_failing_legs(waypoint_distances, route, failed)]
     layers += [] if straight else [Layer("line", "planned", "planned", plane.kilometres, points[:, 2])]
     layers += flown
     labels: list[Label] = []
     if not straight:
         dots = "waypoint" if len(first) <= _MAX_DOTS else "waypoint-small"
-        layers.append(Layer("dots", "waypoint, numbered", dots, at[first] / 1000.0, route[first, 2], quiet=True))
-        labels = _waypoint_labels(at, route, stops, failed)
-    layers += _failing_waypoints(at, route, failed)
-    corners = np.column_stack([at / 1000.0, route[:, 2]])
+        layers.append(
+            Layer("dots", "waypoint, numbered", dots, waypoint_distances[first] / 1000.0, route[first, 2], quiet=True)
+        )
+        labels = _waypoint_labels(waypoint_distances, route, stops, failed)
+    layers += _failing_waypoints(waypoint_distances, route, failed)
+    corners = np.column_stack([waypoint_distances / 1000.0, route[:, 2]])
     labels = [*fail_labels(failed, corners, entered), *labels, *cut_names, *zone_names]
-    limits, note = _bounds(scenario, low, high)
-    panel = Panel("height", "m AMSL", tuple(layers), limits, span=(low, high), note=note, labels=tuple(labels))
-    return _chart(scenario, at, first, panel, straight=straight)
+    limits, note = _bounds(scenario, min_altitude, max_altitude)
+    panel = Panel(
+        "height", "m AMSL", tuple(layers), limits, span=(min_altitude, max_altitude), note=note, labels=tuple(labels)
+    )
+    return _chart(scenario, waypoint_distances, first, panel, straight=straight)
 
 
-def _chart(scenario: Scenario, at: Floats, first: list[int], panel: Panel, *, straight: bool) -> Chart:
+def _chart(scenario: Scenario, waypoint_distances: Floats, first: list[int], panel: Panel, *, straight: bool) -> Chart:
     """Return the panel as a chart.
 
-    at: distance of each waypoint along the route, m.  first: waypoints at which a stop begins.
+    waypoint_distances: distance of each waypoint along the route, m.  first: waypoints at which a stop begins.
     """
     path = "the straight line from start to destination" if straight else "the planned path"
     title = f"{shorten(scenario.name, 60)}: heights along the path"
@@ -106,9 +112,12 @@ def _chart(scenario: Scenario, at: Floats, first: list[int], panel: Panel, *, st
         f"distance along {path}",
         "km",
         (panel,),
-        reach=(0.0, max(float(at[-1]), 1.0) / 1000.0),
+        reach=(0.0, max(float(waypoint_distances[-1]), 1.0) / 1000.0),
         # The leg to a loiter includes the loiter.
-        marks=tuple((float(at[end]) / 1000.0, f"leg {n}") for n, end in enumerate(_leg_begins(first, len(at)))),
+        marks=tuple(
+            (float(waypoint_distances[end]) / 1000.0, f"leg {n}")
+            for n, end in enumerate(_leg_begins(first, len(waypoint_distances)))
+        ),
         tall=420,
         inches=4.05,
         legend="below",
@@ -122,19 +131,27 @@ def _leg_begins(first: list[int], count: int) -> list[int]:
 
 
 def _planned_altitudes(
-    at: Floats, route: Floats, above: Floats, distance: Floats, up: Floats, ground: Floats, scenario: Scenario
+    waypoint_distances: Floats,
+    route: Floats,
+    above: Floats,
+    distance: Floats,
+    up: Floats,
+    ground: Floats,
+    scenario: Scenario,
 ) -> Floats:
     """Return the planned altitude at each route sample, m AMSL, (s,); terrain-following legs keep above the ground.
 
-    at: distance of each waypoint along the route, m.
+    waypoint_distances: distance of each waypoint along the route, m.
     above: height above ground at the end of each leg, m, (w,); NaN if the leg does not follow the terrain.
     distance, up, ground: distance, straight-line altitude and ground altitude of each sample, m, (s,).
     """
-    begins = ground_under(scenario, route)
-    starts = route[:, 2] - (0.0 if begins is None else begins)
-    leg = np.clip(np.searchsorted(at, distance, side="left"), 1, len(at) - 1)
-    share = (distance - at[leg - 1]) / np.maximum(at[leg] - at[leg - 1], 1e-9)
-    followed = ground + starts[leg - 1] + share * (above[leg] - starts[leg - 1])
+    ground_altitudes = ground_under(scenario, route)
+    starts = route[:, 2] - (0.0 if ground_altitudes is None else ground_altitudes)
+    leg = np.clip(np.searchsorted(waypoint_distances, distance, side="left"), 1, len(waypoint_distances) - 1)
+    fraction = (distance - waypoint_distances[leg - 1]) / np.maximum(
+        waypoint_distances[leg] - waypoint_distances[leg - 1], 1e-9
+    )
+    followed = ground + starts[leg - 1] + fraction * (above[leg] - starts[leg - 1])
     return np.where(np.isfinite(followed), followed, up)
 
 
@@ -161,12 +178,12 @@ def _altitude_limits(
             heights.append(np.minimum(ground + scenario.limits.max_height_m, highest))
     together = np.concatenate(heights)
     together = together[np.isfinite(together)]
-    low, high = float(together.min()), float(together.max())
-    span = max(high - low, _MIN_SPAN)
-    if high < scenario.ceiling <= high + 1.2 * span:
-        high = scenario.ceiling
-        span = high - low
-    return low - 0.12 * span, high + 0.14 * span
+    min_altitude, max_altitude = float(together.min()), float(together.max())
+    span = max(max_altitude - min_altitude, _MIN_SPAN)
+    if max_altitude < scenario.ceiling <= max_altitude + 1.2 * span:
+        max_altitude = scenario.ceiling
+        span = max_altitude - min_altitude
+    return min_altitude - 0.12 * span, max_altitude + 0.14 * span
 
 
 def ground_bands(scenario: Scenario, plane: PathPlane) -> list[Layer]:
@@ -210,34 +227,46 @@ def _flown(
     ], places
 
 
-def _failing_legs(at: Floats, route: Floats, failed: Failures) -> list[Layer]:
+def _failing_legs(waypoint_distances: Floats, route: Floats, failed: Failures) -> list[Layer]:
     return [
-        Layer("line", "leg that fails a rule", "failing-leg", at[k : k + 2] / 1000.0, route[k : k + 2, 2], quiet=True)
+        Layer(
+            "line",
+            "leg that fails a rule",
+            "failing-leg",
+            waypoint_distances[k : k + 2] / 1000.0,
+            route[k : k + 2, 2],
+            quiet=True,
+        )
         for k in failed.legs
     ]
 
 
-def _failing_waypoints(at: Floats, route: Floats, failed: Failures) -> list[Layer]:
+def _failing_waypoints(waypoint_distances: Floats, route: Floats, failed: Failures) -> list[Layer]:
     if not failed.waypoints:
         return []
     rows = list(failed.waypoints)
-    return [Layer("rings", "waypoint that fails a rule", "fail", at[rows] / 1000.0, route[rows, 2], quiet=True)]
+    return [
+        Layer(
+            "rings", "waypoint that fails a rule", "fail", waypoint_distances[rows] / 1000.0, route[rows, 2], quiet=True
+        )
+    ]
 
 
-def _waypoint_labels(at: Floats, route: Floats, stops: Sequence[int], failed: Failures) -> list[Label]:
+def _waypoint_labels(waypoint_distances: Floats, route: Floats, stops: Sequence[int], failed: Failures) -> list[Label]:
     first = stop_rows(stops)
     step = max(1, -(-len(first) // _MAX_NUMBERS))
     shown = {k for n, k in enumerate(first) if n % step == 0 or n == len(first) - 1} | set(failed.waypoints)
     return [
-        Label(str(stops[k]), float(at[k]) / 1000.0, float(route[k, 2]), "number", "waypoint") for k in sorted(shown)
+        Label(str(stops[k]), float(waypoint_distances[k]) / 1000.0, float(route[k, 2]), "number", "waypoint")
+        for k in sorted(shown)
     ]
 
 
-def _bounds(scenario: Scenario, low: float, high: float) -> tuple[tuple[tuple[str, float], ...], str]:
+def _bounds(scenario: Scenario, min_altitude: float, max_altitude: float) -> tuple[tuple[tuple[str, float], ...], str]:
     """Return ceiling and floor as level lines, and a note on a ceiling outside the picture."""
     if scenario.external:
         return (), ""
     ceiling, floor = f"ceiling, {scenario.ceiling:.0f} m AMSL", f"floor, {scenario.floor:.0f} m AMSL"
     shown = tuple((name, value) for name, value in ((ceiling, scenario.ceiling), (floor, scenario.floor)))
-    note = "" if low < scenario.ceiling < high else f"{ceiling}, off the picture"
-    return tuple((name, value) for name, value in shown if low < value < high), note
+    note = "" if min_altitude < scenario.ceiling < max_altitude else f"{ceiling}, off the picture"
+    return tuple((name, value) for name, value in shown if min_altitude < value < max_altitude), note

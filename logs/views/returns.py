@@ -41,10 +41,10 @@ def way_layers(
     """
     layers = []
     for role, name in dict.fromkeys(looks.values()):
-        chosen = [ones for kind, ones in stretches if looks[kind] == (role, name)]
-        x, y = parted([np.array([place(one) for one in ones]) for ones in chosen])
-        said = [text for ones in chosen for text in (*map(words, ones), "")]
-        layers.append(Layer("line", name, role, x, y, words=tuple(said)))
+        segments = [segment for kind, segment in stretches if looks[kind] == (role, name)]
+        x, y = parted([np.array([place(element) for element in segment]) for segment in segments])
+        texts = [text for segment in segments for text in (*map(words, segment), "")]
+        layers.append(Layer("line", name, role, x, y, words=tuple(texts)))
     return [layer for layer in layers if layer.x.size]
 
 
@@ -53,29 +53,31 @@ def returns_map(setup: FlightSetup, drawn: DrawnReturns) -> MapChart:
     scenario, route = setup.scenario, setup.route.waypoints
     limit = drawn.returns.limit
 
-    def said(one: ReturnFlown) -> str:
-        return f"{one.time:.0f} s: to {one.target.name}: {outcome_text(one, limit)}"
+    def return_text(ret: ReturnFlown) -> str:
+        return f"{ret.time:.0f} s: to {ret.target.name}: {outcome_text(ret, limit)}"
 
-    layers = way_layers(drawn.by_kind, _LOOKS, lambda one: one.start[:2], said)
-    for one in drawn.worst:
+    layers = way_layers(drawn.by_kind, _LOOKS, lambda ret: ret.start[:2], return_text)
+    for worst in drawn.worst:
         name = "way of one of the worst, numbered"
-        layers.append(Layer("line", name, "return-way", one.way[:, 0], one.way[:, 1], words=(said(one.one),)))
-    wrong = [one for one in drawn.worst if not one.one.safe]
-    if wrong:
-        at = np.array([one.at for one in wrong])
-        words = tuple(said(one.one) for one in wrong)
-        layers.append(Layer("rings", "where it goes wrong", "fail", at[:, 0], at[:, 1], words=words))
-    targets = {one.target.name: one.target.position for one in drawn.returns.each}
+        layers.append(
+            Layer("line", name, "return-way", worst.way[:, 0], worst.way[:, 1], words=(return_text(worst.flown),))
+        )
+    unsafe = [worst for worst in drawn.worst if not worst.flown.safe]
+    if unsafe:
+        positions = np.array([worst.at for worst in unsafe])
+        texts = tuple(return_text(worst.flown) for worst in unsafe)
+        layers.append(Layer("rings", "where it goes wrong", "fail", positions[:, 0], positions[:, 1], words=texts))
+    targets = {ret.target.name: ret.target.position for ret in drawn.returns.each}
     layers += _targets(targets)
     labels = [
-        Label(str(number), float(one.at[0]), float(one.at[1]), "number", "fail")
-        for number, one in enumerate(drawn.worst, 1)
+        Label(str(number), float(worst.at[0]), float(worst.at[1]), "number", "fail")
+        for number, worst in enumerate(drawn.worst, 1)
     ]
     labels += [
         Label(shorten(name, 30), place[0], place[1], "end", "waypoint", (1, 1)) for name, place in targets.items()
     ]
-    ways = [one.way for one in drawn.worst] + [np.array(list(targets.values()) or np.zeros((0, 3)))]
-    extent = map_extent(scenario, route, [*ways, np.array([one.start for one in drawn.returns.each])])
+    ways = [worst.way for worst in drawn.worst] + [np.array(list(targets.values()) or np.zeros((0, 3)))]
+    extent = map_extent(scenario, route, [*ways, np.array([ret.start for ret in drawn.returns.each])])
     return world_map(
         scenario,
         "returns to launch from everywhere on the way",
@@ -106,9 +108,9 @@ def worst_returns_chart(setup: FlightSetup, drawn: DrawnReturns) -> Chart | None
     if not drawn.worst:
         return None
     scenario = setup.scenario
-    spans = [_span(scenario, one) for one in drawn.worst]
-    span = (min(low for low, _ in spans), max(high for _, high in spans))
-    panels = tuple(_profile(scenario, one, number, span) for number, one in enumerate(drawn.worst, 1))
+    spans = [_span(scenario, worst) for worst in drawn.worst]
+    span = (min(bottom for bottom, _ in spans), max(top for _, top in spans))
+    panels = tuple(_profile(scenario, worst, number, span) for number, worst in enumerate(drawn.worst, 1))
     return Chart(
         f"{shorten(scenario.name, 60)}: the worst returns to launch",
         "way since it turned back",
@@ -121,29 +123,29 @@ def worst_returns_chart(setup: FlightSetup, drawn: DrawnReturns) -> Chart | None
     )
 
 
-def _span(scenario: Scenario, one: WorstReturn) -> tuple[float, float]:
+def _span(scenario: Scenario, worst: WorstReturn) -> tuple[float, float]:
     """Return lowest and highest altitude of a path and the ground under it, with a margin, m."""
-    ground = ground_under(scenario, one.way)
-    heights = np.concatenate([one.way[:, 2], np.zeros(0) if ground is None else ground])
-    low, high = float(np.nanmin(heights)), float(np.nanmax(heights))
-    margin = 0.1 * max(high - low, _MIN_SPAN)
-    return low - margin, high + margin
+    ground = ground_under(scenario, worst.way)
+    altitudes = np.concatenate([worst.way[:, 2], np.zeros(0) if ground is None else ground])
+    min_altitude, max_altitude = float(np.nanmin(altitudes)), float(np.nanmax(altitudes))
+    margin = 0.1 * max(max_altitude - min_altitude, _MIN_SPAN)
+    return min_altitude - margin, max_altitude + margin
 
 
-def _profile(scenario: Scenario, one: WorstReturn, number: int, span: tuple[float, float]) -> Panel:
-    way = one.way
-    along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(way[:, :2], axis=0).T))]) / 1000.0
-    plane = PathPlane(along, way, ground_under(scenario, way), *span)
+def _profile(scenario: Scenario, worst: WorstReturn, number: int, span: tuple[float, float]) -> Panel:
+    path = worst.way
+    along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(path[:, :2], axis=0).T))]) / 1000.0
+    plane = PathPlane(along, path, ground_under(scenario, path), *span)
     zones, zone_names = zone_bands(scenario.zones, plane)
     cuts, cut_names = threat_cuts(scenario.threats, plane, frozenset())
     layers = [*zones, *cuts, *ground_bands(scenario, plane)]
-    layers.append(Layer("line", "way of the return", "return-way", along, way[:, 2]))
-    if not one.one.safe:
-        nearest = int(np.argmin(np.linalg.norm(way - one.at, axis=1)))
-        layers.append(Layer("rings", "where it goes wrong", "fail", along[[nearest]], one.at[[2]], quiet=True))
-    when = f"{number}: from {one.one.time:.0f} s"
-    note = way_text(one.one.kind).removeprefix("a return ")
-    return Panel(when, "m AMSL", tuple(layers), span=span, note=note, labels=(*cut_names, *zone_names))
+    layers.append(Layer("line", "way of the return", "return-way", along, path[:, 2]))
+    if not worst.flown.safe:
+        nearest = int(np.argmin(np.linalg.norm(path - worst.at, axis=1)))
+        layers.append(Layer("rings", "where it goes wrong", "fail", along[[nearest]], worst.at[[2]], quiet=True))
+    title = f"{number}: from {worst.flown.time:.0f} s"
+    note = way_text(worst.flown.kind).removeprefix("a return ")
+    return Panel(title, "m AMSL", tuple(layers), span=span, note=note, labels=(*cut_names, *zone_names))
 
 
 # ----------------------------------------------------------------------
@@ -159,16 +161,16 @@ def return_heights_chart(setup: FlightSetup, drawn: DrawnReturns, track: Track |
         return None
     scenario, limit = setup.scenario, drawn.returns.limit
     time, places = _flown_places(drawn, track)
-    ground, least = ground_under(scenario, places), drawn.least
-    heights = np.concatenate([places[:, 2], least.height, np.zeros(0) if ground is None else ground])
-    low, high = float(np.nanmin(heights)), float(np.nanmax(heights))
-    margin = 0.06 * max(high - low, _MIN_SPAN)
-    span = (low - margin, high + margin)
-    name = f"least height for a safe return (no line: none up to {least.searched:.0f} m more)"
+    ground, least_altitudes = ground_under(scenario, places), drawn.least
+    altitudes = np.concatenate([places[:, 2], least_altitudes.height, np.zeros(0) if ground is None else ground])
+    min_altitude, max_altitude = float(np.nanmin(altitudes)), float(np.nanmax(altitudes))
+    margin = 0.06 * max(max_altitude - min_altitude, _MIN_SPAN)
+    span = (min_altitude - margin, max_altitude + margin)
+    name = f"least height for a safe return (no line: none up to {least_altitudes.searched:.0f} m more)"
     layers = [
         *ground_bands(scenario, PathPlane(time, places, ground, *span)),
-        *way_layers(drawn.by_kind, _LOOKS, lambda one: (one.time, one.start[2]), lambda one: outcome_text(one, limit)),
-        Layer("line", name, "limit", least.time, least.height),
+        *way_layers(drawn.by_kind, _LOOKS, lambda ret: (ret.time, ret.start[2]), lambda ret: outcome_text(ret, limit)),
+        Layer("line", name, "limit", least_altitudes.time, least_altitudes.height),
     ]
     panels = [Panel("height", "m AMSL", tuple(layers), span=span)]
     if drawn.glides.each:
@@ -187,29 +189,29 @@ def return_heights_chart(setup: FlightSetup, drawn: DrawnReturns, track: Track |
 
 def _flown_places(drawn: DrawnReturns, track: Track | None) -> tuple[Floats, Floats]:
     """Return times, s, (t,), and positions, m, (t, 3), of the path, from the track or from the starts of returns."""
-    first, last = drawn.returns.each[0].time, max(one.time for one in drawn.returns.each)
+    first, last = drawn.returns.each[0].time, max(ret.time for ret in drawn.returns.each)
     if track is not None and drawn.returns.flown:
-        whole = np.isfinite(track.position).all(axis=1) & (track.time >= first) & (track.time <= last)
-        rows = np.flatnonzero(whole)
+        is_shown = np.isfinite(track.position).all(axis=1) & (track.time >= first) & (track.time <= last)
+        rows = np.flatnonzero(is_shown)
         rows = rows[:: max(1, len(rows) // _GROUND_POINTS)]
         if rows.size:
             return track.time[rows], track.position[rows]
-    ones = [one for _, group in drawn.by_kind for one in group]
-    return np.array([one.time for one in ones]), np.array([one.start for one in ones])
+    returns = [ret for _, group in drawn.by_kind for ret in group]
+    return np.array([ret.time for ret in returns]), np.array([ret.start for ret in returns])
 
 
 def _glide_margin_panel(glides: Glides) -> Panel:
     """Return a panel of the height margin over time for destinations within reach without the engine."""
-    time = np.array([one.time for one in glides.each])
+    time = np.array([glide.time for glide in glides.each])
 
     def line(name: str, role: str, values: list[float]) -> Layer:
         column = np.array(values)
         return series(name, role, time, np.where(np.isfinite(column), column, np.nan))
 
-    layers = [line("left over for home", "left-home", [one.left[0] for one in glides.each])]
+    layers = [line("left over for home", "left-home", [glide.left[0] for glide in glides.each])]
     if len(glides.sites) > 1:
-        best = [max(one.left[1:]) for one in glides.each]
-        layers.append(line("left over for a rally point or landing place", "left-site", best))
-    layers.append(line("left over for flat ground", "left-flat", [one.flat for one in glides.each]))
+        best_site_margins = [max(glide.left[1:]) for glide in glides.each]
+        layers.append(line("left over for a rally point or landing place", "left-site", best_site_margins))
+    layers.append(line("left over for flat ground", "left-flat", [glide.flat for glide in glides.each]))
     limits = (("nothing left over", 0.0),)
     return Panel("height left over without the engine", "m", tuple(layers), limits, min_span=_MIN_SPAN)

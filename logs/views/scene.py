@@ -74,10 +74,12 @@ def exaggeration(setup: FlightSetup, bounds: Floats, grid: GroundGrid | None) ->
     return max(value for value in (1.0, 1.5, 2.0, 3.0) if value <= max(wanted, 1.0))
 
 
-def drawn_rows(track: Track, most: int) -> NDArray[np.intp]:
-    """Return at most ``most`` rows of the track with a known position, including the first and last."""
-    good = np.flatnonzero(np.isfinite(track.position).all(axis=1))
-    return good[np.unique(np.linspace(0, max(len(good) - 1, 0), min(len(good), most)).astype(np.intp))]
+def drawn_rows(track: Track, max_rows: int) -> NDArray[np.intp]:
+    """Return at most ``max_rows`` rows of the track with a known position, including the first and last."""
+    is_finite = np.flatnonzero(np.isfinite(track.position).all(axis=1))
+    return is_finite[
+        np.unique(np.linspace(0, max(len(is_finite) - 1, 0), min(len(is_finite), max_rows)).astype(np.intp))
+    ]
 
 
 def script_json(data: object) -> str:

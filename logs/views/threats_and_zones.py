@@ -29,7 +29,7 @@ _CIRCLE_ANGLES_RAD = np.linspace(0.0, 2.0 * np.pi, 73)
 def threat_circles(threats: Threats, route: Floats | None, entered: frozenset[int]) -> tuple[Layer, ...]:
     """Return circles of missiles and radars from above, m: the sphere as a line, its section at the path filled.
 
-    route: (w, 3) m, or None to show the spheres alone.  entered: threats whose rule fails.
+    route: (w, 3) m, or None to show only the spheres.  entered: threats whose rule fails.
     """
     radars, reach, missiles, units = [], [], [], []
     shown = np.flatnonzero(threats.kill_radius > 0.0)
@@ -81,14 +81,14 @@ def circle(centre: Floats, radius: float) -> tuple[Floats, Floats]:
     return centre[0] + radius * np.cos(_CIRCLE_ANGLES_RAD), centre[1] + radius * np.sin(_CIRCLE_ANGLES_RAD)
 
 
-def threat_names(threats: Threats, named: frozenset[int] = frozenset()) -> tuple[Label, ...]:
+def threat_names(threats: Threats, names: frozenset[int] = frozenset()) -> tuple[Label, ...]:
     """Return the names of threats at their positions on the map.  named: threats with their own labels."""
     if len(threats) > _MAX_NAMES:
         return ()
     return tuple(
         Label(shorten(name, 20), float(east), float(north), "name")
         for k, (name, (east, north, _)) in enumerate(zip(threats.names, threats.position, strict=True))
-        if k not in named
+        if k not in names
     )
 
 

@@ -101,8 +101,8 @@ def energy_chart(setup: FlightSetup, track: Track) -> Chart:
     time = track.time
     used = doubles(track.energy)
     late = np.searchsorted(time, time - _POWER_WINDOW_S)
-    lasts = np.maximum(time - time[late], 1e-9)
-    power = np.where(late < np.arange(len(track)), 3600.0 * (used - used[late]) / lasts, np.nan)
+    duration = np.maximum(time - time[late], 1e-9)
+    power = np.where(late < np.arange(len(track)), 3600.0 * (used - used[late]) / duration, np.nan)
     height = track.position[:, 2]
     kinetic = doubles(track.airspeed) ** 2 / (2.0 * GRAVITY)
     as_height = (

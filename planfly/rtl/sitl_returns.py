@@ -29,10 +29,10 @@ from logs.verdict.returns.judge_returns import (
     Returns,
     ReturnWorld,
     badness,
-    doubt,
+    distance_to_limit,
     is_steady,
     kind_of,
-    zone_met,
+    most_violated_zone,
 )
 from logs.verdict.returns.return_starts import ReturnStarts
 from logs.verdict.returns.returns_text import measured_text
@@ -174,7 +174,7 @@ def worst_apart(
 
 def _badness_key(one: ReturnFlown) -> tuple[int, float]:
     """Return the sort key of a return, which is `badness`, or for a safe return how near it is to a limit."""
-    return (KINDS.index("safe"), doubt(one)) if one.safe else badness(one)
+    return (KINDS.index("safe"), distance_to_limit(one)) if one.safe else badness(one)
 
 
 def _is_clear(world: ReturnWorld, row: Record) -> bool:
@@ -236,7 +236,7 @@ def _judge_flown_return(
     record["clearance"], record["outside"], record["threat"] = clearance, closest.outside, closest.threat
     used = float(track.energy[begin + len(position) - 1] - track.energy[begin])
     left = law.left + law.energy - used
-    zone = zone_met(world, position[::_ROWS_PER_SECOND]) if world.airspace.zones else -1
+    zone = most_violated_zone(world, position[::_ROWS_PER_SECOND]) if world.airspace.zones else -1
     return replace(
         law,
         target=target,

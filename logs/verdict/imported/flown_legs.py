@@ -29,7 +29,7 @@ class FlownLegs:
     stretch: times of the stretch, and how it ended.
     first, last: waypoints between which the stretch was flown.
     partial: True if the last waypoint was not reached.
-    requirements: requirements of the route between these waypoints alone.
+    requirements: requirements of only the route between these waypoints.
     aligned: rows flown on that route.
     """
 
@@ -55,30 +55,32 @@ def flown_legs(setup: FlightSetup, track: Track, stretch: MissionStretch) -> Flo
     (0, 2, True)
     """
     rows = between(track, stretch.start, stretch.end)
-    whole = route_requirements(setup)
-    aligned = align_track(whole, rows)
+    whole_requirements = route_requirements(setup)
+    aligned = align_track(whole_requirements, rows)
     if aligned is None:
         return None
-    met = met_waypoints(whole, aligned)
-    if not met.size:
+    met_waypoint_indices = met_waypoints(whole_requirements, aligned)
+    if not met_waypoint_indices.size:
         return None
-    aligned, met = _earliest_lap(setup, rows, aligned, met)
-    first, last = int(met[0]), int(met[-1])
-    ended = len(setup.route.waypoints) - 1
-    behind = float(aligned.track.time[-1] - aligned.track.time[aligned.rows[last]])
-    partial = last < ended and behind > PARTIAL_LEG_MIN_S
-    until = last + 1 if partial else last
-    if until <= first:
+    aligned, met_waypoint_indices = _earliest_lap(setup, rows, aligned, met_waypoint_indices)
+    first, last = int(met_waypoint_indices[0]), int(met_waypoint_indices[-1])
+    route_end = len(setup.route.waypoints) - 1
+    time_after_last = float(aligned.track.time[-1] - aligned.track.time[aligned.rows[last]])
+    is_partial = last < route_end and time_after_last > PARTIAL_LEG_MIN_S
+    end = last + 1 if is_partial else last
+    if end <= first:
         return None
     # Rows before the first waypoint, and rows after the route's end, belong to no leg.
-    stop = None if partial or last < ended else int(aligned.rows[last]) + 2
-    flown = aligned.track.rows(int(aligned.rows[first]), stop if stop is not None else len(aligned.track))
-    part = route_requirements(replace(setup, route=part_of_route(setup.route, first, until)))
-    laid = align_track(part, flown)
-    if laid is None:
+    end_row = None if is_partial or last < route_end else int(aligned.rows[last]) + 2
+    flown = aligned.track.rows(int(aligned.rows[first]), end_row if end_row is not None else len(aligned.track))
+    part_requirements = route_requirements(replace(setup, route=part_of_route(setup.route, first, end)))
+    part_aligned = align_track(part_requirements, flown)
+    if part_aligned is None:
         return None
     # A log or a stretch that ends a few metres before the waypoint does not show that it was passed.
-    return FlownLegs(stretch, first, until, partial or not bool(laid.passed[-1]), part, laid)
+    return FlownLegs(
+        stretch, first, end, is_partial or not bool(part_aligned.passed[-1]), part_requirements, part_aligned
+    )
 
 
 def gaps_between(legs: FlownLegs, start: float, end: float) -> list[Gap]:
@@ -97,31 +99,31 @@ def stretch_end_text(stretch: MissionStretch) -> str:
 
 
 def _earliest_lap(
-    setup: FlightSetup, rows: Track, aligned: AlignedTrack, met: NDArray[np.intp]
+    setup: FlightSetup, rows: Track, aligned: AlignedTrack, met_indices: NDArray[np.intp]
 ) -> tuple[AlignedTrack, NDArray[np.intp]]:
-    """Align rows with the first laps of a route that repeats its items, if these laps explain the flight.
+    """Align a track with only the first laps of a route that repeats its items, if these laps explain the flight.
 
     A flight that ended within a lap was equally near to the waypoints of any later lap.
     """
-    items, last = setup.route.items, int(met[-1])
-    if len(met) == last - met[0] + 1:
-        return aligned, met
+    items, last = setup.route.items, int(met_indices[-1])
+    if len(met_indices) == last - met_indices[0] + 1:
+        return aligned, met_indices
     for end in np.flatnonzero(items[:last] == items[last]).tolist():
         if end < 1:
             continue
         requirements = route_requirements(replace(setup, route=part_of_route(setup.route, 0, end)))
-        laid = align_track(requirements, rows)
-        found = met if laid is None else met_waypoints(requirements, laid)
+        lap_aligned = align_track(requirements, rows)
+        lap_met = met_indices if lap_aligned is None else met_waypoints(requirements, lap_aligned)
         # Include each item once: a place that was passed once is near its waypoints in all laps.
-        if laid is not None and len(np.unique(items[found])) >= len(np.unique(items[met])):
-            return laid, found
-    return aligned, met
+        if lap_aligned is not None and len(np.unique(items[lap_met])) >= len(np.unique(items[met_indices])):
+            return lap_aligned, lap_met
+    return aligned, met_indices
 
 
 def between(track: Track, start: float, end: float) -> Track:
     """Return the rows of a track between two times, s."""
-    low, high = np.searchsorted(track.time, [start, end + 1e-6])
-    return track.rows(int(low), int(high))
+    first_row, end_row = np.searchsorted(track.time, [start, end + 1e-6])
+    return track.rows(int(first_row), int(end_row))
 
 
 def met_waypoints(requirements: RouteRequirements, aligned: AlignedTrack) -> NDArray[np.intp]:
@@ -129,10 +131,10 @@ def met_waypoints(requirements: RouteRequirements, aligned: AlignedTrack) -> NDA
 
     Waypoints at the very start or end of the track are not included.
     """
-    edge = np.maximum(requirements.fly_by_offset + FINAL_WAYPOINT_TOLERANCE_M, requirements.setup.corridor)
-    inside = (aligned.rows > 0) & (aligned.rows < len(aligned.track) - 1)
-    near = np.where(inside, aligned.distance < CAPTURE_RADIUS_M, aligned.distance <= edge)
-    return np.flatnonzero(near)
+    edge_distance = np.maximum(requirements.fly_by_offset + FINAL_WAYPOINT_TOLERANCE_M, requirements.setup.corridor)
+    is_inner = (aligned.rows > 0) & (aligned.rows < len(aligned.track) - 1)
+    is_near = np.where(is_inner, aligned.distance < CAPTURE_RADIUS_M, aligned.distance <= edge_distance)
+    return np.flatnonzero(is_near)
 
 
 # ----------------------------------------------------------------------
@@ -165,7 +167,7 @@ class PlanMismatch:
 
 
 def plan_mismatch(setup: FlightSetup, track: Track) -> PlanMismatch | None:
-    """Return the reason if the mission stretches of a flight followed another mission than the setup's, or None.
+    """Return why the mission stretches of a flight did not follow the setup's mission, or None if they did.
 
     >>> from dataclasses import replace
     >>> from flight.simulation.setup import ImportedLog, MissionStretch
@@ -184,36 +186,36 @@ def plan_mismatch(setup: FlightSetup, track: Track) -> PlanMismatch | None:
     points = setup.route.waypoints
     if not flown:
         return None
-    nearest, when = _closest_distances(points, flown)
+    nearest, times = _closest_distances(points, flown)
     if nearest.min() > PLAN_MISMATCH_DISTANCE_M:
         return PlanMismatch("place", distance=float(nearest.min()))
-    near = min(MAX_NEAR_WAYPOINT_M, max(MIN_NEAR_WAYPOINT_M, setup.corridor))
-    passed = nearest <= near
-    if passed.sum() < 3:
+    near_distance = min(MAX_NEAR_WAYPOINT_M, max(MIN_NEAR_WAYPOINT_M, setup.corridor))
+    is_passed = nearest <= near_distance
+    if is_passed.sum() < 3:
         return None
     requirements = route_requirements(setup)
-    in_order = np.zeros(len(points), bool)
+    is_in_order = np.zeros(len(points), bool)
     for rows in flown:
         aligned = align_track(requirements, rows)
         if aligned is not None:
-            low = np.maximum(0, aligned.rows - 1)
-            off = np.hypot(*(aligned.track.position[aligned.rows, :2] - points[:, :2]).T)
+            previous_rows = np.maximum(0, aligned.rows - 1)
+            distances = np.hypot(*(aligned.track.position[aligned.rows, :2] - points[:, :2]).T)
             # The nearest row may be half a step from the waypoint.
-            step = np.hypot(*(aligned.track.position[aligned.rows, :2] - aligned.track.position[low, :2]).T)
-            in_order |= off <= near + step
-    if (in_order & passed).sum() >= MIN_IN_ORDER_FRACTION * passed.sum():
+            steps = np.hypot(*(aligned.track.position[aligned.rows, :2] - aligned.track.position[previous_rows, :2]).T)
+            is_in_order |= distances <= near_distance + steps
+    if (is_in_order & is_passed).sum() >= MIN_IN_ORDER_FRACTION * is_passed.sum():
         return None
-    order = [int(k) for k in np.argsort(when, kind="stable") if passed[k]]
+    order = [int(k) for k in np.argsort(times, kind="stable") if is_passed[k]]
     return PlanMismatch("order", order=tuple(int(setup.route.items[k]) for k in order[:_MAX_NAMED]))
 
 
 def _closest_distances(points: Floats, flown: list[Track]) -> tuple[Floats, Floats]:
     """Return each waypoint's minimum horizontal distance from the flight, m, (w,), and its time, s, (w,)."""
-    nearest, when = np.full(len(points), np.inf), np.zeros(len(points))
+    nearest, times = np.full(len(points), np.inf), np.zeros(len(points))
     for rows in flown:
         for k, point in enumerate(points):
             distance, _ = approaches(rows.position, point)
             row = int(np.argmin(distance))
             if distance[row] < nearest[k]:
-                nearest[k], when[k] = float(distance[row]), float(rows.time[row])
-    return nearest, when
+                nearest[k], times[k] = float(distance[row]), float(rows.time[row])
+    return nearest, times

@@ -49,15 +49,15 @@ _MAX_LISTED_JUMPS = 4
 def imported_lines(
     findings: Sequence[Finding],
     setup: FlightSetup,
-    own: LevelAnswer,
+    own_answer: LevelAnswer,
     flown: Sequence[FlownLegs],
     conditions: Conditions,
 ) -> tuple[str, ...]:
     """Return the lines of the summary, the headline first."""
     source = setup.source
     if source is None:
-        return (own.headline,)
-    lines = [own.headline, *condition_lines(conditions)]
+        return (own_answer.headline,)
+    lines = [own_answer.headline, *condition_lines(conditions)]
     lines.append(f"{autopilot_line(conditions, flown=True)} ({source.format} {source.file}{_start_time_text(source)})")
     lines += [*_judged_lines(source, flown, setup.route.leg_numbers.tolist()), *_unjudged_lines(findings)]
     lines += [line] if (line := corridor_line(setup)) else []
@@ -103,8 +103,8 @@ def _unjudged_lines(findings: Sequence[Finding]) -> list[str]:
     """Return a line for each rule that was not judged, with the reason and, if partial, the numbers."""
     lines = []
     for rule in RULE_WORDS.values():
-        rule_findings = [item for item in findings if item.rule == rule.name]
-        unjudged = [item for item in rule_findings if item.ok is None]
+        rule_findings = [finding for finding in findings if finding.rule == rule.name]
+        unjudged = [finding for finding in rule_findings if finding.ok is None]
         if not unjudged:
             continue
         where = "" if len(unjudged) == len(rule_findings) else f" on {len(unjudged)} of {len(rule_findings)}"
@@ -119,7 +119,7 @@ def heights_text(source: ImportedLog) -> str:
     >>> heights_text(ImportedLog("a.BIN", "", "", heights=Heights("POS", "amsl", (HeightOffset("GPS.Alt", -0.1),))))
     'POS, above mean sea level, as the log has it; at the start GPS.Alt -0.1 m of it'
     """
-    offsets = ", ".join(f"{one.name} {one.offset:+.1f} m" for one in source.heights.offsets)
+    offsets = ", ".join(f"{height.name} {height.offset:+.1f} m" for height in source.heights.offsets)
     offset_text = f"; at the start {offsets} of it" if offsets else ""
     return f"{source.heights.source}, {_DATUM_TEXTS[source.heights.datum]}{offset_text}"
 
@@ -132,19 +132,19 @@ def rows_text(faults: RowFaults, gaps: int) -> str:
     >>> rows_text(RowFaults(), 0)
     'in order, without gaps'
     """
-    counted = (
+    counts = (
         (gaps, "gap" if gaps == 1 else "gaps"),
         (faults.doubled, "doubled"),
         (faults.unordered, "out of order"),
         (faults.unusable, "without a place or a time"),
         (faults.glitches, "glitches of position"),
     )
-    words = [f"{count} {name}" for count, name in counted if count]
+    texts = [f"{count} {name}" for count, name in counts if count]
     if faults.clock_jumps:
         count = len(faults.clock_jumps)
         times = ", ".join(f"{time:.1f} s" for time in faults.clock_jumps[:_MAX_LISTED_JUMPS])
-        words.append(f"{count} {'jump' if count == 1 else 'jumps'} of the clock (at {times})")
-    return ", ".join(words) or "in order, without gaps"
+        texts.append(f"{count} {'jump' if count == 1 else 'jumps'} of the clock (at {times})")
+    return ", ".join(texts) or "in order, without gaps"
 
 
 # Largest number of runs of items that a line lists.
@@ -167,16 +167,19 @@ def missing_text(missing: MissingItems) -> str:
             runs[-1] = [runs[-1][0], number]
         else:
             runs.append([number])
-    words = [" to ".join(map(str, run)) for run in runs[:_MAX_RUNS]]
+    run_texts = [" to ".join(map(str, run)) for run in runs[:_MAX_RUNS]]
     if len(runs) > _MAX_RUNS:
-        words.append(f"{len(missing.numbers) - sum(run[-1] - run[0] + 1 for run in runs[:_MAX_RUNS])} more")
-    listed = " and ".join(filter(None, [", ".join(words[:-1]), words[-1]]))
-    before = f"before item {missing.first}" if missing.first > 1 else ""
-    beyond = f"beyond item {missing.last}" if missing.last and missing.beyond else ""
-    where = " and ".join(filter(None, [before, beyond]))
-    several = len(missing.numbers) > 1
-    of = f" of {missing.total}" if missing.total else ""
-    items = f"{'items' if several else 'item'} {listed}{of} {'are' if several else 'is'} not in the log or left out"
+        run_texts.append(f"{len(missing.numbers) - sum(run[-1] - run[0] + 1 for run in runs[:_MAX_RUNS])} more")
+    listed = " and ".join(filter(None, [", ".join(run_texts[:-1]), run_texts[-1]]))
+    before_text = f"before item {missing.first}" if missing.first > 1 else ""
+    after_text = f"beyond item {missing.last}" if missing.last and missing.beyond else ""
+    where = " and ".join(filter(None, [before_text, after_text]))
+    is_several = len(missing.numbers) > 1
+    total_text = f" of {missing.total}" if missing.total else ""
+    items = (
+        f"{'items' if is_several else 'item'} {listed}{total_text} {'are' if is_several else 'is'}"
+        " not in the log or left out"
+    )
     return f"not judged{' ' if where else ''}{where}: {items}"
 
 
@@ -186,15 +189,15 @@ def damage_text(damage: Damage) -> str:
     >>> damage_text(Damage(places=2, size=40, cut=True))
     '2 places in the file (40 bytes) cannot be read; it ends within a message'
     """
-    words = []
+    texts = []
     if damage.places:
         size = f" ({damage.size:,} bytes)" if damage.size else ""
-        words.append(f"{damage.places} {'place' if damage.places == 1 else 'places'} in the file{size} cannot be read")
+        texts.append(f"{damage.places} {'place' if damage.places == 1 else 'places'} in the file{size} cannot be read")
     if damage.unreadable:
-        words.append(f"{damage.unreadable} messages hold nothing that can be used")
+        texts.append(f"{damage.unreadable} messages hold nothing that can be used")
     if damage.cut:
-        words.append("it ends within a message")
-    return "; ".join(words) or "nothing"
+        texts.append("it ends within a message")
+    return "; ".join(texts) or "nothing"
 
 
 def _start_time_text(source: ImportedLog) -> str:
@@ -234,26 +237,26 @@ def judge_imported_flight(setup: FlightSetup, track: Track, *, log_complete: boo
         raise ValueError("a flight without a source was not imported")
     flown = [legs for stretch in source.stretches if (legs := flown_legs(setup, track, stretch)) is not None]
     findings = _merge_findings([_stretch_findings(setup, legs) for legs in flown])
-    ends = [rule.judge_imported_end for rule in RULES.values() if rule.judge_imported_end is not None]
-    findings = (*findings, *(judge(setup, flown, log_complete) for judge in ends))
-    failed = any(item.ok is False for item in findings)
+    end_judges = [rule.judge_imported_end for rule in RULES.values() if rule.judge_imported_end is not None]
+    findings = (*findings, *(judge(setup, flown, log_complete) for judge in end_judges))
+    failed = any(finding.ok is False for finding in findings)
     unjudged = "; ".join(
         filter(None, [_missing_part_text(findings, source.missing), _unseen_text(flown), _uncertainty_text(findings)])
     )
     flyable = bool(flown) and not failed and not unjudged
-    complete = not unjudged and all(item.ok is True for item in findings if item.rule == "completion")
+    complete = not unjudged and all(finding.ok is True for finding in findings if finding.rule == "completion")
     answer = [headline(findings, flyable).replace("flyable", "flown as planned", 1)] if failed or not unjudged else []
     answer_text = "; ".join([*answer, *filter(None, [unjudged])])
-    own = LevelAnswer(setup.autopilot.level, flyable, answer_text, undecided=bool(unjudged) and not failed)
+    own_answer = LevelAnswer(setup.autopilot.level, flyable, answer_text, undecided=bool(unjudged) and not failed)
     conditions = setup_conditions(setup)
-    lines = imported_lines(findings, setup, own, flown, conditions)
+    lines = imported_lines(findings, setup, own_answer, flown, conditions)
     return Verdict(
         findings,
         flyable,
         complete,
         lines,
         "flown",
-        levels=(own,),
+        levels=(own_answer,),
         notes=setup.route.notes,
         leg_ends=_leg_ends(setup, flown),
         parameters=setup.autopilot.parameters,
@@ -267,21 +270,21 @@ def _missing_part_text(findings: Sequence[Finding], missing: MissingItems | None
     """Describe which items or which part of the flight the log lacks; return "" if it lacks none."""
     if missing is not None:
         return missing_text(missing)
-    parts = [item.reason for item in findings if item.rule == "completion" and item.ok is None]
+    parts = [finding.reason for finding in findings if finding.rule == "completion" and finding.ok is None]
     return f"not judged from end to end: {parts[0]}" if parts else ""
 
 
 def _unseen_text(flown: Sequence[FlownLegs]) -> str:
-    """Describe pauses of the log that are too long to know where the aircraft was; return "" if there are none."""
-    long = []
+    """Describe the pauses of the log that are too long to judge the flight in them; return "" if there are none."""
+    pauses = []
     for legs in flown:
         time = legs.aligned.track.time
-        long += [(float(time[k]), float(time[k + 1])) for k in np.flatnonzero(np.diff(time) > MAX_UNSEEN_TIME_S)]
-    if not long:
+        pauses += [(float(time[k]), float(time[k + 1])) for k in np.flatnonzero(np.diff(time) > MAX_UNSEEN_TIME_S)]
+    if not pauses:
         return ""
-    start, end = max(long, key=lambda pause: pause[1] - pause[0])
-    others = f", and in {len(long) - 1} more pauses" if len(long) > 1 else ""
-    return f"not judged from {start:.1f} s to {end:.1f} s{others}: the log has no rows"
+    start, end = max(pauses, key=lambda pause: pause[1] - pause[0])
+    others_text = f", and in {len(pauses) - 1} more pauses" if len(pauses) > 1 else ""
+    return f"not judged from {start:.1f} s to {end:.1f} s{others_text}: the log has no rows"
 
 
 def _judged_times(legs: FlownLegs) -> tuple[float, float]:
@@ -298,132 +301,144 @@ def _uncertainty_text(findings: Sequence[Finding]) -> str:
 
 def _stretch_findings(setup: FlightSetup, legs: FlownLegs) -> list[Finding]:
     """Return the findings of one stretch, at the places of the whole route."""
-    out = []
-    for item in track_findings(legs.requirements, legs.aligned):
-        judged = _check_gaps(_check_data(setup, legs, item), legs)
+    findings = []
+    for finding in track_findings(legs.requirements, legs.aligned):
+        checked = _check_gaps(_check_data(setup, legs, finding), legs)
         if legs.partial:
-            judged = _check_unreached(judged, legs)
-        out.append(_at_route_place(judged, legs.first, setup))
-    return [*out, *_findings_without_data(setup, {item.rule for item in out})]
+            checked = _check_unreached(checked, legs)
+        findings.append(_at_route_place(checked, legs.first, setup))
+    return [*findings, *_findings_without_data(setup, {finding.rule for finding in findings})]
 
 
-def _findings_without_data(setup: FlightSetup, found: set[str]) -> list[Finding]:
+def _findings_without_data(setup: FlightSetup, judged_rules: set[str]) -> list[Finding]:
     """Return findings for rules with `LogNeeds.listed` that found nothing because the log lacks their data."""
-    out = []
+    findings = []
     for rule in RULES.values():
-        lacking = [one for one in rule.log.quantities if setup.source is not None and one not in setup.source.holds]
+        missing = [
+            quantity
+            for quantity in rule.log.quantities
+            if setup.source is not None and quantity not in setup.source.holds
+        ]
         margin = RULE_WORDS[rule.name].margin
-        if rule.log.listed and margin is not None and lacking and rule.name not in found:
-            why = f"the log holds no {_LABELS[lacking[0]]}"
-            out.append(make_finding(rule.name, FLIGHT, ok=None, reason=why, source="aircraft", unit=margin.unit))
-    return out
+        if rule.log.listed and margin is not None and missing and rule.name not in judged_rules:
+            reason = f"the log holds no {_LABELS[missing[0]]}"
+            findings.append(
+                make_finding(rule.name, FLIGHT, ok=None, reason=reason, source="aircraft", unit=margin.unit)
+            )
+    return findings
 
 
-def _check_data(setup: FlightSetup, legs: FlownLegs, item: Finding) -> Finding:
-    """Return a finding, marked as not judged if the log lacks the data that its rule needs."""
+def _check_data(setup: FlightSetup, legs: FlownLegs, finding: Finding) -> Finding:
+    """Mark a finding as not judged if the log lacks data that its rule needs."""
     source = setup.source
     if source is None:
-        return item
-    reason, needs = "", RULES[item.rule].log
+        return finding
+    reason, needs = "", RULES[finding.rule].log
     for quantity in needs.quantities:
         if quantity not in source.holds:
             reason = f"the log holds no {_LABELS[quantity]}"
             break
         if quantity == "heights":
-            stated = source.plan_heights or not needs.planned_heights
-            reason = _DATUMS.get(source.heights.datum, "") if stated else "the plan states no heights"
+            has_plan_heights = source.plan_heights or not needs.planned_heights
+            reason = _DATUMS.get(source.heights.datum, "") if has_plan_heights else "the plan states no heights"
         else:
             reason = _missing_values_text(legs, quantity)
         if reason:
             break
     if reason:
-        return _mark_unjudged(item, reason)
-    if not source.aircraft_known and needs.aircraft and item.limit_source != "scenario":
-        return _mark_unjudged(item, _UNNAMED_TEXT, measured=bool(item.ok))
-    return item
+        return _mark_unjudged(finding, reason)
+    if not source.aircraft_known and needs.aircraft and finding.limit_source != "scenario":
+        return _mark_unjudged(finding, _UNNAMED_TEXT, keep_measurements=bool(finding.ok))
+    return finding
 
 
 def _missing_values_text(legs: FlownLegs, quantity: Quantity) -> str:
     """Describe when a stretch lacks values of a quantity that the log has elsewhere; return "" if it lacks none."""
     values = getattr(legs.aligned.track, _COLUMNS[quantity])
-    bad = ~np.isfinite(values.reshape(len(values), -1)).all(axis=1)
-    if not bad.any():
+    is_missing = ~np.isfinite(values.reshape(len(values), -1)).all(axis=1)
+    if not is_missing.any():
         return ""
-    time = legs.aligned.track.time[bad]
-    return f"the log holds no {_LABELS[quantity]} at {int(bad.sum())} rows from {time[0]:.1f} s to {time[-1]:.1f} s"
+    time = legs.aligned.track.time[is_missing]
+    return (
+        f"the log holds no {_LABELS[quantity]} at {int(is_missing.sum())} rows from {time[0]:.1f} s to {time[-1]:.1f} s"
+    )
 
 
-def _mark_unjudged(item: Finding, why: str, *, measured: bool = False) -> Finding:
-    """Return a finding marked as not judged, with the reason; keep its measurements if `measured`."""
-    reason = f"{why}; {item.reason}" if measured else why
-    facts = item.facts if measured else ()
-    return replace(item, ok=None, reason=reason, brief=why, placed=False, margin=None, facts=facts, suggestions=())
+def _mark_unjudged(finding: Finding, cause: str, *, keep_measurements: bool = False) -> Finding:
+    """Return a finding marked as not judged because of ``cause``."""
+    reason = f"{cause}; {finding.reason}" if keep_measurements else cause
+    facts = finding.facts if keep_measurements else ()
+    return replace(finding, ok=None, reason=reason, brief=cause, placed=False, margin=None, facts=facts, suggestions=())
 
 
-def _check_gaps(item: Finding, legs: FlownLegs) -> Finding:
+def _check_gaps(finding: Finding, legs: FlownLegs) -> Finding:
     """Mark a passed finding as not judged if the log has a pause in its leg."""
-    if item.ok is not True or item.place.index is None or item.place.kind not in ("leg", "waypoint"):
-        return item
+    if finding.ok is not True or finding.place.index is None or finding.place.kind not in ("leg", "waypoint"):
+        return finding
     track, rows = legs.aligned.track, legs.aligned.rows
-    first = item.place.index if item.place.kind == "leg" else max(0, item.place.index - 1)
-    last = min(len(rows) - 1, item.place.index + 1)
+    first = finding.place.index if finding.place.kind == "leg" else max(0, finding.place.index - 1)
+    last = min(len(rows) - 1, finding.place.index + 1)
     start, end = float(track.time[rows[first]]), float(track.time[rows[last]])
     for gap in gaps_between(legs, start, end):
-        if item.place.kind == "leg" or RULES[item.rule].log.no_gap:
-            why = f"the log has no rows from {gap.start:.1f} s to {gap.end:.1f} s"
-            return _mark_unjudged(item, why, measured=True)
-    return item
+        if finding.place.kind == "leg" or RULES[finding.rule].log.no_gap:
+            reason = f"the log has no rows from {gap.start:.1f} s to {gap.end:.1f} s"
+            return _mark_unjudged(finding, reason, keep_measurements=True)
+    return finding
 
 
-def _check_unreached(item: Finding, legs: FlownLegs) -> Finding:
+def _check_unreached(finding: Finding, legs: FlownLegs) -> Finding:
     """Mark the unreached last waypoint as not judged, and findings on the leg before it as partial."""
     leg, waypoint = legs.requirements.legs - 1, legs.requirements.legs
-    unreached = item.place.kind == "waypoint" and item.place.index == waypoint
-    of_leg = item.place.kind == "leg" and item.place.index == leg
-    if unreached:
-        return _mark_unjudged(item, stretch_end_text(legs.stretch))
-    if of_leg and RULES[item.rule].log.full_leg:
+    is_unreached = finding.place.kind == "waypoint" and finding.place.index == waypoint
+    is_last_leg = finding.place.kind == "leg" and finding.place.index == leg
+    if is_unreached:
+        return _mark_unjudged(finding, stretch_end_text(legs.stretch))
+    if is_last_leg and RULES[finding.rule].log.full_leg:
         return (
-            _mark_unjudged(item, f"flown in part: {stretch_end_text(legs.stretch)}") if item.ok is not False else item
+            _mark_unjudged(finding, f"flown in part: {stretch_end_text(legs.stretch)}")
+            if finding.ok is not False
+            else finding
         )
-    return item
+    return finding
 
 
-def _at_route_place(item: Finding, first: int, setup: FlightSetup) -> Finding:
+def _at_route_place(finding: Finding, first: int, setup: FlightSetup) -> Finding:
     """Return a finding at its place on the whole route."""
-    place = item.place
+    place = finding.place
     if not first or place.index is None or place.kind not in ("leg", "waypoint"):
-        return item
+        return finding
     index = place.index + first
-    return replace(item, place=replace(place, index=index))
+    return replace(finding, place=replace(place, index=index))
 
 
 def _merge_findings(stretches: Sequence[Sequence[Finding]]) -> tuple[Finding, ...]:
     """Merge the findings of all stretches: one per rule, place and check, a failure before a pass."""
-    found: dict[tuple[str, Place, str], Finding] = {}
+    merged: dict[tuple[str, Place, str], Finding] = {}
     for findings in stretches:
-        for item in findings:
-            key = (item.rule, item.place, item.check)
-            known = found.get(key)
-            if known is None or _precedence(item) > _precedence(known):
-                found[key] = item
-    rules = list(dict.fromkeys(item.rule for item in found.values()))
-    return tuple(item for rule in rules for item in found.values() if item.rule == rule)
+        for finding in findings:
+            key = (finding.rule, finding.place, finding.check)
+            previous = merged.get(key)
+            if previous is None or _precedence(finding) > _precedence(previous):
+                merged[key] = finding
+    rules = list(dict.fromkeys(finding.rule for finding in merged.values()))
+    return tuple(finding for rule in rules for finding in merged.values() if finding.rule == rule)
 
 
-def _precedence(item: Finding) -> int:
-    return {False: 2, True: 1, None: 0}[item.ok]
+def _precedence(finding: Finding) -> int:
+    return {False: 2, True: 1, None: 0}[finding.ok]
 
 
 def _leg_ends(setup: FlightSetup, flown: Sequence[FlownLegs]) -> tuple[float, ...]:
-    """Return the end of each leg but the last, s, inf from the first leg that no stretch reached; rising."""
+    """Return the time (s) at which each leg but the last ended, in rising order; inf from the first unreached leg."""
     ends = np.full(len(setup.route.waypoints), np.inf)
     for legs in flown:
         times = legs.aligned.track.time[legs.aligned.rows]
-        passed = legs.last if legs.partial else legs.last + 1
-        ends[legs.first : passed] = np.minimum(ends[legs.first : passed], times[: passed - legs.first])
+        end_waypoint = legs.last if legs.partial else legs.last + 1
+        ends[legs.first : end_waypoint] = np.minimum(
+            ends[legs.first : end_waypoint], times[: end_waypoint - legs.first]
+        )
     if flown:
         # The aircraft was past all waypoints before the first one that was met.
         ends[: flown[0].first] = ends[flown[0].first]
-    rising = np.maximum.accumulate(ends)
-    return tuple(rising[1:-1].tolist())
+    sorted_ends = np.maximum.accumulate(ends)
+    return tuple(sorted_ends[1:-1].tolist())

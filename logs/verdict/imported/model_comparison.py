@@ -82,7 +82,7 @@ class Reflight:
     """Imported flight and simulated flight side by side.
 
     stretch: the part of the imported flight that is compared.
-    setup: of the simulated flight.  simulated: its rows.  ended: how it ended.
+    setup: setup of the simulated flight.  simulated: its rows.  ended: how it ended.
     distance: (n,) m along the route's legs at which they are compared.
     ends: (legs,) m along the route at which each leg ends.
     flown, model: profiles.
@@ -110,7 +110,7 @@ def compare_with_model(
 ) -> Reflight:
     """Compare a model's flight of a route with the imported flight on it.
 
-    setup: of the model's flight.  Raises LogError if the model's flight has too few rows.
+    setup: setup of the model's flight.  Raises LogError if the model's flight has too few rows.
 
     >>> from flight.simulation.setup import MissionStretch
     >>> from logs.recording.example_log import example_log
@@ -128,7 +128,7 @@ def compare_with_model(
     pairs = (flown.requirements, flown.aligned), (requirements, aligned)
     ends = np.cumsum(requirements.runs)
     places = [np.arange(0.0, run, STEP) for run in requirements.runs]
-    profiles = [_profile(one, track, places) for one, track in pairs]
+    profiles = [_profile(flight_requirements, track, places) for flight_requirements, track in pairs]
     begins = np.concatenate([[0.0], ends[:-1]])
     distance = np.concatenate([begin + along for begin, along in zip(begins, places, strict=True)])
     counts = np.concatenate([[0], np.cumsum([len(along) for along in places])])
@@ -136,7 +136,7 @@ def compare_with_model(
         _leg_pair(flown.first + k, slice(int(counts[k]), int(counts[k + 1])), profiles)
         for k in range(requirements.legs)
     )
-    corners = [corner_passes(one, track) for one, track in pairs]
+    corners = [corner_passes(flight_requirements, track) for flight_requirements, track in pairs]
     turns = tuple(_turn_pair(flown.first, k, pairs, corners) for k in range(1, requirements.legs))
     flown_profile, model_profile = profiles
     return Reflight(
@@ -170,8 +170,8 @@ def _profile(requirements: RouteRequirements, aligned: AlignedTrack, places: Seq
         # If a flight goes back, as on a loiter, the first pass applies.
         forward = np.concatenate([[True], along[1:] > np.maximum.accumulate(along)[:-1]])
         line = requirements.points[leg, 2] + along * math.tan(requirements.slopes[leg])
-        off = track.position[rows, 2] - line
-        columns = (across, off, speed[rows], bank[rows], energy[rows])
+        height_error = track.position[rows, 2] - line
+        columns = (across, height_error, speed[rows], bank[rows], energy[rows])
         parts.append(
             np.array(
                 [
@@ -181,15 +181,15 @@ def _profile(requirements: RouteRequirements, aligned: AlignedTrack, places: Seq
             )
         )
     table = np.concatenate(parts, axis=1)
-    known = table[4][np.isfinite(table[4])]
-    table[4] -= known[0] if known.size else 0.0
+    known_energy = table[4][np.isfinite(table[4])]
+    table[4] -= known_energy[0] if known_energy.size else 0.0
     return Profile(*table)
 
 
 def _leg_pair(leg: int, rows: slice, profiles: Sequence[Profile]) -> LegPair:
     def pair(name: str, reduce: str) -> tuple[float, float]:
-        one, other = (_reduce_values(getattr(profile, name)[rows], reduce) for profile in profiles)
-        return one, other
+        flown_value, model_value = (_reduce_values(getattr(profile, name)[rows], reduce) for profile in profiles)
+        return flown_value, model_value
 
     flown_bank, model_bank = pair("bank", "size")
     return LegPair(
@@ -203,17 +203,17 @@ def _leg_pair(leg: int, rows: slice, profiles: Sequence[Profile]) -> LegPair:
 
 
 def _reduce_values(values: Floats, reduce: str) -> float:
-    known = values[np.isfinite(values)]
-    if not known.size:
+    known_values = values[np.isfinite(values)]
+    if not known_values.size:
         return math.nan
     match reduce:
         case "mean":
-            return float(known.mean())
+            return float(known_values.mean())
         case "span":
-            return float(known[-1] - known[0])
+            return float(known_values[-1] - known_values[0])
         case "size":
-            return float(np.abs(known).max())
-    return float(known[np.argmax(np.abs(known))])
+            return float(np.abs(known_values).max())
+    return float(known_values[np.argmax(np.abs(known_values))])
 
 
 def _turn_pair(
@@ -222,18 +222,18 @@ def _turn_pair(
     pairs: Sequence[tuple[RouteRequirements, AlignedTrack]],
     corners: Sequence[Sequence[CornerPass]],
 ) -> TurnPair:
-    one, other = (measure_turn(requirements, aligned, k) for requirements, aligned in pairs)
-    passed, again = (passes[k] for passes in corners)
+    flown_turn, model_turn = (measure_turn(requirements, aligned, k) for requirements, aligned in pairs)
+    flown_pass, model_pass = (passes[k] for passes in corners)
 
-    def both(left: float | None, right: float | None, factor: float = 1.0) -> tuple[float, float]:
-        return (math.nan if left is None else left * factor, math.nan if right is None else right * factor)
+    def both(flown: float | None, model: float | None, factor: float = 1.0) -> tuple[float, float]:
+        return (math.nan if flown is None else flown * factor, math.nan if model is None else model * factor)
 
     return TurnPair(
         first + k,
         math.degrees(float(pairs[0][0].turns[k])),
-        overshoot=both(passed.overshoot, again.overshoot),
-        bank=both(one.peak_bank, other.peak_bank, 180.0 / math.pi),
-        passed=both(passed.nearest, again.nearest),
+        overshoot=both(flown_pass.overshoot, model_pass.overshoot),
+        bank=both(flown_turn.peak_bank, model_turn.peak_bank, 180.0 / math.pi),
+        passed=both(flown_pass.nearest, model_pass.nearest),
     )
 
 
@@ -245,8 +245,10 @@ def _spreads(flown: Profile, model: Profile) -> tuple[Spread, ...]:
         ("ground_speed", "m/s", 1.0),
         ("bank", "deg", 180.0 / math.pi),
     ):
-        off = factor * np.abs(getattr(flown, name) - getattr(model, name))
-        known = off[np.isfinite(off)]
-        if known.size:
-            out.append(Spread(name, unit, float(np.median(known)), float(np.percentile(known, 95.0))))
+        difference = factor * np.abs(getattr(flown, name) - getattr(model, name))
+        known_differences = difference[np.isfinite(difference)]
+        if known_differences.size:
+            out.append(
+                Spread(name, unit, float(np.median(known_differences)), float(np.percentile(known_differences, 95.0)))
+            )
     return tuple(out)

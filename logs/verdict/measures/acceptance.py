@@ -48,20 +48,20 @@ class Reach:
 def reach(requirements: RouteRequirements, i: int) -> Reach:
     """Return the condition under which waypoint i counts as reached.
 
-    The mission's own radius applies, otherwise the autopilot's radius.  ArduPlane turns to the next leg at WP_RADIUS
-    for a right angle or a sharper corner and at a fraction of it for a gentler corner.  At the mission's end, and where
-    a return to launch begins, it uses all of WP_RADIUS.
+    The mission's own radius applies, or else the autopilot's radius.  ArduPlane turns to the next leg at WP_RADIUS for
+    a right angle or a sharper corner, and at a fraction of WP_RADIUS for a gentler corner.  At the mission's end, and
+    where a return to launch begins, it uses the full WP_RADIUS.
     """
-    setup, own = requirements.setup, float(requirements.fly_by_offset[i]) + WAYPOINT_PASS_MARGIN_M
-    stated = float(setup.route.acceptance[i])
+    setup, path_radius = requirements.setup, float(requirements.fly_by_offset[i]) + WAYPOINT_PASS_MARGIN_M
+    mission_radius = float(setup.route.acceptance[i])
     tolerance = position_error(setup) + CORNER_CUT_TOLERANCE_M[setup.scenario.wind.turbulence]
-    if stated > 0.0:
-        return Reach(stated, "mission", tolerance)
+    if mission_radius > 0.0:
+        return Reach(mission_radius, "mission", tolerance)
     if not setup.autopilot.follows_path:
-        inside = 0 < i < requirements.legs and i != setup.route.return_from
-        turn = abs(float(requirements.turns[i])) if inside else math.pi
+        is_inner = 0 < i < requirements.legs and i != setup.route.return_from
+        turn = abs(float(requirements.turns[i])) if is_inner else math.pi
         return Reach(setup.autopilot.turn_distance(turn, float(requirements.points[i, 2])), "autopilot", tolerance)
-    return Reach(own, "fly-over" if setup.route.fly_over[i] else "fly-by path", 0.0)
+    return Reach(path_radius, "fly-over" if setup.route.fly_over[i] else "fly-by path", 0.0)
 
 
 def position_error(setup: FlightSetup) -> float:
@@ -70,14 +70,14 @@ def position_error(setup: FlightSetup) -> float:
 
 
 def corner_depths(requirements: RouteRequirements) -> Floats:
-    """Return how far the turn at each waypoint deviates from the legs by itself, m, (w,).
+    """Return the distance by which the turn at each waypoint leaves the legs, m, (w,).
 
     A fly-by arc passes R (1 - cos(turn / 2)) inside the legs.  A fly-over waypoint is passed on the course of the leg
     before it, and the arc from there swings R (1 - cos(turn)) beyond the next leg.
     """
     turns = np.abs(requirements.turns)
-    share = np.where(requirements.setup.route.fly_over, 1.0 - np.cos(turns), 1.0 - np.cos(0.5 * turns))
-    return np.where(np.isfinite(requirements.radius), requirements.radius, 0.0) * share
+    depth_ratio = np.where(requirements.setup.route.fly_over, 1.0 - np.cos(turns), 1.0 - np.cos(0.5 * turns))
+    return np.where(np.isfinite(requirements.radius), requirements.radius, 0.0) * depth_ratio
 
 
 def corridor_limit(requirements: RouteRequirements, leg: int) -> tuple[float, str]:
@@ -87,9 +87,9 @@ def corridor_limit(requirements: RouteRequirements, leg: int) -> tuple[float, st
     that the autopilot joins and leaves by its center, the corridor includes the whole loiter and a turn back next to
     it.
     """
-    half = requirements.setup.corridor
+    half_width = requirements.setup.corridor
     if requirements.setup.scenario.limits.corridor_m is not None:
-        return half, "scenario"
+        return half_width, "scenario"
     ends = slice(leg, leg + 2)
     depths = corner_depths(requirements)[ends]
     source = requirements.setup.source
@@ -99,18 +99,22 @@ def corridor_limit(requirements: RouteRequirements, leg: int) -> tuple[float, st
         radius = np.where(requirements.setup.route.arcs[ends] == 0.0, requirements.radius[ends], 0.0)
         swings = np.where(np.isfinite(radius), radius, 0.0) * (1.0 - np.cos(requirements.turns[ends]))
         depths = np.maximum(depths, FLY_OVER_SWING_RATIO * swings)
-    turning = float(depths.max()) + WAYPOINT_PASS_MARGIN_M
+    turn_width = float(depths.max()) + WAYPOINT_PASS_MARGIN_M
     if requirements.setup.autopilot.loiter_rules.at_middle:
         arcs, tightest = requirements.setup.route.arcs[ends], requirements.tightest[ends]
-        back = float(np.where(np.isfinite(tightest), tightest, 0.0).max())
+        turn_radius = float(np.where(np.isfinite(tightest), tightest, 0.0).max())
         # A loiter too tight for the bank is as wide as the bank limit makes the aircraft swing, whatever its radius.
-        wide = float(arcs.max())
-        across = wide + (LOITER_SWING_RADII * back if wide < back else wide + back) + WAYPOINT_PASS_MARGIN_M
-        if arcs.any() and across > max(turning, half):
-            return across, "circle"
-    if turning > half:
-        return turning, "fly-by path"
-    return half, "default" if requirements.setup.autopilot.follows_path else "autopilot"
+        loiter_radius = float(arcs.max())
+        loiter_width = (
+            loiter_radius
+            + (LOITER_SWING_RADII * turn_radius if loiter_radius < turn_radius else loiter_radius + turn_radius)
+            + WAYPOINT_PASS_MARGIN_M
+        )
+        if arcs.any() and loiter_width > max(turn_width, half_width):
+            return loiter_width, "circle"
+    if turn_width > half_width:
+        return turn_width, "fly-by path"
+    return half_width, "default" if requirements.setup.autopilot.follows_path else "autopilot"
 
 
 def farthest_from_legs(points: Floats, legs: Floats) -> tuple[float, int]:
@@ -122,14 +126,14 @@ def farthest_from_legs(points: Floats, legs: Floats) -> tuple[float, int]:
     >>> farthest_from_legs(np.array([[5.0, 50.0, 0.0], [30.0, 60.0, 0.0], [50.0, 93.0, 0.0]]), legs)
     (30.0, 1)
     """
-    nearest2 = np.full(len(points), math.inf)
+    nearest_square = np.full(len(points), math.inf)
     for start, end in zip(legs[:-1, :2], legs[1:, :2], strict=True):
-        step, away = end - start, points[:, :2] - start
-        along = np.clip(away @ step / max(float(step @ step), 1e-12), 0.0, 1.0)
-        rest = away - along[:, None] * step
-        nearest2 = np.minimum(nearest2, (rest * rest).sum(axis=1))
-    row = int(np.argmax(nearest2))
-    return math.sqrt(float(nearest2[row])), row
+        leg_vector, offsets = end - start, points[:, :2] - start
+        fractions = np.clip(offsets @ leg_vector / max(float(leg_vector @ leg_vector), 1e-12), 0.0, 1.0)
+        leg_offsets = offsets - fractions[:, None] * leg_vector
+        nearest_square = np.minimum(nearest_square, (leg_offsets * leg_offsets).sum(axis=1))
+    row = int(np.argmax(nearest_square))
+    return math.sqrt(float(nearest_square[row])), row
 
 
 # ----------------------------------------------------------------------
@@ -140,50 +144,57 @@ def farthest_from_legs(points: Floats, legs: Floats) -> tuple[float, int]:
 
 
 def negligible_kink(requirements: RouteRequirements, i: int) -> float | None:
-    """Return how closely a flyable path without the corner passes the waypoint, m, or None if there is no such path.
+    """Return the distance at which a flyable path without the corner passes it, m, or None if there is no such path.
 
     The path leaves out the waypoint and up to `KINK_WAYPOINT_COUNT` - 1 of its neighbours, passes each of them within
     """
-    most, circles = KINK_FRACTION * requirements.setup.corridor, requirements.setup.route.arcs > 0.0
+    max_distance, is_circle = KINK_FRACTION * requirements.setup.corridor, requirements.setup.route.arcs > 0.0
     for count in range(1, KINK_WAYPOINT_COUNT + 1):
         for first in range(max(1, i - count + 1), min(i, requirements.legs - count) + 1):
             last = first + count - 1
             chord = requirements.points[[first - 1, last + 1]]
-            away, _ = farthest_from_legs(requirements.points[first : last + 1], chord)
-            apart = math.dist(chord[0, :2], chord[1, :2]) > 0.0
-            if away <= most and apart and not circles[first : last + 1].any() and _has_room(requirements, first, last):
-                return away
+            distance, _ = farthest_from_legs(requirements.points[first : last + 1], chord)
+            is_apart = math.dist(chord[0, :2], chord[1, :2]) > 0.0
+            if (
+                distance <= max_distance
+                and is_apart
+                and not is_circle[first : last + 1].any()
+                and _has_room(requirements, first, last)
+            ):
+                return distance
     return None
 
 
 def _has_room(requirements: RouteRequirements, first: int, last: int) -> bool:
     """Return True if the route without the waypoints first..last has room for the turns at the gap."""
     # Include two waypoints beyond the ends of the gap: their turns use part of the legs.
-    start, stop = max(0, first - 4), min(len(requirements.points), last + 5)
-    near = _reduced_route(requirements.setup.route, np.r_[start:first, last + 1 : stop])
-    made = turn_requirements(near, performance_tables(near, requirements.limits))
-    for new, old in ((first - 1 - start, first - 1), (first - start, last + 1)):
-        if not 0 < old < requirements.legs:
+    start, end = max(0, first - 4), min(len(requirements.points), last + 5)
+    nearby_route = _reduced_route(requirements.setup.route, np.r_[start:first, last + 1 : end])
+    turns = turn_requirements(nearby_route, performance_tables(nearby_route, requirements.limits))
+    for new_corner, old_corner in ((first - 1 - start, first - 1), (first - start, last + 1)):
+        if not 0 < old_corner < requirements.legs:
             continue
-        limit, _ = tighter_turn(requirements, old, float(made.limit[new]))
-        if abs(float(made.turns[new])) > limit + PLAN_TOLERANCE_RAD:
+        limit, _ = tighter_turn(requirements, old_corner, float(turns.limit[new_corner]))
+        if abs(float(turns.turns[new_corner])) > limit + PLAN_TOLERANCE_RAD:
             return False
     return True
 
 
-def _reduced_route(route: Route, kept: NDArray[np.int64]) -> Route:
+def _reduced_route(route: Route, waypoints: NDArray[np.int64]) -> Route:
     """Return the route reduced to some waypoints.
 
     Each leg has the speed of the old leg that begins at the same waypoint.
     """
     names = ("waypoints", "acceptance", "fly_over", "items", "arcs", "above_ground")
-    return replace(route, airspeed=route.airspeed[kept[:-1]], **{name: getattr(route, name)[kept] for name in names})
+    return replace(
+        route, airspeed=route.airspeed[waypoints[:-1]], **{name: getattr(route, name)[waypoints] for name in names}
+    )
 
 
-def step(requirements: RouteRequirements, leg: int) -> float | None:
-    """Return the height (m, positive) of the step that a leg is part of, or None above `NEGLIGIBLE_STEP_M`.
+def step_height(requirements: RouteRequirements, leg: int) -> float | None:
+    """Return the height (m, positive) of the step that a leg belongs to, or None above `NEGLIGIBLE_STEP_M`.
 
-    The leg is beyond its slope limit.  A sequence of legs that is too steep overall, including this leg, is one step:
+    The leg exceeds its slope limit.  A sequence of legs that is too steep overall and includes this leg is one step:
     the height of a staircase is the total height of its stairs.
     """
     limit, _ = slope_limit(requirements, leg)

@@ -31,18 +31,20 @@ _STEP_M = 20.0
 _MAX_LEVELS = 12
 
 
-def hazards_within(requirements: RouteRequirements, middle: Floats, low: float, high: float, reach: float) -> list[str]:
-    """Describe the hazards to which a flight within a distance of a place could come too close.
+def hazards_within(
+    requirements: RouteRequirements, center: Floats, min_altitude: float, max_altitude: float, reach: float
+) -> list[str]:
+    """Describe the hazards that are too close to a flight anywhere within a radius of a place.
 
-    middle: east and north of the place, m, (2,).
-    low, high: minimum and maximum altitude of the flight, m AMSL.
-    reach: distance from the place, m.
+    center: east and north of the place, m, (2,).
+    min_altitude, max_altitude: minimum and maximum altitude of the flight, m AMSL.
+    reach: the radius, m.
     """
     return [
-        *_ground_hazards(requirements, middle, low, high, reach),
-        *_missile_hazards(requirements, middle, low, high, reach),
-        *_zone_hazards(requirements, middle, low, high, reach),
-        *_area_hazards(requirements, middle, reach),
+        *_ground_hazards(requirements, center, min_altitude, max_altitude, reach),
+        *_missile_hazards(requirements, center, min_altitude, max_altitude, reach),
+        *_zone_hazards(requirements, center, min_altitude, max_altitude, reach),
+        *_area_hazards(requirements, center, reach),
     ]
 
 
@@ -54,96 +56,116 @@ def end_loiter_hazards(requirements: RouteRequirements) -> tuple[float, list[str
     setup, rules = requirements.setup, requirements.setup.autopilot.loiter_rules
     if not rules.ends_in_circle or not ends_at_plain_waypoint(setup.route, setup.mission):
         return None
-    up, speed = float(requirements.points[-1, 2]), float(requirements.route.airspeed[-1])
-    held = max(requirements.limits.turn_radius(course, course + math.pi, up, speed) for course in (0.0, math.pi))
-    reach = LOITER_SWING_RADII * max(abs(rules.radius), held)
+    altitude, speed = float(requirements.points[-1, 2]), float(requirements.route.airspeed[-1])
+    min_radius = max(
+        requirements.limits.turn_radius(course, course + math.pi, altitude, speed) for course in (0.0, math.pi)
+    )
+    reach = LOITER_SWING_RADII * max(abs(rules.radius), min_radius)
     if not math.isfinite(reach):
         return reach, ["the wind leaves no way around it"]
-    return reach, hazards_within(requirements, requirements.points[-1, :2], up, up, reach)
+    return reach, hazards_within(requirements, requirements.points[-1, :2], altitude, altitude, reach)
 
 
 def _ground_hazards(
-    requirements: RouteRequirements, middle: Floats, low: float, high: float, reach: float
+    requirements: RouteRequirements, center: Floats, min_altitude: float, max_altitude: float, reach: float
 ) -> list[str]:
     ground, limits = requirements.setup.scenario.terrain, requirements.setup.scenario.limits
     if ground is None:
         return []
-    rings = _ring_points(middle, reach, ground.spacing)
-    above, _ = path_clearance(ground.heights, ground.to_pixel.record, _points_at(rings, low))
-    found = []
+    rings = _ring_points(center, reach, ground.spacing)
+    clearances, _ = path_clearance(ground.heights, ground.to_pixel.record, _points_at(rings, min_altitude))
+    hazards = []
     # Points outside the known terrain are NaN.
-    if np.isnan(above).any():
-        found.append("the terrain is not known")
-    least = float(np.nanmin(above, initial=math.inf))
-    if least < requirements.limits.min_clearance - CLEARANCE_TOLERANCE_M:
-        found.append(f"the ground is {least:.0f} m below")
+    if np.isnan(clearances).any():
+        hazards.append("the terrain is not known")
+    min_clearance = float(np.nanmin(clearances, initial=math.inf))
+    if min_clearance < requirements.limits.min_clearance - CLEARANCE_TOLERANCE_M:
+        hazards.append(f"the ground is {min_clearance:.0f} m below")
     if limits.max_height_m is not None:
-        # The greatest height above ground is the least height above ground of the same world upside down.
-        under, _ = path_clearance(-ground.heights, ground.to_pixel.record, _points_at(rings, -high))
-        most = -float(np.nanmin(under, initial=math.inf))
-        if most > limits.max_height_m + HEIGHT_TOLERANCE_M:
-            found.append(f"the ground is {most:.0f} m below, over the {limits.max_height_m:.0f} m allowed")
-    return found
+        # The maximum height above ground is the minimum height above ground of the inverted world.
+        inverted_clearances, _ = path_clearance(
+            -ground.heights, ground.to_pixel.record, _points_at(rings, -max_altitude)
+        )
+        max_height = -float(np.nanmin(inverted_clearances, initial=math.inf))
+        if max_height > limits.max_height_m + HEIGHT_TOLERANCE_M:
+            hazards.append(f"the ground is {max_height:.0f} m below, over the {limits.max_height_m:.0f} m allowed")
+    return hazards
 
 
 def _missile_hazards(
-    requirements: RouteRequirements, middle: Floats, low: float, high: float, reach: float
+    requirements: RouteRequirements, center: Floats, min_altitude: float, max_altitude: float, reach: float
 ) -> list[str]:
     scenario = requirements.setup.scenario
     if scenario.external:
         return []
-    threats, found = scenario.threats, []
-    for m, table in enumerate(scenario.spec.threats):
-        radius, (east, north, up) = float(threats.kill_radius[m]), threats.position[m]
-        horizontal = max(0.0, math.hypot(east - middle[0], north - middle[1]) - reach)
-        if radius > 0.0 and math.hypot(horizontal, max(0.0, low - up, up - high)) <= radius:
-            found.append(f"the missile {threat_label(table.name or '', m)} reaches it")
-    return found
+    threats, hazards = scenario.threats, []
+    for number, table in enumerate(scenario.spec.threats):
+        radius, (east, north, up) = float(threats.kill_radius[number]), threats.position[number]
+        horizontal_distance = max(0.0, math.hypot(east - center[0], north - center[1]) - reach)
+        if radius > 0.0 and math.hypot(horizontal_distance, max(0.0, min_altitude - up, up - max_altitude)) <= radius:
+            hazards.append(f"the missile {threat_label(table.name or '', number)} reaches it")
+    return hazards
 
 
-def _zone_hazards(requirements: RouteRequirements, middle: Floats, low: float, high: float, reach: float) -> list[str]:
+def _zone_hazards(
+    requirements: RouteRequirements, center: Floats, min_altitude: float, max_altitude: float, reach: float
+) -> list[str]:
     airspace = requirements.airspace
     if not airspace.zones:
         return []
     terrain = requirements.setup.scenario.terrain
-    rings, found = _ring_points(middle, reach, 0.0), set[int]()
-    levels = 1 if high - low < ROUNDING_M else min(_MAX_LEVELS, 2 + int((high - low) / _STEP_M))
-    for up in np.linspace(low, high, levels):
-        visits = path_zones(_moves(_points_at(rings, float(up))), airspace.records, terrain)
-        found |= {z for z in range(len(airspace.zones)) if visits[z].depth > ROUNDING_M or visits[z].unknown}
-    return [f"{airspace.zones[z].kind} zone {airspace.zones[z].name or z} is not kept" for z in sorted(found)]
+    rings, zone_numbers = _ring_points(center, reach, 0.0), set[int]()
+    levels = (
+        1
+        if max_altitude - min_altitude < ROUNDING_M
+        else min(_MAX_LEVELS, 2 + int((max_altitude - min_altitude) / _STEP_M))
+    )
+    for up in np.linspace(min_altitude, max_altitude, levels):
+        visits = path_zones(_straight_moves(_points_at(rings, float(up))), airspace.records, terrain)
+        zone_numbers |= {
+            number
+            for number in range(len(airspace.zones))
+            if visits[number].depth > ROUNDING_M or visits[number].unknown
+        }
+    return [
+        f"{airspace.zones[number].kind} zone {airspace.zones[number].name or number} is not kept"
+        for number in sorted(zone_numbers)
+    ]
 
 
-def _area_hazards(requirements: RouteRequirements, middle: Floats, reach: float) -> list[str]:
+def _area_hazards(requirements: RouteRequirements, center: Floats, reach: float) -> list[str]:
     scenario = requirements.setup.scenario
     if scenario.external:
         return []
-    inside = min(float(min(at - low, high - at)) for at, (low, high) in zip(middle, scenario.bounds, strict=True))
-    return ["the area ends"] if inside < reach - ROUNDING_M else []
+    edge_distance = min(
+        float(min(coordinate - min_edge, max_edge - coordinate))
+        for coordinate, (min_edge, max_edge) in zip(center, scenario.bounds, strict=True)
+    )
+    return ["the area ends"] if edge_distance < reach - ROUNDING_M else []
 
 
-def _ring_points(middle: Floats, reach: float, spacing: float) -> Floats:
+def _ring_points(center: Floats, reach: float, spacing: float) -> Floats:
     """Return points on rings around a center out to the reach, about a raster step apart, m, (n, 2)."""
     count = min(_MAX_RINGS, max(_MIN_RINGS, math.ceil(reach / spacing) if spacing > 0.0 else _MIN_RINGS))
     # A polygon circumscribed about its circle leaves no gap between the last ring and the reach.
-    last = Cylinder(float(middle[0]), float(middle[1]), reach / math.cos(math.pi / CIRCLE_CORNERS))
-    return np.linspace(middle, zone_rings(Zone("", "exclusion", last))[0], count + 1).reshape(-1, 2)
+    last_ring = Cylinder(float(center[0]), float(center[1]), reach / math.cos(math.pi / CIRCLE_CORNERS))
+    return np.linspace(center, zone_rings(Zone("", "exclusion", last_ring))[0], count + 1).reshape(-1, 2)
 
 
-def _points_at(places: Floats, up: float) -> Floats:
+def _points_at(places: Floats, altitude: float) -> Floats:
     """Return places (n, 2) at one altitude as points (n, 3) m."""
-    return np.column_stack([places, np.full(len(places), up)])
+    return np.column_stack([places, np.full(len(places), altitude)])
 
 
-def _moves(points: Floats) -> Records:
+def _straight_moves(points: Floats) -> Records:
     """Return straight moves of one second each from each of n points to the next, (n - 1,) of `MOVE`."""
-    step = np.diff(points, axis=0)
-    run = np.hypot(step[:, 0], step[:, 1])
-    moves: Records = np.zeros(len(step), MOVE)
+    steps = np.diff(points, axis=0)
+    run = np.hypot(steps[:, 0], steps[:, 1])
+    moves: Records = np.zeros(len(steps), MOVE)
     for axis, name in enumerate(("east", "north", "up")):
         moves[name] = points[:-1, axis]
     for axis, name in enumerate(("course_east", "course_north")):
-        moves[name] = np.divide(step[:, axis], run, out=np.zeros_like(run), where=run > 0.0)
-    moves["length"], moves["climb"] = run, step[:, 2]
-    moves["time"], moves["lasts"] = np.arange(len(step)), 1.0
+        moves[name] = np.divide(steps[:, axis], run, out=np.zeros_like(run), where=run > 0.0)
+    moves["length"], moves["climb"] = run, steps[:, 2]
+    moves["time"], moves["lasts"] = np.arange(len(steps)), 1.0
     return moves

@@ -1,7 +1,7 @@
 """Split a flight that includes ground phases into take-off, airborne part and landing.
 
 The usual rules judge the airborne part.  Its route begins where the take-off ended, like the autopilot's own first leg,
-and ends at the last waypoint before the landing point.  Phases are found from positions and altitudes alone.
+and ends at the last waypoint before the landing point.  Phases are found from only positions and altitudes.
 """
 
 from dataclasses import replace
@@ -18,27 +18,27 @@ from world.arrays import Flags
 _END_DELAY_S = 2.0
 
 
-def flown_phases(whole: RouteRequirements, track: Track) -> tuple[RouteRequirements, AlignedTrack | None]:
+def flown_phases(whole_requirements: RouteRequirements, track: Track) -> tuple[RouteRequirements, AlignedTrack | None]:
     """Return the requirements of a flight's airborne part, and its track aligned with them.
 
-    whole: requirements of the whole route; returned unchanged for a flight that is airborne all the time.
+    whole_requirements: requirements of the whole route, returned unchanged for a flight without ground phases.
     """
-    ways = whole.setup.ground_ways
+    ways = whole_requirements.setup.ground_ways
     if not ways:
-        return whole, align_track(whole, track)
+        return whole_requirements, align_track(whole_requirements, track)
     start = _takeoff_end_row(track, ways)
-    first = np.asarray(track.position[start], dtype=np.float64) if ways.take_off is not None else None
-    setup = whole.setup
-    in_air = replace(setup, route=airborne_route(setup.route, ways, first))
-    requirements = route_requirements(in_air, envelope=whole.envelope)
-    flying = track.rows(start, len(track))
-    aligned, left = align_track(requirements, flying), len(track) - 1
+    start_point = np.asarray(track.position[start], dtype=np.float64) if ways.take_off is not None else None
+    setup = whole_requirements.setup
+    airborne_setup = replace(setup, route=airborne_route(setup.route, ways, start_point))
+    requirements = route_requirements(airborne_setup, envelope=whole_requirements.envelope)
+    airborne_track = track.rows(start, len(track))
+    aligned, landing_row = align_track(requirements, airborne_track), len(track) - 1
     if ways.approach is not None and aligned is not None and aligned.passed[-1]:
-        passed = float(aligned.track.time[aligned.rows[-1]])
-        left = min(left, int(np.searchsorted(track.time, passed)))
-        until = int(np.searchsorted(track.time, passed + _END_DELAY_S, side="right"))
-        aligned = align_track(requirements, track.rows(start, until))
-    ground = FlownGround(ways, whole, track, start, left)
+        passed_time = float(aligned.track.time[aligned.rows[-1]])
+        landing_row = min(landing_row, int(np.searchsorted(track.time, passed_time)))
+        end_row = int(np.searchsorted(track.time, passed_time + _END_DELAY_S, side="right"))
+        aligned = align_track(requirements, track.rows(start, end_row))
+    ground = FlownGround(ways, whole_requirements, track, start, landing_row)
     return replace(requirements, ground=ground), aligned
 
 
@@ -46,8 +46,8 @@ def _takeoff_end_row(track: Track, ways: GroundWays) -> int:
     """Return the row where the take-off ended; 0 without a take-off, the last row if the take-off did not end."""
     if ways.take_off is None:
         return 0
-    above = track.position[:, 2] > ways.take_off.top
-    return int(np.argmax(above)) if above.any() else len(track) - 1
+    is_above = track.position[:, 2] > ways.take_off.top
+    return int(np.argmax(is_above)) if is_above.any() else len(track) - 1
 
 
 def by_the_ground(track: Track, ways: GroundWays) -> Flags:
@@ -57,10 +57,10 @@ def by_the_ground(track: Track, ways: GroundWays) -> Flags:
     >>> bool(by_the_ground(example_log().track, GroundWays()).any())
     False
     """
-    found = np.arange(len(track)) < _takeoff_end_row(track, ways)
+    is_ground_phase = np.arange(len(track)) < _takeoff_end_row(track, ways)
     if ways.approach is not None:
-        found |= track.leg >= ways.approach.leg
-    return np.asarray(found)
+        is_ground_phase |= track.leg >= ways.approach.leg
+    return np.asarray(is_ground_phase)
 
 
 def leg_ends(requirements: RouteRequirements, aligned: AlignedTrack) -> tuple[float, ...]:

@@ -13,17 +13,19 @@ def missing_ends_text(mission: Mission, limits: MissionChecks) -> str:
     >>> missing_ends_text(Mission(None, ()), MissionChecks(requires=2))
     "PX4's fixed-wing default refuses a mission without a landing: add one, or set MIS_TKO_LAND_REQ 0"
     """
-    takeoff = any(item.command in TAKEOFFS for item in mission.items)
-    land = any(item.command in LANDINGS for item in mission.items)
-    enough = {0: True, 1: takeoff, 2: land, 3: takeoff and land}.get(limits.requires, takeoff == land)
-    if enough:
+    has_takeoff = any(item.command in TAKEOFFS for item in mission.items)
+    has_landing = any(item.command in LANDINGS for item in mission.items)
+    is_enough = {0: True, 1: has_takeoff, 2: has_landing, 3: has_takeoff and has_landing}.get(
+        limits.requires, has_takeoff == has_landing
+    )
+    if is_enough:
         return ""
     if limits.requires == MissionChecks().requires and not limits.stated:
         return "PX4's fixed-wing default refuses a mission without a landing: add one, or set MIS_TKO_LAND_REQ 0"
-    wanted = f"MIS_TKO_LAND_REQ {limits.requires} asks for {_REQUIRED[limits.requires]}"
-    return f"{wanted}, and this has {_present_ends(takeoff, land)}"
+    requirement = f"MIS_TKO_LAND_REQ {limits.requires} asks for {_REQUIRED[limits.requires]}"
+    return f"{requirement}, and this has {_present_ends(has_takeoff, has_landing)}"
 
 
-def _present_ends(takeoff: bool, land: bool) -> str:
-    present = [name for name, there in (("a takeoff", takeoff), ("a landing", land)) if there]
+def _present_ends(has_takeoff: bool, has_landing: bool) -> str:
+    present = [name for name, is_present in (("a takeoff", has_takeoff), ("a landing", has_landing)) if is_present]
     return " and ".join(present) or "neither a takeoff nor a landing"

@@ -16,9 +16,10 @@ from world.arrays import Floats, Heights
 from world.frames import PolyMapRecord, polymap
 from world.kernels import Record, Records, inner, record_dtype
 
-# A move.  east, north, up: m, of its start.  course_east, course_north: unit vector of its course there, both 0 for a
-# vertical move.  length: m, horizontal.  curvature: 1/m, positive to the right.  climb, bend: m; at the fraction f of a
-# move the altitude is up + climb * f + bend * f * f.  time, lasts: s.  leg: of the route.
+# A move.  east, north, up: its start, m.  course_east, course_north: unit vector of its course there, both 0 for a
+# vertical move.  length: horizontal, m.  curvature: 1/m, positive to the right.  climb, bend: m; at the fraction f of a
+# move the altitude is up + climb * f + bend * f * f.  time: time of its start, s.  lasts: duration, s.  leg: leg of the
+# route.
 MOVE = record_dtype(
     "east",
     "north",
@@ -36,17 +37,20 @@ MOVE = record_dtype(
 
 
 @inner
-def move_point(move: Record, share: float) -> tuple[float, float, float]:
+def move_point(move: Record, fraction: float) -> tuple[float, float, float]:
     """Return east, north and up (m) at a fraction of a move."""
-    run = share * move.length
-    ahead, aside = run, 0.0
+    run = fraction * move.length
+    ahead, lateral_offset = run, 0.0
     if move.curvature != 0.0:
-        turned = move.curvature * run
-        ahead, aside = math.sin(turned) / move.curvature, (1.0 - math.cos(turned)) / move.curvature
+        course_change = move.curvature * run
+        ahead, lateral_offset = (
+            math.sin(course_change) / move.curvature,
+            (1.0 - math.cos(course_change)) / move.curvature,
+        )
     return (
-        move.east + ahead * move.course_east + aside * move.course_north,
-        move.north + ahead * move.course_north - aside * move.course_east,
-        move.up + (move.climb + move.bend * share) * share,
+        move.east + ahead * move.course_east + lateral_offset * move.course_north,
+        move.north + ahead * move.course_north - lateral_offset * move.course_east,
+        move.up + (move.climb + move.bend * fraction) * fraction,
     )
 
 
@@ -78,15 +82,15 @@ def path_moves(path: FlyByPath, speeds: Floats, first_leg: int, last_leg: int) -
         changes = [piece.leg_change] if start < piece.leg_change < end else []
         cuts = np.unique(np.concatenate([[start], inner, changes, [end]]))
         for first, last in pairwise(cuts.tolist()):
-            middle, half = 0.5 * (first + last), 0.5 * (last - first)
+            middle, half_length = 0.5 * (first + last), 0.5 * (last - first)
             # Evaluated at the piece's midpoint: at its ends another parabola, or another leg, may begin.
             height, slope, bend = profile(nodes, middle)
             east, north = arc_point(piece, first - start)
             course = piece.course + piece.curvature * (first - start)
-            up = height - slope * half + 0.5 * bend * half * half
+            up = height - slope * half_length + 0.5 * bend * half_length * half_length
             leg = int(piece.leg) + int(middle > piece.leg_change)
-            length, lasts = last - first, (last - first) / speeds[leg]
-            climb, curved = (slope - bend * half) * length, 0.5 * bend * length * length
+            length, duration = last - first, (last - first) / speeds[leg]
+            climb, move_bend = (slope - bend * half_length) * length, 0.5 * bend * length * length
             rows.append(
                 (
                     east,
@@ -97,13 +101,13 @@ def path_moves(path: FlyByPath, speeds: Floats, first_leg: int, last_leg: int) -
                     length,
                     piece.curvature,
                     climb,
-                    curved,
+                    move_bend,
                     clock,
-                    lasts,
+                    duration,
                     leg,
                 )
             )
-            clock += lasts
+            clock += duration
     return np.array(rows, MOVE)
 
 
@@ -129,14 +133,14 @@ def straight_moves(points: Floats, time: Floats) -> Records:
     >>> float(moves[0].length), float(moves[0].course_east), float(moves[0].climb), float(moves[0].lasts)
     (50.0, 0.6, 10.0, 2.0)
     """
-    step = np.diff(points, axis=0)
-    moves: Records = np.zeros(len(step), MOVE)
+    steps = np.diff(points, axis=0)
+    moves: Records = np.zeros(len(steps), MOVE)
     for axis, name in enumerate(("east", "north", "up")):
         moves[name] = points[:-1, axis]
-    run = np.hypot(step[:, 0], step[:, 1])
-    moves["course_east"] = np.divide(step[:, 0], run, out=np.zeros_like(run), where=run > 0.0)
-    moves["course_north"] = np.divide(step[:, 1], run, out=np.zeros_like(run), where=run > 0.0)
-    moves["length"], moves["climb"] = run, step[:, 2]
+    run = np.hypot(steps[:, 0], steps[:, 1])
+    moves["course_east"] = np.divide(steps[:, 0], run, out=np.zeros_like(run), where=run > 0.0)
+    moves["course_north"] = np.divide(steps[:, 1], run, out=np.zeros_like(run), where=run > 0.0)
+    moves["length"], moves["climb"] = run, steps[:, 2]
     moves["time"], moves["lasts"] = time[:-1], np.diff(time)
     return moves
 
@@ -152,7 +156,9 @@ BLOCK_MOVES = 64
 
 
 @inner
-def move_blocks(moves: Records, heights: Heights, to_pixel: PolyMapRecord, pitch: float, above_ground: bool) -> Records:
+def move_blocks(
+    moves: Records, heights: Heights, to_pixel: PolyMapRecord, spacing: float, above_ground: bool
+) -> Records:
     """Group moves into blocks of dtype `BLOCK`, (b,); read the ground only if a zone limit is given above ground."""
     blocks = np.zeros((moves.shape[0] + BLOCK_MOVES - 1) // BLOCK_MOVES, BLOCK)
     for b in range(blocks.shape[0]):
@@ -163,18 +169,18 @@ def move_blocks(moves: Records, heights: Heights, to_pixel: PolyMapRecord, pitch
             move = moves[k]
             east, north, up = move_point(move, 0.5)
             # No point of a move is further from its midpoint than half its length.
-            half = 0.5 * move.length
-            lift = 0.5 * abs(move.climb) + 1.25 * abs(move.bend)
-            block.west, block.east = min(block.west, east - half), max(block.east, east + half)
-            block.south, block.north = min(block.south, north - half), max(block.north, north + half)
-            block.low, block.high = min(block.low, up - lift), max(block.high, up + lift)
+            half_length = 0.5 * move.length
+            half_height = 0.5 * abs(move.climb) + 1.25 * abs(move.bend)
+            block.west, block.east = min(block.west, east - half_length), max(block.east, east + half_length)
+            block.south, block.north = min(block.south, north - half_length), max(block.north, north + half_length)
+            block.low, block.high = min(block.low, up - half_height), max(block.high, up + half_height)
         if above_ground:
-            block.steepest = _steepest(block, heights, to_pixel, pitch)
+            block.steepest = _steepest_ground(block, heights, to_pixel, spacing)
     return blocks
 
 
 @inner
-def _steepest(block: Record, heights: Heights, to_pixel: PolyMapRecord, pitch: float) -> float:
+def _steepest_ground(block: Record, heights: Heights, to_pixel: PolyMapRecord, spacing: float) -> float:
     """Return the steepest slope that the bilinear ground can have under a block, m per m, ignoring NaN."""
     rows, cols = heights.shape
     west, south = polymap(to_pixel, block.west, block.south)
@@ -186,14 +192,14 @@ def _steepest(block: Record, heights: Heights, to_pixel: PolyMapRecord, pitch: f
     first_row, last_row = min(south, north, upper, lower), max(south, north, upper, lower)
     if not (last_col >= 0.0 and first_col <= cols - 1 and last_row >= 0.0 and first_row <= rows - 1):
         return 0.0
-    steepest = 0.0
+    max_step_square = 0.0
     for i in range(max(0, int(first_row) - 1), min(rows - 1, int(last_row) + 2)):
         for j in range(max(0, int(first_col) - 1), min(cols - 1, int(last_col) + 2)):
-            over = max(abs(heights[i, j + 1] - heights[i, j]), abs(heights[i + 1, j + 1] - heights[i + 1, j]))
-            down = max(abs(heights[i + 1, j] - heights[i, j]), abs(heights[i + 1, j + 1] - heights[i, j + 1]))
-            steep = over * over + down * down
+            col_step = max(abs(heights[i, j + 1] - heights[i, j]), abs(heights[i + 1, j + 1] - heights[i + 1, j]))
+            row_step = max(abs(heights[i + 1, j] - heights[i, j]), abs(heights[i + 1, j + 1] - heights[i, j + 1]))
+            step_square = col_step * col_step + row_step * row_step
             # A comparison with NaN is false.
-            if steep > steepest:
-                steepest = steep
-    # Slightly more, for the rounding of single precision.
-    return math.sqrt(steepest) / pitch * (1.0 + 1e-6)
+            if step_square > max_step_square:
+                max_step_square = step_square
+    # The slight increase allows for the rounding of single precision.
+    return math.sqrt(max_step_square) / spacing * (1.0 + 1e-6)

@@ -19,7 +19,7 @@ from world.terrain import Terrain, segment_clearance
 
 # Number of segments that share one bounding box.
 _BLOCK_SEGMENTS = 256
-# Number of segments joined to one if a sphere's center is `SPHERE_FAR_DIAGONALS` from a block of them.
+# Number of segments joined to one if their block is at least `SPHERE_FAR_DIAGONALS` from a sphere's center.
 _JOINED_SEGMENTS = 16
 
 
@@ -28,17 +28,17 @@ def path_clearance(heights: Heights, to_pixel: PolyMapRecord, points: Floats) ->
 
     Both are NaN if a segment leaves the raster or its data.
     """
-    low, at = _path_clearance(read_only(heights), to_pixel, read_only(np.ascontiguousarray(points)))
-    return low, at
+    clearance, fraction = _segment_clearances(read_only(heights), to_pixel, read_only(np.ascontiguousarray(points)))
+    return clearance, fraction
 
 
 @compiled
-def _path_clearance(heights: Heights, to_pixel: PolyMapRecord, points: Floats) -> tuple[Floats, Floats]:
+def _segment_clearances(heights: Heights, to_pixel: PolyMapRecord, points: Floats) -> tuple[Floats, Floats]:
     count = max(0, points.shape[0] - 1)
-    low, at = np.empty(count), np.empty(count)
+    clearance, fraction = np.empty(count), np.empty(count)
     for k in range(count):
-        low[k], at[k] = segment_clearance(heights, to_pixel, points[k], points[k + 1])
-    return low, at
+        clearance[k], fraction[k] = segment_clearance(heights, to_pixel, points[k], points[k + 1])
+    return clearance, fraction
 
 
 class SphereVisits(NamedTuple):
@@ -67,7 +67,7 @@ class _Boxes(NamedTuple):
 
 
 def path_spheres(points: Floats, time: Floats, centres: Floats, radii: Floats, scales: Floats) -> SphereVisits:
-    """Return the visits of a path to m spheres; a radius of 0 means that there is no sphere.
+    """Measure the visits of a path to m spheres; a radius of 0 means that there is no sphere.
 
     points: (n, 3) m.  time: (n,) s.  centres: (m, 3) m.  radii, scales: (m,) m.
 
@@ -76,42 +76,52 @@ def path_spheres(points: Floats, time: Floats, centres: Floats, radii: Floats, s
     >>> float(visits.closest[0]), round(float(visits.inside[0]), 6)
     (30.0, 8.0)
     """
-    given = (read_only(np.ascontiguousarray(array)) for array in (points, time, centres, radii, scales))
-    return _path_spheres(*given)
+    arrays = (read_only(np.ascontiguousarray(array)) for array in (points, time, centres, radii, scales))
+    return _sphere_visits(*arrays)
 
 
 @compiled
-def _path_spheres(points: Floats, time: Floats, centres: Floats, radii: Floats, scales: Floats) -> SphereVisits:
-    boxes = _boxes(points)
+def _sphere_visits(points: Floats, time: Floats, centres: Floats, radii: Floats, scales: Floats) -> SphereVisits:
+    boxes = _block_boxes(points)
     count = centres.shape[0]
-    out = SphereVisits(
+    visits = SphereVisits(
         np.zeros(count), np.zeros(count), np.full(count, math.inf), np.zeros(count), np.full(count, math.nan)
     )
     for m in range(count):
         if radii[m] <= 0.0 or points.shape[0] < 2:
             continue
-        nearest = 0
-        nearest_box = math.inf
+        nearest_block = 0
+        nearest_distance = math.inf
         for block in range(boxes.diagonal.shape[0]):
-            low, _ = _box_distances(boxes, block, centres[m])
-            if low < nearest_box:
-                nearest_box, nearest = low, block
-        _closest(points, time, nearest, centres[m], m, out)
+            min_distance, _ = _box_distances(boxes, block, centres[m])
+            if min_distance < nearest_distance:
+                nearest_distance, nearest_block = min_distance, block
+        _update_closest(points, time, nearest_block, centres[m], m, visits)
         for block in range(boxes.diagonal.shape[0]):
-            low, high = _box_distances(boxes, block, centres[m])
-            if low < out.closest[m]:
-                _closest(points, time, block, centres[m], m, out)
-            if low <= radii[m]:
-                whole = high <= radii[m] and low > SPHERE_FAR_DIAGONALS * boxes.diagonal[block]
-                _inside(points, time, block, _JOINED_SEGMENTS if whole else 1, centres[m], radii[m], scales[m], m, out)
-    return out
+            min_distance, max_distance = _box_distances(boxes, block, centres[m])
+            if min_distance < visits.closest[m]:
+                _update_closest(points, time, block, centres[m], m, visits)
+            if min_distance <= radii[m]:
+                is_inside = max_distance <= radii[m] and min_distance > SPHERE_FAR_DIAGONALS * boxes.diagonal[block]
+                _add_stay(
+                    points,
+                    time,
+                    block,
+                    _JOINED_SEGMENTS if is_inside else 1,
+                    centres[m],
+                    radii[m],
+                    scales[m],
+                    m,
+                    visits,
+                )
+    return visits
 
 
 @inner
-def _boxes(points: Floats) -> _Boxes:
+def _block_boxes(points: Floats) -> _Boxes:
     segments = max(0, points.shape[0] - 1)
     count = -(-segments // _BLOCK_SEGMENTS)
-    out = _Boxes(np.empty((count, 3)), np.empty((count, 3)), np.empty(count))
+    boxes = _Boxes(np.empty((count, 3)), np.empty((count, 3)), np.empty(count))
     for block in range(count):
         first, last = block * _BLOCK_SEGMENTS, min(segments, (block + 1) * _BLOCK_SEGMENTS)
         diagonal2 = 0.0
@@ -119,45 +129,45 @@ def _boxes(points: Floats) -> _Boxes:
             low, high = math.inf, -math.inf
             for row in range(first, last + 1):
                 low, high = min(low, points[row, axis]), max(high, points[row, axis])
-            out.low[block, axis], out.high[block, axis] = low, high
+            boxes.low[block, axis], boxes.high[block, axis] = low, high
             diagonal2 += (high - low) ** 2
-        out.diagonal[block] = math.sqrt(diagonal2)
-    return out
+        boxes.diagonal[block] = math.sqrt(diagonal2)
+    return boxes
 
 
 @inner
 def _box_distances(boxes: _Boxes, block: int, centre: Floats) -> tuple[float, float]:
     """Return the minimum and the maximum distance of a block's bounding box from a point."""
-    low2 = 0.0
-    high2 = 0.0
+    min_square = 0.0
+    max_square = 0.0
     for axis in range(3):
         below, above = boxes.low[block, axis] - centre[axis], centre[axis] - boxes.high[block, axis]
-        out = max(0.0, below, above)
-        low2 += out * out
-        far = max(abs(below), abs(above))
-        high2 += far * far
-    return math.sqrt(low2), math.sqrt(high2)
+        outside = max(0.0, below, above)
+        min_square += outside * outside
+        farthest = max(abs(below), abs(above))
+        max_square += farthest * farthest
+    return math.sqrt(min_square), math.sqrt(max_square)
 
 
 @inner
-def _closest(points: Floats, time: Floats, block: int, centre: Floats, m: int, out: SphereVisits) -> None:
-    """Update the minimum distance to sphere m and its time in `out` with one block."""
+def _update_closest(points: Floats, time: Floats, block: int, centre: Floats, m: int, visits: SphereVisits) -> None:
+    """Update the minimum distance to sphere m and its time in `visits` with one block."""
     for k in range(block * _BLOCK_SEGMENTS, min(points.shape[0] - 1, (block + 1) * _BLOCK_SEGMENTS)):
-        length2 = 0.0
+        length_square = 0.0
         along = 0.0
         for axis in range(3):
             step = points[k + 1, axis] - points[k, axis]
-            length2 += step * step
+            length_square += step * step
             along += step * (centre[axis] - points[k, axis])
-        f = min(1.0, max(0.0, along / length2)) if length2 > 0.0 else 0.0
-        away, _, _ = sphere_window(points[k], points[k + 1], centre, 0.0)
-        if away < out.closest[m]:
-            out.closest[m] = away
-            out.closest_time[m] = time[k] + f * (time[k + 1] - time[k])
+        fraction = min(1.0, max(0.0, along / length_square)) if length_square > 0.0 else 0.0
+        distance, _, _ = sphere_window(points[k], points[k + 1], centre, 0.0)
+        if distance < visits.closest[m]:
+            visits.closest[m] = distance
+            visits.closest_time[m] = time[k] + fraction * (time[k + 1] - time[k])
 
 
 @inner
-def _inside(
+def _add_stay(
     points: Floats,
     time: Floats,
     block: int,
@@ -166,21 +176,21 @@ def _inside(
     radius: float,
     scale: float,
     m: int,
-    out: SphereVisits,
+    visits: SphereVisits,
 ) -> None:
-    """Add one block's time and exposure inside sphere m to `out`."""
+    """Add one block's time and exposure inside sphere m to `visits`."""
     last = min(points.shape[0] - 1, (block + 1) * _BLOCK_SEGMENTS)
     k = block * _BLOCK_SEGMENTS
     while k < last:
         end = min(last, k + step)
-        share, mean = segment_exposure(points[k], points[end], centre, radius, scale)
-        if share > 0.0:
-            lasts = time[end] - time[k]
-            if math.isnan(out.entry_time[m]):
-                _, enter, _ = sphere_window(points[k], points[end], centre, radius)
-                out.entry_time[m] = time[k] + enter * lasts
-            out.inside[m] += share * lasts
-            out.exposure[m] += mean * lasts
+        fraction, mean_exposure = segment_exposure(points[k], points[end], centre, radius, scale)
+        if fraction > 0.0:
+            duration = time[end] - time[k]
+            if math.isnan(visits.entry_time[m]):
+                _, entry_fraction, _ = sphere_window(points[k], points[end], centre, radius)
+                visits.entry_time[m] = time[k] + entry_fraction * duration
+            visits.inside[m] += fraction * duration
+            visits.exposure[m] += mean_exposure * duration
         k = end
 
 
@@ -209,7 +219,7 @@ def segment_clearances(terrain: Terrain, position: Floats) -> tuple[Floats, Floa
 
     position: (t, 3).  Returns (t - 1,) twice; NaN if the segment leaves the terrain's data or is not a number.
     """
-    return _clearances(terrain.heights, terrain.to_pixel.record, read_only(np.ascontiguousarray(position)))
+    return _plausible_clearances(terrain.heights, terrain.to_pixel.record, read_only(np.ascontiguousarray(position)))
 
 
 def passages(time: Floats, position: Floats, centre: Floats, radius: float) -> list[Passage]:
@@ -219,51 +229,58 @@ def passages(time: Floats, position: Floats, centre: Floats, radius: float) -> l
     """
     if not radius > 0.0 or _boxes_are_disjoint(position, centre, radius):
         return []
-    track, middle = read_only(np.ascontiguousarray(position)), read_only(np.ascontiguousarray(centre))
-    closest, enter, leave = _windows(track, middle, float(radius))
-    rows = np.flatnonzero(leave > enter)
+    track, center = read_only(np.ascontiguousarray(position)), read_only(np.ascontiguousarray(centre))
+    closest, entry_fraction, exit_fraction = _sphere_windows(track, center, float(radius))
+    rows = np.flatnonzero(exit_fraction > entry_fraction)
     if not rows.size:
         return []
     step = np.diff(time)
-    start, end = (time[rows] + share[rows] * step[rows] for share in (enter, leave))
-    first = np.flatnonzero(np.append(True, start[1:] - end[:-1] > SPHERE_STAY_TOLERANCE_S))
-    found: list[Passage] = []
-    for here in np.split(np.arange(rows.size), first[1:]):
-        row, last = rows[here[np.argmin(closest[rows[here]])]], rows[here[-1]]
-        whole = not (last == len(step) - 1 and leave[last] >= 1.0)
-        place = (float(start[here[0]]), float(end[here[-1]]), float(closest[row]), float(time[row]))
-        found.append(Passage(*place, whole=bool(whole)))
-    return found
+    start, end = (time[rows] + fractions[rows] * step[rows] for fractions in (entry_fraction, exit_fraction))
+    first_indices = np.flatnonzero(np.append(True, start[1:] - end[:-1] > SPHERE_STAY_TOLERANCE_S))
+    stays: list[Passage] = []
+    for indices in np.split(np.arange(rows.size), first_indices[1:]):
+        closest_row, last = rows[indices[np.argmin(closest[rows[indices]])]], rows[indices[-1]]
+        is_whole = not (last == len(step) - 1 and exit_fraction[last] >= 1.0)
+        values = (
+            float(start[indices[0]]),
+            float(end[indices[-1]]),
+            float(closest[closest_row]),
+            float(time[closest_row]),
+        )
+        stays.append(Passage(*values, whole=bool(is_whole)))
+    return stays
 
 
 def _boxes_are_disjoint(position: Floats, centre: Floats, radius: float) -> bool:
     """Return True if the track's bounding box does not overlap the sphere's."""
-    good = position[np.isfinite(position).all(axis=1)]
-    if not len(good):
+    finite = position[np.isfinite(position).all(axis=1)]
+    if not len(finite):
         return True
-    return bool((good.min(axis=0) > centre + radius).any() or (good.max(axis=0) < centre - radius).any())
+    return bool((finite.min(axis=0) > centre + radius).any() or (finite.max(axis=0) < centre - radius).any())
 
 
 @compiled
-def _clearances(
+def _plausible_clearances(
     heights: Heights, to_pixel: PolyMapRecord, position: Floats
 ) -> tuple[Floats, Floats]:  # pragma: no cover
     count = max(0, position.shape[0] - 1)
-    low = np.full(count, math.nan)
-    at = np.zeros(count)
+    clearance = np.full(count, math.nan)
+    fraction = np.zeros(count)
     for k in range(count):
         if np.abs(position[k : k + 2]).max() <= MAX_PLAUSIBLE_POSITION_M:
-            low[k], at[k] = segment_clearance(heights, to_pixel, position[k], position[k + 1])
-    return low, at
+            clearance[k], fraction[k] = segment_clearance(heights, to_pixel, position[k], position[k + 1])
+    return clearance, fraction
 
 
 @compiled
-def _windows(position: Floats, centre: Floats, radius: float) -> tuple[Floats, Floats, Floats]:  # pragma: no cover
+def _sphere_windows(
+    position: Floats, centre: Floats, radius: float
+) -> tuple[Floats, Floats, Floats]:  # pragma: no cover
     count = position.shape[0] - 1
     closest = np.full(count, math.inf)
-    enter = np.zeros(count)
-    leave = np.zeros(count)
+    entry = np.zeros(count)
+    exit_ = np.zeros(count)
     for k in range(count):
         if np.abs(position[k : k + 2]).max() <= MAX_PLAUSIBLE_POSITION_M:
-            closest[k], enter[k], leave[k] = sphere_window(position[k], position[k + 1], centre, radius)
-    return closest, enter, leave
+            closest[k], entry[k], exit_[k] = sphere_window(position[k], position[k + 1], centre, radius)
+    return closest, entry, exit_

@@ -26,17 +26,18 @@ from world.arrays import Flags, Floats
 
 @dataclass(frozen=True, slots=True)
 class LineMeasure:
-    """One photo line as flown; all shares are fractions of its length, and add up to 1.
+    """One photo line as flown.
 
     length: m.
-    good: usable share.  The other shares are divided by the first requirement that they fail:
-    away: not flown along, or too far to the side of the line.  banked, high, dark: along the line, but banked too much;
-        then too far off its height above ground; then without the camera.
-    late, early: m from the line's start to the first good place, and from the last good place to its end.
-    aside: greatest distance from the line where it was flown along, m; off: greatest height error, m, above positive.
-    photos, missed: number planned, and how many of them were not taken; 0 if the distance between photos is not stated.
-    allowed_aside: m.  allowed_off: smallest height tolerance anywhere along the line, m.
-    lost: stretches that cannot be used, each from and to, m from the line's start.
+    good, away, banked, high, dark: fractions of the length, which add up to 1.  good is usable; the others are unusable
+        by the first condition that fails.  away: not flown along, or too far to the side.  banked: too much bank.
+        high: too large a height error.  dark: camera off.
+    late, early: distance from the line's start to the first usable place, and from the last usable place to its end, m.
+    aside: greatest distance to the side where the line was flown along, m.  off: greatest height error, m, positive
+        above.
+    photos, missed: number of planned photos, and of those not taken; 0 if the distance between photos is not stated.
+    allowed_aside: tolerance of aside, m.  allowed_off: smallest height tolerance anywhere along the line, m.
+    lost: start and end of each unusable stretch, m from the line's start.
     """
 
     length: float
@@ -62,12 +63,12 @@ def allowed_aside(requirements: RouteRequirements, survey: Survey) -> float:
 
 
 @dataclass(frozen=True, slots=True)
-class _Rows:
+class _LineRows:
     """Rows on which a line may have been flown.
 
     position: (n, 3) m.  along, across: relative to the line, m.  ahead: True for each row that flies along it.
-    off, allowed: m, error from the planned height above ground, and its tolerance.
-    needed: requirements of a photo, by the name of the loss if they are not met.
+    off, allowed: error from the planned height above ground, and its tolerance, m.
+    conditions: True for each row that meets a condition of a photo, by the name of the loss if it is not met.
     """
 
     axis: LineAxis
@@ -78,26 +79,28 @@ class _Rows:
     ahead: Flags
     off: Floats
     allowed: Floats
-    needed: dict[str, Flags]
+    conditions: dict[str, Flags]
 
 
-def _line_rows(requirements: RouteRequirements, aligned: AlignedTrack, survey: Survey, line: PhotoLine) -> _Rows | None:
+def _line_rows(
+    requirements: RouteRequirements, aligned: AlignedTrack, survey: Survey, line: PhotoLine
+) -> _LineRows | None:
     axis = LineAxis(requirements.points[line.first : line.last + 1])
     window = _row_window(requirements, aligned, line)
     if window.stop - window.start < 2 or not aligned.passed[line.begins]:
         return None
     position = aligned.track.position[window]
     along, across, course = axis.of(position)
-    turned = np.abs(np.angle(np.exp(1j * (aligned.course[window] - course))))
-    ahead = turned <= MAX_PHOTO_COURSE_ERROR_RAD
-    off, allowed = _height_errors(requirements, axis, position, along)
-    needed = {
+    course_error = np.abs(np.angle(np.exp(1j * (aligned.course[window] - course))))
+    is_ahead = course_error <= MAX_PHOTO_COURSE_ERROR_RAD
+    height_error, height_tolerance = _height_errors(requirements, axis, position, along)
+    conditions = {
         "away": np.abs(across) <= allowed_aside(requirements, survey),
         "banked": np.abs(aligned.track.attitude[window, ROLL]) <= MAX_PHOTO_BANK_RAD,
-        "high": np.abs(off) <= allowed,
-        "dark": _camera_on(requirements, line, position, along, ahead, axis.length),
+        "high": np.abs(height_error) <= height_tolerance,
+        "dark": _camera_on(requirements, line, position, along, is_ahead, axis.length),
     }
-    return _Rows(axis, window, position, along, across, ahead, off, allowed, needed)
+    return _LineRows(axis, window, position, along, across, is_ahead, height_error, height_tolerance, conditions)
 
 
 def measure_line(
@@ -107,39 +110,39 @@ def measure_line(
     rows = _line_rows(requirements, aligned, survey, line)
     if rows is None:
         return None
-    length, along, ahead = rows.axis.length, rows.along, rows.ahead
-    good, state, lost = np.ones(0, dtype=np.bool_), ahead, {}
-    for name, fulfilled in rows.needed.items():
-        state = state & fulfilled
-        before = float(good.mean()) if good.size else 1.0
-        good = _line_steps(along, state, length)
-        lost[name] = before - float(good.mean())
-    found = np.flatnonzero(good)
-    step = length / len(good)
-    over = ahead & (along >= 0.0) & (along <= length)
+    length, along, is_ahead = rows.axis.length, rows.along, rows.ahead
+    is_good, meets_conditions, lost_fractions = np.ones(0, dtype=np.bool_), is_ahead, {}
+    for name, is_met in rows.conditions.items():
+        meets_conditions = meets_conditions & is_met
+        previous_fraction = float(is_good.mean()) if is_good.size else 1.0
+        is_good = _line_steps(along, meets_conditions, length)
+        lost_fractions[name] = previous_fraction - float(is_good.mean())
+    good_steps = np.flatnonzero(is_good)
+    step = length / len(is_good)
+    is_on_line = is_ahead & (along >= 0.0) & (along <= length)
     photos, missed = _count_photos(
-        line, _line_steps(along, ahead & rows.needed["away"] & rows.needed["dark"], length), length
+        line, _line_steps(along, is_ahead & rows.conditions["away"] & rows.conditions["dark"], length), length
     )
     return LineMeasure(
         length=length,
-        good=float(good.mean()),
-        **lost,
-        late=float(found[0] * step) if found.size else length,
-        early=float((len(good) - 1 - found[-1]) * step) if found.size else length,
-        aside=float(np.abs(rows.across[over]).max(initial=0.0)),
-        off=float(max(rows.off[over], key=abs, default=0.0)),
+        good=float(is_good.mean()),
+        **lost_fractions,
+        late=float(good_steps[0] * step) if good_steps.size else length,
+        early=float((len(is_good) - 1 - good_steps[-1]) * step) if good_steps.size else length,
+        aside=float(np.abs(rows.across[is_on_line]).max(initial=0.0)),
+        off=float(max(rows.off[is_on_line], key=abs, default=0.0)),
         photos=photos,
         missed=missed,
         allowed_aside=allowed_aside(requirements, survey),
         allowed_off=float(rows.allowed.min(initial=math.inf)),
-        lost=_set_runs(~good, step),
+        lost=_set_runs(~is_good, step),
     )
 
 
 def _set_runs(cells: Flags, step: float) -> tuple[tuple[float, float], ...]:
     """Return the start and end of each run of set cells, m."""
     edges = np.flatnonzero(np.diff(np.concatenate([[0], cells.astype(int), [0]]))) * step
-    return tuple((float(low), float(high)) for low, high in zip(edges[::2], edges[1::2], strict=True))
+    return tuple((float(start), float(end)) for start, end in zip(edges[::2], edges[1::2], strict=True))
 
 
 def _row_window(requirements: RouteRequirements, aligned: AlignedTrack, line: PhotoLine) -> slice:
@@ -151,21 +154,21 @@ def _row_window(requirements: RouteRequirements, aligned: AlignedTrack, line: Ph
 def _height_errors(
     requirements: RouteRequirements, axis: LineAxis, position: Floats, along: Floats
 ) -> tuple[Floats, Floats]:
-    """Return each row's error from the planned height above ground, and the tolerance of the error, m."""
+    """Return each row's error from the planned height above ground, and its tolerance, m."""
     planned = over_ground(requirements, axis.at(along))
-    allowed = np.maximum(MIN_PHOTO_HEIGHT_ERROR_M, PHOTO_HEIGHT_FRACTION * planned)
-    return over_ground(requirements, position) - planned, allowed
+    tolerance = np.maximum(MIN_PHOTO_HEIGHT_ERROR_M, PHOTO_HEIGHT_FRACTION * planned)
+    return over_ground(requirements, position) - planned, tolerance
 
 
-def over_ground(requirements: RouteRequirements, places: Floats) -> Floats:
+def over_ground(requirements: RouteRequirements, positions: Floats) -> Floats:
     """Return the heights of places (n, 3) above ground, m, (n,).
 
     Without terrain, heights are above home, or above the route's lowest waypoint if there is no home.
     """
-    ground, home = requirements.setup.scenario.terrain, requirements.setup.mission.home
-    if ground is not None:
-        return places[:, 2] - ground.height(places[:, 0], places[:, 1])
-    return places[:, 2] - (float(requirements.points[:, 2].min()) if home is None else home.alt)
+    terrain, home = requirements.setup.scenario.terrain, requirements.setup.mission.home
+    if terrain is not None:
+        return positions[:, 2] - terrain.height(positions[:, 0], positions[:, 1])
+    return positions[:, 2] - (float(requirements.points[:, 2].min()) if home is None else home.alt)
 
 
 def _camera_on(
@@ -178,29 +181,29 @@ def _camera_on(
     The camera is on from reaching the line's first waypoint to reaching its last waypoint.  It is always on if the
     mission does not switch it on this line.
     """
-    follows, rows = requirements.setup.autopilot.follows_path, np.arange(len(along))
+    follows_path, rows = requirements.setup.autopilot.follows_path, np.arange(len(along))
 
-    def reached(waypoint: int, from_along: float, after: int = 0) -> int:
-        away = np.hypot(*(position[:, :2] - requirements.points[waypoint, :2]).T)
+    def reached(waypoint: int, min_along: float, first_row: int = 0) -> int:
+        distances = np.hypot(*(position[:, :2] - requirements.points[waypoint, :2]).T)
         # An autopilot that follows a path is at a waypoint where the path passes it.
-        near = 0.0 if follows else reach(requirements, waypoint).radius
-        indices = np.flatnonzero(((away <= near) | (along >= from_along)) & ahead & (rows >= after))
+        radius = 0.0 if follows_path else reach(requirements, waypoint).radius
+        indices = np.flatnonzero(((distances <= radius) | (along >= min_along)) & ahead & (rows >= first_row))
         return int(indices[0]) if indices.size else len(along)
 
-    begins = reached(line.first, 0.0) if line.switched_on else 0
-    ends = reached(line.last, length, begins) if line.switched_off else len(along)
-    return (rows >= begins) & (rows <= ends)
+    on_row = reached(line.first, 0.0) if line.switched_on else 0
+    off_row = reached(line.last, length, on_row) if line.switched_off else len(along)
+    return (rows >= on_row) & (rows <= off_row)
 
 
-def _line_steps(along: Floats, state: Flags, length: float) -> Flags:
-    """Return True for each step of a line that lies between two consecutive rows at which `state` is True."""
+def _line_steps(along: Floats, is_set: Flags, length: float) -> Flags:
+    """Return True for each step of a line that lies between two consecutive rows at which `is_set` is True."""
     count = max(1, math.ceil(length / PHOTO_STEP_M))
-    both = state[:-1] & state[1:] & (np.diff(along) > 0.0)
+    in_both = is_set[:-1] & is_set[1:] & (np.diff(along) > 0.0)
     edges = np.clip(along / length * count, 0.0, count)
-    begin, end = np.floor(edges[:-1]).astype(int)[both], np.ceil(edges[1:]).astype(int)[both]
+    first_steps, end_steps = np.floor(edges[:-1]).astype(int)[in_both], np.ceil(edges[1:]).astype(int)[in_both]
     marks = np.zeros(count + 1, dtype=np.int64)
-    np.add.at(marks, begin, 1)
-    np.add.at(marks, end, -1)
+    np.add.at(marks, first_steps, 1)
+    np.add.at(marks, end_steps, -1)
     return np.cumsum(marks[:-1]) > 0
 
 
@@ -225,10 +228,11 @@ class OverlapMeasure:
     camera: the camera that takes them.
     front: overlap with the next photo on the line; None if the distance between photos is not stated, or none is
         usable.
-    line, apart, height, slow: where that is: the line's number from 0, m between photos, m above ground, and True if
-        the camera cannot take them any sooner.
+    line, apart, height, slow: of the minimum front overlap: the line's number from 0, the distance between photos, m,
+        the height above ground, m, and True if the camera cannot take photos any sooner.
     side: overlap with the photos of the neighbouring line; None if no two usable lines are next to each other.
-    pair, between, heights: where that is: both lines' numbers, m between them, m above ground.
+    pair, between, heights: of the minimum side overlap: both lines' numbers, the distance between them, m, and the
+        height above ground, m.
     """
 
     camera: Camera
@@ -285,26 +289,31 @@ def _line_strip(
     if rows is None:
         return None
     usable = rows.ahead & (rows.along >= 0.0) & (rows.along <= rows.axis.length)
-    for fulfilled in rows.needed.values():
-        usable = usable & fulfilled
+    for is_met in rows.conditions.values():
+        usable = usable & is_met
     speeds = np.hypot(*aligned.track.velocity[rows.window, :2].T)
     return _Strip(rows.position, over_ground(requirements, rows.position), speeds, usable)
 
 
 def _with_front_overlap(measure: OverlapMeasure, survey: Survey, strips: Sequence[_Strip | None]) -> OverlapMeasure:
-    """Return the measure with its fields for the minimum overlap along the lines filled in."""
+    """Return the measure with the minimum overlap along the lines."""
     camera = measure.camera
     for number, (line, strip) in enumerate(zip(survey.lines, strips, strict=True)):
         if strip is None or line.photo <= 0.0 or not strip.usable.any():
             continue
-        apart = np.maximum(line.photo, camera.interval * strip.speeds)[strip.usable]
+        spacing = np.maximum(line.photo, camera.interval * strip.speeds)[strip.usable]
         heights = strip.heights[strip.usable]
-        shares = 1.0 - apart / (camera.along * np.maximum(heights, 1e-9))
-        k = int(np.argmin(shares))
-        if measure.front is None or shares[k] < measure.front:
-            metres, slow = float(apart[k]), bool(apart[k] > line.photo)
+        overlaps = 1.0 - spacing / (camera.along * np.maximum(heights, 1e-9))
+        worst = int(np.argmin(overlaps))
+        if measure.front is None or overlaps[worst] < measure.front:
+            metres, is_slow = float(spacing[worst]), bool(spacing[worst] > line.photo)
             measure = replace(
-                measure, front=float(shares[k]), line=number, apart=metres, height=float(heights[k]), slow=slow
+                measure,
+                front=float(overlaps[worst]),
+                line=number,
+                apart=metres,
+                height=float(heights[worst]),
+                slow=is_slow,
             )
     return measure
 
@@ -312,37 +321,45 @@ def _with_front_overlap(measure: OverlapMeasure, survey: Survey, strips: Sequenc
 def _with_side_overlap(
     measure: OverlapMeasure, requirements: RouteRequirements, survey: Survey, strips: Sequence[_Strip | None]
 ) -> OverlapMeasure:
-    """Return the measure with its fields for the minimum overlap across neighbouring lines filled in."""
+    """Return the measure with the minimum overlap between neighbouring lines."""
     corners = [requirements.points[line.first : line.last + 1] for line in survey.lines]
     axis = LineAxis(corners[0])
     ends = [axis.of(places)[0] for places in corners]
-    low = min(float(along.min()) for along in ends)
-    length = max(float(along.max()) for along in ends) - low
+    min_along = min(float(along.min()) for along in ends)
+    length = max(float(along.max()) for along in ends) - min_along
     count = max(1, math.ceil(length / PHOTO_STEP_M))
-    middles = (np.arange(count) + 0.5) * length / count
-    last = np.full((4, count), np.nan)
+    step_middles = (np.arange(count) + 0.5) * length / count
+    previous_line = np.full((4, count), np.nan)
     for number in np.argsort(survey.offsets).tolist():
-        strip, along = strips[number], ends[number] - low
-        here = (middles >= along.min()) & (middles <= along.max())
-        now = np.full((4, count), np.nan)
-        now[3, here] = number
+        strip, along = strips[number], ends[number] - min_along
+        on_line = (step_middles >= along.min()) & (step_middles <= along.max())
+        this_line = np.full((4, count), np.nan)
+        this_line[3, on_line] = number
         if strip is not None and strip.usable.any():
-            at, across, _ = axis.of(strip.places)
-            forth = along[-1] >= along[0]
-            cells = _line_steps((at - low) if forth else length - (at - low), strip.usable, length)
-            used = here & (cells if forth else cells[::-1])
-            order = np.argsort(at[strip.usable])
+            point_along, across, _ = axis.of(strip.places)
+            is_forward = along[-1] >= along[0]
+            cells = _line_steps(
+                (point_along - min_along) if is_forward else length - (point_along - min_along), strip.usable, length
+            )
+            is_used = on_line & (cells if is_forward else cells[::-1])
+            order = np.argsort(point_along[strip.usable])
             for row, values in enumerate((across, strip.heights)):
-                own = np.interp(middles, (at[strip.usable] - low)[order], values[strip.usable][order])
-                now[row] = np.where(used, own, np.nan)
-        gaps, heights = np.abs(now[0] - last[0]), 0.5 * (now[1] + last[1])
-        shares = 1.0 - gaps / (measure.camera.across * np.maximum(heights, 1e-9))
-        if np.isfinite(shares).any():
-            k = int(np.nanargmin(shares))
-            if measure.side is None or shares[k] < measure.side:
-                pair = (int(last[3, k]), number)
-                measure = replace(
-                    measure, side=float(shares[k]), pair=pair, between=float(gaps[k]), heights=float(heights[k])
+                line_values = np.interp(
+                    step_middles, (point_along[strip.usable] - min_along)[order], values[strip.usable][order]
                 )
-        last[:, here] = now[:, here]
+                this_line[row] = np.where(is_used, line_values, np.nan)
+        gaps, heights = np.abs(this_line[0] - previous_line[0]), 0.5 * (this_line[1] + previous_line[1])
+        overlaps = 1.0 - gaps / (measure.camera.across * np.maximum(heights, 1e-9))
+        if np.isfinite(overlaps).any():
+            worst = int(np.nanargmin(overlaps))
+            if measure.side is None or overlaps[worst] < measure.side:
+                pair = (int(previous_line[3, worst]), number)
+                measure = replace(
+                    measure,
+                    side=float(overlaps[worst]),
+                    pair=pair,
+                    between=float(gaps[worst]),
+                    heights=float(heights[worst]),
+                )
+        previous_line[:, on_line] = this_line[:, on_line]
     return measure

@@ -1,4 +1,4 @@
-"""Match a track to its route by positions alone, to find its progress and the rows along each leg.
+"""Match a track to its route by only its positions, to find its progress and the rows along each leg.
 
 A route that returns to its start, or repeats a lap, is near many of its waypoints at once.  The whole track is
 therefore matched to the whole route: both only go forward, and the track may end anywhere on the route.  Data that
@@ -71,44 +71,45 @@ def route_progress(route: Route, position: Floats, *, anywhere: bool) -> RoutePr
     """Match a track to a route.
 
     position: (t, 3) m, usable rows, at least two.
-    anywhere: the track may begin anywhere on the route, like a part of an imported log; otherwise at its start.
+    anywhere: True if the track may begin anywhere on the route, like a part of an imported log; otherwise it begins at
+        the route's start.
 
     >>> from logs.recording.example_log import example_log
     >>> log = example_log()
     >>> route_progress(log.setup.route, log.track.position, anywhere=False).target
     2
     """
-    step = np.hypot(*np.diff(position[:, :2], axis=0).T)
-    run = np.concatenate([[0.0], np.cumsum(step)])
+    steps = np.hypot(*np.diff(position[:, :2], axis=0).T)
+    run = np.concatenate([[0.0], np.cumsum(steps)])
     length = float(np.hypot(*np.diff(route.waypoints[:, :2], axis=0).T).sum())
     spacing = max(_SAMPLE_SPACING_M, math.sqrt(max(1.0, length) * max(1.0, float(run[-1])) / _MAX_CELLS))
     samples = _sample_route(route, spacing)
     rows = np.unique(np.searchsorted(run, np.append(np.arange(0.0, run[-1], spacing), run[-1])))
-    ends = _lay(
+    ends = _match_rows(
         read_only(np.ascontiguousarray(position[rows, :2])),
         read_only(samples.places),
         read_only(samples.radii),
         CAPTURE_RADIUS_M,
         anywhere,
     )
-    begins, until = rows[ends[:, 0]], rows[ends[:, 1]]
-    final = int(np.flatnonzero(ends[:, 0] >= 0)[-1])
+    begin_rows, end_rows = rows[ends[:, 0]], rows[ends[:, 1]]
+    final_sample = int(np.flatnonzero(ends[:, 0] >= 0)[-1])
     count = len(route.waypoints)
-    target = min(count - 1, int(np.searchsorted(samples.of_waypoint, final, side="right")))
+    target = min(count - 1, int(np.searchsorted(samples.of_waypoint, final_sample, side="right")))
     while target + 1 < count and samples.of_waypoint[target + 1] == samples.of_waypoint[target]:
         target += 1
     first, last = np.full(count, len(run)), np.full(count, -1)
     for i in range(target + 1):
-        here = int(samples.of_waypoint[i])
-        before = samples.of_waypoint[samples.of_waypoint < here]
-        after = samples.of_waypoint[samples.of_waypoint > here]
-        low = int(before[-1]) if before.size else 0
-        high = min(final, int(after[0]) if after.size else len(samples.along) - 1)
-        known = np.flatnonzero(ends[low : high + 1, 0] >= 0) + low
-        if known.size:
-            first[i] = np.searchsorted(run, run[begins[known[0]]] - _WINDOW_MARGIN_M)
-            last[i] = np.searchsorted(run, run[until[known[-1]]] + _WINDOW_MARGIN_M, side="right") - 1
-    return RouteProgress(first, last, target, samples.along[samples.of_waypoint] - samples.along[final])
+        sample = int(samples.of_waypoint[i])
+        earlier_samples = samples.of_waypoint[samples.of_waypoint < sample]
+        later_samples = samples.of_waypoint[samples.of_waypoint > sample]
+        first_sample = int(earlier_samples[-1]) if earlier_samples.size else 0
+        last_sample = min(final_sample, int(later_samples[0]) if later_samples.size else len(samples.along) - 1)
+        matched = np.flatnonzero(ends[first_sample : last_sample + 1, 0] >= 0) + first_sample
+        if matched.size:
+            first[i] = np.searchsorted(run, run[begin_rows[matched[0]]] - _WINDOW_MARGIN_M)
+            last[i] = np.searchsorted(run, run[end_rows[matched[-1]]] + _WINDOW_MARGIN_M, side="right") - 1
+    return RouteProgress(first, last, target, samples.along[samples.of_waypoint] - samples.along[final_sample])
 
 
 def _sample_route(route: Route, spacing: float) -> _Samples:
@@ -117,14 +118,14 @@ def _sample_route(route: Route, spacing: float) -> _Samples:
     places, radii, along = [points[0]], [0.0], [0.0]
     of_waypoint = np.zeros(len(points), dtype=np.int64)
     for i in range(1, len(points)):
-        a, b = points[i - 1], points[i]
+        start, end = points[i - 1], points[i]
         if route.arcs[i] > 0.0 and route.arcs[i - 1] > 0.0 and route.stops[i] == route.stops[i - 1]:
             of_waypoint[i] = of_waypoint[i - 1]
             continue
-        length = math.dist(a, b)
+        length = math.dist(start, end)
         count = max(1, math.ceil(length / spacing))
         for k in range(1, count + 1):
-            places.append(a + (b - a) * (k / count))
+            places.append(start + (end - start) * (k / count))
             radii.append(0.0)
             along.append(along[-1] + length / count)
         of_waypoint[i] = len(places) - 1
@@ -137,43 +138,43 @@ def _sample_route(route: Route, spacing: float) -> _Samples:
 
 
 def _loiter_center(route: Route, corners: Floats, radius: float, first: int) -> tuple[Floats, float]:
-    """Return the center of a loiter's corners, and the distance from the center within which the loiter is flown, m."""
-    middle = 0.5 * (corners.min(axis=0) + corners.max(axis=0))
-    wide = float(np.hypot(*(corners - middle).T).max()) + _LOITER_MARGIN_M
+    """Return the center of a loiter's corners, and the radius within which the loiter is flown, m."""
+    center = 0.5 * (corners.min(axis=0) + corners.max(axis=0))
+    reach_radius = float(np.hypot(*(corners - center).T).max()) + _LOITER_MARGIN_M
     if 0 <= route.return_from < first < route.return_until:
-        wide = max(wide, RTL_ARRIVAL_RADIUS_M, RTL_ARRIVAL_LOITER_RADII * radius)
-    return middle, wide
+        reach_radius = max(reach_radius, RTL_ARRIVAL_RADIUS_M, RTL_ARRIVAL_LOITER_RADII * radius)
+    return center, reach_radius
 
 
 @compiled
-def _lay(track: Floats, places: Floats, radii: Floats, capture: float, anywhere: bool) -> Numbers:
-    """Match a track (n, 2) to places (m, 2), both forward only, with the minimum sum of costs.
+def _match_rows(track: Floats, places: Floats, radii: Floats, capture: float, anywhere: bool) -> Numbers:
+    """Match a track (n, 2) to places (m, 2), both only forward, with the minimum sum of costs.
 
-    The cost of a row is min(distance, capture)^2; a place without a row of its own costs `_SKIP_FRACTION` of that and
-    `_SKIP_DISTANCE_M`^2.  Return the first and the last row at each place, (m, 2); -1 for places before its start and
-    after its end.  Among equal ends take the earliest.
+    The cost of a row is min(distance, capture)^2; a skipped place costs `_SKIP_FRACTION` of that, and
+    `_SKIP_DISTANCE_M`^2.  Return the first and the last row at each place, (m, 2); -1 for places before the track's
+    start and after its end.  Of equal ends take the earliest.
     """
     rows, count = track.shape[0], places.shape[0]
     moves = np.zeros((rows, count), dtype=np.uint8)
     total = np.zeros(count)
     for i in range(rows):
-        diagonal = math.inf
+        advancing_cost = math.inf
         for j in range(count):
-            off = math.hypot(track[i, 0] - places[j, 0], track[i, 1] - places[j, 1]) - radii[j]
-            cost = min(max(0.0, off), capture) ** 2
-            before = total[j]
+            distance = math.hypot(track[i, 0] - places[j, 0], track[i, 1] - places[j, 1]) - radii[j]
+            cost = min(max(0.0, distance), capture) ** 2
+            waiting_cost = total[j]
             if i == 0:
-                best, move = cost + j * _LATE_START_M**2 if anywhere or j == 0 else math.inf, 3
-            elif before <= diagonal:
-                best, move = before + cost, 1
+                min_cost, move = cost + j * _LATE_START_M**2 if anywhere or j == 0 else math.inf, 3
+            elif waiting_cost <= advancing_cost:
+                min_cost, move = waiting_cost + cost, 1
             else:
-                best, move = diagonal + cost, 0
+                min_cost, move = advancing_cost + cost, 0
             if j > 0:
-                skipped = total[j - 1] + _SKIP_FRACTION * cost + _SKIP_DISTANCE_M**2
-                if skipped < best:
-                    best, move = skipped, 2
-            diagonal = before
-            total[j] = best
+                skipping_cost = total[j - 1] + _SKIP_FRACTION * cost + _SKIP_DISTANCE_M**2
+                if skipping_cost < min_cost:
+                    min_cost, move = skipping_cost, 2
+            advancing_cost = waiting_cost
+            total[j] = min_cost
             moves[i, j] = move
     ends = np.full((count, 2), -1, dtype=np.int64)
     i, j = rows - 1, int(np.argmin(total))

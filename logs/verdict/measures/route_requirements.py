@@ -73,30 +73,30 @@ class Airspace:
         [2]
         """
         boxes = self.records.zones
-        low, high = (
+        min_corner, max_corner = (
             np.minimum(points[:-1], points[1:]) - _BOX_MARGIN_M,
             np.maximum(points[:-1], points[1:]) + _BOX_MARGIN_M,
         )
-        east = (boxes["west"][:, None] <= high[:, 0]) & (boxes["east"][:, None] >= low[:, 0])
-        north = (boxes["south"][:, None] <= high[:, 1]) & (boxes["north"][:, None] >= low[:, 1])
+        east = (boxes["west"][:, None] <= max_corner[:, 0]) & (boxes["east"][:, None] >= min_corner[:, 0])
+        north = (boxes["south"][:, None] <= max_corner[:, 1]) & (boxes["north"][:, None] >= min_corner[:, 1])
         return np.flatnonzero(~boxes["exclusion"] | (east & north).any(axis=1))
 
 
 def airspace_of(setup: FlightSetup) -> Airspace:
     """Return the exclusion and inclusion zones that apply to a setup's flight.
 
-    A fence that gives no zones, as in logs from before fences were judged, is left out and reported.
+    A fence that gives no zones, as in logs from before fences were judged, is omitted and reported.
 
     >>> from logs.recording.example_log import example_log
     >>> airspace_of(example_log().setup).zones
     ()
     """
-    fault, own = "", tuple[Zone, ...]()
+    fault, fence = "", tuple[Zone, ...]()
     try:
-        own = fence_zones(setup.mission.fences, setup.scenario.origin, "the mission")
+        fence = fence_zones(setup.mission.fences, setup.scenario.origin, "the mission")
     except MissionError as error:
         fault = str(error)
-    zones = (*setup.scenario.zones, *own) if own else setup.scenario.zones
+    zones = (*setup.scenario.zones, *fence) if fence else setup.scenario.zones
     return Airspace(zones, _cached_records(zones), fault, len(setup.scenario.zones))
 
 
@@ -106,8 +106,8 @@ _last_records: list[tuple[tuple[Zone, ...], ZoneRecords]] = []
 
 def _cached_records(zones: tuple[Zone, ...]) -> ZoneRecords:
     """Return the records of zones, cached for the last tuple; the records must not be changed."""
-    for known, records in _last_records:
-        if known is zones:
+    for cached_zones, records in _last_records:
+        if cached_zones is zones:
             return records
     records = zone_records(zones)
     _last_records[:] = [(zones, records)]
@@ -196,15 +196,17 @@ def _reversal_lengths(
 
     The length is 0 between turns to the same side.
     """
-    out = np.zeros(len(courses))
+    lengths = np.zeros(len(courses))
     for leg in range(1, len(courses) - 1):
-        flown_by = not route.fly_over[leg : leg + 2].any() and np.isfinite(radius[leg : leg + 2]).all()
-        if turns[leg] * turns[leg + 1] < 0.0 and flown_by:
+        are_fly_bys = not route.fly_over[leg : leg + 2].any() and np.isfinite(radius[leg : leg + 2]).all()
+        if turns[leg] * turns[leg + 1] < 0.0 and are_fly_bys:
             table = tables[float(route.airspeed[leg])]
-            ux, uy = math.sin(courses[leg]), math.cos(courses[leg])
-            lower = float(min(up[leg], up[leg + 1]))
-            out[leg] = roll_reversal_length(table, ux, uy, lower, radius[leg], radius[leg + 1], *downwind(table))
-    return out
+            course_east, course_north = math.sin(courses[leg]), math.cos(courses[leg])
+            min_altitude = float(min(up[leg], up[leg + 1]))
+            lengths[leg] = roll_reversal_length(
+                table, course_east, course_north, min_altitude, radius[leg], radius[leg + 1], *downwind(table)
+            )
+    return lengths
 
 
 def available_lengths(runs: Floats, before: Floats, after: Floats, reversal: Floats, i: int) -> tuple[float, float]:
@@ -223,28 +225,28 @@ def _sharpest_turns(
     route: Route, runs: Floats, tightest: Floats, before: Floats, after: Floats, reversal: Floats
 ) -> Floats:
     """Return the sharpest turn at each waypoint that fits between the neighbouring turns, (w,) rad."""
-    out = np.full(len(tightest), math.pi)
+    limits = np.full(len(tightest), math.pi)
     for i in range(1, len(tightest) - 1):
         if not math.isfinite(tightest[i]):
-            out[i] = 0.0
+            limits[i] = 0.0
             continue
-        behind, ahead = available_lengths(runs, before, after, reversal, i)
+        length_before, length_after = available_lengths(runs, before, after, reversal, i)
         if route.fly_over[i]:
-            out[i] = _sharpest_fly_over(ahead / tightest[i])
+            limits[i] = _sharpest_fly_over(length_after / tightest[i])
         else:
-            out[i] = 2.0 * math.atan(min(behind, ahead) / tightest[i])
-    return out
+            limits[i] = 2.0 * math.atan(min(length_before, length_after) / tightest[i])
+    return limits
 
 
 def _sharpest_fly_over(radii: float) -> float:
     """Return the sharpest fly-over turn (rad) that needs at most this many radii of leg, by bisection."""
-    low, high = 0.0, math.pi
-    if fly_over_run(high) <= radii:
-        return high
+    fitting, too_sharp = 0.0, math.pi
+    if fly_over_run(too_sharp) <= radii:
+        return too_sharp
     for _ in range(50):
-        middle = 0.5 * (low + high)
-        low, high = (middle, high) if fly_over_run(middle) <= radii else (low, middle)
-    return low
+        middle = 0.5 * (fitting + too_sharp)
+        fitting, too_sharp = (middle, too_sharp) if fly_over_run(middle) <= radii else (fitting, middle)
+    return fitting
 
 
 @dataclass(frozen=True, slots=True)
@@ -267,9 +269,9 @@ class FlownGround:
 
     ways: the planned ground phases.
     whole: requirements of the whole route, with take-off and landing.
-    track: of the whole flight.
-    begun, left: its rows where the take-off had ended, and where the landing began; the first and the last without
-    them.
+    track: track of the whole flight.
+    begun, left: its row where the take-off ended, and its row where the landing began; the first and the last row if
+        there is none.
     """
 
     ways: GroundWays
@@ -308,11 +310,11 @@ class RouteRequirements:
     sure_climb, sure_dive: (w - 1,) the certain part of those limits for an uncertain aircraft model; otherwise the
     same.
     ground_speed: (w - 1,) m/s, NaN if the wind leaves no ground speed.
-    envelope: True if the aircraft's limits apply; otherwise only what the flight showed of them does.
+    envelope: True if the aircraft's limits apply; otherwise only the ability shown by the flight applies.
     airspace: the zones of scenario and mission.
     surveys: surveys of a user's mission, if the scenario judges surveys by their lines.
-    zones_on: first and last leg if zones are checked on these alone, and then only the zones that the planned path
-        violates there, for a quick answer.
+    zones_on: first and last leg if, for a quick answer, zones are checked on only these legs, and only zones that the
+        planned path violates there.
     ground: for a flight that took off or landed, to whose airborne part the other fields belong; None for any other.
     """
 
@@ -387,27 +389,27 @@ class RouteRequirements:
         return np.array([math.sin(self.courses[leg]), math.cos(self.courses[leg])])
 
     def apexes(self) -> Floats:
-        """Return where the fly-by path passes each waypoint: the midpoints of the arcs, (w, 3) m."""
-        out = self.points.copy()
-        for i in range(1, len(out) - 1):
+        """Return the points at which the fly-by path passes each waypoint: the midpoints of the arcs, (w, 3) m."""
+        apexes = self.points.copy()
+        for i in range(1, len(apexes) - 1):
             if self.fly_by_offset[i] > 0.0:
                 inward = self.leg_unit(i) - self.leg_unit(i - 1)
-                out[i, :2] += self.fly_by_offset[i] * inward / math.hypot(*inward)
+                apexes[i, :2] += self.fly_by_offset[i] * inward / math.hypot(*inward)
                 # Halfway between the altitudes at the arc's ends.
                 tangent = min(self.before[i], self.runs[i - 1], self.runs[i])
-                out[i, 2] += 0.5 * tangent * (math.tan(self.slopes[i]) - math.tan(self.slopes[i - 1]))
-        return out
+                apexes[i, 2] += 0.5 * tangent * (math.tan(self.slopes[i]) - math.tan(self.slopes[i - 1]))
+        return apexes
 
 
 def route_requirements(setup: FlightSetup, *, envelope: bool = True) -> RouteRequirements:
     """Compute the requirements of a setup's route.
 
-    envelope: False leaves the aircraft's limits out, for flown evidence alone.
+    envelope: False to omit the aircraft's limits and judge by only the flown evidence.
     """
     route, limits = true_route(setup), setup.limits
     points = np.asarray(route.waypoints, dtype=np.float64)
     tables = performance_tables(route, limits)
-    turning = turn_requirements(route, tables)
+    turns = turn_requirements(route, tables)
     courses, runs = leg_courses(points), leg_runs(points)
     climb, dive, speeds = _leg_limits(route, tables, points, courses)
     certain = limits.surely()
@@ -423,15 +425,15 @@ def route_requirements(setup: FlightSetup, *, envelope: bool = True) -> RouteReq
         runs=runs,
         courses=courses,
         slopes=leg_slopes(points),
-        turns=turning.turns,
-        tightest=turning.tightest,
-        radius=turning.radius,
-        before=turning.before,
-        after=turning.after,
-        reversal=turning.reversal,
-        blend=_blend_lengths(setup, route, points, runs, turning),
-        fly_by_offset=_fly_by_offsets(route, turning),
-        turn_limit=turning.limit if envelope else np.full(len(points), math.inf),
+        turns=turns.turns,
+        tightest=turns.tightest,
+        radius=turns.radius,
+        before=turns.before,
+        after=turns.after,
+        reversal=turns.reversal,
+        blend=_blend_lengths(setup, route, points, runs, turns),
+        fly_by_offset=_fly_by_offsets(route, turns),
+        turn_limit=turns.limit if envelope else np.full(len(points), math.inf),
         climb=climb,
         dive=dive,
         sure_climb=sure_climb,
@@ -447,19 +449,21 @@ def route_requirements(setup: FlightSetup, *, envelope: bool = True) -> RouteReq
 def surveys_of(setup: FlightSetup) -> tuple[Survey, ...]:
     """Return the surveys of a setup's mission that are judged by their lines.
 
-    A plan made by planfly has none.  Its surveys are those whose camera is switched, or, if the scenario asks for
-    "lines", all legs with the form of a survey.
+    A plan made by planfly has none.  Other missions have the surveys whose camera is switched, or, if the scenario
+    states "lines", all legs with the form of a survey.
     """
     mode = setup.scenario.limits.surveys
     if setup.plan is not None or mode == "path":
         return ()
-    beyond = [(one.photo, one.turn_around) for one in setup.mission.survey_plans if one.photo is not None]
+    photo_plans = [
+        (survey.photo, survey.turn_around) for survey in setup.mission.survey_plans if survey.photo is not None
+    ]
     camera = camera_spacing(setup.mission, setup.route)
     if mode != "lines" and not camera.any():
         # If no item switches the camera, no line takes photos.
         return ()
-    found = find_surveys(setup.route, camera, beyond)
-    return tuple(one for one in found if mode == "lines" or one.takes_photos())
+    surveys = find_surveys(setup.route, camera, photo_plans)
+    return tuple(survey for survey in surveys if mode == "lines" or survey.takes_photos())
 
 
 @functools.lru_cache(maxsize=8)
@@ -490,59 +494,61 @@ def true_route(setup: FlightSetup) -> Route:
     route = setup.route
     if not setup.autopilot.equivalent_airspeeds:
         return route
-    middle = 0.5 * (route.waypoints[1:, 2] + route.waypoints[:-1, 2])
-    return replace(route, airspeed=route.airspeed * [setup.autopilot.airspeed_factor(up) for up in middle])
+    mean_altitudes = 0.5 * (route.waypoints[1:, 2] + route.waypoints[:-1, 2])
+    return replace(
+        route, airspeed=route.airspeed * [setup.autopilot.airspeed_factor(altitude) for altitude in mean_altitudes]
+    )
 
 
 def _planned_path(path: FlyByPath, route: Route, ground_speed: Floats) -> PlannedPath:
     points, legs = path_polyline(path)
     speed = np.where(np.isfinite(ground_speed), ground_speed, route.airspeed)
-    run = np.hypot(*np.diff(points[:, :2], axis=0).T)
-    return PlannedPath(points, legs, np.concatenate([[0.0], np.cumsum(run / speed[legs])]))
+    runs = np.hypot(*np.diff(points[:, :2], axis=0).T)
+    return PlannedPath(points, legs, np.concatenate([[0.0], np.cumsum(runs / speed[legs])]))
 
 
 def _leg_limits(
     route: Route, tables: dict[float, PerformanceTable], points: Floats, courses: Floats
 ) -> tuple[Floats, Floats, Floats]:
-    """Return climb and dive over the ground, rad, and ground speed, m/s, available along the whole of each leg."""
+    """Return the climb and dive over the ground, rad, and the ground speed, m/s, that are available along each leg."""
     legs = len(courses)
     climb, dive, speeds = np.zeros(legs), np.zeros(legs), np.zeros(legs)
     for leg in range(legs):
         table, course = tables[float(route.airspeed[leg])], float(courses[leg])
-        heights = (points[leg, 2], 0.5 * (points[leg, 2] + points[leg + 1, 2]), points[leg + 1, 2])
-        speeds[leg] = min(ground_speed_on(table, course, up) for up in heights)
-        if any(math.isnan(ground_speed_on(table, course, up)) for up in heights):
+        altitudes = (points[leg, 2], 0.5 * (points[leg, 2] + points[leg + 1, 2]), points[leg + 1, 2])
+        speeds[leg] = min(ground_speed_on(table, course, altitude) for altitude in altitudes)
+        if any(math.isnan(ground_speed_on(table, course, altitude)) for altitude in altitudes):
             speeds[leg] = math.nan
-        climb[leg], dive[leg] = np.min([aircraft_slopes(table, course, up) for up in heights], axis=0)
+        climb[leg], dive[leg] = np.min([aircraft_slopes(table, course, altitude) for altitude in altitudes], axis=0)
     return climb, dive, speeds
 
 
-def _fly_by_offsets(route: Route, turning: TurnRequirements) -> Floats:
+def _fly_by_offsets(route: Route, turns: TurnRequirements) -> Floats:
     """Return the distance by which the fly-by passes each waypoint, (w,) m."""
-    out = np.zeros(len(turning.radius))
-    for i in np.flatnonzero(np.isfinite(turning.radius) & ~route.fly_over).tolist():
-        radius = float(turning.radius[i])
-        out[i] = min(fly_by_offset(abs(float(turning.turns[i])), radius), MAX_FLY_BY_OFFSET_RADII * radius)
-    return out
+    offsets = np.zeros(len(turns.radius))
+    for i in np.flatnonzero(np.isfinite(turns.radius) & ~route.fly_over).tolist():
+        radius = float(turns.radius[i])
+        offsets[i] = min(fly_by_offset(abs(float(turns.turns[i])), radius), MAX_FLY_BY_OFFSET_RADII * radius)
+    return offsets
 
 
-def _blend_lengths(setup: FlightSetup, route: Route, points: Floats, runs: Floats, turning: TurnRequirements) -> Floats:
+def _blend_lengths(setup: FlightSetup, route: Route, points: Floats, runs: Floats, turns: TurnRequirements) -> Floats:
     """Return the length of leg next to each turn on which the slope still changes, (w,) m.
 
-    A parabola about each end of the arc, or about the waypoint if there is no arc.
+    The altitude follows a parabola about each end of the arc, or about the waypoint if there is no arc.
     """
     rise = np.diff(points[:, 2]) / np.maximum(runs, 1.0)
     blend = np.zeros(len(points))
     speed = float(route.airspeed.max()) + setup.scenario.wind.strongest(points[:, 2])
     for i in range(1, len(points) - 1):
-        steps = [abs(rise[i] - rise[i - 1])]
-        turn = abs(float(turning.turns[i]))
-        arc = float(turning.radius[i]) * turn if turn > 0.0 else 0.0
-        if 0.0 < arc < math.inf and math.isfinite(turning.after[i]) and not setup.route.fly_over[i]:
+        slope_changes = [abs(rise[i] - rise[i - 1])]
+        turn = abs(float(turns.turns[i]))
+        arc = float(turns.radius[i]) * turn if turn > 0.0 else 0.0
+        if 0.0 < arc < math.inf and math.isfinite(turns.after[i]) and not setup.route.fly_over[i]:
             # The arc is shorter than its two tangents, so that its slope is steeper than the slopes of the legs.
-            on_arc = (rise[i - 1] + rise[i]) * turning.after[i] / arc
-            steps = [abs(on_arc - rise[i - 1]), abs(on_arc - rise[i])]
-        blend[i] = max(steps) * speed**2 / (2.0 * BLEND_ACCELERATION)
+            arc_slope_ = (rise[i - 1] + rise[i]) * turns.after[i] / arc
+            slope_changes = [abs(arc_slope_ - rise[i - 1]), abs(arc_slope_ - rise[i])]
+        blend[i] = max(slope_changes) * speed**2 / (2.0 * BLEND_ACCELERATION)
     return blend
 
 
@@ -567,13 +573,13 @@ def turn_limit(requirements: RouteRequirements, i: int) -> tuple[float, str]:
     return tighter_turn(requirements, i, float(requirements.turn_limit[i]))
 
 
-def tighter_turn(requirements: RouteRequirements, i: int, aircraft: float) -> tuple[float, str]:
+def tighter_turn(requirements: RouteRequirements, i: int, aircraft_limit: float) -> tuple[float, str]:
     """Return the tighter of the scenario's limit and an aircraft limit, rad, and its source."""
-    fixed = requirements.limits.max_turn
+    scenario_limit = requirements.limits.max_turn
     # A loiter has no angle: planfly made its corners.
-    if fixed is not None and fixed <= aircraft and requirements.setup.route.arcs[i] == 0.0:
-        return fixed, "scenario"
-    return aircraft, "aircraft" if math.isfinite(aircraft) else "none"
+    if scenario_limit is not None and scenario_limit <= aircraft_limit and requirements.setup.route.arcs[i] == 0.0:
+        return scenario_limit, "scenario"
+    return aircraft_limit, "aircraft" if math.isfinite(aircraft_limit) else "none"
 
 
 def slope_limit(requirements: RouteRequirements, leg: int) -> tuple[float, str]:
@@ -581,12 +587,12 @@ def slope_limit(requirements: RouteRequirements, leg: int) -> tuple[float, str]:
 
     The dive applies to a falling leg.
     """
-    rising = requirements.slopes[leg] >= 0.0
-    fixed = requirements.limits.max_climb if rising else requirements.limits.max_dive
-    aircraft = float((requirements.climb if rising else requirements.dive)[leg])
-    if fixed is not None and fixed <= aircraft:
-        return fixed, "scenario"
-    return aircraft, "aircraft" if math.isfinite(aircraft) else "none"
+    is_rising = requirements.slopes[leg] >= 0.0
+    scenario_limit = requirements.limits.max_climb if is_rising else requirements.limits.max_dive
+    aircraft_limit = float((requirements.climb if is_rising else requirements.dive)[leg])
+    if scenario_limit is not None and scenario_limit <= aircraft_limit:
+        return scenario_limit, "scenario"
+    return aircraft_limit, "aircraft" if math.isfinite(aircraft_limit) else "none"
 
 
 def steep_arc(requirements: RouteRequirements, leg: int) -> SteepArc | None:
@@ -601,8 +607,8 @@ def steep_arc(requirements: RouteRequirements, leg: int) -> SteepArc | None:
     before, length = float(requirements.before[i]), float(requirements.radius[i]) * abs(float(requirements.turns[i]))
     if not 0.0 < before < min(requirements.runs[leg : leg + 2]):
         return None
-    into, out = math.tan(requirements.slopes[leg]), math.tan(requirements.slopes[i])
-    tangent = arc_slope(into, out, before, float(requirements.radius[i]))
+    slope_before, slope_after = math.tan(requirements.slopes[leg]), math.tan(requirements.slopes[i])
+    tangent = arc_slope(slope_before, slope_after, before, float(requirements.radius[i]))
     limits = (requirements.climb if tangent > 0.0 else requirements.dive)[leg : leg + 2]
     if not np.isfinite(limits).all() or not (limits > 0.0).all():
         return None

@@ -50,8 +50,8 @@ class LegFit:
     """A measured course or slope of a leg.
 
     value, tolerance: rad.
-    run: m over which it was measured.
-    fitted: by least squares over a long enough piece; the value of a short leg is rough.
+    run: distance over which it was measured, m.
+    fitted: True if fitted by least squares over a long enough piece; the value of a short leg is rough.
     """
 
     value: float
@@ -73,13 +73,17 @@ def straight_span(
     """Return the span of a leg (m from its start) that lies clear of the turns at its ends.
 
     clear: distance kept from the turns, m.
-    level: exclude the blends of slope too.
+    level: True to exclude the slope blends as well.
     """
-    start, end = clear, clear
+    start_clear, end_clear = clear, clear
     if level:
-        start, end = (max(clear, float(blend) + BLEND_EXCLUSION_M) for blend in requirements.blend[leg : leg + 2])
-    low = requirements.after[leg] + (start if leg > 0 else min(clear, BLEND_EXCLUSION_M))
-    return low, requirements.runs[leg] - requirements.before[leg + 1] - (end if leg + 1 < requirements.legs else 0.0)
+        start_clear, end_clear = (
+            max(clear, float(blend) + BLEND_EXCLUSION_M) for blend in requirements.blend[leg : leg + 2]
+        )
+    span_start = requirements.after[leg] + (start_clear if leg > 0 else min(clear, BLEND_EXCLUSION_M))
+    return span_start, requirements.runs[leg] - requirements.before[leg + 1] - (
+        end_clear if leg + 1 < requirements.legs else 0.0
+    )
 
 
 def leg_course(requirements: RouteRequirements, aligned: AlignedTrack, leg: int) -> LegFit | None:
@@ -88,26 +92,31 @@ def leg_course(requirements: RouteRequirements, aligned: AlignedTrack, leg: int)
         return None
     rows = aligned.leg_rows(leg)
     along, across = along_across(requirements, leg, aligned.track.position[rows])
-    low, high = straight_span(requirements, leg, TURN_EXCLUSION_M)
-    inside = (along >= low) & (along <= high)
-    if inside.sum() >= 20 and np.ptp(along[inside]) >= MIN_COURSE_STRETCH_M:
-        bend, rest = fit_line(along[inside], across[inside])
-        run = float(np.ptp(along[inside]))
+    span_start, span_end = straight_span(requirements, leg, TURN_EXCLUSION_M)
+    is_inside = (along >= span_start) & (along <= span_end)
+    if is_inside.sum() >= 20 and np.ptp(along[is_inside]) >= MIN_COURSE_STRETCH_M:
+        cross_slope, residual = fit_line(along[is_inside], across[is_inside])
+        run = float(np.ptp(along[is_inside]))
         return LegFit(
-            requirements.courses[leg] + math.atan(bend), _angle_tolerance(COURSE_ERROR_FLOOR_RAD, rest, run), run, True
+            requirements.courses[leg] + math.atan(cross_slope),
+            _angle_tolerance(COURSE_ERROR_FLOOR_RAD, residual, run),
+            run,
+            True,
         )
     # A short leg: the mean course between its turns, over at least a second.
-    low, high = straight_span(requirements, leg, 0.0)
-    between = np.flatnonzero((along >= low) & (along <= high))
-    if not between.size:
-        middle = (
-            0.5 * (low + high) if math.isfinite(low) and math.isfinite(high) else 0.5 * float(requirements.runs[leg])
+    span_start, span_end = straight_span(requirements, leg, 0.0)
+    indices = np.flatnonzero((along >= span_start) & (along <= span_end))
+    if not indices.size:
+        midpoint = (
+            0.5 * (span_start + span_end)
+            if math.isfinite(span_start) and math.isfinite(span_end)
+            else 0.5 * float(requirements.runs[leg])
         )
-        between = np.array([np.argmin(np.abs(along - middle))])
-    first, last = rows.start + int(between[0]), rows.start + int(between[-1])
+        indices = np.array([np.argmin(np.abs(along - midpoint))])
+    first, last = rows.start + int(indices[0]), rows.start + int(indices[-1])
     if aligned.track.time[last] - aligned.track.time[first] < 1.0:
-        wide = aligned.around(first, last, 0.5)
-        first, last = wide.start, wide.stop - 1
+        rows_around = aligned.around(first, last, 0.5)
+        first, last = rows_around.start, rows_around.stop - 1
     # In the frame of the course column, which is unwrapped, so that a full circle shows.
     return LegFit(float(aligned.course[first : last + 1].mean()), ROUGH_COURSE_ERROR_RAD, float(np.ptp(along)), False)
 
@@ -119,32 +128,32 @@ def leg_slope(requirements: RouteRequirements, aligned: AlignedTrack, leg: int) 
     rows = aligned.leg_rows(leg)
     position = aligned.track.position[rows]
     along, _ = along_across(requirements, leg, position)
-    low, high = straight_span(requirements, leg, TURN_EXCLUSION_M, level=True)
-    inside = (along >= low) & (along <= high)
-    if inside.sum() >= 20 and np.ptp(along[inside]) >= MIN_SLOPE_STRETCH_M:
-        rise, rest = fit_line(along[inside], position[inside, 2])
-        run = float(np.ptp(along[inside]))
-        return LegFit(math.atan(rise), _angle_tolerance(SLOPE_ERROR_FLOOR_RAD, rest, run), run, True)
+    span_start, span_end = straight_span(requirements, leg, TURN_EXCLUSION_M, level=True)
+    is_inside = (along >= span_start) & (along <= span_end)
+    if is_inside.sum() >= 20 and np.ptp(along[is_inside]) >= MIN_SLOPE_STRETCH_M:
+        rise, residual = fit_line(along[is_inside], position[is_inside, 2])
+        run = float(np.ptp(along[is_inside]))
+        return LegFit(math.atan(rise), _angle_tolerance(SLOPE_ERROR_FLOOR_RAD, residual, run), run, True)
     time = aligned.track.time[rows]
     if time[-1] - time[0] < 1.0:
         return None
     # A short leg: the least-squares slope of at least four seconds about its midpoint, or of the whole leg if shorter.
-    middle = float(np.interp(0.5 * requirements.runs[leg], np.maximum.accumulate(along), time))
+    middle_time = float(np.interp(0.5 * requirements.runs[leg], np.maximum.accumulate(along), time))
     start = min(
-        max(middle - 0.5 * MIN_STRETCH_TIME_S, float(time[0])),
+        max(middle_time - 0.5 * MIN_STRETCH_TIME_S, float(time[0])),
         max(float(time[0]), float(time[-1]) - MIN_STRETCH_TIME_S),
     )
-    window = (time >= start) & (time <= start + MIN_STRETCH_TIME_S)
-    run_at = aligned.distance_run[rows][window]
-    if run_at.size < 2 or np.ptp(run_at) < 1.0:
+    in_window = (time >= start) & (time <= start + MIN_STRETCH_TIME_S)
+    distance_run = aligned.distance_run[rows][in_window]
+    if distance_run.size < 2 or np.ptp(distance_run) < 1.0:
         return None
-    rise, _ = fit_line(run_at, position[window, 2])
-    return LegFit(math.atan(rise), ROUGH_SLOPE_ERROR_RAD, float(np.ptp(run_at)), False)
+    rise, _ = fit_line(distance_run, position[in_window, 2])
+    return LegFit(math.atan(rise), ROUGH_SLOPE_ERROR_RAD, float(np.ptp(distance_run)), False)
 
 
-def _angle_tolerance(floor: float, rest: float, run: float) -> float:
+def _angle_tolerance(floor: float, residual: float, run: float) -> float:
     """Return the tolerance of a fitted angle: residuals at the ends of the run rotate the line."""
-    return min(floor + math.atan2(2.0 * rest, run), MAX_UNSTEADINESS_RAD)
+    return min(floor + math.atan2(2.0 * residual, run), MAX_UNSTEADINESS_RAD)
 
 
 @dataclass(frozen=True, slots=True)
@@ -172,9 +181,9 @@ class SlopeMeasure:
     slope: as fitted.
     height_error: m, largest distance above (negative: below) the leg's line.
     short: True if no part of the leg is clear of the blends.
-    at_full, at_idle: s with the throttle at its limits.
-    slow, fast: m/s, the largest mean airspeed error below and above the command over `SATURATED_TIME_S` seconds at
-        those limits, without the part that a gust explains; 0 for none.
+    at_full, at_idle: time with the throttle at its limits, s.
+    slow, fast: largest mean airspeed error below and above the command over `SATURATED_TIME_S` seconds at those limits,
+        m/s, without the part that a gust explains; 0 for none.
     ability: the aircraft's ability at the throttle limit that the leg needs, if the flight reached that limit.
     finished: the leg was flown to its end.
     """
@@ -195,39 +204,39 @@ def measure_slope(requirements: RouteRequirements, aligned: AlignedTrack, leg: i
     if not aligned.flew(leg):
         return SlopeMeasure()
     rows = aligned.leg_rows(leg)
-    error, short = _height_error(requirements, leg, aligned.track.position[rows])
-    full, idle, slow, fast = _saturation_times(requirements, aligned, leg)
+    height_error, is_short = _height_error(requirements, leg, aligned.track.position[rows])
+    full_time, idle_time, speed_loss, speed_gain = _saturation_times(requirements, aligned, leg)
     return SlopeMeasure(
         slope=leg_slope(requirements, aligned, leg),
-        height_error=error,
-        short=short,
-        at_full=full,
-        at_idle=idle,
-        slow=slow,
-        fast=fast,
+        height_error=height_error,
+        short=is_short,
+        at_full=full_time,
+        at_idle=idle_time,
+        slow=speed_loss,
+        fast=speed_gain,
         ability=measure_ability(requirements, aligned, leg),
         finished=bool(aligned.passed[leg + 1]),
     )
 
 
 def _height_error(requirements: RouteRequirements, leg: int, position: Floats) -> tuple[float | None, bool]:
-    """Return the largest signed distance from the leg's line, m, and whether no part is clear of blends."""
+    """Return the largest signed height error from the leg's line, m, and True if no part is clear of blends."""
     along, _ = along_across(requirements, leg, position)
-    low, high = straight_span(requirements, leg, TURN_EXCLUSION_M, level=True)
-    inside = (along >= low) & (along <= high)
-    short = not inside.any()
-    if short:
-        low, high = straight_span(requirements, leg, 0.0)
-        inside = (along >= low) & (along <= high)
-        if not inside.any():
+    span_start, span_end = straight_span(requirements, leg, TURN_EXCLUSION_M, level=True)
+    is_inside = (along >= span_start) & (along <= span_end)
+    is_short = not is_inside.any()
+    if is_short:
+        span_start, span_end = straight_span(requirements, leg, 0.0)
+        is_inside = (along >= span_start) & (along <= span_end)
+        if not is_inside.any():
             return None, True
-    line = requirements.points[leg, 2] + along[inside] * math.tan(requirements.slopes[leg])
-    off = position[inside, 2] - line
-    return float(off[np.argmax(np.abs(off))]), short
+    line = requirements.points[leg, 2] + along[is_inside] * math.tan(requirements.slopes[leg])
+    height_errors = position[is_inside, 2] - line
+    return float(height_errors[np.argmax(np.abs(height_errors))]), is_short
 
 
 def steady_rows(requirements: RouteRequirements, aligned: AlignedTrack, leg: int) -> slice:
-    """Return the rows of a leg after the time needed to reach its commanded speed; may be empty."""
+    """Return the rows of a leg from when its commanded speed can be reached; may be empty."""
     rows = aligned.leg_rows(leg)
     speeds = requirements.route.airspeed
     change = abs(float(speeds[leg] - speeds[leg - 1])) if leg else 0.0
@@ -244,20 +253,20 @@ def _saturation_times(
     if rows.stop - rows.start < 2:
         return 0.0, 0.0, 0.0, 0.0
     tick = aligned.tick
-    full, idle = _rows_at_limits(requirements, aligned, rows)
+    at_full, at_idle = _rows_at_limits(requirements, aligned, rows)
     commanded = float(requirements.route.airspeed[leg])
     error = track.airspeed[rows].astype(np.float64) - commanded
     # A gust along the track changes the airspeed without any energy, so it has to be off without the gust as well.
-    steady = _speed_in_mean_wind(requirements, aligned, rows) - commanded
+    gust_free_error = _speed_in_mean_wind(requirements, aligned, rows) - commanded
     width = max(1, round(SATURATED_TIME_S / tick))
-    lifted = lifted_speed(aligned.track.time, aligned.track.airspeed, aligned.track.wind[:, 2], rows.stop)[rows]
-    slower = np.minimum(-error, -steady) - np.maximum(0.0, -lifted)
-    faster = np.minimum(error, steady) - np.maximum(0.0, lifted)
+    lift_gain = lifted_speed(aligned.track.time, aligned.track.airspeed, aligned.track.wind[:, 2], rows.stop)[rows]
+    slower = np.minimum(-error, -gust_free_error) - np.maximum(0.0, -lift_gain)
+    faster = np.minimum(error, gust_free_error) - np.maximum(0.0, lift_gain)
     # A log may lack the airspeed at some rows.
-    known = np.isfinite(slower) & np.isfinite(faster)
-    slow = _largest_mean_within(full & known, np.where(known, slower, 0.0), width)
-    fast = _largest_mean_within(idle & known, np.where(known, faster, 0.0), width)
-    return float(full.sum() * tick), float(idle.sum() * tick), slow, fast
+    is_known = np.isfinite(slower) & np.isfinite(faster)
+    speed_loss = _max_mean_within(at_full & is_known, np.where(is_known, slower, 0.0), width)
+    speed_gain = _max_mean_within(at_idle & is_known, np.where(is_known, faster, 0.0), width)
+    return float(at_full.sum() * tick), float(at_idle.sum() * tick), speed_loss, speed_gain
 
 
 def _rows_at_limits(requirements: RouteRequirements, aligned: AlignedTrack, rows: slice) -> tuple[Flags, Flags]:
@@ -276,38 +285,40 @@ def measure_ability(requirements: RouteRequirements, aligned: AlignedTrack, leg:
     """Measure the aircraft's ability at the throttle limit that a leg needs: full to climb, idle to dive.
 
     Thrust less drag gives an aircraft the climb rate v_up + v . a / g, where v is its velocity relative to the air and
-    a its acceleration over the ground: exact in any gust, because lift does no work.  A least-squares plane over
-    airspeed and altitude gives it at the commanded airspeed and the greatest altitude at which it was seen, where an
-    aircraft climbs least.
+    a its acceleration over the ground.  This is exact in any gust, because lift does no work.  The climb rate is fitted
+    by a least-squares plane over airspeed and altitude, and evaluated at the commanded airspeed and the greatest
+    measured altitude, where an aircraft climbs least.
     """
     rows = steady_rows(requirements, aligned, leg)
     track, sign = aligned.track, 1.0 if requirements.slopes[leg] >= 0.0 else -1.0
     if rows.stop - rows.start < 3:
         return None
-    full, idle = _rows_at_limits(requirements, aligned, rows)
-    full &= track.controls[rows, THROTTLE] >= SATURATED_THROTTLE_FRACTION
+    at_full, at_idle = _rows_at_limits(requirements, aligned, rows)
+    at_full &= track.controls[rows, THROTTLE] >= SATURATED_THROTTLE_FRACTION
     along, _ = along_across(requirements, leg, track.position[rows])
-    low, high = straight_span(requirements, leg, 0.0)
-    use = _rows_after(full if sign > 0.0 else idle, round(ABILITY_SETTLING_S / aligned.tick))
-    use &= (along >= low) & (along <= high)
+    span_start, span_end = straight_span(requirements, leg, 0.0)
+    is_used = _rows_after(at_full if sign > 0.0 else at_idle, round(ABILITY_SETTLING_S / aligned.tick))
+    is_used &= (along >= span_start) & (along <= span_end)
     velocity = track.velocity[rows].astype(np.float64)
-    air = velocity - track.wind[rows]
+    air_velocity = velocity - track.wind[rows]
     # A log may lack the wind at some rows.
-    use &= np.isfinite(air).all(axis=1)
-    seconds = float(use.sum() * aligned.tick)
+    is_used &= np.isfinite(air_velocity).all(axis=1)
+    seconds = float(is_used.sum() * aligned.tick)
     if seconds < ABILITY_WINDOW_S:
         return None
-    push = np.gradient(velocity, track.time[rows], axis=0)
-    rate = (air[:, 2] + (air * push).sum(axis=1) / GRAVITY)[use]
-    commanded, up = float(requirements.route.airspeed[leg]), track.position[rows, 2][use]
-    top = float(up.max())
-    faster = np.sqrt((air[use] ** 2).sum(axis=1)) - commanded
-    fit = _plane_at_origin(rate, faster, 0.01 * (up - top), seconds / ABILITY_SAMPLE_INTERVAL_S)
+    acceleration = np.gradient(velocity, track.time[rows], axis=0)
+    climb_rate = (air_velocity[:, 2] + (air_velocity * acceleration).sum(axis=1) / GRAVITY)[is_used]
+    commanded, altitude = float(requirements.route.airspeed[leg]), track.position[rows, 2][is_used]
+    top_altitude = float(altitude.max())
+    excess_speed = np.sqrt((air_velocity[is_used] ** 2).sum(axis=1)) - commanded
+    fit = _plane_at_origin(
+        climb_rate, excess_speed, 0.01 * (altitude - top_altitude), seconds / ABILITY_SAMPLE_INTERVAL_S
+    )
     if fit is None:
         return None
-    tail, cross = requirements.setup.scenario.wind.along(float(requirements.courses[leg]), top)
+    tailwind, crosswind = requirements.setup.scenario.wind.along(float(requirements.courses[leg]), top_altitude)
     slopes = [
-        ground_slope(math.asin(min(1.0, max(-1.0, value / commanded))), commanded, tail, cross)
+        ground_slope(math.asin(min(1.0, max(-1.0, value / commanded))), commanded, tailwind, crosswind)
         for value in (fit[0], fit[0] + fit[1])
     ]
     error = abs(slopes[1] - slopes[0])
@@ -316,9 +327,9 @@ def measure_ability(requirements: RouteRequirements, aligned: AlignedTrack, leg:
 
 
 def _rows_after(mask: Flags, count: int) -> Flags:
-    """Return the rows of ``mask`` whose ``count`` preceding rows are in the mask too."""
-    row = np.arange(mask.size)
-    return np.asarray(row - np.maximum.accumulate(np.where(mask, -1, row)) > count)
+    """Return the rows of ``mask`` that follow at least ``count`` rows of the mask in a row."""
+    rows = np.arange(mask.size)
+    return np.asarray(rows - np.maximum.accumulate(np.where(mask, -1, rows)) > count)
 
 
 def _plane_at_origin(value: Floats, x: Floats, y: Floats, independent: float) -> tuple[float, float] | None:
@@ -329,16 +340,18 @@ def _plane_at_origin(value: Floats, x: Floats, y: Floats, independent: float) ->
     if np.linalg.cond(moments) > MAX_CONDITION_NUMBER:
         return None
     inverse = np.linalg.inv(moments)
-    found = inverse @ (table.T @ value) / len(x)
-    rest = value - table @ found
-    return float(found[0]), math.sqrt(float((rest.var() + CLIMB_RATE_RESOLUTION_MPS**2) * inverse[0, 0]) / independent)
+    coefficients = inverse @ (table.T @ value) / len(x)
+    residuals = value - table @ coefficients
+    return float(coefficients[0]), math.sqrt(
+        float((residuals.var() + CLIMB_RATE_RESOLUTION_MPS**2) * inverse[0, 0]) / independent
+    )
 
 
 def _speed_in_mean_wind(requirements: RouteRequirements, aligned: AlignedTrack, rows: slice) -> Floats:
     """Return the airspeed that the aircraft would have without gusts, m/s."""
     wind, track = requirements.setup.scenario.wind, aligned.track
-    mean = wind.at_each(np.ascontiguousarray(track.position[rows, 2]))
-    east, north = track.velocity[rows, 0] - mean[:, 0], track.velocity[rows, 1] - mean[:, 1]
+    mean_wind = wind.at_each(np.ascontiguousarray(track.position[rows, 2]))
+    east, north = track.velocity[rows, 0] - mean_wind[:, 0], track.velocity[rows, 1] - mean_wind[:, 1]
     return np.asarray(np.sqrt(east**2 + north**2 + track.velocity[rows, 2].astype(np.float64) ** 2))
 
 
@@ -348,22 +361,22 @@ def lifted_speed(time: Floats, airspeed: Singles, rising: Singles, stop: int) ->
 
     The gain fades with time.
     """
-    out = np.zeros(stop)
+    speed = np.zeros(stop)
     for k in range(1, stop):
         step = time[k] - time[k - 1]
         gain = GRAVITY * rising[k] / max(MIN_AIRBORNE_AIRSPEED_MPS, airspeed[k])
         # A log may lack the airspeed or the wind at some rows.
         gain = gain if math.isfinite(gain) else 0.0
-        out[k] = (out[k - 1] + gain * step) / (1.0 + step / SPEED_MEMORY_S)
-    return out
+        speed[k] = (speed[k - 1] + gain * step) / (1.0 + step / SPEED_MEMORY_S)
+    return speed
 
 
-def _largest_mean_within(mask: NDArray[np.bool_], value: Floats, width: int) -> float:
+def _max_mean_within(mask: NDArray[np.bool_], value: Floats, width: int) -> float:
     """Return the largest mean of ``value`` over ``width`` rows that are mostly in ``mask``; 0 if there are none."""
     if mask.size < width:
         return 0.0
-    total = np.concatenate([[0.0], np.cumsum(value)])
-    count = np.concatenate([[0], np.cumsum(mask)])
-    means = (total[width:] - total[:-width]) / width
-    held = count[width:] - count[:-width] >= SATURATED_FRACTION * width
-    return max(0.0, float(means[held].max())) if held.any() else 0.0
+    sums = np.concatenate([[0.0], np.cumsum(value)])
+    counts = np.concatenate([[0], np.cumsum(mask)])
+    means = (sums[width:] - sums[:-width]) / width
+    is_mostly_in_mask = counts[width:] - counts[:-width] >= SATURATED_FRACTION * width
+    return max(0.0, float(means[is_mostly_in_mask].max())) if is_mostly_in_mask.any() else 0.0

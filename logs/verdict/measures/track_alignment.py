@@ -52,8 +52,8 @@ class AlignedTrack:
     passed: (w,) bool, the flight passed the waypoint.
     course: (t,) rad over the ground, unwrapped.
     distance_run: (t,) m along the ground track.
-    low, low_at: (t - 1,) least height above ground between a row and the next, m, and the fraction of the segment at
-        which it occurs; NaN off the known terrain, and without terrain.
+    clearance, clearance_fraction: (t - 1,) minimum height above ground between a row and the next, m, and the fraction
+        of the segment at which it occurs; NaN off the known terrain, and without terrain.
     tick: usual time between rows, s.
     """
 
@@ -65,8 +65,8 @@ class AlignedTrack:
     passed: NDArray[np.bool_]
     course: Floats
     distance_run: Floats
-    low: Floats
-    low_at: Floats
+    clearance: Floats
+    clearance_fraction: Floats
     tick: float
 
     def leg_rows(self, leg: int) -> slice:
@@ -101,104 +101,112 @@ class AlignedTrack:
 
 def align_track(requirements: RouteRequirements, track: Track) -> AlignedTrack | None:
     """Align a track with a route; return None if the track has fewer than two usable rows."""
-    good = _usable_rows(track, own=requirements.setup.source is None)
-    if int(good.sum()) < 2:
+    is_usable = _usable_rows(track, is_own=requirements.setup.source is None)
+    if int(is_usable.sum()) < 2:
         return None
-    if good.all():
+    if is_usable.all():
         clean, first_bad = track, math.nan
     else:
-        first_bad = float(track.time[int(np.argmin(good))])
-        clean = Track(*(getattr(track, item.name)[good] for item in fields(track)))
-    apexes, last = requirements.apexes(), len(clean) - 1
+        first_bad = float(track.time[int(np.argmin(is_usable))])
+        clean = Track(*(getattr(track, column.name)[is_usable] for column in fields(track)))
+    apexes, last_row = requirements.apexes(), len(clean) - 1
     progress = route_progress(requirements.setup.route, clean.position, anywhere=requirements.setup.source is not None)
-    arrived = _arrival_distances(requirements)
-    progress = _with_arrivals(requirements, clean, progress, arrived)
-    rows, distance = _passage_rows(clean, apexes, progress)
-    off = np.hypot(*(clean.position[rows, :2] - requirements.points[:, :2]).T)
+    arrival_radius = _arrival_radii(requirements)
+    progress = _count_end_as_arrival(requirements, clean, progress, arrival_radius)
+    rows, distance = _find_passage_rows(clean, apexes, progress)
+    distances = np.hypot(*(clean.position[rows, :2] - requirements.points[:, :2]).T)
     # The flight is past a waypoint that it passed, or at the waypoint where it ended; it did not pass one far ahead.
-    ahead = progress.left > arrived + _MISSED_MARGIN_M
-    ahead[-1] = False
-    passed = ((rows < last) & ~ahead) | (off <= arrived)
+    is_far_ahead = progress.left > arrival_radius + _MISSED_MARGIN_M
+    is_far_ahead[-1] = False
+    passed = ((rows < last_row) & ~is_far_ahead) | (distances <= arrival_radius)
     passed &= np.arange(len(rows)) <= progress.target
     passed = np.logical_and.accumulate(passed)
-    rows[~passed] = last
-    _begin_last_leg(requirements, clean, rows, passed, arrived)
-    step = np.diff(clean.position[:, :2], axis=0)
-    course = np.unwrap(np.arctan2(step[:, 0], step[:, 1]))
-    ground = requirements.setup.scenario.terrain
-    low, low_at = np.full(last, math.nan), np.zeros(last)
-    if ground is not None:
-        low, low_at = path_clearance(ground.heights, ground.to_pixel.record, clean.position)
+    rows[~passed] = last_row
+    _advance_last_leg(requirements, clean, rows, passed, arrival_radius)
+    steps = np.diff(clean.position[:, :2], axis=0)
+    course = np.unwrap(np.arctan2(steps[:, 0], steps[:, 1]))
+    terrain = requirements.setup.scenario.terrain
+    clearance, clearance_fraction = np.full(last_row, math.nan), np.zeros(last_row)
+    if terrain is not None:
+        clearance, clearance_fraction = path_clearance(terrain.heights, terrain.to_pixel.record, clean.position)
     return AlignedTrack(
         track=clean,
-        bad_rows=int(good.size - good.sum()),
+        bad_rows=int(is_usable.size - is_usable.sum()),
         first_bad=first_bad,
         rows=rows,
         distance=distance,
         passed=passed,
         course=np.append(course, course[-1]),
-        distance_run=np.concatenate([[0.0], np.cumsum(np.hypot(step[:, 0], step[:, 1]))]),
-        low=low,
-        low_at=low_at,
+        distance_run=np.concatenate([[0.0], np.cumsum(np.hypot(steps[:, 0], steps[:, 1]))]),
+        clearance=clearance,
+        clearance_fraction=clearance_fraction,
         tick=float(np.median(np.diff(clean.time))),
     )
 
 
-def _arrival_distances(requirements: RouteRequirements) -> Floats:
-    """Return the distance from each waypoint within which a track that ends has passed the waypoint, m, (w,)."""
+def _arrival_radii(requirements: RouteRequirements) -> Floats:
+    """Return the radius of each waypoint within which the end of a track counts as its arrival, m, (w,)."""
     route, follows_path = requirements.setup.route, requirements.setup.autopilot.follows_path
     offsets = requirements.fly_by_offset if follows_path else np.zeros(len(route.waypoints))
-    arrived = [
+    radii = [
         max(float(offset) + FINAL_WAYPOINT_TOLERANCE_M, reach(requirements, i).radius)
         for i, offset in enumerate(offsets)
     ]
-    first = route.return_from
-    if first >= 0:
+    first_return = route.return_from
+    if first_return >= 0:
         # A return ends where its autopilot loiters, which is not where the loiter is drawn.
-        until = route.return_until
-        arrived[first + 1 : until] = [max(RTL_ARRIVAL_RADIUS_M, radius) for radius in arrived[first + 1 : until]]
+        end_return = route.return_until
+        radii[first_return + 1 : end_return] = [
+            max(RTL_ARRIVAL_RADIUS_M, radius) for radius in radii[first_return + 1 : end_return]
+        ]
     if requirements.setup.autopilot.loiter_rules.at_middle:
         # A mission that ends on a loiter about a center ends anywhere on it, as wide as it is flown.
-        ends, item = route.arcs.size - 1, route.items[-1]
-        while ends > 0 and route.items[ends] == item and route.arcs[ends - 1]:
-            arrived[ends] = max(arrived[ends], RTL_ARRIVAL_RADIUS_M)
-            ends -= 1
-    return np.array(arrived)
+        k, item = route.arcs.size - 1, route.items[-1]
+        while k > 0 and route.items[k] == item and route.arcs[k - 1]:
+            radii[k] = max(radii[k], RTL_ARRIVAL_RADIUS_M)
+            k -= 1
+    return np.array(radii)
 
 
-def _with_arrivals(
-    requirements: RouteRequirements, track: Track, progress: RouteProgress, arrived: Floats
+def _count_end_as_arrival(
+    requirements: RouteRequirements, track: Track, progress: RouteProgress, arrival_radius: Floats
 ) -> RouteProgress:
-    """Add the waypoints at which a track ends to the waypoints that it set out for.
+    """Advance the target past every waypoint whose arrival radius the track has entered for good.
 
-    A flight within reach of a waypoint is flying to the next one, from the row where it came within reach.
+    A flight inside that radius already flies towards the next waypoint, from the row where it entered.
     """
-    points, last, target = requirements.points, len(track) - 1, progress.target
-    first, until = progress.first.copy(), progress.last.copy()
+    points, final_row, target = requirements.points, len(track) - 1, progress.target
+    first_row, last_row = progress.first.copy(), progress.last.copy()
     while target + 1 < len(points):
-        beyond = np.flatnonzero(np.hypot(*(track.position[:, :2] - points[target, :2]).T) > arrived[target])
-        entry = int(beyond[-1]) + 1 if beyond.size else 0
-        if entry > last:
+        outside = np.flatnonzero(np.hypot(*(track.position[:, :2] - points[target, :2]).T) > arrival_radius[target])
+        entry_row = int(outside[-1]) + 1 if outside.size else 0
+        if entry_row > final_row:
             break
         target += 1
-        first[target], until[target] = max(int(first[target - 1]), entry), last
-    return replace(progress, first=first, last=until, target=target)
+        first_row[target], last_row[target] = max(int(first_row[target - 1]), entry_row), final_row
+    return replace(progress, first=first_row, last=last_row, target=target)
 
 
-def _begin_last_leg(
-    requirements: RouteRequirements, track: Track, rows: RowNumbers, passed: NDArray[np.bool_], arrived: Floats
+def _advance_last_leg(
+    requirements: RouteRequirements, track: Track, rows: RowNumbers, passed: NDArray[np.bool_], arrival_radius: Floats
 ) -> None:
-    """Begin the track's last leg, in ``rows``, at the row that came within reach of the leg's first waypoint.
+    """Begin the track's last leg, in ``rows``, where the track entered the arrival radius of the leg's first waypoint.
 
-    Change ``rows`` only if the track ends within that reach, before the waypoint, because the autopilot is on the next
-    leg by then.
+    Change ``rows`` only if the track ends inside that radius, before the waypoint: the autopilot is then already on the
+    next leg.
     """
-    k = int(np.flatnonzero(passed)[-1]) if passed.any() else 0
-    if not 0 < k < len(rows) - 1 or rows[k] < len(track) - 1 or requirements.setup.route.arcs[k] > 0.0:
+    last_passed = int(np.flatnonzero(passed)[-1]) if passed.any() else 0
+    if (
+        not 0 < last_passed < len(rows) - 1
+        or rows[last_passed] < len(track) - 1
+        or requirements.setup.route.arcs[last_passed] > 0.0
+    ):
         return
-    off = np.hypot(*(track.position[:, :2] - requirements.points[k, :2]).T)
-    beyond = np.flatnonzero(off[rows[k - 1] :] > arrived[k])
-    rows[k] = min(rows[k] - 1, rows[k - 1] + (int(beyond[-1]) + 1 if beyond.size else 0))
+    distances = np.hypot(*(track.position[:, :2] - requirements.points[last_passed, :2]).T)
+    outside = np.flatnonzero(distances[rows[last_passed - 1] :] > arrival_radius[last_passed])
+    rows[last_passed] = min(
+        rows[last_passed] - 1, rows[last_passed - 1] + (int(outside[-1]) + 1 if outside.size else 0)
+    )
 
 
 def along_across(requirements: RouteRequirements, leg: int, position: Floats) -> tuple[Floats, Floats]:
@@ -215,126 +223,129 @@ def approaches(position: Floats, target: Floats) -> tuple[Floats, Floats]:
     """
     start = position[:-1, :2]
     step = position[1:, :2] - start
-    away = target[:2] - start
-    length2 = np.maximum((step * step).sum(axis=1), 1e-12)
-    fraction = np.clip((step * away).sum(axis=1) / length2, 0.0, 1.0)
-    rest = away - fraction[:, None] * step
-    return np.hypot(rest[:, 0], rest[:, 1]), fraction
+    offsets = target[:2] - start
+    length_square = np.maximum((step * step).sum(axis=1), 1e-12)
+    fraction = np.clip((step * offsets).sum(axis=1) / length_square, 0.0, 1.0)
+    closest_offsets = offsets - fraction[:, None] * step
+    return np.hypot(closest_offsets[:, 0], closest_offsets[:, 1]), fraction
 
 
-def _usable_rows(track: Track, *, own: bool) -> NDArray[np.bool_]:
-    """Return the rows with finite, plausible numbers, later than every usable row before them.
+def _usable_rows(track: Track, *, is_own: bool) -> NDArray[np.bool_]:
+    """Return a mask of the rows with finite, plausible numbers, each later than the usable rows before it.
 
-    own: the flight is planfly's own, with all numbers in every row; of an imported log only positions and velocities
-    are checked here, and each rule checks what else it needs.
+    is_own: True for planfly's own flights, which have all numbers in every row.  Only the positions and velocities of
+    an imported log are checked here; each rule checks the other data that it needs.
     """
-    good = np.isfinite(track.time)
+    is_usable = np.isfinite(track.time)
     plausible: tuple[tuple[str, float], ...] = (
         ("position", MAX_PLAUSIBLE_POSITION_M),
         ("velocity", MAX_PLAUSIBLE_SPEED_MPS),
     )
-    if own:
+    if is_own:
         for name in ("airspeed", "current", "energy"):
-            good &= np.isfinite(getattr(track, name))
+            is_usable &= np.isfinite(getattr(track, name))
         plausible = (
             *plausible,
             ("attitude", MAX_PLAUSIBLE_VALUE),
             ("controls", MAX_PLAUSIBLE_VALUE),
             ("wind", MAX_PLAUSIBLE_VALUE),
         )
-    for name, largest in plausible:
+    for name, bound in plausible:
         # A NaN is not within any bound.
-        good &= (np.abs(getattr(track, name)) <= largest).all(axis=1)
-    time = np.where(good, track.time, -math.inf)
-    before = np.concatenate([[-math.inf], np.maximum.accumulate(time)[:-1]]) if time.size else time
-    return np.asarray(good & (time > before))
+        is_usable &= (np.abs(getattr(track, name)) <= bound).all(axis=1)
+    time = np.where(is_usable, track.time, -math.inf)
+    latest_before = np.concatenate([[-math.inf], np.maximum.accumulate(time)[:-1]]) if time.size else time
+    return np.asarray(is_usable & (time > latest_before))
 
 
-def _passage_rows(track: Track, apexes: Floats, progress: RouteProgress) -> tuple[RowNumbers, Floats]:
-    """Return the row of each waypoint's passage, and its distance, m.
+def _find_passage_rows(track: Track, apexes: Floats, progress: RouteProgress) -> tuple[RowNumbers, Floats]:
+    """Find the row at which each waypoint was passed, and its distance, m.
 
-    The assignment in time order with the least sum of squared distances.  Only rows along each waypoint's legs are
+    Minimize the sum of squared distances, with the rows in order of time.  Only rows along each waypoint's legs are
     considered.
     """
-    position, count, last = track.position, len(apexes), len(track) - 1
-    tick = max(1e-6, float(track.time[-1] - track.time[0]) / last)
+    position, count, last_row = track.position, len(apexes), len(track) - 1
+    tick = max(1e-6, float(track.time[-1] - track.time[0]) / last_row)
     step = max(1, int(CHORD_TIME_S / tick), -(-len(track) * count // _CELLS))
-    first, until = read_only(progress.first // step), read_only(progress.last // step)
-    chords, capped = _align(read_only(position), apexes, first, until, step, CAPTURE_RADIUS_M)
+    first, last = read_only(progress.first // step), read_only(progress.last // step)
+    chords, is_missed = _match_chords(read_only(position), apexes, first, last, step, CAPTURE_RADIUS_M)
     rows = np.zeros(count, dtype=np.int64)
     distance = np.zeros(count)
     # Missed waypoints lie between their neighbours; waypoints after the last one that was met lie at the end.
-    met = np.flatnonzero(~capped)
-    final = int(met[-1]) if met.size else -1
-    low = 0
+    captured = np.flatnonzero(~is_missed)
+    final = int(captured[-1]) if captured.size else -1
+    previous_row = 0
     for i in range(count):
         if i > final and i > 0:
-            start, stop = last, last
-        elif capped[i]:
-            after = met[met > i]
-            start, stop = low, min(last, (int(chords[after[0]]) + 1) * step) if after.size else last
+            start, end = last_row, last_row
+        elif is_missed[i]:
+            later_captured = captured[captured > i]
+            start, end = (
+                previous_row,
+                min(last_row, (int(chords[later_captured[0]]) + 1) * step) if later_captured.size else last_row,
+            )
         else:
-            start, stop = max(low, (int(chords[i]) - 1) * step), min(last, (int(chords[i]) + 2) * step)
-        start, stop = min(start, last), max(min(start, last), stop)
-        off = position[start : stop + 1] - apexes[i]
-        away = np.sqrt((off * off).sum(axis=1))
-        nearest = int(np.argmin(away))
-        rows[i], distance[i] = start + nearest, away[nearest]
-        low = int(rows[i])
+            start, end = max(previous_row, (int(chords[i]) - 1) * step), min(last_row, (int(chords[i]) + 2) * step)
+        start, end = min(start, last_row), max(min(start, last_row), end)
+        offsets = position[start : end + 1] - apexes[i]
+        distances = np.sqrt((offsets * offsets).sum(axis=1))
+        nearest = int(np.argmin(distances))
+        rows[i], distance[i] = start + nearest, distances[nearest]
+        previous_row = int(rows[i])
     return rows, distance
 
 
 @compiled
-def _align(
-    position: Floats, marks: Floats, first: RowNumbers, until: RowNumbers, step: int, capture: float
+def _match_chords(
+    position: Floats, marks: Floats, first: RowNumbers, last: RowNumbers, step: int, capture: float
 ) -> tuple[RowNumbers, NDArray[np.bool_]]:
     """Find the chord (of ``step`` rows) of each mark, in time order.
 
-    The sum of min(distance, capture)^2 is the least.  By dynamic programming; among equal assignments the earliest.
-    Also return which marks no row of their chord captures; only chords first..until can capture a mark.
+    Minimize the sum of min(distance, capture)^2 by dynamic programming; of equal assignments take the earliest.  Also
+    return a mask of the marks that no row of their chord captures; only chords first..last can capture a mark.
     """
-    last = position.shape[0] - 1
-    chords = -(-last // step)
+    last_row = position.shape[0] - 1
+    chords = -(-last_row // step)
     count = marks.shape[0]
-    best = np.zeros(chords)
-    fresh = np.zeros((count, chords), dtype=np.uint8)
+    cost = np.zeros(chords)
+    starts_here = np.zeros((count, chords), dtype=np.uint8)
     for i in range(count):
         lowest = math.inf
         for j in range(chords):
-            a, b = j * step, min(last, (j + 1) * step)
-            length2 = 0.0
+            start_row, end_row = j * step, min(last_row, (j + 1) * step)
+            length_square = 0.0
             along = 0.0
-            start2 = 0.0
+            offset_square = 0.0
             for k in range(3):
-                leg = position[b, k] - position[a, k]
-                out = marks[i, k] - position[a, k]
-                length2 += leg * leg
-                along += leg * out
-                start2 += out * out
-            f = min(1.0, max(0.0, along / length2)) if length2 > 0.0 else 0.0
-            away2 = max(0.0, start2 - 2.0 * f * along + f * f * length2)
-            if not first[i] <= j <= until[i]:
-                away2 = math.inf
-            total = best[j] + min(away2, capture * capture)
+                chord_step = position[end_row, k] - position[start_row, k]
+                offset = marks[i, k] - position[start_row, k]
+                length_square += chord_step * chord_step
+                along += chord_step * offset
+                offset_square += offset * offset
+            fraction = min(1.0, max(0.0, along / length_square)) if length_square > 0.0 else 0.0
+            distance_square = max(0.0, offset_square - 2.0 * fraction * along + fraction * fraction * length_square)
+            if not first[i] <= j <= last[i]:
+                distance_square = math.inf
+            total = cost[j] + min(distance_square, capture * capture)
             if total < lowest:
                 lowest = total
-                fresh[i, j] = 1
-            best[j] = lowest
+                starts_here[i, j] = 1
+            cost[j] = lowest
     chosen = np.zeros(count, dtype=np.int64)
-    capped = np.zeros(count, dtype=np.bool_)
+    is_missed = np.zeros(count, dtype=np.bool_)
     j = chords - 1
     for i in range(count - 1, -1, -1):
-        while fresh[i, j] == 0:
+        while starts_here[i, j] == 0:
             j -= 1
         chosen[i] = j
-        nearest2 = math.inf
-        for row in range(j * step, min(last, (j + 1) * step) + 1):
-            away2 = 0.0
+        nearest_square = math.inf
+        for row in range(j * step, min(last_row, (j + 1) * step) + 1):
+            distance_square = 0.0
             for k in range(3):
-                away2 += (marks[i, k] - position[row, k]) ** 2
-            nearest2 = min(nearest2, away2)
-        capped[i] = nearest2 >= capture * capture or not first[i] <= j <= until[i]
-    return chosen, capped
+                distance_square += (marks[i, k] - position[row, k]) ** 2
+            nearest_square = min(nearest_square, distance_square)
+        is_missed[i] = nearest_square >= capture * capture or not first[i] <= j <= last[i]
+    return chosen, is_missed
 
 
 # ----------------------------------------------------------------------
@@ -356,8 +367,8 @@ def find_leg_ends(setup: FlightSetup, track: Track) -> tuple[float, ...]:
     >>> find_leg_ends(log.setup, log.track)
     (20.0,)
     """
-    places = replace(track, **{name: np.zeros_like(getattr(track, name)) for name in _IGNORED_COLUMNS})
-    aligned = align_track(route_requirements(setup), places)
+    positions = replace(track, **{name: np.zeros_like(getattr(track, name)) for name in _IGNORED_COLUMNS})
+    aligned = align_track(route_requirements(setup), positions)
     return () if aligned is None else aligned.leg_ends()
 
 

@@ -27,10 +27,10 @@ OF_NEXT_LEG = 0.7
 class CornerPass:
     """Measured pass of one waypoint.
 
-    time: s, of the nearest pass.  nearest: m, horizontal distance from the waypoint then.
-    overshoot: m past the next leg, on the outside of the turn, from there to `OF_NEXT_LEG` of that leg, or to the next
-        waypoint's pass if that is sooner; None if the next leg was not joined.
-    beyond: m past the next leg's end at the nearest pass, if the leg was not joined.
+    time: time of the nearest pass, s.  nearest: horizontal distance from the waypoint at that time, m.
+    overshoot: distance past the next leg, m, on the outside of the turn, up to `OF_NEXT_LEG` of that leg or the next
+        waypoint's pass, whichever is sooner; None if the next leg was not joined.
+    beyond: distance past the next leg's end at the nearest pass, m, if the leg was not joined.
     """
 
     time: float
@@ -40,7 +40,7 @@ class CornerPass:
 
 
 def corner_passes(requirements: RouteRequirements, aligned: AlignedTrack) -> tuple[CornerPass, ...]:
-    """Measure how each waypoint of a route was passed, in route order: each after the one before it.
+    """Measure the pass of each waypoint of a route, each later than the pass before it.
 
     >>> from logs.recording.example_log import example_log
     >>> from logs.verdict.measures.route_requirements import route_requirements
@@ -51,58 +51,60 @@ def corner_passes(requirements: RouteRequirements, aligned: AlignedTrack) -> tup
     >>> len(passes) == requirements.legs + 1, passes[1].nearest < 60.0
     (True, True)
     """
-    found = _nearest_passes(requirements, aligned)
-    times, tick = [time for time, _ in found], aligned.tick
-    out = []
-    for k, (time, nearest) in enumerate(found):
+    nearest_passes = _nearest_passes(requirements, aligned)
+    times, tick = [time for time, _ in nearest_passes], aligned.tick
+    passes = []
+    for k, (time, nearest) in enumerate(nearest_passes):
         overshoot, beyond = None, 0.0
         if 0 < k < requirements.legs:
-            later = next((other for other in times[k + 1 :] if other > time + tick), float(aligned.track.time[-1]))
-            overshoot, beyond = _corner_overshoot(requirements, aligned, k, time, later)
-        out.append(CornerPass(time, nearest, overshoot, beyond))
-    return tuple(out)
+            next_time = next(
+                (other_time for other_time in times[k + 1 :] if other_time > time + tick), float(aligned.track.time[-1])
+            )
+            overshoot, beyond = _corner_overshoot(requirements, aligned, k, time, next_time)
+        passes.append(CornerPass(time, nearest, overshoot, beyond))
+    return tuple(passes)
 
 
 def _nearest_passes(requirements: RouteRequirements, aligned: AlignedTrack) -> list[tuple[float, float]]:
     """Return the time (s) and distance (m) of each waypoint's nearest pass, in order of time."""
     time, rows = aligned.track.time, aligned.rows
-    out: list[tuple[float, float]] = []
+    passes: list[tuple[float, float]] = []
     begin = float(time[0])
     for k in range(len(rows)):
         # Waypoints that share a row do not bound each other.
-        later = rows[k + 1 :][time[rows[k + 1 :]] > max(float(time[rows[k]]), begin)]
-        moments, place = _track_between(aligned, begin, float(time[later[0]] if later.size else time[-1]))
-        away, fraction = approaches(place, requirements.points[k])
-        nearest = int(np.argmin(away))
-        begin = float(moments[nearest] + fraction[nearest] * (moments[nearest + 1] - moments[nearest]))
-        out.append((begin, float(away[nearest])))
-    return out
+        later_rows = rows[k + 1 :][time[rows[k + 1 :]] > max(float(time[rows[k]]), begin)]
+        times, positions = _track_between(aligned, begin, float(time[later_rows[0]] if later_rows.size else time[-1]))
+        distances, fraction = approaches(positions, requirements.points[k])
+        nearest = int(np.argmin(distances))
+        begin = float(times[nearest] + fraction[nearest] * (times[nearest + 1] - times[nearest]))
+        passes.append((begin, float(distances[nearest])))
+    return passes
 
 
 def _track_between(aligned: AlignedTrack, start: float, end: float) -> tuple[Floats, Floats]:
     """Return times between `start` and `end`, s, (n,), and the positions of the flight at these times, m, (n, 3)."""
     time = aligned.track.time
-    moments = np.concatenate([[start], time[(time > start) & (time < end)], [end]])
-    return moments, np.column_stack([np.interp(moments, time, aligned.track.position[:, j]) for j in range(3)])
+    times = np.concatenate([[start], time[(time > start) & (time < end)], [end]])
+    return times, np.column_stack([np.interp(times, time, aligned.track.position[:, j]) for j in range(3)])
 
 
 def _corner_overshoot(
     requirements: RouteRequirements, aligned: AlignedTrack, k: int, start: float, end: float
 ) -> tuple[float | None, float]:
-    """Return the overshoot at a waypoint (or None), and how far past the leg's end the flight was, m."""
+    """Return the overshoot at a waypoint (or None), and the distance past the next leg's end, m."""
     run = float(requirements.runs[k])
     along, across = along_across(requirements, k, _track_between(aligned, start, end)[1])
     if along[0] > run:
         return None, float(along[0]) - run
-    outside = -math.copysign(1.0, float(requirements.turns[k])) * across
-    gone = np.flatnonzero(along >= OF_NEXT_LEG * run)
-    until = int(gone[0]) if gone.size else len(along)
-    if 0 < until < len(along):
+    outside_offset = -math.copysign(1.0, float(requirements.turns[k])) * across
+    rows_past = np.flatnonzero(along >= OF_NEXT_LEG * run)
+    end_row = int(rows_past[0]) if rows_past.size else len(along)
+    if 0 < end_row < len(along):
         # Interpolate to the exact end: rows may be a second apart.
-        share = (OF_NEXT_LEG * run - along[until - 1]) / (along[until] - along[until - 1])
-        last = outside[until - 1] + share * (outside[until] - outside[until - 1])
-        return max(0.0, float(last), float(outside[:until].max())), 0.0
-    return max(0.0, float(outside[: max(1, until)].max())), 0.0
+        fraction = (OF_NEXT_LEG * run - along[end_row - 1]) / (along[end_row] - along[end_row - 1])
+        end_offset = outside_offset[end_row - 1] + fraction * (outside_offset[end_row] - outside_offset[end_row - 1])
+        return max(0.0, float(end_offset), float(outside_offset[:end_row].max())), 0.0
+    return max(0.0, float(outside_offset[: max(1, end_row)].max())), 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -115,9 +117,9 @@ class TurnMeasure:
     held_bank: rad, the largest mean over a second.
     radius: m, the least over a second.
     overshoot: m past the arc, on its outside.
-    settled: m, mean distance from the next leg in the last second before its end.
-    passed: m, least distance from the waypoint.
-    full_circles: whole turns flown beyond the corner's own.
+    settled: mean distance from the next leg in the last second before its end, m.
+    passed: minimum distance from the waypoint, m.
+    full_circles: number of full circles flown in addition to the corner's turn.
     over: True if the flight got past the turn.
     corner: for an imported flight, the measured pass of the waypoint; ``overshoot`` and ``passed`` are then taken from
     it.
@@ -156,50 +158,52 @@ def measure_turn(requirements: RouteRequirements, aligned: AlignedTrack, i: int)
     track = aligned.track
     first, middle, last = (int(aligned.rows[k]) for k in (i - 1, i, i + 1))
     position = track.position[first : last + 1]
-    before, _ = along_across(requirements, i - 1, position)
+    along_before, _ = along_across(requirements, i - 1, position)
     along, across = along_across(requirements, i, position)
-    entry = _first_row(before >= requirements.runs[i - 1] - requirements.before[i], middle - first)
-    leaving = np.arange(first, last + 1) >= middle
-    leave = _first_row(leaving & (along >= requirements.after[i]), last - first)
-    # A neighbour that needs more than the leg has gets half of it: the neighbour is at fault, not this turn.
-    ahead = min(
+    entry_row = _first_row(along_before >= requirements.runs[i - 1] - requirements.before[i], middle - first)
+    is_after_waypoint = np.arange(first, last + 1) >= middle
+    exit_row = _first_row(is_after_waypoint & (along >= requirements.after[i]), last - first)
+    # A next turn that needs more than the rest of the leg gets half of the leg: it is at fault, not this turn.
+    next_turn_length = min(
         float(requirements.before[i + 1]), max(0.5 * requirements.runs[i], requirements.runs[i] - requirements.after[i])
     )
-    end = _first_row(leaving & (along >= requirements.runs[i] - ahead), last - first)
-    around = aligned.around(first + entry, first + max(entry, leave), 1.0)
-    held, radius = _bank_and_radius(aligned, around)
+    end_row = _first_row(is_after_waypoint & (along >= requirements.runs[i] - next_turn_length), last - first)
+    rows_around = aligned.around(first + entry_row, first + max(entry_row, exit_row), 1.0)
+    held_bank, radius = _bank_and_radius(aligned, rows_around)
     angle, tolerance, fitted = _course_change(requirements, aligned, i)
-    watched = np.arange(position.shape[0]) <= max(leave, end)
-    watched &= track.time[first : last + 1] <= track.time[first + leave] + SETTLING_WATCH_TIME_S
-    turned = abs(float(aligned.course[first + leave] - aligned.course[first + entry]))
+    is_watched = np.arange(position.shape[0]) <= max(exit_row, end_row)
+    is_watched &= track.time[first : last + 1] <= track.time[first + exit_row] + SETTLING_WATCH_TIME_S
+    course_change = abs(float(aligned.course[first + exit_row] - aligned.course[first + entry_row]))
     return TurnMeasure(
         angle=angle,
         tolerance=tolerance,
         fitted=fitted,
-        peak_bank=None if math.isnan(held) else float(np.abs(track.attitude[around, ROLL]).max()),
-        held_bank=None if math.isnan(held) else held,
+        peak_bank=None if math.isnan(held_bank) else float(np.abs(track.attitude[rows_around, ROLL]).max()),
+        held_bank=None if math.isnan(held_bank) else held_bank,
         radius=radius,
-        overshoot=_arc_overshoot(requirements, i, position[watched], before[watched], along[watched], across[watched]),
-        settled=_settled_distance(requirements, aligned, i, first, end, along, across),
+        overshoot=_arc_overshoot(
+            requirements, i, position[is_watched], along_before[is_watched], along[is_watched], across[is_watched]
+        ),
+        settled=_settled_distance(requirements, aligned, i, first, end_row, along, across),
         passed=float(approaches(position, requirements.points[i])[0].min()),
-        full_circles=max(0, round((turned - abs(float(requirements.turns[i]))) / (2.0 * math.pi))),
-        over=bool(aligned.passed[i + 1] or end < last - first or leave < last - first),
+        full_circles=max(0, round((course_change - abs(float(requirements.turns[i]))) / (2.0 * math.pi))),
+        over=bool(aligned.passed[i + 1] or end_row < last - first or exit_row < last - first),
     )
 
 
-def _first_row(mask: NDArray[np.bool_], otherwise: int) -> int:
-    found = int(np.argmax(mask))
-    return found if mask[found] else otherwise
+def _first_row(mask: NDArray[np.bool_], default: int) -> int:
+    row = int(np.argmax(mask))
+    return row if mask[row] else default
 
 
 def _course_change(
     requirements: RouteRequirements, aligned: AlignedTrack, i: int
 ) -> tuple[float | None, float | None, bool]:
-    into, out = leg_course(requirements, aligned, i - 1), leg_course(requirements, aligned, i)
-    if into is None or out is None:
+    course_before, course_after = leg_course(requirements, aligned, i - 1), leg_course(requirements, aligned, i)
+    if course_before is None or course_after is None:
         return None, None, False
-    change = abs(math.remainder(out.value - into.value, 2.0 * math.pi))
-    return change, into.tolerance + out.tolerance, into.fitted and out.fitted
+    change = abs(math.remainder(course_after.value - course_before.value, 2.0 * math.pi))
+    return change, course_before.tolerance + course_after.tolerance, course_before.fitted and course_after.fitted
 
 
 def _bank_and_radius(aligned: AlignedTrack, rows: slice) -> tuple[float, float]:
@@ -209,46 +213,52 @@ def _bank_and_radius(aligned: AlignedTrack, rows: slice) -> tuple[float, float]:
     ticks = int(np.searchsorted(time, time[0] + 1.0))
     if ticks < 1 or ticks >= time.size:
         return float(bank.mean()), math.inf
-    total = np.concatenate([[0.0], np.cumsum(bank)])
-    held = float(((total[ticks:] - total[:-ticks]) / ticks).max())
+    bank_sums = np.concatenate([[0.0], np.cumsum(bank)])
+    held_bank = float(((bank_sums[ticks:] - bank_sums[:-ticks]) / ticks).max())
     course, run = aligned.course[rows], aligned.distance_run[rows]
-    bend = np.abs(course[ticks:] - course[:-ticks]) / np.maximum(run[ticks:] - run[:-ticks], 1e-6)
-    sharpest = float(bend.max())
-    return held, 1.0 / sharpest if sharpest > 1e-9 else math.inf
+    curvature = np.abs(course[ticks:] - course[:-ticks]) / np.maximum(run[ticks:] - run[:-ticks], 1e-6)
+    max_curvature = float(curvature.max())
+    return held_bank, 1.0 / max_curvature if max_curvature > 1e-9 else math.inf
 
 
 def _arc_overshoot(
-    requirements: RouteRequirements, i: int, position: Floats, before: Floats, along: Floats, across: Floats
+    requirements: RouteRequirements, i: int, position: Floats, along_before: Floats, along: Floats, across: Floats
 ) -> float | None:
     """Return the largest distance outside the arc and then outside the next leg, m; 0 if it was never outside."""
     if requirements.setup.route.fly_over[i] or not math.isfinite(requirements.before[i]):
         return None
     side = math.copysign(1.0, requirements.turns[i])
     ux, uy = requirements.leg_unit(i - 1)
-    centre = (
+    center = (
         requirements.points[i, :2]
         - requirements.before[i] * np.array([ux, uy])
         + side * requirements.radius[i] * np.array([uy, -ux])
     )
-    started = np.maximum.accumulate(before >= requirements.runs[i - 1] - requirements.before[i])
-    in_arc = started & (along < requirements.after[i])
-    outside = np.where(started & ~in_arc, -side * across, 0.0)
-    off = position[in_arc, :2] - centre
-    outside[in_arc] = np.hypot(off[:, 0], off[:, 1]) - requirements.radius[i]
+    has_started = np.maximum.accumulate(along_before >= requirements.runs[i - 1] - requirements.before[i])
+    is_in_arc = has_started & (along < requirements.after[i])
+    outside = np.where(has_started & ~is_in_arc, -side * across, 0.0)
+    center_offset = position[is_in_arc, :2] - center
+    outside[is_in_arc] = np.hypot(center_offset[:, 0], center_offset[:, 1]) - requirements.radius[i]
     return max(0.0, float(outside.max())) if outside.size else 0.0
 
 
 def _settled_distance(
-    requirements: RouteRequirements, aligned: AlignedTrack, i: int, first: int, end: int, along: Floats, across: Floats
+    requirements: RouteRequirements,
+    aligned: AlignedTrack,
+    i: int,
+    first_row: int,
+    end_row: int,
+    along: Floats,
+    across: Floats,
 ) -> float:
     """Return the mean distance from the next leg's line in the last second before the next turn, m.
 
     If the turn uses the whole leg, return the distance at the end of the leg.
     """
-    time = aligned.track.time[first : first + end + 1]
+    time = aligned.track.time[first_row : first_row + end_row + 1]
     start = int(np.searchsorted(time, time[-1] - 1.0))
-    rows = np.arange(start, end + 1)
+    rows = np.arange(start, end_row + 1)
     rows = rows[along[rows] >= requirements.after[i]]
     if rows.size:
         return float(np.abs(across[rows]).mean())
-    return float(abs(across[end]))
+    return float(abs(across[end_row]))

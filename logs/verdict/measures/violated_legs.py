@@ -10,21 +10,23 @@ from world.arrays import Floats
 from world.threats import Threats
 
 
-def violated_legs(requirements: RouteRequirements, item: Finding) -> tuple[int, ...]:
+def violated_legs(requirements: RouteRequirements, finding: Finding) -> tuple[int, ...]:
     """Return the legs of the planned path on which a failed finding of a threat, zone or area applies."""
-    path, place = requirements.path, item.place
+    path, place = requirements.path, finding.place
     scenario = requirements.setup.scenario
     if place.kind in ("missile", "radar") and place.index is not None:
-        near = _sphere_segments(path.points, scenario.threats, place.index, missile=place.kind == "missile")
-        return tuple(np.unique(path.legs[near]).tolist())
-    facts = {fact.what: fact.value for fact in item.facts}
+        is_inside = _sphere_segments(path.points, scenario.threats, place.index, missile=place.kind == "missile")
+        return tuple(np.unique(path.legs[is_inside]).tolist())
+    facts = {fact.what: fact.value for fact in finding.facts}
     if "entry leg" in facts and "exit leg" in facts:
         return tuple(range(int(facts["entry leg"]), int(facts["exit leg"]) + 1))
-    if item.rule == "bounds":
+    if finding.rule == "bounds":
         (west, east), (south, north) = scenario.bounds.tolist()
-        low, high = np.array([west, south, scenario.floor]), np.array([east, north, scenario.ceiling])
-        beyond = np.asarray(((path.points < low - ROUNDING_M) | (path.points > high + ROUNDING_M)).any(axis=1))
-        return tuple(np.unique(path.legs[beyond[:-1] | beyond[1:]]).tolist())
+        min_corner, max_corner = np.array([west, south, scenario.floor]), np.array([east, north, scenario.ceiling])
+        is_outside = np.asarray(
+            ((path.points < min_corner - ROUNDING_M) | (path.points > max_corner + ROUNDING_M)).any(axis=1)
+        )
+        return tuple(np.unique(path.legs[is_outside[:-1] | is_outside[1:]]).tolist())
     return ()
 
 
@@ -32,9 +34,13 @@ def _sphere_segments(points: Floats, threats: Threats, number: int, *, missile: 
     """Return True for each segment of a path that enters the sphere of a threat, (n - 1,).  points: (n, 3) m."""
     radius = float((threats.kill_radius if missile else threats.detection_radius)[number])
     start, step = points[:-1] - threats.position[number], np.diff(points, axis=0)
-    length2 = (step**2).sum(axis=1)
-    share = np.clip(
-        np.divide(-(start * step).sum(axis=1), length2, out=np.zeros_like(length2), where=length2 > 0), 0, 1
+    length_square = (step**2).sum(axis=1)
+    fraction = np.clip(
+        np.divide(
+            -(start * step).sum(axis=1), length_square, out=np.zeros_like(length_square), where=length_square > 0
+        ),
+        0,
+        1,
     )
-    nearest = start + share[:, None] * step
-    return np.asarray((nearest**2).sum(axis=1) <= radius**2)
+    nearest_offset = start + fraction[:, None] * step
+    return np.asarray((nearest_offset**2).sum(axis=1) <= radius**2)

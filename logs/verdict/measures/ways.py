@@ -22,8 +22,8 @@ from world.terrain import Terrain
 # Altitudes (m AMSL) at increasing runs (m from the path's start).
 Profile = list[tuple[float, float]]
 
-# Length of the pieces in which a path's clearance is computed, m.  The ground that is known before a gap in the
-# elevation data applies piece by piece.
+# Length of the pieces in which a path's clearance is computed, m.  Pieces before a gap in the elevation data keep their
+# known ground.
 _PIECE_LENGTH_M = 100.0
 
 
@@ -35,9 +35,9 @@ class Way(NamedTuple):
 
     def between(self, first: float, last: float) -> "Way":
         """Return the part between two runs, m."""
-        inner = self.run[(self.run > first) & (self.run < last)]
-        at = np.concatenate([[first], inner, [max(first, last)]])
-        return Way(np.stack([np.interp(at, self.run, self.points[:, k]) for k in range(3)], axis=1), at)
+        inner_runs = self.run[(self.run > first) & (self.run < last)]
+        runs = np.concatenate([[first], inner_runs, [max(first, last)]])
+        return Way(np.stack([np.interp(runs, self.run, self.points[:, k]) for k in range(3)], axis=1), runs)
 
 
 def track_way(track: Track) -> Way:
@@ -62,32 +62,34 @@ def way_clearance(ground: Terrain, way: Way) -> tuple[float, float]:
     first, last = float(way.run[0]), float(way.run[-1])
     cuts = np.linspace(first, last, max(2, math.ceil((last - first) / _PIECE_LENGTH_M) + 1))
     run = np.union1d(cuts, way.run)
-    points = np.stack([np.interp(run, way.run, way.points[:, k]) for k in range(3)], axis=1)
-    found = [ground.clearance(*points[k : k + 2]) for k in range(len(run) - 1)]
-    low = np.array([clearance for clearance, _ in found])
+    points = np.stack([np.interp(run, way.run, way.points[:, lowest]) for lowest in range(3)], axis=1)
+    clearances = [ground.clearance(*points[lowest : lowest + 2]) for lowest in range(len(run) - 1)]
+    heights = np.array([clearance for clearance, _ in clearances])
     # A NaN takes precedence, unless the path hits known ground.
-    k = int(np.nanargmin(low)) if (low < 0.0).any() else int(np.argmin(low))
-    return float(low[k]), float(run[k] + found[k][1] * (run[k + 1] - run[k]))
+    lowest = int(np.nanargmin(heights)) if (heights < 0.0).any() else int(np.argmin(heights))
+    return float(heights[lowest]), float(run[lowest] + clearances[lowest][1] * (run[lowest + 1] - run[lowest]))
 
 
 def first_obstacle_on(requirements: RouteRequirements, way: Way) -> str:
     """Return the name of the first missile sphere or zone that a path enters, or "" if it enters none.
 
-    Ignores zones the path starts in, and inclusion zones with a floor.
+    Ignore zones that contain the path's start, and inclusion zones with a floor.
     """
     scenario, airspace = requirements.setup.scenario, requirements.airspace
     if not scenario.external:
         threats = scenario.threats
-        visits = path_spheres(way.points, way.run, threats.position, threats.kill_radius, threats.kill_scale)
-        for m in np.flatnonzero(visits.inside > 0.0).tolist():
-            return place_text(Place("missile", m, name=scenario.spec.threats[m].name or ""))
-    relevant = [z for z, zone in enumerate(airspace.zones) if zone.kind == "exclusion" or zone.floor is None]
-    if relevant:
-        records = zone_records([airspace.zones[z] for z in relevant])
-        met = path_zones(straight_moves(way.points, way.run), records, scenario.terrain)
-        for z, visit in zip(relevant, met, strict=True):
+        sphere_visits = path_spheres(way.points, way.run, threats.position, threats.kill_radius, threats.kill_scale)
+        for missile in np.flatnonzero(sphere_visits.inside > 0.0).tolist():
+            return place_text(Place("missile", missile, name=scenario.spec.threats[missile].name or ""))
+    zone_numbers = [
+        zone_number for zone_number, zone in enumerate(airspace.zones) if zone.kind == "exclusion" or zone.floor is None
+    ]
+    if zone_numbers:
+        records = zone_records([airspace.zones[zone_number] for zone_number in zone_numbers])
+        zone_visits = path_zones(straight_moves(way.points, way.run), records, scenario.terrain)
+        for zone_number, visit in zip(zone_numbers, zone_visits, strict=True):
             if visit.depth > ROUNDING_M and visit.entry_time > 0.0:
-                return place_text(airspace.place(z))
+                return place_text(airspace.place(zone_number))
     return ""
 
 
@@ -98,20 +100,22 @@ def first_obstacle_on(requirements: RouteRequirements, way: Way) -> str:
 def is_laid_out(requirements: RouteRequirements) -> bool:
     """Return True if ground paths apply: known terrain, not an imported flight or an airborne plan."""
     setup = requirements.setup
-    on_ground = setup.plan is None or setup.plan.ways is not None
-    return setup.scenario.terrain is not None and on_ground and setup.source is None
+    has_ground_phases = setup.plan is None or setup.plan.ways is not None
+    return setup.scenario.terrain is not None and has_ground_phases and setup.source is None
 
 
 def first_item(requirements: RouteRequirements) -> tuple[int, MissionItem | None]:
     """Return the index of the first waypoint of a mission item, and that item if it is a take-off."""
     route = requirements.setup.route
     first = next((k for k, seq in enumerate(route.items.tolist()) if seq >= 0), 0)
-    found = [one for one in requirements.setup.mission.items if one.seq == int(route.items[first])]
-    return first, found[0] if found and found[0].command in TAKEOFFS else None
+    items = [item for item in requirements.setup.mission.items if item.seq == int(route.items[first])]
+    return first, items[0] if items and items[0].command in TAKEOFFS else None
 
 
 def landing_item(requirements: RouteRequirements) -> tuple[int, MissionItem] | None:
     """Return the waypoint and item of the glide landing of a mission, or None if there is none."""
-    lands = {item.seq: item for item in requirements.setup.mission.items if item.command == Command.NAV_LAND}
-    found = [(k, lands[seq]) for k, seq in enumerate(requirements.setup.route.items.tolist()) if k and seq in lands]
-    return found[-1] if found else None
+    landings = {item.seq: item for item in requirements.setup.mission.items if item.command == Command.NAV_LAND}
+    landing_waypoints = [
+        (k, landings[seq]) for k, seq in enumerate(requirements.setup.route.items.tolist()) if k and seq in landings
+    ]
+    return landing_waypoints[-1] if landing_waypoints else None

@@ -6,7 +6,7 @@ can contain a place deeper than the deepest known one.  Nothing between two samp
 as on straight lines.
 
 shapely's distance and intersection take 170 times as long (1,000 zones, 36,000 rows: 7.7 s, here 0.05 s), give the
-depth of the rows alone (0.5 m off), and support neither arcs, heights above ground nor times.
+depth of only the rows (0.5 m off), and support neither arcs, heights above ground nor times.
 """
 
 import math
@@ -24,8 +24,9 @@ from world.terrain import Terrain, ground_height
 # Parts of a move near a zone, compiled: how far beyond the zone's limit they can be between their ends.
 
 
-# A part of a move: its first and last fraction of the move, and for both ends: the position, m, the distances outside
-# the zone's shape and outside its band, m, and the zone's nearest edge.
+# A part of a move.  first, last: fractions of the move at its ends.  east, north: position of its start, m.  away, off:
+# distances of the start outside the zone's outline and altitude band, m.  edge: the zone's edge nearest to the start.
+# to_east to to_edge: the same for its end.
 PART = record_dtype(
     "first",
     "last",
@@ -43,40 +44,40 @@ PART = record_dtype(
 
 
 @inner
-def look_at_zone(
+def distances_outside_zone(
     records: ZoneRecords, z: int, heights: Heights, to_pixel: PolyMapRecord, east: float, north: float, up: float
 ) -> tuple[float, float, int]:
-    """Return a place's distances outside zone z's shape and band, m, and its nearest edge.
+    """Return a place's distances outside zone z's outline and altitude band, m, and its nearest edge.
 
-    Negative inside.  NaN for a band given above ground if the ground there is not known.
+    A distance is negative inside, and NaN for a band above ground if the ground there is not known.
     """
     zone = records.zones[z]
-    away, edge = nearest_edge(records, z, east, north)
+    outline_distance, edge = nearest_edge(records, z, east, north)
     ground = 0.0
     if zone.floor_above_ground or zone.ceiling_above_ground:
         ground = ground_height(heights, to_pixel, east, north)
-    return away, outside_band(zone, up, ground), edge
+    return outline_distance, outside_band(zone, up, ground), edge
 
 
 @inlined
-def beyond_limit(exclusion: bool, away: float, off: float) -> float:
-    """Return how far beyond a zone's limit a place is, m.
+def beyond_limit(exclusion: bool, outline_distance: float, band_distance: float) -> float:
+    """Return the distance of a place beyond a zone's limit, m; negative if the place complies.
 
-    This is the shortest move, level or vertical, to comply again; negative for a place that complies, the
-    shortest move to the limit.  away, off: from `look_at_zone`.  NaN if the answer depends on ground that is not known.
+    This is the shortest level or vertical move to the limit, or NaN if it depends on ground that is not known.
+    outline_distance, band_distance: from `distances_outside_zone`.
     """
-    if off != off:
+    if band_distance != band_distance:
         # Outside the zone's shape the place is outside the zone whatever the ground.
-        if away <= 0.0:
+        if outline_distance <= 0.0:
             return math.nan
-        off = away
-    outside = max(away, off)
-    return -outside if exclusion else outside
+        band_distance = outline_distance
+    distance = max(outline_distance, band_distance)
+    return -distance if exclusion else distance
 
 
 @inlined
-def copy_part(source: Record, target: Record) -> None:
-    """Copy one part to another."""
+def copy_move_part(source: Record, target: Record) -> None:
+    """Copy one part of a move into another record."""
     target.first, target.last = source.first, source.last
     target.east, target.north, target.away, target.off = source.east, source.north, source.away, source.off
     target.to_east, target.to_north, target.to_away = source.to_east, source.to_north, source.to_away
@@ -84,56 +85,58 @@ def copy_part(source: Record, target: Record) -> None:
 
 
 @inlined
-def between_ends(exclusion: bool, part: Record, run: float, rise: float, farthest: float) -> tuple[float, float]:
-    """Return the minimum and maximum distance beyond a zone's limit between a part's ends, m.
+def depth_bounds(exclusion: bool, part: Record, run: float, rise: float, farthest: float) -> tuple[float, float]:
+    """Return lower and upper bounds of the distance beyond a zone's limit within a part, m.
 
-    run: length of the part, m.  rise: the largest change of its height in the band.  farthest: upper bound of its
+    run: length of the part, m.  rise: largest change of its height in the band, m.  farthest: upper bound of its
     distance beyond the zone's outline, m.
     """
     sign = -1.0 if exclusion else 1.0
-    level, upright = sign * (part.away + part.to_away), sign * (part.off + part.to_off)
-    level_low, level_high = 0.5 * (level - run), min(farthest, 0.5 * (level + run))
-    if upright != upright:
+    outline_sum, band_sum = sign * (part.away + part.to_away), sign * (part.off + part.to_off)
+    outline_min, outline_max = 0.5 * (outline_sum - run), min(farthest, 0.5 * (outline_sum + run))
+    if band_sum != band_sum:
         # Over unknown ground at one end only the outline can decide: it can show that the part is not inside an
         # exclusion.
-        return (-math.inf, level_high) if exclusion else (level_low, math.inf)
-    low, high = 0.5 * (upright - rise), 0.5 * (upright + rise)
+        return (-math.inf, outline_max) if exclusion else (outline_min, math.inf)
+    band_min, band_max = 0.5 * (band_sum - rise), 0.5 * (band_sum + rise)
     if exclusion:
-        return min(level_low, low), min(level_high, high)
-    return max(level_low, low), max(level_high, high)
+        return min(outline_min, band_min), min(outline_max, band_max)
+    return max(outline_min, band_min), max(outline_max, band_max)
 
 
 @inner
 def farthest_from_outline(records: ZoneRecords, z: int, move: Record, part: Record, run: float) -> float:
-    """Return an upper bound, m, of a part's distance beyond zone z's outline.
+    """Return an upper bound of a part's distance beyond zone z's outline, m.
 
-    It follows from the edges nearest to the part's ends.  The distance from one edge, or from a center, is greatest at
-    an end of a straight line.  An arc of less than a radian leaves its chord by no more than an eighth of its curvature
-    times its length squared.
+    The bound uses the edges nearest to the part's ends.  The distance from an edge, or from a center, is greatest at an
+    end of a straight line.  An arc of less than a radian leaves its chord by at most an eighth of its curvature times
+    its length squared.
     """
     zone = records.zones[z]
     bow: float = 0.125 * abs(move.curvature) * run * run
     if abs(move.curvature) * run > 1.0:
         return math.inf
     if not zone.round:
-        best = math.inf
-        for k in (part.edge, part.to_edge):
-            edge = records.edges[k]
-            here, there = (
+        min_distance = math.inf
+        for edge_index in (part.edge, part.to_edge):
+            edge = records.edges[edge_index]
+            start_distance, end_distance = (
                 distance_to_edge(edge, part.east, part.north),
                 distance_to_edge(edge, part.to_east, part.to_north),
             )
-            best = min(best, max(here, there))
-        return best + bow
+            min_distance = min(min_distance, max(start_distance, end_distance))
+        return min_distance + bow
     if not zone.exclusion:
         return float(max(part.away, part.to_away) + bow)
     step_e, step_n = part.to_east - part.east, part.to_north - part.north
-    off_e, off_n = zone.centre_east - part.east, zone.centre_north - part.north
-    long2 = step_e * step_e + step_n * step_n
-    share = min(1.0, max(0.0, (off_e * step_e + off_n * step_n) / long2)) if long2 > 0.0 else 0.0
-    off_e -= share * step_e
-    off_n -= share * step_n
-    return float(zone.radius - math.sqrt(off_e * off_e + off_n * off_n) + bow)
+    offset_e, offset_n = zone.centre_east - part.east, zone.centre_north - part.north
+    length_square = step_e * step_e + step_n * step_n
+    fraction = (
+        min(1.0, max(0.0, (offset_e * step_e + offset_n * step_n) / length_square)) if length_square > 0.0 else 0.0
+    )
+    offset_e -= fraction * step_e
+    offset_n -= fraction * step_n
+    return float(zone.radius - math.sqrt(offset_e * offset_e + offset_n * offset_n) + bow)
 
 
 # How a path meets one zone.  depth: greatest distance beyond the zone's limit, m, negative if the path complies.  It is
@@ -179,16 +182,16 @@ def path_zones(moves: Records, records: ZoneRecords, terrain: Terrain | None) ->
 
     moves: (m,) of `logs.verdict.measures.path_moves.MOVE`.  terrain: None if unknown.
     """
-    heights, to_pixel, pitch = read_only(np.full((2, 2), np.nan, dtype=np.float32)), np.zeros(1, POLYMAP)[0], 1.0
+    heights, to_pixel, spacing = read_only(np.full((2, 2), np.nan, dtype=np.float32)), np.zeros(1, POLYMAP)[0], 1.0
     if terrain is not None:
-        heights, to_pixel, pitch = terrain.heights, terrain.to_pixel.record, terrain.spacing
+        heights, to_pixel, spacing = terrain.heights, terrain.to_pixel.record, terrain.spacing
     # Arrays from compiled code have the fields, but not numpy's records with the fields as attributes.
-    return _path_zones(moves, records, heights, to_pixel, pitch).view(VISIT)
+    return _visit_zones(moves, records, heights, to_pixel, spacing).view(VISIT)
 
 
 @compiled
-def _path_zones(
-    moves: Records, records: ZoneRecords, heights: Heights, to_pixel: PolyMapRecord, pitch: float
+def _visit_zones(
+    moves: Records, records: ZoneRecords, heights: Heights, to_pixel: PolyMapRecord, spacing: float
 ) -> Records:
     count = records.zones.shape[0]
     visits = np.zeros(count, VISIT)
@@ -196,24 +199,26 @@ def _path_zones(
     for z in range(count):
         zone = records.zones[z]
         above_ground = above_ground or zone.floor_above_ground or zone.ceiling_above_ground
-    blocks = move_blocks(moves, heights, to_pixel, pitch, above_ground)
-    apart = np.zeros(count)
+    blocks = move_blocks(moves, heights, to_pixel, spacing, above_ground)
+    distances = np.zeros(count)
     for z in range(count):
         visits[z].depth = -math.inf
         if records.zones[z].exclusion:
-            apart[z] = math.inf
+            distances[z] = math.inf
             for b in range(blocks.shape[0]):
                 block = blocks[b]
-                apart[z] = min(apart[z], box_distance(records, z, block.west, block.east, block.south, block.north))
+                distances[z] = min(
+                    distances[z], box_distance(records, z, block.west, block.east, block.south, block.north)
+                )
     parts = np.zeros(_MAX_PARTS, PART)
-    known = -math.inf
+    known_depth = -math.inf
     # The nearest zone first: its depth is a bound that shows that the others are further away.
-    for z in np.argsort(apart, kind="mergesort"):
-        if -apart[z] < known:
-            visits[z].depth = -apart[z]
+    for z in np.argsort(distances, kind="mergesort"):
+        if -distances[z] < known_depth:
+            visits[z].depth = -distances[z]
             continue
-        _fill_visit(moves, blocks, records, z, heights, to_pixel, known, parts, visits[z])
-        known = max(known, min(0.0, visits[z].depth))
+        _fill_visit(moves, blocks, records, z, heights, to_pixel, known_depth, parts, visits[z])
+        known_depth = max(known_depth, min(0.0, visits[z].depth))
     return visits
 
 
@@ -225,55 +230,70 @@ def _fill_visit(
     z: int,
     heights: Heights,
     to_pixel: PolyMapRecord,
-    known: float,
+    known_depth: float,
     parts: Records,
     visit: Record,
 ) -> None:
     """Fill `visit` with the visit of a path to zone z.
 
-    known: depth below which the result need not be exact, m.
+    known_depth: depth below which the result need not be exact, m.
 
-    Work in three rounds: check the moves' ends alone; find the deepest place, which is near the deepest end; and, if
-    the zone is violated, find the times.
+    Work in three rounds: check only the moves' ends; find the deepest place, which is near the deepest end; and, if the
+    zone is violated, find the times.
     """
     zone = records.zones[z]
     above_ground = zone.floor_above_ground or zone.ceiling_above_ground
-    for turn in range(3):
+    for round_number in range(3):
         for b in range(blocks.shape[0]):
             block = blocks[b]
             steepest = block.steepest if above_ground else 0.0
-            across, along = 0.5 * (block.east - block.west), 0.5 * (block.north - block.south)
-            reach, lift = math.sqrt(across * across + along * along), 0.5 * (block.high - block.low)
-            away, off, _ = look_at_zone(
-                records, z, heights, to_pixel, block.west + across, block.south + along, block.low + lift
+            half_width, half_length = 0.5 * (block.east - block.west), 0.5 * (block.north - block.south)
+            half_diagonal, half_height = (
+                math.sqrt(half_width * half_width + half_length * half_length),
+                0.5 * (block.high - block.low),
             )
-            highest = beyond_limit(zone.exclusion, away, off) + max(reach, lift + steepest * reach)
+            outline_distance, band_distance, _ = distances_outside_zone(
+                records,
+                z,
+                heights,
+                to_pixel,
+                block.west + half_width,
+                block.south + half_length,
+                block.low + half_height,
+            )
+            max_depth = beyond_limit(zone.exclusion, outline_distance, band_distance) + max(
+                half_diagonal, half_height + steepest * half_diagonal
+            )
             # The ground may be unknown near a center point whose ground is known: look for it.
-            if highest <= (0.0 if turn == 2 else max(known, visit.depth)) and not (above_ground and away < reach):
+            if max_depth <= (0.0 if round_number == 2 else max(known_depth, visit.depth)) and not (
+                above_ground and outline_distance < half_diagonal
+            ):
                 continue
             first, last = b * BLOCK_MOVES, min(moves.shape[0], (b + 1) * BLOCK_MOVES)
-            _add_block(moves[first:last], turn, records, z, heights, to_pixel, steepest, known, parts, visit)
-        if turn == 1 and not visit.depth > 0.0:
+            _add_block(
+                moves[first:last], round_number, records, z, heights, to_pixel, steepest, known_depth, parts, visit
+            )
+        if round_number == 1 and not visit.depth > 0.0:
             break
 
 
 @inner
 def _add_block(
     moves: Records,
-    turn: int,
+    round_number: int,
     records: ZoneRecords,
     z: int,
     heights: Heights,
     to_pixel: PolyMapRecord,
     steepest: float,
-    known: float,
+    known_depth: float,
     parts: Records,
     visit: Record,
 ) -> None:
-    """Add consecutive moves to a visit; turn: the round, numbered as in `_fill_visit`."""
+    """Add consecutive moves to a visit.  round_number: round of `_fill_visit`, 0 to 2."""
     part = parts[0]
     part.to_east, part.to_north, up = move_point(moves[0], 0.0)
-    part.to_away, part.to_off, part.to_edge = look_at_zone(
+    part.to_away, part.to_off, part.to_edge = distances_outside_zone(
         records, z, heights, to_pixel, part.to_east, part.to_north, up
     )
     for k in range(moves.shape[0]):
@@ -281,13 +301,15 @@ def _add_block(
         part.east, part.north, part.away = part.to_east, part.to_north, part.to_away
         part.off, part.edge = part.to_off, part.to_edge
         part.to_east, part.to_north, up = move_point(moves[k], 1.0)
-        part.to_away, part.to_off, part.to_edge = look_at_zone(
+        part.to_away, part.to_off, part.to_edge = distances_outside_zone(
             records, z, heights, to_pixel, part.to_east, part.to_north, up
         )
-        if turn == 0:
+        if round_number == 0:
             _update_depth(moves[k], part, records.zones[z].exclusion, visit)
         else:
-            _bisect_move(moves[k], turn == 2, records, z, heights, to_pixel, steepest, known, parts, visit)
+            _bisect_move(
+                moves[k], round_number == 2, records, z, heights, to_pixel, steepest, known_depth, parts, visit
+            )
 
 
 @inner
@@ -299,98 +321,104 @@ def _bisect_move(
     heights: Heights,
     to_pixel: PolyMapRecord,
     steepest: float,
-    known: float,
+    known_depth: float,
     parts: Records,
     visit: Record,
 ) -> None:
     """Bisect a move, the first of the parts, until each part is certain, and add the parts to a visit.
 
-    ordered: bisect until each part is known to be on one side of the limit, and add the parts in order of time;
-    otherwise until none can be deeper than the known depth.  The first part's end is left unchanged: the next move
-    begins there.
+    ordered: if True, bisect until each part is on one side of the limit, and add the parts in order of time; otherwise
+    bisect until no part can be deeper than the known depth.  The first part's end is left unchanged, because the next
+    move begins there.
     """
     exclusion = records.zones[z].exclusion
     # The largest change of the height in a band over the whole move.
     climb = max(abs(move.climb), abs(move.climb + 2.0 * move.bend)) + steepest * move.length
-    copy_part(parts[0], parts[1])
-    left = 1
-    while left > 0:
-        part = parts[left]
-        share = part.last - part.first
-        run, rise = share * move.length, share * climb
-        enough = 0.0 if ordered else max(visit.depth, known) + DEPTH_PRECISION
-        lowest, highest = between_ends(exclusion, part, run, rise, math.inf)
-        done = highest <= enough or (ordered and lowest > 0.0) or max(run, rise) <= EDGE_PRECISION
-        done = done or _is_unknown(exclusion, part)
-        if not done:
+    copy_move_part(parts[0], parts[1])
+    top = 1
+    while top > 0:
+        part = parts[top]
+        fraction = part.last - part.first
+        run, rise = fraction * move.length, fraction * climb
+        sufficient_depth = 0.0 if ordered else max(visit.depth, known_depth) + DEPTH_PRECISION
+        min_depth, max_depth = depth_bounds(exclusion, part, run, rise, math.inf)
+        is_certain = max_depth <= sufficient_depth or (ordered and min_depth > 0.0) or max(run, rise) <= EDGE_PRECISION
+        is_certain = is_certain or _is_unknown(exclusion, part)
+        if not is_certain:
             # Bound again with the nearest edges, which takes longer.
             farthest = farthest_from_outline(records, z, move, part, run)
-            lowest, highest = between_ends(exclusion, part, run, rise, farthest)
-            done = highest <= enough
-        if done:
+            min_depth, max_depth = depth_bounds(exclusion, part, run, rise, farthest)
+            is_certain = max_depth <= sufficient_depth
+        if is_certain:
             if ordered:
                 _add_part(move, part, exclusion, visit)
             else:
                 _update_depth(move, part, exclusion, visit)
-            left -= 1
+            top -= 1
             continue
-        earlier = parts[left + 1]
-        copy_part(part, earlier)
+        earlier = parts[top + 1]
+        copy_move_part(part, earlier)
         middle = 0.5 * (part.first + part.last)
         earlier.last = part.first = middle
         east, north, up = move_point(move, middle)
-        away, off, edge = look_at_zone(records, z, heights, to_pixel, east, north, up)
-        part.east, part.north, part.away, part.off, part.edge = east, north, away, off, edge
-        earlier.to_east, earlier.to_north, earlier.to_away = east, north, away
-        earlier.to_off, earlier.to_edge = off, edge
+        outline_distance, band_distance, edge = distances_outside_zone(records, z, heights, to_pixel, east, north, up)
+        part.east, part.north, part.away, part.off, part.edge = east, north, outline_distance, band_distance, edge
+        earlier.to_east, earlier.to_north, earlier.to_away = east, north, outline_distance
+        earlier.to_off, earlier.to_edge = band_distance, edge
         if not ordered and beyond_limit(exclusion, part.to_away, part.to_off) > beyond_limit(
             exclusion, earlier.away, earlier.off
         ):
             # Put the half that may be deeper on top: its result may make the other half unnecessary.
-            copy_part(part, parts[_MAX_PARTS - 1])
-            copy_part(earlier, part)
-            copy_part(parts[_MAX_PARTS - 1], earlier)
-        left += 1
+            copy_move_part(part, parts[_MAX_PARTS - 1])
+            copy_move_part(earlier, part)
+            copy_move_part(parts[_MAX_PARTS - 1], earlier)
+        top += 1
 
 
 @inner
 def _is_unknown(exclusion: bool, part: Record) -> bool:
     """Return True if both ends depend on unknown ground: the whole part between them is then unknown."""
-    before, after = beyond_limit(exclusion, part.away, part.off), beyond_limit(exclusion, part.to_away, part.to_off)
-    return before != before and after != after
+    start_depth, end_depth = (
+        beyond_limit(exclusion, part.away, part.off),
+        beyond_limit(exclusion, part.to_away, part.to_off),
+    )
+    return start_depth != start_depth and end_depth != end_depth
 
 
 @inner
 def _update_depth(move: Record, part: Record, exclusion: bool, visit: Record) -> None:
     """Update the deepest place of a visit with a part's ends, and note unknown ground."""
-    for at_end in range(2):
+    for end in range(2):
         depth = beyond_limit(exclusion, part.away, part.off)
-        if at_end:
+        if end:
             depth = beyond_limit(exclusion, part.to_away, part.to_off)
         if depth > visit.depth:
-            share = part.last if at_end else part.first
-            visit.depth, visit.at_time, visit.at_leg = depth, move.time + share * move.lasts, move.leg
-            visit.at_east, visit.at_north, visit.at_up = move_point(move, share)
+            fraction = part.last if end else part.first
+            visit.depth, visit.at_time, visit.at_leg = depth, move.time + fraction * move.lasts, move.leg
+            visit.at_east, visit.at_north, visit.at_up = move_point(move, fraction)
         visit.unknown = visit.unknown or depth != depth
 
 
 @inner
 def _add_part(move: Record, part: Record, exclusion: bool, visit: Record) -> None:
     """Add a part of a move that violates, complies, or crosses the limit once, to a visit."""
-    before, after = beyond_limit(exclusion, part.away, part.off), beyond_limit(exclusion, part.to_away, part.to_off)
-    if not (before > 0.0 or after > 0.0):
+    start_depth, end_depth = (
+        beyond_limit(exclusion, part.away, part.off),
+        beyond_limit(exclusion, part.to_away, part.to_off),
+    )
+    if not (start_depth > 0.0 or end_depth > 0.0):
         return
-    enter, leave = part.first, part.last
-    if before <= 0.0:
-        enter += (leave - enter) * before / (before - after)
-    elif after <= 0.0:
-        leave = enter + (leave - enter) * before / (before - after)
-    begins, ends = move.time + enter * move.lasts, move.time + leave * move.lasts
-    visit.beyond += ends - begins
-    if visit.entries == 0 or begins > visit.exit_time + _MERGE_TIME_S:
+    entry_fraction, exit_fraction = part.first, part.last
+    if start_depth <= 0.0:
+        entry_fraction += (exit_fraction - entry_fraction) * start_depth / (start_depth - end_depth)
+    elif end_depth <= 0.0:
+        exit_fraction = entry_fraction + (exit_fraction - entry_fraction) * start_depth / (start_depth - end_depth)
+    entry_time, exit_time = move.time + entry_fraction * move.lasts, move.time + exit_fraction * move.lasts
+    visit.beyond += exit_time - entry_time
+    if visit.entries == 0 or entry_time > visit.exit_time + _MERGE_TIME_S:
         visit.entries += 1
         if visit.entries == 1:
-            visit.entry_time, visit.entry_leg = begins, move.leg
-            visit.entry_east, visit.entry_north, visit.entry_up = move_point(move, enter)
-    visit.exit_time, visit.exit_leg = ends, move.leg
-    visit.exit_east, visit.exit_north, visit.exit_up = move_point(move, leave)
+            visit.entry_time, visit.entry_leg = entry_time, move.leg
+            visit.entry_east, visit.entry_north, visit.entry_up = move_point(move, entry_fraction)
+    visit.exit_time, visit.exit_leg = exit_time, move.leg
+    visit.exit_east, visit.exit_north, visit.exit_up = move_point(move, exit_fraction)

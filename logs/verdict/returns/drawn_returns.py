@@ -42,7 +42,7 @@ _HALVINGS = 3
 class WorstReturn:
     """Return that is drawn, the worst of its time range.
 
-    found: the range.  way: (t, 3) positions a second apart, m.  at: (3,) where it goes wrong, or is lowest.
+    found: the time range.  way: (t, 3) positions a second apart, m.  at: (3,) place where it fails, or is lowest, m.
     """
 
     found: ReturnRange
@@ -50,7 +50,7 @@ class WorstReturn:
     at: Floats
 
     @property
-    def one(self) -> ReturnFlown:
+    def flown(self) -> ReturnFlown:
         """The return itself."""
         return self.found.worst
 
@@ -85,27 +85,27 @@ class DrawnReturns:
     @property
     def by_kind(self) -> list[tuple[Kind, list[ReturnFlown]]]:
         """Segments of the path by the outcome of their returns; of two return paths the worse one applies."""
-        by_time = sorted(self.returns.each, key=lambda one: one.time)
-        worst = [min(ones, key=badness) for _, ones in groupby(by_time, lambda one: one.time)]
-        return stretches(worst, lambda one: one.kind)
+        by_time = sorted(self.returns.each, key=lambda ret: ret.time)
+        worst = [min(group, key=badness) for _, group in groupby(by_time, lambda ret: ret.time)]
+        return stretches(worst, lambda ret: ret.kind)
 
     @property
     def by_reach(self) -> list[tuple[Reach, list[Glide]]]:
         """Segments of the track with the same best glide destination."""
-        return stretches(self.glides.each, lambda one: one.reach)
+        return stretches(self.glides.each, lambda glide: glide.reach)
 
 
 One = TypeVar("One")
 Key = TypeVar("Key")
 
 
-def stretches(ones: Sequence[One], key: Callable[[One], Key]) -> list[tuple[Key, list[One]]]:
-    """Group consecutive items by their key; each group but the last includes the first item of the next.
+def stretches(elements: Sequence[One], key: Callable[[One], Key]) -> list[tuple[Key, list[One]]]:
+    """Group consecutive elements by their key; each group but the last includes the first element of the next.
 
     >>> stretches([1, 3, 2, 5], lambda one: one % 2)
     [(1, [1, 3, 2]), (0, [2, 5]), (1, [5])]
     """
-    groups = [(key, list(group)) for key, group in groupby(ones, key)]
+    groups = [(key, list(group)) for key, group in groupby(elements, key)]
     for (_, group), (_, after) in pairwise(groups):
         group.append(after[0])
     return groups
@@ -118,45 +118,47 @@ def drawn_returns(
 
     starts: the places from which they were judged.
     """
-    least = least_heights(world, starts if returns.each else starts.at(np.zeros(0, dtype=np.intp)))
-    return DrawnReturns(returns, worst_returns(world, starts, returns), least, glides)
+    least_altitudes = least_heights(world, starts if returns.each else starts.at(np.zeros(0, dtype=np.intp)))
+    return DrawnReturns(returns, worst_returns(world, starts, returns), least_altitudes, glides)
 
 
 def draw_returns_without_glides(world: ReturnWorld, starts: ReturnStarts, returns: Returns) -> DrawnReturns:
-    """Add data for drawing to judged returns, without glides and minimum altitudes, which take longest to compute."""
+    """Add the data for drawing to judged returns, except glides and minimum altitudes, which take longest."""
     return DrawnReturns(returns, worst_returns(world, starts, returns), LeastHeights(np.zeros(0), np.zeros(0)))
 
 
 def worst_returns(world: ReturnWorld, starts: ReturnStarts, returns: Returns) -> tuple[WorstReturn, ...]:
-    """Return the worst return of each kind of failure, then the next worst; the lowest return if all are safe."""
-    unsafe = [one for one in returns.ranges if not one.worst.safe]
-    firsts = {one.worst.kind: one for one in reversed(unsafe)}
-    order = [one for one in unsafe if firsts[one.worst.kind] is one]
-    order += [one for one in unsafe if firsts[one.worst.kind] is not one]
-    chosen = order[:MAX_WAYS] or list(returns.ranges[:1])
-    rows = np.array([int(np.argmin(np.abs(starts.time - one.worst.time))) for one in chosen], dtype=np.intp)
-    if not chosen:
+    """Return the worst return of each kind of failure, then the next worst, or the lowest return if all are safe."""
+    unsafe = [return_range for return_range in returns.ranges if not return_range.worst.safe]
+    worst_of_kind = {return_range.worst.kind: return_range for return_range in reversed(unsafe)}
+    order = [return_range for return_range in unsafe if worst_of_kind[return_range.worst.kind] is return_range]
+    order += [return_range for return_range in unsafe if worst_of_kind[return_range.worst.kind] is not return_range]
+    drawn = order[:MAX_WAYS] or list(returns.ranges[:1])
+    rows = np.array(
+        [int(np.argmin(np.abs(starts.time - return_range.worst.time))) for return_range in drawn], dtype=np.intp
+    )
+    if not drawn:
         return ()
-    targets = [one.worst.target for one in chosen]
-    _, ways = fly_home(world, starts.at(rows), targets, keep=True)
+    targets = [return_range.worst.target for return_range in drawn]
+    _, paths = fly_home(world, starts.at(rows), targets, keep_paths=True)
     return tuple(
-        WorstReturn(found, way, _failure_place(world, found.worst, way))
-        for found, way in zip(chosen, ways, strict=True)
+        WorstReturn(drawn_range, path, _failure_place(world, drawn_range.worst, path))
+        for drawn_range, path in zip(drawn, paths, strict=True)
     )
 
 
-def _failure_place(world: ReturnWorld, one: ReturnFlown, way: Floats) -> Floats:
+def _failure_place(world: ReturnWorld, ret: ReturnFlown, path: Floats) -> Floats:
     """Return the place where a return fails, or where it is lowest, m, (3,)."""
-    if one.kind == "threat":
-        away = np.linalg.norm(way - world.around.spheres[one.threat], axis=1)
-        return np.asarray(way[int(np.argmin(away))])
-    if one.kind in ("ground", "low", "safe", "unsure") and not math.isnan(one.clearance_at[0]):
-        return np.array(one.clearance_at)
-    return np.asarray(way[-1])
+    if ret.kind == "threat":
+        distances = np.linalg.norm(path - world.around.spheres[ret.threat], axis=1)
+        return np.asarray(path[int(np.argmin(distances))])
+    if ret.kind in ("ground", "low", "safe", "unsure") and not math.isnan(ret.clearance_at[0]):
+        return np.array(ret.clearance_at)
+    return np.asarray(path[-1])
 
 
 # ----------------------------------------------------------------------
-# The least altitude from which the aircraft could be called home.
+# The minimum altitude from which a return to launch is safe.
 
 
 def least_heights(world: ReturnWorld, starts: ReturnStarts) -> LeastHeights:
@@ -165,31 +167,37 @@ def least_heights(world: ReturnWorld, starts: ReturnStarts) -> LeastHeights:
         return LeastHeights(np.zeros(0), np.zeros(0))
     rows = np.unique(np.linspace(0, len(starts) - 1, _MAX_PLACES).round().astype(np.intp))
     chosen = starts.at(rows)
-    begins = heights_above_ground(world, chosen)
-    lowest = np.where(np.isfinite(begins), np.minimum(0.0, world.limit - begins), math.nan)
-    safe = meets_return_limits(world, chosen)
+    start_heights = heights_above_ground(world, chosen)
+    lowest = np.where(np.isfinite(start_heights), np.minimum(0.0, world.limit - start_heights), math.nan)
+    is_safe = meets_return_limits(world, chosen)
     # Altitudes relative to the flight, m: the last one that was safe, and the last one that was not.
-    good, bad = np.where(safe, 0.0, math.nan), np.where(safe, math.nan, 0.0)
-    direction = np.where(safe, -1.0, 1.0)
-    going = np.isfinite(lowest)
+    last_safe, last_unsafe = np.where(is_safe, 0.0, math.nan), np.where(is_safe, math.nan, 0.0)
+    direction = np.where(is_safe, -1.0, 1.0)
+    is_searching = np.isfinite(lowest)
     for step in range(1, _STEPS + 1):
-        tried = np.maximum(direction * step * _STEP_M, lowest)
-        ok = _safe_at_offset(world, chosen, tried, going)
-        good, bad = np.where(going & ok, tried, good), np.where(going & ~ok, tried, bad)
-        going &= (ok == safe) & (tried > lowest)
+        offsets = np.maximum(direction * step * _STEP_M, lowest)
+        is_offset_safe = _safe_at_offset(world, chosen, offsets, is_searching)
+        last_safe, last_unsafe = (
+            np.where(is_searching & is_offset_safe, offsets, last_safe),
+            np.where(is_searching & ~is_offset_safe, offsets, last_unsafe),
+        )
+        is_searching &= (is_offset_safe == is_safe) & (offsets > lowest)
     for _ in range(_HALVINGS):
-        both = np.isfinite(good) & np.isfinite(bad)
-        middle = np.where(both, 0.5 * (good + bad), 0.0)
-        ok = _safe_at_offset(world, chosen, middle, both)
-        good, bad = np.where(both & ok, middle, good), np.where(both & ~ok, middle, bad)
-    return LeastHeights(chosen.time, np.where(np.isfinite(lowest), chosen.rows["up"] + good, math.nan))
+        is_bracketed = np.isfinite(last_safe) & np.isfinite(last_unsafe)
+        midpoints = np.where(is_bracketed, 0.5 * (last_safe + last_unsafe), 0.0)
+        is_offset_safe = _safe_at_offset(world, chosen, midpoints, is_bracketed)
+        last_safe, last_unsafe = (
+            np.where(is_bracketed & is_offset_safe, midpoints, last_safe),
+            np.where(is_bracketed & ~is_offset_safe, midpoints, last_unsafe),
+        )
+    return LeastHeights(chosen.time, np.where(np.isfinite(lowest), chosen.rows["up"] + last_safe, math.nan))
 
 
-def _safe_at_offset(world: ReturnWorld, starts: ReturnStarts, above: Floats, asked: Flags) -> Flags:
-    """Flag each return that is safe from a start ``above`` m higher, (n,); fly only those flagged in ``asked``."""
-    found = np.zeros(len(starts), dtype=np.bool_)
-    if asked.any():
-        rows = starts.rows[asked].copy()
-        rows["up"] += above[asked]
-        found[asked] = meets_return_limits(world, replace(starts.at(np.flatnonzero(asked)), rows=rows))
-    return found
+def _safe_at_offset(world: ReturnWorld, starts: ReturnStarts, offsets: Floats, is_flown: Flags) -> Flags:
+    """Flag each return that is safe from a start ``offsets`` m higher, (n,); fly only those flagged in ``is_flown``."""
+    is_safe = np.zeros(len(starts), dtype=np.bool_)
+    if is_flown.any():
+        rows = starts.rows[is_flown].copy()
+        rows["up"] += offsets[is_flown]
+        is_safe[is_flown] = meets_return_limits(world, replace(starts.at(np.flatnonzero(is_flown)), rows=rows))
+    return is_safe

@@ -23,7 +23,7 @@ BANDS = (150.0, 300.0, 600.0)
 # Drawing role of each band, by its upper limit.
 BAND_ROLES = dict(zip(BANDS, ("glide-near", "glide-middle", "glide-far"), strict=True))
 _ALL = (-math.inf, math.inf)
-# Largest number of cells along the longer side of the shown map; a larger cell is as bad as the worst cell in it.
+# Largest number of blocks along the longer side of the shown map; a block is as bad as the worst cell in it.
 _MAX_CELLS = 200
 
 
@@ -49,28 +49,28 @@ class GlideFootprint:
     flat: Flags
 
     def bands(self, east: tuple[float, float] = _ALL, north: tuple[float, float] = _ALL) -> tuple[Band, ...]:
-        """Return the bands of needed height above ground, lowest first, for the map within these ranges, m."""
-        made = self.made
-        above = np.where(np.isfinite(made.ground), self.chosen - made.ground, math.inf)
-        cells = _Cells.within(made, east, north)
-        worst = cells.merged(above)
+        """Return the bands of needed height above ground, lowest first, within ranges of the map, m."""
+        grid = self.made
+        needed_heights = np.where(np.isfinite(grid.ground), self.chosen - grid.ground, math.inf)
+        cells = _Cells.within(grid, east, north)
+        block_heights = cells.merged(needed_heights)
         edges = (-math.inf, *BANDS)
-        found = (
-            Band(max(0.0, low), high, cells.parts((worst > low) & (worst <= high)))
-            for low, high in zip(edges, BANDS, strict=False)
+        bands = (
+            Band(max(0.0, lower), upper, cells.parts((block_heights > lower) & (block_heights <= upper)))
+            for lower, upper in zip(edges, BANDS, strict=False)
         )
-        return tuple(band for band in found if band.parts)
+        return tuple(band for band in bands if band.parts)
 
     def landings(self, east: tuple[float, float] = _ALL, north: tuple[float, float] = _ALL) -> tuple[Part, ...]:
-        """Return ground that is flat by the elevation file, for the map within these ranges, m."""
-        cells = _Cells.within(self.made, east, north)
-        return cells.parts(cells.merged(self.flat.astype(np.float64)) > 0.0)
+        """Return the outlines of ground that is flat by the elevation file, within ranges of the map, m."""
+        blocks = _Cells.within(self.made, east, north)
+        return blocks.parts(blocks.merged(self.flat.astype(np.float64)) > 0.0)
 
 
 class _Cells(NamedTuple):
     """Square blocks of map cells, in rows to the north.
 
-    west, south: m, of the first block's corner.  side: of a block, m.  block: number of cells along it.
+    west, south: corner of the first block, m.  side: side of a block, m.  block: number of cells along a side.
     first: row and column of the first cell.  shape: rows and columns of blocks.
     """
 
@@ -82,35 +82,38 @@ class _Cells(NamedTuple):
     shape: tuple[int, int]
 
     @classmethod
-    def within(cls, made: GlideMap, east: tuple[float, float], north: tuple[float, float]) -> "_Cells":
+    def within(cls, grid: GlideMap, east: tuple[float, float], north: tuple[float, float]) -> "_Cells":
         """Return the blocks of a map that lie within ranges, m."""
-        rows, columns = made.floor.shape
-        sides = ((north, made.south, rows), (east, made.west, columns))
-        low = [math.floor(max(0.0, (edge[0] - origin) / made.cell)) for edge, origin, _ in sides]
-        high = [math.ceil(min(count - 1.0, (edge[1] - origin) / made.cell)) + 1 for edge, origin, count in sides]
-        spans = [max(0, end - begin) for begin, end in zip(low, high, strict=True)]
-        block = max(1, math.ceil(max(spans) / _MAX_CELLS))
-        west, south = made.west + (low[1] - 0.5) * made.cell, made.south + (low[0] - 0.5) * made.cell
-        return cls(west, south, block * made.cell, block, (low[0], low[1]), (spans[0] // block, spans[1] // block))
+        rows, columns = grid.floor.shape
+        sides = ((north, grid.south, rows), (east, grid.west, columns))
+        first = [math.floor(max(0.0, (edge[0] - origin) / grid.cell)) for edge, origin, _ in sides]
+        end = [math.ceil(min(count - 1.0, (edge[1] - origin) / grid.cell)) + 1 for edge, origin, count in sides]
+        counts = [max(0, end - begin) for begin, end in zip(first, end, strict=True)]
+        block = max(1, math.ceil(max(counts) / _MAX_CELLS))
+        west, south = grid.west + (first[1] - 0.5) * grid.cell, grid.south + (first[0] - 0.5) * grid.cell
+        return cls(
+            west, south, block * grid.cell, block, (first[0], first[1]), (counts[0] // block, counts[1] // block)
+        )
 
     def merged(self, values: Floats) -> Floats:
         """Return the greatest value in each block."""
         (row, column), (rows, columns) = self.first, self.shape
-        cut = values[row : row + rows * self.block, column : column + columns * self.block]
-        blocks = cut.reshape(rows, self.block, columns, self.block)
+        values_within = values[row : row + rows * self.block, column : column + columns * self.block]
+        blocks = values_within.reshape(rows, self.block, columns, self.block)
         return np.asarray(blocks.max(axis=(1, 3)))
 
-    def parts(self, chosen: Flags) -> tuple[Part, ...]:
+    def parts(self, is_chosen: Flags) -> tuple[Part, ...]:
         """Return the outlines of chosen blocks, with their holes."""
-        if not chosen.any():
+        if not is_chosen.any():
             return ()
-        edges = np.diff(np.pad(chosen.astype(np.int8), ((0, 0), (1, 1))), axis=1)
+        edges = np.diff(np.pad(is_chosen.astype(np.int8), ((0, 0), (1, 1))), axis=1)
         rows, starts = np.nonzero(edges == 1)
         _, ends = np.nonzero(edges == -1)
         south = self.south + rows * self.side
         boxes = shapely.box(self.west + starts * self.side, south, self.west + ends * self.side, south + self.side)
-        whole = shapely.get_parts(shapely.union_all(boxes).simplify(0.0))
-        polygons = [orient(one) for one in whole if not one.is_empty]
+        areas = shapely.get_parts(shapely.union_all(boxes).simplify(0.0))
+        polygons = [orient(polygon) for polygon in areas if not polygon.is_empty]
         return tuple(
-            tuple(shapely.get_coordinates(ring) for ring in (one.exterior, *one.interiors)) for one in polygons
+            tuple(shapely.get_coordinates(ring) for ring in (polygon.exterior, *polygon.interiors))
+            for polygon in polygons
         )

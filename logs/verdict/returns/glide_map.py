@@ -77,11 +77,13 @@ class GlideMap:
 
 
 def glide_map(
-    terrain: Terrain, places: Floats, margin: float, spheres: Floats, radii: Floats, around: float = AROUND
+    terrain: Terrain, places: Floats, margin: float, spheres: Floats, radii: Floats, map_margin: float = AROUND
 ) -> GlideMap | None:
     """Return the map around places (p, 2), m, or None if its cells would be too coarse for its extent.
 
-    margin: height above ground that a glide keeps, m.  spheres, radii: (m, 3) and (m,) of kill spheres, m.
+    margin: height above ground that a glide keeps, m.
+    spheres, radii: centers (m, 3) and radii (m,) of kill spheres, m.
+    map_margin: margin of the map around the places, m.
 
     >>> from world.terrain import flat_terrain
     >>> ground = flat_terrain(np.array([[-5000.0, 5000.0], [-5000.0, 5000.0]]), 100.0, 0.0)
@@ -90,42 +92,42 @@ def glide_map(
     >>> float(made.floor[row, column]), bool(made.high[row, column] > 590.0), made.cell
     (130.0, True, 100.0)
     """
-    (west, south), (east, north) = places.min(axis=0) - around, places.max(axis=0) + around
+    (west, south), (east, north) = places.min(axis=0) - map_margin, places.max(axis=0) + map_margin
     spacing = max(1.0, terrain.spacing)
     cell = max(_MIN_CELL_M, min(0.5 * spacing, 100.0), math.sqrt((east - west) * (north - south) / MAX_CELLS))
     if cell > max(_MAX_CELL_M, _MAX_CELL_PIXELS * spacing):
         return None
     columns, rows = math.ceil((east - west) / cell) + 1, math.ceil((north - south) / cell) + 1
     highest = highest_in_cells(terrain, west - 0.5 * cell, south - 0.5 * cell, cell, rows, columns)
-    middles = terrain.height(west + cell * np.arange(columns)[None, :], south + cell * np.arange(rows)[:, None])
-    low, high = np.full(highest.shape, math.inf), np.full(highest.shape, -math.inf)
-    made = GlideMap(west, south, cell, middles, highest + margin, low, high)
-    for centre, radius in zip(spheres, radii, strict=True):
+    center_heights = terrain.height(west + cell * np.arange(columns)[None, :], south + cell * np.arange(rows)[:, None])
+    sphere_bottoms, sphere_tops = np.full(highest.shape, math.inf), np.full(highest.shape, -math.inf)
+    result = GlideMap(west, south, cell, center_heights, highest + margin, sphere_bottoms, sphere_tops)
+    for center, radius in zip(spheres, radii, strict=True):
         if radius > 0.0:
-            _add_sphere(made, centre, float(radius))
-    return made
+            _add_sphere(result, center, float(radius))
+    return result
 
 
-def _add_sphere(made: GlideMap, centre: Floats, radius: float) -> None:
-    """Widen the altitude ranges in which the cells of `made` lie in a kill sphere.
+def _add_sphere(grid: GlideMap, center: Floats, radius: float) -> None:
+    """Widen the altitude ranges in which the cells of ``grid`` lie in a kill sphere.
 
     Each cell is checked at its point nearest to the sphere's center.
     """
-    row, column = made.cell_of(float(centre[0]), float(centre[1]))
-    steps = math.ceil(radius / made.cell) + 1
+    row, column = grid.cell_of(float(center[0]), float(center[1]))
+    steps = math.ceil(radius / grid.cell) + 1
     rows = slice(max(0, row - steps), max(0, row + steps + 1))
     columns = slice(max(0, column - steps), max(0, column + steps + 1))
-    shape = made.floor[rows, columns].shape
-    norths = made.south + made.cell * (rows.start + np.arange(shape[0]))
-    easts = made.west + made.cell * (columns.start + np.arange(shape[1]))
-    across = np.maximum(0.0, np.abs(easts[None, :] - centre[0]) - 0.5 * made.cell)
-    along = np.maximum(0.0, np.abs(norths[:, None] - centre[1]) - 0.5 * made.cell)
-    away = np.hypot(across, along)
-    half = np.sqrt(np.maximum(0.0, radius * radius - away**2))
-    inside = away < radius
-    low, high = made.low[rows, columns], made.high[rows, columns]
-    low[inside] = np.minimum(low, centre[2] - half)[inside]
-    high[inside] = np.maximum(high, centre[2] + half)[inside]
+    shape = grid.floor[rows, columns].shape
+    norths = grid.south + grid.cell * (rows.start + np.arange(shape[0]))
+    easts = grid.west + grid.cell * (columns.start + np.arange(shape[1]))
+    east_distance = np.maximum(0.0, np.abs(easts[None, :] - center[0]) - 0.5 * grid.cell)
+    north_distance = np.maximum(0.0, np.abs(norths[:, None] - center[1]) - 0.5 * grid.cell)
+    distances = np.hypot(east_distance, north_distance)
+    half_heights = np.sqrt(np.maximum(0.0, radius * radius - distances**2))
+    is_inside = distances < radius
+    bottoms, tops = grid.low[rows, columns], grid.high[rows, columns]
+    bottoms[is_inside] = np.minimum(bottoms, center[2] - half_heights)[is_inside]
+    tops[is_inside] = np.maximum(tops, center[2] + half_heights)[is_inside]
 
 
 # Side of the square that a landing place needs, m.
@@ -136,62 +138,64 @@ STEEPEST = 0.05
 ROUGHEST = 1.5
 
 
-def landable(made: GlideMap) -> Flags:
-    """Return cells (n, e) with flat ground around them by the elevation file, outside kill spheres.
+def landable(grid: GlideMap) -> Flags:
+    """Return a mask of the cells outside kill spheres with flat ground around them, (n, e).
 
-    The file has no trees, houses or water.
+    The ground comes from the elevation file, which has no trees, houses or water.
     """
-    half = max(1, math.ceil(0.5 * (PATCH / made.cell - 1.0) - 1e-9))
-    taps = np.arange(-half, half + 1)
-    count = taps.size**2
-    ground = made.ground
+    half_count = max(1, math.ceil(0.5 * (PATCH / grid.cell - 1.0) - 1e-9))
+    offsets = np.arange(-half_count, half_count + 1)
+    count = offsets.size**2
+    ground = grid.ground
     # Heights relative to a mean, so that their squares keep their digits.
     z = ground - (np.nanmean(ground) if np.isfinite(ground).any() else 0.0)
-    one = np.ones(taps.size)
-    total, squares = _patch_sums(z, one, one), _patch_sums(z * z, one, one)
-    away = np.asarray(taps * made.cell, dtype=np.float64)
-    across, up = _patch_sums(z, one, away), _patch_sums(z, away, one)
-    spread = taps.size * float((taps**2).sum()) * made.cell**2
-    left = squares - total**2 / count - (across**2 + up**2) / spread
-    flat = np.hypot(across, up) / spread <= STEEPEST
-    flat &= np.sqrt(np.maximum(0.0, left) / count) <= ROUGHEST
-    return np.asarray(flat & ~((made.low < made.floor) & (made.floor < made.high)))
+    ones = np.ones(offsets.size)
+    sums, squares = _patch_sums(z, ones, ones), _patch_sums(z * z, ones, ones)
+    distances = np.asarray(offsets * grid.cell, dtype=np.float64)
+    east_moments, north_moments = _patch_sums(z, ones, distances), _patch_sums(z, distances, ones)
+    spread = offsets.size * float((offsets**2).sum()) * grid.cell**2
+    residuals = squares - sums**2 / count - (east_moments**2 + north_moments**2) / spread
+    is_flat = np.hypot(east_moments, north_moments) / spread <= STEEPEST
+    is_flat &= np.sqrt(np.maximum(0.0, residuals) / count) <= ROUGHEST
+    return np.asarray(is_flat & ~((grid.low < grid.floor) & (grid.floor < grid.high)))
 
 
 def _patch_sums(values: Floats, by_row: Floats, by_column: Floats) -> Floats:
     """Return weighted sums (n, e) over the square around each cell; NaN if the square leaves the map."""
-    out = values
+    sums = values
     for axis, weights in ((0, by_row), (1, by_column)):
-        half = weights.size // 2
-        padded = np.pad(out, [(half, half) if k == axis else (0, 0) for k in range(2)], constant_values=math.nan)
+        half_count = weights.size // 2
+        padded = np.pad(
+            sums, [(half_count, half_count) if k == axis else (0, 0) for k in range(2)], constant_values=math.nan
+        )
         length = values.shape[axis]
         parts = [np.take(padded, range(k, k + length), axis=axis) for k in range(weights.size)]
-        out = np.sum([weight * part for weight, part in zip(weights, parts, strict=True)], axis=0)
-    return np.asarray(out)
+        sums = np.sum([weight * part for weight, part in zip(weights, parts, strict=True)], axis=0)
+    return np.asarray(sums)
 
 
-def bar_zones(made: GlideMap, flat: Flags, zones: ZoneRecords, above: float) -> None:
-    """Clear cells (n, e) in exclusion zones that reach down to a height above ground, m."""
+def bar_zones(grid: GlideMap, is_flat: Flags, zones: ZoneRecords, height: float) -> None:
+    """Clear the mask ``is_flat``, (n, e), in exclusion zones that reach down to a height above ground, m."""
     for z in np.flatnonzero(zones.zones["exclusion"]):
-        _bar_zone(flat, made.ground, zones, int(z), made.west, made.south, made.cell, above)
+        _bar_zone(is_flat, grid.ground, zones, int(z), grid.west, grid.south, grid.cell, height)
 
 
 @compiled
 def _bar_zone(
-    flat: Flags, ground: Floats, zones: ZoneRecords, z: int, west: float, south: float, cell: float, above: float
+    is_flat: Flags, ground: Floats, zones: ZoneRecords, z: int, west: float, south: float, cell: float, height: float
 ) -> None:
     zone = zones.zones[z]
-    rows, columns = flat.shape
+    rows, columns = is_flat.shape
     for i in range(
         max(0, math.ceil((zone.south - south) / cell)), min(rows, math.floor((zone.north - south) / cell) + 1)
     ):
         for j in range(
             max(0, math.ceil((zone.west - west) / cell)), min(columns, math.floor((zone.east - west) / cell) + 1)
         ):
-            if flat[i, j]:
+            if is_flat[i, j]:
                 floor = zone.floor + (ground[i, j] if zone.floor_above_ground else 0.0)
-                if floor <= ground[i, j] + above and edge_distance(zones, z, west + j * cell, south + i * cell) < 0.0:
-                    flat[i, j] = False
+                if floor <= ground[i, j] + height and edge_distance(zones, z, west + j * cell, south + i * cell) < 0.0:
+                    is_flat[i, j] = False
 
 
 # ----------------------------------------------------------------------
@@ -214,33 +218,33 @@ def steps() -> tuple[Records, Records]:
     >>> len(made), len({round(float(one.course), 6) for one in made})
     (32, 32)
     """
-    found: set[tuple[int, int]] = set()
-    for a, b in _OCTANT_STEPS:
-        found |= {(x * i, y * j) for x, y in ((a, b), (b, a)) for i in (-1, 1) for j in (-1, 1)}
-    made: Records = np.zeros(len(found), STEP)
+    offsets: set[tuple[int, int]] = set()
+    for major, minor in _OCTANT_STEPS:
+        offsets |= {(x * i, y * j) for x, y in ((major, minor), (minor, major)) for i in (-1, 1) for j in (-1, 1)}
+    records: Records = np.zeros(len(offsets), STEP)
     between: list[tuple[int, int, float]] = []
-    for step, (east, north) in zip(made, sorted(found), strict=True):
+    for step, (east, north) in zip(records, sorted(offsets), strict=True):
         step.east, step.north = east, north
         step.course, step.length, step.first = math.atan2(east, north), math.hypot(east, north), len(between)
         nearest: dict[tuple[int, int], float] = {}
         for k in range(1, 64):
-            share = k / 64.0
+            fraction = k / 64.0
             # From the end backwards; corners, which are touched and not crossed, are assigned to either side.
-            cell = (-round(share * east), -round(share * north))
-            nearest.setdefault(cell, share)
+            cell = (-round(fraction * east), -round(fraction * north))
+            nearest.setdefault(cell, fraction)
         ends = ((0, 0), (-east, -north))
-        between += [(cell[0], cell[1], share) for cell, share in nearest.items() if cell not in ends]
+        between += [(cell[0], cell[1], fraction) for cell, fraction in nearest.items() if cell not in ends]
         step.last = len(between)
     cells: Records = np.zeros(len(between), _BETWEEN)
     for cell, row in zip(cells, between, strict=True):
         cell.east, cell.north, cell.share = row
-    return made, cells
+    return records, cells
 
 
 class GlideSlopes(NamedTuple):
     """Height lost per metre over the ground, by course and altitude.
 
-    low, pitch: the first altitude and the step between two, m.
+    low, pitch: first altitude, and altitude step, m.
     table: (c, h) m per m, for the courses of `steps`; inf if no progress is made.
     """
 
@@ -251,32 +255,34 @@ class GlideSlopes(NamedTuple):
 
 # Altitude step of the slopes, m.
 _ALTITUDE_STEP_M = 100.0
-# Least ground speed that is progress, m/s.
+# Minimum ground speed that counts as progress, m/s.
 _MIN_GROUND_SPEED_MPS = 1.0
 
 
-def glide_slopes(aircraft: PointMass, airspeed: float, low: float, top: float) -> GlideSlopes:
+def glide_slopes(aircraft: PointMass, airspeed: float, min_altitude: float, max_altitude: float) -> GlideSlopes:
     """Return the slopes between two altitudes (m AMSL) at an equivalent airspeed, m/s."""
     courses = np.array(steps()[0]["course"])
-    table = np.empty((courses.size, max(2, math.ceil((top - low) / _ALTITUDE_STEP_M) + 1)))
-    _fill_slopes(aircraft.record, aircraft.excess, airspeed, courses, low, table)
-    return GlideSlopes(low, _ALTITUDE_STEP_M, table)
+    table = np.empty((courses.size, max(2, math.ceil((max_altitude - min_altitude) / _ALTITUDE_STEP_M) + 1)))
+    _fill_slopes(aircraft.record, aircraft.excess, airspeed, courses, min_altitude, table)
+    return GlideSlopes(min_altitude, _ALTITUDE_STEP_M, table)
 
 
 @compiled
-def _fill_slopes(aircraft: Record, excess: Floats, airspeed: float, courses: Floats, low: float, table: Floats) -> None:
+def _fill_slopes(
+    aircraft: Record, excess: Floats, airspeed: float, courses: Floats, min_altitude: float, table: Floats
+) -> None:
     for h in range(table.shape[1]):
-        amsl = low + h * _ALTITUDE_STEP_M
-        true = airspeed * true_by_equivalent(amsl)
-        sink = max(0.0, -excess_power(excess, 0.0, true, amsl, aircraft))
-        level = math.sqrt(max(0.0, true * true - sink * sink))
-        wind = mean_wind_speed(aircraft.wind_speed, aircraft.wind_gradient, aircraft.wind_reference, amsl)
+        altitude = min_altitude + h * _ALTITUDE_STEP_M
+        true_airspeed = airspeed * true_by_equivalent(altitude)
+        sink = max(0.0, -excess_power(excess, 0.0, true_airspeed, altitude, aircraft))
+        horizontal_speed = math.sqrt(max(0.0, true_airspeed * true_airspeed - sink * sink))
+        wind = mean_wind_speed(aircraft.wind_speed, aircraft.wind_gradient, aircraft.wind_reference, altitude)
         for c in range(courses.size):
             east, north = math.sin(courses[c]), math.cos(courses[c])
-            along = wind * (aircraft.wind_east * east + aircraft.wind_north * north)
-            across = wind * (aircraft.wind_east * north - aircraft.wind_north * east)
-            over = ground_speed(level, along, across)
-            table[c, h] = sink / over if over > _MIN_GROUND_SPEED_MPS else math.inf
+            tailwind = wind * (aircraft.wind_east * east + aircraft.wind_north * north)
+            crosswind = wind * (aircraft.wind_east * north - aircraft.wind_north * east)
+            speed_over_ground = ground_speed(horizontal_speed, tailwind, crosswind)
+            table[c, h] = sink / speed_over_ground if speed_over_ground > _MIN_GROUND_SPEED_MPS else math.inf
 
 
 # ----------------------------------------------------------------------
@@ -288,8 +294,8 @@ class Needs:
     """Result of the search for one set of places.
 
     made: the map.
-    need: (n, e) least altitude from which a glide gets to one of them, m AMSL; inf if none.
-    origin: (n, e) the cell of the place that is reached, numbered through all rows; -1 if none.
+    need: (n, e) minimum altitude from which a glide reaches one of them, m AMSL; inf if none.
+    origin: (n, e) cell of the place that is reached, numbered through all rows; -1 if none.
     onward: (n, e) the next step of the glide, an index of `steps`; -1 at the place itself.
     """
 
@@ -299,50 +305,52 @@ class Needs:
     onward: Codes
 
 
-def least_heights(made: GlideMap, cells: Cells, slopes: GlideSlopes, top: float) -> Needs:
-    """Search backwards from cells up to an altitude, m AMSL; higher labels are not computed.
+def least_heights(grid: GlideMap, cells: Cells, slopes: GlideSlopes, max_altitude: float) -> Needs:
+    """Search backwards from cells up to ``max_altitude``, m AMSL; higher labels are not computed.
 
-    Cells off the map, and cells whose ground is unknown, lead nowhere.
+    Cells off the map, and cells with unknown ground, reach nothing.
     """
-    need: Floats = np.full_like(made.floor, math.inf)
+    need: Floats = np.full_like(grid.floor, math.inf)
     origin: Codes = np.full(need.shape, -1, dtype=np.int32)
     onward: Codes = np.full(need.shape, -1, dtype=np.int32)
-    rows, columns = made.floor.shape
+    rows, columns = grid.floor.shape
     row, column = cells[:, 0], cells[:, 1]
-    held = (row >= 0) & (row < rows) & (column >= 0) & (column < columns)
-    row, column = row[held], column[held]
-    begins = made.floor[row, column]
-    low, high = made.low[row, column], made.high[row, column]
-    need[row, column] = np.where((low < begins) & (begins < high), high, begins)
-    need[~(need <= top)] = math.inf
+    is_on_map = (row >= 0) & (row < rows) & (column >= 0) & (column < columns)
+    row, column = row[is_on_map], column[is_on_map]
+    floor_altitudes = grid.floor[row, column]
+    sphere_bottoms, sphere_tops = grid.low[row, column], grid.high[row, column]
+    need[row, column] = np.where(
+        (sphere_bottoms < floor_altitudes) & (floor_altitudes < sphere_tops), sphere_tops, floor_altitudes
+    )
+    need[~(need <= max_altitude)] = math.inf
     origin[row, column] = row * columns + column
     origin[np.isinf(need)] = -1
-    moves, between = steps()
+    step_records, between = steps()
     finite = slopes.table[np.isfinite(slopes.table) & (slopes.table > 0.0)]
     if np.isfinite(need).any() and finite.size:
-        band = float(finite.min()) * made.cell
+        band = float(finite.min()) * grid.cell
         lowest = float(need.min())
-        heads: Codes = np.full(max(1, math.ceil((top - lowest) / band) + 2), -1, dtype=np.int32)
+        heads: Codes = np.full(max(1, math.ceil((max_altitude - lowest) / band) + 2), -1, dtype=np.int32)
         _search(
-            made.floor,
-            made.low,
-            made.high,
+            grid.floor,
+            grid.low,
+            grid.high,
             need,
             origin,
             onward,
-            moves,
+            step_records,
             between,
             slopes.table,
             slopes.low,
             slopes.pitch,
-            made.cell,
+            grid.cell,
             lowest,
             band,
-            top,
+            max_altitude,
             heads,
             np.full((need.size, 2), -1, dtype=np.int32),
         )
-    return Needs(made, need, origin, onward)
+    return Needs(grid, need, origin, onward)
 
 
 @compiled
@@ -357,11 +365,11 @@ def _search(
     between: Records,
     slopes: Floats,
     slopes_low: float,
-    pitch: float,
+    altitude_step: float,
     cell: float,
     lowest: float,
     band: float,
-    top: float,
+    max_altitude: float,
     heads: Codes,
     links: Codes,
 ) -> None:
@@ -372,15 +380,15 @@ def _search(
     rows, columns = need.shape
     flat = need.ravel()
     for k in range(flat.size):
-        if flat[k] <= top:
+        if flat[k] <= max_altitude:
             _insert(k, int((flat[k] - lowest) / band), heads, links)
     for b in range(heads.size):
         while heads[b] >= 0:
             k = heads[b]
             _remove(k, b, heads, links)
             row, column = k // columns, k % columns
-            here = flat[k]
-            x = min(slopes.shape[1] - 1.001, max(0.0, (here - slopes_low) / pitch))
+            altitude = flat[k]
+            x = min(slopes.shape[1] - 1.001, max(0.0, (altitude - slopes_low) / altitude_step))
             h = int(x)
             for m in range(moves.shape[0]):
                 move = moves[m]
@@ -388,16 +396,16 @@ def _search(
                 if not (0 <= i < rows and 0 <= j < columns):
                     continue
                 loss = cell * move.length * (slopes[m, h] + (x - h) * (slopes[m, h + 1] - slopes[m, h]))
-                if not here + loss < need[i, j]:
+                if not altitude + loss < need[i, j]:
                     continue
-                wanted = _step_start_altitude(floor, low, high, between, move, row, column, here, loss)
-                if not (wanted < need[i, j] and wanted <= top):
+                start_altitude = _step_start_altitude(floor, low, high, between, move, row, column, altitude, loss)
+                if not (start_altitude < need[i, j] and start_altitude <= max_altitude):
                     continue
-                other = i * columns + j
-                if need[i, j] <= top:
-                    _remove(other, int((need[i, j] - lowest) / band), heads, links)
-                need[i, j], origin[i, j], onward[i, j] = wanted, origin[row, column], m
-                _insert(other, int((wanted - lowest) / band), heads, links)
+                neighbour = i * columns + j
+                if need[i, j] <= max_altitude:
+                    _remove(neighbour, int((need[i, j] - lowest) / band), heads, links)
+                need[i, j], origin[i, j], onward[i, j] = start_altitude, origin[row, column], m
+                _insert(neighbour, int((start_altitude - lowest) / band), heads, links)
 
 
 @inner
@@ -409,32 +417,32 @@ def _step_start_altitude(
     move: Record,
     row: int,
     column: int,
-    here: float,
+    end_altitude: float,
     loss: float,
 ) -> float:
     """Return the minimum start altitude of a step that ends in a cell and stays above all cells between, m, or NaN."""
-    wanted = here + loss
+    start_altitude = end_altitude + loss
     for k in range(move.first, move.last):
         cell = between[k]
         i, j = row + cell.north, column + cell.east
         # Height lost from the step's start to this cell.
-        lost = (1.0 - cell.share) * loss
-        altitude = _raise_above_spheres(max(wanted - lost, floor[i, j]), low[i, j], high[i, j])
+        altitude_lost = (1.0 - cell.share) * loss
+        altitude = _raise_above_spheres(max(start_altitude - altitude_lost, floor[i, j]), low[i, j], high[i, j])
         # NaN, for unknown ground, fails the comparison.
         if not floor[i, j] <= altitude:
             return math.nan
-        wanted = altitude + lost
+        start_altitude = altitude + altitude_lost
     i, j = row - move.north, column - move.east
     if not floor[i, j] <= math.inf:
         return math.nan
-    wanted = _raise_above_spheres(max(wanted, floor[i, j]), low[i, j], high[i, j])
-    return wanted
+    start_altitude = _raise_above_spheres(max(start_altitude, floor[i, j]), low[i, j], high[i, j])
+    return start_altitude
 
 
 @inner
-def _raise_above_spheres(up: float, low: float, high: float) -> float:
+def _raise_above_spheres(altitude: float, bottom: float, top: float) -> float:
     """Return an altitude, or the top of the spheres if they contain the altitude, m."""
-    return high if low < up < high else up
+    return top if bottom < altitude < top else altitude
 
 
 @inner
@@ -449,12 +457,12 @@ def _insert(cell: int, band: int, heads: Codes, links: Codes) -> None:
 
 @inner
 def _remove(cell: int, band: int, heads: Codes, links: Codes) -> None:
-    """Remove a cell from its band, if it is in it."""
-    before, after = links[cell, 0], links[cell, 1]
-    if before >= 0:
-        links[before, 1] = after
+    """Remove a cell from a band if the band contains it."""
+    previous, next_cell = links[cell, 0], links[cell, 1]
+    if previous >= 0:
+        links[previous, 1] = next_cell
     elif heads[band] == cell:
-        heads[band] = after
-    if after >= 0:
-        links[after, 0] = before
+        heads[band] = next_cell
+    if next_cell >= 0:
+        links[next_cell, 0] = previous
     links[cell, 0], links[cell, 1] = -1, -1

@@ -45,14 +45,16 @@ def glides_headline(glides: Glides) -> str:
         return f"not judged: {_NOT_JUDGED_TEXTS[glides.not_judged]}"
     if not glides.each:
         return "no place to glide from"
-    counted = [(reach, glides.count(reach)) for reach in REACHES]
+    counts = [(reach, glides.count(reach)) for reach in REACHES]
     # Home is reported even if it is reached from nowhere.
-    reached = ", ".join(_COUNT_TEXTS[reach].format(count=count) for reach, count in counted if count or reach == "home")
-    if any(one.own.end == "not flown" for one in glides.each):
-        own = "ArduPlane's own return, which would follow the terrain, is not flown"
+    reach_text = ", ".join(
+        _COUNT_TEXTS[reach].format(count=count) for reach, count in counts if count or reach == "home"
+    )
+    if any(glide.own.end == "not flown" for glide in glides.each):
+        own_text = "ArduPlane's own return, which would follow the terrain, is not flown"
     else:
-        own = f"ArduPlane's own return arrives from {glides.arrivals}"
-    return f"of {len(glides.each)} places {reached}; {own}"
+        own_text = f"ArduPlane's own return arrives from {glides.arrivals}"
+    return f"of {len(glides.each)} places {reach_text}; {own_text}"
 
 
 def site_text(site: GlideSite) -> str:
@@ -70,23 +72,27 @@ def site_text(site: GlideSite) -> str:
             return f"the landing at item {site.number}"
 
 
-def glide_range_text(found: GlideRange, glides: Glides) -> str:
+def glide_range_text(glide_range: GlideRange, glides: Glides) -> str:
     """Return the text of a time range: what is in reach, the height left over, and ArduPlane's own return."""
-    when = f"{found.first:.0f} s" if found.count == 1 else f"{found.first:.0f} to {found.last:.0f} s"
-    return f"{when}: {_reach_text(found, glides)}{_own_return_text(found.least)}"
+    when = (
+        f"{glide_range.first:.0f} s"
+        if glide_range.count == 1
+        else f"{glide_range.first:.0f} to {glide_range.last:.0f} s"
+    )
+    return f"{when}: {_reach_text(glide_range, glides)}{_own_return_text(glide_range.least)}"
 
 
-def _reach_text(found: GlideRange, glides: Glides) -> str:
-    one = found.least
-    spare = glides.spare(one)
-    at = "" if found.count == 1 else f" at the least, from {one.time:.0f} s"
-    match one.reach:
+def _reach_text(glide_range: GlideRange, glides: Glides) -> str:
+    glide = glide_range.least
+    spare = glides.spare(glide)
+    when = "" if glide_range.count == 1 else f" at the least, from {glide.time:.0f} s"
+    match glide.reach:
         case "home" | "site":
-            return f"{site_text(glides.sites[found.site])}, {spare:.0f} m left over{at}"
+            return f"{site_text(glides.sites[glide_range.site])}, {spare:.0f} m left over{when}"
         case "flat":
-            east, north, up = one.flat_at
+            east, north, up = glide.flat_at
             where = f"such as at {east:.0f} m east, {north:.0f} m north, {up:.0f} m AMSL"
-            return f"flat ground alone, {where}, {spare:.0f} m left over{at}"
+            return f"flat ground alone, {where}, {spare:.0f} m left over{when}"
         case "nothing":
             missing = "no way leads anywhere" if math.isinf(spare) else f"{-spare:.0f} m are missing at the most"
             return f"nothing, {missing}"
@@ -94,16 +100,16 @@ def _reach_text(found: GlideRange, glides: Glides) -> str:
             return "not known, for it is beyond the elevation data"
 
 
-def _own_return_text(one: Glide) -> str:
-    name = one.own.target.name
-    match one.own.end:
+def _own_return_text(glide: Glide) -> str:
+    name = glide.own.target.name
+    match glide.own.end:
         case "arrives":
             return f"; ArduPlane's own return arrives over {name}"
         case "low":
-            low = min(one.own.over, one.own.clearance)
-            return f"; ArduPlane's own return comes {low:.0f} m above ground, and {MARGIN:.0f} m are asked"
+            lowest = min(glide.own.over, glide.own.clearance)
+            return f"; ArduPlane's own return comes {lowest:.0f} m above ground, and {MARGIN:.0f} m are asked"
         case "ground":
-            return f"; ArduPlane's own return comes down {one.own.short / 1000.0:.1f} km from {name}"
+            return f"; ArduPlane's own return comes down {glide.own.short / 1000.0:.1f} km from {name}"
         case "threat":
             return "; ArduPlane's own return enters a missile's sphere"
         case "unknown":

@@ -40,7 +40,7 @@ Reach = Literal["home", "site", "flat", "nothing", "unknown"]
 REACHES: tuple[Reach, ...] = ("home", "site", "flat", "nothing", "unknown")
 # Outcome of ArduPlane's own return without thrust: at its target; at its target, but lower above ground than `MARGIN`;
 # ground impact; in a kill sphere; off the elevation data; or not simulated, because it would follow the terrain.
-OwnEnd = Literal["arrives", "low", "ground", "threat", "unknown", "not flown"]
+EngineOutEnd = Literal["arrives", "low", "ground", "threat", "unknown", "not flown"]
 # Why nothing is judged: there is no elevation file; the model has no trim with the throttle closed; or the mission
 # is too large for a map.
 NotJudged = Literal["", "terrain", "trim", "far"]
@@ -49,7 +49,7 @@ NotJudged = Literal["", "terrain", "trim", "far"]
 class GlideSite(NamedTuple):
     """Chosen place to glide to.
 
-    number: of the rally point, or the mission item that lands; 0 for home.
+    number: number of the rally point, or the mission item that lands; 0 for home.
     east, north: m.
     """
 
@@ -60,18 +60,18 @@ class GlideSite(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True)
-class OwnGlide:
+class EngineOutReturn:
     """ArduPlane's return without thrust.
 
     target: its destination.  end: its outcome.
-    over: height above ground at arrival over its target, m; NaN if it does not arrive.
-    clearance: least height above ground on the path, m.
+    over: height above ground on arrival over its target, m; NaN if it does not arrive.
+    clearance: minimum height above ground on the path, m.
     at: east, north, up of the ground impact, m; NaN without one.
-    short: distance from there to its target, m; NaN without an impact.
+    short: distance from the ground impact to its target, m; NaN without one.
     """
 
     target: ReturnTarget
-    end: OwnEnd
+    end: EngineOutEnd
     over: float
     clearance: float
     at: tuple[float, float, float]
@@ -92,7 +92,7 @@ class Glide:
 
     time: float
     start: tuple[float, float, float]
-    own: OwnGlide
+    own: EngineOutReturn
     left: tuple[float, ...]
     flat: float
     flat_at: tuple[float, float, float]
@@ -120,7 +120,7 @@ class Glides:
 
     each: by time; empty if nothing is judged.
     sites: home first, then rally points and landing places.
-    airspeed: of the glides, equivalent, m/s.
+    airspeed: equivalent airspeed of the glides, m/s.
     cell: side of the map's cells, m.
     fuel: True if the engine burns fuel: the drag of the stopped engine is unknown.
     not_judged: why nothing is judged.
@@ -137,12 +137,12 @@ class Glides:
 
     def count(self, reach: Reach) -> int:
         """Return the number of places whose best destination is this one."""
-        return sum(one.reach == reach for one in self.each)
+        return sum(glide.reach == reach for glide in self.each)
 
     @property
     def arrivals(self) -> int:
         """Number of ArduPlane's own returns that arrive."""
-        return sum(one.own.end == "arrives" for one in self.each)
+        return sum(glide.own.end == "arrives" for glide in self.each)
 
     @property
     def somewhere(self) -> bool | None:
@@ -151,31 +151,37 @@ class Glides:
             return False
         return None if not self.each or self.count("unknown") else True
 
-    def best_site(self, one: Glide) -> int:
+    def best_site(self, glide: Glide) -> int:
         """Return the index of home if in reach, otherwise of the site with most altitude left; -1 if there is none."""
-        if one.reach == "home":
+        if glide.reach == "home":
             return 0
-        return int(np.argmax(one.left)) if one.reach == "site" else -1
+        return int(np.argmax(glide.left)) if glide.reach == "site" else -1
 
     @property
     def ranges(self) -> tuple[GlideRange, ...]:
         """All glides in time ranges, by time."""
-        found = []
-        for (site, *_), group in groupby(self.each, lambda one: (self.best_site(one), one.reach, one.own.end)):
-            ones = list(group)
-            found.append(
-                GlideRange(ones[0].time, ones[-1].time, len(ones), site, min(ones, key=lambda one: self.spare(one)))
+        ranges = []
+        for (site, *_), group in groupby(self.each, lambda glide: (self.best_site(glide), glide.reach, glide.own.end)):
+            group_glides = list(group)
+            ranges.append(
+                GlideRange(
+                    group_glides[0].time,
+                    group_glides[-1].time,
+                    len(group_glides),
+                    site,
+                    min(group_glides, key=lambda glide: self.spare(glide)),
+                )
             )
-        return tuple(found)
+        return tuple(ranges)
 
-    def spare(self, one: Glide) -> float:
+    def spare(self, glide: Glide) -> float:
         """Return the altitude left at the best destination, m.
 
         Below 0 if none is in reach, -inf without a path.
         """
-        if one.reach in ("home", "site"):
-            return one.left[self.best_site(one)]
-        return one.flat if one.reach == "flat" else max((*one.left, one.flat))
+        if glide.reach in ("home", "site"):
+            return glide.left[self.best_site(glide)]
+        return glide.flat if glide.reach == "flat" else max((*glide.left, glide.flat))
 
 
 # Placeholder for a flight without judged glides.
@@ -183,15 +189,15 @@ NOT_ASKED = Glides((), (), math.nan)
 
 
 def judge_glides(world: ReturnWorld, starts: ReturnStarts) -> Glides:
-    """Judge which places each start can reach without an engine, except starts in low take-offs and landings.
+    """Judge the places that each start can reach without an engine.
 
-    From a low start the aircraft descends straight ahead.
+    Low starts in take-offs and landings are omitted: from them the aircraft descends straight ahead.
     """
     starts = starts.at(np.flatnonzero(~starts.low))
     parameters = world.parameters
     sites, airspeed = _glide_sites(world), float(parameters.airspeed_min)
     fuel = world.setup.envelope.volts <= 0.0
-    terrain, around = world.scenario.terrain, world.around
+    terrain, environment = world.scenario.terrain, world.around
     if terrain is None:
         return Glides((), sites, airspeed, fuel=fuel, not_judged="terrain")
     if not world.aircraft.glides:
@@ -200,38 +206,50 @@ def judge_glides(world: ReturnWorld, starts: ReturnStarts) -> Glides:
         return Glides((), sites, airspeed, fuel=fuel)
     rows = starts.rows
     places = np.concatenate([np.stack([rows["east"], rows["north"]], axis=1), [site[2:] for site in sites]])
-    made = glide_map(terrain, places, MARGIN, around.spheres, around.radii)
-    if made is None:
+    grid = glide_map(terrain, places, MARGIN, environment.spheres, environment.radii)
+    if grid is None:
         return Glides((), sites, airspeed, fuel=fuel, not_judged="far")
-    ends = _own_glides(world, starts)
-    bank, top = float(parameters.roll_limit), float(rows["up"].max())
-    low = float(np.nanmin(made.ground)) if np.isfinite(made.ground).any() else 0.0
-    slopes = glide_slopes(world.aircraft, airspeed, low, max(top, low + 1.0))
+    own_returns = _simulate_engine_out_returns(world, starts)
+    bank, max_altitude = float(parameters.roll_limit), float(rows["up"].max())
+    lowest_ground = float(np.nanmin(grid.ground)) if np.isfinite(grid.ground).any() else 0.0
+    slopes = glide_slopes(world.aircraft, airspeed, lowest_ground, max(max_altitude, lowest_ground + 1.0))
 
     def search_from(cells: Cells) -> tuple[Floats, NDArray[np.int32], Floats]:
-        needs = least_heights(made, cells, slopes, top)
-        return *heights_left(rows, needs, world.aircraft, around, airspeed, bank), needs.need
+        needs = least_heights(grid, cells, slopes, max_altitude)
+        return *heights_left(rows, needs, world.aircraft, environment, airspeed, bank), needs.need
 
-    by_site = [search_from(np.array([made.cell_of(site.east, site.north)])) for site in sites]
-    left = [found[0] for found in by_site]
-    landings = _flat_ground(world, made)
-    flat, flat_cells, _ = search_from(np.argwhere(landings))
-    known = np.isfinite(terrain.height(rows["east"], rows["north"]))
+    site_results = [search_from(np.array([grid.cell_of(site.east, site.north)])) for site in sites]
+    altitudes_left = [result[0] for result in site_results]
+    landable_cells = _flat_ground(world, grid)
+    flat_altitudes_left, flat_cells, _ = search_from(np.argwhere(landable_cells))
+    is_known = np.isfinite(terrain.height(rows["east"], rows["north"]))
     each = []
     for k, row in enumerate(rows):
-        lefts = tuple(float(one[k]) for one in left)
-        at = place_of(made, int(flat_cells[k])) if flat_cells[k] >= 0 else _NOWHERE
+        site_altitudes_left = tuple(float(altitudes[k]) for altitudes in altitudes_left)
+        flat_place = place_of(grid, int(flat_cells[k])) if flat_cells[k] >= 0 else _NOWHERE
         start = (float(row["east"]), float(row["north"]), float(row["up"]))
-        reach = _best_reach(lefts, float(flat[k])) if known[k] else "unknown"
-        each.append(Glide(float(starts.time[k]), start, ends[k], lefts, float(flat[k]), at, reach))
-    chosen = np.minimum.reduce([found[2] for found in by_site])
-    return Glides(tuple(each), sites, airspeed, made.cell, fuel, footprint=GlideFootprint(made, chosen, landings))
+        reach = _best_reach(site_altitudes_left, float(flat_altitudes_left[k])) if is_known[k] else "unknown"
+        each.append(
+            Glide(
+                float(starts.time[k]),
+                start,
+                own_returns[k],
+                site_altitudes_left,
+                float(flat_altitudes_left[k]),
+                flat_place,
+                reach,
+            )
+        )
+    site_needs = np.minimum.reduce([result[2] for result in site_results])
+    return Glides(
+        tuple(each), sites, airspeed, grid.cell, fuel, footprint=GlideFootprint(grid, site_needs, landable_cells)
+    )
 
 
 def _best_reach(left: tuple[float, ...], flat: float) -> Reach:
     if left[0] >= 0.0:
         return "home"
-    if any(one >= 0.0 for one in left):
+    if any(altitude >= 0.0 for altitude in left):
         return "site"
     return "flat" if flat >= 0.0 else "nothing"
 
@@ -241,55 +259,67 @@ def _glide_sites(world: ReturnWorld) -> tuple[GlideSite, ...]:
     mission, origin = world.setup.mission, world.scenario.origin
     return (
         GlideSite("home", 0, world.home.east, world.home.north),
-        *(GlideSite("rally", one.number or k, one.east, one.north) for k, one in enumerate(world.rally, 1)),
+        *(GlideSite("rally", point.number or k, point.east, point.north) for k, point in enumerate(world.rally, 1)),
         *(GlideSite("landing", item, east, north) for item, east, north in landing_places(mission, origin)),
     )
 
 
-def _flat_ground(world: ReturnWorld, made: GlideMap) -> Flags:
-    """Return cells (n, e) for landing: flat, and in no exclusion zone that reaches down to the ground."""
-    flat = landable(made)
-    bar_zones(made, flat, world.airspace.records, MARGIN)
-    return flat
+def _flat_ground(world: ReturnWorld, grid: GlideMap) -> Flags:
+    """Return a mask of the cells for landing, (n, e): flat, and in no exclusion zone that reaches the ground."""
+    is_flat = landable(grid)
+    bar_zones(grid, is_flat, world.airspace.records, MARGIN)
+    return is_flat
 
 
 # ----------------------------------------------------------------------
 # ArduPlane's own return.
 
 
-def _own_glides(world: ReturnWorld, starts: ReturnStarts) -> list[OwnGlide]:
-    """Simulate ArduPlane's returns without thrust.
+def _simulate_engine_out_returns(world: ReturnWorld, starts: ReturnStarts) -> list[EngineOutReturn]:
+    """Simulate ArduPlane's own return from each start without thrust.
 
-    A return that goes on to land is flown as far as its loiter.
+    A return that continues with a landing is simulated only up to its loiter.
     """
     targets = [world.target(row) for row in starts.rows]
     if "terrain" in world.open:
-        return [OwnGlide(one, "not flown", math.nan, math.nan, _NOWHERE, math.nan) for one in targets]
+        return [EngineOutReturn(target, "not flown", math.nan, math.nan, _NOWHERE, math.nan) for target in targets]
     radius = ArduPlane(world.parameters).return_rules.radius
-    circles = [None if one.straight else ReturnCircle(*one.position, radius, one.slope_base) for one in targets]
-    landings = [one.landing._replace(onward=()) if one.landing and one.straight else None for one in targets]
-    flown = fly_returns(
-        starts.rows, circles, world.parameters, world.aircraft, world.around, landings=landings, engine_out=True
+    return_circles = [
+        None if target.straight else ReturnCircle(*target.position, radius, target.slope_base) for target in targets
+    ]
+    landing_sequences = [
+        target.landing._replace(onward=()) if target.landing and target.straight else None for target in targets
+    ]
+    outcomes = fly_returns(
+        starts.rows,
+        return_circles,
+        world.parameters,
+        world.aircraft,
+        world.around,
+        landings=landing_sequences,
+        engine_out=True,
     ).flown
-    return [_own_glide(world, target, row) for target, row in zip(targets, flown, strict=True)]
+    return [_engine_out_return(world, target, row) for target, row in zip(targets, outcomes, strict=True)]
 
 
-def _own_glide(world: ReturnWorld, target: ReturnTarget, flown: Record) -> OwnGlide:
+def _engine_out_return(world: ReturnWorld, target: ReturnTarget, flown: Record) -> EngineOutReturn:
     clearance = float(flown["clearance_before"])
-    over, short, at = math.nan, math.nan, _NOWHERE
+    arrival_height, shortfall, impact = math.nan, math.nan, _NOWHERE
     if flown["ended"] == RETURN_ARRIVED and world.scenario.terrain is not None:
-        over = float(flown["circle_up"] - world.scenario.terrain.height(*target.position[:2]))
+        arrival_height = float(flown["circle_up"] - world.scenario.terrain.height(*target.position[:2]))
     if flown["ended"] == RETURN_GROUND_IMPACT:
-        at = (float(flown["clearance_east"]), float(flown["clearance_north"]), float(flown["clearance_up"]))
-        short = math.dist(at[:2], target.position[:2])
-    return OwnGlide(target, _own_end(flown, clearance, over), over, clearance, at, short)
+        impact = (float(flown["clearance_east"]), float(flown["clearance_north"]), float(flown["clearance_up"]))
+        shortfall = math.dist(impact[:2], target.position[:2])
+    return EngineOutReturn(
+        target, _engine_out_end(flown, clearance, arrival_height), arrival_height, clearance, impact, shortfall
+    )
 
 
-def _own_end(flown: Record, clearance: float, over: float) -> OwnEnd:
+def _engine_out_end(flown: Record, clearance: float, arrival_height: float) -> EngineOutEnd:
     if flown["ended"] == RETURN_GROUND_IMPACT:
         return "ground"
     if flown["outside"] <= 0.0:
         return "threat"
     if flown["ended"] != RETURN_ARRIVED:
         return "unknown"
-    return "arrives" if min(clearance, over) >= MARGIN else "low"
+    return "arrives" if min(clearance, arrival_height) >= MARGIN else "low"

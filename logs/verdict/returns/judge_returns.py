@@ -67,9 +67,9 @@ Way = Literal["circle", "on to land", "straight to land"]
 # 4); or the landing sequence begins with the landing itself.
 Open = Literal["terrain", "law", "autoland", "return path", "landing"]
 
-# Closer to a limit than this the point mass could be wrong, m: it is within 7 m of 38 flights of ArduPlane.
+# Distance to a limit within which the point mass could be wrong, m: it is within 7 m of 38 flights of ArduPlane.
 UNSURE = 10.0
-# The difference between point mass and JSBSim matters only this close to a limit, m.
+# Distance to a limit within which the difference between point mass and JSBSim matters, m.
 _DECISIVE_MARGIN_M = 50.0
 # Height that the turn of a return costs, m.  A return that begins below the least height above ground, as after a
 # take-off, has to keep its starting height less this.
@@ -78,8 +78,8 @@ TURN = 2.0
 _LOW_START_FRACTION = 0.5
 # Least height above ground from which returns in a take-off or a landing are judged, m: nothing turns below it.
 MIN_JUDGED_HEIGHT_M = 10.0
-# A return from higher up is left out if it hits the ground or gets low within this run, m, because it sinks by the rest
-# of that fraction.
+# A return from a greater height is omitted if, within this run, m, it hits the ground or gets low, and loses more than
+# that fraction of its starting height.
 _SINK_RUN_M = 500.0
 # Bank beyond which a JSBSim flight cannot begin at a start, rad, because it approaches the start straight.
 _MAX_START_BANK_RAD = math.radians(10.0)
@@ -89,11 +89,11 @@ _MAX_START_BANK_RAD = math.radians(10.0)
 class ReturnFlown:
     """One simulated return.
 
-    time: s of the flight at which it begins.  start: (3,) m.
+    time: time in the flight at which it begins, s.  start: (3,) m.
     target: its destination, and the reason for it.
     kind: its outcome.
-    clearance: least height above ground, m, NaN if unknown; clearance_at: (3,) m, where.
-    outside: least distance outside a kill sphere, m, inf for none; threat: index of that sphere, -1 for none.
+    clearance: minimum height above ground, m; NaN if unknown.  clearance_at: place of that minimum, (3,) m.
+    outside: minimum distance outside a kill sphere, m; inf for none.  threat: index of that sphere; -1 for none.
     zone: the zone that it violates, an index of `Returns.airspace`, -1 for none.
     energy: energy that it uses, Wh; left: energy left at its end, Wh; NaN if unknown.
     seconds: time to its loiter, NaN if it does not get there.
@@ -144,9 +144,9 @@ class PointOfNoReturn(NamedTuple):
     """Last place from which a return leaves the reserve, in the given wind.
 
     kind: whether there is such a point, or why it is unknown.
-    time: s, of the last place with the reserve; NaN if there is no point of no return, or it is unknown.
-    left: Wh left after the return from there, or the least left after any return if there is no such point.
-    skipped: number of returns before it that do not arrive, so that their energy is unknown.
+    time: time of that place, s; NaN if there is no point of no return, or it is unknown.
+    left: energy left after the return from that place, or the least left after any return if there is none, Wh.
+    skipped: number of earlier returns that do not arrive, so that their energy is unknown.
     """
 
     kind: NoReturn
@@ -159,13 +159,13 @@ class PointOfNoReturn(NamedTuple):
 class Returns:
     """Returns from all places on the path.
 
-    each: by time.  every: s between two.
-    causes: events that can take the aircraft off its mission, and its action then.
+    each: in order of time.  every: time between two, s.
+    causes: events that can take the aircraft off its mission, and the action on each.
     limit: least height above ground that is required, m.
     airspace: the zones.
     reserve: energy that has to be left, Wh.
     flown: True if they begin on a flown track, False for the planned path.
-    again: for each return flown again in JSBSim, the clearance there minus the clearance of the point mass, m.
+    again: for each return flown again in JSBSim, its clearance minus the clearance of the point mass, m.
     stands_in: True if ArduPlane's law stands in for an autopilot without a return law.
     open: parts that are not judged.
     autoland: RTL_AUTOLAND; None for the mission of another autopilot.
@@ -191,7 +191,7 @@ class Returns:
     @property
     def safe(self) -> bool:
         """True if every return is safe and nothing is left undecided; a landing at the end is not judged."""
-        return bool(self.each) and not self.open and all(one.safe for one in self.each)
+        return bool(self.each) and not self.open and all(ret.safe for ret in self.each)
 
     @property
     def undecided(self) -> bool:
@@ -202,66 +202,72 @@ class Returns:
     @property
     def lands(self) -> bool:
         """True if any return goes to a landing sequence."""
-        return any(one.target.landing is not None for one in self.each)
+        return any(ret.target.landing is not None for ret in self.each)
 
     @property
     def unsafe(self) -> tuple[ReturnFlown, ...]:
         """Returns whose outcome is in `UNSAFE`."""
-        return tuple(one for one in self.each if one.kind in UNSAFE)
+        return tuple(ret for ret in self.each if ret.kind in UNSAFE)
 
     def count(self, kind: Kind) -> int:
         """Return the number of returns with this outcome."""
-        return sum(one.kind == kind for one in self.each)
+        return sum(ret.kind == kind for ret in self.each)
 
     @property
     def point_of_no_return(self) -> PointOfNoReturn:
         """Point of no return by energy, for RTL returns; returns that do not arrive are left out."""
-        last, least, skipped = math.nan, math.inf, 0
-        if not self.each or all(math.isnan(one.left) for one in self.each):
+        last_time, least_left, skipped_count = math.nan, math.inf, 0
+        if not self.each or all(math.isnan(ret.left) for ret in self.each):
             return PointOfNoReturn("battery")
-        for k, one in enumerate(self.each):
-            if k and one.time <= self.each[k - 1].time:
+        for k, ret in enumerate(self.each):
+            if k and ret.time <= self.each[k - 1].time:
                 # From here on the returns end differently.
                 break
-            if math.isnan(one.used):
+            if math.isnan(ret.used):
                 return PointOfNoReturn("used")
-            if math.isnan(one.seconds) or math.isnan(one.left):
-                skipped += 1
-            elif one.left < self.reserve:
-                return PointOfNoReturn("at once" if math.isnan(last) else "later", last, least, skipped)
+            if math.isnan(ret.seconds) or math.isnan(ret.left):
+                skipped_count += 1
+            elif ret.left < self.reserve:
+                return PointOfNoReturn(
+                    "at once" if math.isnan(last_time) else "later", last_time, least_left, skipped_count
+                )
             else:
-                last, least = one.time, min(least, one.left)
-        return PointOfNoReturn("arrives" if math.isnan(last) else "never", math.nan, least, skipped)
+                last_time, least_left = ret.time, min(least_left, ret.left)
+        return PointOfNoReturn("arrives" if math.isnan(last_time) else "never", math.nan, least_left, skipped_count)
 
     @property
     def ranges(self) -> tuple[ReturnRange, ...]:
         """All returns in time ranges, the worst first."""
-        found = []
+        ranges = []
         for _, group in groupby(self.each, _report_key):
-            ones = list(group)
-            found.append(ReturnRange(ones[0].time, ones[-1].time, len(ones), min(ones, key=badness)))
-        return tuple(sorted(found, key=lambda one: (*badness(one.worst), one.first)))
+            group_returns = list(group)
+            ranges.append(
+                ReturnRange(
+                    group_returns[0].time, group_returns[-1].time, len(group_returns), min(group_returns, key=badness)
+                )
+            )
+        return tuple(sorted(ranges, key=lambda return_range: (*badness(return_range.worst), return_range.first)))
 
 
-def _report_key(one: ReturnFlown) -> tuple[object, ...]:
+def _report_key(ret: ReturnFlown) -> tuple[object, ...]:
     """Return a key that is equal for returns that are reported together."""
-    goes = (one.kind, one.target.name)
-    return (*goes, one.threat, one.zone) if one.kind in ("threat", "zone") else goes
+    key = (ret.kind, ret.target.name)
+    return (*key, ret.threat, ret.zone) if ret.kind in ("threat", "zone") else key
 
 
-def badness(one: ReturnFlown) -> tuple[int, float]:
+def badness(ret: ReturnFlown) -> tuple[int, float]:
     """Return a sort key that puts the worst return first."""
-    measure = one.outside if one.kind == "threat" else one.left if one.kind == "energy" else one.clearance
-    return KINDS.index(one.kind), math.inf if math.isnan(measure) else measure
+    measure = ret.outside if ret.kind == "threat" else ret.left if ret.kind == "energy" else ret.clearance
+    return KINDS.index(ret.kind), math.inf if math.isnan(measure) else measure
 
 
 @dataclass(frozen=True, slots=True)
 class ReturnWorld:
     """Data on which the result of returns depends, except their starts.
 
-    parameters: of ArduPlane.  home, rally: on the map.
-    aircraft: as a point mass.  around: ground and spheres.
-    stands_in: as in `Returns`.  other_law: True if it replaces an autopilot with its own return law.
+    parameters: ArduPlane's parameters.  home, rally: places on the map.
+    aircraft: point-mass model.  around: ground and spheres.
+    stands_in: as in `Returns`.  other_law: True if ArduPlane replaces an autopilot with its own return law.
     landings: the mission's landing sequences.
     """
 
@@ -307,45 +313,45 @@ class ReturnWorld:
     @property
     def way(self) -> Way:
         """End of a return by RTL."""
-        named: dict[int, Way] = {1: "on to land", 2: "straight to land"}
-        return named.get(int(self.parameters.rtl_autoland), "circle") if self.landings else "circle"
+        ways: dict[int, Way] = {1: "on to land", 2: "straight to land"}
+        return ways.get(int(self.parameters.rtl_autoland), "circle") if self.landings else "circle"
 
     @property
     def ways(self) -> tuple[Way, ...]:
         """All kinds of ends of returns, RTL's first."""
-        lands = any(cause.does == "land" for cause in self.causes) and self.way != "straight to land"
-        return (self.way, "straight to land") if lands else (self.way,)
+        has_landing = any(cause.does == "land" for cause in self.causes) and self.way != "straight to land"
+        return (self.way, "straight to land") if has_landing else (self.way,)
 
     @property
     def open(self) -> tuple[Open, ...]:
         """Parts of its returns that cannot be judged."""
-        found: dict[Open, bool] = {
+        reasons: dict[Open, bool] = {
             "terrain": self.parameters.follows_terrain_home,
             "law": self.other_law,
             "autoland": any(cause.does == "autoland" for cause in self.causes),
             "return path": int(self.parameters.rtl_autoland) == 4 and _has_return_path(self.setup),
-            "landing": any(way != "circle" for way in self.ways) and any(one.lands for one in self.landings),
+            "landing": any(way != "circle" for way in self.ways) and any(landing.lands for landing in self.landings),
         }
-        return tuple(name for name, is_so in found.items() if is_so)
+        return tuple(name for name, applies in reasons.items() if applies)
 
     def target(self, row: Record, way: Way | None = None) -> ReturnTarget:
         """Return the destination of a return from a start.  way: end of the return, RTL's by default."""
         rules = ArduPlane(self.parameters).return_rules
-        here = (float(row["east"]), float(row["north"]), float(row["up"]))
+        position = (float(row["east"]), float(row["north"]), float(row["up"]))
         way = way or self.way
-        if way == "straight to land" and (landing := nearest_landing(here, self.landings)) is not None:
-            away = math.dist(here[:2], landing.place[:2])
-            name, why = f"the landing sequence at item {landing.item}", self._choice_reason(landing)
-            return ReturnTarget(landing.place, name, why, away, landing=landing, straight=True)
-        target = choose_target(rules, here, self.home, self.rally)
+        if way == "straight to land" and (landing := nearest_landing(position, self.landings)) is not None:
+            distance = math.dist(position[:2], landing.place[:2])
+            name, reason = f"the landing sequence at item {landing.item}", self._choice_reason(landing)
+            return ReturnTarget(landing.place, name, reason, distance, landing=landing, straight=True)
+        target = choose_target(rules, position, self.home, self.rally)
         return self.going_on(target) if way == "on to land" else target
 
     def going_on(self, target: ReturnTarget) -> ReturnTarget:
-        """Return the target of a return to a loiter, with the landing sequence to which RTL then goes on."""
+        """Return the target of a return to a loiter, with the landing sequence that RTL flies after the loiter."""
         landing = nearest_landing(target.position, self.landings) if self.way == "on to land" else None
         if landing is None:
             return target
-        reasons = [one for one in (target.reason, self._choice_reason(landing)) if one]
+        reasons = [reason for reason in (target.reason, self._choice_reason(landing)) if reason]
         name = f"{target.name}, and on to the landing sequence at item {landing.item}"
         return target._replace(name=name, reason=", ".join(reasons), landing=landing)
 
@@ -379,8 +385,10 @@ def return_world(setup: FlightSetup) -> ReturnWorld:
         message = f"{source}: home: none is stated, so there is nowhere to return to"
         raise MissionError(message, file=source, field="home")
     aircraft: Aircraft = find_again(setup.aircraft, setup.scenario.flight.aircraft)
-    own = setup.autopilot.law.parameters
-    parameters = own if isinstance(own, ArduPilotParameters) else ArduPilotParameters.load(aircraft)
+    setup_parameters = setup.autopilot.law.parameters
+    parameters = (
+        setup_parameters if isinstance(setup_parameters, ArduPilotParameters) else ArduPilotParameters.load(aircraft)
+    )
     return ReturnWorld(
         setup,
         parameters,
@@ -389,8 +397,8 @@ def return_world(setup: FlightSetup) -> ReturnWorld:
         point_mass(aircraft, setup.envelope, setup.airspeed, setup.scenario.wind),
         surroundings(setup.scenario),
         airspace_of(setup),
-        own is not parameters,
-        own is not None and own is not parameters,
+        setup_parameters is not parameters,
+        setup_parameters is not None and setup_parameters is not parameters,
         landing_starts(setup.mission, setup.scenario.origin, setup.scenario.terrain),
     )
 
@@ -405,49 +413,54 @@ MAX_AGAIN = 4
 def judge_returns(
     world: ReturnWorld,
     starts: ReturnStarts,
-    every: float,
+    interval: float,
     fly_again: FlyAgain | None = None,
-    most: int = MAX_AGAIN,
+    max_flights: int = MAX_AGAIN,
     advance: Callable[[float, float], None] = lambda done, total: None,
 ) -> Returns:
     """Simulate and judge the return from each start.
 
-    every: s between them.  fly_again: flies a return in JSBSim; None for no such flights.  most: largest number of
-    them.
+    interval: time between starts, s.
+    fly_again: flies a return in JSBSim; None for no such flights.
+    max_flights: maximum number of JSBSim flights.
     advance: called with the number judged and the total; an exception that it raises ends the work.
     """
-    each: list[ReturnFlown] = []
-    again: list[float] = []
-    left_out, total = 0, len(world.ways) * len(starts)
+    returns: list[ReturnFlown] = []
+    differences: list[float] = []
+    left_out, total_count = 0, len(world.ways) * len(starts)
     for number, way in enumerate(world.ways):
-        advance(number * len(starts), total)
+        advance(number * len(starts), total_count)
         if "terrain" in world.open or ("landing" in world.open and way == "straight to land"):
             continue
-        ends = [world.target(row, way) for row in starts.rows]
-        flown, paths = fly_home(world, starts, ends)
+        targets = [world.target(row, way) for row in starts.rows]
+        flown, paths = fly_home(world, starts, targets)
         floor_heights = floors(world, starts)
-        ones = []
+        way_returns = []
         for k, row in enumerate(flown):
-            advance(number * len(starts) + k, total)
-            ones.append(
-                _judge_return(world, starts, k, ends[k], row, paths[k] if paths else _NO_PATH, float(floor_heights[k]))
+            advance(number * len(starts) + k, total_count)
+            way_returns.append(
+                _judge_return(
+                    world, starts, k, targets[k], row, paths[k] if paths else _NO_PATH, float(floor_heights[k])
+                )
             )
         if fly_again is not None and way == "circle":
-            ones, apart = _recheck_in_jsbsim(world, starts, ones, flown, fly_again, most)
-            again += apart
-        begins = heights_above_ground(world, starts)
-        kept = [one for k, one in enumerate(ones) if not (starts.low[k] and sinks_down(one, float(begins[k])))]
-        left_out += starts.grounded + len(ones) - len(kept)
-        each += kept
+            way_returns, way_differences = _recheck_in_jsbsim(world, starts, way_returns, flown, fly_again, max_flights)
+            differences += way_differences
+        start_heights = heights_above_ground(world, starts)
+        kept_returns = [
+            ret for k, ret in enumerate(way_returns) if not (starts.low[k] and sinks_down(ret, float(start_heights[k])))
+        ]
+        left_out += starts.grounded + len(way_returns) - len(kept_returns)
+        returns += kept_returns
     return Returns(
-        each=tuple(each),
-        every=every,
+        each=tuple(returns),
+        every=interval,
         causes=world.causes,
         limit=world.limit,
         airspace=world.airspace,
         reserve=ENERGY_RESERVE_FRACTION * world.setup.battery,
         flown=starts.flown,
-        again=tuple(again),
+        again=tuple(differences),
         stands_in=world.stands_in,
         open=world.open,
         autoland=None if world.other_law else int(world.parameters.rtl_autoland),
@@ -456,19 +469,22 @@ def judge_returns(
     )
 
 
-def sinks_down(one: ReturnFlown, height: float) -> bool:
-    """Return True if a return from a low start in a take-off or landing just sinks to the ground.
+def sinks_down(ret: ReturnFlown, height: float) -> bool:
+    """Return True if a return from a low start in a take-off or landing only sinks to the ground.
 
     That is no fault of its path.
 
-    height: its starting height above ground, m.  Below `MIN_JUDGED_HEIGHT_M` this is any return that hits the ground
-    or gets low
-    near its start; higher up, one that loses half of its height by then.  A return that flies into rising ground, or
-    hits a hill later, is judged.
+    height: its starting height above ground, m.
+
+    Below `MIN_JUDGED_HEIGHT_M` this applies to any return that hits the ground or gets low near its start; above, only
+    to one that loses half of its height by then.  A return that flies into rising ground, or hits a hill later, is
+    judged.
     """
-    run = math.dist(one.start[:2], one.clearance_at[:2])
-    sinks = height < MIN_JUDGED_HEIGHT_M or one.start[2] - one.clearance_at[2] >= (1.0 - _LOW_START_FRACTION) * height
-    return one.kind in ("ground", "low", "unsure") and sinks and run <= _SINK_RUN_M
+    distance = math.dist(ret.start[:2], ret.clearance_at[:2])
+    is_sinking = (
+        height < MIN_JUDGED_HEIGHT_M or ret.start[2] - ret.clearance_at[2] >= (1.0 - _LOW_START_FRACTION) * height
+    )
+    return ret.kind in ("ground", "low", "unsure") and is_sinking and distance <= _SINK_RUN_M
 
 
 _NO_PATH: Floats = np.zeros((0, 3))
@@ -477,47 +493,55 @@ _NO_PATH: Floats = np.zeros((0, 3))
 def fly_home(
     world: ReturnWorld,
     starts: ReturnStarts,
-    ends: Sequence[ReturnTarget],
-    least: tuple[Floats, Floats] | None = None,
+    targets: Sequence[ReturnTarget],
+    limits: tuple[Floats, Floats] | None = None,
     *,
-    keep: bool = False,
+    keep_paths: bool = False,
 ) -> tuple[Records, tuple[Floats, ...]]:
-    """Simulate returns from starts to their targets: (n,) of `RETURN_FLOWN`, and their paths.
+    """Simulate returns from starts to their targets: (n,) of `RETURN_FLOWN`, and their paths if there are zones.
 
-    The paths are returned if there are zones.
-
-    least: as in `flight.autopilots.arduplane.rtl_point_mass.fly_returns`.  keep: True to return all paths.
+    limits: parameter ``least`` of `flight.autopilots.arduplane.rtl_point_mass.fly_returns`.
+    keep_paths: True to return the paths in any case.
     """
     radius = ArduPlane(world.parameters).return_rules.radius
-    circles = [None if end.straight else ReturnCircle(*end.position, radius, end.slope_base) for end in ends]
+    circles = [
+        None if target.straight else ReturnCircle(*target.position, radius, target.slope_base) for target in targets
+    ]
     # A landing is not simulated: a return that would begin with the landing ends where it would go on to it.
-    landings = [end.landing if end.landing and not end.landing.lands else None for end in ends]
-    keep = keep or bool(world.airspace.zones)
-    found = fly_returns(
-        starts.rows, circles, world.parameters, world.aircraft, world.around, landings=landings, keep=keep, least=least
+    landings = [target.landing if target.landing and not target.landing.lands else None for target in targets]
+    keep_paths = keep_paths or bool(world.airspace.zones)
+    result = fly_returns(
+        starts.rows,
+        circles,
+        world.parameters,
+        world.aircraft,
+        world.around,
+        landings=landings,
+        keep=keep_paths,
+        least=limits,
     )
-    return found.flown, found.ways
+    return result.flown, result.ways
 
 
 def floors(world: ReturnWorld, starts: ReturnStarts) -> Floats:
-    """Return the required height above ground (n,) for the return from each start, m."""
-    begins = heights_above_ground(world, starts)
-    own = np.where(begins < world.limit, begins - TURN, world.limit)
-    return np.where(starts.low, np.minimum(_LOW_START_FRACTION * begins, world.limit), own)
+    """Return the required height above ground of the return from each start, m, (n,)."""
+    start_heights = heights_above_ground(world, starts)
+    required_heights = np.where(start_heights < world.limit, start_heights - TURN, world.limit)
+    return np.where(starts.low, np.minimum(_LOW_START_FRACTION * start_heights, world.limit), required_heights)
 
 
 def heights_above_ground(world: ReturnWorld, starts: ReturnStarts) -> Floats:
-    """Return the heights above ground of starts (n,), m; NaN if the ground is unknown."""
+    """Return the heights above ground of starts, m, (n,); NaN if the ground is unknown."""
     if world.scenario.terrain is None:
         return np.full(len(starts), math.nan)
     rows = starts.rows
     return np.asarray(rows["up"] - world.scenario.terrain.height(rows["east"], rows["north"]), dtype=np.float64)
 
 
-def kind_of(world: ReturnWorld, flown: Record, zone: int, left: float, floor: float) -> Kind:
+def kind_of(world: ReturnWorld, flown: Record, zone: int, energy_left: float, floor: float) -> Kind:
     """Classify a simulated return.
 
-    zone: the zone that it violates, -1 for none.  left: Wh left at the end, NaN if unknown.
+    zone: the zone that it violates, -1 for none.  energy_left: energy left at the end, Wh; NaN if unknown.
     floor: required height above ground, m.
     """
     if flown["ended"] == RETURN_GROUND_IMPACT:
@@ -528,7 +552,7 @@ def kind_of(world: ReturnWorld, flown: Record, zone: int, left: float, floor: fl
         return "zone"
     if flown["ended"] == RETURN_TIMEOUT:
         return "lost"
-    if left < ENERGY_RESERVE_FRACTION * world.setup.battery:
+    if energy_left < ENERGY_RESERVE_FRACTION * world.setup.battery:
         return "energy"
     if flown["clearance"] < floor - CLEARANCE_TOLERANCE_M:
         # Applies wherever the return goes after that.
@@ -537,41 +561,41 @@ def kind_of(world: ReturnWorld, flown: Record, zone: int, left: float, floor: fl
 
 
 def _judge_return(
-    world: ReturnWorld, starts: ReturnStarts, k: int, target: ReturnTarget, flown: Record, way: Floats, floor: float
+    world: ReturnWorld, starts: ReturnStarts, k: int, target: ReturnTarget, flown: Record, path: Floats, floor: float
 ) -> ReturnFlown:
-    zone = zone_met(world, way) if len(way) > 1 else -1
-    used = 0.0 if math.isnan(starts.used[k]) else float(starts.used[k])
-    left = float(world.setup.battery - used - flown["energy"]) if world.battery_known else math.nan
+    zone = most_violated_zone(world, path) if len(path) > 1 else -1
+    energy_used = 0.0 if math.isnan(starts.used[k]) else float(starts.used[k])
+    energy_left = float(world.setup.battery - energy_used - flown["energy"]) if world.battery_known else math.nan
     row = starts.rows[k]
     return ReturnFlown(
         time=float(starts.time[k]),
         start=(float(row["east"]), float(row["north"]), float(row["up"])),
         target=target,
-        kind=kind_of(world, flown, zone, left, floor),
+        kind=kind_of(world, flown, zone, energy_left, floor),
         clearance=float(flown["clearance"]),
         clearance_at=(float(flown["clearance_east"]), float(flown["clearance_north"]), float(flown["clearance_up"])),
         outside=float(flown["outside"]),
         threat=int(flown["threat"]),
         zone=zone,
         energy=float(flown["energy"]),
-        left=left,
+        left=energy_left,
         seconds=float(flown["to_circle"]),
         floor=floor,
         used=float(starts.used[k]),
     )
 
 
-def zone_met(world: ReturnWorld, way: Floats) -> int:
+def most_violated_zone(world: ReturnWorld, path: Floats) -> int:
     """Return the index of the zone that a path (t, 3) violates most, or -1 if it violates none."""
-    step = np.diff(way, axis=0)
-    moves: Records = np.zeros(len(step), MOVE)
-    run = np.hypot(step[:, 0], step[:, 1])
+    steps = np.diff(path, axis=0)
+    moves: Records = np.zeros(len(steps), MOVE)
+    run = np.hypot(steps[:, 0], steps[:, 1])
     for axis, name in enumerate(("east", "north", "up")):
-        moves[name] = way[:-1, axis]
-    moves["course_east"] = np.divide(step[:, 0], run, out=np.zeros_like(run), where=run > 0.0)
-    moves["course_north"] = np.divide(step[:, 1], run, out=np.zeros_like(run), where=run > 0.0)
-    moves["length"], moves["climb"], moves["lasts"] = run, step[:, 2], 1.0
-    moves["time"] = np.arange(len(step))
+        moves[name] = path[:-1, axis]
+    moves["course_east"] = np.divide(steps[:, 0], run, out=np.zeros_like(run), where=run > 0.0)
+    moves["course_north"] = np.divide(steps[:, 1], run, out=np.zeros_like(run), where=run > 0.0)
+    moves["length"], moves["climb"], moves["lasts"] = run, steps[:, 2], 1.0
+    moves["time"] = np.arange(len(steps))
     visits = path_zones(moves, world.airspace.records, world.scenario.terrain)
     worst = int(np.argmax(visits["depth"]))
     return worst if visits[worst]["depth"] > 0.0 else -1
@@ -582,68 +606,80 @@ def zone_met(world: ReturnWorld, way: Floats) -> int:
 
 
 def _recheck_in_jsbsim(
-    world: ReturnWorld, starts: ReturnStarts, each: list[ReturnFlown], flown: Records, fly_again: FlyAgain, most: int
+    world: ReturnWorld,
+    starts: ReturnStarts,
+    returns: list[ReturnFlown],
+    flown: Records,
+    fly_again: FlyAgain,
+    max_flights: int,
 ) -> tuple[list[ReturnFlown], list[float]]:
-    """Fly the most doubtful of each run of doubtful returns in JSBSim, and correct the run by the result."""
-    out, differences = list(each), []
-    by_doubt = groupby(range(len(each)), lambda k: doubt(each[k]) < UNSURE)
-    groups = [[k for k in group if is_steady(world, starts.rows[k])] for unsure, group in by_doubt if unsure]
-    stretches = sorted((min(doubt(each[k]) for k in group), group) for group in groups if group)
-    for _, group in stretches[:most]:
-        k = min(group, key=lambda k: doubt(each[k]))
-        found = fly_again(world, starts.rows[k])
-        if found is None:
+    """Fly the most doubtful return of each run of doubtful returns in JSBSim, and correct the run by the result."""
+    corrected, differences = list(returns), []
+    runs = groupby(range(len(returns)), lambda k: distance_to_limit(returns[k]) < UNSURE)
+    groups = [[k for k in group if is_steady(world, starts.rows[k])] for is_unsure, group in runs if is_unsure]
+    ranked_groups = sorted((min(distance_to_limit(returns[k]) for k in group), group) for group in groups if group)
+    for _, group in ranked_groups[:max_flights]:
+        k = min(group, key=lambda k: distance_to_limit(returns[k]))
+        result = fly_again(world, starts.rows[k])
+        if result is None:
             continue
         # Differences in clearance and in distance outside spheres, m; 0 if there is nothing to compare.
-        apart = [new - old for new, old in zip(found, (each[k].clearance, each[k].outside), strict=True)]
-        higher, farther = (one if math.isfinite(one) else 0.0 for one in apart)
-        if math.isfinite(apart[0]):
-            differences.append(higher)
-        low = min(each[k].clearance, each[k].clearance + higher) < each[k].floor + _DECISIVE_MARGIN_M
-        close = min(each[k].outside, each[k].outside + farther) < _DECISIVE_MARGIN_M
-        disagrees = (low and abs(higher) > UNSURE) or (close and abs(farther) > UNSURE)
-        out[k] = _with_offsets(world, each[k], flown[k], higher, farther)
-        if disagrees and out[k].kind not in ("ground", "threat"):
-            out[k] = replace(out[k], kind="unsure")
+        offsets = [
+            new_value - old_value
+            for new_value, old_value in zip(result, (returns[k].clearance, returns[k].outside), strict=True)
+        ]
+        height_offset, distance_offset = (offset if math.isfinite(offset) else 0.0 for offset in offsets)
+        if math.isfinite(offsets[0]):
+            differences.append(height_offset)
+        is_low = min(returns[k].clearance, returns[k].clearance + height_offset) < returns[k].floor + _DECISIVE_MARGIN_M
+        is_close = min(returns[k].outside, returns[k].outside + distance_offset) < _DECISIVE_MARGIN_M
+        disagrees = (is_low and abs(height_offset) > UNSURE) or (is_close and abs(distance_offset) > UNSURE)
+        corrected[k] = _with_offsets(world, returns[k], flown[k], height_offset, distance_offset)
+        if disagrees and corrected[k].kind not in ("ground", "threat"):
+            corrected[k] = replace(corrected[k], kind="unsure")
         for j in group:
-            if j != k and disagrees and each[j].kind in ("low", "safe"):
-                out[j] = replace(each[j], kind="unsure")
+            if j != k and disagrees and returns[j].kind in ("low", "safe"):
+                corrected[j] = replace(returns[j], kind="unsure")
             elif j != k and not disagrees:
                 # The flight of one return never improves another one.
-                out[j] = _with_offsets(world, each[j], flown[j], min(0.0, higher), min(0.0, farther))
-    return out, differences
+                corrected[j] = _with_offsets(
+                    world, returns[j], flown[j], min(0.0, height_offset), min(0.0, distance_offset)
+                )
+    return corrected, differences
 
 
-def _with_offsets(world: ReturnWorld, one: ReturnFlown, flown: Record, higher: float, farther: float) -> ReturnFlown:
+def _with_offsets(
+    world: ReturnWorld, ret: ReturnFlown, flown: Record, height_offset: float, distance_offset: float
+) -> ReturnFlown:
     """Return a copy of a return that is higher and farther outside spheres by the given differences, m."""
-    moved = flown.copy()
-    moved["clearance"] += higher
-    moved["outside"] += farther
-    if moved["clearance"] <= 0.0:
-        moved["ended"] = RETURN_GROUND_IMPACT
-    elif moved["ended"] == RETURN_GROUND_IMPACT:
+    corrected = flown.copy()
+    corrected["clearance"] += height_offset
+    corrected["outside"] += distance_offset
+    if corrected["clearance"] <= 0.0:
+        corrected["ended"] = RETURN_GROUND_IMPACT
+    elif corrected["ended"] == RETURN_GROUND_IMPACT:
         # It was simulated on from where it grazed the ground: energy and zones cover the whole path.
-        moved["ended"] = RETURN_TIMEOUT if math.isnan(one.seconds) else RETURN_ARRIVED
-    kind = kind_of(world, moved, one.zone, one.left, one.floor)
-    return replace(one, clearance=float(moved["clearance"]), outside=float(moved["outside"]), kind=kind)
+        corrected["ended"] = RETURN_TIMEOUT if math.isnan(ret.seconds) else RETURN_ARRIVED
+    kind = kind_of(world, corrected, ret.zone, ret.left, ret.floor)
+    return replace(ret, clearance=float(corrected["clearance"]), outside=float(corrected["outside"]), kind=kind)
 
 
 def is_steady(world: ReturnWorld, row: Record) -> bool:
     """Return True if a JSBSim flight can be brought to a start: its bank is small, and its airspeed fast enough."""
     wind = world.scenario.wind
-    over = mean_wind_speed(wind.speed, wind.gradient, wind.reference_amsl, float(row["up"]))
-    east = float(row["velocity_east"]) + over * math.sin(wind.from_course)
-    north = float(row["velocity_north"]) + over * math.cos(wind.from_course)
+    wind_speed = mean_wind_speed(wind.speed, wind.gradient, wind.reference_amsl, float(row["up"]))
+    east = float(row["velocity_east"]) + wind_speed * math.sin(wind.from_course)
+    north = float(row["velocity_north"]) + wind_speed * math.cos(wind.from_course)
     airspeed = math.hypot(east, north, float(row["velocity_up"]))
     return abs(float(row["roll"])) <= _MAX_START_BANK_RAD and airspeed >= float(world.aircraft.record.slowest)
 
 
-def doubt(one: ReturnFlown) -> float:
-    """Return how close a return came to a deciding limit (ground, required height or a kill sphere), m."""
-    if one.kind in ("zone", "unknown"):
+def distance_to_limit(ret: ReturnFlown) -> float:
+    """Return the distance of a return to the nearest deciding limit (ground, required height or kill sphere), m."""
+    if ret.kind in ("zone", "unknown"):
         # Neither depends on a distance.
         return math.inf
-    near = [abs(one.clearance)]
-    if one.kind != "ground":
-        near += [abs(one.clearance - one.floor), abs(one.outside)]
-    return min((value for value in near if not math.isnan(value)), default=math.inf)
+    distances = [abs(ret.clearance)]
+    if ret.kind != "ground":
+        distances += [abs(ret.clearance - ret.floor), abs(ret.outside)]
+    return min((value for value in distances if not math.isnan(value)), default=math.inf)

@@ -1,4 +1,4 @@
-"""Sample places from which an aircraft may be called home, at intervals along a flight or path."""
+"""Sample the starts of returns to launch at intervals along a flight or path."""
 
 from dataclasses import dataclass
 
@@ -17,7 +17,7 @@ from world.kernels import Records
 
 # Time over which velocities are computed for a track without velocities, s.
 _VELOCITY_WINDOW_S = 1.0
-# Height that a return loses from a final with its motor off before it climbs, m; a place this close to a limit is low.
+# Height that a return from a final approach with its motor off loses before it climbs, m.
 SINKING = 10.0
 
 
@@ -26,7 +26,7 @@ class ReturnStarts:
     """Places where returns begin.
 
     time: (n,) s.  rows: (n,) of `flight.autopilots.arduplane.rtl_point_mass.RETURN_START`.
-    used: (n,) energy used until then, Wh; NaN if unknown.
+    used: (n,) energy used before the return, Wh; NaN if unknown.
     flown: True for a flown track, False for the planned path.
     low: (n,) True for a place in a flown take-off or landing that is lower above ground than the required clearance
         plus `SINKING`.
@@ -46,12 +46,14 @@ class ReturnStarts:
 
     def at(self, chosen: NDArray[np.intp]) -> "ReturnStarts":
         """Return the chosen places."""
-        chosen_of = (self.time[chosen], self.rows[chosen], self.used[chosen])
-        return ReturnStarts(*chosen_of, self.flown, self.low[chosen], self.grounded)
+        arrays = (self.time[chosen], self.rows[chosen], self.used[chosen])
+        return ReturnStarts(*arrays, self.flown, self.low[chosen], self.grounded)
 
 
-def flown_starts(setup: FlightSetup, track: Track, every: float) -> ReturnStarts:
-    """Sample a flown track at an interval in s, up to its own return to launch, while the aircraft flies.
+def flown_starts(setup: FlightSetup, track: Track, interval: float) -> ReturnStarts:
+    """Sample a flown track up to its own return to launch, while the aircraft flies.
+
+    interval: s.
 
     >>> from logs.recording.example_log import example_log
     >>> log = example_log()
@@ -59,23 +61,23 @@ def flown_starts(setup: FlightSetup, track: Track, every: float) -> ReturnStarts
     >>> starts.flown, float(starts.time[0]), bool((np.diff(starts.time) > 0.4).all())
     (True, 0.0, True)
     """
-    whole = np.isfinite(track.position).all(axis=1) & np.isfinite(track.time)
+    is_usable = np.isfinite(track.position).all(axis=1) & np.isfinite(track.time)
     if setup.route.return_from >= 0 and setup.source is None:
-        whole &= track.leg < setup.route.return_from
-    known = np.flatnonzero(whole)
-    if not known.size:
+        is_usable &= track.leg < setup.route.return_from
+    usable_rows = np.flatnonzero(is_usable)
+    if not usable_rows.size:
         return _no_starts(flown=True)
-    time = track.time[known]
-    wanted = np.arange(time[0], time[-1] + 1e-9, every)
+    time = track.time[usable_rows]
+    sample_times = np.arange(time[0], time[-1] + 1e-9, interval)
     # Take the nearest row, except in a pause of the log.
-    every_row = known[np.unique(np.searchsorted(time, wanted - 1e-9).clip(0, len(known) - 1))]
-    near, slow = _low_and_slow_rows(setup, track, every_row)
-    rows, low = every_row[~slow], near[~slow]
+    sampled_rows = usable_rows[np.unique(np.searchsorted(time, sample_times - 1e-9).clip(0, len(usable_rows) - 1))]
+    is_low, is_slow = _low_and_slow_rows(setup, track, sampled_rows)
+    rows, is_low_start = sampled_rows[~is_slow], is_low[~is_slow]
     velocity = _velocities(track, rows)
     roll = track.attitude[rows, ROLL].astype(np.float64)
     energy = track.energy[rows].astype(np.float64)
     records = _start_records(track.position[rows], velocity, np.nan_to_num(roll))
-    return ReturnStarts(track.time[rows], records, energy, True, low, int(slow.sum()))
+    return ReturnStarts(track.time[rows], records, energy, True, is_low_start, int(is_slow.sum()))
 
 
 def _no_starts(*, flown: bool) -> ReturnStarts:
@@ -83,31 +85,33 @@ def _no_starts(*, flown: bool) -> ReturnStarts:
 
 
 def _low_and_slow_rows(setup: FlightSetup, track: Track, rows: NDArray[np.intp]) -> tuple[Flags, Flags]:
-    """Flag the rows that are low in a flown take-off or landing, and those that are also too slow to fly, (n,) each."""
+    """Flag the rows that are low in a flown take-off or landing, and those also too slow to fly, (n,) each."""
     ways, terrain = setup.ground_ways, setup.scenario.terrain
-    on_way = by_the_ground(track, ways)[rows]
+    is_ground_phase = by_the_ground(track, ways)[rows]
     position = np.asarray(track.position[rows], dtype=np.float64)
     if terrain is None or not ways:
-        return on_way, on_way.copy()
+        return is_ground_phase, is_ground_phase.copy()
     above_ground = position[:, 2] - terrain.height(position[:, 0], position[:, 1])
-    low = on_way & (above_ground < setup.limits.min_clearance + SINKING)
-    slowest = setup.envelope.level_speeds(float(setup.route.waypoints[0, 2]))[0]
-    return low, low & (track.airspeed[rows] < slowest)
+    is_low = is_ground_phase & (above_ground < setup.limits.min_clearance + SINKING)
+    min_airspeed = setup.envelope.level_speeds(float(setup.route.waypoints[0, 2]))[0]
+    return is_low, is_low & (track.airspeed[rows] < min_airspeed)
 
 
 def _velocities(track: Track, rows: NDArray[np.intp]) -> Floats:
     """Return velocities over the ground at some rows, m/s, (n, 3), from nearby positions if the track has none."""
     velocity = track.velocity[rows].astype(np.float64)
     for k in np.flatnonzero(~np.isfinite(velocity).all(axis=1)):
-        near = np.flatnonzero(np.abs(track.time - track.time[rows[k]]) <= _VELOCITY_WINDOW_S)
-        first, last = (near[0], near[-1]) if near.size else (rows[k], rows[k])
-        lasts = float(track.time[last] - track.time[first])
-        velocity[k] = (track.position[last] - track.position[first]) / lasts if lasts > 0.0 else 0.0
+        rows_near = np.flatnonzero(np.abs(track.time - track.time[rows[k]]) <= _VELOCITY_WINDOW_S)
+        first, last = (rows_near[0], rows_near[-1]) if rows_near.size else (rows[k], rows[k])
+        duration = float(track.time[last] - track.time[first])
+        velocity[k] = (track.position[last] - track.position[first]) / duration if duration > 0.0 else 0.0
     return np.asarray(np.nan_to_num(velocity))
 
 
-def planned_starts(setup: FlightSetup, every: float) -> ReturnStarts:
-    """Sample the planned path at an interval in s, up to its own return to launch; no energy is used yet.
+def planned_starts(setup: FlightSetup, interval: float) -> ReturnStarts:
+    """Sample the planned path up to its own return to launch, with unknown energy used.
+
+    interval: s.
 
     >>> from logs.recording.example_log import example_log
     >>> starts = planned_starts(example_log().setup, 1.0)
@@ -120,45 +124,45 @@ def planned_starts(setup: FlightSetup, every: float) -> ReturnStarts:
     moves = moves[moves["leg"] <= last]
     if not len(moves):
         return _no_starts(flown=False)
-    times = np.arange(0.0, float(moves["time"][-1] + moves["lasts"][-1]), every)
-    at = np.searchsorted(moves["time"], times, side="right") - 1
-    move = moves[at]
-    share = np.clip((times - move["time"]) / np.maximum(1e-9, move["lasts"]), 0.0, 1.0)
-    run, turned = share * move["length"], share * move["length"] * move["curvature"]
-    bent = move["curvature"] != 0.0
-    curvature = np.where(bent, move["curvature"], 1.0)
-    ahead = np.where(bent, np.sin(turned) / curvature, run)
-    aside = np.where(bent, (1.0 - np.cos(turned)) / curvature, 0.0)
-    ce, cn = move["course_east"], move["course_north"]
+    times = np.arange(0.0, float(moves["time"][-1] + moves["lasts"][-1]), interval)
+    move_numbers = np.searchsorted(moves["time"], times, side="right") - 1
+    move = moves[move_numbers]
+    fraction = np.clip((times - move["time"]) / np.maximum(1e-9, move["lasts"]), 0.0, 1.0)
+    run, course_change = fraction * move["length"], fraction * move["length"] * move["curvature"]
+    is_curved = move["curvature"] != 0.0
+    curvature = np.where(is_curved, move["curvature"], 1.0)
+    ahead = np.where(is_curved, np.sin(course_change) / curvature, run)
+    lateral_offset = np.where(is_curved, (1.0 - np.cos(course_change)) / curvature, 0.0)
+    course_east, course_north = move["course_east"], move["course_north"]
     position = np.stack(
         [
-            move["east"] + ahead * ce + aside * cn,
-            move["north"] + ahead * cn - aside * ce,
-            move["up"] + (move["climb"] + move["bend"] * share) * share,
+            move["east"] + ahead * course_east + lateral_offset * course_north,
+            move["north"] + ahead * course_north - lateral_offset * course_east,
+            move["up"] + (move["climb"] + move["bend"] * fraction) * fraction,
         ],
         axis=1,
     )
     speed = move["length"] / np.maximum(1e-9, move["lasts"])
-    east, north = ce * np.cos(turned) + cn * np.sin(turned), cn * np.cos(turned) - ce * np.sin(turned)
-    rise = (move["climb"] + 2.0 * move["bend"] * share) / np.maximum(1e-9, move["lasts"])
-    velocity = np.stack([speed * east, speed * north, rise], axis=1)
+    east, north = (
+        course_east * np.cos(course_change) + course_north * np.sin(course_change),
+        course_north * np.cos(course_change) - course_east * np.sin(course_change),
+    )
+    climb_rate = (move["climb"] + 2.0 * move["bend"] * fraction) / np.maximum(1e-9, move["lasts"])
+    velocity = np.stack([speed * east, speed * north, climb_rate], axis=1)
     bank = np.arctan(speed * speed * move["curvature"] / GRAVITY)
-    unknown, none_low = np.full(len(times), np.nan), np.zeros(len(times), dtype=np.bool_)
-    return ReturnStarts(times, _start_records(position, velocity, bank), unknown, False, none_low)
+    unknown_energy, is_low = np.full(len(times), np.nan), np.zeros(len(times), dtype=np.bool_)
+    return ReturnStarts(times, _start_records(position, velocity, bank), unknown_energy, False, is_low)
 
 
 def _ground_speeds(setup: FlightSetup) -> Floats:
-    """Return the ground speed on each leg in the mean wind, m/s.
-
-    The airspeed if the wind leaves no ground speed.
-    """
-    route, found = setup.route, []
+    """Return the ground speed on each leg in the mean wind, or the airspeed if the wind is too strong, m/s."""
+    route, speeds = setup.route, []
     courses = leg_courses(route.waypoints)
     for leg, speed in enumerate(route.airspeed.tolist()):
         wind = setup.scenario.wind.along(float(courses[leg]), float(route.waypoints[leg, 2]))
-        over = ground_speed(speed, *wind)
-        found.append(over if over > 0.0 else speed)
-    return np.array(found)
+        speed_over_ground = ground_speed(speed, *wind)
+        speeds.append(speed_over_ground if speed_over_ground > 0.0 else speed)
+    return np.array(speeds)
 
 
 def _start_records(position: Floats, velocity: Floats, roll: Floats) -> Records:

@@ -75,38 +75,38 @@ def way_text(kind: Kind) -> str:
     return _SEGMENT_NAMES[kind]
 
 
-def outcome_text(one: ReturnFlown, limit: float) -> str:
+def outcome_text(ret: ReturnFlown, limit: float) -> str:
     """Return the outcome of one return.  limit: required least height above ground, m."""
-    return "is safe" if one.safe else _SINGULAR_TEXTS[one.kind].format(limit=limit)
+    return "is safe" if ret.safe else _SINGULAR_TEXTS[ret.kind].format(limit=limit)
 
 
-def measured_text(one: ReturnFlown, limit: float, scenario: Scenario) -> str:
+def measured_text(ret: ReturnFlown, limit: float, scenario: Scenario) -> str:
     """Return the destination of one return, its outcome, and its distances from ground and spheres.
 
     limit: required least height above ground, m.
     """
-    east, north, _ = one.clearance_at
+    east, north, _ = ret.clearance_at
     where = f"{east:.0f} m east, {north:.0f} m north"
-    parts = [f"to {one.target.name}", outcome_text(one, limit)]
-    if one.kind == "ground":
+    parts = [f"to {ret.target.name}", outcome_text(ret, limit)]
+    if ret.kind == "ground":
         parts[-1] += f" at {where}"
-    elif not math.isnan(one.clearance):
-        parts.append(f"{one.clearance:.0f} m above ground at the least at {where}")
-    if one.threat >= 0 and one.outside <= 0.0:
-        parts.append(f"{-one.outside:.0f} m inside the sphere of {scenario.threats.names[one.threat]}")
-    elif math.isfinite(one.outside):
-        parts.append(f"{one.outside:.0f} m outside every missile's sphere")
+    elif not math.isnan(ret.clearance):
+        parts.append(f"{ret.clearance:.0f} m above ground at the least at {where}")
+    if ret.threat >= 0 and ret.outside <= 0.0:
+        parts.append(f"{-ret.outside:.0f} m inside the sphere of {scenario.threats.names[ret.threat]}")
+    elif math.isfinite(ret.outside):
+        parts.append(f"{ret.outside:.0f} m outside every missile's sphere")
     return ", ".join(parts)
 
 
 def counts_text(returns: Returns) -> str:
     """Return the number of returns per outcome, the worst first; "" if all are safe."""
-    counted = {kind: returns.count(kind) for kind in KINDS if kind != "safe"}
+    counts = {kind: returns.count(kind) for kind in KINDS if kind != "safe"}
     texts = {
         kind: (_SINGULAR_TEXTS if count == 1 else _PLURAL_TEXTS)[kind].format(limit=returns.limit)
-        for kind, count in counted.items()
+        for kind, count in counts.items()
     }
-    return ", ".join(f"{count} {texts[kind]}" for kind, count in counted.items() if count)
+    return ", ".join(f"{count} {texts[kind]}" for kind, count in counts.items() if count)
 
 
 def headline(returns: Returns) -> str:
@@ -118,12 +118,14 @@ def headline(returns: Returns) -> str:
     >>> headline(Returns((), 1.0, (), 60.0, None, 0.0, True, open=("terrain",)))
     'not judged: TERRAIN_FOLLOW has returns follow the terrain, which is not flown here'
     """
-    reasons = "; ".join(_OPEN_TEXTS[one] for one in returns.open)
+    reasons = "; ".join(_OPEN_TEXTS[reason] for reason in returns.open)
     if not returns.each:
         return f"not judged: {reasons}" if reasons else "no place to return from"
     landing = "; the landing is not judged" if returns.lands else ""
-    low = f"; {returns.left_out} on or near the ground in take-off and landing left out" if returns.left_out else ""
-    return (f"not judged in full ({reasons}): " if reasons else "") + _judged_text(returns) + low + landing
+    left_out_text = (
+        f"; {returns.left_out} on or near the ground in take-off and landing left out" if returns.left_out else ""
+    )
+    return (f"not judged in full ({reasons}): " if reasons else "") + _judged_text(returns) + left_out_text + landing
 
 
 def _judged_text(returns: Returns) -> str:
@@ -132,12 +134,12 @@ def _judged_text(returns: Returns) -> str:
         safe = returns.count("safe")
         return f"of {total} returns {failures}; {safe} {'is' if safe == 1 else 'are'} safe"
     # Returns that begin below the limit, as after a take-off, say nothing about the path home.
-    aloft = [one for one in returns.each if not one.floor < returns.limit] or returns.each
-    lowest = min(aloft, key=lambda one: one.clearance)
-    left = min((one.left for one in returns.each if not math.isnan(one.left)), default=math.nan)
-    energy = "" if math.isnan(left) else f", and {left:.0f} Wh are left at the least"
-    until = " up to their landing" if returns.lands else ""
-    return f"all {total} returns are safe{until}: never lower than {lowest.clearance:.0f} m above ground{energy}"
+    high_returns = [ret for ret in returns.each if not ret.floor < returns.limit] or returns.each
+    lowest = min(high_returns, key=lambda ret: ret.clearance)
+    least_left = min((ret.left for ret in returns.each if not math.isnan(ret.left)), default=math.nan)
+    energy = "" if math.isnan(least_left) else f", and {least_left:.0f} Wh are left at the least"
+    until_text = " up to their landing" if returns.lands else ""
+    return f"all {total} returns are safe{until_text}: never lower than {lowest.clearance:.0f} m above ground{energy}"
 
 
 def no_return_text(returns: Returns) -> str:
@@ -161,8 +163,8 @@ def no_return_text(returns: Returns) -> str:
             text = f"{name}: {point.time:.0f} s; a return from later on does not leave {reserve}"
         case "never":
             text = f"{name}: none, for every return leaves {reserve} ({point.left:.0f} Wh at the least)"
-    does = "does" if point.skipped == 1 else "do"
-    return text + (f"; {point.skipped} that {does} not arrive left out" if point.skipped else "")
+    verb = "does" if point.skipped == 1 else "do"
+    return text + (f"; {point.skipped} that {verb} not arrive left out" if point.skipped else "")
 
 
 def causes_text(causes: tuple[Cause, ...]) -> list[str]:
@@ -177,17 +179,17 @@ def causes_text(causes: tuple[Cause, ...]) -> list[str]:
     it does not: battery low (BATT_FS_LOW_ACT 0), battery critical (BATT_FS_CRT_ACT 0): goes on with its mission
     """
 
-    def stated(cause: Cause) -> str:
+    def setting_text(cause: Cause) -> str:
         return f" ({cause.parameter} {cause.value})" if cause.parameter else ""
 
-    back = [f"{cause.name}{stated(cause)}" for cause in causes if cause.returns]
-    lines = [f"it returns: {', '.join(back)}"] if back else []
-    for heading, counted in (("it lands", True), ("it does not", False)):
-        others: dict[str, list[str]] = {}
+    returning = [f"{cause.name}{setting_text(cause)}" for cause in causes if cause.returns]
+    lines = [f"it returns: {', '.join(returning)}"] if returning else []
+    for heading, is_landing in (("it lands", True), ("it does not", False)):
+        other_causes: dict[str, list[str]] = {}
         for cause in causes:
-            if not cause.returns and (cause.does in ("land", "autoland")) == counted:
-                others.setdefault(_ACTION_TEXTS[cause.does], []).append(f"{cause.name}{stated(cause)}")
-        text = [f"{', '.join(names)}: {does}" for does, names in others.items()]
+            if not cause.returns and (cause.does in ("land", "autoland")) == is_landing:
+                other_causes.setdefault(_ACTION_TEXTS[cause.does], []).append(f"{cause.name}{setting_text(cause)}")
+        text = [f"{', '.join(names)}: {action}" for action, names in other_causes.items()]
         lines += [f"{heading}: {'; '.join(text)}"] if text else []
     return lines
 
@@ -202,80 +204,93 @@ def landing_text(returns: Returns) -> list[str]:
     """
     if returns.autoland is None:
         return []
-    stays = "a return stays in its circle"
-    where = f"item{'s' if len(returns.landings) > 1 else ''} {', '.join(str(one.item) for one in returns.landings)}"
+    stays_text = "a return stays in its circle"
+    items_text = (
+        f"item{'s' if len(returns.landings) > 1 else ''} {', '.join(str(landing.item) for landing in returns.landings)}"
+    )
     match returns.autoland, bool(returns.landings):
         case 0, True:
-            text = f"{stays}; with DO_LAND_START in the mission ArduPlane does not arm so"
+            text = f"{stays_text}; with DO_LAND_START in the mission ArduPlane does not arm so"
         case ((1 | 2), False):
-            text = f"the mission has no DO_LAND_START: {stays}"
+            text = f"the mission has no DO_LAND_START: {stays_text}"
         case 1, True:
-            text = f"from its circle a return goes on to the landing sequence at {where}"
+            text = f"from its circle a return goes on to the landing sequence at {items_text}"
         case 2, True:
-            text = f"a return flies straight to the landing sequence at {where}"
+            text = f"a return flies straight to the landing sequence at {items_text}"
         case 3, _:
-            text = f"the landing sequence is for go-arounds only: {stays}"
+            text = f"the landing sequence is for go-arounds only: {stays_text}"
         case 4, _:
             text = "a return goes by the mission's return path, where it has one"
         case _:
-            text = stays
+            text = stays_text
     lines = [f"RTL_AUTOLAND {returns.autoland}: {text}"]
     if returns.landings:
         lines.append("within the landing sequence a lost transmitter or station changes nothing")
     return lines
 
 
-def range_text(found: ReturnRange, returns: Returns, scenario: Scenario) -> str:
+def range_text(return_range: ReturnRange, returns: Returns, scenario: Scenario) -> str:
     """Describe a time range: destination and outcome of its returns, and its worst return."""
-    one = found.worst
-    when = f"{found.first:.0f} s" if found.count == 1 else f"{found.first:.0f} to {found.last:.0f} s"
-    reason = f" ({one.target.reason})" if one.target.reason else ""
-    return f"{when}: to {one.target.name}{reason}: {_range_outcome_text(one, found, returns, scenario)}"
+    worst = return_range.worst
+    when = (
+        f"{return_range.first:.0f} s"
+        if return_range.count == 1
+        else f"{return_range.first:.0f} to {return_range.last:.0f} s"
+    )
+    reason = f" ({worst.target.reason})" if worst.target.reason else ""
+    return f"{when}: to {worst.target.name}{reason}: {_range_outcome_text(worst, return_range, returns, scenario)}"
 
 
-def _range_outcome_text(one: ReturnFlown, found: ReturnRange, returns: Returns, scenario: Scenario) -> str:
-    worst = "" if found.count == 1 else f"at worst from {one.time:.0f} s, "
-    east, north, up = one.clearance_at
+def _range_outcome_text(
+    worst_return: ReturnFlown, return_range: ReturnRange, returns: Returns, scenario: Scenario
+) -> str:
+    prefix = "" if return_range.count == 1 else f"at worst from {worst_return.time:.0f} s, "
+    east, north, up = worst_return.clearance_at
     where = f"{east:.0f} m east, {north:.0f} m north"
-    digits = 1 if abs(one.clearance - returns.limit) < 1.0 else 0
-    low = f"{one.clearance:.{digits}f} m above ground at {where}"
-    match one.kind:
+    digits = 1 if abs(worst_return.clearance - returns.limit) < 1.0 else 0
+    height_text = f"{worst_return.clearance:.{digits}f} m above ground at {where}"
+    match worst_return.kind:
         case "ground":
-            return f"{worst}hits the ground at {where}, {up:.0f} m AMSL"
+            return f"{prefix}hits the ground at {where}, {up:.0f} m AMSL"
         case "threat":
-            return f"{worst}{-one.outside:.0f} m inside the sphere of {scenario.threats.names[one.threat]}"
+            return (
+                f"{prefix}{-worst_return.outside:.0f} m inside the sphere of"
+                f" {scenario.threats.names[worst_return.threat]}"
+            )
         case "zone":
-            return f"{worst}violates zone {returns.airspace.zones[one.zone].name}"
+            return f"{prefix}violates zone {returns.airspace.zones[worst_return.zone].name}"
         case "lost":
-            end = "landing sequence" if one.target.landing is not None else "circle"
-            return f"{worst}does not get to its {end} at {one.target.position[2]:.0f} m AMSL"
+            end = "landing sequence" if worst_return.target.landing is not None else "circle"
+            return f"{prefix}does not get to its {end} at {worst_return.target.position[2]:.0f} m AMSL"
         case "energy":
-            leaves = f"leaves {one.left:.0f} Wh, where {returns.reserve:.0f} Wh are to be left"
-            return f"{worst}takes {one.energy:.0f} Wh and {leaves}"
+            leaves = f"leaves {worst_return.left:.0f} Wh, where {returns.reserve:.0f} Wh are to be left"
+            return f"{prefix}takes {worst_return.energy:.0f} Wh and {leaves}"
         case "unknown":
-            return f"{worst}flies where the elevation is not known"
+            return f"{prefix}flies where the elevation is not known"
         case "unsure":
-            return f"{worst}{low} by the point mass, and JSBSim has it or one like it too far from there"
-    if one.floor < returns.limit:
-        low += " (taking off or landing: it begins lower than the least height)"
-    left = "" if math.isnan(one.left) else f", {one.left:.0f} Wh left"
-    outside = "" if math.isinf(one.outside) else f", {one.outside:.0f} m outside every missile's sphere"
-    return f"{worst}{low} at the least{outside}{left}"
+            return f"{prefix}{height_text} by the point mass, and JSBSim has it or one like it too far from there"
+    if worst_return.floor < returns.limit:
+        height_text += " (taking off or landing: it begins lower than the least height)"
+    energy_text = "" if math.isnan(worst_return.left) else f", {worst_return.left:.0f} Wh left"
+    sphere_text = (
+        "" if math.isinf(worst_return.outside) else f", {worst_return.outside:.0f} m outside every missile's sphere"
+    )
+    return f"{prefix}{height_text} at the least{sphere_text}{energy_text}"
 
 
 def remedy_text(remedy: Remedy, returns: Returns, scenario: Scenario) -> str:
     """Describe a remedy and the outcome of the returns with it."""
-    changed = [f"{name} {value:g}" for name, value in remedy.parameters.items()]
+    changes = [f"{name} {value:g}" for name, value in remedy.parameters.items()]
     if remedy.rally is not None:
-        many = "rally point" if len(remedy.rally) == 1 else "rally points"
-        changed.append(f"{len(remedy.rally)} {many} ({'; '.join(rally_texts(remedy.rally, scenario))})")
-    return f"{' and '.join(changed)}: {headline(returns)}"
+        noun = "rally point" if len(remedy.rally) == 1 else "rally points"
+        changes.append(f"{len(remedy.rally)} {noun} ({'; '.join(rally_texts(remedy.rally, scenario))})")
+    return f"{' and '.join(changes)}: {headline(returns)}"
 
 
 def rally_texts(rally: Sequence[ReturnPlace], scenario: Scenario) -> list[str]:
-    """Return latitude, longitude and height above home of rally points, as a ground station takes them."""
-    out = []
+    """Return latitude, longitude and height above home of rally points, for entry in a ground station."""
+    texts = []
     for point in rally:
         lat, lon = (float(value) for value in to_geo(scenario.origin, point.east, point.north))
-        out.append(f"{lat:.7f}, {lon:.7f}, {point.up - point.base:.0f} m over home")
-    return out
+        texts.append(f"{lat:.7f}, {lon:.7f}, {point.up - point.base:.0f} m over home")
+    return texts

@@ -9,7 +9,7 @@ from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.places import FLIGHT
 from logs.verdict.rule import LogNeeds, Rule
-from logs.verdict.suggestions import stay_inside
+from logs.verdict.suggestions import suggest_staying_inside
 from logs.verdict.tolerances import ROUNDING_M
 from logs.verdict.wording import place_text
 from world.arrays import Floats
@@ -24,29 +24,29 @@ def bounds_findings(
         reason = "the mission came without a scenario, so there is no area to stay in"
         return [make_finding("bounds", FLIGHT, ok=None, reason=reason, unit="m")]
     planned, side, k = _min_distance_inside(requirements, requirements.points)
-    found, at = planned, f"at {place_text(requirements.waypoint(k))}"
+    distance, where_text = planned, f"at {place_text(requirements.waypoint(k))}"
     ok: bool | None = planned >= -ROUNDING_M
     flown_margin = math.nan
     if not geometric and aligned is None:
-        ok, at = None, "nothing was flown"
+        ok, where_text = None, "nothing was flown"
     elif aligned is not None:
-        found, side, k = _min_distance_inside(requirements, aligned.track.position)
-        flown_margin, ok = found, found >= -ROUNDING_M
-        at = f"at {aligned.track.time[k]:.1f} s"
-    where = f"{abs(found):.0f} m {'inside' if found >= 0.0 else 'beyond'} the {side} {at}"
+        distance, side, k = _min_distance_inside(requirements, aligned.track.position)
+        flown_margin, ok = distance, distance >= -ROUNDING_M
+        where_text = f"at {aligned.track.time[k]:.1f} s"
+    where = f"{abs(distance):.0f} m {'inside' if distance >= 0.0 else 'beyond'} the {side} {where_text}"
     return [
         make_finding(
             "bounds",
             FLIGHT,
             ok=ok,
-            reason=where if ok is not None else at,
+            reason=where if ok is not None else where_text,
             planned=planned,
             flown=flown_margin,
             limit=0.0,
             at_least=True,
             source="scenario",
             tolerance=ROUNDING_M,
-            margin=found if ok is not None else None,
+            margin=distance if ok is not None else None,
             unit="m",
             method="least distance inside the box",
         )
@@ -57,7 +57,7 @@ def _min_distance_inside(requirements: RouteRequirements, points: Floats) -> tup
     """Return the minimum distance inside the box, m (negative if outside), its side's name, and the row of `points`."""
     scenario = requirements.setup.scenario
     (west, east), (south, north) = scenario.bounds
-    inside = {
+    distances = {
         "western edge": points[:, 0] - west,
         "eastern edge": east - points[:, 0],
         "southern edge": points[:, 1] - south,
@@ -65,9 +65,9 @@ def _min_distance_inside(requirements: RouteRequirements, points: Floats) -> tup
         "floor": points[:, 2] - scenario.floor,
         "ceiling": scenario.ceiling - points[:, 2],
     }
-    side = min(inside, key=lambda name: float(inside[name].min()))
-    k = int(np.argmin(inside[side]))
-    return float(inside[side][k]), side, k
+    side = min(distances, key=lambda name: float(distances[name].min()))
+    k = int(np.argmin(distances[side]))
+    return float(distances[side][k]), side, k
 
 
 RULE = Rule(
@@ -75,6 +75,6 @@ RULE = Rule(
     tolerances=("ROUNDING_M",),
     judge=bounds_findings,
     whole=True,
-    suggest=stay_inside,
+    suggest=suggest_staying_inside,
     log=LogNeeds(("heights",)),
 )

@@ -12,7 +12,7 @@ from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.places import FLIGHT
 from logs.verdict.rule import LogNeeds, Rule
-from logs.verdict.suggestions import fly_higher
+from logs.verdict.suggestions import suggest_flying_higher
 from logs.verdict.tolerances import (
     BELOW_HOME_M,
     CLEARANCE_TOLERANCE_M,
@@ -29,9 +29,9 @@ def clearance_findings(
     requirements: RouteRequirements, aligned: AlignedTrack | None, *, geometric: bool = False
 ) -> list[Finding]:
     """Judge the minimum height above ground on each leg."""
-    ground = requirements.setup.scenario.terrain
+    terrain = requirements.setup.scenario.terrain
     limit = requirements.limits.min_clearance
-    if ground is None:
+    if terrain is None:
         reason = "no terrain was given, so heights above ground are not known"
         unknown = make_finding(
             "clearance",
@@ -44,20 +44,20 @@ def clearance_findings(
             at_least=True,
         )
         return [unknown, *_below_home_findings(requirements)]
-    near = _fields_by_leg(requirements)
+    fields = _fields_by_leg(requirements)
     legs, points = requirements.path.legs, requirements.path.points
-    low, _ = path_clearance(ground.heights, ground.to_pixel.record, points)
-    out = []
+    heights, _ = path_clearance(terrain.heights, terrain.to_pixel.record, points)
+    findings = []
     for leg in range(requirements.legs):
-        requirement = _Requirement(limit, near.get(leg, ()))
-        of_leg = np.flatnonzero(legs == leg)
-        planned, least = requirement.worst(low[of_leg], points[of_leg])
+        requirement = _Requirement(limit, fields.get(leg, ()))
+        segments = np.flatnonzero(legs == leg)
+        planned, required = requirement.worst(heights[segments], points[segments])
         if geometric:
-            out.append(_planned_clearance(requirements, leg, planned, least, ground.vertical_error))
+            findings.append(_planned_clearance(requirements, leg, planned, required, terrain.vertical_error))
         else:
-            short = planned < least - CLEARANCE_TOLERANCE_M
-            out.append(_flown_clearance(requirements, aligned, leg, planned, requirement, planned_short=short))
-    return [*_home_above_ground_findings(requirements, ground, out), *out]
+            is_short = planned < required - CLEARANCE_TOLERANCE_M
+            findings.append(_flown_clearance(requirements, aligned, leg, planned, requirement, planned_short=is_short))
+    return [*_home_above_ground_findings(requirements, terrain, findings), *findings]
 
 
 def _below_home_findings(requirements: RouteRequirements) -> list[Finding]:
@@ -68,17 +68,19 @@ def _below_home_findings(requirements: RouteRequirements) -> list[Finding]:
     home = requirements.setup.mission.home
     if home is None:
         return []
-    below = home.alt - requirements.points[:, 2]
-    k = int(np.argmax(below))
-    if not float(below[k]) > BELOW_HOME_M:
+    depths = home.alt - requirements.points[:, 2]
+    k = int(np.argmax(depths))
+    if not float(depths[k]) > BELOW_HOME_M:
         return []
-    brief = f"waypoint {k} is {float(below[k]):.0f} m below home ({home.alt:.0f} m AMSL)"
+    brief = f"waypoint {k} is {float(depths[k]):.0f} m below home ({home.alt:.0f} m AMSL)"
     fault = message(brief, ", and no terrain says that the ground there is as low: --terrain names an elevation file")
     place = requirements.waypoint(k)
     return [make_finding("clearance", place, ok=None, reason=fault.text, faults=[fault], check=GROUND_WAY)]
 
 
-def _home_above_ground_findings(requirements: RouteRequirements, ground: Terrain, legs: list[Finding]) -> list[Finding]:
+def _home_above_ground_findings(
+    requirements: RouteRequirements, terrain: Terrain, legs: list[Finding]
+) -> list[Finding]:
     """Report a route with heights above home as undecided if it becomes too low once home is on the ground.
 
     An autopilot sets home on the ground when it is armed there.
@@ -90,14 +92,16 @@ def _home_above_ground_findings(requirements: RouteRequirements, ground: Terrain
     if home is None or setup.plan is not None or not any(item.frame in OVER_HOME for item in setup.mission.items):
         return []
     east, north = to_map(setup.scenario.origin, home.lat_deg, home.lon_deg)
-    above = home.alt - float(ground.height(float(east), float(north)))
+    height = home.alt - float(terrain.height(float(east), float(north)))
     # NaN, where the terrain does not reach, decides nothing.
-    if not above > HOME_ERROR_M or not any(one.margin is not None and 0.0 <= one.margin < above for one in legs):
+    if not height > HOME_ERROR_M or not any(
+        finding.margin is not None and 0.0 <= finding.margin < height for finding in legs
+    ):
         return []
-    least = min(one.margin + (one.limit or 0.0) for one in legs if one.margin is not None) - above
-    brief = f"the mission's home is {above:.0f} m above the ground there"
-    more = f": armed on that ground, an autopilot flies as much lower, down to {least:.0f} m above ground"
-    fault = message(brief, more)
+    min_height = min(finding.margin + (finding.limit or 0.0) for finding in legs if finding.margin is not None) - height
+    brief = f"the mission's home is {height:.0f} m above the ground there"
+    rest = f": armed on that ground, an autopilot flies as much lower, down to {min_height:.0f} m above ground"
+    fault = message(brief, rest)
     return [make_finding("clearance", FLIGHT, ok=None, reason=fault.text, faults=[fault], check=GROUND_WAY)]
 
 
@@ -115,54 +119,54 @@ class _Requirement(NamedTuple):
         """Return the required height above ground at points (n, 3), (n,) m."""
         requirement = np.full(len(points), self.limit)
         for east, north in self.fields:
-            away = np.hypot(points[:, 0] - east, points[:, 1] - north)
-            requirement[away <= FIELD_RADIUS_M] = min(self.limit, GROUND_LEG_CLEARANCE_M)
+            distances = np.hypot(points[:, 0] - east, points[:, 1] - north)
+            requirement[distances <= FIELD_RADIUS_M] = min(self.limit, GROUND_LEG_CLEARANCE_M)
         return requirement
 
-    def worst(self, low: Floats, points: Floats) -> tuple[float, float]:
+    def worst(self, heights: Floats, points: Floats) -> tuple[float, float]:
         """Return the height above ground with the smallest margin, and the required height there, m.
 
-        low: heights above ground at `points` (n, 3), m, (n,).
+        heights: heights above ground at `points` (n, 3), m, (n,).
 
-        The returned height is NaN if any height is unknown, or if `low` is empty.
+        The returned height is NaN if any height is unknown, or if `heights` is empty.
         """
-        if not low.size or np.isnan(low).any():
+        if not heights.size or np.isnan(heights).any():
             return math.nan, self.limit
-        k, requirement = self.least(low, points)
-        return float(low[k]), requirement
+        k, requirement = self.smallest_margin(heights, points)
+        return float(heights[k]), requirement
 
-    def least(self, low: Floats, points: Floats) -> tuple[int, float]:
+    def smallest_margin(self, heights: Floats, points: Floats) -> tuple[int, float]:
         """Return the index of the known height with the smallest margin, and the required height there, m."""
         if not self.fields:
-            return int(np.nanargmin(low)), self.limit
+            return int(np.nanargmin(heights)), self.limit
         requirement = self.of(points)
-        k = int(np.nanargmin(low - requirement))
+        k = int(np.nanargmin(heights - requirement))
         return k, float(requirement[k])
 
 
 def _fields_by_leg(requirements: RouteRequirements) -> dict[int, tuple[tuple[float, float], ...]]:
-    """Return the places (east, north), m, near which a leg needs less height above ground, by leg number.
+    """Return the places (east, north), m, near which each leg needs less height above ground, by leg number.
 
     The leg after a flown take-off has the home, and the legs before a flown landing have the landing point.  The legs
-    before a landing begin at DO_LAND_START, or are the last two legs if the mission has none.  Only the legs after the
-    last waypoint that meets the limit on height above ground count, and the final in any case.
+    before a landing begin at DO_LAND_START, or are the last two legs if the mission has none.  Of these, only the final
+    and the legs after the last waypoint that meets the limit on height above ground are included.
     """
     setup, ground = requirements.setup, requirements.ground
     ways = setup.ground_ways if ground is None else ground.ways
-    near: dict[int, tuple[tuple[float, float], ...]] = {}
+    fields: dict[int, tuple[tuple[float, float], ...]] = {}
     if ways.take_off is not None:
-        near[ways.take_off.waypoint] = ((float(ways.take_off.home[0]), float(ways.take_off.home[1])),)
+        fields[ways.take_off.waypoint] = ((float(ways.take_off.home[0]), float(ways.take_off.home[1])),)
     if ways.approach is not None:
         starts = [item.seq for item in setup.mission.items if item.command == Command.DO_LAND_START]
         sequence_start = max((seq for seq in starts if seq < ways.approach.item), default=None)
         first = max(0, ways.approach.leg - 1)
         if sequence_start is not None:
-            after = np.flatnonzero(setup.route.items > sequence_start)
-            first = max(0, int(after[0]) - 1) if after.size else first
+            later_waypoints = np.flatnonzero(setup.route.items > sequence_start)
+            first = max(0, int(later_waypoints[0]) - 1) if later_waypoints.size else first
         point = (float(ways.approach.point[0]), float(ways.approach.point[1]))
         for leg in range(max(first, _last_clear_waypoint(requirements, ways.approach.leg)), ways.approach.leg + 1):
-            near[leg] = (*near.get(leg, ()), point)
-    return near
+            fields[leg] = (*fields.get(leg, ()), point)
+    return fields
 
 
 def _last_clear_waypoint(requirements: RouteRequirements, final: int) -> int:
@@ -173,9 +177,9 @@ def _last_clear_waypoint(requirements: RouteRequirements, final: int) -> int:
     terrain, waypoints = requirements.setup.scenario.terrain, requirements.setup.route.waypoints[: final + 1]
     if terrain is None:
         return final
-    over = waypoints[:, 2] - terrain.height(waypoints[:, 0], waypoints[:, 1])
-    high = np.flatnonzero(over >= requirements.limits.min_clearance - CLEARANCE_TOLERANCE_M)
-    return int(high[-1]) if high.size else final
+    heights = waypoints[:, 2] - terrain.height(waypoints[:, 0], waypoints[:, 1])
+    clear_waypoints = np.flatnonzero(heights >= requirements.limits.min_clearance - CLEARANCE_TOLERANCE_M)
+    return int(clear_waypoints[-1]) if clear_waypoints.size else final
 
 
 def _source(requirements: RouteRequirements, limit: float) -> str:
@@ -187,8 +191,10 @@ def _terrain_error_text(clearance: float, limit: float, error: float | None) -> 
     """Describe a clearance (m) reduced by the terrain's stated error; return "" if no error is stated."""
     if error is None or math.isnan(clearance):
         return ""
-    short = f", less than the {limit:.0f} m required" if limit - CLEARANCE_TOLERANCE_M > clearance - error else ""
-    return f"; {clearance - error:.1f} m less the terrain's stated error of {error:g} m{short}"
+    shortfall_text = (
+        f", less than the {limit:.0f} m required" if limit - CLEARANCE_TOLERANCE_M > clearance - error else ""
+    )
+    return f"; {clearance - error:.1f} m less the terrain's stated error of {error:g} m{shortfall_text}"
 
 
 def _planned_clearance(
@@ -224,28 +230,33 @@ def _flown_clearance(
     *,
     planned_short: bool,
 ) -> Finding:
-    least, ok, reason, limit = math.nan, None, "the leg was not flown", requirement.limit
+    min_clearance, ok, reason, limit = math.nan, None, "the leg was not flown", requirement.limit
     if aligned is not None and aligned.flew(leg):
         # The first leg includes what came before it, the last leg what came after.
         first = 0 if leg == 0 else int(aligned.rows[leg])
         last = len(aligned.track) - 1 if leg + 1 == requirements.legs else int(aligned.rows[leg + 1])
-        span = aligned.low[first:last]
-        known = np.isfinite(span)
-        if known.any():
-            row, limit = requirement.least(span, np.asarray(aligned.track.position[first:last], dtype=np.float64))
+        clearances = aligned.clearance[first:last]
+        is_known = np.isfinite(clearances)
+        if is_known.any():
+            row, limit = requirement.smallest_margin(
+                clearances, np.asarray(aligned.track.position[first:last], dtype=np.float64)
+            )
             k = first + row
-            least = float(aligned.low[k])
-            reason = f"{least:.1f} m above ground {_when_and_where(aligned, k, float(aligned.low_at[k]))}"
-            ok = least >= limit - CLEARANCE_TOLERANCE_M
-        if not known.all():
-            k = first + int(np.argmin(known))
-            off = f"off the known terrain {_when_and_where(aligned, k, 0.0)}"
-            reason = off if math.isnan(least) else f"{reason}; {off}"
+            min_clearance = float(aligned.clearance[k])
+            reason = (
+                f"{min_clearance:.1f} m above ground"
+                f" {_time_and_place_text(aligned, k, float(aligned.clearance_fraction[k]))}"
+            )
+            ok = min_clearance >= limit - CLEARANCE_TOLERANCE_M
+        if not is_known.all():
+            k = first + int(np.argmin(is_known))
+            off_text = f"off the known terrain {_time_and_place_text(aligned, k, 0.0)}"
+            reason = off_text if math.isnan(min_clearance) else f"{reason}; {off_text}"
             ok = None if ok is not False else False
         if ok is False:
             reason += f"; {limit:.0f} m are required"
         ground = requirements.setup.scenario.terrain
-        reason += _terrain_error_text(least, limit, None if ground is None else ground.vertical_error)
+        reason += _terrain_error_text(min_clearance, limit, None if ground is None else ground.vertical_error)
     if planned_short:
         reason += f"; the planned path comes down to {planned:.1f} m"
     return make_finding(
@@ -254,18 +265,18 @@ def _flown_clearance(
         ok=ok,
         reason=reason,
         planned=planned,
-        flown=least,
+        flown=min_clearance,
         limit=limit,
         at_least=True,
         source=_source(requirements, limit),
         tolerance=CLEARANCE_TOLERANCE_M,
-        margin=least - limit,
+        margin=min_clearance - limit,
         unit="m",
         method="exact along the flown track",
     )
 
 
-def _when_and_where(aligned: AlignedTrack, k: int, fraction: float) -> str:
+def _time_and_place_text(aligned: AlignedTrack, k: int, fraction: float) -> str:
     """Describe when and where the aircraft was at a fraction of track segment `k`."""
     time = aligned.track.time
     return f"at {time[k] + fraction * (time[k + 1] - time[k]):.1f} s, {aligned.where(k, fraction)}"
@@ -275,6 +286,6 @@ RULE = Rule(
     name="clearance",
     tolerances=("BELOW_HOME_M", "CLEARANCE_TOLERANCE_M", "GROUND_LEG_CLEARANCE_M", "HOME_ERROR_M", "FIELD_RADIUS_M"),
     judge=clearance_findings,
-    suggest=fly_higher,
+    suggest=suggest_flying_higher,
     log=LogNeeds(("heights",)),
 )

@@ -1,4 +1,4 @@
-"""The completion rule: judge if a flight was planned feasibly, flown to its end and recorded completely."""
+"""The completion rule: judge if a feasible plan was flown to its end and recorded completely."""
 
 from collections.abc import Iterable, Sequence
 
@@ -19,7 +19,7 @@ from logs.verdict.wording import place_text_within
 def completion_findings(
     requirements: RouteRequirements, aligned: AlignedTrack | None, ended: str, log_complete: bool
 ) -> list[Finding]:
-    """Judge if a flight was planned feasibly, flown to the last waypoint, and recorded completely and consistently."""
+    """Judge if a feasible plan was flown to its last waypoint, and recorded completely and consistently."""
     plan = requirements.setup.plan
     faults = []
     if plan is not None and not plan.feasible:
@@ -28,18 +28,18 @@ def completion_findings(
         faults.append(message(f"the flight ended early: {ended}", _ending_place_text(requirements, aligned)))
     if not log_complete:
         faults.append(message("the log is damaged or unfinished"))
-    legs, numbers = 0, requirements.setup.route.leg_numbers
-    every = len(set(numbers.tolist()))
+    flown_count, numbers = 0, requirements.setup.route.leg_numbers
+    leg_count = len(set(numbers.tolist()))
     if aligned is None:
         faults.append(message("the track has fewer than two usable rows"))
     else:
         # A leg whose loiter was not flown to its end was not flown.
-        legs = every - len(set(numbers[~aligned.passed[1:]].tolist()))
-        if legs < every:
-            faults.append(message(f"{legs} of {every} legs flown"))
+        flown_count = leg_count - len(set(numbers[~aligned.passed[1:]].tolist()))
+        if flown_count < leg_count:
+            faults.append(message(f"{flown_count} of {leg_count} legs flown"))
         faults += _record_faults(aligned)
     notes = "; ".join(requirements.setup.route.notes)
-    reason = reason_of(faults) if faults else f"all {every} legs flown"
+    reason = reason_of(faults) if faults else f"all {leg_count} legs flown"
     return [
         make_finding(
             "completion",
@@ -47,13 +47,13 @@ def completion_findings(
             ok=not faults,
             reason=reason + (f" (not flown as written: {notes})" if notes else ""),
             faults=faults,
-            planned=every,
-            flown=legs,
-            limit=every,
+            planned=leg_count,
+            flown=flown_count,
+            limit=leg_count,
             at_least=True,
             source="route",
             tolerance=0.0,
-            margin=legs - every,
+            margin=flown_count - leg_count,
             unit="legs",
             method="waypoints passed in order",
         )
@@ -69,21 +69,21 @@ def _ending_place_text(requirements: RouteRequirements, aligned: AlignedTrack | 
 
 
 def _record_faults(aligned: AlignedTrack) -> list[Message]:
-    """Return faults for pauses in the record, and for contradictions between position and velocity."""
-    track, out = aligned.track, []
-    step = np.diff(track.time)
-    gap = int(np.argmax(step))
-    if step[gap] > max(MAX_ROW_GAP_S, MAX_ROW_GAP_TICKS * float(np.median(step))):
-        out.append(message(f"rows are missing from {track.time[gap]:.1f} s to {track.time[gap + 1]:.1f} s"))
+    """Return faults for gaps in the record, and for contradictions between position and velocity."""
+    track, faults = aligned.track, []
+    steps = np.diff(track.time)
+    gap = int(np.argmax(steps))
+    if steps[gap] > max(MAX_ROW_GAP_S, MAX_ROW_GAP_TICKS * float(np.median(steps))):
+        faults.append(message(f"rows are missing from {track.time[gap]:.1f} s to {track.time[gap + 1]:.1f} s"))
     # Across missing rows the mean velocity is meaningless.
-    short = step <= MAX_ROW_GAP_S
-    moved = np.diff(track.position, axis=0)[short] / step[short, None]
-    mean = 0.5 * (track.velocity[1:].astype(np.float64) + track.velocity[:-1])[short]
-    off = np.sqrt(((moved - mean) ** 2).sum(axis=1))
-    if off.size and off.max() > MAX_VELOCITY_DISAGREEMENT_MPS:
-        k = int(np.argmax(off))
-        out.append(message(f"position and velocity contradict each other at {track.time[:-1][short][k]:.2f} s"))
-    return out
+    is_short = steps <= MAX_ROW_GAP_S
+    mean_velocity = np.diff(track.position, axis=0)[is_short] / steps[is_short, None]
+    recorded_velocity = 0.5 * (track.velocity[1:].astype(np.float64) + track.velocity[:-1])[is_short]
+    differences = np.sqrt(((mean_velocity - recorded_velocity) ** 2).sum(axis=1))
+    if differences.size and differences.max() > MAX_VELOCITY_DISAGREEMENT_MPS:
+        k = int(np.argmax(differences))
+        faults.append(message(f"position and velocity contradict each other at {track.time[:-1][is_short][k]:.2f} s"))
+    return faults
 
 
 # Name of the mode that flies a return to launch.
@@ -91,78 +91,89 @@ _RETURN_MODE = "RTL"
 
 
 def imported_completion(setup: FlightSetup, flown: Sequence[FlownLegs], log_complete: bool) -> Finding:
-    """Judge how much of the mission the log shows; a log that ends en route leaves the other legs undecided."""
-    last_leg, faults, unknown, known = setup.route.legs - 1, [], [], []
-    done = {leg for one in flown for leg in range(one.first, one.last - one.partial)}
-    every = len(set(setup.route.leg_numbers.tolist()))
-    finished = every - len(_leg_numbers(setup, set(range(setup.route.legs)) - done))
+    """Judge the part of the mission that the log shows; a log that ends en route leaves the other legs undecided."""
+    last_leg, faults, unknown_texts, notes = setup.route.legs - 1, [], [], []
+    flown_legs = {
+        leg for stretch_legs in flown for leg in range(stretch_legs.first, stretch_legs.last - stretch_legs.partial)
+    }
+    leg_count = len(set(setup.route.leg_numbers.tolist()))
+    finished_count = leg_count - len(_leg_numbers(setup, set(range(setup.route.legs)) - flown_legs))
     missing = None if setup.source is None else setup.source.missing
     if not log_complete:
         faults.append(message("the log is damaged or unfinished"))
     if not flown:
         stretches = () if setup.source is None else setup.source.stretches
-        why = "none of the mission's legs was flown" if stretches else "no stretch of it followed the mission"
+        reason = "none of the mission's legs was flown" if stretches else "no stretch of it followed the mission"
         # The flight may have included legs that the log does not hold.
         if missing is not None and stretches:
-            unknown.append(f"none of the legs that the log holds was flown: {_absent_text(missing)}")
+            unknown_texts.append(f"none of the legs that the log holds was flown: {_absent_text(missing)}")
         else:
-            faults.append(message(why))
-    elif last_leg in done and missing is not None and missing.beyond:
-        unknown.append(
-            f"{finished} of {every} legs flown that the log holds, the last of them to its end: {_absent_text(missing)}"
+            faults.append(message(reason))
+    elif last_leg in flown_legs and missing is not None and missing.beyond:
+        unknown_texts.append(
+            f"{finished_count} of {leg_count} legs flown that the log holds, the last of them to its end:"
+            f" {_absent_text(missing)}"
         )
-    elif last_leg in done:
-        counted = f"{finished} of {every} legs flown, the last of them to its end"
-        absent, doubts = _unflown_legs(setup, flown, done)
+    elif last_leg in flown_legs:
+        last_leg_text = f"{finished_count} of {leg_count} legs flown, the last of them to its end"
+        unflown, doubt_texts = _unflown_legs(setup, flown, flown_legs)
         faults += (
-            [message(f"{_legs_text(setup, absent)} not flown along the mission", f": {counted}")] if absent else []
+            [message(f"{_legs_text(setup, unflown)} not flown along the mission", f": {last_leg_text}")]
+            if unflown
+            else []
         )
-        unknown += [f"{'; '.join(doubts)}: {counted}"] if doubts else []
-        known += [] if absent or doubts else [counted]
+        unknown_texts += [f"{'; '.join(doubt_texts)}: {last_leg_text}"] if doubt_texts else []
+        notes += [] if unflown or doubt_texts else [last_leg_text]
     else:
-        last = flown[-1]
-        what = f"{finished} of {every} legs flown"
-        ending = f"{stretch_end_text(last.stretch)}, on the way to {_next_waypoint_text(setup, last)}"
-        if _ends_in_return(setup, last):
-            known.append(f"{what}, and the return that the mission ends with begun at {last.stretch.end:.1f} s")
-        elif last.stretch.ended == "log":
-            unknown.append(f"{ending}: {what}")
+        last_stretch = flown[-1]
+        count_text = f"{finished_count} of {leg_count} legs flown"
+        ending = f"{stretch_end_text(last_stretch.stretch)}, on the way to {_next_waypoint_text(setup, last_stretch)}"
+        if _ends_in_return(setup, last_stretch):
+            notes.append(
+                f"{count_text}, and the return that the mission ends with begun at {last_stretch.stretch.end:.1f} s"
+            )
+        elif last_stretch.stretch.ended == "log":
+            unknown_texts.append(f"{ending}: {count_text}")
         else:
-            faults.append(message(ending, f": {what}"))
-    unknown += [f"the way to item {stop.item} is not judged: it is not laid out" for stop in setup.route.unjoined]
-    known += _gaps_text(flown)
+            faults.append(message(ending, f": {count_text}"))
+    unknown_texts += [f"the way to item {stop.item} is not judged: it is not laid out" for stop in setup.route.unjoined]
+    notes += _gaps_text(flown)
     return make_finding(
         "completion",
         FLIGHT,
-        ok=False if faults else None if unknown else True,
-        reason=reason_of(faults, [*unknown, *known]),
+        ok=False if faults else None if unknown_texts else True,
+        reason=reason_of(faults, [*unknown_texts, *notes]),
         faults=faults,
-        planned=every,
-        flown=finished,
-        limit=every,
+        planned=leg_count,
+        flown=finished_count,
+        limit=leg_count,
         at_least=True,
         source="route",
         tolerance=0.0,
-        margin=finished - every,
+        margin=finished_count - leg_count,
         unit="legs",
         method="waypoints passed in order, in the stretches that followed the mission",
     )
 
 
-def _unflown_legs(setup: FlightSetup, flown: Sequence[FlownLegs], done: set[int]) -> tuple[list[int], list[str]]:
+def _unflown_legs(setup: FlightSetup, flown: Sequence[FlownLegs], flown_legs: set[int]) -> tuple[list[int], list[str]]:
     """Return the legs that no stretch flew, and a text for each group of legs that the log may not show completely."""
-    absent = [leg for leg in range(setup.route.legs) if leg not in done]
-    unseen = setup.source is not None and setup.source.begins_in_flight
-    before = [leg for leg in absent if unseen and leg < flown[0].first]
-    started = [leg for leg in absent if leg not in before and any(one.partial and one.last - 1 == leg for one in flown)]
-    doubts = [f"the log begins in flight, and {_legs_text(setup, before)} not in it"] if before else []
-    doubts += [f"{_legs_text(setup, started)} flown along the mission in part"] if started else []
-    return [leg for leg in absent if leg not in before and leg not in started], doubts
+    unflown = [leg for leg in range(setup.route.legs) if leg not in flown_legs]
+    begins_in_flight = setup.source is not None and setup.source.begins_in_flight
+    unseen = [leg for leg in unflown if begins_in_flight and leg < flown[0].first]
+    partly_flown = [
+        leg
+        for leg in unflown
+        if leg not in unseen and any(stretch_legs.partial and stretch_legs.last - 1 == leg for stretch_legs in flown)
+    ]
+    doubts = [f"the log begins in flight, and {_legs_text(setup, unseen)} not in it"] if unseen else []
+    doubts += [f"{_legs_text(setup, partly_flown)} flown along the mission in part"] if partly_flown else []
+    return [leg for leg in unflown if leg not in unseen and leg not in partly_flown], doubts
 
 
 def _gaps_text(flown: Sequence[FlownLegs]) -> list[str]:
     """Describe the gaps between the rows of the judged stretches in one line; return [] without gaps."""
-    gaps = [gap for one in flown for gap in gaps_between(one, one.stretch.start, one.stretch.end)]
+    gaps = [gap for legs in flown for gap in gaps_between(legs, legs.stretch.start, legs.stretch.end)]
     if not gaps:
         return []
     longest = max(gaps, key=lambda gap: gap.end - gap.start)
@@ -183,9 +194,9 @@ def _legs_text(setup: FlightSetup, legs: Iterable[int]) -> str:
     first, last = numbers[0], numbers[-1]
     if first == last:
         return f"leg {first} is"
-    unbroken = last - first + 1 == len(numbers)
-    several = f"legs {first} to {last}" if unbroken else f"{len(numbers)} legs from {first} to {last}"
-    return f"{several} are"
+    is_unbroken = last - first + 1 == len(numbers)
+    plural_text = f"legs {first} to {last}" if is_unbroken else f"{len(numbers)} legs from {first} to {last}"
+    return f"{plural_text} are"
 
 
 def _absent_text(missing: MissingItems) -> str:
@@ -195,7 +206,7 @@ def _absent_text(missing: MissingItems) -> str:
 def _ends_in_return(setup: FlightSetup, legs: FlownLegs) -> bool:
     """Return True if a stretch ended in the return mode and the mission's next item is that return."""
     item = int(setup.route.items[_next_waypoint(setup, legs)])
-    commands = {one.seq: one.command for one in setup.mission.items}
+    commands = {mission_item.seq: mission_item.command for mission_item in setup.mission.items}
     return legs.stretch.next_mode == _RETURN_MODE and commands.get(item) == Command.NAV_RETURN_TO_LAUNCH
 
 
@@ -205,9 +216,9 @@ def _next_waypoint(setup: FlightSetup, legs: FlownLegs) -> int:
 
 
 def _next_waypoint_text(setup: FlightSetup, legs: FlownLegs) -> str:
-    ahead = _next_waypoint(setup, legs)
-    item = int(setup.route.items[ahead])
-    return f"waypoint {setup.route.stops[ahead]}" + (f" (item {item})" if item >= 0 else "")
+    waypoint = _next_waypoint(setup, legs)
+    item = int(setup.route.items[waypoint])
+    return f"waypoint {setup.route.stops[waypoint]}" + (f" (item {item})" if item >= 0 else "")
 
 
 RULE = Rule(

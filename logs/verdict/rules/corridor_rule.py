@@ -15,17 +15,17 @@ from logs.verdict.tolerances import ROUNDING_M, RUNWAY_COURSE_TOLERANCE_RAD
 def corridor_findings(
     requirements: RouteRequirements, aligned: AlignedTrack | None, *, geometric: bool = False
 ) -> list[Finding]:
-    """Judge how far the flight of each leg, or its planned turns (``geometric``), deviates from the legs.
+    """Judge the distance from the legs of each leg's flight, or of its planned turns (``geometric``).
 
     In a survey, and on the legs that lead to the survey and away from it, only an explicitly stated corridor applies,
     because the survey rule judges the distance from the photo lines, and the autopilot chooses its turns onto the first
     line and off the last line.
     """
-    stated = requirements.setup.scenario.limits.corridor_m is not None
+    is_stated = requirements.setup.scenario.limits.corridor_m is not None
     return [
         _leg_finding(requirements, aligned, leg, geometric)
         for leg in range(requirements.legs)
-        if stated or not any(one.has_leg(leg) for one in requirements.surveys)
+        if is_stated or not any(survey.has_leg(leg) for survey in requirements.surveys)
     ]
 
 
@@ -42,10 +42,10 @@ def _leg_finding(requirements: RouteRequirements, aligned: AlignedTrack | None, 
         facts.append("the leg was not flown")
     else:
         rows = _rows_after_takeoff(requirements, aligned, leg, limit)
-        near = slice(max(0, leg - 1), min(requirements.legs, leg + 2) + 1)
-        flown, row = farthest_from_legs(aligned.track.position[rows], requirements.points[near])
+        nearby_legs = slice(max(0, leg - 1), min(requirements.legs, leg + 2) + 1)
+        flown, row = farthest_from_legs(aligned.track.position[rows], requirements.points[nearby_legs])
         ok = flown <= limit
-        where = _when_and_where(aligned, rows.start + row)
+        where = _time_and_place_text(aligned, rows.start + row)
         facts.append(f"within {flown:.1f} m of the legs, the farthest {where}")
         if not ok:
             faults.append(message(f"{flown:.0f} m off the legs {where}", f"; the corridor is {limit:.0f} m"))
@@ -75,13 +75,13 @@ def _rows_after_takeoff(requirements: RouteRequirements, aligned: AlignedTrack, 
     rows, ground = aligned.leg_rows(leg), requirements.ground
     if ground is None or ground.ways.take_off is None or ground.ways.take_off.waypoint != leg:
         return rows
-    off = np.abs(np.sin(0.5 * (aligned.course[rows] - requirements.courses[leg])))
-    aside = along_across(requirements, leg, np.asarray(aligned.track.position[rows], dtype=np.float64))[1]
-    on_course = (off < math.sin(0.5 * RUNWAY_COURSE_TOLERANCE_RAD)) & (np.abs(aside) <= limit)
-    return slice(rows.start + int(np.argmax(on_course)), rows.stop) if on_course.any() else rows
+    course_error = np.abs(np.sin(0.5 * (aligned.course[rows] - requirements.courses[leg])))
+    lateral_offset = along_across(requirements, leg, np.asarray(aligned.track.position[rows], dtype=np.float64))[1]
+    has_joined = (course_error < math.sin(0.5 * RUNWAY_COURSE_TOLERANCE_RAD)) & (np.abs(lateral_offset) <= limit)
+    return slice(rows.start + int(np.argmax(has_joined)), rows.stop) if has_joined.any() else rows
 
 
-def _when_and_where(aligned: AlignedTrack, row: int) -> str:
+def _time_and_place_text(aligned: AlignedTrack, row: int) -> str:
     east, north, _ = aligned.track.position[row]
     return f"at {aligned.track.time[row]:.1f} s, east {east:.0f} m, north {north:.0f} m"
 

@@ -8,7 +8,7 @@ from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.places import FLIGHT
 from logs.verdict.rule import LogNeeds, Rule
-from logs.verdict.suggestions import use_less_energy
+from logs.verdict.suggestions import suggest_using_less_energy
 from logs.verdict.tolerances import ENERGY_RESERVE_FRACTION, UNDECIDED_FRACTION
 
 
@@ -18,13 +18,13 @@ def energy_findings(
     """Compare the energy used with the battery's energy without its reserve.
 
     An endless jump exceeds any battery.  A guessed battery is not judged.  If the aircraft's power is uncertain, energy
-    that is not certainly within the limit is undecided, except in an imported log, which contains measured energy.
+    that may exceed the limit is undecided, except in an imported log, which contains measured energy.
     """
     setup = requirements.setup
     usable = (1.0 - ENERGY_RESERVE_FRACTION) * setup.battery
     predicted, peak = predicted_energy(requirements)
     faults = [_endless_jump_message(requirements, usable)] if setup.route.endless >= 0 else []
-    guessed = setup.envelope.battery_guessed and setup.scenario.flight.battery_wh is None
+    is_guessed = setup.envelope.battery_guessed and setup.scenario.flight.battery_wh is None
     used, current = predicted, peak
     if not geometric:
         # The energy of a flown take-off and landing is included.
@@ -33,9 +33,9 @@ def energy_findings(
             track = requirements.ground.track
         used = math.nan if track is None else float(track.energy.max())
         current = math.nan if track is None else float(track.current.max())
-    measured = setup.source is not None and not geometric
-    most = used * (1.0 + (0.0 if measured else UNDECIDED_FRACTION * setup.envelope.power_sd))
-    doubt = not faults and not guessed and used <= usable < most
+    is_measured = setup.source is not None and not geometric
+    max_used = used * (1.0 + (0.0 if is_measured else UNDECIDED_FRACTION * setup.envelope.power_sd))
+    is_uncertain = not faults and not is_guessed and used <= usable < max_used
     if used == 0.0 and predicted == 0.0:
         # A model without a reading of power reads as 0 W.
         used, predicted = math.nan, math.nan
@@ -46,11 +46,11 @@ def energy_findings(
         reason = _used_text(requirements, used, current) + (" by prediction" if geometric else "")
         if not geometric and math.isfinite(predicted):
             reason += f"; {predicted:.1f} Wh by prediction"
-        if guessed:
+        if is_guessed:
             reason = (
                 f"the battery is guessed: state --battery with the aircraft, or the scenario's battery_wh; {reason}"
             )
-        elif doubt:
+        elif is_uncertain:
             reason += f"; what {setup.envelope.source} says of the power is give or take {setup.envelope.power_sd:.0%}"
         elif used > usable:
             reason += f"; {ENERGY_RESERVE_FRACTION:.0%} are to be left"
@@ -58,7 +58,7 @@ def energy_findings(
         make_finding(
             "energy",
             FLIGHT,
-            ok=False if faults else None if guessed or doubt or math.isnan(used) else used <= usable,
+            ok=False if faults else None if is_guessed or is_uncertain or math.isnan(used) else used <= usable,
             reason=reason_of(faults, [reason]),
             faults=faults,
             planned=predicted,
@@ -66,9 +66,9 @@ def energy_findings(
             limit=usable,
             source="aircraft" if setup.scenario.flight.battery_wh is None else "scenario",
             tolerance=0.0,
-            margin=math.nan if guessed else usable - used,
+            margin=math.nan if is_guessed else usable - used,
             unit="Wh",
-            check=UNKNOWN_AIRCRAFT if doubt else "",
+            check=UNKNOWN_AIRCRAFT if is_uncertain else "",
             method="power of steady flight on each leg over its time" if geometric else "power over time",
         )
     ]
@@ -84,18 +84,19 @@ def _endless_jump_message(requirements: RouteRequirements, usable: float) -> Mes
     # Find where the round that ends the route began: at the item where the route ends.
     while begin > 0 and route.items[begin] != route.items[last]:
         begin -= 1
-    one = sum(leg_energies(requirements)[0][begin:]) if route.items[begin] == route.items[last] else math.nan
-    lasts = f": the energy lasts for {usable / one:.0f} rounds" if one > 0.0 else ""
-    return message(f"the jump of item {route.endless} has no end{lasts}")
+    round_energy = sum(leg_energies(requirements)[0][begin:]) if route.items[begin] == route.items[last] else math.nan
+    duration_text = f": the energy lasts for {usable / round_energy:.0f} rounds" if round_energy > 0.0 else ""
+    return message(f"the jump of item {route.endless} has no end{duration_text}")
 
 
 def _used_text(requirements: RouteRequirements, used: float, current: float) -> str:
     """Describe the energy used (Wh) and the peak current (A), or the fuel used by an aircraft without a battery."""
     capacity = requirements.setup.battery
     if requirements.setup.envelope.power_level.size and not requirements.setup.envelope.volts:
-        share = used / capacity
+        fraction = used / capacity
         return (
-            f"{used:.0f} Wh of {capacity:.0f} Wh of fuel heat used, {share:.1%} of the fuel; no battery, so no current"
+            f"{used:.0f} Wh of {capacity:.0f} Wh of fuel heat used, {fraction:.1%} of the fuel;"
+            " no battery, so no current"
         )
     peak = f", peak current {current:.1f} A" if math.isfinite(current) else ""
     return f"{used:.1f} Wh of {capacity:.0f} Wh used{peak}"
@@ -106,6 +107,6 @@ RULE = Rule(
     tolerances=("ENERGY_RESERVE_FRACTION", "UNDECIDED_FRACTION"),
     judge=energy_findings,
     whole=True,
-    suggest=use_less_energy,
+    suggest=suggest_using_less_energy,
     log=LogNeeds(("battery",), aircraft=True),
 )

@@ -1,4 +1,4 @@
-"""The fence rule: judge how far planned path and flight go into exclusion zones, or out of inclusion zones.
+"""The fence rule: judge the depth of planned path and flight in exclusion zones, or outside inclusion zones.
 
 The zones are those of the scenario and of the mission's own fence.  The rule judges the path's line, including arcs,
 loiters and jumps; it only reports a corridor that reaches into a zone.
@@ -17,7 +17,7 @@ from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.measures.zone_visits import path_zones
 from logs.verdict.places import FLIGHT, MISSION
 from logs.verdict.rule import LogNeeds, Rule
-from logs.verdict.suggestions import pass_zone
+from logs.verdict.suggestions import suggest_passing_zone
 from logs.verdict.tolerances import ROUNDING_M
 from logs.verdict.wording import place_text
 from world.airspace.zone_kernels import ZoneRecords, zone_records
@@ -28,7 +28,7 @@ _METHOD = "every point of each piece, arc and row"
 
 
 def zone_test(setup: FlightSetup) -> Callable[[Zone], bool]:
-    """Return a function that tells if the setup's planned path violates a zone by more than rounding.
+    """Return a function that returns True if the setup's planned path violates a zone by more than rounding.
 
     >>> from logs.recording.example_log import example_log
     >>> from world.airspace.zones import Cylinder
@@ -49,27 +49,27 @@ def fence_findings(
 ) -> list[Finding]:
     """Judge each zone that plan or flight touches, or report that no zone is violated; return [] without zones."""
     airspace = requirements.airspace
-    out = []
+    findings = []
     if airspace.fault:
-        out.append(make_finding("fence", MISSION, ok=None, reason=f"its fence is not judged: {airspace.fault}"))
+        findings.append(make_finding("fence", MISSION, ok=None, reason=f"its fence is not judged: {airspace.fault}"))
     if not airspace.zones:
-        return out
+        return findings
     if not geometric and aligned is None:
-        return [*out, make_finding("fence", FLIGHT, ok=None, reason="nothing was flown", unit="m", method=_METHOD)]
+        return [*findings, make_finding("fence", FLIGHT, ok=None, reason="nothing was flown", unit="m", method=_METHOD)]
     terrain = requirements.setup.scenario.terrain
     if geometric and requirements.zones_on is not None:
-        return out + _findings_on_legs(requirements, *requirements.zones_on)
+        return findings + _findings_on_legs(requirements, *requirements.zones_on)
     planned = path_zones(planned_moves(requirements), airspace.records, terrain)
     flown = None if aligned is None else path_zones(flown_moves(aligned), airspace.records, terrain)
-    sides = [planned] if flown is None else [planned, flown]
-    met = np.any([(side["depth"] > 0.0) | side["unknown"] for side in sides], axis=0)
-    touched = [
-        _zone_finding(requirements, z, planned[z], None if flown is None else flown[z])
-        for z in np.flatnonzero(met).tolist()
+    visits = [planned] if flown is None else [planned, flown]
+    is_touched = np.any([(visit["depth"] > 0.0) | visit["unknown"] for visit in visits], axis=0)
+    zone_findings = [
+        _zone_finding(requirements, zone_number, planned[zone_number], None if flown is None else flown[zone_number])
+        for zone_number in np.flatnonzero(is_touched).tolist()
     ]
-    if not any(item.ok is False for item in touched):
-        touched.insert(0, _compliance_finding(requirements, planned, flown))
-    return out + touched
+    if not any(finding.ok is False for finding in zone_findings):
+        zone_findings.insert(0, _compliance_finding(requirements, planned, flown))
+    return findings + zone_findings
 
 
 def _findings_on_legs(requirements: RouteRequirements, first: int, last: int) -> list[Finding]:
@@ -79,8 +79,8 @@ def _findings_on_legs(requirements: RouteRequirements, first: int, last: int) ->
     numbers = airspace.about(path.points[begin : end + 1])
     records = ZoneRecords(airspace.records.zones[numbers], airspace.records.edges)
     planned = path_zones(planned_moves(requirements, first, last), records, requirements.setup.scenario.terrain)
-    met = np.flatnonzero((planned["depth"] > 0.0) | planned["unknown"])
-    return [_zone_finding(requirements, int(numbers[k]), planned[k], None) for k in met.tolist()]
+    touched = np.flatnonzero((planned["depth"] > 0.0) | planned["unknown"])
+    return [_zone_finding(requirements, int(numbers[k]), planned[k], None) for k in touched.tolist()]
 
 
 def _compliance_finding(requirements: RouteRequirements, planned: Records, flown: Records | None) -> Finding:
@@ -114,21 +114,21 @@ def _compliance_finding(requirements: RouteRequirements, planned: Records, flown
     )
 
 
-def _zone_finding(requirements: RouteRequirements, z: int, planned: Record, flown: Record | None) -> Finding:
+def _zone_finding(requirements: RouteRequirements, zone_number: int, planned: Record, flown: Record | None) -> Finding:
     airspace = requirements.airspace
-    zone = airspace.zones[z]
+    zone = airspace.zones[zone_number]
     visit = planned if flown is None else flown
     ok: bool | None = visit.depth <= ROUNDING_M
     if ok and visit.unknown:
         ok = None
-    side_text, stay = ("inside", "enters it") if zone.kind == "exclusion" else ("outside", "leaves it")
+    side_text, entry_text = ("inside", "enters it") if zone.kind == "exclusion" else ("outside", "leaves it")
     faults, notes = [], []
     if visit.depth > ROUNDING_M:
         faults.append(
             message(
                 f"{visit.depth:.1f} m {side_text}",
                 f" at {_event_text(requirements, visit, 'at')}, for {visit.beyond:.1f} s in all:"
-                f" {stay} at {_event_text(requirements, visit, 'entry')}"
+                f" {entry_text} at {_event_text(requirements, visit, 'entry')}"
                 f" and is back at {_event_text(requirements, visit, 'exit')}"
                 + (f"; {visit.entries} times" if visit.entries > 1 else ""),
             )
@@ -143,14 +143,14 @@ def _zone_finding(requirements: RouteRequirements, z: int, planned: Record, flow
         )
     return make_finding(
         "fence",
-        airspace.place(z),
+        airspace.place(zone_number),
         ok=ok,
         reason=reason_of(faults, notes),
         faults=faults,
         planned=max(0.0, planned.depth),
         flown=None if flown is None else max(0.0, flown.depth),
         limit=0.0,
-        source=_source(requirements, z),
+        source=_source(requirements, zone_number),
         tolerance=ROUNDING_M,
         margin=-visit.depth,
         unit="m",
@@ -168,12 +168,12 @@ def _visit_facts(visit: Record) -> list[Fact]:
     return facts
 
 
-def _source(requirements: RouteRequirements, z: int) -> str:
+def _source(requirements: RouteRequirements, zone_number: int) -> str:
     """Return the name of the source of a zone: "mission", "scenario" or "fence".
 
     Without a scenario, a zone given on the command line has the source "fence".
     """
-    if z >= requirements.airspace.of_scenario:
+    if zone_number >= requirements.airspace.of_scenario:
         return "mission"
     return "fence" if requirements.setup.scenario.external else "scenario"
 
@@ -189,6 +189,6 @@ RULE = Rule(
     name="fence",
     tolerances=("ROUNDING_M",),
     judge=fence_findings,
-    suggest=pass_zone,
+    suggest=suggest_passing_zone,
     log=LogNeeds(("heights",)),
 )

@@ -89,13 +89,13 @@ class _Landing:
     item: MissionItem
     open: str
 
-    def place(self, before: float) -> tuple[float, float, float]:
+    def place(self, distance: float) -> tuple[float, float, float]:
         """Return the glide's east, north and up at a distance (m) before the landing point, m."""
-        low = float(self.point[2])
-        up = low + self.glide.flare_height + self.glide.slope * (before - self.glide.flare_distance)
-        east = float(self.point[0]) - before * math.sin(self.course)
-        north = float(self.point[1]) - before * math.cos(self.course)
-        return east, north, max(low, min(self.high, up))
+        point_altitude = float(self.point[2])
+        altitude = point_altitude + self.glide.flare_height + self.glide.slope * (distance - self.glide.flare_distance)
+        east = float(self.point[0]) - distance * math.sin(self.course)
+        north = float(self.point[1]) - distance * math.cos(self.course)
+        return east, north, max(point_altitude, min(self.high, altitude))
 
 
 class _Aborted(NamedTuple):
@@ -145,15 +145,15 @@ def go_around_findings(
     """
     requirements = requirements if requirements.ground is None else requirements.ground.whole
     setup = requirements.setup
-    returns, ground, home = setup.scenario.returns, setup.scenario.terrain, setup.mission.home
-    required = returns is not None and "go_around" in returns.require
-    found = (
-        landing_item(requirements) if is_laid_out(requirements) and ground is not None and home is not None else None
+    returns, terrain, home = setup.scenario.returns, setup.scenario.terrain, setup.mission.home
+    is_required = returns is not None and "go_around" in returns.require
+    landing_place = (
+        landing_item(requirements) if is_laid_out(requirements) and terrain is not None and home is not None else None
     )
-    landing = None if found is None or ground is None else _landing(requirements, ground, *found)
-    if landing is not None and ground is not None:
-        return [_finding(requirements, ground, landing, required=required)]
-    if not required or setup.source is not None:
+    landing = None if landing_place is None or terrain is None else _landing(requirements, terrain, *landing_place)
+    if landing is not None and terrain is not None:
+        return [_finding(requirements, terrain, landing, is_required=is_required)]
+    if not is_required or setup.source is not None:
         return []
     reason = message(
         "a go-around is not judged", ": that takes the simulated ArduPlane, a home, known ground and a glide to land by"
@@ -161,33 +161,41 @@ def go_around_findings(
     return [make_finding("go_around", FLIGHT, ok=None, reason=reason.text, faults=[reason], check=GROUND_WAY)]
 
 
-def _landing(requirements: RouteRequirements, ground: Terrain, at: int, item: MissionItem) -> _Landing | None:
-    """Return the landing at waypoint `at`, or None if its glide or the height of its go-around is not known."""
-    setup, leg = requirements.setup, at - 1
-    begin, end = requirements.points[leg], requirements.points[at]
+def _landing(requirements: RouteRequirements, terrain: Terrain, waypoint: int, item: MissionItem) -> _Landing | None:
+    """Return the landing at waypoint `waypoint`, or None if its glide or the height of its go-around is not known."""
+    setup, leg = requirements.setup, waypoint - 1
+    glide_start, landing_point = requirements.points[leg], requirements.points[waypoint]
     run, course = float(requirements.runs[leg]), float(requirements.courses[leg])
-    place = home_place(setup.mission, setup.scenario.origin, ground)
-    home = math.nan if place is None else place.up
+    home_position = home_place(setup.mission, setup.scenario.origin, terrain)
+    home_altitude = math.nan if home_position is None else home_position.up
     first, takeoff = first_item(requirements)
-    climbed = 0.0 if takeoff is None else float(requirements.points[first, 2]) - home
-    height = setup.autopilot.go_around_height(item.params[0], climbed)
-    landings = _go_around_destinations(requirements, at)
-    low, under = setup.route.landing_ground, float(ground.height(float(end[0]), float(end[1])))
-    if height is None or math.isnan(home + low + under) or run < MIN_LEG_LENGTH_M or begin[2] <= low:
+    takeoff_climb = 0.0 if takeoff is None else float(requirements.points[first, 2]) - home_altitude
+    height = setup.autopilot.go_around_height(item.params[0], takeoff_climb)
+    landings = _go_around_destinations(requirements, waypoint)
+    ground_altitude, terrain_altitude = (
+        setup.route.landing_ground,
+        float(terrain.height(float(landing_point[0]), float(landing_point[1]))),
+    )
+    if (
+        height is None
+        or math.isnan(home_altitude + ground_altitude + terrain_altitude)
+        or run < MIN_LEG_LENGTH_M
+        or glide_start[2] <= ground_altitude
+    ):
         return None
-    wind = setup.scenario.wind.along(course, low)[0]
-    point = np.array([end[0], end[1], low])
+    wind = setup.scenario.wind.along(course, ground_altitude)[0]
+    point = np.array([landing_point[0], landing_point[1], ground_altitude])
     return _Landing(
-        glide=setup.autopilot.landing_glide(float(begin[2]) - low, run, wind, low),
-        at=at,
+        glide=setup.autopilot.landing_glide(float(glide_start[2]) - ground_altitude, run, wind, ground_altitude),
+        at=waypoint,
         point=point,
-        ground=under,
+        ground=terrain_altitude,
         course=course,
         run=run,
-        high=float(begin[2]),
-        airspeed=setup.autopilot.landing_airspeed(setup.airspeed, wind, low),
+        high=float(glide_start[2]),
+        airspeed=setup.autopilot.landing_airspeed(setup.airspeed, wind, ground_altitude),
         pitch=_CLIMB_PITCH_RAD if takeoff is None else climb_pitch(takeoff),
-        home=home,
+        home=home_altitude,
         height=height,
         landings=landings,
         item=item,
@@ -195,56 +203,63 @@ def _landing(requirements: RouteRequirements, ground: Terrain, at: int, item: Mi
     )
 
 
-def _go_around_destinations(requirements: RouteRequirements, at: int) -> tuple[LandingStart, ...]:
+def _go_around_destinations(requirements: RouteRequirements, waypoint: int) -> tuple[LandingStart, ...]:
     """Return the landing sequences to which a go-around may fly, or else the place before the landing."""
     setup = requirements.setup
     mission, origin, terrain = setup.mission, setup.scenario.origin, setup.scenario.terrain
-    before = int(setup.route.items[at - 1])
-    back = landing_sequence(mission, origin, terrain, before)[:1] if before >= 0 else ()
-    return landing_starts(mission, origin, terrain) or back
+    previous_item = int(setup.route.items[waypoint - 1])
+    previous_place = landing_sequence(mission, origin, terrain, previous_item)[:1] if previous_item >= 0 else ()
+    return landing_starts(mission, origin, terrain) or previous_place
 
 
 def _unknown_path_text(requirements: RouteRequirements, item: MissionItem, landings: tuple[LandingStart, ...]) -> str:
     """Explain why the path of a go-around is not known; return "" if it is known."""
-    after = next((one for one in requirements.setup.mission.items if one.seq == item.seq + 1), None)
+    next_item = next(
+        (mission_item for mission_item in requirements.setup.mission.items if mission_item.seq == item.seq + 1), None
+    )
     # This takes precedence over landing sequences (`AP_Landing::restart_landing_sequence`).
-    if after is not None and after.command == Command.NAV_CONTINUE_AND_CHANGE_ALT and int(after.params[0]) in (0, 1):
-        return f"{command_name(after.command)} (item {after.seq}) follows the landing, and is flown instead"
+    if (
+        next_item is not None
+        and next_item.command == Command.NAV_CONTINUE_AND_CHANGE_ALT
+        and int(next_item.params[0]) in (0, 1)
+    ):
+        return f"{command_name(next_item.command)} (item {next_item.seq}) follows the landing, and is flown instead"
     return "" if landings else "no place before the landing is known to fly back to"
 
 
-def _finding(requirements: RouteRequirements, ground: Terrain, landing: _Landing, *, required: bool) -> Finding:
+def _finding(requirements: RouteRequirements, terrain: Terrain, landing: _Landing, *, is_required: bool) -> Finding:
     place, height = requirements.waypoint(landing.at), landing.height
     climb_text = f"it climbs to {height:.0f} m over home"
     climb_text += f", which is {landing.home + height - landing.ground:.0f} m over the landing point"
     # A go-around flies to no rally point.
     setup = requirements.setup
     world = return_world(replace(setup, mission=replace(setup.mission, rally=())))
-    flown = (
+    aborted_landings = (
         []
         if landing.open
-        else _simulate_go_arounds(requirements, ground, world, landing, height, _abort_places(landing))
+        else _simulate_go_arounds(requirements, terrain, world, landing, height, _abort_places(landing))
     )
-    worst = max(flown, key=lambda one: one.badness, default=None)
-    unknown = landing.open or next((one.open for one in flown if one.open), "")
-    climb = Fact("climb above ground", min((one.climb for one in flown), default=math.inf), "m")
-    if worst is None or (unknown and worst.is_free):
-        unknown = unknown or "its glide is in the ground, or the ground below is not known"
-        open_ = message("a go-around is not judged", f": {climb_text}; {unknown}")
-        check = GROUND_WAY if required else ""
+    worst = max(aborted_landings, key=lambda aborted: aborted.badness, default=None)
+    unknown_text = landing.open or next((aborted.open for aborted in aborted_landings if aborted.open), "")
+    climb = Fact("climb above ground", min((aborted.climb for aborted in aborted_landings), default=math.inf), "m")
+    if worst is None or (unknown_text and worst.is_free):
+        unknown_text = unknown_text or "its glide is in the ground, or the ground below is not known"
+        unjudged = message("a go-around is not judged", f": {climb_text}; {unknown_text}")
+        check = GROUND_WAY if is_required else ""
         return make_finding(
-            "go_around", place, ok=None, reason=open_.text, faults=[open_], unit="m", check=check, facts=[climb]
+            "go_around", place, ok=None, reason=unjudged.text, faults=[unjudged], unit="m", check=check, facts=[climb]
         )
     if worst.is_free:
         fault = message(f"{climb_text}; {worst.room:.0f} m above ground or more on the way back")
     else:
-        enough = _next_sufficient_height(requirements, ground, world, landing, worst.before)
-        would = f"{enough:.0f} m would do (the first number of item {landing.item.seq})"
+        sufficient_height = _next_sufficient_height(requirements, terrain, world, landing, worst.before)
+        remedy_text = f"{sufficient_height:.0f} m would do (the first number of item {landing.item.seq})"
         fault = message(
             _brief_outcome(worst),
-            f": {climb_text}, and {_outcome_text(worst)}; {would if enough > 0.0 else _NO_HEIGHT_TEXT}",
+            f": {climb_text}, and {_outcome_text(worst)};"
+            f" {remedy_text if sufficient_height > 0.0 else _NO_HEIGHT_TEXT}",
         )
-    ok = worst.is_free or (False if required else None)
+    ok = worst.is_free or (False if is_required else None)
     return make_finding(
         "go_around",
         place,
@@ -258,7 +273,7 @@ def _finding(requirements: RouteRequirements, ground: Terrain, landing: _Landing
         tolerance=0.0,
         margin=None if worst.entered or worst.lost else worst.room - worst.needed,
         unit="m",
-        method=f"flown by the simulated ArduPlane on a point mass from {len(flown)} places of the glide",
+        method=f"flown by the simulated ArduPlane on a point mass from {len(aborted_landings)} places of the glide",
         facts=[climb],
     )
 
@@ -272,7 +287,7 @@ def _abort_places(landing: _Landing) -> Floats:
 
 def _simulate_go_arounds(
     requirements: RouteRequirements,
-    ground: Terrain,
+    terrain: Terrain,
     world: ReturnWorld,
     landing: _Landing,
     height: float,
@@ -283,120 +298,145 @@ def _simulate_go_arounds(
     height: height above home at which the climb ends, m.
     places: distances before the landing point, m.
     """
-    top = landing.home + height
-    begins = [(float(before), landing.place(float(before))) for before in places]
-    over = [up - float(ground.height(east, north)) for _, (east, north, up) in begins]
-    kept = [(*one, high) for one, high in zip(begins, over, strict=True) if high > 0.0]
-    if not kept:
+    top_altitude = landing.home + height
+    starts_on_glide = [(float(distance), landing.place(float(distance))) for distance in places]
+    heights = [altitude - float(terrain.height(east, north)) for _, (east, north, altitude) in starts_on_glide]
+    airborne = [
+        (*start, height_above_ground)
+        for start, height_above_ground in zip(starts_on_glide, heights, strict=True)
+        if height_above_ground > 0.0
+    ]
+    if not airborne:
         return []
-    starts: Records = np.concatenate(
+    start_records: Records = np.concatenate(
         [
             aborted_at(place, landing.course, landing.glide.slope, landing.airspeed, world.aircraft)
-            for _, place, _ in kept
+            for _, place, _ in airborne
         ]
     )
-    flown = fly_go_arounds(starts, top, landing.pitch, landing.landings, world.parameters, world.aircraft, world.around)
+    flown = fly_go_arounds(
+        start_records, top_altitude, landing.pitch, landing.landings, world.parameters, world.aircraft, world.around
+    )
     return [
         _judge_go_around(
-            requirements, ground, landing, _Aborted(before, high, at_once=place[2] > top), row, way, goal, top
+            requirements,
+            terrain,
+            landing,
+            _Aborted(distance, height_above_ground, at_once=place[2] > top_altitude),
+            row,
+            path,
+            destination,
+            top_altitude,
         )
-        for (before, place, high), row, way, goal in zip(kept, flown.flown, flown.ways, flown.landings, strict=True)
+        for (distance, place, height_above_ground), row, path, destination in zip(
+            airborne, flown.flown, flown.ways, flown.landings, strict=True
+        )
     ]
 
 
 def _judge_go_around(
     requirements: RouteRequirements,
-    ground: Terrain,
+    terrain: Terrain,
     landing: _Landing,
-    state: _Aborted,
+    aborted: _Aborted,
     flown: Record,
     positions: Floats,
-    goal: LandingStart,
-    top: float,
+    destination: LandingStart,
+    top_altitude: float,
 ) -> _Aborted:
-    """Return `state` completed with the judgement of its simulated go-around.
+    """Return `aborted` completed with the judgement of its simulated go-around.
 
     flown: record with dtype `flight.autopilots.arduplane.rtl_point_mass.RETURN_RESULT`.
     positions: one point a second, m, (n, 3).
-    goal: destination of the go-around.
-    top: altitude above which the climb is over, m AMSL.
+    destination: destination of the go-around.
+    top_altitude: altitude above which the climb is over, m AMSL.
     """
-    rows, ended = climb_rows(positions, top), int(flown["ended"])
-    state = state._replace(lost=ended == RETURN_TIMEOUT, open=_unknown_part_text(ended, climbs=rows < len(positions)))
-    if goal.lands and rows < len(positions):
-        # Its path on a glide that begins anywhere is unknown; the path before is known.
-        positions, ended = positions[: rows + 1], 0
-        state = state._replace(lost=False, open=f"its landing sequence begins with the landing (item {goal.item})")
-    if len(positions) < 2:
-        # Aborted where it is to fly back to, or where the climb is over at once.
-        return state._replace(room=state.over)
-    step = np.diff(positions[:, :2], axis=0)
-    way = Way(positions, np.concatenate([[0.0], np.cumsum(np.hypot(step[:, 0], step[:, 1]))]))
-    low = path_clearance(ground.heights, ground.to_pixel.record, positions)[0]
-    least = float(np.nanmin(low, initial=math.inf))
-    state = state._replace(entered=first_obstacle_on(requirements, way))
-    if ended == RETURN_GROUND_IMPACT or least <= 0.0:
-        return state._replace(room=min(least, 0.0), after=float(flown["clearance_time"]))
-    ahead = (positions[:-1, :2] - landing.point[:2]) @ (math.sin(landing.course), math.cos(landing.course)) > 0.0
-    climb = float(np.nanmin(low[:rows][ahead[:rows]], initial=math.inf))
-    if climb < GO_AROUND_MODEL_ERROR_M and not state.open:
-        passes = (
-            f"aborted {state.before:.0f} m before the landing point it passes the ground in its climb by {climb:.0f} m"
+    rows, end_status = climb_rows(positions, top_altitude), int(flown["ended"])
+    aborted = aborted._replace(
+        lost=end_status == RETURN_TIMEOUT, open=_unknown_part_text(end_status, has_climbed=rows < len(positions))
+    )
+    if destination.lands and rows < len(positions):
+        # Its path on a glide that may begin anywhere is unknown; the path before the glide is known.
+        positions, end_status = positions[: rows + 1], 0
+        aborted = aborted._replace(
+            lost=False, open=f"its landing sequence begins with the landing (item {destination.item})"
         )
-        state = state._replace(open=f"{passes}, and may be flown {GO_AROUND_MODEL_ERROR_M:.0f} m lower")
-    minimum = _required_heights(ground, goal, 0.5 * (positions[:-1] + positions[1:]))[rows:]
-    back = np.where(np.isnan(low[rows:]), math.inf, low[rows:])
-    if not back.size:
-        return state._replace(climb=climb)
-    k = int(np.argmin(back - minimum))
-    return state._replace(climb=climb, room=float(back[k]), needed=float(minimum[k]))
+    if len(positions) < 2:
+        # It was aborted at its destination, or above the end of its climb.
+        return aborted._replace(room=aborted.over)
+    steps = np.diff(positions[:, :2], axis=0)
+    path = Way(positions, np.concatenate([[0.0], np.cumsum(np.hypot(steps[:, 0], steps[:, 1]))]))
+    heights = path_clearance(terrain.heights, terrain.to_pixel.record, positions)[0]
+    min_height = float(np.nanmin(heights, initial=math.inf))
+    aborted = aborted._replace(entered=first_obstacle_on(requirements, path))
+    if end_status == RETURN_GROUND_IMPACT or min_height <= 0.0:
+        return aborted._replace(room=min(min_height, 0.0), after=float(flown["clearance_time"]))
+    is_beyond_point = (positions[:-1, :2] - landing.point[:2]) @ (
+        math.sin(landing.course),
+        math.cos(landing.course),
+    ) > 0.0
+    climb = float(np.nanmin(heights[:rows][is_beyond_point[:rows]], initial=math.inf))
+    if climb < GO_AROUND_MODEL_ERROR_M and not aborted.open:
+        passing_text = (
+            f"aborted {aborted.before:.0f} m before the landing point it passes the ground in its climb by"
+            f" {climb:.0f} m"
+        )
+        aborted = aborted._replace(open=f"{passing_text}, and may be flown {GO_AROUND_MODEL_ERROR_M:.0f} m lower")
+    required = _required_heights(terrain, destination, 0.5 * (positions[:-1] + positions[1:]))[rows:]
+    return_heights = np.where(np.isnan(heights[rows:]), math.inf, heights[rows:])
+    if not return_heights.size:
+        return aborted._replace(climb=climb)
+    worst = int(np.argmin(return_heights - required))
+    return aborted._replace(climb=climb, room=float(return_heights[worst]), needed=float(required[worst]))
 
 
-def _unknown_part_text(ended: int, *, climbs: bool) -> str:
+def _unknown_part_text(end_status: int, *, has_climbed: bool) -> str:
     """Describe the unknown part of a go-around; return "" if the path is known.
 
-    ended: status with which the simulation ended.
-    climbs: True if the go-around reaches the height at which its climb ends.
+    end_status: status with which the simulation ended.
+    has_climbed: True if the go-around reaches the height at which its climb ends.
     """
-    if ended != RETURN_OFF_TERRAIN:
+    if end_status != RETURN_OFF_TERRAIN:
         return ""
-    return "it leads to where the ground is not known" if climbs else "it does not reach its height on known ground"
+    return (
+        "it leads to where the ground is not known" if has_climbed else "it does not reach its height on known ground"
+    )
 
 
-def _required_heights(ground: Terrain, goal: LandingStart, points: Floats) -> Floats:
+def _required_heights(terrain: Terrain, destination: LandingStart, points: Floats) -> Floats:
     """Return the required height above ground at points (n, 3) of the path back, m, (n,).
 
     Near a destination that is lower than `GO_AROUND_CLEARANCE_M`, the destination's own height is required.
     """
-    minimum = np.full(len(points), GO_AROUND_CLEARANCE_M)
-    for east, north, up in (one.place for one in (goal, *goal.onward)):
-        high = up - float(ground.height(east, north))
-        near = np.hypot(points[:, 0] - east, points[:, 1] - north) <= LINE_UP_DISTANCE_M
-        if high < GO_AROUND_CLEARANCE_M:
-            minimum[near] = np.minimum(minimum[near], high)
-    return minimum
+    required = np.full(len(points), GO_AROUND_CLEARANCE_M)
+    for east, north, up in (start.place for start in (destination, *destination.onward)):
+        height = up - float(terrain.height(east, north))
+        is_near = np.hypot(points[:, 0] - east, points[:, 1] - north) <= LINE_UP_DISTANCE_M
+        if height < GO_AROUND_CLEARANCE_M:
+            required[is_near] = np.minimum(required[is_near], height)
+    return required
 
 
 def _next_sufficient_height(
-    requirements: RouteRequirements, ground: Terrain, world: ReturnWorld, landing: _Landing, worst: float
+    requirements: RouteRequirements, terrain: Terrain, world: ReturnWorld, landing: _Landing, worst_distance: float
 ) -> float:
     """Return the next climb height above home at which all go-arounds are free, m; NaN if no height is sufficient.
 
-    worst: distance before the landing point of the abort place to try first, m.
+    worst_distance: distance before the landing point of the abort place to try first, m.
 
     Heights are tried in steps of `_HEIGHT_STEP_M` up to `_MAX_HEIGHT_M`.
     """
     first = _HEIGHT_STEP_M * math.ceil(landing.height / _HEIGHT_STEP_M + 1e-9)
-    order = [worst, *_abort_places(landing).tolist()]
-    for up in np.arange(first, _MAX_HEIGHT_M + 1.0, _HEIGHT_STEP_M).tolist():
-        for before in order:
-            flown = _simulate_go_arounds(requirements, ground, world, landing, up, [before])
-            if not all(one.is_free and not one.open for one in flown):
+    distances = [worst_distance, *_abort_places(landing).tolist()]
+    for height in np.arange(first, _MAX_HEIGHT_M + 1.0, _HEIGHT_STEP_M).tolist():
+        for distance in distances:
+            aborted_landings = _simulate_go_arounds(requirements, terrain, world, landing, height, [distance])
+            if not all(aborted.is_free and not aborted.open for aborted in aborted_landings):
                 # Try the next height first at the place where this one was not enough.
-                order[0] = before
+                distances[0] = distance
                 break
         else:
-            return float(up)
+            return float(height)
     return math.nan
 
 
@@ -411,17 +451,17 @@ def _brief_outcome(worst: _Aborted) -> str:
 
 def _outcome_text(worst: _Aborted) -> str:
     """Describe the abort and the outcome of the worst go-around."""
-    where = f"aborted {worst.before:.0f} m before the landing point, {worst.over:.0f} m above ground,"
-    turns = " is so high already, turns at once" if worst.at_once else ""
+    abort_text = f"aborted {worst.before:.0f} m before the landing point, {worst.over:.0f} m above ground,"
+    turn_text = " is so high already, turns at once" if worst.at_once else ""
     if not math.isnan(worst.after):
-        does = f"meets the ground {worst.after:.0f} s later"
+        outcome = f"meets the ground {worst.after:.0f} s later"
     elif worst.entered:
-        does = f"enters {worst.entered}"
+        outcome = f"enters {worst.entered}"
     elif worst.lost:
-        does = "does not get back to the line-up"
+        outcome = "does not get back to the line-up"
     else:
-        does = f"comes down to {worst.room:.0f} m above ground on the way back"
-    return f"{where}{turns} and {does}" if turns else f"{where} {does}"
+        outcome = f"comes down to {worst.room:.0f} m above ground on the way back"
+    return f"{abort_text}{turn_text} and {outcome}" if turn_text else f"{abort_text} {outcome}"
 
 
 RULE = Rule(

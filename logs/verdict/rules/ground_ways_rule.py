@@ -83,7 +83,7 @@ class _Obstacles(NamedTuple):
 def _climb_slopes(requirements: RouteRequirements, leg: int, course: float, amsl: float) -> tuple[float, float]:
     """Return the nominal and the certain maximum climb slope on a course (rad) at an altitude (m AMSL), m per m."""
     speed, limits = float(requirements.route.airspeed[leg]), requirements.limits
-    steepest, certain = (one.slopes(course, amsl, speed)[0] for one in (limits, limits.surely()))
+    steepest, certain = (limit_set.slopes(course, amsl, speed)[0] for limit_set in (limits, limits.surely()))
     return math.tan(steepest), math.tan(certain)
 
 
@@ -98,51 +98,71 @@ def climbout_findings(
 
     Return [] if the first place is over home, or if the aircraft takes off vertically.
     """
-    home, ground = requirements.setup.mission.home, requirements.setup.scenario.terrain
-    if not is_laid_out(requirements) or home is None or ground is None:
+    home, terrain = requirements.setup.mission.home, requirements.setup.scenario.terrain
+    if not is_laid_out(requirements) or home is None or terrain is None:
         return []
     if requirements.ground is not None and requirements.ground.ways.take_off is not None:
         return []
     east, north = to_map(requirements.setup.scenario.origin, home.lat_deg, home.lon_deg)
-    begin = (float(east), float(north))
-    first, takeoff = first_item(requirements)
-    here, low = requirements.points[first], float(ground.height(*begin))
-    place = requirements.waypoint(first)
+    home_place = (float(east), float(north))
+    first_waypoint, takeoff = first_item(requirements)
+    first_point, ground_altitude = requirements.points[first_waypoint], float(terrain.height(*home_place))
+    place = requirements.waypoint(first_waypoint)
     if takeoff is not None:
         if takeoff.command == Command.NAV_VTOL_TAKEOFF:
             return []
         launch = _launch(requirements)
         course, run, slope = launch.course, launch.run, launch.slope
     else:
-        course, run = math.atan2(here[0] - begin[0], here[1] - begin[1]), math.dist(here[:2], begin)
+        course, run = (
+            math.atan2(first_point[0] - home_place[0], first_point[1] - home_place[1]),
+            math.dist(first_point[:2], home_place),
+        )
         if run < SAME_PLACE:
             return []
-    if math.isnan(low):
-        return [_unjudged_finding("climbout", place, "the ground at home is not known", opens=takeoff is not None)]
-    steepest, certain = _climb_slopes(requirements, max(0, first - 1), course, low)
-    if not steepest > 0.0:
+    if math.isnan(ground_altitude):
+        return [
+            _unjudged_finding("climbout", place, "the ground at home is not known", is_undecided=takeoff is not None)
+        ]
+    steepest_slope, certain_slope = _climb_slopes(requirements, max(0, first_waypoint - 1), course, ground_altitude)
+    if not steepest_slope > 0.0:
         reason = "the aircraft cannot climb there at this speed and in this wind"
-        return [_unjudged_finding("climbout", place, reason, opens=takeoff is not None)]
+        return [_unjudged_finding("climbout", place, reason, is_undecided=takeoff is not None)]
     if takeoff is None:
-        way = straight_way(begin, course, _climb_profile(low, float(here[2]), run, steepest))
-        return [_air_start_finding(place, _find_obstacles(requirements, way))]
-    up = float(requirements.points[0, 2])
-    if up <= low:
-        reason = f"the take-off's height is not above the ground at home, which is at {low:.0f} m AMSL"
-        return [_unjudged_finding("climbout", place, reason, opens=True)]
-    met, least = (
-        _find_obstacles(requirements, straight_way(begin, course, _takeoff_profile(low, up, run, slope, climb)))
-        for climb in (steepest, max(1e-3, MIN_CLIMB_FRACTION * certain))
+        path = straight_way(
+            home_place, course, _climb_profile(ground_altitude, float(first_point[2]), run, steepest_slope)
+        )
+        return [_air_start_finding(place, _find_obstacles(requirements, path))]
+    takeoff_altitude = float(requirements.points[0, 2])
+    if takeoff_altitude <= ground_altitude:
+        reason = f"the take-off's height is not above the ground at home, which is at {ground_altitude:.0f} m AMSL"
+        return [_unjudged_finding("climbout", place, reason, is_undecided=True)]
+    obstacles, obstacles_at_min_climb = (
+        _find_obstacles(
+            requirements,
+            straight_way(home_place, course, _takeoff_profile(ground_altitude, takeoff_altitude, run, slope, climb)),
+        )
+        for climb in (steepest_slope, max(1e-3, MIN_CLIMB_FRACTION * certain_slope))
     )
-    return [_launch_finding(requirements, launch.way, place, met, least, (begin, low, up), certain == steepest)]
+    return [
+        _launch_finding(
+            requirements,
+            launch.way,
+            place,
+            obstacles,
+            obstacles_at_min_climb,
+            (home_place, ground_altitude, takeoff_altitude),
+            certain_slope == steepest_slope,
+        )
+    ]
 
 
-def _unjudged_finding(rule: str, place: Place, reason: str, *, opens: bool) -> Finding:
+def _unjudged_finding(rule: str, place: Place, reason: str, *, is_undecided: bool) -> Finding:
     """Return a finding on a path that is not judged.  opens: True if it leaves the verdict undecided."""
     title = "climb-out" if rule == "climbout" else rule
     fault = message(f"the {title} at {place_text(place)} is not judged: {reason}")
     return make_finding(
-        rule, place, ok=None, reason=reason, faults=[fault], unit="m", check=GROUND_WAY if opens else ""
+        rule, place, ok=None, reason=reason, faults=[fault], unit="m", check=GROUND_WAY if is_undecided else ""
     )
 
 
@@ -166,121 +186,143 @@ def _launch(requirements: RouteRequirements) -> _Launch:
 
     The first leg's run and slope apply if the leg is on the launch course.
     """
-    stated = requirements.setup.scenario.launch
-    along = _Launch(
+    stated_launch = requirements.setup.scenario.launch
+    first_leg = _Launch(
         float(requirements.courses[0]), float(requirements.runs[0]), math.tan(float(requirements.slopes[0]))
     )
-    if stated is None or stated.course is None:
-        return along
-    way = f"on the launch course {round(math.degrees(stated.course)) % 360}°"
-    if abs(float(wrap(stated.course - along.course))) <= PLAN_TOLERANCE_RAD:
-        return along._replace(way=way)
-    return _Launch(stated.course, math.inf, 0.0, way)
+    if stated_launch is None or stated_launch.course is None:
+        return first_leg
+    course_text = f"on the launch course {round(math.degrees(stated_launch.course)) % 360}°"
+    if abs(float(wrap(stated_launch.course - first_leg.course))) <= PLAN_TOLERANCE_RAD:
+        return first_leg._replace(way=course_text)
+    return _Launch(stated_launch.course, math.inf, 0.0, course_text)
 
 
-def _climb_profile(low: float, up: float, run: float, climb: float) -> Profile:
-    """Return the profile of a climb from the ground followed by a straight line to a place.
+def _climb_profile(ground_altitude: float, place_altitude: float, run: float, climb: float) -> Profile:
+    """Return the profile of a climb from the ground and then a straight line to a place.
 
-    low: altitude of the ground, m AMSL.
-    up: altitude of the place, m AMSL.
+    ground_altitude: altitude of the ground, m AMSL.
+    place_altitude: altitude of the place, m AMSL.
     run: distance of the place, m.
     climb: climb slope, m per m.
     """
-    top = max(up, low + FIRST_CLIMB_HEIGHT_M)
-    reached = (top - low) / climb
-    if reached >= run:
-        return [(0.0, low), (run, low + climb * run)]
-    return [(0.0, low), (reached, top), (run, up)]
+    top_altitude = max(place_altitude, ground_altitude + FIRST_CLIMB_HEIGHT_M)
+    climb_run = (top_altitude - ground_altitude) / climb
+    if climb_run >= run:
+        return [(0.0, ground_altitude), (run, ground_altitude + climb * run)]
+    return [(0.0, ground_altitude), (climb_run, top_altitude), (run, place_altitude)]
 
 
-def _takeoff_profile(low: float, up: float, run: float, slope: float, climb: float) -> Profile:
+def _takeoff_profile(ground_altitude: float, leg_altitude: float, run: float, slope: float, climb: float) -> Profile:
     """Return the climb profile from the ground until the aircraft is on the first leg.
 
-    low: altitude of the ground, m AMSL.
-    up: altitude at which the leg begins over home and to which the take-off climbs, m AMSL.
+    ground_altitude: altitude of the ground, m AMSL.
+    leg_altitude: altitude at which the leg begins over home and to which the take-off climbs, m AMSL.
     run: length of the leg, m.
     slope: slope of the leg, m per m.
     climb: climb slope, m per m.
     """
-    reached = (up - low) / climb
-    if reached < run:
-        on_leg = (up - low) / (climb - slope) if climb > slope else math.inf
-        reached = min(run, max(reached, on_leg))
-    return [(0.0, low), (reached, low + climb * reached)]
+    climb_run = (leg_altitude - ground_altitude) / climb
+    if climb_run < run:
+        joining_run = (leg_altitude - ground_altitude) / (climb - slope) if climb > slope else math.inf
+        climb_run = min(run, max(climb_run, joining_run))
+    return [(0.0, ground_altitude), (climb_run, ground_altitude + climb * climb_run)]
 
 
-def _find_obstacles(requirements: RouteRequirements, way: Way) -> _Obstacles:
+def _find_obstacles(requirements: RouteRequirements, path: Way) -> _Obstacles:
     """Return the obstacles on a path from home; the first `LAUNCH_RUN_M` of the path may be close to the ground."""
-    ground, end = requirements.setup.scenario.terrain, float(way.run[-1])
-    entered = first_obstacle_on(requirements, way)
-    if ground is None or end <= LAUNCH_RUN_M:
+    terrain, end = requirements.setup.scenario.terrain, float(path.run[-1])
+    entered = first_obstacle_on(requirements, path)
+    if terrain is None or end <= LAUNCH_RUN_M:
         return _Obstacles(math.inf, 0.0, entered)
-    return _Obstacles(*way_clearance(ground, way.between(LAUNCH_RUN_M, end)), entered)
+    return _Obstacles(*way_clearance(terrain, path.between(LAUNCH_RUN_M, end)), entered)
 
 
-def _air_start_finding(place: Place, met: _Obstacles) -> Finding:
-    """Judge the direct climb from home to the first waypoint, not simulated, of a mission that starts in the air."""
+def _air_start_finding(place: Place, obstacles: _Obstacles) -> Finding:
+    """Judge the direct climb from home to the first waypoint, not simulated, for a mission that starts in the air."""
     subject = f"the way up from home to {_item_text(place)}"
-    if math.isnan(met.clearance) and not met.entered:
+    if math.isnan(obstacles.clearance) and not obstacles.entered:
         reason, check, ok = f"the ground below {subject} is not known", "", None
-    elif met.free:
+    elif obstacles.free:
         reason, check, ok = (
-            f"straight from home: {_clearance_text(met)}; not flown: the flight begins in the air",
+            f"straight from home: {_clearance_text(obstacles)}; not flown: the flight begins in the air",
             "",
             True,
         )
     else:
-        fault = met.obstacle_message(subject, "from home, at the steepest climb")
-        return _finding("climbout", place, met, None, fault, GROUND_WAY)
-    return _finding("climbout", place, met, ok, message(reason), check)
+        fault = obstacles.obstacle_message(subject, "from home, at the steepest climb")
+        return _finding("climbout", place, obstacles, None, fault, GROUND_WAY)
+    return _finding("climbout", place, obstacles, ok, message(reason), check)
 
 
 def _launch_finding(
     requirements: RouteRequirements,
-    way: str,
+    course_text: str,
     place: Place,
-    met: _Obstacles,
-    least: _Obstacles,
+    obstacles: _Obstacles,
+    obstacles_at_min_climb: _Obstacles,
     launch: tuple[tuple[float, float], float, float],
     is_known: bool,
 ) -> Finding:
     """Judge the climb of a mission that takes off, towards its next place or on a launch course.
 
-    way: description of the launch course, "" along the first leg.
-    met: obstacles at the steepest climb.
-    least: obstacles at the minimum climb.
+    course_text: description of the launch course, "" along the first leg.
+    obstacles: obstacles at the steepest climb.
+    obstacles_at_min_climb: obstacles at the minimum climb.
     launch: launch place (east, north, m), altitude of the ground there and altitude at the end of the climb (m AMSL).
     is_known: True if the aircraft's climb is certain.
     """
     to_item = requirements.leg(0).to_item
-    towards = f"towards {'the next place' if to_item is None else f'item {to_item}'}"
-    subject = f"the climb from home {way or towards}"
-    if math.isnan(met.clearance) and not met.entered:
+    direction_text = f"towards {'the next place' if to_item is None else f'item {to_item}'}"
+    subject = f"the climb from home {course_text or direction_text}"
+    if math.isnan(obstacles.clearance) and not obstacles.entered:
         reason = message(f"the ground below {subject} is not known")
-        return _finding("climbout", place, met, None, reason)
-    if not met.free:
-        fault = met.obstacle_message(subject, "from home, at the steepest climb")
-        other = _free_courses_text(requirements, *launch)
-        fault = message(fault.brief, fault.text[len(fault.brief) :] + other)
-        return _finding("climbout", place, met, False if is_known else None, fault, "" if is_known else GROUND_WAY)
-    at_least = f"{subject}, at {100.0 * MIN_CLIMB_FRACTION:.0f} % of the steepest,"
-    if math.isnan(least.clearance) and not least.entered:
-        return _finding("climbout", place, met, None, message(f"{at_least} leads to where the ground is not known"))
-    if not least.free:
-        return _finding("climbout", place, met, None, least.obstacle_message(at_least, "from home"), GROUND_WAY)
+        return _finding("climbout", place, obstacles, None, reason)
+    if not obstacles.free:
+        fault = obstacles.obstacle_message(subject, "from home, at the steepest climb")
+        other_courses_text = _free_courses_text(requirements, *launch)
+        fault = message(fault.brief, fault.text[len(fault.brief) :] + other_courses_text)
+        return _finding(
+            "climbout", place, obstacles, False if is_known else None, fault, "" if is_known else GROUND_WAY
+        )
+    min_climb_text = f"{subject}, at {100.0 * MIN_CLIMB_FRACTION:.0f} % of the steepest,"
+    if math.isnan(obstacles_at_min_climb.clearance) and not obstacles_at_min_climb.entered:
+        return _finding(
+            "climbout", place, obstacles, None, message(f"{min_climb_text} leads to where the ground is not known")
+        )
+    if not obstacles_at_min_climb.free:
+        return _finding(
+            "climbout",
+            place,
+            obstacles,
+            None,
+            obstacles_at_min_climb.obstacle_message(min_climb_text, "from home"),
+            GROUND_WAY,
+        )
     return _finding(
-        "climbout", place, met, True, message(f"{subject.removeprefix('the climb from home ')}: {_clearance_text(met)}")
+        "climbout",
+        place,
+        obstacles,
+        True,
+        message(f"{subject.removeprefix('the climb from home ')}: {_clearance_text(obstacles)}"),
     )
 
 
-def _free_courses_text(requirements: RouteRequirements, begin: tuple[float, float], low: float, up: float) -> str:
+def _free_courses_text(
+    requirements: RouteRequirements, home_place: tuple[float, float], ground_altitude: float, top_altitude: float
+) -> str:
     """Describe the widest range of courses on which a launch climbs to the take-off's altitude without obstacles."""
 
     def is_free(course: float) -> bool:
-        climb, _ = _climb_slopes(requirements, 0, course, low)
+        climb, _ = _climb_slopes(requirements, 0, course, ground_altitude)
         if not climb > 0.0:
             return False
-        return _find_obstacles(requirements, straight_way(begin, course, [(0.0, low), ((up - low) / climb, up)])).free
+        return _find_obstacles(
+            requirements,
+            straight_way(
+                home_place, course, [(0.0, ground_altitude), ((top_altitude - ground_altitude) / climb, top_altitude)]
+            ),
+        ).free
 
     courses = list(range(0, 360, _COURSE_STEP_DEG))
     free = [is_free(math.radians(course)) for course in courses]
@@ -288,8 +330,14 @@ def _free_courses_text(requirements: RouteRequirements, begin: tuple[float, floa
         return "; no launch course climbs free"
     # Begin after a course with obstacles, so that no range is cut at north.
     start = free.index(False) if False in free else 0
-    turned = [(courses[k % len(courses)], free[k % len(courses)]) for k in range(start, start + len(courses))]
-    ranges = [[course for course, _ in group] for is_one, group in groupby(turned, key=lambda one: one[1]) if is_one]
+    courses_from_start = [
+        (courses[k % len(courses)], free[k % len(courses)]) for k in range(start, start + len(courses))
+    ]
+    ranges = [
+        [course for course, _ in group]
+        for is_free_range, group in groupby(courses_from_start, key=lambda entry: entry[1])
+        if is_free_range
+    ]
     widest = max(ranges, key=len)
     if len(widest) == 1:
         return f"; launched on {widest[0]:03d}° it would climb free"
@@ -304,60 +352,79 @@ def approach_findings(
     requirements: RouteRequirements, _aligned: AlignedTrack | None = None, *, geometric: bool = False
 ) -> list[Finding]:
     """Judge the glide from the last waypoint to the landing point with one finding, if the mission lands."""
-    found, ground, setup = landing_item(requirements), requirements.setup.scenario.terrain, requirements.setup
-    if found is None or ground is None or not is_laid_out(requirements):
+    landing, terrain, setup = landing_item(requirements), requirements.setup.scenario.terrain, requirements.setup
+    if landing is None or terrain is None or not is_laid_out(requirements):
         return []
     if requirements.ground is not None and requirements.ground.ways.approach is not None:
         return []
-    at, leg = found[0], found[0] - 1
-    place, item = requirements.waypoint(at), _item_text(requirements.waypoint(at))
-    begin, point = requirements.points[leg], requirements.points[at]
-    run, course, low = float(requirements.runs[leg]), float(requirements.courses[leg]), setup.route.landing_ground
-    high, under = float(begin[2]), float(ground.height(float(point[0]), float(point[1])))
-    if math.isnan(low) or math.isnan(under) or run < MIN_LEG_LENGTH_M:
+    waypoint, leg = landing[0], landing[0] - 1
+    place, item_text = requirements.waypoint(waypoint), _item_text(requirements.waypoint(waypoint))
+    glide_start, landing_point = requirements.points[leg], requirements.points[waypoint]
+    run, course, point_altitude = (
+        float(requirements.runs[leg]),
+        float(requirements.courses[leg]),
+        setup.route.landing_ground,
+    )
+    start_altitude, ground_altitude = (
+        float(glide_start[2]),
+        float(terrain.height(float(landing_point[0]), float(landing_point[1]))),
+    )
+    if math.isnan(point_altitude) or math.isnan(ground_altitude) or run < MIN_LEG_LENGTH_M:
         reason = "the height of the ground at the landing point is not known"
-        return [_unjudged_finding("approach", place, reason, opens=True)]
-    if high <= low:
+        return [_unjudged_finding("approach", place, reason, is_undecided=True)]
+    if start_altitude <= point_altitude:
         reason = "it begins no higher than the landing point"
-        return [_unjudged_finding("approach", place, reason, opens=True)]
-    glide = setup.autopilot.landing_glide(high - low, run, setup.scenario.wind.along(course, low)[0], low)
-    flare = (run - glide.flare_distance, low + glide.flare_height)
-    way = straight_way(begin, course, [(0.0, high), *([flare] if glide.flare_distance > 0.0 else []), (run, low)])
-    last, room, at_run = run - EARLY_TOUCHDOWN_DISTANCE_M, math.inf, 0.0
-    if last > 0.0:
-        room, at_run = way_clearance(ground, way.between(0.0, last))
-    met = _Obstacles(room, run - at_run, first_obstacle_on(requirements, way))
-    subject = f"the glide to {item}"
-    if math.isnan(met.clearance) and not met.entered:
-        return [_finding("approach", place, met, None, message(f"the ground below {subject} is not known"))]
-    obstacle_message = met.obstacle_message(subject, "before the landing point")
+        return [_unjudged_finding("approach", place, reason, is_undecided=True)]
+    glide = setup.autopilot.landing_glide(
+        start_altitude - point_altitude, run, setup.scenario.wind.along(course, point_altitude)[0], point_altitude
+    )
+    flare = (run - glide.flare_distance, point_altitude + glide.flare_height)
+    path = straight_way(
+        glide_start,
+        course,
+        [(0.0, start_altitude), *([flare] if glide.flare_distance > 0.0 else []), (run, point_altitude)],
+    )
+    last_run, clearance, at_run = run - EARLY_TOUCHDOWN_DISTANCE_M, math.inf, 0.0
+    if last_run > 0.0:
+        clearance, at_run = way_clearance(terrain, path.between(0.0, last_run))
+    obstacles = _Obstacles(clearance, run - at_run, first_obstacle_on(requirements, path))
+    subject = f"the glide to {item_text}"
+    if math.isnan(obstacles.clearance) and not obstacles.entered:
+        return [_finding("approach", place, obstacles, None, message(f"the ground below {subject} is not known"))]
+    obstacle_message = obstacles.obstacle_message(subject, "before the landing point")
     # With a landing point below the ground the glide hits the ground early: the elevation file may be some metres off.
-    if met.entered or met.clearance + min(LANDING_POINT_ERROR_M, max(0.0, under - low)) < 0.0:
-        return [_finding("approach", place, met, False, obstacle_message)]
-    if met.clearance < 0.0:
+    if (
+        obstacles.entered
+        or obstacles.clearance + min(LANDING_POINT_ERROR_M, max(0.0, ground_altitude - point_altitude)) < 0.0
+    ):
+        return [_finding("approach", place, obstacles, False, obstacle_message)]
+    if obstacles.clearance < 0.0:
         fault = message(
-            f"the landing point of {item} is {under - low:.0f} m below the ground", f": {obstacle_message.text}"
+            f"the landing point of {item_text} is {ground_altitude - point_altitude:.0f} m below the ground",
+            f": {obstacle_message.text}",
         )
-        return [_finding("approach", place, met, None, fault, GROUND_WAY)]
-    if low - under > LANDING_POINT_ERROR_M:
-        fault = message(f"the landing point of {item} is {low - under:.0f} m above the ground")
-        return [_finding("approach", place, met, None, fault, GROUND_WAY)]
-    until = run - glide.flare_distance - max(0.0, FLARE_HEIGHT_MARGIN_M - glide.flare_height) / glide.slope
-    room = way_clearance(ground, way.between(0.0, until))[0] if until > 0.0 else math.inf
-    if room < GLIDE_PATH_TOLERANCE_M:
+        return [_finding("approach", place, obstacles, None, fault, GROUND_WAY)]
+    if point_altitude - ground_altitude > LANDING_POINT_ERROR_M:
         fault = message(
-            f"{subject} passes the ground by {room:.1f} m",
+            f"the landing point of {item_text} is {point_altitude - ground_altitude:.0f} m above the ground"
+        )
+        return [_finding("approach", place, obstacles, None, fault, GROUND_WAY)]
+    judged_run = run - glide.flare_distance - max(0.0, FLARE_HEIGHT_MARGIN_M - glide.flare_height) / glide.slope
+    clearance = way_clearance(terrain, path.between(0.0, judged_run))[0] if judged_run > 0.0 else math.inf
+    if clearance < GLIDE_PATH_TOLERANCE_M:
+        fault = message(
+            f"{subject} passes the ground by {clearance:.1f} m",
             f", and may be flown {GLIDE_PATH_TOLERANCE_M:.0f} m lower than laid out",
         )
-        return [_finding("approach", place, met, None, fault, GROUND_WAY)]
+        return [_finding("approach", place, obstacles, None, fault, GROUND_WAY)]
     reason = f"glides down at {math.degrees(math.atan(glide.slope)):.1f}°"
     if glide.flare_distance > 0.0:
         reason += (
             f", flares {glide.flare_height:.1f} m over the landing point and {glide.flare_distance:.0f} m before it"
         )
-    reason += f"; {_clearance_text(met)} until {EARLY_TOUCHDOWN_DISTANCE_M:.0f} m before it"
+    reason += f"; {_clearance_text(obstacles)} until {EARLY_TOUCHDOWN_DISTANCE_M:.0f} m before it"
     reason += "" if setup.ground_ways.approach is not None else "; not flown: the flight ends in the air"
-    return [_finding("approach", place, met, True, message(reason))]
+    return [_finding("approach", place, obstacles, True, message(reason))]
 
 
 # ----------------------------------------------------------------------
@@ -368,23 +435,29 @@ def _item_text(place: Place) -> str:
     return "the first place" if place.item is None else f"item {place.item}"
 
 
-def _clearance_text(met: _Obstacles) -> str:
-    return "nothing is in the way" if math.isinf(met.clearance) else f"{met.clearance:.0f} m above ground or more"
+def _clearance_text(obstacles: _Obstacles) -> str:
+    return (
+        "nothing is in the way"
+        if math.isinf(obstacles.clearance)
+        else f"{obstacles.clearance:.0f} m above ground or more"
+    )
 
 
-def _finding(rule: str, place: Place, met: _Obstacles, ok: bool | None, said: Message, check: str = "") -> Finding:
+def _finding(
+    rule: str, place: Place, obstacles: _Obstacles, ok: bool | None, outcome: Message, check: str = ""
+) -> Finding:
     return make_finding(
         rule,
         place,
         ok=ok,
-        reason=said.text,
-        faults=[] if ok else [said],
-        planned=met.clearance,
+        reason=outcome.text,
+        faults=[] if ok else [outcome],
+        planned=obstacles.clearance,
         limit=0.0,
         at_least=True,
         source="terrain",
         tolerance=0.0,
-        margin=None if met.entered else met.clearance,
+        margin=None if obstacles.entered else obstacles.clearance,
         unit="m",
         method="laid out from the mission's items, exact over the elevation file",
         check=check,

@@ -1,6 +1,6 @@
 """The height rule: judge the maximum height above ground on each leg, and the ceiling, planned and flown.
 
-The rule applies if the scenario has a `max_height_m`; the bounds rule judges a ceiling alone.
+The rule applies if the scenario has a `max_height_m`; without it, the bounds rule judges the ceiling.
 """
 
 import math
@@ -15,7 +15,7 @@ from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.places import FLIGHT
 from logs.verdict.rule import LogNeeds, Rule
-from logs.verdict.suggestions import fly_lower
+from logs.verdict.suggestions import suggest_flying_lower
 from logs.verdict.tolerances import HEIGHT_TOLERANCE_M
 from world.arrays import Floats
 from world.terrain import Terrain
@@ -26,10 +26,10 @@ def height_findings(
 ) -> list[Finding]:
     """Judge the maximum height above ground on each leg; return [] if the scenario has no limit."""
     scenario = requirements.setup.scenario
-    limit, ground = scenario.limits.max_height_m, scenario.terrain
+    limit, terrain = scenario.limits.max_height_m, scenario.terrain
     if limit is None:
         return []
-    if ground is None:
+    if terrain is None:
         reason = "no terrain was given, so heights above ground are not known"
         return [
             make_finding(
@@ -37,8 +37,8 @@ def height_findings(
             )
         ]
     path = requirements.path
-    way = _Path(path.points, path.times, *greatest_heights(ground, path.points))
-    planned = [_max_heights(way, np.flatnonzero(path.legs == leg)) for leg in range(requirements.legs)]
+    path_heights = _Path(path.points, path.times, *greatest_heights(terrain, path.points))
+    planned = [_max_heights(path_heights, np.flatnonzero(path.legs == leg)) for leg in range(requirements.legs)]
     if geometric:
         return [
             _finding(requirements, leg, limit, planned[leg], planned[leg], "fly-by path")
@@ -47,9 +47,9 @@ def height_findings(
     flown: list[_Highest | None] = [None] * requirements.legs
     if aligned is not None:
         track = aligned.track
-        way = _Path(track.position, track.time, *greatest_heights(ground, track.position))
+        path_heights = _Path(track.position, track.time, *greatest_heights(terrain, track.position))
         flown = [
-            _max_heights(way, _leg_segments(requirements, aligned, leg)) if aligned.flew(leg) else None
+            _max_heights(path_heights, _leg_segments(requirements, aligned, leg)) if aligned.flew(leg) else None
             for leg in range(requirements.legs)
         ]
     return [
@@ -62,12 +62,12 @@ def greatest_heights(terrain: Terrain, points: Floats) -> tuple[Floats, Floats]:
 
     points: east, north and up, m, (n, 3).
 
-    The maximum is exact for bilinear ground, because it is the minimum height in the same world upside down.  It is NaN
-    if a segment leaves the raster or its data.
+    The maximum is exact for bilinear ground, because it is the minimum height in the inverted world.  It is NaN if a
+    segment leaves the raster or its data.
     """
     upside_down = points * np.array([1.0, 1.0, -1.0])
-    low, at = path_clearance(-terrain.heights, terrain.to_pixel.record, upside_down)
-    return -low, at
+    inverted_heights, fraction = path_clearance(-terrain.heights, terrain.to_pixel.record, upside_down)
+    return -inverted_heights, fraction
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,19 +94,21 @@ class _Highest:
     known: bool
 
 
-def _max_heights(way: _Path, segments: NDArray[np.intp]) -> _Highest | None:
+def _max_heights(path: _Path, segments: NDArray[np.intp]) -> _Highest | None:
     """Return the maximum heights on some segments of a path, or None without segments."""
     if not segments.size:
         return None
-    amsl = float(max(way.points[segments, 2].max(), way.points[segments + 1, 2].max()))
-    heights = way.greatest[segments]
-    known = np.isfinite(heights)
-    if not known.any():
+    amsl = float(max(path.points[segments, 2].max(), path.points[segments + 1, 2].max()))
+    heights = path.greatest[segments]
+    is_known = np.isfinite(heights)
+    if not is_known.any():
         return _Highest(math.nan, amsl, "", False)
     k = int(segments[np.nanargmax(heights)])
-    time, place = ((1.0 - way.fraction[k]) * one[k] + way.fraction[k] * one[k + 1] for one in (way.times, way.points))
+    time, place = (
+        (1.0 - path.fraction[k]) * values[k] + path.fraction[k] * values[k + 1] for values in (path.times, path.points)
+    )
     where = f"at {time:.1f} s, east {place[0]:.0f} m, north {place[1]:.0f} m"
-    return _Highest(float(way.greatest[k]), amsl, where, bool(known.all()))
+    return _Highest(float(path.greatest[k]), amsl, where, bool(is_known.all()))
 
 
 def _leg_segments(requirements: RouteRequirements, aligned: AlignedTrack, leg: int) -> NDArray[np.intp]:
@@ -117,18 +119,23 @@ def _leg_segments(requirements: RouteRequirements, aligned: AlignedTrack, leg: i
 
 
 def _finding(
-    requirements: RouteRequirements, leg: int, limit: float, planned: _Highest | None, judged: _Highest | None, by: str
+    requirements: RouteRequirements,
+    leg: int,
+    limit: float,
+    planned: _Highest | None,
+    judged: _Highest | None,
+    path_name: str,
 ) -> Finding:
     faults, facts, ok = [], [], None
     if judged is None:
         facts.append("the leg was not flown")
     else:
         ceiling = requirements.setup.scenario.ceiling
-        high = f"{judged.height:.1f} m above ground {judged.where}"
+        height_text = f"{judged.height:.1f} m above ground {judged.where}"
         if judged.height > limit + HEIGHT_TOLERANCE_M:
-            faults.append(message(high, f"; {limit:g} m are allowed"))
+            faults.append(message(height_text, f"; {limit:g} m are allowed"))
         elif math.isfinite(judged.height):
-            facts.append(f"{high} at the highest")
+            facts.append(f"{height_text} at the highest")
         if judged.amsl > ceiling + HEIGHT_TOLERANCE_M:
             faults.append(message(f"{judged.amsl:.1f} m AMSL", f", above the scenario's ceiling of {ceiling:.0f} m"))
         if not judged.known:
@@ -149,7 +156,7 @@ def _finding(
         tolerance=HEIGHT_TOLERANCE_M,
         margin=None if judged is None else limit - judged.height,
         unit="m",
-        method=f"exact along the {by}",
+        method=f"exact along the {path_name}",
     )
 
 
@@ -157,6 +164,6 @@ RULE = Rule(
     name="height",
     tolerances=("HEIGHT_TOLERANCE_M",),
     judge=height_findings,
-    suggest=fly_lower,
+    suggest=suggest_flying_lower,
     log=LogNeeds(("heights",), planned_heights=True),
 )

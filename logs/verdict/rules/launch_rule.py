@@ -41,77 +41,81 @@ def launch_findings(
 
 def _launch_finding(requirements: RouteRequirements, ground: FlownGround, take_off: TakeOff) -> Finding:
     track = ground.launch
-    way = track_way(track)
-    position, run = way
-    lost = float(position[0, 2] - position[:, 2].min())
-    room, where = _climb_clearance(requirements, way)
+    path = track_way(track)
+    position, run = path
+    height_lost = float(position[0, 2] - position[:, 2].min())
+    clearance, distance = _climb_clearance(requirements, path)
     trigger = requirements.setup.autopilot.launch_trigger
     faults = []
     if trigger is not None and take_off.acceleration < trigger[0]:
         faults.append(message(gentle_launch_text(take_off.acceleration, trigger), ": the motor never starts"))
-    top = float(position[:, 2].max())
-    if top <= take_off.top:
-        brief = f"the take-off ended {top - take_off.base:.0f} m above home"
+    top_altitude = float(position[:, 2].max())
+    if top_altitude <= take_off.top:
+        brief = f"the take-off ended {top_altitude - take_off.base:.0f} m above home"
         faults.append(message(brief, f", short of {take_off.top - take_off.base:.0f} m"))
-    if lost > MAX_LAUNCH_HEIGHT_LOSS_M:
-        faults.append(message(f"sinks {lost:.1f} m after the launch", f"; {MAX_LAUNCH_HEIGHT_LOSS_M:g} m are allowed"))
-    left = _remaining_runway(requirements, take_off, position)
-    if left < RUNWAY_MARGIN_M:
-        brief = f"leaves the ground {take_off.launch.run - left:.0f} m from home"
+    if height_lost > MAX_LAUNCH_HEIGHT_LOSS_M:
+        faults.append(
+            message(f"sinks {height_lost:.1f} m after the launch", f"; {MAX_LAUNCH_HEIGHT_LOSS_M:g} m are allowed")
+        )
+    runway_left = _remaining_runway(requirements, take_off, position)
+    if runway_left < RUNWAY_MARGIN_M:
+        brief = f"leaves the ground {take_off.launch.run - runway_left:.0f} m from home"
         runway_text = (
             f"; the runway is {take_off.launch.run:.0f} m long, of which {RUNWAY_MARGIN_M:.0f} m are to be left"
         )
         faults.append(message(brief, runway_text))
-    if room < LAUNCH_CLEARANCE_M:
-        faults.append(message(f"{room:.1f} m above ground", f" {where:.0f} m from home, on the course that is held"))
-    entered = first_obstacle_on(requirements, way)
+    if clearance < LAUNCH_CLEARANCE_M:
+        faults.append(
+            message(f"{clearance:.1f} m above ground", f" {distance:.0f} m from home, on the course that is held")
+        )
+    entered = first_obstacle_on(requirements, path)
     if entered:
         faults.append(message(f"the climb enters {entered}"))
-    known = _describe_take_off(take_off, track, run, room)
-    open_ = []
-    if not faults and LAUNCH_CLEARANCE_M <= room < LAUNCH_CLEARANCE_M + CLIMB_MODEL_ERROR_M:
-        brief = f"the launch passes {room:.1f} m above ground {where:.0f} m from home"
-        open_.append(message(brief, ", less than the error of the simulated climb"))
-    elif not faults and math.isnan(room):
-        open_.append(message("the ground below the launch's climb is not known"))
+    notes = _describe_take_off(take_off, track, run, clearance)
+    undecided = []
+    if not faults and LAUNCH_CLEARANCE_M <= clearance < LAUNCH_CLEARANCE_M + CLIMB_MODEL_ERROR_M:
+        brief = f"the launch passes {clearance:.1f} m above ground {distance:.0f} m from home"
+        undecided.append(message(brief, ", less than the error of the simulated climb"))
+    elif not faults and math.isnan(clearance):
+        undecided.append(message("the ground below the launch's climb is not known"))
     return make_finding(
         "launch",
         requirements.waypoint(take_off.waypoint),
-        ok=False if faults else None if open_ else True,
-        reason=reason_of(faults or open_, known),
-        faults=faults or open_,
-        flown=room,
+        ok=False if faults else None if undecided else True,
+        reason=reason_of(faults or undecided, notes),
+        faults=faults or undecided,
+        flown=clearance,
         limit=LAUNCH_CLEARANCE_M,
         at_least=True,
         source="check",
         tolerance=0.0,
-        margin=room - LAUNCH_CLEARANCE_M,
+        margin=clearance - LAUNCH_CLEARANCE_M,
         unit="m",
         method="exact along the flown track",
-        check=GROUND_WAY if open_ else "",
-        facts=(Fact("height lost", lost, "m"), Fact("runway left", left, "m")),
+        check=GROUND_WAY if undecided else "",
+        facts=(Fact("height lost", height_lost, "m"), Fact("runway left", runway_left, "m")),
     )
 
 
-def _climb_clearance(requirements: RouteRequirements, way: Way) -> tuple[float, float]:
+def _climb_clearance(requirements: RouteRequirements, path: Way) -> tuple[float, float]:
     """Return the minimum height above ground after the launch run, m, and its distance from home along the path, m.
 
     The height is inf if the take-off ends within the launch run, NaN if the ground is unknown.
     """
-    terrain, (position, run) = requirements.setup.scenario.terrain, way
+    terrain, (position, run) = requirements.setup.scenario.terrain, path
     if terrain is None:
         return math.nan, math.nan
     # On a runway the aircraft is on the ground: heights apply from lift-off on.
-    first = LAUNCH_RUN_M
+    first_run = LAUNCH_RUN_M
     take_off = None if requirements.ground is None else requirements.ground.ways.take_off
     if take_off is not None and take_off.launch.method == "runway":
-        standing = float(position[0, 2] - take_off.home[2])
-        above = position[:, 2] - terrain.height(position[:, 0], position[:, 1])
-        over = above > standing + LAUNCH_CLEARANCE_M + CLIMB_MODEL_ERROR_M
-        first = max(first, float(run[int(np.argmax(over))]) if over.any() else float(run[-1]))
-    if run[-1] <= first:
+        standing_height = float(position[0, 2] - take_off.home[2])
+        heights = position[:, 2] - terrain.height(position[:, 0], position[:, 1])
+        is_airborne = heights > standing_height + LAUNCH_CLEARANCE_M + CLIMB_MODEL_ERROR_M
+        first_run = max(first_run, float(run[int(np.argmax(is_airborne))]) if is_airborne.any() else float(run[-1]))
+    if run[-1] <= first_run:
         return math.inf, math.nan
-    return way_clearance(terrain, way.between(first, float(run[-1])))
+    return way_clearance(terrain, path.between(first_run, float(run[-1])))
 
 
 def _remaining_runway(requirements: RouteRequirements, take_off: TakeOff, position: Floats) -> float:
@@ -119,28 +123,28 @@ def _remaining_runway(requirements: RouteRequirements, take_off: TakeOff, positi
     terrain = requirements.setup.scenario.terrain
     if take_off.launch.method != "runway" or terrain is None:
         return math.inf
-    standing = float(position[0, 2] - take_off.home[2])
-    on_it = np.flatnonzero(
-        position[:, 2] - terrain.height(position[:, 0], position[:, 1]) <= standing + CONTACT_HEIGHT_M
+    standing_height = float(position[0, 2] - take_off.home[2])
+    contact_rows = np.flatnonzero(
+        position[:, 2] - terrain.height(position[:, 0], position[:, 1]) <= standing_height + CONTACT_HEIGHT_M
     )
-    last = position[on_it[-1] if on_it.size else 0]
+    last = position[contact_rows[-1] if contact_rows.size else 0]
     return take_off.launch.run - math.dist(last[:2], take_off.home[:2])
 
 
-def _describe_take_off(take_off: TakeOff, track: Track, run: Floats, room: float) -> list[str]:
+def _describe_take_off(take_off: TakeOff, track: Track, run: Floats, clearance: float) -> list[str]:
     """Describe the take-off in a list of phrases."""
     course, method = round(math.degrees(take_off.course)) % 360, take_off.launch.method
-    known = [f"launched on a runway on {course}°"]
+    notes = [f"launched on a runway on {course}°"]
     if method != "runway":
-        how = "from a catapult" if method == "catapult" else "by hand"
-        known = [f"launched {how} on {course}° at {take_off.speed:.1f} m/s, {take_off.acceleration:.1f} m/s²"]
+        method_text = "from a catapult" if method == "catapult" else "by hand"
+        notes = [f"launched {method_text} on {course}° at {take_off.speed:.1f} m/s, {take_off.acceleration:.1f} m/s²"]
     if run[-1] > 1.0:
         rise = float(track.position[-1, 2] - track.position[0, 2])
         course = round(math.degrees(math.atan2(*track.velocity[-1, :2].tolist()))) % 360
-        known.append(f"climbs at {rise / run[-1]:.2f}, at last on {course}°")
-    if math.isfinite(room):
-        known.append(f"{room:.0f} m above ground or more beyond {LAUNCH_RUN_M:.0f} m")
-    return known
+        notes.append(f"climbs at {rise / run[-1]:.2f}, at last on {course}°")
+    if math.isfinite(clearance):
+        notes.append(f"{clearance:.0f} m above ground or more beyond {LAUNCH_RUN_M:.0f} m")
+    return notes
 
 
 RULE = Rule(

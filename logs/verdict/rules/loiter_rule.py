@@ -49,7 +49,7 @@ class Circle:
 def circles(requirements: RouteRequirements) -> list[Circle]:
     """Return the loiters of a route, in flying order."""
     arcs, items = requirements.setup.route.arcs, requirements.setup.route.items
-    found: list[Circle] = []
+    loiters: list[Circle] = []
     i = 0
     while i < len(arcs):
         last = i
@@ -57,10 +57,10 @@ def circles(requirements: RouteRequirements) -> list[Circle]:
             last += 1
         if arcs[i] > 0.0:
             angle = float(np.abs(requirements.turns[i : last + 1]).sum())
-            found.append(Circle(i, last, _center(requirements, i), float(arcs[i]), angle / (2.0 * math.pi)))
+            loiters.append(Circle(i, last, _center(requirements, i), float(arcs[i]), angle / (2.0 * math.pi)))
             i = last
         i += 1
-    return found
+    return loiters
 
 
 def _center(requirements: RouteRequirements, i: int) -> Floats:
@@ -77,42 +77,50 @@ def fold_loiters(
     requirements: RouteRequirements, aligned: AlignedTrack | None, findings: Sequence[Finding]
 ) -> tuple[Finding, ...]:
     """Merge the findings at each loiter's corners into one, and keep only each rule's worst finding on its legs."""
-    at_once = requirements.setup.autopilot.loiter_rules.at_middle
-    kept: list[Finding | None] = list(findings)
+    joins_at_center = requirements.setup.autopilot.loiter_rules.at_middle
+    merged: list[Finding | None] = list(findings)
     # Indexed by rule and place: a mission of jumps has hundreds of loiters, and each thousands of findings.
     positions: dict[tuple[str, Place], list[int]] = {}
-    for k, item in enumerate(findings):
-        positions.setdefault((item.rule, item.place), []).append(k)
+    for k, finding in enumerate(findings):
+        positions.setdefault((finding.rule, finding.place), []).append(k)
 
-    def left(rules: Sequence[str], places: Sequence[Place]) -> list[tuple[int, Finding]]:
+    def remaining(rules: Sequence[str], places: Sequence[Place]) -> list[tuple[int, Finding]]:
         """Return positions and findings of these rules at these places, in order, without replaced findings."""
-        every = sorted(k for rule in rules for place in places for k in positions.get((rule, place), ()))
-        return [(k, item) for k in every if (item := kept[k]) is not None and item.rule in rules]
+        indices = sorted(k for rule in rules for place in places for k in positions.get((rule, place), ()))
+        return [(k, finding) for k in indices if (finding := merged[k]) is not None and finding.rule in rules]
 
     for circle in circles(requirements):
         # If the mission ends on its loiter, that end is on it too.
-        here = requirements.setup.route.items[circle.last : circle.last + 2]
-        last = circle.last + 1 if at_once and len(here) == 2 and here[0] == here[1] else circle.last
-        at = left(("turn", "waypoint"), [requirements.waypoint(i) for i in range(circle.first, last + 1)])
-        for k, _ in at:
-            kept[k] = None
-        if at:
-            kept[at[0][0]] = _loiter_finding(requirements, aligned, circle, [item for _, item in at])
+        last_items = requirements.setup.route.items[circle.last : circle.last + 2]
+        last = (
+            circle.last + 1
+            if joins_at_center and len(last_items) == 2 and last_items[0] == last_items[1]
+            else circle.last
+        )
+        corner_findings = remaining(
+            ("turn", "waypoint"), [requirements.waypoint(i) for i in range(circle.first, last + 1)]
+        )
+        for k, _ in corner_findings:
+            merged[k] = None
+        if corner_findings:
+            merged[corner_findings[0][0]] = _loiter_finding(
+                requirements, aligned, circle, [item for _, item in corner_findings]
+            )
         legs = [requirements.leg(leg) for leg in range(circle.first, circle.last)]
         for rule in ("slope", "speed", "clearance", "corridor"):
-            rule_findings = left((rule,), legs)
-            if at_once and any(item.ok is not None for _, item in rule_findings):
+            rule_findings = remaining((rule,), legs)
+            if joins_at_center and any(finding.ok is not None for _, finding in rule_findings):
                 # The loiter was left before the other legs: only the flown ones are judged.
-                for k, item in rule_findings:
-                    kept[k] = item if item.ok is not None else None
-                rule_findings = [one for one in rule_findings if one[1].ok is not None]
+                for k, finding in rule_findings:
+                    merged[k] = finding if finding.ok is not None else None
+                rule_findings = [entry for entry in rule_findings if entry[1].ok is not None]
             if len(rule_findings) > 1:
-                at_worst, worst = min(rule_findings, key=lambda one: badness(one[1]))
+                worst_index, worst = min(rule_findings, key=lambda entry: badness(entry[1]))
                 for k, _ in rule_findings:
-                    kept[k] = None
+                    merged[k] = None
                 reason = f"{worst.reason}; the worst of the circle's {len(rule_findings)} legs"
-                kept[at_worst] = replace(worst, reason=reason)
-    return tuple(item for item in kept if item is not None)
+                merged[worst_index] = replace(worst, reason=reason)
+    return tuple(item for item in merged if item is not None)
 
 
 def end_findings(
@@ -125,64 +133,64 @@ def end_findings(
     hazards = end_loiter_hazards(requirements) if geometric else None
     if hazards is None:
         return []
-    reach, found = hazards
+    reach, descriptions = hazards
     reason = f"after it {requirements.setup.autopilot.title} circles, up to {reach:.0f} m from it"
-    if found:
-        reason += f": {', '.join(found)}: only a flight tells how near it comes"
+    if descriptions:
+        reason += f": {', '.join(descriptions)}: only a flight tells how near it comes"
     return [
         make_finding(
             "loiter",
             requirements.waypoint(requirements.legs),
-            ok=None if found else True,
+            ok=None if descriptions else True,
             reason=reason,
             method="all that its circles may reach, at the height of the last waypoint",
-            check=UNKNOWN_WAY if found else "",
+            check=UNKNOWN_WAY if descriptions else "",
         )
     ]
 
 
 def _loiter_finding(
-    requirements: RouteRequirements, aligned: AlignedTrack | None, circle: Circle, at: list[Finding]
+    requirements: RouteRequirements, aligned: AlignedTrack | None, circle: Circle, corner_findings: list[Finding]
 ) -> Finding:
     inner = slice(circle.first, circle.last + 1)
-    known = bool(np.isfinite(requirements.turn_limit[inner]).all())
-    tightest = float(requirements.tightest[inner].max()) if known else math.nan
-    bad = [item for item in at if item.ok is False]
-    at_middle = requirements.setup.autopilot.loiter_rules.at_middle
-    own = _uses_parameter_radius(requirements, circle)
-    if at_middle and (own if aligned is None else _has_reached(requirements, aligned, circle)):
-        bad = []
-    faults = _small_radius_faults(requirements, circle, tightest) if known else []
+    is_known = bool(np.isfinite(requirements.turn_limit[inner]).all())
+    min_radius = float(requirements.tightest[inner].max()) if is_known else math.nan
+    failed = [finding for finding in corner_findings if finding.ok is False]
+    joins_at_center = requirements.setup.autopilot.loiter_rules.at_middle
+    uses_parameter = _uses_parameter_radius(requirements, circle)
+    if joins_at_center and (uses_parameter if aligned is None else _has_reached(requirements, aligned, circle)):
+        failed = []
+    faults = _small_radius_faults(requirements, circle, min_radius) if is_known else []
     facts = [f"{circle.turns:.2f} turns with {circle.radius:.0f} m"]
     open_text, name = "", requirements.setup.autopilot.loiter_rules.radius_name
-    if own and faults and math.isfinite(tightest):
+    if uses_parameter and faults and math.isfinite(min_radius):
         # If the parameter makes the loiter too tight, the autopilot flies it wider, as at the end of a return.
-        bank = _held_bank(requirements, circle, tightest, at)
+        bank = _held_bank(requirements, circle, min_radius, corner_findings)
         if bank <= requirements.limits.max_bank + BANK_TOLERANCE_RAD + 1e-9:
-            facts.append(f"{name} asks for less than the {tightest:.0f} m of the bank limit: flown wider")
+            facts.append(f"{name} asks for less than the {min_radius:.0f} m of the bank limit: flown wider")
             faults = []
-            open_text = "" if aligned is not None else _hazards_text(requirements, circle, tightest)
+            open_text = "" if aligned is not None else _hazards_text(requirements, circle, min_radius)
         else:
             facts.append(f"{name}, held with {math.degrees(bank):.0f}° of bank")
-    if aligned is not None and bad:
-        faults.append(_unheld_corners_message(circle, bad))
-    elif bad and not faults:
-        first = bad[0]
+    if aligned is not None and failed:
+        faults.append(_unheld_corners_message(circle, failed))
+    elif failed and not faults:
+        first = failed[0]
         text, placed = f"{place_text(first.place)}: {first.reason}", first.place == requirements.waypoint(circle.first)
         faults.append(Message(text, _corner_text(first.place), placed))
     radii = np.zeros(0) if aligned is None else _flown_radii(aligned, circle)
-    mean = float(radii.mean()) if radii.size else math.nan
+    mean_radius = float(radii.mean()) if radii.size else math.nan
     if radii.size:
         facts.append(f"flown with {radii.min():.1f} to {radii.max():.1f} m")
         if (
-            at_middle
-            and not own
+            joins_at_center
+            and not uses_parameter
             and circle.turns >= 1.0
-            and mean > circle.radius * (1.0 + LOITER_WIDENING_FRACTION) + WAYPOINT_PASS_MARGIN_M
+            and mean_radius > circle.radius * (1.0 + LOITER_WIDENING_FRACTION) + WAYPOINT_PASS_MARGIN_M
         ):
-            faults.append(message(f"flown with {mean:.0f} m where {circle.radius:.0f} m is asked for"))
-    ok: bool | None = not (faults or bad)
-    if ok and any(item.ok is None for item in at):
+            faults.append(message(f"flown with {mean_radius:.0f} m where {circle.radius:.0f} m is asked for"))
+    ok: bool | None = not (faults or failed)
+    if ok and any(finding.ok is None for finding in corner_findings):
         ok = None
         facts.append("the flight did not get to its end")
     if ok and open_text:
@@ -195,12 +203,12 @@ def _loiter_finding(
         reason=reason_of(faults, facts),
         faults=faults,
         planned=circle.radius,
-        flown=mean,
-        limit=tightest,
+        flown=mean_radius,
+        limit=min_radius,
         at_least=True,
-        source="aircraft" if known else "none",
+        source="aircraft" if is_known else "none",
         tolerance=RADIUS_TOLERANCE_FRACTION,
-        margin=circle.radius - tightest,
+        margin=circle.radius - min_radius,
         unit="m",
         method="radius over the ground against the bank limit's in this wind; each corner as a turn",
         check=UNKNOWN_WAY if ok is None and open_text else "",
@@ -215,8 +223,8 @@ def _flown_radii(aligned: AlignedTrack, circle: Circle) -> Floats:
     first, last = int(aligned.rows[circle.first]), int(aligned.rows[circle.last])
     if not aligned.passed[circle.last] or last <= first:
         return np.zeros(0)
-    off = aligned.track.position[first : last + 1, :2] - circle.middle
-    return np.asarray(np.hypot(off[:, 0], off[:, 1]))
+    offsets = aligned.track.position[first : last + 1, :2] - circle.middle
+    return np.asarray(np.hypot(offsets[:, 0], offsets[:, 1]))
 
 
 def _uses_parameter_radius(requirements: RouteRequirements, circle: Circle) -> bool:
@@ -229,64 +237,66 @@ def _uses_parameter_radius(requirements: RouteRequirements, circle: Circle) -> b
     return rules.lines_up and rules.radius != 0.0 and loiter is not None and rules.radius_of(loiter) == 0.0
 
 
-def _held_bank(requirements: RouteRequirements, circle: Circle, tightest: float, at: list[Finding]) -> float:
-    """Return the bank with which a loiter tighter than the bank limit allows was held, rad.
+def _held_bank(
+    requirements: RouteRequirements, circle: Circle, min_radius: float, corner_findings: list[Finding]
+) -> float:
+    """Return the bank with which a loiter was held that is tighter than the bank limit allows, rad.
 
-    tightest: radius at the bank limit, m.
+    min_radius: radius at the bank limit, m.
 
     The bank is the largest mean over a second.  Without a flight or a measurement, it is the bank needed to hold the
     loiter, up to the autopilot's limit.
     """
-    measured = [fact.value for item in at for fact in item.facts if fact.what == "bank"]
+    measured = [fact.value for finding in corner_findings for fact in finding.facts if fact.what == "bank"]
     if measured:
         return math.radians(max(measured))
-    needed = math.atan(math.tan(requirements.limits.max_bank) * tightest / circle.radius)
+    needed = math.atan(math.tan(requirements.limits.max_bank) * min_radius / circle.radius)
     return min(requirements.setup.autopilot.bank_limit, needed)
 
 
-def _hazards_text(requirements: RouteRequirements, circle: Circle, tightest: float) -> str:
+def _hazards_text(requirements: RouteRequirements, circle: Circle, min_radius: float) -> str:
     """Describe the hazards too close to a loiter that is flown wider than drawn; return "" if there are none."""
     heights = requirements.points[circle.first : circle.last + 1, 2]
-    reach = LOITER_SWING_RADII * tightest
-    found = hazards_within(requirements, circle.middle, float(heights.min()), float(heights.max()), reach)
-    if not found:
+    reach = LOITER_SWING_RADII * min_radius
+    hazards = hazards_within(requirements, circle.middle, float(heights.min()), float(heights.max()), reach)
+    if not hazards:
         return ""
-    near = f"within the {reach:.0f} m of its middle that it may get to"
-    return f"{near}, {', '.join(found)}: only a flight tells where it is"
+    reach_text = f"within the {reach:.0f} m of its middle that it may get to"
+    return f"{reach_text}, {', '.join(hazards)}: only a flight tells where it is"
 
 
 def _has_reached(requirements: RouteRequirements, aligned: AlignedTrack, circle: Circle) -> bool:
     """Return True if the flight came close enough to a loiter to count as having reached it.
 
-    The corners do not tell, because a flight that leaves the loiter when its time is over may miss all of them.
+    The corners do not show this, because a flight that leaves the loiter when its time is over may miss all of them.
     """
-    away, _ = approaches(aligned.track.position, circle.middle)
-    early = requirements.setup.autopilot.turn_distance(math.pi, float(requirements.points[circle.first, 2]))
-    return bool(away.min() <= circle.radius + early + WAYPOINT_PASS_MARGIN_M)
+    distances, _ = approaches(aligned.track.position, circle.middle)
+    turn_distance = requirements.setup.autopilot.turn_distance(math.pi, float(requirements.points[circle.first, 2]))
+    return bool(distances.min() <= circle.radius + turn_distance + WAYPOINT_PASS_MARGIN_M)
 
 
-def _small_radius_faults(requirements: RouteRequirements, circle: Circle, tightest: float) -> list[Message]:
+def _small_radius_faults(requirements: RouteRequirements, circle: Circle, min_radius: float) -> list[Message]:
     """Return a fault if a loiter is smaller than the radius at the bank limit (m)."""
-    if circle.radius >= tightest - RADIUS_TOLERANCE_FRACTION:
+    if circle.radius >= min_radius - RADIUS_TOLERANCE_FRACTION:
         return []
     speed, bank = float(requirements.route.airspeed[circle.first]), math.degrees(requirements.limits.max_bank)
-    needs = f"at {speed:.0f} m/s and {bank:.0f}° bank the aircraft needs {tightest:.0f} m"
-    if not math.isfinite(tightest):
-        needs = f"at {speed:.0f} m/s the wind leaves no way around it"
-    return [message(f"radius {circle.radius:.0f} m where {needs} in this wind")]
+    need_text = f"at {speed:.0f} m/s and {bank:.0f}° bank the aircraft needs {min_radius:.0f} m"
+    if not math.isfinite(min_radius):
+        need_text = f"at {speed:.0f} m/s the wind leaves no way around it"
+    return [message(f"radius {circle.radius:.0f} m where {need_text} in this wind")]
 
 
-def _unheld_corners_message(circle: Circle, bad: list[Finding]) -> Message:
-    """Describe how many corners were not held, and the worst corner."""
-    worst = min(bad, key=badness)
-    corners = len({item.place for item in bad})
+def _unheld_corners_message(circle: Circle, failed: list[Finding]) -> Message:
+    """State the number of corners that were not held, and the worst corner."""
+    worst = min(failed, key=badness)
+    corners = len({finding.place for finding in failed})
     count = f"{corners} of {circle.last - circle.first + 1} corners not held, as "
     return Message(f"{count}{place_text(worst.place)}: {worst.reason}", f"{count}{_corner_text(worst.place)}")
 
 
-def _corner_text(corner: Place) -> str:
+def _corner_text(place: Place) -> str:
     """Name a corner for a headline, without the mission item, which all corners of a loiter share."""
-    return place_text(replace(corner, item=None))
+    return place_text(replace(place, item=None))
 
 
 RULE = Rule(

@@ -25,7 +25,7 @@ def departure_findings(
         return [make_finding("departure", FLIGHT, ok=None, reason="no usable rows", unit="deg")]
     track = aligned.track
     bank = np.abs(track.attitude[:, ROLL].astype(np.float64))
-    most, slow = _max_finite(bank), _low_airspeed_faults(requirements, aligned)
+    max_bank, airspeed_faults = _max_finite(bank), _low_airspeed_faults(requirements, aligned)
     faults = []
     if aligned.bad_rows:
         faults.append(
@@ -34,32 +34,32 @@ def departure_findings(
     if (bank > MAX_CONTROLLED_BANK_RAD).any():
         k = int(np.argmax(bank > MAX_CONTROLLED_BANK_RAD))
         faults.append(message(f"bank {math.degrees(bank[k]):.0f}° at {track.time[k]:.1f} s"))
-    faults += slow
-    if (aligned.low <= 0.0).any():
-        k = int(np.argmax(aligned.low <= 0.0))
-        time = track.time[k] + aligned.low_at[k] * (track.time[k + 1] - track.time[k])
+    faults += airspeed_faults
+    if (aligned.clearance <= 0.0).any():
+        k = int(np.argmax(aligned.clearance <= 0.0))
+        time = track.time[k] + aligned.clearance_fraction[k] * (track.time[k + 1] - track.time[k])
         faults.append(
             message(
                 f"ground contact at {time:.1f} s on {place_text(requirements.leg(aligned.leg_at(k)))}",
-                f", {aligned.where(k, float(aligned.low_at[k]))}",
+                f", {aligned.where(k, float(aligned.clearance_fraction[k]))}",
             )
         )
-    least = -_max_finite(-track.airspeed.astype(np.float64))
-    known = [] if math.isnan(most) else [f"bank at most {math.degrees(most):.0f}°"]
-    known += [] if math.isnan(least) else [f"airspeed at least {least:.1f} m/s"]
-    steady = ", ".join(known) or "no ground contact; neither bank nor airspeed is known"
+    min_airspeed = -_max_finite(-track.airspeed.astype(np.float64))
+    notes = [] if math.isnan(max_bank) else [f"bank at most {math.degrees(max_bank):.0f}°"]
+    notes += [] if math.isnan(min_airspeed) else [f"airspeed at least {min_airspeed:.1f} m/s"]
+    notes_text = ", ".join(notes) or "no ground contact; neither bank nor airspeed is known"
     return [
         make_finding(
             "departure",
             FLIGHT,
             ok=not faults,
-            reason=reason_of(faults) if faults else steady,
+            reason=reason_of(faults) if faults else notes_text,
             faults=faults,
-            flown=math.degrees(most),
+            flown=math.degrees(max_bank),
             limit=math.degrees(MAX_CONTROLLED_BANK_RAD),
             source="check",
             tolerance=0.0,
-            margin=math.degrees(MAX_CONTROLLED_BANK_RAD - most),
+            margin=math.degrees(MAX_CONTROLLED_BANK_RAD - max_bank),
             unit="deg",
             method="every row",
         )
@@ -78,24 +78,24 @@ def _low_airspeed_faults(requirements: RouteRequirements, aligned: AlignedTrack)
     if source is not None and not source.aircraft_known:
         return []
     track = aligned.track
-    slowest = _min_flying_airspeed(requirements, track.position[:, 2])
-    slow = np.flatnonzero(track.airspeed < slowest)
-    if not slow.size:
+    min_airspeeds = _min_flying_airspeed(requirements, track.position[:, 2])
+    slow_rows = np.flatnonzero(track.airspeed < min_airspeeds)
+    if not slow_rows.size:
         return []
-    k = int(slow[0])
-    return [message(f"airspeed {track.airspeed[k]:.1f} m/s at {track.time[k]:.1f} s, below {slowest[k]:.1f} m/s")]
+    k = int(slow_rows[0])
+    return [message(f"airspeed {track.airspeed[k]:.1f} m/s at {track.time[k]:.1f} s, below {min_airspeeds[k]:.1f} m/s")]
 
 
 def _time_text(time: float) -> str:
     return f"at {time:.1f} s" if math.isfinite(time) else "without a time"
 
 
-def _min_flying_airspeed(requirements: RouteRequirements, up: Floats) -> Floats:
-    """Return the airspeed below which the aircraft no longer counts as flying, m/s, at each altitude `up` (m AMSL)."""
+def _min_flying_airspeed(requirements: RouteRequirements, altitude: Floats) -> Floats:
+    """Return the airspeed below which the aircraft no longer counts as flying at each altitude (m AMSL), m/s."""
     if requirements.setup.aircraft == "aerosonde":
-        return np.full(up.shape, MIN_CONTROLLED_AIRSPEED_MPS)
+        return np.full(altitude.shape, MIN_CONTROLLED_AIRSPEED_MPS)
     envelope = requirements.setup.envelope
-    return np.asarray(MIN_CONTROLLED_STALL_RATIO * np.interp(up, envelope.amsl, envelope.level_speed_min))
+    return np.asarray(MIN_CONTROLLED_STALL_RATIO * np.interp(altitude, envelope.amsl, envelope.level_speed_min))
 
 
 RULE = Rule(

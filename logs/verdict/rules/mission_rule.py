@@ -63,10 +63,10 @@ def mission_findings(setup: FlightSetup) -> list[Finding]:
         ("checkGeofence", _check_fence(setup)),
     )
     refuses = setup.autopilot.refuses
-    found = [_finding(name, list(remarks), refuses) for name, remarks in checks]
+    findings = [_finding(name, list(remarks), refuses) for name, remarks in checks]
     # No autopilot has a name for the last checks, which report the parts of a mission that are not judged.
     return [
-        *found,
+        *findings,
         *_arduplane_refusals(setup),
         *([_unjoined_finding(setup)] if setup.route.unjoined else []),
         *_unflown_findings(setup),
@@ -79,21 +79,21 @@ REFUSED: Literal["refused"] = "refused"
 _Remark = tuple[bool | Literal["refused"] | None, int | None, str | Message]
 
 
-def _finding(check: str, said: list[_Remark], refuses: bool) -> Finding:
-    """Merge the remarks of a check into one finding.  refuses: True if the autopilot refuses the same items as PX4."""
+def _finding(check: str, remarks: list[_Remark], refuses: bool) -> Finding:
+    """Merge the remarks of a check into one finding.  refuses: True if the autopilot refuses what PX4 refuses."""
     verdict = False if refuses else None
-    remarks = [(verdict if ok == REFUSED else ok, item, why) for ok, item, why in said]
+    sorted_remarks = [(verdict if ok == REFUSED else ok, item, reason) for ok, item, reason in remarks]
     # A failure comes first, then PX4's refusals, then mere remarks.
-    remarks.sort(key=lambda one: {False: 0, None: 1, True: 2}[one[0]])
-    ok, item, why = remarks[0] if remarks else (True, None, "nothing to object to")
-    first = why if isinstance(why, Message) else message(why)
-    more = f" (+{len(remarks) - 1} more)" if len(remarks) > 1 else ""
+    sorted_remarks.sort(key=lambda remark: {False: 0, None: 1, True: 2}[remark[0]])
+    ok, item, reason = sorted_remarks[0] if sorted_remarks else (True, None, "nothing to object to")
+    first_message = reason if isinstance(reason, Message) else message(reason)
+    more_text = f" (+{len(sorted_remarks) - 1} more)" if len(sorted_remarks) > 1 else ""
     return make_finding(
         "mission",
         Place("mission", item=item),
         ok=ok,
-        reason=f"{first.text}{more} (PX4 {check})",
-        faults=[first],
+        reason=f"{first_message.text}{more_text} (PX4 {check})",
+        faults=[first_message],
         source="PX4",
         method="mission items",
         check=check,
@@ -109,8 +109,8 @@ def _arduplane_refusals(setup: FlightSetup) -> list[Finding]:
     ]
     if not refused or not setup.autopilot.refuses_as_arduplane:
         return []
-    more = f" (+{len(refused) - 1} more)" if len(refused) > 1 else ""
-    fault = message(f"unsupported command {command_name(refused[0].command)}", f"; PX4 takes it{more}")
+    more_text = f" (+{len(refused) - 1} more)" if len(refused) > 1 else ""
+    fault = message(f"unsupported command {command_name(refused[0].command)}", f"; PX4 takes it{more_text}")
     return [
         make_finding(
             "mission",
@@ -126,7 +126,7 @@ def _arduplane_refusals(setup: FlightSetup) -> list[Finding]:
 
 
 def _unjoined_finding(setup: FlightSetup) -> Finding:
-    """Report that an autopilot leaves the route, to a place inside a loiter or around another center.
+    """Report that an autopilot leaves the route for a place inside a loiter, or a loiter about another center.
 
     For an imported flight this is undecided, not a fault; see
     `logs.verdict.rules.completion_rule.imported_completion`.
@@ -134,12 +134,12 @@ def _unjoined_finding(setup: FlightSetup) -> Finding:
     first, *others = setup.route.unjoined
     autopilot = setup.autopilot.title
     if first.is_circle:
-        why = f"no tangent joins its circle to that of item {first.circle}"
+        reason = f"no tangent joins its circle to that of item {first.circle}"
     else:
-        why = f"lies inside the circle of item {first.circle}"
-    more = f" (+{len(others)} more)" if others else ""
+        reason = f"lies inside the circle of item {first.circle}"
+    more_text = f" (+{len(others)} more)" if others else ""
     fault = message(
-        why, f": {autopilot} flies {'it as it is' if first.is_circle else 'there'}, which is not judged{more}"
+        reason, f": {autopilot} flies {'it as it is' if first.is_circle else 'there'}, which is not judged{more_text}"
     )
     return make_finding(
         "mission",
@@ -154,15 +154,17 @@ def _unjoined_finding(setup: FlightSetup) -> Finding:
 
 
 def _unflown_findings(setup: FlightSetup) -> Iterator[Finding]:
-    """Yield a finding for each item or setting that would change the flight path but is not simulated."""
-    left = [(one.item, one.text) for one in setup.route.open_items]
+    """Yield a finding for each item or setting that changes the flight path but is not simulated."""
+    unflown = [(open_item.item, open_item.text) for open_item in setup.route.open_items]
     if not setup.autopilot.follows_ground:
-        held = sorted(set(setup.route.items[np.isfinite(setup.route.above_ground)].tolist()))
-        why = f"its height above terrain is not followed along the leg by {setup.autopilot.title} as it is flown here"
-        left += [(seq, why) for seq in held]
+        items_above_terrain = sorted(set(setup.route.items[np.isfinite(setup.route.above_ground)].tolist()))
+        reason = (
+            f"its height above terrain is not followed along the leg by {setup.autopilot.title} as it is flown here"
+        )
+        unflown += [(seq, reason) for seq in items_above_terrain]
     if setup.scenario.returns is not None:
         # Returns from anywhere on the route are judged only to the mission's home.
-        left += [
+        unflown += [
             (item.seq, f"{command_name(item.command)}: returns are judged to the mission's home alone")
             for item in setup.mission.items
             if item.command == C.DO_SET_HOME
@@ -170,12 +172,12 @@ def _unflown_findings(setup: FlightSetup) -> Iterator[Finding]:
     slopes = landing_slopes(setup.mission, setup.route, setup.scenario)
     if setup.source is None and slopes is not None and max(map(abs, slopes)) > STEEPEST_STRIP:
         steepest = f"{max(map(abs, slopes)):.1%}, and at most {STEEPEST_STRIP:.0%} can be landed on"
-        why = f"NAV_LAND: the ground there slopes by {steepest}: the touchdown is not judged"
-        left.append((int(setup.route.items[-1]), why))
+        reason = f"NAV_LAND: the ground there slopes by {steepest}: the touchdown is not judged"
+        unflown.append((int(setup.route.items[-1]), reason))
     # An imported flight was flown with its settings.
     texts = setup.autopilot.settings_not_flown(_mission_parts(setup)) if setup.source is None else []
     settings = [(None, text) for text in texts]
-    for seq, text in [*left, *settings]:
+    for seq, text in [*unflown, *settings]:
         yield make_finding(
             "mission",
             Place("mission", item=seq),
@@ -214,10 +216,10 @@ def _check_validity(mission: Mission) -> Iterator[_Remark]:
     for item in mission.items:
         name, support = command_name(item.command), support_of(item.command)
         if support.px4 == Treatment.REFUSED:
-            taken = support.arduplane != Treatment.REFUSED
-            autopilot = "ArduPlane takes it" if taken else "nor does ArduPlane take it"
+            arduplane_accepts = support.arduplane != Treatment.REFUSED
+            autopilot = "ArduPlane takes it" if arduplane_accepts else "nor does ArduPlane take it"
             autopilot = "ArduPlane passes it over" if support.reason == PASSED_OVER else autopilot
-            yield REFUSED if taken else False, item.seq, f"unsupported command {name}; {autopilot}"
+            yield REFUSED if arduplane_accepts else False, item.seq, f"unsupported command {name}; {autopilot}"
         elif item.frame in OVER_TERRAIN and item.command in PLACES | TAKEOFFS | LANDINGS:
             yield (
                 REFUSED,
@@ -236,74 +238,74 @@ def _height_above_home(mission: Mission, item: MissionItem) -> float:
 
 
 def _check_takeoff(mission: Mission) -> Iterator[_Remark]:
-    placed = False
+    has_place = False
     for item in mission.items:
         if item.command in TAKEOFFS:
             height = _height_above_home(mission, item)
             if height <= 0.0:
                 yield REFUSED, item.seq, f"takeoff altitude {height:.1f} m is not above home"
-            if placed:
+            if has_place:
                 yield REFUSED, item.seq, "takeoff is not the first waypoint item"
-        placed = placed or item.command in PLACES | TAKEOFFS | LANDINGS | {C.NAV_RETURN_TO_LAUNCH}
+        has_place = has_place or item.command in PLACES | TAKEOFFS | LANDINGS | {C.NAV_RETURN_TO_LAUNCH}
 
 
 def _check_landing(mission: Mission) -> Iterator[_Remark]:
     commands = [item.command for item in mission.items]
-    starts = [k for k, command in enumerate(commands) if command == C.DO_LAND_START]
-    lands = [k for k, command in enumerate(commands) if command in LANDINGS]
+    land_starts = [k for k, command in enumerate(commands) if command == C.DO_LAND_START]
+    landings = [k for k, command in enumerate(commands) if command in LANDINGS]
     seq = [item.seq for item in mission.items]
-    if len(starts) > 1:
-        yield REFUSED, seq[starts[1]], "more than one land start command"
-    if lands and lands[0] == 0:
+    if len(land_starts) > 1:
+        yield REFUSED, seq[land_starts[1]], "more than one land start command"
+    if landings and landings[0] == 0:
         yield REFUSED, seq[0], "starts with landing"
     for k, command in enumerate(commands):
-        if command == C.NAV_RETURN_TO_LAUNCH and starts and starts[0] < k:
+        if command == C.NAV_RETURN_TO_LAUNCH and land_starts and land_starts[0] < k:
             yield REFUSED, seq[k], "land start item before RTL item is not possible"
-    if starts and not any(land > starts[0] for land in lands):
-        yield REFUSED, seq[starts[0]], "invalid land start: no landing follows"
+    if land_starts and not any(land > land_starts[0] for land in landings):
+        yield REFUSED, seq[land_starts[0]], "invalid land start: no landing follows"
 
 
 def _check_approach(mission: Mission, origin: GeoOrigin, limits: MissionChecks) -> Iterator[_Remark]:
-    steepest = math.degrees(limits.landing_angle)
-    for before, item in zip(mission.items, mission.items[1:], strict=False):
-        if item.command != C.NAV_LAND or before.command not in PLACES | TAKEOFFS or not before.has_position:
+    max_angle = math.degrees(limits.landing_angle)
+    for previous, item in zip(mission.items, mission.items[1:], strict=False):
+        if item.command != C.NAV_LAND or previous.command not in PLACES | TAKEOFFS or not previous.has_position:
             continue
-        rise = _height_above_home(mission, before) - _height_above_home(mission, item)
+        rise = _height_above_home(mission, previous) - _height_above_home(mission, item)
         if math.isnan(rise):
             yield None, item.seq, "the heights of landing and approach are not known over one another"
             continue
         if rise <= 0.0:
             yield REFUSED, item.seq, "the approach waypoint must be above the landing point"
             continue
-        run = _distance_between(before, item, origin)
-        if before.command == C.NAV_LOITER_TO_ALT:
-            radius = 0.0 if math.isnan(before.params[1]) else abs(before.params[1])
+        run = _distance_between(previous, item, origin)
+        if previous.command == C.NAV_LOITER_TO_ALT:
+            radius = 0.0 if math.isnan(previous.params[1]) else abs(previous.params[1])
             if run <= radius:
                 yield REFUSED, item.seq, "the landing point must be outside the orbit radius"
                 continue
             run = math.sqrt(run * run - radius * radius)
-        elif before.command != C.NAV_WAYPOINT:
+        elif previous.command != C.NAV_WAYPOINT:
             yield REFUSED, item.seq, "unsupported landing approach entrance: only LOITER_TO_ALT or WAYPOINT"
             continue
         angle = math.atan2(rise, run)
         if angle > limits.landing_angle + PX4_LANDING_BUFFER_RAD:
-            steep = f"the landing glide slope {math.degrees(angle):.1f}° is steeper than {steepest:.1f}°"
-            yield REFUSED, item.seq, steep
+            reason = f"the landing glide slope {math.degrees(angle):.1f}° is steeper than {max_angle:.1f}°"
+            yield REFUSED, item.seq, reason
 
 
 def _check_required_ends(mission: Mission, limits: MissionChecks, refuses: bool) -> Iterator[_Remark]:
-    lack = missing_ends_text(mission, limits)
-    if not lack:
+    missing_ends = missing_ends_text(mission, limits)
+    if not missing_ends:
         yield True, None, "takeoff and landing are as MIS_TKO_LAND_REQ asks for them"
     elif limits.stated:
-        yield REFUSED, None, lack
+        yield REFUSED, None, missing_ends
     else:
         # A single parameter of unknown value: no verdict, and irrelevant for another autopilot.
-        yield None if refuses else True, None, lack
+        yield None if refuses else True, None, missing_ends
 
 
-def _distance_between(a: MissionItem, b: MissionItem, origin: GeoOrigin) -> float:
-    east, north = to_map(origin, [a.lat_deg, b.lat_deg], [a.lon_deg, b.lon_deg])
+def _distance_between(first: MissionItem, second: MissionItem, origin: GeoOrigin) -> float:
+    east, north = to_map(origin, [first.lat_deg, second.lat_deg], [first.lon_deg, second.lon_deg])
     return float(math.hypot(float(np.diff(east)[0]), float(np.diff(north)[0])))
 
 
@@ -313,13 +315,13 @@ def _check_first_distance(mission: Mission, origin: GeoOrigin) -> Iterator[_Rema
         yield True, None, "no home, so no distance to the first waypoint"
         return
     home = MissionItem(0, int(C.NAV_WAYPOINT), 0, (0.0,) * 4, mission.home.lat_deg, mission.home.lon_deg, 0.0)
-    away = _distance_between(home, places[0], origin)
-    if not away < PX4_FIRST_WAYPOINT_DISTANCE_M:
-        # A warning in the releases whose control law is simulated here.
+    distance = _distance_between(home, places[0], origin)
+    if not distance < PX4_FIRST_WAYPOINT_DISTANCE_M:
+        # This is only a warning in the releases whose control law is simulated here.
         yield (
             None,
             places[0].seq,
-            f"first waypoint too far away: {away:.0f} m from home, maximum {PX4_FIRST_WAYPOINT_DISTANCE_M:.0f} m",
+            f"first waypoint too far away: {distance:.0f} m from home, maximum {PX4_FIRST_WAYPOINT_DISTANCE_M:.0f} m",
         )
 
 
@@ -330,10 +332,10 @@ def _check_gates(mission: Mission, origin: GeoOrigin) -> Iterator[_Remark]:
         for item in mission.items
         if item.has_position and (item.command in PLACES | TAKEOFFS | LANDINGS or item.command == C.CONDITION_GATE)
     ]
-    for before, after in itertools.pairwise(places):
-        gates = C.CONDITION_GATE in (before.command, after.command)
-        if gates and _distance_between(before, after, origin) < PX4_GATE_SPACING_M:
-            yield REFUSED, after.seq, "distance between waypoint and gate too close"
+    for previous, following in itertools.pairwise(places):
+        has_gate = C.CONDITION_GATE in (previous.command, following.command)
+        if has_gate and _distance_between(previous, following, origin) < PX4_GATE_SPACING_M:
+            yield REFUSED, following.seq, "distance between waypoint and gate too close"
 
 
 def _check_distances(mission: Mission, origin: GeoOrigin) -> Iterator[_Remark]:
@@ -367,9 +369,9 @@ def _check_fence(setup: FlightSetup) -> Iterator[_Remark]:
     for point, item in zip(route.waypoints, route.items, strict=True):
         problem = fence_problem(setup.mission.fences, origin, float(point[0]), float(point[1]))
         if problem is not None:
-            broken, fence_item = problem
-            why = message(f"geofence violation: {broken}", f" (fence item {fence_item})")
-            yield False, int(item) if item >= 0 else None, why
+            violation, fence_item = problem
+            reason = message(f"geofence violation: {violation}", f" (fence item {fence_item})")
+            yield False, int(item) if item >= 0 else None, reason
 
 
 RULE = Rule(

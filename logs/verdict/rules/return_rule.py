@@ -1,4 +1,4 @@
-"""The return rule: judge where a return to launch goes, and how far it was flown.
+"""The return rule: judge the destination of a return to launch, and how far it was flown.
 
 A mission only states that the aircraft is to return.  The autopilot chooses the path back, so the path has no required
 corridor, waypoint or slope, and is not judged against its stand-in in the route.  Ground, threats, zones, area, speed,
@@ -42,18 +42,20 @@ _LEG_RULES = frozenset({"turn", "waypoint", "corridor", "slope", "loiter"})
 def return_findings(
     requirements: RouteRequirements, aligned: AlignedTrack | None, *, geometric: bool = False
 ) -> list[Finding]:
-    """Judge where a planned return to launch goes, and whether an imported flight completed its return.
+    """Judge the destination of a planned return to launch, and whether an imported flight completed its return.
 
-    `flown_return_findings` judges planfly's own flights, because their track alone does not tell how they ended.
+    `flown_return_findings` judges planfly's own flights, because their track does not show how they ended.
     """
     if geometric:
-        demanded = _requirement_findings(requirements, partial(planned_starts, requirements.setup))
-        return _finding(requirements, None, "not flown yet") + demanded
+        required_findings = _requirement_findings(requirements, partial(planned_starts, requirements.setup))
+        return _finding(requirements, None, "not flown yet") + required_findings
     if requirements.setup.source is None:
         return []
-    passed = aligned is not None and bool(aligned.passed[-1])
-    lands = requirements.setup.route.return_until <= requirements.legs
-    return _flown_finding(requirements, passed and (lands or (aligned is not None and circled(requirements, aligned))))
+    has_passed_end = aligned is not None and bool(aligned.passed[-1])
+    goes_on_to_land = requirements.setup.route.return_until <= requirements.legs
+    return _flown_finding(
+        requirements, has_passed_end and (goes_on_to_land or (aligned is not None and circled(requirements, aligned)))
+    )
 
 
 def flown_return_findings(
@@ -64,13 +66,13 @@ def flown_return_findings(
     ended: "completed" if the flight ended after its loiter, otherwise the reason for its end.
     log_complete: not used, because the completion rule reports it.
     """
-    arrived = aligned is not None and bool(aligned.passed[-1]) and ended == "completed"
-    why = "" if ended == "completed" else f": {ended}"
+    has_arrived = aligned is not None and bool(aligned.passed[-1]) and ended == "completed"
+    reason = "" if ended == "completed" else f": {ended}"
     track = None if aligned is None else aligned.track
     starts = partial(planned_starts, requirements.setup)
     if track is not None:
         starts = partial(flown_starts, requirements.setup, track)
-    return _flown_finding(requirements, arrived, why) + _requirement_findings(requirements, starts)
+    return _flown_finding(requirements, has_arrived, reason) + _requirement_findings(requirements, starts)
 
 
 def _requirement_findings(requirements: RouteRequirements, starts: Callable[[float], ReturnStarts]) -> list[Finding]:
@@ -79,23 +81,23 @@ def _requirement_findings(requirements: RouteRequirements, starts: Callable[[flo
     starts: function that samples the starts of returns at an interval, s.
     """
     setup = requirements.setup
-    demanded = setup.scenario.returns
-    demands = [] if demanded is None else [_DEMANDS[name] for name in demanded.require if name in _DEMANDS]
-    if demanded is None or not demands:
+    requirement = setup.scenario.returns
+    demands = [] if requirement is None else [_DEMANDS[name] for name in requirement.require if name in _DEMANDS]
+    if requirement is None or not demands:
         return []
-    every = float(max(1, math.ceil(setup.path.length / setup.airspeed / _MAX_RETURNS)))
+    interval = float(max(1, math.ceil(setup.path.length / setup.airspeed / _MAX_RETURNS)))
     try:
-        world, return_starts = return_world(setup), starts(every)
-        found = [judge(world, return_starts, every) for judge in demands]
+        world, return_starts = return_world(setup), starts(interval)
+        answers = [judge(world, return_starts, interval) for judge in demands]
     except MissionError as error:
         # Without a home nothing returns; what a glide could reach is not known.
-        found = [_Answer(False if "rtl" in demanded.require else None, str(error), _METHOD)]
-    results = {one.ok for one in found}
+        answers = [_Answer(False if "rtl" in requirement.require else None, str(error), _METHOD)]
+    results = {answer.ok for answer in answers}
     ok = False if False in results else None if None in results else True
     # Failures come first, then what is not known.
-    found.sort(key=lambda one: (one.ok is not False, one.ok is not None))
-    reason, method = "; ".join(one.reason for one in found), "; ".join(one.method for one in found)
-    method = f"from every {every:.0f} s of the way, {method}"
+    answers.sort(key=lambda answer: (answer.ok is not False, answer.ok is not None))
+    reason, method = "; ".join(answer.reason for answer in answers), "; ".join(answer.method for answer in answers)
+    method = f"from every {interval:.0f} s of the way, {method}"
     # A verdict that requires them is undecided without them.
     faults, check = ([Message(reason, _NOT_KNOWN)], UNKNOWN_RETURN) if ok is None else ([], "")
     return [
@@ -117,21 +119,21 @@ class _Answer(NamedTuple):
     method: str
 
 
-def _judge_rtl(world: ReturnWorld, starts: ReturnStarts, every: float) -> _Answer:
+def _judge_rtl(world: ReturnWorld, starts: ReturnStarts, interval: float) -> _Answer:
     """Judge whether every return to launch is safe."""
-    returns = judge_returns(world, starts, every)
+    returns = judge_returns(world, starts, interval)
     return _Answer(None if returns.undecided else returns.safe, headline(returns), _METHOD)
 
 
 def _judge_glides(world: ReturnWorld, starts: ReturnStarts, _: float) -> _Answer:
     """Judge whether a glide from every start reaches home, a rally point, a landing place or flat ground.
 
-    Starts below the minimum height above ground are left out, because there the aircraft takes off or lands and would
-    descend straight ahead.
+    Starts below the minimum height above ground are omitted: there the aircraft takes off or lands, and would descend
+    straight ahead.
     """
-    low = heights_above_ground(world, starts) < world.limit
-    glides = judge_glides(world, starts.at(np.flatnonzero(~low)))
-    left_out = f"; {low.sum()} lower than {world.limit:.0f} m above ground are left out" if low.any() else ""
+    is_low = heights_above_ground(world, starts) < world.limit
+    glides = judge_glides(world, starts.at(np.flatnonzero(~is_low)))
+    left_out = f"; {is_low.sum()} lower than {world.limit:.0f} m above ground are left out" if is_low.any() else ""
     reason = f"without the engine: {glides_headline(glides)}{left_out}"
     return _Answer(glides.somewhere, reason, f"glides that keep {MARGIN:.0f} m above ground")
 
@@ -149,27 +151,27 @@ def circled(requirements: RouteRequirements, aligned: AlignedTrack) -> bool:
     The time starts when the aircraft is near the center and at the loiter's altitude, as for a simulated flight
     (`flight.simulation.tick.end_return`).
     """
-    end = requirements.setup.route.return_to
-    if end is None:
+    loiter = requirements.setup.route.return_to
+    if loiter is None:
         return False
     track = aligned.track
-    east, north, up = (track.position - (end.east, end.north, end.up)).T
+    east, north, up = (track.position - (loiter.east, loiter.north, loiter.up)).T
     # True radii grow with altitude as the square of true airspeed.
-    wide = RTL_ARRIVAL_LOITER_RADII * abs(end.radius) * true_by_equivalent(end.up) ** 2
-    at_loiter = (np.hypot(east, north) < max(RTL_ARRIVAL_RADIUS_M, wide)) & (
+    radius = RTL_ARRIVAL_LOITER_RADII * abs(loiter.radius) * true_by_equivalent(loiter.up) ** 2
+    at_loiter = (np.hypot(east, north) < max(RTL_ARRIVAL_RADIUS_M, radius)) & (
         np.abs(up) < RTL_ARRIVAL_ALTITUDE_TOLERANCE_M
     )
     if not at_loiter.any():
         return False
     first = int(np.argmax(at_loiter))
     bearing = np.unwrap(np.arctan2(east[first:], north[first:]))
-    around = abs(float(bearing[-1] - bearing[0])) >= 2.0 * math.pi - _LAP_TOLERANCE_RAD
-    return around and float(track.time[-1] - track.time[first]) >= UNLIMITED
+    has_circled = abs(float(bearing[-1] - bearing[0])) >= 2.0 * math.pi - _LAP_TOLERANCE_RAD
+    return has_circled and float(track.time[-1] - track.time[first]) >= UNLIMITED
 
 
-def _flown_finding(requirements: RouteRequirements, arrived: bool, why: str = "") -> list[Finding]:
-    outcome = "flown to its end" if arrived else f"the flight did not get to its end{why}"
-    return _finding(requirements, True if arrived else None, outcome)
+def _flown_finding(requirements: RouteRequirements, has_arrived: bool, reason: str = "") -> list[Finding]:
+    outcome = "flown to its end" if has_arrived else f"the flight did not get to its end{reason}"
+    return _finding(requirements, True if has_arrived else None, outcome)
 
 
 def _finding(requirements: RouteRequirements, ok: bool | None, outcome: str) -> list[Finding]:
@@ -180,11 +182,11 @@ def _finding(requirements: RouteRequirements, ok: bool | None, outcome: str) -> 
     name = f"{Command.NAV_RETURN_TO_LAUNCH.name}: "
     note_text = next((note.partition(name)[2] for note in route.notes if name in note), "")
     reason = f"by the simulated {requirements.setup.autopilot.title}: {note_text}; {outcome}"
-    other = next((note.partition(": ")[2] for note in route.notes if RETURN_NOT_FLOWN_ON in note), "")
+    unknown_reason = next((note.partition(": ")[2] for note in route.notes if RETURN_NOT_FLOWN_ON in note), "")
     faults = []
-    if other and requirements.setup.source is None:
+    if unknown_reason and requirements.setup.source is None:
         # What was flown instead does not show where the autopilot goes.
-        faults, ok = [message("where the return leads to is not known", f": {other}")], None
+        faults, ok = [message("where the return leads to is not known", f": {unknown_reason}")], None
         reason = f"{faults[0].text}; {reason}"
     return [
         make_finding(
@@ -202,29 +204,34 @@ def _finding(requirements: RouteRequirements, ok: bool | None, outcome: str) -> 
 def without_style(
     requirements: RouteRequirements, aligned: AlignedTrack | None, findings: Sequence[Finding]
 ) -> tuple[Finding, ...]:
-    """Remove the findings that judge how well the return follows its drawn path.
+    """Remove the findings on how well the return follows its drawn path.
 
     findings: all findings, including the finding on the return itself.
     """
     first = requirements.setup.route.return_from
     if first < 0:
         return tuple(findings)
-    # The corner where the return begins belongs to it; the waypoint there belongs to the mission.
-    until = requirements.setup.route.return_until
-    legs = range(first, min(until, requirements.legs))
-    places = {requirements.waypoint(i) for i in range(first + 1, min(until, requirements.legs + 1))}
+    # The corner where the return begins belongs to the return; the waypoint there belongs to the mission.
+    end_waypoint = requirements.setup.route.return_until
+    legs = range(first, min(end_waypoint, requirements.legs))
+    places = {requirements.waypoint(i) for i in range(first + 1, min(end_waypoint, requirements.legs + 1))}
     places |= {requirements.leg(i) for i in legs}
     corner = requirements.waypoint(first)
-    kept = [
-        item
-        for item in findings
-        if not ((item.rule in _LEG_RULES and item.place in places) or (item.rule == "turn" and item.place == corner))
+    kept_findings = [
+        finding
+        for finding in findings
+        if not (
+            (finding.rule in _LEG_RULES and finding.place in places)
+            or (finding.rule == "turn" and finding.place == corner)
+        )
     ]
-    if aligned is None or not any(item.rule == "return" and item.place != FLIGHT and item.ok for item in kept):
-        return tuple(kept)
-    # All of the return is on some leg; a drawn leg without any part of it was not flown.
+    if aligned is None or not any(
+        finding.rule == "return" and finding.place != FLIGHT and finding.ok for finding in kept_findings
+    ):
+        return tuple(kept_findings)
+    # Every part of the return is on some leg; a drawn leg without any part was not flown.
     unflown = {requirements.leg(i) for i in legs if not aligned.flew(i)}
-    return tuple(item for item in kept if item.ok is not None or item.place not in unflown)
+    return tuple(finding for finding in kept_findings if finding.ok is not None or finding.place not in unflown)
 
 
 RULE = Rule(

@@ -3,13 +3,13 @@
 import math
 
 from logs.verdict.findings import UNKNOWN_AIRCRAFT, Fact, Finding, Message, make_finding, message, reason_of
-from logs.verdict.measures.acceptance import step
+from logs.verdict.measures.acceptance import step_height
 from logs.verdict.measures.route_requirements import RouteRequirements, slope_limit, steep_arc
 from logs.verdict.measures.slopes import LegFit, SlopeMeasure, measure_slope
 from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.places import Place
 from logs.verdict.rule import LogNeeds, Rule
-from logs.verdict.suggestions import ease_slope
+from logs.verdict.suggestions import suggest_gentler_slope
 from logs.verdict.tolerances import (
     ABILITY_SIGMAS,
     ABILITY_TOLERANCE_RAD,
@@ -31,8 +31,8 @@ from world.wind import W20
 def slope_findings(
     requirements: RouteRequirements, aligned: AlignedTrack | None, *, geometric: bool = False
 ) -> list[Finding]:
-    """Judge the slope of each leg; if ``geometric``, judge the route alone, without a flight."""
-    out = []
+    """Judge the slope of each leg; if ``geometric``, judge only the route, without a flight."""
+    findings = []
     for leg in range(requirements.legs):
         # Without a flight the path of a climb that cannot be flown is unknown.
         if requirements.leads_around(leg) and not geometric:
@@ -40,11 +40,11 @@ def slope_findings(
         measure = None if geometric else SlopeMeasure()
         if aligned is not None:
             measure = measure_slope(requirements, aligned, leg)
-        out.append(_judge(requirements, leg, measure))
-    return out
+        findings.append(_finding(requirements, leg, measure))
+    return findings
 
 
-def _judge(requirements: RouteRequirements, leg: int, measure: SlopeMeasure | None) -> Finding:
+def _finding(requirements: RouteRequirements, leg: int, measure: SlopeMeasure | None) -> Finding:
     planned = float(requirements.slopes[leg])
     limit, source = slope_limit(requirements, leg)
     sign = 1.0 if planned >= 0.0 else -1.0
@@ -53,7 +53,7 @@ def _judge(requirements: RouteRequirements, leg: int, measure: SlopeMeasure | No
         limit = max(limit, LEVEL_SLOPE_RAD)
     faults, facts = [], [f"slope {math.degrees(planned):+.2f}°"]
     if abs(planned) > limit + PLAN_TOLERANCE_RAD:
-        rise = step(requirements, leg)
+        rise = step_height(requirements, leg)
         if rise is None:
             faults.append(_steep_leg_message(requirements, leg, limit, source))
         else:
@@ -63,22 +63,22 @@ def _judge(requirements: RouteRequirements, leg: int, measure: SlopeMeasure | No
     method = "route"
     if measure is not None:
         facts += _flown_facts(measure)
-        weak = _performance_faults(requirements, leg, measure)
-        shown = _flown_faults(requirements, leg, measure, limit, weak)
-        # If the aircraft's limits apply, they judge, and so does a shown lack of performance; the height error on the
-        # leg is only reported.
-        facts += [one.brief for one in shown] if requirements.envelope else []
-        faults += weak if requirements.envelope else [*shown, *weak]
+        performance_faults = _performance_faults(requirements, leg, measure)
+        flown_faults = _flown_faults(requirements, leg, measure, limit, performance_faults)
+        # If the aircraft's limits apply, the leg is judged by them and by a shown lack of performance; the height error
+        # on the leg is only reported.
+        facts += [fault.brief for fault in flown_faults] if requirements.envelope else []
+        faults += performance_faults if requirements.envelope else [*flown_faults, *performance_faults]
         fit = measure.slope
         method = "not flown"
         if fit is not None:
-            how = "least squares" if fit.fitted else "least squares, short leg,"
-            method = f"{how} over {fit.run:.0f} m"
+            method_text = "least squares" if fit.fitted else "least squares, short leg,"
+            method = f"{method_text} over {fit.run:.0f} m"
     ok: bool | None = not faults
     check = ""
-    if not faults and (doubt := _uncertainty_text(requirements, leg)):
+    if not faults and (uncertainty := _uncertainty_text(requirements, leg)):
         ok, check = None, UNKNOWN_AIRCRAFT
-        facts.insert(0, doubt)
+        facts.insert(0, uncertainty)
     if measure is not None and not measure.finished:
         facts.append("the flight did not get to its end")
         ok = None if ok else False
@@ -104,58 +104,66 @@ def _judge(requirements: RouteRequirements, leg: int, measure: SlopeMeasure | No
 
 
 def _uncertainty_text(requirements: RouteRequirements, leg: int) -> str:
-    """Explain why an uncertain aircraft model leaves a slope within its limits undecided; return "" if decided.
+    """Explain why an uncertain aircraft model leaves a slope within its limits undecided; return "" if it is decided.
 
-    Only the aircraft's own limits count, because a tighter limit of the scenario says nothing about its ability.
+    Only the aircraft's own limits are considered: a tighter limit of the scenario says nothing about its ability.
     """
     planned, envelope = float(requirements.slopes[leg]), requirements.setup.envelope
-    limits, certain, verb, off = (
+    limits, certain_limits, verb, deviation = (
         (requirements.climb, requirements.sure_climb, "climbs", envelope.climb_sd)
         if planned >= 0.0
         else (requirements.dive, requirements.sure_dive, "falls", envelope.descent_sd)
     )
-    limit, sure = float(limits[leg]), float(certain[leg])
-    # When judged without the aircraft's limits, there is no limit to be in doubt.
-    if abs(planned) <= max(LEVEL_SLOPE_RAD, sure) or not sure < limit < math.inf:
+    limit, certain_limit = float(limits[leg]), float(certain_limits[leg])
+    # Without the aircraft's limits there is no uncertain limit.
+    if abs(planned) <= max(LEVEL_SLOPE_RAD, certain_limit) or not certain_limit < limit < math.inf:
         return ""
-    slope, known, give = (math.degrees(angle) for angle in (abs(planned), limit, off))
-    return f"{verb} {slope:.1f}°, and what {envelope.source} says of the limit is {known:.1f}° give or take {give:.1f}°"
+    slope, limit_deg, deviation_deg = (math.degrees(angle) for angle in (abs(planned), limit, deviation))
+    return (
+        f"{verb} {slope:.1f}°, and what {envelope.source} says of the limit is {limit_deg:.1f}°"
+        f" give or take {deviation_deg:.1f}°"
+    )
 
 
 def _steep_arc_faults(requirements: RouteRequirements, leg: int) -> list[Message]:
     """Return a fault if the fly-by arc at a leg's end is beyond the aircraft's limit."""
-    found = steep_arc(requirements, leg)
-    if found is None:
+    arc = steep_arc(requirements, leg)
+    if arc is None:
         return []
-    i = leg + 1
-    place = requirements.waypoint(i)
-    length = float(requirements.radius[i]) * abs(float(requirements.turns[i]))
-    verb = "climbs" if found.tangent > 0.0 else "falls"
-    legs = " and ".join(f"{math.degrees(abs(float(requirements.slopes[k]))):.1f}°" for k in (leg, i))
-    slope, missing = math.degrees(math.atan(abs(found.tangent))), (abs(found.tangent) - found.limit) * length
-    asks = (
-        f"the arc at {place_text(place)} {verb} {slope:.1f}° for {length:.0f} m, where legs {leg} and {i} have {legs}:"
-        f" flown by, it is shorter than the {2.0 * float(requirements.before[i]):.0f} m of leg that it replaces"
+    corner = leg + 1
+    place = requirements.waypoint(corner)
+    length = float(requirements.radius[corner]) * abs(float(requirements.turns[corner]))
+    verb = "climbs" if arc.tangent > 0.0 else "falls"
+    legs = " and ".join(f"{math.degrees(abs(float(requirements.slopes[k]))):.1f}°" for k in (leg, corner))
+    slope, missing_height = math.degrees(math.atan(abs(arc.tangent))), (abs(arc.tangent) - arc.limit) * length
+    arc_text = (
+        f"the arc at {place_text(place)} {verb} {slope:.1f}° for {length:.0f} m, where legs {leg} and {corner} have"
+        f" {legs}: flown by, it is shorter than the {2.0 * float(requirements.before[corner]):.0f} m of leg"
+        " that it replaces"
     )
-    limit = f"; the aircraft can {math.degrees(math.atan(found.limit)):.1f}° there, {missing:.0f} m less"
+    limit = f"; the aircraft can {math.degrees(math.atan(arc.limit)):.1f}° there, {missing_height:.0f} m less"
     # A headline names the waypoint, not its item.
-    return [Message(asks + limit, asks if place.item is None else f"the arc at {place_text(Place('waypoint', i))}")]
+    return [
+        Message(
+            arc_text + limit, arc_text if place.item is None else f"the arc at {place_text(Place('waypoint', corner))}"
+        )
+    ]
 
 
 def _is_in_envelope(requirements: RouteRequirements, leg: int) -> bool:
-    low, high = requirements.setup.envelope.level_speeds(float(requirements.points[leg, 2]))
-    return low <= float(requirements.route.airspeed[leg]) <= high
+    min_speed, max_speed = requirements.setup.envelope.level_speeds(float(requirements.points[leg, 2]))
+    return min_speed <= float(requirements.route.airspeed[leg]) <= max_speed
 
 
 def _steep_leg_message(requirements: RouteRequirements, leg: int, limit: float, source: str) -> Message:
     """Describe a planned slope beyond its limit, with the slope that the leg needs and the limit."""
     planned = float(requirements.slopes[leg])
     verb = "climbs" if planned >= 0.0 else "falls"
-    asks = f"{math.degrees(abs(planned)):.1f}° for {_distance_text(float(requirements.runs[leg]))}"
+    slope_text = f"{math.degrees(abs(planned)):.1f}° for {_distance_text(float(requirements.runs[leg]))}"
     if requirements.runs[leg] < MIN_LEG_LENGTH_M:
         rise = abs(float(requirements.points[leg + 1, 2] - requirements.points[leg, 2]))
-        asks = f"{round(rise, 1):g} m on the spot, {math.degrees(abs(planned)):.1f}°"
-    return message(f"leg {leg} {verb} {asks}", f"; {_limit_text(requirements, leg, limit, source)}", placed=True)
+        slope_text = f"{round(rise, 1):g} m on the spot, {math.degrees(abs(planned)):.1f}°"
+    return message(f"leg {leg} {verb} {slope_text}", f"; {_limit_text(requirements, leg, limit, source)}", placed=True)
 
 
 def _limit_text(requirements: RouteRequirements, leg: int, limit: float, source: str) -> str:
@@ -163,20 +171,20 @@ def _limit_text(requirements: RouteRequirements, leg: int, limit: float, source:
     if source == "scenario":
         return f"the scenario allows {math.degrees(limit):.1f}°"
     speed = float(requirements.route.airspeed[leg])
-    up = float(max(requirements.points[leg, 2], requirements.points[leg + 1, 2]))
-    at = f"at {speed:.0f} m/s and {up:.0f} m"
+    altitude = float(max(requirements.points[leg, 2], requirements.points[leg + 1, 2]))
+    condition = f"at {speed:.0f} m/s and {altitude:.0f} m"
     if limit <= 0.0:
-        return f"{at} the aircraft has no steady flight on this course"
+        return f"{condition} the aircraft has no steady flight on this course"
     wind = requirements.setup.scenario.wind
-    tail, cross = wind.along(float(requirements.courses[leg]), up)
-    if math.hypot(tail, cross) < CALM_WIND_MPS:
-        return f"{at} the aircraft can {math.degrees(limit):.1f}° in calm air"
-    calm = requirements.setup.envelope.slope_limits(speed, up)[0 if requirements.slopes[leg] >= 0.0 else 1]
-    blows = f"{abs(tail):.0f} m/s {'tailwind' if tail > 0.0 else 'headwind'}"
-    if abs(cross) > abs(tail):
-        blows = f"{abs(cross):.0f} m/s crosswind"
-    calm_text = f"{math.degrees(calm):.1f}°" if math.isfinite(calm) else "nothing"
-    return f"{at} the aircraft can {calm_text} in calm air but {math.degrees(limit):.1f}° in this {blows}"
+    tailwind, crosswind = wind.along(float(requirements.courses[leg]), altitude)
+    if math.hypot(tailwind, crosswind) < CALM_WIND_MPS:
+        return f"{condition} the aircraft can {math.degrees(limit):.1f}° in calm air"
+    calm_limit = requirements.setup.envelope.slope_limits(speed, altitude)[0 if requirements.slopes[leg] >= 0.0 else 1]
+    wind_text = f"{abs(tailwind):.0f} m/s {'tailwind' if tailwind > 0.0 else 'headwind'}"
+    if abs(crosswind) > abs(tailwind):
+        wind_text = f"{abs(crosswind):.0f} m/s crosswind"
+    calm_text = f"{math.degrees(calm_limit):.1f}°" if math.isfinite(calm_limit) else "nothing"
+    return f"{condition} the aircraft can {calm_text} in calm air but {math.degrees(limit):.1f}° in this {wind_text}"
 
 
 def _distance_text(metres: float) -> str:
@@ -195,7 +203,11 @@ def _flown_facts(measure: SlopeMeasure) -> list[str]:
         facts.append(f"flown {math.degrees(measure.slope.value):+.2f}°")
     if measure.height_error is not None:
         facts.append(f"height within {abs(measure.height_error):.1f} m of the leg")
-    facts += [f"throttle at {name} for {held:.0f} s" for name, held, _, _ in _throttle_times(measure) if held >= 1.0]
+    facts += [
+        f"throttle at {name} for {duration:.0f} s"
+        for name, duration, _, _ in _throttle_times(measure)
+        if duration >= 1.0
+    ]
     return facts
 
 
@@ -205,19 +217,23 @@ def _measured_facts(requirements: RouteRequirements, leg: int, measure: SlopeMea
         return []
     facts = [] if measure.height_error is None else [Fact("height error", measure.height_error, "m")]
     if measure.slope is not None:
-        off = math.degrees(measure.slope.value - float(requirements.slopes[leg]))
-        facts.append(Fact("slope error", off, "deg"))
-    for name, held, off, way in _throttle_times(measure):
-        facts += [Fact(f"throttle at {name}", held, "s"), Fact(f"too {way}", off, "m/s")] if held > 0.0 else []
+        error = math.degrees(measure.slope.value - float(requirements.slopes[leg]))
+        facts.append(Fact("slope error", error, "deg"))
+    for name, duration, error, direction in _throttle_times(measure):
+        facts += (
+            [Fact(f"throttle at {name}", duration, "s"), Fact(f"too {direction}", error, "m/s")]
+            if duration > 0.0
+            else []
+        )
     return facts
 
 
 def _flown_faults(
-    requirements: RouteRequirements, leg: int, measure: SlopeMeasure, limit: float, weak: list[Message]
+    requirements: RouteRequirements, leg: int, measure: SlopeMeasure, limit: float, performance_faults: list[Message]
 ) -> list[Message]:
     """Return faults in which the flown leg differs from the planned leg.
 
-    weak: faults that show a lack of performance.
+    performance_faults: faults that show a lack of performance.
     """
     faults = []
     planned = float(requirements.slopes[leg])
@@ -230,16 +246,20 @@ def _flown_faults(
         if fit.fitted and abs(fit.value - planned) > SLOPE_TOLERANCE_RAD + fit.tolerance:
             faults.append(message(f"flown at {flown:+.1f}° instead of {math.degrees(planned):+.1f}°"))
     if measure.height_error is not None:
-        off = abs(measure.height_error)
-        if off > (SHORT_LEG_HEIGHT_ERROR_LIMIT_M if measure.short else HEIGHT_ERROR_LIMIT_M):
+        error = abs(measure.height_error)
+        if error > (SHORT_LEG_HEIGHT_ERROR_LIMIT_M if measure.short else HEIGHT_ERROR_LIMIT_M):
             side = "above" if measure.height_error > 0.0 else "below"
-            faults.append(message(f"{off:.0f} m {side} the leg"))
-    covered = not weak and measure.ability is not None and measure.ability.covers(planned)
-    most = SPEED_TOLERANCE_MPS + GUST_SPEED_FRACTION * W20[requirements.setup.scenario.wind.turbulence]
-    for name, held, off, way in _throttle_times(measure):
+            faults.append(message(f"{error:.0f} m {side} the leg"))
+    has_ability = not performance_faults and measure.ability is not None and measure.ability.covers(planned)
+    max_error = SPEED_TOLERANCE_MPS + GUST_SPEED_FRACTION * W20[requirements.setup.scenario.wind.turbulence]
+    for name, duration, error, direction in _throttle_times(measure):
         # If the aircraft showed more ability than the leg needs, the air caused the speed error.
-        if held >= SATURATED_TIME_S and off > most and not (covered and name == _throttle_limit(planned)):
-            faults.append(message(f"throttle at {name} for {held:.0f} s and {off:.1f} m/s too {way}"))
+        if (
+            duration >= SATURATED_TIME_S
+            and error > max_error
+            and not (has_ability and name == _throttle_limit(planned))
+        ):
+            faults.append(message(f"throttle at {name} for {duration:.0f} s and {error:.1f} m/s too {direction}"))
     return faults
 
 
@@ -316,6 +336,6 @@ RULE = Rule(
         ),
     ),
     judge=slope_findings,
-    suggest=ease_slope,
+    suggest=suggest_gentler_slope,
     log=LogNeeds(("heights",), planned_heights=True, aircraft=True, full_leg=True),
 )

@@ -11,7 +11,7 @@ from logs.verdict.measures.slopes import measure_ability, steady_rows
 from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.places import FLIGHT
 from logs.verdict.rule import LogNeeds, Rule
-from logs.verdict.suggestions import fly_level_speed
+from logs.verdict.suggestions import suggest_level_flight_speed
 from logs.verdict.tolerances import (
     GUST_DURATION_S,
     GUST_SIGMAS,
@@ -35,8 +35,8 @@ def speed_findings(
     requirements: RouteRequirements, aligned: AlignedTrack | None, *, geometric: bool = False
 ) -> list[Finding]:
     """Judge each leg's commanded airspeed by the envelope, and report the flown airspeed."""
-    found = [_speed_finding(requirements, aligned, leg, geometric) for leg in range(requirements.legs)]
-    return [*_parameter_findings(requirements), *found] if geometric else found
+    findings = [_speed_finding(requirements, aligned, leg, geometric) for leg in range(requirements.legs)]
+    return [*_parameter_findings(requirements), *findings] if geometric else findings
 
 
 def _parameter_findings(requirements: RouteRequirements) -> list[Finding]:
@@ -44,8 +44,8 @@ def _parameter_findings(requirements: RouteRequirements) -> list[Finding]:
     parameters = requirements.setup.autopilot.parameters
     if parameters is None or not parameters.misfits or requirements.setup.source is not None:
         return []
-    more = f" (+{len(parameters.misfits) - 1} more)" if len(parameters.misfits) > 1 else ""
-    fault = message(f"{parameters.misfits[0]}{more}", ": only a flight tells which airspeed is held")
+    more_text = f" (+{len(parameters.misfits) - 1} more)" if len(parameters.misfits) > 1 else ""
+    fault = message(f"{parameters.misfits[0]}{more_text}", ": only a flight tells which airspeed is held")
     return [make_finding("speed", FLIGHT, ok=None, reason=fault.text, faults=[fault], check=NOT_FLOWN)]
 
 
@@ -59,41 +59,44 @@ def _speed_finding(requirements: RouteRequirements, aligned: AlignedTrack | None
     at_least = commanded - slowest <= fastest - commanded
     limit = slowest if at_least else fastest
     mean, tolerance, facts, source = math.nan, 0.0, [], "aircraft"
-    unflown = not geometric and (aligned is None or not aligned.flew(leg))
-    if unflown:
+    is_unflown = not geometric and (aligned is None or not aligned.flew(leg))
+    if is_unflown:
         notes.append("the leg was not flown")
     elif aligned is not None:
-        measured = _measure_airspeed(requirements, aligned, leg)
-        if measured is None:
+        measurement = _measure_airspeed(requirements, aligned, leg)
+        if measurement is None:
             mean = _nearest_mean(aligned, leg, commanded)
             notes.append(f"{mean:.1f} m/s reached; the leg is too short to hold it")
         else:
-            mean, tolerance, least = measured
-            off = abs(mean - commanded)
-            notes.append(f"flown {mean:.2f} m/s on average, {least:.1f} m/s at the slowest second")
-            if off > MEAN_SPEED_TOLERANCE_MPS + tolerance and not _caused_by_air(
+            mean, tolerance, min_mean = measurement
+            error = abs(mean - commanded)
+            notes.append(f"flown {mean:.2f} m/s on average, {min_mean:.1f} m/s at the slowest second")
+            if error > MEAN_SPEED_TOLERANCE_MPS + tolerance and not _is_caused_by_air(
                 requirements, aligned, leg, mean - commanded
             ):
-                text = f"flown {mean:.1f} m/s on average, {off:.1f} m/s off the commanded {commanded:.1f} m/s"
+                text = f"flown {mean:.1f} m/s on average, {error:.1f} m/s off the commanded {commanded:.1f} m/s"
                 notes += [text] if requirements.envelope else []
                 faults += [] if requirements.envelope else [message(text)]
-            wanted = _flown_command(requirements, leg)
-            if not faults and (unheld := _find_held_speed(requirements, aligned, leg, wanted)):
-                # From here on the flown speed is judged by its command, no longer the command by the envelope.
-                mean, allowed, source = unheld.speed, unheld.allowed, "mission"
-                limit, at_least = wanted + math.copysign(allowed, mean - wanted), mean < wanted
-                margin, tolerance = allowed - abs(mean - wanted), unheld.tolerance
-                faults.append(message(f"{mean:.1f} m/s held of the commanded {wanted:.1f} m/s"))
+            flown_command = _flown_command(requirements, leg)
+            if not faults and (held_speed := _find_held_speed(requirements, aligned, leg, flown_command)):
+                # From here on the flown speed is judged by the command, instead of the command by the envelope.
+                mean, allowed_error, source = held_speed.speed, held_speed.allowed, "mission"
+                limit, at_least = (
+                    flown_command + math.copysign(allowed_error, mean - flown_command),
+                    mean < flown_command,
+                )
+                margin, tolerance = allowed_error - abs(mean - flown_command), held_speed.tolerance
+                faults.append(message(f"{mean:.1f} m/s held of the commanded {flown_command:.1f} m/s"))
         facts.append(Fact("speed error", mean - commanded, "m/s"))
     ok: bool | None = not faults
     check = ""
-    if not faults and (doubt := _uncertainty_text(requirements, leg, commanded, fastest)):
+    if not faults and (uncertainty := _uncertainty_text(requirements, leg, commanded, fastest)):
         ok, check = None, UNKNOWN_AIRCRAFT
-        notes.insert(0, doubt)
+        notes.insert(0, uncertainty)
     return make_finding(
         "speed",
         requirements.leg(leg),
-        ok=None if ok and unflown else ok,
+        ok=None if ok and is_unflown else ok,
         reason=reason_of(faults, notes),
         faults=faults,
         planned=commanded,
@@ -111,19 +114,19 @@ def _speed_finding(requirements: RouteRequirements, aligned: AlignedTrack | None
 
 
 def _command_text(command: float, commanded: float, slowest: float, fastest: float) -> str:
-    """Describe a commanded airspeed, equivalent and true, among those of level flight; all m/s."""
-    true = "" if command == commanded else f" of equivalent airspeed, {commanded:.1f} m/s of true airspeed,"
+    """Describe a commanded airspeed, equivalent and true, and the range of airspeeds in level flight, m/s."""
+    true_speed_text = "" if command == commanded else f" of equivalent airspeed, {commanded:.1f} m/s of true airspeed,"
     if not (math.isfinite(slowest) and math.isfinite(fastest)):
-        return f"{command:.1f} m/s{true} commanded, and no level flight is known"
-    return f"{command:.1f} m/s{true} commanded of {slowest:.1f} to {fastest:.1f} m/s in level flight"
+        return f"{command:.1f} m/s{true_speed_text} commanded, and no level flight is known"
+    return f"{command:.1f} m/s{true_speed_text} commanded of {slowest:.1f} to {fastest:.1f} m/s in level flight"
 
 
 def _flown_command(requirements: RouteRequirements, leg: int) -> float:
     """Return the airspeed that the autopilot flies on a leg, m/s; it may differ from the command."""
     setup = requirements.setup
     command = setup.route.airspeed
-    taken = setup.autopilot.speeds_flown(command, setup.airspeed)
-    return float(requirements.route.airspeed[leg] * taken[leg] / command[leg])
+    flown_speeds = setup.autopilot.speeds_flown(command, setup.airspeed)
+    return float(requirements.route.airspeed[leg] * flown_speeds[leg] / command[leg])
 
 
 class _HeldSpeed(NamedTuple):
@@ -141,7 +144,7 @@ class _HeldSpeed(NamedTuple):
 def _find_held_speed(
     requirements: RouteRequirements, aligned: AlignedTrack, leg: int, commanded: float
 ) -> _HeldSpeed | None:
-    """Return the airspeed at which the flight of a leg settled if it is far from the command, or None.
+    """Return the airspeed at which a flight settled on a leg if it is far from the command, or None.
 
     The airspeed is the mean over the second half of the leg's steady rows, because in the first half the autopilot may
     still change its speed.  Return None if the leg is too steep for the aircraft, because the slope rule then names the
@@ -153,15 +156,15 @@ def _find_held_speed(
     time = aligned.track.time[rows]
     if requirements.setup.source is not None or time.size < 2 or 0.5 * float(time[-1] - time[0]) < SATURATED_TIME_S:
         return None
-    half = rows.start + int(np.searchsorted(time, 0.5 * float(time[0] + time[-1])))
-    speed = float(aligned.track.airspeed[half : rows.stop].astype(np.float64).mean())
-    off, allowed = speed - commanded, max(MEAN_SPEED_TOLERANCE_MPS, HELD_SPEED_FRACTION * commanded)
-    tolerance = _gust_spread(requirements, float(aligned.track.time[rows.stop - 1] - aligned.track.time[half]))
-    if abs(off) <= allowed + tolerance or _caused_by_air(requirements, aligned, leg, off):
+    middle_row = rows.start + int(np.searchsorted(time, 0.5 * float(time[0] + time[-1])))
+    speed = float(aligned.track.airspeed[middle_row : rows.stop].astype(np.float64).mean())
+    error, allowed_error = speed - commanded, max(MEAN_SPEED_TOLERANCE_MPS, HELD_SPEED_FRACTION * commanded)
+    tolerance = _gust_spread(requirements, float(aligned.track.time[rows.stop - 1] - aligned.track.time[middle_row]))
+    if abs(error) <= allowed_error + tolerance or _is_caused_by_air(requirements, aligned, leg, error):
         return None
-    if off > 0.0 and float(requirements.ground_speed[leg]) < MIN_GROUND_SPEED_MPS:
+    if error > 0.0 and float(requirements.ground_speed[leg]) < MIN_GROUND_SPEED_MPS:
         return None
-    return _HeldSpeed(speed, allowed, tolerance)
+    return _HeldSpeed(speed, allowed_error, tolerance)
 
 
 def _uncertainty_text(requirements: RouteRequirements, leg: int, commanded: float, fastest: float) -> str:
@@ -169,12 +172,12 @@ def _uncertainty_text(requirements: RouteRequirements, leg: int, commanded: floa
     envelope = requirements.setup.envelope
     if not envelope.fastest_sd:
         return ""
-    sure = envelope.surely()
-    heights = requirements.points[leg : leg + 2, 2].tolist()
-    if commanded <= min(sure.level_speeds(up)[1] for up in heights):
+    certain_envelope = envelope.surely()
+    altitudes = requirements.points[leg : leg + 2, 2].tolist()
+    if commanded <= min(certain_envelope.level_speeds(altitude)[1] for altitude in altitudes):
         return ""
-    says = f"what {envelope.source} says of the fastest level flight is {fastest:.1f} m/s"
-    return f"{commanded:.1f} m/s commanded, and {says} give or take {envelope.fastest_sd:.1f} m/s"
+    limit_text = f"what {envelope.source} says of the fastest level flight is {fastest:.1f} m/s"
+    return f"{commanded:.1f} m/s commanded, and {limit_text} give or take {envelope.fastest_sd:.1f} m/s"
 
 
 def _speed_range_notes(requirements: RouteRequirements, command: float) -> list[str]:
@@ -183,27 +186,31 @@ def _speed_range_notes(requirements: RouteRequirements, command: float) -> list[
     limits = autopilot.speed_limits
     if limits is None or limits.min <= command <= limits.max:
         return []
-    taken = f"{limits.min_name} {limits.min:g} to {limits.max_name} {limits.max:g} m/s"
-    does = "flies the nearest for this one" if limits.nearest else "ignores this one"
-    return [f"{autopilot.title} takes speeds from {taken}, and {does}"]
+    range_text = f"{limits.min_name} {limits.min:g} to {limits.max_name} {limits.max:g} m/s"
+    behaviour = "flies the nearest for this one" if limits.nearest else "ignores this one"
+    return [f"{autopilot.title} takes speeds from {range_text}, and {behaviour}"]
 
 
 def _short_leg_notes(requirements: RouteRequirements, leg: int, commanded: float) -> list[str]:
     """Return a note if a leg is too short to reach its speed at `MAX_STEADY_ACCELERATION_MPS2`."""
-    before = float(requirements.route.airspeed[leg - 1]) if leg else commanded
-    change, run = commanded - before, float(requirements.runs[leg])
-    seconds = abs(change) / MAX_STEADY_ACCELERATION_MPS2
+    previous_speed = float(requirements.route.airspeed[leg - 1]) if leg else commanded
+    change, run = commanded - previous_speed, float(requirements.runs[leg])
+    duration = abs(change) / MAX_STEADY_ACCELERATION_MPS2
     # Distance at the mean of both speeds over ground, in the wind along the leg.
-    start = float(requirements.ground_speed[leg]) - change
-    needs = seconds * (start + 0.5 * change)
-    if not needs > run or not start > 0.0:
+    start_ground_speed = float(requirements.ground_speed[leg]) - change
+    needed_length = duration * (start_ground_speed + 0.5 * change)
+    if not needed_length > run or not start_ground_speed > 0.0:
         return []
     # start t + a t^2 / 2 = run
-    rate = math.copysign(MAX_STEADY_ACCELERATION_MPS2, change)
-    end = math.sqrt(max(0.0, start * start + 2.0 * rate * run)) - start + before
+    acceleration = math.copysign(MAX_STEADY_ACCELERATION_MPS2, change)
+    end_speed = (
+        math.sqrt(max(0.0, start_ground_speed * start_ground_speed + 2.0 * acceleration * run))
+        - start_ground_speed
+        + previous_speed
+    )
     return [
-        f"from {before:.1f} to {commanded:.1f} m/s takes about {seconds:.0f} s and {needs:.0f} m, and the leg has"
-        f" {run:.0f} m: about {end:.1f} m/s are reached on it"
+        f"from {previous_speed:.1f} to {commanded:.1f} m/s takes about {duration:.0f} s and {needed_length:.0f} m,"
+        f" and the leg has {run:.0f} m: about {end_speed:.1f} m/s are reached on it"
     ]
 
 
@@ -217,13 +224,13 @@ def _second_means(aligned: AlignedTrack, rows: slice) -> Floats:
     """Return the mean airspeed over each second of some rows, or over all rows if they are fewer, m/s."""
     speed = aligned.track.airspeed[rows].astype(np.float64)
     width = max(1, min(speed.size, round(1.0 / aligned.tick)))
-    total = np.concatenate([[0.0], np.cumsum(speed)])
-    return np.asarray((total[width:] - total[:-width]) / width)
+    sums = np.concatenate([[0.0], np.cumsum(speed)])
+    return np.asarray((sums[width:] - sums[:-width]) / width)
 
 
-def _caused_by_air(requirements: RouteRequirements, aligned: AlignedTrack, leg: int, off: float) -> bool:
-    """Return True if vertical air motion caused the speed error `off`, because the aircraft showed enough ability."""
-    if off * requirements.slopes[leg] >= 0.0:
+def _is_caused_by_air(requirements: RouteRequirements, aligned: AlignedTrack, leg: int, error: float) -> bool:
+    """Return True if vertical air motion caused the speed error `error`, because the aircraft showed enough ability."""
+    if error * requirements.slopes[leg] >= 0.0:
         return False
     ability = measure_ability(requirements, aligned, leg)
     return ability is not None and ability.covers(float(requirements.slopes[leg]))
@@ -233,22 +240,25 @@ def _level_speed_range(
     requirements: RouteRequirements, leg: int, commanded: float
 ) -> tuple[float, float, list[Message]]:
     """Return the airspeeds at which level flight is possible along the whole leg, and faults of the commanded speed."""
-    heights = (float(requirements.points[leg, 2]), float(requirements.points[leg + 1, 2]))
-    speeds = [requirements.setup.envelope.level_speeds(up) for up in heights]
+    altitudes = (float(requirements.points[leg, 2]), float(requirements.points[leg + 1, 2]))
+    speeds = [requirements.setup.envelope.level_speeds(altitude) for altitude in altitudes]
     # If level flight is impossible at one altitude, NaN remains for the whole leg.
-    slowest, fastest = float(np.max([low for low, _ in speeds])), float(np.min([high for _, high in speeds]))
+    slowest, fastest = (
+        float(np.max([min_speed for min_speed, _ in speeds])),
+        float(np.min([max_speed for _, max_speed in speeds])),
+    )
     faults = []
     if math.isnan(requirements.ground_speed[leg]):
         faults.append(message(f"the wind leaves no way along leg {leg} at {commanded:.0f} m/s"))
-    top = max(heights)
+    max_altitude = max(altitudes)
     if math.isnan(slowest) or math.isnan(fastest):
-        faults.append(message(f"no level flight at {top:.0f} m"))
+        faults.append(message(f"no level flight at {max_altitude:.0f} m"))
     if commanded < slowest:
-        below = f"{commanded:.1f} m/s is below the slowest level flight, {slowest:.1f} m/s at {top:.0f} m"
-        faults.append(message(below))
+        slow_text = f"{commanded:.1f} m/s is below the slowest level flight, {slowest:.1f} m/s at {max_altitude:.0f} m"
+        faults.append(message(slow_text))
     if commanded > fastest:
-        above = f"{commanded:.1f} m/s is above the fastest level flight, {fastest:.1f} m/s at {top:.0f} m"
-        faults.append(message(above))
+        fast_text = f"{commanded:.1f} m/s is above the fastest level flight, {fastest:.1f} m/s at {max_altitude:.0f} m"
+        faults.append(message(fast_text))
     return slowest, fastest, faults
 
 
@@ -266,15 +276,15 @@ def _measure_airspeed(
     ):
         return None
     speed = aligned.track.airspeed[rows].astype(np.float64)
-    lasts = float(time[-1] - time[0])
-    least = float(_second_means(aligned, rows).min())
-    spread = _gust_spread(requirements, lasts)
-    steepened = leg > 0 and abs(float(requirements.slopes[leg] - requirements.slopes[leg - 1])) > LEVEL_SLOPE_RAD
-    return float(speed.mean()), spread + (SLOPE_CHANGE_LAG_M / lasts if steepened else 0.0), least
+    duration = float(time[-1] - time[0])
+    min_mean = float(_second_means(aligned, rows).min())
+    spread = _gust_spread(requirements, duration)
+    is_steepened = leg > 0 and abs(float(requirements.slopes[leg] - requirements.slopes[leg - 1])) > LEVEL_SLOPE_RAD
+    return float(speed.mean()), spread + (SLOPE_CHANGE_LAG_M / duration if is_steepened else 0.0), min_mean
 
 
 def _gust_spread(requirements: RouteRequirements, seconds: float) -> float:
-    """Return how much gusts may change the mean airspeed over a duration, m/s."""
+    """Return the change of the mean airspeed over a duration that gusts may cause, m/s."""
     gust = GUST_SPEED_FRACTION * W20[requirements.setup.scenario.wind.turbulence]
     return GUST_SIGMAS * gust * math.sqrt(min(1.0, 2.0 * GUST_DURATION_S / max(seconds, 1e-3)))
 
@@ -302,6 +312,6 @@ RULE = Rule(
         ),
     ),
     judge=speed_findings,
-    suggest=fly_level_speed,
+    suggest=suggest_level_flight_speed,
     log=LogNeeds(("airspeed",), aircraft=True, full_leg=True),
 )

@@ -20,7 +20,7 @@ from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.places import FLIGHT
 from logs.verdict.rule import LogNeeds, Rule
-from logs.verdict.suggestions import fly_faster
+from logs.verdict.suggestions import suggest_flying_faster
 from logs.verdict.tolerances import GUST_SPEED_FRACTION, STALL_AVERAGING_TIME_S, STALL_TOLERANCE_MPS
 from world.arrays import Floats
 from world.wind import W20
@@ -46,8 +46,8 @@ def stall_findings(
 ) -> list[Finding]:
     """Judge the minimum margin of airspeed above the stall in a bank; return [] for a route without a turn.
 
-    A route fails in flight too if its speed is below the stall in a bank that it needs, whatever speed was flown,
-    because an autopilot that did not accept the speed, or banked less, does not make the route flyable.
+    A route whose speed is below the stall in a bank that it needs fails in flight too, whatever speed was flown: an
+    autopilot that did not accept the speed, or banked less, does not make the route flyable.
     """
     planned = _planned_findings(requirements)
     if geometric:
@@ -55,24 +55,24 @@ def stall_findings(
     # Without an envelope there is no limit to compare a flight with.
     if aligned is None or not requirements.envelope:
         return []
-    return [found for found in planned if found.ok is False] or _flown_findings(requirements, aligned)
+    return [finding for finding in planned if finding.ok is False] or _flown_findings(requirements, aligned)
 
 
 def _planned_findings(requirements: RouteRequirements) -> list[Finding]:
     worst: tuple[float, int, _Margin] | None = None
-    for i in range(1, requirements.legs):
-        for speed in requirements.route.airspeed[i - 1 : i + 1].tolist():
-            bank, level = (
-                planned_bank(requirements, i, speed),
-                level_stall(requirements, float(requirements.points[i, 2])),
+    for corner in range(1, requirements.legs):
+        for speed in requirements.route.airspeed[corner - 1 : corner + 1].tolist():
+            bank, stall_speed = (
+                planned_bank(requirements, corner, speed),
+                level_stall(requirements, float(requirements.points[corner, 2])),
             )
-            found = _Margin(speed, level / math.sqrt(math.cos(bank)), level, bank)
-            if bank > 0.0 and math.isfinite(level) and (worst is None or found.left < worst[0]):
-                worst = found.left, i, found
+            margin = _Margin(speed, stall_speed / math.sqrt(math.cos(bank)), stall_speed, bank)
+            if bank > 0.0 and math.isfinite(stall_speed) and (worst is None or margin.left < worst[0]):
+                worst = margin.left, corner, margin
     if worst is None:
         return []
-    _, i, found = worst
-    return [_finding(found, f"at waypoint {i}", 0.0, geometric=True)]
+    _, corner, margin = worst
+    return [_finding(margin, f"at waypoint {corner}", 0.0, geometric=True)]
 
 
 def planned_bank(requirements: RouteRequirements, i: int, speed: float) -> float:
@@ -85,20 +85,20 @@ def planned_bank(requirements: RouteRequirements, i: int, speed: float) -> float
     if turn <= 0.0 or not math.isfinite(radius):
         return 0.0
     # The bank limit's radius belongs to the ground speed of the faster leg.
-    fastest = math.sqrt(float(requirements.tightest[i]) * GRAVITY * math.tan(limit))
-    slower = max(requirements.route.airspeed[i - 1 : i + 1]) - speed
-    bank = math.atan(max(0.0, fastest - slower) ** 2 / (GRAVITY * radius))
+    fastest_ground_speed = math.sqrt(float(requirements.tightest[i]) * GRAVITY * math.tan(limit))
+    speed_deficit = max(requirements.route.airspeed[i - 1 : i + 1]) - speed
+    bank = math.atan(max(0.0, fastest_ground_speed - speed_deficit) ** 2 / (GRAVITY * radius))
     # Rolling in and out again at 1 / ROLL_TIME turns by (g / v) ROLL_TIME bank^2.
-    rolled = math.sqrt(turn * speed / (GRAVITY * ROLL_TIME))
-    return min(bank, rolled, limit)
+    reachable_bank = math.sqrt(turn * speed / (GRAVITY * ROLL_TIME))
+    return min(bank, reachable_bank, limit)
 
 
-def level_stall(requirements: RouteRequirements, up: float) -> float:
+def level_stall(requirements: RouteRequirements, altitude: float) -> float:
     """Return the minimum true airspeed of level flight at an altitude (m AMSL), m/s.
 
     At this airspeed the elevator is at its stop.
     """
-    return requirements.setup.envelope.level_speeds(up)[0]
+    return requirements.setup.envelope.level_speeds(altitude)[0]
 
 
 def _flown_findings(requirements: RouteRequirements, aligned: AlignedTrack) -> list[Finding]:
@@ -106,44 +106,44 @@ def _flown_findings(requirements: RouteRequirements, aligned: AlignedTrack) -> l
     width = max(1, min(len(track), round(STALL_AVERAGING_TIME_S / aligned.tick)))
     speed, load = _window_means(track.airspeed, width), _window_means(track.load_factor, width)
     bank = _window_means(np.abs(track.attitude[:, ROLL]), width)
-    up = _window_means(track.position[:, 2], width)
+    altitude = _window_means(track.position[:, 2], width)
     envelope = requirements.setup.envelope
-    level = np.interp(up, envelope.amsl, envelope.level_speed_min)
+    level_stall_speed = np.interp(altitude, envelope.amsl, envelope.level_speed_min)
     # Load that the wing carried, or that it needed to hold altitude in a turn within the bank limit.
     # An imported log may hold no load factor.
-    carried = np.fmax(load, 1.0 / np.cos(np.minimum(bank, requirements.limits.max_bank)))
-    stall = level * np.sqrt(np.maximum(carried, 0.0))
-    margin = speed - stall
-    if not np.isfinite(margin).any():
+    load_factor = np.fmax(load, 1.0 / np.cos(np.minimum(bank, requirements.limits.max_bank)))
+    stall_speed = level_stall_speed * np.sqrt(np.maximum(load_factor, 0.0))
+    margins = speed - stall_speed
+    if not np.isfinite(margins).any():
         return []
-    k = int(np.nanargmin(margin))
+    k = int(np.nanargmin(margins))
     tolerance = STALL_TOLERANCE_MPS + GUST_SPEED_FRACTION * W20[requirements.setup.scenario.wind.turbulence]
-    found = _Margin(float(speed[k]), float(stall[k]), float(level[k]), float(bank[k]))
-    return [_finding(found, f"at {track.time[k + width // 2]:.1f} s", tolerance, geometric=False)]
+    worst = _Margin(float(speed[k]), float(stall_speed[k]), float(level_stall_speed[k]), float(bank[k]))
+    return [_finding(worst, f"at {track.time[k + width // 2]:.1f} s", tolerance, geometric=False)]
 
 
 def _window_means(values: NDArray[np.floating], width: int) -> Floats:
     """Return the mean over each window of `width` rows."""
-    total = np.concatenate([[0.0], np.cumsum(values.astype(np.float64))])
-    return np.asarray((total[width:] - total[:-width]) / width)
+    sums = np.concatenate([[0.0], np.cumsum(values.astype(np.float64))])
+    return np.asarray((sums[width:] - sums[:-width]) / width)
 
 
-def _finding(found: _Margin, where: str, tolerance: float, *, geometric: bool) -> Finding:
-    stall = f"{found.speed:.1f} m/s {where}, stall {found.stall:.1f} m/s in {math.degrees(found.bank):.0f}° of bank"
-    fault = message(stall, f" (level {found.level:.1f} m/s; true airspeeds)")
+def _finding(margin: _Margin, where: str, tolerance: float, *, geometric: bool) -> Finding:
+    stall = f"{margin.speed:.1f} m/s {where}, stall {margin.stall:.1f} m/s in {math.degrees(margin.bank):.0f}° of bank"
+    fault = message(stall, f" (level {margin.level:.1f} m/s; true airspeeds)")
     return make_finding(
         "stall",
         FLIGHT,
-        ok=found.left >= -tolerance,
+        ok=margin.left >= -tolerance,
         reason=fault.text,
         faults=[fault],
-        planned=found.speed if geometric else None,
-        flown=None if geometric else found.speed,
-        limit=found.stall,
+        planned=margin.speed if geometric else None,
+        flown=None if geometric else margin.speed,
+        limit=margin.stall,
         at_least=True,
         source="aircraft",
         tolerance=tolerance,
-        margin=found.left,
+        margin=margin.left,
         unit="m/s",
         method="slowest level flight times the root of the load factor",
     )
@@ -154,6 +154,6 @@ RULE = Rule(
     tolerances=("STALL_AVERAGING_TIME_S", "STALL_TOLERANCE_MPS", "GUST_SPEED_FRACTION"),
     judge=stall_findings,
     whole=True,
-    suggest=fly_faster,
+    suggest=suggest_flying_faster,
     log=LogNeeds(("airspeed", "attitude"), aircraft=True, listed=True),
 )

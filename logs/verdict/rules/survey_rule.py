@@ -1,4 +1,4 @@
-"""The survey rule: judge how much of each photo line is usable for photos, and how much the photos overlap.
+"""The survey rule: judge the usable fraction of each photo line, and the overlap of the photos.
 
 The autopilot chooses the path of a survey's turnarounds, as long as they stay clear of ground, threats and zones.  The
 turn, slope and waypoint rules therefore ignore turnarounds, and so does the corridor rule unless a corridor is stated.
@@ -37,18 +37,18 @@ def survey_findings(
     If ``geometric``, judge a line by the part that the turns at its ends leave straight, and report turnarounds that
     are too tight.
     """
-    out = []
+    findings = []
     for survey in requirements.surveys:
         for number, line in enumerate(survey.lines, 1):
             if geometric:
-                out.append(_planned_finding(requirements, survey, line, number))
+                findings.append(_planned_finding(requirements, survey, line, number))
             else:
-                out.append(_flown_finding(requirements, aligned, survey, line, number))
+                findings.append(_flown_finding(requirements, aligned, survey, line, number))
         if geometric:
-            out += _tight_turnaround_findings(requirements, survey)
+            findings += _tight_turnaround_findings(requirements, survey)
         if geometric or aligned is not None:
-            out += _overlap_findings(requirements, None if geometric else aligned, survey)
-    return out
+            findings += _overlap_findings(requirements, None if geometric else aligned, survey)
+    return findings
 
 
 def _overlap_findings(requirements: RouteRequirements, aligned: AlignedTrack | None, survey: Survey) -> list[Finding]:
@@ -60,76 +60,80 @@ def _overlap_findings(requirements: RouteRequirements, aligned: AlignedTrack | N
         (FRONT, measure.front, measure.camera.front, survey.line(measure.line)),
         (SIDE, measure.side, measure.camera.side, survey.line(measure.pair[1])),
     )
-    out = []
-    for check, share, specified, line in sides:
-        if share is None or specified is None:
+    findings = []
+    for check, overlap, required, line in sides:
+        if overlap is None or required is None:
             continue
-        limit = specified - PHOTO_OVERLAP_FRACTION
-        ok = share >= limit
+        limit = required - PHOTO_OVERLAP_FRACTION
+        ok = overlap >= limit
         text = overlap_text(measure, check)
         faults = [] if ok else [message(text)]
-        out.append(
+        findings.append(
             make_finding(
                 "survey",
                 _line_place(requirements, line),
                 ok=ok,
                 reason=reason_of(faults, [] if faults else [text]),
                 faults=faults,
-                planned=100.0 * share if aligned is None else 100.0 * specified,
-                flown=None if aligned is None else 100.0 * share,
+                planned=100.0 * overlap if aligned is None else 100.0 * required,
+                flown=None if aligned is None else 100.0 * overlap,
                 limit=100.0 * limit,
                 at_least=True,
                 source="mission",
-                margin=100.0 * (share - limit),
+                margin=100.0 * (overlap - limit),
                 unit="%",
                 method="photos of level ground, taken straight down",
                 check=check,
             )
         )
-    return out
+    return findings
 
 
 def overlap_text(measure: OverlapMeasure, check: str) -> str:
     """Describe the minimum overlap of photos along or across lines, its place, and the required overlap."""
     if check == FRONT:
-        share, specified = measure.front, measure.camera.front
-        soonest = f" apart, one each {measure.camera.interval:g} s" if measure.slow else " apart"
-        where = f"line {measure.line + 1}: photos {measure.apart:.0f} m{soonest}, {measure.height:.0f} m above ground"
+        overlap, required = measure.front, measure.camera.front
+        spacing_text = f" apart, one each {measure.camera.interval:g} s" if measure.slow else " apart"
+        where = (
+            f"line {measure.line + 1}: photos {measure.apart:.0f} m{spacing_text}, {measure.height:.0f} m above ground"
+        )
     else:
-        share, specified = measure.side, measure.camera.side
-        one, other = sorted(measure.pair)
-        where = f"lines {one + 1} and {other + 1}: {measure.between:.0f} m apart, {measure.heights:.0f} m above ground"
-    if share is None:
+        overlap, required = measure.side, measure.camera.side
+        first, second = sorted(measure.pair)
+        where = (
+            f"lines {first + 1} and {second + 1}: {measure.between:.0f} m apart, {measure.heights:.0f} m above ground"
+        )
+    if overlap is None:
         return ""
-    text = f"{check} {100.0 * share:.0f} % at the least ({where})"
-    return text if specified is None else f"{text}, {100.0 * specified:.0f} % asked for"
+    text = f"{check} {100.0 * overlap:.0f} % at the least ({where})"
+    return text if required is None else f"{text}, {100.0 * required:.0f} % asked for"
 
 
 def _tight_turnaround_findings(requirements: RouteRequirements, survey: Survey) -> list[Finding]:
     """Report each turnaround that is too tight to be flown as drawn and has hazards within reach.
 
-    Only a flight shows the path of such a turnaround.  The turns onto the first line and off the last line count as
-    turnarounds.
+    Only a flight shows the path of such a turnaround.  The turns onto the first line and off the last line are included
+    as turnarounds.
     """
-    out = []
-    ways = survey.ways_onto_lines()
-    for number, (first, last) in enumerate(ways):
+    findings = []
+    turnarounds = survey.ways_onto_lines()
+    for number, (first, last) in enumerate(turnarounds):
         if not any(_is_too_tight(requirements, i) for i in range(first, last + 1)):
             continue
         points, radii = requirements.points[first : last + 1], requirements.tightest[first : last + 1]
-        middle = points[:, :2].mean(axis=0)
+        center = points[:, :2].mean(axis=0)
         radius = float(radii[np.isfinite(radii)].max(initial=0.0))
-        reach = float(np.hypot(*(points[:, :2] - middle).T).max()) + TURN_AROUND_RADII * radius
-        low, high = float(points[:, 2].min()), float(points[:, 2].max())
-        if found := hazards_within(requirements, middle, low, high, reach):
-            ends = {0: "the turn onto the first line", len(ways) - 1: "the turn off the last line"}
+        reach = float(np.hypot(*(points[:, :2] - center).T).max()) + TURN_AROUND_RADII * radius
+        min_altitude, max_altitude = float(points[:, 2].min()), float(points[:, 2].max())
+        if hazards := hazards_within(requirements, center, min_altitude, max_altitude, reach):
+            end_names = {0: "the turn onto the first line", len(turnarounds) - 1: "the turn off the last line"}
             reason = (
-                f"{ends.get(number, f'turn-around {number}')} is too tight to be flown as drawn, and within"
-                f" {reach:.0f} m of it {'; '.join(found)}: only a flight tells"
+                f"{end_names.get(number, f'turn-around {number}')} is too tight to be flown as drawn, and within"
+                f" {reach:.0f} m of it {'; '.join(hazards)}: only a flight tells"
             )
             place, method = requirements.leg(first), "what lies around it"
-            out.append(make_finding("survey", place, ok=None, reason=reason, check=UNKNOWN_WAY, method=method))
-    return out
+            findings.append(make_finding("survey", place, ok=None, reason=reason, check=UNKNOWN_WAY, method=method))
+    return findings
 
 
 def _is_too_tight(requirements: RouteRequirements, i: int) -> bool:
@@ -155,18 +159,19 @@ def _planned_finding(requirements: RouteRequirements, survey: Survey, line: Phot
     lead_out = float(requirements.runs[line.last : line.ends].sum())
     cut_in = _clip_length(float(requirements.after[line.begins]) - lead_in, length)
     cut_out = _clip_length(_turn_lead(requirements, line) - lead_out, length)
-    share = max(0.0, length - cut_in - cut_out) / length
-    ok = share >= PHOTO_COVERAGE_FRACTION
+    straight_fraction = max(0.0, length - cut_in - cut_out) / length
+    ok = straight_fraction >= PHOTO_COVERAGE_FRACTION
     name = _line_text(requirements, survey, line, number)
-    faults, facts = [], [f"{name}: its turns leave {100.0 * share:.0f} % of its {length:.0f} m straight"]
+    faults, facts = [], [f"{name}: its turns leave {100.0 * straight_fraction:.0f} % of its {length:.0f} m straight"]
     if not ok:
         faults.append(
             message(
-                f"{name}: the turns at its ends leave only {100.0 * share:.0f} % of its {length:.0f} m straight",
+                f"{name}: the turns at its ends leave only {100.0 * straight_fraction:.0f} % of its {length:.0f} m"
+                " straight",
                 f" (they take {cut_in:.0f} m at the start and {cut_out:.0f} m at the end)",
             )
         )
-    return _finding(requirements, line, ok, faults, facts, share, geometric=True)
+    return _finding(requirements, line, ok, faults, facts, straight_fraction, geometric=True)
 
 
 def _turn_lead(requirements: RouteRequirements, line: PhotoLine) -> float:
@@ -175,12 +180,12 @@ def _turn_lead(requirements: RouteRequirements, line: PhotoLine) -> float:
     if setup.autopilot.follows_path or not 0 < last < requirements.legs:
         return float(requirements.before[last])
     turn = abs(float(requirements.turns[last]))
-    stated = float(setup.route.acceptance[last]) if setup.autopilot.reads_acceptance else 0.0
-    return stated or setup.autopilot.turn_distance(turn, float(requirements.points[last, 2]))
+    mission_radius = float(setup.route.acceptance[last]) if setup.autopilot.reads_acceptance else 0.0
+    return mission_radius or setup.autopilot.turn_distance(turn, float(requirements.points[last, 2]))
 
 
-def _clip_length(metres: float, length: float) -> float:
-    return min(max(metres, 0.0), length) if math.isfinite(metres) else length
+def _clip_length(distance: float, length: float) -> float:
+    return min(max(distance, 0.0), length) if math.isfinite(distance) else length
 
 
 def _flown_finding(
@@ -200,22 +205,22 @@ def _flown_finding(
 
 def lost_text(measure: LineMeasure) -> str:
     """Describe the defects of a line's unusable parts, the largest first; return "" if almost nothing is lost."""
-    lacks = {
+    fractions = {
         f"not along it within {measure.allowed_aside:.0f} m": measure.away,
         f"banked beyond {math.degrees(MAX_PHOTO_BANK_RAD):.0f}°": measure.banked,
         f"more than {measure.allowed_off:.0f} m off its height over ground": measure.high,
         "with the camera off": measure.dark,
     }
-    parts = sorted(((share, what) for what, share in lacks.items() if share >= 0.005), reverse=True)
-    return ", ".join(f"{100.0 * share:.0f} % {what}" for share, what in parts)
+    parts = sorted(((fraction, defect) for defect, fraction in fractions.items() if fraction >= 0.005), reverse=True)
+    return ", ".join(f"{100.0 * fraction:.0f} % {defect}" for fraction, defect in parts)
 
 
 def _coverage_fault(measure: LineMeasure, name: str) -> Message:
     """Describe a line's usable part, the defects of its other parts, and the length lost at its ends."""
-    ends = f"; its first {measure.late:.0f} m and last {measure.early:.0f} m are lost"
+    ends_text = f"; its first {measure.late:.0f} m and last {measure.early:.0f} m are lost"
     return message(
         f"{name}: {100.0 * measure.good:.0f} % of its {measure.length:.0f} m can be used",
-        f": {lost_text(measure)}{ends if max(measure.late, measure.early) >= 1.0 else ''}",
+        f": {lost_text(measure)}{ends_text if max(measure.late, measure.early) >= 1.0 else ''}",
     )
 
 
@@ -225,14 +230,14 @@ def _finding(
     ok: bool | None,
     faults: list[Message],
     facts: list[str],
-    share: float,
+    usable_fraction: float,
     *,
     geometric: bool,
     measure: LineMeasure | None = None,
 ) -> Finding:
-    numbers = []
+    measurements = []
     if measure is not None:
-        numbers = [
+        measurements = [
             Fact("distance from the line", measure.aside, "m"),
             Fact("height error", measure.off, "m"),
             Fact("lost at its begin", measure.late, "m"),
@@ -245,15 +250,15 @@ def _finding(
         ok=ok,
         reason=reason_of(faults, facts),
         faults=faults,
-        planned=100.0 * share if geometric else 100.0,
-        flown=None if geometric else 100.0 * share,
+        planned=100.0 * usable_fraction if geometric else 100.0,
+        flown=None if geometric else 100.0 * usable_fraction,
         limit=100.0 * PHOTO_COVERAGE_FRACTION,
         at_least=True,
         source="default",
-        margin=100.0 * (share - PHOTO_COVERAGE_FRACTION),
+        margin=100.0 * (usable_fraction - PHOTO_COVERAGE_FRACTION),
         unit="%",
         method="the turns' arcs" if geometric else "on the line, level, at its height, camera on",
-        facts=numbers,
+        facts=measurements,
     )
 
 

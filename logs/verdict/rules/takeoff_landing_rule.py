@@ -1,6 +1,6 @@
 """The take-off and landing rules: judge the climb to a mission's first place, and its final approach.
 
-A flight begins and ends in the air, so both are judged from the mission's places alone, whether or not the mission was
+A flight begins and ends in the air, so both are judged from only the mission's places, whether or not the mission was
 flown.  An approach steeper than the aircraft can sink misses its landing place, and fails.  A climb steeper than the
 aircraft can climb is not judged, because QGroundControl draws a climb-out of 30 degrees (its TakeoffMissionItem), and
 autopilots continue to climb.  Any part of a mission's own take-off or landing that is not judged leaves the verdict
@@ -38,24 +38,24 @@ def takeoff_findings(
         return []
     route, mission = requirements.setup.route, requirements.setup.mission
     items = [item for item in mission.items if item.command in TAKEOFFS]
-    at = _waypoint_of(requirements, items[0].seq) if items else -1
+    waypoint = _waypoint_of(requirements, items[0].seq) if items else -1
     # A take-off item in the air is a waypoint like any other.
-    if at < 0 or (route.items[:at] >= 0).any():
+    if waypoint < 0 or (route.items[:waypoint] >= 0).any():
         return []
-    up, home = float(requirements.points[at, 2]), mission.home
-    own = home is not None and (items[0].lat_deg, items[0].lon_deg) != (home.lat_deg, home.lon_deg)
+    altitude, home = float(requirements.points[waypoint, 2]), mission.home
+    has_own_place = home is not None and (items[0].lat_deg, items[0].lon_deg) != (home.lat_deg, home.lon_deg)
     launch = requirements.setup.scenario.launch
-    if launch is not None and (held := _gentle_launch_findings(requirements, launch)):
-        return held
-    if launch is not None and (at == 0 or not own):
+    if launch is not None and (launch_findings := _gentle_launch_findings(requirements, launch)):
+        return launch_findings
+    if launch is not None and (waypoint == 0 or not has_own_place):
         # From the ground at home to the next place, on the launch course.
-        high = float(requirements.points[at + 1, 2])
-        return [_slope_finding(requirements, "takeoff", at, at + 1, route.takeoff_ground, high)]
-    if at == 0 or not own:
-        reason = f"to {up:.0f} m AMSL over home, on a course that is the autopilot's to choose"
-        return [_unjudged_finding("takeoff", requirements.waypoint(at), reason)]
+        next_altitude = float(requirements.points[waypoint + 1, 2])
+        return [_slope_finding(requirements, "takeoff", waypoint, waypoint + 1, route.takeoff_ground, next_altitude)]
+    if waypoint == 0 or not has_own_place:
+        reason = f"to {altitude:.0f} m AMSL over home, on a course that is the autopilot's to choose"
+        return [_unjudged_finding("takeoff", requirements.waypoint(waypoint), reason)]
     # From home, over which the flight starts: `at` is the take-off item's own place.
-    return [_slope_finding(requirements, "takeoff", 0, at, route.takeoff_ground, up)]
+    return [_slope_finding(requirements, "takeoff", 0, waypoint, route.takeoff_ground, altitude)]
 
 
 def _gentle_launch_findings(requirements: RouteRequirements, launch: Launch) -> list[Finding]:
@@ -64,10 +64,10 @@ def _gentle_launch_findings(requirements: RouteRequirements, launch: Launch) -> 
     Return [] if the autopilot needs no acceleration.
     """
     setup = requirements.setup
-    trigger, found = setup.autopilot.launch_trigger, launch.acceleration(setup.slowest_launched)
-    if trigger is None or found >= trigger[0]:
+    trigger, acceleration = setup.autopilot.launch_trigger, launch.acceleration(setup.slowest_launched)
+    if trigger is None or acceleration >= trigger[0]:
         return []
-    fault = message(gentle_launch_text(found, trigger), ": the motor never starts")
+    fault = message(gentle_launch_text(acceleration, trigger), ": the motor never starts")
     return [
         make_finding(
             "takeoff",
@@ -75,11 +75,11 @@ def _gentle_launch_findings(requirements: RouteRequirements, launch: Launch) -> 
             ok=False,
             reason=fault.text,
             faults=[fault],
-            planned=found,
+            planned=acceleration,
             limit=trigger[0],
             at_least=True,
             source="autopilot",
-            margin=found - trigger[0],
+            margin=acceleration - trigger[0],
             unit="m/s2",
             method="v²/2L of the scenario's launch",
         )
@@ -96,57 +96,61 @@ def landing_findings(
     if requirements.ground is not None and requirements.ground.ways.approach is not None:
         return []
     items = [item for item in requirements.setup.mission.items if item.command in LANDINGS]
-    found = [at for item in items if (at := _waypoint_of(requirements, item.seq)) > 0]
-    if not found:
+    landing_waypoints = [waypoint for item in items if (waypoint := _waypoint_of(requirements, item.seq)) > 0]
+    if not landing_waypoints:
         if not items:
             return []
         reason = f"{command_name(items[-1].command)} has no place of its own on the route"
         route = requirements.setup.route
         if route.return_from >= 0:
             reason = RETURN_NOT_FLOWN_ON
-        end, flown_on = requirements.waypoint(requirements.legs), RETURN_NOT_FLOWN_ON in " ".join(route.notes)
+        end_place, flown_on = requirements.waypoint(requirements.legs), RETURN_NOT_FLOWN_ON in " ".join(route.notes)
         if route.return_from >= 0 and not flown_on:
             # The return ends the mission; the landing after it is not flown.
-            return [make_finding("landing", end, ok=None, reason=reason, unit="deg")]
-        return [_unjudged_finding("landing", end, reason)]
-    at, ground = found[-1], requirements.setup.route.landing_ground
-    return [_slope_finding(requirements, "landing", at - 1, at, float(requirements.points[at - 1, 2]), ground)]
+            return [make_finding("landing", end_place, ok=None, reason=reason, unit="deg")]
+        return [_unjudged_finding("landing", end_place, reason)]
+    waypoint, ground = landing_waypoints[-1], requirements.setup.route.landing_ground
+    return [
+        _slope_finding(
+            requirements, "landing", waypoint - 1, waypoint, float(requirements.points[waypoint - 1, 2]), ground
+        )
+    ]
 
 
 def _waypoint_of(requirements: RouteRequirements, seq: int) -> int:
     """Return the last waypoint that belongs to a mission item, or -1 if there is none."""
-    found = [k for k, item in enumerate(requirements.setup.route.items) if int(item) == seq]
-    return found[-1] if found else -1
+    waypoints = [k for k, item in enumerate(requirements.setup.route.items) if int(item) == seq]
+    return waypoints[-1] if waypoints else -1
 
 
 def _slope_finding(
-    requirements: RouteRequirements, rule: str, first: int, last: int, low: float, high: float
+    requirements: RouteRequirements, rule: str, first: int, last: int, first_altitude: float, last_altitude: float
 ) -> Finding:
-    """Judge the slope from waypoint `first` at altitude `low` to waypoint `last` at altitude `high`, m AMSL."""
+    """Judge the slope from waypoint `first` to waypoint `last`, at their altitudes, m AMSL."""
     place = requirements.waypoint(last)
     run = float(requirements.runs[first:last].sum())
-    if math.isnan(low) or math.isnan(high):
+    if math.isnan(first_altitude) or math.isnan(last_altitude):
         return _unjudged_finding(rule, place, "the height of the ground there is not known")
-    slope = math.atan2(high - low, run)
-    limit, source = _slope_limit(requirements, first, low, high, slope)
+    slope = math.atan2(last_altitude - first_altitude, run)
+    limit, source = _slope_limit(requirements, first, first_altitude, last_altitude, slope)
     verb = "climbs" if slope >= 0.0 else "sinks"
-    text = f"{verb} {abs(high - low):.0f} m in {run:.0f} m, {math.degrees(abs(slope)):.1f}°"
-    within = abs(slope) <= limit + PLAN_TOLERANCE_RAD
-    ways = requirements.setup.ground_ways
-    flown = (ways.take_off if rule == "takeoff" else ways.approach) is not None
+    text = f"{verb} {abs(last_altitude - first_altitude):.0f} m in {run:.0f} m, {math.degrees(abs(slope)):.1f}°"
+    is_within = abs(slope) <= limit + PLAN_TOLERANCE_RAD
+    ground_phases = requirements.setup.ground_ways
+    is_flown = (ground_phases.take_off if rule == "takeoff" else ground_phases.approach) is not None
     reason = f"{text} of {math.degrees(limit):.1f}°"
-    reason += "" if flown else f"; not flown: the flight {_VERBS[rule]} in the air"
+    reason += "" if is_flown else f"; not flown: the flight {_VERBS[rule]} in the air"
     fault = message(
         f"the {_TITLES[rule]} {text}",
         f"; at most {math.degrees(limit):.1f}° can be flown at this speed and in this wind",
     )
-    ok = True if within else _RESULT_BEYOND_LIMIT[rule]
+    ok = True if is_within else _RESULT_BEYOND_LIMIT[rule]
     return make_finding(
         rule,
         place,
         ok=ok,
-        reason=reason if within else fault.text.removeprefix(f"the {_TITLES[rule]} "),
-        faults=[] if within else [fault],
+        reason=reason if is_within else fault.text.removeprefix(f"the {_TITLES[rule]} "),
+        faults=[] if is_within else [fault],
         planned=math.degrees(abs(slope)),
         limit=math.degrees(limit),
         source=source,
@@ -164,15 +168,19 @@ def _unjudged_finding(rule: str, place: Place, reason: str) -> Finding:
     return make_finding(rule, place, ok=None, reason=reason, faults=[fault], unit="deg", check=GROUND_WAY)
 
 
-def _slope_limit(requirements: RouteRequirements, leg: int, low: float, high: float, slope: float) -> tuple[float, str]:
+def _slope_limit(
+    requirements: RouteRequirements, leg: int, first_altitude: float, last_altitude: float, slope: float
+) -> tuple[float, str]:
     """Return the limit of slopes with the sign of `slope`, over the ground on a leg's course, rad, and its source."""
-    side, limits = (0 if slope >= 0.0 else 1), requirements.limits
+    direction, limits = (0 if slope >= 0.0 else 1), requirements.limits
     speed, course = float(requirements.route.airspeed[leg]), float(requirements.courses[leg])
-    by_aircraft = min(limits.slopes(course, up, speed)[side] for up in (low, high))
-    by_scenario = (limits.max_climb, limits.max_dive)[side]
-    if by_scenario is not None and by_scenario < by_aircraft:
-        return by_scenario, "scenario"
-    return by_aircraft, "aircraft"
+    aircraft_limit = min(
+        limits.slopes(course, altitude, speed)[direction] for altitude in (first_altitude, last_altitude)
+    )
+    scenario_limit = (limits.max_climb, limits.max_dive)[direction]
+    if scenario_limit is not None and scenario_limit < aircraft_limit:
+        return scenario_limit, "scenario"
+    return aircraft_limit, "aircraft"
 
 
 TAKEOFF = Rule(

@@ -13,7 +13,7 @@ from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.places import FLIGHT, Place
 from logs.verdict.rule import LogNeeds, Rule
-from logs.verdict.suggestions import pass_threat
+from logs.verdict.suggestions import suggest_wider_berth
 from logs.verdict.wording import place_text_within
 from world.arrays import Floats
 from world.threats import Threats, threat_label
@@ -32,7 +32,7 @@ def threat_findings(
         reason = "the mission came without a scenario, so threats are not known"
         return [make_finding("threat", FLIGHT, ok=None, reason=reason, unit="s")]
     threats = scenario.threats
-    touched: list[Finding] = []
+    findings: list[Finding] = []
     nearest, name = math.inf, ""
     for side in ("missile", "radar"):
         radii, scales = _spheres(threats, side)
@@ -40,23 +40,25 @@ def threat_findings(
         track = None
         if aligned is not None:
             track = path_spheres(aligned.track.position, aligned.track.time, threats.position, radii, scales)
-        for m, table in enumerate(scenario.spec.threats):
-            if radii[m] <= 0.0:
+        for number, table in enumerate(scenario.spec.threats):
+            if radii[number] <= 0.0:
                 continue
             if side == "missile":
                 judged = plan if geometric or track is None else track
-                away = float(judged.closest[m] - radii[m])
-                if away < nearest:
-                    nearest, name = away, threat_label(table.name or "", m)
-            if plan.closest[m] <= radii[m] or (track is not None and track.closest[m] <= radii[m]):
-                visit = None if geometric else _sphere_visit(track, m)
-                place = Place(side, m, name=table.name or "")
-                where = "" if side == "radar" else _nearest_place_text(requirements, aligned, visit, float(radii[m]))
-                touched.append(_sphere_finding(place, _sphere_visit(plan, m), visit, float(radii[m]), where))
-    if not any(item.place.kind == "missile" for item in touched):
+                distance = float(judged.closest[number] - radii[number])
+                if distance < nearest:
+                    nearest, name = distance, threat_label(table.name or "", number)
+            if plan.closest[number] <= radii[number] or (track is not None and track.closest[number] <= radii[number]):
+                visit = None if geometric else _sphere_visit(track, number)
+                place = Place(side, number, name=table.name or "")
+                where = (
+                    "" if side == "radar" else _nearest_place_text(requirements, aligned, visit, float(radii[number]))
+                )
+                findings.append(_sphere_finding(place, _sphere_visit(plan, number), visit, float(radii[number]), where))
+    if not any(finding.place.kind == "missile" for finding in findings):
         error = position_error(requirements.setup)
-        touched.insert(0, _no_entry_finding(len(threats), nearest, name, error, aligned is not None or geometric))
-    return touched
+        findings.insert(0, _no_entry_finding(len(threats), nearest, name, error, aligned is not None or geometric))
+    return findings
 
 
 def _spheres(threats: Threats, side: Side) -> tuple[Floats, Floats]:
@@ -90,7 +92,7 @@ def _sphere_visit(visits: SphereVisits | None, m: int) -> _Visit:
 def _nearest_place_text(
     requirements: RouteRequirements, aligned: AlignedTrack | None, visit: _Visit | None, radius: float
 ) -> str:
-    """Describe where a flight inside a sphere was nearest to the center; return "" if it was not inside.
+    """Describe the place inside a sphere nearest to its center; return "" if the flight was never inside.
 
     radius: radius of the sphere, m.
     """
@@ -102,7 +104,7 @@ def _nearest_place_text(
     return f" on {place_text_within(requirements.leg(aligned.leg_at(k)))} {aligned.where(k, fraction)}"
 
 
-def _no_entry_finding(count: int, nearest: float, name: str, error: float, judged: bool) -> Finding:
+def _no_entry_finding(count: int, nearest: float, name: str, error: float, is_judged: bool) -> Finding:
     """Report that no missile sphere is entered.
 
     nearest: distance outside the sphere of the threat called `name`, m.
@@ -119,25 +121,25 @@ def _no_entry_finding(count: int, nearest: float, name: str, error: float, judge
     return make_finding(
         "threat",
         FLIGHT,
-        ok=True if judged else None,
-        reason=reason if judged else "nothing was flown",
+        ok=True if is_judged else None,
+        reason=reason if is_judged else "nothing was flown",
         planned=0.0,
-        flown=0.0 if judged else None,
+        flown=0.0 if is_judged else None,
         limit=0.0,
         source="scenario",
         tolerance=0.0,
         margin=0.0,
         unit="s",
         method=_METHOD,
-        facts=facts if judged else (),
+        facts=facts if is_judged else (),
     )
 
 
 def _sphere_finding(place: Place, plan: _Visit, track: _Visit | None, radius: float, where: str) -> Finding:
     judged = plan if track is None else track
-    missing = math.isnan(judged.closest)
+    is_missing = math.isnan(judged.closest)
     facts = f"planned {plan.inside:.1f} s inside {radius:.0f} m, exposure {plan.exposure:.3g} s"
-    if track is not None and not missing:
+    if track is not None and not is_missing:
         facts += f"; flown {track.inside:.1f} s, exposure {track.exposure:.3g} s, nearest {track.closest:.0f} m"
         facts += f" at {track.closest_time:.1f} s{where}"
     flown = None if track is None else track.inside
@@ -152,7 +154,7 @@ def _sphere_finding(place: Place, plan: _Visit, track: _Visit | None, radius: fl
             unit="s",
             method=_METHOD,
         )
-    ok = None if missing else judged.closest > radius
+    ok = None if is_missing else judged.closest > radius
     return make_finding(
         "threat",
         place,
@@ -174,6 +176,6 @@ RULE = Rule(
     name="threat",
     tolerances=("NAVIGATION_SIGMAS", "SPHERE_FAR_DIAGONALS", "SPHERE_STAY_TOLERANCE_S"),
     judge=threat_findings,
-    suggest=pass_threat,
+    suggest=suggest_wider_berth,
     log=LogNeeds(("heights",)),
 )

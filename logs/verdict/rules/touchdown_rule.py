@@ -76,75 +76,79 @@ def touchdown_findings(
         reason = "the flight did not get to its landing"
         fault = message(f"the touchdown at {place_text(place)} is not judged: {reason}")
         return [make_finding("touchdown", place, ok=None, reason=reason, faults=[fault], unit="m", check=GROUND_WAY)]
-    over = math.nan if terrain is None else float(approach.point[2] - terrain.height(*approach.point[:2]))
-    if terrain is None or math.isnan(over):
+    point_height = math.nan if terrain is None else float(approach.point[2] - terrain.height(*approach.point[:2]))
+    if terrain is None or math.isnan(point_height):
         reason = "the ground at the landing point is not known"
         fault = message(f"the touchdown at {place_text(place)} is not judged: {reason}")
         return [make_finding("touchdown", place, ok=None, reason=reason, faults=[fault], unit="m", check=GROUND_WAY)]
-    k = _touchdown_row(track, terrain)
-    if k is None:
+    touchdown_row = _touchdown_row(track, terrain)
+    if touchdown_row is None:
         fault = message("the aircraft did not touch down", f" at {_landing_point_text(approach)}")
         return [make_finding("touchdown", place, ok=False, reason=fault.text, faults=[fault], unit="m")]
-    landing = _measure_landing(requirements, track, terrain, approach, k)._replace(over=over)
+    landing = _measure_landing(requirements, track, terrain, approach, touchdown_row)._replace(over=point_height)
     faults = _detect_faults(approach, landing)
     if entered := first_obstacle_on(requirements, track_way(track)):
         faults.append(message(f"the final enters {entered}"))
-    gusts = requirements.setup.scenario.wind.turbulence != "none"
-    return [_finding(place, approach, landing, faults, gusts=gusts)]
+    has_gusts = requirements.setup.scenario.wind.turbulence != "none"
+    return [_finding(place, approach, landing, faults, has_gusts=has_gusts)]
 
 
 def _planned_findings(place: Place, approach: Approach) -> list[Finding]:
     """Before a flight, return a finding if the strip is too short to judge the touch-down."""
-    found = _short_strip_messages(approach)
-    reason = reason_of(found)
-    return [make_finding("touchdown", place, ok=None, reason=reason, faults=found, check=GROUND_WAY)] if found else []
+    messages = _short_strip_messages(approach)
+    reason = reason_of(messages)
+    return (
+        [make_finding("touchdown", place, ok=None, reason=reason, faults=messages, check=GROUND_WAY)]
+        if messages
+        else []
+    )
 
 
 def _measure_landing(
-    requirements: RouteRequirements, track: Track, terrain: Terrain, approach: Approach, k: int
+    requirements: RouteRequirements, track: Track, terrain: Terrain, approach: Approach, touchdown_row: int
 ) -> _Landing:
-    """Measure a landing that touches down at row `k`; the field `over` stays unset."""
+    """Measure a landing that touches down at row `touchdown_row`; the field `over` stays unset."""
     position = np.asarray(track.position, dtype=np.float64)
-    along, aside = _as_floats(approach.place(position[k]))
-    touch, stop = (_as_floats(approach.on_strip(position[row])) for row in (k, -1))
-    sink, towards = _sink_rates(track, terrain, approach, k)
+    along, lateral_offset = _as_floats(approach.place(position[touchdown_row]))
+    touch, stop = (_as_floats(approach.on_strip(position[row])) for row in (touchdown_row, -1))
+    sink, ground_sink = _sink_rates(track, terrain, approach, touchdown_row)
     return _Landing(
         along=along,
-        aside=aside,
+        aside=lateral_offset,
         touch=touch,
         stop=stop,
         left=0.5 * approach.strip.length - stop[0],
         sink=sink,
-        towards=towards,
+        towards=ground_sink,
         room=_final_clearance(requirements, position, terrain, approach),
     )
 
 
-def _finding(place: Place, approach: Approach, landing: _Landing, faults: list[Message], *, gusts: bool) -> Finding:
+def _finding(place: Place, approach: Approach, landing: _Landing, faults: list[Message], *, has_gusts: bool) -> Finding:
     """Return the finding on a landing, with its faults, otherwise its undecided parts, otherwise unknown ground.
 
-    gusts: True if the air is turbulent.
+    has_gusts: True if the air is turbulent.
     """
-    open_ = [] if faults else _undecided_messages(approach, landing, gusts=gusts)
-    if not faults and not open_ and math.isnan(landing.room):
-        open_ = [message("the ground below the final is not known")]
-    messages = faults or open_
-    inside = 0.5 * approach.strip.length - TOUCHDOWN_ERROR_M
+    undecided = [] if faults else _undecided_messages(approach, landing, has_gusts=has_gusts)
+    if not faults and not undecided and math.isnan(landing.room):
+        undecided = [message("the ground below the final is not known")]
+    messages = faults or undecided
+    limit = 0.5 * approach.strip.length - TOUCHDOWN_ERROR_M
     farthest = max(landing.stop[0], abs(landing.touch[0]))
     return make_finding(
         "touchdown",
         place,
-        ok=False if faults else None if open_ else True,
+        ok=False if faults else None if undecided else True,
         reason=reason_of(messages, _describe_landing(approach, landing)),
         faults=messages,
         flown=farthest,
-        limit=inside,
+        limit=limit,
         source="scenario",
         tolerance=0.0,
-        margin=inside - farthest,
+        margin=limit - farthest,
         unit="m",
         method="contact of skids or wheels with the ground, from the flown track",
-        check=GROUND_WAY if open_ else "",
+        check=GROUND_WAY if undecided else "",
         facts=(
             Fact("along", landing.along, "m"),
             Fact("aside", landing.aside, "m"),
@@ -170,103 +174,109 @@ def _touchdown_row(track: Track, terrain: Terrain) -> int | None:
     if not len(track):
         return None
     position = np.asarray(track.position, dtype=np.float64)
-    over = position[:, 2] - terrain.height(position[:, 0], position[:, 1])
+    heights = position[:, 2] - terrain.height(position[:, 0], position[:, 1])
     speed = np.hypot(*np.asarray(track.velocity[:, :2], dtype=np.float64).T)
     # The aircraft has landed only if it has stopped.
     if not speed[-1] < 1.0:
         return None
-    low = over <= over[-1] + CONTACT_HEIGHT_M
-    return int(np.argmax(low)) if low.any() else None
+    is_low = heights <= heights[-1] + CONTACT_HEIGHT_M
+    return int(np.argmax(is_low)) if is_low.any() else None
 
 
-def _sink_rates(track: Track, terrain: Terrain, approach: Approach, k: int) -> tuple[float, float]:
+def _sink_rates(track: Track, terrain: Terrain, approach: Approach, row: int) -> tuple[float, float]:
     """Return the vertical sink rate just before touch-down, and the sink rate relative to the sloping ground, m/s."""
-    k = max(0, k - 2)
-    east, north, up = (float(value) for value in track.velocity[k])
-    here = np.asarray(track.position[k, :2], dtype=np.float64)
-    ahead = 0.5 * _SLOPE_RUN_M * np.array([math.sin(approach.course), math.cos(approach.course)])
-    rise = float(terrain.height(*(here + ahead)) - terrain.height(*(here - ahead))) / _SLOPE_RUN_M
-    over_ground = east * math.sin(approach.course) + north * math.cos(approach.course)
-    return -up, -up + rise * over_ground
+    row = max(0, row - 2)
+    east, north, vertical_speed = (float(value) for value in track.velocity[row])
+    position = np.asarray(track.position[row, :2], dtype=np.float64)
+    half_run = 0.5 * _SLOPE_RUN_M * np.array([math.sin(approach.course), math.cos(approach.course)])
+    rise = float(terrain.height(*(position + half_run)) - terrain.height(*(position - half_run))) / _SLOPE_RUN_M
+    course_speed = east * math.sin(approach.course) + north * math.cos(approach.course)
+    return -vertical_speed, -vertical_speed + rise * course_speed
 
 
 def _final_clearance(requirements: RouteRequirements, position: Floats, terrain: Terrain, approach: Approach) -> float:
     """Return the minimum height above ground before flare or touch-down, m, as in `_Landing.room`."""
-    up = float(approach.point[2])
-    glide = requirements.setup.autopilot.landing_glide(approach.begin - up, approach.run, approach.tail_wind, up)
-    flares = glide.flare_distance + max(0.0, FLARE_HEIGHT_MARGIN_M - glide.flare_height) / glide.slope
-    near = approach.place(position)[0] > -max(EARLY_TOUCHDOWN_DISTANCE_M, flares)
-    until = int(np.argmax(near)) if near.any() else len(position)
-    if until < 2:
+    point_altitude = float(approach.point[2])
+    glide = requirements.setup.autopilot.landing_glide(
+        approach.begin - point_altitude, approach.run, approach.tail_wind, point_altitude
+    )
+    flare_distance = glide.flare_distance + max(0.0, FLARE_HEIGHT_MARGIN_M - glide.flare_height) / glide.slope
+    is_near = approach.place(position)[0] > -max(EARLY_TOUCHDOWN_DISTANCE_M, flare_distance)
+    end_row = int(np.argmax(is_near)) if is_near.any() else len(position)
+    if end_row < 2:
         return math.inf
-    low, _ = path_clearance(terrain.heights, terrain.to_pixel.record, np.ascontiguousarray(position[:until]))
-    return float(low.min())
+    heights, _ = path_clearance(terrain.heights, terrain.to_pixel.record, np.ascontiguousarray(position[:end_row]))
+    return float(heights.min())
 
 
 def _detect_faults(approach: Approach, landing: _Landing) -> list[Message]:
     """Return a fault for each part of the landing off the strip, and for a landing point below the ground."""
-    half, side = 0.5 * approach.strip.length, 0.5 * approach.strip.width
+    half_length, half_width = 0.5 * approach.strip.length, 0.5 * approach.strip.width
     # On a strip shorter than the error, only a distance beyond the strip by more than the error is known.
-    inside = half - TOUCHDOWN_ERROR_M if half > TOUCHDOWN_ERROR_M else half + TOUCHDOWN_ERROR_M
+    allowed_distance = (
+        half_length - TOUCHDOWN_ERROR_M if half_length > TOUCHDOWN_ERROR_M else half_length + TOUCHDOWN_ERROR_M
+    )
     touch, stop = landing.touch, landing.stop
     faults = []
     if -landing.over > LANDING_POINT_ERROR_M:
         brief = f"the landing point of {_landing_point_text(approach)} is {-landing.over:.0f} m below the ground"
         faults.append(message(brief, ": the aircraft meets it before it flares"))
-    if abs(touch[0]) > inside:
+    if abs(touch[0]) > allowed_distance:
         where = "before" if touch[0] < 0.0 else "beyond"
         brief = f"touches down {abs(touch[0]):.0f} m {where} the strip's middle"
-        faults.append(message(brief, f"; {max(0.0, half - TOUCHDOWN_ERROR_M):.0f} m are allowed on this strip"))
-    if stop[0] > inside:
-        brief = f"comes to rest {half - stop[0]:.0f} m before the strip's end"
-        if stop[0] > half:
-            brief = f"runs {stop[0] - half:.0f} m beyond the strip's end"
+        faults.append(message(brief, f"; {max(0.0, half_length - TOUCHDOWN_ERROR_M):.0f} m are allowed on this strip"))
+    if stop[0] > allowed_distance:
+        brief = f"comes to rest {half_length - stop[0]:.0f} m before the strip's end"
+        if stop[0] > half_length:
+            brief = f"runs {stop[0] - half_length:.0f} m beyond the strip's end"
         faults.append(message(brief, f"; {TOUCHDOWN_ERROR_M:.0f} m are to be left"))
-    aside = max(abs(touch[1]), abs(stop[1]))
-    if aside > side:
-        faults.append(message(f"{aside:.0f} m beside the strip's middle", f"; it is {2.0 * side:.0f} m wide"))
+    lateral_offset = max(abs(touch[1]), abs(stop[1]))
+    if lateral_offset > half_width:
+        faults.append(
+            message(f"{lateral_offset:.0f} m beside the strip's middle", f"; it is {2.0 * half_width:.0f} m wide")
+        )
     return faults
 
 
 def _short_strip_messages(approach: Approach) -> list[Message]:
-    """Return a message if a strip is too short for the touch-down error of the simulated law."""
+    """Return a message if a strip is shorter than the simulated law's error in the touch-down."""
     if approach.strip.length > 2.0 * TOUCHDOWN_ERROR_M:
         return []
     brief = f"the strip is {approach.strip.length:.0f} m long"
     return [message(brief, f"; a touch-down is known within {TOUCHDOWN_ERROR_M:.0f} m either way, which takes more")]
 
 
-def _undecided_messages(approach: Approach, landing: _Landing, *, gusts: bool) -> list[Message]:
+def _undecided_messages(approach: Approach, landing: _Landing, *, has_gusts: bool) -> list[Message]:
     """Return messages on parts of a landing that the limited accuracy of the simulated law leaves undecided."""
-    found = _short_strip_messages(approach)
-    left = 0.5 * approach.strip.length - max(landing.touch[0], landing.stop[0])
-    if gusts and left < GUST_TOUCHDOWN_ERROR_M and not found:
-        brief = f"comes down or to rest {left:.0f} m before the strip's end"
-        found.append(message(brief, f"; in turbulence that is known within {GUST_TOUCHDOWN_ERROR_M:.0f} m"))
+    messages = _short_strip_messages(approach)
+    strip_left = 0.5 * approach.strip.length - max(landing.touch[0], landing.stop[0])
+    if has_gusts and strip_left < GUST_TOUCHDOWN_ERROR_M and not messages:
+        brief = f"comes down or to rest {strip_left:.0f} m before the strip's end"
+        messages.append(message(brief, f"; in turbulence that is known within {GUST_TOUCHDOWN_ERROR_M:.0f} m"))
     if landing.over > LANDING_POINT_ERROR_M:
         brief = f"the landing point of {_landing_point_text(approach)} is {landing.over:.0f} m above the ground"
-        found.append(message(brief, ": it flares too early, and falls"))
+        messages.append(message(brief, ": it flares too early, and falls"))
     if landing.room < FINAL_APPROACH_CLEARANCE_M:
         brief = f"the final passes the ground by {landing.room:.1f} m"
-        found.append(message(brief, f", and may be flown {FINAL_APPROACH_CLEARANCE_M:.0f} m lower than simulated"))
+        messages.append(message(brief, f", and may be flown {FINAL_APPROACH_CLEARANCE_M:.0f} m lower than simulated"))
     if landing.towards > MAX_TOUCHDOWN_SINK_MPS:
         brief = f"sinks at {landing.towards:.1f} m/s towards the ground at its touch-down"
-        found.append(message(brief, f"; up to {MAX_TOUCHDOWN_SINK_MPS:g} m/s are known of ArduPlane's landings"))
-    return found
+        messages.append(message(brief, f"; up to {MAX_TOUCHDOWN_SINK_MPS:g} m/s are known of ArduPlane's landings"))
+    return messages
 
 
 def _describe_landing(approach: Approach, landing: _Landing) -> list[str]:
     """Describe the landing in a list of phrases."""
-    before = "before" if landing.along < 0.0 else "beyond"
-    known = [f"touches down {abs(landing.along):.0f} m {before} the landing point, {abs(landing.aside):.1f} m aside"]
-    known.append(f"comes to rest with {landing.left:.0f} m of the strip left")
-    sinks = f"sinks at {landing.sink:.1f} m/s, {landing.towards:.1f} m/s towards the ground"
-    known.append(f"{sinks}, by a flare that is not judged")
+    direction = "before" if landing.along < 0.0 else "beyond"
+    notes = [f"touches down {abs(landing.along):.0f} m {direction} the landing point, {abs(landing.aside):.1f} m aside"]
+    notes.append(f"comes to rest with {landing.left:.0f} m of the strip left")
+    sink_text = f"sinks at {landing.sink:.1f} m/s, {landing.towards:.1f} m/s towards the ground"
+    notes.append(f"{sink_text}, by a flare that is not judged")
     if math.isfinite(landing.room):
-        known.append(f"the final stays {landing.room:.0f} m above ground or more")
+        notes.append(f"the final stays {landing.room:.0f} m above ground or more")
     if approach.tail_wind > 0.1:
-        known.append(f"with {approach.tail_wind:.1f} m/s of tail wind")
-    return known
+        notes.append(f"with {approach.tail_wind:.1f} m/s of tail wind")
+    return notes
 
 
 RULE = Rule(

@@ -12,7 +12,7 @@ from logs.verdict.measures.route_requirements import RouteRequirements, turn_lim
 from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.measures.turns import TurnMeasure, measure_turns
 from logs.verdict.rule import LogNeeds, Rule
-from logs.verdict.suggestions import ease_turn
+from logs.verdict.suggestions import suggest_gentler_turn
 from logs.verdict.tolerances import (
     BANK_TOLERANCE_RAD,
     CORNER_CUT_FRACTION,
@@ -33,23 +33,23 @@ from world.geometry import fly_by_offset
 def turn_findings(
     requirements: RouteRequirements, aligned: AlignedTrack | None, *, geometric: bool = False
 ) -> list[Finding]:
-    """Judge the turn at each inner waypoint; if ``geometric``, judge the route alone, without a flight."""
+    """Judge the turn at each inner waypoint; if ``geometric``, judge only the route, without a flight."""
     measures: list[TurnMeasure | None] = [None if geometric else TurnMeasure()] * (requirements.legs - 1)
     if aligned is not None:
         measures = [*measure_turns(requirements, aligned)]
     return [
-        _judge(requirements, i, measure, aligned)
+        _finding(requirements, i, measure, aligned)
         for i, measure in enumerate(measures, 1)
         if not requirements.turns_around(i)
     ]
 
 
-def _judge(
+def _finding(
     requirements: RouteRequirements, i: int, measure: TurnMeasure | None, aligned: AlignedTrack | None
 ) -> Finding:
     planned = abs(float(requirements.turns[i]))
     limit, source = turn_limit(requirements, i)
-    # Neighbours that need more than the legs have are at fault themselves: going straight on takes no room.
+    # A neighbouring turn that needs more than the whole leg is itself at fault: going straight on needs no length.
     limit = max(limit, 0.0)
     if requirements.runs[i - 1 : i + 1].min() < MIN_LEG_LENGTH_M:
         reason = "a leg beside it goes straight up or down, which has no course to turn from or to"
@@ -69,10 +69,10 @@ def _judge(
     if measure is not None:
         angle, tolerance = measure.angle, measure.tolerance or PLAN_TOLERANCE_RAD
         facts += _flown_facts(requirements, i, measure)
-        shown = _flown_faults(requirements, i, measure, limit)
-        # If the aircraft's limits apply, they judge; what the flight showed of them is only reported.
-        facts += [one.brief for one in shown] if requirements.envelope else []
-        faults += [] if requirements.envelope else shown
+        flown_faults = _flown_faults(requirements, i, measure, limit)
+        # If the aircraft's limits apply, the turn is judged by them; faults of the flown turn are only reported.
+        facts += [fault.brief for fault in flown_faults] if requirements.envelope else []
+        faults += [] if requirements.envelope else flown_faults
         method = "least-squares courses of both legs" if measure.fitted else "course change over the turn"
         if angle is None:
             method = "not flown"
@@ -109,13 +109,13 @@ def _unflown_turn_text(
         return "its legs were not flown in turn"
     if aligned is None or int(aligned.track.leg.max()) < i:
         return "the flight did not get past it"
-    active = [float(np.count_nonzero(aligned.track.leg == leg)) * aligned.tick for leg in (i - 1, i)]
-    leg = i if active[1] <= active[0] else i - 1
-    taken, run = min(active), float(requirements.runs[leg])
+    active_times = [float(np.count_nonzero(aligned.track.leg == leg)) * aligned.tick for leg in (i - 1, i)]
+    leg = i if active_times[1] <= active_times[0] else i - 1
+    active_time, run = min(active_times), float(requirements.runs[leg])
     radius = reach(requirements, leg + 1).radius
     return (
         f"{requirements.setup.autopilot.title} was on {place_text_within(requirements.leg(leg))} of {run:.0f} m for"
-        f" {taken:.1f} s, since it counts a waypoint as reached from {radius:.0f} m"
+        f" {active_time:.1f} s, since it counts a waypoint as reached from {radius:.0f} m"
     )
 
 
@@ -135,29 +135,30 @@ def _fly_over_notes(requirements: RouteRequirements, i: int, turn: float) -> lis
 
 
 def _sharp_turn_message(requirements: RouteRequirements, i: int, planned: float, limit: float, source: str) -> Message:
-    sharp = f"turns {math.degrees(planned):.1f}°"
+    turn_text = f"turns {math.degrees(planned):.1f}°"
     if source == "scenario":
-        return message(f"{sharp}, beyond the scenario's {math.degrees(limit):.1f}°")
+        return message(f"{turn_text}, beyond the scenario's {math.degrees(limit):.1f}°")
     speed, bank = float(max(requirements.route.airspeed[i - 1 : i + 1])), math.degrees(requirements.limits.max_bank)
     radius = float(requirements.radius[i])
     if not math.isfinite(radius):
-        return message(f"{sharp} where the wind leaves no way along a leg at {speed:.0f} m/s")
+        return message(f"{turn_text} where the wind leaves no way along a leg at {speed:.0f} m/s")
     if requirements.setup.route.arcs[i] > 0.0:
         return message(
             f"circles with radius {radius:.0f} m",
             f"; at {speed:.0f} m/s and {bank:.0f}° bank the aircraft turns with {requirements.tightest[i]:.0f} m on"
             " these courses in this wind",
         )
-    takes = "no length of leg is enough"
+    length_text = "no length of leg is enough"
     if requirements.after[i] < MAX_FLY_BY_OFFSET_RADII * radius:
-        takes = f"that takes {requirements.after[i]:.0f} m of each leg"
+        length_text = f"that takes {requirements.after[i]:.0f} m of each leg"
         if requirements.setup.route.fly_over[i]:
-            takes = f"flying over it takes {requirements.after[i]:.0f} m of the next leg"
-    before, after = requirements.runs[i - 1], requirements.runs[i]
-    fits = f"its neighbours leave room for {math.degrees(limit):.1f}°" if limit > 0.0 else "no turn fits"
+            length_text = f"flying over it takes {requirements.after[i]:.0f} m of the next leg"
+    run_before, run_after = requirements.runs[i - 1], requirements.runs[i]
+    room_text = f"its neighbours leave room for {math.degrees(limit):.1f}°" if limit > 0.0 else "no turn fits"
     return message(
-        f"{sharp} between legs of {before:.0f} m and {after:.0f} m: at {speed:.0f} m/s and {bank:.0f}° bank",
-        f" (radius {radius:.0f} m) {takes}, and {fits}",
+        f"{turn_text} between legs of {run_before:.0f} m and {run_after:.0f} m:"
+        f" at {speed:.0f} m/s and {bank:.0f}° bank",
+        f" (radius {radius:.0f} m) {length_text}, and {room_text}",
     )
 
 
@@ -200,52 +201,54 @@ def _flown_faults(requirements: RouteRequirements, i: int, measure: TurnMeasure,
     """Return faults of the flown turn, such as an angle or bank beyond its limit, a tighter arc, or overshoot."""
     faults = []
     if measure.angle is not None and measure.tolerance is not None and measure.angle > limit + measure.tolerance:
-        flown, most = math.degrees(measure.angle), math.degrees(limit)
-        faults.append(message(f"flown course change {flown:.1f}° beyond {most:.1f}°"))
+        flown, max_value = math.degrees(measure.angle), math.degrees(limit)
+        faults.append(message(f"flown course change {flown:.1f}° beyond {max_value:.1f}°"))
     max_bank = requirements.limits.max_bank + BANK_TOLERANCE_RAD
     # Roll in a gust, or into a turn, is not the bank of the turn: the mean over a second applies.
     if measure.held_bank is not None and measure.held_bank > max_bank:
-        held, most = math.degrees(measure.held_bank), math.degrees(max_bank)
-        faults.append(message(f"bank {held:.1f}° beyond {most:.1f}°"))
+        held_bank, max_value = math.degrees(measure.held_bank), math.degrees(max_bank)
+        faults.append(message(f"bank {held_bank:.1f}° beyond {max_value:.1f}°"))
     faults += _tight_turn_faults(requirements, i, measure)
     if measure.overshoot is not None and measure.overshoot > OVERSHOOT_TOLERANCE_M:
-        past = "its arc" if measure.corner is None else "its next leg"
+        passed_text = "its arc" if measure.corner is None else "its next leg"
         faults.append(
-            message(f"overshoots {past} by {measure.overshoot:.0f} m", f" (at most {OVERSHOOT_TOLERANCE_M:.0f} m)")
+            message(
+                f"overshoots {passed_text} by {measure.overshoot:.0f} m", f" (at most {OVERSHOOT_TOLERANCE_M:.0f} m)"
+            )
         )
-    most = SETTLED_CROSS_TRACK_M + GUST_OFFSET_M[requirements.setup.scenario.wind.turbulence]
-    if measure.settled is not None and measure.over and measure.settled > most:
-        off = f"still {measure.settled:.1f} m off the next leg at its end"
-        faults.append(message(off, f" (at most {most:.1f} m)"))
+    max_value = SETTLED_CROSS_TRACK_M + GUST_OFFSET_M[requirements.setup.scenario.wind.turbulence]
+    if measure.settled is not None and measure.over and measure.settled > max_value:
+        offset_text = f"still {measure.settled:.1f} m off the next leg at its end"
+        faults.append(message(offset_text, f" (at most {max_value:.1f} m)"))
     if measure.full_circles:
         faults.append(message(f"{measure.full_circles} full circle(s) flown at the corner"))
     return faults
 
 
 def _tight_turn_faults(requirements: RouteRequirements, i: int, measure: TurnMeasure) -> list[Message]:
-    """Return a fault if a turn passed its waypoint so closely that it was tighter than the arc at the bank limit.
+    """Return a fault if a turn passed its waypoint closer than the arc at the bank limit does.
 
     Legs too short for their turn are joined by a tighter arc, and a flight that follows this arc exceeded the bank
     limit or slowed down.
     """
     turn, setup = abs(float(requirements.turns[i])), requirements.setup
-    tightest = float(requirements.tightest[i])
+    min_radius = float(requirements.tightest[i])
     # Guidance's own limit: a sharper corner has no arc to follow if its legs are short.
-    least = fly_by_offset(turn, tightest) if turn < SHARPEST_FLY_BY_RAD else math.inf
+    min_distance = fly_by_offset(turn, min_radius) if turn < SHARPEST_FLY_BY_RAD else math.inf
     # An autopilot that does not follow the arc may pass the waypoint at any distance.
-    followed = setup.autopilot.keeps_to_arcs and setup.source is None and not setup.route.fly_over[i]
-    if measure.passed is None or not math.isfinite(least) or not followed:
+    follows_arc = setup.autopilot.keeps_to_arcs and setup.source is None and not setup.route.fly_over[i]
+    if measure.passed is None or not math.isfinite(min_distance) or not follows_arc:
         return []
-    tolerance = CORNER_CUT_FRACTION * least + CORNER_CUT_TOLERANCE_M[setup.scenario.wind.turbulence]
+    tolerance = CORNER_CUT_FRACTION * min_distance + CORNER_CUT_TOLERANCE_M[setup.scenario.wind.turbulence]
     tolerance += NAVIGATION_SIGMAS * ERRORS[setup.nav][0]
-    if measure.passed >= least - tolerance:
+    if measure.passed >= min_distance - tolerance:
         return []
-    radius = measure.passed / least * tightest
+    radius = measure.passed / min_distance * min_radius
     return [
         message(
             f"flown with a radius of {radius:.0f} m, {measure.passed:.1f} m from its waypoint",
-            f"; at {math.degrees(requirements.limits.max_bank):.0f}° bank in this wind it is {tightest:.0f} m, and"
-            f" {least:.1f} m from it",
+            f"; at {math.degrees(requirements.limits.max_bank):.0f}° bank in this wind it is {min_radius:.0f} m, and"
+            f" {min_distance:.1f} m from it",
         )
     ]
 
@@ -281,6 +284,6 @@ RULE = Rule(
         ),
     ),
     judge=turn_findings,
-    suggest=ease_turn,
+    suggest=suggest_gentler_turn,
     log=LogNeeds(aircraft=True, no_gap=True),
 )

@@ -22,28 +22,28 @@ from world.arrays import Floats
 def waypoint_findings(
     requirements: RouteRequirements, aligned: AlignedTrack | None, *, geometric: bool = False
 ) -> list[Finding]:
-    """Judge how closely the track, or the planned path (``geometric``), passes each waypoint."""
-    judged = [i for i in range(len(requirements.points)) if not requirements.turns_around(i)]
+    """Judge the distance at which the track, or the planned path (``geometric``), passes each waypoint."""
+    judged_waypoints = [i for i in range(len(requirements.points)) if not requirements.turns_around(i)]
     if geometric:
-        return [_planned_finding(requirements, i) for i in judged]
+        return [_planned_finding(requirements, i) for i in judged_waypoints]
     apexes = requirements.apexes()
-    return [_flown_finding(requirements, aligned, i, apexes) for i in judged]
+    return [_flown_finding(requirements, aligned, i, apexes) for i in judged_waypoints]
 
 
 def _planned_finding(requirements: RouteRequirements, i: int) -> Finding:
     """Judge whether the fly-by arc at a waypoint passes it within its acceptance distance."""
-    near, offset = reach(requirements, i), float(requirements.fly_by_offset[i])
+    condition, offset = reach(requirements, i), float(requirements.fly_by_offset[i])
     faults, fact = [], f"the fly-by path passes at {offset:.0f} m"
     if requirements.setup.route.fly_over[i]:
         fact = "flown over"
     elif not requirements.setup.autopilot.follows_path:
-        fact = _turn_text(requirements, i, near)
-    elif offset > near.radius + ROUNDING_M:
+        fact = _turn_text(requirements, i, condition)
+    elif offset > condition.radius + ROUNDING_M:
         turn, radius = math.degrees(abs(float(requirements.turns[i]))), float(requirements.radius[i])
         faults.append(
             message(
                 f"the arc of its {turn:.0f}° corner passes it at {offset:.0f} m",
-                f" (radius {radius:.0f} m), and {near.radius:.0f} m count as reached",
+                f" (radius {radius:.0f} m), and {condition.radius:.0f} m count as reached",
             )
         )
     return make_finding(
@@ -53,55 +53,59 @@ def _planned_finding(requirements: RouteRequirements, i: int) -> Finding:
         reason=reason_of(faults) if faults else fact,
         faults=faults,
         planned=offset,
-        limit=near.radius,
-        source=near.source,
+        limit=condition.radius,
+        source=condition.source,
         tolerance=ROUNDING_M,
-        margin=near.radius - offset if requirements.setup.autopilot.follows_path else None,
+        margin=condition.radius - offset if requirements.setup.autopilot.follows_path else None,
         unit="m",
         method="the fly-by arc",
     )
 
 
-def _turn_text(requirements: RouteRequirements, i: int, near: Reach) -> str:
+def _turn_text(requirements: RouteRequirements, i: int, condition: Reach) -> str:
     """Describe where an autopilot that flies from leg to leg turns at a waypoint."""
-    autopilot, before, unread = requirements.setup.autopilot, near.radius, ""
-    if near.source == "mission" and not autopilot.reads_acceptance:
+    autopilot, turn_distance, unread_text = requirements.setup.autopilot, condition.radius, ""
+    if condition.source == "mission" and not autopilot.reads_acceptance:
         turn = abs(float(requirements.turns[i])) if 0 < i < requirements.legs else math.pi
-        before = autopilot.turn_distance(turn, float(requirements.points[i, 2]))
-        unread = f"; {autopilot.title} does not read the mission's {near.radius:.0f} m"
-    return f"{autopilot.title} turns to the next leg {before:.0f} m before it, or where it is past it{unread}"
+        turn_distance = autopilot.turn_distance(turn, float(requirements.points[i, 2]))
+        unread_text = f"; {autopilot.title} does not read the mission's {condition.radius:.0f} m"
+    return (
+        f"{autopilot.title} turns to the next leg {turn_distance:.0f} m before it, or where it is past it{unread_text}"
+    )
 
 
 def _flown_finding(requirements: RouteRequirements, aligned: AlignedTrack | None, i: int, apexes: Floats) -> Finding:
-    near, setup = reach(requirements, i), requirements.setup
-    offset, most = float(requirements.fly_by_offset[i]), near.radius + near.tolerance
-    away, reason = math.nan, "missed: nothing was flown"
+    condition, setup = reach(requirements, i), requirements.setup
+    offset, max_distance = float(requirements.fly_by_offset[i]), condition.radius + condition.tolerance
+    distance, reason = math.nan, "missed: nothing was flown"
     ok: bool | None = False
     facts: tuple[Fact, ...] = ()
     faults: list[Message] = []
     if aligned is not None:
-        away, off = _closest_approach(requirements, aligned, i, float(apexes[i, 2]))
-        facts = (Fact("height error", off, "m"),)
-        ok = away <= most
+        distance, height_error = _closest_approach(requirements, aligned, i, float(apexes[i, 2]))
+        facts = (Fact("height error", height_error, "m"),)
+        ok = distance <= max_distance
         crossing = math.inf if ok or setup.autopilot.follows_path else _crossing_offset(requirements, aligned, i)
         if crossing <= setup.corridor:
             ok = True
-        reason = f"passed at {away:.1f} m, {abs(off):.1f} m {'above' if off >= 0.0 else 'below'}"
+        reason = f"passed at {distance:.1f} m, {abs(height_error):.1f} m {'above' if height_error >= 0.0 else 'below'}"
         if offset >= 1.0:
             reason += f" (the fly-by path passes at {offset:.0f} m)"
         if math.isfinite(crossing):
             reason += f"; the line across the leg there crossed {crossing:.0f} m beside it"
         if i > 0 and not aligned.passed[i]:
-            ended = requirements.leg(aligned.leg_at(len(aligned.track) - 1))
-            text = f": the flight ended on {place_text_within(ended)} {math.hypot(away, off):.0f} m away"
+            last_leg = requirements.leg(aligned.leg_at(len(aligned.track) - 1))
+            text = (
+                f": the flight ended on {place_text_within(last_leg)} {math.hypot(distance, height_error):.0f} m away"
+            )
             faults = [message("not reached", text)]
             ok, reason = False, reason_of(faults)
             if not aligned.passed[i - 1]:
                 # The flight was not flying to this waypoint: its distance says nothing.
-                away, ok, facts = math.nan, None, ()
-                reason = f"not reached: the flight ended on {place_text(ended)}"
+                distance, ok, facts = math.nan, None, ()
+                reason = f"not reached: the flight ended on {place_text(last_leg)}"
         elif not ok:
-            reason = f"missed: {reason}; {_acceptance_text(near)}"
+            reason = f"missed: {reason}; {_acceptance_text(condition)}"
     return make_finding(
         "waypoint",
         requirements.waypoint(i),
@@ -109,12 +113,12 @@ def _flown_finding(requirements: RouteRequirements, aligned: AlignedTrack | None
         reason=reason,
         faults=faults,
         planned=offset,
-        flown=away,
-        limit=near.radius,
-        source=near.source,
-        tolerance=near.tolerance,
-        # A waypoint passed to the side is reached whatever its distance; one not reached has no margin.
-        margin=near.radius - away if ok is (away <= most) and not faults else None,
+        flown=distance,
+        limit=condition.radius,
+        source=condition.source,
+        tolerance=condition.tolerance,
+        # A waypoint reached by crossing its line has no margin, nor does one that was not reached.
+        margin=condition.radius - distance if ok is (distance <= max_distance) and not faults else None,
         unit="m",
         method="closest approach, horizontal",
         facts=facts,
@@ -127,15 +131,15 @@ def _crossing_offset(requirements: RouteRequirements, aligned: AlignedTrack, i: 
         return math.inf
     last = int(aligned.rows[i + 1]) if i + 1 < len(requirements.points) else len(aligned.track) - 1
     along, across = along_across(requirements, i - 1, aligned.track.position[int(aligned.rows[i - 1]) : last + 1])
-    past = np.flatnonzero(along >= requirements.runs[i - 1])
-    return abs(float(across[past[0]])) if past.size else math.inf
+    rows_past = np.flatnonzero(along >= requirements.runs[i - 1])
+    return abs(float(across[rows_past[0]])) if rows_past.size else math.inf
 
 
-def _acceptance_text(near: Reach) -> str:
+def _acceptance_text(condition: Reach) -> str:
     """Describe the acceptance distance and its source."""
-    owner = {"mission": "the mission's", "autopilot": "the autopilot's"}.get(near.source, "the path's")
-    error = f", and {near.tolerance:.1f} m for navigation and gusts," if near.tolerance else ""
-    return f"{near.radius:.0f} m{error} count as reached ({owner})"
+    owner = {"mission": "the mission's", "autopilot": "the autopilot's"}.get(condition.source, "the path's")
+    error_text = f", and {condition.tolerance:.1f} m for navigation and gusts," if condition.tolerance else ""
+    return f"{condition.radius:.0f} m{error_text} count as reached ({owner})"
 
 
 def _closest_approach(
@@ -147,8 +151,8 @@ def _closest_approach(
     position = aligned.track.position[first : max(last, first + 1) + 1]
     distance, fraction = approaches(position, requirements.points[i])
     if not distance.size:
-        off = aligned.track.position[-1] - requirements.points[i]
-        return math.hypot(off[0], off[1]), float(off[2])
+        offset = aligned.track.position[-1] - requirements.points[i]
+        return math.hypot(offset[0], offset[1]), float(offset[2])
     # Among equally close rows take the one nearest in altitude.
     near = np.flatnonzero(distance <= distance.min() + EQUAL_DISTANCE_TOLERANCE_M)
     up = position[near, 2] + fraction[near] * (position[near + 1, 2] - position[near, 2]) - level

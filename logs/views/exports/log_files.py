@@ -137,8 +137,8 @@ def px4_log_bytes(log: FlightLog) -> bytes:
     >>> px4_log_bytes(example_log())[:7]
     b'ULog\x01\x125'
     """
-    good = np.isfinite(log.track.position).all(axis=1) & np.isfinite(log.track.attitude).all(axis=1)
-    topics = [topic for topic in _topics(log, np.flatnonzero(good)) if len(topic.values["timestamp"])]
+    is_finite = np.isfinite(log.track.position).all(axis=1) & np.isfinite(log.track.attitude).all(axis=1)
+    topics = [topic for topic in _topics(log, np.flatnonzero(is_finite)) if len(topic.values["timestamp"])]
     head = bytearray(_MAGIC + struct.pack("<Q", 0) + _message(b"B", bytes(_FLAG_BITS_SIZE_BYTES)))
     for topic in topics:
         head += _message(b"F", f"{topic.name}:{_format(topic)}".encode())
@@ -182,17 +182,19 @@ def _records(number: int, topic: _Topic) -> tuple[list[int], list[bytes]]:
     stamps = topic.values["timestamp"]
     if topic.period:
         slots = np.floor(stamps * 1e-6 / topic.period + 1e-9)
-        kept = np.flatnonzero(np.diff(slots, prepend=-1.0) > 0.0)
+        recorded_rows = np.flatnonzero(np.diff(slots, prepend=-1.0) > 0.0)
     else:
-        kept = np.arange(len(stamps))
+        recorded_rows = np.arange(len(stamps))
     shapes = [(name, kind, *([(shape[0],)] if shape else [])) for name, kind, *shape in topic.fields]
     body = np.dtype([("timestamp", "<u8"), *shapes])
-    record = np.zeros(len(kept), np.dtype([("size", "<u2"), ("letter", "S1"), ("number", "<u2"), ("body", body)]))
+    record = np.zeros(
+        len(recorded_rows), np.dtype([("size", "<u2"), ("letter", "S1"), ("number", "<u2"), ("body", body)])
+    )
     record["size"], record["letter"], record["number"] = body.itemsize + 2, b"D", number
     for name in body.names or ():
-        record["body"][name] = topic.values[name][kept]
+        record["body"][name] = topic.values[name][recorded_rows]
     data, size = record.tobytes(), record.dtype.itemsize
-    return stamps[kept].tolist(), [data[at : at + size] for at in range(0, len(data), size)]
+    return stamps[recorded_rows].tolist(), [data[start : start + size] for start in range(0, len(data), size)]
 
 
 def _topics(log: FlightLog, rows: NDArray[np.int64]) -> list[_Topic]:
@@ -201,7 +203,7 @@ def _topics(log: FlightLog, rows: NDArray[np.int64]) -> list[_Topic]:
     east, north, up = track.position[rows].T
     lat, lon = (np.asarray(values) for values in to_geo(origin, east, north))
     v_east, v_north, v_up = track.velocity[rows].T
-    one, ground = np.ones(len(rows), dtype=bool), up[0] if len(rows) else 0.0
+    ones, ground = np.ones(len(rows), dtype=bool), up[0] if len(rows) else 0.0
     true, height = track.airspeed[rows].astype(np.float64), track.clearance[rows]
     calibrated = true * np.sqrt(np.maximum(1.0 - _DENSITY_LAPSE_PER_M * up, 0.0) ** _DENSITY_EXPONENT)
     wind, battery = track.wind[rows], _battery(log, rows)
@@ -209,7 +211,7 @@ def _topics(log: FlightLog, rows: NDArray[np.int64]) -> list[_Topic]:
     def topic(name: str, period: float, fields: list[tuple[Any, ...]], **values: Any) -> _Topic:
         return _Topic(name, period, fields, {"timestamp": stamp, **values})
 
-    found = [
+    topics = [
         topic("vehicle_attitude", _EVERY_ROW_S, [("q", "<f4", 4)], q=attitude_quaternion(track.attitude[rows])),
         topic("vehicle_angular_velocity", _EVERY_ROW_S, [("xyz", "<f4", 3)], xyz=track.rates[rows]),
         topic(
@@ -245,12 +247,12 @@ def _topics(log: FlightLog, rows: NDArray[np.int64]) -> list[_Topic]:
             ref_lat=np.full(len(rows), origin.lat_deg),
             ref_lon=np.full(len(rows), origin.lon_deg),
             ref_timestamp=np.zeros(len(rows)),
-            xy_valid=one,
-            z_valid=one,
-            v_xy_valid=one,
-            v_z_valid=one,
-            xy_global=one,
-            z_global=one,
+            xy_valid=ones,
+            z_valid=ones,
+            v_xy_valid=ones,
+            v_z_valid=ones,
+            xy_global=ones,
+            z_global=ones,
             dist_bottom_valid=np.isfinite(height),
         ),
         topic(
@@ -289,12 +291,12 @@ def _topics(log: FlightLog, rows: NDArray[np.int64]) -> list[_Topic]:
             "vehicle_status",
             _SECOND,
             [(name, "u1") for name in ("arming_state", "nav_state", "vehicle_type")],
-            arming_state=_ARMED * one,
-            nav_state=_MISSION * one,
-            vehicle_type=_FIXED_WING * one,
+            arming_state=_ARMED * ones,
+            nav_state=_MISSION * ones,
+            vehicle_type=_FIXED_WING * ones,
         ),
     ]
-    return [*found, _items(log, rows)]
+    return [*topics, _items(log, rows)]
 
 
 def _battery(log: FlightLog, rows: NDArray[np.int64]) -> dict[str, Columns]:
@@ -305,8 +307,8 @@ def _battery(log: FlightLog, rows: NDArray[np.int64]) -> dict[str, Columns]:
     time, current = log.track.time[rows], log.track.current[rows].astype(np.float64)
     energy = log.track.energy[rows].astype(np.float64)
     charge = np.concatenate([[0.0], np.cumsum(np.diff(time) * current[1:])])[: len(rows)]  # As
-    whole = float(charge[-1]) if len(rows) else 0.0
-    volts = float(energy[-1] - energy[0]) * 3600.0 / whole if whole > 0.0 else np.nan
+    total_charge = float(charge[-1]) if len(rows) else 0.0
+    volts = float(energy[-1] - energy[0]) * 3600.0 / total_charge if total_charge > 0.0 else np.nan
     return {
         "voltage_v": np.full(len(rows), volts),
         "current_a": current,

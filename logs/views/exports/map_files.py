@@ -76,11 +76,11 @@ def track_line(setup: FlightSetup, track: Track) -> MapLine:
     >>> line.name, line.amsl.size, float(line.amsl[0])
     ('example flown', 74, 200.0)
     """
-    good = np.flatnonzero(np.isfinite(track.position).all(axis=1) & np.isfinite(track.time))
-    slots = np.floor(track.time[good] / EVERY + 1e-9)
-    keep = np.concatenate([[True], np.diff(slots) > 0.0])[: good.size]
-    keep[-1:] = True
-    position = track.position[good[keep]]
+    finite_rows = np.flatnonzero(np.isfinite(track.position).all(axis=1) & np.isfinite(track.time))
+    slots = np.floor(track.time[finite_rows] / EVERY + 1e-9)
+    is_kept = np.concatenate([[True], np.diff(slots) > 0.0])[: finite_rows.size]
+    is_kept[-1:] = True
+    position = track.position[finite_rows[is_kept]]
     lat, lon = to_geo(setup.scenario.origin, position[:, 0], position[:, 1])
     return MapLine(f"{setup.scenario.name} flown", np.asarray(lat), np.asarray(lon), position[:, 2])
 
@@ -111,14 +111,14 @@ def map_zones(setup: FlightSetup) -> list[MapZone]:
     >>> map_zones(example_log().setup)
     []
     """
-    made = []
+    zones = []
     for zone in with_fence_zones(setup).scenario.zones:
         parts = tuple(tuple(_geographic(setup, ring) for ring in part) for part in zone_parts(zone))
         top = zone.ceiling
         name = f"{zone.name} ({'keep out' if zone.kind == 'exclusion' else 'stay in'})"
         height = None if top is None else top.height
-        made.append(MapZone(name, parts, height, top is not None and top.datum == "ground"))
-    return made
+        zones.append(MapZone(name, parts, height, top is not None and top.datum == "ground"))
+    return zones
 
 
 # Returns and glides, in colours.
@@ -127,16 +127,16 @@ def map_zones(setup: FlightSetup) -> list[MapZone]:
 def return_lines(setup: FlightSetup, drawn: DrawnReturns) -> list[MapLine]:
     """Return the path by outcome of returns, the worst returns, and the path by glide destination."""
     limit, lines = drawn.returns.limit, []
-    for kind, ones in drawn.by_kind:
-        name = f"{ones[0].time:.0f} to {ones[-1].time:.0f} s: {way_text(kind)}"
-        lines.append(_line(setup, name, [one.start for one in ones], "returns to launch", f"return-{kind}"))
+    for kind, segment in drawn.by_kind:
+        name = f"{segment[0].time:.0f} to {segment[-1].time:.0f} s: {way_text(kind)}"
+        lines.append(_line(setup, name, [ret.start for ret in segment], "returns to launch", f"return-{kind}"))
     for number, worst in enumerate(drawn.worst, 1):
-        one = worst.one
-        name = f"{number}: from {one.time:.0f} s to {one.target.name}: {outcome_text(one, limit)}"
+        ret = worst.flown
+        name = f"{number}: from {ret.time:.0f} s to {ret.target.name}: {outcome_text(ret, limit)}"
         lines.append(_line(setup, name, worst.way, "the worst returns", "return-way"))
     for reach, glides in drawn.by_reach:
         name = f"{glides[0].time:.0f} to {glides[-1].time:.0f} s: {reached_text(reach)}"
-        lines.append(_line(setup, name, [one.start for one in glides], "without its engine", f"reach-{reach}"))
+        lines.append(_line(setup, name, [ret.start for ret in glides], "without its engine", f"reach-{reach}"))
     return lines
 
 
@@ -156,13 +156,13 @@ def glide_shapes(setup: FlightSetup, drawn: DrawnReturns) -> list[MapZone]:
         placed = tuple(tuple(_geographic(setup, ring) for ring in part) for part in parts)
         return MapZone(name, placed, folder="the glide's footprint", role=role)
 
-    found = [
+    shapes = [
         shape(f"home or another chosen place in reach from {band.up_to:.0f} m above ground", role, band.parts)
         for band in footprint.bands()
         for role in [BAND_ROLES[band.up_to]]
     ]
     flat = footprint.landings()
-    return [*found, *([shape("flat ground by the elevation file", "landable", flat)] if flat else [])]
+    return [*shapes, *([shape("flat ground by the elevation file", "landable", flat)] if flat else [])]
 
 
 def _geographic(setup: FlightSetup, ring: Floats) -> Floats:

@@ -52,10 +52,10 @@ def telemetry_bytes(log: FlightLog) -> bytes:
     >>> struct.unpack(">Q", data[:8])[0] == EPOCH_NS // 1000, data[8] == 0xFD  # the first frame is of MAVLink 2
     (True, True)
     """
-    senders = {ends: mavlink.MAVLink(None, *ends) for ends in (_VEHICLE, _STATION)}
+    senders = {sender_ids: mavlink.MAVLink(None, *sender_ids) for sender_ids in (_VEHICLE, _STATION)}
     out = bytearray()
-    for time, ends, message in _frames(log):
-        sender = senders[ends]
+    for time, sender_ids, message in _frames(log):
+        sender = senders[sender_ids]
         out += _STAMP.pack(EPOCH_NS // 1000 + round(time * 1e6)) + message.pack(sender)
         sender.seq = (sender.seq + 1) % 256
     return bytes(out)
@@ -94,8 +94,8 @@ def _messages_of(log: FlightLog) -> Iterator[tuple[float, Any]]:
             event = events.pop(0)
             for piece in status_texts(event.text, _SEVERITY.get(event.level, INFO), texts):
                 yield time, piece
-        now = [name for name, at in due.items() if time >= at - 1e-6]
-        if not now and int(row.leg) == leg:
+        due_names = [name for name, due_time in due.items() if time >= due_time - 1e-6]
+        if not due_names and int(row.leg) == leg:
             continue
         snapshot = snapshots.snapshot(row)
         if not snapshot.finite:
@@ -109,7 +109,7 @@ def _messages_of(log: FlightLog) -> Iterator[tuple[float, Any]]:
             ahead = items[leg + 1 :]
             status.current = numbers[int(ahead[ahead >= 0][0])] if np.any(ahead >= 0) else status.current
             yield time, telemetry_message("MISSION_CURRENT", status)
-        for name in now:
+        for name in due_names:
             due[name] += max(PERIODS.get(name, _HEARTBEAT_INTERVAL_S), 1e-3)
             yield time, telemetry_message(name, status)
     end = float(track.time[-1]) if len(track) else 0.0

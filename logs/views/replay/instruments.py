@@ -1,6 +1,6 @@
 """Show the instruments of a recorded flight at one time, as lines of text for a terminal.
 
-A frame depends on log and time alone: the same log and time give the same lines, whatever the clock.
+A frame depends only on log and time: the same log and time give the same lines, whatever the clock.
 """
 
 import bisect
@@ -95,8 +95,8 @@ class Instruments:
                 across = (column - columns // 2) / 2.0  # a letter is twice as high as wide
                 up = _HORIZON_ROWS // 2 - row
                 # Height of this cell above the rolled horizon, rows.
-                over = up * math.cos(roll) + across * math.sin(-roll) + math.degrees(pitch) / _DEGREES_A_ROW
-                cells.append("-" if abs(over) <= 0.5 else " " if over > 0.0 else ":")
+                elevation = up * math.cos(roll) + across * math.sin(-roll) + math.degrees(pitch) / _DEGREES_A_ROW
+                cells.append("-" if abs(elevation) <= 0.5 else " " if elevation > 0.0 else ":")
             rows.append(cells)
         middle = rows[_HORIZON_ROWS // 2]
         for offset, mark in ((-5, "="), (-4, "="), (-3, "="), (0, "o"), (3, "="), (4, "="), (5, "=")):
@@ -112,12 +112,12 @@ class Instruments:
         above = amsl - float(self.ground[k])
         wind_east, wind_north, _ = (float(value) for value in track.wind[k])
         height = _metres(above) if math.isfinite(above) else "not known"
-        airspeed, wanted, load, used, current = (
+        airspeed, commanded, load, used, current = (
             float(column[k])
             for column in (track.airspeed, track.speed_command, track.load_factor, track.energy, track.current)
         )
         return [
-            f"airspeed     {_number(airspeed, 1)} m/s, wanted {_number(wanted, 1)}",
+            f"airspeed     {_number(airspeed, 1)} m/s, wanted {_number(commanded, 1)}",
             f"ground speed {_number(math.hypot(east, north), 1)} m/s, climb {_number(up, 1, '+')} m/s",
             f"height       {_metres(amsl)} AMSL, {height} above ground",
             f"course       {_course(math.degrees(math.atan2(east, north)))}, heading {_course(yaw)}",
@@ -133,28 +133,28 @@ class Instruments:
         """Draw one bar for each control, with its position (O) between its limits, and its command (|)."""
         lines = []
         controls, commands = self.log.track.controls[k].tolist(), self.log.track.commands[k].tolist()
-        for (name, limit), stands, asked in zip(self.limits, controls, commands, strict=True):
+        for (name, limit), stands, command in zip(self.limits, controls, commands, strict=True):
             throttle = name == "throttle"
             full = limit if math.isfinite(limit) else math.radians(30.0)
             cells = list("." * bar)
             if not throttle:
                 cells[bar // 2] = "+"
-            for value, mark in ((asked, "|"), (stands, "O")):
+            for value, mark in ((command, "|"), (stands, "O")):
                 if math.isfinite(value):
-                    share = value if throttle else 0.5 + 0.5 * value / full
-                    cells[round((bar - 1) * min(max(share, 0.0), 1.0))] = mark
+                    position = value if throttle else 0.5 + 0.5 * value / full
+                    cells[round((bar - 1) * min(max(position, 0.0), 1.0))] = mark
             state = f"{_number(100.0 * stands, 0)} %" if throttle else f"{_number(math.degrees(stands), 1, '+')}°"
-            held = "  AT ITS LIMIT" if (asked >= 1.0 if throttle else abs(asked) >= full) else ""
-            lines.append(f"{name:<9} [{''.join(cells)}] {state}{held}")
+            limit_text = "  AT ITS LIMIT" if (command >= 1.0 if throttle else abs(command) >= full) else ""
+            lines.append(f"{name:<9} [{''.join(cells)}] {state}{limit_text}")
         return lines
 
     def _threats(self, k: int) -> str:
         threats, position = self.log.setup.scenario.threats, self.log.track.position[k]
-        away = np.sqrt(((threats.position - position) ** 2).sum(axis=1))
+        distances = np.sqrt(((threats.position - position) ** 2).sum(axis=1))
         within = [
-            f"{unit} {threats.names[m]} at {_metres(float(away[m]))}"
+            f"{unit} {threats.names[m]} at {_metres(float(distances[m]))}"
             for unit, radii in (("MISSILE", threats.kill_radius), ("radar", threats.detection_radius))
-            for m in np.flatnonzero((radii > 0.0) & (away <= radii)).tolist()
+            for m in np.flatnonzero((radii > 0.0) & (distances <= radii)).tolist()
         ]
         return _printable("within reach of: " + "; ".join(within) if within else "within no unit's reach")
 

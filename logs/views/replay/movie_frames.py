@@ -125,8 +125,8 @@ class _MovingParts:
         trail = track.position[rows]
         self._trail.set_data(trail[:, 0], trail[:, 1])
         _, _, yaw = track.attitude[k].tolist()
-        turned = Affine2D().rotate(-yaw if math.isfinite(yaw) else 0.0)
-        self._aircraft.set_marker(MarkerStyle(_PLANE, transform=turned))
+        rotation = Affine2D().rotate(-yaw if math.isfinite(yaw) else 0.0)
+        self._aircraft.set_marker(MarkerStyle(_PLANE, transform=rotation))
         self._aircraft.set_data(track.position[k : k + 1, 0], track.position[k : k + 1, 1])
         self._text.set_text(self._line(k))
         for artist in (self._trail, self._aircraft):

@@ -192,23 +192,23 @@ def _clearances(log: FlightLog, parts: list[_LegRows]) -> list[TimelineEntry]:
     terrain, track = log.setup.scenario.terrain, log.track
     if terrain is None:
         return [TimelineEntry(float(track.time[0]), "ground", "no terrain in the log: clearance is not known")]
-    low, at = segment_clearances(terrain, track.position)
+    clearances, fractions = segment_clearances(terrain, track.position)
     required = log.setup.scenario.limits.min_clearance_m
     entries = []
     for group in _group_by_loiter(parts, log.setup.route):
         part = replace(group[0], last=group[-1].last)
         name = f"leg {log.setup.route.leg_numbers[part.leg]}" + (", around its circle" if len(group) > 1 else "")
         # Segment k leads from row k to row k + 1; the segment into the next leg belongs to this leg.
-        here = low[part.first : part.last + 1]
-        if not np.isfinite(here).any():
+        part_clearances = clearances[part.first : part.last + 1]
+        if not np.isfinite(part_clearances).any():
             time = float(track.time[part.first])
             entries.append(TimelineEntry(time, "ground", f"{name}: no terrain data under it"))
             continue
-        k = part.first + int(np.nanargmin(here))
-        time = float(track.time[k] + at[k] * (track.time[k + 1] - track.time[k]))
-        below = "" if low[k] >= required else f", under the required {required:.0f} m"
-        known = "" if np.isfinite(here).all() else ", where there is terrain data"
-        text = f"lowest of {name}: {low[k]:.1f} m above ground{below}{known}"
+        k = part.first + int(np.nanargmin(part_clearances))
+        time = float(track.time[k] + fractions[k] * (track.time[k + 1] - track.time[k]))
+        below_text = "" if clearances[k] >= required else f", under the required {required:.0f} m"
+        known_text = "" if np.isfinite(part_clearances).all() else ", where there is terrain data"
+        text = f"lowest of {name}: {clearances[k]:.1f} m above ground{below_text}{known_text}"
         entries.append(TimelineEntry(time, "ground", text))
     return entries
 
@@ -234,11 +234,11 @@ def _stay_entries(name: str, unit: str, radius: float, stay: Passage) -> list[Ti
 def _throttle(track: Track) -> list[TimelineEntry]:
     _, _, _, throttle = track.commands.T
     entries = []
-    for name, held in (
+    for name, is_held in (
         ("full", throttle >= 1.0 - _THROTTLE_LIMIT_TOLERANCE),
         ("closed", throttle <= _THROTTLE_LIMIT_TOLERANCE),
     ):
-        padded = np.concatenate([[False], held, [False]])
+        padded = np.concatenate([[False], is_held, [False]])
         edges = np.flatnonzero(padded[1:] != padded[:-1])
         for first, stop in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
             start = float(track.time[first])

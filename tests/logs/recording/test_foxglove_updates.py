@@ -16,7 +16,7 @@ from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track
 from logs import theme
 from logs.recording.foxglove_scene import body_rotation
-from logs.recording.foxglove_updates import EVERY, MAX_POINTS, THINNED, TrackSoFar, along, thinned
+from logs.recording.foxglove_updates import EVERY, MAX_POINTS, THINNED, TrackSoFar, along, thin_line
 from logs.recording.mcap_writer import SECOND_NS
 from logs.recording.reader import read_log
 from logs.recording.state_channel import EPOCH_NS
@@ -46,7 +46,7 @@ def test_a_long_winding_flight_keeps_its_shape() -> None:
 @pytest.mark.parametrize("wanted", [2, 5, 30])
 def test_thinning_keeps_ends_and_the_count(wanted: int) -> None:
     points = np.random.default_rng(wanted).normal(size=(60, 3))
-    left = thinned(points, wanted)
+    left = thin_line(points, wanted)
     assert len(left) == wanted
     assert (left[[0, -1]] == points[[0, -1]]).all()
 
@@ -55,7 +55,7 @@ def test_points_on_straight_ways_go_first() -> None:
     square = np.array([[0.0, 0.0], [9.0, 0.0], [9.0, 9.0], [0.0, 9.0]])
     way = np.concatenate([np.linspace(a, b, 10, endpoint=False) for a, b in itertools.pairwise(square)])
     points = np.column_stack([np.vstack([way, square[-1:]]), np.zeros(31)])
-    assert thinned(points, 4)[:, :2].tolist() == square.tolist()
+    assert thin_line(points, 4)[:, :2].tolist() == square.tolist()
 
 
 # ----------------------------------------------------------------------

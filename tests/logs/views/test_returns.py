@@ -68,7 +68,7 @@ def test_the_worst_are_numbered_where_they_go_wrong(shown: tuple[FlightSetup, Dr
     numbers = [(label.text, label.x, label.y) for label in panel.labels if label.rank == "number"]
     assert numbers == [(str(k), float(one.at[0]), float(one.at[1])) for k, one in enumerate(drawn.worst, 1)]
     (ring,) = [layer for layer in panel.layers if layer.kind == "rings"]
-    assert ring.x.tolist() == [one.at[0] for one in drawn.worst if not one.one.safe]
+    assert ring.x.tolist() == [one.at[0] for one in drawn.worst if not one.flown.safe]
     assert ("home", 0.0, 0.0) in [(label.text, round(label.x, 3), round(label.y, 3)) for label in panel.labels]
 
 
@@ -90,9 +90,9 @@ def test_the_worst_in_profile_stand_over_their_ground(shown: tuple[FlightSetup, 
         (ring,) = [layer for layer in panel.layers if layer.kind == "rings"]
         assert ring.y.tolist() == [worst.at[2]]
     # From the worst's begin to the hill's top.
-    hits = next(k for k, one in enumerate(drawn.worst) if one.one.kind == "ground")
+    hits = next(k for k, one in enumerate(drawn.worst) if one.flown.kind == "ground")
     ring = next(layer for layer in chart.panels[hits].layers if layer.kind == "rings")
-    assert ring.x[0] == pytest.approx((drawn.worst[hits].one.start[0] - 3000.0) / 1000.0, abs=0.7)
+    assert ring.x[0] == pytest.approx((drawn.worst[hits].flown.start[0] - 3000.0) / 1000.0, abs=0.7)
 
 
 def test_heights_and_what_is_left_over_stand_at_their_times(shown: tuple[FlightSetup, DrawnReturns]) -> None:

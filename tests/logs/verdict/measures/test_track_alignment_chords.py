@@ -34,7 +34,7 @@ def test_of_all_assignments_in_order_of_time_the_least_is_found(seed: int, step:
     every = combinations_with_replacement(range(len(ends) - 1), len(marks))
     least = min(sum(costs[i][j] for i, j in enumerate(chosen)) for chosen in every)
     all_rows = np.zeros(3, dtype=np.int64), np.full(3, 24)
-    chords, capped = track_alignment._align(position, marks, *all_rows, step, CAPTURE)
+    chords, capped = track_alignment._match_chords(position, marks, *all_rows, step, CAPTURE)
     assert (np.diff(chords) >= 0).all()
     assert sum(costs[i][j] for i, j in enumerate(chords)) == pytest.approx(least, rel=1e-9)
     for i, j in enumerate(chords):
@@ -45,13 +45,13 @@ def test_of_all_assignments_in_order_of_time_the_least_is_found(seed: int, step:
 @pytest.fixture
 def steps(monkeypatch: pytest.MonkeyPatch) -> list[int]:
     """How many rows a chord had, each time that rows were laid to waypoints."""
-    seen, align = [], track_alignment._align
+    seen, align = [], track_alignment._match_chords
 
     def watched(position: Any, marks: Any, first: Any, until: Any, step: int, capture: float) -> Any:
         seen.append(step)
         return align(position, marks, first, until, step, capture)
 
-    monkeypatch.setattr(track_alignment, "_align", watched)
+    monkeypatch.setattr(track_alignment, "_match_chords", watched)
     return seen
 
 

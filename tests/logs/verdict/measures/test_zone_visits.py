@@ -8,11 +8,11 @@ import pytest
 from logs.verdict.measures.path_moves import MOVE, move_point
 from logs.verdict.measures.zone_visits import (
     PART,
-    between_ends,
     beyond_limit,
-    copy_part,
+    copy_move_part,
+    depth_bounds,
+    distances_outside_zone,
     farthest_from_outline,
-    look_at_zone,
     path_zones,
 )
 from tests.soak import scaled
@@ -244,7 +244,7 @@ NO_GROUND = (np.full((2, 2), np.nan, np.float32), np.zeros(1, POLYMAP)[0])
 
 
 def looked(records: ZoneRecords, place: tuple[float, float, float]) -> tuple[float, float, int]:
-    return look_at_zone(records, 0, *NO_GROUND, *place)
+    return distances_outside_zone(records, 0, *NO_GROUND, *place)
 
 
 def whole(one: Record, records: ZoneRecords) -> Record:
@@ -280,7 +280,7 @@ def test_no_place_is_beyond_the_bounds(kind: str) -> None:
         one, part = moves[0], whole(moves[0], records)
         rise = max(abs(one.climb), abs(one.climb + 2.0 * one.bend))
         farthest = farthest_from_outline(records, 0, one, part, length)
-        low, high = between_ends(kind == "exclusion", part, length, rise, farthest)
+        low, high = depth_bounds(kind == "exclusion", part, length, rise, farthest)
         depths = []
         for share in np.linspace(0.0, 1.0, 101):
             away, off, _ = looked(records, move_point(one, share))
@@ -309,7 +309,7 @@ def test_a_copy_is_the_same() -> None:
     parts: Records = np.zeros(2, PART)
     for k, name in enumerate(parts.dtype.names or ()):
         parts[0][name] = k + 1
-    copy_part(parts[0], parts[1])
+    copy_move_part(parts[0], parts[1])
     assert parts[0].tolist() == parts[1].tolist()
 
 
@@ -324,20 +324,20 @@ def test_the_bounds_by_plain_sums() -> None:
     """A place between two ends is nearest to the limit where the ways from both meet."""
     part = ends(4.0, 2.0, -3.0, -5.0)
     # Outline: 2..8 m outside over 10 m of way; band: -9..1 m over 10 m of rise.
-    assert between_ends(False, part, 10.0, 10.0, math.inf) == (max(-2.0, -9.0), max(8.0, 1.0))
-    assert between_ends(True, part, 10.0, 10.0, math.inf) == (min(-8.0, -1.0), min(2.0, 9.0))
+    assert depth_bounds(False, part, 10.0, 10.0, math.inf) == (max(-2.0, -9.0), max(8.0, 1.0))
+    assert depth_bounds(True, part, 10.0, 10.0, math.inf) == (min(-8.0, -1.0), min(2.0, 9.0))
     # No place is further than the edges beside it say.
-    assert between_ends(False, part, 10.0, 10.0, 5.0) == (-2.0, 5.0)
-    assert between_ends(True, part, 10.0, 10.0, 1.5) == (-8.0, 1.5)
+    assert depth_bounds(False, part, 10.0, 10.0, 5.0) == (-2.0, 5.0)
+    assert depth_bounds(True, part, 10.0, 10.0, 1.5) == (-8.0, 1.5)
     # In the band's upper part the band decides.
     low = ends(-9.0, -9.0, -1.0, -1.0)
-    assert between_ends(False, low, 2.0, 4.0, math.inf) == (-3.0, 1.0)
+    assert depth_bounds(False, low, 2.0, 4.0, math.inf) == (-3.0, 1.0)
 
 
 def test_over_unknown_ground_the_outline_alone_bounds() -> None:
     part = ends(4.0, 2.0, math.nan, -5.0)
-    assert between_ends(True, part, 10.0, 10.0, math.inf) == (-math.inf, 2.0)
-    assert between_ends(False, part, 10.0, 10.0, math.inf) == (-2.0, math.inf)
+    assert depth_bounds(True, part, 10.0, 10.0, math.inf) == (-math.inf, 2.0)
+    assert depth_bounds(False, part, 10.0, 10.0, math.inf) == (-2.0, math.inf)
 
 
 @pytest.mark.parametrize(("length", "farthest"), [(2000.0, 250.0), (500.0, 300.0 - math.hypot(50.0, 500.0))])
@@ -369,5 +369,5 @@ def test_an_arc_is_bounded_by_its_bow_up_to_a_radian(turned: float, bounded: boo
 def test_levels_above_ground_count_from_it(floor: ZoneLevel | None, ceiling: ZoneLevel | None, off: float) -> None:
     ground = flat_terrain(np.array([[-900.0, 900.0], [-900.0, 900.0]]), 80.0, 100.0)
     records = zone_records([Zone("z", "exclusion", Cylinder(0.0, 0.0, 300.0), floor, ceiling)])
-    found = look_at_zone(records, 0, ground.heights, ground.to_pixel.record, 0.0, 0.0, 150.0)
+    found = distances_outside_zone(records, 0, ground.heights, ground.to_pixel.record, 0.0, 0.0, 150.0)
     assert found[1] == pytest.approx(off)

@@ -22,15 +22,15 @@ def test_stretches_hold_every_place_and_meet() -> None:
 def test_the_way_of_the_worst_begins_where_it_turns_back_and_ends_where_it_hits(tmp_path: Path) -> None:
     found = hill_drawn(hill_setup(tmp_path))
     first, *others = found.worst
-    assert first.one.kind == "ground"
-    assert math.dist(first.way[0], first.one.start) < 1.0
+    assert first.flown.kind == "ground"
+    assert math.dist(first.way[0], first.flown.start) < 1.0
     # 26 m/s and a second apart.
     steps = np.linalg.norm(np.diff(first.way, axis=0), axis=1)
     assert steps.max() < 40.0
     assert math.dist(first.at[:2], (3000.0, 0.0)) < 500.0
     assert np.linalg.norm(first.way - first.at, axis=1).min() < 40.0
     # Of each kind of trouble one before a second of any.
-    kinds = [one.one.kind for one in (first, *others)]
+    kinds = [one.flown.kind for one in (first, *others)]
     assert kinds[: len(set(kinds))] == list(dict.fromkeys(kinds))
     assert {kind for kind, _ in found.by_kind} >= {"safe", "ground"}
 
@@ -40,8 +40,8 @@ def test_where_all_are_safe_the_lowest_is_drawn(tmp_path: Path) -> None:
     world, starts = return_world(setup).with_parameters(RTL_ALTITUDE=600.0), planned_starts(setup, 20.0)
     returns = judge_returns(world, starts, 20.0)
     (only,) = draw_returns_without_glides(world, starts, returns).worst
-    assert only.one.safe
-    assert only.one.clearance == min(one.clearance for one in returns.each)
+    assert only.flown.safe
+    assert only.flown.clearance == min(one.clearance for one in returns.each)
 
 
 def test_the_least_height_is_that_of_the_straight_slope_over_the_hill(tmp_path: Path) -> None:

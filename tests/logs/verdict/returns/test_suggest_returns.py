@@ -134,8 +134,8 @@ def test_the_search_finds_as_few_points_as_all_sets_tried(tmp_path: Path, seed: 
     count = len(starts)
     needs = _Needs(np.zeros(count), np.zeros(count))
     search = _Search(world, starts, needs, places, rng.random(count) < 0.2)
-    search._good[:] = rng.random((count, 8)) < 0.6
-    search._known[:] = True
+    search._is_good[:] = rng.random((count, 8)) < 0.6
+    search._is_simulated[:] = True
     every = np.arange(count)
     chosen = search.find(every, [])
     sets = [list(one) for size in range(5) for one in itertools.combinations(range(8), size)]

@@ -49,7 +49,7 @@ def test_a_strip_that_the_error_leaves_nothing_of_is_left_open(
     assert approach is not None
     short = replace(approach, strip=replace(approach.strip, length=length))
     at = _Landing(0.0, 0.0, (0.0, 0.0), (stop, 0.0), 0.5 * length - stop, 1.0, 1.0, 10.0, 0.0)
-    assert (len(_detect_faults(short, at)), len(_undecided_messages(short, at, gusts=False))) == (faults, open_)
+    assert (len(_detect_faults(short, at)), len(_undecided_messages(short, at, has_gusts=False))) == (faults, open_)
 
 
 @pytest.mark.parametrize(
@@ -73,7 +73,7 @@ def test_in_turbulence_fifty_metres_of_the_strip_are_left(
     assert approach is not None
     strip = replace(approach, strip=replace(approach.strip, length=200.0))
     at = _Landing(0.0, 0.0, (touch, 0.0), (stop, 0.0), 100.0 - stop, 1.0, 1.0, 10.0, 0.0)
-    assert _finding(leg(0), strip, at, _detect_faults(strip, at), gusts=gusts).ok is ok
+    assert _finding(leg(0), strip, at, _detect_faults(strip, at), has_gusts=gusts).ok is ok
 
 
 @pytest.mark.parametrize(("turbulence", "ok"), [("none", True), ("light", None)])
