@@ -54,7 +54,7 @@ class WindsGoal:
 USUAL_WIND_FLIGHTS = 5000
 
 
-def asked_flights(asked: int | None, folder: Path, *, resume: bool) -> int:
+def flight_limit(asked: int | None, folder: Path, *, resume: bool) -> int:
     """Return the requested maximum number of flights; without a request, that of the folder's search, or the default.
 
     Raises StoreError for a file that planfly did not write, or that another process has locked.

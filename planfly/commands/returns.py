@@ -85,24 +85,24 @@ def returns(args: argparse.Namespace) -> int:
     print(f"returns   {coloured(found.headline, 'good' if found.safe else 'warning' if found.undecided else 'bad')}")
     for text in flown_lines(setup_conditions(found.setup)):
         print(f"  {text}")
-    for text in found.lines_of_causes:
+    for text in found.cause_lines:
         print(f"  {text}")
-    for text in found.lines_of_ranges[:_LISTED]:
+    for text in found.range_lines[:_LISTED]:
         print(f"  {text}")
-    if len(found.lines_of_ranges) > _LISTED:
-        print(f"  and {len(found.lines_of_ranges) - _LISTED} ranges more; --json FILE has them all")
-    for text in found.lines_of_program:
+    if len(found.range_lines) > _LISTED:
+        print(f"  and {len(found.range_lines) - _LISTED} ranges more; --json FILE has them all")
+    for text in found.program_lines:
         print(f"  {text}")
-    print(f"  {found.line_of_no_return}")
-    for text in found.lines_of_suggestions:
+    print(f"  {found.no_return_line}")
+    for text in found.suggestion_lines:
         print(coloured("  would help: ", "hint") + text)
     if args.suggest and not found.safe and not found.suggested:
         print("  no RTL_ALTITUDE, climb or rally points were found that would help")
-    print(f"engine out: {found.headline_of_glides}")
-    for text in found.lines_of_glides[:_LISTED]:
+    print(f"engine out: {found.glide_headline}")
+    for text in found.glide_lines[:_LISTED]:
         print(f"  {text}")
-    if len(found.lines_of_glides) > _LISTED:
-        print(f"  and {len(found.lines_of_glides) - _LISTED} ranges more; --json FILE has them all")
+    if len(found.glide_lines) > _LISTED:
+        print(f"  and {len(found.glide_lines) - _LISTED} ranges more; --json FILE has them all")
     for text in found.notes:
         print(f"  note    {text}")
     for path in found.files:

@@ -63,12 +63,12 @@ def survey(args: argparse.Namespace) -> int:
     print(f"flight    {found.verdict.headline}")
     for text in flown_lines(setup_conditions(found.setup)):
         print(f"  {text}")
-    for text in found.lines_of_lines:
+    for text in found.survey_lines:
         print(f"  {text}")
-    for text in found.lines_of_remedies:
+    for text in found.remedy_lines:
         print(coloured("  would help: ", "hint") + text)
     if args.suggest and not found.usable and not found.remedies:
-        for text in found.lines_without_remedy:
+        for text in found.no_remedy_lines:
             print(f"  {text}")
     for path in found.files:
         print(f"  written {path}")

@@ -134,13 +134,13 @@ class ProgramReturns:
             out.append(f"{begins}: simulated {law}; by the program {flown}: {agree}")
         return out
 
-    def put_right(self, returns: Returns) -> Returns:
+    def with_worse_results(self, returns: Returns) -> Returns:
         """Return the returns, with the program's result for each return for which it is worse."""
         worse = {id(one.law): one.flown for one in self.each if one.worse}
         return replace(returns, each=tuple(worse.get(id(one)) or one for one in returns.each))
 
 
-def refuse_program(program: Path) -> None:
+def check_is_arduplane(program: Path) -> None:
     """Raise ArgumentError for a program whose returns planfly does not simulate and so cannot compare."""
     kind = program_autopilot(program)
     if not issubclass(kind, ArduPlaneSitl):

@@ -22,8 +22,8 @@ from planfly.campaigns.find_winds import (
     WindsFound,
     WindsGoal,
     _Search,
-    asked_flights,
     find_winds,
+    flight_limit,
     open_winds_store,
 )
 from planfly.campaigns.flight_requests import FlyOne
@@ -192,11 +192,11 @@ def test_a_flight_that_did_not_go_on_to_its_end_states_no_margin(
 
 @pytest.mark.usefixtures("here")
 def test_a_search_that_is_gone_on_with_keeps_its_number_of_flights(wind_base: CampaignBase, tmp_path: Path) -> None:
-    assert asked_flights(None, tmp_path, resume=False) == asked_flights(None, tmp_path, resume=True) == 5000
+    assert flight_limit(None, tmp_path, resume=False) == flight_limit(None, tmp_path, resume=True) == 5000
     searched(wind_base, tmp_path, replace(GOAL, flights=31))
-    assert asked_flights(None, tmp_path, resume=True) == 31
-    assert asked_flights(48, tmp_path, resume=True) == 48
-    assert asked_flights(None, tmp_path, resume=False) == 5000
+    assert flight_limit(None, tmp_path, resume=True) == 31
+    assert flight_limit(48, tmp_path, resume=True) == 48
+    assert flight_limit(None, tmp_path, resume=False) == 5000
 
 
 @pytest.mark.usefixtures("here")

@@ -113,7 +113,7 @@ def test_the_worst_are_far_apart_and_what_is_worse_counts(tmp_path: Path) -> Non
     safe, ground = (next(one for one in returns.each if one.kind == kind) for kind in ("safe", "ground"))
     hit = replace(safe, kind="ground", clearance=-3.0)
     both = ProgramReturns("it", (ProgramReturn(safe, hit), ProgramReturn(ground, replace(ground, kind="safe"))))
-    right = both.put_right(returns)
+    right = both.with_worse_results(returns)
     assert right.count("ground") == returns.count("ground") + 1
     assert right.count("safe") == returns.count("safe") - 1
     assert [one.worse for one in both.each] == [True, False]
@@ -129,4 +129,4 @@ def test_arduplane_returns_as_its_law_does(tmp_path: Path, monkeypatch: pytest.M
     found = planfly.returns("hill.waypoints", scenario="hill.toml", every=10, sitl=need_arduplane(), points=2)
     assert found.by_program is not None
     assert found.by_program.each[0].law.kind == "ground"
-    assert all(one.agrees for one in found.by_program.each), found.lines_of_program
+    assert all(one.agrees for one in found.by_program.each), found.program_lines
