@@ -17,7 +17,7 @@ from planfly.flight_options import takes_options
 from planfly.runtime.first_start import with_warm_up
 from planfly.runtime.stages import stage
 from planfly.workflow.airframe import check_level_flight
-from planfly.workflow.output_paths import expand_path_pattern, prepare_folder, refuse_folder
+from planfly.workflow.output_paths import check_output_folder, expand_path_pattern, prepare_folder
 from world.errors import PlanflyError
 from world.files import whole_path, write_whole
 from world.scenario_tables import names_folder
@@ -172,7 +172,7 @@ def describe_aircraft(
     lacking = tuple(missing for kind in AUTOPILOTS for missing in kind.missing_files(described))
     folder = None if out is None else expand_path_pattern(out, described.name, 0)
     if folder is not None:
-        refuse_folder(folder, overwrite)
+        check_output_folder(folder, overwrite)
     # Compute all results before writing any file.
     with stage(f"trimming {described.name}", "trimming"):
         envelope = load_envelope(described, motor_braking=motor_braking)

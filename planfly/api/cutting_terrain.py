@@ -10,7 +10,7 @@ from platformdirs import user_cache_dir
 from flight.mission_files.formats import read_mission
 from planfly.arguments import check_arguments
 from planfly.runtime.stages import stage
-from planfly.workflow.output_paths import refuse_existing
+from planfly.workflow.output_paths import check_output_file
 from world.errors import ArgumentError, PlanflyError
 from world.remote_files import is_address
 from world.terrain_cut import COPERNICUS, Box, CutTerrain, cut_from_files, cut_from_server
@@ -56,12 +56,12 @@ def terrain(
     target = Path(out)
     if target.suffix.lower() not in (".tif", ".tiff"):
         raise PlanflyError(f"{target}: a name that ends with .tif is expected", file=target)
-    refuse_existing(target, overwrite, Path(around) if around is not None else None)
+    check_output_file(target, overwrite, Path(around) if around is not None else None)
     area = _widen(_parse_box(box) if box is not None else _mission_box(Path(str(around))), margin)
     source_name = str(source)
     with stage("fetching terrain" if "://" in source_name else "cutting terrain") as advance:
         if "://" not in source_name:
-            refuse_existing(target, True, Path(source_name))
+            check_output_file(target, True, Path(source_name))
             return cut_from_files(Path(source_name), area, target)
         if not is_address(source_name):
             allowed = "a folder, or the address of one by http or https, is expected"

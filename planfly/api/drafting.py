@@ -9,7 +9,7 @@ from pathlib import Path
 from aircraft.catalog import find_aircraft
 from planfly.arguments import check_arguments, is_place
 from planfly.runtime.stages import stage
-from planfly.workflow.output_paths import refuse_existing
+from planfly.workflow.output_paths import check_output_file
 from world.elevation_formats import EMBEDDED
 from world.errors import ArgumentError, PlanflyError
 from world.files import whole_path, write_whole
@@ -92,7 +92,7 @@ def _scenario_file(folder: Path, name: str, *, overwrite: bool) -> Path:
         raise PlanflyError(f"{folder}: a folder is expected; the scenario is written into it", file=folder)
     file = folder / f"{name}.toml"
     if folder.is_dir():
-        refuse_existing(file, overwrite)
+        check_output_file(file, overwrite)
     elif not folder.absolute().parent.is_dir():
         raise PlanflyError(f"{folder}: its folder {folder.parent} does not exist", file=folder)
     return file

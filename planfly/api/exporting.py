@@ -33,7 +33,7 @@ from planfly.rtl.return_summary import return_summary
 from planfly.runtime.first_start import with_warm_up
 from planfly.runtime.stages import stage
 from planfly.workflow.open_flight import open_flight
-from planfly.workflow.output_paths import refuse_existing
+from planfly.workflow.output_paths import check_output_file
 from planner.plan import Plan, plan_json
 from world.errors import MissionError, PlanflyError
 from world.extras import need_extra
@@ -127,7 +127,7 @@ def export(
         for target in targets:
             if target.suffix.lower() not in (*MAPS, *PARAMETERS, *LOGS):
                 _check_suffix(target)
-            refuse_existing(target, overwrite, path)
+            check_output_file(target, overwrite, path)
         parts = _read_source(path, targets, {"fence": fence, "at": at})
         contents = [_target_content(parts, target) for target in targets]
     for target, (data, _) in zip(targets, contents, strict=True):

@@ -36,7 +36,7 @@ from planfly.workflow import pipeline
 from planfly.workflow.airframe import airframe_of
 from planfly.workflow.crash_safe_log import FlightLimits, flight_kind, flight_text
 from planfly.workflow.open_flight import open_flight
-from planfly.workflow.output_paths import FLY_LOG, LOG_FIGURES, file_target, prepare_folder, refuse_existing
+from planfly.workflow.output_paths import FLY_LOG, LOG_FIGURES, check_output_file, file_target, prepare_folder
 from planfly.workflow.pipeline import PlanThenFly, autopilot_log, fly_and_judge
 from planfly.workflow.suggestion_trials import judge_mission
 from planner.plan import Plan
@@ -152,7 +152,7 @@ def plan_then_fly(
     """
     check_arguments(seed=seed)
     if log is not None:
-        refuse_existing(Path(log), overwrite=True)
+        check_output_file(Path(log), overwrite=True)
     world = named_scenario(scenario, options)
     return pipeline.plan_then_fly(world, seed=seed, log=None if log is None else Path(log))
 
@@ -246,7 +246,7 @@ def fly_by_each(
     per_autopilot_options = {
         name: value for name, value in options.items() if name in ("params", "guidance", "autopilot")
     }
-    refuse(_source_name(mission), per_autopilot_options, "belongs to one autopilot, and several are named")
+    refuse_keywords(_source_name(mission), per_autopilot_options, "belongs to one autopilot, and several are named")
     flown = {}
     for name in names:
         options["autopilot"] = name
@@ -264,7 +264,7 @@ def _prepare_log_file(
     source = None if isinstance(mission, Plan) else Path(mission)
     target = file_target(log, setup.name, setup.seed, overwrite=overwrite, source=source)
     if program is not None:
-        refuse_existing(autopilot_log(target, program), overwrite, source)
+        check_output_file(autopilot_log(target, program), overwrite, source)
     target.parent.mkdir(parents=True, exist_ok=True)
     if log == FLY_LOG:
         # Remove the report and the pictures of the previous flight.
@@ -303,10 +303,10 @@ def judge(
         imported = read_imported(what, **options)
         return Judged(imported.setup, imported.verdict, lossy=imported.lossy, track=imported.track, is_log=True)
     source = _source_name(what)
-    refuse(source, options_of_log(options), "goes with an imported log, not with this file")
+    refuse_keywords(source, options_of_log(options), "goes with an imported log, not with this file")
     if isinstance(what, FlightLog | FlownMission) or (isinstance(what, str | Path) and is_log(Path(what))):
         check_judging_options(source, options)
-        refuse(source, {"geometry": geometry or None}, "a flight is judged as it was flown")
+        refuse_keywords(source, {"geometry": geometry or None}, "a flight is judged as it was flown")
         what = read_log(Path(what)) if isinstance(what, str | Path) else what
         return _judge_flight(what, options["terrain"], read_named_fences(options["fence"]))
     flight_options = mission_options(options)
@@ -344,7 +344,7 @@ def _source_name(what: FlightLog | FlownMission | Plan | str | Path) -> str:
     return what.scenario.name if isinstance(what, Plan) else str(what)
 
 
-def refuse(source: str, keywords: Mapping[str, Any], reason: str) -> None:
+def refuse_keywords(source: str, keywords: Mapping[str, Any], reason: str) -> None:
     """Raise ScenarioError for the first keyword with a value, because none applies to the judged source.
 
     keywords: keywords and their values; None is a keyword that was not given.
@@ -364,10 +364,10 @@ _JUDGED_IN_SCENARIO_TEXT = "a log is judged in the scenario it carries; only `te
 def check_judging_options(source: str, options: MissionOptions) -> None:
     """Raise ScenarioError for an option that would change the flight recorded in a log."""
     allowed_options = (*LOG_OPTIONS, "terrain", "fence", "scenario")
-    refuse(
+    refuse_keywords(
         source, {name: value for name, value in options.items() if name not in allowed_options}, _JUDGED_AS_FLOWN_TEXT
     )
-    refuse(source, {"scenario": options["scenario"]}, _JUDGED_IN_SCENARIO_TEXT)
+    refuse_keywords(source, {"scenario": options["scenario"]}, _JUDGED_IN_SCENARIO_TEXT)
 
 
 def _judge_flight(flight: FlightLog | FlownMission, terrain: str | Path | None, fences: NamedFences) -> Judged:

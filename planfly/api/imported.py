@@ -17,7 +17,13 @@ from planfly.kernel_units.unit_kernels import FLYING
 from planfly.runtime.first_start import with_warm_up
 from planfly.runtime.stages import stage
 from planfly.workflow.imported_flights import ImportedFlight, fly_again, import_flight
-from planfly.workflow.output_paths import REFLOWN, REFLY_FILES, clean_folder, refuse_existing, refuse_folder
+from planfly.workflow.output_paths import (
+    MAX_REFLOWN_PARTS,
+    REFLY_FILES,
+    check_output_file,
+    check_output_folder,
+    clean_folder,
+)
 from world.errors import LogError, ScenarioError
 from world.files import write_whole
 
@@ -70,7 +76,7 @@ def import_log(
     Raises a `planfly.PlanflyError` for bad input; then nothing is written.
     """
     if target is not None:
-        refuse_existing(Path(target), overwrite, Path(log))
+        check_output_file(Path(target), overwrite, Path(log))
     flight = read_imported(log, **options)
     if target is not None:
         _write_log(Path(target), flight)
@@ -119,14 +125,14 @@ def refly(
         message = f"{flight_log.source}: flown by planfly itself: refly takes a log that `planfly import` wrote"
         raise LogError(message, file=flight_log.source)
     if out is not None:
-        refuse_folder(Path(out), overwrite)
+        check_output_folder(Path(out), overwrite)
     with stage("flying again") as advance:
         model = str(aircraft.resolve()) if isinstance(aircraft, Path) else aircraft
-        reflights = fly_again(flight_log.setup, flight_log.track, model, turbulence, advance, REFLOWN)
+        reflights = fly_again(flight_log.setup, flight_log.track, model, turbulence, advance, MAX_REFLOWN_PARTS)
     lines: list[str] = []
     for number, reflight in enumerate(reflights, 1):
         lines += [*([] if number == 1 else [""]), *refly_lines(reflight)]
-    lines += left_lines(reflights, flight_log.setup.source.stretches, REFLOWN)
+    lines += left_lines(reflights, flight_log.setup.source.stretches, MAX_REFLOWN_PARTS)
     files: list[Path] = []
     if out is not None:
         folder = clean_folder(out, REFLY_FILES, overwrite=True)
@@ -182,7 +188,7 @@ def recover(log: str | Path, out: str | Path | None = None, *, overwrite: bool =
     True
     """
     target = recovered_path(log) if out is None else Path(out)
-    refuse_existing(target, overwrite)
+    check_output_file(target, overwrite)
     recovered = recover_log(Path(log))
     if recovered is None:
         return None

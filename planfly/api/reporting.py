@@ -16,7 +16,7 @@ from planfly.rtl.return_summary import return_summary
 from planfly.runtime.first_start import with_warm_up
 from planfly.runtime.stages import stage
 from planfly.workflow.open_flight import open_flight
-from planfly.workflow.output_paths import COMPARE_FILES, LOG_FIGURES, clean_folder, refuse_existing
+from planfly.workflow.output_paths import COMPARE_FILES, LOG_FIGURES, check_output_file, clean_folder
 from planfly.workflow.suggestion_trials import judge_mission
 from planner.plan import Plan
 from world.files import write_whole
@@ -135,7 +135,7 @@ def foxglove_layout(file: str | Path, *, overwrite: bool = False) -> Path:
     ...     planfly.foxglove_layout(Path(folder) / "layout.json").name
     'layout.json'
     """
-    refuse_existing(Path(file), overwrite)
+    check_output_file(Path(file), overwrite)
     write_whole(Path(file), layout_text())
     return Path(file)
 

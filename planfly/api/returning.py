@@ -28,7 +28,7 @@ from logs.verdict.returns.returns_text import (
 )
 from logs.verdict.returns.suggest_returns import Remedy, helps, suggest_parameters, suggest_rally
 from logs.views.exports.map_files import glide_shapes, kml_text, map_zones, plan_line, return_lines, track_line
-from planfly.api.flying import FlownMission, named_program, refuse
+from planfly.api.flying import FlownMission, named_program, refuse_keywords
 from planfly.arguments import check_arguments
 from planfly.flight_logs import is_log
 from planfly.flight_options import LogOptions, mission_options, options_of_log, takes_options
@@ -41,7 +41,7 @@ from planfly.runtime.stages import stage
 from planfly.workflow.airframe import airframe_of
 from planfly.workflow.crash_safe_log import INTERRUPTED
 from planfly.workflow.open_flight import open_flight
-from planfly.workflow.output_paths import RETURN_FILES, clean_folder, refuse_folder
+from planfly.workflow.output_paths import RETURN_FILES, check_output_folder, clean_folder
 from planfly.workflow.pipeline import fly_and_judge
 from planner.plan import Plan
 from world.files import write_whole
@@ -204,14 +204,14 @@ def returns(
     path = Path(what) if isinstance(what, str | Path) else None
     request = _check_request(every, suggest, out, sitl, points, overwrite=overwrite)
     if path is not None and is_imported_log(path):
-        refuse(str(path), {"seed": options["seed"], "nav": options["nav"]}, _RETURNS_AS_FLOWN_TEXT)
+        refuse_keywords(str(path), {"seed": options["seed"], "nav": options["nav"]}, _RETURNS_AS_FLOWN_TEXT)
         return _judge_imported_flight(_read_imported_flight(path, options), request)
-    refuse(str(path or "mission"), options_of_log(options), "goes with an imported log")
+    refuse_keywords(str(path or "mission"), options_of_log(options), "goes with an imported log")
     what = read_log(path) if path is not None and is_log(path) else what
     flight_options = mission_options(options)
     if isinstance(what, FlightLog | FlownMission):
         fixed_options: dict[str, Any] = {**flight_options, "terrain": None, "fence": options["fence"] or None}
-        refuse(str(path or "flight"), fixed_options, _RETURNS_AS_FLOWN_TEXT)
+        refuse_keywords(str(path or "flight"), fixed_options, _RETURNS_AS_FLOWN_TEXT)
         return _judge_flight(
             _with_terrain(what.setup, options["terrain"]), what.track, request, what.ended or INTERRUPTED
         )
@@ -252,7 +252,7 @@ def _check_request(
     if program is not None:
         check_is_arduplane(program)
     if out is not None:
-        refuse_folder(Path(out), overwrite)
+        check_output_folder(Path(out), overwrite)
     return _ReturnsRequest(every, suggest, None if out is None else Path(out), overwrite, program, points)
 
 

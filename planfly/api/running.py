@@ -24,7 +24,13 @@ from planfly.workflow.airframe import Airframe, choose_seed, load_airframe, tigh
 from planfly.workflow.crash_safe_log import FlightLimits, flight_kind, flight_text
 from planfly.workflow.make_plan import make_plan, planned_for
 from planfly.workflow.open_flight import make_setup, mission_of_plan
-from planfly.workflow.output_paths import RUN_FILES, RUN_FOLDER, expand_path_pattern, prepare_folder, refuse_folder
+from planfly.workflow.output_paths import (
+    RUN_FILES,
+    RUN_FOLDER,
+    check_output_folder,
+    expand_path_pattern,
+    prepare_folder,
+)
 from planfly.workflow.pipeline import autopilot_log, fly_and_judge
 from planfly.workflow.reference_flights import FlyReference
 from planfly.workflow.tighten_plan import refine as refine_rounds
@@ -149,7 +155,7 @@ def run(
     world = named_scenario(scenario, options, program)
     chosen_seed, airframe = choose_seed(world, seed), load_airframe(world)
     folder = expand_path_pattern(out, world.name, chosen_seed)
-    refuse_folder(folder, overwrite or out == RUN_FOLDER)
+    check_output_folder(folder, overwrite or out == RUN_FOLDER)
     scenario_name = world.name if isinstance(scenario, Scenario) else str(scenario)
     defaults = {"refine": 0, **option_defaults(RunOptions)}
     changed_options = {name: value for name, value in {"refine": refine, **options}.items() if value != defaults[name]}
@@ -188,10 +194,12 @@ def _fly_rounds(
     scenario, airframe, folder = task.scenario, task.airframe, task.folder
     rounds_flown: list[Round] = []
 
-    def one_round(planned_in: Scenario) -> tuple[Verdict, bool]:
-        planned_with = airframe if planned_in is scenario else tightened_airframe(airframe, planned_in)
+    def fly_round(planning_scenario: Scenario) -> tuple[Verdict, bool]:
+        planning_airframe = (
+            airframe if planning_scenario is scenario else tightened_airframe(airframe, planning_scenario)
+        )
         with stage(f"planning {scenario.name}", "planning") as advance:
-            plan = make_plan(planned_in, planned_with, task.seed, advance=advance)
+            plan = make_plan(planning_scenario, planning_airframe, task.seed, advance=advance)
         if not rounds_flown:
             folder.mkdir(parents=True, exist_ok=True)
             locks.enter_context(hold(folder))
@@ -203,7 +211,7 @@ def _fly_rounds(
             on_round(rounds_flown[-1])
         return rounds_flown[-1].verdict, rounds_flown[-1].flown
 
-    _, entries = refine_rounds(scenario, refine, one_round, lambda number: _keep_round(folder, number))
+    _, entries = refine_rounds(scenario, refine, fly_round, lambda number: _keep_round(folder, number))
     if refine:
         write_whole(folder / "rounds.json", json.dumps(entries, indent=1) + "\n")
     *earlier, last = (

@@ -17,7 +17,7 @@ from logs.verdict.measures.route_requirements import RouteRequirements, route_re
 from logs.verdict.measures.track_alignment import align_track
 from logs.verdict.verdict import Verdict
 from logs.views.surveys import survey_chart
-from planfly.api.flying import FlownMission, refuse
+from planfly.api.flying import FlownMission, refuse_keywords
 from planfly.arguments import CAMERA, check_arguments, is_camera
 from planfly.flight_logs import is_log
 from planfly.flight_options import MissionOptions, takes_options
@@ -39,7 +39,7 @@ from planfly.surveys.survey_text import (
 from planfly.workflow.airframe import airframe_of
 from planfly.workflow.crash_safe_log import flight_text
 from planfly.workflow.open_flight import open_flight
-from planfly.workflow.output_paths import SURVEY_FILES, clean_folder, refuse_folder
+from planfly.workflow.output_paths import SURVEY_FILES, check_output_folder, clean_folder
 from planfly.workflow.pipeline import fly_and_judge
 from world.errors import ArgumentError, LogError, MissionError
 from world.files import write_whole
@@ -145,12 +145,12 @@ def survey(
     own_camera = _parse_camera(camera)
     fixed_options: dict[str, Any] = {**options, "fence": options["fence"] or None, "suggest": suggest or None}
     if out is not None:
-        refuse_folder(Path(out), overwrite)
+        check_output_folder(Path(out), overwrite)
     if isinstance(what, str | Path) and is_log(Path(what)):
-        refuse(str(what), fixed_options, _LINES_AS_FLOWN_TEXT)
+        refuse_keywords(str(what), fixed_options, _LINES_AS_FLOWN_TEXT)
         what = read_log(Path(what))
     if isinstance(what, FlightLog | FlownMission):
-        refuse("flight", fixed_options, _LINES_AS_FLOWN_TEXT)
+        refuse_keywords("flight", fixed_options, _LINES_AS_FLOWN_TEXT)
         source = what.setup.source
         if source is not None and "attitude" not in source.holds:
             raise LogError(f"{source.file}: no attitude: how far photos are banked is not known", file=source.file)

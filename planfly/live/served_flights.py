@@ -249,12 +249,12 @@ class ServedLog:
         self._recorder.write(block)
         self._recorder.flush()
 
-    def finish(self, ended: str, hurry: Callable[[], bool]) -> FlightJudged:
+    def finish(self, ended: str, should_abort: Callable[[], bool]) -> FlightJudged:
         """Judge the flight and close the log.
 
-        A path that was abandoned within a second leaves no log.  In a hurry, an abandoned path is not judged;
-        `planfly check` can judge it.
-        hurry: see `planfly.workflow.reference_flights.judge_with_reference_flights`.
+        A path that was abandoned within a second leaves no log.  If the process is to end, an abandoned path is not
+        judged; `planfly check` can judge it.
+        should_abort: see `planfly.workflow.reference_flights.judge_with_reference_flights`.
         """
         track = join_tracks(self._blocks)
         left = ended.startswith((DIVERTED_TEXT, STILL_LOITERING_TEXT))
@@ -264,12 +264,14 @@ class ServedLog:
             self._path.unlink()
             return FlightJudged(False, ())
         self._recorder.event(end, f"flight ended: {ended}", "info" if left or ended == "completed" else "error")
-        if left and hurry():
+        if left and should_abort():
             self._recorder.finish(ended)
             return FlightJudged(False, (StatusText(f"log {self._path}, not judged yet", INFO),))
         if ended == "completed":
             requirements = route_requirements(self._setup)
-            verdict, reference = judge_with_reference_flights(requirements, self._aircraft, track, ended, hurry=hurry)
+            verdict, reference = judge_with_reference_flights(
+                requirements, self._aircraft, track, ended, should_abort=should_abort
+            )
         else:
             verdict, reference = judge_flight(self._setup, track, ended), None
         self._recorder.finish(ended, verdict, reference)

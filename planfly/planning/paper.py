@@ -19,7 +19,7 @@ from planfly.arguments import check_arguments
 from planfly.runtime.stages import stage
 from planfly.workflow.airframe import load_airframe
 from planfly.workflow.make_plan import Advance, make_plan
-from planfly.workflow.output_paths import prepare_folder, refuse_folder
+from planfly.workflow.output_paths import check_output_folder, prepare_folder
 from planner.plan import Objective, Violation
 from planner.search.algorithms import find_algorithm
 from world.arrays import Floats
@@ -407,7 +407,7 @@ def paper_tables(
     check_arguments(problems=tuple(problems), runs=runs, jobs=jobs)
     folder = None if out is None else Path(out)
     if folder is not None:
-        refuse_folder(folder, overwrite)
+        check_output_folder(folder, overwrite)
     with stage("planning", "planning the paper's problems") as advance:
         plans = plan_section(problems, runs, algorithm, jobs, advance)
     rows = table(plans)

@@ -17,7 +17,7 @@ from logs.recording.reader import FlightLog
 from logs.theme import drawn_colours
 from logs.views.replay.movie_frames import RATE, MovieFrames
 from planfly.runtime.stages import stage
-from planfly.workflow.output_paths import refuse_existing, refuse_folder
+from planfly.workflow.output_paths import check_output_file, check_output_folder
 from world.errors import PlanflyError
 from world.extras import need_extra
 from world.files import temporary_folder, write_whole
@@ -43,12 +43,12 @@ def write_movie(
     """
     kind = target.suffix.lower()
     if kind in SUFFIXES:
-        refuse_existing(target, overwrite)
+        check_output_file(target, overwrite)
     elif kind:
         allowed = f"{', '.join(SUFFIXES)} or a folder is expected"
         raise PlanflyError.of_argument("movie", kind, allowed, shown="", file=target)
     else:
-        refuse_folder(target, overwrite)
+        check_output_folder(target, overwrite)
     program = _ffmpeg(target) if kind == ".mp4" else ""
     film = MovieFrames(log.setup, log.track, start, end, speed or max(1.0, (end - start) / _DEFAULT_DURATION_S))
     if len(film) > _MAX_FRAMES:

@@ -182,12 +182,12 @@ class _Trials:
             trial = Trial(self._changed_setup(mission, airframe), airframe.aircraft)
         except PlanflyError:
             return None
-        usable, lines = _count_usable(trial.flown)
-        best, failed = self.nearest, len(trial.flown.failed)
+        usable, lines = _count_usable(trial.flight_verdict)
+        best, failed = self.nearest, len(trial.flight_verdict.failed)
         before = _count_usable(self._verdict)[0] if best is None else best.usable
         if usable > before or (best is not None and usable == before and failed < len(best.verdict.failed)):
-            self.nearest = NearMiss(what, usable, lines, trial.flown)
-        return trial.flown, mission, trial.setup.path.length
+            self.nearest = NearMiss(what, usable, lines, trial.flight_verdict)
+        return trial.flight_verdict, mission, trial.setup.path.length
 
     def _fly_layout(self, layout: SurveyLayout, what: str) -> _FlownMission | None:
         """Fly the surveys in another layout; return None if that layout cannot be made."""

@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, NamedTuple, TextIO
 from planfly.runtime.stages import Advance, Receiver, received_by
 from planfly.terminal.command_parser import wants_colour
 from planfly.terminal.control_characters import escaped_json, without_controls
-from planfly.workflow.output_paths import refuse_existing
+from planfly.workflow.output_paths import check_output_file
 from world.errors import PlanflyError
 from world.files import read_at_most, write_whole
 
@@ -467,7 +467,7 @@ def asked_output(args: argparse.Namespace) -> Iterator[None]:
     for target in (answer, getattr(args, "junit", None)):
         if target not in (None, STANDARD_OUTPUT):
             _refuse_inputs(Path(target), args)
-            refuse_existing(Path(target), getattr(args, "overwrite", False))
+            check_output_file(Path(target), getattr(args, "overwrite", False))
     token = _output.set(sys.stdout)
     try:
         with contextlib.ExitStack() as opened:
