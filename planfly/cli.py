@@ -10,11 +10,11 @@ from collections.abc import Sequence
 
 from planfly.commands.registry import build_parser, find_command
 from planfly.runtime.process_setup import prepare_process, with_large_stack
-from planfly.terminal.arguments import ASKS_COMPLETION, answer_shell
+from planfly.terminal.arguments import COMPLETION_VARIABLE, complete_for_shell
 from planfly.terminal.command_parser import coloured, error_text
 from planfly.terminal.exit_codes import BAD_INPUT, FAULT, INTERRUPTED
-from planfly.terminal.output import asked_output, give_junit_error, open_standard_streams, printable, safe_streams
-from planfly.terminal.signal_watch import end_process, ended_by_signals
+from planfly.terminal.output import give_junit_error, open_standard_streams, printable, redirected_output, safe_streams
+from planfly.terminal.signal_watch import end_on_signals, end_process
 from world.errors import CrashError, PlanflyError
 from world.interruption import Interrupted
 
@@ -31,9 +31,9 @@ def main(argv: Sequence[str] | None = None) -> int:
         return _run_and_report(argv)
     prepare_process()
     open_standard_streams()
-    if ASKS_COMPLETION in os.environ:
-        answer_shell(build_parser())
-    with ended_by_signals() as received_signals:
+    if COMPLETION_VARIABLE in os.environ:
+        complete_for_shell(build_parser())
+    with end_on_signals() as received_signals:
         try:
             code = with_large_stack(lambda: _run_and_report(argv))
         except Exception:
@@ -66,7 +66,7 @@ def _run_command(argv: Sequence[str] | None) -> int:
     parser = build_parser()
     args = parser.parse_args(argv)
     try:
-        with asked_output(args):
+        with redirected_output(args):
             try:
                 return find_command(args.command)(args)
             except PlanflyError as error:
