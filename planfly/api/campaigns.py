@@ -32,7 +32,7 @@ from planfly.flight_options import (
     named_fences,
     takes_options,
 )
-from planfly.kernel_units.unit_kernels import BOTH
+from planfly.kernel_units.unit_kernels import PLANNING_AND_FLYING
 from planfly.runtime.first_start import with_warm_up
 from planfly.runtime.stages import stage
 from planner.plan import Plan
@@ -115,7 +115,7 @@ def continued_goal(
 
 
 @needs_extra("campaigns")
-@with_warm_up(*BOTH)
+@with_warm_up(*PLANNING_AND_FLYING)
 @takes_options
 def campaign(
     target: Plan | str | Path,
@@ -180,7 +180,7 @@ def _fly_and_summarise(
 
 
 @needs_extra("campaigns")
-@with_warm_up(*BOTH)
+@with_warm_up(*PLANNING_AND_FLYING)
 @takes_options
 def campaign_flight(
     target: Plan | str | Path,
@@ -219,7 +219,7 @@ def _flight_row(base: CampaignBase, goal: Goal, folder: Path, index: int) -> Fli
 
 
 @needs_extra("campaigns")
-@with_warm_up(*BOTH)
+@with_warm_up(*PLANNING_AND_FLYING)
 @takes_options
 def winds(
     target: Plan | str | Path,

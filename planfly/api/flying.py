@@ -27,11 +27,11 @@ from planfly.flight_options import (
     options_of_log,
     takes_options,
 )
-from planfly.kernel_units.unit_kernels import BOTH, FLYING
+from planfly.kernel_units.unit_kernels import FLYING, PLANNING_AND_FLYING
 from planfly.named_fences import NamedFences, read_named_fences
 from planfly.rtl.return_summary import ReturnSummary, returns_line
 from planfly.runtime.first_start import with_warm_up
-from planfly.runtime.stages import say_replaced, stage
+from planfly.runtime.stages import report_replaced, stage
 from planfly.workflow import pipeline
 from planfly.workflow.airframe import airframe_of
 from planfly.workflow.crash_safe_log import FlightLimits, flight_kind, flight_text
@@ -128,7 +128,7 @@ class Judged:
 # Fly a mission.
 
 
-@with_warm_up(*BOTH)
+@with_warm_up(*PLANNING_AND_FLYING)
 @takes_options
 def plan_then_fly(
     scenario: Scenario | str | Path,
@@ -269,7 +269,7 @@ def _prepare_log_file(
     if log == FLY_LOG:
         # Remove the report and the pictures of the previous flight.
         prepare_folder(target.parent, LOG_FIGURES)
-    say_replaced(target, *((autopilot_log(target, program),) if program is not None else ()))
+    report_replaced(target, *((autopilot_log(target, program),) if program is not None else ()))
     return target
 
 

@@ -11,7 +11,7 @@ from typing import Any, Unpack
 from planfly.api.planning import stop_condition
 from planfly.arguments import RANGES, check_arguments
 from planfly.flight_options import FlightOptions, named_scenario, takes_options
-from planfly.kernel_units.unit_kernels import CHOOSING
+from planfly.kernel_units.unit_kernels import FRONT_PLANNING
 from planfly.planning.pareto_plans import make_pareto_plans
 from planfly.runtime.first_start import with_warm_up
 from planfly.runtime.stages import stage
@@ -39,7 +39,7 @@ FRONT_FILES = (
 )
 
 
-@with_warm_up(*CHOOSING)
+@with_warm_up(*FRONT_PLANNING)
 @takes_options
 def plan_front(
     scenario: Scenario | str | Path,

@@ -12,14 +12,14 @@ from aircraft.identification.estimate import Estimate, estimate_model
 from aircraft.identification.flight_record import GRID_HZ, FlightRecord
 from logs.importers.motion import MotionLog
 from logs.importers.motion_log import read_motion
-from planfly.identification.base_numbers import base_model, scaled
+from planfly.identification.base_numbers import base_model, scale_model
 from planfly.identification.checks import check_estimate
 from planfly.identification.folder import Identified, folder_files, make_identified
 from planfly.identification.model_text import check_base
 from planfly.identification.records import (
+    AMPLE_HZ,
     LEFT,
     MIN_HZ,
-    PLENTY_HZ,
     flight_records,
     log_outputs,
     recording_setting,
@@ -121,7 +121,7 @@ def identify_aircraft(
     if battery is not None:
         sheet = parse_sheet({}, battery=battery, prop=None, layout=None)
         volts, energy = sheet.volts, sheet.energy
-    base_numbers = scaled(
+    base_numbers = scale_model(
         base_model(prior), stated_numbers["mass"], stated_numbers["span"], stated_numbers["area"], volts
     )
     check_base(prior)
@@ -295,6 +295,6 @@ def without_current(records: Sequence[FlightRecord]) -> tuple[str, ...]:
 
 
 def slow_logs(logs: Sequence[MotionLog]) -> tuple[SlowLog, ...]:
-    """Return the logs with less than `PLENTY_HZ` rows per second."""
+    """Return the logs with less than `AMPLE_HZ` rows per second."""
     rates = [(log, slowest_rows(log)) for log in logs]
-    return tuple(SlowLog(log.source, rate, recording_setting(log)) for log, rate in rates if rate < PLENTY_HZ)
+    return tuple(SlowLog(log.source, rate, recording_setting(log)) for log, rate in rates if rate < AMPLE_HZ)

@@ -16,10 +16,10 @@ from planfly.api.exporting import judged_parameters
 from planfly.api.flying import named_program
 from planfly.arguments import check_arguments
 from planfly.flight_options import RunOptions, named_scenario, option_defaults, takes_options
-from planfly.kernel_units.unit_kernels import BOTH, GLIDING
+from planfly.kernel_units.unit_kernels import GLIDING, PLANNING_AND_FLYING
 from planfly.rtl.return_summary import return_summary
 from planfly.runtime.first_start import with_warm_up
-from planfly.runtime.stages import say_replaced, stage
+from planfly.runtime.stages import report_replaced, stage
 from planfly.workflow.airframe import Airframe, choose_seed, load_airframe, tightened_airframe
 from planfly.workflow.crash_safe_log import FlightLimits, flight_kind, flight_text
 from planfly.workflow.make_plan import make_plan, planned_for
@@ -117,7 +117,7 @@ class _Task:
     reference: FlyReference
 
 
-@with_warm_up(*BOTH, *GLIDING)
+@with_warm_up(*PLANNING_AND_FLYING, *GLIDING)
 @takes_options
 def run(
     scenario: Scenario | str | Path = "jacksboro",
@@ -204,7 +204,7 @@ def _fly_rounds(
             folder.mkdir(parents=True, exist_ok=True)
             locks.enter_context(hold(folder))
             if task.program is not None:
-                say_replaced(folder / "flight.mcap", autopilot_log(folder / "flight.mcap", task.program))
+                report_replaced(folder / "flight.mcap", autopilot_log(folder / "flight.mcap", task.program))
             prepare_folder(folder)
         rounds_flown.append(_fly_round(task, plan, len(rounds_flown)))
         if on_round is not None:

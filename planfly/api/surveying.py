@@ -26,7 +26,7 @@ from planfly.runtime.first_start import with_warm_up
 from planfly.runtime.stages import stage
 from planfly.surveys.survey_remedies import NearMiss, SurveyRemedy, survey_remedies
 from planfly.surveys.survey_text import (
-    kept_overlap,
+    has_required_overlap,
     line_text,
     lines_headline,
     near_miss_text,
@@ -74,7 +74,9 @@ class SurveyFound:
     @property
     def usable(self) -> bool:
         """True if enough of every line is usable and the photos overlap as required."""
-        return all(usable(line) for lines in self.lines for line in lines) and all(map(kept_overlap, self.overlaps))
+        return all(usable(line) for lines in self.lines for line in lines) and all(
+            map(has_required_overlap, self.overlaps)
+        )
 
     @property
     def headline(self) -> str:

@@ -1,7 +1,7 @@
 """Plan a Pareto front for a scenario, with the default plan of every command and alternatives."""
 
-from planfly.planning.gust_altitude_margin import limits_of_others
-from planfly.planning.gust_orbits import waypoints_in_gusts
+from planfly.planning.gust_altitude_margin import limits_of_alternatives
+from planfly.planning.gust_orbits import max_waypoints_in_gusts
 from planfly.workflow.airframe import Airframe
 from planfly.workflow.make_plan import Advance, finish_plan, make_plan
 from planner.plan import Plan
@@ -33,12 +33,12 @@ def make_pareto_plans(
 
     return plan_front(
         scenario,
-        limits_of_others(default, airframe),
+        limits_of_alternatives(default, airframe),
         count,
         seed=seed,
         progress=advance,
         stop=stop,
         default=default,
-        waypoints=waypoints_in_gusts(default, airframe),
+        waypoints=max_waypoints_in_gusts(default, airframe),
         finish=finish,
     )

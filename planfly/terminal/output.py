@@ -16,7 +16,7 @@ from contextvars import ContextVar
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple, TextIO
 
-from planfly.runtime.stages import Advance, Receiver, received_by
+from planfly.runtime.stages import Advance, Receiver, send_progress_to
 from planfly.terminal.command_parser import wants_colour
 from planfly.terminal.control_characters import escaped_json, without_controls
 from planfly.workflow.output_paths import check_output_file
@@ -483,7 +483,7 @@ def redirected_output(args: argparse.Namespace) -> Iterator[None]:
     token = _output.set(sys.stdout)
     try:
         with contextlib.ExitStack() as contexts:
-            contexts.enter_context(received_by(SILENT if quiet else ON_STANDARD_ERROR))
+            contexts.enter_context(send_progress_to(SILENT if quiet else ON_STANDARD_ERROR))
             if quiet:
                 null_file = contexts.enter_context(Path(os.devnull).open("w", encoding="utf-8"))
                 contexts.enter_context(contextlib.redirect_stdout(null_file))

@@ -7,7 +7,7 @@ from aircraft.path_limits import Limits
 from logs.verdict.conditions import Conditions, conditions_of
 from logs.verdict.measures.circle_reach import end_loiter_hazards
 from logs.verdict.measures.route_requirements import route_requirements
-from planfly.planning.gust_altitude_margin import keep_height
+from planfly.planning.gust_altitude_margin import ensure_altitude_margin
 from planfly.planning.gust_orbits import limit_waypoint_orbits
 from planfly.workflow.airframe import Airframe, with_departure_and_approach
 from planfly.workflow.open_flight import make_setup, mission_of_plan
@@ -61,7 +61,7 @@ def make_plan(
         def search_within(limits_used: Limits) -> Plan:
             return limit_orbits(search(plan.scenario, limits_used), limits_used)
 
-        return keep_height(limit_orbits(plan, limits), airframe, search_within)
+        return ensure_altitude_margin(limit_orbits(plan, limits), airframe, search_within)
 
     if flown is not None:
         old_plan, leg = flown
@@ -89,7 +89,7 @@ def make_plan(
 def finish_plan(plan: Plan, airframe: Airframe, *, continues: bool = False) -> Plan:
     """Apply the steps of `make_plan` after its search to a plan, without another search."""
     return _with_ground_phases(
-        keep_height(limit_waypoint_orbits(plan, airframe), airframe), airframe, continues=continues
+        ensure_altitude_margin(limit_waypoint_orbits(plan, airframe), airframe), airframe, continues=continues
     )
 
 

@@ -33,7 +33,7 @@ from planfly.campaigns.tables import (
     read_table,
 )
 from planfly.campaigns.worker_pool import Workers
-from planfly.runtime.stages import Receiver, received_by
+from planfly.runtime.stages import Receiver, send_progress_to
 from tests.planfly.campaigns.made_campaigns import made_flight, table
 from tests.soak import note, scaled
 
@@ -209,7 +209,7 @@ def test_what_is_damaged_is_named_and_flown_again(base: CampaignBase, tmp_path: 
         connection.execute("UPDATE flights SET outcome = 'lost', failed = '[]' WHERE flight = 3")
         connection.execute("UPDATE flights SET margin_clearance = 99.0 WHERE flight = 7")
         connection.execute("UPDATE flights SET ended = CAST(X'FFFE' AS TEXT) WHERE flight = 8")
-    with received_by(Receiver(lambda *_: pytest.fail("no stage"), told.append)):
+    with send_progress_to(Receiver(lambda *_: pytest.fail("no stage"), told.append)):
         store = open_store(base, goal, tmp_path / "one", resume=True)
     assert told == [
         f"{path}: flights 3, 7, 8 are damaged and were taken out: 9 flights are whole and stay;"
