@@ -251,10 +251,10 @@ class Direction:
         return FailureLaws.up_to(self.most)
 
 
-def needs_more(found: WindBoundary, flights: int, accuracy: float, fewest: int) -> bool:
+def needs_more_flights(found: WindBoundary, flights: int, accuracy: float, fewest: int) -> bool:
     """Return True if a direction needs more flights: too few, or an interval wider than twice the accuracy.
 
-    >>> needs_more(WindBoundary(9.0, 8.8, 9.2, False), 40, 0.5, 30)
+    >>> needs_more_flights(WindBoundary(9.0, 8.8, 9.2, False), 40, 0.5, 30)
     False
     """
     return flights < fewest or found.width > 2.0 * accuracy
