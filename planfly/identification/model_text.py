@@ -273,7 +273,10 @@ def _electric_functions(motor: ElectricMotor) -> dict[str, str]:
     # Divide by the factor on motor speed: KV is divided by it, and its square is KQ KV.
     speed = "<p> ident/motor-speed </p>"
     loss_torque = f"<quotient> <v> {number(kv * motor.idle_current)} </v> {speed} </quotient>"
-    drive_torque = f"<quotient> <product> <v> {number(-kv / resistance)} </v> <p> motor/input-v </p> </product> {speed} </quotient>"
+    drive_torque = (
+        f"<quotient> <product> <v> {number(-kv / resistance)} </v> <p> motor/input-v </p> </product>"
+        f" {speed} </quotient>"
+    )
     back_voltage_damping = (
         f"<quotient> <v> {number(kv * kv / resistance)} </v> <product> {speed} {speed} </product> </quotient>"
     )

@@ -234,7 +234,7 @@ def fail_shares(modes: Sequence[FailureMode], terms: Floats) -> Floats:
 
 
 def boundary_speed(modes: Sequence[FailureMode], draws: Floats, failing_fraction: float, max_speed: float) -> float:
-    """Find the wind up to `max_speed`, m/s, in which this fraction of draws (m, d) is expected to fail, by bisection."""
+    """Find the wind up to `max_speed`, m/s, in which this fraction of draws (m, d) should fail, by bisection."""
     mode_predictors = [(mode.link, regressors(ORIGIN, draws) @ mode.mean, float(mode.mean[1])) for mode in modes]
 
     def exceeds_fraction(speed: float) -> bool:

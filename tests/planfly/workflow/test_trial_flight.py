@@ -31,7 +31,9 @@ def test_a_trial_is_flown_when_it_is_asked_for_and_once(monkeypatch: pytest.Monk
     assert trial.flight_verdict is trial.flight_verdict
     assert flown == [SETUP]
     assert trial.flight[1] == "not started: no trim"
-    assert [item.reason for item in trial.flight_verdict.failed if item.rule == "completion"] == ["not started: no trim"]
+    assert [item.reason for item in trial.flight_verdict.failed if item.rule == "completion"] == [
+        "not started: no trim"
+    ]
 
 
 @pytest.mark.parametrize(("ratio", "reason"), [(1.99, ""), (2.01, "not started: it takes 2 times the energy carried")])

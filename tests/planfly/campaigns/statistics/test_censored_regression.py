@@ -173,7 +173,8 @@ def test_the_covariance_is_that_of_repeated_flights(known: bool) -> None:
 
 def test_margins_make_each_coefficient_surer() -> None:
     some, none = (
-        np.diag(fit_regression(flights, PROBIT).covariance) for flights in (made(300, 1), made(300, 1).as_pass_or_fail())
+        np.diag(fit_regression(flights, PROBIT).covariance)
+        for flights in (made(300, 1), made(300, 1).as_pass_or_fail())
     )
     assert (some < 0.8 * none).all()
 
@@ -262,7 +263,8 @@ def test_the_evidence_is_for_the_link_that_flights_follow(known: bool) -> None:
     for law, right, wrong in ((norm, PROBIT, CLOGLOG), (gumbel_l, CLOGLOG, PROBIT)):
         flights = made(6000, 3, law)
         by_right, by_wrong = (
-            fit_regression(flights if known else flights.as_pass_or_fail(), link).log_evidence for link in (right, wrong)
+            fit_regression(flights if known else flights.as_pass_or_fail(), link).log_evidence
+            for link in (right, wrong)
         )
         assert by_right > by_wrong + 3.0
 
