@@ -532,23 +532,30 @@ def narrow_figure(figure: Figure) -> Figure:
         title_height = label_height = 0.0
         for axes in figure.axes:
             box = axes.get_position()
-            left = box.x0 * old_width
-            width = NARROW_WIDTH_IN - left - 2.0 * _EDGE_IN
+            box_left = box.x0 * old_width
+            width = NARROW_WIDTH_IN - box_left - 2.0 * _EDGE_IN
             title_height = max(title_height, sum(_wrap_text(handle, width) for handle in _left_title(axes)))
             label_height = max(label_height, _wrap_text(axes.xaxis.label, width))
             if axes.patches and axes.get_xlim()[0] == 0.0:
                 # Leave room for the number after the longest bar.
                 axes.set_xlim(0.0, 1.5 * axes.get_xlim()[1])
-            boxes.append((left, (1.0 - box.y1) * old_height, width, box.height * old_height))
-        boxes = [(left, top + title_height, width, box_height) for left, top, width, box_height in boxes]
+            boxes.append((box_left, (1.0 - box.y1) * old_height, width, box.height * old_height))
+        boxes = [
+            (box_left, box_top + title_height, width, box_height) for box_left, box_top, width, box_height in boxes
+        ]
         height = old_height + title_height + label_height + legend_height
     figure.set_size_inches(NARROW_WIDTH_IN, height)
-    for axes, (left, top, width, box_height) in zip(panels or figure.axes, boxes, strict=True):
+    for axes, (box_left, box_top, width, box_height) in zip(panels or figure.axes, boxes, strict=True):
         axes.set_position(
-            (left / NARROW_WIDTH_IN, 1.0 - (top + box_height) / height, width / NARROW_WIDTH_IN, box_height / height)
+            (
+                box_left / NARROW_WIDTH_IN,
+                1.0 - (box_top + box_height) / height,
+                width / NARROW_WIDTH_IN,
+                box_height / height,
+            )
         )
-    for text, top in texts:
-        text.update({"x": _EDGE_IN / NARROW_WIDTH_IN, "y": 1.0 - top / height, "ha": "left", "va": "top"})
+    for text, box_top in texts:
+        text.update({"x": _EDGE_IN / NARROW_WIDTH_IN, "y": 1.0 - box_top / height, "ha": "left", "va": "top"})
     for legend in legends:
         labels = [text.get_text() for text in legend.get_texts()]
         handles = [handle for handle in legend.legend_handles if handle is not None]

@@ -326,18 +326,18 @@ def _heights_at_ends(problem: Problem, parts: _Parts) -> list[tuple[str, float, 
 def _clearance_shortfall(problem: Problem, parts: _Parts) -> Shortfall | None:
     """Return the deepest displacement of a path by a downdraft below its clearance, or None without one."""
     data = problem.certified
-    into = f"into the clearance of {data.clearance:g} m"
+    hazard = f"into the clearance of {data.clearance:g} m"
     for name, height, k in _heights_at_ends(problem, parts):
         if (depth := float(parts.after[k]) + data.clearance - height) > _ROUNDING_TOLERANCE_M:
-            return Shortfall(parts.gust, depth, into, f"at its {name}", at_end=name)
-    lowest = Shortfall(parts.gust, 0.0, into, "")
+            return Shortfall(parts.gust, depth, hazard, f"at its {name}", at_end=name)
+    lowest = Shortfall(parts.gust, 0.0, hazard, "")
     for piece in heights_above_ground(data, parts.points):
         k = int(piece["number"])
         # A part needs the margin of that of its ends which is nearer to the end of the path.
         margin = max(parts.before[k], parts.after[k]) if piece["of_arc"] else min(parts.after[k], parts.before[k + 1])
         depth = float(margin) + data.clearance - float(piece["height"])
         if depth > lowest.depth:
-            lowest = Shortfall(parts.gust, depth, into, f"on leg {parts.legs[k]}")
+            lowest = Shortfall(parts.gust, depth, hazard, f"on leg {parts.legs[k]}")
     return lowest
 
 
@@ -346,14 +346,14 @@ def _max_height_shortfall(problem: Problem, parts: _Parts) -> Shortfall | None:
     data, max_height = problem.certified, problem.certified.airspace.max_height
     if max_height == math.inf:
         return None
-    into = f"above the {max_height:.0f} m over ground that are allowed"
+    hazard = f"above the {max_height:.0f} m over ground that are allowed"
     for name, height, k in _heights_at_ends(problem, parts):
         if (depth := height + float(parts.after[k]) - max_height) > _ROUNDING_TOLERANCE_M:
-            return Shortfall(parts.gust, depth, into, f"at its {name}", at_end=name)
+            return Shortfall(parts.gust, depth, hazard, f"at its {name}", at_end=name)
     pieces = airspace_pieces(data, _gust_paths(parts)[-1])
     highest = max(pieces, key=lambda piece: float(piece["height"]))
     where = f"on leg {parts.legs[min(int(highest['number']), len(parts.legs) - 1)]}"
-    return Shortfall(parts.gust, float(highest["height"]) - max_height, into, where)
+    return Shortfall(parts.gust, float(highest["height"]) - max_height, hazard, where)
 
 
 def _missile_shortfall(problem: Problem, parts: _Parts) -> Shortfall | None:
@@ -386,9 +386,9 @@ def _zone_shortfall(problem: Problem, parts: _Parts) -> Shortfall | None:
         return None
     number = data.airspace.zones.required[int(worst["zones"]["zone"])]["number"]
     zone = problem.scenario.zones[int(number)]
-    into = f"into {zone.name}" if zone.kind == "exclusion" else f"out of {zone.name}"
+    hazard = f"into {zone.name}" if zone.kind == "exclusion" else f"out of {zone.name}"
     where = f"on leg {parts.legs[min(int(worst['number']), len(parts.legs) - 1)]}"
-    return Shortfall(parts.gust, -float(worst["zones"]["nearest"]), into, where, of_threats=True)
+    return Shortfall(parts.gust, -float(worst["zones"]["nearest"]), hazard, where, of_threats=True)
 
 
 def _gust_paths(parts: _Parts) -> list[Floats]:

@@ -58,9 +58,9 @@ def return_summary(setup: FlightSetup, track: Track | None) -> ReturnSummary:
         duration = setup.path.length / max(1.0, setup.airspeed)
         if track is not None and len(track):
             duration = float(track.time[-1] - track.time[0])
-        every = max(1.0, duration / _SUMMARY_RETURNS)
-        starts = return_starts(setup, track, every)
-        returns = judge_returns(world, starts, every)
+        interval = max(1.0, duration / _SUMMARY_RETURNS)
+        starts = return_starts(setup, track, interval)
+        returns = judge_returns(world, starts, interval)
     except PlanflyError as error:
         return ReturnSummary(f"not judged: {error}")
     names_stand_in = world.stands_in and not world.other_law

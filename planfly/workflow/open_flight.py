@@ -29,7 +29,7 @@ PLAN_FILE = "plan.json"
 def open_flight(source: Plan | str | Path, options: MissionOptions, program: Path | None = None) -> FlightSetup:
     """Make the setup of a plan, or of a plan.json, .waypoints or .plan file.
 
-    The scenario is the named one, the plan's own, or for a mission file one implied by its items.
+    The scenario is the named scenario, the plan's own, or for a mission file a scenario implied by its items.
 
     program: the autopilot program that flies, or None for a simulated autopilot.
     Raises MissionError, ScenarioError, ParameterError or TerrainError.

@@ -2,14 +2,14 @@
 
 The probability of failure is a link function of a + b * wind + c . draws.  Three likelihoods are available:
 
-- of the failures alone, a binary regression;
+- of only the failures, a binary regression;
 - of the failures and the margins of passed flights, with one distribution: the share of flights that pass by less than
   a given margin is the same function with k * margin added, so that the margin has the link's distribution with scale
   1/k, in units of the margin's scale.  A failed flight only contributes that it failed, and a flight that passed by a
   scale or more only that it did, so that the distribution need not hold far from failure: a regression censored on both
   sides (Tobin, "Estimation of relationships for limited dependent variables", Econometrica 26, 1958; Rosett and Nelson,
   "Estimation of the two-limit probit regression model", Econometrica 43, 1975);
-- of the margin alone, given that a flight passed: the same regression truncated at zero margin.
+- of only the margin, given that a flight passed: the same regression truncated at zero margin.
 
 Priors are weak and normal, on the logarithm of b and on the other coefficients themselves.  The most informative
 flight, and the evidence for a link and for the prior width of the draws' coefficients, follow from a normal
@@ -468,7 +468,7 @@ def _fit(posterior: _Posterior, start: Floats) -> RegressionFit:
     """Find the posterior's mode from a start, and the inverse of its curvature there.
 
     Newton's method with halved steps, and with the absolute eigenvalues of the curvature where the loss is not convex,
-    as may be with margins alone (Nocedal and Wright, Numerical Optimization, 2nd edition, 2006, sections 3.4 and 19.2).
+    as may be with margins only (Nocedal and Wright, Numerical Optimization, 2nd edition, 2006, sections 3.4 and 19.2).
     """
     size = posterior.size
 

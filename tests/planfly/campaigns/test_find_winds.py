@@ -108,13 +108,13 @@ def test_failures_in_calm_air_are_known_by_rule_and_place(wind_base: CampaignBas
     flown = [(direction, 0.0, failed) for direction in (0, 0, 1)] + [(0, 5.0, failed)] * 20 + [(1, 5.0, failed)] * 20
     flown += [(direction, 20.0, flies) for direction in (2, 3) for _ in range(60)]
     for number, (direction, speed, outcome) in enumerate(flown):
-        search.take(RequestedFlight(number, direction, speed, number), outcome)
-    calm = search.found().calm
+        search.add_result(RequestedFlight(number, direction, speed, number), outcome)
+    calm = search.result().calm
     assert calm == CalmFailures(0.0, 3, 3, (RuleFailures("clearance", 3, ((LEG, 3),)),))
     windy = _Search(GOAL, wind_base)
     for number in range(80):
-        windy.take(RequestedFlight(number, number % 4, 20.0, number), flies)
-    assert windy.found().calm is None
+        windy.add_result(RequestedFlight(number, number % 4, 20.0, number), flies)
+    assert windy.result().calm is None
 
 
 @pytest.mark.usefixtures("here")
@@ -185,7 +185,7 @@ def test_a_flight_that_did_not_go_on_to_its_end_states_no_margin(
     wind_base: CampaignBase, flown: FlownFlight, margin: dict[Any, float] | None
 ) -> None:
     search = _Search(GOAL, wind_base)
-    search.take(RequestedFlight(0, 2, 8.0, 0), flown)
+    search.add_result(RequestedFlight(0, 2, 8.0, 0), flown)
     assert search.directions[2].margin == [margin]
     assert search.directions[2].speeds == [8.0]
 
