@@ -283,7 +283,7 @@ def _raise_terrain(terrain: Terrain, height: float) -> Terrain:
 
 
 def _limits_in_wind(airframe: Airframe, scenario: Scenario, *, is_drawn: bool) -> Limits:
-    """Return the airframe's limits in the wind of a scenario.  drawn: True if the flight's aircraft is drawn."""
+    """Return the airframe's limits in the wind of a scenario.  is_drawn: True if the flight's aircraft is drawn."""
     old_limits = airframe.limits
     # The performance of a drawn aircraft is known exactly, so it has no standard deviations.
     exact_envelope = replace(old_limits.envelope, climb_sd=0.0, descent_sd=0.0, fastest_sd=0.0, power_sd=0.0)

@@ -139,7 +139,10 @@ class _Pace:
         return max(self._estimator.fewest, tally.flown) if self._goal.stops else self._goal.flights
 
     def report(self, tally: Tally, is_last: bool = False) -> None:
-        """Report the flights, P with its bounds, flights per minute and remaining time.  last: True reports at once."""
+        """Report the flights, P with its bounds, flights per minute and remaining time.
+
+        is_last: True reports even if no report is due.
+        """
         if self._advance is None or not tally.flown or not (self._rate.is_due() or is_last):
             return
         estimate = self._estimator.estimate(tally)

@@ -449,7 +449,10 @@ def draw_go_no_go(
 def _draw_legend(
     figure: Figure, target: float, confidence: float, wind: tuple[float, float] | None, open_edge: float | None
 ) -> None:
-    """Draw the legend.  edge: maximum wind of the search, m/s, if a direction has no lower limit, otherwise None."""
+    """Draw the legend.
+
+    open_edge: maximum wind of the search, m/s, if the boundary of a direction is beyond it, otherwise None.
+    """
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
 

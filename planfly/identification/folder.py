@@ -155,7 +155,10 @@ def _airspeeds(log: MotionLog, base: Aircraft) -> tuple[float, float, float]:
 def _metadata_text(
     identified: Identified, battery: tuple[float, float], min_level_speed: float, max_level_speed: float = math.inf
 ) -> str:
-    """Return the text of ``name.toml``.  slow, fast: minimum and maximum airspeed of level flight, m/s."""
+    """Return the text of ``name.toml``.
+
+    min_level_speed, max_level_speed: minimum and maximum airspeed of level flight, m/s.
+    """
     base, value = identified.base, flown_parameters(identified.logs[-1]).get
     _, stated_min, stated_max = _airspeeds(identified.logs[-1], base)
     min_airspeed = max(min(stated_min, identified.cruise), min_level_speed + 0.1)

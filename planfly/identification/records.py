@@ -314,7 +314,7 @@ def _hold_samples(samples: Samples, grid: Floats) -> Floats:
 
 
 def _airspeed_ratio(amsl: Floats) -> Floats:
-    """Return the ratio of true to equivalent airspeed in the standard atmosphere.  height: altitude, m AMSL."""
+    """Return the ratio of true to equivalent airspeed in the standard atmosphere.  amsl: altitude, m AMSL."""
     return np.asarray((1.0 - 2.25577e-5 * np.clip(amsl, -500.0, 9000.0)) ** -2.12794)
 
 

@@ -201,7 +201,7 @@ def steering_options(parser: CommandParser) -> OptionTaker:
 
 
 def program_option(group: OptionTaker, help_text: str) -> None:
-    """Add the option for the program of an autopilot.  does: help text."""
+    """Add the option for the program of an autopilot.  help_text: help text."""
     group.add_argument("--sitl", metavar="PATH", help=help_text)
 
 

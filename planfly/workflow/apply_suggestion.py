@@ -85,7 +85,7 @@ class _EditedMission:
         return np.asarray(self.route.waypoints)
 
     def shift(self, waypoints: Sequence[int], offset: Floats) -> None:
-        """Move the items of waypoints, each once, but no landings.  by: east, north and up, m."""
+        """Move the items of waypoints, each once, except landings.  offset: east, north and up, m."""
         for index in dict.fromkeys(self.index_of(waypoint) for waypoint in waypoints):
             if index is None or self.mission.items[index].command in LANDINGS:
                 continue

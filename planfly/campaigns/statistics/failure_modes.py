@@ -84,7 +84,8 @@ class FailureLaws:
     def quantile_at(self, fraction: float, speeds: Floats, flyable: NDArray[np.bool_], probabilities: Floats) -> Floats:
         """Return quantiles (k,) of the posterior of the wind at which this share of flights fails, m/s.
 
-        speeds, flyable: (m,) winds and outcomes of the flights.  parts: (k,) probabilities of the quantiles, 0 to 1.
+        speeds, flyable: (m,) winds and outcomes of the flights.
+        probabilities: (k,) probabilities of the quantiles, 0 to 1.
         """
         log_weights = np.zeros(self.location.size)
         for speed, counts in _counts_by_wind(speeds, flyable).items():
