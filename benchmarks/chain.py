@@ -27,7 +27,7 @@ from logs.verdict.judge_flight import judge_flight
 from planfly.workflow.airframe import Airframe, load_airframe
 from planfly.workflow.make_plan import make_plan
 from planfly.workflow.open_flight import make_setup
-from planfly.workflow.pipeline import BATCH
+from planfly.workflow.pipeline import BATCH_S
 from world.scenario import load_scenario
 
 # Number of rounds.
@@ -97,7 +97,7 @@ def recording(setup: FlightSetup, airframe: Airframe, folder: Path, rounds: int 
     log = folder / "flight.mcap"
 
     def fly(every: int) -> None:
-        with Recorder(log, setup, every=every, batch=BATCH) as recorder:
+        with Recorder(log, setup, every=every, batch=BATCH_S) as recorder:
             ended = ""
             for block in simulate(Flight(setup, airframe.aircraft)):
                 recorder.write_rows(block.rows)

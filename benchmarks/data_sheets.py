@@ -220,7 +220,7 @@ def check_intervals(draws: int) -> int:
             published = performance(load_aircraft(name))
             sheet = sheet_of(name)
             sized = size_aircraft(sheet, name, kind)
-            made = make_data_sheet_folder(Path(place) / f"{name}-sheet", sheet, made=sized)
+            made = make_data_sheet_folder(Path(place) / f"{name}-sheet", sheet, sized=sized)
             drawn = read_draws(made.folder / "draws.csv")
             found = [performance(made, Variation(properties=drawn.properties(k))) for k in range(draws)]
             for what, unit, factor in (("climb", "deg", 180.0 / math.pi), ("sink", "m/s", 1.0), ("power", "W", 1.0)):

@@ -32,7 +32,7 @@ from aircraft.identification.performance import performance
 from flight.dynamics.fdm import Fdm
 from flight.dynamics.trim import straight
 from flight.simulation.track import Track
-from planfly.identification.base_numbers import base_model, scaled
+from planfly.identification.base_numbers import base_model, scale_model
 from planfly.identification.folder import AMSL, DENSITY, folder_files, make_identified
 from planfly.identification.records import flight_records
 from planfly.identification.servos import read_servos
@@ -77,7 +77,7 @@ def drawn_truth(seed: int) -> Truth:
         for field, sd in (_FIXED_SIGMAS | _INERTIA_SIGMAS).items():
             values[field] = float(np.clip(draw.normal(1.0, sd), 1.0 - 2.0 * sd, 1.0 + 2.0 * sd))
         truth = Truth(**values)
-        base = scaled(numbers, 11.0 * truth.mass, numbers.span, numbers.area)
+        base = scale_model(numbers, 11.0 * truth.mass, numbers.span, numbers.area)
         flown = performance(base, true_values(truth), _CRUISE_MPS, DENSITY)
         stable = truth.pitch_stiffness > 0.5 and truth.weathercock > 0.4 and truth.roll_damping > 0.5
         if math.radians(4.0) < flown.climb[0] < math.radians(16.0) and flown.throttle[0] < 0.93 and stable:
@@ -205,7 +205,7 @@ def one_variant(seed: int, repeats: int, shorts: int, factor: float, *, missions
     truth = drawn_truth(seed)
     values = true_values(truth)
     numbers = base_model(load_aircraft("aerosonde"))
-    base = scaled(numbers, 11.0 * truth.mass, numbers.span, numbers.area)
+    base = scale_model(numbers, 11.0 * truth.mass, numbers.span, numbers.area)
     made: dict[str, Any] = {
         "seed": seed,
         "truth": {one.name: round(getattr(truth, one.name), 3) for one in fields(truth)},

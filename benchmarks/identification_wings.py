@@ -25,7 +25,7 @@ from aircraft.identification.parameters import INDEX, NAMES, PARAMETERS, prior_m
 from aircraft.identification.performance import performance
 from flight.dynamics.fdm import Fdm
 from flight.dynamics.trim import full_throttle, idle, straight
-from planfly.identification.base_numbers import base_model, scaled
+from planfly.identification.base_numbers import base_model, scale_model
 from planfly.identification.folder import AMSL, DENSITY, folder_files, make_identified
 from planfly.identification.model_text import identified_xml
 from planfly.identification.records import flight_records, log_outputs
@@ -102,7 +102,7 @@ def one_variant(name: str, seed: int, repeats: int) -> dict[str, Any]:
         draw = np.random.default_rng([seed, 3])
         wind = (float(draw.uniform(1.0, 5.0)), float(draw.uniform(0.0, 360.0)))
         track = fly_wing(wing, folder, seed, repeats=repeats, wind=wind)
-        numbers = scaled(base_model(base), wing.mass, base.wing_span, base.wing_area)
+        numbers = scale_model(base_model(base), wing.mass, base.wing_span, base.wing_area)
         made: dict[str, Any] = {
             "base": name,
             "seed": seed,

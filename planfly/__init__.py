@@ -39,10 +39,10 @@ Paths are `str` or `pathlib.Path`.  The command line is ``planfly --help``.
 from typing import TYPE_CHECKING, Any
 
 from planfly._version import __version__ as __version__
-from planfly.own_packages import refuse_hidden_packages
+from planfly.own_packages import check_hidden_packages
 from planfly.runtime.process_setup import prepare_child
 
-refuse_hidden_packages()
+check_hidden_packages()
 prepare_child()
 
 if TYPE_CHECKING:

@@ -45,9 +45,9 @@ _POSITIVE_RANGE = Range(0.0, 1e6, "a number above 0, up to 1,000,000, is expecte
 # Range of numbers of items.
 _COUNT_RANGE = Range(1, 1000, "a whole number from 1 to 1,000 is expected", integer=True)
 # Range of probabilities to prove.
-_SHARE = Range(0.5, 1.0, "at least 0.5 and below 1 is expected", below=True)
+_PROBABILITY_RANGE = Range(0.5, 1.0, "at least 0.5 and below 1 is expected", below=True)
 
-# Ranges by keyword.  Values that a scenario file also bounds (wind, turbulence, airspeed, laws) are checked there.
+# Ranges by keyword.  Values that a scenario file also limits (wind, turbulence, airspeed, laws) are checked there.
 RANGES: Mapping[str, Range] = {
     "seed": Range(0, 2**63 - 1, "a whole number from 0 to 2^63 - 1 is expected", integer=True),
     "refine": Range(0, 20, "a whole number from 0 to 20 is expected", integer=True),
@@ -68,9 +68,9 @@ RANGES: Mapping[str, Range] = {
     "runs": _COUNT_RANGE,
     "jobs": _COUNT_RANGE,
     "workers": _COUNT_RANGE,
-    "prove": _SHARE,
-    "at_least": _SHARE,
-    "confidence": _SHARE,
+    "prove": _PROBABILITY_RANGE,
+    "at_least": _PROBABILITY_RANGE,
+    "confidence": _PROBABILITY_RANGE,
     "flights": Range(1, 10_000_000, "a whole number from 1 to 10,000,000 is expected", integer=True),
     "index": Range(0, 10**9 - 1, "a flight's index is expected, from 0", integer=True),
     "directions": Range(4, 72, "4 to 72 is expected", integer=True),
@@ -95,7 +95,7 @@ CHOICES: Mapping[str, tuple[Any, ...]] = {
 def check_arguments(**given: Any) -> None:
     """Raise ArgumentError for the first number or word that is outside its range.
 
-    given: values by their name in `RANGES` or `CHOICES`; None is a value that was not given.
+    given: values by their name in `RANGES` or `CHOICES`; None if a value was not given.
 
     >>> check_arguments(seed=3, log_hz=60, max_hours=None)
     >>> check_arguments(directions=3)
@@ -107,7 +107,7 @@ def check_arguments(**given: Any) -> None:
             continue
         if name in CHOICES:
             values = value if isinstance(value, tuple | list) else (value,)
-            if all(one in CHOICES[name] for one in values):
+            if all(choice in CHOICES[name] for choice in values):
                 continue
             allowed = f"{', '.join(map(str, CHOICES[name]))} is expected"
         elif RANGES[name].allows(value):
@@ -155,7 +155,7 @@ def is_camera(numbers: Sequence[float]) -> bool:
     (True, True, False)
     """
     if len(numbers) not in (3, 5) or not all(
-        0.0 < one <= most for one, most in zip(numbers, _MAX_CAMERA_SIZES_MM, strict=False)
+        0.0 < number <= limit for number, limit in zip(numbers, _MAX_CAMERA_SIZES_MM, strict=False)
     ):
         return False
-    return all(0.0 <= one < 100.0 for one in numbers[3:])
+    return all(0.0 <= number < 100.0 for number in numbers[3:])

@@ -10,16 +10,16 @@ from collections.abc import Sequence
 
 from planfly.commands.registry import build_parser, find_command
 from planfly.runtime.process_setup import prepare_process, with_large_stack
-from planfly.terminal.arguments import ASKS_COMPLETION, answer_shell
+from planfly.terminal.arguments import COMPLETION_VARIABLE, complete_for_shell
 from planfly.terminal.command_parser import coloured, error_text
 from planfly.terminal.exit_codes import BAD_INPUT, FAULT, INTERRUPTED
-from planfly.terminal.output import asked_output, give_junit_error, open_standard_streams, printable, safe_streams
-from planfly.terminal.signal_watch import end_process, ended_by_signals
+from planfly.terminal.output import give_junit_error, open_standard_streams, printable, redirected_output, safe_streams
+from planfly.terminal.signal_watch import end_on_signals, end_process
 from world.errors import CrashError, PlanflyError
 from world.interruption import Interrupted
 
-# Errors of the machine, which are too few descriptors of the process or the system, too little memory, and disk errors.
-_MACHINES = (errno.EMFILE, errno.ENFILE, errno.ENOMEM, errno.EIO)
+# Errors of the machine: too many open files in the process or the system, too little memory, and disk errors.
+_MACHINE_ERRORS = (errno.EMFILE, errno.ENFILE, errno.ENOMEM, errno.EIO)
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -31,17 +31,17 @@ def main(argv: Sequence[str] | None = None) -> int:
         return _run_and_report(argv)
     prepare_process()
     open_standard_streams()
-    if ASKS_COMPLETION in os.environ:
-        answer_shell(build_parser())
-    with ended_by_signals() as heard:
+    if COMPLETION_VARIABLE in os.environ:
+        complete_for_shell(build_parser())
+    with end_on_signals() as received_signals:
         try:
             code = with_large_stack(lambda: _run_and_report(argv))
         except Exception:
-            if not heard:
+            if not received_signals:
                 raise
             # An interrupted compiler may fail with any error.
-            code = _fail(128 + heard[0], "interrupted")
-    if heard:
+            code = _fail(128 + received_signals[0], "interrupted")
+    if received_signals:
         # End the process directly, because the shutdown of an interpreter with compiled code takes a second.
         end_process(code)
     return code
@@ -54,8 +54,8 @@ def _run_and_report(argv: Sequence[str] | None) -> int:
     except OSError as error:
         return _fail(FAULT, f"{error.filename or 'file'}: {error.strerror or error}")
     except MemoryError as error:
-        said = str(error)
-        return _fail(FAULT, f"too little memory: {said}" if said and "bad_alloc" not in said else "too little memory")
+        text = str(error)
+        return _fail(FAULT, f"too little memory: {text}" if text and "bad_alloc" not in text else "too little memory")
     except Interrupted as interrupted:
         return _fail(128 + interrupted.number, "interrupted")
     except KeyboardInterrupt:
@@ -63,23 +63,23 @@ def _run_and_report(argv: Sequence[str] | None) -> int:
 
 
 def _run_command(argv: Sequence[str] | None) -> int:
-    line = build_parser()
-    args = line.parse_args(argv)
+    parser = build_parser()
+    args = parser.parse_args(argv)
     try:
-        with asked_output(args):
+        with redirected_output(args):
             try:
                 return find_command(args.command)(args)
             except PlanflyError as error:
-                give_junit_error(args, error_text(error, line.commands[args.command]))
+                give_junit_error(args, error_text(error, parser.commands[args.command]))
                 raise
     except PlanflyError as error:
         code = FAULT if isinstance(error, CrashError) or _is_machine_error(error.__cause__) else BAD_INPUT
-        return _fail(code, error_text(error, line.commands[args.command]))
+        return _fail(code, error_text(error, parser.commands[args.command]))
 
 
 def _is_machine_error(cause: BaseException | None) -> bool:
     """Return True if a file could not be read because of an error of the machine, not because of its content."""
-    return isinstance(cause, OSError) and cause.errno in _MACHINES
+    return isinstance(cause, OSError) and cause.errno in _MACHINE_ERRORS
 
 
 def _fail(code: int, message: object) -> int:

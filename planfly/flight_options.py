@@ -62,7 +62,7 @@ class MissionOptions(FlightOptions, total=False):
 
     scenario: a name or a TOML file; None for the plan's own scenario, or one made around the mission.
     fence: files of fences and zones in addition to the mission's own.
-    seed: of the turbulence; None takes the seed of the plan or of the scenario, or 1.
+    seed: seed of the turbulence; None takes the seed of the plan or of the scenario, or 1.
     """
 
     scenario: str | Path | None
@@ -73,7 +73,7 @@ class MissionOptions(FlightOptions, total=False):
 class PlanOptions(FlightOptions, total=False):
     """Options of the search for a path, and of the flight to plan for.
 
-    seed: of the search; None takes the seed of the scenario, or 1.
+    seed: seed of the search; None takes the seed of the scenario, or 1.
     algorithm: a name of ``planfly plan --help``; None for the default.
     budget: maximum number of evaluations.
     seconds: time limit, after which the best path found is returned.
@@ -141,8 +141,9 @@ class CampaignOptions(MissionOptions, total=False):
 class WindsOptions(MissionOptions, total=False):
     """Options of the flights of a search for the strongest winds, and of the search's end.
 
-    spread: a TOML file of what varies.  flights: largest number, for all directions.  confidence: of each interval.
-    workers: processes on this machine; None for one per core.  scheduler: the address of a running dask scheduler.
+    spread: a TOML file of the quantities that vary.  flights: maximum number of flights for all directions together.
+    confidence: confidence level of each interval.  workers: number of processes on this machine; None for one per core.
+    scheduler: address of a running dask scheduler.
     """
 
     spread: str | Path | None
@@ -168,7 +169,7 @@ _Given = TypeVar("_Given")
 
 
 def takes_options(function: Callable[_Taken, _Given]) -> Callable[_Taken, _Given]:
-    """Return a function that shows its ``Unpack[...]`` options in its signature, fills in defaults, and refuses others.
+    """Return a function with its ``Unpack[...]`` options in its signature, which fills in defaults and refuses others.
 
     >>> from typing import Unpack
     >>> @takes_options
@@ -180,22 +181,22 @@ def takes_options(function: Callable[_Taken, _Given]) -> Callable[_Taken, _Given
     Traceback (most recent call last):
     TypeError: fly() got an unexpected keyword argument 'winds': did you mean 'wind'?
     """
-    *named, rest = inspect.signature(function).parameters.values()
-    (options,) = get_args(rest.annotation)
-    defaults, kinds = option_defaults(options), get_type_hints(options)
-    shown = [
-        inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=kinds[name])
+    *parameters, options_parameter = inspect.signature(function).parameters.values()
+    (options,) = get_args(options_parameter.annotation)
+    defaults, annotations = option_defaults(options), get_type_hints(options)
+    option_parameters = [
+        inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=annotations[name])
         for name, default in defaults.items()
     ]
-    signature = inspect.signature(function).replace(parameters=[*named, *shown])
+    signature = inspect.signature(function).replace(parameters=[*parameters, *option_parameters])
 
     @functools.wraps(function)
-    def with_defaults(*args: _Taken.args, **given: _Taken.kwargs) -> _Given:
-        for name in given:
+    def with_defaults(*args: _Taken.args, **keywords: _Taken.kwargs) -> _Given:
+        for name in keywords:
             if name not in signature.parameters:
-                near = did_you_mean(name, signature.parameters)
-                raise TypeError(f"{function.__name__}() got an unexpected keyword argument {name!r}{near}")
-        return function(*args, **{**defaults, **given})  # type: ignore[arg-type]
+                hint = did_you_mean(name, signature.parameters)
+                raise TypeError(f"{function.__name__}() got an unexpected keyword argument {name!r}{hint}")
+        return function(*args, **{**defaults, **keywords})  # type: ignore[arg-type]
 
     with_defaults.__signature__ = signature  # type: ignore[attr-defined]
     return with_defaults
@@ -226,7 +227,7 @@ def mission_options(options: MissionOptions) -> MissionOptions:
 def named_fences(options: MissionOptions) -> list[str]:
     """Return the names of the fence files."""
     fence = options.get("fence") or ()
-    return [str(one) for one in ([fence] if isinstance(fence, str | Path) else fence)]
+    return [str(file) for file in ([fence] if isinstance(fence, str | Path) else fence)]
 
 
 # ----------------------------------------------------------------------
@@ -234,7 +235,7 @@ def named_fences(options: MissionOptions) -> list[str]:
 
 
 def named_scenario(scenario: Scenario | str | Path, options: FlightOptions, program: Path | None = None) -> Scenario:
-    """Return a scenario, from an embedded name, a TOML file or as given, with options applied.
+    """Return a scenario with options applied; a name or a TOML file is loaded first.
 
     program: the autopilot's program that flies.  Raises ScenarioError, TerrainError or ParameterError.
     """
@@ -248,7 +249,7 @@ def named_scenario(scenario: Scenario | str | Path, options: FlightOptions, prog
 
 
 def apply_options(scenario: Scenario, options: FlightOptions, program: Path | None = None) -> Scenario:
-    """Return a scenario with the weather and the flight options applied; its terrain stays.
+    """Return a scenario with the weather and the flight options applied, over the same terrain.
 
     program: the autopilot's program that flies.
     If no autopilot is named, the file of parameters decides the autopilot.
@@ -266,8 +267,8 @@ def apply_options(scenario: Scenario, options: FlightOptions, program: Path | No
             "wind", wind, "expected the direction that the wind blows from, degrees from north, -360..360"
         )
     from_course = None if from_deg is None else math.radians(from_deg)
-    flown = with_flight(at_time(scenario, options.get("at")), **flight_entries(options, program))
-    return with_wind(with_file_autopilot(flown), speed, from_course, options.get("turbulence"))
+    changed = with_flight(at_time(scenario, options.get("at")), **flight_entries(options, program))
+    return with_wind(with_file_autopilot(changed), speed, from_course, options.get("turbulence"))
 
 
 def flight_entries(options: FlightOptions, program: Path | None = None) -> dict[str, str | float | None]:
@@ -279,12 +280,12 @@ def flight_entries(options: FlightOptions, program: Path | None = None) -> dict[
     >>> entries["autopilot"], entries["px4_version"]
     ('px4', '1.16')
     """
-    aircraft, params, named = options.get("aircraft"), options.get("params"), options.get("autopilot")
-    check_arguments(autopilot=named)
-    if program is not None and named is not None:
+    aircraft, params, autopilot = options.get("aircraft"), options.get("params"), options.get("autopilot")
+    check_arguments(autopilot=autopilot)
+    if program is not None and autopilot is not None:
         allowed = "not with sitl: a real autopilot flies by its own control laws"
-        raise ArgumentError.of_argument("autopilot", named, allowed)
-    law, _, version = (named or "").partition("-")
+        raise ArgumentError.of_argument("autopilot", autopilot, allowed)
+    law, _, version = (autopilot or "").partition("-")
     return {
         # A `Path` is a folder; its absolute path marks it as a folder instead of a name.
         "aircraft": str(aircraft.resolve()) if isinstance(aircraft, Path) else aircraft,

@@ -14,7 +14,7 @@ from world.scenario import Scenario, with_zones
 
 @dataclass(frozen=True, slots=True)
 class NamedFences:
-    """Content of the files.
+    """Content of the named files of fences and zones.
 
     items: fence items, which are added to the mission's own.
     zones: zones by their file, which are added to the scenario's own.
@@ -34,8 +34,8 @@ class NamedFences:
 
     def on_scenario(self, scenario: Scenario) -> Scenario:
         """Return a scenario with the zones in addition to its own.  Raises the ScenarioError of `with_zones`."""
-        for source, found in self.zones:
-            scenario = with_zones(scenario, found.zones, source, found.notes)
+        for source, file_zones in self.zones:
+            scenario = with_zones(scenario, file_zones.zones, source, file_zones.notes)
         return scenario
 
 
@@ -55,8 +55,8 @@ def read_named_fences(files: FencePaths) -> NamedFences:
         if is_zone_file(path):
             zones.append((str(file), read_zone_file(path, str(file))))
             continue
-        found = read_fence(path)
+        fence_items = read_fence(path)
         # Check the shapes here, because the file they are from is known only here.
-        fence_zones(found, GeoOrigin(found[0].lat_deg, found[0].lon_deg), str(file))
-        items += found
+        fence_zones(fence_items, GeoOrigin(fence_items[0].lat_deg, fence_items[0].lon_deg), str(file))
+        items += fence_items
     return NamedFences(tuple(items), tuple(zones))

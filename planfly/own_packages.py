@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 PACKAGES = ("aircraft", "flight", "logs", "planner", "world")
 # Exit code of the command line for bad usage.
-_BAD_USAGE = 2
+_BAD_USAGE_CODE = 2
 
 
 class Hidden(NamedTuple):
@@ -18,7 +18,7 @@ class Hidden(NamedTuple):
 
 
 def hidden_package(home: Path) -> Hidden | None:
-    """Return the first package of planfly that a module of the same name hides, or None, without importing anything.
+    """Return the first package of planfly that a module of the same name hides, or None.  Imports nothing.
 
     home: the folder of planfly and its packages.
 
@@ -28,44 +28,44 @@ def hidden_package(home: Path) -> Hidden | None:
     '/elsewhere/aircraft/__init__.py'
     """
     for name in PACKAGES:
-        found, own = _file_of(name), home / name / "__init__.py"
-        if found is not None and found != str(own) and not _same_file(found, own):
-            return Hidden(found, str(own))
+        found_file, own_file = _module_file(name), home / name / "__init__.py"
+        if found_file is not None and found_file != str(own_file) and not _is_same_file(found_file, own_file):
+            return Hidden(found_file, str(own_file))
     return None
 
 
-def _file_of(name: str) -> str | None:
+def _module_file(name: str) -> str | None:
     if name in sys.modules:
         return getattr(sys.modules[name], "__file__", None)
     spec = find_spec(name)
     return None if spec is None else spec.origin
 
 
-def _same_file(found: str, own: Path) -> bool:
+def _is_same_file(found_file: str, own_file: Path) -> bool:
     try:
-        return own.samefile(found)
+        return own_file.samefile(found_file)
     except OSError:
         return False
 
 
-def refuse_hidden_packages() -> None:
+def check_hidden_packages() -> None:
     """Raise ImportError, with a one-line message, if a file hides a package of planfly.
 
     The command line prints this line and ends with exit code 2.
 
-    >>> refuse_hidden_packages()
+    >>> check_hidden_packages()
     """
     hidden = hidden_package(Path(__file__).parents[1])
     if hidden is None:
         return
-    line = (
+    message = (
         f"{hidden.found}: hides {hidden.own}, which planfly is made of: rename it, or keep its folder off Python's path"
         " (python -P leaves the current one out)"
     )
     if _is_command():
-        sys.stderr.write(f"planfly: {line}\n")
-        raise SystemExit(_BAD_USAGE)
-    raise ImportError(line, name="planfly", path=hidden.found)
+        sys.stderr.write(f"planfly: {message}\n")
+        raise SystemExit(_BAD_USAGE_CODE)
+    raise ImportError(message, name="planfly", path=hidden.found)
 
 
 def _is_command() -> bool:

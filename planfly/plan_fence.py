@@ -7,7 +7,7 @@ from logs.verdict.rules.fence_rule import zone_test
 
 
 def fence_of_plan(setup: FlightSetup) -> tuple[Mission, tuple[str, ...]]:
-    """Return a plan's mission with the scenario in its fence, and notes on the contents that a fence cannot store.
+    """Return a plan's mission with the scenario as its fence, and notes on the contents that a fence cannot store.
 
     Shapes that the planned path violates by the verdict's rule `fence` are left out, and named in the notes.
 
@@ -16,9 +16,9 @@ def fence_of_plan(setup: FlightSetup) -> tuple[Mission, tuple[str, ...]]:
     >>> [item.command for item in mission.fences]  # the area; the example has no missiles
     [5001, 5001, 5001, 5001]
     """
-    is_entered = zone_test(setup)
+    is_entered_zone = zone_test(setup)
 
-    def passes(shape: tuple[MissionItem, ...]) -> bool:
-        return any(is_entered(zone) for zone in fence_zones(shape, setup.scenario.origin))
+    def is_entered_shape(shape: tuple[MissionItem, ...]) -> bool:
+        return any(is_entered_zone(zone) for zone in fence_zones(shape, setup.scenario.origin))
 
-    return with_fences(setup.mission, setup.scenario, passes)
+    return with_fences(setup.mission, setup.scenario, is_entered_shape)

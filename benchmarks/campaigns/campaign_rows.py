@@ -54,13 +54,13 @@ def flights_a_minute(base: CampaignBase, workers: int, flights: int) -> float:
     """Return the flights a minute, measured from the first result of each worker on."""
     indices = iter(range(flights))
 
-    def following() -> FlightRequest | None:
+    def next_request() -> FlightRequest | None:
         index = next(indices, None)
         return None if index is None else FlightRequest(index)
 
     moments: list[float] = []
     with worker_pool(Workers(workers), base) as pool:
-        moments += [time.perf_counter() for _ in pool.fly(following)]
+        moments += [time.perf_counter() for _ in pool.fly(next_request)]
     return 60.0 * (flights - workers) / (moments[-1] - moments[workers - 1])
 
 

@@ -74,12 +74,12 @@ def _count_outcomes(
 ) -> Tally:
     indices, flown = iter(range(most)), Tally(0, 0, 0)
 
-    def following() -> FlightRequest | None:
+    def next_request() -> FlightRequest | None:
         index = None if ends(flown) else next(indices, None)
         return None if index is None else FlightRequest(index, wind)
 
     with worker_pool(Workers(2), base, fly) as pool:
-        for one in pool.fly(following):
+        for one in pool.fly(next_request):
             good = one.row.outcome == "flyable"
             flown = Tally(flown.flyable + good, flown.failed + (not good), 0)
     return flown

@@ -189,10 +189,10 @@ class LogSink(Protocol):
     def write(self, block: Track) -> None:
         """Append rows and hand them to the operating system."""
 
-    def finish(self, ended: str, hurry: Callable[[], bool]) -> FlightJudged:
+    def finish(self, ended: str, should_abort: Callable[[], bool]) -> FlightJudged:
         """Judge the flight and close the log.
 
-        hurry: returns True if the process is to end; called during long work.
+        should_abort: returns True if the process is to end; called during long work.
         """
 
     def abandon(self) -> None:
@@ -397,13 +397,13 @@ class _LoggedFlight:
                 beat = max(beat, int((clock() - begun) * SNAPSHOT_RATE))
         return ended, go_on
 
-    def finish(self, ended: str, hurry: Callable[[], bool]) -> list[FlightJudged]:
+    def finish(self, ended: str, should_abort: Callable[[], bool]) -> list[FlightJudged]:
         """Judge each route, and close its log.
 
-        hurry: as in `LogSink.finish`.
+        should_abort: as in `LogSink.finish`.
         """
         endings = (*self._ends, ended)
-        return [log.finish(how, hurry) for log, how in zip(self._logs, endings, strict=True)]
+        return [log.finish(how, should_abort) for log, how in zip(self._logs, endings, strict=True)]
 
     def abandon(self) -> None:
         """Close the logs as they are."""

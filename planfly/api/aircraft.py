@@ -17,7 +17,7 @@ from planfly.flight_options import takes_options
 from planfly.runtime.first_start import with_warm_up
 from planfly.runtime.stages import stage
 from planfly.workflow.airframe import check_level_flight
-from planfly.workflow.output_paths import expand_path_pattern, prepare_folder, refuse_folder
+from planfly.workflow.output_paths import check_output_folder, expand_path_pattern, prepare_folder
 from world.errors import PlanflyError
 from world.files import whole_path, write_whole
 from world.scenario_tables import names_folder
@@ -66,7 +66,7 @@ def aircraft(name: str | Path | None = None) -> Aircraft | dict[str, Aircraft]:
     ['aerosonde', 'c172x', 'ultrastick25e', 'x8', 'zagi']
     """
     if name is None:
-        return {known: load_aircraft(known) for known in aircraft_names()}
+        return {embedded: load_aircraft(embedded) for embedded in aircraft_names()}
     return find_aircraft(str(name.resolve()) if isinstance(name, Path) else name)
 
 
@@ -96,14 +96,15 @@ def new_aircraft(
     source: str | Path | None = None,
     *,
     overwrite: bool = False,
-    **given: Unpack[DataSheetOptions],
+    **options: Unpack[DataSheetOptions],
 ) -> Aircraft:
     """Make the folder of a new aircraft.
 
     overwrite: True replaces the folder of an aircraft, and keeps files of other kinds in it.
-    Without numbers it holds copies of another aircraft's files: source is that aircraft, a name or a folder (the
-    Aerosonde if not given).  With numbers it holds a model that matches them, scaled from published aircraft of its
-    class, and a list of what is unknown; mass, span, cruise and stall are needed, the others are estimated if missing.
+    Without numbers the folder gets copies of another aircraft's files: source is that aircraft, a name or a folder (the
+    Aerosonde if not given).  With numbers the folder gets a model that matches them, scaled from published aircraft of
+    its class, and a list of unknown properties; mass, span, cruise and stall are required, the others are estimated if
+    missing.
 
     mass: kg.  span: wing span, m.  area: wing area, m^2.
     cruise, stall, top: airspeeds of usual, slowest and fastest level flight, m/s.
@@ -125,22 +126,22 @@ def new_aircraft(
     >>> made.mass, made.airspeed, round(made.wing_area, 2)
     (2.1, 15.0, 0.32)
     """
-    stated = {name: value for name, value in given.items() if value is not None}
-    if not stated:
-        copied = _open_aircraft("aerosonde" if source is None else source)
-        model = shipped_model(copied) if copied.model.shipped else None
-        make_own_folder(Path(folder), copied, model, overwrite=overwrite)
+    sheet_values = {name: value for name, value in options.items() if value is not None}
+    if not sheet_values:
+        source_aircraft = _open_aircraft("aerosonde" if source is None else source)
+        model = shipped_model(source_aircraft) if source_aircraft.model.shipped else None
+        make_own_folder(Path(folder), source_aircraft, model, overwrite=overwrite)
         return find_aircraft(str(Path(folder).absolute()))
     if source is not None:
         raise PlanflyError.of_argument(
-            "source", source, f"goes without {next(iter(stated))}: a copy has that aircraft's numbers"
+            "source", source, f"goes without {next(iter(sheet_values))}: a copy has that aircraft's numbers"
         )
     from planfly.workflow.data_sheets import make_data_sheet_folder, parse_sheet
 
-    params = given["params"]
+    params = options["params"]
     texts = ("battery", "prop", "layout", "params")
-    numbers = {name: cast("float | None", value) for name, value in given.items() if name not in texts}
-    sheet = parse_sheet(numbers, battery=given["battery"], prop=given["prop"], layout=given["layout"])
+    sheet_numbers = {name: cast("float | None", value) for name, value in options.items() if name not in texts}
+    sheet = parse_sheet(sheet_numbers, battery=options["battery"], prop=options["prop"], layout=options["layout"])
     with stage(f"making {Path(folder).name}", "making"):
         return make_data_sheet_folder(
             Path(folder), sheet, None if params is None else Path(params), overwrite=overwrite
@@ -165,28 +166,28 @@ def describe_aircraft(
     >>> numbers.envelope.level_speeds(0.0)
     (15.9..., 32.4...)
     """
-    chosen = _open_aircraft(name)
-    identity = model_hash(chosen)
+    described = _open_aircraft(name)
+    model_sha256 = model_hash(described)
     # Invalid settings files are refused here.
-    lacking = tuple(missing for kind in AUTOPILOTS for missing in kind.missing_files(chosen))
-    folder = None if out is None else expand_path_pattern(out, chosen.name, 0)
+    lacking = tuple(missing for kind in AUTOPILOTS for missing in kind.missing_files(described))
+    folder = None if out is None else expand_path_pattern(out, described.name, 0)
     if folder is not None:
-        refuse_folder(folder, overwrite)
+        check_output_folder(folder, overwrite)
     # Compute all results before writing any file.
-    with stage(f"trimming {chosen.name}", "trimming"):
-        envelope = load_envelope(chosen, motor_braking=motor_braking)
-        check_level_flight(chosen, envelope)
-        trims = trim_table(chosen)
-        modes = {row.trim.airspeed: modes_at(chosen, row.trim.airspeed) for row in trims}
-        cruise, steps = modes_at(chosen, chosen.airspeed), step_responses(chosen)
+    with stage(f"trimming {described.name}", "trimming"):
+        envelope = load_envelope(described, motor_braking=motor_braking)
+        check_level_flight(described, envelope)
+        trims = trim_table(described)
+        modes = {row.trim.airspeed: modes_at(described, row.trim.airspeed) for row in trims}
+        cruise, steps = modes_at(described, described.airspeed), step_responses(described)
     files: tuple[Path, ...] = ()
     if folder is not None:
-        pictures = _draw_pictures(chosen, envelope, trims, modes, steps)
+        pictures = _draw_pictures(described, envelope, trims, modes, steps)
         prepare_folder(folder, tuple(pictures))
         for file, data in pictures.items():
             write_whole(folder / file, data)
         files = tuple(folder / file for file in pictures)
-    return AircraftNumbers(chosen, identity, envelope, trims, modes, cruise, steps, lacking, files)
+    return AircraftNumbers(described, model_sha256, envelope, trims, modes, cruise, steps, lacking, files)
 
 
 def _open_aircraft(name: str | Path) -> Aircraft:
@@ -201,7 +202,7 @@ def _open_aircraft(name: str | Path) -> Aircraft:
 
 
 def _draw_pictures(
-    chosen: Aircraft,
+    aircraft: Aircraft,
     envelope: Envelope,
     trims: tuple[TrimRow, ...],
     modes: Mapping[float, tuple[Mode, ...]],
@@ -213,7 +214,7 @@ def _draw_pictures(
 
     with stage("drawing", "drawing an aircraft"):
         return {
-            "envelope.png": png_bytes(draw_envelope(chosen, envelope)),
-            "trims.png": png_bytes(draw_trims(chosen, trims, modes)),
-            "steps.png": png_bytes(draw_steps(chosen, steps)),
+            "envelope.png": png_bytes(draw_envelope(aircraft, envelope)),
+            "trims.png": png_bytes(draw_trims(aircraft, trims, modes)),
+            "steps.png": png_bytes(draw_steps(aircraft, steps)),
         }

@@ -13,8 +13,8 @@ from planfly.campaigns.find_winds import (
     SEARCHED_QUANTITIES,
     WindsFound,
     WindsGoal,
-    asked_flights,
     find_winds,
+    flight_limit,
     open_winds_store,
 )
 from planfly.campaigns.flight_row import FlightRow
@@ -32,7 +32,7 @@ from planfly.flight_options import (
     named_fences,
     takes_options,
 )
-from planfly.kernel_units.unit_kernels import BOTH
+from planfly.kernel_units.unit_kernels import PLANNING_AND_FLYING
 from planfly.runtime.first_start import with_warm_up
 from planfly.runtime.stages import stage
 from planner.plan import Plan
@@ -58,17 +58,17 @@ def _open_base(
 
     A scenario is planned if the folder has no plan for it.  Raises PlanflyError; then the folder is not changed.
     """
-    named, flown = target if isinstance(target, Plan) else str(target), mission_options(options)
-    is_planned = isinstance(named, Plan) or is_mission_file(named)
+    campaign_target, flight_options = target if isinstance(target, Plan) else str(target), mission_options(options)
+    is_planned = isinstance(campaign_target, Plan) or is_mission_file(campaign_target)
 
-    def opened(planned: Path | None) -> CampaignBase:
-        made = partial(open_campaign, named, dispersions, flown, planned=planned)
+    def open_planned(planned: Path | None) -> CampaignBase:
+        make_base = partial(open_campaign, campaign_target, dispersions, flight_options, planned=planned)
         if is_planned or (planned is not None and planned.is_file()):
-            return made()
+            return make_base()
         with stage("planning") as advance:
-            return made(advance=advance)
+            return make_base(advance=advance)
 
-    return folder.open(opened)
+    return folder.open(open_planned)
 
 
 def _command_line_target(target: Plan | str | Path, folder: Path) -> str:
@@ -108,12 +108,14 @@ def continued_goal(
 
     Raises PlanflyError for numbers outside their ranges, and for a folder without a campaign.
     """
-    asked = make_goal(flights, prove, at_least, confidence)
-    return resumed_goal(None if (flights, prove, at_least) == (None, None, None) else asked, folder, confidence)
+    requested_goal = make_goal(flights, prove, at_least, confidence)
+    return resumed_goal(
+        None if (flights, prove, at_least) == (None, None, None) else requested_goal, folder, confidence
+    )
 
 
 @needs_extra("campaigns")
-@with_warm_up(*BOTH)
+@with_warm_up(*PLANNING_AND_FLYING)
 @takes_options
 def campaign(
     target: Plan | str | Path,
@@ -147,38 +149,38 @@ def campaign(
     ...
     world.errors.ArgumentError: prove 1.5: at least 0.5 and below 1 is expected
     """
-    place_of_work = _make_workers(workers, scheduler, options["seed"])
-    asked = (options["flights"], options["prove"], options["at_least"], options["confidence"])
-    goal, spread = make_goal(*asked), options["spread"]
-    with campaign_folder(out, DATABASE, resume=resume, overwrite=overwrite) as place:
+    workers_used = _make_workers(workers, scheduler, options["seed"])
+    requested = (options["flights"], options["prove"], options["at_least"], options["confidence"])
+    goal, spread = make_goal(*requested), options["spread"]
+    with campaign_folder(out, DATABASE, resume=resume, overwrite=overwrite) as directory:
         if resume:
-            goal = continued_goal(place.folder, *asked)
-        base = _open_base(target, options, _read_spread(spread), place)
-        line = campaign_line(
-            _command_line_target(target, place.folder), goal, _command_line_options(base, options, spread)
+            goal = continued_goal(directory.folder, *requested)
+        base = _open_base(target, options, _read_spread(spread), directory)
+        command_line = campaign_line(
+            _command_line_target(target, directory.folder), goal, _command_line_options(base, options, spread)
         )
-        return _fly_and_summarise(base, goal, place_of_work, place, line, keep=out is not None)
+        return _fly_and_summarise(base, goal, workers_used, directory, command_line, keep=out is not None)
 
 
 def _fly_and_summarise(
-    base: CampaignBase, goal: Goal, workers: Workers, place: OutputDirectory, line: str, *, keep: bool
+    base: CampaignBase, goal: Goal, workers: Workers, directory: OutputDirectory, command_line: str, *, keep: bool
 ) -> CampaignResult:
-    """Fly a campaign or its remaining flights, and sum it up.  keep: True keeps its folder and writes its files."""
-    table = place.folder / DATABASE
-    with open_store(base, goal, place.folder, resume=place.resume) as store:
+    """Fly a campaign or its remaining flights, and summarise them.  keep: True keeps its folder and files."""
+    table = directory.folder / DATABASE
+    with open_store(base, goal, directory.folder, resume=directory.resume) as store:
         with stage("flying", "flying a campaign") as advance:
             estimate = fly_campaign(base, goal, workers, store, advance)
-        brief = None if keep else summarise(base, goal, estimate, store)
+        short_summary = None if keep else summarise(base, goal, estimate, store)
     # The open store locks its table.
-    if brief is not None:
-        return CampaignResult(brief, read_table(table))
+    if short_summary is not None:
+        return CampaignResult(short_summary, read_table(table))
     with stage("reporting") as advance:
-        summary = finish_campaign(base, goal, estimate, place.folder, line, advance)
+        summary = finish_campaign(base, goal, estimate, directory.folder, command_line, advance)
     return CampaignResult(summary, read_table(table), table)
 
 
 @needs_extra("campaigns")
-@with_warm_up(*BOTH)
+@with_warm_up(*PLANNING_AND_FLYING)
 @takes_options
 def campaign_flight(
     target: Plan | str | Path,
@@ -195,8 +197,8 @@ def campaign_flight(
     check_arguments(index=index, seed=options["seed"])
     folder = Path(out)
     goal = continued_goal(folder, options["flights"], options["prove"], options["at_least"], options["confidence"])
-    place = OutputDirectory(folder, DATABASE, resume=True, overwrite=False)
-    base = _open_base(target, options, _read_spread(options["spread"]), place)
+    directory = OutputDirectory(folder, DATABASE, resume=True, overwrite=False)
+    base = _open_base(target, options, _read_spread(options["spread"]), directory)
     row = _flight_row(base, goal, folder, index)
     log = folder / "flights" / f"flight-{index:06d}.mcap"
     log.parent.mkdir(exist_ok=True)
@@ -217,7 +219,7 @@ def _flight_row(base: CampaignBase, goal: Goal, folder: Path, index: int) -> Fli
 
 
 @needs_extra("campaigns")
-@with_warm_up(*BOTH)
+@with_warm_up(*PLANNING_AND_FLYING)
 @takes_options
 def winds(
     target: Plan | str | Path,
@@ -252,14 +254,16 @@ def winds(
     """
     confidence, flights, spread = options["confidence"], options["flights"], options["spread"]
     check_arguments(prove=prove, confidence=confidence, directions=directions, most=most, flights=flights)
-    place_of_work = _make_workers(options["workers"], options["scheduler"], options["seed"])
-    with campaign_folder(out, WINDS_DATABASE, resume=resume, overwrite=overwrite) as place:
-        folder = place.folder
-        goal = WindsGoal(prove, confidence, directions, most, asked_flights(flights, folder, resume=resume))
-        base = _open_base(target, options, _read_spread(spread).without(SEARCHED_QUANTITIES), place)
+    workers_used = _make_workers(options["workers"], options["scheduler"], options["seed"])
+    with campaign_folder(out, WINDS_DATABASE, resume=resume, overwrite=overwrite) as directory:
+        folder = directory.folder
+        goal = WindsGoal(prove, confidence, directions, most, flight_limit(flights, folder, resume=resume))
+        base = _open_base(target, options, _read_spread(spread).without(SEARCHED_QUANTITIES), directory)
         with open_winds_store(base, goal, folder, resume=resume) as store, stage("flying", "winds") as advance:
-            found = find_winds(base, goal, place_of_work, store, advance)
+            found = find_winds(base, goal, workers_used, store, advance)
         if out is not None:
-            line = winds_line(_command_line_target(target, folder), goal, _command_line_options(base, options, spread))
-            write_winds(folder, base, found, line)
+            command_line = winds_line(
+                _command_line_target(target, folder), goal, _command_line_options(base, options, spread)
+            )
+            write_winds(folder, base, found, command_line)
     return found

@@ -10,13 +10,13 @@ from platformdirs import user_cache_dir
 from flight.mission_files.formats import read_mission
 from planfly.arguments import check_arguments
 from planfly.runtime.stages import stage
-from planfly.workflow.output_paths import refuse_existing
+from planfly.workflow.output_paths import check_output_file
 from world.errors import ArgumentError, PlanflyError
 from world.remote_files import is_address
 from world.terrain_cut import COPERNICUS, Box, CutTerrain, cut_from_files, cut_from_server
 
 # Length of a degree of latitude, km.
-_DEGREE = 111.2
+_DEGREE_KM = 111.2
 # Maximum absolute latitude of an area, degrees.
 _MAX_LATITUDE_DEG = 84.0
 
@@ -56,51 +56,51 @@ def terrain(
     target = Path(out)
     if target.suffix.lower() not in (".tif", ".tiff"):
         raise PlanflyError(f"{target}: a name that ends with .tif is expected", file=target)
-    refuse_existing(target, overwrite, Path(around) if around is not None else None)
+    check_output_file(target, overwrite, Path(around) if around is not None else None)
     area = _widen(_parse_box(box) if box is not None else _mission_box(Path(str(around))), margin)
-    named = str(source)
-    with stage("fetching terrain" if "://" in named else "cutting terrain") as advance:
-        if "://" not in named:
-            refuse_existing(target, True, Path(named))
-            return cut_from_files(Path(named), area, target)
-        if not is_address(named):
+    source_name = str(source)
+    with stage("fetching terrain" if "://" in source_name else "cutting terrain") as advance:
+        if "://" not in source_name:
+            check_output_file(target, True, Path(source_name))
+            return cut_from_files(Path(source_name), area, target)
+        if not is_address(source_name):
             allowed = "a folder, or the address of one by http or https, is expected"
-            raise ArgumentError.of_argument("source", named, allowed, shown=ascii(named))
-        with tempfile.TemporaryDirectory() as instead:
-            return cut_from_server(named, area, target, _cache_folder(Path(instead)), advance, sea=sea)
+            raise ArgumentError.of_argument("source", source_name, allowed, shown=ascii(source_name))
+        with tempfile.TemporaryDirectory() as fallback:
+            return cut_from_server(source_name, area, target, _cache_folder(Path(fallback)), advance, sea=sea)
 
 
-def _parse_box(given: Sequence[float]) -> Box:
+def _parse_box(edges: Sequence[float]) -> Box:
     """Return the box with the given edges.  Raises ArgumentError for invalid edges."""
     try:
-        south, west, north, east = (float(value) for value in given)
+        south, west, north, east = (float(value) for value in edges)
     except (TypeError, ValueError):
         south = west = north = east = math.nan
     # NaN must fail these comparisons.  An area may lie across the 180th meridian, from 179 to -179 or to 181.
-    around = east + 360.0 if east < west else east
+    unwrapped_east = east + 360.0 if east < west else east
     if not (
         -_MAX_LATITUDE_DEG <= south < north <= _MAX_LATITUDE_DEG
         and -180.0 <= west <= 180.0
-        and west < around <= west + 30.0
+        and west < unwrapped_east <= west + 30.0
     ):
         allowed = "south, west, north, east are expected, degrees -84..84 and -180..180, south below north"
-        raise ArgumentError.of_argument("box", given, allowed)
-    return Box(south, west, north, around)
+        raise ArgumentError.of_argument("box", edges, allowed)
+    return Box(south, west, north, unwrapped_east)
 
 
 def _mission_box(file: Path) -> Box:
     """Return the smallest box around all items, home, fences and rally points of a mission.  Raises PlanflyError."""
     mission = read_mission(file)
     places = [
-        (one.lat_deg, one.lon_deg) for one in (*mission.items, *mission.fences, *mission.rally) if one.has_position
+        (item.lat_deg, item.lon_deg) for item in (*mission.items, *mission.fences, *mission.rally) if item.has_position
     ]
     if mission.home is not None:
         places.append((mission.home.lat_deg, mission.home.lon_deg))
     if not places:
         raise PlanflyError(f"{file}: contains no coordinates", file=file)
-    first = places[0][1]
+    first_lon = places[0][1]
     lats = [lat for lat, _ in places]
-    lons = [first + (lon - first + 180.0) % 360.0 - 180.0 for _, lon in places]
+    lons = [first_lon + (lon - first_lon + 180.0) % 360.0 - 180.0 for _, lon in places]
     if max(abs(lat) for lat in lats) > _MAX_LATITUDE_DEG or max(lons) - min(lons) > 30.0:
         raise PlanflyError(
             f"{file}: its places lie too far apart, or beyond {_MAX_LATITUDE_DEG:g} degrees of latitude", file=file
@@ -110,17 +110,17 @@ def _mission_box(file: Path) -> Box:
 
 def _widen(box: Box, margin: float) -> Box:
     """Return the box widened by a margin on every side.  margin: km."""
-    up = margin / _DEGREE
-    across = up / math.cos(math.radians(min(_MAX_LATITUDE_DEG, max(abs(box.south), abs(box.north)))))
-    return Box(box.south - up, box.west - across, box.north + up, box.east + across)
+    lat_margin = margin / _DEGREE_KM
+    lon_margin = lat_margin / math.cos(math.radians(min(_MAX_LATITUDE_DEG, max(abs(box.south), abs(box.north)))))
+    return Box(box.south - lat_margin, box.west - lon_margin, box.north + lat_margin, box.east + lon_margin)
 
 
-def _cache_folder(instead: Path) -> Path:
-    """Return the cache folder of downloaded parts, or `instead` if the user's cache cannot be written."""
+def _cache_folder(fallback: Path) -> Path:
+    """Return the cache folder of downloaded parts, or `fallback` if the user's cache cannot be written."""
     folder = Path(user_cache_dir("planfly")) / "terrain"
     try:
         folder.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryFile(dir=folder):
             return folder
     except OSError:
-        return instead
+        return fallback

@@ -9,7 +9,7 @@ from pathlib import Path
 from aircraft.catalog import find_aircraft
 from planfly.arguments import check_arguments, is_place
 from planfly.runtime.stages import stage
-from planfly.workflow.output_paths import refuse_existing
+from planfly.workflow.output_paths import check_output_file
 from world.elevation_formats import EMBEDDED
 from world.errors import ArgumentError, PlanflyError
 from world.files import whole_path, write_whole
@@ -51,11 +51,11 @@ def new_scenario(
     ('ridge.toml', True)
     """
     check_arguments(height=height, autopilot=autopilot)
-    ends = _parse_place("start", start), _parse_place("destination", destination)
+    endpoints = _parse_place("start", start), _parse_place("destination", destination)
     target = Path(folder)
     name = Path(whole_path(target)).name if ".." in target.parts else target.absolute().name
     file = _scenario_file(target, name, overwrite=overwrite)
-    law, _, version = (autopilot or DEFAULT_AUTOPILOT).partition("-")
+    autopilot_name, _, version = (autopilot or DEFAULT_AUTOPILOT).partition("-")
     ground = None if terrain is None else _absolute_path(terrain, is_name=terrain in EMBEDDED)
     model = _absolute_path(aircraft, is_name=isinstance(aircraft, str) and not names_folder(aircraft))
     airspeed = find_aircraft(model).airspeed
@@ -63,21 +63,23 @@ def new_scenario(
         raster = None if ground is None else open_raster(ground)
         draft = make_draft(
             name,
-            ends[0],
-            ends[1],
+            endpoints[0],
+            endpoints[1],
             height,
             raster=raster,
             terrain=ground,
             aircraft=model,
             airspeed=airspeed,
-            autopilot=law,
+            autopilot=autopilot_name,
             px4_version=version or None,
         )
         # Parse the text as it will be read from the file, so that a fault is found before anything is written.
         from_spec(parse_scenario(draft_text(draft), str(file)), str(file))
-    moved = replace(draft, terrain=ground and _relative_path(target, ground), aircraft=_relative_path(target, model))
+    relative_draft = replace(
+        draft, terrain=ground and _relative_path(target, ground), aircraft=_relative_path(target, model)
+    )
     target.mkdir(exist_ok=True)
-    write_whole(file, draft_text(moved))
+    write_whole(file, draft_text(relative_draft))
     return file
 
 
@@ -90,32 +92,32 @@ def _scenario_file(folder: Path, name: str, *, overwrite: bool) -> Path:
         raise PlanflyError(f"{folder}: a folder is expected; the scenario is written into it", file=folder)
     file = folder / f"{name}.toml"
     if folder.is_dir():
-        refuse_existing(file, overwrite)
+        check_output_file(file, overwrite)
     elif not folder.absolute().parent.is_dir():
         raise PlanflyError(f"{folder}: its folder {folder.parent} does not exist", file=folder)
     return file
 
 
-def _parse_place(keyword: str, given: Sequence[float]) -> Place:
+def _parse_place(keyword: str, coordinates: Sequence[float]) -> Place:
     """Return a place by its latitude and longitude.  Raises ArgumentError for an invalid place."""
     try:
-        lat, lon = (float(value) for value in given)
+        lat, lon = (float(value) for value in coordinates)
     except (TypeError, ValueError):
         lat = lon = math.nan
     if not is_place(lat, lon):
-        raise ArgumentError.of_argument(keyword, given, "latitude -89..89 and longitude -180..180 are expected")
+        raise ArgumentError.of_argument(keyword, coordinates, "latitude -89..89 and longitude -180..180 are expected")
     return Place(lat, lon)
 
 
-def _absolute_path(given: str | Path, *, is_name: bool) -> str:
+def _absolute_path(path: str | Path, *, is_name: bool) -> str:
     """Return the absolute path of a file, or an embedded name unchanged."""
-    return str(given) if is_name else whole_path(Path(given))
+    return str(path) if is_name else whole_path(Path(path))
 
 
-def _relative_path(folder: Path, given: str) -> str:
+def _relative_path(folder: Path, path: str) -> str:
     """Return an absolute path relative to a folder, as a file in that folder names it, or a name unchanged."""
-    if not Path(given).is_absolute():
-        return given
-    relative = os.path.relpath(given, whole_path(folder))
+    if not Path(path).is_absolute():
+        return path
+    relative = os.path.relpath(path, whole_path(folder))
     # The slash marks the text as the folder of an aircraft, not a name.
     return relative if "/" in relative else f"./{relative}"

@@ -33,7 +33,7 @@ from planfly.rtl.return_summary import return_summary
 from planfly.runtime.first_start import with_warm_up
 from planfly.runtime.stages import stage
 from planfly.workflow.open_flight import open_flight
-from planfly.workflow.output_paths import refuse_existing
+from planfly.workflow.output_paths import check_output_file
 from planner.plan import Plan, plan_json
 from world.errors import MissionError, PlanflyError
 from world.extras import need_extra
@@ -46,7 +46,7 @@ MAPS = {".kml": kml_text, ".gpx": gpx_text}
 # Suffixes of files with the autopilot parameters that returns, rally points, take-off and landing are judged with.
 PARAMETERS = (".parm",)
 # Prefixes of the names of these parameters.
-_JUDGED = ("RTL_", "RALLY_", "LAND_", "TECS_LAND_", "TKOFF_", "FW_LND_", "FW_TKO_", "NAV_DLL_ACT")
+_JUDGED_PREFIXES = ("RTL_", "RALLY_", "LAND_", "TECS_LAND_", "TKOFF_", "FW_LND_", "FW_TKO_", "NAV_DLL_ACT")
 # Suffixes of formats that only a flight log can be exported to.
 LOGS = (".csv", ".parquet", ".tlog", ".ulg")
 # Names of contents in messages, by suffix.
@@ -126,15 +126,15 @@ def export(
         path = _source_path(source, place)
         for target in targets:
             if target.suffix.lower() not in (*MAPS, *PARAMETERS, *LOGS):
-                _refuse_unknown(target)
-            refuse_existing(target, overwrite, path)
-        found = _read_source(path, targets, {"fence": fence, "at": at})
-        texts = [_target_content(found, target) for target in targets]
-    for target, (text, _) in zip(targets, texts, strict=True):
-        write_whole(target, text)
-    loss = "" if found.log is None else loss_text(found.log)
-    notes = (*found.mission.warnings, *found.notes, *([loss] if loss else []))
-    return ExportedFiles(targets, notes, tuple(content for _, content in texts), loss)
+                _check_suffix(target)
+            check_output_file(target, overwrite, path)
+        parts = _read_source(path, targets, {"fence": fence, "at": at})
+        contents = [_target_content(parts, target) for target in targets]
+    for target, (data, _) in zip(targets, contents, strict=True):
+        write_whole(target, data)
+    loss = "" if parts.log is None else loss_text(parts.log)
+    notes = (*parts.mission.warnings, *parts.notes, *([loss] if loss else []))
+    return ExportedFiles(targets, notes, tuple(description for _, description in contents), loss)
 
 
 def _source_path(source: FlightLog | FlownMission | Plan | str | Path, place: contextlib.ExitStack) -> Path:
@@ -152,7 +152,7 @@ def _source_path(source: FlightLog | FlownMission | Plan | str | Path, place: co
     return Path(source)
 
 
-def _refuse_unknown(target: Path) -> None:
+def _check_suffix(target: Path) -> None:
     try:
         mission_kind(target)
     except MissionError:
@@ -170,14 +170,14 @@ def _read_source(path: Path, targets: tuple[Path, ...], options: MissionOptions)
         if options["fence"]:
             allowed = "a log is exported with the fence that it was flown with"
             raise MissionError.of_argument("fence", options["fence"], allowed, shown="", file=path)
-        return _read_log(path, coloured=_needs_kml(targets))
+        return _read_log(path, needs_returns=_needs_kml(targets))
     for target in targets:
         suffix = target.suffix
         if suffix.lower() in LOGS:
             message = f"{target}: {suffix} is written of a flight log (.mcap), and {path} is none"
             raise MissionError(message, file=target, field="suffix", value=suffix)
-    placed = any(target.suffix.lower() in (*MAPS, *PARAMETERS) for target in targets)
-    return _read_mission(path, options, placed=placed, coloured=_needs_kml(targets))
+    needs_world = any(target.suffix.lower() in (*MAPS, *PARAMETERS) for target in targets)
+    return _read_mission(path, options, needs_world=needs_world, needs_returns=_needs_kml(targets))
 
 
 def _needs_kml(targets: tuple[Path, ...]) -> bool:
@@ -193,41 +193,41 @@ def _with_returns(source: _Source, setup: FlightSetup, track: Track | None) -> _
     return replace(source, returns=return_lines(setup, drawn), footprint=glide_shapes(setup, drawn))
 
 
-def _read_log(path: Path, *, coloured: bool) -> _Source:
+def _read_log(path: Path, *, needs_returns: bool) -> _Source:
     log = read_log(path)
     lines = {"plan": plan_line(log.setup)}
     if len(log.track):
         lines["flown"] = track_line(log.setup, log.track)
     setup = log.setup
     source = _Source(setup.mission, setup.scenario.name, lines, map_zones(setup), log=log, autopilot=setup.autopilot)
-    return _with_returns(source, log.setup, log.track) if coloured else source
+    return _with_returns(source, log.setup, log.track) if needs_returns else source
 
 
-def _read_mission(path: Path, options: MissionOptions, *, placed: bool, coloured: bool) -> _Source:
+def _read_mission(path: Path, options: MissionOptions, *, needs_world: bool, needs_returns: bool) -> _Source:
     """Read a plan or a mission file; place the mission in its scenario if a target, a plan or a fence needs this."""
     if not path.is_file():
         raise MissionError(f"{path}: no such file; a plan.json, mission file or log is expected", file=path)
     is_plan, fences = path.suffix.lower() == ".json", read_named_fences(options["fence"])
-    if not (placed or is_plan or fences.zones or options["at"] is not None):
+    if not (needs_world or is_plan or fences.zones or options["at"] is not None):
         mission = fences.on_mission(read_mission(path))
         return _Source(replace(mission, autopilot=mission.autopilot or DEFAULT_AUTOPILOT), path.stem)
     # Mission items have no times, so select the zones that are active during the flight.
     setup = open_flight(path, options)
-    line, zones = {"plan": plan_line(setup)}, map_zones(setup)
-    source = _Source(setup.mission, setup.scenario.name, line, zones, autopilot=setup.autopilot)
-    source = _with_returns(source, setup, None) if coloured else source
+    lines, zones = {"plan": plan_line(setup)}, map_zones(setup)
+    source = _Source(setup.mission, setup.scenario.name, lines, zones, autopilot=setup.autopilot)
+    source = _with_returns(source, setup, None) if needs_returns else source
     if not is_plan:
         return _with_zones(source, setup.scenario)
     mission, notes = fence_of_plan(setup)
-    lack = missing_ends_text(mission, setup.autopilot.mission_checks) if setup.autopilot.refuses else ""
-    return replace(source, mission=mission, notes=(*notes, *([lack] if lack else [])))
+    missing_ends = missing_ends_text(mission, setup.autopilot.mission_checks) if setup.autopilot.refuses else ""
+    return replace(source, mission=mission, notes=(*notes, *([missing_ends] if missing_ends else [])))
 
 
 def _with_zones(source: _Source, scenario: Scenario) -> _Source:
     """Return the source with the zones of the scenario as fence items, in addition to the mission's own fences."""
     items, notes = zone_fences(scenario.zones, scenario.origin)
-    fenced = replace(source.mission, fences=numbered([*source.mission.fences, *items]))
-    return replace(source, mission=fenced, notes=tuple(notes))
+    mission = replace(source.mission, fences=numbered([*source.mission.fences, *items]))
+    return replace(source, mission=mission, notes=tuple(notes))
 
 
 def _target_content(source: _Source, target: Path) -> tuple[str | bytes, str]:
@@ -238,12 +238,12 @@ def _target_content(source: _Source, target: Path) -> tuple[str | bytes, str]:
     if suffix in LOGS and source.log is not None:
         return _flight_content(source.log, suffix)
     if suffix in MAPS:
-        parts = [*source.lines, *([f"{len(source.zones)} zones"] if source.zones else [])]
+        descriptions = [*source.lines, *([f"{len(source.zones)} zones"] if source.zones else [])]
         lines, zones = list(source.lines.values()), source.zones
         if suffix == ".kml" and source.returns:
             lines, zones = lines + source.returns, zones + source.footprint
-            parts.append("returns")
-        return MAPS[suffix](source.name, lines, zones), " and ".join(parts)
+            descriptions.append("returns")
+        return MAPS[suffix](source.name, lines, zones), " and ".join(descriptions)
     if suffix in PARAMETERS and source.autopilot is not None:
         return judged_parameters(mission.source, source.autopilot)
     kind = mission_kind(target)
@@ -263,11 +263,11 @@ def judged_parameters(mission: str, autopilot: Autopilot) -> tuple[str, str]:
 
     mission: name of the mission in messages.  Raises MissionError for an autopilot without such parameters.
     """
-    found = () if autopilot.parameters is None else autopilot.parameters.values
-    values = {name: value for name, value, _ in found if name.startswith(_JUDGED)}
+    parameters = () if autopilot.parameters is None else autopilot.parameters.values
+    values = {name: value for name, value, _ in parameters if name.startswith(_JUDGED_PREFIXES)}
     if not values:
-        who = f"{autopilot.title} has no parameters of take-off, landing and returns"
-        raise MissionError(f"{mission}: {who}", file=mission, field="autopilot")
+        reason = f"{autopilot.title} has no parameters of take-off, landing and returns"
+        raise MissionError(f"{mission}: {reason}", file=mission, field="autopilot")
     title = f"{autopilot.title}: take-off, landing and returns as planfly judged the mission with"
     return parameters_text(values, title), f"{len(values)} parameters of {autopilot.title}"
 
@@ -277,16 +277,16 @@ def _flight_content(log: FlightLog, suffix: str) -> tuple[str | bytes, str]:
 
     Only the libraries that the format needs are imported.
     """
-    content = f"{len(log.track):,} rows, {log.end_time:.0f} s"
+    description = f"{len(log.track):,} rows, {log.end_time:.0f} s"
     if suffix == ".tlog":
         need_extra("live", ".tlog needs")
         from logs.views.exports.telemetry_file import telemetry_bytes
 
-        return telemetry_bytes(log), content
+        return telemetry_bytes(log), description
     if suffix == ".ulg":
         from logs.views.exports.log_files import px4_log_bytes
 
-        return px4_log_bytes(log), content
+        return px4_log_bytes(log), description
     from logs.views.exports.log_files import csv_text, parquet_bytes
 
-    return (csv_text(log) if suffix == ".csv" else parquet_bytes(log)), content
+    return (csv_text(log) if suffix == ".csv" else parquet_bytes(log)), description

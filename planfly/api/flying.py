@@ -27,16 +27,16 @@ from planfly.flight_options import (
     options_of_log,
     takes_options,
 )
-from planfly.kernel_units.unit_kernels import BOTH, FLYING
+from planfly.kernel_units.unit_kernels import FLYING, PLANNING_AND_FLYING
 from planfly.named_fences import NamedFences, read_named_fences
 from planfly.rtl.return_summary import ReturnSummary, returns_line
 from planfly.runtime.first_start import with_warm_up
-from planfly.runtime.stages import say_replaced, stage
+from planfly.runtime.stages import report_replaced, stage
 from planfly.workflow import pipeline
 from planfly.workflow.airframe import airframe_of
 from planfly.workflow.crash_safe_log import FlightLimits, flight_kind, flight_text
 from planfly.workflow.open_flight import open_flight
-from planfly.workflow.output_paths import FLY_LOG, LOG_FIGURES, file_target, prepare_folder, refuse_existing
+from planfly.workflow.output_paths import FLY_LOG, LOG_FIGURES, check_output_file, file_target, prepare_folder
 from planfly.workflow.pipeline import PlanThenFly, autopilot_log, fly_and_judge
 from planfly.workflow.suggestion_trials import judge_mission
 from planner.plan import Plan
@@ -128,7 +128,7 @@ class Judged:
 # Fly a mission.
 
 
-@with_warm_up(*BOTH)
+@with_warm_up(*PLANNING_AND_FLYING)
 @takes_options
 def plan_then_fly(
     scenario: Scenario | str | Path,
@@ -152,7 +152,7 @@ def plan_then_fly(
     """
     check_arguments(seed=seed)
     if log is not None:
-        refuse_existing(Path(log), overwrite=True)
+        check_output_file(Path(log), overwrite=True)
     world = named_scenario(scenario, options)
     return pipeline.plan_then_fly(world, seed=seed, log=None if log is None else Path(log))
 
@@ -217,8 +217,10 @@ def fly(
             returns=target is not None,
         )
     target = target if len(flown.track) else None
-    own = None if target is None or program is None else autopilot_log(target, program)
-    return FlownMission(flown.setup, flown.track, flown.verdict, flown.ended, flown.events, target, own, flown.returns)
+    program_log = None if target is None or program is None else autopilot_log(target, program)
+    return FlownMission(
+        flown.setup, flown.track, flown.verdict, flown.ended, flown.events, target, program_log, flown.returns
+    )
 
 
 @with_warm_up(*FLYING)
@@ -237,14 +239,16 @@ def fly_by_each(
     >>> list(flown), flown["planfly"].flyable
     (['planfly', 'px4'], True)
     """
-    named = list(dict.fromkeys(autopilots))
-    if not named:
+    names = list(dict.fromkeys(autopilots))
+    if not names:
         raise ArgumentError.of_argument("autopilots", "", "at least one autopilot is expected")
-    check_arguments(autopilot=named)
-    own = {name: value for name, value in options.items() if name in ("params", "guidance", "autopilot")}
-    refuse(_source_name(mission), own, "belongs to one autopilot, and several are named")
+    check_arguments(autopilot=names)
+    per_autopilot_options = {
+        name: value for name, value in options.items() if name in ("params", "guidance", "autopilot")
+    }
+    refuse_keywords(_source_name(mission), per_autopilot_options, "belongs to one autopilot, and several are named")
     flown = {}
-    for name in named:
+    for name in names:
         options["autopilot"] = name
         flown[name] = fly(mission, **options)
     return flown
@@ -260,12 +264,12 @@ def _prepare_log_file(
     source = None if isinstance(mission, Plan) else Path(mission)
     target = file_target(log, setup.name, setup.seed, overwrite=overwrite, source=source)
     if program is not None:
-        refuse_existing(autopilot_log(target, program), overwrite, source)
+        check_output_file(autopilot_log(target, program), overwrite, source)
     target.parent.mkdir(parents=True, exist_ok=True)
     if log == FLY_LOG:
-        # The report and its pictures are of the flight before.
+        # Remove the report and the pictures of the previous flight.
         prepare_folder(target.parent, LOG_FIGURES)
-    say_replaced(target, *((autopilot_log(target, program),) if program is not None else ()))
+    report_replaced(target, *((autopilot_log(target, program),) if program is not None else ()))
     return target
 
 
@@ -282,7 +286,7 @@ def judge(
 
     what: a flight log or its path, an autopilot's log, a result of `planfly.fly`, a `Plan`, or the path of a plan.json,
     .waypoints or .plan.
-    geometry: True judges a plan or a mission by its geometry alone, without a flight.
+    geometry: True judges a plan or a mission by its geometry only, without a flight.
     options: for a plan or mission, see `planfly.fly`.  A flight is judged as it was flown; of these options, only
     `terrain`, which replaces its terrain, and `fence`, which adds fences, are allowed.
     plan, flight, datum: for an autopilot's log, see `planfly.import_log`.
@@ -293,23 +297,23 @@ def judge(
     ['autopilot', 'geometric']
     """
     if isinstance(what, str | Path) and is_imported_log(Path(what)):
-        # Imported here: only this check needs the libraries that read the logs of other programs.
+        # Imported here: only this branch needs the libraries that read the logs of other programs.
         from planfly.api.imported import read_imported
 
-        found = read_imported(what, **options)
-        return Judged(found.setup, found.verdict, lossy=found.lossy, track=found.track, is_log=True)
+        imported = read_imported(what, **options)
+        return Judged(imported.setup, imported.verdict, lossy=imported.lossy, track=imported.track, is_log=True)
     source = _source_name(what)
-    refuse(source, options_of_log(options), "goes with an imported log, not with this file")
+    refuse_keywords(source, options_of_log(options), "goes with an imported log, not with this file")
     if isinstance(what, FlightLog | FlownMission) or (isinstance(what, str | Path) and is_log(Path(what))):
-        refuse_other_flight(source, options)
-        refuse(source, {"geometry": geometry or None}, "a flight is judged as it was flown")
+        check_judging_options(source, options)
+        refuse_keywords(source, {"geometry": geometry or None}, "a flight is judged as it was flown")
         what = read_log(Path(what)) if isinstance(what, str | Path) else what
         return _judge_flight(what, options["terrain"], read_named_fences(options["fence"]))
-    mission = mission_options(options)
+    flight_options = mission_options(options)
     if not geometry:
-        flown = fly(what, **mission)
+        flown = fly(what, **flight_options)
         return Judged(flown.setup, flown.verdict, track=flown.track if len(flown.track) else None)
-    setup = open_flight(what, mission)
+    setup = open_flight(what, flight_options)
     return Judged(setup, judge_mission(setup))
 
 
@@ -340,28 +344,30 @@ def _source_name(what: FlightLog | FlownMission | Plan | str | Path) -> str:
     return what.scenario.name if isinstance(what, Plan) else str(what)
 
 
-def refuse(source: str, given: Mapping[str, Any], allowed: str) -> None:
-    """Raise ScenarioError for the first given keyword, because it does not apply to the judged source.
+def refuse_keywords(source: str, keywords: Mapping[str, Any], reason: str) -> None:
+    """Raise ScenarioError for the first keyword with a value, because none applies to the judged source.
 
-    given: keywords and their values; None is a keyword that was not given.
-    allowed: reason for the message.
+    keywords: keywords and their values; None is a keyword that was not given.
+    reason: text of the message.
     """
-    for name, value in given.items():
+    for name, value in keywords.items():
         if value is not None:
-            raise ScenarioError.of_argument(name, value, allowed, shown="", file=source)
+            raise ScenarioError.of_argument(name, value, reason, shown="", file=source)
 
 
 # Reason why a log cannot be judged in another world, in messages.
-_AS_FLOWN = "a log is judged with the aircraft, the speeds, the wind and the autopilot it was flown with"
+_JUDGED_AS_FLOWN_TEXT = "a log is judged with the aircraft, the speeds, the wind and the autopilot it was flown with"
 # Reason why a log cannot be judged in another scenario, in messages.
-_WHERE_FLOWN = "a log is judged in the scenario it carries; only `terrain` replaces its ground"
+_JUDGED_IN_SCENARIO_TEXT = "a log is judged in the scenario it carries; only `terrain` replaces its ground"
 
 
-def refuse_other_flight(source: str, options: MissionOptions) -> None:
+def check_judging_options(source: str, options: MissionOptions) -> None:
     """Raise ScenarioError for an option that would change the flight recorded in a log."""
-    kept = (*LOG_OPTIONS, "terrain", "fence", "scenario")
-    refuse(source, {name: value for name, value in options.items() if name not in kept}, _AS_FLOWN)
-    refuse(source, {"scenario": options["scenario"]}, _WHERE_FLOWN)
+    allowed_options = (*LOG_OPTIONS, "terrain", "fence", "scenario")
+    refuse_keywords(
+        source, {name: value for name, value in options.items() if name not in allowed_options}, _JUDGED_AS_FLOWN_TEXT
+    )
+    refuse_keywords(source, {"scenario": options["scenario"]}, _JUDGED_IN_SCENARIO_TEXT)
 
 
 def _judge_flight(flight: FlightLog | FlownMission, terrain: str | Path | None, fences: NamedFences) -> Judged:

@@ -11,7 +11,7 @@ from typing import Any, Unpack
 from planfly.api.planning import stop_condition
 from planfly.arguments import RANGES, check_arguments
 from planfly.flight_options import FlightOptions, named_scenario, takes_options
-from planfly.kernel_units.unit_kernels import CHOOSING
+from planfly.kernel_units.unit_kernels import FRONT_PLANNING
 from planfly.planning.pareto_plans import make_pareto_plans
 from planfly.runtime.first_start import with_warm_up
 from planfly.runtime.stages import stage
@@ -27,7 +27,7 @@ FRONT_FOLDER = f"{RUN_FOLDER}-front"
 # Name and version of the format of front.json.
 TABLE_SCHEMA = "planfly.front/1"
 # Energy of one watt hour, J.
-WATT_HOUR = 3600.0
+WATT_HOUR_J = 3600.0
 # Columns of the table of a front.
 COLUMNS = ("plan", "length_m", "exposure_s", "clearance_m", "energy_wh", "time_s")
 # Files of the pictures of a front.
@@ -39,7 +39,7 @@ FRONT_FILES = (
 )
 
 
-@with_warm_up(*CHOOSING)
+@with_warm_up(*FRONT_PLANNING)
 @takes_options
 def plan_front(
     scenario: Scenario | str | Path,
@@ -71,22 +71,22 @@ def plan_front(
     """
     check_arguments(front=count, seed=seed, seconds=seconds)
     world = named_scenario(scenario, options)
-    number = choose_seed(world, seed)
+    chosen_seed = choose_seed(world, seed)
     airframe = load_airframe(world)
     folder = None
     if out is not None:
-        folder = clean_folder(expand_path_pattern(out, world.name, number), FRONT_FILES, overwrite=overwrite)
+        folder = clean_folder(expand_path_pattern(out, world.name, chosen_seed), FRONT_FILES, overwrite=overwrite)
     with stage(f"planning a front of {world.name}", "planning a front") as advance:
-        found = make_pareto_plans(world, airframe, number, count, advance, stop=stop_condition(seconds, stop))
+        front = make_pareto_plans(world, airframe, chosen_seed, count, advance, stop=stop_condition(seconds, stop))
     if folder is not None:
-        _write_front(found, world, folder)
-    return found
+        _write_front(front, world, folder)
+    return front
 
 
 def _write_front(front: Front, world: Scenario, folder: Path) -> None:
     """Write plans, tables and pictures; a front without plans gets only the empty tables."""
-    for number, one in enumerate(front.plans, 1):
-        write_whole(folder / f"plan-{number}.json", plan_json(one.plan))
+    for number, front_plan in enumerate(front.plans, 1):
+        write_whole(folder / f"plan-{number}.json", plan_json(front_plan.plan))
     rows = table_rows(front)
     text = io.StringIO()
     table = csv.writer(text, lineterminator="\n")
@@ -119,11 +119,17 @@ def _write_front(front: Front, world: Scenario, folder: Path) -> None:
 
 def table_rows(front: Front) -> list[dict[str, Any]]:
     """Return the rows of the table of a front, with the keys `COLUMNS`; an unknown energy is None."""
-    return [_table_row(number, one) for number, one in enumerate(front.plans, 1)]
+    return [_table_row(number, front_plan) for number, front_plan in enumerate(front.plans, 1)]
 
 
-def _table_row(number: int, one: FrontPlan) -> dict[str, Any]:
-    values = (one.length, one.exposure, one.clearance, one.energy / WATT_HOUR, one.time)
+def _table_row(number: int, front_plan: FrontPlan) -> dict[str, Any]:
+    values = (
+        front_plan.length,
+        front_plan.exposure,
+        front_plan.clearance,
+        front_plan.energy / WATT_HOUR_J,
+        front_plan.time,
+    )
     digits = (1, 3, 2, 3, 2)
     rounded = [
         round(value, places) if math.isfinite(value) else None for value, places in zip(values, digits, strict=True)

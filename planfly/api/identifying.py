@@ -12,14 +12,14 @@ from aircraft.identification.estimate import Estimate, estimate_model
 from aircraft.identification.flight_record import GRID_HZ, FlightRecord
 from logs.importers.motion import MotionLog
 from logs.importers.motion_log import read_motion
-from planfly.identification.base_numbers import base_model, scaled
+from planfly.identification.base_numbers import base_model, scale_model
 from planfly.identification.checks import check_estimate
 from planfly.identification.folder import Identified, folder_files, make_identified
 from planfly.identification.model_text import check_base
 from planfly.identification.records import (
+    AMPLE_HZ,
     LEFT,
     MIN_HZ,
-    PLENTY_HZ,
     flight_records,
     log_outputs,
     recording_setting,
@@ -102,7 +102,7 @@ def identify_aircraft(
 
     logs: `.BIN` or `.ulg` of one aircraft with one mass, with inertial sensors and servo outputs.
     folder: the folder to make.  overwrite: True replaces the folder of an aircraft.
-    mass: kg, in flight.  span: of the wing, m.  area: of the wing, m^2; None takes the ratio of area to squared span
+    mass: mass in flight, kg.  span: wing span, m.  area: wing area, m^2; None takes the ratio of area to squared span
     from the base.
     battery: volts and capacity, "44.4V,888Wh"; None takes the battery of the base.
     base: the most similar aircraft, by name or folder; it supplies every property that the logs do not show.
@@ -110,74 +110,89 @@ def identify_aircraft(
     Raises a `planfly.PlanflyError` for logs that cannot be used; then nothing is written.
     """
     target = check_new_folder(Path(folder), overwrite=overwrite)
-    paths = [Path(one) for one in ([logs] if isinstance(logs, str | Path) else logs)]
+    paths = [Path(path) for path in ([logs] if isinstance(logs, str | Path) else logs)]
     if not paths:
         raise PlanflyError.of_argument("logs", "", "at least one log is expected", shown="")
     prior = _load_base(base)
     area = prior.wing_area * (span / prior.wing_span) ** 2 if area is None else area
-    stated = {"mass": mass, "span": span, "area": area}
-    _check_stated(stated, prior)
+    stated_numbers = {"mass": mass, "span": span, "area": area}
+    _check_stated(stated_numbers, prior)
     volts, energy = prior.battery_voltage, prior.battery_energy
     if battery is not None:
         sheet = parse_sheet({}, battery=battery, prop=None, layout=None)
         volts, energy = sheet.volts, sheet.energy
-    numbers = scaled(base_model(prior), stated["mass"], stated["span"], stated["area"], volts)
+    base_numbers = scale_model(
+        base_model(prior), stated_numbers["mass"], stated_numbers["span"], stated_numbers["area"], volts
+    )
     check_base(prior)
     with stage(f"reading {len(paths)} log{'s' if len(paths) > 1 else ''}", "reading logs"):
-        motions = [read_motion(path) for path in paths]
-        motion = None if check is None else read_motion(Path(check))
-        _refuse_equal([*motions, *([] if motion is None else [motion])])
-        read = [(log, *_records_and_outputs(log, prior)) for log in motions]
-        checked = None if motion is None else _records_and_outputs(motion, prior)[0]
-    records = [record for _, stretches, _ in read for record in stretches]
-    log, _, outputs = read[-1]
+        motion_logs = [read_motion(path) for path in paths]
+        check_motion = None if check is None else read_motion(Path(check))
+        _check_distinct([*motion_logs, *([] if check_motion is None else [check_motion])])
+        log_parts = [(log, *_records_and_outputs(log, prior)) for log in motion_logs]
+        check_records = None if check_motion is None else _records_and_outputs(check_motion, prior)[0]
+    records = [record for _, stretches, _ in log_parts for record in stretches]
+    log, _, outputs = log_parts[-1]
     with stage("estimating"):
-        fast = all(slowest_rows(one) >= MIN_HZ for one, _, _ in read)
-        estimate = estimate_model(records, numbers, dynamics=fast)
-        check_estimate(estimate, numbers, _unmixed_outputs(log, prior), log.source)
-        found = make_identified(prior, numbers, estimate, [one for one, _, _ in read], outputs)
-        files = folder_files(found, target.name, (volts, energy))
-    replays = () if checked is None else _replay_check_log(found, files, target.name, checked)
+        has_fast_rows = all(slowest_rows(motion_log) >= MIN_HZ for motion_log, _, _ in log_parts)
+        estimate = estimate_model(records, base_numbers, dynamics=has_fast_rows)
+        check_estimate(estimate, base_numbers, _unmixed_outputs(log, prior), log.source)
+        identified = make_identified(
+            prior, base_numbers, estimate, [motion_log for motion_log, _, _ in log_parts], outputs
+        )
+        files = folder_files(identified, target.name, (volts, energy))
+    replays = () if check_records is None else _replay_check_log(identified, files, target.name, check_records)
     with stage("drawing", "drawing an identification"):
-        files["identify.html"] = _report_page(found, replays, None if check is None else Path(check).name, target.name)
+        files["identify.html"] = _report_page(
+            identified, replays, None if check is None else Path(check).name, target.name
+        )
     write_own_folder(target, {name: text.encode() for name, text in files.items()})
-    slow = slow_logs([one for one, _, _ in read])
-    made, wide = read_aircraft(target), _find_wide_numbers(found)
-    return IdentifiedAircraft(made, estimate, *_intervals(found), replays, without_current(records), slow, wide)
+    slow = slow_logs([motion_log for motion_log, _, _ in log_parts])
+    aircraft, wide = read_aircraft(target), _find_wide_numbers(identified)
+    return IdentifiedAircraft(
+        aircraft, estimate, *_intervals(identified), replays, without_current(records), slow, wide
+    )
 
 
 def _load_base(base: str | Path) -> Aircraft:
     text = str(base.absolute()) if isinstance(base, Path) else base
-    found = find_aircraft(whole_path(Path(text)) if names_folder(text) else text)
-    if (found.folder / "posterior.toml").is_file():
+    aircraft = find_aircraft(whole_path(Path(text)) if names_folder(text) else text)
+    if (aircraft.folder / "posterior.toml").is_file():
         allowed = "identified from flight logs itself: name the base that it came from, as its posterior.toml has it"
         raise FlightError.of_argument("base", str(base), allowed)
-    return found
+    return aircraft
 
 
-def _check_stated(stated: dict[str, float], prior: Aircraft) -> None:
+def _check_stated(stated_numbers: dict[str, float], prior: Aircraft) -> None:
     """Raise FlightError for numbers outside the range of small aircraft, and for a base of a very different size."""
-    for name, value in stated.items():
-        low, high, unit = _RANGES[name]
-        if isinstance(value, bool) or not low <= value <= high:
-            raise FlightError.of_argument(name, value, f"allowed {low:g}..{high:g} {unit}", shown=f"{value} {unit}")
-    for name, value, own in (("mass", stated["mass"], prior.mass), ("span", stated["span"], prior.wing_span)):
-        if not 1.0 / _MAX_SIZE_RATIO <= value / own <= _MAX_SIZE_RATIO:
-            allowed = f"{own / _MAX_SIZE_RATIO:.3g}..{own * _MAX_SIZE_RATIO:.3g} is near enough to {prior.name}"
+    for name, value in stated_numbers.items():
+        min_value, max_value, unit = _RANGES[name]
+        if isinstance(value, bool) or not min_value <= value <= max_value:
+            raise FlightError.of_argument(
+                name, value, f"allowed {min_value:g}..{max_value:g} {unit}", shown=f"{value} {unit}"
+            )
+    for name, value, base_value in (
+        ("mass", stated_numbers["mass"], prior.mass),
+        ("span", stated_numbers["span"], prior.wing_span),
+    ):
+        if not 1.0 / _MAX_SIZE_RATIO <= value / base_value <= _MAX_SIZE_RATIO:
+            allowed = (
+                f"{base_value / _MAX_SIZE_RATIO:.3g}..{base_value * _MAX_SIZE_RATIO:.3g} is near enough to {prior.name}"
+            )
             advice = "planfly aircraft --new FOLDER makes a base from a data sheet, for `base`"
             raise FlightError.of_argument(name, value, f"{allowed}; {advice}", shown=f"{value:g}")
 
 
-def _refuse_equal(logs: Sequence[MotionLog]) -> None:
+def _check_distinct(logs: Sequence[MotionLog]) -> None:
     """Raise LogError if a log is given twice, or if the check log is also used for identification."""
-    first: dict[str, str] = {}
+    sources: dict[str, str] = {}
     for log in logs:
-        if log.sha256 in first:
+        if log.sha256 in sources:
             allowed = "each log is expected once, and another one to check with"
             raise LogError(
-                f"{log.source}: the same bytes as {first[log.sha256]}: {allowed}", file=log.source, allowed=allowed
+                f"{log.source}: the same bytes as {sources[log.sha256]}: {allowed}", file=log.source, allowed=allowed
             )
-        first[log.sha256] = log.source
+        sources[log.sha256] = log.source
 
 
 def _records_and_outputs(log: MotionLog, prior: Aircraft) -> tuple[list[FlightRecord], dict[str, ServoOutput]]:
@@ -187,15 +202,17 @@ def _records_and_outputs(log: MotionLog, prior: Aircraft) -> tuple[list[FlightRe
     with elevons, whose mixer is part of the model, they are always those of the base.
     """
     file = prior.folder / "ardupilot.toml"
-    own = read_servos(file) if file.is_file() else {}
+    base_outputs = read_servos(file) if file.is_file() else {}
     if log.program_kind == "px4":
-        return flight_records(log, prior), dict(own)
+        return flight_records(log, prior), dict(base_outputs)
     outputs = log_outputs(log, prior)
     if LEFT in outputs:
-        return flight_records(log, prior, outputs), dict(own)
-    same = own.keys() == outputs.keys() and all(_is_same_output(own[name], output) for name, output in outputs.items())
-    chosen = dict(own) if same else outputs
-    return flight_records(log, prior, chosen if same else None), chosen
+        return flight_records(log, prior, outputs), dict(base_outputs)
+    is_same = base_outputs.keys() == outputs.keys() and all(
+        _is_same_output(base_outputs[name], output) for name, output in outputs.items()
+    )
+    used_outputs = dict(base_outputs) if is_same else outputs
+    return flight_records(log, prior, used_outputs if is_same else None), used_outputs
 
 
 def _unmixed_outputs(log: MotionLog, prior: Aircraft) -> dict[str, int]:
@@ -205,67 +222,69 @@ def _unmixed_outputs(log: MotionLog, prior: Aircraft) -> dict[str, int]:
     return {name: output.output for name, output in log_outputs(log, prior).items()}
 
 
-def _is_same_output(one: ServoOutput, other: ServoOutput) -> bool:
+def _is_same_output(first: ServoOutput, second: ServoOutput) -> bool:
     """Return True if two servo outputs have the same number, pulse range and direction."""
-    (a, *_, b), (c, *_, d) = one.value, other.value
-    ends = (one.pulse[0], one.pulse[-1]) == (other.pulse[0], other.pulse[-1])
-    return one.output == other.output and ends and (b - a) * (d - c) > 0.0
+    (first_low, *_, first_high), (second_low, *_, second_high) = first.value, second.value
+    has_same_range = (first.pulse[0], first.pulse[-1]) == (second.pulse[0], second.pulse[-1])
+    return (
+        first.output == second.output and has_same_range and (first_high - first_low) * (second_high - second_low) > 0.0
+    )
 
 
 def _replay_check_log(
-    found: Identified, files: dict[str, str], name: str, records: list[FlightRecord]
+    identified: Identified, files: dict[str, str], name: str, records: list[FlightRecord]
 ) -> tuple[Replay, ...]:
     with stage("replaying the check log"):
-        return replay_log(found, files, name, records)
+        return replay_log(identified, files, name, records)
 
 
-def _report_page(found: Identified, replays: tuple[Replay, ...], checked: str | None, name: str) -> str:
+def _report_page(identified: Identified, replays: tuple[Replay, ...], check_name: str | None, name: str) -> str:
     from logs.views.report.identification import IdentificationFacts, ReplayedLog, identification_page
 
     numbers = tuple(
         (title, unit, *interval)
         for (title, unit), interval in zip(
             (("climb at full throttle", "°"), ("sink at idle", "°"), ("power in level flight", "W")),
-            _intervals(found),
+            _intervals(identified),
             strict=True,
         )
     )
     replay = None
-    if checked is not None and replays:
+    if check_name is not None and replays:
         before, after = replays
         logged, flown = after.shown
         rows = tuple(
             (quantity, unit, before.rms[quantity], after.rms[quantity])
             for quantity, unit in zip(QUANTITIES, UNITS, strict=True)
         )
-        replay = ReplayedLog(checked, after.windows, rows, logged, flown, GRID_HZ)
-    logs = tuple((Path(log.source).name, log.sha256) for log in found.logs)
-    wide = tuple(one.text for one in _find_wide_numbers(found))
-    return identification_page(IdentificationFacts(name, found.estimate, logs, numbers, replay, wide))
+        replay = ReplayedLog(check_name, after.windows, rows, logged, flown, GRID_HZ)
+    logs = tuple((Path(log.source).name, log.sha256) for log in identified.logs)
+    wide = tuple(wide_number.text for wide_number in _find_wide_numbers(identified))
+    return identification_page(IdentificationFacts(name, identified.estimate, logs, numbers, replay, wide))
 
 
-def _find_wide_numbers(found: Identified) -> tuple[WideNumber, ...]:
-    _, sink, power = _intervals(found)
-    return wide_numbers(sink, power, with_current=found.estimate.with_current)
+def _find_wide_numbers(identified: Identified) -> tuple[WideNumber, ...]:
+    _, sink, power = _intervals(identified)
+    return wide_numbers(sink, power, with_current=identified.estimate.with_current)
 
 
 # Lower end, estimate and upper end (95 %) of a number.
 Interval = tuple[float, float, float]
 
 
-def _intervals(found: Identified) -> tuple[Interval, Interval, Interval]:
+def _intervals(identified: Identified) -> tuple[Interval, Interval, Interval]:
     """Return climb and sink, degrees, and power, W, each as lower end, estimate and upper end (95 %)."""
-    best, drawn = found.performance()
+    best, samples = identified.performance()
 
-    def interval(value: Floats, draws: Floats, factor: float = 1.0) -> Interval:
-        low, high = np.percentile(draws, [2.5, 97.5])
-        return factor * float(low), factor * float(value[0]), factor * float(high)
+    def interval(value: Floats, sample_values: Floats, factor: float = 1.0) -> Interval:
+        lower, upper = np.percentile(sample_values, [2.5, 97.5])
+        return factor * float(lower), factor * float(value[0]), factor * float(upper)
 
     degrees = math.degrees(1.0)
     return (
-        interval(best.climb, drawn.climb, degrees),
-        interval(best.sink, drawn.sink, degrees),
-        interval(best.power, drawn.power),
+        interval(best.climb, samples.climb, degrees),
+        interval(best.sink, samples.sink, degrees),
+        interval(best.power, samples.power),
     )
 
 
@@ -276,6 +295,6 @@ def without_current(records: Sequence[FlightRecord]) -> tuple[str, ...]:
 
 
 def slow_logs(logs: Sequence[MotionLog]) -> tuple[SlowLog, ...]:
-    """Return the logs with less than `PLENTY_HZ` rows per second."""
+    """Return the logs with less than `AMPLE_HZ` rows per second."""
     rates = [(log, slowest_rows(log)) for log in logs]
-    return tuple(SlowLog(log.source, rate, recording_setting(log)) for log, rate in rates if rate < PLENTY_HZ)
+    return tuple(SlowLog(log.source, rate, recording_setting(log)) for log, rate in rates if rate < AMPLE_HZ)

@@ -17,12 +17,18 @@ from planfly.kernel_units.unit_kernels import FLYING
 from planfly.runtime.first_start import with_warm_up
 from planfly.runtime.stages import stage
 from planfly.workflow.imported_flights import ImportedFlight, fly_again, import_flight
-from planfly.workflow.output_paths import REFLOWN, REFLY_FILES, clean_folder, refuse_existing, refuse_folder
+from planfly.workflow.output_paths import (
+    MAX_REFLOWN_PARTS,
+    REFLY_FILES,
+    check_output_file,
+    check_output_folder,
+    clean_folder,
+)
 from world.errors import LogError, ScenarioError
 from world.files import write_whole
 
 # Number of rows recorded per call; it is limited because a recorder needs many times the memory of a row.
-_ROWS_AT_ONCE = 4096
+_ROWS_PER_WRITE = 4096
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,11 +76,11 @@ def import_log(
     Raises a `planfly.PlanflyError` for bad input; then nothing is written.
     """
     if target is not None:
-        refuse_existing(Path(target), overwrite, Path(log))
-    found = read_imported(log, **options)
+        check_output_file(Path(target), overwrite, Path(log))
+    flight = read_imported(log, **options)
     if target is not None:
-        _write_log(Path(target), found)
-    return found
+        _write_log(Path(target), flight)
+    return flight
 
 
 def _write_log(target: Path, flight: ImportedFlight) -> None:
@@ -85,8 +91,8 @@ def _write_log(target: Path, flight: ImportedFlight) -> None:
             # Write the events first, so that each event is at its time in the log.
             for event in flight.events:
                 recorder.event(event.time, event.text, event.level)
-            for start in range(0, len(flight.track), _ROWS_AT_ONCE):
-                recorder.write(flight.track.rows(start, start + _ROWS_AT_ONCE))
+            for start in range(0, len(flight.track), _ROWS_PER_WRITE):
+                recorder.write(flight.track.rows(start, start + _ROWS_PER_WRITE))
             recorder.finish(flight.ended, flight.verdict)
         path.replace(target)
 
@@ -114,49 +120,52 @@ def refly(
     Raises a `planfly.PlanflyError` for bad input; then nothing is written.
     """
     check_arguments(turbulence=turbulence)
-    found = log if isinstance(log, FlightLog) else read_log(log)
-    if found.setup.source is None:
-        message = f"{found.source}: flown by planfly itself: refly takes a log that `planfly import` wrote"
-        raise LogError(message, file=found.source)
+    flight_log = log if isinstance(log, FlightLog) else read_log(log)
+    if flight_log.setup.source is None:
+        message = f"{flight_log.source}: flown by planfly itself: refly takes a log that `planfly import` wrote"
+        raise LogError(message, file=flight_log.source)
     if out is not None:
-        refuse_folder(Path(out), overwrite)
+        check_output_folder(Path(out), overwrite)
     with stage("flying again") as advance:
         model = str(aircraft.resolve()) if isinstance(aircraft, Path) else aircraft
-        agains = fly_again(found.setup, found.track, model, turbulence, advance, REFLOWN)
+        reflights = fly_again(flight_log.setup, flight_log.track, model, turbulence, advance, MAX_REFLOWN_PARTS)
     lines: list[str] = []
-    for number, again in enumerate(agains, 1):
-        lines += [*([] if number == 1 else [""]), *refly_lines(again)]
-    lines += left_lines(agains, found.setup.source.stretches, REFLOWN)
+    for number, reflight in enumerate(reflights, 1):
+        lines += [*([] if number == 1 else [""]), *refly_lines(reflight)]
+    lines += left_lines(reflights, flight_log.setup.source.stretches, MAX_REFLOWN_PARTS)
     files: list[Path] = []
     if out is not None:
         folder = clean_folder(out, REFLY_FILES, overwrite=True)
         with stage("drawing", "drawing a flight again"):
-            for number, again in enumerate(agains, 1):
+            for number, reflight in enumerate(reflights, 1):
                 ending = "" if number == 1 else f"-{number}"
-                files += [*_draw_charts(folder, again, ending), _record_simulation(folder, again, found, ending)]
-    return Reflown(agains, tuple(lines), tuple(files))
+                files += [
+                    *_draw_charts(folder, reflight, ending),
+                    _record_simulation(folder, reflight, flight_log, ending),
+                ]
+    return Reflown(reflights, tuple(lines), tuple(files))
 
 
-def _draw_charts(folder: Path, again: Reflight, ending: str) -> list[Path]:
+def _draw_charts(folder: Path, reflight: Reflight, ending: str) -> list[Path]:
     # Imported here: only pictures need matplotlib.
     from logs.views.compare import refly_charts
     from logs.views.drawing import draw_chart, png_bytes
 
     files = []
-    for name, chart in refly_charts(again).items():
+    for name, chart in refly_charts(reflight).items():
         path = (folder / name).with_stem(f"{Path(name).stem}{ending}")
         write_whole(path, png_bytes(draw_chart(chart)))
         files.append(path)
     return files
 
 
-def _record_simulation(folder: Path, again: Reflight, log: FlightLog, ending: str) -> Path:
+def _record_simulation(folder: Path, reflight: Reflight, log: FlightLog, ending: str) -> Path:
     """Write the simulated flight as a separate log, for `compare` and `replay`, and return its file."""
     path = folder / f"simulated{ending}.mcap"
-    verdict = judge_flight(again.setup, again.simulated, again.ended)
-    with Recorder(path, replace(again.setup, seed=log.setup.seed)) as recorder:
-        recorder.write(again.simulated)
-        recorder.finish(again.ended, verdict)
+    verdict = judge_flight(reflight.setup, reflight.simulated, reflight.ended)
+    with Recorder(path, replace(reflight.setup, seed=log.setup.seed)) as recorder:
+        recorder.write(reflight.simulated)
+        recorder.finish(reflight.ended, verdict)
     return path
 
 
@@ -179,7 +188,7 @@ def recover(log: str | Path, out: str | Path | None = None, *, overwrite: bool =
     True
     """
     target = recovered_path(log) if out is None else Path(out)
-    refuse_existing(target, overwrite)
+    check_output_file(target, overwrite)
     recovered = recover_log(Path(log))
     if recovered is None:
         return None

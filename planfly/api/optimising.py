@@ -61,8 +61,8 @@ class Optimiser:
         self._scores: Floats = np.empty((0, 0))
         self._points: Floats = np.empty((0, lower.size))
         self._levels: tuple[Level, ...] = ()
-        self._violations = 0
-        self._most = population
+        self._violation_count = 0
+        self._max_points = population
         self._search = _MODELS[model](
             lower, upper, lambda scores: ranks(scores, self._levels), population, rng, initial=initial
         )
@@ -86,30 +86,34 @@ class Optimiser:
         Raises ValueError if the number of rows differs from the number of points that `ask` returned, or the number of
         columns from that of the previous call.
         """
-        asked = self._search.ask()
-        given = _checked_columns("values", values, len(asked))
-        broken = (
-            np.empty((len(asked), 0)) if violations is None else _checked_columns("violations", violations, len(asked))
+        points = self._search.ask()
+        objective_values = _checked_columns("values", values, len(points))
+        violation_values = (
+            np.empty((len(points), 0))
+            if violations is None
+            else _checked_columns("violations", violations, len(points))
         )
-        if not given.shape[1]:
+        if not objective_values.shape[1]:
             raise ValueError("values: no columns: one an objective is expected")
-        scores = np.concatenate([np.maximum(broken, 0.0), given], axis=1)
-        if self._levels and (scores.shape[1] != self._scores.shape[1] or broken.shape[1] != self._violations):
+        scores = np.concatenate([np.maximum(violation_values, 0.0), objective_values], axis=1)
+        if self._levels and (
+            scores.shape[1] != self._scores.shape[1] or violation_values.shape[1] != self._violation_count
+        ):
             raise ValueError("values, violations: other numbers of columns than before")
         if not self._levels:
-            self._violations = broken.shape[1]
-            self._levels = _levels(broken.shape[1], given.shape[1])
+            self._violation_count = violation_values.shape[1]
+            self._levels = _levels(violation_values.shape[1], objective_values.shape[1])
             self._scores = np.empty((0, scores.shape[1]))
-        self.evaluations += len(asked)
-        self._add_points(asked, scores)
+        self.evaluations += len(points)
+        self._update_front(points, scores)
         self._search.tell(scores)
 
-    def _add_points(self, points: Floats, scores: Floats) -> None:
-        """Add points, and keep those to which no other point is preferred, sorted by the first objective."""
-        every, known = np.concatenate([self._points, points]), np.concatenate([self._scores, scores])
-        first = np.flatnonzero(ranks(known, self._levels) == 0)
-        order = first[np.argsort(known[first, self._violations], kind="stable")][: self._most]
-        self._points, self._scores = every[order], known[order]
+    def _update_front(self, points: Floats, scores: Floats) -> None:
+        """Merge points into the front, keep the non-dominated points, and sort them by the first objective."""
+        all_points, all_scores = np.concatenate([self._points, points]), np.concatenate([self._scores, scores])
+        front = np.flatnonzero(ranks(all_scores, self._levels) == 0)
+        order = front[np.argsort(all_scores[front, self._violation_count], kind="stable")][: self._max_points]
+        self._points, self._scores = all_points[order], all_scores[order]
 
     @property
     def best(self) -> BestFound:
@@ -121,10 +125,10 @@ class Optimiser:
 
     @property
     def front(self) -> tuple[BestFound, ...]:
-        """Points to which no evaluated point is preferred; there are at most as many as in the population."""
+        """Non-dominated points among all evaluated points; there are at most as many as in the population."""
         if not self._levels:
             raise ValueError("nothing has been evaluated yet: call ask() and tell() first")
-        v = self._violations
+        v = self._violation_count
         return tuple(
             BestFound(x.copy(), row[v:].copy(), row[:v].copy())
             for x, row in zip(self._points, self._scores, strict=True)
@@ -148,8 +152,8 @@ class Optimiser:
         return self.best
 
     def __repr__(self) -> str:
-        name, found = type(self._search).__name__, f", best {self.best.value:.6g}" if self._levels else ""
-        return f"<Optimiser {name}: {self._points.shape[1]} variables, {self.evaluations:,} evaluations{found}>"
+        name, best = type(self._search).__name__, f", best {self.best.value:.6g}" if self._levels else ""
+        return f"<Optimiser {name}: {self._points.shape[1]} variables, {self.evaluations:,} evaluations{best}>"
 
 
 def optimise(
@@ -199,19 +203,25 @@ def optimise(
     >>> round(search.minimise(length, evaluations=10_000).value, 2)
     1.08
     """
-    low, high = np.array(lower, dtype=np.float64), np.array(upper, dtype=np.float64)
-    if low.ndim != 1 or low.shape != high.shape or not low.size:
-        raise ValueError(f"lower, upper: shapes {low.shape} and {high.shape}: two of (d,) are expected")
-    if not (np.isfinite(low) & np.isfinite(high) & (low < high)).all():
+    lower_bounds, upper_bounds = np.array(lower, dtype=np.float64), np.array(upper, dtype=np.float64)
+    if lower_bounds.ndim != 1 or lower_bounds.shape != upper_bounds.shape or not lower_bounds.size:
+        raise ValueError(
+            f"lower, upper: shapes {lower_bounds.shape} and {upper_bounds.shape}: two of (d,) are expected"
+        )
+    if not (np.isfinite(lower_bounds) & np.isfinite(upper_bounds) & (lower_bounds < upper_bounds)).all():
         raise ValueError("lower, upper: finite numbers, lower below upper, are expected")
     if model not in _MODELS:
         raise ValueError(f"model: {model!r}: allowed {', '.join(_MODELS)}")
     if population < 4 or population % 2:
         raise ValueError(f"population: {population}: an even number from 4 is expected")
-    first = None if initial is None else np.array(initial, dtype=np.float64)
-    if first is not None and (first.shape != (population, low.size) or not np.isfinite(first).all()):
-        raise ValueError(f"initial: shape {first.shape}: finite numbers of ({population}, {low.size}) are expected")
-    return Optimiser(low, high, model, population, np.random.default_rng(seed), first)
+    first_points = None if initial is None else np.array(initial, dtype=np.float64)
+    if first_points is not None and (
+        first_points.shape != (population, lower_bounds.size) or not np.isfinite(first_points).all()
+    ):
+        raise ValueError(
+            f"initial: shape {first_points.shape}: finite numbers of ({population}, {lower_bounds.size}) are expected"
+        )
+    return Optimiser(lower_bounds, upper_bounds, model, population, np.random.default_rng(seed), first_points)
 
 
 def _levels(violations: int, objectives: int) -> tuple[Level, ...]:
@@ -220,9 +230,11 @@ def _levels(violations: int, objectives: int) -> tuple[Level, ...]:
     return (Level(tuple(range(violations)), (0.0,) * violations), values) if violations else (values,)
 
 
-def _checked_columns(name: str, given: ArrayLike, rows: int) -> Floats:
-    table = np.array(given, dtype=np.float64)
+def _checked_columns(name: str, numbers: ArrayLike, row_count: int) -> Floats:
+    table = np.array(numbers, dtype=np.float64)
     table = table[:, np.newaxis] if table.ndim == 1 else table
-    if table.ndim != 2 or len(table) != rows:
-        raise ValueError(f"{name}: shape {np.shape(given)}: {rows} rows are expected, one for each point asked for")
+    if table.ndim != 2 or len(table) != row_count:
+        raise ValueError(
+            f"{name}: shape {np.shape(numbers)}: {row_count} rows are expected, one for each point asked for"
+        )
     return np.where(np.isnan(table), np.inf, table)

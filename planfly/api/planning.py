@@ -97,10 +97,10 @@ def replan(
     """
     check_arguments(seed=options["seed"], budget=options["budget"], seconds=options["seconds"], at_leg=at_leg)
     world = _with_budget(named_scenario(scenario, options), options["budget"])
-    flown = old if isinstance(old, Plan) else read_plan(Path(old))
-    check_same_mission(world, flown)
+    old_plan = old if isinstance(old, Plan) else read_plan(Path(old))
+    check_same_mission(world, old_plan)
     return _search_and_write(
-        _with_new_threats(world, flown, threats), scenario, (flown, at_leg), options, out, overwrite
+        _with_new_threats(world, old_plan, threats), scenario, (old_plan, at_leg), options, out, overwrite
     )
 
 
@@ -117,8 +117,8 @@ def _with_new_threats(scenario: Scenario, old: Plan, threats: Sequence[Threat]) 
         if scenario.terrain is not None and math.isnan(scenario.terrain.height(east, north)):
             place = f"east {east:g} m, north {north:g} m: outside the terrain that is known"
             raise ScenarioError.of_argument("threats", (east, north), place, shown="")
-    kept = [table for table in old.scenario.spec.threats if table not in scenario.spec.threats]
-    return with_threats(scenario, threats, "threats", kept)
+    old_threats = [table for table in old.scenario.spec.threats if table not in scenario.spec.threats]
+    return with_threats(scenario, threats, "threats", old_threats)
 
 
 def _search_and_write(
@@ -134,29 +134,29 @@ def _search_and_write(
     source: the scenario as the caller named it; its file must not be overwritten.
     flown: the plan being flown and the leg to plan from; None for a new plan.
     """
-    number, target = choose_seed(world, options["seed"]), None
+    seed, target = choose_seed(world, options["seed"]), None
     if out is not None:
-        read = None if isinstance(source, Scenario) else Path(source)
-        target = file_target(out, world.name, number, overwrite=overwrite, source=read)
-    airframe, ends = load_airframe(world), stop_condition(options["seconds"], options["stop"])
+        source_file = None if isinstance(source, Scenario) else Path(source)
+        target = file_target(out, world.name, seed, overwrite=overwrite, source=source_file)
+    airframe, should_stop = load_airframe(world), stop_condition(options["seconds"], options["stop"])
     with stage(f"planning {world.name}", "planning") as advance:
-        made = make_plan(world, airframe, number, options["algorithm"], advance, stop=ends, flown=flown)
+        plan = make_plan(world, airframe, seed, options["algorithm"], advance, stop=should_stop, flown=flown)
     if target is not None:
         target.parent.mkdir(parents=True, exist_ok=True)
-        write_whole(target, plan_json(made))
-    return made
+        write_whole(target, plan_json(plan))
+    return plan
 
 
 def stop_condition(seconds: float | None, stop: Callable[[], bool] | None) -> StopCondition:
-    """Return the check made between generations; it returns "interrupted", "budget" after `seconds`, or "" to go on."""
+    """Return a check to make between generations, which returns "interrupted", "budget" after `seconds`, or ""."""
     deadline = None if seconds is None else time.monotonic() + seconds
 
-    def ends() -> str:
+    def should_stop() -> str:
         if stop is not None and stop():
             return "interrupted"
         return "budget" if deadline is not None and time.monotonic() >= deadline else ""
 
-    return ends
+    return should_stop
 
 
 def conditions_of_plan(plan: Plan) -> Conditions:

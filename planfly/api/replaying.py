@@ -22,7 +22,7 @@ _PORTS = range(1024, 65536)
 # Origin of web pages with a scheme, a lower-case host name, as browsers write it, and a port.
 _ORIGIN = re.compile(r"[a-z][a-z0-9+.-]*://[a-z0-9._\[\]:-]+")
 # Frame rate of the instruments, Hz.
-_FRAMES = 10.0
+_FRAME_RATE_HZ = 10.0
 # Default time to wait for a ground station, s.
 _STATION_TIMEOUT_S = 10.0
 
@@ -34,18 +34,18 @@ def _open_log(log: FlightLog | str | Path) -> FlightLog:
 def replayed_part(log: FlightLog, start: float | None, end: float | None) -> tuple[float, float]:
     """Return start and end of the replayed part in flight time, s.  Raises LogError if the part is empty."""
     check_arguments(start=start, end=end)
-    first = start if start is not None else float(log.track.time[0])
-    last = log.end_time if end is None else min(end, log.end_time)
-    ends = f"the log ends at {log.end_time:.1f} s"
+    start_time = start if start is not None else float(log.track.time[0])
+    end_time = log.end_time if end is None else min(end, log.end_time)
+    end_text = f"the log ends at {log.end_time:.1f} s"
     if end is not None and end > log.end_time and end in _PORTS:
-        allowed = f"{ends}; if a port is meant, name its address, too: `end` 127.0.0.1:{end:g}"
+        allowed = f"{end_text}; if a port is meant, name its address, too: `end` 127.0.0.1:{end:g}"
         raise LogError.of_argument("end", end, allowed, shown=f"{end:g}", file=log.source)
-    if first > log.end_time:
-        raise LogError.of_argument("start", first, ends, shown=f"{first:g}", file=log.source)
-    if last < first:
-        allowed = f"at or after `start`, {first:g} s, is expected"
-        raise LogError.of_argument("end", last, allowed, shown=f"{last:g}", file=log.source)
-    return first, last
+    if start_time > log.end_time:
+        raise LogError.of_argument("start", start_time, end_text, shown=f"{start_time:g}", file=log.source)
+    if end_time < start_time:
+        allowed = f"at or after `start`, {start_time:g} s, is expected"
+        raise LogError.of_argument("end", end_time, allowed, shown=f"{end_time:g}", file=log.source)
+    return start_time, end_time
 
 
 @with_warm_up()
@@ -63,9 +63,11 @@ def timeline(
     >>> planfly.timeline(example_log(), start=20.0)[0].text
     'turn left 14.0° at waypoint 1 (item 2), peak bank 0.0°'
     """
-    found = _open_log(log)
-    first, last = (-math.inf, math.inf) if start is None and end is None else replayed_part(found, start, end)
-    return tuple(entry for entry in list_timeline(found) if first <= entry.time <= last)
+    flight_log = _open_log(log)
+    start_time, end_time = (
+        (-math.inf, math.inf) if start is None and end is None else replayed_part(flight_log, start, end)
+    )
+    return tuple(entry for entry in list_timeline(flight_log) if start_time <= entry.time <= end_time)
 
 
 @with_warm_up()
@@ -102,21 +104,21 @@ def replay(
     20.1
     """
     check_arguments(speed=speed)
-    found = _open_log(log)
-    first, last = replayed_part(found, start, end)
-    return _play_frames(instruments(found), first, last, speed or 1.0, width)
+    flight_log = _open_log(log)
+    start_time, end_time = replayed_part(flight_log, start, end)
+    return _play_frames(instruments(flight_log), start_time, end_time, speed or 1.0, width)
 
 
 def _play_frames(
-    shown: Instruments, first: float, last: float, speed: float, width: int | Callable[[], int]
+    instruments_shown: Instruments, start_time: float, end_time: float, speed: float, width: int | Callable[[], int]
 ) -> Iterator[tuple[float, list[str]]]:
-    played, now = RunningClock(), first
+    clock, flight_time = RunningClock(), start_time
     while True:
-        yield now, shown.frame(now, width=width() if callable(width) else width)
-        if now >= last:
+        yield flight_time, instruments_shown.frame(flight_time, width=width() if callable(width) else width)
+        if flight_time >= end_time:
             return
-        time.sleep(1.0 / _FRAMES)
-        now = min(last, first + speed * played())
+        time.sleep(1.0 / _FRAME_RATE_HZ)
+        flight_time = min(end_time, start_time + speed * clock())
 
 
 @with_warm_up()
@@ -141,16 +143,16 @@ def movie(
     from planfly.replays.movie import write_movie
 
     check_arguments(speed=speed)
-    found = _open_log(log)
-    first, last = replayed_part(found, start, end)
-    return tuple(write_movie(found, Path(out), first, last, speed=speed, overwrite=overwrite))
+    flight_log = _open_log(log)
+    start_time, end_time = replayed_part(flight_log, start, end)
+    return tuple(write_movie(flight_log, Path(out), start_time, end_time, speed=speed, overwrite=overwrite))
 
 
 def _never_stop() -> bool:
     return False
 
 
-def _ignore(_text: str) -> None:
+def _ignore_message(_text: str) -> None:
     pass
 
 
@@ -166,7 +168,7 @@ def play_to_foxglove(
     allow_origin: str | Sequence[str] = (),
     wait: float | None = None,
     stop: Callable[[], bool] = _never_stop,
-    on_message: Callable[[str], None] = _ignore,
+    on_message: Callable[[str], None] = _ignore_message,
 ) -> None:
     """Play a flight to Foxglove on this machine over WebSocket; needs the extra ``planfly[foxglove]``.
 
@@ -184,17 +186,17 @@ def play_to_foxglove(
     from planfly.replays import foxglove_server
 
     check_arguments(speed=speed, port=port, wait=wait)
-    given = allow_origin.split(",") if isinstance(allow_origin, str) else allow_origin
-    allowed = [_checked_origin(one.strip()) for one in given if one.strip()]
-    found = _open_log(log)
-    first, last = replayed_part(found, start, end)
+    origins = allow_origin.split(",") if isinstance(allow_origin, str) else allow_origin
+    allowed_origins = [_checked_origin(origin.strip()) for origin in origins if origin.strip()]
+    flight_log = _open_log(log)
+    start_time, end_time = replayed_part(flight_log, start, end)
     foxglove_server.play_to_foxglove(
-        found,
-        first,
-        last,
+        flight_log,
+        start_time,
+        end_time,
         speed=speed or 1.0,
         port=port,
-        allowed=allowed,
+        allowed=allowed_origins,
         wait=wait,
         stopped=stop,
         on_message=on_message,
@@ -221,7 +223,7 @@ def play_to_stations(
     speed: float | None = None,
     wait: float | None = None,
     stop: Callable[[], bool] = _never_stop,
-    on_message: Callable[[str], None] = _ignore,
+    on_message: Callable[[str], None] = _ignore_message,
 ) -> None:
     """Play a flight to MAVLink ground stations as if it were flown now; needs ``planfly[live]``.
 

@@ -16,7 +16,7 @@ from planfly.rtl.return_summary import return_summary
 from planfly.runtime.first_start import with_warm_up
 from planfly.runtime.stages import stage
 from planfly.workflow.open_flight import open_flight
-from planfly.workflow.output_paths import COMPARE_FILES, LOG_FIGURES, clean_folder, refuse_existing
+from planfly.workflow.output_paths import COMPARE_FILES, LOG_FIGURES, check_output_file, clean_folder
 from planfly.workflow.suggestion_trials import judge_mission
 from planner.plan import Plan
 from world.files import write_whole
@@ -75,8 +75,8 @@ def figures(source: Source) -> "dict[str, Figure]":
     # Imported here: only pictures need matplotlib.
     from logs.views.figures import draw_figures
 
-    shown = _report_content(source)
-    return draw_figures(shown.setup, shown.track, shown.verdict)
+    content = _report_content(source)
+    return draw_figures(content.setup, content.track, content.verdict)
 
 
 @with_warm_up()
@@ -106,22 +106,22 @@ def report(
     from logs.recording.setup_attachments import package_versions
     from logs.views.report.page import write_report
 
-    shown = _report_content(source)
+    content = _report_content(source)
     folder = clean_folder(out, LOG_FIGURES, overwrite=overwrite)
     with stage("drawing", "drawing a report"):
         files = write_report(
             folder,
-            shown.setup,
-            shown.track,
-            shown.verdict,
-            ended=shown.ended,
-            events=shown.events,
+            content.setup,
+            content.track,
+            content.verdict,
+            ended=content.ended,
+            events=content.events,
             svg=svg,
-            versions=shown.versions or package_versions(),
+            versions=content.versions or package_versions(),
             command=command,
-            returns=return_summary(shown.setup, shown.track).drawn(),
+            returns=return_summary(content.setup, content.track).drawn(),
         )
-    return WrittenReport(folder / "report.html", tuple(files), shown.verdict)
+    return WrittenReport(folder / "report.html", tuple(files), content.verdict)
 
 
 def foxglove_layout(file: str | Path, *, overwrite: bool = False) -> Path:
@@ -135,7 +135,7 @@ def foxglove_layout(file: str | Path, *, overwrite: bool = False) -> Path:
     ...     planfly.foxglove_layout(Path(folder) / "layout.json").name
     'layout.json'
     """
-    refuse_existing(Path(file), overwrite)
+    check_output_file(Path(file), overwrite)
     write_whole(Path(file), layout_text())
     return Path(file)
 
@@ -164,12 +164,12 @@ def compare(
     tracks: 0.00 m apart on average, 0.00 m at most
     """
     logs = [log if isinstance(log, FlightLog) else read_log(log) for log in (first, second)]
-    found = compare_logs(*logs, names=(Path(logs[0].source).name, Path(logs[1].source).name))
+    comparison = compare_logs(*logs, names=(Path(logs[0].source).name, Path(logs[1].source).name))
     if out is not None:
         folder = clean_folder(out, COMPARE_FILES, overwrite=overwrite)
         with stage("drawing", "drawing a comparison"):
-            write_comparison(folder, found, svg=svg)
-    return found
+            write_comparison(folder, comparison, svg=svg)
+    return comparison
 
 
 def _report_content(source: Source) -> _ReportContent:

@@ -28,20 +28,20 @@ from logs.verdict.returns.returns_text import (
 )
 from logs.verdict.returns.suggest_returns import Remedy, helps, suggest_parameters, suggest_rally
 from logs.views.exports.map_files import glide_shapes, kml_text, map_zones, plan_line, return_lines, track_line
-from planfly.api.flying import FlownMission, named_program, refuse
+from planfly.api.flying import FlownMission, named_program, refuse_keywords
 from planfly.arguments import check_arguments
 from planfly.flight_logs import is_log
 from planfly.flight_options import LogOptions, mission_options, options_of_log, takes_options
 from planfly.kernel_units.unit_kernels import FLYING, GLIDING
 from planfly.rtl.jsbsim_returns import fly_return
 from planfly.rtl.return_summary import return_starts
-from planfly.rtl.sitl_returns import ProgramReturns, fly_by_program, refuse_program
+from planfly.rtl.sitl_returns import ProgramReturns, check_is_arduplane, fly_by_program
 from planfly.runtime.first_start import with_warm_up
 from planfly.runtime.stages import stage
 from planfly.workflow.airframe import airframe_of
 from planfly.workflow.crash_safe_log import INTERRUPTED
 from planfly.workflow.open_flight import open_flight
-from planfly.workflow.output_paths import RETURN_FILES, clean_folder, refuse_folder
+from planfly.workflow.output_paths import RETURN_FILES, check_output_folder, clean_folder
 from planfly.workflow.pipeline import fly_and_judge
 from planner.plan import Plan
 from world.files import write_whole
@@ -94,72 +94,78 @@ class ReturnsFound:
         return headline(self.returns)
 
     @property
-    def lines_of_causes(self) -> tuple[str, ...]:
+    def cause_lines(self) -> tuple[str, ...]:
         """Lines on the triggers of a return, the settings that trigger no return, and the end of a return."""
         return (*causes_text(self.returns.causes), *landing_text(self.returns))
 
     @property
-    def lines_of_ranges(self) -> tuple[str, ...]:
+    def range_lines(self) -> tuple[str, ...]:
         """Description of each range of seconds, the worst first."""
-        return tuple(range_text(one, self.returns, self.setup.scenario) for one in self.returns.ranges)
+        return tuple(
+            range_text(return_range, self.returns, self.setup.scenario) for return_range in self.returns.ranges
+        )
 
     @property
-    def lines_of_program(self) -> tuple[str, ...]:
+    def program_lines(self) -> tuple[str, ...]:
         """Lines on the worst returns by the ArduPlane program and the simulated ArduPlane; empty without a program."""
         if self.by_program is None:
             return ()
         return (self.by_program.headline(), *self.by_program.lines(self.returns, self.setup.scenario))
 
     @property
-    def line_of_no_return(self) -> str:
-        """Description of the point after which the battery no longer suffices for the return."""
+    def no_return_line(self) -> str:
+        """Description of the point after which the battery is too low for the return."""
         return no_return_text(self.returns)
 
     @property
-    def headline_of_glides(self) -> str:
+    def glide_headline(self) -> str:
         """One line on the reach of the aircraft without its engine."""
         return glides_headline(self.glides)
 
     @property
-    def lines_of_glides(self) -> tuple[str, ...]:
+    def glide_lines(self) -> tuple[str, ...]:
         """One line for each range of seconds with the same best glide destination, by time."""
-        return tuple(glide_range_text(one, self.glides) for one in self.glides.ranges)
+        return tuple(glide_range_text(glide_range, self.glides) for glide_range in self.glides.ranges)
 
     @property
-    def lines_of_suggestions(self) -> tuple[str, ...]:
-        """One line for each remedy, with the outcome of its returns."""
-        return tuple(remedy_text(one.remedy, one.returns, self.setup.scenario) for one in self.suggested)
+    def suggestion_lines(self) -> tuple[str, ...]:
+        """One line for each remedy, with the outcome of the returns flown with it."""
+        return tuple(
+            remedy_text(suggested.remedy, suggested.returns, self.setup.scenario) for suggested in self.suggested
+        )
 
     @property
     def notes(self) -> tuple[str, ...]:
         """Notes on how the returns were flown."""
-        found = ["by the simulated ArduPlane on a point mass, in the mean wind"]
+        notes = ["by the simulated ArduPlane on a point mass, in the mean wind"]
         if self.returns.again:
-            most = max(abs(one) for one in self.returns.again)
-            found.append(f"{len(self.returns.again)} of the least sure flown again in JSBSim: up to {most:.0f} m apart")
+            max_difference = max(abs(difference) for difference in self.returns.again)
+            notes.append(
+                f"{len(self.returns.again)} of the least sure flown again in JSBSim: up to {max_difference:.0f} m apart"
+            )
         if self.returns.stands_in:
-            found.append(f"{self.setup.autopilot.title}'s own return is not simulated: ArduPlane's return stands in")
+            notes.append(f"{self.setup.autopilot.title}'s own return is not simulated: ArduPlane's return stands in")
         if self.setup.envelope.battery_guessed and self.setup.scenario.flight.battery_wh is None:
-            found.append("the battery is guessed: energy is not judged; battery_wh in the scenario states it")
+            notes.append("the battery is guessed: energy is not judged; battery_wh in the scenario states it")
         if self.returns.lands:
-            found.append("ways to a landing sequence are judged up to its first item; the landing is not")
+            notes.append("ways to a landing sequence are judged up to its first item; the landing is not")
         parameters = self.setup.autopilot.parameters
         if parameters is None or not parameters.source:
-            found.append("no parameter file was given: the settings above are not yours, --params states them")
+            notes.append("no parameter file was given: the settings above are not yours, --params states them")
         if self.setup.scenario.terrain is None:
-            found.append("no terrain was given: --terrain names an elevation file")
+            notes.append("no terrain was given: --terrain names an elevation file")
         if self.setup.scenario.external:
-            found.append("the mission came without a scenario: threats are not known")
+            notes.append("the mission came without a scenario: threats are not known")
         if not self.returns.flown:
-            found.append("from the planned path: nothing was flown, and no energy was used before")
-        return (*found, *glide_notes(self.glides))
+            notes.append("from the planned path: nothing was flown, and no energy was used before")
+        return (*notes, *glide_notes(self.glides))
 
     def __repr__(self) -> str:
         return f"<ReturnsFound {self.setup.scenario.name}: {self.headline}>"
 
 
 # Reason why the returns of a flight cannot be judged in another world, in messages.
-_AS_FLOWN = "a flight's returns are flown as it was flown; only `terrain` replaces its ground"
+_RETURNS_AS_FLOWN_TEXT = "a flight's returns are flown as it was flown; only `terrain` replaces its ground"
 
 
 @with_warm_up(*FLYING, *GLIDING)
@@ -196,20 +202,20 @@ def returns(
     """
     check_arguments(every=every, points=points, seed=options["seed"], flight=options["flight"], datum=options["datum"])
     path = Path(what) if isinstance(what, str | Path) else None
-    asked = _check_request(every, suggest, out, sitl, points, overwrite=overwrite)
+    request = _check_request(every, suggest, out, sitl, points, overwrite=overwrite)
     if path is not None and is_imported_log(path):
-        refuse(str(path), {"seed": options["seed"], "nav": options["nav"]}, _AS_FLOWN)
-        return _judge_imported_flight(_read_imported_flight(path, options), asked)
-    refuse(str(path or "mission"), options_of_log(options), "goes with an imported log")
+        refuse_keywords(str(path), {"seed": options["seed"], "nav": options["nav"]}, _RETURNS_AS_FLOWN_TEXT)
+        return _judge_imported_flight(_read_imported_flight(path, options), request)
+    refuse_keywords(str(path or "mission"), options_of_log(options), "goes with an imported log")
     what = read_log(path) if path is not None and is_log(path) else what
-    mission = mission_options(options)
+    flight_options = mission_options(options)
     if isinstance(what, FlightLog | FlownMission):
-        given: dict[str, Any] = {**mission, "terrain": None, "fence": options["fence"] or None}
-        refuse(str(path or "flight"), given, _AS_FLOWN)
+        fixed_options: dict[str, Any] = {**flight_options, "terrain": None, "fence": options["fence"] or None}
+        refuse_keywords(str(path or "flight"), fixed_options, _RETURNS_AS_FLOWN_TEXT)
         return _judge_flight(
-            _with_terrain(what.setup, options["terrain"]), what.track, asked, what.ended or INTERRUPTED
+            _with_terrain(what.setup, options["terrain"]), what.track, request, what.ended or INTERRUPTED
         )
-    return _judge_mission(open_flight(what, mission), asked)
+    return _judge_mission(open_flight(what, flight_options), request)
 
 
 def _read_imported_flight(path: Path, options: LogOptions) -> "ImportedFlight":
@@ -244,49 +250,49 @@ def _check_request(
     """
     program = named_program(sitl)
     if program is not None:
-        refuse_program(program)
+        check_is_arduplane(program)
     if out is not None:
-        refuse_folder(Path(out), overwrite)
+        check_output_folder(Path(out), overwrite)
     return _ReturnsRequest(every, suggest, None if out is None else Path(out), overwrite, program, points)
 
 
-def _judge_imported_flight(found: "ImportedFlight", asked: _ReturnsRequest) -> ReturnsFound:
-    return _judge_flight(found.setup, found.track, asked, found.ended)
+def _judge_imported_flight(imported: "ImportedFlight", request: _ReturnsRequest) -> ReturnsFound:
+    return _judge_flight(imported.setup, imported.track, request, imported.ended)
 
 
-def _judge_mission(setup: FlightSetup, asked: _ReturnsRequest) -> ReturnsFound:
+def _judge_mission(setup: FlightSetup, request: _ReturnsRequest) -> ReturnsFound:
     """Fly a mission, and judge the returns of its flight."""
     return_world(setup)  # Raises errors before the flight.
     with stage("flying the mission"):
         flown = fly_and_judge(setup, airframe_of(setup), None, reference="never")
-    return _judge_flight(flown.setup, flown.track, asked, flown.ended)
+    return _judge_flight(flown.setup, flown.track, request, flown.ended)
 
 
-def _judge_flight(setup: FlightSetup, track: Track, asked: _ReturnsRequest, ended: str) -> ReturnsFound:
+def _judge_flight(setup: FlightSetup, track: Track, request: _ReturnsRequest, ended: str) -> ReturnsFound:
     world = return_world(setup)
-    starts = return_starts(setup, track, asked.every)
+    starts = return_starts(setup, track, request.every)
     with stage(f"flying {len(starts)} returns", "flying returns"):
-        judged = judge_returns(world, starts, asked.every, fly_return)
-    with TemporaryDirectory(prefix="planfly-returns-") as kept:
-        flown = None
-        if asked.program is not None:
-            logs = None if asked.folder is None else Path(kept)
-            flown = fly_by_program(world, starts, judged, asked.program, asked.points, logs)
-            judged = flown.put_right(judged)
+        judged_returns = judge_returns(world, starts, request.every, fly_return)
+    with TemporaryDirectory(prefix="planfly-returns-") as log_folder:
+        program_returns = None
+        if request.program is not None:
+            logs = None if request.folder is None else Path(log_folder)
+            program_returns = fly_by_program(world, starts, judged_returns, request.program, request.points, logs)
+            judged_returns = program_returns.with_worse_results(judged_returns)
         with stage("gliding from there without the engine"):
-            found = ReturnsFound(setup, judged, judge_glides(world, starts), by_program=flown)
-        if asked.suggest and not found.safe and found.returns.each:
-            found = replace(found, suggested=_suggest_remedies(world, starts, found, asked.every))
-        if asked.folder is None or not found.returns.each:
+            found = ReturnsFound(setup, judged_returns, judge_glides(world, starts), by_program=program_returns)
+        if request.suggest and not found.safe and found.returns.each:
+            found = replace(found, suggested=_suggest_remedies(world, starts, found, request.every))
+        if request.folder is None or not found.returns.each:
             return found
         with stage("drawing", "drawing returns"):
-            drawn = drawn_returns(world, starts, judged, found.glides)
-            files = _files(setup, track, drawn)
-        folder = clean_folder(asked.folder, RETURN_FILES, overwrite=asked.overwrite)
+            drawn = drawn_returns(world, starts, judged_returns, found.glides)
+            files = _draw_files(setup, track, drawn)
+        folder = clean_folder(request.folder, RETURN_FILES, overwrite=request.overwrite)
         for name, data in files.items():
             write_whole(folder / name, data)
         names = list(files)
-        for log in sorted(Path(kept).iterdir()):
+        for log in sorted(Path(log_folder).iterdir()):
             shutil.move(log, folder / log.name)
             names.append(log.name)
     if len(track):
@@ -302,25 +308,25 @@ def _suggest_remedies(
 ) -> tuple[Suggested, ...]:
     """Return the suggested remedies that improve the returns."""
     # Remedies do not help a return that sinks to the ground in a take-off or a landing.
-    judged = [one.time for one in found.returns.each]
-    aloft = starts.at(np.flatnonzero(np.isin(starts.time, judged)))
+    judged_times = [judged.time for judged in found.returns.each]
+    airborne_starts = starts.at(np.flatnonzero(np.isin(starts.time, judged_times)))
     with stage("looking for what would make them safe"):
-        remedies = suggest_parameters(world, aloft)
-        rally = suggest_rally(world, aloft)
+        remedies = suggest_parameters(world, airborne_starts)
+        rally = suggest_rally(world, airborne_starts)
     remedies += [] if rally is None else [rally]
     with stage(f"flying the returns of {len(remedies)} suggestions", "flying suggested returns"):
-        proved = [Suggested(one, judge_returns(one.on(world), starts, every, fly_return)) for one in remedies]
-    return tuple(one for one in proved if helps(found.returns, one.returns))
+        tested = [Suggested(remedy, judge_returns(remedy.on(world), starts, every, fly_return)) for remedy in remedies]
+    return tuple(suggested for suggested in tested if helps(found.returns, suggested.returns))
 
 
-def _files(setup: FlightSetup, track: Track, drawn: DrawnReturns) -> dict[str, bytes]:
+def _draw_files(setup: FlightSetup, track: Track, drawn: DrawnReturns) -> dict[str, bytes]:
     """Draw the pictures of returns, and the map with their lines and shapes, by file name."""
     # Imported here: only pictures need matplotlib.
     from logs.views.figures import draw_pictures, return_views
 
-    flown = [track_line(setup, track)] if len(track) else []
-    lines = [plan_line(setup), *flown, *return_lines(setup, drawn)]
+    tracks = [track_line(setup, track)] if len(track) else []
+    lines = [plan_line(setup), *tracks, *return_lines(setup, drawn)]
     zones = [*map_zones(setup), *glide_shapes(setup, drawn)]
     text = kml_text(f"{setup.scenario.name} returns", lines, zones)
-    pictures = draw_pictures(return_views(setup, drawn, track if flown else None))
+    pictures = draw_pictures(return_views(setup, drawn, track if tracks else None))
     return {**pictures, "returns.kml": text.encode("utf-8")}

@@ -16,15 +16,21 @@ from planfly.api.exporting import judged_parameters
 from planfly.api.flying import named_program
 from planfly.arguments import check_arguments
 from planfly.flight_options import RunOptions, named_scenario, option_defaults, takes_options
-from planfly.kernel_units.unit_kernels import BOTH, GLIDING
+from planfly.kernel_units.unit_kernels import GLIDING, PLANNING_AND_FLYING
 from planfly.rtl.return_summary import return_summary
 from planfly.runtime.first_start import with_warm_up
-from planfly.runtime.stages import say_replaced, stage
+from planfly.runtime.stages import report_replaced, stage
 from planfly.workflow.airframe import Airframe, choose_seed, load_airframe, tightened_airframe
 from planfly.workflow.crash_safe_log import FlightLimits, flight_kind, flight_text
 from planfly.workflow.make_plan import make_plan, planned_for
 from planfly.workflow.open_flight import make_setup, mission_of_plan
-from planfly.workflow.output_paths import RUN_FILES, RUN_FOLDER, expand_path_pattern, prepare_folder, refuse_folder
+from planfly.workflow.output_paths import (
+    RUN_FILES,
+    RUN_FOLDER,
+    check_output_folder,
+    expand_path_pattern,
+    prepare_folder,
+)
 from planfly.workflow.pipeline import autopilot_log, fly_and_judge
 from planfly.workflow.reference_flights import FlyReference
 from planfly.workflow.tighten_plan import refine as refine_rounds
@@ -37,12 +43,12 @@ from world.scenario import Scenario
 class Round:
     """One round of a run.
 
-    number: from 0.
-    changes: limits tightened for its planning, a line each.
+    number: number of the round, from 0.
+    changes: limits that were tightened for its planning, a line each.
     verdict: verdict on its flight, or on its plan if nothing was flown.
     flown: True if it was flown.
     folder: the folder of its files.
-    notes: on the scenario's zones and the mission's route.
+    notes: notes on the scenario's zones and the mission's route.
     has_log: True if a flight log was written.
     returns_line: returns from a few places of the flight, in one line; "" if nothing was flown.
     """
@@ -111,7 +117,7 @@ class _Task:
     reference: FlyReference
 
 
-@with_warm_up(*BOTH, *GLIDING)
+@with_warm_up(*PLANNING_AND_FLYING, *GLIDING)
 @takes_options
 def run(
     scenario: Scenario | str | Path = "jacksboro",
@@ -147,17 +153,19 @@ def run(
     )
     program = named_program(options["sitl"])
     world = named_scenario(scenario, options, program)
-    number, airframe = choose_seed(world, seed), load_airframe(world)
-    folder = expand_path_pattern(out, world.name, number)
-    refuse_folder(folder, overwrite or out == RUN_FOLDER)
-    name = world.name if isinstance(scenario, Scenario) else str(scenario)
+    chosen_seed, airframe = choose_seed(world, seed), load_airframe(world)
+    folder = expand_path_pattern(out, world.name, chosen_seed)
+    check_output_folder(folder, overwrite or out == RUN_FOLDER)
+    scenario_name = world.name if isinstance(scenario, Scenario) else str(scenario)
     defaults = {"refine": 0, **option_defaults(RunOptions)}
-    repeated = {one: value for one, value in {"refine": refine, **options}.items() if value != defaults[one]}
-    line = command_line(name, number, repeated)
+    changed_options = {name: value for name, value in {"refine": refine, **options}.items() if value != defaults[name]}
+    repeat_command = command_line(scenario_name, chosen_seed, changed_options)
     reference: FlyReference = "always" if options["levels"] else "failed"
-    task = _Task(world, airframe, number, line, folder, program, limits, 60 // options["log_hz"], reference)
-    with contextlib.ExitStack() as held:
-        return _fly_rounds(task, refine, held, on_round)
+    task = _Task(
+        world, airframe, chosen_seed, repeat_command, folder, program, limits, 60 // options["log_hz"], reference
+    )
+    with contextlib.ExitStack() as locks:
+        return _fly_rounds(task, refine, locks, on_round)
 
 
 def command_line(scenario: str, seed: int, options: Mapping[str, Any]) -> str:
@@ -166,46 +174,51 @@ def command_line(scenario: str, seed: int, options: Mapping[str, Any]) -> str:
     >>> command_line("tight", 3, {"wind": (8.0, 270.0), "autopilot": "px4", "params": "my file.parm"})
     "planfly run tight --seed 3 --wind 8,270 --autopilot px4 --params 'my file.parm'"
     """
-    words = [f"planfly run {shlex.quote(scenario)} --seed {seed}"]
+    parts = [f"planfly run {shlex.quote(scenario)} --seed {seed}"]
     for name, value in options.items():
-        words.append(f"--{name.replace('_', '-')}")
+        parts.append(f"--{name.replace('_', '-')}")
         if name == "wind":
-            words.append("{:g},{:g}".format(*value))
+            parts.append("{:g},{:g}".format(*value))
         elif value is not True:
-            words.append(shlex.quote(str(value)))
-    return " ".join(words)
+            parts.append(shlex.quote(str(value)))
+    return " ".join(parts)
 
 
 def _fly_rounds(
-    task: _Task, refine: int, held: contextlib.ExitStack, on_round: Callable[[Round], None] | None
+    task: _Task, refine: int, locks: contextlib.ExitStack, on_round: Callable[[Round], None] | None
 ) -> RunResult:
     """Plan and fly until a round flies or no round remains.
 
-    held: stack that takes the lock of the folder, after the first plan.
+    locks: stack that takes the lock of the folder, after the first plan.
     """
     scenario, airframe, folder = task.scenario, task.airframe, task.folder
-    flown: list[Round] = []
+    rounds_flown: list[Round] = []
 
-    def one_round(planned_in: Scenario) -> tuple[Verdict, bool]:
-        planned_with = airframe if planned_in is scenario else tightened_airframe(airframe, planned_in)
+    def fly_round(planning_scenario: Scenario) -> tuple[Verdict, bool]:
+        planning_airframe = (
+            airframe if planning_scenario is scenario else tightened_airframe(airframe, planning_scenario)
+        )
         with stage(f"planning {scenario.name}", "planning") as advance:
-            plan = make_plan(planned_in, planned_with, task.seed, advance=advance)
-        if not flown:
+            plan = make_plan(planning_scenario, planning_airframe, task.seed, advance=advance)
+        if not rounds_flown:
             folder.mkdir(parents=True, exist_ok=True)
-            held.enter_context(hold(folder))
+            locks.enter_context(hold(folder))
             if task.program is not None:
-                say_replaced(folder / "flight.mcap", autopilot_log(folder / "flight.mcap", task.program))
+                report_replaced(folder / "flight.mcap", autopilot_log(folder / "flight.mcap", task.program))
             prepare_folder(folder)
-        flown.append(_fly_round(task, plan, len(flown)))
+        rounds_flown.append(_fly_round(task, plan, len(rounds_flown)))
         if on_round is not None:
-            on_round(flown[-1])
-        return flown[-1].verdict, flown[-1].flown
+            on_round(rounds_flown[-1])
+        return rounds_flown[-1].verdict, rounds_flown[-1].flown
 
-    _, entries = refine_rounds(scenario, refine, one_round, lambda number: _keep_round(folder, number))
+    _, entries = refine_rounds(scenario, refine, fly_round, lambda number: _keep_round(folder, number))
     if refine:
         write_whole(folder / "rounds.json", json.dumps(entries, indent=1) + "\n")
-    *earlier, last = (replace(one, changes=tuple(entry["changes"])) for one, entry in zip(flown, entries, strict=True))
-    rounds = (*(replace(one, folder=folder / f"round-{one.number}") for one in earlier), last)
+    *earlier, last = (
+        replace(finished, changes=tuple(entry["changes"]))
+        for finished, entry in zip(rounds_flown, entries, strict=True)
+    )
+    rounds = (*(replace(finished, folder=folder / f"round-{finished.number}") for finished in earlier), last)
     return RunResult(scenario.name, task.seed, folder, rounds, entries[-1]["next"])
 
 
@@ -263,8 +276,8 @@ def _fly_round(task: _Task, plan: Plan, number: int) -> Round:
 
 def _keep_round(folder: Path, number: int) -> None:
     """Move the results of a round to its own subfolder before the next round."""
-    kept = folder / f"round-{number}"
-    kept.mkdir(exist_ok=True)
+    round_folder = folder / f"round-{number}"
+    round_folder.mkdir(exist_ok=True)
     for name in RUN_FILES:
         if (folder / name).exists():
-            (folder / name).replace(kept / name)
+            (folder / name).replace(round_folder / name)

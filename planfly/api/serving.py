@@ -20,7 +20,7 @@ def _never_stop() -> bool:
     return False
 
 
-def _ignore(_text: str) -> None:
+def _ignore_message(_text: str) -> None:
     pass
 
 
@@ -37,16 +37,16 @@ def serve(
     speed: float = 1.0,
     log: str | Path = "runs/serve",
     stop: Callable[[], bool] = _never_stop,
-    on_message: Callable[[str], None] = _ignore,
+    on_message: Callable[[str], None] = _ignore_message,
     **options: Unpack[MissionOptions],
 ) -> None:
     """Serve a MAVLink vehicle in a simulated world until ``stop`` returns True; needs ``planfly[live]``.
 
     mission: the file of the first mission; None waits for an upload into the scenario that the options name.
-    options: as of `planfly.fly`.
+    options: options of `planfly.fly`.
     to: addresses of ground stations, IP:PORT, one or several.  bind: address of the vehicle.
     allow: IP addresses beyond this machine that may talk to it.  sign_key: a file with a MAVLink signing key.
-    speed: times real time, 0.1 to 100.  log: the folder of the flight logs.
+    speed: multiple of real time, 0.1 to 100.  log: the folder of the flight logs.
     stop: polled continuously.  on_message: called with one line for each event.
 
     A script must call this function under ``if __name__ == "__main__":``, because flight processes import the script.
@@ -58,11 +58,11 @@ def serve(
 
     access = link_access(to, bind, allow, sign_key)
     check_arguments(served_speed=speed)
-    flown = ServeOptions("" if mission is None else str(mission), speed, Path(log), options)
-    served = open_served(flown)
-    if flown.logs.exists() and not flown.logs.is_dir():
+    serve_options = ServeOptions("" if mission is None else str(mission), speed, Path(log), options)
+    served = open_served(serve_options)
+    if serve_options.logs.exists() and not serve_options.logs.is_dir():
         raise PlanflyError.of_argument("log", log, "is a file; a folder is expected")
-    serve_vehicle(access, flown, served, stop, on_message)
+    serve_vehicle(access, serve_options, served, stop, on_message)
 
 
 # ----------------------------------------------------------------------
@@ -93,8 +93,8 @@ def link_access(
     return access
 
 
-def _split_addresses(given: str | Sequence[str]) -> Sequence[str]:
-    return given.split(",") if isinstance(given, str) else given
+def _split_addresses(addresses: str | Sequence[str]) -> Sequence[str]:
+    return addresses.split(",") if isinstance(addresses, str) else addresses
 
 
 def _parse_address(argument: str, text: str) -> tuple[str, int]:

@@ -17,7 +17,7 @@ from logs.verdict.measures.route_requirements import RouteRequirements, route_re
 from logs.verdict.measures.track_alignment import align_track
 from logs.verdict.verdict import Verdict
 from logs.views.surveys import survey_chart
-from planfly.api.flying import FlownMission, refuse
+from planfly.api.flying import FlownMission, refuse_keywords
 from planfly.arguments import CAMERA, check_arguments, is_camera
 from planfly.flight_logs import is_log
 from planfly.flight_options import MissionOptions, takes_options
@@ -26,7 +26,7 @@ from planfly.runtime.first_start import with_warm_up
 from planfly.runtime.stages import stage
 from planfly.surveys.survey_remedies import NearMiss, SurveyRemedy, survey_remedies
 from planfly.surveys.survey_text import (
-    kept_overlap,
+    has_required_overlap,
     line_text,
     lines_headline,
     near_miss_text,
@@ -39,7 +39,7 @@ from planfly.surveys.survey_text import (
 from planfly.workflow.airframe import airframe_of
 from planfly.workflow.crash_safe_log import flight_text
 from planfly.workflow.open_flight import open_flight
-from planfly.workflow.output_paths import SURVEY_FILES, clean_folder, refuse_folder
+from planfly.workflow.output_paths import SURVEY_FILES, check_output_folder, clean_folder
 from planfly.workflow.pipeline import fly_and_judge
 from world.errors import ArgumentError, LogError, MissionError
 from world.files import write_whole
@@ -74,47 +74,49 @@ class SurveyFound:
     @property
     def usable(self) -> bool:
         """True if enough of every line is usable and the photos overlap as required."""
-        return all(usable(one) for lines in self.lines for one in lines) and all(map(kept_overlap, self.overlaps))
+        return all(usable(line) for lines in self.lines for line in lines) and all(
+            map(has_required_overlap, self.overlaps)
+        )
 
     @property
     def headline(self) -> str:
         """Summary of all photo lines, in one line."""
-        return lines_headline([one for lines in self.lines for one in lines])
+        return lines_headline([line for lines in self.lines for line in lines])
 
     @property
-    def lines_of_lines(self) -> tuple[str, ...]:
+    def survey_lines(self) -> tuple[str, ...]:
         """Lines that describe each survey and its photo lines."""
-        out = []
+        texts = []
         for survey, lines, overlap in zip(self.surveys, self.lines, self.overlaps, strict=True):
-            out += [survey_text(survey), *overlap_lines(overlap)]
-            out += [line_text(number, one) for number, one in enumerate(lines, 1)]
-        return tuple(out)
+            texts += [survey_text(survey), *overlap_lines(overlap)]
+            texts += [line_text(number, line) for number, line in enumerate(lines, 1)]
+        return tuple(texts)
 
     @property
-    def lines_of_remedies(self) -> tuple[str, ...]:
+    def remedy_lines(self) -> tuple[str, ...]:
         """Lines that describe the remedies."""
-        return tuple(remedy_text(one, self.setup.path.length) for one in self.remedies)
+        return tuple(remedy_text(remedy, self.setup.path.length) for remedy in self.remedies)
 
     @property
-    def lines_without_remedy(self) -> tuple[str, ...]:
-        """Lines that state that no remedy was found, the closest trial, and why no other layout was tried."""
-        said = [
+    def no_remedy_lines(self) -> tuple[str, ...]:
+        """Lines for a search without a remedy: the closest trial, and why no other layout was tried."""
+        texts = [
             "no turn-around, order, course, parameter or airspeed alone was found that would help, nor longer"
             " turn-arounds with another parameter or a slower flight"
         ]
-        said += [needed_text(*pair) for pair in zip(self.surveys, self.lines, strict=True)]
+        texts += [needed_text(*pair) for pair in zip(self.surveys, self.lines, strict=True)]
         if self.kept:
-            said.append(f"no other layout was tried: {self.kept}")
+            texts.append(f"no other layout was tried: {self.kept}")
         if self.nearest is not None:
-            said.append(f"nearest: {near_miss_text(self.nearest)}")
-        return tuple(said)
+            texts.append(f"nearest: {near_miss_text(self.nearest)}")
+        return tuple(texts)
 
     def __repr__(self) -> str:
         return f"<SurveyFound {self.setup.scenario.name}: {self.headline}>"
 
 
 # Reason why a flown survey cannot be judged in another world, in messages.
-_AS_FLOWN = "a flight's photo lines are those that were flown"
+_LINES_AS_FLOWN_TEXT = "a flight's photo lines are those that were flown"
 
 
 @with_warm_up(*FLYING)
@@ -142,23 +144,23 @@ def survey(
     Raises a `planfly.PlanflyError` for bad input, and for a mission without a survey.
     """
     check_arguments(seed=options["seed"])
-    taken = _parse_camera(camera)
-    given: dict[str, Any] = {**options, "fence": options["fence"] or None, "suggest": suggest or None}
+    own_camera = _parse_camera(camera)
+    fixed_options: dict[str, Any] = {**options, "fence": options["fence"] or None, "suggest": suggest or None}
     if out is not None:
-        refuse_folder(Path(out), overwrite)
+        check_output_folder(Path(out), overwrite)
     if isinstance(what, str | Path) and is_log(Path(what)):
-        refuse(str(what), given, _AS_FLOWN)
+        refuse_keywords(str(what), fixed_options, _LINES_AS_FLOWN_TEXT)
         what = read_log(Path(what))
     if isinstance(what, FlightLog | FlownMission):
-        refuse("flight", given, _AS_FLOWN)
+        refuse_keywords("flight", fixed_options, _LINES_AS_FLOWN_TEXT)
         source = what.setup.source
         if source is not None and "attitude" not in source.holds:
             raise LogError(f"{source.file}: no attitude: how far photos are banked is not known", file=source.file)
-        setup = _with_camera(what.setup.in_scenario(_judging_parallel_lines(what.setup.scenario)), taken)
+        setup = _with_camera(what.setup.in_scenario(_judging_parallel_lines(what.setup.scenario)), own_camera)
         return _write_results(_judge_flown_survey(setup, what.track, what.ended or ""), out, overwrite)
 
-    opened = open_flight(what, options)
-    setup = _with_camera(opened.in_scenario(_judging_parallel_lines(opened.scenario)), taken)
+    planned_setup = open_flight(what, options)
+    setup = _with_camera(planned_setup.in_scenario(_judging_parallel_lines(planned_setup.scenario)), own_camera)
     return _write_results(_fly_survey(setup, suggest), out, overwrite)
 
 
@@ -167,16 +169,16 @@ def _parse_camera(numbers: tuple[float, ...] | None) -> Camera | None:
     if numbers is None:
         return None
     try:
-        found = tuple(float(number) for number in numbers)
+        camera_numbers = tuple(float(number) for number in numbers)
     except (TypeError, ValueError):
-        found = ()
-    if isinstance(numbers, str | bytes) or not is_camera(found):
+        camera_numbers = ()
+    if isinstance(numbers, str | bytes) or not is_camera(camera_numbers):
         raise ArgumentError.of_argument(
             "camera", numbers, f"{CAMERA}, are expected, as (23.5, 15.6, 16)", shown=repr(numbers)
         )
-    width, height, focal, *asked = found
-    front, side = (one / 100.0 for one in asked) if asked else (None, None)
-    return Camera(width / focal, height / focal, front, side)
+    width, height, focal, *overlaps = camera_numbers
+    front_overlap, side_overlap = (percent / 100.0 for percent in overlaps) if overlaps else (None, None)
+    return Camera(width / focal, height / focal, front_overlap, side_overlap)
 
 
 def _with_camera(setup: FlightSetup, camera: Camera | None) -> FlightSetup:
@@ -188,9 +190,9 @@ def _with_camera(setup: FlightSetup, camera: Camera | None) -> FlightSetup:
         return setup
     plans = []
     for plan in setup.mission.survey_plans:
-        own = plan.camera or camera
-        front, side = (camera.front, camera.side) if camera.front is not None else (own.front, own.side)
-        plans.append(replace(plan, camera=replace(camera, front=front, side=side, interval=own.interval)))
+        plan_camera = plan.camera or camera
+        front, side = (camera.front, camera.side) if camera.front is not None else (plan_camera.front, plan_camera.side)
+        plans.append(replace(plan, camera=replace(camera, front=front, side=side, interval=plan_camera.interval)))
     return replace(setup, mission=replace(setup.mission, survey_plans=(*plans, SurveyPlan(None, 0.0, camera))))
 
 
@@ -204,9 +206,11 @@ def _fly_survey(setup: FlightSetup, suggest: bool) -> SurveyFound:
     if not suggest or found.usable:
         return found
     with stage("looking for what would help") as advance:
-        counted = count(1)
-        tried = survey_remedies(flown.setup, airframe, flown.verdict, lambda text: advance(next(counted), 0.0, text))
-    return replace(found, remedies=tried.remedies, nearest=tried.nearest, kept=tried.kept)
+        step_counter = count(1)
+        trials = survey_remedies(
+            flown.setup, airframe, flown.verdict, lambda text: advance(next(step_counter), 0.0, text)
+        )
+    return replace(found, remedies=trials.remedies, nearest=trials.nearest, kept=trials.kept)
 
 
 def _write_results(found: SurveyFound, out: str | Path | None, overwrite: bool) -> SurveyFound:
@@ -229,10 +233,10 @@ def _write_results(found: SurveyFound, out: str | Path | None, overwrite: bool) 
             files.append(path)
         if remedy.kind == "parameter":
             # Include the parameters of the user's own file, because they were flown, too.
-            own = found.setup.autopilot.with_parameters(**{remedy.name: remedy.value}).parameters
-            stated = {} if own is None else own.by_origin("file")
+            parameters = found.setup.autopilot.with_parameters(**{remedy.name: remedy.value}).parameters
+            file_values = {} if parameters is None else parameters.by_origin("file")
             path = folder / "parameter.param"
-            write_whole(path, "".join(f"{name},{value!r}\n" for name, value in stated.items()))
+            write_whole(path, "".join(f"{name},{value!r}\n" for name, value in file_values.items()))
             files.append(path)
     return replace(found, files=tuple(files))
 
@@ -264,8 +268,8 @@ def _measure_survey(requirements: RouteRequirements, track: Track, verdict: Verd
     setup, surveys = requirements.setup, requirements.surveys
     aligned = align_track(requirements, track) if len(track) else None
     lines = tuple(
-        tuple(None if aligned is None else measure_line(requirements, aligned, one, line) for line in one.lines)
-        for one in surveys
+        tuple(None if aligned is None else measure_line(requirements, aligned, survey, line) for line in survey.lines)
+        for survey in surveys
     )
-    overlaps = tuple(None if aligned is None else measure_overlap(requirements, aligned, one) for one in surveys)
+    overlaps = tuple(None if aligned is None else measure_overlap(requirements, aligned, survey) for survey in surveys)
     return SurveyFound(setup, track, verdict, surveys, lines, overlaps)

@@ -19,7 +19,7 @@ from flight.mission.placing import PlacedMission, place_stops
 from flight.mission_files.formats import mission_text
 from flight.simulation.setup import FlightSetup, make_limits
 from logs.verdict.conditions import Conditions, setup_conditions
-from planfly.campaigns.dispersions import DEFAULT, DRAWN, Dispersions, Draw, SpreadError
+from planfly.campaigns.dispersions import DEFAULT, QUANTITIES_OF_DRAWS, Dispersions, Draw, SpreadError
 from planfly.flight_options import MissionOptions, named_scenario
 from planfly.named_fences import NamedFences, read_named_fences
 from planfly.workflow.airframe import (
@@ -121,14 +121,14 @@ def open_campaign(
     else:
         fences, seed = read_named_fences(options.get("fence") or ()), options.get("seed")
         scenario = fences.on_scenario(named_scenario(target, options))
-        kept = planned is not None and planned.is_file()
-        plan = read_plan(planned) if kept and planned is not None else _make_plan(scenario, seed, advance)
-        if kept and plan.scenario.to_json() != scenario.to_json():
+        has_plan_file = planned is not None and planned.is_file()
+        plan = read_plan(planned) if has_plan_file and planned is not None else _make_plan(scenario, seed, advance)
+        if has_plan_file and plan.scenario.to_json() != scenario.to_json():
             raise MissionError(f"{planned}: is the plan of another scenario than {target}", file=str(planned))
-        if planned is not None and not kept:
+        if planned is not None and not has_plan_file:
             write_whole(planned, plan_json(plan))
         base = _base_of_plan(plan, fences, dispersions, choose_seed(scenario, seed))
-    check_middle(base)
+    check_level_flight_at_medians(base)
     # Refuse a mission without a valid route now, not in a worker.
     base.nominal_setup()
     return base
@@ -160,12 +160,12 @@ def _base_of_setup(setup: FlightSetup, dispersions: Dispersions, source: str) ->
     return CampaignBase(scenario, airframe, mission, placed, setup.plan, dispersions, setup.seed, setup.name)
 
 
-def check_middle(base: CampaignBase) -> None:
+def check_level_flight_at_medians(base: CampaignBase) -> None:
     """Raise SpreadError if the aircraft cannot fly level at the medians of the dispersions.
 
-    Raise FlightError if it cannot fly level at all.
+    Raises FlightError if the aircraft cannot fly level at all.
     """
-    medians = {one.quantity.name: one.value(0.5) for one in base.dispersions.varying}
+    medians = {varying.quantity.name: varying.value(0.5) for varying in base.dispersions.varying}
     variation = Variation(
         mass=medians.get("mass", 1.0), drag=medians.get("drag", 1.0), control=medians.get("control_power", 1.0)
     )
@@ -204,8 +204,10 @@ def _with_own_draws(dispersions: Dispersions, aircraft: Aircraft) -> Dispersions
     A dispersions file that names other draws, or has its own dispersions of drag or control power, is used unchanged.
     """
     file = aircraft.folder / DRAWS_FILE
-    stated = dispersions.name != DEFAULT and any(one.quantity.name in DRAWN for one in dispersions.varying)
-    if stated or dispersions.draws is not None or not file.is_file():
+    has_own_dispersions = dispersions.name != DEFAULT and any(
+        varying.quantity.name in QUANTITIES_OF_DRAWS for varying in dispersions.varying
+    )
+    if has_own_dispersions or dispersions.draws is not None or not file.is_file():
         return dispersions
     return dispersions.with_draws(read_draws(file, SpreadError))
 
@@ -251,7 +253,7 @@ def vary(base: CampaignBase, draw: Draw, wind: GivenWind | None = None) -> Varie
         scenario = replace(scenario, terrain=_raise_terrain(scenario.terrain, values["terrain_height"]))
     battery = base.airframe.battery * values["battery"]
     draws = base.dispersions.draws
-    limits = _limits_in_wind(base.airframe, scenario, drawn=draws is not None)
+    limits = _limits_in_wind(base.airframe, scenario, is_drawn=draws is not None)
     airframe = replace(base.airframe, limits=limits, battery=battery)
     setup = make_setup(scenario, airframe, base.mission, draw.seed, plan=base.plan, placed=base.placed)
     properties = () if draws is None else draws.properties(draw.seed)
@@ -262,29 +264,29 @@ def vary(base: CampaignBase, draw: Draw, wind: GivenWind | None = None) -> Varie
     return VariedFlight(setup, airframe, OffNominal(variation, offset))
 
 
-def _with_drawn_wind(scenario: Scenario, values: dict[str, float], mean: GivenWind | None) -> Scenario:
+def _with_drawn_wind(scenario: Scenario, values: dict[str, float], mean_wind: GivenWind | None) -> Scenario:
     """Return the scenario with the wind of a draw; gusts use the flight's seed, not the scenario's seed."""
-    old = scenario.wind
-    about = mean or GivenWind(old.speed, math.degrees(old.from_course))
-    speed = min(MAX_WIND, max(0.0, about.speed + values["wind_speed"]))
-    from_deg = (about.from_deg + values["wind_from"]) % 360.0
-    gradient = min(MAX_GRADIENT, max(-MAX_GRADIENT, old.gradient + values["wind_gradient"]))
-    level = LEVELS.index(old.turbulence) + round(values["turbulence"])
+    old_wind = scenario.wind
+    nominal = mean_wind or GivenWind(old_wind.speed, math.degrees(old_wind.from_course))
+    speed = min(MAX_WIND, max(0.0, nominal.speed + values["wind_speed"]))
+    from_deg = (nominal.from_deg + values["wind_from"]) % 360.0
+    gradient = min(MAX_GRADIENT, max(-MAX_GRADIENT, old_wind.gradient + values["wind_gradient"]))
+    level = LEVELS.index(old_wind.turbulence) + round(values["turbulence"])
     turbulence = LEVELS[min(len(LEVELS) - 1, max(0, level))]
     table = WindTable(speed_mps=speed, from_deg=from_deg, gradient=gradient, turbulence=turbulence)
-    wind = Wind(speed, math.radians(from_deg), gradient, turbulence, None, old.reference_amsl)
+    wind = Wind(speed, math.radians(from_deg), gradient, turbulence, None, old_wind.reference_amsl)
     return replace(scenario, spec=scenario.spec.model_copy(update={"wind": table}), wind=wind)
 
 
-def _raise_terrain(terrain: Terrain, by: float) -> Terrain:
-    return replace(terrain, heights=(terrain.heights + np.float32(by)).astype(np.float32))
+def _raise_terrain(terrain: Terrain, height: float) -> Terrain:
+    return replace(terrain, heights=(terrain.heights + np.float32(height)).astype(np.float32))
 
 
-def _limits_in_wind(airframe: Airframe, scenario: Scenario, *, drawn: bool) -> Limits:
-    """Return the airframe's limits in the wind of a scenario.  drawn: True if the flight's aircraft is drawn."""
-    old = airframe.limits
+def _limits_in_wind(airframe: Airframe, scenario: Scenario, *, is_drawn: bool) -> Limits:
+    """Return the airframe's limits in the wind of a scenario.  is_drawn: True if the flight's aircraft is drawn."""
+    old_limits = airframe.limits
     # The performance of a drawn aircraft is known exactly, so it has no standard deviations.
-    known = replace(old.envelope, climb_sd=0.0, descent_sd=0.0, fastest_sd=0.0, power_sd=0.0)
-    envelope = known if drawn else old.envelope
-    limits = make_limits(scenario, envelope, old.airspeed, bank_limit(scenario, airframe.autopilot))
+    exact_envelope = replace(old_limits.envelope, climb_sd=0.0, descent_sd=0.0, fastest_sd=0.0, power_sd=0.0)
+    envelope = exact_envelope if is_drawn else old_limits.envelope
+    limits = make_limits(scenario, envelope, old_limits.airspeed, bank_limit(scenario, airframe.autopilot))
     return with_tracking(limits, airframe.autopilot, scenario)

@@ -43,23 +43,23 @@ def winds_line(target: str, goal: WindsGoal, options: Mapping[str, object]) -> s
     'planfly winds jacksboro-air --prove 0.9 --directions 8 --seed 1'
     """
     flights = None if goal.flights == USUAL_WIND_FLIGHTS else goal.flights
-    asked = {"prove": goal.target, "directions": goal.directions, "most": goal.most, "flights": flights}
-    return _command_line("winds", target, {**asked, "confidence": goal.confidence, **options})
+    goal_options = {"prove": goal.target, "directions": goal.directions, "most": goal.most, "flights": flights}
+    return _command_line("winds", target, {**goal_options, "confidence": goal.confidence, **options})
 
 
 def _command_line(command: str, target: str, options: Mapping[str, object]) -> str:
-    words = ["planfly", command, shlex.quote(target)]
+    parts = ["planfly", command, shlex.quote(target)]
     for name, value in options.items():
         if value is None or value == _DEFAULTS.get(name):
             continue
-        for one in value if isinstance(value, list) else [value]:
-            words += [f"--{name.replace('_', '-')}", shlex.quote(_option_text(one))]
-    return " ".join(words)
+        for item in value if isinstance(value, list) else [value]:
+            parts += [f"--{name.replace('_', '-')}", shlex.quote(_option_text(item))]
+    return " ".join(parts)
 
 
 def _option_text(value: object) -> str:
     if isinstance(value, tuple):
-        return ",".join(_option_text(one) for one in value)
+        return ",".join(_option_text(item) for item in value)
     return f"{value:g}" if isinstance(value, float) and float(f"{value:g}") == value else str(value)
 
 
@@ -104,7 +104,7 @@ class CampaignResult:
     @property
     def by_rule(self) -> dict[str, int]:
         """Number of flights that failed each rule, for rules that at least one flight failed."""
-        return {one.rule: one.flights for one in self.summary.by_rule}
+        return {failures.rule: failures.flights for failures in self.summary.by_rule}
 
     @property
     def flights(self) -> Any:
@@ -146,5 +146,7 @@ def make_goal(flights: int | None, prove: float | None, at_least: float | None, 
     if prove is not None and at_least is not None:
         raise ArgumentError("`prove` and `at_least`: give one of them", field="prove", value=prove)
     check_arguments(prove=prove, at_least=at_least, confidence=confidence, flights=flights)
-    number = flights or (USUAL_FLIGHTS if prove is None else MAX_FLIGHTS)
-    return Goal(prove if prove is not None else at_least, prove is not None, number, confidence or USUAL_CONFIDENCE)
+    flight_count = flights or (USUAL_FLIGHTS if prove is None else MAX_FLIGHTS)
+    return Goal(
+        prove if prove is not None else at_least, prove is not None, flight_count, confidence or USUAL_CONFIDENCE
+    )

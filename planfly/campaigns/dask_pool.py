@@ -20,8 +20,8 @@ from planfly.campaigns.flight_requests import (
     LOST,
     MAX_FAILURES,
     CampaignCopy,
+    FinishedFlight,
     FlightRequest,
-    Flown,
     FlyOne,
     fingerprint,
 )
@@ -32,7 +32,7 @@ from world.interruption import Interrupted
 # Timeout for the connection to a scheduler, s.
 _CONNECT_SECONDS = 20
 # Number of task names that are used in turn; dask keeps the last 100,000 tasks, so an old name is free again in time.
-_NAMES = 4096
+_TASK_NAME_COUNT = 4096
 
 
 def connect(address: str) -> Any:
@@ -71,7 +71,7 @@ class DaskPool:
     def __init__(self, client: Any, base: CampaignBase, fly: FlyOne = fly_one) -> None:
         self._client, self._base = client, base
         self._name = f"planfly-{uuid.uuid4().hex[:12]}"
-        self._numbers = itertools.cycle(range(_NAMES))
+        self._numbers = itertools.cycle(range(_TASK_NAME_COUNT))
         copy = CampaignCopy(base, fingerprint(base.scenario.flight.aircraft), fly)
         client.register_plugin(CampaignPlugin(self._name, copy))
 
@@ -85,40 +85,40 @@ class DaskPool:
         threads: dict[str, int] = self._client.nthreads()
         return max(1, sum(threads.values()))
 
-    def fly(self, following: Callable[[], FlightRequest | None]) -> Iterator[Flown]:
-        """Fly the requests that `following` returns, and yield each flight when it is done, in any order.
+    def fly(self, next_request: Callable[[], FlightRequest | None]) -> Iterator[FinishedFlight]:
+        """Fly the requests that `next_request` returns, and yield each flight when it is done, in any order.
 
-        following: returns the next request, or None if there is none at present; called again after each flight.
+        next_request: returns the next request, or None if there is none at present; called again after each flight.
         Raises the `world.errors.PlanflyError` of a flight, and OSError if the scheduler is lost.
         """
         flying: dict[tuple[str, int], FlightRequest] = {}
-        given_up: Counter[FlightRequest] = Counter()
-        done: Any = cast("Any", distributed.as_completed)(loop=self._client.loop)
+        abandoned_counts: Counter[FlightRequest] = Counter()
+        finished: Any = cast("Any", distributed.as_completed)(loop=self._client.loop)
 
         def send(request: FlightRequest) -> None:
             # Dask takes the first word of a tuple as the kind of task, and keeps a permanent record of each kind.
             key = next(key for number in self._numbers if (key := (self._name, number)) not in flying)
             flying[key] = request
-            done.add(self._client.submit(fly_task, self._name, request, key=key, pure=False))
+            finished.add(self._client.submit(fly_task, self._name, request, key=key, pure=False))
 
-        def send_following() -> None:
-            while len(flying) < min(_NAMES, self._threads()) and (request := following()) is not None:
+        def send_requests() -> None:
+            while len(flying) < min(_TASK_NAME_COUNT, self._threads()) and (request := next_request()) is not None:
                 send(request)
 
         try:
-            send_following()
+            send_requests()
             while flying:
-                future = next(done)
+                future = next(finished)
                 request = flying.pop(future.key)
                 row = self._result_row(future, request)
                 if row is None:
-                    given_up[request] += 1
-                if row is None and given_up[request] < MAX_FAILURES:
+                    abandoned_counts[request] += 1
+                if row is None and abandoned_counts[request] < MAX_FAILURES:
                     send(request)
                 else:
-                    yield Flown(request, row or lost_row(self._base, request.index, LOST))
-                    send_following()
-                # Release it after the next task was sent, because dask makes a new record for a kind without a task.
+                    yield FinishedFlight(request, row or lost_row(self._base, request.index, LOST))
+                    send_requests()
+                # Release it after the next task was sent, because dask makes a new record for a kind without tasks.
                 future.release()
         except Interrupted:
             # Do not wait for these flights, which end with the client.
@@ -126,7 +126,7 @@ class DaskPool:
             raise
         finally:
             if flying:
-                self._client.cancel(list(done.futures), force=True)
+                self._client.cancel(list(finished.futures), force=True)
 
     def _result_row(self, future: Any, request: FlightRequest) -> FlightRow | None:
         """Return the row of a flight, or None if dask abandoned the flight because its workers died.
@@ -134,8 +134,7 @@ class DaskPool:
         Raises OSError if the scheduler is lost.
         """
         if future.status == "finished":
-            # A result is lost with its worker until it is fetched; dask then repeats the flight, and may give that up,
-            # too.
+            # Until it is fetched, a result is lost if its worker dies.  Dask then flies again, and may give up, too.
             with contextlib.suppress(KilledWorker, CancelledError):
                 return future.result()
         elif future.status == "error":

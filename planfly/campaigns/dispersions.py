@@ -78,11 +78,11 @@ NAMES = tuple(BY_NAME)
 
 
 # Quantities that draws of the whole aircraft replace.
-DRAWN = ("drag", "control_power")
+QUANTITIES_OF_DRAWS = ("drag", "control_power")
 # Name of the table with the file of draws.
-_AIRCRAFT = "aircraft"
-# Minimum share of a distribution within the range of its quantity; the rest of the distribution is never drawn.
-INSIDE = 0.99
+_DRAWS_TABLE = "aircraft"
+# Minimum fraction of a distribution within the range of its quantity; the rest of the distribution is never drawn.
+MIN_FRACTION_INSIDE = 0.99
 # Maximum size of a dispersions file, bytes.
 MAX_BYTES = 100_000
 # Name of the default dispersions in messages and reports.
@@ -108,7 +108,7 @@ class Varying:
     source: str
 
     @cached_property
-    def _frozen(self) -> Any:
+    def _distribution(self) -> Any:
         from scipy import stats
 
         return getattr(stats, self.distribution)(**dict(self.parameters))
@@ -116,29 +116,29 @@ class Varying:
     @cached_property
     def _range_limits(self) -> tuple[float, float]:
         """Return the values of the distribution function just below the quantity's range and at its upper end."""
-        low = self.quantity.low - (0.5 if self.quantity.integer else 0.0)
-        return float(self._frozen.cdf(low)), float(self._frozen.cdf(self.quantity.high))
+        min_value = self.quantity.low - (0.5 if self.quantity.integer else 0.0)
+        return float(self._distribution.cdf(min_value)), float(self._distribution.cdf(self.quantity.high))
 
     @property
-    def share_inside(self) -> float:
-        """Return the share of the distribution within the quantity's range, 0 to 1; NaN for invalid parameters."""
-        low, high = self._range_limits
-        return high - low
+    def fraction_inside(self) -> float:
+        """Fraction of the distribution within the quantity's range, 0 to 1; NaN for invalid parameters."""
+        lower_probability, upper_probability = self._range_limits
+        return upper_probability - lower_probability
 
-    def value(self, uniform: float) -> float:
-        """Return the inverse distribution function at a share, 0 to 1, of the distribution within the range.
+    def value(self, fraction: float) -> float:
+        """Return the inverse distribution function at a fraction, 0 to 1, of the distribution within the range.
 
         >>> mass = Varying(BY_NAME["mass"], "uniform", (("loc", 0.9), ("scale", 0.2)), "by hand")
         >>> round(mass.value(0.25), 6)
         0.95
         """
-        return float(self.values(np.array([uniform]))[0])
+        return float(self.values(np.array([fraction]))[0])
 
-    def values(self, uniform: Floats) -> Floats:
-        """Return the values at many shares, (n,), as `value` does.  uniform: shares, (n,)."""
-        low, high = self._range_limits
-        drawn = self._frozen.ppf(low + uniform * (high - low))
-        return np.clip(drawn, self.quantity.low, self.quantity.high)
+    def values(self, fractions: Floats) -> Floats:
+        """Return the values at many fractions of the distribution, (n,), as `value` does.  fractions: (n,)."""
+        lower_probability, upper_probability = self._range_limits
+        values = self._distribution.ppf(lower_probability + fractions * (upper_probability - lower_probability))
+        return np.clip(values, self.quantity.low, self.quantity.high)
 
 
 @dataclass(frozen=True)
@@ -155,7 +155,7 @@ class Dispersions:
 
     def without(self, names: tuple[str, ...]) -> "Dispersions":
         """Return the dispersions without the named quantities."""
-        return replace(self, varying=tuple(one for one in self.varying if one.quantity.name not in names))
+        return replace(self, varying=tuple(varying for varying in self.varying if varying.quantity.name not in names))
 
     def with_draws(self, draws: Draws) -> "Dispersions":
         """Return the dispersions with draws of the aircraft instead of drag and control power.
@@ -165,16 +165,20 @@ class Dispersions:
         >>> [one.quantity.name for one in made.varying][3:5], made.to_json()["aircraft"]["rows"]
         (['mass', 'battery'], 1)
         """
-        return replace(self.without(DRAWN), draws=draws)
+        return replace(self.without(QUANTITIES_OF_DRAWS), draws=draws)
 
     def to_json(self) -> dict[str, dict[str, Any]]:
         """Return plain data with a table for each quantity, and a table for the aircraft's draws."""
         tables: dict[str, dict[str, Any]] = {
-            one.quantity.name: {"distribution": one.distribution, **dict(one.parameters), "source": one.source}
-            for one in self.varying
+            varying.quantity.name: {
+                "distribution": varying.distribution,
+                **dict(varying.parameters),
+                "source": varying.source,
+            }
+            for varying in self.varying
         }
         if self.draws is not None:
-            tables[_AIRCRAFT] = {
+            tables[_DRAWS_TABLE] = {
                 "draws": Path(self.draws.source).name,
                 "rows": len(self.draws.values),
                 "properties": list(self.draws.names),
@@ -215,29 +219,29 @@ def parse_dispersions(text: str, name: str) -> Dispersions:
         tables = toml_table(text)
     except ValueError as error:
         raise SpreadError(f"{name}: {' '.join(str(error).split())}", file=name) from None
-    aircraft = tables.pop(_AIRCRAFT, None)
+    aircraft = tables.pop(_DRAWS_TABLE, None)
     unknown = [key for key in tables if key not in BY_NAME]
     if unknown:
-        allowed = f"unknown; it is one of {', '.join((*NAMES, _AIRCRAFT))}"
+        allowed = f"unknown; it is one of {', '.join((*NAMES, _DRAWS_TABLE))}"
         raise SpreadError.at(name, unknown[0], tables[unknown[0]], allowed, shown="")
     varying = tuple(_parse_quantity(BY_NAME[key], tables[key], name) for key in NAMES if key in tables)
     if not varying and aircraft is None:
         raise SpreadError(f"{name}: nothing varies; give at least one of {', '.join(NAMES)}", file=name)
     if aircraft is None:
         return Dispersions(varying, name)
-    for one in varying:
-        if one.quantity.name in DRAWN:
-            raise SpreadError.at(name, one.quantity.name, None, f"goes without [{_AIRCRAFT}] draws", shown="")
+    for varied in varying:
+        if varied.quantity.name in QUANTITIES_OF_DRAWS:
+            raise SpreadError.at(name, varied.quantity.name, None, f"goes without [{_DRAWS_TABLE}] draws", shown="")
     return Dispersions(varying, name, _read_named_draws(aircraft, name))
 
 
 def _read_named_draws(table: Any, name: str) -> Draws:
     """Return the aircraft's draws from the file that a dispersions file names, relative to the dispersions file."""
-    given = table.get("draws") if isinstance(table, dict) else None
-    if not isinstance(given, str) or not given or (isinstance(table, dict) and len(table) > 1):
+    file_name = table.get("draws") if isinstance(table, dict) else None
+    if not isinstance(file_name, str) or not file_name or (isinstance(table, dict) and len(table) > 1):
         allowed = 'a file of draws is expected, and nothing else, such as draws = "mine/draws.csv"'
-        raise SpreadError.at(name, f"{_AIRCRAFT}.draws", table, allowed, shown="")
-    return read_draws(Path(name).parent / Path(given).expanduser(), SpreadError)
+        raise SpreadError.at(name, f"{_DRAWS_TABLE}.draws", table, allowed, shown="")
+    return read_draws(Path(name).parent / Path(file_name).expanduser(), SpreadError)
 
 
 def _parse_quantity(quantity: Quantity, table: Any, name: str) -> Varying:
@@ -252,11 +256,11 @@ def _parse_quantity(quantity: Quantity, table: Any, name: str) -> Varying:
         raise SpreadError.at(name, f"{quantity.name}.source", source, allowed, shown="")
     _check_parameters(str(distribution), entries, name, quantity.name)
     varying = Varying(quantity, str(distribution), tuple((key, float(value)) for key, value in entries.items()), source)
-    share = _share_inside(varying, name)
-    if not share >= INSIDE:
+    fraction = _checked_fraction_inside(varying, name)
+    if not fraction >= MIN_FRACTION_INSIDE:
         allowed = (
-            f"{100.0 * share:.1f} % of it lies within {quantity.low:g}..{quantity.high:g}"
-            f" {quantity.unit or 'of the nominal'}; at least {100.0 * INSIDE:.0f} % has to"
+            f"{100.0 * fraction:.1f} % of it lies within {quantity.low:g}..{quantity.high:g}"
+            f" {quantity.unit or 'of the nominal'}; at least {100.0 * MIN_FRACTION_INSIDE:.0f} % has to"
         )
         raise SpreadError.at(name, quantity.name, _call_text(varying), allowed)
     return varying
@@ -271,35 +275,39 @@ def _check_distribution(quantity: Quantity, distribution: Any, name: str) -> Non
         allowed = "missing; the name of one of scipy.stats' distributions is expected"
         raise SpreadError.at(name, field, distribution, allowed, shown="")
     if not isinstance(getattr(stats, distribution, None), kind):
-        sort = "a discrete one, such as randint" if quantity.integer else "a continuous one, such as norm"
-        allowed = f"no distribution of scipy.stats; {sort}, is expected"
+        kind_text = "a discrete one, such as randint" if quantity.integer else "a continuous one, such as norm"
+        allowed = f"no distribution of scipy.stats; {kind_text}, is expected"
         raise SpreadError.at(name, field, distribution, allowed, shown=repr(distribution))
 
 
 def _check_parameters(distribution: str, entries: dict[str, Any], name: str, quantity: str) -> None:
     from scipy import stats
 
-    frozen: Any = getattr(stats, distribution)
-    shapes = frozen.shapes.replace(",", " ").split() if frozen.shapes else []
-    allowed = [*shapes, "loc"] if isinstance(frozen, stats.rv_discrete) else [*shapes, "loc", "scale"]
+    scipy_distribution: Any = getattr(stats, distribution)
+    shape_parameters = scipy_distribution.shapes.replace(",", " ").split() if scipy_distribution.shapes else []
+    allowed = (
+        [*shape_parameters, "loc"]
+        if isinstance(scipy_distribution, stats.rv_discrete)
+        else [*shape_parameters, "loc", "scale"]
+    )
     for key, value in entries.items():
         if key not in allowed:
-            has = f"not a parameter of {distribution}, which has {', '.join(allowed)}"
-            raise SpreadError.at(name, f"{quantity}.{key}", value, has, shown="")
+            reason = f"not a parameter of {distribution}, which has {', '.join(allowed)}"
+            raise SpreadError.at(name, f"{quantity}.{key}", value, reason, shown="")
         if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
             raise SpreadError.at(name, f"{quantity}.{key}", value, "a finite number is expected", shown=repr(value))
-    missing = [key for key in shapes if key not in entries]
+    missing = [key for key in shape_parameters if key not in entries]
     if missing:
-        needs = f"missing; {distribution} needs {', '.join(shapes)}"
-        raise SpreadError.at(name, f"{quantity}.{missing[0]}", None, needs, shown="")
+        reason_missing = f"missing; {distribution} needs {', '.join(shape_parameters)}"
+        raise SpreadError.at(name, f"{quantity}.{missing[0]}", None, reason_missing, shown="")
 
 
-def _share_inside(varying: Varying, name: str) -> float:
-    share = varying.share_inside
-    if math.isnan(share):
+def _checked_fraction_inside(varying: Varying, name: str) -> float:
+    fraction = varying.fraction_inside
+    if math.isnan(fraction):
         allowed = f"no parameters that {varying.distribution} may have"
         raise SpreadError.at(name, varying.quantity.name, _call_text(varying), allowed)
-    return share
+    return fraction
 
 
 def _call_text(varying: Varying) -> str:
@@ -337,13 +345,13 @@ def draw_flight(dispersions: Dispersions, seed: int, index: int) -> Draw:
     >>> first == again, first.values["drag"], 0.9 < first.values["mass"] < 1.1
     (True, 1.0, True)
     """
-    uniform, number = _draw_shares(seed, index)
-    varying = {one.quantity.name: one for one in dispersions.varying}
+    fractions, flight_seed = _draw_fractions(seed, index)
+    varying = {quantity_dispersion.quantity.name: quantity_dispersion for quantity_dispersion in dispersions.varying}
     values = {
-        quantity.name: varying[quantity.name].value(share) if quantity.name in varying else quantity.nominal
-        for quantity, share in zip(QUANTITIES, uniform.tolist(), strict=True)
+        quantity.name: varying[quantity.name].value(fraction) if quantity.name in varying else quantity.nominal
+        for quantity, fraction in zip(QUANTITIES, fractions.tolist(), strict=True)
     }
-    return Draw(index, number, values)
+    return Draw(index, flight_seed, values)
 
 
 def standard_draws(dispersions: Dispersions, seed: int, start: int, stop: int) -> Floats:
@@ -355,9 +363,9 @@ def standard_draws(dispersions: Dispersions, seed: int, start: int, stop: int) -
     >>> standard_draws(default_dispersions(), 1, 5, 7).shape
     (2, 11)
     """
-    uniform = np.array([_draw_shares(seed, index)[0] for index in range(start, stop)]).reshape(-1, len(QUANTITIES))
-    columns = [QUANTITIES.index(one.quantity) for one in dispersions.varying]
-    return _standardise(dispersions, uniform[:, columns])
+    fractions = np.array([_draw_fractions(seed, index)[0] for index in range(start, stop)]).reshape(-1, len(QUANTITIES))
+    columns = [QUANTITIES.index(varying.quantity) for varying in dispersions.varying]
+    return _standardise(dispersions, fractions[:, columns])
 
 
 def standard_population(dispersions: Dispersions, count: int) -> Floats:
@@ -372,26 +380,26 @@ def standard_population(dispersions: Dispersions, count: int) -> Floats:
     """
     from scipy.stats import qmc
 
-    quantities = len(dispersions.varying)
-    shares = qmc.Sobol(quantities, scramble=False).random(count) if quantities else np.zeros((count, 0))
-    return _standardise(dispersions, shares + 0.5 / count)
+    quantity_count = len(dispersions.varying)
+    fractions = qmc.Sobol(quantity_count, scramble=False).random(count) if quantity_count else np.zeros((count, 0))
+    return _standardise(dispersions, fractions + 0.5 / count)
 
 
-def _draw_shares(seed: int, index: int) -> tuple[Floats, int]:
-    """Draw a share of the distribution of each of `QUANTITIES`, 0 to 1, and the seed of changes within the flight."""
+def _draw_fractions(seed: int, index: int) -> tuple[Floats, int]:
+    """Draw a fraction of the distribution of each of `QUANTITIES`, 0 to 1, and the seed used within the flight."""
     random = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(index,)))
     return random.random(len(QUANTITIES)), int(random.integers(2**63))
 
 
-def _standardise(dispersions: Dispersions, shares: Floats) -> Floats:
-    """Convert shares of the varying quantities' distributions, (n, v), to deviations from the mean, (n, d).
+def _standardise(dispersions: Dispersions, fractions: Floats) -> Floats:
+    """Convert fractions of the varying quantities' distributions, (n, v), to deviations from the mean, (n, d).
 
     The deviations are in standard deviations.
     """
     quantiles = (np.arange(_QUANTILES) + 0.5) / _QUANTILES
     columns = []
-    for k, one in enumerate(dispersions.varying):
-        values = one.values(quantiles)
+    for k, varying in enumerate(dispersions.varying):
+        values = varying.values(quantiles)
         if (deviation := float(values.std())) > 0.0:
-            columns.append((one.values(shares[:, k]) - values.mean()) / deviation)
-    return np.column_stack(columns) if columns else np.zeros((len(shares), 0))
+            columns.append((varying.values(fractions[:, k]) - values.mean()) / deviation)
+    return np.column_stack(columns) if columns else np.zeros((len(fractions), 0))

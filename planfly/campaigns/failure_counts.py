@@ -41,18 +41,20 @@ def failures_document(by_rule: Iterable[RuleFailures]) -> list[dict[str, Any]]:
     """Return the failures by rule and place as data for a JSON document."""
     return [
         {
-            "rule": one.rule,
-            "flights": one.flights,
-            "places": [{"where": place_text(place), "flights": n, **asdict(place)} for place, n in one.places],
+            "rule": failures.rule,
+            "flights": failures.flights,
+            "places": [
+                {"where": place_text(place), "flights": count, **asdict(place)} for place, count in failures.places
+            ],
         }
-        for one in by_rule
+        for failures in by_rule
     ]
 
 
 def failure_lines(by_rule: Iterable[RuleFailures]) -> list[str]:
     """Return a line for each failed rule, with the number of flights and the places where most of them failed."""
     lines = []
-    for one in by_rule:
-        where = ", ".join(f"{place_text(place)} in {n}" for place, n in one.places[:3])
-        lines.append(f"  failed  {RULE_WORDS[one.rule].title} in {one.flights}: {where}")
+    for failures in by_rule:
+        where = ", ".join(f"{place_text(place)} in {count}" for place, count in failures.places[:3])
+        lines.append(f"  failed  {RULE_WORDS[failures.rule].title} in {failures.flights}: {where}")
     return lines

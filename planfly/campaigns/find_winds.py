@@ -14,8 +14,21 @@ from planfly.campaigns.dispersions import standard_draws, standard_population
 from planfly.campaigns.failure_counts import RuleFailures, count_failures
 from planfly.campaigns.flight_requests import FlightRequest, FlyOne, code_hash
 from planfly.campaigns.flight_row import FlightRow, fly_one
-from planfly.campaigns.statistics.wind_boundary import Direction, DrawnNumbers, WindBoundary, needs_more, next_flights
-from planfly.campaigns.tables import WINDS_DATABASE, AskedFlight, FlownFlight, StoreError, WindsStore, kept_settings
+from planfly.campaigns.statistics.wind_boundary import (
+    Direction,
+    DrawnNumbers,
+    WindBoundary,
+    needs_more_flights,
+    next_flights,
+)
+from planfly.campaigns.tables import (
+    WINDS_DATABASE,
+    FlownFlight,
+    RequestedFlight,
+    StoreError,
+    WindsStore,
+    read_stored_settings,
+)
 from planfly.campaigns.worker_pool import FlightRate, WorkerPool, Workers, worker_pool
 
 # Target for half the width of a boundary's interval, m/s.
@@ -28,7 +41,7 @@ _POPULATION = 4096
 # Approximate number of flights of a round; workers wait for the end of each round.
 _FLIGHTS_PER_ROUND = 48
 # Minimum number of flights of one direction in a round.
-_MIN_EACH = 3
+_MIN_FLIGHTS_EACH = 3
 # Maximum number of flights of one direction in a round.
 _MAX_EACH = 6
 # Growth of the number of flights between two checks of an open direction, because the posterior is slow to compute.
@@ -54,13 +67,13 @@ class WindsGoal:
 USUAL_WIND_FLIGHTS = 5000
 
 
-def asked_flights(asked: int | None, folder: Path, *, resume: bool) -> int:
-    """Return the requested maximum number of flights; without a request, that of the folder's search, or the default.
+def flight_limit(requested: int | None, folder: Path, *, resume: bool) -> int:
+    """Return the requested maximum number of flights; without a request, the folder's stored number, or the default.
 
     Raises StoreError for a file that planfly did not write, or that another process has locked.
     """
-    kept = kept_settings(folder / WINDS_DATABASE) if resume else {}
-    return int(kept.get("flights", USUAL_WIND_FLIGHTS)) if asked is None else asked
+    settings = read_stored_settings(folder / WINDS_DATABASE) if resume else {}
+    return int(settings.get("flights", USUAL_WIND_FLIGHTS)) if requested is None else requested
 
 
 # Boundary below which a mission does not fly with the target probability even in calm air, m/s; it is printed as 0.0.
@@ -105,9 +118,9 @@ class WindsFound:
         return 360.0 * direction / self.goal.directions
 
     def __repr__(self) -> str:
-        least = min(one.estimate for one in self.boundaries)
+        lowest = min(boundary.estimate for boundary in self.boundaries)
         return (
-            f"<WindsFound {len(self.boundaries)} directions, {least:.1f} m/s the lowest; {len(self.flights)} flights>"
+            f"<WindsFound {len(self.boundaries)} directions, {lowest:.1f} m/s the lowest; {len(self.flights)} flights>"
         )
 
 
@@ -133,27 +146,27 @@ def find_winds(
 ) -> WindsFound:
     """Fly rounds of flights until each boundary is known well enough or all flights are used.
 
-    Flights in the table are not flown again.  The winds of a round depend on the earlier rounds alone, so that the
+    Flights in the table are not flown again.  The winds of a round depend only on the earlier rounds, so that the
     result is the same for any number of workers and of interruptions.  Flights completed before an error or Ctrl-C stay
     in the table.
 
     base: campaign base, whose dispersions must not contain `SEARCHED_QUANTITIES`.
     """
-    search, known = _Search(goal, base), _Known(store)
-    pace = _Pace(search, len(known.flown), advance)
+    search, stored = _Search(goal, base), _StoredFlights(store)
+    progress = _Pace(search, len(stored.flown), advance)
     with ExitStack() as stack:
         pool: WorkerPool | None = None
-        while asked := search.next_round():
-            if missing := known.missing(asked):
+        while requests := search.next_round():
+            if missing_requests := stored.missing(requests):
                 if pool is None:
                     # Report before the workers start, because the start takes seconds.
-                    pace.begin(len(known.flown))
+                    progress.begin(len(stored.flown))
                 pool = pool or stack.enter_context(worker_pool(workers, base, fly))
-                _fly_round(pool, search, missing, known, pace)
-            for one in asked:
-                search.take(one, known.flown[one.number])
-    pace.tell(len(search.flown), last=True)
-    return search.found()
+                _fly_round(pool, search, missing_requests, stored, progress)
+            for request in requests:
+                search.add_result(request, stored.flown[request.number])
+    progress.report(len(search.flown), is_last=True)
+    return search.result()
 
 
 class _Search:
@@ -161,10 +174,12 @@ class _Search:
 
     def __init__(self, goal: WindsGoal, base: CampaignBase) -> None:
         self.goal, self._base = goal, base
-        numbers = DrawnNumbers(
+        drawn_numbers = DrawnNumbers(
             standard_population(base.dispersions, _POPULATION), partial(standard_draws, base.dispersions, base.seed)
         )
-        self.directions = [Direction(goal.most, goal.target, numbers, goal.confidence) for _ in range(goal.directions)]
+        self.directions = [
+            Direction(goal.most, goal.target, drawn_numbers, goal.confidence) for _ in range(goal.directions)
+        ]
         self.open = list(range(goal.directions))
         # Number of flights of each direction at which it is checked next.
         self._next_check = [FEWEST] * goal.directions
@@ -173,63 +188,70 @@ class _Search:
         # Failed rules and places of each flight.
         self._failed: list[tuple[tuple[str, Place], ...]] = []
 
-    def next_round(self) -> list[AskedFlight]:
+    def next_round(self) -> list[RequestedFlight]:
         """Return the flights to fly next; empty if all boundaries are known or all flights are used."""
         self.open = [number for number in self.open if self._is_open(number)]
-        each = max(_MIN_EACH, min(_MAX_EACH, _FLIGHTS_PER_ROUND // max(1, len(self.open))))
-        asked: list[AskedFlight] = []
+        flights_each = max(_MIN_FLIGHTS_EACH, min(_MAX_EACH, _FLIGHTS_PER_ROUND // max(1, len(self.open))))
+        requests: list[RequestedFlight] = []
         for number in self.open:
-            for speed, draw in next_flights(self.directions[number], each):
-                asked.append(AskedFlight(len(self.flown) + len(asked), number, speed, draw))
-        return asked[: max(0, self.goal.flights - len(self.flown))]
+            for speed, draw in next_flights(self.directions[number], flights_each):
+                requests.append(RequestedFlight(len(self.flown) + len(requests), number, speed, draw))
+        return requests[: max(0, self.goal.flights - len(self.flown))]
 
-    def _is_open(self, number: int) -> bool:
-        direction = self.directions[number]
+    def _is_open(self, index: int) -> bool:
+        direction = self.directions[index]
         count = len(direction.speeds)
-        if count < self._next_check[number]:
+        if count < self._next_check[index]:
             return True
-        self._next_check[number] = math.ceil(_CHECK_GROWTH_RATIO * count)
-        return needs_more(direction.boundary(), count, ACCURACY, FEWEST)
+        self._next_check[index] = math.ceil(_CHECK_GROWTH_RATIO * count)
+        return needs_more_flights(direction.boundary(), count, ACCURACY, FEWEST)
 
-    def take(self, asked: AskedFlight, flown: FlownFlight) -> None:
+    def add_result(self, request: RequestedFlight, flown: FlownFlight) -> None:
         """Add the result of a flight; flights must be added in the order in which they were requested."""
         flyable = flown.outcome == "flyable"
         failures: set[Hashable] = {_failure_key(rule, place) for rule, place in flown.failed} or {flown.outcome}
         failed = frozenset() if flyable else frozenset(failures)
-        margin: dict[Hashable, float] | None = {_failure_key(rule, place): share for rule, place, share in flown.narrow}
+        margins: dict[Hashable, float] | None = {
+            _failure_key(rule, place): fraction for rule, place, fraction in flown.narrow
+        }
         if flown.outcome == "lost" or any(rule == "completion" for rule, _ in flown.failed):
             # The rules that the flight would have passed if it had continued are unknown.
-            margin = None
-        self.directions[asked.direction].add(asked.speed, asked.draw, failed, margin)
-        self.flown.append((asked.direction, asked.speed, flyable))
+            margins = None
+        self.directions[request.direction].add(request.speed, request.draw, failed, margins)
+        self.flown.append((request.direction, request.speed, flyable))
         self._failed.append(flown.failed)
         if flown.outcome == "lost":
-            self.lost.append(asked.number)
+            self.lost.append(request.number)
 
-    def request(self, asked: AskedFlight) -> FlightRequest:
+    def request(self, requested_flight: RequestedFlight) -> FlightRequest:
         """Return the flight as a request to a worker."""
-        return FlightRequest(asked.draw, GivenWind(asked.speed, 360.0 * asked.direction / self.goal.directions))
+        return FlightRequest(
+            requested_flight.draw,
+            GivenWind(requested_flight.speed, 360.0 * requested_flight.direction / self.goal.directions),
+        )
 
-    def at_least(self) -> int:
+    def min_remaining_flights(self) -> int:
         """Return the number of flights until all open directions have the minimum number of flights."""
-        to_come = sum(max(0, FEWEST - len(self.directions[number].speeds)) for number in self.open)
-        return min(to_come, self.goal.flights - len(self.flown))
+        remaining = sum(max(0, FEWEST - len(self.directions[number].speeds)) for number in self.open)
+        return min(remaining, self.goal.flights - len(self.flown))
 
-    def found(self) -> WindsFound:
+    def result(self) -> WindsFound:
         """Return the result of the search."""
-        boundaries = tuple(one.boundary() for one in self.directions)
+        boundaries = tuple(direction.boundary() for direction in self.directions)
         conditions = replace(self._base.conditions(), wind_mps=None, wind_from_deg=None)
         calm = self._calm_failures(boundaries)
         return WindsFound(self.goal, boundaries, tuple(self.flown), tuple(self.lost), conditions, calm)
 
     def _calm_failures(self, boundaries: tuple[WindBoundary, ...]) -> CalmFailures | None:
         """Return the failures in the weakest wind flown, for directions whose boundary is calm air, or None."""
-        calm = {number for number, one in enumerate(boundaries) if one.estimate < CALM_MPS}
-        numbered = [(number, one) for number, one in enumerate(self.flown) if one[0] in calm]
-        if not numbered:
+        calm_directions = {number for number, boundary in enumerate(boundaries) if boundary.estimate < CALM_MPS}
+        numbered_flights = [
+            (number, flight) for number, flight in enumerate(self.flown) if flight[0] in calm_directions
+        ]
+        if not numbered_flights:
             return None
-        weakest = min(speed for _, (_, speed, _) in numbered)
-        numbers = [number for number, (_, speed, _) in numbered if speed == weakest]
+        weakest = min(speed for _, (_, speed, _) in numbered_flights)
+        numbers = [number for number, (_, speed, _) in numbered_flights if speed == weakest]
         failed = [self._failed[number] for number in numbers if not self.flown[number][2]]
         return CalmFailures(weakest, len(numbers), len(failed), count_failures(failed))
 
@@ -239,71 +261,80 @@ def _failure_key(rule: str, place: Place) -> Hashable:
     return rule, place.kind, place.index
 
 
-class _Known:
+class _StoredFlights:
     """Flights in the table, and their outcomes by number."""
 
     def __init__(self, store: WindsStore) -> None:
-        known = store.known()
+        stored = store.known()
         self._store = store
-        self._asked = {number: asked for number, (asked, _) in known.items()}
-        self.flown = {number: flown for number, (_, flown) in known.items()}
+        self._requests = {number: request for number, (request, _) in stored.items()}
+        self.flown = {number: flown for number, (_, flown) in stored.items()}
 
-    def missing(self, asked: list[AskedFlight]) -> list[AskedFlight]:
+    def missing(self, requests: list[RequestedFlight]) -> list[RequestedFlight]:
         """Return the requested flights that the table lacks.  Raises StoreError if a number has another request."""
-        for one in asked:
-            if self._asked.get(one.number, one) != one:
+        for request in requests:
+            if self._requests.get(request.number, request) != request:
                 path = self._store.path
-                raise StoreError(f"{path}: flight {one.number} does not follow from those before it", file=path)
-        return [one for one in asked if one.number not in self.flown]
+                raise StoreError(f"{path}: flight {request.number} does not follow from those before it", file=path)
+        return [request for request in requests if request.number not in self.flown]
 
-    def add(self, asked: AskedFlight, row: FlightRow) -> None:
+    def add(self, request: RequestedFlight, row: FlightRow) -> None:
         """Write a flight to the table."""
-        self._store.add(asked, row)
-        self.flown[asked.number] = FlownFlight(row.outcome, row.failed, row.narrow)
+        self._store.add(request, row)
+        self.flown[request.number] = FlownFlight(row.outcome, row.failed, row.narrow)
 
 
-def _fly_round(pool: WorkerPool, search: _Search, missing: list[AskedFlight], known: _Known, pace: "_Pace") -> None:
-    left = iter(missing)
-    asked: dict[FlightRequest, AskedFlight] = {}
+def _fly_round(
+    pool: WorkerPool,
+    search: _Search,
+    missing_requests: list[RequestedFlight],
+    stored: _StoredFlights,
+    progress: "_Pace",
+) -> None:
+    remaining = iter(missing_requests)
+    requests: dict[FlightRequest, RequestedFlight] = {}
 
-    def following() -> FlightRequest | None:
-        one = next(left, None)
-        if one is None:
+    def next_flight_request() -> FlightRequest | None:
+        requested_flight = next(remaining, None)
+        if requested_flight is None:
             return None
-        request = search.request(one)
-        asked[request] = one
+        request = search.request(requested_flight)
+        requests[request] = requested_flight
         return request
 
-    for request, row in pool.fly(following):
-        known.add(asked[request], row)
-        pace.tell(len(known.flown))
+    for request, row in pool.fly(next_flight_request):
+        stored.add(requests[request], row)
+        progress.report(len(stored.flown))
 
 
 class _Pace:
-    """Periodic progress report.  known: number of flights in the table at the start."""
+    """Periodic progress report.  stored_count: number of flights in the table at the start."""
 
-    def __init__(self, search: _Search, known: int, advance: Advance | None) -> None:
-        self._search, self._advance, self._rate = search, advance, FlightRate(known)
+    def __init__(self, search: _Search, stored_count: int, advance: Advance | None) -> None:
+        self._search, self._advance, self._rate = search, advance, FlightRate(stored_count)
 
-    def begin(self, flights: int) -> None:
+    def begin(self, flight_count: int) -> None:
         """Report the minimum amount of work before the first flight."""
         if self._advance is not None:
-            total = max(len(self._search.flown) + self._search.at_least(), flights + 1)
-            remark = f"{flights} of {total} flights at least"
-            self._advance(float(flights), float(total), remark)
+            total = max(len(self._search.flown) + self._search.min_remaining_flights(), flight_count + 1)
+            remark = f"{flight_count} of {total} flights at least"
+            self._advance(float(flight_count), float(total), remark)
 
-    def tell(self, flights: int, last: bool = False) -> None:
+    def report(self, flight_count: int, is_last: bool = False) -> None:
         """Report the settled directions, the flights, the flights per minute, and the remaining time if it is known.
 
         The number of flights beyond `FEWEST` is not known in advance; then no remaining time is given.
-        last: True reports even if no report is due.
+        is_last: True reports even if no report is due.
         """
-        if self._advance is None or not (self._rate.due() or last):
+        if self._advance is None or not (self._rate.is_due() or is_last):
             return
-        search, rate = self._search, self._rate.a_second(flights)
-        to_come = len(search.flown) + search.at_least() - flights
-        settled, total = search.goal.directions - len(search.open), search.goal.directions
-        remark = f"{settled} of {total} directions settled, {flights} flights, {60.0 * rate:.0f} a minute"
-        if to_come > 0 and rate > 0.0:
-            remark += f", {to_come / rate:.0f} s left at least"
-        self._advance(float(flights), float(flights + max(to_come, 1)), remark)
+        search, flights_per_second = self._search, self._rate.flights_per_second(flight_count)
+        remaining = len(search.flown) + search.min_remaining_flights() - flight_count
+        settled_count, total = search.goal.directions - len(search.open), search.goal.directions
+        remark = (
+            f"{settled_count} of {total} directions settled, {flight_count} flights,"
+            f" {60.0 * flights_per_second:.0f} a minute"
+        )
+        if remaining > 0 and flights_per_second > 0.0:
+            remark += f", {remaining / flights_per_second:.0f} s left at least"
+        self._advance(float(flight_count), float(flight_count + max(remaining, 1)), remark)

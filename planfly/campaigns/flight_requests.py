@@ -33,7 +33,7 @@ class FlightRequest:
     wind: GivenWind | None = None
 
 
-class Flown(NamedTuple):
+class FinishedFlight(NamedTuple):
     """Request with the row of its flight."""
 
     request: FlightRequest
@@ -84,31 +84,31 @@ def fingerprint(aircraft: str) -> dict[str, str]:
     }
 
 
-def refuse_different(mine: dict[str, str], theirs: dict[str, str], worker: str) -> None:
+def check_fingerprint(own_fingerprint: dict[str, str], worker_fingerprint: dict[str, str], worker: str) -> None:
     """Raise WorkerError, which names the worker and the first difference, unless the fingerprints are equal.
 
-    >>> refuse_different({"planfly": "0.1.0"}, {"planfly": "0.0.9"}, "tls://10.0.0.7:4000")
+    >>> check_fingerprint({"planfly": "0.1.0"}, {"planfly": "0.0.9"}, "tls://10.0.0.7:4000")
     Traceback (most recent call last):
     ...
     planfly.campaigns.flight_requests.WorkerError: worker tls://10.0.0.7:4000: planfly 0.0.9, not 0.1.0 as here
     """
-    for name, value in mine.items():
-        if theirs.get(name) != value:
-            found, allowed = theirs.get(name), f"not {value} as here"
-            message = f"worker {worker}: {name} {found or 'missing'}, {allowed}"
-            raise WorkerError(message, file=f"worker {worker}", field=name, value=found, allowed=allowed)
+    for name, value in own_fingerprint.items():
+        if worker_fingerprint.get(name) != value:
+            value_there, allowed = worker_fingerprint.get(name), f"not {value} as here"
+            message = f"worker {worker}: {name} {value_there or 'missing'}, {allowed}"
+            raise WorkerError(message, file=f"worker {worker}", field=name, value=value_there, allowed=allowed)
 
 
 class CampaignCopy:
     """Campaign packed for its workers; each worker unpacks it once.
 
-    mine: `fingerprint` of the process that leads the campaign.
+    own_fingerprint: `fingerprint` of the process that leads the campaign.
     """
 
-    def __init__(self, base: CampaignBase, mine: dict[str, str], fly: FlyOne = fly_one) -> None:
+    def __init__(self, base: CampaignBase, own_fingerprint: dict[str, str], fly: FlyOne = fly_one) -> None:
         self._packed = pickle.dumps((base, fly))
         self._aircraft = base.scenario.flight.aircraft
-        self._mine = mine
+        self._own_fingerprint = own_fingerprint
         self._unpacked: tuple[CampaignBase, FlyOne] | None = None
 
     def fly(self, request: FlightRequest, worker: str) -> FlightRow:
@@ -119,7 +119,7 @@ class CampaignCopy:
     def unpacked(self, worker: str) -> tuple[CampaignBase, FlyOne]:
         """Return the campaign and the function that flies it.  Raises WorkerError as `fly` does."""
         if self._unpacked is None:
-            refuse_different(self._mine, fingerprint(self._aircraft), worker)
+            check_fingerprint(self._own_fingerprint, fingerprint(self._aircraft), worker)
             base, fly = pickle.loads(self._packed)
             # The same model, from its folder on this machine.
             airframe = replace(base.airframe, aircraft=find_aircraft(self._aircraft))

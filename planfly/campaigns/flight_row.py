@@ -45,20 +45,20 @@ def narrow_passes(findings: Iterable[Finding], scenario: Scenario, track: Track)
 
     The margin is 0 if a rule accepts a value beyond its limit for another reason.
     """
-    shares: dict[tuple[str, Place], float] = {}
-    failed = {(item.rule, item.place) for item in findings if item.ok is False}
-    for item in findings:
-        at = item.rule, item.place
-        scale = RULE_WORDS[item.rule].scale
-        if at in failed or not item.ok or item.margin is None or scale is None:
+    fractions: dict[tuple[str, Place], float] = {}
+    failed = {(finding.rule, finding.place) for finding in findings if finding.ok is False}
+    for finding in findings:
+        key = finding.rule, finding.place
+        scale = RULE_WORDS[finding.rule].scale
+        if key in failed or not finding.ok or finding.margin is None or scale is None:
             continue
-        share = max(0.0, item.margin + (item.tolerance or 0.0)) / scale
-        if share < 1.0:
-            shares[at] = min(share, shares.get(at, share))
+        fraction = max(0.0, finding.margin + (finding.tolerance or 0.0)) / scale
+        if fraction < 1.0:
+            fractions[key] = min(fraction, fractions.get(key, fraction))
     for place, distance in _distances_outside_spheres(scenario, track):
         if ("threat", place) not in failed and distance < SPHERE_SCALE:
-            shares["threat", place] = max(0.0, distance) / SPHERE_SCALE
-    return tuple((rule, place, share) for (rule, place), share in shares.items())
+            fractions["threat", place] = max(0.0, distance) / SPHERE_SCALE
+    return tuple((rule, place, fraction) for (rule, place), fraction in fractions.items())
 
 
 def _distances_outside_spheres(scenario: Scenario, track: Track) -> list[tuple[Place, float]]:
@@ -68,9 +68,9 @@ def _distances_outside_spheres(scenario: Scenario, track: Track) -> list[tuple[P
         return []
     visits = path_spheres(track.position, track.time, threats.position, threats.kill_radius, threats.kill_scale)
     return [
-        (Place("missile", m, name=table.name or ""), float(visits.closest[m] - threats.kill_radius[m]))
-        for m, table in enumerate(scenario.spec.threats)
-        if threats.kill_radius[m] > 0.0
+        (Place("missile", index, name=table.name or ""), float(visits.closest[index] - threats.kill_radius[index]))
+        for index, table in enumerate(scenario.spec.threats)
+        if threats.kill_radius[index] > 0.0
     ]
 
 
@@ -89,15 +89,15 @@ def clearance_profile(route: Route, track: Track) -> Singles:
     """
     starts, ends = route.waypoints[:-1, :2], route.waypoints[1:, :2]
     lengths = np.hypot(*(ends - starts).T)
-    before = np.concatenate([[0.0], np.cumsum(lengths)])
+    leg_starts = np.concatenate([[0.0], np.cumsum(lengths)])
     leg = np.clip(track.leg, 0, len(lengths) - 1)
-    along = (ends - starts)[leg] / np.maximum(lengths[leg], 1e-9)[:, None]
-    covered = np.einsum("ij,ij->i", track.position[:, :2] - starts[leg], along)
-    distance = before[leg] + np.clip(covered, 0.0, lengths[leg])
-    piece = np.minimum((distance / before[-1] * STATIONS).astype(int), STATIONS - 1)
-    least = np.full(STATIONS, np.inf, dtype=np.float32)
-    np.fmin.at(least, piece, track.clearance)
-    return np.where(np.isfinite(least), least, np.float32(np.nan)).astype(np.float32)
+    directions = (ends - starts)[leg] / np.maximum(lengths[leg], 1e-9)[:, None]
+    distances_along_leg = np.einsum("ij,ij->i", track.position[:, :2] - starts[leg], directions)
+    distance = leg_starts[leg] + np.clip(distances_along_leg, 0.0, lengths[leg])
+    piece = np.minimum((distance / leg_starts[-1] * STATIONS).astype(int), STATIONS - 1)
+    min_clearance = np.full(STATIONS, np.inf, dtype=np.float32)
+    np.fmin.at(min_clearance, piece, track.clearance)
+    return np.where(np.isfinite(min_clearance), min_clearance, np.float32(np.nan)).astype(np.float32)
 
 
 def waypoint_crossings(route: Route, track: Track) -> Singles:
@@ -107,21 +107,21 @@ def waypoint_crossings(route: Route, track: Track) -> Singles:
     number differs between flights.  Right is relative to the mean of the incoming and outgoing courses.
     """
     points = route.waypoints
-    out = np.full((len(points), 2), np.nan, dtype=np.float32)
+    crossings = np.full((len(points), 2), np.nan, dtype=np.float32)
     steps = np.diff(points[:, :2], axis=0)
     courses = np.unwrap(np.arctan2(steps[:, 0], steps[:, 1]))
-    middle = np.concatenate([courses[:1], 0.5 * (courses[:-1] + courses[1:]), courses[-1:]])
+    mean_courses = np.concatenate([courses[:1], 0.5 * (courses[:-1] + courses[1:]), courses[-1:]])
     first = np.unique(route.stops, return_index=True)[1]
     for k in first.tolist():
         point = points[k]
-        near = np.flatnonzero((track.leg == k) | (track.leg == k - 1))
-        passed = len(track) and (track.leg.max() >= k or k == len(points) - 1)
-        if not near.size or not passed:
+        near_rows = np.flatnonzero((track.leg == k) | (track.leg == k - 1))
+        was_passed = len(track) and (track.leg.max() >= k or k == len(points) - 1)
+        if not near_rows.size or not was_passed:
             continue
-        off = track.position[near] - point
-        nearest = off[np.argmin(off[:, 0] ** 2 + off[:, 1] ** 2)]
-        out[k] = nearest[0] * np.cos(middle[k]) - nearest[1] * np.sin(middle[k]), nearest[2]
-    return out[first]
+        offsets = track.position[near_rows] - point
+        nearest = offsets[np.argmin(offsets[:, 0] ** 2 + offsets[:, 1] ** 2)]
+        crossings[k] = nearest[0] * np.cos(mean_courses[k]) - nearest[1] * np.sin(mean_courses[k]), nearest[2]
+    return crossings[first]
 
 
 # ----------------------------------------------------------------------
@@ -161,10 +161,10 @@ def _failed_text(failed: Iterable[tuple[str, Place]]) -> str:
     return json.dumps([{"rule": rule, **asdict(place)} for rule, place in failed])
 
 
-def failed_of(text: str) -> tuple[tuple[str, Place], ...]:
+def parse_failed(text: str) -> tuple[tuple[str, Place], ...]:
     """Parse the rule and place of each failed finding from the text in the column.
 
-    >>> failed_of('[{"rule": "slope", "kind": "leg", "index": 3}]')[0][1].index
+    >>> parse_failed('[{"rule": "slope", "kind": "leg", "index": 3}]')[0][1].index
     3
     """
     entries = json.loads(text)
@@ -178,7 +178,7 @@ _REAL = Column("REAL NOT NULL")
 # Column of an array stored as bytes.
 _BLOB = Column("BLOB NOT NULL")
 # Column of the failed findings, as JSON.
-_FAILED = Column("TEXT NOT NULL", _failed_text, failed_of)
+_FAILED = Column("TEXT NOT NULL", _failed_text, parse_failed)
 
 
 @dataclass(frozen=True, slots=True)
@@ -218,11 +218,11 @@ class FlightRow:
     @property
     def closeness(self) -> float:
         """Minimum of all scaled margins, by which the closest calls are sorted; inf if no margin is known."""
-        shares = (share for rule, margin in self.margins if (share := scaled(rule, margin)) is not None)
-        return min((share for share in shares if math.isfinite(share)), default=math.inf)
+        fractions = (fraction for rule, margin in self.margins if (fraction := scaled_margin(rule, margin)) is not None)
+        return min((fraction for fraction in fractions if math.isfinite(fraction)), default=math.inf)
 
 
-def scaled(rule: str, margin: LeastMargin) -> float | None:
+def scaled_margin(rule: str, margin: LeastMargin) -> float | None:
     """Return a margin divided by the scale of its rule, or None if the margin or the scale has no number."""
     scale = RULE_WORDS[rule].scale
     return None if margin.value is None or scale is None else margin.value / scale
@@ -231,8 +231,8 @@ def scaled(rule: str, margin: LeastMargin) -> float | None:
 def _column_fields() -> dict[str, Column]:
     """Return the columns of `FlightRow` by field name, in order."""
     hints = get_type_hints(FlightRow, include_extras=True)
-    found = {name: get_args(hint) for name, hint in hints.items()}
-    return {name: args[-1] for name, args in found.items() if args and isinstance(args[-1], Column)}
+    hint_args = {name: get_args(hint) for name, hint in hints.items()}
+    return {name: args[-1] for name, args in hint_args.items() if args and isinstance(args[-1], Column)}
 
 
 # Fields of `FlightRow` that are columns, by name.
@@ -245,30 +245,30 @@ def fly_one(base: CampaignBase, index: int, wind: GivenWind | None = None, log: 
     wind: mean wind that replaces the scenario's wind, or None.
     log: file for the recording, or None for no recording.
     """
-    started = time.perf_counter()
+    start_time = time.perf_counter()
     draw = draw_flight(base.dispersions, base.seed, index)
     varied = vary(base, draw, wind)
     flown = fly_and_judge(varied.setup, varied.airframe, log, off_nominal=varied.off_nominal, reference="never")
     track, route = flown.track, varied.setup.route
-    some = len(track) > 0
+    has_rows = len(track) > 0
     return FlightRow(
         draw=draw,
         outcome="flyable" if flown.verdict.flies else "not flyable",
         ended=flown.ended,
         failed=failed_findings(flown.verdict),
         margins=least_margins(flown.verdict.findings),
-        energy_left=varied.setup.battery - float(track.energy[-1]) if some else None,
-        duration=float(track.time[-1]) if some else 0.0,
-        clearance=clearance_profile(route, track).tobytes() if some else b"",
-        crossings=waypoint_crossings(route, track).tobytes() if some else b"",
+        energy_left=varied.setup.battery - float(track.energy[-1]) if has_rows else None,
+        duration=float(track.time[-1]) if has_rows else 0.0,
+        clearance=clearance_profile(route, track).tobytes() if has_rows else b"",
+        crossings=waypoint_crossings(route, track).tobytes() if has_rows else b"",
         narrow=narrow_passes(flown.verdict.findings, varied.setup.scenario, track),
-        seconds=time.perf_counter() - started,
+        seconds=time.perf_counter() - start_time,
     )
 
 
 def failed_findings(verdict: Verdict) -> tuple[tuple[str, Place], ...]:
-    """Return the rule and place of each failed finding; if none failed in an incomplete flight, those of completion."""
-    failed = tuple((item.rule, item.place) for item in verdict.findings if item.ok is False)
+    """Return the rule and place of each failed finding; for an incomplete flight without one, those of completion."""
+    failed = tuple((finding.rule, finding.place) for finding in verdict.findings if finding.ok is False)
     if failed or verdict.flies:
         return failed
     return (("completion", Place("flight")),)
@@ -283,13 +283,15 @@ def least_margins(findings: tuple[Finding, ...]) -> tuple[tuple[str, LeastMargin
     4.0
     """
     by_rule: dict[str, list[Finding]] = {}
-    for item in findings:
-        if item.ok is not None and RULE_WORDS[item.rule].scale is not None:
-            by_rule.setdefault(item.rule, []).append(item)
-    closest = [closest_to_limit(mine) for mine in by_rule.values()]
+    for finding in findings:
+        if finding.ok is not None and RULE_WORDS[finding.rule].scale is not None:
+            by_rule.setdefault(finding.rule, []).append(finding)
+    closest = [closest_to_limit(findings_of_rule) for findings_of_rule in by_rule.values()]
     # A rule that fails for a reason other than its value has no margin.
     return tuple(
-        (one.rule, LeastMargin(one.margin, one.unit, one.place)) for one in closest if one and one.margin is not None
+        (finding.rule, LeastMargin(finding.margin, finding.unit, finding.place))
+        for finding in closest
+        if finding and finding.margin is not None
     )
 
 

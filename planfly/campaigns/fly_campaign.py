@@ -8,7 +8,7 @@ from planfly.campaigns.campaign_base import CampaignBase
 from planfly.campaigns.flight_requests import FlightRequest, FlyOne, code_hash
 from planfly.campaigns.flight_row import FlightRow, fly_one
 from planfly.campaigns.statistics.decision import Estimate, Estimator, Goal, Tally
-from planfly.campaigns.tables import DATABASE, Store, StoreError, kept_settings
+from planfly.campaigns.tables import DATABASE, Store, StoreError, read_stored_settings
 from planfly.campaigns.worker_pool import FlightRate, WorkerPool, Workers, worker_pool
 
 Advance = Callable[[float, float, str], None]
@@ -31,11 +31,11 @@ class _FlightTally:
     def add(self, index: int, outcome: str) -> None:
         """Add a flight, and decide as soon as the flights before the first missing index allow a decision."""
         self.beyond[index] = outcome
-        while not self.decided and (known := self.beyond.pop(self.tally.flown, None)) is not None:
-            self.tally = _with_outcome(self.tally, known)
+        while not self.decided and (next_outcome := self.beyond.pop(self.tally.flown, None)) is not None:
+            self.tally = _with_outcome(self.tally, next_outcome)
             self.decided = self.goal.stops and self.estimator.decides(self.tally)
 
-    def following(self) -> FlightRequest | None:
+    def next_request(self) -> FlightRequest | None:
         """Return the next flight to send, or None if no flight remains."""
         self.sent = max(self.sent, self.tally.flown)
         while self.sent in self.beyond:
@@ -51,20 +51,20 @@ def _with_outcome(tally: Tally, outcome: str) -> Tally:
     return Tally(flyable + (outcome == "flyable"), failed + (outcome == "not flyable"), lost + (outcome == "lost"))
 
 
-def resumed_goal(asked: Goal | None, folder: Path, confidence: float | None = None) -> Goal:
+def resumed_goal(requested: Goal | None, folder: Path, confidence: float | None = None) -> Goal:
     """Return the goal of a resumed campaign, which is the requested goal, or without a request the stored goal.
 
     confidence: confidence of the goal; None keeps the stored confidence.
     Raises StoreError for a folder without a campaign.
     """
     path = folder / DATABASE
-    kept = kept_settings(path)
-    if not kept:
+    settings = read_stored_settings(path)
+    if not settings:
         raise StoreError(f"{path}: no campaign there to go on with", file=path)
-    before = Goal(**{one.name: kept[one.name] for one in fields(Goal) if one.name in kept})
-    goal = before if asked is None else asked
-    same = (goal.stops, goal.flights) == (before.stops, before.flights)
-    return replace(goal, confidence=confidence or before.confidence, changed=before.changed or not same)
+    old_goal = Goal(**{setting.name: settings[setting.name] for setting in fields(Goal) if setting.name in settings})
+    goal = old_goal if requested is None else requested
+    is_same = (goal.stops, goal.flights) == (old_goal.stops, old_goal.flights)
+    return replace(goal, confidence=confidence or old_goal.confidence, changed=old_goal.changed or not is_same)
 
 
 def open_store(base: CampaignBase, goal: Goal, folder: Path, *, resume: bool) -> Store:
@@ -91,63 +91,66 @@ def fly_campaign(
     after the deciding one are deleted.  Flights completed before an error or Ctrl-C stay in the table.
     """
     estimator = Estimator(goal)
-    book = _FlightTally(estimator, goal)
+    flight_tally = _FlightTally(estimator, goal)
     for index, outcome in store.outcomes().items():
         if index < goal.flights:
-            book.add(index, outcome)
-    if not book.decided and book.tally.flown < goal.flights:
-        pace = _Pace(goal, estimator, book.tally, advance)
+            flight_tally.add(index, outcome)
+    if not flight_tally.decided and flight_tally.tally.flown < goal.flights:
+        progress = _Pace(goal, estimator, flight_tally.tally, advance)
         with worker_pool(workers, base, fly) as pool:
-            _fly_rest(pool, book, store, pace)
-    store.drop_from(book.tally.flown)
+            _fly_remaining(pool, flight_tally, store, progress)
+    store.drop_from(flight_tally.tally.flown)
     return estimator.estimate(store.tally())
 
 
-def _fly_rest(pool: WorkerPool, book: _FlightTally, store: Store, pace: "_Pace") -> None:
-    pace.start(book.tally)
-    for _, row in pool.fly(book.following):
-        _store_flight(row, book, store)
-        pace.tell(book.tally)
-        if book.decided:
+def _fly_remaining(pool: WorkerPool, flight_tally: _FlightTally, store: Store, progress: "_Pace") -> None:
+    progress.start(flight_tally.tally)
+    for _, row in pool.fly(flight_tally.next_request):
+        _store_flight(row, flight_tally, store)
+        progress.report(flight_tally.tally)
+        if flight_tally.decided:
             break
-    pace.tell(book.tally, last=True)
+    progress.report(flight_tally.tally, is_last=True)
 
 
-def _store_flight(row: FlightRow, book: _FlightTally, store: Store) -> None:
+def _store_flight(row: FlightRow, flight_tally: _FlightTally, store: Store) -> None:
     store.add(row)
-    book.add(row.draw.index, row.outcome)
+    flight_tally.add(row.draw.index, row.outcome)
 
 
 class _Pace:
-    """Periodic progress report.  known: number of flights in the table at the start."""
+    """Periodic progress report.  stored: tally of the flights in the table at the start."""
 
-    def __init__(self, goal: Goal, estimator: Estimator, known: Tally, advance: Advance | None) -> None:
+    def __init__(self, goal: Goal, estimator: Estimator, stored: Tally, advance: Advance | None) -> None:
         self._goal, self._estimator, self._advance = goal, estimator, advance
-        self.start(known)
+        self.start(stored)
         if advance is not None:
             # Report before the workers start, because the start takes seconds.
-            total = self._total(known)
-            remark = f"{known.flown} of {total} flights" + (" at least" if goal.stops else "")
-            advance(float(known.flown), float(total), remark)
+            total = self._total(stored)
+            remark = f"{stored.flown} of {total} flights" + (" at least" if goal.stops else "")
+            advance(float(stored.flown), float(total), remark)
 
-    def start(self, known: Tally) -> None:
+    def start(self, stored: Tally) -> None:
         """Start timing, because the workers are ready."""
-        self._rate = FlightRate(known.flown)
+        self._rate = FlightRate(stored.flown)
 
     def _total(self, tally: Tally) -> int:
         """Return the minimum possible total number of flights."""
         return max(self._estimator.fewest, tally.flown) if self._goal.stops else self._goal.flights
 
-    def tell(self, tally: Tally, last: bool = False) -> None:
-        """Report the flights, P with its bounds, flights per minute and remaining time.  last: True reports at once."""
-        if self._advance is None or not tally.flown or not (self._rate.due() or last):
+    def report(self, tally: Tally, is_last: bool = False) -> None:
+        """Report the flights, P with its bounds, flights per minute and remaining time.
+
+        is_last: True reports even if no report is due.
+        """
+        if self._advance is None or not tally.flown or not (self._rate.is_due() or is_last):
             return
-        found = self._estimator.estimate(tally)
-        rate = self._rate.a_second(tally.flown)
+        estimate = self._estimator.estimate(tally)
+        flights_per_second = self._rate.flights_per_second(tally.flown)
         total = self._total(tally)
-        left = (total - tally.flown) / rate if rate > 0.0 else 0.0
+        seconds_left = (total - tally.flown) / flights_per_second if flights_per_second > 0.0 else 0.0
         remark = (
-            f"{tally.flown} flights, P {tally.share:.4f} ({found.lower:.4f} to {found.upper:.4f}),"
-            f" {60.0 * rate:.0f} a minute, {left:.0f} s left"
+            f"{tally.flown} flights, P {tally.share:.4f} ({estimate.lower:.4f} to {estimate.upper:.4f}),"
+            f" {60.0 * flights_per_second:.0f} a minute, {seconds_left:.0f} s left"
         )
         self._advance(float(tally.flown), float(total), remark)

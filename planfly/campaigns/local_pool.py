@@ -14,8 +14,8 @@ from planfly.campaigns.flight_requests import (
     LOST,
     MAX_FAILURES,
     CampaignCopy,
+    FinishedFlight,
     FlightRequest,
-    Flown,
     FlyOne,
     fingerprint,
 )
@@ -30,17 +30,17 @@ if TYPE_CHECKING:
 MAX_FAILED_STARTS = 10
 
 # Campaign of this worker process.
-_copies: list[CampaignCopy] = []
+_worker_campaign: list[CampaignCopy] = []
 
 
-def _begin(copy: CampaignCopy) -> None:
-    """Load the campaign in a worker process."""
-    _copies.append(copy)
+def _initialise_worker(campaign: CampaignCopy) -> None:
+    """Store the campaign in this worker process, for `_fly_request`."""
+    _worker_campaign.append(campaign)
 
 
 def _fly_request(request: FlightRequest) -> FlightRow:
     """Fly a flight in a worker process."""
-    return _copies[0].fly(request, f"process {os.getpid()}")
+    return _worker_campaign[0].fly(request, f"process {os.getpid()}")
 
 
 class _Worker:
@@ -66,12 +66,12 @@ class _Worker:
 
     def _submit(self, request: FlightRequest) -> Future[FlightRow]:
         if self._pool is None:
-            others = set(active_children())
+            other_children = set(active_children())
             # The pool has one process, so that its flight is known if the process dies.
             self._pool = ProcessPoolExecutor(1, mp_context=get_context("spawn"), initializer=end_with_parent)
             # The campaign is not an argument of the process, because the start would wait for the imports it needs.
-            self._started = self._pool.submit(_begin, self._copy)
-            self.processes = [child for child in active_children() if child not in others]
+            self._started = self._pool.submit(_initialise_worker, self._copy)
+            self.processes = [child for child in active_children() if child not in other_children]
         return self._pool.submit(_fly_request, request)
 
     @property
@@ -90,9 +90,9 @@ class _Worker:
 
 def _end_workers(workers: Iterable[_Worker]) -> None:
     """Kill the processes of workers."""
-    ended = list(workers)
-    end_children([process for worker in ended for process in worker.processes])
-    for worker in ended:
+    worker_list = list(workers)
+    end_children([process for worker in worker_list for process in worker.processes])
+    for worker in worker_list:
         worker.close()
 
 
@@ -101,27 +101,27 @@ class LocalPool:
 
     def __init__(self, count: int, base: CampaignBase, fly: FlyOne = fly_one) -> None:
         self._base = base
-        copy = CampaignCopy(base, fingerprint(base.scenario.flight.aircraft), fly)
-        self._workers = [_Worker(copy) for _ in range(count)]
+        campaign = CampaignCopy(base, fingerprint(base.scenario.flight.aircraft), fly)
+        self._workers = [_Worker(campaign) for _ in range(count)]
         self._failed_starts = 0
 
     def close(self) -> None:
         """End all processes."""
         _end_workers(self._workers)
 
-    def fly(self, following: Callable[[], FlightRequest | None]) -> Iterator[Flown]:
-        """Fly the requests that `following` returns, and yield each flight when it is done, in any order.
+    def fly(self, next_request: Callable[[], FlightRequest | None]) -> Iterator[FinishedFlight]:
+        """Fly the requests that `next_request` returns, and yield each flight when it is done, in any order.
 
-        following: returns the next request, or None if there is none at present; called again after each flight.
+        next_request: returns the next request, or None if there is none at present; called again after each flight.
         Raises the `world.errors.PlanflyError` of a flight, and OSError if no process can be started.
         """
         idle = list(self._workers)
         flying: dict[Future[FlightRow], tuple[_Worker, FlightRequest]] = {}
-        again: deque[FlightRequest] = deque()
+        retries: deque[FlightRequest] = deque()
         deaths: Counter[FlightRequest] = Counter()
         try:
             while True:
-                while idle and (request := again.popleft() if again else following()) is not None:
+                while idle and (request := retries.popleft() if retries else next_request()) is not None:
                     worker = idle.pop()
                     flying[worker.send(request)] = worker, request
                 if not flying:
@@ -134,10 +134,10 @@ class LocalPool:
                         deaths[request] += worker.has_started
                         _end_workers([worker])
                         if deaths[request] < MAX_FAILURES:
-                            again.append(request)
+                            retries.append(request)
                             continue
                         row = lost_row(self._base, request.index, LOST)
-                    yield Flown(request, row)
+                    yield FinishedFlight(request, row)
         finally:
             _end_workers(worker for worker, _ in flying.values())
 

@@ -44,19 +44,19 @@ def draw_failures(counts: Sequence[tuple[str, str, int]], flights: int) -> Figur
     flights: total number of flights.
     """
     with clean_style():
-        shown = sorted(counts, key=lambda one: -one[2])[:MAX_BARS]
-        tall = 1.4 + 0.32 * max(1, len(shown))
-        figure = new_figure(tall)
-        axes = figure.add_axes((0.27, 0.6 / tall, 0.69, 1.0 - 1.1 / tall))
+        shown_counts = sorted(counts, key=lambda count: -count[2])[:MAX_BARS]
+        height = 1.4 + 0.32 * max(1, len(shown_counts))
+        figure = new_figure(height)
+        axes = figure.add_axes((0.27, 0.6 / height, 0.69, 1.0 - 1.1 / height))
         axes.set_title("Failures by rule and place")
         for side in ("top", "right"):
             axes.spines[side].set_visible(False)
-        if not shown:
+        if not shown_counts:
             axes.set_axis_off()
             axes.text(0.0, 0.5, f"No flight of {flights} failed.", transform=axes.transAxes, fontsize=11, color=QUIET)
             return figure
-        rows = list(range(len(shown)))
-        numbers = [one[2] for one in shown]
+        rows = list(range(len(shown_counts)))
+        numbers = [count[2] for count in shown_counts]
         axes.barh(rows, numbers, height=0.62, color=FAIL)
         for row, number in zip(rows, numbers, strict=True):
             axes.annotate(
@@ -68,7 +68,7 @@ def draw_failures(counts: Sequence[tuple[str, str, int]], flights: int) -> Figur
                 fontsize=8,
                 color=INK,
             )
-        axes.set_yticks(rows, [shorten(f"{rule}, {place}", 38) for rule, place, _ in shown])
+        axes.set_yticks(rows, [shorten(f"{rule}, {place}", 38) for rule, place, _ in shown_counts])
         axes.invert_yaxis()
         axes.set_xlim(0.0, 1.2 * max(numbers))
         axes.set_xlabel(f"flights, of {flights}")
@@ -114,12 +114,20 @@ def speed_bins(speed: Floats, flyable: NDArray[np.bool_], confidence: float = 0.
     if not speed.size:
         return []
     width = max(_BIN_WIDTH_MPS, float(np.ptp(speed)) / _MAX_BINS)
-    group = np.floor(speed / width).astype(int)
+    groups = np.floor(speed / width).astype(int)
     bins = []
-    for number in np.unique(group):
-        mine = flyable[group == number]
-        total, good = int(mine.size), int(mine.sum())
-        bins.append(SpeedBin(number * width, (number + 1) * width, total, good, wilson(good, total, confidence)))
+    for number in np.unique(groups):
+        is_flyable = flyable[groups == number]
+        flight_count, flyable_count = int(is_flyable.size), int(is_flyable.sum())
+        bins.append(
+            SpeedBin(
+                number * width,
+                (number + 1) * width,
+                flight_count,
+                flyable_count,
+                wilson(flyable_count, flight_count, confidence),
+            )
+        )
     return bins
 
 
@@ -128,16 +136,21 @@ def draw_probability(bins: Sequence[SpeedBin], target: float | None) -> Figure:
     with clean_style():
         figure = new_figure(4.2)
         axes = figure.add_axes((0.08, 0.16, 0.89, 0.70))
-        middle = [0.5 * (one.low + one.high) for one in bins]
-        share = [one.flyable / one.flights for one in bins]
-        for one, x, p in zip(bins, middle, share, strict=True):
+        centres = [0.5 * (speed_bin.low + speed_bin.high) for speed_bin in bins]
+        fractions = [speed_bin.flyable / speed_bin.flights for speed_bin in bins]
+        for speed_bin, centre, fraction in zip(bins, centres, fractions, strict=True):
             axes.fill_between(
-                [one.low, one.high], one.interval.low, one.interval.high, color=PLANNED, alpha=0.35, linewidth=0.0
+                [speed_bin.low, speed_bin.high],
+                speed_bin.interval.low,
+                speed_bin.interval.high,
+                color=PLANNED,
+                alpha=0.35,
+                linewidth=0.0,
             )
-            axes.plot([one.low, one.high], [p, p], color=BLUE, linewidth=2.0)
+            axes.plot([speed_bin.low, speed_bin.high], [fraction, fraction], color=BLUE, linewidth=2.0)
             axes.annotate(
-                f"{one.flights}",
-                (x, 0.0),
+                f"{speed_bin.flights}",
+                (centre, 0.0),
                 xytext=(0, 3),
                 textcoords="offset points",
                 ha="center",
@@ -164,12 +177,12 @@ def draw_probability(bins: Sequence[SpeedBin], target: float | None) -> Figure:
     return figure
 
 
-def draw_tornado(bars: Sequence[Bar], of_what: str) -> Figure:
+def draw_tornado(bars: Sequence[Bar], rule_title: str) -> Figure:
     """Draw the quantities that explain the variance of the deciding margin, to the right if an increase helps."""
     with clean_style():
-        tall = 1.2 + 0.3 * max(1, len(bars))
-        figure = new_figure(tall)
-        axes = figure.add_axes((0.17, 0.5 / tall, 0.79, 1.0 - 1.1 / tall))
+        height = 1.2 + 0.3 * max(1, len(bars))
+        figure = new_figure(height)
+        axes = figure.add_axes((0.17, 0.5 / height, 0.79, 1.0 - 1.1 / height))
         rows = range(len(bars))
         for row, bar in zip(rows, bars, strict=True):
             length = bar.index * (1.0 if bar.slope >= 0.0 else -1.0)
@@ -186,10 +199,10 @@ def draw_tornado(bars: Sequence[Bar], of_what: str) -> Figure:
         axes.axvline(0.0, color=INK, linewidth=0.8)
         axes.set_yticks(list(rows), [bar.title for bar in bars])
         axes.invert_yaxis()
-        reach = max([0.2, *(1.25 * bar.index for bar in bars)])
-        axes.set_xlim(-reach, reach)
+        half_range = max([0.2, *(1.25 * bar.index for bar in bars)])
+        axes.set_xlim(-half_range, half_range)
         axes.set_xlabel("share of the margin's variance   (left: more of it leaves less margin; right: more)")
-        axes.set_title(f"What decides: first-order sensitivity of the margin of {of_what}")
+        axes.set_title(f"What decides: first-order sensitivity of the margin of {rule_title}")
         axes.set_xticks([])
         for side in ("top", "right", "left"):
             axes.spines[side].set_visible(False)
@@ -217,7 +230,7 @@ _COLUMNS = 5
 
 
 def draw_clearance_fan(
-    clearance: Floats, failed: NDArray[np.bool_], ground: Floats, length: float, least: float
+    clearance: Floats, failed: NDArray[np.bool_], ground: Floats, length: float, min_clearance: float
 ) -> Figure:
     """Draw the height above ground along the path for all flights, above the profile of the ground.
 
@@ -225,38 +238,46 @@ def draw_clearance_fan(
     failed: True for a flight that is not flyable, (n,); at most 30 of them are drawn.
     ground: terrain altitude, m AMSL, (s,).
     length: length of the path, m.
-    least: required clearance, m.
+    min_clearance: required clearance, m.
     """
     with clean_style():
         figure = new_figure(5.4)
-        top = figure.add_axes((0.08, 0.36, 0.89, 0.56))
-        low = figure.add_axes((0.08, 0.10, 0.89, 0.20), sharex=top)
+        upper_axes = figure.add_axes((0.08, 0.36, 0.89, 0.56))
+        lower_axes = figure.add_axes((0.08, 0.10, 0.89, 0.20), sharex=upper_axes)
         stations = clearance.shape[1]
-        along = (np.arange(stations) + 0.5) / stations * length / 1000.0
-        some = np.isfinite(clearance).any(axis=0)
-        for below, above, alpha in _BANDS:
-            ends = np.full((2, stations), np.nan)
-            ends[:, some] = np.nanquantile(clearance[:, some], (below, above), axis=0)
-            label = "all flights" if below == 0.0 else f"{100 * (above - below):.0f} % of them"
-            top.fill_between(along, ends[0], ends[1], color=PLANNED, alpha=alpha + 0.15, linewidth=0.0, label=label)
-        middle = np.full(stations, np.nan)
-        middle[some] = np.nanmedian(clearance[:, some], axis=0)
-        top.plot(along, middle, color=BLUE, linewidth=1.4, label="median")
+        distance_km = (np.arange(stations) + 0.5) / stations * length / 1000.0
+        has_data = np.isfinite(clearance).any(axis=0)
+        for lower_quantile, upper_quantile, alpha in _BANDS:
+            band = np.full((2, stations), np.nan)
+            band[:, has_data] = np.nanquantile(clearance[:, has_data], (lower_quantile, upper_quantile), axis=0)
+            label = (
+                "all flights" if lower_quantile == 0.0 else f"{100 * (upper_quantile - lower_quantile):.0f} % of them"
+            )
+            upper_axes.fill_between(
+                distance_km, band[0], band[1], color=PLANNED, alpha=alpha + 0.15, linewidth=0.0, label=label
+            )
+        median = np.full(stations, np.nan)
+        median[has_data] = np.nanmedian(clearance[:, has_data], axis=0)
+        upper_axes.plot(distance_km, median, color=BLUE, linewidth=1.4, label="median")
         for k, row in enumerate(clearance[failed][:30]):
-            top.plot(along, row, color=FAIL, linewidth=0.7, alpha=0.8, label="not flyable" if k == 0 else None)
-        top.axhline(least, color=LIMIT, linewidth=1.4, linestyle="--", label=f"required, {least:g} m")
-        top.set_ylim(bottom=0.0)
-        top.set_ylabel("above ground (m)")
+            upper_axes.plot(
+                distance_km, row, color=FAIL, linewidth=0.7, alpha=0.8, label="not flyable" if k == 0 else None
+            )
+        upper_axes.axhline(
+            min_clearance, color=LIMIT, linewidth=1.4, linestyle="--", label=f"required, {min_clearance:g} m"
+        )
+        upper_axes.set_ylim(bottom=0.0)
+        upper_axes.set_ylabel("above ground (m)")
         # The legend is above the panel, where it covers no band, and the title above the legend.
-        top.set_title("Clearance along the way, over all flights", pad=20.0)
-        top.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=6, columnspacing=1.0, borderaxespad=0.2)
-        top.tick_params(labelbottom=False)
-        low.fill_between(along, ground, np.nanmin(ground) - 10.0, color=theme.GROUND[1], linewidth=0.0)
-        low.plot(along, ground, color=QUIET, linewidth=0.8)
-        low.set_xlim(0.0, length / 1000.0)
-        low.set_ylabel("ground (m AMSL)")
-        low.set_xlabel("along the way (km)")
-        for axes in (top, low):
+        upper_axes.set_title("Clearance along the way, over all flights", pad=20.0)
+        upper_axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=6, columnspacing=1.0, borderaxespad=0.2)
+        upper_axes.tick_params(labelbottom=False)
+        lower_axes.fill_between(distance_km, ground, np.nanmin(ground) - 10.0, color=theme.GROUND[1], linewidth=0.0)
+        lower_axes.plot(distance_km, ground, color=QUIET, linewidth=0.8)
+        lower_axes.set_xlim(0.0, length / 1000.0)
+        lower_axes.set_ylabel("ground (m AMSL)")
+        lower_axes.set_xlabel("along the way (km)")
+        for axes in (upper_axes, lower_axes):
             axes.grid(visible=True, color=GRID, linewidth=0.5)
             axes.set_axisbelow(True)
             for side in ("top", "right"):
@@ -272,38 +293,38 @@ def draw_crossings(crossings: Floats, failed: NDArray[np.bool_]) -> Figure:
     """
     count = crossings.shape[1]
     columns = min(_COLUMNS, count)
-    lines = -(-count // columns)
+    row_count = -(-count // columns)
     with clean_style():
-        figure = new_figure(0.7 + 2.0 * lines)
-        panels = figure.subplots(lines, columns, squeeze=False)
-        tall = 0.7 + 2.0 * lines
+        figure = new_figure(0.7 + 2.0 * row_count)
+        panels = figure.subplots(row_count, columns, squeeze=False)
+        height = 0.7 + 2.0 * row_count
         figure.subplots_adjust(
-            left=0.07, right=0.98, bottom=0.4 / tall, top=1.0 - 0.65 / tall, wspace=0.22, hspace=0.35
+            left=0.07, right=0.98, bottom=0.4 / height, top=1.0 - 0.65 / height, wspace=0.22, hspace=0.35
         )
         for k, axes in enumerate(panels.ravel()):
             if k >= count:
                 axes.set_axis_off()
                 continue
-            here = crossings[:, k]
-            good = np.isfinite(here).all(axis=1)
+            points = crossings[:, k]
+            is_reached = np.isfinite(points).all(axis=1)
             axes.axhline(0.0, color=GRID, linewidth=0.6)
             axes.axvline(0.0, color=GRID, linewidth=0.6)
             # Thousands of points, drawn as pixels, in a colour that is visible on light and on dark paper.
-            axes.plot(*here[good & ~failed].T, ".", color=PLANNED, markersize=2.6, alpha=0.8, rasterized=True)
-            axes.plot(*here[good & failed].T, "x", color=FAIL, markersize=3.5)
-            reach = _panel_half_size(here)
-            if good.sum() > 2:
-                ellipse = covariance_ellipse(here[good])
+            axes.plot(*points[is_reached & ~failed].T, ".", color=PLANNED, markersize=2.6, alpha=0.8, rasterized=True)
+            axes.plot(*points[is_reached & failed].T, "x", color=FAIL, markersize=3.5)
+            half_size = _panel_half_size(points)
+            if is_reached.sum() > 2:
+                ellipse = covariance_ellipse(points[is_reached])
                 # Its extents are in metres until it is added to axes.
-                reach = max(reach, 1.05 * float(np.abs(ellipse.get_extents().get_points()).max()))
+                half_size = max(half_size, 1.05 * float(np.abs(ellipse.get_extents().get_points()).max()))
                 axes.add_patch(ellipse)
             axes.set_title(f"waypoint {k}", fontsize=8.5, pad=3.0)
-            axes.set_xlim(-reach, reach)
-            axes.set_ylim(-reach, reach)
+            axes.set_xlim(-half_size, half_size)
+            axes.set_ylim(-half_size, half_size)
             axes.tick_params(labelsize=7)
         title = "Crossings of the waypoints, m right of and above each, with the ellipse of 95 %"
-        figure.text(0.07, 1.0 - 0.3 / tall, title, fontsize=11, color=INK)
-        figure.text(0.98, 1.0 - 0.3 / tall, "dots flyable, crosses not", fontsize=8, color=QUIET, ha="right")
+        figure.text(0.07, 1.0 - 0.3 / height, title, fontsize=11, color=INK)
+        figure.text(0.98, 1.0 - 0.3 / height, "dots flyable, crosses not", fontsize=8, color=QUIET, ha="right")
     return figure
 
 
@@ -315,17 +336,17 @@ def covariance_ellipse(points: Floats) -> Ellipse:
     >>> round(ellipse.width, 2), round(ellipse.height, 2)
     (11.99, 4.0)
     """
-    spread = np.cov(points.T)
-    values, vectors = np.linalg.eigh(spread)
-    wide, narrow = (2.0 * math.sqrt(_CHI2 * max(0.0, float(value))) for value in values[::-1])
+    covariance = np.cov(points.T)
+    values, vectors = np.linalg.eigh(covariance)
+    major_axis, minor_axis = (2.0 * math.sqrt(_CHI2 * max(0.0, float(value))) for value in values[::-1])
     angle = math.degrees(math.atan2(vectors[1, 1], vectors[0, 1]))
     east, up = (float(value) for value in points.mean(axis=0))
-    return Ellipse((east, up), wide, narrow, angle=angle, fill=False, edgecolor=INK, linewidth=0.9)
+    return Ellipse((east, up), major_axis, minor_axis, angle=angle, fill=False, edgecolor=INK, linewidth=0.9)
 
 
 def _panel_half_size(crossings: Floats) -> float:
-    known = np.abs(crossings[np.isfinite(crossings)])
-    return max(5.0, 1.1 * float(np.quantile(known, 0.995))) if known.size else 10.0
+    distances = np.abs(crossings[np.isfinite(crossings)])
+    return max(5.0, 1.1 * float(np.quantile(distances, 0.995))) if distances.size else 10.0
 
 
 # ----------------------------------------------------------------------
@@ -352,9 +373,14 @@ class Spoke:
 
 
 def draw_go_no_go(
-    spokes: Sequence[Spoke], most: float, target: float, confidence: float, name: str, wind: tuple[float, float] | None
+    spokes: Sequence[Spoke],
+    max_speed: float,
+    target: float,
+    confidence: float,
+    name: str,
+    wind: tuple[float, float] | None,
 ) -> Figure:
-    """Draw a polar chart with north up, spokes in the directions of the wind, and speed outwards to ``most`` m/s.
+    """Draw a polar chart with north up, spokes in the directions of the wind, and speed outwards to ``max_speed`` m/s.
 
     wind: the scenario's wind, which is drawn as a star, by its speed, m/s, and direction, degrees.
     """
@@ -363,46 +389,46 @@ def draw_go_no_go(
         axes = figure.add_axes((0.06, 0.07, 0.64, 0.80), projection="polar")
         axes.set_theta_zero_location("N")  # type: ignore[attr-defined]  # of polar axes
         axes.set_theta_direction(-1)  # type: ignore[attr-defined]  # of polar axes
-        angle = np.radians([one.from_deg for one in spokes] + [spokes[0].from_deg + 360.0])
+        angle = np.radians([spoke.from_deg for spoke in spokes] + [spokes[0].from_deg + 360.0])
         ring = [*spokes, spokes[0]]
-        fine = np.linspace(angle[0], angle[-1], 720)
+        fine_angles = np.linspace(angle[0], angle[-1], 720)
 
         def outline(values: Sequence[float]) -> np.ndarray:
-            return np.interp(fine, angle, values)
+            return np.interp(fine_angles, angle, values)
 
-        low, high = outline([one.low for one in ring]), outline([one.high for one in ring])
-        boundary = outline([one.boundary for one in ring])
-        axes.fill_between(fine, 0.0, low, color=PLANNED, alpha=0.45, linewidth=0.0)
-        axes.fill_between(fine, boundary, most, color=FAIL, alpha=0.13, linewidth=0.0)
-        axes.fill_between(fine, low, high, color=INTERVAL, alpha=0.45, linewidth=0.0)
+        lower, upper = outline([spoke.low for spoke in ring]), outline([spoke.high for spoke in ring])
+        boundary = outline([spoke.boundary for spoke in ring])
+        axes.fill_between(fine_angles, 0.0, lower, color=PLANNED, alpha=0.45, linewidth=0.0)
+        axes.fill_between(fine_angles, boundary, max_speed, color=FAIL, alpha=0.13, linewidth=0.0)
+        axes.fill_between(fine_angles, lower, upper, color=INTERVAL, alpha=0.45, linewidth=0.0)
         # The largest wind of the search is not a limit of the mission.
-        axes.plot(fine, np.where(boundary < most - 1e-6, boundary, np.nan), color=INK, linewidth=1.8)
-        for one in spokes:
-            if one.reaches:
-                outwards = (3, 0, -one.from_deg)
+        axes.plot(fine_angles, np.where(boundary < max_speed - 1e-6, boundary, np.nan), color=INK, linewidth=1.8)
+        for spoke in spokes:
+            if spoke.reaches:
+                marker = (3, 0, -spoke.from_deg)
                 axes.plot(
-                    np.radians(one.from_deg),
-                    most,
-                    marker=outwards,
+                    np.radians(spoke.from_deg),
+                    max_speed,
+                    marker=marker,
                     color=QUIET,
                     markersize=7,
                     linewidth=0.0,
                     clip_on=False,
                 )
-            for speed, flights, flyable in one.flights:
-                all_well = flights == flyable
+            for speed, flights, flyable in spoke.flights:
+                all_flyable = flights == flyable
                 axes.plot(
-                    np.radians(one.from_deg),
+                    np.radians(spoke.from_deg),
                     speed,
-                    marker="o" if all_well else "x",
-                    color=BLUE if all_well else FAIL,
-                    markersize=2.6 if all_well else 3.6,
+                    marker="o" if all_flyable else "x",
+                    color=BLUE if all_flyable else FAIL,
+                    markersize=2.6 if all_flyable else 3.6,
                     linewidth=0.0,
                     alpha=0.75,
                 )
         if wind is not None:
             axes.plot(np.radians(wind[1]), wind[0], marker="*", color=INK, markersize=13, markeredgecolor=PAPER)
-        axes.set_ylim(0.0, most)
+        axes.set_ylim(0.0, max_speed)
         axes.set_xticks(np.radians(np.arange(0, 360, 45)), ["N", "NE", "E", "SE", "S", "SW", "W", "NW"])
         axes.set_rlabel_position(11.0)  # type: ignore[attr-defined]  # of polar axes
         axes.tick_params(axis="y", labelsize=8)
@@ -415,15 +441,18 @@ def draw_go_no_go(
             fontsize=9,
             color=QUIET,
         )
-        edge = most if any(one.reaches for one in spokes) else None
-        _draw_legend(figure, target, confidence, wind, edge)
+        open_edge = max_speed if any(spoke.reaches for spoke in spokes) else None
+        _draw_legend(figure, target, confidence, wind, open_edge)
     return figure
 
 
 def _draw_legend(
-    figure: Figure, target: float, confidence: float, wind: tuple[float, float] | None, edge: float | None
+    figure: Figure, target: float, confidence: float, wind: tuple[float, float] | None, open_edge: float | None
 ) -> None:
-    """Draw the legend.  edge: maximum wind of the search, m/s, if a direction has no lower limit, otherwise None."""
+    """Draw the legend.
+
+    open_edge: maximum wind of the search, m/s, if the boundary of a direction is beyond it, otherwise None.
+    """
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
 
@@ -435,9 +464,12 @@ def _draw_legend(
         (Line2D([], [], color=BLUE, marker="o", markersize=3, linewidth=0), "flown, all flyable"),
         (Line2D([], [], color=FAIL, marker="x", markersize=4, linewidth=0), "flown, some not"),
     ]
-    if edge is not None:
+    if open_edge is not None:
         entries.append(
-            (Line2D([], [], color=QUIET, marker="^", markersize=7, linewidth=0), f"no limit found up to\n{edge:g} m/s")
+            (
+                Line2D([], [], color=QUIET, marker="^", markersize=7, linewidth=0),
+                f"no limit found up to\n{open_edge:g} m/s",
+            )
         )
     if wind is not None:
         entries.append((Line2D([], [], color=INK, marker="*", markersize=11, linewidth=0), "the scenario's wind"))
@@ -455,7 +487,7 @@ def _draw_legend(
 # Lay out the pictures for phones, so narrow that their letters stay readable.
 
 # Width of a picture, in.
-NARROW = 5.0
+NARROW_WIDTH_IN = 5.0
 # Margin at an edge, in.
 _EDGE_IN = 0.15
 # Height of a line of a legend, in.
@@ -472,65 +504,74 @@ _LETTER_WIDTH_RATIO = 0.57
 _LINE_SPACING_RATIO = 1.3
 
 
-def narrowed(figure: Figure) -> Figure:
-    """Change a picture of this module to a layout `NARROW` inches wide, with wrapped text and the legends below.
+def narrow_figure(figure: Figure) -> Figure:
+    """Lay out a picture of this module `NARROW_WIDTH_IN` inches wide, with wrapped text and the legends below.
 
     >>> float(narrowed(draw_failures([("slopes", "leg 2", 3)], 9)).get_figwidth())
     5.0
     """
-    wide, tall = figure.get_size_inches().tolist()
+    old_width, old_height = figure.get_size_inches().tolist()
     panels = [axes for axes in figure.axes if axes.axison]
-    legends = [*figure.legends, *(found for axes in panels if (found := axes.get_legend()) is not None)]
-    foot = _LEGEND_LINE_IN * sum(-(-len(found.get_texts()) // 2) for found in legends)
+    legends = [*figure.legends, *(legend for axes in panels if (legend := axes.get_legend()) is not None)]
+    legend_height = _LEGEND_LINE_IN * sum(-(-len(legend.get_texts()) // 2) for legend in legends)
     # Height of the figure's own texts, in from the top.
-    head = _EDGE_IN
-    said = []
+    text_height = _EDGE_IN
+    texts = []
     for text in figure.texts:
-        said.append((text, head))
-        head += _wrap_text(text, NARROW - 2.0 * _EDGE_IN)
+        texts.append((text, text_height))
+        text_height += _wrap_text(text, NARROW_WIDTH_IN - 2.0 * _EDGE_IN)
     boxes: list[tuple[float, float, float, float]] = []  # left, top from the picture's top, width, height, in
     if any(axes.name == "polar" for axes in panels):
-        side = NARROW - 1.0
-        boxes = [(0.5, head + 0.4, side, side)]
-        height = head + side + 0.9 + foot
+        side = NARROW_WIDTH_IN - 1.0
+        boxes = [(0.5, text_height + 0.4, side, side)]
+        height = text_height + side + 0.9 + legend_height
     elif any(axes.get_subplotspec() is not None for axes in panels):
-        step = (NARROW - _EDGE_IN) / _NARROW_COLUMNS
+        step = (NARROW_WIDTH_IN - _EDGE_IN) / _NARROW_COLUMNS
         for k in range(len(panels)):
             row, column = divmod(k, _NARROW_COLUMNS)
-            boxes.append((0.4 + step * column, head + 0.3 + _PANEL_STEP_IN * row, _PANEL_IN, _PANEL_IN))
-        height = head + 0.3 + _PANEL_STEP_IN * -(-len(panels) // _NARROW_COLUMNS)
+            boxes.append((0.4 + step * column, text_height + 0.3 + _PANEL_STEP_IN * row, _PANEL_IN, _PANEL_IN))
+        height = text_height + 0.3 + _PANEL_STEP_IN * -(-len(panels) // _NARROW_COLUMNS)
     else:
-        more = below = 0.0
+        title_height = label_height = 0.0
         for axes in figure.axes:
             box = axes.get_position()
-            left = box.x0 * wide
-            width = NARROW - left - 2.0 * _EDGE_IN
-            more = max(more, sum(_wrap_text(one, width) for one in _left_title(axes)))
-            below = max(below, _wrap_text(axes.xaxis.label, width))
+            box_left = box.x0 * old_width
+            width = NARROW_WIDTH_IN - box_left - 2.0 * _EDGE_IN
+            title_height = max(title_height, sum(_wrap_text(handle, width) for handle in _left_title(axes)))
+            label_height = max(label_height, _wrap_text(axes.xaxis.label, width))
             if axes.patches and axes.get_xlim()[0] == 0.0:
                 # Leave room for the number after the longest bar.
                 axes.set_xlim(0.0, 1.5 * axes.get_xlim()[1])
-            boxes.append((left, (1.0 - box.y1) * tall, width, box.height * tall))
-        boxes = [(left, top + more, width, high) for left, top, width, high in boxes]
-        height = tall + more + below + foot
-    figure.set_size_inches(NARROW, height)
-    for axes, (left, top, width, high) in zip(panels or figure.axes, boxes, strict=True):
-        axes.set_position((left / NARROW, 1.0 - (top + high) / height, width / NARROW, high / height))
-    for text, top in said:
-        text.update({"x": _EDGE_IN / NARROW, "y": 1.0 - top / height, "ha": "left", "va": "top"})
-    for found in legends:
-        labels = [text.get_text() for text in found.get_texts()]
-        handles = [one for one in found.legend_handles if one is not None]
+            boxes.append((box_left, (1.0 - box.y1) * old_height, width, box.height * old_height))
+        boxes = [
+            (box_left, box_top + title_height, width, box_height) for box_left, box_top, width, box_height in boxes
+        ]
+        height = old_height + title_height + label_height + legend_height
+    figure.set_size_inches(NARROW_WIDTH_IN, height)
+    for axes, (box_left, box_top, width, box_height) in zip(panels or figure.axes, boxes, strict=True):
+        axes.set_position(
+            (
+                box_left / NARROW_WIDTH_IN,
+                1.0 - (box_top + box_height) / height,
+                width / NARROW_WIDTH_IN,
+                box_height / height,
+            )
+        )
+    for text, box_top in texts:
+        text.update({"x": _EDGE_IN / NARROW_WIDTH_IN, "y": 1.0 - box_top / height, "ha": "left", "va": "top"})
+    for legend in legends:
+        labels = [text.get_text() for text in legend.get_texts()]
+        handles = [handle for handle in legend.legend_handles if handle is not None]
         with clean_style():
             figure.legend(handles, labels, loc="lower left", ncols=2, fontsize=9)
-        found.remove()
+        legend.remove()
     return figure
 
 
 def _left_title(axes: Axes) -> list[Text]:
     """Return the left title of a panel in a list, empty without a title."""
-    said = axes.get_title("left")
-    return [one for one in axes.get_children() if isinstance(one, Text) and said and one.get_text() == said]
+    title = axes.get_title("left")
+    return [child for child in axes.get_children() if isinstance(child, Text) and title and child.get_text() == title]
 
 
 def _wrap_text(text: Text, width: float) -> float:

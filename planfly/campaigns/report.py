@@ -35,11 +35,11 @@ from planfly.campaigns.pictures import (
     draw_go_no_go,
     draw_probability,
     draw_tornado,
-    narrowed,
+    narrow_figure,
     speed_bins,
 )
 from planfly.campaigns.statistics.decision import Estimate, Goal, Tally, lower_bound
-from planfly.campaigns.statistics.wind_boundary import needs_more
+from planfly.campaigns.statistics.wind_boundary import needs_more_flights
 from planfly.campaigns.summary import (
     CampaignSummary,
     campaign_lines,
@@ -48,7 +48,7 @@ from planfly.campaigns.summary import (
     summarise,
     summary_json,
 )
-from planfly.campaigns.tables import DATABASE, WINDS_DATABASE, Store, refuse_held, same_flight
+from planfly.campaigns.tables import DATABASE, WINDS_DATABASE, Store, check_not_locked, is_same_flight
 from planfly.workflow.make_plan import Advance
 from planfly.workflow.open_flight import make_setup
 from planner.plan import plan_json
@@ -56,12 +56,12 @@ from world.errors import ArgumentError, PlanflyError
 from world.files import write_whole
 
 # Maximum number of flights drawn in the pictures of tracks; more flights do not change the pictures visibly.
-_DRAWN = 3000
+_MAX_DRAWN = 3000
 
 
 def campaign_page(base: CampaignBase, summary: CampaignSummary, store: Store, command: str) -> bytes:
     """Return the report page as bytes.  command: the command line that repeats the campaign."""
-    pictures = [_draw_both_widths(figure, words) for figure, words in _draw_pictures(base, summary, store)]
+    pictures = [_draw_both_widths(figure, caption) for figure, caption in _draw_pictures(base, summary, store)]
     lines = campaign_lines(summary)
     text = _render_page(
         "campaign.html",
@@ -69,9 +69,9 @@ def campaign_page(base: CampaignBase, summary: CampaignSummary, store: Store, co
         answer=summary.estimate.answer,
         lines=lines,
         failures=[
-            (RULE_WORDS[one.rule].title, place_text(place), number)
-            for one in summary.by_rule
-            for place, number in one.places
+            (RULE_WORDS[failures.rule].title, place_text(place), count)
+            for failures in summary.by_rule
+            for place, count in failures.places
         ],
         flights=summary.estimate.tally.flown,
         worst=[
@@ -109,20 +109,20 @@ def _render_page(template: str, **values: object) -> str:
     return page_template(template, "planfly.campaigns").render(colours=Markup(css_variables()), **values)
 
 
-def winds_page(name: str, figure: Figure, found: WindsFound, rows: Sequence[tuple[str, ...]], command: str) -> bytes:
+def winds_page(name: str, figure: Figure, winds: WindsFound, rows: Sequence[tuple[str, ...]], command: str) -> bytes:
     """Return the page of a go/no-go chart, and change the figure to its narrow layout."""
     picture = _draw_both_widths(figure, "Go/no-go chart: wind from each direction")
-    answer, lines = "" if found.calm is None else "missed", wind_lines(found)
+    answer, lines = "" if winds.calm is None else "missed", wind_lines(winds)
     page = _render_page(
         "winds.html", name=name, picture=picture, answer=answer, lines=lines, rows=rows, command=command
     )
     return page.encode("utf-8")
 
 
-def _draw_both_widths(figure: Figure, words: str) -> Markup:
+def _draw_both_widths(figure: Figure, caption: str) -> Markup:
     """Return a picture for a page in two widths, for desktops and phones; change the figure to the narrow layout."""
-    wide = page_svg(figure, words)
-    narrow = page_svg(narrowed(figure), f"{words} (narrow)")
+    wide = page_svg(figure, caption)
+    narrow = page_svg(narrow_figure(figure), f"{caption} (narrow)")
     return Markup(f'<div class="wide">{wide}</div><div class="narrow">{narrow}</div>')
 
 
@@ -131,45 +131,55 @@ def _draw_pictures(base: CampaignBase, summary: CampaignSummary, store: Store) -
     flyable = np.array([outcome == "flyable" for outcome in store.outcomes().values()])
     speed = np.maximum(0.0, base.scenario.wind.speed + store.column("wind_speed"))
     bins = speed_bins(speed, flyable, summary.goal.confidence)
-    counts = [(RULE_WORDS[one.rule].title, place_text(place), n) for one in summary.by_rule for place, n in one.places]
-    out = [
+    counts = [
+        (RULE_WORDS[entry.rule].title, place_text(place), count)
+        for entry in summary.by_rule
+        for place, count in entry.places
+    ]
+    figures = [
         (draw_probability(bins, summary.goal.target), "Share of flyable flights against the mean wind's speed"),
     ]
     if summary.deciding:
-        bars = [Bar(BY_NAME[one.quantity].title, one.index, one.slope) for one in summary.sensitivities]
-        out.append((draw_tornado(bars, RULE_WORDS[summary.deciding].title), "What the deciding margin depends on"))
+        bars = [Bar(BY_NAME[entry.quantity].title, entry.index, entry.slope) for entry in summary.sensitivities]
+        figures.append((draw_tornado(bars, RULE_WORDS[summary.deciding].title), "What the deciding margin depends on"))
     if counts:
         failures = draw_failures(counts, summary.estimate.tally.flown)
-        out.append((failures, "In how many flights each rule failed, and where"))
-    return out + _draw_tracks(base, store)
+        figures.append((failures, "In how many flights each rule failed, and where"))
+    return figures + _draw_tracks(base, store)
 
 
 def _draw_tracks(base: CampaignBase, store: Store) -> list[tuple[Figure, str]]:
     """Draw the clearance fan and the crossings of the flights that have a track."""
     setup = make_setup(base.scenario, base.airframe, base.mission, base.seed, plan=base.plan, placed=base.placed)
     points = setup.route.waypoints
-    shapes = [np.frombuffer(data, np.float32) for data in store.blobs("clearance", _DRAWN)]
+    shapes = [np.frombuffer(data, np.float32) for data in store.blobs("clearance", _MAX_DRAWN)]
     if not shapes:
         return []
-    outcomes = [one != "flyable" for one, there in zip(store.texts("outcome"), store.has_track(), strict=True) if there]
+    outcomes = [
+        outcome != "flyable"
+        for outcome, has_track in zip(store.texts("outcome"), store.has_track(), strict=True)
+        if has_track
+    ]
     failed = np.array(outcomes[: len(shapes)])
-    out = []
+    figures = []
     if base.scenario.terrain is not None:
         lengths = np.hypot(*np.diff(points[:, :2], axis=0).T)
-        before = np.concatenate([[0.0], np.cumsum(lengths)])
-        at = (np.arange(STATIONS) + 0.5) / STATIONS * before[-1]
-        east, north = (np.interp(at, before, points[:, axis]) for axis in range(2))
+        leg_starts = np.concatenate([[0.0], np.cumsum(lengths)])
+        distances = (np.arange(STATIONS) + 0.5) / STATIONS * leg_starts[-1]
+        east, north = (np.interp(distances, leg_starts, points[:, axis]) for axis in range(2))
         ground = base.scenario.terrain.height(east, north)
-        least = base.scenario.limits.min_clearance_m
-        figure = draw_clearance_fan(np.array(shapes, dtype=np.float64), failed, ground, float(before[-1]), least)
-        out.append((figure, "Height above ground along the way, over all flights, and the ground itself"))
-    crossings = [np.frombuffer(data, np.float32).reshape(-1, 2) for data in store.blobs("crossings", _DRAWN)]
+        min_clearance = base.scenario.limits.min_clearance_m
+        figure = draw_clearance_fan(
+            np.array(shapes, dtype=np.float64), failed, ground, float(leg_starts[-1]), min_clearance
+        )
+        figures.append((figure, "Height above ground along the way, over all flights, and the ground itself"))
+    crossings = [np.frombuffer(data, np.float32).reshape(-1, 2) for data in store.blobs("crossings", _MAX_DRAWN)]
     # The number of stops on a return depends on the wind, so flights without the further stops have NaN.
-    crossed = np.full((len(crossings), max(map(len, crossings)), 2), np.nan)
-    for row, known in zip(crossed, crossings, strict=True):
-        row[: len(known)] = known
-    out.append((draw_crossings(crossed, failed), "Where flights crossed each waypoint"))
-    return out
+    all_crossings = np.full((len(crossings), max(map(len, crossings)), 2), np.nan)
+    for row, flight_crossings in zip(all_crossings, crossings, strict=True):
+        row[: len(flight_crossings)] = flight_crossings
+    figures.append((draw_crossings(all_crossings, failed), "Where flights crossed each waypoint"))
+    return figures
 
 
 # ----------------------------------------------------------------------
@@ -201,7 +211,7 @@ class OutputDirectory:
     resume: bool
     overwrite: bool
 
-    def refuse(self) -> None:
+    def check_contents(self) -> None:
         """Raise PlanflyError if the folder is a file, or has contents that may not be resumed or replaced."""
         folder = self.folder
         if self.resume:
@@ -220,21 +230,21 @@ class OutputDirectory:
             raise PlanflyError(f"{folder}: holds another campaign; overwrite=True replaces it", file=folder)
         raise PlanflyError(f"{folder}: exists and is not empty; overwrite=True replaces its results", file=folder)
 
-    def open(self, opened: Callable[[Path | None], CampaignBase]) -> CampaignBase:
+    def open(self, open_base: Callable[[Path | None], CampaignBase]) -> CampaignBase:
         """Return the opened campaign base, and clear its folder unless the campaign is resumed.
 
         The plan of a scenario is stored in the folder, from which the campaign can be resumed later.
 
-        opened: returns the base, from the plan file of a resumed campaign, if there is one.
+        open_base: returns the base, from the plan file of a resumed campaign, if there is one.
         Raises PlanflyError, without changes to a folder that is refused.
         """
-        self.refuse()
-        kept = self.folder / "plan.json"
-        base = opened(kept if self.resume else None)
+        self.check_contents()
+        plan_file = self.folder / "plan.json"
+        base = open_base(plan_file if self.resume else None)
         if not self.resume:
             clear_campaign(self.folder)
-        if base.plan is not None and not kept.exists():
-            write_whole(kept, plan_json(base.plan))
+        if base.plan is not None and not plan_file.exists():
+            write_whole(plan_file, plan_json(base.plan))
         return base
 
 
@@ -261,7 +271,7 @@ def clear_campaign(folder: Path) -> None:
     """
     folder.mkdir(parents=True, exist_ok=True)
     for table in (DATABASE, WINDS_DATABASE):
-        refuse_held(folder / table)
+        check_not_locked(folder / table)
     for path in (*(folder / name for name in CAMPAIGN_FILES), *_worst_flight_logs(folder)):
         path.unlink(missing_ok=True)
 
@@ -280,9 +290,9 @@ def write_files(
 ) -> None:
     """Write ``summary.json``, ``report.html`` and the worst flights' logs; remove logs of other flights."""
     (folder / "worst").mkdir(exist_ok=True)
-    kept = {folder / log_name(row) for row in summary.worst}
+    kept_logs = {folder / log_name(row) for row in summary.worst}
     for path in _worst_flight_logs(folder):
-        if path not in kept:
+        if path not in kept_logs:
             path.unlink()
     for count, row in enumerate(summary.worst):
         path = folder / log_name(row)
@@ -300,11 +310,11 @@ def fly_row_again(base: CampaignBase, row: FlightRow, log: Path) -> FlightRow:
     Raises PlanflyError if the result differs from the table, because another machine, which computed differently, flew
     it.
     """
-    again = fly_one(base, row.draw.index, log=log)
-    if not same_flight(row, again):
+    new_row = fly_one(base, row.draw.index, log=log)
+    if not is_same_flight(row, new_row):
         message = f"{log}: flight {row.draw.index} comes out otherwise here than where it was flown"
         raise PlanflyError(message, file=log, field="flight", value=row.draw.index)
-    return again
+    return new_row
 
 
 # ----------------------------------------------------------------------
@@ -314,35 +324,35 @@ def fly_row_again(base: CampaignBase, row: FlightRow, log: Path) -> FlightRow:
 SCHEMA = "planfly.winds/1"
 
 
-def spokes(found: WindsFound) -> list[Spoke]:
+def spokes(winds: WindsFound) -> list[Spoke]:
     """Return the spokes of the go/no-go chart, one for each direction."""
-    out = []
-    for number, boundary in enumerate(found.boundaries):
+    chart = []
+    for number, boundary in enumerate(winds.boundaries):
         counts: dict[float, list[bool]] = {}
-        for direction, speed, flyable in found.flights:
+        for direction, speed, flyable in winds.flights:
             if direction == number:
                 counts.setdefault(speed, []).append(flyable)
-        marks = tuple((speed, len(all_), sum(all_)) for speed, all_ in sorted(counts.items()))
-        out.append(
-            Spoke(found.from_deg(number), boundary.estimate, boundary.low, boundary.high, boundary.beyond, marks)
+        marks = tuple((speed, len(outcomes), sum(outcomes)) for speed, outcomes in sorted(counts.items()))
+        chart.append(
+            Spoke(winds.from_deg(number), boundary.estimate, boundary.low, boundary.high, boundary.beyond, marks)
         )
-    return out
+    return chart
 
 
-def write_winds(folder: Path, base: CampaignBase, found: WindsFound, command: str) -> None:
+def write_winds(folder: Path, base: CampaignBase, winds: WindsFound, command: str) -> None:
     """Write ``winds.json``, ``winds.png`` and ``winds.html``."""
-    goal, chart = found.goal, spokes(found)
+    goal, chart = winds.goal, spokes(winds)
     wind = base.scenario.wind
-    own = (wind.speed, math.degrees(wind.from_course)) if wind.speed else None
-    figure = draw_go_no_go(chart, goal.most, goal.target, goal.confidence, base.name, own)
+    scenario_wind = (wind.speed, math.degrees(wind.from_course)) if wind.speed else None
+    figure = draw_go_no_go(chart, goal.most, goal.target, goal.confidence, base.name, scenario_wind)
     rows = [
         (
-            f"{one.from_deg:g}°",
-            _speed_text(one.boundary, goal.most),
-            _interval_text(one.low, one.high, goal.most),
-            str(sum(count for _, count, _ in one.flights)),
+            f"{spoke.from_deg:g}°",
+            _speed_text(spoke.boundary, goal.most),
+            _interval_text(spoke.low, spoke.high, goal.most),
+            str(sum(count for _, count, _ in spoke.flights)),
         )
-        for one in chart
+        for spoke in chart
     ]
     data = {
         "schema": SCHEMA,
@@ -351,26 +361,27 @@ def write_winds(folder: Path, base: CampaignBase, found: WindsFound, command: st
         "target": goal.target,
         "confidence": goal.confidence,
         "most": goal.most,
-        "flights": len(found.flights),
-        "lost": list(found.lost),
+        "flights": len(winds.flights),
+        "lost": list(winds.lost),
         "directions": [
             {
-                "from_deg": one.from_deg,
-                "boundary_mps": round(one.boundary, 3),
-                "interval_mps": [round(one.low, 3), round(one.high, 3)],
-                "beyond": one.reaches,
+                "from_deg": spoke.from_deg,
+                "boundary_mps": round(spoke.boundary, 3),
+                "interval_mps": [round(spoke.low, 3), round(spoke.high, 3)],
+                "beyond": spoke.reaches,
                 "flown": [
-                    {"speed_mps": round(v, 3), "flights": count, "flyable": good} for v, count, good in one.flights
+                    {"speed_mps": round(speed, 3), "flights": count, "flyable": flyable}
+                    for speed, count, flyable in spoke.flights
                 ],
             }
-            for one in chart
+            for spoke in chart
         ],
-        "calm": None if found.calm is None else _calm_document(found.calm),
+        "calm": None if winds.calm is None else _calm_document(winds.calm),
         "spread": base.dispersions.to_json(),
-        "conditions": None if found.conditions is None else asdict(found.conditions),
+        "conditions": None if winds.conditions is None else asdict(winds.conditions),
     }
     picture = png_bytes(figure)
-    page = winds_page(base.name, figure, found, rows, command)
+    page = winds_page(base.name, figure, winds, rows, command)
     write_whole(folder / "winds.json", json.dumps(data, indent=1, allow_nan=False) + "\n")
     write_whole(folder / "winds.png", picture)
     write_whole(folder / "winds.html", page)
@@ -385,95 +396,99 @@ def _calm_document(calm: CalmFailures) -> dict[str, Any]:
     }
 
 
-def _speed_text(speed: float, most: float) -> str:
-    return f"over {most:g} m/s" if speed >= most - 1e-9 else f"{speed:.1f} m/s"
+def _speed_text(speed: float, max_speed: float) -> str:
+    return f"over {max_speed:g} m/s" if speed >= max_speed - 1e-9 else f"{speed:.1f} m/s"
 
 
-def _interval_text(low: float, high: float, most: float) -> str:
+def _interval_text(lower: float, upper: float, max_speed: float) -> str:
     """Describe an interval, m/s; bounds beyond the maximum wind of the search are unknown."""
-    if low >= most - 1e-9:
-        return f"over {most:g}"
-    return f"{low:.1f} to {f'over {most:g}' if high >= most - 1e-9 else f'{high:.1f}'}"
+    if lower >= max_speed - 1e-9:
+        return f"over {max_speed:g}"
+    return f"{lower:.1f} to {f'over {max_speed:g}' if upper >= max_speed - 1e-9 else f'{upper:.1f}'}"
 
 
-def _open_lines(found: WindsFound) -> list[str]:
+def _unsettled_lines(winds: WindsFound) -> list[str]:
     """Return a line about directions with too few flights, if there are any."""
-    counts = Counter(direction for direction, _, _ in found.flights)
-    short = [k for k, one in enumerate(found.boundaries) if needs_more(one, counts[k], ACCURACY, FEWEST)]
-    if not short:
+    counts = Counter(direction for direction, _, _ in winds.flights)
+    unsettled = [
+        k for k, boundary in enumerate(winds.boundaries) if needs_more_flights(boundary, counts[k], ACCURACY, FEWEST)
+    ]
+    if not unsettled:
         return []
     return [
-        f"not settled: {len(short)} of {len(found.boundaries)} directions, for want of flights: each takes"
+        f"not settled: {len(unsettled)} of {len(winds.boundaries)} directions, for want of flights: each takes"
         f" {FEWEST} at least, and an interval of {2.0 * ACCURACY:g} m/s; with fewer the interval is mostly assumption"
     ]
 
 
-def _lost_lines(found: WindsFound) -> list[str]:
+def _lost_lines(winds: WindsFound) -> list[str]:
     """Return a line about flights that could not be flown, if there are any."""
-    if not found.lost:
+    if not winds.lost:
         return []
-    named = ", ".join(
-        f"{number} ({found.flights[number][1]:.1f} m/s from {found.from_deg(found.flights[number][0]):g}°)"
-        for number in found.lost[:10]
+    flight_texts = ", ".join(
+        f"{number} ({winds.flights[number][1]:.1f} m/s from {winds.from_deg(winds.flights[number][0]):g}°)"
+        for number in winds.lost[:10]
     )
-    return [f"lost      {len(found.lost)} could not be flown, their workers died, and count as not flyable: {named}"]
-
-
-def _none_failed_lines(found: WindsFound) -> list[str]:
-    """Return a line about directions without a failure, with the probability that their flights alone prove."""
-    most, confidence = found.goal.most, found.goal.confidence
-    at_most = Counter(direction for direction, speed, _ in found.flights if speed == most)
-    failed = {direction for direction, _, flyable in found.flights if not flyable}
-    counts = [at_most[k] for k in range(len(found.boundaries)) if k not in failed and at_most[k]]
-    if not counts:
-        return []
-    fewest, shown = min(counts), f"{lower_bound(Tally(min(counts), 0), confidence):.3g}"
     return [
-        f"none failed from {len(counts)} of {len(found.boundaries)} directions: {fewest} flights in {most:g} m/s from"
-        f" each show P >= {shown} by themselves"
+        f"lost      {len(winds.lost)} could not be flown, their workers died, and count as not flyable: {flight_texts}"
     ]
 
 
-def _calm_lines(found: WindsFound) -> list[str]:
+def _none_failed_lines(winds: WindsFound) -> list[str]:
+    """Return a line about directions without a failure, with the probability that their flights alone prove."""
+    max_speed, confidence = winds.goal.most, winds.goal.confidence
+    counts_at_max = Counter(direction for direction, speed, _ in winds.flights if speed == max_speed)
+    failed = {direction for direction, _, flyable in winds.flights if not flyable}
+    counts = [counts_at_max[k] for k in range(len(winds.boundaries)) if k not in failed and counts_at_max[k]]
+    if not counts:
+        return []
+    min_count, probability_text = min(counts), f"{lower_bound(Tally(min(counts), 0), confidence):.3g}"
+    return [
+        f"none failed from {len(counts)} of {len(winds.boundaries)} directions: {min_count} flights in"
+        f" {max_speed:g} m/s from each show P >= {probability_text} by themselves"
+    ]
+
+
+def _calm_lines(winds: WindsFound) -> list[str]:
     """Return lines about the rules that fail in calm air; empty if the mission flies in calm air."""
-    calm = found.calm
+    calm = winds.calm
     if calm is None:
         return []
     wind = "calm air" if calm.speed < CALM_MPS else f"{calm.speed:.1f} m/s, the weakest wind flown"
     return [f"in {wind}, {calm.failed} of {calm.flights} flights fail", *failure_lines(calm.by_rule)]
 
 
-def _winds_answer(found: WindsFound) -> str:
+def _winds_answer(winds: WindsFound) -> str:
     """Return the answer of a search in a line, with the lowest and the highest boundary."""
-    chart, target = spokes(found), found.goal.target
-    least, largest = (pick(chart, key=lambda one: one.boundary) for pick in (min, max))
-    most, percent = found.goal.most, f"{100 * found.goal.confidence:g} %"
-    best = f"{_speed_text(largest.boundary, most)} from {largest.from_deg:g}°"
-    if found.calm is None:
+    chart, target = spokes(winds), winds.goal.target
+    lowest, highest = (select(chart, key=lambda spoke: spoke.boundary) for select in (min, max))
+    max_speed, percent = winds.goal.most, f"{100 * winds.goal.confidence:g} %"
+    best_text = f"{_speed_text(highest.boundary, max_speed)} from {highest.from_deg:g}°"
+    if winds.calm is None:
         return (
-            f"flies with P >= {target:g}, by best estimate, in wind up to {_speed_text(least.boundary, most)}"
-            f" from {least.from_deg:g}° (the lowest; {_interval_text(least.low, least.high, most)} m/s at {percent}),"
-            f" {best}"
+            f"flies with P >= {target:g}, by best estimate, in wind up to {_speed_text(lowest.boundary, max_speed)}"
+            f" from {lowest.from_deg:g}° (the lowest; {_interval_text(lowest.low, lowest.high, max_speed)} m/s"
+            f" at {percent}), {best_text}"
         )
-    if largest.boundary < CALM_MPS:
+    if highest.boundary < CALM_MPS:
         return f"does not fly with P >= {target:g}, by best estimate, even in calm air"
     return (
-        f"does not fly with P >= {target:g}, by best estimate, in wind from {least.from_deg:g}° even in calm air;"
-        f" it flies in wind up to {best}"
+        f"does not fly with P >= {target:g}, by best estimate, in wind from {lowest.from_deg:g}° even in calm air;"
+        f" it flies in wind up to {best_text}"
     )
 
 
-def wind_lines(found: WindsFound) -> list[str]:
+def wind_lines(winds: WindsFound) -> list[str]:
     """Summarise the result of a search in a few lines."""
-    percent = f"{100 * found.goal.confidence:g} %"
+    percent = f"{100 * winds.goal.confidence:g} %"
     return [
-        _winds_answer(found),
-        *_calm_lines(found),
-        *(() if found.conditions is None else flown_lines(found.conditions)),
-        *_none_failed_lines(found),
-        *_open_lines(found),
-        *_lost_lines(found),
-        f"{len(found.flights)} flights; intervals at {percent}, by the flights of each direction",
+        _winds_answer(winds),
+        *_calm_lines(winds),
+        *(() if winds.conditions is None else flown_lines(winds.conditions)),
+        *_none_failed_lines(winds),
+        *_unsettled_lines(winds),
+        *_lost_lines(winds),
+        f"{len(winds.flights)} flights; intervals at {percent}, by the flights of each direction",
     ]
 
 

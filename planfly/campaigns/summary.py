@@ -14,7 +14,7 @@ from logs.verdict.wording import place_text
 from planfly.campaigns.campaign_base import CampaignBase
 from planfly.campaigns.dispersions import BY_NAME
 from planfly.campaigns.failure_counts import RuleFailures, count_failures, failure_lines, failures_document
-from planfly.campaigns.flight_row import FlightRow, scaled
+from planfly.campaigns.flight_row import FlightRow, scaled_margin
 from planfly.campaigns.statistics.decision import Estimate, Goal, first_order, rank_slope
 from planfly.campaigns.tables import Store
 
@@ -70,7 +70,7 @@ def summarise(base: CampaignBase, goal: Goal, estimate: Estimate, store: Store) 
     """Summarise a campaign in one pass through its table."""
     by_rule = _count_failures(store)
     worst = tuple(store.closest(WORST))
-    deciding, low = _deciding_rule(store, by_rule)
+    deciding, low_margin = _deciding_rule(store, by_rule)
     return CampaignSummary(
         name=base.name,
         seed=base.seed,
@@ -79,7 +79,7 @@ def summarise(base: CampaignBase, goal: Goal, estimate: Estimate, store: Store) 
         by_rule=by_rule,
         lost=tuple(index for index, outcome in store.outcomes().items() if outcome == "lost"),
         deciding=deciding,
-        low_margin=low,
+        low_margin=low_margin,
         unit=next((margin.unit for row in worst for rule, margin in row.margins if rule == deciding), ""),
         sensitivities=_sensitivities(base, store, deciding),
         worst=worst,
@@ -90,26 +90,26 @@ def summarise(base: CampaignBase, goal: Goal, estimate: Estimate, store: Store) 
 
 
 def _count_failures(store: Store) -> tuple[RuleFailures, ...]:
-    listed = map(json.loads, store.texts("failed"))
-    return count_failures([(entry.pop("rule"), Place(**entry)) for entry in failed] for failed in listed)
+    failed_lists = map(json.loads, store.texts("failed"))
+    return count_failures([(entry.pop("rule"), Place(**entry)) for entry in failed] for failed in failed_lists)
 
 
 def _deciding_rule(store: Store, by_rule: tuple[RuleFailures, ...]) -> tuple[str, float | None]:
-    lows, indices = {}, {}
+    low_margins, reliability_indices = {}, {}
     for rule in RULE_WORDS:
         margins = store.column(RULE_WORDS[rule].margin_column)
-        known = margins[np.isfinite(margins)]
-        if known.size:
-            lows[rule] = float(np.quantile(known, 0.05))
-            deviation = float(known.std())
-            indices[rule] = float(known.mean()) / deviation if deviation > 0.0 else math.inf
+        known_margins = margins[np.isfinite(margins)]
+        if known_margins.size:
+            low_margins[rule] = float(np.quantile(known_margins, 0.05))
+            deviation = float(known_margins.std())
+            reliability_indices[rule] = float(known_margins.mean()) / deviation if deviation > 0.0 else math.inf
     if by_rule:
-        rule = max(by_rule, key=lambda one: one.flights).rule
-        return rule, lows.get(rule)
-    if not lows:
+        rule = max(by_rule, key=lambda failures: failures.flights).rule
+        return rule, low_margins.get(rule)
+    if not low_margins:
         return "", None
-    rule = min(indices, key=lambda name: indices[name])
-    return rule, lows[rule]
+    rule = min(reliability_indices, key=lambda name: reliability_indices[name])
+    return rule, low_margins[rule]
 
 
 def _sensitivities(base: CampaignBase, store: Store, rule: str) -> tuple[Sensitivity, ...]:
@@ -117,33 +117,35 @@ def _sensitivities(base: CampaignBase, store: Store, rule: str) -> tuple[Sensiti
     if not rule:
         return ()
     margin = store.column(RULE_WORDS[rule].margin_column)
-    known = np.isfinite(margin)
-    found = []
+    is_known = np.isfinite(margin)
+    sensitivities = []
     for varying in base.dispersions.varying:
         name = varying.quantity.name
-        x = store.column(name)[known]
-        found.append(Sensitivity(name, first_order(x, margin[known]), rank_slope(x, margin[known])))
-    return tuple(sorted(found, key=lambda one: -one.index))
+        values = store.column(name)[is_known]
+        sensitivities.append(
+            Sensitivity(name, first_order(values, margin[is_known]), rank_slope(values, margin[is_known]))
+        )
+    return tuple(sorted(sensitivities, key=lambda sensitivity: -sensitivity.index))
 
 
 def summary_json(summary: CampaignSummary) -> str:
     """Return the text of ``summary.json``, which has no times and workers and so is the same for any workers."""
-    found = summary.estimate
+    estimate = summary.estimate
     data = {
         "schema": SCHEMA,
         "name": summary.name,
         "seed": summary.seed,
         "target": summary.goal.target,
-        "answer": found.answer,
-        "flights": found.tally.flown,
-        "flyable": found.tally.flyable,
-        "not_flyable": found.tally.failed,
+        "answer": estimate.answer,
+        "flights": estimate.tally.flown,
+        "flyable": estimate.tally.flyable,
+        "not_flyable": estimate.tally.failed,
         "lost": list(summary.lost),
-        "probability": _to_plain_number(found.tally.share),
+        "probability": _to_plain_number(estimate.tally.share),
         "confidence": summary.goal.confidence,
-        "lower_bound": _to_plain_number(found.lower),
-        "upper_bound": _to_plain_number(found.upper),
-        "interval": [_to_plain_number(found.interval.low), _to_plain_number(found.interval.high)],
+        "lower_bound": _to_plain_number(estimate.lower),
+        "upper_bound": _to_plain_number(estimate.upper),
+        "interval": [_to_plain_number(estimate.interval.low), _to_plain_number(estimate.interval.high)],
         "method": summary.goal.method,
         "failed_by_rule": failures_document(summary.by_rule),
         "deciding_rule": summary.deciding,
@@ -151,11 +153,11 @@ def summary_json(summary: CampaignSummary) -> str:
         "margin_unit": summary.unit,
         "sensitivities": [
             {
-                "quantity": one.quantity,
-                "first_order": _to_plain_number(one.index),
-                "rank_slope": _to_plain_number(one.slope),
+                "quantity": sensitivity.quantity,
+                "first_order": _to_plain_number(sensitivity.index),
+                "rank_slope": _to_plain_number(sensitivity.slope),
             }
-            for one in summary.sensitivities
+            for sensitivity in summary.sensitivities
         ],
         "worst": [_flight_data(row) for row in summary.worst],
         "spread": summary.dispersions,
@@ -180,10 +182,14 @@ def _flight_data(row: FlightRow) -> dict[str, Any]:
 
 def closest_text(row: FlightRow) -> str:
     """Describe the minimum margin of a flight; return "" if no margin is known."""
-    known = [(share, rule, margin) for rule, margin in row.margins if (share := scaled(rule, margin)) is not None]
-    if not known:
+    scaled_margins = [
+        (fraction, rule, margin)
+        for rule, margin in row.margins
+        if (fraction := scaled_margin(rule, margin)) is not None
+    ]
+    if not scaled_margins:
         return ""
-    _, rule, margin = min(known, key=lambda one: one[0])
+    _, rule, margin = min(scaled_margins, key=lambda entry: entry[0])
     return f"{RULE_WORDS[rule].title} {margin.value:+.1f} {margin.unit} at {place_text(margin.place)}"
 
 
@@ -194,18 +200,18 @@ def log_name(row: FlightRow) -> str:
 
 def campaign_lines(summary: CampaignSummary) -> list[str]:
     """Return the lines of the summary for a terminal."""
-    found, goal = summary.estimate, summary.goal
-    tally, sure = found.tally, f"{100.0 * goal.confidence:g} %"
+    estimate, goal = summary.estimate, summary.goal
+    tally, confidence_text = estimate.tally, f"{100.0 * goal.confidence:g} %"
     lines = [
         f"{_answer_text(summary)}: {tally.flyable} of {tally.flown} flights are flyable, P = {tally.share:.4f}",
-        f"  at least {found.lower:.4f}, at most {found.upper:.4f} (each at {sure}; {goal.method})",
-        f"  two-sided at {sure}: {found.interval.low:.4f} to {found.interval.high:.4f}",
+        f"  at least {estimate.lower:.4f}, at most {estimate.upper:.4f} (each at {confidence_text}; {goal.method})",
+        f"  two-sided at {confidence_text}: {estimate.interval.low:.4f} to {estimate.interval.high:.4f}",
         *(f"  {line}" for line in flown_lines(summary.conditions)),
     ]
     lines += failure_lines(summary.by_rule)
     if summary.lost:
-        named = ", ".join(map(str, summary.lost[:10]))
-        lines.append(f"  lost    {len(summary.lost)} could not be flown, their workers died: {named}")
+        lost_text = ", ".join(map(str, summary.lost[:10]))
+        lines.append(f"  lost    {len(summary.lost)} could not be flown, their workers died: {lost_text}")
     if summary.deciding and summary.low_margin is not None:
         lines.append(
             f"  decides {RULE_WORDS[summary.deciding].title}: one flight in twenty has a margin below"
@@ -216,16 +222,16 @@ def campaign_lines(summary: CampaignSummary) -> list[str]:
 
 def _answer_text(summary: CampaignSummary) -> str:
     target = summary.goal.target
-    words = {"reached": f"P >= {target}", "missed": f"P < {target}", "undecided": f"P >= {target} is undecided"}
-    return words.get(summary.estimate.answer, "no target is set (--prove P or --at-least P)")
+    texts = {"reached": f"P >= {target}", "missed": f"P < {target}", "undecided": f"P >= {target} is undecided"}
+    return texts.get(summary.estimate.answer, "no target is set (--prove P or --at-least P)")
 
 
 def _drivers_text(summary: CampaignSummary) -> str:
-    drivers = [one for one in summary.sensitivities if one.index >= _MIN_NAMED_FRACTION][:3]
+    drivers = [sensitivity for sensitivity in summary.sensitivities if sensitivity.index >= _MIN_NAMED_FRACTION][:3]
     if not drivers:
         return "no single quantity explains it"
     return "of its variance " + ", ".join(
-        f"{BY_NAME[one.quantity].title} explains {100.0 * one.index:.0f} %" for one in drivers
+        f"{BY_NAME[sensitivity.quantity].title} explains {100.0 * sensitivity.index:.0f} %" for sensitivity in drivers
     )
 
 

@@ -10,12 +10,12 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 # Error codes of SQLite for a file that another process has locked.
-HELD = (sqlite3.SQLITE_BUSY, sqlite3.SQLITE_LOCKED)
+LOCKED_CODES = (sqlite3.SQLITE_BUSY, sqlite3.SQLITE_LOCKED)
 # Maximum number of flights listed in a line.
-_LISTED = 8
+_MAX_LISTED = 8
 
 
-def stored(value: Any, kind: str) -> Any:
+def stored_value(value: Any, kind: str) -> Any:
     """Return a value as SQLite reads it from a column; numpy numbers become Python numbers, and NaN becomes None.
 
     >>> stored(3, "REAL NOT NULL"), stored(math.nan, "REAL"), stored(True, "INTEGER")
@@ -34,8 +34,8 @@ def checksum(values: Iterable[Any]) -> str:
     False
     """
     # SQLite does not keep the sign of a zero.
-    plain = [value + 0.0 if isinstance(value, float) else value for value in values]
-    return hashlib.blake2b(repr(plain).encode("utf-8", "surrogatepass"), digest_size=8).hexdigest()
+    plain_values = [value + 0.0 if isinstance(value, float) else value for value in values]
+    return hashlib.blake2b(repr(plain_values).encode("utf-8", "surrogatepass"), digest_size=8).hexdigest()
 
 
 class Examined(NamedTuple):
@@ -57,26 +57,30 @@ class Examined(NamedTuple):
         >>> Examined([0, 1, 3], [2]).text()
         'flight 2 is damaged and was taken out: 3 flights are whole and stay; --resume flies what is missing'
         """
-        stay = f"{len(self.whole)} flights are whole and stay; --resume flies what is missing"
-        behind = ""
+        kept_text = f"{len(self.whole)} flights are whole and stay; --resume flies what is missing"
+        later_text = ""
         if self.after is not None:
-            behind = f", and any after flight {self.after} were lost" if self.after >= 0 else ", and no flight is found"
+            later_text = (
+                f", and any after flight {self.after} were lost" if self.after >= 0 else ", and no flight is found"
+            )
         if not self.damaged:
-            return f"is damaged{behind}: {stay}"
-        listed = ", ".join(map(str, self.damaged[:_LISTED]))
-        more = f" and {len(self.damaged) - _LISTED} more" if len(self.damaged) > _LISTED else ""
-        several = len(self.damaged) > 1
-        damaged = f"flight{'s' if several else ''} {listed}{more} {'are' if several else 'is'} damaged"
-        taken = f"{'were' if several else 'was'} taken out"
-        return f"{damaged} and {taken}{behind}: {stay}"
+            return f"is damaged{later_text}: {kept_text}"
+        numbers_text = ", ".join(map(str, self.damaged[:_MAX_LISTED]))
+        more_text = f" and {len(self.damaged) - _MAX_LISTED} more" if len(self.damaged) > _MAX_LISTED else ""
+        has_several = len(self.damaged) > 1
+        damaged_text = (
+            f"flight{'s' if has_several else ''} {numbers_text}{more_text} {'are' if has_several else 'is'} damaged"
+        )
+        removed_text = f"{'were' if has_several else 'was'} taken out"
+        return f"{damaged_text} and {removed_text}{later_text}: {kept_text}"
 
 
-def examine(connection: sqlite3.Connection, columns: Sequence[str], asked: int, most: int) -> Examined:
+def examine(connection: sqlite3.Connection, columns: Sequence[str], requested_count: int, max_number: int) -> Examined:
     """Determine which rows of the table ``flights`` are undamaged, even in a broken file.
 
     columns: columns of the checksum, in order, with the flight's number first.
-    asked: number of requested flights.
-    most: number of flights to try one by one in a broken file.
+    requested_count: number of requested flights.
+    max_number: number of flights to try one by one in a broken file.
     Raises sqlite3.Error for a file that another process has locked.
     """
     # Invalid UTF-8 must not stop the reading, because it changes the checksum anyway.
@@ -86,65 +90,73 @@ def examine(connection: sqlite3.Connection, columns: Sequence[str], asked: int, 
         if connection.execute("PRAGMA quick_check(1)").fetchone() == ("ok",):
             return _check_rows(connection.execute(f"{query} ORDER BY flight"))
     except sqlite3.Error as error:
-        _refuse_held(error)
-    rows = (row for number in range(most) if (row := _read_row(connection, query, number)) is not None)
-    whole, damaged = _check_rows(rows)[:2]
+        _raise_if_locked(error)
+    rows = (row for number in range(max_number) if (row := _read_row(connection, query, number)) is not None)
+    undamaged, damaged = _check_rows(rows)[:2]
     # In a broken file, a missing row may have been lost with its page.  A number without a valid checksum is accepted
     # if it is in the range of requested flights, which are numbered from 0.
     numbers = (
-        number for number in (*damaged, *_readable_numbers(connection)) if isinstance(number, int) and number < asked
+        number
+        for number in (*damaged, *_readable_numbers(connection))
+        if isinstance(number, int) and number < requested_count
     )
-    last = max([-1, *whole, *numbers])
-    missing = set(range(last + 1)) - set(whole)
-    return Examined(whole, sorted(missing), sound=False, after=last if last + 1 < asked else None)
+    last_number = max([-1, *undamaged, *numbers])
+    missing = set(range(last_number + 1)) - set(undamaged)
+    return Examined(
+        undamaged, sorted(missing), sound=False, after=last_number if last_number + 1 < requested_count else None
+    )
 
 
 def _readable_numbers(connection: sqlite3.Connection) -> list[Any]:
     """Return the flight numbers that can be read up to the damaged part of the file; some may be corrupt."""
-    seen: list[Any] = []
+    numbers: list[Any] = []
     with contextlib.suppress(sqlite3.Error):
         for (number,) in connection.execute("SELECT flight FROM flights"):
-            seen.append(number)
-    return seen
+            numbers.append(number)
+    return numbers
 
 
 def _check_rows(rows: Iterable[tuple[Any, ...]]) -> Examined:
-    found = Examined([], [])
-    for *values, kept in rows:
-        (found.whole if kept == checksum(values) else found.damaged).append(values[0])
-    return found
+    examined = Examined([], [])
+    for *values, stored_checksum in rows:
+        (examined.whole if stored_checksum == checksum(values) else examined.damaged).append(values[0])
+    return examined
 
 
 def _read_row(connection: sqlite3.Connection, query: str, number: int) -> tuple[Any, ...] | None:
     """Return a row by its number, with the checksum None if the row cannot be read."""
     try:
-        found: tuple[Any, ...] | None = connection.execute(f"{query} WHERE flight = ?", (number,)).fetchone()
+        row: tuple[Any, ...] | None = connection.execute(f"{query} WHERE flight = ?", (number,)).fetchone()
     except sqlite3.Error as error:
-        _refuse_held(error)
+        _raise_if_locked(error)
         return number, None
-    return found
+    return row
 
 
-def _refuse_held(error: sqlite3.Error) -> None:
-    if getattr(error, "sqlite_errorcode", sqlite3.SQLITE_CORRUPT) & 0xFF in HELD:
+def _raise_if_locked(error: sqlite3.Error) -> None:
+    if getattr(error, "sqlite_errorcode", sqlite3.SQLITE_CORRUPT) & 0xFF in LOCKED_CODES:
         raise error
 
 
-def copy_whole(
-    connection: sqlite3.Connection, target: Path, create: Sequence[str], numbers: Sequence[int], kept: Mapping[str, str]
+def copy_undamaged_rows(
+    connection: sqlite3.Connection,
+    target: Path,
+    statements: Sequence[str],
+    numbers: Sequence[int],
+    entries: Mapping[str, str],
 ) -> None:
-    """Write a new file with the given rows of a table, and with the entries `kept` in its table ``campaign``.
+    """Write a new file with the given rows of a table, and with the entries `entries` in its table ``campaign``.
 
-    create: SQL statements that create both tables.
+    statements: SQL statements that create both tables.
     numbers: numbers of the rows to copy.
     """
     target.unlink(missing_ok=True)
     with closing(sqlite3.connect(target, isolation_level=None)) as copy:
         copy.execute("BEGIN")
-        for statement in create:
+        for statement in statements:
             copy.execute(statement)
         for number in numbers:
             row = connection.execute("SELECT * FROM flights WHERE flight = ?", (number,)).fetchone()
             copy.execute(f"INSERT INTO flights VALUES ({', '.join('?' * len(row))})", row)
-        copy.executemany("INSERT INTO campaign VALUES (?, ?)", kept.items())
+        copy.executemany("INSERT INTO campaign VALUES (?, ?)", entries.items())
         copy.execute("COMMIT")

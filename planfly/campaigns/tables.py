@@ -24,9 +24,9 @@ from numpy.typing import NDArray
 from logs.verdict.places import Place
 from logs.verdict.rule_words import RULE_WORDS
 from planfly.campaigns.dispersions import NAMES, Draw
-from planfly.campaigns.flight_row import FIELDS, FlightRow, LeastMargin, NarrowPass, Outcome, failed_of
+from planfly.campaigns.flight_row import FIELDS, FlightRow, LeastMargin, NarrowPass, Outcome, parse_failed
 from planfly.campaigns.statistics.decision import Tally
-from planfly.campaigns.table_repair import HELD, checksum, copy_whole, examine, stored
+from planfly.campaigns.table_repair import LOCKED_CODES, checksum, copy_undamaged_rows, examine, stored_value
 from planfly.runtime.stages import say
 from world.errors import PlanflyError
 
@@ -69,25 +69,27 @@ def row_values(row: FlightRow) -> dict[str, Any]:
     return values
 
 
-def row_of(index: int, known: Mapping[str, Any]) -> FlightRow:
+def make_flight_row(index: int, values: Mapping[str, Any]) -> FlightRow:
     """Return the row with a draw's index and the given values by column."""
     margins = []
     for rule in RULE_WORDS.values():
-        if (place := known[rule.place_column]) is not None:
+        if (place := values[rule.place_column]) is not None:
             data = json.loads(place)
-            margins.append((rule.name, LeastMargin(known[rule.margin_column], data.pop("unit"), Place(**data))))
+            margins.append((rule.name, LeastMargin(values[rule.margin_column], data.pop("unit"), Place(**data))))
     return FlightRow(
-        draw=Draw(index, known["seed"], {name: known[name] for name in NAMES}),
+        draw=Draw(index, values["seed"], {name: values[name] for name in NAMES}),
         margins=tuple(margins),
-        **{name: column.read(known[name]) for name, column in FIELDS.items()},
+        **{name: column.read(values[name]) for name, column in FIELDS.items()},
     )
 
 
-def same_flight(one: FlightRow, other: FlightRow) -> bool:
+def is_same_flight(first: FlightRow, second: FlightRow) -> bool:
     """Return True if two rows describe the same flight; the machine and its speed may differ."""
-    mine, theirs = (row_values(replace(row, made_of="")) for row in (one, other))
-    same = all(mine[name] == theirs[name] for name in ROW_COLUMNS if name not in RUN_DEPENDENT_COLUMNS)
-    return same and one.draw.index == other.draw.index
+    first_values, second_values = (row_values(replace(row, made_of="")) for row in (first, second))
+    is_same = all(
+        first_values[name] == second_values[name] for name in ROW_COLUMNS if name not in RUN_DEPENDENT_COLUMNS
+    )
+    return is_same and first.draw.index == second.draw.index
 
 
 # ----------------------------------------------------------------------
@@ -144,7 +146,7 @@ class LockedTable:
             raise StoreError(f"{path}: no such campaign to resume", file=path)
         self._connection = sqlite3.connect(path, timeout=1.0, isolation_level=None)
         try:
-            with translated_errors(path):
+            with converted_errors(path):
                 self._prepare(settings)
             self._file = path.stat()
         except BaseException:
@@ -153,103 +155,110 @@ class LockedTable:
 
     def _prepare(self, settings: dict[str, Any]) -> None:
         self._lock()
-        run = self._connection.execute
-        tables = {name for (name,) in run("SELECT name FROM sqlite_master WHERE type = 'table'")}
+        execute = self._connection.execute
+        tables = {name for (name,) in execute("SELECT name FROM sqlite_master WHERE type = 'table'")}
         if tables:
-            known = _read_settings(self._connection) if "campaign" in tables else {}
-            self._refuse_other(known, settings)
-            self._repair(known)
-        run = self._connection.execute
-        for statement in self._create():
-            run(statement)
+            stored_settings = _read_settings(self._connection) if "campaign" in tables else {}
+            self._check_same_campaign(stored_settings, settings)
+            self._repair(stored_settings)
+        execute = self._connection.execute
+        for statement in self._create_statements():
+            execute(statement)
         # Refuse the request before its settings are written, because they would stay in the file.
-        self._refuse_more(settings)
+        self._check_flight_count(settings)
         values = {
             "schema": self._kind.schema,
             "made_of": self.made_of,
             "settings": json.dumps(settings, sort_keys=True),
         }
-        run("DELETE FROM campaign")
+        execute("DELETE FROM campaign")
         self._connection.executemany(
             "INSERT INTO campaign VALUES (?, ?)", {**values, "checksum": checksum(values.values())}.items()
         )
-        run("COMMIT")
+        execute("COMMIT")
 
     def _lock(self) -> None:
         """Lock the file for this process, and start a transaction."""
-        run = self._connection.execute
-        run("PRAGMA locking_mode = EXCLUSIVE")
-        run("PRAGMA journal_mode = WAL")
-        run("PRAGMA synchronous = NORMAL")
-        run("BEGIN EXCLUSIVE")
+        execute = self._connection.execute
+        execute("PRAGMA locking_mode = EXCLUSIVE")
+        execute("PRAGMA journal_mode = WAL")
+        execute("PRAGMA synchronous = NORMAL")
+        execute("BEGIN EXCLUSIVE")
 
-    def _create(self) -> list[str]:
+    def _create_statements(self) -> list[str]:
         columns = ", ".join(f"{name} {kind}" for name, kind in self._kind.columns.items())
         return [
             f"CREATE TABLE IF NOT EXISTS flights ({columns}, checksum TEXT NOT NULL)",
             "CREATE TABLE IF NOT EXISTS campaign (key TEXT PRIMARY KEY, value TEXT NOT NULL)",
         ]
 
-    def _refuse_other(self, known: dict[str, str], settings: dict[str, Any]) -> None:
+    def _check_same_campaign(self, stored_settings: dict[str, str], settings: dict[str, Any]) -> None:
         schema = self._kind.schema
-        if "schema" not in known:
-            _refuse_damaged(known, self.path)
-        if known.get("schema") != schema:
-            raise StoreError(f"{self.path}: schema {known.get('schema')!r}: {schema} is expected", file=self.path)
-        _refuse_damaged(known, self.path)
-        if known.get("made_of") != self.made_of:
+        if "schema" not in stored_settings:
+            _check_settings_intact(stored_settings, self.path)
+        if stored_settings.get("schema") != schema:
+            raise StoreError(
+                f"{self.path}: schema {stored_settings.get('schema')!r}: {schema} is expected", file=self.path
+            )
+        _check_settings_intact(stored_settings, self.path)
+        if stored_settings.get("made_of") != self.made_of:
             raise StoreError(
                 f"{self.path}: is of another campaign: its code, mission, aircraft, scenario, dispersions or seed"
-                f" differs ({known.get('made_of')}, not {self.made_of})",
+                f" differs ({stored_settings.get('made_of')}, not {self.made_of})",
                 file=self.path,
             )
-        before = json.loads(known["settings"])
+        stored_request = json.loads(stored_settings["settings"])
         for name in self._kind.fixed:
-            if before[name] != settings[name]:
+            if stored_request[name] != settings[name]:
                 raise StoreError(
-                    f"{self.path}: {name} {settings[name]}: the flights there were asked for with {before[name]}",
+                    f"{self.path}: {name} {settings[name]}: the flights there were asked for with"
+                    f" {stored_request[name]}",
                     file=self.path,
                 )
 
-    def _repair(self, known: dict[str, str]) -> None:
+    def _repair(self, stored_settings: dict[str, str]) -> None:
         """Keep the undamaged flights, report the others, and rewrite the file."""
         # A search may have been resumed with fewer flights than the table contains; all of them are kept.
-        asked = json.loads(known["settings"]).get("flights", _MAX_FLIGHTS)
-        examined = examine(self._connection, tuple(self._kind.columns), asked, max(asked, self._last_number() + 1))
-        if examined.sound and not examined.damaged:
+        requested_count = json.loads(stored_settings["settings"]).get("flights", _MAX_FLIGHTS)
+        examination = examine(
+            self._connection, tuple(self._kind.columns), requested_count, max(requested_count, self._last_number() + 1)
+        )
+        if examination.sound and not examination.damaged:
             return
-        repaired = self.path.with_name(f".{self.path.name}.mended")
-        copy_whole(self._connection, repaired, self._create(), examined.whole, known)
+        repaired_path = self.path.with_name(f".{self.path.name}.mended")
+        copy_undamaged_rows(
+            self._connection, repaired_path, self._create_statements(), examination.whole, stored_settings
+        )
         self._connection.close()
-        repaired.replace(self.path)
+        repaired_path.replace(self.path)
         for ending in ("-wal", "-shm"):
             Path(f"{self.path}{ending}").unlink(missing_ok=True)
         self._connection = sqlite3.connect(self.path, timeout=1.0, isolation_level=None)
         self._lock()
-        say(f"{self.path}: {examined.text()}")
+        say(f"{self.path}: {examination.text()}")
 
     def _last_number(self) -> int:
         """Return the largest flight number that can be read from either end of the table, or -1 without any."""
-        last = -1
+        last_number = -1
         for order in ("", " DESC"):
             with suppress(sqlite3.Error, UnicodeDecodeError):
                 for (number,) in self._connection.execute(f"SELECT flight FROM flights ORDER BY flight{order}"):
                     # A damaged page may contain any number.
                     if isinstance(number, int) and number < _MAX_FLIGHTS:
-                        last = max(last, number)
+                        last_number = max(last_number, number)
                         if order:
                             break
-        return last
+        return last_number
 
-    def _refuse_more(self, settings: Mapping[str, Any]) -> None:
-        """Raise StoreError if the table has more flights than requested."""
+    def _check_flight_count(self, settings: Mapping[str, Any]) -> None:
+        """Raise StoreError if the table holds more flights than requested; by default, do nothing."""
 
     def __enter__(self) -> Self:
         """Return the locked table."""
         return self
 
     def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+        self, error_type: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
     ) -> None:
         """Release the table."""
         self._connection.close()
@@ -260,30 +269,30 @@ class LockedTable:
         Raises OSError for a full disk or a removed table; earlier flights stay in the file.  Raises StoreError for a
         number that the table already has.
         """
-        self._refuse_removed()
-        with translated_errors(self.path):
-            row = [stored(values[name], kind) for name, kind in self._kind.columns.items()]
-            marks = ", ".join("?" * (len(row) + 1))
-            self._connection.execute(f"INSERT INTO flights VALUES ({marks})", [*row, checksum(row)])
+        self._check_not_removed()
+        with converted_errors(self.path):
+            row = [stored_value(values[name], kind) for name, kind in self._kind.columns.items()]
+            placeholders = ", ".join("?" * (len(row) + 1))
+            self._connection.execute(f"INSERT INTO flights VALUES ({placeholders})", [*row, checksum(row)])
 
     def drop_from(self, flight: int) -> None:
         """Delete the flights from a number on, which were still being flown when an earlier flight decided.
 
         Raises OSError for a table that was removed.
         """
-        self._refuse_removed()
-        with translated_errors(self.path):
+        self._check_not_removed()
+        with converted_errors(self.path):
             self._connection.execute("DELETE FROM flights WHERE flight >= ?", (flight,))
 
-    def _refuse_removed(self) -> None:
+    def _check_not_removed(self) -> None:
         """Raise OSError if the file was deleted; on POSIX writing would succeed, but everything would be lost."""
         try:
-            there = os.path.samestat(self.path.stat(), self._file)
+            is_same_file = os.path.samestat(self.path.stat(), self._file)
         except OSError:
-            there = False
-        if not there:
-            words = "was removed, or another file took its place: the flights that were written into it are lost"
-            raise OSError(errno.EIO, words, str(self.path))
+            is_same_file = False
+        if not is_same_file:
+            reason = "was removed, or another file took its place: the flights that were written into it are lost"
+            raise OSError(errno.EIO, reason, str(self.path))
 
     def tally(self) -> Tally:
         """Return the number of flights with each outcome."""
@@ -291,18 +300,18 @@ class LockedTable:
         return Tally(counts.get("flyable", 0), counts.get("not flyable", 0), counts.get("lost", 0))
 
 
-def kept_settings(path: Path) -> dict[str, Any]:
+def read_stored_settings(path: Path) -> dict[str, Any]:
     """Return the settings stored in a table; empty if the file does not exist.
 
     Raises StoreError for a file that planfly did not write, or that another process has locked.
     """
     if not path.is_file():
         return {}
-    with translated_errors(path), closing(sqlite3.connect(path, timeout=1.0)) as connection:
-        known = _read_settings(connection)
-    if known:
-        _refuse_damaged(known, path)
-    return json.loads(known["settings"]) if known else {}
+    with converted_errors(path), closing(sqlite3.connect(path, timeout=1.0)) as connection:
+        settings = _read_settings(connection)
+    if settings:
+        _check_settings_intact(settings, path)
+    return json.loads(settings["settings"]) if settings else {}
 
 
 def _read_settings(connection: sqlite3.Connection) -> dict[str, str]:
@@ -311,28 +320,28 @@ def _read_settings(connection: sqlite3.Connection) -> dict[str, str]:
     return dict(connection.execute("SELECT key, value FROM campaign").fetchall())
 
 
-def _refuse_damaged(known: Mapping[str, str], path: Path) -> None:
-    """Raise StoreError for a file with settings that planfly did not write."""
-    if known.get("checksum") != checksum(known.get(name) for name in ("schema", "made_of", "settings")):
-        words = "its settings are damaged, or another version's: it cannot be resumed, and --overwrite begins anew"
-        raise StoreError(f"{path}: {words}", file=path, field="settings")
+def _check_settings_intact(settings: Mapping[str, str], path: Path) -> None:
+    """Raise StoreError if planfly did not write the settings of a file."""
+    if settings.get("checksum") != checksum(settings.get(name) for name in ("schema", "made_of", "settings")):
+        reason = "its settings are damaged, or another version's: it cannot be resumed, and --overwrite begins anew"
+        raise StoreError(f"{path}: {reason}", file=path, field="settings")
 
 
-def refuse_held(path: Path) -> None:
-    """Raise StoreError if another process has locked a table; a missing file is not locked."""
+def check_not_locked(path: Path) -> None:
+    """Raise StoreError if another process has locked a table; a missing file passes."""
     if not path.is_file():
         return
     connection = sqlite3.connect(path, timeout=1.0, isolation_level=None)
     try:
         connection.execute("BEGIN EXCLUSIVE")
     except sqlite3.Error as error:
-        if getattr(error, "sqlite_errorcode", sqlite3.SQLITE_NOTADB) & 0xFF in HELD:
+        if getattr(error, "sqlite_errorcode", sqlite3.SQLITE_NOTADB) & 0xFF in LOCKED_CODES:
             raise StoreError(f"{path}: is held by another process", file=path) from error
     finally:
         connection.close()
 
 
-class translated_errors:
+class converted_errors:
     """Context that converts SQLite errors about a file, to OSError for a full disk, and to StoreError for others."""
 
     def __init__(self, path: Path) -> None:
@@ -342,7 +351,7 @@ class translated_errors:
         """Enter the context."""
 
     def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+        self, error_type: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
     ) -> None:
         """Raise the converted SQLite error, if there is one."""
         if isinstance(error, UnicodeDecodeError):
@@ -353,7 +362,7 @@ class translated_errors:
         code = getattr(error, "sqlite_errorcode", None)
         if code is not None and code & 0xFF == sqlite3.SQLITE_FULL:
             raise OSError(errno.ENOSPC, "no space left; the flights before are kept, --resume goes on", str(self._path))
-        if code is not None and code & 0xFF in HELD:
+        if code is not None and code & 0xFF in LOCKED_CODES:
             raise StoreError(f"{self._path}: is held by another process", file=self._path) from error
         raise StoreError(f"{self._path}: {error}", file=self._path) from error
 
@@ -375,16 +384,16 @@ class Store(LockedTable):
     """Table of a campaign, locked by one process at a time; the number of a flight is the index of its draw."""
 
     def __init__(self, path: Path, made_of: str, settings: dict[str, Any], *, resume: bool) -> None:
-        """Create the table, or open it to resume, like `LockedTable`, but never for fewer flights than it has."""
+        """Create the table, or open it to resume, like `LockedTable`, but not for fewer flights than the table has."""
         super().__init__(path, CAMPAIGN_KIND, made_of, settings, resume=resume)
 
-    def _refuse_more(self, settings: Mapping[str, Any]) -> None:
-        if (flown := self.tally().flown) > settings.get("flights", math.inf):
-            words = f"flights {settings['flights']}: {flown} have been flown there"
-            raise StoreError(f"{self.path}: {words}", file=self.path)
+    def _check_flight_count(self, settings: Mapping[str, Any]) -> None:
+        if (flight_count := self.tally().flown) > settings.get("flights", math.inf):
+            reason = f"flights {settings['flights']}: {flight_count} have been flown there"
+            raise StoreError(f"{self.path}: {reason}", file=self.path)
 
     def add(self, row: FlightRow) -> None:
-        """Write a flight, for good.  Raises OSError for a full disk; what was written before stays."""
+        """Write a flight durably.  Raises OSError for a full disk; earlier flights stay in the file."""
         self.insert({"flight": row.draw.index, **row_values(replace(row, made_of=self.made_of))})
 
     def outcomes(self) -> dict[int, str]:
@@ -403,25 +412,27 @@ class Store(LockedTable):
             for (value,) in self._connection.execute(f"SELECT {_checked_column(name)} FROM flights ORDER BY flight")
         ]
 
-    def blobs(self, name: str, most: int) -> list[bytes]:
-        """Return a column of arrays as bytes, for at most `most` flights that have an array, in order."""
+    def blobs(self, name: str, max_count: int) -> list[bytes]:
+        """Return a column of arrays as bytes, for at most `max_count` flights that have an array, in order."""
         query = f"SELECT {_checked_column(name)} FROM flights WHERE LENGTH({name}) > 0 ORDER BY flight LIMIT ?"
-        return [value for (value,) in self._connection.execute(query, (most,))]
+        return [value for (value,) in self._connection.execute(query, (max_count,))]
 
     def has_track(self) -> list[bool]:
         """Return True for each flight, in order, whose path data are stored."""
-        return [bool(n) for (n,) in self._connection.execute("SELECT LENGTH(clearance) FROM flights ORDER BY flight")]
+        return [
+            bool(size) for (size,) in self._connection.execute("SELECT LENGTH(clearance) FROM flights ORDER BY flight")
+        ]
 
-    def closest(self, most: int) -> list[FlightRow]:
+    def closest(self, max_count: int) -> list[FlightRow]:
         """Return the worst flights, first lost flights, then failed flights, then the closest calls by margin."""
         order = "CASE outcome WHEN 'lost' THEN 0 WHEN 'not flyable' THEN 1 ELSE 2 END, closeness IS NULL, closeness"
-        rows = self._connection.execute(f"{_SELECT} ORDER BY {order}, flight LIMIT ?", (most,))
+        rows = self._connection.execute(f"{_SELECT} ORDER BY {order}, flight LIMIT ?", (max_count,))
         return [_make_row(values) for values in rows]
 
     def flight(self, index: int) -> FlightRow | None:
         """Return the flight with an index, or None if the table has no such flight."""
-        found = self._connection.execute(f"{_SELECT} WHERE flight = ?", (index,)).fetchone()
-        return None if found is None else _make_row(found)
+        values = self._connection.execute(f"{_SELECT} WHERE flight = ?", (index,)).fetchone()
+        return None if values is None else _make_row(values)
 
     def rows(self) -> Iterator[FlightRow]:
         """Yield all flights in order."""
@@ -436,8 +447,8 @@ def _checked_column(name: str) -> str:
 
 
 def _make_row(values: tuple[Any, ...]) -> FlightRow:
-    known = dict(zip(COLUMNS, values, strict=True))
-    return row_of(known["flight"], known)
+    columns = dict(zip(COLUMNS, values, strict=True))
+    return make_flight_row(columns["flight"], columns)
 
 
 # ----------------------------------------------------------------------
@@ -463,7 +474,7 @@ WINDS_KIND = TableKind(
 
 
 @dataclass(frozen=True, slots=True)
-class AskedFlight:
+class RequestedFlight:
     """Flight that a search requests.
 
     number: position in the order of the search.
@@ -494,32 +505,37 @@ class WindsStore(LockedTable):
         """Create the table, or open it to resume the same search.  settings: must include `FIXED`."""
         super().__init__(path, WINDS_KIND, made_of, settings, resume=resume)
 
-    def add(self, asked: AskedFlight, row: FlightRow) -> None:
-        """Write a flight, for good.  Raises OSError for a full disk; what was written before stays."""
-        asked_for = {
-            "flight": asked.number,
-            "direction": asked.direction,
-            "asked_speed": asked.speed,
-            "draw": asked.draw,
-            "narrow": json.dumps([{"rule": rule, "margin": left, **asdict(place)} for rule, place, left in row.narrow]),
+    def add(self, request: RequestedFlight, row: FlightRow) -> None:
+        """Write a flight durably.  Raises OSError for a full disk; earlier flights stay in the file."""
+        request_values = {
+            "flight": request.number,
+            "direction": request.direction,
+            "asked_speed": request.speed,
+            "draw": request.draw,
+            "narrow": json.dumps(
+                [{"rule": rule, "margin": margin, **asdict(place)} for rule, place, margin in row.narrow]
+            ),
         }
-        self.insert({**asked_for, **row_values(replace(row, made_of=self.made_of))})
+        self.insert({**request_values, **row_values(replace(row, made_of=self.made_of))})
 
-    def known(self) -> dict[int, tuple[AskedFlight, FlownFlight]]:
+    def known(self) -> dict[int, tuple[RequestedFlight, FlownFlight]]:
         """Return each flight of the table and its outcome, by number."""
         rows = self._connection.execute(
             "SELECT flight, direction, asked_speed, draw, outcome, failed, narrow FROM flights ORDER BY flight"
         )
         return {
-            number: (AskedFlight(number, *asked), FlownFlight(outcome, failed_of(failed), narrow_passes_of(narrow)))
-            for number, *asked, outcome, failed, narrow in rows
+            number: (
+                RequestedFlight(number, *request),
+                FlownFlight(outcome, parse_failed(failed), parse_narrow_passes(narrow)),
+            )
+            for number, *request, outcome, failed, narrow in rows
         }
 
 
-def narrow_passes_of(text: str) -> tuple[NarrowPass, ...]:
+def parse_narrow_passes(text: str) -> tuple[NarrowPass, ...]:
     """Parse the narrow passes from the text in the column.
 
-    >>> narrow_passes_of('[{"rule": "slope", "margin": 0.25, "kind": "leg", "index": 3}]')[0][2]
+    >>> parse_narrow_passes('[{"rule": "slope", "margin": 0.25, "kind": "leg", "index": 3}]')[0][2]
     0.25
     """
     return tuple(_narrow_pass(**entry) for entry in json.loads(text))
@@ -533,7 +549,7 @@ def _narrow_pass(rule: str, margin: float, **place: Any) -> NarrowPass:
 # Read the table of a campaign as columns, without locking it and without the columns of arrays.
 
 # Number of rows converted to arrays in one step.
-_CHUNK = 1000
+_ROWS_PER_STEP = 1000
 # Array type of each kind of column.
 _TYPES: dict[str, type] = {"INTEGER": np.int64, "REAL": np.float64, "TEXT": object}
 
@@ -546,22 +562,24 @@ def read_table(path: Path) -> dict[str, NDArray[Any]]:
     Raises StoreError for a file that planfly did not write, or that another process has locked.
     """
     names = tuple(name for name in CAMPAIGN_KIND.columns if name not in SHAPES)
-    with _opened(path) as connection:
+    with _open_to_read(path) as connection:
         (count,) = connection.execute("SELECT COUNT(*) FROM flights").fetchone()
         table = {name: np.empty(count, dtype=_TYPES[CAMPAIGN_KIND.columns[name].split()[0]]) for name in names}
-        words: dict[str | None, str | None] = {}
+        shared_texts: dict[str | None, str | None] = {}
         cursor = connection.execute(f"SELECT {', '.join(names)} FROM flights ORDER BY flight")
-        for start in range(0, count, _CHUNK):
-            for name, values in zip(names, zip(*cursor.fetchmany(_CHUNK), strict=True), strict=True):
+        for start in range(0, count, _ROWS_PER_STEP):
+            for name, values in zip(names, zip(*cursor.fetchmany(_ROWS_PER_STEP), strict=True), strict=True):
                 column = table[name]
-                some = [words.setdefault(one, one) for one in values] if column.dtype == object else values
-                column[start : start + len(values)] = some
+                shared_values = (
+                    [shared_texts.setdefault(text, text) for text in values] if column.dtype == object else values
+                )
+                column[start : start + len(values)] = shared_values
     return table
 
 
 def count_flights(path: Path) -> int:
     """Return the number of flights in a table of either kind.  Raises StoreError for another or a locked file."""
-    with _opened(path) as connection:
+    with _open_to_read(path) as connection:
         return int(connection.execute("SELECT COUNT(*) FROM flights").fetchone()[0])
 
 
@@ -572,26 +590,26 @@ def read_shapes(path: Path) -> dict[str, NDArray[np.float32]]:
     "crossings": distance right of and above each stop of the route at closest approach, m, (n, s, 2).
     Raises StoreError for a file that planfly did not write, or that another process has locked.
     """
-    with _opened(path) as connection:
+    with _open_to_read(path) as connection:
         return {name: _read_arrays(connection, name, FIELDS[name].entry) for name in SHAPES}
 
 
 def _read_arrays(connection: sqlite3.Connection, name: str, entry: tuple[int, ...]) -> NDArray[np.float32]:
     """Return the arrays of a column, (n, m, *entry), where m is the length of the longest one."""
     count, size = connection.execute(f"SELECT COUNT(*), MAX(LENGTH({name})) FROM flights").fetchone()
-    found = np.full((count, (size or 0) // np.dtype(np.float32).itemsize), np.nan, dtype=np.float32)
-    for row, (data,) in zip(found, connection.execute(f"SELECT {name} FROM flights ORDER BY flight"), strict=True):
+    arrays = np.full((count, (size or 0) // np.dtype(np.float32).itemsize), np.nan, dtype=np.float32)
+    for row, (data,) in zip(arrays, connection.execute(f"SELECT {name} FROM flights ORDER BY flight"), strict=True):
         if data:
-            known = np.frombuffer(data, np.float32)
-            row[: known.size] = known
-    return found.reshape(count, found.shape[1] // math.prod(entry), *entry)
+            array = np.frombuffer(data, np.float32)
+            row[: array.size] = array
+    return arrays.reshape(count, arrays.shape[1] // math.prod(entry), *entry)
 
 
 @contextmanager
-def _opened(path: Path) -> Iterator[sqlite3.Connection]:
+def _open_to_read(path: Path) -> Iterator[sqlite3.Connection]:
     # Nothing is written, but a writable connection removes its -wal and -shm files when it closes.
     with (
-        translated_errors(path),
+        converted_errors(path),
         closing(sqlite3.connect(f"{path.absolute().as_uri()}?mode=rw", uri=True, timeout=1.0)) as connection,
     ):
         yield connection

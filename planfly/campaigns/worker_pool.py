@@ -10,14 +10,14 @@ from typing import Protocol
 from urllib.parse import urlsplit
 
 from planfly.campaigns.campaign_base import CampaignBase
-from planfly.campaigns.flight_requests import FlightRequest, Flown, FlyOne
+from planfly.campaigns.flight_requests import FinishedFlight, FlightRequest, FlyOne
 from planfly.campaigns.flight_row import fly_one
 from planfly.campaigns.local_pool import LocalPool
 from world.errors import PlanflyError
 from world.extras import need_extra
 
 # Minimum time between two progress reports, s.
-REPORTED_EVERY = 0.5
+REPORT_INTERVAL_S = 0.5
 
 
 class SchedulerError(PlanflyError):
@@ -39,8 +39,8 @@ class Workers:
 class WorkerPool(Protocol):
     """Workers that fly the flights of a campaign."""
 
-    def fly(self, following: Callable[[], FlightRequest | None]) -> Iterator[Flown]:
-        """Fly the requests that `following` returns, and yield each flight when it is done, in any order."""
+    def fly(self, next_request: Callable[[], FlightRequest | None]) -> Iterator[FinishedFlight]:
+        """Fly the requests that `next_request` returns, and yield each flight when it is done, in any order."""
 
 
 @contextlib.contextmanager
@@ -78,9 +78,9 @@ def checked_address(address: str) -> str:
     ...
     planfly.campaigns.worker_pool.SchedulerError: scheduler tcp://10.0.0.7:8786: plain TCP beyond loopback; ...
     """
-    whole = address if "://" in address else f"tcp://{address}"
+    full_address = address if "://" in address else f"tcp://{address}"
     try:
-        parts = urlsplit(whole)
+        parts = urlsplit(full_address)
         host, port = parts.hostname, parts.port
     except ValueError:
         host = port = None
@@ -90,7 +90,7 @@ def checked_address(address: str) -> str:
     if parts.scheme == "tcp" and not _is_loopback(host):
         allowed = "plain TCP beyond loopback; use tls://, with certificates in dask's configuration"
         raise SchedulerError.of_argument("scheduler", address, allowed)
-    return whole
+    return full_address
 
 
 def _is_loopback(host: str) -> bool:
@@ -101,20 +101,20 @@ def _is_loopback(host: str) -> bool:
 
 
 class FlightRate:
-    """Rate of flights since this object was made.  known: number of flights in the table at the start."""
+    """Rate of flights since this object was made.  stored_count: number of flights in the table at the start."""
 
-    def __init__(self, known: int) -> None:
-        self._known = known
-        self._started = self._reported = time.monotonic()
+    def __init__(self, stored_count: int) -> None:
+        self._stored_count = stored_count
+        self._start_time = self._last_report = time.monotonic()
 
-    def due(self) -> bool:
-        """Return True if the next report is due, and start timing the one after it."""
+    def is_due(self) -> bool:
+        """Return True if the next report is due, and start timing the following report."""
         now = time.monotonic()
-        if now - self._reported < REPORTED_EVERY:
+        if now - self._last_report < REPORT_INTERVAL_S:
             return False
-        self._reported = now
+        self._last_report = now
         return True
 
-    def a_second(self, flights: int) -> float:
+    def flights_per_second(self, flights: int) -> float:
         """Return the rate at this number of flights, flights per second; 0 before the first flight."""
-        return (flights - self._known) / max(time.monotonic() - self._started, 1e-3)
+        return (flights - self._stored_count) / max(time.monotonic() - self._start_time, 1e-3)

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import planfly
-from planfly.terminal.arguments import aircraft_words, completed, files
+from planfly.terminal.arguments import complete_aircraft, files, with_completer
 from planfly.terminal.command_parser import CommandParser, LineParser
 from planfly.terminal.exit_codes import FLYABLE
 from planfly.terminal.options import call, result_options
@@ -45,22 +45,22 @@ def aircraft_options(line: LineParser) -> None:
         "planfly aircraft --new ./copy --from aerosonde",
         "planfly aircraft --identify A.BIN B.BIN --mass 13.2 --span 2.9 --area 0.55 --check C.BIN --out ./mine",
     )
-    completed(
+    with_completer(
         parser.add_argument("name", metavar="NAME", nargs="?", help="embedded name, or a folder (with a slash)"),
-        aircraft_words,
+        complete_aircraft,
     )
     parser.add_argument("--motor-braking", action="store_true", help="let the motor brake in descents")
     own = parser.group("an aircraft of your own")
     own.add_argument("--new", dest="folder", metavar="FOLDER", help="make its folder, which must not exist yet")
-    completed(
+    with_completer(
         own.add_argument(
             "--from", dest="source", metavar="NAME", help="with --new: the aircraft to start from (default: aerosonde)"
         ),
-        aircraft_words,
+        complete_aircraft,
     )
     _data_sheet_options(parser)
     logs = parser.group("flight logs: with --mass and --span, and --out for the folder to make")
-    completed(
+    with_completer(
         logs.add_argument(
             "--identify",
             dest="logs",
@@ -70,13 +70,13 @@ def aircraft_options(line: LineParser) -> None:
         ),
         files(".bin", ".BIN", ".ulg"),
     )
-    completed(
+    with_completer(
         logs.add_argument(
             "--base", metavar="NAME", help="with --identify: the aircraft that it is most like (default: aerosonde)"
         ),
-        aircraft_words,
+        complete_aircraft,
     )
-    completed(
+    with_completer(
         logs.add_argument("--check", metavar="LOG", help="with --identify: another log, to replay with the model"),
         files(".bin", ".BIN", ".ulg"),
     )
@@ -123,11 +123,11 @@ def aircraft(args: argparse.Namespace) -> int:
         allowed = "goes with `folder` FOLDER, the folder to make"
         raise PlanflyError.of_argument("source", args.source, allowed, shown="")
     if args.name is None:
-        listed = list(planfly.aircraft().values())
-        for known in listed:
-            size = f"{known.mass:.5g} kg, span {known.wing_span:.5g} m"
-            print(f"{known.name:<14} {known.title}: {size}, cruises at {known.airspeed:g} m/s")
-        give_answer(args, lambda: _json_answer(listed))
+        embedded_aircraft = list(planfly.aircraft().values())
+        for listed in embedded_aircraft:
+            size = f"{listed.mass:.5g} kg, span {listed.wing_span:.5g} m"
+            print(f"{listed.name:<14} {listed.title}: {size}, cruises at {listed.airspeed:g} m/s")
+        give_answer(args, lambda: _json_answer(embedded_aircraft))
         return FLYABLE
     out = args.out or "runs/aircraft-{name}"
     numbers = call(planfly.describe_aircraft, args, out=out, overwrite=args.overwrite or args.out is None)
@@ -139,12 +139,12 @@ def aircraft(args: argparse.Namespace) -> int:
     return FLYABLE
 
 
-def _json_answer(chosen: "Sequence[Aircraft]", numbers: "AircraftNumbers | None" = None) -> object:
+def _json_answer(entries: "Sequence[Aircraft]", numbers: "AircraftNumbers | None" = None) -> object:
     """Return the answer for --json, for one aircraft with its numbers or for several aircraft without numbers."""
     from planfly.terminal.answers import AircraftAnswer, aircraft_detail, aircraft_entry
 
     detail = None if numbers is None else aircraft_detail(numbers)
-    return AircraftAnswer(exit_code=FLYABLE, aircraft=[aircraft_entry(one, detail) for one in chosen])
+    return AircraftAnswer(exit_code=FLYABLE, aircraft=[aircraft_entry(aircraft, detail) for aircraft in entries])
 
 
 def _make_folder(args: argparse.Namespace) -> int:
@@ -152,16 +152,19 @@ def _make_folder(args: argparse.Namespace) -> int:
         message = f"{args.name}: --new takes the folder alone; --from names the aircraft to begin with"
         raise PlanflyError(message, field="--new", value=args.folder)
     folder = Path(args.folder)
-    made = call(planfly.new_aircraft, args)
-    files = sorted(file.name for file in made.folder.iterdir())
-    shown = folder if folder.is_absolute() else f"./{folder}"
-    sheet = any(getattr(args, name) is not None for name in (*_DATA_SHEET_KEYWORDS, "params"))
-    whose = "from a data sheet" if sheet else f"as {Path(args.source or 'aerosonde').name}"
-    print(f"aircraft  {shown}/ ({', '.join(files)}), {whose}")
-    if sheet:
-        _print_sheet(made)
-    give_answer(args, lambda: _json_answer([made]))
-    print(f"next      planfly aircraft {shlex.quote(str(shown))}, and --aircraft {shlex.quote(str(shown))} flies it")
+    new_aircraft = call(planfly.new_aircraft, args)
+    files = sorted(file.name for file in new_aircraft.folder.iterdir())
+    folder_text = folder if folder.is_absolute() else f"./{folder}"
+    has_sheet = any(getattr(args, name) is not None for name in (*_DATA_SHEET_KEYWORDS, "params"))
+    origin_text = "from a data sheet" if has_sheet else f"as {Path(args.source or 'aerosonde').name}"
+    print(f"aircraft  {folder_text}/ ({', '.join(files)}), {origin_text}")
+    if has_sheet:
+        _print_sheet(new_aircraft)
+    give_answer(args, lambda: _json_answer([new_aircraft]))
+    print(
+        f"next      planfly aircraft {shlex.quote(str(folder_text))},"
+        f" and --aircraft {shlex.quote(str(folder_text))} flies it"
+    )
     return FLYABLE
 
 
@@ -169,72 +172,75 @@ def _identify(args: argparse.Namespace) -> int:
     """Identify an aircraft from logs, and make its folder."""
     for name in ("mass", "span", "out"):
         if getattr(args, name) is None:
-            said = "the folder to make" if name == "out" else "of the aircraft as it flew"
-            raise PlanflyError(f"--identify needs --{name}, {said}", field=f"--{name}")
-    given = [
+            reason = "the folder to make" if name == "out" else "of the aircraft as it flew"
+            raise PlanflyError(f"--identify needs --{name}, {reason}", field=f"--{name}")
+    extra_names = [
         name
         for name in _DATA_SHEET_KEYWORDS
         if name not in ("mass", "span", "area", "battery") and getattr(args, name) is not None
     ]
-    if given or args.name is not None or args.folder is not None:
-        field = "name" if args.name is not None else f"--{given[0]}" if given else "--new"
+    if extra_names or args.name is not None or args.folder is not None:
+        field = "name" if args.name is not None else f"--{extra_names[0]}" if extra_names else "--new"
         raise PlanflyError(f"--identify goes without {field}: the logs have that", field=field)
-    for field, is_given, instead in (
+    for field, is_given, reason_text in (
         ("--params", args.params is not None, "the logs have the parameters"),
         ("--from", args.source is not None, "--base names the aircraft to begin with"),
         ("--motor-braking", args.motor_braking, "it is a choice of each flight"),
     ):
         if is_given:
-            raise PlanflyError(f"--identify goes without {field}: {instead}", field=field)
-    found = call(planfly.identify_aircraft, args, folder=args.out)
-    made, estimate = found.aircraft, found.estimate
-    files_made = sorted(file.name for file in made.folder.iterdir())
+            raise PlanflyError(f"--identify goes without {field}: {reason_text}", field=field)
+    identified = call(planfly.identify_aircraft, args, folder=args.out)
+    new_aircraft, estimate = identified.aircraft, identified.estimate
+    files_made = sorted(file.name for file in new_aircraft.folder.iterdir())
     print(f"aircraft  {args.out} ({', '.join(files_made)}), from {estimate.seconds / 60.0:.1f} min of flight")
-    for name, unit, (low, value, high) in (
-        ("climb", "deg", found.climb),
-        ("sink", "deg", found.sink),
-        ("power", "W", found.power),
+    for name, unit, (lower, value, upper) in (
+        ("climb", "deg", identified.climb),
+        ("sink", "deg", identified.sink),
+        ("power", "W", identified.power),
     ):
-        print(f"  {name:<8} {value:.{0 if unit == 'W' else 1}f} {unit} at cruise, {low:.1f} to {high:.1f} (95 %)")
-    _print_unknown(found)
+        print(f"  {name:<8} {value:.{0 if unit == 'W' else 1}f} {unit} at cruise, {lower:.1f} to {upper:.1f} (95 %)")
+    _print_unknown(identified)
     if "identify.waypoints" not in files_made:
         print("  no mission identify.waypoints: the logs have neither home (ORGN) nor a position on the ground (POS)")
-    for replay in found.replays:
-        shown = ", ".join(f"{name} {value:.2g}" for name, value in replay.rms.items())
-        print(f"  replay   {replay.model}: {shown} (rms of {replay.windows} windows of 5 s; deg/s, deg, m/s)")
-    give_answer(args, lambda: _json_answer([made]))
+    for replay in identified.replays:
+        rms_text = ", ".join(f"{name} {value:.2g}" for name, value in replay.rms.items())
+        print(f"  replay   {replay.model}: {rms_text} (rms of {replay.windows} windows of 5 s; deg/s, deg, m/s)")
+    give_answer(args, lambda: _json_answer([new_aircraft]))
     print(f"next      planfly aircraft {shlex.quote(args.out)}; {args.out}/identify.html says how sure each number is")
     return FLYABLE
 
 
-def _print_unknown(found: "planfly.IdentifiedAircraft") -> None:
+def _print_unknown(identified: "planfly.IdentifiedAircraft") -> None:
     """Print the properties that the logs do not show, and the flights that would show them."""
-    if not found.estimate.dynamics:
+    if not identified.estimate.dynamics:
         print("  performance only: under 10 rows of inertial sensors or outputs a second tell nothing of the moments")
-    for log in found.slow:
+    for log in identified.slow:
         print(f"  rows     {log.source}: {log.hertz:.1f} a second of sensors or outputs: {log.setting} records more")
-    for number in found.wide:
+    for number in identified.wide:
         print(f"  wide     {number.text}")
-    for line in found.estimate.silent():
+    for line in identified.estimate.silent():
         print(f"  not seen {line}")
-    for lacking in found.without_current:
-        print(f"  current  not used, as {lacking} has none (BAT): identify from the other logs alone to use theirs")
+    for log_name in identified.without_current:
+        print(f"  current  not used, as {log_name} has none (BAT): identify from the other logs alone to use theirs")
 
 
-def _print_sheet(made: "Aircraft") -> None:
+def _print_sheet(aircraft: "Aircraft") -> None:
     """Print the performance of a data sheet's model, and its uncertainty."""
     from aircraft.uncertainty import read_uncertainty
     from flight.dynamics.envelope_tables import load_envelope
 
-    envelope = load_envelope(made)
-    climb, descent = (math.degrees(angle) for angle in envelope.air_angles(made.airspeed, 500.0))
-    known = read_uncertainty(made.folder)
-    print(f"  speed    cruise {made.airspeed:g} m/s, stall {made.stall_speed:g}, up to {made.airspeed_max:g} m/s")
-    if known is not None:
-        up, down = math.degrees(known.climb), math.degrees(known.descent)
+    envelope = load_envelope(aircraft)
+    climb, descent = (math.degrees(angle) for angle in envelope.air_angles(aircraft.airspeed, 500.0))
+    uncertainty = read_uncertainty(aircraft.folder)
+    print(
+        f"  speed    cruise {aircraft.airspeed:g} m/s, stall {aircraft.stall_speed:g},"
+        f" up to {aircraft.airspeed_max:g} m/s"
+    )
+    if uncertainty is not None:
+        climb_sd, descent_sd = math.degrees(uncertainty.climb), math.degrees(uncertainty.descent)
         print(
-            f"  slopes   climb {climb:.1f} degrees, give or take {up:.1f}; descent {descent:.1f}, give or take"
-            f" {down:.1f} (at cruise and 500 m; one standard deviation)"
+            f"  slopes   climb {climb:.1f} degrees, give or take {climb_sd:.1f}; descent {descent:.1f}, give or take"
+            f" {descent_sd:.1f} (at cruise and 500 m; one standard deviation)"
         )
     print("  guessed  README.md says what was, and how far off it may be")
 
@@ -242,34 +248,35 @@ def _print_sheet(made: "Aircraft") -> None:
 def _print_numbers(numbers: "AircraftNumbers") -> None:
     from flight.dynamics.characteristics import TRIM_AMSL
 
-    chosen, envelope = numbers.aircraft, numbers.envelope
-    print(f"{chosen.name}: {chosen.title}")
+    aircraft, envelope = numbers.aircraft, numbers.envelope
+    print(f"{aircraft.name}: {aircraft.title}")
     print(f"  model    {numbers.model_sha256[:16]}")
-    _print_limits(chosen, envelope)
+    _print_limits(aircraft, envelope)
     _print_trims(numbers.trims, TRIM_AMSL)
-    _print_modes(numbers.cruise, chosen.airspeed, TRIM_AMSL)
-    _print_envelope(chosen, envelope)
-    _print_turns(chosen)
+    _print_modes(numbers.cruise, aircraft.airspeed, TRIM_AMSL)
+    _print_envelope(aircraft, envelope)
+    _print_turns(aircraft)
 
 
-def _print_limits(chosen: "Aircraft", envelope: "Envelope") -> None:
-    slow, fast = envelope.level_speeds(0.0)
-    if chosen.battery_voltage > 0.0:
-        store = f"battery {chosen.battery_energy / 3600.0:g} Wh at {chosen.battery_voltage:g} V"
+def _print_limits(aircraft: "Aircraft", envelope: "Envelope") -> None:
+    min_speed, max_speed = envelope.level_speeds(0.0)
+    if aircraft.battery_voltage > 0.0:
+        store = f"battery {aircraft.battery_energy / 3600.0:g} Wh at {aircraft.battery_voltage:g} V"
     else:
-        store = f"fuel with {chosen.battery_energy / 3.6e9:.4g} MWh of heat; energy is the heat of the fuel burned"
+        store = f"fuel with {aircraft.battery_energy / 3.6e9:.4g} MWh of heat; energy is the heat of the fuel burned"
     braking = "the motor brakes" if envelope.motor_braking else "the motor does not brake"
-    if chosen.battery_voltage == 0.0:
+    if aircraft.battery_voltage == 0.0:
         braking = "descents with the throttle closed"
-    print(f"  mass     {chosen.mass:g} kg; wing {chosen.wing_area:g} m2, span {chosen.wing_span:g} m; {store}")
+    print(f"  mass     {aircraft.mass:g} kg; wing {aircraft.wing_area:g} m2, span {aircraft.wing_span:g} m; {store}")
     print(
-        f"  speed    cruise {chosen.airspeed:g} m/s, guidance uses {chosen.airspeed_min:g}..{chosen.airspeed_max:g};"
-        f" level flight at sea level {slow:.1f}..{fast:.1f} m/s"
+        f"  speed    cruise {aircraft.airspeed:g} m/s, guidance uses"
+        f" {aircraft.airspeed_min:g}..{aircraft.airspeed_max:g};"
+        f" level flight at sea level {min_speed:.1f}..{max_speed:.1f} m/s"
     )
     print(
-        f"  limits   bank {_deg(chosen.max_bank):.0f}, pitch {_deg(chosen.max_pitch):.0f}, elevator"
-        f" {_deg(chosen.max_elevator):.0f}, aileron {_deg(chosen.max_aileron):.0f}, rudder"
-        f" {_deg(chosen.max_rudder):.0f} deg either way; {braking}"
+        f"  limits   bank {_deg(aircraft.max_bank):.0f}, pitch {_deg(aircraft.max_pitch):.0f}, elevator"
+        f" {_deg(aircraft.max_elevator):.0f}, aileron {_deg(aircraft.max_aileron):.0f}, rudder"
+        f" {_deg(aircraft.max_rudder):.0f} deg either way; {braking}"
     )
     if envelope.source:
         climb, descent = math.degrees(envelope.climb_sd), math.degrees(envelope.descent_sd)
@@ -301,43 +308,44 @@ def _print_modes(modes: "tuple[Mode, ...]", airspeed: float, amsl: float) -> Non
         print(f"  {mode.name:<14} {root:<20} {mode.frequency:7.3f} rad/s{mode.damping:9.2f}{mode.time:9.2f} s {kind}")
 
 
-def _print_envelope(chosen: "Aircraft", envelope: "Envelope") -> None:
+def _print_envelope(aircraft: "Aircraft", envelope: "Envelope") -> None:
     heights = [float(amsl) for amsl in envelope.amsl[::2]]
-    head = "".join(f"{amsl:>13.0f} m" for amsl in heights)
+    header = "".join(f"{amsl:>13.0f} m" for amsl in heights)
     print("\nsteepest climb / descent to the air, deg, by airspeed and height AMSL ('-': no steady flight)")
-    print(f"  m/s  {head}")
+    print(f"  m/s  {header}")
     for airspeed in envelope.airspeed.tolist():
         cells = "".join(f"{_angle_pair(*envelope.air_angles(airspeed, amsl)):>15}" for amsl in heights)
         print(f"  {airspeed:5.1f}{cells}")
-    for title, pick in (("level, from", 0), ("level, to", 1)):
-        cells = "".join(f"{envelope.level_speeds(amsl)[pick]:11.1f} m/s" for amsl in heights)
+    for title, index in (("level, from", 0), ("level, to", 1)):
+        cells = "".join(f"{envelope.level_speeds(amsl)[index]:11.1f} m/s" for amsl in heights)
         print(f"  {title:<5}{cells[len(title) - 5 :]}")
-    print(f"\nsteepest climb / dive over the ground at {chosen.airspeed:g} m/s and 500 m, deg")
+    print(f"\nsteepest climb / dive over the ground at {aircraft.airspeed:g} m/s and 500 m, deg")
     for title, tail, cross in (
         ("calm", 0.0, 0.0),
         (f"{_WIND_MPS:g} m/s tailwind", _WIND_MPS, 0.0),
         (f"{_WIND_MPS:g} m/s headwind", -_WIND_MPS, 0.0),
         (f"{_WIND_MPS:g} m/s crosswind", 0.0, _WIND_MPS),
     ):
-        print(f"  {title:<18}{_angle_pair(*envelope.slope_limits(chosen.airspeed, 500.0, tail, cross))}")
+        print(f"  {title:<18}{_angle_pair(*envelope.slope_limits(aircraft.airspeed, 500.0, tail, cross))}")
 
 
-def _print_turns(chosen: "Aircraft") -> None:
+def _print_turns(aircraft: "Aircraft") -> None:
     from aircraft.envelope import turn_radius
 
-    speeds = [chosen.airspeed_min, chosen.airspeed, chosen.airspeed_max]
+    speeds = [aircraft.airspeed_min, aircraft.airspeed, aircraft.airspeed_max]
     print("\nturn radius, m, by ground speed and bank")
     print("  m/s     " + "".join(f"{bank:>8.0f} deg" for bank in _BANKS_DEG))
-    for speed in (*speeds, chosen.airspeed + _WIND_MPS):
+    for speed in (*speeds, aircraft.airspeed + _WIND_MPS):
         cells = "".join(f"{turn_radius(speed, math.radians(bank)):12.0f}" for bank in _BANKS_DEG)
         print(f"  {speed:<8.1f}{cells}" + ("  (cruise in a 10 m/s tailwind)" if speed == speeds[1] + _WIND_MPS else ""))
-    bank = _deg(chosen.max_bank)
+    bank = _deg(aircraft.max_bank)
     print(f"\nshortest leg between two equal turns, m, at {bank:.0f} deg of bank, by ground speed and turn")
     print("  m/s     " + "".join(f"{turn:>8.0f} deg" for turn in _TURNS_DEG))
-    for speed in (*speeds, chosen.airspeed + _WIND_MPS):
-        radius = turn_radius(speed, chosen.max_bank)
+    for speed in (*speeds, aircraft.airspeed + _WIND_MPS):
+        radius = turn_radius(speed, aircraft.max_bank)
         print(
-            f"  {speed:<8.1f}" + "".join(f"{2.0 * radius * math.tan(math.radians(t) / 2.0):12.0f}" for t in _TURNS_DEG)
+            f"  {speed:<8.1f}"
+            + "".join(f"{2.0 * radius * math.tan(math.radians(turn) / 2.0):12.0f}" for turn in _TURNS_DEG)
         )
 
 
@@ -346,7 +354,7 @@ def _deg(angle: float) -> float:
 
 
 def _angle_pair(climb: float, descent: float) -> str:
-    def one(angle: float) -> str:
+    def angle_text(angle: float) -> str:
         return "-" if math.isnan(angle) else f"{_deg(angle):.1f}"
 
-    return f"{one(climb)} / {one(descent)}"
+    return f"{angle_text(climb)} / {angle_text(descent)}"

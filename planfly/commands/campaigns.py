@@ -8,10 +8,10 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import planfly
-from planfly.terminal.arguments import completed, files, mission_or_scenario_words, number
+from planfly.terminal.arguments import complete_mission_or_scenario, files, number, with_completer
 from planfly.terminal.command_parser import CommandParser, LineParser
 from planfly.terminal.exit_codes import FLYABLE, LOSS, NOT_FLYABLE
-from planfly.terminal.options import call, flown_by_options, result_options, steering_options, world_options
+from planfly.terminal.options import aircraft_and_wind_options, call, result_options, steering_options, world_options
 from planfly.terminal.output import give_answer
 from planfly.workflow.output_paths import RESULTS
 from world.errors import PlanflyError
@@ -29,7 +29,7 @@ def campaign_options(line: LineParser) -> None:
         "planfly campaign jacksboro-air --prove 0.99",
         extra="campaigns",
     )
-    parser.alias("index", "--refly")
+    parser.alias_keyword("index", "--refly")
     _shared_options(parser)
     goal = parser.add_mutually_exclusive_group()
     goal.add_argument(
@@ -99,16 +99,16 @@ def winds_options(line: LineParser) -> None:
 
 
 def _shared_options(parser: CommandParser) -> None:
-    completed(
+    with_completer(
         parser.add_argument(
             "target", metavar="SCENARIO|PLAN|MISSION", help="embedded name, TOML file, plan.json, .waypoints or .plan"
         ),
-        mission_or_scenario_words,
+        complete_mission_or_scenario,
     )
     world_options(parser)
-    flown_by_options(parser)
+    aircraft_and_wind_options(parser)
     steering_options(parser)
-    completed(
+    with_completer(
         parser.add_argument("--spread", metavar="FILE", help="what varies, as TOML (default: planfly's own)"),
         files("toml"),
     )
@@ -167,12 +167,12 @@ def _refly(args: argparse.Namespace, folder: Path) -> int:
 
     if args.json:
         raise PlanflyError("--json: goes with a campaign, not with --refly", field="--json", value=args.json)
-    again = call(planfly.campaign_flight, args, index=args.refly, out=folder)
-    print(f"flight {args.refly}: {again.row.outcome}, ended: {again.row.ended}, as in the table")
-    for rule, place in again.row.failed:
+    flight = call(planfly.campaign_flight, args, index=args.refly, out=folder)
+    print(f"flight {args.refly}: {flight.row.outcome}, ended: {flight.row.ended}, as in the table")
+    for rule, place in flight.row.failed:
         print(f"  failed  {rule} at {place_text(place)}")
-    print(f"log       {again.log}")
-    return FLYABLE if again.row.outcome == "flyable" else NOT_FLYABLE
+    print(f"log       {flight.log}")
+    return FLYABLE if flight.row.outcome == "flyable" else NOT_FLYABLE
 
 
 @contextmanager

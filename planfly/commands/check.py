@@ -6,14 +6,14 @@ from typing import TYPE_CHECKING
 
 import planfly
 from planfly.arguments import CHOICES
-from planfly.terminal.arguments import IMPORTED_LOGS, MISSIONS, autopilots, completed, files
+from planfly.terminal.arguments import IMPORTED_LOGS, MISSIONS, autopilots, files, with_completer
 from planfly.terminal.command_parser import LineParser
 from planfly.terminal.exit_codes import LOSS, verdict_code
 from planfly.terminal.options import (
+    aircraft_and_wind_options,
+    autopilot_options,
     call,
-    flown_by_options,
     imported_log_options,
-    pilot_options,
     result_options,
     world_options,
 )
@@ -39,7 +39,7 @@ def check_options(line: LineParser) -> None:
         "planfly check mission.waypoints --terrain jacksboro --geometry",
         "planfly check mission.waypoints --terrain jacksboro --for ardupilot,px4",
     )
-    completed(
+    with_completer(
         parser.add_argument(
             "what", metavar="LOG|MISSION", help=f"a flight log (.mcap, or {LOGS}), or plan.json, .waypoints, .plan"
         ),
@@ -47,8 +47,8 @@ def check_options(line: LineParser) -> None:
     )
     imported_log_options(parser)
     world_options(parser)
-    flown_by_options(parser)
-    group = pilot_options(parser)
+    aircraft_and_wind_options(parser)
+    group = autopilot_options(parser)
     group.add_argument(
         "--for",
         dest="autopilots",
@@ -93,8 +93,8 @@ def _check_by_autopilots(args: argparse.Namespace) -> int:
     for name in _SINGLE_AUTOPILOT_OPTIONS:
         if (value := getattr(args, name)) not in (None, False):
             raise ArgumentError.of_argument(name, value, "not with --for, which flies several autopilots")
-    flown = call(planfly.fly_by_each, args, mission=args.what)
-    verdicts = {name: one.verdict for name, one in flown.items()}
+    flights = call(planfly.fly_by_each, args, mission=args.what)
+    verdicts = {name: flight.verdict for name, flight in flights.items()}
     code = max(verdict_code(verdict) for verdict in verdicts.values())
     give_answer(args, lambda: _verdicts_answer(verdicts, args.what, code))
     give_junit(args, {f"{args.what} by {name}": verdict for name, verdict in verdicts.items()})

@@ -36,8 +36,8 @@ def compare(args: argparse.Namespace) -> int:
 
     logs = [planfly.read_log(Path(file)) for file in (args.first, args.second)]
     comparison = planfly.compare(logs[0], logs[1], args.out, svg=args.svg, overwrite=args.overwrite)
-    made = [] if args.out is None else [Path(args.out) / name for name in COMPARE_FILES]
-    files = [file for file in made if file.exists()]
+    target_files = [] if args.out is None else [Path(args.out) / name for name in COMPARE_FILES]
+    files = [file for file in target_files if file.exists()]
     print("\n".join(difference_lines(comparison)))
     for file in files:
         print(f"compare   {file}")
@@ -60,8 +60,13 @@ def _json_answer(comparison: "Comparison", files: list[Path], code: int) -> obje
         names=list(comparison.names),
         flyable=[verdict.flyable for verdict in comparison.verdicts],
         quantities=[
-            QuantityPair(name=one.name, unit=one.unit, first=number(one.first), second=number(one.second))
-            for one in comparison.differences
+            QuantityPair(
+                name=difference.name,
+                unit=difference.unit,
+                first=number(difference.first),
+                second=number(difference.second),
+            )
+            for difference in comparison.differences
         ],
         notes=list(comparison.notes),
         files=[str(file) for file in files],

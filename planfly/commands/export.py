@@ -3,7 +3,7 @@
 import argparse
 
 import planfly
-from planfly.terminal.arguments import MISSIONS, completed, files
+from planfly.terminal.arguments import MISSIONS, files, with_completer
 from planfly.terminal.command_parser import LineParser
 from planfly.terminal.exit_codes import FLYABLE, LOSS
 from planfly.terminal.options import fence_option, result_options, time_option
@@ -18,7 +18,7 @@ def export_options(line: LineParser) -> None:
         "write a plan, mission or log in the format that a suffix names",
         "planfly export plan.json mission.waypoints mission.fence mission.plan plan.kml",
     )
-    completed(
+    with_completer(
         parser.add_argument(
             "source",
             metavar="PLAN.json|MISSION|LOG.mcap",

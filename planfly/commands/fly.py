@@ -5,7 +5,7 @@ import shlex
 from typing import TYPE_CHECKING
 
 import planfly
-from planfly.terminal.arguments import MISSIONS, completed, files, number
+from planfly.terminal.arguments import MISSIONS, files, number, with_completer
 from planfly.terminal.command_parser import LineParser, coloured
 from planfly.terminal.exit_codes import verdict_code
 from planfly.terminal.options import call, flight_options, log_rate_option, result_options, world_options
@@ -24,7 +24,7 @@ def fly_options(line: LineParser) -> None:
         "fly a plan or any mission file, write the log, and judge the flight",
         "planfly fly mission.waypoints --terrain jacksboro --wind 8,270 --turbulence light",
     )
-    completed(
+    with_completer(
         parser.add_argument("mission", metavar="MISSION", help="plan.json, .waypoints or .plan"), files(*MISSIONS)
     )
     world_options(parser)
@@ -44,9 +44,9 @@ def fly_options(line: LineParser) -> None:
 
 def fly(args: argparse.Namespace) -> int:
     """Fly a mission, write its log, and return the exit code of the verdict."""
-    named = args.log is not None
-    log = args.log if named else FLY_LOG
-    flown = call(planfly.fly, args, log=log, overwrite=args.overwrite or not named)
+    is_log_named = args.log is not None
+    log = args.log if is_log_named else FLY_LOG
+    flown = call(planfly.fly, args, log=log, overwrite=args.overwrite or not is_log_named)
     print_warnings([*flown.mission.warnings, *flown.setup.scenario.notes])
     print_verdict(flown.verdict, flown.setup.notes)
     print_returns(flown.returns_line)

@@ -6,12 +6,12 @@ from typing import TYPE_CHECKING
 
 import planfly
 from planfly.commands.check import LOGS
-from planfly.terminal.arguments import IMPORTED_LOGS, aircraft_words, completed, files
+from planfly.terminal.arguments import IMPORTED_LOGS, complete_aircraft, files, with_completer
 from planfly.terminal.command_parser import LineParser
 from planfly.terminal.exit_codes import FLYABLE, LOSS, verdict_code
 from planfly.terminal.options import (
+    aircraft_and_wind_options,
     call,
-    flown_by_options,
     imported_log_options,
     result_options,
     turbulence_option,
@@ -31,7 +31,7 @@ def import_log_options(line: LineParser) -> None:
         "convert an autopilot's log into a flight log, and judge the flight against its plan",
         "planfly import 00000042.BIN flight.mcap --terrain dem.tif --aircraft aerosonde",
     )
-    completed(
+    with_completer(
         parser.add_argument(
             "log",
             metavar=LOGS,
@@ -43,7 +43,7 @@ def import_log_options(line: LineParser) -> None:
     parser.add_argument("target", metavar="FLIGHT.mcap", help="the flight log to write")
     imported_log_options(parser)
     world_options(parser)
-    flown_by_options(parser)
+    aircraft_and_wind_options(parser)
     result_options(parser, junit=True)
 
 
@@ -72,12 +72,14 @@ def refly_options(line: LineParser) -> None:
         "fly the mission of an imported flight again in JSBSim, in the wind of its log, and compare the two",
         "planfly refly flight.mcap --out refly",
     )
-    completed(parser.add_argument("log", metavar="FLIGHT.mcap", help="a flight log that import wrote"), files("mcap"))
-    completed(
+    with_completer(
+        parser.add_argument("log", metavar="FLIGHT.mcap", help="a flight log that import wrote"), files("mcap")
+    )
+    with_completer(
         parser.add_argument(
             "--aircraft", metavar="AIRCRAFT", help="aircraft that flies it again (default: the aircraft of the log)"
         ),
-        aircraft_words,
+        complete_aircraft,
     )
     turbulence_option(parser)
     result_options(parser, "where the pictures go (default: <log>-refly beside it, replaced)")
@@ -88,18 +90,18 @@ def refly(args: argparse.Namespace) -> int:
     source = Path(args.log)
     log = planfly.read_log(source)
     folder = args.out or source.with_name(f"{source.stem}-refly")
-    done = call(planfly.refly, args, log=log, out=folder, overwrite=args.overwrite or args.out is None)
-    print("\n".join(done.lines))
-    for file in done.files:
+    reflown = call(planfly.refly, args, log=log, out=folder, overwrite=args.overwrite or args.out is None)
+    print("\n".join(reflown.lines))
+    for file in reflown.files:
         print(f"refly     {file}")
     if not log.complete:
         warn_of_loss(log)
     code = FLYABLE if log.complete else LOSS
-    give_answer(args, lambda: _refly_answer(done, code))
+    give_answer(args, lambda: _refly_answer(reflown, code))
     return code
 
 
-def _refly_answer(done: "Reflown", code: int) -> object:
+def _refly_answer(reflown: "Reflown", code: int) -> object:
     from planfly.terminal.answers import ReflyAnswer
 
-    return ReflyAnswer(exit_code=code, lines=list(done.lines), files=[str(file) for file in done.files])
+    return ReflyAnswer(exit_code=code, lines=list(reflown.lines), files=[str(file) for file in reflown.files])

@@ -5,7 +5,7 @@ import shlex
 
 import planfly
 from planfly.arguments import CHOICES
-from planfly.terminal.arguments import aircraft_words, completed, number, place
+from planfly.terminal.arguments import complete_aircraft, number, place, with_completer
 from planfly.terminal.command_parser import LineParser, coloured
 from planfly.terminal.exit_codes import FLYABLE, NOT_FLYABLE
 from planfly.terminal.options import call, result_options, terrain_option
@@ -21,12 +21,12 @@ def new_options(line: LineParser) -> None:
         "planfly new ./site --from 46.52,8.01 --to 46.60,8.12 --aircraft x8 --height 100",
     )
     parser.add_argument("folder", metavar="FOLDER", help="folder for the scenario file, which gets the folder's name")
-    way = parser.group("the way")
+    route_group = parser.group("the way")
     for option, keyword in (("--from", "start"), ("--to", "destination")):
-        way.add_argument(
+        route_group.add_argument(
             option, dest=keyword, metavar="LAT,LON", type=place, required=True, help="latitude and longitude, degrees"
         )
-    way.add_argument(
+    route_group.add_argument(
         "--height",
         metavar="M",
         type=number("height"),
@@ -34,17 +34,19 @@ def new_options(line: LineParser) -> None:
         help="height of both ends above ground, m (default: 120)",
     )
     terrain_option(parser.group("where it flies"))
-    flown = parser.group("aircraft and autopilot")
-    completed(
-        flown.add_argument(
+    flight_group = parser.group("aircraft and autopilot")
+    with_completer(
+        flight_group.add_argument(
             "--aircraft",
             metavar="AIRCRAFT",
             default="aerosonde",
             help="a name that planfly aircraft lists, or a folder (default: aerosonde)",
         ),
-        aircraft_words,
+        complete_aircraft,
     )
-    flown.add_argument("--autopilot", choices=CHOICES["autopilot"], help="simulated autopilot (default: ardupilot)")
+    flight_group.add_argument(
+        "--autopilot", choices=CHOICES["autopilot"], help="simulated autopilot (default: ardupilot)"
+    )
     result_options(parser)
 
 
@@ -56,22 +58,22 @@ def new(args: argparse.Namespace) -> int:
     print(f"scenario  {file}")
     if args.terrain is None:
         print("ground    flat, at mean sea level: nobody named an elevation file (--terrain DEM)")
-    made = planfly.plan(file)
-    code = FLYABLE if made.safe else NOT_FLYABLE
-    if made.safe:
-        ratio = float(made.objectives[Objective.LENGTH_RATIO])
+    plan = planfly.plan(file)
+    code = FLYABLE if plan.safe else NOT_FLYABLE
+    if plan.safe:
+        ratio = float(plan.objectives[Objective.LENGTH_RATIO])
         safe = coloured("plans     safe", "good")
-        print(f"{safe}: {len(made.waypoints)} waypoints, {ratio:.3f} times the straight line")
+        print(f"{safe}: {len(plan.waypoints)} waypoints, {ratio:.3f} times the straight line")
     else:
         print(coloured("plans     no safe path", "bad"))
-        for said in (*made.certificate.problems, *planfly.what_blocks(made)):
-            print(f"  {said}")
+        for problem in (*plan.certificate.problems, *planfly.what_blocks(plan)):
+            print(f"  {problem}")
     print(f"next      planfly run {shlex.quote(str(file))}")
 
     def answer() -> object:
         from planfly.terminal.answers import NewAnswer
 
-        return NewAnswer(exit_code=code, file=str(file), safe=made.safe, waypoints=len(made.waypoints))
+        return NewAnswer(exit_code=code, file=str(file), safe=plan.safe, waypoints=len(plan.waypoints))
 
     give_answer(args, answer)
     return code

@@ -48,16 +48,16 @@ def paper_options(line: LineParser) -> None:
 def paper(args: argparse.Namespace) -> int:
     """Plan, and write and print the table; return 0 for every result, because "no path" is also an answer."""
     folder = Path(args.out) if args.out else RESULTS / "paper"
-    made = call(planfly.paper_tables, args, out=folder, overwrite=args.overwrite or args.out is None)
+    tables = call(planfly.paper_tables, args, out=folder, overwrite=args.overwrite or args.out is None)
     from planfly.planning.paper import table_text
 
-    print(table_text(made.rows))
+    print(table_text(tables.rows))
     print(f"results   {folder}/ (table.csv, runs.csv, runs.json, times.csv, paths-, encodings-, convergence.png)")
 
     def answer() -> object:
         from planfly.terminal.answers import PaperAnswer, PaperRow
 
-        return PaperAnswer(exit_code=FLYABLE, folder=str(folder), rows=[PaperRow(**asdict(row)) for row in made.rows])
+        return PaperAnswer(exit_code=FLYABLE, folder=str(folder), rows=[PaperRow(**asdict(row)) for row in tables.rows])
 
     give_answer(args, answer)
     return FLYABLE

@@ -8,10 +8,16 @@ from types import FrameType
 from typing import TYPE_CHECKING
 
 import planfly
-from planfly.terminal.arguments import budget, completed, files, number, threat
+from planfly.terminal.arguments import budget, files, number, threat, with_completer
 from planfly.terminal.command_parser import LineParser
 from planfly.terminal.exit_codes import FLYABLE, NOT_FLYABLE
-from planfly.terminal.options import call, flown_by_options, pilot_options, result_options, scenario_argument
+from planfly.terminal.options import (
+    aircraft_and_wind_options,
+    autopilot_options,
+    call,
+    result_options,
+    scenario_argument,
+)
 from planfly.terminal.output import give_answer
 from planfly.terminal.results import print_warnings
 from planfly.workflow.output_paths import RUN_FOLDER, expand_path_pattern
@@ -33,8 +39,8 @@ def plan_options(line: LineParser) -> None:
         "planfly plan jacksboro --from plan.json --at-leg 4 --add-threat -2000,1500,800,1500",
         "planfly plan hard-30 --front 20 --out front",
     )
-    parser.more = _algorithms_help
-    parser.alias("seconds", "--budget")
+    parser.extra_help = _algorithms_help
+    parser.alias_keyword("seconds", "--budget")
     scenario_argument(parser, help="TOML file or embedded name")
     planning = parser.group("planning")
     planning.add_argument(
@@ -59,7 +65,7 @@ def plan_options(line: LineParser) -> None:
         "of plan-1.json ..., front.csv, front.json and pictures (default: runs/<name>-seed<N>-front, replaced)",
     )
     again = parser.group("planning again in flight")
-    completed(
+    with_completer(
         again.add_argument("--from", dest="old", metavar="PLAN.json", help="plan that is being flown"),
         files("json"),
     )
@@ -74,8 +80,8 @@ def plan_options(line: LineParser) -> None:
         action="append",
         help="a threat that has appeared, in m; repeatable",
     )
-    flown_by_options(parser)
-    pilot_options(parser)
+    aircraft_and_wind_options(parser)
+    autopilot_options(parser)
     result_options(parser, "the plan file (default: runs/<name>-seed<N>/plan.json, replaced)", "FILE")
 
 
@@ -94,7 +100,7 @@ def plan(args: argparse.Namespace) -> int:
     out = f"{RUN_FOLDER}/{name}" if args.out is None else args.out
     evaluations, seconds = args.budget or (None, None)
     with _stop_on_interrupt() as stop:
-        made = call(
+        plan_made = call(
             planfly.plan if args.old is None else planfly.replan,
             args,
             budget=evaluations,
@@ -103,12 +109,12 @@ def plan(args: argparse.Namespace) -> int:
             overwrite=args.overwrite or args.out is None,
             stop=stop,
         )
-    target = expand_path_pattern(out, made.scenario.name, made.seed)
-    print_warnings(made.scenario.notes)
-    _print_plan(made)
+    target = expand_path_pattern(out, plan_made.scenario.name, plan_made.seed)
+    print_warnings(plan_made.scenario.notes)
+    _print_plan(plan_made)
     print(f"plan      {target}")
-    code = FLYABLE if made.safe else NOT_FLYABLE
-    give_answer(args, lambda: _json_answer(made, target, code))
+    code = FLYABLE if plan_made.safe else NOT_FLYABLE
+    give_answer(args, lambda: _json_answer(plan_made, target, code))
     return code
 
 
@@ -126,7 +132,7 @@ def _plan_front(args: argparse.Namespace) -> int:
         raise ScenarioError.of_argument("budget", evaluations, allowed)
     out = FRONT_FOLDER if args.out is None else args.out
     with _stop_on_interrupt() as stop:
-        made = call(
+        front = call(
             planfly.plan_front,
             args,
             count=args.front,
@@ -135,53 +141,53 @@ def _plan_front(args: argparse.Namespace) -> int:
             overwrite=args.overwrite or args.out is None,
             stop=stop,
         )
-    default = made.default.plan
+    default = front.default.plan
     folder = expand_path_pattern(out, default.scenario.name, default.seed)
     print_warnings(default.scenario.notes)
-    print("\n".join(front_lines(made, folder)))
-    code = FLYABLE if made.plans else NOT_FLYABLE
-    give_answer(args, lambda: front_answer(made, folder, code))
+    print("\n".join(front_lines(front, folder)))
+    code = FLYABLE if front.plans else NOT_FLYABLE
+    give_answer(args, lambda: front_answer(front, folder, code))
     return code
 
 
-def _json_answer(made: "Plan", target: "Path", code: int) -> object:
+def _json_answer(plan: "Plan", target: "Path", code: int) -> object:
     from planfly.api.planning import conditions_of_plan
     from planfly.terminal.plan_answers import PlanAnswer
     from planner.plan import Objective
 
     return PlanAnswer(
         exit_code=code,
-        scenario=made.scenario.name,
-        seed=made.seed,
+        scenario=plan.scenario.name,
+        seed=plan.seed,
         file=str(target),
-        safe=made.safe,
-        feasible=made.feasible,
-        waypoints=len(made.waypoints),
-        length_ratio=float(made.objectives[Objective.LENGTH_RATIO]),
-        algorithm=made.algorithm,
-        evaluations=made.evaluations,
-        ended=made.ended,
-        problems=list(made.certificate.problems),
-        conditions=conditions_of_plan(made),
+        safe=plan.safe,
+        feasible=plan.feasible,
+        waypoints=len(plan.waypoints),
+        length_ratio=float(plan.objectives[Objective.LENGTH_RATIO]),
+        algorithm=plan.algorithm,
+        evaluations=plan.evaluations,
+        ended=plan.ended,
+        problems=list(plan.certificate.problems),
+        conditions=conditions_of_plan(plan),
     )
 
 
 @contextmanager
 def _stop_on_interrupt() -> Iterator[Callable[[], bool]]:
     """Yield a function that returns True after Ctrl-C, which stops a search; a second Ctrl-C ends the command."""
-    pressed = False
+    was_pressed = False
 
-    def press(_signal: int, _frame: FrameType | None) -> None:
-        nonlocal pressed
-        if pressed:
+    def handle_signal(_signal: int, _frame: FrameType | None) -> None:
+        nonlocal was_pressed
+        if was_pressed:
             interrupt(signal.SIGINT)
-        pressed = True
+        was_pressed = True
 
-    before = signal.signal(signal.SIGINT, press)
+    previous_handler = signal.signal(signal.SIGINT, handle_signal)
     try:
-        yield lambda: pressed
+        yield lambda: was_pressed
     finally:
-        signal.signal(signal.SIGINT, before)
+        signal.signal(signal.SIGINT, previous_handler)
 
 
 def _check_replanning(args: argparse.Namespace) -> None:
@@ -196,23 +202,23 @@ def _check_replanning(args: argparse.Namespace) -> None:
         raise ScenarioError.of_argument("old", args.old, allowed, shown="")
 
 
-def _print_plan(made: "Plan") -> None:
+def _print_plan(plan: "Plan") -> None:
     """Print the properties of a plan."""
     from logs.verdict.conditions import autopilot_line, condition_lines
     from planfly.api.planning import conditions_of_plan
     from planner.plan import Objective
 
-    state = "safe" if made.safe else "feasible, but inside a missile's reach" if made.feasible else "no feasible plan"
-    length = float(made.objectives[Objective.LENGTH_RATIO])
-    print(f"{state}: {len(made.waypoints)} waypoints, {length:.3f} times the straight line, algorithm {made.algorithm}")
-    conditions = conditions_of_plan(made)
+    state = "safe" if plan.safe else "feasible, but inside a missile's reach" if plan.feasible else "no feasible plan"
+    length = float(plan.objectives[Objective.LENGTH_RATIO])
+    print(f"{state}: {len(plan.waypoints)} waypoints, {length:.3f} times the straight line, algorithm {plan.algorithm}")
+    conditions = conditions_of_plan(plan)
     print("\n".join([*condition_lines(conditions), autopilot_line(conditions, flown=False)]))
-    if made.ended != "completed":
-        why = "at its budget" if made.ended == "budget" else "by Ctrl-C"
-        print(f"  note    the search was ended {why}, after {made.evaluations:,} evaluations: the best plan so far")
-    if made.flown_legs:
-        print(f"  note    legs 0..{made.flown_legs - 1} are flown and kept; judged is what follows them")
-    for problem in made.certificate.problems:
+    if plan.ended != "completed":
+        reason = "at its budget" if plan.ended == "budget" else "by Ctrl-C"
+        print(f"  note    the search was ended {reason}, after {plan.evaluations:,} evaluations: the best plan so far")
+    if plan.flown_legs:
+        print(f"  note    legs 0..{plan.flown_legs - 1} are flown and kept; judged is what follows them")
+    for problem in plan.certificate.problems:
         print(f"  failed  {problem}")
-    for obstacle in planfly.what_blocks(made):
+    for obstacle in planfly.what_blocks(plan):
         print(f"  note    {obstacle}")

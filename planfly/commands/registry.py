@@ -85,16 +85,16 @@ first steps:
 
 def build_parser() -> LineParser:
     """Return the parser for the whole command line."""
-    line = LineParser(
+    parser = LineParser(
         __version__,
         "Will this plan really fly?  Plans a fixed-wing path over terrain and threats,\n"
         "flies it (or any mission file) in JSBSim, and gives a verdict with numbers.",
         _FIRST_STEPS,
     )
     for command in COMMANDS:
-        line.section(command.section)
-        command.load("_options")(line)
-    return line
+        parser.section(command.section)
+        command.load("_options")(parser)
+    return parser
 
 
 def find_command(name: str) -> CommandFunction:
@@ -137,8 +137,8 @@ def answer_schema(name: str) -> dict[str, Any]:
         raise KeyError(name)
     module, _, answer = _find_entry(name).answer.rpartition(".")
     answers = import_module(f"planfly.terminal.{module or 'answers'}")
-    made = TypeAdapter(getattr(answers, answer)).json_schema(mode="serialization")
-    return {"$schema": _JSON_SCHEMA_DRAFT, **made, "title": f"planfly {name} --json"}
+    schema = TypeAdapter(getattr(answers, answer)).json_schema(mode="serialization")
+    return {"$schema": _JSON_SCHEMA_DRAFT, **schema, "title": f"planfly {name} --json"}
 
 
 def answer_objects(schema: dict[str, Any]) -> list[dict[str, Any]]:
@@ -147,7 +147,7 @@ def answer_objects(schema: dict[str, Any]) -> list[dict[str, Any]]:
     >>> [one["properties"]["schema"]["const"] for one in answer_objects(answer_schema("check"))]
     ['planfly.verdict/3', 'planfly.verdicts/1']
     """
-    refs = [one["$ref"].rpartition("/")[2] for one in schema.get("anyOf", ())]
+    refs = [option["$ref"].rpartition("/")[2] for option in schema.get("anyOf", ())]
     return [schema["$defs"][ref] for ref in refs] or [schema]
 
 

@@ -18,7 +18,7 @@ from planfly.terminal.options import (
     own_link_options,
     print_at_once,
     result_options,
-    stop_signals,
+    watch_stop_signals,
 )
 from planfly.terminal.output import give_answer, plain_stream
 from planfly.terminal.results import warn_of_loss
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from planfly import FlightLog
 
 # Frame rate on a terminal, Hz.
-_RATE = 10.0
+_FRAME_RATE_HZ = 10.0
 # Terminal sequence that switches to the alternate screen and hides the cursor.
 _ENTER_SCREEN = "\x1b[?1049h\x1b[?25l"
 # Terminal sequence that shows the cursor and leaves the alternate screen.
@@ -50,7 +50,7 @@ def replay_options(line: LineParser) -> None:
         "planfly replay flight.mcap --speed 20 --from 60",
         "planfly replay flight.mcap --to 127.0.0.1:14550",
     )
-    parser.alias("end", "--to")
+    parser.alias_keyword("end", "--to")
     log_argument(parser)
     part = parser.group("which part, how fast")
     part.add_argument(
@@ -104,16 +104,16 @@ def replay_options(line: LineParser) -> None:
 
 def replay(args: argparse.Namespace) -> int:
     """Show the instruments or the timeline, or replay as the options request; return 3 for an incomplete log."""
-    stations = isinstance(args.to, str)
-    if bool(args.foxglove) + bool(args.movie) + stations > 1:
+    to_station = isinstance(args.to, str)
+    if bool(args.foxglove) + bool(args.movie) + to_station > 1:
         options = "--foxglove, --movie, --to IP:PORT"
         raise PlanflyError(f"{options}: expected only one of them", field=options, allowed="expected only one of them")
     log = planfly.read_log(Path(args.log))
-    if not stations:
+    if not to_station:
         args.end = args.to
-    if stations or args.foxglove:
-        play = planfly.play_to_stations if stations else planfly.play_to_foxglove
-        with stop_signals() as stop:
+    if to_station or args.foxglove:
+        play = planfly.play_to_stations if to_station else planfly.play_to_foxglove
+        with watch_stop_signals() as stop:
             call(play, args, log=log, stop=stop, on_message=print_at_once)
     elif args.movie:
         for file in call(planfly.movie, args, log=log, out=args.movie)[:3]:
@@ -134,7 +134,7 @@ def _json_answer(args: argparse.Namespace, log: "FlightLog", code: int) -> objec
     from planfly.terminal.answers import ReplayAnswer, TimelineEvent
 
     entries = planfly.timeline(log) if isinstance(args.to, str) else call(planfly.timeline, args, log=log)
-    events = [TimelineEvent(time_s=one.time, kind=one.kind, text=one.text) for one in entries]
+    events = [TimelineEvent(time_s=entry.time, kind=entry.kind, text=entry.text) for entry in entries]
     return ReplayAnswer(exit_code=code, log=args.log, complete=log.complete, end_s=log.end_time, timeline=events)
 
 
@@ -144,10 +144,10 @@ def _print_timeline(log: "FlightLog", args: argparse.Namespace) -> None:
 
     speed = args.speed
     entries = call(planfly.timeline, args, log=log)
-    start, played = args.start or float(log.track.time[0]), RunningClock()
+    start, clock = args.start or float(log.track.time[0]), RunningClock()
     for entry in entries:
-        while speed and (ahead := (entry.time - start) / speed - played()) > 0.0:
-            time.sleep(min(ahead, 1.0 / _RATE))
+        while speed and (wait := (entry.time - start) / speed - clock()) > 0.0:
+            time.sleep(min(wait, 1.0 / _FRAME_RATE_HZ))
         print("\n".join(entry_lines(entry)), flush=bool(speed))
 
 
@@ -159,8 +159,8 @@ def _show_instruments(log: "FlightLog", args: argparse.Namespace) -> None:
     print(_ENTER_SCREEN, end="", file=screen)
     try:
         for _, lines in frames:
-            fitting = [*lines[: max(1, shutil.get_terminal_size().lines - 2)], f"x {speed:g}, Ctrl-C stops"]
-            text = "".join(without_controls(line) + _ERASE_LINE_END + "\n" for line in fitting)
+            visible_lines = [*lines[: max(1, shutil.get_terminal_size().lines - 2)], f"x {speed:g}, Ctrl-C stops"]
+            text = "".join(without_controls(line) + _ERASE_LINE_END + "\n" for line in visible_lines)
             print(_HOME + text + _ERASE_SCREEN_END, end="", flush=True, file=screen)
     finally:
         print(_LEAVE_SCREEN, end="", flush=True, file=screen)

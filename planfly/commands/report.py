@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import planfly
-from planfly.terminal.arguments import completed, files
+from planfly.terminal.arguments import files, with_completer
 from planfly.terminal.command_parser import LineParser
 from planfly.terminal.exit_codes import BAD_INPUT, FLYABLE, LOSS, NOT_FLYABLE, verdict_code
 from planfly.terminal.options import result_options
@@ -26,7 +26,7 @@ def report_options(line: LineParser) -> None:
         "draw the figures and write report.html from a log alone, or write the layout for Foxglove",
         "planfly report flight.mcap --out report --svg",
     )
-    completed(parser.add_argument("log", metavar="LOG.mcap", nargs="?", help="a flight log"), files("mcap"))
+    with_completer(parser.add_argument("log", metavar="LOG.mcap", nargs="?", help="a flight log"), files("mcap"))
     parser.add_argument("--svg", action="store_true", help="also write the figures as SVG")
     parser.add_argument("--layout", metavar="FILE", help="write only the layout file for Foxglove")
     result_options(parser, "where the files go (default: <log>-report beside the log, replaced)")

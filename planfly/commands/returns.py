@@ -6,12 +6,12 @@ from typing import TYPE_CHECKING
 
 import planfly
 from planfly.commands.check import LOGS
-from planfly.terminal.arguments import IMPORTED_LOGS, MISSIONS, completed, files, number
+from planfly.terminal.arguments import IMPORTED_LOGS, MISSIONS, files, number, with_completer
 from planfly.terminal.command_parser import LineParser, coloured
 from planfly.terminal.exit_codes import FLYABLE, LOSS, NOT_FLYABLE
 from planfly.terminal.options import (
+    aircraft_and_wind_options,
     call,
-    flown_by_options,
     imported_log_options,
     program_option,
     result_options,
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from planfly import ReturnsFound
 
 # Maximum number of ranges of seconds that are listed.
-_LISTED = 20
+_MAX_LISTED = 20
 
 
 def returns_options(line: LineParser) -> None:
@@ -37,7 +37,7 @@ def returns_options(line: LineParser) -> None:
         "planfly returns flight.mcap --every 5 --out pictures",
         "planfly returns flight.mcap --sitl ./arduplane --points 5",
     )
-    completed(
+    with_completer(
         parser.add_argument(
             "what", metavar="MISSION|LOG", help=f"plan.json, .waypoints or .plan, or a flight log (.mcap, or {LOGS})"
         ),
@@ -65,7 +65,7 @@ def returns_options(line: LineParser) -> None:
     )
     imported_log_options(parser)
     world_options(parser)
-    flown_by_options(parser)
+    aircraft_and_wind_options(parser)
     steering_options(parser).add_argument(
         "--seed", metavar="N", type=number("seed"), help="seed of the turbulence (default: the plan's, or 1)"
     )
@@ -85,24 +85,24 @@ def returns(args: argparse.Namespace) -> int:
     print(f"returns   {coloured(found.headline, 'good' if found.safe else 'warning' if found.undecided else 'bad')}")
     for text in flown_lines(setup_conditions(found.setup)):
         print(f"  {text}")
-    for text in found.lines_of_causes:
+    for text in found.cause_lines:
         print(f"  {text}")
-    for text in found.lines_of_ranges[:_LISTED]:
+    for text in found.range_lines[:_MAX_LISTED]:
         print(f"  {text}")
-    if len(found.lines_of_ranges) > _LISTED:
-        print(f"  and {len(found.lines_of_ranges) - _LISTED} ranges more; --json FILE has them all")
-    for text in found.lines_of_program:
+    if len(found.range_lines) > _MAX_LISTED:
+        print(f"  and {len(found.range_lines) - _MAX_LISTED} ranges more; --json FILE has them all")
+    for text in found.program_lines:
         print(f"  {text}")
-    print(f"  {found.line_of_no_return}")
-    for text in found.lines_of_suggestions:
+    print(f"  {found.no_return_line}")
+    for text in found.suggestion_lines:
         print(coloured("  would help: ", "hint") + text)
     if args.suggest and not found.safe and not found.suggested:
         print("  no RTL_ALTITUDE, climb or rally points were found that would help")
-    print(f"engine out: {found.headline_of_glides}")
-    for text in found.lines_of_glides[:_LISTED]:
+    print(f"engine out: {found.glide_headline}")
+    for text in found.glide_lines[:_MAX_LISTED]:
         print(f"  {text}")
-    if len(found.lines_of_glides) > _LISTED:
-        print(f"  and {len(found.lines_of_glides) - _LISTED} ranges more; --json FILE has them all")
+    if len(found.glide_lines) > _MAX_LISTED:
+        print(f"  and {len(found.glide_lines) - _MAX_LISTED} ranges more; --json FILE has them all")
     for text in found.notes:
         print(f"  note    {text}")
     for path in found.files:
@@ -132,17 +132,18 @@ def _json_answer(what: str, found: "ReturnsFound", code: int) -> object:
         every_s=returns.every,
         least_clearance_m=returns.limit,
         causes=[
-            CauseEntry(name=one.name, does=one.does, parameter=one.parameter, value=one.value) for one in returns.causes
+            CauseEntry(name=cause.name, does=cause.does, parameter=cause.parameter, value=cause.value)
+            for cause in returns.causes
         ],
         rtl_autoland=returns.autoland,
         not_judged=list(returns.open),
-        ranges=[return_entry(found, one) for one in returns.ranges],
+        ranges=[return_entry(found, return_range) for return_range in returns.ranges],
         by_program=program_entry(found),
         left_out=returns.left_out,
         no_return=no_return.kind,
         no_return_s=None if math.isnan(no_return.time) else round(no_return.time, 2),
         engine_out=glides_entry(found),
-        suggestions=[suggestion_entry(found, one) for one in found.suggested],
+        suggestions=[suggestion_entry(found, suggested) for suggested in found.suggested],
         files=[str(path) for path in found.files],
         notes=list(found.notes),
     )

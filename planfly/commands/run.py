@@ -66,7 +66,8 @@ def _json_answer(result: "RunResult", refined: bool, code: int) -> object:
     from planfly.terminal.answers import RoundAnswer, RunAnswer
 
     rounds = [
-        RoundAnswer(round=one.number, changes=list(one.changes), summary=one.verdict.headline) for one in result.rounds
+        RoundAnswer(round=finished.number, changes=list(finished.changes), summary=finished.verdict.headline)
+        for finished in result.rounds
     ]
     return RunAnswer(
         exit_code=code,
@@ -79,19 +80,19 @@ def _json_answer(result: "RunResult", refined: bool, code: int) -> object:
     )
 
 
-def _print_round(done: "Round") -> None:
-    print_verdict(done.verdict, done.notes)
-    print_returns(done.returns_line)
+def _print_round(finished: "Round") -> None:
+    print_verdict(finished.verdict, finished.notes)
+    print_returns(finished.returns_line)
     files = "plan.json, mission.waypoints, mission.plan, verdict.json; nothing was flown"
-    if done.flown:
-        flight = "flight.mcap" if done.has_log else "no flight"
+    if finished.flown:
+        flight = "flight.mcap" if finished.has_log else "no flight"
         files = f"report.html, map.png, profile.png, {flight}, verdict.json, plan.json, missions"
-    print(f"results   {done.folder}/ ({files})")
+    print(f"results   {finished.folder}/ ({files})")
 
 
 def _print_rounds(result: "RunResult") -> None:
     print("rounds")
-    for one in result.rounds:
-        changes = "; ".join(one.changes) or "as given"
-        print(f"  {one.number}  {one.folder}/  {changes}: {one.verdict.headline}")
+    for finished in result.rounds:
+        changes = "; ".join(finished.changes) or "as given"
+        print(f"  {finished.number}  {finished.folder}/  {changes}: {finished.verdict.headline}")
     print(f"  {result.ended}")

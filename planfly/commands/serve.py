@@ -3,16 +3,16 @@
 import argparse
 
 import planfly
-from planfly.terminal.arguments import MISSIONS, completed, files, number
+from planfly.terminal.arguments import MISSIONS, files, number, with_completer
 from planfly.terminal.command_parser import LineParser
 from planfly.terminal.exit_codes import FLYABLE
 from planfly.terminal.options import (
+    aircraft_and_wind_options,
     call,
-    flown_by_options,
     own_link_options,
     print_at_once,
     steering_options,
-    stop_signals,
+    watch_stop_signals,
     world_options,
 )
 
@@ -32,12 +32,12 @@ def serve_options(line: LineParser) -> None:
         extra="live",
         more=_VEHICLE_HELP,
     )
-    completed(
+    with_completer(
         parser.add_argument("mission", metavar="MISSION", nargs="?", help="a mission file to begin with"),
         files(*MISSIONS),
     )
     world_options(parser)
-    flown_by_options(parser)
+    aircraft_and_wind_options(parser)
     steering_options(parser)
     parser.add_argument(
         "--to",
@@ -60,6 +60,6 @@ def serve_options(line: LineParser) -> None:
 
 def serve(args: argparse.Namespace) -> int:
     """Serve until SIGINT or SIGTERM."""
-    with stop_signals() as stop:
+    with watch_stop_signals() as stop:
         call(planfly.serve, args, stop=stop, on_message=print_at_once)
     return FLYABLE

@@ -4,7 +4,7 @@ import argparse
 import sys
 
 import planfly
-from planfly.terminal.arguments import SHELLS, completed, shell_script
+from planfly.terminal.arguments import SHELLS, shell_script, with_completer
 from planfly.terminal.command_parser import LineParser
 from planfly.terminal.exit_codes import BAD_INPUT, FLYABLE
 from planfly.terminal.options import json_option
@@ -29,7 +29,7 @@ def completion_options(line: LineParser) -> None:
         "print the script with which a shell completes planfly's commands, options and names",
         "planfly completion bash",
     )
-    parser.more = lambda: _COMPLETION_HELP
+    parser.extra_help = lambda: _COMPLETION_HELP
     parser.add_argument("shell", choices=SHELLS, metavar="SHELL", help="bash, zsh or fish")
 
 
@@ -48,7 +48,7 @@ def show_help_options(line: LineParser) -> None:
     parser = line.command(
         "help", "show the help of a command, or list the commands", "planfly help fly", "planfly help fly --schema"
     )
-    completed(
+    with_completer(
         parser.add_argument("topic", metavar="COMMAND", nargs="?", help="a command (default: all of them)"),
         lambda prefix, **_: [name for name in line.commands if name.startswith(prefix)],
     )
@@ -63,22 +63,24 @@ def show_help(args: argparse.Namespace) -> int:
     line = build_parser()
     if args.topic is None:
         if args.schema:
-            return _refuse("--schema: name a command, as in planfly help fly --schema")
+            return _report_bad_usage("--schema: name a command, as in planfly help fly --schema")
         line.print_help()
         return FLYABLE
     if args.topic not in line.commands:
-        return _refuse(f"{args.topic!r}: no such command{did_you_mean(args.topic, line.commands)}")
+        return _report_bad_usage(f"{args.topic!r}: no such command{did_you_mean(args.topic, line.commands)}")
     if args.schema:
         if args.topic not in answering_commands():
-            return _refuse(f"--schema: {args.topic} has no --json; these have: {', '.join(answering_commands())}")
+            return _report_bad_usage(
+                f"--schema: {args.topic} has no --json; these have: {', '.join(answering_commands())}"
+            )
         print(schema_text(args.topic), end="")
         return FLYABLE
     line.commands[args.topic].print_help()
     return FLYABLE
 
 
-def _refuse(why: str) -> int:
-    print(f"planfly help: {why}", file=sys.stderr)
+def _report_bad_usage(reason: str) -> int:
+    print(f"planfly help: {reason}", file=sys.stderr)
     return BAD_INPUT
 
 
@@ -94,14 +96,14 @@ def scenarios_options(line: LineParser) -> None:
 
 def scenarios(args: argparse.Namespace) -> int:
     """Print the name and description of each embedded scenario."""
-    known = planfly.scenarios()
-    for name, description in known.items():
+    descriptions = planfly.scenarios()
+    for name, description in descriptions.items():
         print(f"{name:<12} {description}")
 
     def answer() -> object:
         from planfly.terminal.answers import ScenarioEntry, ScenariosAnswer
 
-        entries = [ScenarioEntry(name=name, description=description) for name, description in known.items()]
+        entries = [ScenarioEntry(name=name, description=description) for name, description in descriptions.items()]
         return ScenariosAnswer(exit_code=FLYABLE, scenarios=entries)
 
     give_answer(args, answer)

@@ -3,15 +3,15 @@
 import argparse
 
 import planfly
-from planfly.terminal.arguments import IMPORTED_LOGS, MISSIONS, completed, files, number
+from planfly.terminal.arguments import IMPORTED_LOGS, MISSIONS, files, number, with_completer
 from planfly.terminal.command_parser import LineParser
 from planfly.terminal.exit_codes import FLYABLE
 from planfly.terminal.options import (
+    aircraft_and_wind_options,
+    autopilot_options,
     call,
-    flown_by_options,
-    pilot_options,
     print_at_once,
-    stop_signals,
+    watch_stop_signals,
     world_options,
 )
 
@@ -34,7 +34,7 @@ def studio_options(line: LineParser) -> None:
         extra="studio",
         more=_CONTROLS_HELP,
     )
-    completed(
+    with_completer(
         parser.add_argument(
             "what",
             metavar="SCENARIO|MISSION|PLAN",
@@ -64,12 +64,12 @@ def studio_options(line: LineParser) -> None:
         "--keep", metavar="DIR", help="folder of the session that the next start restores (default: runs/studio)"
     )
     world_options(parser)
-    flown_by_options(parser)
-    pilot_options(parser)
+    aircraft_and_wind_options(parser)
+    autopilot_options(parser)
 
 
 def studio(args: argparse.Namespace) -> int:
     """Serve until SIGINT or SIGTERM."""
-    with stop_signals() as stop:
+    with watch_stop_signals() as stop:
         call(planfly.open_studio, args, stop=stop, on_message=print_at_once)
     return FLYABLE

@@ -6,10 +6,10 @@ from shlex import quote
 from typing import TYPE_CHECKING
 
 import planfly
-from planfly.terminal.arguments import MISSIONS, camera, completed, files, number
+from planfly.terminal.arguments import MISSIONS, camera, files, number, with_completer
 from planfly.terminal.command_parser import LineParser, coloured
 from planfly.terminal.exit_codes import NOT_FLYABLE, verdict_code
-from planfly.terminal.options import call, flown_by_options, result_options, steering_options, world_options
+from planfly.terminal.options import aircraft_and_wind_options, call, result_options, steering_options, world_options
 from planfly.terminal.output import give_answer
 
 if TYPE_CHECKING:
@@ -24,7 +24,7 @@ def survey_options(line: LineParser) -> None:
         "planfly survey field.plan --terrain dem.tif --aircraft x8 --autopilot ardupilot --wind 5,250",
         "planfly survey field.waypoints --suggest --out better",
     )
-    completed(
+    with_completer(
         parser.add_argument("what", metavar="MISSION|LOG", help=".waypoints or .plan, or a flight log (.mcap)"),
         files(*MISSIONS, "mcap"),
     )
@@ -44,7 +44,7 @@ def survey_options(line: LineParser) -> None:
         "be used: each is flown",
     )
     world_options(parser)
-    flown_by_options(parser)
+    aircraft_and_wind_options(parser)
     steering_options(parser).add_argument(
         "--seed", metavar="N", type=number("seed"), help="seed of the turbulence (default: 1)"
     )
@@ -63,21 +63,23 @@ def survey(args: argparse.Namespace) -> int:
     print(f"flight    {found.verdict.headline}")
     for text in flown_lines(setup_conditions(found.setup)):
         print(f"  {text}")
-    for text in found.lines_of_lines:
+    for text in found.survey_lines:
         print(f"  {text}")
-    for text in found.lines_of_remedies:
+    for text in found.remedy_lines:
         print(coloured("  would help: ", "hint") + text)
     if args.suggest and not found.usable and not found.remedies:
-        for text in found.lines_without_remedy:
+        for text in found.no_remedy_lines:
             print(f"  {text}")
     for path in found.files:
         print(f"  written {path}")
     if missions := [path for path in found.files if path.suffix == ".waypoints"]:
         # Other commands judge a mission without camera items as a path, not as a survey.
         settings = [f" --params {quote(str(path))}" for path in found.files if path.suffix == ".param"]
-        also = settings[0] if missions[0].stem == "parameter" and settings else ""
-        following = f"next      planfly survey {quote(str(missions[0]))}{also} with the same options, as it was flown"
-        print(coloured(following, "hint"))
+        params_option = settings[0] if missions[0].stem == "parameter" and settings else ""
+        next_line = (
+            f"next      planfly survey {quote(str(missions[0]))}{params_option} with the same options, as it was flown"
+        )
+        print(coloured(next_line, "hint"))
     give_answer(args, lambda: _json_answer(str(args.what), found, code))
     return code
 
@@ -99,11 +101,11 @@ def _json_answer(what: str, found: "SurveyFound", code: int) -> object:
         usable=found.usable,
         conditions=setup_conditions(found.setup),
         surveys=[
-            [photo_line_entry(found.setup, line, one) for line, one in zip(survey.lines, lines, strict=True)]
+            [photo_line_entry(found.setup, line, measure) for line, measure in zip(survey.lines, lines, strict=True)]
             for survey, lines in zip(found.surveys, found.lines, strict=True)
         ],
-        overlaps=[None if one is None else overlap_entry(one) for one in found.overlaps],
-        remedies=[survey_remedy_entry(one) for one in found.remedies],
+        overlaps=[None if overlap is None else overlap_entry(overlap) for overlap in found.overlaps],
+        remedies=[survey_remedy_entry(remedy) for remedy in found.remedies],
         nearest=None if found.nearest is None else near_miss_entry(found.nearest),
         files=[str(Path(path)) for path in found.files],
     )

@@ -23,7 +23,7 @@ _AMSL = 500.0
 # Step of flow angles for central differences, rad.
 _ANGLE_STEP_RAD = 1e-3
 # Step of angular rates, rad/s.
-_RATE = 1e-3
+_RATE_STEP_RAD_S = 1e-3
 # Step of surface deflections, rad.
 _SURFACE_STEP_RAD = 1e-3
 # Moment of inertia of 1 slug ft^2, kg m^2.
@@ -65,11 +65,11 @@ class _Probe:
         read = fdm.properties.getter
         self.chord = read("metrics/cbarw-ft")() * 0.3048
         self._span, self._area = aircraft.wing_span, aircraft.wing_area
-        found = straight(fdm, aircraft.airspeed, _AMSL)
-        if found is None:
+        trim = straight(fdm, aircraft.airspeed, _AMSL)
+        if trim is None:
             raise FlightError(f"{aircraft.name}: no level flight at cruise to begin with", file=aircraft.name)
         self._airspeed = aircraft.airspeed
-        fdm.balance(found.vector())
+        fdm.balance(trim.vector())
         self.mass = read("inertia/mass-slugs")() * 14.593902937206364
         ixx, iyy, izz, ixz = (read(f"inertia/i{axes}-slugs_ft2")() * _SLUG_FT2 for axes in ("xx", "yy", "zz", "xz"))
         # JSBSim's product of inertia has the opposite sign.
@@ -78,21 +78,24 @@ class _Probe:
 
     def coefficients(self) -> Coefficients:
         """Return coefficients by central differences about the trim at closed throttle; the propeller may windmill."""
-        zero = self._at(0.0)
+        zero = self._coefficients_at(0.0)
         # Fit drag over lift on the straight part of the lift curve.
         angles = np.radians([-2.0, 0.0, 2.0, 4.0, 6.0])
-        table = np.array([self._at(angle)[:2] for angle in angles])
+        table = np.array([self._coefficients_at(angle)[:2] for angle in angles])
         induced, linear, constant = np.polyfit(table[:, 1], table[:, 0], 2)
-        least = -0.5 * linear / induced
-        alpha = self._slope(self._at, _ANGLE_STEP_RAD)
-        beta = self._slope(lambda step: self._at(0.0, beta=step), _ANGLE_STEP_RAD)
-        elevator, aileron, rudder = (self._slope(partial(self._surface, k), _SURFACE_STEP_RAD) for k in range(3))
-        across, along = self._span / (2.0 * self._airspeed), self.chord / (2.0 * self._airspeed)
+        min_drag_lift = -0.5 * linear / induced
+        alpha = self._derivative(self._coefficients_at, _ANGLE_STEP_RAD)
+        beta = self._derivative(lambda step: self._coefficients_at(0.0, beta=step), _ANGLE_STEP_RAD)
+        elevator, aileron, rudder = (
+            self._derivative(partial(self._with_deflection, k), _SURFACE_STEP_RAD) for k in range(3)
+        )
+        half_span_time, half_chord_time = self._span / (2.0 * self._airspeed), self.chord / (2.0 * self._airspeed)
         roll, pitch, yaw = (
-            self._slope(partial(self._rate, k), _RATE) / size for k, size in enumerate((across, along, across))
+            self._derivative(partial(self._with_rate, k), _RATE_STEP_RAD_S) / size
+            for k, size in enumerate((half_span_time, half_chord_time, half_span_time))
         )
         return Coefficients(
-            drag_zero=float(constant - induced * least * least),
+            drag_zero=float(constant - induced * min_drag_lift * min_drag_lift),
             drag_induced=float(induced),
             drag_elevator=float(elevator[0]),
             lift_zero=float(zero[1]),
@@ -116,29 +119,31 @@ class _Probe:
             yaw_yaw=float(yaw[5]),
             yaw_aileron=float(aileron[5]),
             yaw_rudder=float(rudder[5]),
-            lift_least_drag=float(least),
+            lift_least_drag=float(min_drag_lift),
             side_roll=float(roll[2]),
             side_yaw=float(yaw[2]),
         )
 
-    def _surface(self, k: int, step: float) -> Floats:
-        return self._at(0.0, surfaces=step * np.eye(3)[k])
+    def _with_deflection(self, surface: int, deflection: float) -> Floats:
+        """Return the coefficients with one surface deflected, rad, at zero angle of attack."""
+        return self._coefficients_at(0.0, surfaces=deflection * np.eye(3)[surface])
 
-    def _rate(self, k: int, step: float) -> Floats:
-        return self._at(0.0, rates=step * np.eye(3)[k])
+    def _with_rate(self, axis: int, rate: float) -> Floats:
+        """Return the coefficients with one angular rate, rad/s, at zero angle of attack."""
+        return self._coefficients_at(0.0, rates=rate * np.eye(3)[axis])
 
-    def _slope(self, at: Callable[[float], Floats], step: float) -> Floats:
-        return np.asarray((at(step) - at(-step)) / (2.0 * step))
+    def _derivative(self, function: Callable[[float], Floats], step: float) -> Floats:
+        return np.asarray((function(step) - function(-step)) / (2.0 * step))
 
-    def _at(
+    def _coefficients_at(
         self, alpha: float, beta: float = 0.0, rates: Floats | None = None, surfaces: Floats | None = None
     ) -> Floats:
         """Return the coefficients of drag, lift, side force and moments at closed throttle, (6,)."""
-        turning = np.zeros(3) if rates is None else rates
+        angular_rates = np.zeros(3) if rates is None else rates
         deflections = np.zeros(3) if surfaces is None else surfaces
         speed = self._airspeed
         flow = speed * np.array([math.cos(alpha) * math.cos(beta), math.sin(beta), math.sin(alpha) * math.cos(beta)])
-        states = np.array([*flow, *turning, 0.0, 0.0])
+        states = np.array([*flow, *angular_rates, 0.0, 0.0])
         self._fdm.derivatives(states, np.array([*deflections, 0.0]))
         read = self._fdm.properties.getter
         x, y, z = (read(f"forces/fb{axis}-aero-lbs")() * 4.4482216152605 for axis in "xyz")
@@ -152,7 +157,7 @@ class _Probe:
 def is_flying_wing(aircraft: Aircraft) -> bool:
     """Return True if a model has elevons, which it mixes from elevator and aileron."""
     root = _parse_model(aircraft)
-    return root is not None and any(one.get("name") == "elevon/left-rad" for one in root.iter("actuator"))
+    return root is not None and any(actuator.get("name") == "elevon/left-rad" for actuator in root.iter("actuator"))
 
 
 def _has_torque_reaction(aircraft: Aircraft) -> bool:
@@ -180,7 +185,7 @@ def read_motor(aircraft: Aircraft) -> Motor:
     """
     try:
         root = ElementTree.parse(aircraft.model_file).getroot()
-        functions = {one.get("name", ""): one for one in root.iter("function")}
+        functions = {function.get("name", ""): function for function in root.iter("function")}
         if "motor/exit-mps" in functions:
             return _read_propeller_disc(functions, aircraft.battery_voltage)
         return _read_electric_motor(functions, aircraft.battery_voltage)
@@ -194,17 +199,21 @@ def read_motor(aircraft: Aircraft) -> Motor:
 
 
 def _function_values(function: ElementTree.Element) -> list[float]:
-    return [float(one.text or "nan") for one in function.iter("v")]
+    return [float(value.text or "nan") for value in function.iter("v")]
 
 
 def _read_propeller_disc(functions: dict[str, ElementTree.Element], volts: float) -> PropellerDisc:
-    behind, pull, power = (functions[f"motor/{name}"] for name in ("exit-mps", "thrust-n", "battery-power-w"))
-    (exit_speed,) = _function_values(behind)
-    (area,) = (value for value in _function_values(pull) if value != 0.0)
+    exit_function, thrust_function, power = (
+        functions[f"motor/{name}"] for name in ("exit-mps", "thrust-n", "battery-power-w")
+    )
+    (exit_speed,) = _function_values(exit_function)
+    (area,) = (value for value in _function_values(thrust_function) if value != 0.0)
     # The factor is half the power given to the air, divided by the efficiency.
-    (half,) = _function_values(power)
-    ducted = any((one.text or "").strip() == "motor/airspeed-mps" for one in behind.iter("p"))
-    return PropellerDisc(area, exit_speed, ducted, losses=2.0 * half - 1.0, voltage=volts, nominal=volts)
+    (half_factor,) = _function_values(power)
+    is_ducted = any(
+        (property_element.text or "").strip() == "motor/airspeed-mps" for property_element in exit_function.iter("p")
+    )
+    return PropellerDisc(area, exit_speed, is_ducted, losses=2.0 * half_factor - 1.0, voltage=volts, nominal=volts)
 
 
 def _read_electric_motor(functions: dict[str, ElementTree.Element], volts: float) -> ElectricMotor:
@@ -216,45 +225,49 @@ def _read_electric_motor(functions: dict[str, ElementTree.Element], volts: float
     driven = numbers("motor/driven-rad_sec")
     per_volt = -next(value for value in driven if value < 0.0)
     # The no-load torque is in this function or in a separate function.
-    own = functions.get("motor/loss-n_m")
-    idle = numbers("motor/loss-n_m")[0] if own is not None else next(v for v in driven if 0.0 < v < 2.0)
-    back = damping / per_volt
-    pull = "motor/pull-n" if "motor/pull-n" in functions else "motor/thrust-n"
-    thrust = numbers(pull)
+    loss_function = functions.get("motor/loss-n_m")
+    no_load_torque = (
+        numbers("motor/loss-n_m")[0]
+        if loss_function is not None
+        else next(value for value in driven if 0.0 < value < 2.0)
+    )
+    back_voltage = damping / per_volt
+    thrust_name = "motor/pull-n" if "motor/pull-n" in functions else "motor/thrust-n"
+    thrust = numbers(thrust_name)
     return ElectricMotor(
         torque=(q2, q1, q0),
         thrust=(thrust[0], thrust[1], thrust[2]),
-        back_voltage=back,
-        resistance=back / per_volt,
-        idle_current=idle / back,
+        back_voltage=back_voltage,
+        resistance=back_voltage / per_volt,
+        idle_current=no_load_torque / back_voltage,
         voltage=volts,
-        windmill=numbers("motor/thrust-n")[1] if pull == "motor/pull-n" else 1.0,
+        windmill=numbers("motor/thrust-n")[1] if thrust_name == "motor/pull-n" else 1.0,
     )
 
 
-def scaled(base: BaseModel, mass: float, span: float, area: float, volts: float | None = None) -> BaseModel:
-    """Return the same kind of aircraft with another mass (kg), span (m) and area (m^2).
+def scale_model(base: BaseModel, mass: float, span: float, area: float, volts: float | None = None) -> BaseModel:
+    """Scale a model to another mass (kg), span (m) and wing area (m^2).
 
-    Inertia scales with mass and span squared.  The ratio of chord to mean chord is kept.  Induced drag is CL^2 divided
+    Inertia scales with mass and span squared.  The chord keeps its ratio to area / span.  Induced drag is CL^2 divided
     by pi, span efficiency and aspect ratio (Anderson, Fundamentals of Aerodynamics, section 5.3.2); the efficiency, all
     other coefficients and the motor are kept.
 
-    volts: battery voltage, V; if it differs, the motor is replaced by one with the same speed at full throttle.
+    volts: battery voltage, V; if it differs, the motor is replaced by a motor with the same speed at full throttle.
     """
-    weight, wide = mass / base.mass, span / base.span
+    mass_ratio, span_ratio = mass / base.mass, span / base.span
     chord = base.chord * (area / span) / (base.area / base.span)
     ixx, iyy, izz, ixz = base.inertia
-    factor = weight * wide * wide
-    slender = (span * span / area) / (base.span * base.span / base.area)
-    induced = base.coefficients.drag_induced / slender
+    inertia_ratio = mass_ratio * span_ratio * span_ratio
+    aspect_ratio_ratio = (span * span / area) / (base.span * base.span / base.area)
+    induced = base.coefficients.drag_induced / aspect_ratio_ratio
     return replace(
         base,
         coefficients=replace(base.coefficients, drag_induced=induced),
-        induced_factor=base.induced_factor / slender,
+        induced_factor=base.induced_factor / aspect_ratio_ratio,
         mass=mass,
         span=span,
         area=area,
         chord=chord,
-        inertia=(ixx * factor, iyy * factor, izz * factor, ixz * factor),
+        inertia=(ixx * inertia_ratio, iyy * inertia_ratio, izz * inertia_ratio, ixz * inertia_ratio),
         motor=base.motor if volts is None else base.motor.for_voltage(volts),
     )

@@ -8,13 +8,13 @@ from aircraft.identification.parameters import INDEX, PARAMETERS
 from world.errors import LogError
 
 # Control of each parameter whose sign depends on the direction of a servo output.
-_POWERS = {"aileron-power": "aileron", "elevator-power": "elevator", "rudder-power": "rudder"}
+_CONTROL_BY_PARAMETER = {"aileron-power": "aileron", "elevator-power": "elevator", "rudder-power": "rudder"}
 # Minimum fraction of a parameter's information that the logs must contribute for its sign to be judged.
-_KNOWN = 0.3
+_MIN_LOG_FRACTION = 0.3
 # Minimum and maximum plausible lift slope of a wing, per rad.
-LIFT_SLOPES = (3.0, 7.0)
+LIFT_SLOPE_RANGE = (3.0, 7.0)
 # Maximum accepted change of mass within the logs, as a fraction.
-MASS_CHANGE = 0.05
+MAX_MASS_CHANGE = 0.05
 # Minimum change of mass that is reported, in standard deviations.
 _MASS_CHANGE_SIGMAS = 4.0
 # Duration of the blocks over which the trend of the mass is averaged, s.
@@ -27,33 +27,35 @@ def check_estimate(estimate: Estimate, base: BaseModel, outputs: dict[str, int],
     outputs: servo output number of each control that has its own output.
     source: name of the logs, for the one-line message.
     """
-    known = estimate.of_log()
-    for name, control in _POWERS.items():
+    log_fractions = estimate.of_log()
+    for name, control in _CONTROL_BY_PARAMETER.items():
         k = INDEX[name]
-        if estimate.values[k] < 0.0 and (known[k] > _KNOWN or estimate.values[k] < -2.0 * estimate.sds[k]):
-            number = outputs.get(control)
-            if number is None:
+        if estimate.values[k] < 0.0 and (
+            log_fractions[k] > _MIN_LOG_FRACTION or estimate.values[k] < -2.0 * estimate.sds[k]
+        ):
+            output = outputs.get(control)
+            if output is None:
                 message = f"the {control} seems reversed: it moves the aircraft the other way"
                 raise LogError(f"{source}: {message}", file=source, field=control)
-            message = f"output {number} seems reversed: {control} moves the aircraft the other way"
+            message = f"output {output} seems reversed: {control} moves the aircraft the other way"
             raise LogError(
-                f"{source}: {message} (SERVO{number}_REVERSED)", file=source, field=f"SERVO{number}_REVERSED"
+                f"{source}: {message} (SERVO{output}_REVERSED)", file=source, field=f"SERVO{output}_REVERSED"
             )
     slope = base.coefficients.lift_alpha * estimate.values[INDEX["lift-slope"]]
-    low, high = LIFT_SLOPES
-    if not low <= slope <= high:
-        allowed = f"{low:g}..{high:g} is expected: are mass and wing area those of these logs?"
+    min_value, max_value = LIFT_SLOPE_RANGE
+    if not min_value <= slope <= max_value:
+        allowed = f"{min_value:g}..{max_value:g} is expected: are mass and wing area those of these logs?"
         raise LogError(
             f"{source}: lift slope {slope:.2f} per rad: {allowed}", file=source, value=slope, allowed=allowed
         )
     for parameter, value in zip(PARAMETERS, estimate.values.tolist(), strict=True):
-        low, high = parameter.bounds
-        if not low < value < high:
-            allowed = f"allowed {low:g}..{high:g}"
+        min_value, max_value = parameter.bounds
+        if not min_value < value < max_value:
+            allowed = f"allowed {min_value:g}..{max_value:g}"
             message = f"{parameter.title} ({parameter.name}) = {value:.2f} is at its bound: {allowed}"
             raise LogError(f"{source}: {message}", file=source, field=parameter.name, value=value, allowed=allowed)
     change, sd = mass_change(estimate, base)
-    if abs(change) > MASS_CHANGE and abs(change) > _MASS_CHANGE_SIGMAS * sd:
+    if abs(change) > MAX_MASS_CHANGE and abs(change) > _MASS_CHANGE_SIGMAS * sd:
         message = f"the mass seems to change by {100.0 * change:+.0f} % within the logs: one mass is expected"
         raise LogError(f"{source}: {message}", file=source, value=change)
 
@@ -73,10 +75,10 @@ def mass_change(estimate: Estimate, base: BaseModel) -> tuple[float, float]:
     count = len(equation.measured) // length
     if count < 6:
         return 0.0, np.inf
-    share = (equation.measured - equation.predicted) / np.maximum(0.02, equation.predicted - zero)
-    means = share[: count * length].reshape(count, length).mean(axis=1)
+    relative_error = (equation.measured - equation.predicted) / np.maximum(0.02, equation.predicted - zero)
+    means = relative_error[: count * length].reshape(count, length).mean(axis=1)
     time = (np.arange(count) + 0.5) / count - 0.5
     trend = float(time @ means / (time @ time))
-    left = means - means.mean() - trend * time
-    sd = float(np.sqrt(left @ left / (count - 2) / (time @ time)))
+    residuals = means - means.mean() - trend * time
+    sd = float(np.sqrt(residuals @ residuals / (count - 2) / (time @ time)))
     return trend, sd

@@ -31,7 +31,7 @@ AMSL = 480.0
 # Density of the standard atmosphere at that altitude, kg/m^3 (ISO 2533).
 DENSITY = 1.1695
 # Prefixes of the parameters that determine flight behaviour; other parameters describe hardware.
-_FLYING = (
+_FLIGHT_PREFIXES = (
     "AIRSPEED_",
     "ARSPD_FBW_",
     "TECS_",
@@ -96,7 +96,7 @@ def make_identified(
     return Identified(base, numbers, estimate, draw_aircraft(estimate), logs, outputs, cruise)
 
 
-def folder_files(found: Identified, name: str, battery: tuple[float, float]) -> dict[str, str]:
+def folder_files(identified: Identified, name: str, battery: tuple[float, float]) -> dict[str, str]:
     """Return the files of the folder by name, except the page.
 
     The mission of manoeuvres starts at the home position of the last log that has one; without a home position it is
@@ -105,18 +105,18 @@ def folder_files(found: Identified, name: str, battery: tuple[float, float]) -> 
     battery: voltage, V, and energy, J.
     Raises FlightError for an aircraft that cannot be trimmed.
     """
-    xml = identified_xml(found.base, name, found.numbers, found.estimate.values)
-    with temporary_folder("planfly-identified-") as place:
-        folder = place / name
+    xml = identified_xml(identified.base, name, identified.numbers, identified.estimate.values)
+    with temporary_folder("planfly-identified-") as parent:
+        folder = parent / name
         folder.mkdir()
         (folder / f"{name}.xml").write_text(xml, encoding="utf-8")
         toml = folder / f"{name}.toml"
-        toml.write_text(_metadata_text(found, battery, 0.0), encoding="utf-8")
+        toml.write_text(_metadata_text(identified, battery, 0.0), encoding="utf-8")
         envelope = load_envelope(read_aircraft(folder))
-        slow, fast = envelope.level_speeds(0.0)
-        toml.write_text(_metadata_text(found, battery, slow, fast), encoding="utf-8")
+        min_speed, max_speed = envelope.level_speeds(0.0)
+        toml.write_text(_metadata_text(identified, battery, min_speed, max_speed), encoding="utf-8")
         aircraft = read_aircraft(folder)
-        home = next((log.home for log in reversed(found.logs) if log.home is not None), None)
+        home = next((log.home for log in reversed(identified.logs) if log.home is not None), None)
         files = {
             f"{name}.xml": xml,
             f"{name}.toml": toml.read_text(encoding="utf-8"),
@@ -127,10 +127,10 @@ def folder_files(found: Identified, name: str, battery: tuple[float, float]) -> 
             files["identify.waypoints"] = waypoints_text(mission)
     properties = tuple(parameter.property_name for parameter in PARAMETERS)
     return files | {
-        "ardupilot.parm": _parameter_file_text(found.logs[-1]),
-        "ardupilot.toml": _servo_file_text(found.outputs),
-        "posterior.toml": posterior_text(found),
-        "draws.csv": draws_text(Draws(properties, found.draws)),
+        "ardupilot.parm": _parameter_file_text(identified.logs[-1]),
+        "ardupilot.toml": _servo_file_text(identified.outputs),
+        "posterior.toml": posterior_text(identified),
+        "draws.csv": draws_text(Draws(properties, identified.draws)),
     }
 
 
@@ -139,35 +139,40 @@ def _airspeeds(log: MotionLog, base: Aircraft) -> tuple[float, float, float]:
 
     Values that the log does not state are taken from the base.  ArduPlane's parameters are equivalent airspeeds.
     """
-    stated = flown_parameters(log)
+    parameters = flown_parameters(log)
     ratio = math.sqrt(1.225 / DENSITY)
-    cruise, least, most = (
-        stated[name] * ratio if name in stated else own
-        for name, own in (
+    cruise, min_airspeed, max_airspeed = (
+        parameters[name] * ratio if name in parameters else base_value
+        for name, base_value in (
             ("AIRSPEED_CRUISE", base.airspeed),
             ("AIRSPEED_MIN", base.airspeed_min),
             ("AIRSPEED_MAX", base.airspeed_max),
         )
     )
-    return cruise, least, most
+    return cruise, min_airspeed, max_airspeed
 
 
-def _metadata_text(found: Identified, battery: tuple[float, float], slow: float, fast: float = math.inf) -> str:
-    """Return the text of ``name.toml``.  slow, fast: minimum and maximum airspeed of level flight, m/s."""
-    base, value = found.base, flown_parameters(found.logs[-1]).get
-    _, lowest, highest = _airspeeds(found.logs[-1], base)
-    least = max(min(lowest, found.cruise), slow + 0.1)
-    cruise = max(found.cruise, least)
-    most = max(cruise, min(highest, fast))
-    stall = min(slow if slow > 0.0 else base.stall_speed, least)
+def _metadata_text(
+    identified: Identified, battery: tuple[float, float], min_level_speed: float, max_level_speed: float = math.inf
+) -> str:
+    """Return the text of ``name.toml``.
+
+    min_level_speed, max_level_speed: minimum and maximum airspeed of level flight, m/s.
+    """
+    base, value = identified.base, flown_parameters(identified.logs[-1]).get
+    _, stated_min, stated_max = _airspeeds(identified.logs[-1], base)
+    min_airspeed = max(min(stated_min, identified.cruise), min_level_speed + 0.1)
+    cruise = max(identified.cruise, min_airspeed)
+    max_airspeed = max(cruise, min(stated_max, max_level_speed))
+    stall = min(min_level_speed if min_level_speed > 0.0 else base.stall_speed, min_airspeed)
     volts, energy = battery
     rows = {
-        "mass_kg": found.numbers.mass,
-        "wing_area_m2": found.numbers.area,
-        "wing_span_m": found.numbers.span,
+        "mass_kg": identified.numbers.mass,
+        "wing_area_m2": identified.numbers.area,
+        "wing_span_m": identified.numbers.span,
         "airspeed_mps": cruise,
-        "airspeed_min_mps": least,
-        "airspeed_max_mps": most,
+        "airspeed_min_mps": min_airspeed,
+        "airspeed_max_mps": max_airspeed,
         "stall_speed_mps": stall,
         "max_bank_deg": value("ROLL_LIMIT_DEG", math.degrees(base.max_bank)),
         "max_pitch_deg": math.degrees(base.max_pitch),
@@ -182,7 +187,7 @@ def _metadata_text(found: Identified, battery: tuple[float, float], slow: float,
     }
     lines = [
         "# What planner, guidance and verdict need to know of the aircraft; posterior.toml says what was estimated.",
-        f'title = "aircraft of {found.numbers.mass:.3g} kg, identified from flight logs"',
+        f'title = "aircraft of {identified.numbers.mass:.3g} kg, identified from flight logs"',
         *(f"{key} = {number:.6g}" for key, number in rows.items()),
     ]
     return "\n".join(lines) + "\n"
@@ -193,15 +198,15 @@ def flown_parameters(log: MotionLog) -> dict[str, float]:
 
     The log may use the parameter names of ArduPlane 4.4 and earlier; values out of range are left out.
     """
-    old = {definition.old[0] for definition in DEFINITIONS.values() if definition.old is not None}
-    present = {definition.name for definition in DEFINITIONS.values()}
-    law, _ = ArduPilotParameters.of_log(log.parameters, log.source)
+    old_names = {definition.old[0] for definition in DEFINITIONS.values() if definition.old is not None}
+    current_names = {definition.name for definition in DEFINITIONS.values()}
+    law_parameters, _ = ArduPilotParameters.of_log(log.parameters, log.source)
     others = {
         name: value
         for name, value in log.parameters.items()
-        if name.startswith(_FLYING) and name not in old and name not in present
+        if name.startswith(_FLIGHT_PREFIXES) and name not in old_names and name not in current_names
     }
-    return others | law.by_origin("file")
+    return others | law_parameters.by_origin("file")
 
 
 def _parameter_file_text(log: MotionLog) -> str:
@@ -225,15 +230,15 @@ def _servo_file_text(outputs: Mapping[str, ServoOutput]) -> str:
     return "\n".join(lines)
 
 
-def posterior_text(found: Identified) -> str:
+def posterior_text(identified: Identified) -> str:
     """Return the text of ``posterior.toml``."""
-    estimate = found.estimate
-    best, drawn = found.performance()
+    estimate = identified.estimate
+    best, samples = identified.performance()
     # Standard deviation as a fraction; if it exceeds the value itself, nothing is known of the value.
-    power = min(1.0, float(np.std(drawn.power) / best.power[0]))
-    climb, sink = (float(np.degrees(np.std(angles))) for angles in (drawn.climb, drawn.sink))
-    fastest = fastest_level(found.numbers, found.draws, DENSITY)
-    shares = estimate.of_log()
+    power = min(1.0, float(np.std(samples.power) / best.power[0]))
+    climb, sink = (float(np.degrees(np.std(angles))) for angles in (samples.climb, samples.sink))
+    fastest = fastest_level(identified.numbers, identified.draws, DENSITY)
+    log_fractions = estimate.of_log()
     lines = [
         "# What flight logs say of this aircraft.  Each property is one of the model's: a factor on the base's",
         "# coefficient, or an offset to it; the model's own value of it is the estimate.",
@@ -243,8 +248,8 @@ def posterior_text(found: Identified) -> str:
         f"descent_sd_deg = {sink:.3f}  # of the steepest descent",
         f"fastest_sd_mps = {np.std(fastest):.3f}  # of the fastest level flight",
         f"power_sd = {power:.4f}        # of the power in level flight, as a share of it",
-        f'base = "{found.base.name}"',
-        f"mass_kg = {found.numbers.mass:.6g}",
+        f'base = "{identified.base.name}"',
+        f"mass_kg = {identified.numbers.mass:.6g}",
         f"seconds = {estimate.seconds:.0f}",
         f"battery_current = {'true' if estimate.with_current else 'false'}",
         f"airspeed_factor = {estimate.airspeed[0]:.4f}  # true by measured airspeed, from the wind triangle",
@@ -254,7 +259,7 @@ def posterior_text(found: Identified) -> str:
         *(f'  "{name}",' for name in (*estimate.shifts, *NUISANCES)),
         "]",
     ]
-    for log in found.logs:
+    for log in identified.logs:
         lines += ["", "[[log]]", f'file = "{_toml_safe(Path(log.source).name)}"', f'sha256 = "{log.sha256}"']
     for k, parameter in enumerate(PARAMETERS):
         lines += [
@@ -266,7 +271,7 @@ def posterior_text(found: Identified) -> str:
             f"prior_sd = {parameter.sd:g}",
             f"estimate = {estimate.values[k]:.6g}",
             f"sd = {estimate.sds[k]:.4g}",
-            f"of_log = {shares[k]:.3f}  # share of the interval that is the logs'",
+            f"of_log = {log_fractions[k]:.3f}  # share of the interval that is the logs'",
             f'reason = "{parameter.title}"',
         ]
     correlation = estimate.covariance / np.outer(estimate.sds, estimate.sds)

@@ -15,9 +15,9 @@ from world.frames import GeoOrigin, to_geo
 
 # Slopes of the mission as a fraction of the steepest climb and descent, which need slightly less than full throttle, so
 # that the mission can be flown in wind.
-_SHARE = 0.85
+_SLOPE_FRACTION = 0.85
 # Duration of a level run, s.
-_RUN = 25.0
+_LEVEL_RUN_TIME_S = 25.0
 # Duration of a climb or a glide, s.
 _SLOPE_TIME_S = 25.0
 # Height above home at which the mission starts, m.
@@ -39,18 +39,20 @@ def identification_mission(
     lats, lons = to_geo(GeoOrigin(lat_deg, lon_deg), east, north)
     items: list[MissionItem] = []
 
-    def add(
-        command: int, frame: int, params: tuple[float, float, float, float], lat: float, lon: float, up: float
+    def add_item(
+        command: int, frame: int, params: tuple[float, float, float, float], lat: float, lon: float, altitude: float
     ) -> None:
         number = len(items) + 1
-        items.append(MissionItem(number, command, frame, params, on_grid(lat), on_grid(lon), round(up, 2)))
+        items.append(MissionItem(number, command, frame, params, on_grid(lat), on_grid(lon), round(altitude, 2)))
 
     speed = math.nan
-    for (_, _, up, asked), lat, lon in zip(places, lats.tolist(), lons.tolist(), strict=True):
-        if asked != speed and items:
-            add(int(Command.DO_CHANGE_SPEED), int(Frame.MISSION), (0.0, asked, -1.0, 0.0), 0.0, 0.0, 0.0)
-        speed = asked
-        add(int(Command.NAV_WAYPOINT), int(Frame.GLOBAL_RELATIVE_ALT), (0.0, 0.0, 0.0, 0.0), lat, lon, up - ground)
+    for (_, _, altitude, leg_airspeed), lat, lon in zip(places, lats.tolist(), lons.tolist(), strict=True):
+        if leg_airspeed != speed and items:
+            add_item(int(Command.DO_CHANGE_SPEED), int(Frame.MISSION), (0.0, leg_airspeed, -1.0, 0.0), 0.0, 0.0, 0.0)
+        speed = leg_airspeed
+        add_item(
+            int(Command.NAV_WAYPOINT), int(Frame.GLOBAL_RELATIVE_ALT), (0.0, 0.0, 0.0, 0.0), lat, lon, altitude - ground
+        )
     return Mission(Home(on_grid(lat_deg), on_grid(lon_deg), ground), tuple(items), source="identify.waypoints")
 
 
@@ -59,36 +61,39 @@ def _waypoints(
 ) -> Iterator[tuple[float, float, float, float]]:
     """Yield east, north and altitude of each waypoint, m, and the airspeed on the leg to the waypoint, m/s."""
     cruise = aircraft.airspeed
-    slow = aircraft.airspeed_min + 0.15 * (cruise - aircraft.airspeed_min)
-    fast = cruise + 0.6 * (aircraft.airspeed_max - cruise)
-    between = 0.5 * (slow + cruise)
+    slow_speed = aircraft.airspeed_min + 0.15 * (cruise - aircraft.airspeed_min)
+    fast_speed = cruise + 0.6 * (aircraft.airspeed_max - cruise)
+    medium_speed = 0.5 * (slow_speed + cruise)
     # Airspeed, duration (s), and -1, 0 or 1 for descent, level flight and climb.
-    figure = (
-        (cruise, _RUN, 0),
+    sequence = (
+        (cruise, _LEVEL_RUN_TIME_S, 0),
         (cruise, _SLOPE_TIME_S, 1),
-        (slow, _RUN, 0),
+        (slow_speed, _LEVEL_RUN_TIME_S, 0),
         (cruise, _SLOPE_TIME_S, -1),
-        (fast, _RUN, 0),
-        (between, _SLOPE_TIME_S, 1),
-        (cruise, _RUN, 0),
-        (fast, _SLOPE_TIME_S, -1),
-        (between, _RUN, 0),
+        (fast_speed, _LEVEL_RUN_TIME_S, 0),
+        (medium_speed, _SLOPE_TIME_S, 1),
+        (cruise, _LEVEL_RUN_TIME_S, 0),
+        (fast_speed, _SLOPE_TIME_S, -1),
+        (medium_speed, _LEVEL_RUN_TIME_S, 0),
         (cruise, _SLOPE_TIME_S, 1),
-        (0.5 * (cruise + fast), _RUN, 0),
+        (0.5 * (cruise + fast_speed), _LEVEL_RUN_TIME_S, 0),
         (cruise, _SLOPE_TIME_S, -1),
     )
     east = north = 0.0
-    up, heading = base, 0.0
-    yield east, north, up, cruise
+    altitude, heading = base, 0.0
+    yield east, north, altitude, cruise
     for _ in range(repeats):
-        for number, (speed, seconds, way) in enumerate(figure):
+        for number, (speed, seconds, vertical_direction) in enumerate(sequence):
             # Add length for the turns at both ends of the leg.
             length = speed * seconds + 2.0 * speed * speed / 9.81
-            climb, descent = envelope.air_angles(speed, up)
-            angle = (climb if way > 0 else descent) * _SHARE if way else 0.0
-            up = max(base - 60.0, up + way * length * math.tan(max(0.0, angle) if math.isfinite(angle) else 0.0))
+            climb, descent = envelope.air_angles(speed, altitude)
+            angle = (climb if vertical_direction > 0 else descent) * _SLOPE_FRACTION if vertical_direction else 0.0
+            altitude = max(
+                base - 60.0,
+                altitude + vertical_direction * length * math.tan(max(0.0, angle) if math.isfinite(angle) else 0.0),
+            )
             east += length * math.sin(heading)
             north += length * math.cos(heading)
-            yield east, north, up, speed
+            yield east, north, altitude, speed
             # Four right turns, then four left turns.
             heading += 0.5 * math.pi if number // 4 % 2 == 0 else -0.5 * math.pi

@@ -20,9 +20,9 @@ from world.errors import FlightError
 # Moment of inertia of 1 slug ft^2, kg m^2.
 _SLUG_FT2 = 1.3558179483314004
 # One pound, kg.
-_POUND = 0.45359237
+_POUND_KG = 0.45359237
 # Maximum angle of attack seen in flight, rad; the estimated terms are constant beyond this angle.
-_LARGEST_ALPHA = 0.25
+_MAX_ALPHA_RAD = 0.25
 
 
 def identified_xml(base: Aircraft, name: str, numbers: BaseModel, values: Floats) -> str:
@@ -38,10 +38,14 @@ def identified_xml(base: Aircraft, name: str, numbers: BaseModel, values: Floats
     root = ElementTree.fromstring(text, parser=ElementTree.XMLParser(target=ElementTree.TreeBuilder()))
     root.set("name", name)
     _set_sizes(root, numbers, base)
-    kept = [one for one in root.iter("property") if (one.text or "").strip().startswith("base/")]
-    old = _find_part(root, "external_reactions", base)
-    reactions = ElementTree.fromstring(_reactions_text(numbers, values, kept))
-    root.remove(old)
+    base_properties = [
+        property_element
+        for property_element in root.iter("property")
+        if (property_element.text or "").strip().startswith("base/")
+    ]
+    old_reactions = _find_part(root, "external_reactions", base)
+    reactions = ElementTree.fromstring(_reactions_text(numbers, values, base_properties))
+    root.remove(old_reactions)
     # Insert the properties before the elements that read them.
     root.insert(list(root).index(_find_part(root, "flight_control", base)), reactions)
     aerodynamics = _find_part(root, "aerodynamics", base)
@@ -57,13 +61,13 @@ def identified_xml(base: Aircraft, name: str, numbers: BaseModel, values: Floats
         ):
             axis.append(function)
     ElementTree.indent(root)
-    said = f"{base.name}, identified from flight logs by planfly: posterior.toml says how."
-    head = f'<?xml version="1.0"?>\n<!-- {said} -->\n'
-    return head + ElementTree.tostring(root, encoding="unicode") + "\n"
+    note = f"{base.name}, identified from flight logs by planfly: posterior.toml says how."
+    header = f'<?xml version="1.0"?>\n<!-- {note} -->\n'
+    return header + ElementTree.tostring(root, encoding="unicode") + "\n"
 
 
 # Elements of a base model that are rewritten or extended.
-_PARTS = (
+_REQUIRED_PARTS = (
     *(f"metrics/{name}" for name in ("wingarea", "wingspan", "chord")),
     *(f"mass_balance/{name}" for name in ("ixx", "iyy", "izz", "ixz", "emptywt")),
     *("external_reactions", "flight_control", "aerodynamics/axis"),
@@ -77,13 +81,13 @@ def check_base(base: Aircraft) -> None:
     except (OSError, ElementTree.ParseError) as error:
         message = f"{base.model_file}: {' '.join(str(error).split())}: a JSBSim model is expected"
         raise FlightError(message, file=base.model_file) from None
-    for path in _PARTS:
+    for path in _REQUIRED_PARTS:
         _find_part(root, path, base)
 
 
 def _find_part(root: ElementTree.Element, path: str, base: Aircraft) -> ElementTree.Element:
-    found = root.find(path)
-    if found is None:
+    element = root.find(path)
+    if element is None:
         allowed = "a model to identify from needs it, as aircraft/aerosonde/aerosonde.xml has it"
         raise FlightError(
             f"{base.model_file}: no <{path.replace('/', '><')}>: {allowed}",
@@ -91,7 +95,7 @@ def _find_part(root: ElementTree.Element, path: str, base: Aircraft) -> ElementT
             field=path,
             allowed=allowed,
         )
-    return found
+    return element
 
 
 def _set_sizes(root: ElementTree.Element, numbers: BaseModel, base: Aircraft) -> None:
@@ -104,11 +108,11 @@ def _set_sizes(root: ElementTree.Element, numbers: BaseModel, base: Aircraft) ->
         "mass_balance/iyy": (iyy / _SLUG_FT2, "SLUG*FT2"),
         "mass_balance/izz": (izz / _SLUG_FT2, "SLUG*FT2"),
         "mass_balance/ixz": (ixz / _SLUG_FT2, "SLUG*FT2"),
-        "mass_balance/emptywt": (numbers.mass / _POUND, "LBS"),
+        "mass_balance/emptywt": (numbers.mass / _POUND_KG, "LBS"),
     }
     for path, (value, unit) in sizes.items():
-        found = _find_part(root, path, base)
-        found.text, found.attrib = f" {number(value)} ", {"unit": unit}
+        element = _find_part(root, path, base)
+        element.text, element.attrib = f" {number(value)} ", {"unit": unit}
     _find_part(root, "mass_balance", base).set("negated_crossproduct_inertia", "false")
 
 
@@ -126,11 +130,11 @@ def _product_term(coefficient: float, *factors: str) -> str:
 
 
 def _lift_functions(numbers: BaseModel) -> str:
-    """Return the functions of lift coefficient by angle of attack, of base and estimate, up to `_LARGEST_ALPHA`."""
+    """Return the functions of lift coefficient by angle of attack, of base and estimate, up to `_MAX_ALPHA_RAD`."""
     c = numbers.coefficients
     return f"""
-    <function name="ident/alpha-rad"> <min> <v> {_LARGEST_ALPHA} </v>
-      <max> <v> {-_LARGEST_ALPHA} </v> <p> aero/alpha-rad </p> </max> </min> </function>
+    <function name="ident/alpha-rad"> <min> <v> {_MAX_ALPHA_RAD} </v>
+      <max> <v> {-_MAX_ALPHA_RAD} </v> <p> aero/alpha-rad </p> </max> </min> </function>
     <function name="ident/lift-before">
       <sum> <v> {number(c.lift_zero)} </v> {_product_term(c.lift_alpha, "<p> ident/alpha-rad </p>")} </sum> </function>
     <function name="ident/lift-after">
@@ -147,13 +151,13 @@ def _added_function(base: Aircraft, numbers: BaseModel, axis: str, drag: str, co
     ]
     elevator, aileron, rudder = surfaces
     roll, pitch, yaw = (f"<p> velocities/{letter}-aero-rad_sec </p>" for letter in "pqr")
-    wide, long, beta = "<p> aero/bi2vel </p>", "<p> aero/ci2vel </p>", "<p> aero/beta-rad </p>"
-    above = [
-        f" <difference> <p> ident/lift-{when} </p> <v> {number(c.lift_least_drag)} </v> </difference>"
-        for when in ("before", "after")
+    span_factor, chord_factor, beta = "<p> aero/bi2vel </p>", "<p> aero/ci2vel </p>", "<p> aero/beta-rad </p>"
+    lift_above_min_drag = [
+        f" <difference> <p> ident/lift-{state} </p> <v> {number(c.lift_least_drag)} </v> </difference>"
+        for state in ("before", "after")
     ]
-    before, after = (f"<product>{2 * lift} </product>" for lift in above)
-    sums = {
+    before, after = (f"<product>{2 * lift} </product>" for lift in lift_above_min_drag)
+    terms_by_axis = {
         "X": (
             f"{drag} ",
             _product_term(c.drag_zero, _factor_minus_one("zero-lift-drag")),
@@ -164,29 +168,29 @@ def _added_function(base: Aircraft, numbers: BaseModel, axis: str, drag: str, co
         "ROLL": (
             "<p> metrics/bw-ft </p>",
             _product_term(c.roll_beta, _factor_minus_one("dihedral-effect"), beta),
-            _product_term(c.roll_roll, _factor_minus_one("roll-damping"), wide, roll),
-            _product_term(c.roll_yaw, _factor_minus_one("roll-from-yaw"), wide, yaw),
+            _product_term(c.roll_roll, _factor_minus_one("roll-damping"), span_factor, roll),
+            _product_term(c.roll_yaw, _factor_minus_one("roll-from-yaw"), span_factor, yaw),
             _product_term(c.roll_aileron, _factor_minus_one("aileron-power"), aileron),
         ),
         "PITCH": (
             "<p> metrics/cbarw-ft </p>",
             "<p> ident/pitch-offset </p>",
             _product_term(c.pitch_alpha, _factor_minus_one("pitch-stiffness"), "<p> aero/alpha-rad </p>"),
-            _product_term(c.pitch_rate, _factor_minus_one("pitch-damping"), long, pitch),
+            _product_term(c.pitch_rate, _factor_minus_one("pitch-damping"), chord_factor, pitch),
             _product_term(c.pitch_elevator, _factor_minus_one("elevator-power"), elevator),
         ),
         "YAW": (
             "<p> metrics/bw-ft </p>",
             _product_term(c.yaw_beta, _factor_minus_one("weathercock"), beta),
-            _product_term(c.yaw_roll, _factor_minus_one("yaw-from-roll"), wide, roll),
-            _product_term(c.yaw_yaw, _factor_minus_one("yaw-damping"), wide, yaw),
+            _product_term(c.yaw_roll, _factor_minus_one("yaw-from-roll"), span_factor, roll),
+            _product_term(c.yaw_yaw, _factor_minus_one("yaw-damping"), span_factor, yaw),
             _product_term(c.yaw_aileron, _factor_minus_one("adverse-yaw"), aileron),
             _product_term(c.yaw_rudder, _factor_minus_one("rudder-power"), rudder),
         ),
     }
-    if axis not in sums:
+    if axis not in terms_by_axis:
         return ""
-    scale, *terms = sums[axis]
+    scale, *terms = terms_by_axis[axis]
     return f"""<function name="ident/added/{axis.lower()}">
       <product> <p> aero/qbar-area </p> {scale} <sum> <v> 0 </v> {" ".join(terms)} </sum> </product> </function>"""
 
@@ -199,13 +203,13 @@ _SPEED = "<p> motor/propeller-rad_sec </p>"
 _AIR = "<p> motor/airspeed-mps </p>"
 
 
-def _reactions_text(numbers: BaseModel, values: Floats, kept: list[ElementTree.Element]) -> str:
+def _reactions_text(numbers: BaseModel, values: Floats, base_properties: list[ElementTree.Element]) -> str:
     """Return the text of ``<external_reactions>``, with the properties and the forces of motor and propeller."""
-    own = "\n".join(
+    identified_text = "\n".join(
         f'<property value="{values[INDEX[parameter.name]]:.9g}"> {parameter.property_name} </property>'
         for parameter in PARAMETERS
     )
-    old = "\n".join(ElementTree.tostring(one, encoding="unicode").strip() for one in kept)
+    base_text = "\n".join(ElementTree.tostring(element, encoding="unicode").strip() for element in base_properties)
     motor = numbers.motor
     functions = _motor_functions(motor)
     body = "\n".join(f'<function name="motor/{name}"> {text} </function>' for name, text in functions.items())
@@ -214,8 +218,8 @@ def _reactions_text(numbers: BaseModel, values: Floats, kept: list[ElementTree.E
   <direction> <x> 1 </x> <y> 0 </y> <z> 0 </z> </direction>
 </moment>"""
     return f"""<external_reactions>
-{old}
-{own}
+{base_text}
+{identified_text}
 <property value="{number(motor.voltage)}"> motor/battery-v </property>
 <property value="0"> motor/braking </property>
 {body}
@@ -243,63 +247,70 @@ def _motor_functions(motor: Motor) -> dict[str, str]:
 
 
 def _disc_functions(disc: PropellerDisc) -> dict[str, str]:
-    behind = "<p> motor/exit-mps </p>"
-    full = f"<product> <v> {number(disc.exit_speed)} </v> <p> ident/motor-speed </p> </product>"
-    exit_speed = f"<product> <p> motor/throttle-norm </p> {full} </product>"
-    first = f"<sum> {behind} {_AIR} </sum>"
+    exit_property = "<p> motor/exit-mps </p>"
+    full_speed = f"<product> <v> {number(disc.exit_speed)} </v> <p> ident/motor-speed </p> </product>"
+    exit_speed = f"<product> <p> motor/throttle-norm </p> {full_speed} </product>"
+    flow_speed = f"<sum> {exit_property} {_AIR} </sum>"
     if disc.ducted:
-        gained = f"<product> <p> motor/throttle-norm </p> <difference> {full} {_AIR} </difference> </product>"
-        exit_speed, first = f"<sum> {_AIR} {gained} </sum>", behind
-    pull = f"<v> {number(disc.pull)} </v> <p> ident/thrust </p> {_RHO} {first}"
+        speed_gain = f"<product> <p> motor/throttle-norm </p> <difference> {full_speed} {_AIR} </difference> </product>"
+        exit_speed, flow_speed = f"<sum> {_AIR} {speed_gain} </sum>", exit_property
+    thrust = f"<v> {number(disc.pull)} </v> <p> ident/thrust </p> {_RHO} {flow_speed}"
     # Power given to the air, T (V + v_e) / 2, plus losses.
     power = f"<v> {number(0.5 * disc.power * (1.0 + disc.losses))} </v> <p> ident/propeller-torque </p>"
     return {
         "exit-mps": exit_speed,
-        "thrust-n": f"<max> <v> 0 </v> <product> {pull} <difference> {behind} {_AIR} </difference> </product> </max>",
+        "thrust-n": f"<max> <v> 0 </v> <product> {thrust} <difference> {exit_property} {_AIR} </difference> </product>"
+        " </max>",
         "torque-n_m": "<product> <v> 0 </v> <p> motor/throttle-norm </p> </product>",
-        "battery-power-w": f"<product> {power} <p> motor/thrust-n </p> <sum> {behind} {_AIR} </sum> </product>",
+        "battery-power-w": f"<product> {power} <p> motor/thrust-n </p> <sum> {exit_property} {_AIR} </sum> </product>",
         "battery-current-a": "<quotient> <p> motor/battery-power-w </p> <p> motor/battery-v </p> </quotient>",
     }
 
 
 def _electric_functions(motor: ElectricMotor) -> dict[str, str]:
     q2, q1, q0 = (number(value) for value in motor.torque)
-    kv, r = motor.back_voltage, motor.resistance
+    kv, resistance = motor.back_voltage, motor.resistance
     # Divide by the factor on motor speed: KV is divided by it, and its square is KQ KV.
     speed = "<p> ident/motor-speed </p>"
-    loss = f"<quotient> <v> {number(kv * motor.idle_current)} </v> {speed} </quotient>"
-    drive = f"<quotient> <product> <v> {number(-kv / r)} </v> <p> motor/input-v </p> </product> {speed} </quotient>"
-    square = f"<quotient> <v> {number(kv * kv / r)} </v> <product> {speed} {speed} </product> </quotient>"
+    loss_torque = f"<quotient> <v> {number(kv * motor.idle_current)} </v> {speed} </quotient>"
+    drive_torque = (
+        f"<quotient> <product> <v> {number(-kv / resistance)} </v> <p> motor/input-v </p> </product>"
+        f" {speed} </quotient>"
+    )
+    back_voltage_damping = (
+        f"<quotient> <v> {number(kv * kv / resistance)} </v> <product> {speed} {speed} </product> </quotient>"
+    )
 
     def root(b: str, c: str) -> str:
-        inside = f"""<difference> <product> {b} {b} </product>
+        discriminant = f"""<difference> <product> {b} {b} </product>
           <product> <v> 4 </v> <p> motor/q2 </p> <sum> <p> motor/q0 </p> {c} </sum> </product> </difference>"""
-        return f"""<quotient> <difference> <sqrt> <max> <v> 0 </v> {inside} </max> </sqrt> {b} </difference>
+        return f"""<quotient> <difference> <sqrt> <max> <v> 0 </v> {discriminant} </max> </sqrt> {b} </difference>
           <product> <v> 2 </v> <p> motor/q2 </p> </product> </quotient>"""
 
-    pull = [
+    thrust_terms = [
         f"<product> <v> {number(motor.thrust[0])} </v> {_SPEED} {_SPEED} </product>",
         f"<product> <v> {number(motor.thrust[1])} </v> {_AIR} {_SPEED} </product>",
         f"<product> <v> {number(motor.thrust[2])} </v> {_AIR} {_AIR} </product>",
     ]
     torque = "<p> ident/propeller-torque </p>"
-    back = f"<quotient> <product> <v> {number(kv)} </v> {_SPEED} </product> {speed} </quotient>"
+    back_voltage = f"<quotient> <product> <v> {number(kv)} </v> {_SPEED} </product> {speed} </quotient>"
     return {
         "input-v": "<product> <p> motor/battery-v </p> <p> motor/throttle-norm </p> </product>",
         "q2": f"<product> <v> {q2} </v> {torque} {_RHO} </product>",
         "q1": f"<product> <v> {q1} </v> {torque} {_RHO} {_AIR} </product>",
         "q0": f"<product> <v> {q0} </v> {torque} {_RHO} {_AIR} {_AIR} </product>",
-        "b": f"<sum> <p> motor/q1 </p> {square} </sum>",
-        "driven-rad_sec": root("<p> motor/b </p>", f"{loss} {drive}"),
-        "windmill-rad_sec": root("<p> motor/q1 </p>", loss),
+        "b": f"<sum> <p> motor/q1 </p> {back_voltage_damping} </sum>",
+        "driven-rad_sec": root("<p> motor/b </p>", f"{loss_torque} {drive_torque}"),
+        "windmill-rad_sec": root("<p> motor/q1 </p>", loss_torque),
         "propeller-rad_sec": "<max> <v> 0 </v> <p> motor/driven-rad_sec </p>"
         " <difference> <p> motor/windmill-rad_sec </p>"
         " <product> <v> 1000000000 </v> <p> motor/braking </p> </product> </difference> </max>",
         "current-a": "<max> <product> <v> -1000000 </v> <p> motor/braking </p> </product>"
-        f" <quotient> <difference> <p> motor/input-v </p> {back} </difference> <v> {number(r)} </v> </quotient> </max>",
+        f" <quotient> <difference> <p> motor/input-v </p> {back_voltage} </difference> <v> {number(resistance)} </v>"
+        " </quotient> </max>",
         "battery-power-w": "<product> <p> motor/input-v </p> <p> motor/current-a </p> </product>",
         "battery-current-a": "<product> <p> motor/throttle-norm </p> <p> motor/current-a </p> </product>",
-        "pull-n": f"<product> {_RHO} <p> ident/thrust </p> <sum> {' '.join(pull)} </sum> </product>",
+        "pull-n": f"<product> {_RHO} <p> ident/thrust </p> <sum> {' '.join(thrust_terms)} </sum> </product>",
         "thrust-n": "<sum> <max> <v> 0 </v> <p> motor/pull-n </p> </max>"
         f" <product> <v> {number(motor.windmill)} </v> <min> <v> 0 </v> <p> motor/pull-n </p> </min> </product> </sum>",
         "torque-n_m": f"<sum> <product> <p> motor/q2 </p> {_SPEED} {_SPEED} </product>"

@@ -16,13 +16,13 @@ from world.errors import LogError
 # because a nominal 10 Hz varies slightly in a log.
 MIN_HZ = 9.5
 # Rate below which the report names the setting that records more rows, Hz.
-PLENTY_HZ = 20.0
+AMPLE_HZ = 20.0
 # Minimum usable flight time of a log, after unusable parts are cut, s.
 MIN_SECONDS = 180.0
 # Minimum duration of a stretch, s.
 MIN_STRETCH = 30.0
 # Maximum pause between rows of the sensors within a stretch, s.
-_GAP = 0.5
+_MAX_SENSOR_GAP_S = 0.5
 # Maximum pause between rows of airspeed or wind, which are logged more slowly, s.
 _MAX_AIR_GAP_S = 1.0
 # Maximum pause between rows of PX4's wind, which is logged about once a second, s.
@@ -30,7 +30,7 @@ _MAX_PX4_WIND_GAP_S = 2.5
 # Time after take-off or release that is cut, s.
 _SETTLING_TIME_S = 15.0
 # Fraction of AIRSPEED_MIN above which the aircraft is flying.
-_FLYING = 0.8
+_MIN_AIRSPEED_FRACTION = 0.8
 # ArduPlane's quadplane modes (QSTABILIZE 17 to QACRO 23, QAUTOTUNE 22, LOITER_ALT_QLAND 25), and the mode that does not
 # control the surfaces: INITIALISING 16.
 _VTOL_MODES = frozenset({17, 18, 19, 20, 21, 22, 23, 25})
@@ -42,7 +42,7 @@ _THROTTLE = 70
 _ELEVON_LEFT = 77
 _ELEVON_RIGHT = 78
 # Functions of mixed surfaces, which are refused.
-_MIXED = {79: "a V-tail", 80: "a V-tail"}
+_MIXED_FUNCTIONS = {79: "a V-tail", 80: "a V-tail"}
 # Names of the two outputs of a flying wing, each a mix of elevator and aileron.
 LEFT = "left elevon"
 RIGHT = "right elevon"
@@ -59,45 +59,55 @@ _FLAPS = {
 }
 # Functions of lifting motors.
 _LIFT_MOTORS = frozenset(range(33, 41))
-# ArduPlane's default LOG_BITMASK, which logs both at a high rate.
-_BITMASK = 65535
+# ArduPlane's default LOG_BITMASK, which logs inertial sensors and servo outputs at a high rate.
+_HIGH_RATE_BITMASK = 65535
 # PX4's SDLOG_PROFILE: the default set (1) and the high-rate set (16).
-_PROFILE = 17
+_HIGH_RATE_PROFILE = 17
 
 
 def flight_records(
     log: MotionLog, aircraft: Aircraft, servos: Mapping[str, ServoOutput] | None = None
 ) -> list[FlightRecord]:
-    """Return the stretches of a log that an identification can use, in which the aircraft flies on the wing alone.
+    """Return the stretches of a log that an identification can use, in which only the wing carries the aircraft.
 
-    servos: the output of each control, if known better than from the SERVOn_* parameters of the log.
+    servos: output of each control, if known better than from the SERVOn_* parameters of the log.
     Raises LogError, with a one-line message, for a log that cannot be used.
     """
-    _refuse_unusable(log)
+    _check_usable(log)
     if log.elevons:
-        _refuse_base_of_elevons(log, aircraft)
+        _check_flying_wing_base(log, aircraft)
     grid = _time_grid(log)
-    pulses = _held(log.outputs, grid) if len(log.outputs.time) else np.zeros((len(grid), log.outputs.values.shape[1]))
+    pulses = (
+        _hold_samples(log.outputs, grid)
+        if len(log.outputs.time)
+        else np.zeros((len(grid), log.outputs.values.shape[1]))
+    )
     if len(log.controls.time):
-        controls = _shares_as_angles(_held(log.controls, grid), aircraft)
+        controls = _fractions_to_controls(_hold_samples(log.controls, grid), aircraft)
     else:
-        controls = _pulses_as_controls(servos or log_outputs(log, aircraft), pulses)
+        controls = _pulses_to_controls(servos or log_outputs(log, aircraft), pulses)
     # A surface that is commanded beyond its stop stays at the stop.
     stops = np.array([aircraft.max_elevator, aircraft.max_aileron, aircraft.max_rudder, 1.0])
     controls = np.clip(controls, -stops, stops)
-    ratio = _at(log.ratio, grid)[:, 0] if len(log.ratio.time) else _ratio_of_height(_at(log.height, grid)[:, 0])
-    height = _at(log.height, grid)[:, 0]
-    velocity, wind = _at(log.velocity, grid), _at(log.wind, grid)
-    airspeed = _at(log.airspeed, grid)[:, 0] * ratio
-    inertial = _at(log.inertial, grid)
-    attitude = np.column_stack([np.interp(grid, log.attitude.time, np.unwrap(a)) for a in log.attitude.values.T])
+    ratio = (
+        _interpolate(log.ratio, grid)[:, 0]
+        if len(log.ratio.time)
+        else _airspeed_ratio(_interpolate(log.height, grid)[:, 0])
+    )
+    height = _interpolate(log.height, grid)[:, 0]
+    velocity, wind = _interpolate(log.velocity, grid), _interpolate(log.wind, grid)
+    airspeed = _interpolate(log.airspeed, grid)[:, 0] * ratio
+    inertial = _interpolate(log.inertial, grid)
+    attitude = np.column_stack(
+        [np.interp(grid, log.attitude.time, np.unwrap(angle)) for angle in log.attitude.values.T]
+    )
     unknown = np.full(len(grid), np.nan)
-    battery = _at(log.battery, grid) if _has_current(log) else np.column_stack([unknown, unknown])
+    battery = _interpolate(log.battery, grid) if _has_current(log) else np.column_stack([unknown, unknown])
     usable = _usable_rows(log, grid, airspeed / ratio, pulses)
-    made = []
-    for first, last in _find_stretches(usable):
-        rows = slice(first, last)
-        made.append(
+    records = []
+    for begin, end in _find_stretches(usable):
+        rows = slice(begin, end)
+        records.append(
             FlightRecord(
                 time=grid[rows],
                 acceleration=inertial[rows, :3],
@@ -114,35 +124,35 @@ def flight_records(
                 source=log.source,
             )
         )
-    seconds = sum(record.seconds for record in made)
+    seconds = sum(record.seconds for record in records)
     if seconds < MIN_SECONDS:
-        cut = "; flight on its lifting motors is cut" if _vtol_rows(log, grid, pulses).any() else ""
-        message = f"{seconds / 60.0:.1f} min of it are flight on the wing that can be used{cut}"
+        vtol_note = "; flight on its lifting motors is cut" if _vtol_rows(log, grid, pulses).any() else ""
+        message = f"{seconds / 60.0:.1f} min of it are flight on the wing that can be used{vtol_note}"
         raise LogError(f"{log.source}: {message}: at least {MIN_SECONDS / 60.0:g} min are needed", file=log.source)
-    return made
+    return records
 
 
-def _pulses_as_controls(outputs: Mapping[str, ServoOutput], pulses: Floats) -> Floats:
+def _pulses_to_controls(outputs: Mapping[str, ServoOutput], pulses: Floats) -> Floats:
     """Return elevator, aileron, rudder, rad, and throttle, (n, 4).  pulses: pulses of the outputs, us, (n, m).
 
     With elevons, elevator and aileron are half the sum and half the difference of the elevons.
     """
-    found = {name: output.control(pulses[:, output.output - 1]) for name, output in outputs.items()}
-    if LEFT in found:
-        left, right = found.pop(LEFT), found.pop(RIGHT)
-        found |= {"elevator": 0.5 * (left + right), "aileron": 0.5 * (left - right)}
-    still = np.zeros(len(pulses))
-    return np.column_stack([found.get(name, still) for name in ("elevator", "aileron", "rudder", "throttle")])
+    controls = {name: output.control(pulses[:, output.output - 1]) for name, output in outputs.items()}
+    if LEFT in controls:
+        left, right = controls.pop(LEFT), controls.pop(RIGHT)
+        controls |= {"elevator": 0.5 * (left + right), "aileron": 0.5 * (left - right)}
+    zeros = np.zeros(len(pulses))
+    return np.column_stack([controls.get(name, zeros) for name in ("elevator", "aileron", "rudder", "throttle")])
 
 
-def _shares_as_angles(shares: Floats, aircraft: Aircraft) -> Floats:
+def _fractions_to_controls(fractions: Floats, aircraft: Aircraft) -> Floats:
     """Convert fractions of full travel to controls, rad and throttle, (n, 4).
 
     Full travel is the maximum deflection of the base aircraft.
     """
     # Positive fractions are nose up and yaw to the right; the model's elevator and rudder have the opposite sign.
-    largest = np.array([-aircraft.max_elevator, aircraft.max_aileron, -aircraft.max_rudder, 1.0])
-    return np.asarray(shares * largest)
+    max_controls = np.array([-aircraft.max_elevator, aircraft.max_aileron, -aircraft.max_rudder, 1.0])
+    return np.asarray(fractions * max_controls)
 
 
 # Message and quantity of each series, by autopilot.
@@ -169,25 +179,25 @@ _SERIES = {
 }
 
 
-def _refuse_unusable(log: MotionLog) -> None:
+def _check_usable(log: MotionLog) -> None:
     """Raise LogError for a log that no identification can use."""
     if log.vehicle not in ("plane", "unknown"):
         raise LogError(f"{log.source}: flown by a {log.vehicle} ({log.program}): a plane is expected", file=log.source)
-    named = _SERIES[log.program_kind]
+    series_names = _SERIES[log.program_kind]
     for samples, name in ((log.inertial, "inertial"), (log.moved, "outputs")):
         if len(samples.time) < 2:
-            raise LogError(f"{log.source}: no {named[name]}: {_recording_hint(log)}", file=log.source)
+            raise LogError(f"{log.source}: no {series_names[name]}: {_recording_hint(log)}", file=log.source)
     for samples, name in ((log.attitude, "attitude"), (log.velocity, "velocity"), (log.height, "height")):
         if len(samples.time) < 2:
-            raise LogError(f"{log.source}: no {named[name]}", file=log.source)
-    air = ((log.airspeed, "airspeed"), (log.wind, "wind"))
-    if lacking := [named[name] for samples, name in air if len(samples.time) < 2]:
-        raise LogError(f"{log.source}: no {'; no '.join(lacking)}", file=log.source)
-    for number, kind in _servo_functions(log).items():
-        if kind in _FLAPS:
-            lowest, highest = _pulse_range(log, number)
-            if highest - lowest > 20.0:
-                message = f"output {number} (SERVO{number}_FUNCTION {kind}, {_FLAPS[kind]}) moves in flight"
+            raise LogError(f"{log.source}: no {series_names[name]}", file=log.source)
+    air_series = ((log.airspeed, "airspeed"), (log.wind, "wind"))
+    if missing := [series_names[name] for samples, name in air_series if len(samples.time) < 2]:
+        raise LogError(f"{log.source}: no {'; no '.join(missing)}", file=log.source)
+    for number, function in _servo_functions(log).items():
+        if function in _FLAPS:
+            min_pulse, max_pulse = _pulse_range(log, number)
+            if max_pulse - min_pulse > 20.0:
+                message = f"output {number} (SERVO{number}_FUNCTION {function}, {_FLAPS[function]}) moves in flight"
                 raise LogError(f"{log.source}: {message}, and no model is estimated for that", file=log.source)
 
 
@@ -198,7 +208,7 @@ def slowest_rows(log: MotionLog) -> float:
 
 def recording_setting(log: MotionLog) -> str:
     """Return the parameter, with its value, that records sensors and outputs at a high rate."""
-    return f"SDLOG_PROFILE {_PROFILE}" if log.program_kind == "px4" else f"LOG_BITMASK {_BITMASK}"
+    return f"SDLOG_PROFILE {_HIGH_RATE_PROFILE}" if log.program_kind == "px4" else f"LOG_BITMASK {_HIGH_RATE_BITMASK}"
 
 
 def _recording_hint(log: MotionLog) -> str:
@@ -210,23 +220,23 @@ def _recording_hint(log: MotionLog) -> str:
 
 
 def _pulse_range(log: MotionLog, number: int) -> tuple[float, float]:
-    used = log.outputs.values[:, number - 1]
-    used = used[used > 0.0]
-    return (float(used.min()), float(used.max())) if len(used) else (0.0, 0.0)
+    pulses = log.outputs.values[:, number - 1]
+    pulses = pulses[pulses > 0.0]
+    return (float(pulses.min()), float(pulses.max())) if len(pulses) else (0.0, 0.0)
 
 
 def _servo_functions(log: MotionLog) -> dict[int, int]:
     """Return SERVOn_FUNCTION for each output, or ArduPlane's defaults if the log has none."""
-    found = {
+    functions = {
         k: int(log.parameters[f"SERVO{k}_FUNCTION"])
         for k in range(1, log.outputs.values.shape[1] + 1)
         if f"SERVO{k}_FUNCTION" in log.parameters
     }
-    return found or {1: _AILERON, 2: _ELEVATOR, 3: _THROTTLE, 4: _RUDDER}
+    return functions or {1: _AILERON, 2: _ELEVATOR, 3: _THROTTLE, 4: _RUDDER}
 
 
 def _first_output(log: MotionLog, function: int) -> int:
-    return next((number for number, kind in _servo_functions(log).items() if kind == function), 0)
+    return next((number for number, output_function in _servo_functions(log).items() if output_function == function), 0)
 
 
 def log_outputs(log: MotionLog, aircraft: Aircraft) -> dict[str, ServoOutput]:
@@ -239,16 +249,16 @@ def log_outputs(log: MotionLog, aircraft: Aircraft) -> dict[str, ServoOutput]:
     """
     functions = _servo_functions(log)
     for number, kind in functions.items():
-        if kind in _MIXED:
-            message = f"output {number} (SERVO{number}_FUNCTION {kind}) is one half of {_MIXED[kind]}"
+        if kind in _MIXED_FUNCTIONS:
+            message = f"output {number} (SERVO{number}_FUNCTION {kind}) is one half of {_MIXED_FUNCTIONS[kind]}"
             raise LogError(f"{log.source}: {message}: its mix is not modelled", file=log.source)
-    elevons = [kind in functions.values() for kind in (_ELEVON_LEFT, _ELEVON_RIGHT)]
-    if any(elevons):
-        _refuse_base_of_elevons(log, aircraft)
-    if any(elevons) and not all(elevons):
+    has_elevons = [kind in functions.values() for kind in (_ELEVON_LEFT, _ELEVON_RIGHT)]
+    if any(has_elevons):
+        _check_flying_wing_base(log, aircraft)
+    if any(has_elevons) and not all(has_elevons):
         raise LogError(f"{log.source}: one elevon alone: SERVOn_FUNCTION 77 and 78 are expected", file=log.source)
-    made = {}
-    for name, function, largest in (
+    outputs = {}
+    for name, function, max_deflection in (
         ("elevator", _ELEVATOR, -aircraft.max_elevator),
         ("aileron", _AILERON, aircraft.max_aileron),
         ("rudder", _RUDDER, -aircraft.max_rudder),
@@ -257,19 +267,21 @@ def log_outputs(log: MotionLog, aircraft: Aircraft) -> dict[str, ServoOutput]:
     ):
         number = _first_output(log, function)
         if number:
-            lowest, middle, highest, sign = _pulse_travel(log, number)
-            made[name] = ServoOutput(number, (lowest, middle, highest), (-largest * sign, 0.0, largest * sign))
+            min_pulse, trim_pulse, max_pulse, sign = _pulse_travel(log, number)
+            outputs[name] = ServoOutput(
+                number, (min_pulse, trim_pulse, max_pulse), (-max_deflection * sign, 0.0, max_deflection * sign)
+            )
     number = _first_output(log, _THROTTLE)
     if number:
-        lowest, _, highest, _ = _pulse_travel(log, number)
-        made["throttle"] = ServoOutput(number, (lowest, highest), (0.0, 1.0))
-    for name in ("throttle",) if LEFT in made else ("elevator", "aileron", "throttle"):
-        if name not in made:
+        min_pulse, _, max_pulse, _ = _pulse_travel(log, number)
+        outputs["throttle"] = ServoOutput(number, (min_pulse, max_pulse), (0.0, 1.0))
+    for name in ("throttle",) if LEFT in outputs else ("elevator", "aileron", "throttle"):
+        if name not in outputs:
             raise LogError(f"{log.source}: no SERVOn_FUNCTION is the {name}'s", file=log.source)
-    return made
+    return outputs
 
 
-def _refuse_base_of_elevons(log: MotionLog, aircraft: Aircraft) -> None:
+def _check_flying_wing_base(log: MotionLog, aircraft: Aircraft) -> None:
     if not is_flying_wing(aircraft):
         advice = "a flying wing is expected as base: x8, zagi, or one of planfly aircraft --new FOLDER --layout wing"
         message = f"flown with elevons, and the base {aircraft.name} has a tail: {advice}"
@@ -279,31 +291,31 @@ def _refuse_base_of_elevons(log: MotionLog, aircraft: Aircraft) -> None:
 def _pulse_travel(log: MotionLog, number: int) -> tuple[float, float, float, float]:
     """Return the minimum, trim and maximum pulse of an output, us, and its sign."""
     value = log.parameters.get
-    lowest, highest = value(f"SERVO{number}_MIN", 1100.0), value(f"SERVO{number}_MAX", 1900.0)
-    middle = min(max(value(f"SERVO{number}_TRIM", 1500.0), lowest + 1.0), highest - 1.0)
-    return lowest, middle, highest, -1.0 if value(f"SERVO{number}_REVERSED", 0.0) > 0.0 else 1.0
+    min_pulse, max_pulse = value(f"SERVO{number}_MIN", 1100.0), value(f"SERVO{number}_MAX", 1900.0)
+    trim_pulse = min(max(value(f"SERVO{number}_TRIM", 1500.0), min_pulse + 1.0), max_pulse - 1.0)
+    return min_pulse, trim_pulse, max_pulse, -1.0 if value(f"SERVO{number}_REVERSED", 0.0) > 0.0 else 1.0
 
 
 def _time_grid(log: MotionLog) -> Floats:
     """Return the time grid over the span that all series cover."""
     series = (log.inertial, log.moved, log.attitude, log.velocity, log.height, log.airspeed, log.wind)
-    first, last = max(one.time[0] for one in series), min(one.time[-1] for one in series)
-    return np.arange(first, last, 1.0 / GRID_HZ)
+    start_time, end_time = max(samples.time[0] for samples in series), min(samples.time[-1] for samples in series)
+    return np.arange(start_time, end_time, 1.0 / GRID_HZ)
 
 
-def _at(samples: Samples, grid: Floats) -> Floats:
+def _interpolate(samples: Samples, grid: Floats) -> Floats:
     return np.column_stack([np.interp(grid, samples.time, column) for column in samples.values.T])
 
 
-def _held(samples: Samples, grid: Floats) -> Floats:
-    """Resample on the grid, each sample holding its value until the next."""
+def _hold_samples(samples: Samples, grid: Floats) -> Floats:
+    """Resample on the grid; each sample holds its value until the next sample."""
     rows = np.clip(np.searchsorted(samples.time, grid, side="right") - 1, 0, len(samples.time) - 1)
     return np.asarray(samples.values[rows])
 
 
-def _ratio_of_height(height: Floats) -> Floats:
-    """Return the ratio of true to equivalent airspeed in the standard atmosphere.  height: altitude, m AMSL."""
-    return np.asarray((1.0 - 2.25577e-5 * np.clip(height, -500.0, 9000.0)) ** -2.12794)
+def _airspeed_ratio(amsl: Floats) -> Floats:
+    """Return the ratio of true to equivalent airspeed in the standard atmosphere.  amsl: altitude, m AMSL."""
+    return np.asarray((1.0 - 2.25577e-5 * np.clip(amsl, -500.0, 9000.0)) ** -2.12794)
 
 
 def _has_current(log: MotionLog) -> bool:
@@ -318,29 +330,29 @@ def _vtol_rows(log: MotionLog, grid: Floats, pulses: Floats) -> Flags:
             rows |= (grid >= start) & (grid < end)
     for start, end in log.hovering:
         rows |= (grid >= start) & (grid < end)
-    for number, kind in _servo_functions(log).items() if len(log.outputs.time) else ():
-        if kind in _LIFT_MOTORS and log.parameters.get("Q_ENABLE", 0.0) > 0.0:
+    for number, function in _servo_functions(log).items() if len(log.outputs.time) else ():
+        if function in _LIFT_MOTORS and log.parameters.get("Q_ENABLE", 0.0) > 0.0:
             rows |= pulses[:, number - 1] > 1100.0
     return rows
 
 
-def _usable_rows(log: MotionLog, grid: Floats, equivalent: Floats, pulses: Floats) -> Flags:
+def _usable_rows(log: MotionLog, grid: Floats, equivalent_airspeed: Floats, pulses: Floats) -> Flags:
     """Flag the rows in free flight on the wing, without gaps in sensors, airspeed or wind."""
-    least = log.parameters.get("AIRSPEED_MIN", log.parameters.get("ARSPD_FBW_MIN", 9.0))
-    flying = (equivalent > _FLYING * least) & ~_vtol_rows(log, grid, pulses)
-    sensors = [(samples, _GAP) for samples in (log.inertial, log.moved, log.attitude, log.velocity)]
+    min_airspeed = log.parameters.get("AIRSPEED_MIN", log.parameters.get("ARSPD_FBW_MIN", 9.0))
+    is_flying = (equivalent_airspeed > _MIN_AIRSPEED_FRACTION * min_airspeed) & ~_vtol_rows(log, grid, pulses)
+    sensors = [(samples, _MAX_SENSOR_GAP_S) for samples in (log.inertial, log.moved, log.attitude, log.velocity)]
     wind_gap = _MAX_PX4_WIND_GAP_S if log.program_kind == "px4" else _MAX_AIR_GAP_S
-    for samples, longest in (*sensors, (log.airspeed, _MAX_AIR_GAP_S), (log.wind, wind_gap)):
+    for samples, max_gap in (*sensors, (log.airspeed, _MAX_AIR_GAP_S), (log.wind, wind_gap)):
         steps = np.diff(samples.time)
-        for k in np.flatnonzero(steps > longest):
-            flying &= ~((grid > samples.time[k]) & (grid < samples.time[k + 1]))
-    made = flying.copy()
-    for first, last in _find_stretches(flying, 0.0):
-        made[first : min(last, first + round(_SETTLING_TIME_S * GRID_HZ))] = False
-    return made
+        for k in np.flatnonzero(steps > max_gap):
+            is_flying &= ~((grid > samples.time[k]) & (grid < samples.time[k + 1]))
+    is_usable = is_flying.copy()
+    for begin, end in _find_stretches(is_flying, 0.0):
+        is_usable[begin : min(end, begin + round(_SETTLING_TIME_S * GRID_HZ))] = False
+    return is_usable
 
 
-def _find_stretches(flags: Flags, least: float = MIN_STRETCH) -> list[tuple[int, int]]:
+def _find_stretches(flags: Flags, min_duration: float = MIN_STRETCH) -> list[tuple[int, int]]:
     edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(np.int8)))
     pairs = zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True)
-    return [(first, last) for first, last in pairs if last - first >= least * GRID_HZ]
+    return [(begin, end) for begin, end in pairs if end - begin >= min_duration * GRID_HZ]

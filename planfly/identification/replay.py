@@ -23,9 +23,9 @@ from world.arrays import Floats
 from world.files import temporary_folder
 
 # Duration of a window, s.
-WINDOW = 5.0
+WINDOW_S = 5.0
 # Maximum number of windows of a log.
-COUNT = 40
+MAX_WINDOWS = 40
 # Rate of JSBSim steps, Hz.
 _JSBSIM_RATE_HZ = 100.0
 # Highest frequency of gusts that is replayed, Hz.
@@ -53,25 +53,25 @@ class Replay:
 
 
 def replay_log(
-    found: Identified, files: Mapping[str, str], name: str, records: Sequence[FlightRecord]
+    identified: Identified, files: Mapping[str, str], name: str, records: Sequence[FlightRecord]
 ) -> tuple[Replay, ...]:
     """Replay a log with the base, scaled to the aircraft, and with the identified model.
 
     files: texts of the aircraft's folder by file name.
     """
-    clock = found.estimate.clocks[-1]
+    clock = identified.estimate.clocks[-1]
     signals = level_signals(align(records, [Clocks(clock.lag, clock.delay, 0.0)] * len(records), 0.0))
-    signals = replace(signals, airspeed=signals.airspeed * found.estimate.airspeed[0])
-    flow = vane(signals, found.numbers, found.estimate.values)
-    with temporary_folder("planfly-replay-") as place:
-        folder = place / name
+    signals = replace(signals, airspeed=signals.airspeed * identified.estimate.airspeed[0])
+    flow = vane(signals, identified.numbers, identified.estimate.values)
+    with temporary_folder("planfly-replay-") as parent:
+        folder = parent / name
         folder.mkdir()
         for file, text in files.items():
             (folder / file).write_text(text, encoding="utf-8")
         aircraft = read_aircraft(folder)
-        before = _replay_model(found.base.name, aircraft, prior_means(), signals, flow, folder)
-        after = _replay_model("identified", aircraft, found.estimate.values, signals, flow, folder)
-    return before, after
+        base_replay = _replay_model(identified.base.name, aircraft, prior_means(), signals, flow, folder)
+        identified_replay = _replay_model("identified", aircraft, identified.estimate.values, signals, flow, folder)
+    return base_replay, identified_replay
 
 
 def _replay_model(model: str, aircraft: Aircraft, values: Floats, signals: Signals, flow: Flow, folder: Path) -> Replay:
@@ -79,20 +79,20 @@ def _replay_model(model: str, aircraft: Aircraft, values: Floats, signals: Signa
     for parameter, value in zip(PARAMETERS, values.tolist(), strict=True):
         fdm.properties.set(parameter.property_name, value)
     del folder
-    air = _wind_velocity(signals, flow)
-    rows = round(WINDOW * GRID_HZ)
+    wind = _wind_velocity(signals, flow)
+    rows = round(WINDOW_S * GRID_HZ)
     starts = [
         start
         for first, last in zip(signals.edges[:-1], signals.edges[1:], strict=True)
         for start in range(first, last - rows, rows)
     ]
-    chosen = [starts[k] for k in np.unique(np.linspace(0, len(starts) - 1, COUNT).astype(int))]
-    flown = np.array([_fly_window(fdm, signals, air, start, rows) for start in chosen])
-    logged = np.array([_logged_quantities(signals, start, rows) for start in chosen])
-    off = flown - logged
-    rms = np.sqrt(np.nanmean(np.square(off), axis=(0, 1)))
-    shown = np.stack([logged[:4].reshape(-1, len(QUANTITIES)), flown[:4].reshape(-1, len(QUANTITIES))])
-    return Replay(model, dict(zip(QUANTITIES, rms.tolist(), strict=True)), len(chosen), shown)
+    window_starts = [starts[k] for k in np.unique(np.linspace(0, len(starts) - 1, MAX_WINDOWS).astype(int))]
+    replayed = np.array([_fly_window(fdm, signals, wind, start, rows) for start in window_starts])
+    logged = np.array([_logged_quantities(signals, start, rows) for start in window_starts])
+    errors = replayed - logged
+    rms = np.sqrt(np.nanmean(np.square(errors), axis=(0, 1)))
+    shown = np.stack([logged[:4].reshape(-1, len(QUANTITIES)), replayed[:4].reshape(-1, len(QUANTITIES))])
+    return Replay(model, dict(zip(QUANTITIES, rms.tolist(), strict=True)), len(window_starts), shown)
 
 
 def _logged_quantities(signals: Signals, start: int, rows: int) -> Floats:
@@ -106,41 +106,44 @@ def _wind_velocity(signals: Signals, flow: Flow) -> Floats:
     roll, pitch, yaw = signals.attitude.T
     alpha, beta, speed = flow.alpha, flow.beta, signals.airspeed
     u, v, w = speed * np.cos(alpha) * np.cos(beta), speed * np.sin(beta), speed * np.sin(alpha) * np.cos(beta)
-    right, below = v * np.cos(roll) - w * np.sin(roll), v * np.sin(roll) + w * np.cos(roll)
-    ahead, down = u * np.cos(pitch) + below * np.sin(pitch), below * np.cos(pitch) - u * np.sin(pitch)
-    north, east = ahead * np.cos(yaw) - right * np.sin(yaw), ahead * np.sin(yaw) + right * np.cos(yaw)
-    return signals.smooth(signals.velocity - np.column_stack([north, east, down]), _GUST_BANDWIDTH_HZ)
+    air_right, air_below = v * np.cos(roll) - w * np.sin(roll), v * np.sin(roll) + w * np.cos(roll)
+    air_ahead, air_down = u * np.cos(pitch) + air_below * np.sin(pitch), air_below * np.cos(pitch) - u * np.sin(pitch)
+    air_north, air_east = (
+        air_ahead * np.cos(yaw) - air_right * np.sin(yaw),
+        air_ahead * np.sin(yaw) + air_right * np.cos(yaw),
+    )
+    return signals.smooth(signals.velocity - np.column_stack([air_north, air_east, air_down]), _GUST_BANDWIDTH_HZ)
 
 
-def _fly_window(fdm: Fdm, signals: Signals, air: Floats, start: int, rows: int) -> Floats:
+def _fly_window(fdm: Fdm, signals: Signals, wind: Floats, start: int, rows: int) -> Floats:
     """Fly a window with the model, and return `QUANTITIES` at each row, (rows, 6)."""
-    begin = slice(start, start + 1)
+    first_row = slice(start, start + 1)
     fdm.begin_at(
-        attitude=signals.attitude[begin][0],
-        velocity=signals.velocity[begin][0],
-        rates=signals.rates[begin][0],
-        wind=air[start],
+        attitude=signals.attitude[first_row][0],
+        velocity=signals.velocity[first_row][0],
+        rates=signals.rates[first_row][0],
+        wind=wind[start],
         amsl=_density_altitude(float(signals.density[start])),
         commands=[*signals.surfaces[start], float(signals.throttle[start])],
     )
-    made = np.full((rows, len(QUANTITIES)), np.nan)
+    quantities = np.full((rows, len(QUANTITIES)), np.nan)
     steps = round(_JSBSIM_RATE_HZ / GRID_HZ)
     for k in range(rows):
         state = fdm.read()
-        made[k] = (
+        quantities[k] = (
             *np.degrees([state.roll_rate, state.pitch_rate, state.yaw_rate]),
             *np.degrees([_unwrap_near(state.roll, signals.attitude[start + k, 0]), state.pitch]),
             state.airspeed,
         )
-        fdm.set_wind(*air[start + k])
+        fdm.set_wind(*wind[start + k])
         fdm.write([*signals.surfaces[start + k], float(signals.throttle[start + k])])
         fdm.step(steps)
-    return made
+    return quantities
 
 
-def _unwrap_near(angle: float, other: float) -> float:
+def _unwrap_near(angle: float, reference: float) -> float:
     """Return an angle shifted by whole turns to be as near as possible to another angle, rad."""
-    return angle + 2.0 * math.pi * round((other - angle) / (2.0 * math.pi))
+    return angle + 2.0 * math.pi * round((reference - angle) / (2.0 * math.pi))
 
 
 def _density_altitude(density: float) -> float:

@@ -46,15 +46,15 @@ def read_servos(file: Path) -> Mapping[str, ServoOutput]:
     """
     try:
         table = read_toml(file, "servo outputs")
-        made = {}
+        outputs = {}
         for name, entry in table.items():
             angles = entry.get("value") or [math.radians(angle) for angle in entry["value_deg"]]
             pulses = [float(pulse) for pulse in entry["pulse_us"]]
             if len(pulses) != len(angles) or len(pulses) < 2 or any(np.diff(pulses) <= 0.0):
                 raise ValueError("pulse_us must rise, with as many values")
-            made[name] = ServoOutput(int(entry["output"]), tuple(pulses), tuple(float(angle) for angle in angles))
+            outputs[name] = ServoOutput(int(entry["output"]), tuple(pulses), tuple(float(angle) for angle in angles))
     except OSError as error:
         raise FlightError(f"{file}: {error.strerror}", file=file) from None
     except (KeyError, TypeError, ValueError, AttributeError) as error:
         raise FlightError(f"{file}: {' '.join(str(error).split())}: no table of servo outputs", file=file) from None
-    return made
+    return outputs

@@ -3,12 +3,12 @@
 from dataclasses import dataclass
 
 # Maximum half width of the sink's 95 % interval, as a fraction of the estimate; a wider interval makes it uncertain.
-WIDE_SINK = 0.10
+MAX_SINK_FRACTION = 0.10
 # Maximum half width of the 95 % interval of the power in level flight, as a fraction of the estimate.
-WIDE_POWER = 0.20
+MAX_POWER_FRACTION = 0.20
 # Duration of a glide that shows what half an hour of powered flight does not show, s; from
 # `benchmarks.identification_information`.
-GLIDE_SECONDS = 20
+GLIDE_TIME_S = 20
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,18 +45,18 @@ def wide_numbers(sink: Interval, power: Interval, *, with_current: bool) -> tupl
     >>> [one.title for one in wide_numbers((6.0, 7.0, 8.0), (400.0, 500.0, 590.0), with_current=False)]
     ['sink at idle']
     """
-    speeds = "level runs of 20 s at several speeds"
-    made = []
-    for title, (low, value, high), limit, show in (
-        ("sink at idle", sink, WIDE_SINK, f"glides of {GLIDE_SECONDS} s at idle, at cruise speed"),
+    speed_runs = "level runs of 20 s at several speeds"
+    wide = []
+    for title, (lower, value, upper), limit, show in (
+        ("sink at idle", sink, MAX_SINK_FRACTION, f"glides of {GLIDE_TIME_S} s at idle, at cruise speed"),
         (
             "power in level flight",
             power,
-            WIDE_POWER,
-            speeds if with_current else "with the battery's current logged (BAT); no manoeuvre does without it",
+            MAX_POWER_FRACTION,
+            speed_runs if with_current else "with the battery's current logged (BAT); no manoeuvre does without it",
         ),
     ):
-        half = 0.5 * (high - low) / abs(value)
-        if half > limit:
-            made.append(WideNumber(title, half, show))
-    return tuple(made)
+        half_width = 0.5 * (upper - lower) / abs(value)
+        if half_width > limit:
+            wide.append(WideNumber(title, half_width, show))
+    return tuple(wide)

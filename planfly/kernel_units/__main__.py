@@ -19,14 +19,14 @@ def answer_requests() -> int:
     # Ctrl-C reaches all processes of a terminal: this process ends with the process that started it.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     requested: queue.Queue[str] = queue.Queue()
-    threading.Thread(target=_listen, args=(requested,), daemon=True).start()
+    threading.Thread(target=_queue_requests, args=(requested,), daemon=True).start()
     prepare_process()
-    from planfly.kernel_units.ready_kernels import do_unit
+    from planfly.kernel_units.ready_kernels import run_unit
 
     while True:
         unit = requested.get()
         try:
-            with_large_stack(functools.partial(do_unit, unit, _report))
+            with_large_stack(functools.partial(run_unit, unit, _report))
         except Exception:
             # The kernels of this unit are compiled later, where they are needed, and report their own errors there.
             _report(f"failed {unit}")
@@ -34,7 +34,7 @@ def answer_requests() -> int:
             _report(f"done {unit}")
 
 
-def _listen(requested: queue.Queue[str]) -> None:
+def _queue_requests(requested: queue.Queue[str]) -> None:
     for line in sys.stdin:
         requested.put(line.strip())
     os._exit(0)

@@ -72,17 +72,17 @@ MISSION = """QGC WPL 110
 """
 
 
-def _field() -> Scenario:
+def _make_scenario() -> Scenario:
     return from_spec(tomllib.loads(FIELD), "field")
 
 
-def _world() -> tuple[Scenario, Airframe]:
-    scenario = _field()
+def _make_world() -> tuple[Scenario, Airframe]:
+    scenario = _make_scenario()
     return scenario, load_airframe(scenario)
 
 
 def _make_problem() -> None:
-    scenario = _field()
+    scenario = _make_scenario()
     aircraft, _ = find_airframe(scenario)
     limits = make_limits(
         scenario, load_envelope(aircraft), aircraft.airspeed, math.radians(scenario.flight.max_bank_deg)
@@ -90,21 +90,21 @@ def _make_problem() -> None:
     make_problem(scenario, limits)
 
 
-def _track() -> None:
+def _compute_tracking_error() -> None:
     tracking_error(ArduPilotParameters.defaults(), load_aircraft("aerosonde").airspeed, "gnss")
 
 
-def _rank() -> None:
+def _rank_scores() -> None:
     best_first(np.zeros((FEW, SCORE_COLUMNS)))
 
 
-def _plan(part: str) -> None:
-    scenario, airframe = _world()
+def _plan_part(part: str) -> None:
+    scenario, airframe = _make_world()
     call_kernels(part, scenario, airframe.limits)
 
 
-def _fly() -> None:
-    scenario, airframe = _world()
+def _fly_mission() -> None:
+    scenario, airframe = _make_world()
     setup = make_setup(scenario, airframe, parse_mission(MISSION, "field.waypoints"), 1)
     flown = fly_and_judge(setup, airframe, None)
     returns_line(setup, flown.track)
@@ -113,8 +113,8 @@ def _fly() -> None:
         recorder.finish(flown.ended, flown.verdict)
 
 
-def _glide() -> None:
-    scenario, airframe = _world()
+def _judge_glides() -> None:
+    scenario, airframe = _make_world()
     setup = make_setup(scenario, airframe, parse_mission(MISSION, "field.waypoints"), 1)
     return_summary(setup, None).drawn()
 
@@ -122,29 +122,29 @@ def _glide() -> None:
 # Function of each unit by name.
 UNITS: dict[str, Callable[[], None]] = {
     "problem": _make_problem,
-    "tracking": _track,
-    "ranks": _rank,
-    **{part: functools.partial(_plan, part) for part in (*PARTS, FRONT)},
-    "flight": _fly,
-    "glides": _glide,
+    "tracking": _compute_tracking_error,
+    "ranks": _rank_scores,
+    **{part: functools.partial(_plan_part, part) for part in (*PARTS, FRONT)},
+    "flight": _fly_mission,
+    "glides": _judge_glides,
 }
 
 
-def do_unit(unit: str, report: Callable[[str], None]) -> None:
-    """Run a unit of work; report ``ready KERNEL`` for each of its kernels, as soon as the next one is being compiled.
+def run_unit(unit: str, report: Callable[[str], None]) -> None:
+    """Run a unit of work; report ``ready KERNEL`` for each of its kernels as soon as the next kernel is compiled.
 
     Raises KeyError for an unknown unit.
     """
-    waiting = list(UNIT_KERNELS[unit])
+    pending = list(UNIT_KERNELS[unit])
 
-    def tell_ready() -> None:
-        for name in [one for one in waiting if is_ready(one)]:
-            waiting.remove(name)
+    def report_ready() -> None:
+        for name in [kernel for kernel in pending if is_ready(kernel)]:
+            pending.remove(name)
             report(f"ready {name}")
 
-    with tell_before_compiling(tell_ready):
+    with tell_before_compiling(report_ready):
         UNITS[unit]()
-    tell_ready()
+    report_ready()
 
 
 def is_ready(kernel: str) -> bool:

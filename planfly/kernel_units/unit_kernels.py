@@ -131,13 +131,13 @@ _SHARED = ("problem", "tracking", "ranks")
 # Units of a plan.
 PLANNING = (*_SHARED, "scores", "shortening", "routes", "certificates", "paper", "sides")
 # Units of a choice of plans: all units of a default plan, and its own.
-CHOOSING = (*_SHARED, "scores", "shortening", "routes", "certificates", "fronts", "paper", "sides")
+FRONT_PLANNING = (*_SHARED, "scores", "shortening", "routes", "certificates", "fronts", "paper", "sides")
 # Units of a flight.
 FLYING = ("tracking", "flight")
 # Units of glides without the engine.
 GLIDING = ("glides",)
 # Units of a plan and its flights.
-BOTH = (*_SHARED, "scores", "flight", "shortening", "routes", "certificates", "paper", "sides")
+PLANNING_AND_FLYING = (*_SHARED, "scores", "flight", "shortening", "routes", "certificates", "paper", "sides")
 
 
 def kernels_of(units: tuple[str, ...]) -> frozenset[str]:

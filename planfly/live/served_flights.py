@@ -60,7 +60,7 @@ from world.interruption import end_with_parent
 from world.scenario import Scenario, without_ground_phases
 
 # Duration of a loiter in LOITER and GUIDED in one log, s: each lap of a loiter is laid out, and judged, separately.
-HELD = 900.0
+LOITER_DURATION_S = 900.0
 # Maximum number of texts about one verdict; the log has the others.
 _MAX_TEXTS = 4
 
@@ -72,7 +72,7 @@ class ServeOptions:
     mission: path of a mission file, or "".
     speed: multiple of real time.
     logs: the folder of the flight logs.
-    flown: options of the flight.  An uploaded fence replaces the items of named fences, but not their zones.
+    flown: options of the flights.  An uploaded fence replaces the items of named fences, but not their zones.
     """
 
     mission: str
@@ -97,24 +97,24 @@ def open_served(options: ServeOptions) -> ServedScenario:
     if options.mission:
         setup = open_flight(options.mission, options.flown)
         return ServedScenario(setup.scenario, airframe_of(setup), setup.seed, setup.mission)
-    named = options.flown.get("scenario")
-    if named is None:
+    scenario_name = options.flown.get("scenario")
+    if scenario_name is None:
         allowed = "a mission, or a scenario to wait for an upload in, is expected: `scenario` NAME"
         raise PlanflyError(f"mission: none is named; {allowed}", field="scenario", allowed=allowed)
     fences = read_named_fences(options.flown.get("fence") or ())
-    scenario = named_scenario(named, options.flown)
+    scenario = named_scenario(scenario_name, options.flown)
     scenario, seed = fences.on_scenario(scenario), options.flown.get("seed")
     return ServedScenario(scenario, load_airframe(scenario), choose_seed(scenario, seed), None, fences.items)
 
 
-def flown_parameters(scenario: Scenario, stated: Mapping[str, float]) -> dict[str, float]:
+def flown_parameters(scenario: Scenario, stated_values: Mapping[str, float]) -> dict[str, float]:
     """Return the parameters of a scenario's autopilot by name, with stated values applied.
 
     The cruise airspeed is the airspeed that is flown.  Raises PlanflyError for values that are not allowed.
     """
-    airframe = load_airframe(scenario, stated)
+    airframe = load_airframe(scenario, stated_values)
     parameters = airframe.autopilot.parameters
-    values = {} if parameters is None else {one.name: one.value for one in parameters.values}
+    values = {} if parameters is None else {parameter.name: parameter.value for parameter in parameters.values}
     cruise = airframe.autopilot.cruise_parameter
     return values | {cruise: airframe.airspeed} if cruise in values else values
 
@@ -124,7 +124,7 @@ def fly_process(connection: Connection, options: ServeOptions) -> None:
     in_service = threading.Event()
     end_with_parent(in_service)
     factory = ServedFlights(options)
-    factory.warm()
+    factory.warm_up()
     # A signal to the process group also reaches the link, which orders this process to end after closing its log.
     in_service.set()
     signal.signal(signal.SIGTERM, signal.SIG_IGN)
@@ -136,7 +136,7 @@ def fly_process(connection: Connection, options: ServeOptions) -> None:
 
 
 class ServedFlights:
-    """Judges missions in the served scenario, and logs flights into the served folder."""
+    """Judge missions in the served scenario, and log flights into the served folder."""
 
     def __init__(self, options: ServeOptions) -> None:
         self._served = open_served(options)
@@ -147,14 +147,14 @@ class ServedFlights:
         self.aircraft = self._airframe.aircraft
         self.speed = options.speed
 
-    def warm(self) -> None:
+    def warm_up(self) -> None:
         """Fly and judge half a second, so that no station has to wait for compilers later."""
         scenario = self._served.scenario
         points = np.linspace(scenario.start, scenario.destination, 3)
         lats, lons = to_geo(scenario.origin, points[:, 0], points[:, 1])
-        none, amsl = (0.0, 0.0, 0.0, 0.0), float(points[0, 2])
+        no_params, amsl = (0.0, 0.0, 0.0, 0.0), float(points[0, 2])
         items = tuple(
-            MissionItem(k, int(Command.NAV_WAYPOINT), int(Frame.GLOBAL), none, on_grid(lat), on_grid(lon), amsl)
+            MissionItem(k, int(Command.NAV_WAYPOINT), int(Frame.GLOBAL), no_params, on_grid(lat), on_grid(lon), amsl)
             for k, (lat, lon) in enumerate(zip(lats.tolist(), lons.tolist(), strict=True), 1)
         )
         with contextlib.suppress(PlanflyError):
@@ -185,23 +185,25 @@ class ServedFlights:
         items = tuple(int(item) for item in setup.route.items)
         texts = mission_texts(setup, verdict)
         # A mission that is not judged in full is armed with a warning; for example, MAVSDK writes ground speeds.
-        arms = verdict.flies or verdict.undecided
-        judged = MissionJudged(request.number, True, arms, texts, home, items, start)
+        can_arm = verdict.flies or verdict.undecided
+        judged = MissionJudged(request.number, True, can_arm, texts, home, items, start)
         return PreparedFlight(setup, flight.map), judged
 
-    def divert(self, request: DivertFlight, here: Floats) -> PreparedFlight:
-        """Return the flight that a station requests from the current position; a loiter lasts `HELD`."""
+    def divert(self, request: DivertFlight, position: Floats) -> PreparedFlight:
+        """Return the flight that a station requests from the current position; a loiter lasts `LOITER_DURATION_S`."""
         served = self._served
-        lat, lon = (on_grid(float(value)) for value in to_geo(served.scenario.origin, here[0], here[1]))
-        none = (0.0, 0.0, 0.0, 0.0)
-        begin = MissionItem(-1, int(Command.NAV_WAYPOINT), int(Frame.GLOBAL), none, lat, lon, float(here[2]))
+        lat, lon = (on_grid(float(value)) for value in to_geo(served.scenario.origin, position[0], position[1]))
+        no_params = (0.0, 0.0, 0.0, 0.0)
+        start_item = MissionItem(
+            -1, int(Command.NAV_WAYPOINT), int(Frame.GLOBAL), no_params, lat, lon, float(position[2])
+        )
         if request.mode == AUTO:
             items = request.mission.items
         elif request.mode == RTL:
-            items = (MissionItem(0, int(Command.NAV_RETURN_TO_LAUNCH), int(Frame.MISSION), none, 0.0, 0.0, 0.0),)
+            items = (MissionItem(0, int(Command.NAV_RETURN_TO_LAUNCH), int(Frame.MISSION), no_params, 0.0, 0.0, 0.0),)
         else:
-            items = (_loiter_item(begin, request.place),)
-        mission = replace(request.mission, items=(begin, *items), source=MODE_NAMES[request.mode])
+            items = (_loiter_item(start_item, request.place),)
+        mission = replace(request.mission, items=(start_item, *items), source=MODE_NAMES[request.mode])
         # The aircraft is in the air, so there is no take-off, and it does not land.
         setup = make_setup(without_ground_phases(served.scenario), self._airframe, mission, served.seed)
         return PreparedFlight(setup, LocalMap.around(setup))
@@ -220,17 +222,17 @@ class ServedFlights:
         return ServedLog(path, setup, self.aircraft, mode)
 
 
-def _loiter_item(here: MissionItem, place: Place) -> MissionItem:
-    """Return a loiter about a place; values that the place does not state are taken from `here`."""
-    located = math.isfinite(place.lat_deg) and math.isfinite(place.lon_deg)
-    height = replace(here, frame=place.frame, alt=place.alt) if math.isfinite(place.alt) else here
+def _loiter_item(current: MissionItem, place: Place) -> MissionItem:
+    """Return a loiter about a place; values that the place does not state are taken from `current`."""
+    has_position = math.isfinite(place.lat_deg) and math.isfinite(place.lon_deg)
+    with_altitude = replace(current, frame=place.frame, alt=place.alt) if math.isfinite(place.alt) else current
     return replace(
-        height,
+        with_altitude,
         seq=0,
         command=int(Command.NAV_LOITER_TIME),
-        params=(HELD, 0.0, place.radius, 0.0),
-        lat_deg=on_grid(place.lat_deg) if located else here.lat_deg,
-        lon_deg=on_grid(place.lon_deg) if located else here.lon_deg,
+        params=(LOITER_DURATION_S, 0.0, place.radius, 0.0),
+        lat_deg=on_grid(place.lat_deg) if has_position else current.lat_deg,
+        lon_deg=on_grid(place.lon_deg) if has_position else current.lon_deg,
     )
 
 
@@ -249,31 +251,33 @@ class ServedLog:
         self._recorder.write(block)
         self._recorder.flush()
 
-    def finish(self, ended: str, hurry: Callable[[], bool]) -> FlightJudged:
+    def finish(self, ended: str, should_abort: Callable[[], bool]) -> FlightJudged:
         """Judge the flight and close the log.
 
-        A path that was abandoned within a second leaves no log.  In a hurry, an abandoned path is not judged;
-        `planfly check` can judge it.
-        hurry: see `planfly.workflow.reference_flights.judge_with_reference_flights`.
+        A path that was abandoned within a second leaves no log.  If the process is to end, an abandoned path is not
+        judged; `planfly check` can judge it.
+        should_abort: see `planfly.workflow.reference_flights.judge_with_reference_flights`.
         """
         track = join_tracks(self._blocks)
-        left = ended.startswith((DIVERTED_TEXT, STILL_LOITERING_TEXT))
+        was_left = ended.startswith((DIVERTED_TEXT, STILL_LOITERING_TEXT))
         end = float(track.time[-1]) if len(track) else 0.0
-        if left and end < 1.0:
+        if was_left and end < 1.0:
             self._recorder.abandon()
             self._path.unlink()
             return FlightJudged(False, ())
-        self._recorder.event(end, f"flight ended: {ended}", "info" if left or ended == "completed" else "error")
-        if left and hurry():
+        self._recorder.event(end, f"flight ended: {ended}", "info" if was_left or ended == "completed" else "error")
+        if was_left and should_abort():
             self._recorder.finish(ended)
             return FlightJudged(False, (StatusText(f"log {self._path}, not judged yet", INFO),))
         if ended == "completed":
             requirements = route_requirements(self._setup)
-            verdict, reference = judge_with_reference_flights(requirements, self._aircraft, track, ended, hurry=hurry)
+            verdict, reference = judge_with_reference_flights(
+                requirements, self._aircraft, track, ended, should_abort=should_abort
+            )
         else:
             verdict, reference = judge_flight(self._setup, track, ended), None
         self._recorder.finish(ended, verdict, reference)
-        texts = left_texts(self._level, ended, verdict) if left else verdict_texts(self._level, verdict)
+        texts = unfinished_texts(self._level, ended, verdict) if was_left else verdict_texts(self._level, verdict)
         return FlightJudged(verdict.flyable, (*texts, StatusText(f"log {self._path}", INFO)))
 
     def abandon(self) -> None:
@@ -285,21 +289,25 @@ def mission_texts(setup: FlightSetup, verdict: Verdict) -> tuple[StatusText, ...
     """Return texts for stations on a mission's verdict, its size, and items that are not flown as written."""
     route = setup.route
     length = float(np.linalg.norm(np.diff(route.waypoints[:, :2], axis=0), axis=1).sum()) / 1000.0
-    size = StatusText(f"mission: {len(route.waypoints)} waypoints, {length:.1f} km; {route.started}", INFO)
+    size_text = StatusText(f"mission: {len(route.waypoints)} waypoints, {length:.1f} km; {route.started}", INFO)
     notes = tuple(StatusText(f"note: {note}", NOTICE) for note in route.notes[:_MAX_TEXTS])
-    return (size, *verdict_texts("geometry", verdict), *notes)
+    return (size_text, *verdict_texts("geometry", verdict), *notes)
 
 
 # Rules that fail on a path only because the aircraft left it before its end.
 _RULES_OF_UNFINISHED_PATHS = ("completion", "loiter", "waypoint", "turn", "survey")
 
 
-def left_texts(level: str, ended: str, verdict: Verdict) -> tuple[StatusText, ...]:
+def unfinished_texts(level: str, ended: str, verdict: Verdict) -> tuple[StatusText, ...]:
     """Return texts on the verdict on the flown part of a path that the aircraft left early."""
-    failed = [item for item in verdict.findings if item.ok is False and item.rule not in _RULES_OF_UNFINISHED_PATHS]
-    found = "1 finding" if len(failed) == 1 else f"{len(failed) or 'no'} findings"
-    first = StatusText(f"verdict ({level}): {ended}; {found} failed until then", INFO)
-    return (first, *_failed_texts(failed))
+    failed = [
+        finding
+        for finding in verdict.findings
+        if finding.ok is False and finding.rule not in _RULES_OF_UNFINISHED_PATHS
+    ]
+    count_text = "1 finding" if len(failed) == 1 else f"{len(failed) or 'no'} findings"
+    first_text = StatusText(f"verdict ({level}): {ended}; {count_text} failed until then", INFO)
+    return (first_text, *_failed_texts(failed))
 
 
 def verdict_texts(level: str, verdict: Verdict) -> tuple[StatusText, ...]:
@@ -314,13 +322,13 @@ def verdict_texts(level: str, verdict: Verdict) -> tuple[StatusText, ...]:
 
 
 def _failed_texts(failed: list[Finding]) -> list[StatusText]:
-    lines = [StatusText(f"{_heading(item)}: {item.reason}", WARNING) for item in failed[:_MAX_TEXTS]]
+    lines = [StatusText(f"{_heading(finding)}: {finding.reason}", WARNING) for finding in failed[:_MAX_TEXTS]]
     if len(failed) > _MAX_TEXTS:
         lines.append(StatusText(f"and {len(failed) - _MAX_TEXTS} more findings", WARNING))
     return lines
 
 
-def _heading(item: Finding) -> str:
+def _heading(finding: Finding) -> str:
     """Return the rule of a finding, and its place unless the text of the finding names the place."""
-    word = rule_word(item.rule)
-    return word if item.placed else f"{word} at {place_text(item.place)}"
+    rule_name = rule_word(finding.rule)
+    return rule_name if finding.placed else f"{rule_name} at {place_text(finding.place)}"

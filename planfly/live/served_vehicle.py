@@ -31,21 +31,21 @@ def serve_vehicle(
     on_message: Callable[[str], None],
 ) -> None:
     """Serve the vehicle until ``stop`` returns True.  on_message: called with each message, in one line."""
-    with contextlib.ExitStack() as opened:
+    with contextlib.ExitStack() as exit_stack:
         link = Link(access)
-        opened.callback(link.close)
+        exit_stack.callback(link.close)
         pool = _FlightPool(options)
-        opened.callback(pool.end)
+        exit_stack.callback(pool.end)
         vehicle = _make_vehicle(link, pool, served, options.speed, on_message)
         host, port = link.address
-        targets = ", ".join(f"{station}:{number}" for station, number in access.to)
+        targets = ", ".join(f"{station}:{station_port}" for station, station_port in access.to)
         on_message(f"vehicle {SYSTEM} at {host}:{port}, calling {targets}; scenario {served.scenario.name}")
         on_message(f"flight logs go to {options.logs}/; Ctrl-C ends")
         if served.mission is not None:
             vehicle.load(served.mission)
         elif served.fence:
             vehicle.load_fence(served.fence)
-        opened.callback(vehicle.close)
+        exit_stack.callback(vehicle.close)
         vehicle.run(stop)
     dropped = ", ".join(f"{count:,} {reason}" for reason, count in asdict(link.dropped).items() if count)
     if dropped:
@@ -56,10 +56,10 @@ def _make_vehicle(
     link: Link, pool: "_FlightPool", served: ServedScenario, speed: float, on_message: Callable[[str], None]
 ) -> Vehicle:
     airframe = served.airframe
-    law = airframe.autopilot.parameters
+    law_parameters = airframe.autopilot.parameters
     parameters = vehicle_parameters(
         flown=partial(flown_parameters, served.scenario),
-        not_flown=() if law is None else law.not_flown,
+        not_flown=() if law_parameters is None else law_parameters.not_flown,
         airspeed=airframe.airspeed,
         slowest=airframe.aircraft.airspeed_min,
         fastest=airframe.aircraft.airspeed_max,
@@ -91,13 +91,13 @@ class _FlightPool:
         for child in self._children:
             child.join(timeout=0.0)
         self._children = [child for child in self._children if child.is_alive()]
-        ours, theirs = self._context.Pipe()
-        child = self._context.Process(target=fly_process, args=(theirs, self._options), daemon=True)
+        link_end, process_end = self._context.Pipe()
+        child = self._context.Process(target=fly_process, args=(process_end, self._options), daemon=True)
         with children_ignore_sigint(), uninterrupted():
             child.start()
-        theirs.close()
+        process_end.close()
         self._children.append(child)
-        return ours
+        return link_end
 
     def end(self) -> None:
         """End the processes that are still alive."""
@@ -109,7 +109,7 @@ def standby_at_start(scenario: Scenario) -> Standby:
     east, north, amsl = (float(value) for value in scenario.start)
     lat, lon = (float(value) for value in to_geo(scenario.origin, east, north))
     ground = math.nan if scenario.terrain is None else float(scenario.terrain.height(east, north))
-    step = scenario.destination - scenario.start
-    course = math.atan2(float(step[0]), float(step[1]))
+    displacement = scenario.destination - scenario.start
+    course = math.atan2(float(displacement[0]), float(displacement[1]))
     snapshot = Snapshot(time=0.0, lat_deg=lat, lon_deg=lon, amsl=amsl, height=amsl - ground, yaw=course)
     return Standby(snapshot, Home(lat, lon, amsl if math.isnan(ground) else ground))

@@ -77,12 +77,12 @@ class Shortfall(NamedTuple):
     of_threats: bool = False
 
 
-def keep_height(plan: Plan, airframe: Airframe, search: Search | None = None) -> Plan:
+def ensure_altitude_margin(plan: Plan, airframe: Airframe, search: Search | None = None) -> Plan:
     """Return the plan if each leg has a margin for a one-in-a-hundred gust, otherwise another plan.
 
     If no other plan is found, the given plan is returned as not safe, with the reason in its certificate.
 
-    search: plans the same scenario within other limits; None if no other path is to be searched for.
+    search: plans the same scenario within other limits; None to search for no other path.
 
     >>> from planfly.workflow.airframe import load_airframe
     >>> from planner.search.plan_path import plan_path
@@ -90,7 +90,7 @@ def keep_height(plan: Plan, airframe: Airframe, search: Search | None = None) ->
     >>> scenario = load_scenario("tight")
     >>> airframe = load_airframe(scenario)
     >>> plan = plan_path(scenario, airframe.limits, seed=1)
-    >>> keep_height(plan, airframe) is plan
+    >>> ensure_altitude_margin(plan, airframe) is plan
     True
     """
     if not plan.safe or not _gusts_matter(plan, airframe):
@@ -100,11 +100,11 @@ def keep_height(plan: Plan, airframe: Airframe, search: Search | None = None) ->
     shortfalls = find_shortfalls(plan, airframe)
     if not shortfalls:
         return plan
-    if search is not None and not any(one.at_end for one in shortfalls):
-        other = _other_plan(plan, airframe, search, shortfalls)
-        if other is not None:
-            return other
-    return _with_problems(plan, [_shortfall_text(one, plan, airframe) for one in shortfalls])
+    if search is not None and not any(shortfall.at_end for shortfall in shortfalls):
+        other_plan = _search_other_plan(plan, airframe, search, shortfalls)
+        if other_plan is not None:
+            return other_plan
+    return _with_problems(plan, [_shortfall_text(shortfall, plan, airframe) for shortfall in shortfalls])
 
 
 def _gusts_matter(plan: Plan, airframe: Airframe) -> bool:
@@ -119,11 +119,11 @@ def _gust_displacements(
     scenario: Scenario, autopilot: Autopilot
 ) -> list[tuple[Gust, Callable[[float, Turbulence], float]]]:
     """Return the gusts that matter, each with its displacement, m, as a function of the unused rate, m/s."""
-    found: list[tuple[Gust, Callable[[float, Turbulence], float]]] = [("downdrafts", autopilot.gust_sink)]
+    displacements: list[tuple[Gust, Callable[[float, Turbulence], float]]] = [("downdrafts", autopilot.gust_sink)]
     # Above a path there are no hazards other than a maximum height or a zone.
     if scenario.zones or scenario.limits.max_height_m is not None:
-        found.append(("updrafts", autopilot.gust_rise))
-    return found
+        displacements.append(("updrafts", autopilot.gust_rise))
+    return displacements
 
 
 def _with_problems(plan: Plan, problems: list[str]) -> Plan:
@@ -138,63 +138,66 @@ def _climb_problem(plan: Plan, airframe: Airframe) -> str:
     24 flights of a Zagi with a climb rate of 0.57 standard deviations, 3 lost more than 47 m; of 24 with 0.8, none did.
     """
     amsl, turbulence = float(plan.waypoints[:, 2].max()), plan.scenario.wind.turbulence
-    climb, least = airframe.limits.surely().rates(amsl)[0], LEAST_SIGMAS * gust_deviation(turbulence)
-    if climb >= least or not airframe.autopilot.gust_sink(climb, turbulence):
+    climb_rate, min_climb_rate = airframe.limits.surely().rates(amsl)[0], LEAST_SIGMAS * gust_deviation(turbulence)
+    if climb_rate >= min_climb_rate or not airframe.autopilot.gust_sink(climb_rate, turbulence):
         return ""
     return (
-        f"climbs {climb:.2f} m/s at {amsl:.0f} m at most; with less than {least:.2f} m/s downdrafts of {turbulence}"
-        " turbulence may take it down further than any height allows for; less turbulence, a lower mission or an"
+        f"climbs {climb_rate:.2f} m/s at {amsl:.0f} m at most; with less than {min_climb_rate:.2f} m/s"
+        f" downdrafts of {turbulence} turbulence may take it down further than any height allows for;"
+        " less turbulence, a lower mission or an"
         " aircraft that climbs better would help"
     )
 
 
-def _other_plan(plan: Plan, airframe: Airframe, search: Search, shortfalls: list[Shortfall]) -> Plan | None:
+def _search_other_plan(plan: Plan, airframe: Airframe, search: Search, shortfalls: list[Shortfall]) -> Plan | None:
     """Search for a plan with the margin that gusts need; return None if there is none."""
-    shares = [_UNUSED_CLIMB_FRACTION]
-    if _exceeds_a_limit(plan, limits_in_gusts(plan, airframe).reserve_height):
-        shares.append(_UNUSED_CLIMB_FRACTION_BELOW_A_LIMIT)
-    seen = list(shortfalls)
-    for unused, from_threats in product(shares, (False, True)):
+    fractions = [_UNUSED_CLIMB_FRACTION]
+    if _exceeds_height_limit(plan, limits_in_gusts(plan, airframe).reserve_height):
+        fractions.append(_UNUSED_CLIMB_FRACTION_BELOW_A_LIMIT)
+    all_shortfalls = list(shortfalls)
+    for unused_fraction, from_threats in product(fractions, (False, True)):
         # Most paths pass missiles and zones at the side, so stay away from their tops only if a path led above one.
-        if from_threats and not any(one.of_threats for one in seen):
+        if from_threats and not any(shortfall.of_threats for shortfall in all_shortfalls):
             continue
-        within = limits_in_gusts(plan, airframe, unused)
+        search_limits = limits_in_gusts(plan, airframe, unused_fraction)
         # Without a maximum height the first of the two limits keeps only sink for updrafts, no distance.
-        from_zones_alone = all(one.of_threats for one in shortfalls) and plan.scenario.limits.max_height_m is None
-        if not from_threats and from_zones_alone and not within.reserve_height:
+        has_only_threats = (
+            all(shortfall.of_threats for shortfall in shortfalls) and plan.scenario.limits.max_height_m is None
+        )
+        if not from_threats and has_only_threats and not search_limits.reserve_height:
             continue
-        other = search(_with_margin_at_threats(within) if from_threats else within)
-        if not other.safe:
+        other_plan = search(_with_margin_at_threats(search_limits) if from_threats else search_limits)
+        if not other_plan.safe:
             continue
-        lacking = find_shortfalls(other, airframe)
-        if not lacking:
-            return other
-        seen += lacking
+        remaining = find_shortfalls(other_plan, airframe)
+        if not remaining:
+            return other_plan
+        all_shortfalls += remaining
     return None
 
 
-def _with_margin_at_threats(kept: Limits) -> Limits:
+def _with_margin_at_threats(limits: Limits) -> Limits:
     """Return limits that also require their margin to the ground or the maximum height at missiles and zones."""
-    return replace(kept, reserve_threats=max(kept.reserve_height, kept.reserve_above))
+    return replace(limits, reserve_threats=max(limits.reserve_height, limits.reserve_above))
 
 
-def _exceeds_a_limit(plan: Plan, higher: float) -> bool:
-    """Return True if a plan raised by `higher`, m, exceeds a ceiling or a maximum height."""
-    if not higher:
+def _exceeds_height_limit(plan: Plan, raised_by: float) -> bool:
+    """Return True if a plan raised by `raised_by`, m, exceeds a ceiling or a maximum height."""
+    if not raised_by:
         return False
-    scenario, inner = plan.scenario, plan.waypoints[1:-1]
-    if not inner.size:
-        inner = plan.waypoints
-    limits = [np.full(len(inner), scenario.ceiling)]
+    scenario, inner_points = plan.scenario, plan.waypoints[1:-1]
+    if not inner_points.size:
+        inner_points = plan.waypoints
+    limits = [np.full(len(inner_points), scenario.ceiling)]
     if scenario.limits.max_height_m is not None and scenario.terrain is not None:
-        limits.append(scenario.terrain.height(inner[:, 0], inner[:, 1]) + scenario.limits.max_height_m)
-    return bool((inner[:, 2] + higher > np.minimum.reduce(limits)).any())
+        limits.append(scenario.terrain.height(inner_points[:, 0], inner_points[:, 1]) + scenario.limits.max_height_m)
+    return bool((inner_points[:, 2] + raised_by > np.minimum.reduce(limits)).any())
 
 
-def limits_in_gusts(plan: Plan, airframe: Airframe, unused: float = _UNUSED_CLIMB_FRACTION) -> Limits:
+def limits_in_gusts(plan: Plan, airframe: Airframe, unused_fraction: float = _UNUSED_CLIMB_FRACTION) -> Limits:
     """Return search limits for paths with the margin that gusts need at the plan's altitude.
 
-    unused: maximum fraction of the maximum climb rate that is left unused for downdrafts.
+    unused_fraction: maximum fraction of the maximum climb rate that is left unused for downdrafts.
     """
     limits, autopilot, turbulence = airframe.limits.surely(), airframe.autopilot, plan.scenario.wind.turbulence
     climb, sink = limits.rates(float(plan.waypoints[:, 2].max()))
@@ -203,26 +206,28 @@ def limits_in_gusts(plan: Plan, airframe: Airframe, unused: float = _UNUSED_CLIM
         if not displacement(0.0, turbulence):
             continue
         if gust == "downdrafts":
-            left = max(0.0, min(_UNUSED_SIGMAS * deviation, unused * climb))
-            limits = replace(limits, reserve_height=displacement(left, turbulence), reserve_climb=left)
+            unused_rate = max(0.0, min(_UNUSED_SIGMAS * deviation, unused_fraction * climb))
+            limits = replace(limits, reserve_height=displacement(unused_rate, turbulence), reserve_climb=unused_rate)
         else:
-            left = max(LEAST_SIGMAS * deviation, min(_UNUSED_SINK_SIGMAS * deviation, _UNUSED_SINK_FRACTION * sink))
+            unused_rate = max(
+                LEAST_SIGMAS * deviation, min(_UNUSED_SINK_SIGMAS * deviation, _UNUSED_SINK_FRACTION * sink)
+            )
             if sink < LEAST_SIGMAS * deviation:
-                left = 0.0
-            limits = replace(limits, reserve_above=displacement(left, turbulence), reserve_sink=left)
+                unused_rate = 0.0
+            limits = replace(limits, reserve_above=displacement(unused_rate, turbulence), reserve_sink=unused_rate)
     return limits
 
 
-def limits_of_others(plan: Plan, airframe: Airframe) -> Limits:
+def limits_of_alternatives(plan: Plan, airframe: Airframe) -> Limits:
     """Return search limits for alternatives to a safe plan, which are the tightest limits that this plan meets."""
     limits = airframe.limits.surely()
     if not _gusts_matter(plan, airframe):
         return limits
-    for unused in (_UNUSED_CLIMB_FRACTION, _UNUSED_CLIMB_FRACTION_BELOW_A_LIMIT):
-        kept = limits_in_gusts(plan, airframe, unused)
-        for within in (_with_margin_at_threats(kept), kept):
-            if certify(make_problem(plan.scenario, within), plan.waypoints).ok:
-                return within
+    for unused_fraction in (_UNUSED_CLIMB_FRACTION, _UNUSED_CLIMB_FRACTION_BELOW_A_LIMIT):
+        gust_limits = limits_in_gusts(plan, airframe, unused_fraction)
+        for candidate in (_with_margin_at_threats(gust_limits), gust_limits):
+            if certify(make_problem(plan.scenario, candidate), plan.waypoints).ok:
+                return candidate
     return limits
 
 
@@ -250,52 +255,62 @@ def find_shortfalls(plan: Plan, airframe: Airframe) -> list[Shortfall]:
     limits, autopilot, turbulence = airframe.limits.surely(), airframe.autopilot, plan.scenario.wind.turbulence
     problem = make_problem(plan.scenario, limits)
     rates = np.array([limits.rates(float(amsl)) for amsl in plan.waypoints[:, 2]])
-    climbs, found = limits.climb_rates(plan.waypoints), list[Shortfall | None]()
+    climbs, shortfalls = limits.climb_rates(plan.waypoints), list[Shortfall | None]()
     for gust, displacement in _gust_displacements(plan.scenario, autopilot):
         if not displacement(0.0, turbulence):
             continue
-        down = gust == "downdrafts"
-        able, used = (rates[:, 0], np.maximum(0.0, climbs)) if down else (rates[:, 1], np.maximum(0.0, -climbs))
+        is_down = gust == "downdrafts"
+        max_rates, used_rates = (
+            (rates[:, 0], np.maximum(0.0, climbs)) if is_down else (rates[:, 1], np.maximum(0.0, -climbs))
+        )
         # Minimum of the unused rates at the start and at the end of each leg.
-        left = np.minimum(able[:-1] - used[:, 0], able[1:] - used[:, 1])
+        unused_rates = np.minimum(max_rates[:-1] - used_rates[:, 0], max_rates[1:] - used_rates[:, 1])
         # ArduPlane and PX4 have an altitude error even without such a gust; planfly's guidance does not.
-        strays = 0.0 if down else float(problem.certified.tracking.up)
-        needs = np.array([displacement(float(one), turbulence) + strays for one in left])
-        at_ends = _END_HEIGHT_FRACTION * np.array([displacement(float(able[k]), turbulence) + strays for k in (0, -1)])
-        parts = _cut_into_parts(problem, plan.waypoints, gust, needs, at_ends)
-        found += [
-            _into_clearance(problem, parts) if down else _above_maximum(problem, parts),
-            _into_missile(problem, parts) if down else None,
-            _into_zone(problem, parts),
+        altitude_error = 0.0 if is_down else float(problem.certified.tracking.up)
+        margins = np.array([displacement(float(rate), turbulence) + altitude_error for rate in unused_rates])
+        end_margins = _END_HEIGHT_FRACTION * np.array(
+            [displacement(float(max_rates[k]), turbulence) + altitude_error for k in (0, -1)]
+        )
+        parts = _cut_into_parts(problem, plan.waypoints, gust, margins, end_margins)
+        shortfalls += [
+            _clearance_shortfall(problem, parts) if is_down else _max_height_shortfall(problem, parts),
+            _missile_shortfall(problem, parts) if is_down else None,
+            _zone_shortfall(problem, parts),
         ]
-    return [one for one in found if one is not None and one.depth > _ROUNDING_TOLERANCE_M]
+    return [shortfall for shortfall in shortfalls if shortfall is not None and shortfall.depth > _ROUNDING_TOLERANCE_M]
 
 
-def _cut_into_parts(problem: Problem, waypoints: Floats, gust: Gust, needs: Floats, at_ends: Floats) -> _Parts:
+def _cut_into_parts(problem: Problem, waypoints: Floats, gust: Gust, margins: Floats, end_margins: Floats) -> _Parts:
     """Cut the legs of a path near its ends into parts, but not within a turn.
 
     waypoints: (w, 3), m.
-    needs: altitude that gusts may cost or add on each leg, (w - 1,), m.
-    at_ends: margin needed at the ends, (2,), m.
+    margins: altitude that gusts may cost or add on each leg, (w - 1,), m.
+    end_margins: margin needed at the ends, (2,), m.
     """
     ends = waypoints[[0, -1]]
     tangents = turn_tangents(problem.certified.aircraft, waypoints) * _TANGENT_RATIO
     points, legs = [waypoints[0]], list[int]()
     for leg, (a, b) in enumerate(pairwise(waypoints)):
-        run = math.dist(a[:2], b[:2])
-        count = math.ceil(run / _PART_LENGTH_M)
-        for along in run * np.arange(1, count) / count:
-            point = a + (b - a) * along / run
+        length = math.dist(a[:2], b[:2])
+        count = math.ceil(length / _PART_LENGTH_M)
+        for distance in length * np.arange(1, count) / count:
+            point = a + (b - a) * distance / length
             is_near = min(math.dist(point, end) for end in ends) <= _FULL_HEIGHT_DISTANCE_M + _PART_LENGTH_M
-            if is_near and tangents[leg] <= along <= run - tangents[leg + 1]:
+            if is_near and tangents[leg] <= distance <= length - tangents[leg + 1]:
                 points.append(point)
                 legs.append(leg)
         points.append(b)
         legs.append(leg)
-    path, own = np.array(points), needs[legs]
-    away = np.array([np.linalg.norm(path - end, axis=1) for end in ends])
-    share, at_end = np.minimum(1.0, away.min(axis=0) / _FULL_HEIGHT_DISTANCE_M), at_ends[away.argmin(axis=0)]
-    before, after = (at_end + share * (need - at_end) for need in ([*own[:1], *own], [*own, *own[-1:]]))
+    path, part_margins = np.array(points), margins[legs]
+    end_distances = np.array([np.linalg.norm(path - end, axis=1) for end in ends])
+    fraction, nearest_end_margin = (
+        np.minimum(1.0, end_distances.min(axis=0) / _FULL_HEIGHT_DISTANCE_M),
+        end_margins[end_distances.argmin(axis=0)],
+    )
+    before, after = (
+        nearest_end_margin + fraction * (margins_of_side - nearest_end_margin)
+        for margins_of_side in ([*part_margins[:1], *part_margins], [*part_margins, *part_margins[-1:]])
+    )
     return _Parts(gust, path, legs, before, after)
 
 
@@ -304,54 +319,54 @@ def _heights_at_ends(problem: Problem, parts: _Parts) -> list[tuple[str, float, 
     terrain = problem.scenario.terrain
     if terrain is None:  # pragma: no cover - a problem has one
         return []
-    over = parts.points[:, 2] - terrain.height(parts.points[:, 0], parts.points[:, 1])
-    return [("start", float(over[0]), 0), ("destination", float(over[-1]), -1)]
+    heights = parts.points[:, 2] - terrain.height(parts.points[:, 0], parts.points[:, 1])
+    return [("start", float(heights[0]), 0), ("destination", float(heights[-1]), -1)]
 
 
-def _into_clearance(problem: Problem, parts: _Parts) -> Shortfall | None:
+def _clearance_shortfall(problem: Problem, parts: _Parts) -> Shortfall | None:
     """Return the deepest displacement of a path by a downdraft below its clearance, or None without one."""
     data = problem.certified
-    into = f"into the clearance of {data.clearance:g} m"
-    for name, over, k in _heights_at_ends(problem, parts):
-        if (depth := float(parts.after[k]) + data.clearance - over) > _ROUNDING_TOLERANCE_M:
-            return Shortfall(parts.gust, depth, into, f"at its {name}", at_end=name)
-    lowest = Shortfall(parts.gust, 0.0, into, "")
+    hazard = f"into the clearance of {data.clearance:g} m"
+    for name, height, k in _heights_at_ends(problem, parts):
+        if (depth := float(parts.after[k]) + data.clearance - height) > _ROUNDING_TOLERANCE_M:
+            return Shortfall(parts.gust, depth, hazard, f"at its {name}", at_end=name)
+    lowest = Shortfall(parts.gust, 0.0, hazard, "")
     for piece in heights_above_ground(data, parts.points):
         k = int(piece["number"])
         # A part needs the margin of that of its ends which is nearer to the end of the path.
-        need = max(parts.before[k], parts.after[k]) if piece["of_arc"] else min(parts.after[k], parts.before[k + 1])
-        depth = float(need) + data.clearance - float(piece["height"])
+        margin = max(parts.before[k], parts.after[k]) if piece["of_arc"] else min(parts.after[k], parts.before[k + 1])
+        depth = float(margin) + data.clearance - float(piece["height"])
         if depth > lowest.depth:
-            lowest = Shortfall(parts.gust, depth, into, f"on leg {parts.legs[k]}")
+            lowest = Shortfall(parts.gust, depth, hazard, f"on leg {parts.legs[k]}")
     return lowest
 
 
-def _above_maximum(problem: Problem, parts: _Parts) -> Shortfall | None:
+def _max_height_shortfall(problem: Problem, parts: _Parts) -> Shortfall | None:
     """Return the highest displacement by an updraft above the maximum height, or None without one."""
-    data, most = problem.certified, problem.certified.airspace.max_height
-    if most == math.inf:
+    data, max_height = problem.certified, problem.certified.airspace.max_height
+    if max_height == math.inf:
         return None
-    above = f"above the {most:.0f} m over ground that are allowed"
-    for name, over, k in _heights_at_ends(problem, parts):
-        if (depth := over + float(parts.after[k]) - most) > _ROUNDING_TOLERANCE_M:
-            return Shortfall(parts.gust, depth, above, f"at its {name}", at_end=name)
+    hazard = f"above the {max_height:.0f} m over ground that are allowed"
+    for name, height, k in _heights_at_ends(problem, parts):
+        if (depth := height + float(parts.after[k]) - max_height) > _ROUNDING_TOLERANCE_M:
+            return Shortfall(parts.gust, depth, hazard, f"at its {name}", at_end=name)
     pieces = airspace_pieces(data, _gust_paths(parts)[-1])
     highest = max(pieces, key=lambda piece: float(piece["height"]))
     where = f"on leg {parts.legs[min(int(highest['number']), len(parts.legs) - 1)]}"
-    return Shortfall(parts.gust, float(highest["height"]) - most, above, where)
+    return Shortfall(parts.gust, float(highest["height"]) - max_height, hazard, where)
 
 
-def _into_missile(problem: Problem, parts: _Parts) -> Shortfall | None:
+def _missile_shortfall(problem: Problem, parts: _Parts) -> Shortfall | None:
     """Return the deepest displacement by a gust into the sphere of a missile, or None without one."""
     threats = problem.scenario.threats
     paths = _gust_paths(parts) if (threats.kill_radius > 0.0).any() else []
     deepest = min(paths, key=lambda path: kill_distance(problem.certified, path), default=None)
     if deepest is None or (distance := kill_distance(problem.certified, deepest)) >= 0.0:
         return None
-    begins, steps = deepest[:-1, None], np.diff(deepest, axis=0)[:, None]
+    leg_starts, steps = deepest[:-1, None], np.diff(deepest, axis=0)[:, None]
     # Nearest point of each leg to each missile, as a fraction of the leg.
-    along = ((threats.position - begins) * steps).sum(axis=2) / (steps**2).sum(axis=2)
-    nearest = begins + np.clip(along, 0.0, 1.0)[..., None] * steps
+    fractions = ((threats.position - leg_starts) * steps).sum(axis=2) / (steps**2).sum(axis=2)
+    nearest = leg_starts + np.clip(fractions, 0.0, 1.0)[..., None] * steps
     outside = np.linalg.norm(nearest - threats.position, axis=2) - threats.kill_radius
     part, missile = np.unravel_index(np.argmin(np.where(threats.kill_radius > 0.0, outside, np.inf)), outside.shape)
     leg = parts.legs[int(part)]
@@ -360,41 +375,41 @@ def _into_missile(problem: Problem, parts: _Parts) -> Shortfall | None:
     )
 
 
-def _into_zone(problem: Problem, parts: _Parts) -> Shortfall | None:
+def _zone_shortfall(problem: Problem, parts: _Parts) -> Shortfall | None:
     """Return the deepest displacement by a gust into an exclusion zone or out of an inclusion zone, or None."""
     data = problem.certified
     if not is_limited(data.airspace) or not problem.scenario.zones:
         return None
-    found = [piece for path in _gust_paths(parts) for piece in airspace_pieces(data, path)]
-    worst = min(found, key=lambda piece: float(piece["zones"]["nearest"]))
+    pieces = [piece for path in _gust_paths(parts) for piece in airspace_pieces(data, path)]
+    worst = min(pieces, key=lambda piece: float(piece["zones"]["nearest"]))
     if worst["zones"]["nearest"] >= 0.0:
         return None
     number = data.airspace.zones.required[int(worst["zones"]["zone"])]["number"]
     zone = problem.scenario.zones[int(number)]
-    into = f"into {zone.name}" if zone.kind == "exclusion" else f"out of {zone.name}"
+    hazard = f"into {zone.name}" if zone.kind == "exclusion" else f"out of {zone.name}"
     where = f"on leg {parts.legs[min(int(worst['number']), len(parts.legs) - 1)]}"
-    return Shortfall(parts.gust, -float(worst["zones"]["nearest"]), into, where, of_threats=True)
+    return Shortfall(parts.gust, -float(worst["zones"]["nearest"]), hazard, where, of_threats=True)
 
 
 def _gust_paths(parts: _Parts) -> list[Floats]:
     """Return the path displaced by gusts, (p, 3) each, in steps that miss no hazard, up to the full displacement."""
     heights = np.maximum(parts.before, parts.after)
-    count = max(1, math.ceil(float(heights.max()) / _HEIGHT_STEP_M))
-    whole = np.array([0.0, 0.0, -1.0 if parts.gust == "downdrafts" else 1.0]) * heights[:, None]
-    return [np.ascontiguousarray(parts.points + whole * k / count) for k in range(1, count + 1)]
+    step_count = max(1, math.ceil(float(heights.max()) / _HEIGHT_STEP_M))
+    displacement = np.array([0.0, 0.0, -1.0 if parts.gust == "downdrafts" else 1.0]) * heights[:, None]
+    return [np.ascontiguousarray(parts.points + displacement * k / step_count) for k in range(1, step_count + 1)]
 
 
-def _shortfall_text(one: Shortfall, plan: Plan, airframe: Airframe) -> str:
+def _shortfall_text(shortfall: Shortfall, plan: Plan, airframe: Airframe) -> str:
     """Describe a shortfall and its remedies in one line."""
-    better = "climbs better" if one.gust == "downdrafts" else "sinks faster"
-    helps = f"less turbulence, an aircraft that {better}"
-    is_held_down = one.gust == "updrafts" and not one.of_threats
-    if one.at_end:
-        lies = "higher" if one.gust == "downdrafts" else "lower"
-        helps += f" or a {one.at_end} that is {math.ceil(one.depth)} m {lies}"
-    elif is_held_down or _exceeds_a_limit(plan, limits_in_gusts(plan, airframe).reserve_height):
-        helps += " or a higher limit on its height"
+    ability = "climbs better" if shortfall.gust == "downdrafts" else "sinks faster"
+    remedies = f"less turbulence, an aircraft that {ability}"
+    is_held_down = shortfall.gust == "updrafts" and not shortfall.of_threats
+    if shortfall.at_end:
+        direction = "higher" if shortfall.gust == "downdrafts" else "lower"
+        remedies += f" or a {shortfall.at_end} that is {math.ceil(shortfall.depth)} m {direction}"
+    elif is_held_down or _exceeds_height_limit(plan, limits_in_gusts(plan, airframe).reserve_height):
+        remedies += " or a higher limit on its height"
     else:
-        helps = f"less turbulence, or an aircraft that {better},"
-    gusts = f"in {plan.scenario.wind.turbulence} turbulence {one.gust} may take it"
-    return f"{gusts} {one.depth:.0f} m {one.into} {one.where}; {helps} would help"
+        remedies = f"less turbulence, or an aircraft that {ability},"
+    gusts = f"in {plan.scenario.wind.turbulence} turbulence {shortfall.gust} may take it"
+    return f"{gusts} {shortfall.depth:.0f} m {shortfall.into} {shortfall.where}; {remedies} would help"

@@ -40,7 +40,7 @@ def limit_waypoint_orbits(
     If no plan with fewer waypoints is found, the given plan is returned as not safe, with the reason in its
     certificate.
 
-    search: plans a scenario as the plan was planned; None if no other path is to be searched for.
+    search: plans a scenario as the plan was planned; None to search for no other path.
     within: limits within which the plan was made; None for the limits of the aircraft.
 
     >>> from planfly.workflow.airframe import load_airframe
@@ -53,26 +53,28 @@ def limit_waypoint_orbits(
     True
     """
     autopilot, limits = airframe.autopilot, airframe.limits.surely()
-    expected = expected_circles(plan, autopilot, limits)
-    if not plan.safe or expected == 0.0:
+    orbits = expected_orbits(plan, autopilot, limits)
+    if not plan.safe or orbits == 0.0:
         return plan
-    if expected <= MAX_EXPECTED_ORBITS:
+    if orbits <= MAX_EXPECTED_ORBITS:
         # A plan with the number of waypoints that is usual without orbits has no corner that is too sharp.
-        has_all = len(plan.waypoints) >= plan.scenario.planner.waypoints
+        has_usual_count = len(plan.waypoints) >= plan.scenario.planner.waypoints
         return (
-            plan if has_all or _is_accepted(plan, airframe) else _with_problem(plan, _corridor_problem(plan, airframe))
+            plan
+            if has_usual_count or _is_accepted(plan, airframe)
+            else _with_problem(plan, _corridor_problem(plan, airframe))
         )
     fewer = drop_waypoints(plan, limits if within is None else within)
     if _is_accepted(fewer, airframe):
         return fewer
-    circles, count = expected_circles(fewer, autopilot, limits), len(fewer.waypoints) - 2
+    fewer_orbits, count = expected_orbits(fewer, autopilot, limits), len(fewer.waypoints) - 2
     if search is not None:
         # Assume the orbit probability per waypoint of this path; it may be lower on another path.
-        allowed, scenario = max(1, int(MAX_EXPECTED_ORBITS * count / circles)), plan.scenario
-        table = scenario.planner.model_copy(update={"waypoints": allowed + 2})
-        other = replace(search(replace(scenario, planner=table)), scenario=scenario)
-        if other.safe and _is_accepted(other, airframe):
-            return other
+        allowed_count, scenario = max(1, int(MAX_EXPECTED_ORBITS * count / fewer_orbits)), plan.scenario
+        table = scenario.planner.model_copy(update={"waypoints": allowed_count + 2})
+        other_plan = replace(search(replace(scenario, planner=table)), scenario=scenario)
+        if other_plan.safe and _is_accepted(other_plan, airframe):
+            return other_plan
     return _with_problem(plan, _orbit_problem(plan, autopilot, limits))
 
 
@@ -83,7 +85,7 @@ def _with_problem(plan: Plan, problem: str) -> Plan:
 
 def _is_accepted(plan: Plan, airframe: Airframe) -> bool:
     """Return True if few enough orbits are expected and the aircraft stays in the corridor at every corner."""
-    if expected_circles(plan, airframe.autopilot, airframe.limits.surely()) > MAX_EXPECTED_ORBITS:
+    if expected_orbits(plan, airframe.autopilot, airframe.limits.surely()) > MAX_EXPECTED_ORBITS:
         return False
     return max(_excursions(plan, airframe), default=0.0) <= _half_width(plan, airframe)
 
@@ -100,33 +102,35 @@ def _excursions(plan: Plan, airframe: Airframe) -> list[float]:
         return []
     turns, speeds = turning_angles(plan.waypoints), corner_speeds(plan.scenario, plan.waypoints, limits.airspeed)
     return [
-        tracking.corner_excursion(float(one), v) + GUST_CORNER_MARGIN_M for one, v in zip(turns, speeds, strict=True)
+        tracking.corner_excursion(float(turn), speed) + GUST_CORNER_MARGIN_M
+        for turn, speed in zip(turns, speeds, strict=True)
     ]
 
 
 def _corridor_problem(plan: Plan, airframe: Airframe) -> str:
     """Describe the corner at which the aircraft leaves the corridor in a line."""
     excursions = _excursions(plan, airframe)
-    aside = max(excursions)
+    max_excursion = max(excursions)
     return (
-        f"in {plan.scenario.wind.turbulence} turbulence {airframe.autopilot.title} is {aside:.0f} m off the legs at the"
-        f" corner of waypoint {1 + excursions.index(aside)}; the corridor is {_half_width(plan, airframe):.0f} m"
+        f"in {plan.scenario.wind.turbulence} turbulence {airframe.autopilot.title} is {max_excursion:.0f} m off"
+        f" the legs at the corner of waypoint {1 + excursions.index(max_excursion)}; the corridor is"
+        f" {_half_width(plan, airframe):.0f} m"
     )
 
 
-def expected_circles(plan: Plan, autopilot: Autopilot, limits: Limits) -> float:
+def expected_orbits(plan: Plan, autopilot: Autopilot, limits: Limits) -> float:
     """Return the expected number of orbits at the inner waypoints of a plan in one flight.
 
     On a leg that climbs or sinks, less of the aircraft's climb or sink rate remains to act against the gusts.
     """
-    turbulence, expected = plan.scenario.wind.turbulence, 0.0
+    turbulence, orbits = plan.scenario.wind.turbulence, 0.0
     for rate, waypoint in zip(limits.climb_rates(plan.waypoints)[:-1, 1].tolist(), plan.waypoints[1:-1], strict=True):
         climb, sink = limits.rates(float(waypoint[2]))
-        expected += autopilot.altitude_miss_probability(climb - max(0.0, rate), sink - max(0.0, -rate), turbulence)
-    return expected
+        orbits += autopilot.altitude_miss_probability(climb - max(0.0, rate), sink - max(0.0, -rate), turbulence)
+    return orbits
 
 
-def waypoints_in_gusts(plan: Plan, airframe: Airframe) -> int:
+def max_waypoints_in_gusts(plan: Plan, airframe: Airframe) -> int:
     """Return the maximum number of waypoints, including the ends, for alternatives to a safe plan in level flight.
 
     >>> from planfly.workflow.airframe import load_airframe
@@ -134,30 +138,30 @@ def waypoints_in_gusts(plan: Plan, airframe: Airframe) -> int:
     >>> from world.scenario import load_scenario
     >>> scenario = load_scenario("tight")
     >>> airframe = load_airframe(scenario)
-    >>> waypoints_in_gusts(plan_path(scenario, airframe.limits, seed=1), airframe)
+    >>> max_waypoints_in_gusts(plan_path(scenario, airframe.limits, seed=1), airframe)
     22
     """
     scenario, count = plan.scenario, len(plan.waypoints)
     climb, sink = airframe.limits.surely().rates(float(plan.waypoints[:, 2].max()))
-    chance = airframe.autopilot.altitude_miss_probability(climb, sink, scenario.wind.turbulence)
-    if chance == 0.0:
+    probability = airframe.autopilot.altitude_miss_probability(climb, sink, scenario.wind.turbulence)
+    if probability == 0.0:
         return count
-    return max(count, min(scenario.planner.waypoints, 2 + int(MAX_EXPECTED_ORBITS / chance)))
+    return max(count, min(scenario.planner.waypoints, 2 + int(MAX_EXPECTED_ORBITS / probability)))
 
 
 def _orbit_problem(plan: Plan, autopilot: Autopilot, limits: Limits) -> str:
     """Return a line on why a plan is not safe in its turbulence, and on the remedies."""
     count, name = len(plan.waypoints) - 2, autopilot.height_parameter
-    circles = expected_circles(plan, autopilot, limits)
+    orbits = expected_orbits(plan, autopilot, limits)
     radius = first_that_passes(
         _TRIED_ALTITUDE_RADII_M,
         lambda value: (
-            expected_circles(plan, autopilot.with_parameters(**{name: float(value)}), limits) <= MAX_EXPECTED_ORBITS
+            expected_orbits(plan, autopilot.with_parameters(**{name: float(value)}), limits) <= MAX_EXPECTED_ORBITS
         ),
     )
-    helps = "Less turbulence" if radius is None else f"{name} of {radius} m"
+    remedy = "Less turbulence" if radius is None else f"{name} of {radius} m"
     return (
         f"in {plan.scenario.wind.turbulence} turbulence {autopilot.title} circles where gusts have it off a waypoint's"
-        f" height, at one of {count} in {min(circles, 1.0):.0%} of flights; up to {MAX_EXPECTED_ORBITS:.0%} are taken"
-        f" for safe. {helps} would help"
+        f" height, at one of {count} in {min(orbits, 1.0):.0%} of flights; up to {MAX_EXPECTED_ORBITS:.0%} are taken"
+        f" for safe. {remedy} would help"
     )

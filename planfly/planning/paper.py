@@ -19,7 +19,7 @@ from planfly.arguments import check_arguments
 from planfly.runtime.stages import stage
 from planfly.workflow.airframe import load_airframe
 from planfly.workflow.make_plan import Advance, make_plan
-from planfly.workflow.output_paths import prepare_folder, refuse_folder
+from planfly.workflow.output_paths import check_output_folder, prepare_folder
 from planner.plan import Objective, Violation
 from planner.search.algorithms import find_algorithm
 from world.arrays import Floats
@@ -114,27 +114,27 @@ def exposure_probability(scenario: Scenario, waypoints: Floats, kind: str) -> fl
     waypoints: (w, 3), m.
     kind: "kill" or "detection".
     """
-    share = np.arange(6)[:, None] / 6.0
-    points = np.concatenate([a + share * (b - a) for a, b in itertools.pairwise(waypoints)])
+    fractions = np.arange(6)[:, None] / 6.0
+    points = np.concatenate([a + fractions * (b - a) for a, b in itertools.pairwise(waypoints)])
     points = np.vstack([points, waypoints[-1:]])
     threats = scenario.threats
     radius, scale = getattr(threats, f"{kind}_radius"), getattr(threats, f"{kind}_scale")
     distance = np.sqrt(((points[:, None, :] - threats.position[None]) ** 2).sum(axis=-1))
-    chance = np.minimum(1.0, (scale / np.maximum(distance, 1.0)) ** 4)
-    chance[(distance > radius) | (radius <= 0.0)] = 0.0
-    return float(1.0 - np.prod(1.0 - chance))
+    probability = np.minimum(1.0, (scale / np.maximum(distance, 1.0)) ** 4)
+    probability[(distance > radius) | (radius <= 0.0)] = 0.0
+    return float(1.0 - np.prod(1.0 - probability))
 
 
 def plan_once(threats: int, algorithm: str, seed: int) -> SeededPlan:
     """Plan once, and return the values for tables and figures.  algorithm: name of a planner, or `STRIP`."""
     scenario = load_scenario(problem_name(threats))
-    searched = algorithm
+    searched_algorithm = algorithm
     if algorithm == STRIP:
-        scenario, searched = with_planner(scenario, STRIP, across_m=STRIP_ACROSS[threats]), PAPER
+        scenario, searched_algorithm = with_planner(scenario, STRIP, across_m=STRIP_ACROSS[threats]), PAPER
     airframe = load_airframe(scenario)
-    began = time.process_time()
-    plan = make_plan(scenario, airframe, seed, searched)
-    seconds = time.process_time() - began
+    start_time = time.process_time()
+    plan = make_plan(scenario, airframe, seed, searched_algorithm)
+    seconds = time.process_time() - start_time
     return SeededPlan(
         threats=threats,
         algorithm=algorithm,
@@ -164,15 +164,15 @@ def plan_section(
     names += [name for name in (STRIP, *BASELINES) if name not in names]
     tasks = [(threats, name, seed) for threats in problems for name in names for seed in range(1, seeds + 1)]
     count = min(len(tasks), jobs or usable_cores())
-    done: list[SeededPlan] = []
+    plans: list[SeededPlan] = []
     if advance is not None:
         advance(0, len(tasks), f"0 of {len(tasks)} plans")
-    for item in _plan_in_processes(tasks, count):
-        done.append(item)
+    for seeded_plan in _plan_in_processes(tasks, count):
+        plans.append(seeded_plan)
         if advance is not None:
-            remark = f"{item.threats} threats, {item.algorithm}, seed {item.seed}"
-            advance(len(done), len(tasks), remark)
-    return done
+            remark = f"{seeded_plan.threats} threats, {seeded_plan.algorithm}, seed {seeded_plan.seed}"
+            advance(len(plans), len(tasks), remark)
+    return plans
 
 
 def usable_cores() -> int:
@@ -181,8 +181,8 @@ def usable_cores() -> int:
     >>> usable_cores() >= 1
     True
     """
-    may_use = getattr(os, "sched_getaffinity", None)
-    return len(may_use(0)) if may_use is not None else os.cpu_count() or 1
+    affinity = getattr(os, "sched_getaffinity", None)
+    return len(affinity(0)) if affinity is not None else os.cpu_count() or 1
 
 
 def _plan_in_processes(tasks: list[tuple[int, str, int]], count: int) -> Iterator[SeededPlan]:
@@ -215,32 +215,34 @@ def _plan_task(task: tuple[int, str, int]) -> SeededPlan:
 def table(plans: Sequence[SeededPlan]) -> list[TableRow]:
     """Return the table, with one row for each problem and algorithm, in the order of planning."""
     groups: dict[tuple[int, str], list[SeededPlan]] = {}
-    for item in plans:
-        groups.setdefault((item.threats, item.algorithm), []).append(item)
+    for seeded_plan in plans:
+        groups.setdefault((seeded_plan.threats, seeded_plan.algorithm), []).append(seeded_plan)
     return [_table_row(group) for group in groups.values()]
 
 
 def _table_row(group: list[SeededPlan]) -> TableRow:
-    lengths = [item.objectives[Objective.LENGTH_RATIO] for item in group if item.safe]
-    kills = _column(group, lambda item: item.objectives[Objective.KILL_EXPOSURE])
+    lengths = [seeded_plan.objectives[Objective.LENGTH_RATIO] for seeded_plan in group if seeded_plan.safe]
+    kills = _column(group, lambda seeded_plan: seeded_plan.objectives[Objective.KILL_EXPOSURE])
     return TableRow(
         threats=group[0].threats,
         algorithm=group[0].algorithm,
         runs=len(group),
-        safe=sum(item.safe for item in group),
-        certified=sum(item.certified for item in group),
+        safe=sum(seeded_plan.safe for seeded_plan in group),
+        certified=sum(seeded_plan.certified for seeded_plan in group),
         length_median=float(np.median(lengths)) if lengths else None,
         length_worst=max(lengths) if lengths else None,
         kill_median=float(np.median(kills)),
         kill_worst=float(kills.max()),
-        kill_probability_worst=float(_column(group, lambda item: item.kill_probability).max()),
-        detection_median=float(np.median(_column(group, lambda item: item.objectives[Objective.DETECTION_EXPOSURE]))),
-        seconds_median=float(np.median(_column(group, lambda item: item.seconds))),
+        kill_probability_worst=float(_column(group, lambda seeded_plan: seeded_plan.kill_probability).max()),
+        detection_median=float(
+            np.median(_column(group, lambda seeded_plan: seeded_plan.objectives[Objective.DETECTION_EXPOSURE]))
+        ),
+        seconds_median=float(np.median(_column(group, lambda seeded_plan: seeded_plan.seconds))),
     )
 
 
 def _column(group: list[SeededPlan], value: Callable[[SeededPlan], float]) -> Floats:
-    return np.array([value(item) for item in group])
+    return np.array([value(seeded_plan) for seeded_plan in group])
 
 
 # ----------------------------------------------------------------------
@@ -260,11 +262,11 @@ def file_names(problems: Sequence[int]) -> list[str]:
 
 def table_text(rows: Sequence[TableRow]) -> str:
     """Format the table for a terminal."""
-    head = (
+    header = (
         f"{'threats':>7}  {'algorithm':<15}{'safe':>7}{'certified':>11}  {'PLR median':>10}  {'worst':>6}"
         f"  {'PKill median':>12}  {'worst':>6}  {'PRD median':>10}  {'CPU s':>6}"
     )
-    lines = [head]
+    lines = [header]
     for row in rows:
         safe, certified = f"{row.safe}/{row.runs}", f"{row.certified}/{row.runs}"
         lines.append(
@@ -285,38 +287,43 @@ def _number_text(value: float | None, digits: int) -> str:
 
 def write_tables(folder: Path, rows: Sequence[TableRow], plans: Sequence[SeededPlan]) -> None:
     """Write table.csv, runs.csv and runs.json, which are reproducible for a seed, and times.csv, which is not."""
-    columns = [item.name for item in fields(TableRow) if item.name != "seconds_median"]
+    columns = [field.name for field in fields(TableRow) if field.name != "seconds_median"]
     write_whole(folder / "table.csv", _csv_text(columns, ([getattr(row, name) for name in columns] for row in rows)))
-    write_whole(folder / "runs.csv", _csv_text(_PLAN_COLUMNS, (list(_plan_row(item).values()) for item in plans)))
-    times = ([item.threats, item.algorithm, item.seed, f"{item.seconds:.3f}"] for item in plans)
+    write_whole(
+        folder / "runs.csv", _csv_text(_PLAN_COLUMNS, (list(_plan_row(seeded_plan).values()) for seeded_plan in plans))
+    )
+    times = (
+        [seeded_plan.threats, seeded_plan.algorithm, seeded_plan.seed, f"{seeded_plan.seconds:.3f}"]
+        for seeded_plan in plans
+    )
     write_whole(folder / "times.csv", _csv_text(["threats", "algorithm", "seed", "cpu_s"], times))
-    kept = [{key: value for key, value in asdict(row).items() if key != "seconds_median"} for row in rows]
+    table_rows = [{key: value for key, value in asdict(row).items() if key != "seconds_median"} for row in rows]
     runs = [
-        _plan_row(item)
+        _plan_row(seeded_plan)
         | {
-            "waypoints_east_north_amsl_m": item.waypoints.tolist(),
-            "history_length_kill_violations": item.history.tolist(),
+            "waypoints_east_north_amsl_m": seeded_plan.waypoints.tolist(),
+            "history_length_kill_violations": seeded_plan.history.tolist(),
         }
-        for item in plans
+        for seeded_plan in plans
     ]
-    text = json.dumps({"schema": PAPER_SCHEMA, "table": kept, "runs": runs}, allow_nan=False, indent=1)
+    text = json.dumps({"schema": PAPER_SCHEMA, "table": table_rows, "runs": runs}, allow_nan=False, indent=1)
     write_whole(folder / "runs.json", text + "\n")
 
 
-def _plan_row(item: SeededPlan) -> dict[str, Any]:
+def _plan_row(seeded_plan: SeededPlan) -> dict[str, Any]:
     row: dict[str, Any] = {
-        "threats": item.threats,
-        "algorithm": item.algorithm,
-        "seed": item.seed,
-        "safe": item.safe,
-        "certified": item.certified,
+        "threats": seeded_plan.threats,
+        "algorithm": seeded_plan.algorithm,
+        "seed": seeded_plan.seed,
+        "safe": seeded_plan.safe,
+        "certified": seeded_plan.certified,
     }
-    row |= {f"violations_{kind.name.lower()}": item.violations[kind] for kind in Violation}
-    row |= {kind.name.lower(): item.objectives[kind] for kind in Objective}
+    row |= {f"violations_{kind.name.lower()}": seeded_plan.violations[kind] for kind in Violation}
+    row |= {kind.name.lower(): seeded_plan.objectives[kind] for kind in Objective}
     return row | {
-        "kill_probability": item.kill_probability,
-        "detection_probability": item.detection_probability,
-        "evaluations": item.evaluations,
+        "kill_probability": seeded_plan.kill_probability,
+        "detection_probability": seeded_plan.detection_probability,
+        "evaluations": seeded_plan.evaluations,
     }
 
 
@@ -348,20 +355,23 @@ def write_figures(folder: Path, plans: Sequence[SeededPlan]) -> None:
     from logs.views.paper import PaperPath, draw_convergence, draw_encodings, draw_paths
 
     by_problem: dict[int, dict[str, list[SeededPlan]]] = {}
-    for item in plans:
-        by_problem.setdefault(item.threats, {}).setdefault(item.algorithm, []).append(item)
+    for seeded_plan in plans:
+        by_problem.setdefault(seeded_plan.threats, {}).setdefault(seeded_plan.algorithm, []).append(seeded_plan)
     for threats, groups in by_problem.items():
         scenario = load_scenario(problem_name(threats))
-        first = next(iter(groups))
+        first_algorithm = next(iter(groups))
         lines = {
-            name: [PaperPath(item.waypoints, item.objectives[Objective.LENGTH_RATIO], item.safe) for item in group]
+            name: [
+                PaperPath(seeded_plan.waypoints, seeded_plan.objectives[Objective.LENGTH_RATIO], seeded_plan.safe)
+                for seeded_plan in group
+            ]
             for name, group in groups.items()
         }
-        write_png(draw_paths(scenario, first, lines[first]), folder / f"paths-{threats:02d}.png")
-        chosen = {name: group[0] for name, group in lines.items()}
-        write_png(draw_encodings(scenario, chosen, seed=1), folder / f"encodings-{threats:02d}.png")
+        write_png(draw_paths(scenario, first_algorithm, lines[first_algorithm]), folder / f"paths-{threats:02d}.png")
+        first_paths = {name: group[0] for name, group in lines.items()}
+        write_png(draw_encodings(scenario, first_paths, seed=1), folder / f"encodings-{threats:02d}.png")
     histories = {
-        threats: {name: [item.history for item in group] for name, group in groups.items()}
+        threats: {name: [seeded_plan.history for seeded_plan in group] for name, group in groups.items()}
         for threats, groups in by_problem.items()
     }
     write_png(draw_convergence(histories), folder / "convergence.png")
@@ -407,7 +417,7 @@ def paper_tables(
     check_arguments(problems=tuple(problems), runs=runs, jobs=jobs)
     folder = None if out is None else Path(out)
     if folder is not None:
-        refuse_folder(folder, overwrite)
+        check_output_folder(folder, overwrite)
     with stage("planning", "planning the paper's problems") as advance:
         plans = plan_section(problems, runs, algorithm, jobs, advance)
     rows = table(plans)

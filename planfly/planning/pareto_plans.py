@@ -1,7 +1,7 @@
 """Plan a Pareto front for a scenario, with the default plan of every command and alternatives."""
 
-from planfly.planning.gust_altitude_margin import limits_of_others
-from planfly.planning.gust_orbits import waypoints_in_gusts
+from planfly.planning.gust_altitude_margin import limits_of_alternatives
+from planfly.planning.gust_orbits import max_waypoints_in_gusts
 from planfly.workflow.airframe import Airframe
 from planfly.workflow.make_plan import Advance, finish_plan, make_plan
 from planner.plan import Plan
@@ -18,27 +18,27 @@ def make_pareto_plans(
     advance: Advance | None = None,
     *,
     stop: StopCondition | None = None,
-    onward: bool = False,
+    continues: bool = False,
 ) -> Front:
     """Return up to `count` plans of a front, each safe by all checks of `planfly.workflow.make_plan.make_plan`.
 
     The default plan is made by `make_plan`; if it is not safe, the front is empty.  Alternatives that are not safe when
     completed are left out.  If gusts make the autopilot orbit, alternatives have no more waypoints than gusts allow.
-    stop, onward: see `make_plan`.
+    stop, continues: see `make_plan`.
     """
-    default = make_plan(scenario, airframe, seed, advance=advance, stop=stop, onward=onward)
+    default = make_plan(scenario, airframe, seed, advance=advance, stop=stop, continues=continues)
 
     def finish(plan: Plan) -> Plan:
-        return finish_plan(plan, airframe, onward=onward)
+        return finish_plan(plan, airframe, continues=continues)
 
     return plan_front(
         scenario,
-        limits_of_others(default, airframe),
+        limits_of_alternatives(default, airframe),
         count,
         seed=seed,
         progress=advance,
         stop=stop,
         default=default,
-        waypoints=waypoints_in_gusts(default, airframe),
+        waypoints=max_waypoints_in_gusts(default, airframe),
         finish=finish,
     )

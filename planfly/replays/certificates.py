@@ -1,11 +1,11 @@
-"""Make certificates that last as long as a process and prove that a connection belongs to the process's run."""
+"""Make certificates that last as long as a process and prove that a connection belongs to this process."""
 
 from datetime import UTC, datetime
 from typing import NamedTuple
 
 # Start of validity, so early that the certificate stays valid if the clock is changed during the run.
-_FROM = datetime(1970, 1, 1, tzinfo=UTC)
-_UNTIL = datetime(9999, 12, 31, tzinfo=UTC)
+_VALID_FROM = datetime(1970, 1, 1, tzinfo=UTC)
+_VALID_UNTIL = datetime(9999, 12, 31, tzinfo=UTC)
 
 
 class Certificate(NamedTuple):
@@ -40,13 +40,13 @@ def temporary_certificate() -> Certificate:
         .issuer_name(name)
         .public_key(key.public_key())
         .serial_number(x509.random_serial_number())
-        .not_valid_before(_FROM)
-        .not_valid_after(_UNTIL)
+        .not_valid_before(_VALID_FROM)
+        .not_valid_after(_VALID_UNTIL)
         .add_extension(x509.BasicConstraints(ca=True, path_length=0), critical=True)
         .add_extension(x509.SubjectAlternativeName([x509.DNSName("localhost")]), critical=False)
         .sign(key, hashes.SHA256())
     )
-    private = key.private_bytes(
+    private_key = key.private_bytes(
         serialization.Encoding.PEM, serialization.PrivateFormat.PKCS8, serialization.NoEncryption()
     )
-    return Certificate(certificate.public_bytes(serialization.Encoding.PEM).decode(), private.decode())
+    return Certificate(certificate.public_bytes(serialization.Encoding.PEM).decode(), private_key.decode())

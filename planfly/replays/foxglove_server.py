@@ -53,19 +53,19 @@ def play_to_foxglove(
 
     file = Path(log.source)
     broadcast = _Broadcast(foxglove, log_channels(file))
-    with contextlib.ExitStack() as opened:
-        gate = OriginGate(port, {*VIEWERS, *allowed}, lambda why: on_message(f"foxglove  refused {why}"))
-        opened.callback(gate.close)
+    with contextlib.ExitStack() as exit_stack:
+        gate = OriginGate(port, {*VIEWERS, *allowed}, lambda reason: on_message(f"foxglove  refused {reason}"))
+        exit_stack.callback(gate.close)
         server = _start_server(foxglove, f"planfly {file.name}", broadcast, gate)
-        opened.callback(server.stop)
+        exit_stack.callback(server.stop)
         on_message(f"foxglove  ws://{HOST}:{gate.port} (Open connection, Foxglove WebSocket; {SUBPROTOCOL})")
-        messages = broadcast.up_to(log_messages(file), round(start * 1e9) + EPOCH_NS)
+        messages = broadcast.record_scenes_until(log_messages(file), round(start * 1e9) + EPOCH_NS)
         _wait_for_listener(broadcast, wait, stopped)
         _play_messages(broadcast, server, messages, round(end * 1e9) + EPOCH_NS, speed, stopped)
 
 
 def _start_server(foxglove: Any, name: str, broadcast: "_Broadcast", gate: OriginGate) -> Any:
-    """Start the server behind the gate; no browser trusts its certificate, so that no page can bypass the gate."""
+    """Start the server behind the gate; no page can bypass the gate, because no browser trusts the certificate."""
     certificate = temporary_certificate()
     try:
         server = foxglove.start_server(
@@ -84,35 +84,40 @@ def _start_server(foxglove: Any, name: str, broadcast: "_Broadcast", gate: Origi
     return server
 
 
-def _wait_for_listener(broadcast: "_Broadcast", timeout: float | None, stopped: Stopped) -> None:
-    waited = RunningClock()
-    while not broadcast.listeners and not stopped():
-        if timeout is not None and waited() > timeout:
+def _wait_for_listener(broadcast: "_Broadcast", timeout: float | None, should_stop: Stopped) -> None:
+    clock = RunningClock()
+    while not broadcast.listeners and not should_stop():
+        if timeout is not None and clock() > timeout:
             raise FlightError.of_argument("foxglove", timeout, f"nobody has subscribed within {timeout:g} s", shown="")
         time.sleep(_POLL_INTERVAL_S)
 
 
 def _play_messages(
-    broadcast: "_Broadcast", server: Any, messages: Iterator[LogMessage], end_ns: int, speed: float, stopped: Stopped
+    broadcast: "_Broadcast",
+    server: Any,
+    messages: Iterator[LogMessage],
+    end_ns: int,
+    speed: float,
+    should_stop: Stopped,
 ) -> None:
-    played, first, newest = RunningClock(), None, 0
+    playback_clock, first_time, latest_time = RunningClock(), None, 0
     for message in messages:
         if message.log_time > end_ns:
             break
-        first = message.log_time if first is None else first
-        while (ahead := (message.log_time - first) / 1e9 / speed - played()) > 0.0 and not stopped():
-            broadcast.catch_up()
-            time.sleep(min(ahead, _POLL_INTERVAL_S))
-        if stopped():
+        first_time = message.log_time if first_time is None else first_time
+        while (wait := (message.log_time - first_time) / 1e9 / speed - playback_clock()) > 0.0 and not should_stop():
+            broadcast.serve_new_subscribers()
+            time.sleep(min(wait, _POLL_INTERVAL_S))
+        if should_stop():
             return
-        # An event that was recorded afterwards is later in the file than its time.
-        if message.log_time > newest:
-            newest = message.log_time
-            server.broadcast_time(newest)
-        broadcast.show(message)
+        # Events written after the flight come later in the file than their time.
+        if message.log_time > latest_time:
+            latest_time = message.log_time
+            server.broadcast_time(latest_time)
+        broadcast.send(message)
     # Serve pending messages and the last subscribers before the server ends.
     time.sleep(2.0 * _SUBSCRIPTION_DELAY_S)
-    broadcast.catch_up()
+    broadcast.serve_new_subscribers()
     time.sleep(_SUBSCRIPTION_DELAY_S)
 
 
@@ -123,20 +128,20 @@ class _Broadcast:
         self.context = foxglove.Context()
         self.listeners = 0
         self._channels = {
-            kind.topic: foxglove.Channel(
-                kind.topic,
-                schema=foxglove.Schema(name=kind.schema, encoding=kind.schema_encoding, data=kind.schema_data),
-                message_encoding=kind.encoding,
+            channel.topic: foxglove.Channel(
+                channel.topic,
+                schema=foxglove.Schema(name=channel.schema, encoding=channel.schema_encoding, data=channel.schema_data),
+                message_encoding=channel.encoding,
                 context=self.context,
             )
-            for kind in channels
+            for channel in channels
         }
         self._scenes: dict[str, LogMessage] = {}
         # Filled by the thread of the server: time and topic.
         self._arrivals: SimpleQueue[tuple[float, str]] = SimpleQueue()
         self._waiting: list[tuple[float, str]] = []
 
-    def up_to(self, messages: Iterator[LogMessage], start_ns: int) -> Iterator[LogMessage]:
+    def record_scenes_until(self, messages: Iterator[LogMessage], start_ns: int) -> Iterator[LogMessage]:
         """Record the messages before ``start_ns`` as scenes, and return the rest."""
         for message in messages:
             if message.log_time >= start_ns:
@@ -144,24 +149,26 @@ class _Broadcast:
             self._record_scene(message)
         return iter(())
 
-    def show(self, message: LogMessage) -> None:
+    def send(self, message: LogMessage) -> None:
         """Send a message to the subscribers."""
-        self.catch_up()
+        self.serve_new_subscribers()
         self._record_scene(message)
         channel = self._channels.get(message.channel.topic)
         if channel is not None:
             channel.log(message.data, log_time=message.log_time)
 
-    def catch_up(self) -> None:
+    def serve_new_subscribers(self) -> None:
         """Send the current scenes to new subscribers."""
         while not self._arrivals.empty():
             self._waiting.append(self._arrivals.get())
         now = time.monotonic()
-        for came, topic in self._waiting:
+        for arrival_time, topic in self._waiting:
             scene = self._scenes.get(topic)
-            if scene is not None and now - came >= _SUBSCRIPTION_DELAY_S:
+            if scene is not None and now - arrival_time >= _SUBSCRIPTION_DELAY_S:
                 self._channels[topic].log(scene.data, log_time=scene.log_time)
-        self._waiting = [item for item in self._waiting if now - item[0] < _SUBSCRIPTION_DELAY_S]
+        self._waiting = [
+            subscription for subscription in self._waiting if now - subscription[0] < _SUBSCRIPTION_DELAY_S
+        ]
 
     def _record_scene(self, message: LogMessage) -> None:
         if message.channel.topic.startswith(("/scene/", "/points/")):

@@ -17,7 +17,7 @@ from logs.recording.reader import FlightLog
 from logs.theme import drawn_colours
 from logs.views.replay.movie_frames import RATE, MovieFrames
 from planfly.runtime.stages import stage
-from planfly.workflow.output_paths import refuse_existing, refuse_folder
+from planfly.workflow.output_paths import check_output_file, check_output_folder
 from world.errors import PlanflyError
 from world.extras import need_extra
 from world.files import temporary_folder, write_whole
@@ -43,20 +43,20 @@ def write_movie(
     """
     kind = target.suffix.lower()
     if kind in SUFFIXES:
-        refuse_existing(target, overwrite)
+        check_output_file(target, overwrite)
     elif kind:
         allowed = f"{', '.join(SUFFIXES)} or a folder is expected"
         raise PlanflyError.of_argument("movie", kind, allowed, shown="", file=target)
     else:
-        refuse_folder(target, overwrite)
-    program = _ffmpeg(target) if kind == ".mp4" else ""
+        check_output_folder(target, overwrite)
+    program = _find_ffmpeg(target) if kind == ".mp4" else ""
     film = MovieFrames(log.setup, log.track, start, end, speed or max(1.0, (end - start) / _DEFAULT_DURATION_S))
     if len(film) > _MAX_FRAMES:
         allowed = f"{len(film):,} frames: at most {_MAX_FRAMES:,}; raise `speed`"
         raise PlanflyError.of_argument("movie", len(film), allowed, shown="", file=target)
     if not kind:
         return _write_folder(target, film)
-    write_whole(target, _encode_gif(film) if kind == ".gif" else _mp4(film, program))
+    write_whole(target, _encode_gif(film) if kind == ".gif" else _encode_mp4(film, program))
     return [target]
 
 
@@ -70,8 +70,8 @@ def _draw_frames(film: MovieFrames) -> Iterator[Image.Image]:
 def _write_folder(folder: Path, film: MovieFrames) -> list[Path]:
     """Write each frame to a file, and remove old frames."""
     folder.mkdir(parents=True, exist_ok=True)
-    for old in folder.glob("frame-[0-9][0-9][0-9][0-9].png"):
-        old.unlink()
+    for old_file in folder.glob("frame-[0-9][0-9][0-9][0-9].png"):
+        old_file.unlink()
     files = []
     for number, image in enumerate(_draw_frames(film)):
         data = io.BytesIO()
@@ -84,46 +84,48 @@ def _write_folder(folder: Path, film: MovieFrames) -> list[Path]:
 def _make_palette(frame: Image.Image) -> Image.Image:
     """Return an image whose palette has the exact drawing colors, and blends of the frame's other colors.
 
-    If the few colors were chosen by area alone, thin lines and small marks would get the colors of the ground.
+    If colors were chosen only by area, thin lines and small marks would get the colors of the ground.
     """
-    kept = [ImageColor.getrgb(colour)[:3] for colour in drawn_colours()]
-    blended = frame.quantize(_TRANSPARENT - len(kept), dither=Image.Dither.NONE).getpalette() or []
-    palette = [part for colour in kept for part in colour] + blended[: 3 * (_TRANSPARENT - len(kept))]
-    holder = Image.new("P", (1, 1))
+    drawing_colours = [ImageColor.getrgb(colour)[:3] for colour in drawn_colours()]
+    blended_palette = frame.quantize(_TRANSPARENT - len(drawing_colours), dither=Image.Dither.NONE).getpalette() or []
+    palette = [component for colour in drawing_colours for component in colour] + blended_palette[
+        : 3 * (_TRANSPARENT - len(drawing_colours))
+    ]
+    palette_image = Image.new("P", (1, 1))
     # The rest of the 256 entries repeats the first entry.
-    holder.putpalette(palette + palette[:3] * (256 - len(palette) // 3))
-    return holder
+    palette_image.putpalette(palette + palette[:3] * (256 - len(palette) // 3))
+    return palette_image
 
 
 def _apply_palette(frame: Image.Image, palette: Image.Image) -> Image.Image:
     """Return the frame in the colors of the palette, without transparent pixels."""
     image = frame.quantize(palette=palette, dither=Image.Dither.NONE)
     numbers = np.asarray(image)
-    same = Image.fromarray(np.where(numbers == _TRANSPARENT, 0, numbers).astype(np.uint8))
-    same.putpalette(palette.getpalette() or [])
-    return same
+    opaque = Image.fromarray(np.where(numbers == _TRANSPARENT, 0, numbers).astype(np.uint8))
+    opaque.putpalette(palette.getpalette() or [])
+    return opaque
 
 
 def _encode_gif(film: MovieFrames) -> bytes:
     """Encode all frames in the same colors, to prevent flicker; each frame contains only changed pixels."""
     images = _draw_frames(film)
-    start = next(images)
-    palette = _make_palette(start)
-    first = _apply_palette(start, palette)
-    before, rest = np.asarray(first), []
+    first_frame = next(images)
+    palette = _make_palette(first_frame)
+    first_image = _apply_palette(first_frame, palette)
+    previous, later_images = np.asarray(first_image), []
     for image in images:
-        now = np.asarray(_apply_palette(image, palette))
-        rest.append(Image.fromarray(np.where(now == before, _TRANSPARENT, now).astype(np.uint8)))
-        rest[-1].putpalette(first.getpalette() or [])
-        rest[-1].info["transparency"] = _TRANSPARENT
-        before = now
+        current = np.asarray(_apply_palette(image, palette))
+        later_images.append(Image.fromarray(np.where(current == previous, _TRANSPARENT, current).astype(np.uint8)))
+        later_images[-1].putpalette(first_image.getpalette() or [])
+        later_images[-1].info["transparency"] = _TRANSPARENT
+        previous = current
     data = io.BytesIO()
-    durations = [round(1000 / RATE)] * len(rest) + [_LAST_FRAME_MS]
-    first.save(
+    durations = [round(1000 / RATE)] * len(later_images) + [_LAST_FRAME_MS]
+    first_image.save(
         data,
         "GIF",
         save_all=True,
-        append_images=rest,
+        append_images=later_images,
         duration=durations,
         loop=0,
         optimize=False,
@@ -133,22 +135,22 @@ def _encode_gif(film: MovieFrames) -> bytes:
     return data.getvalue()
 
 
-def _ffmpeg(target: Path) -> str:
+def _find_ffmpeg(target: Path) -> str:
     """Return the encoder: ffmpeg on the path, or from the extra.  Raises MissingExtraError without either."""
-    found = shutil.which("ffmpeg")
-    if found is not None:
-        return found
+    program = shutil.which("ffmpeg")
+    if program is not None:
+        return program
     need_extra("films", f"{target}: an .mp4 needs ffmpeg (a .gif or a folder does not), or")
     from imageio_ffmpeg import get_ffmpeg_exe
 
     return str(get_ffmpeg_exe())
 
 
-def _mp4(film: MovieFrames, program: str) -> bytes:
-    """Encode frames by ffmpeg, as raw pixels on its input.  Raises OSError with its last line if it fails."""
+def _encode_mp4(film: MovieFrames, program: str) -> bytes:
+    """Encode frames by ffmpeg, as raw pixels on its input.  Raises OSError with ffmpeg's last line if it fails."""
     frames = film.frames()
-    first = next(frames)
-    height, width = first.shape[:2]
+    first_frame = next(frames)
+    height, width = first_frame.shape[:2]
     with temporary_folder("planfly-movie-") as folder, tempfile.TemporaryFile() as messages:
         out = folder / "film.mp4"
         command = [
@@ -175,15 +177,15 @@ def _mp4(film: MovieFrames, program: str) -> bytes:
             stage("drawing", "drawing frames") as advance,
             subprocess.Popen(command, stdin=subprocess.PIPE, stderr=messages) as encoder,
         ):
-            entry = encoder.stdin
+            encoder_input = encoder.stdin
             # If ffmpeg ends early, its status gives the reason.
             with contextlib.suppress(BrokenPipeError):
-                for number, frame in enumerate(itertools.chain([first], frames), 1):
-                    if entry is not None:
-                        entry.write(frame.tobytes())
+                for number, frame in enumerate(itertools.chain([first_frame], frames), 1):
+                    if encoder_input is not None:
+                        encoder_input.write(frame.tobytes())
                     advance(number, len(film), f"frame {number} of {len(film)}")
-                if entry is not None:
-                    entry.close()
+                if encoder_input is not None:
+                    encoder_input.close()
             status = encoder.wait()
         messages.seek(0)
         lines = messages.read().decode("utf-8", "replace").strip().splitlines()

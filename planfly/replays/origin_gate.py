@@ -1,4 +1,4 @@
-"""Gate before a WebSocket server of this machine: it admits viewers, and web pages that are named.
+"""Gate before a WebSocket server of this machine: it admits viewers and named web pages.
 
 A page of any site may open a WebSocket to 127.0.0.1, and a site may point its own host name there.  Browsers state
 both, as Origin and as Host, and no page can change these headers.
@@ -16,7 +16,7 @@ from collections.abc import Callable, Collection
 from planfly.replays.certificates import Certificate
 
 HOST = "127.0.0.1"
-_NAMES = (HOST, "localhost")
+_HOST_NAMES = (HOST, "localhost")
 # Present and former page of Foxglove, and the desktop programs of Foxglove and Lichtblick, whose pages are files.
 VIEWERS = ("https://app.foxglove.dev", "https://studio.foxglove.dev", "file://")
 # Longest head of a request, bytes.
@@ -31,15 +31,15 @@ _PIECE_BYTES = 65_536
 _CLOSE_TIMEOUT_S = 0.5
 # Greatest number of refusals that are reported.
 _MAX_REPORTED = 16
-# Greatest number of characters of each.
+# Greatest number of characters of a reported refusal.
 _MAX_REPORTED_LENGTH = 80
 
 
-def refusal(head: bytes, port: int, allowed: Collection[str]) -> str:
-    r"""Return why a WebSocket request is refused, in words; "" if it is accepted.
+def refusal_reason(head: bytes, port: int, allowed: Collection[str]) -> str:
+    r"""Return the reason why a WebSocket request is refused; "" if it is accepted.
 
-    head: its first line and headers.  port: port of arrival.  allowed: origins of pages; a program other than a browser
-    states none, and is accepted.
+    head: first line and headers of the request.  port: port of arrival.
+    allowed: origins of pages; a program other than a browser states no origin, and is accepted.
 
     >>> page = b"GET / HTTP/1.1\r\nHost: 127.0.0.1:8765\r\nOrigin: https://example.com\r\n\r\n"
     >>> refusal(page, 8765, VIEWERS), refusal(page, 8765, ["https://example.com"])
@@ -50,14 +50,14 @@ def refusal(head: bytes, port: int, allowed: Collection[str]) -> str:
     except http.client.HTTPException:
         return "a request that is none"
     hosts, origins = headers.get_all("Host", []), headers.get_all("Origin", [])
-    if [host.strip().lower() for host in hosts] not in [[f"{name}:{port}"] for name in _NAMES]:
-        return f"a request to {_shown(hosts)}"
-    if origins and [origin.strip() for origin in origins] not in [[one] for one in allowed]:
-        return f"a page of {_shown(origins)}"
+    if [host.strip().lower() for host in hosts] not in [[f"{name}:{port}"] for name in _HOST_NAMES]:
+        return f"a request to {_header_text(hosts)}"
+    if origins and [origin.strip() for origin in origins] not in [[allowed_origin] for allowed_origin in allowed]:
+        return f"a page of {_header_text(origins)}"
     return ""
 
 
-def _shown(values: list[str]) -> str:
+def _header_text(values: list[str]) -> str:
     """Format the values of a header for a terminal, without control characters."""
     return ascii(", ".join(values))[1:-1][:_MAX_REPORTED_LENGTH] or "no host"
 
@@ -69,7 +69,7 @@ class OriginGate:
         """Take the port, 0 for any that is free.
 
         allowed: origins of pages that are accepted.
-        on_refused: called, from another thread, with each new `refusal`.
+        on_refused: called, from another thread, with each new `refusal_reason`.
         Raises OSError for a port in use.
         """
         try:
@@ -80,12 +80,12 @@ class OriginGate:
         self._allowed, self._on_refused = frozenset(allowed), on_refused
         self._reported: set[str] = set()
         self._connections: set[asyncio.Task[None]] = set()
-        self._thread = threading.Thread(target=self._run, name="origin gate", daemon=True)
+        self._thread = threading.Thread(target=self._run_loop, name="origin gate", daemon=True)
         self._closed = asyncio.Event()
 
     def open(self, port: int, certificate: Certificate) -> None:
         """Begin to forward to a server that speaks TLS with this certificate, which no browser trusts."""
-        self._behind = port
+        self._server_port = port
         self._tls = ssl.create_default_context(cadata=certificate.certificate)
         self._loop = asyncio.new_event_loop()
         self._thread.start()
@@ -97,7 +97,7 @@ class OriginGate:
             self._thread.join(2.0 * _CLOSE_TIMEOUT_S)
         self._socket.close()
 
-    def _run(self) -> None:
+    def _run_loop(self) -> None:
         with contextlib.closing(self._loop):
             self._loop.run_until_complete(self._serve())
 
@@ -106,18 +106,18 @@ class OriginGate:
         await self._closed.wait()
         server.close()
         if self._connections:
-            _, left = await asyncio.wait(self._connections, timeout=_CLOSE_TIMEOUT_S)
-            for meeting in left:
-                meeting.cancel()
-            await asyncio.gather(*left, return_exceptions=True)
+            _, open_connections = await asyncio.wait(self._connections, timeout=_CLOSE_TIMEOUT_S)
+            for connection in open_connections:
+                connection.cancel()
+            await asyncio.gather(*open_connections, return_exceptions=True)
 
     def _accept(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         if len(self._connections) >= _MAX_CONNECTIONS:
             writer.close()
             return
-        meeting = self._loop.create_task(self._serve_connection(reader, writer))
-        self._connections.add(meeting)
-        meeting.add_done_callback(self._connections.discard)
+        connection = self._loop.create_task(self._serve_connection(reader, writer))
+        self._connections.add(connection)
+        connection.add_done_callback(self._connections.discard)
 
     async def _serve_connection(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         """Read a request, and refuse it or forward everything, both ways."""
@@ -126,21 +126,21 @@ class OriginGate:
                 head = await asyncio.wait_for(reader.readuntil(b"\r\n\r\n"), _HEAD_TIMEOUT_S)
             except asyncio.LimitOverrunError:
                 return
-            why = refusal(head, self.port, self._allowed)
-            if why:
-                self._report(why)
+            reason = refusal_reason(head, self.port, self._allowed)
+            if reason:
+                self._report(reason)
                 writer.write(b"HTTP/1.1 403 Forbidden\r\nContent-Length: 0\r\nConnection: close\r\n\r\n")
                 await writer.drain()
                 return
-            behind = asyncio.open_connection(HOST, self._behind, ssl=self._tls, server_hostname="localhost")
-            inward, outward = await behind
-            outward.write(head)
-            await asyncio.gather(_forward(reader, outward), _forward(inward, writer))
+            server = asyncio.open_connection(HOST, self._server_port, ssl=self._tls, server_hostname="localhost")
+            server_reader, server_writer = await server
+            server_writer.write(head)
+            await asyncio.gather(_forward(reader, server_writer), _forward(server_reader, writer))
 
-    def _report(self, why: str) -> None:
-        if why not in self._reported and len(self._reported) < _MAX_REPORTED:
-            self._reported.add(why)
-            self._on_refused(why)
+    def _report(self, reason: str) -> None:
+        if reason not in self._reported and len(self._reported) < _MAX_REPORTED:
+            self._reported.add(reason)
+            self._on_refused(reason)
 
 
 async def _forward(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:

@@ -46,13 +46,13 @@ def play_to_stations(
     try:
         player.wait(wait, stopped)
         if not link.peers:
-            asked = ",".join(f"{host}:{port}" for host, port in access.to)
-            raise FlightError.of_argument("to", asked, f"no ground station has answered within {wait:g} s")
-        begun, k = link.clock(), 0
+            addresses = ",".join(f"{host}:{port}" for host, port in access.to)
+            raise FlightError.of_argument("to", addresses, f"no ground station has answered within {wait:g} s")
+        start_time, k = link.clock(), 0
         player.announce(f"replay of {log.source} at {speed:g}x")
         while k < len(rows) - 1 and not stopped():
-            played = (link.clock() - begun) * speed
-            k = min(len(rows) - 1, int(np.searchsorted(track.time, played, side="right")))
+            log_time = (link.clock() - start_time) * speed
+            k = min(len(rows) - 1, int(np.searchsorted(track.time, log_time, side="right")))
             snapshot = snapshots.snapshot(rows[k])
             if snapshot.finite:
                 status.snapshot = snapshot
@@ -62,7 +62,7 @@ def play_to_stations(
             status.mission_state = COMPLETE
         status.armed = status.flying = False
         player.announce(f"replay over: {log.ended or CUT_SHORT}")
-        player.rest(1.5, stopped)
+        player.continue_sending(1.5, stopped)
     finally:
         link.close()
 
@@ -72,16 +72,16 @@ class _Player:
 
     def __init__(self, link: Link, status: Status, on_message: OnMessage) -> None:
         self._link, self._status, self._on_message = link, status, on_message
-        self._born = link.clock()
-        self._hello = 0.0
-        self._texts = 0
+        self._start_time = link.clock()
+        self._next_heartbeat = 0.0
+        self._text_count = 0
 
     def announce(self, text: str) -> None:
         """Send a text to the stations and to on_message."""
         self._on_message(text)
-        self._texts += 1
+        self._text_count += 1
         for peer in self._link.peers.values():
-            for piece in status_texts(text, INFO, self._texts):
+            for piece in status_texts(text, INFO, self._text_count):
                 self._link.send(piece, peer)
 
     def wait(self, timeout: float, stopped: Stopped) -> None:
@@ -90,7 +90,7 @@ class _Player:
         while not self._link.peers and self._link.clock() < end and not stopped():
             self.step(0.05)
 
-    def rest(self, seconds: float, stopped: Stopped) -> None:
+    def continue_sending(self, seconds: float, stopped: Stopped) -> None:
         """Continue sending the last snapshot."""
         end = self._link.clock() + seconds
         while self._link.clock() < end and not stopped():
@@ -99,12 +99,12 @@ class _Player:
     def step(self, pause: float) -> None:
         """Read messages of stations, send due messages, and pause, s."""
         now = self._link.clock()
-        self._status.boot, self._status.wall = now - self._born, time.time()
+        self._status.boot, self._status.wall = now - self._start_time, time.time()
         self._link.receive()
         for notice in self._link.notices():
             self._on_message(notice)
-        if now >= self._hello:
-            self._hello = now + 1.0
+        if now >= self._next_heartbeat:
+            self._next_heartbeat = now + 1.0
             self._link.send_heartbeat(heartbeat(self._status))
         for peer in self._link.peers.values():
             for name, due in peer.due.items():

@@ -21,7 +21,7 @@ from world.frames import to_geo
 from world.kernels import Record
 
 # Length of the lead-in, m, so that the flight is steady at the start of the return.
-LEAD = 500.0
+LEAD_IN_LENGTH_M = 500.0
 # Maximum horizontal distance at which a flight passes the start of a return, m.
 _MAX_START_DISTANCE_M = 60.0
 # Maximum vertical distance at which a flight passes the start of a return, m.
@@ -31,17 +31,17 @@ _MAX_START_HEIGHT_ERROR_M = 15.0
 _SLOPE_DELAY_S = 3.0
 
 
-class Met(NamedTuple):
+class NearestApproaches(NamedTuple):
     """Nearest approaches of a path to ground and missiles.
 
     clearance: minimum height above ground, m; NaN if unknown.
-    at: place of this minimum, (3,), m.
+    lowest_position: position of this minimum, (3,), m.
     outside: minimum distance outside a kill sphere, m; inf without missiles.
     threat: index of this threat, -1 without missiles.
     """
 
     clearance: float
-    at: tuple[float, float, float]
+    lowest_position: tuple[float, float, float]
     outside: float
     threat: int
 
@@ -49,21 +49,21 @@ class Met(NamedTuple):
 def fly_return(world: ReturnWorld, start: Record) -> tuple[float, float] | None:
     """Fly a return in JSBSim, and return the minimum height above ground and distance outside a kill sphere, m.
 
-    The flight has exact navigation and the mean wind alone, as with the point mass.  Return None for a return that
+    The flight has exact navigation and only the mean wind, as with the point mass.  Returns None for a return that
     cannot be flown.
 
     start: a record of `flight.autopilots.arduplane.rtl_point_mass.RETURN_START`.
     """
     try:
         setup, airframe = return_setup(world, start)
-        flown = fly_to_end(Flight(setup, airframe.aircraft))
+        flight = fly_to_end(Flight(setup, airframe.aircraft))
     except PlanflyError:
         return None
-    position = from_start(flown.track, start)
+    position = positions_from_start(flight.track, start)
     if position is None:
         return None
-    met = met_on_way(world, position)
-    return (min(0.0, met.clearance) if flown.ended == "ground contact" else met.clearance), met.outside
+    nearest = nearest_approaches(world, position)
+    return (min(0.0, nearest.clearance) if flight.ended == "ground contact" else nearest.clearance), nearest.outside
 
 
 def return_setup(
@@ -79,63 +79,70 @@ def return_setup(
     return replace(make_setup(scenario, airframe, _return_mission(world, start, landing), 1), nav="perfect"), airframe
 
 
-def from_start(track: Track, start: Record) -> Floats | None:
-    """Return the positions from the start of the return on, (t, 3), or None if the flight does not reach the start."""
-    begin = np.array([float(start["east"]), float(start["north"])])
-    near = np.hypot(*(track.position[: round(2.0 * LEAD / 10.0 * 60.0), :2] - begin).T)
-    if not near.size or float(near.min()) > _MAX_START_DISTANCE_M:
+def positions_from_start(track: Track, start: Record) -> Floats | None:
+    """Return the positions from the start of the return, (t, 3), or None if the flight does not reach the start."""
+    start_position = np.array([float(start["east"]), float(start["north"])])
+    start_distances = np.hypot(*(track.position[: round(2.0 * LEAD_IN_LENGTH_M / 10.0 * 60.0), :2] - start_position).T)
+    if not start_distances.size or float(start_distances.min()) > _MAX_START_DISTANCE_M:
         return None
-    position: Floats = track.position[int(np.argmin(near)) :]
+    position: Floats = track.position[int(np.argmin(start_distances)) :]
     return None if abs(float(position[0, 2]) - float(start["up"])) > _MAX_START_HEIGHT_ERROR_M else position
 
 
-def met_on_way(world: ReturnWorld, position: Floats) -> Met:
+def nearest_approaches(world: ReturnWorld, position: Floats) -> NearestApproaches:
     """Find the nearest approaches of a path to ground and missiles.  position: path points, (t, 3), m."""
-    low, at = math.nan, (math.nan, math.nan, math.nan)
+    clearance, lowest_position = math.nan, (math.nan, math.nan, math.nan)
     if world.scenario.terrain is not None:
-        above = position[:, 2] - world.scenario.terrain.height(position[:, 0], position[:, 1])
-        lowest = int(np.argmin(above))
-        low, (east, north, up) = float(above[lowest]), position[lowest].tolist()
-        at = east, north, up
+        heights = position[:, 2] - world.scenario.terrain.height(position[:, 0], position[:, 1])
+        lowest_row = int(np.argmin(heights))
+        clearance, (east, north, up) = float(heights[lowest_row]), position[lowest_row].tolist()
+        lowest_position = east, north, up
     outside, threat = math.inf, -1
     threats = world.scenario.threats
     for k in np.flatnonzero(threats.kill_radius > 0.0):
-        away = float((np.linalg.norm(position - threats.position[k], axis=1) - threats.kill_radius[k]).min())
-        if away < outside:
-            outside, threat = away, int(k)
-    return Met(low, at, outside, threat)
+        distance = float((np.linalg.norm(position - threats.position[k], axis=1) - threats.kill_radius[k]).min())
+        if distance < outside:
+            outside, threat = distance, int(k)
+    return NearestApproaches(clearance, lowest_position, outside, threat)
 
 
 def _return_mission(world: ReturnWorld, start: Record, landing: LandingStart | None) -> Mission:
     """Return a mission that passes the start on its course and slope, and then returns to launch."""
     east, north, up = (float(start[name]) for name in ("east", "north", "up"))
-    ve, vn, vu = (float(start[f"velocity_{name}"]) for name in ("east", "north", "up"))
-    over = max(1.0, math.hypot(ve, vn))
-    up += _SLOPE_DELAY_S * vu
-    places = [(east - LEAD * ve / over, north - LEAD * vn / over, up - LEAD * vu / over), (east, north, up)]
+    velocity_east, velocity_north, velocity_up = (float(start[f"velocity_{name}"]) for name in ("east", "north", "up"))
+    ground_speed = max(1.0, math.hypot(velocity_east, velocity_north))
+    up += _SLOPE_DELAY_S * velocity_up
+    places = [
+        (
+            east - LEAD_IN_LENGTH_M * velocity_east / ground_speed,
+            north - LEAD_IN_LENGTH_M * velocity_north / ground_speed,
+            up - LEAD_IN_LENGTH_M * velocity_up / ground_speed,
+        ),
+        (east, north, up),
+    ]
     origin, mission = world.scenario.origin, world.setup.mission
     items = []
     for number, place in enumerate(places, 1):
         lat, lon = (float(value) for value in to_geo(origin, place[0], place[1]))
         params = (0.0, float(number - 1), 0.0, 0.0)
         items.append(MissionItem(number, Command.NAV_WAYPOINT, Frame.GLOBAL, params, lat, lon, place[2]))
-    back = int(Command.NAV_RETURN_TO_LAUNCH)
-    items.append(MissionItem(3, back, int(Frame.MISSION), (0.0,) * 4, 0.0, 0.0, 0.0))
+    rtl_command = int(Command.NAV_RETURN_TO_LAUNCH)
+    items.append(MissionItem(3, rtl_command, int(Frame.MISSION), (0.0,) * 4, 0.0, 0.0, 0.0))
     if landing is not None:
         items += _landing_items(mission.items, landing)
     rally = []
     for number, point in enumerate(world.rally):
         lat, lon = (float(value) for value in to_geo(origin, point.east, point.north))
         frame = Frame.GLOBAL_RELATIVE_ALT if point.base else Frame.GLOBAL
-        place_up = point.up - point.base
-        rally.append(MissionItem(number, Command.NAV_RALLY_POINT, frame, (0.0,) * 4, lat, lon, place_up))
+        height = point.up - point.base
+        rally.append(MissionItem(number, Command.NAV_RALLY_POINT, frame, (0.0,) * 4, lat, lon, height))
     home = None if mission.home is None else replace(mission.home, alt=world.home.up)
     return Mission(home, tuple(items), rally=tuple(rally), source=mission.source)
 
 
 def _landing_items(items: tuple[MissionItem, ...], landing: LandingStart) -> list[MissionItem]:
     """Return the items of a landing sequence, from its DO_LAND_START to the landing, numbered from 4."""
-    first = next(k for k, item in enumerate(items) if item.seq == landing.item)
-    begin = max(k for k in range(first) if items[k].command == Command.DO_LAND_START)
-    end = next(k for k in range(first, len(items)) if items[k].command in LANDINGS)
-    return [replace(item, seq=number) for number, item in enumerate(items[begin : end + 1], 4)]
+    start_index = next(k for k, item in enumerate(items) if item.seq == landing.item)
+    begin_index = max(k for k in range(start_index) if items[k].command == Command.DO_LAND_START)
+    end_index = next(k for k in range(start_index, len(items)) if items[k].command in LANDINGS)
+    return [replace(item, seq=number) for number, item in enumerate(items[begin_index : end_index + 1], 4)]

@@ -55,17 +55,17 @@ def return_summary(setup: FlightSetup, track: Track | None) -> ReturnSummary:
         return ReturnSummary()
     try:
         world = return_world(setup)
-        seconds = setup.path.length / max(1.0, setup.airspeed)
+        duration = setup.path.length / max(1.0, setup.airspeed)
         if track is not None and len(track):
-            seconds = float(track.time[-1] - track.time[0])
-        every = max(1.0, seconds / _SUMMARY_RETURNS)
-        starts = return_starts(setup, track, every)
-        found = judge_returns(world, starts, every)
+            duration = float(track.time[-1] - track.time[0])
+        interval = max(1.0, duration / _SUMMARY_RETURNS)
+        starts = return_starts(setup, track, interval)
+        returns = judge_returns(world, starts, interval)
     except PlanflyError as error:
         return ReturnSummary(f"not judged: {error}")
-    own = world.stands_in and not world.other_law
-    stands_in = f" (by the simulated ArduPlane in place of {setup.autopilot.title})" if own else ""
-    return ReturnSummary(headline(found) + stands_in, world, starts, found)
+    names_stand_in = world.stands_in and not world.other_law
+    stands_in = f" (by the simulated ArduPlane in place of {setup.autopilot.title})" if names_stand_in else ""
+    return ReturnSummary(headline(returns) + stands_in, world, starts, returns)
 
 
 def returns_line(setup: FlightSetup, track: Track | None) -> str:

@@ -36,7 +36,7 @@ from logs.verdict.returns.judge_returns import (
 )
 from logs.verdict.returns.return_starts import ReturnStarts
 from logs.verdict.returns.returns_text import measured_text
-from planfly.rtl.jsbsim_returns import LEAD, from_start, met_on_way, return_setup
+from planfly.rtl.jsbsim_returns import LEAD_IN_LENGTH_M, nearest_approaches, positions_from_start, return_setup
 from planfly.runtime.stages import stage
 from planfly.workflow.pipeline import fly_and_judge
 from world.arrays import Floats
@@ -88,16 +88,16 @@ class ProgramReturns:
     """Returns that the program flew.
 
     program: name and version of the program; "" if it flew no return.
-    each: the returns, the worst first.
+    pairs: the returns, the worst first.
     """
 
     program: str
-    each: tuple[ProgramReturn, ...]
+    pairs: tuple[ProgramReturn, ...]
 
     @property
     def flown(self) -> tuple[ProgramReturn, ...]:
         """Returns that the program could fly."""
-        return tuple(one for one in self.each if one.flown is not None)
+        return tuple(pair for pair in self.pairs if pair.flown is not None)
 
     def headline(self) -> str:
         """Return a one-line summary.
@@ -107,48 +107,52 @@ class ProgramReturns:
         """
         if not self.flown:
             return "by the program: no return could be flown"
-        same = sum(one.agrees for one in self.flown)
-        worse = sum(one.worse for one in self.flown)
-        compared = "all of them as simulated" if same == len(self.flown) else f"{same} of them as simulated"
-        compared += f"; {worse} worse than simulated, so that the simulation errs there" if worse else ""
-        return f"by {self.program} itself: {len(self.flown)} of the worst flown, {compared}"
+        agreeing_count = sum(pair.agrees for pair in self.flown)
+        worse_count = sum(pair.worse for pair in self.flown)
+        comparison = (
+            "all of them as simulated"
+            if agreeing_count == len(self.flown)
+            else f"{agreeing_count} of them as simulated"
+        )
+        comparison += f"; {worse_count} worse than simulated, so that the simulation errs there" if worse_count else ""
+        return f"by {self.program} itself: {len(self.flown)} of the worst flown, {comparison}"
 
     def lines(self, returns: Returns, scenario: Scenario) -> list[str]:
         """Describe each return in a line with its start, both outcomes, and their agreement."""
-        out = []
-        for one in self.each:
-            east, north, _ = one.law.start
-            begins = f"{one.law.time:.0f} s, from {east:.0f} m east, {north:.0f} m north"
-            law = measured_text(one.law, returns.limit, scenario)
-            if one.flown is None:
-                out.append(f"{begins}: simulated {law}; not flown by the program: {one.reason}")
+        texts = []
+        for pair in self.pairs:
+            east, north, _ = pair.law.start
+            start_text = f"{pair.law.time:.0f} s, from {east:.0f} m east, {north:.0f} m north"
+            simulated_text = measured_text(pair.law, returns.limit, scenario)
+            if pair.flown is None:
+                texts.append(f"{start_text}: simulated {simulated_text}; not flown by the program: {pair.reason}")
                 continue
-            agree = (
+            agreement = (
                 "they agree"
-                if one.agrees
+                if pair.agrees
                 else "the program's outcome counts"
-                if one.worse
+                if pair.worse
                 else "the simulated outcome, the worse one, counts"
             )
-            flown = measured_text(one.flown, returns.limit, scenario)
-            out.append(f"{begins}: simulated {law}; by the program {flown}: {agree}")
-        return out
+            program_text = measured_text(pair.flown, returns.limit, scenario)
+            texts.append(f"{start_text}: simulated {simulated_text}; by the program {program_text}: {agreement}")
+        return texts
 
-    def put_right(self, returns: Returns) -> Returns:
-        """Return the returns, with the program's result for each return for which it is worse."""
-        worse = {id(one.law): one.flown for one in self.each if one.worse}
-        return replace(returns, each=tuple(worse.get(id(one)) or one for one in returns.each))
+    def with_worse_results(self, returns: Returns) -> Returns:
+        """Replace each return's simulated result by the program's result where the program's result is worse."""
+        worse = {id(pair.law): pair.flown for pair in self.pairs if pair.worse}
+        return replace(returns, each=tuple(worse.get(id(ret)) or ret for ret in returns.each))
 
 
-def refuse_program(program: Path) -> None:
-    """Raise ArgumentError for a program whose returns planfly does not simulate and so cannot compare."""
+def check_is_arduplane(program: Path) -> None:
+    """Raise ArgumentError for a program other than ArduPlane, whose returns planfly does not simulate."""
     kind = program_autopilot(program)
     if not issubclass(kind, ArduPlaneSitl):
         allowed = f"ArduPlane's program is expected: how {kind.title} returns is not flown here"
         raise ArgumentError.of_argument("autopilot", str(program), allowed)
 
 
-def worst_apart(
+def worst_separated_returns(
     world: ReturnWorld, starts: ReturnStarts, returns: Returns, points: int
 ) -> list[tuple[ReturnFlown, int]]:
     """Choose at most `points` of the worst returns that can be flown, each with the number of its start.
@@ -156,35 +160,42 @@ def worst_apart(
     The worst comes first.  Starts closer together than half of the path divided by `points` are skipped, because
     neighbouring seconds show the same.
     """
-    rows = starts.rows
-    place = np.column_stack([rows["east"], rows["north"]])
-    apart = 0.5 * float(np.hypot(*np.diff(place, axis=0).T).sum()) / points if len(starts) > 1 else 0.0
-    number = {float(time): k for k, time in enumerate(starts.time)}
+    start_rows = starts.rows
+    positions = np.column_stack([start_rows["east"], start_rows["north"]])
+    min_distance = 0.5 * float(np.hypot(*np.diff(positions, axis=0).T).sum()) / points if len(starts) > 1 else 0.0
+    numbers = {float(time): k for k, time in enumerate(starts.time)}
     chosen: list[tuple[ReturnFlown, int]] = []
-    for one in sorted(returns.each, key=_badness_key):
-        k = number[one.time]
-        near = any(np.hypot(*(place[k] - place[other])) < apart for _, other in chosen)
-        if near or starts.low[k] or not is_steady(world, rows[k]) or not _is_clear(world, rows[k]):
+    for ret in sorted(returns.each, key=_badness_key):
+        k = numbers[ret.time]
+        is_near = any(
+            np.hypot(*(positions[k] - positions[chosen_number])) < min_distance for _, chosen_number in chosen
+        )
+        if (
+            is_near
+            or starts.low[k]
+            or not is_steady(world, start_rows[k])
+            or not _is_lead_in_clear(world, start_rows[k])
+        ):
             continue
-        chosen.append((one, k))
+        chosen.append((ret, k))
         if len(chosen) == points:
             break
     return chosen
 
 
-def _badness_key(one: ReturnFlown) -> tuple[int, float]:
-    """Return the sort key of a return, which is `badness`, or for a safe return how near it is to a limit."""
-    return (KINDS.index("safe"), distance_to_limit(one)) if one.safe else badness(one)
+def _badness_key(ret: ReturnFlown) -> tuple[int, float]:
+    """Return the sort key of a return: `badness`, or for a safe return how near it is to a limit."""
+    return (KINDS.index("safe"), distance_to_limit(ret)) if ret.safe else badness(ret)
 
 
-def _is_clear(world: ReturnWorld, row: Record) -> bool:
+def _is_lead_in_clear(world: ReturnWorld, row: Record) -> bool:
     """Return True if the straight lead-in to a start stays above the ground."""
     if world.scenario.terrain is None:
         return True
     velocity = np.array([float(row[f"velocity_{name}"]) for name in ("east", "north", "up")])
-    begin = np.array([float(row[name]) for name in ("east", "north", "up")])
-    back = np.linspace(0.0, LEAD / max(1.0, math.hypot(*velocity[:2])), 26)
-    path = begin - back[:, None] * velocity
+    start_position = np.array([float(row[name]) for name in ("east", "north", "up")])
+    seconds_before = np.linspace(0.0, LEAD_IN_LENGTH_M / max(1.0, math.hypot(*velocity[:2])), 26)
+    path = start_position - seconds_before[:, None] * velocity
     return bool((path[:, 2] - world.scenario.terrain.height(path[:, 0], path[:, 1])).min() > _MIN_LEAD_IN_HEIGHT_M)
 
 
@@ -196,58 +207,60 @@ def fly_by_program(
     folder: folder for the flight logs of planfly and of the program; None writes no logs.
     Raises FlightError if the program does not start or breaks off.
     """
-    flown, version = [], ""
-    for number, (one, k) in enumerate(worst_apart(world, starts, returns, points), 1):
+    program_returns, version = [], ""
+    for number, (ret, k) in enumerate(worst_separated_returns(world, starts, returns, points), 1):
         log = None if folder is None else folder / f"worst-return-{number}.mcap"
         with stage(f"flying return {number} of {points} by the program", "flying a return by a program") as advance:
             try:
-                setup, airframe = return_setup(world, starts.rows[k], one.target.landing)
+                setup, airframe = return_setup(world, starts.rows[k], ret.target.landing)
             except MissionError as error:
-                flown.append(ProgramReturn(one, reason=str(error)))
+                program_returns.append(ProgramReturn(ret, reason=str(error)))
                 continue
             judged = fly_and_judge(setup, airframe, log, advance, autopilot=program, reference="never")
         version = judged.setup.autopilot.version
-        found = _judge_flown_return(world, one, starts.rows[k], judged.track, judged.ended)
-        reason = "" if found else f"it does not come to where the return begins ({judged.ended})"
-        flown.append(ProgramReturn(one, found, reason, log))
-    return ProgramReturns(version, tuple(flown))
+        judged_return = _judge_flown_return(world, ret, starts.rows[k], judged.track, judged.ended)
+        reason = "" if judged_return else f"it does not come to where the return begins ({judged.ended})"
+        program_returns.append(ProgramReturn(ret, judged_return, reason, log))
+    return ProgramReturns(version, tuple(program_returns))
 
 
 def _judge_flown_return(
     world: ReturnWorld, law: ReturnFlown, start: Record, track: Track, ended: str
 ) -> ReturnFlown | None:
     """Judge a return flown by the program; return None if the flight did not reach the start of the return."""
-    whole = from_start(track, start)
-    if whole is None:
+    path = positions_from_start(track, start)
+    if path is None:
         return None
-    begin = len(track) - len(whole)
-    position = _cut_at_landing(law.target, whole)
+    start_row = len(track) - len(path)
+    position = _cut_at_landing(law.target, path)
     target = _flown_target(world, law.target, position)
-    closest = met_on_way(world, position)
-    hits = ended == "ground contact" and len(position) == len(whole)
-    arrives = hits or bool(np.hypot(*(position[-1, :2] - np.array(_end_position(target)[:2]))) < _ARRIVAL_DISTANCE_M)
+    closest = nearest_approaches(world, position)
+    hits_ground = ended == "ground contact" and len(position) == len(path)
+    has_arrived = hits_ground or bool(
+        np.hypot(*(position[-1, :2] - np.array(_end_position(target)[:2]))) < _ARRIVAL_DISTANCE_M
+    )
     record: Record = np.zeros(1, RETURN_RESULT)[0]
-    clearance = min(0.0, closest.clearance) if hits else closest.clearance
+    clearance = min(0.0, closest.clearance) if hits_ground else closest.clearance
     record["ended"] = (
-        RETURN_GROUND_IMPACT if hits or clearance <= 0.0 else RETURN_ARRIVED if arrives else RETURN_TIMEOUT
+        RETURN_GROUND_IMPACT if hits_ground or clearance <= 0.0 else RETURN_ARRIVED if has_arrived else RETURN_TIMEOUT
     )
     if math.isnan(clearance):
         record["ended"] = RETURN_OFF_TERRAIN
     record["clearance"], record["outside"], record["threat"] = clearance, closest.outside, closest.threat
-    used = float(track.energy[begin + len(position) - 1] - track.energy[begin])
-    left = law.left + law.energy - used
+    used_energy = float(track.energy[start_row + len(position) - 1] - track.energy[start_row])
+    remaining_energy = law.left + law.energy - used_energy
     zone = most_violated_zone(world, position[::_ROWS_PER_SECOND]) if world.airspace.zones else -1
     return replace(
         law,
         target=target,
-        kind=kind_of(world, record, zone, left, law.floor),
+        kind=kind_of(world, record, zone, remaining_energy, law.floor),
         clearance=clearance,
-        clearance_at=closest.at,
+        clearance_at=closest.lowest_position,
         outside=closest.outside,
         threat=closest.threat,
         zone=zone,
-        energy=used,
-        left=left,
+        energy=used_energy,
+        left=remaining_energy,
     )
 
 
@@ -272,28 +285,33 @@ def _flown_target(world: ReturnWorld, law: ReturnTarget, position: Floats) -> Re
 
     position: path points, (t, 3), m.
     """
-    last, before = position[-1, :2], position[max(0, len(position) - 5 * _ROWS_PER_SECOND), :2]
-    course = math.atan2(*(last - before))
-    best, least = law, math.inf
+    end_point, earlier_point = position[-1, :2], position[max(0, len(position) - 5 * _ROWS_PER_SECOND), :2]
+    course = math.atan2(*(end_point - earlier_point))
+    best, best_rank = law, math.inf
     for target in (law, *_other_targets(world, law)):
-        off = np.array(_end_position(target)[:2]) - last
-        away = math.hypot(*off)
-        turned = abs(math.remainder(math.atan2(*off) - course, math.tau))
+        offset = np.array(_end_position(target)[:2]) - end_point
+        distance = math.hypot(*offset)
+        course_difference = abs(math.remainder(math.atan2(*offset) - course, math.tau))
         # A place at which the path ends ranks before any place for which the path heads.
         rank = (
-            away / _ARRIVAL_DISTANCE_M if away < _ARRIVAL_DISTANCE_M else 1.0 + turned / _ARRIVAL_HEADING_TOLERANCE_RAD
+            distance / _ARRIVAL_DISTANCE_M
+            if distance < _ARRIVAL_DISTANCE_M
+            else 1.0 + course_difference / _ARRIVAL_HEADING_TOLERANCE_RAD
         )
-        if rank < min(least, 2.0):
-            best, least = target, rank
+        if rank < min(best_rank, 2.0):
+            best, best_rank = target, rank
     return best
 
 
 def _other_targets(world: ReturnWorld, law: ReturnTarget) -> Iterator[ReturnTarget]:
     """Yield home and all rally points, except the target of the simulated ArduPlane."""
-    home = ArduPlane(world.parameters).return_rules.height + world.home.up
+    home_altitude = ArduPlane(world.parameters).return_rules.height + world.home.up
     places = [
-        ("home", (world.home.east, world.home.north, home)),
-        *((f"rally point {one.number or k}", (one.east, one.north, one.up)) for k, one in enumerate(world.rally, 1)),
+        ("home", (world.home.east, world.home.north, home_altitude)),
+        *(
+            (f"rally point {rally_point.number or k}", (rally_point.east, rally_point.north, rally_point.up))
+            for k, rally_point in enumerate(world.rally, 1)
+        ),
     ]
     for name, place in places:
         if name != law.name:

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import ParamSpec, TypeVar
 
 from planfly.kernel_units.unit_kernels import kernels_of
-from planfly.runtime.stages import is_received, say, stage
+from planfly.runtime.stages import has_receiver, say, stage
 from world.compile_events import tell_before_compiling
 from world.kernel_cache import VARIABLE, can_write
 
@@ -23,43 +23,45 @@ from world.kernel_cache import VARIABLE, can_write
 
 # Number of processes; more would wait for each other, because the longest unit takes nearly half of the total time.
 PROCESSES = 2
-# Arguments of Python; -P leaves out the current folder, whose modules may have the names of ours.
+# Arguments of Python; -P leaves out the current folder, whose modules may have the names of planfly's modules.
 PROGRAM = ("-P", "-m", "planfly.kernel_units")
 # Line that marks the end of the output of a process.
 _END_OF_OUTPUT = ""
 
 
 def compile_units(units: list[str], folder: Path, on_ready: Callable[[int], None]) -> None:
-    """Compile units into a cache folder; return when all are compiled or given up.
+    """Compile units into a cache folder; return when each unit is compiled or has failed.
 
-    units: longest first.  on_ready: called with the number of kernels that are ready.
+    units: names of units, the longest first.  on_ready: called with the number of kernels that are ready.
     The processes end with this call, also if it raises, and with this process.
     """
-    waiting, lines = deque(units), queue.SimpleQueue[str]()
+    units_left, lines = deque(units), queue.SimpleQueue[str]()
     count = min(PROCESSES, len(units), os.cpu_count() or 1)
-    helpers = [_start(folder) for _ in range(count)]
-    leaders = [threading.Thread(target=_lead, args=(helper, waiting, lines), daemon=True) for helper in helpers]
+    processes = [_start_process(folder) for _ in range(count)]
+    threads = [
+        threading.Thread(target=_feed_process, args=(process, units_left, lines), daemon=True) for process in processes
+    ]
     try:
-        for leader in leaders:
-            leader.start()
-        ready: set[str] = set()
-        over = 0
-        while over < count:
+        for thread in threads:
+            thread.start()
+        ready_kernels: set[str] = set()
+        ended_count = 0
+        while ended_count < count:
             line = lines.get()
-            over += line == _END_OF_OUTPUT
-            word, _, name = line.partition(" ")
-            if word == "ready" and name not in ready:
-                ready.add(name)
-                on_ready(len(ready))
+            ended_count += line == _END_OF_OUTPUT
+            state, _, name = line.partition(" ")
+            if state == "ready" and name not in ready_kernels:
+                ready_kernels.add(name)
+                on_ready(len(ready_kernels))
     finally:
-        for helper in helpers:
-            helper.kill()
-        for helper, leader in zip(helpers, leaders, strict=True):
-            helper.wait()
-            leader.join()
+        for process in processes:
+            process.kill()
+        for process, thread in zip(processes, threads, strict=True):
+            process.wait()
+            thread.join()
 
 
-def _start(folder: Path) -> "subprocess.Popen[str]":
+def _start_process(folder: Path) -> "subprocess.Popen[str]":
     home = str(Path(__file__).parents[2])
     path = os.pathsep.join(filter(None, [home, os.environ.get("PYTHONPATH", "")]))
     return subprocess.Popen(
@@ -73,13 +75,13 @@ def _start(folder: Path) -> "subprocess.Popen[str]":
     )
 
 
-def _lead(helper: "subprocess.Popen[str]", waiting: "deque[str]", lines: "queue.SimpleQueue[str]") -> None:
-    """Give a process one unit after another, and pass its lines on; an empty line marks its end."""
-    requests, answers = helper.stdin, helper.stdout
+def _feed_process(process: "subprocess.Popen[str]", units_left: "deque[str]", lines: "queue.SimpleQueue[str]") -> None:
+    """Give a process one unit after another, and queue its output lines; an empty line marks its end."""
+    requests, answers = process.stdin, process.stdout
     # The process may have died, or the other process may have taken the last unit.
     with contextlib.suppress(OSError, IndexError):
         while requests is not None and answers is not None:
-            requests.write(f"{waiting.popleft()}\n")
+            requests.write(f"{units_left.popleft()}\n")
             line = "ready"
             while line.startswith("ready"):
                 line = answers.readline()
@@ -102,11 +104,11 @@ _Given = TypeVar("_Given")
 # Title of the stage; a command may show it more than once, because each group is compiled at its first use.
 TITLE = "compiling numeric kernels"
 # End of the message on compiled kernels.
-KEPT = ", which later runs load"
+_CACHE_NOTE = ", which later runs load"
 # Hint at the variable that names another cache folder.
 _CACHE_DIR_HINT = f"{VARIABLE}=FOLDER names one that can"
 # Units that this process has compiled or tried to compile.
-_shared: set[str] = set()
+_compiled_units: set[str] = set()
 
 
 @contextmanager
@@ -116,29 +118,29 @@ def warm_up(*units: str) -> Iterator[None]:
     units: units of `planfly.kernel_units` that the work will call, longest first.  They are compiled in two processes
     before the work continues; if the cache cannot be written, each kernel is compiled when it is called.
     """
-    reported = False
+    has_reported = False
 
-    def compile_first() -> None:
-        nonlocal reported
-        if not reported:
-            reported = True
-            _report_and_compile([unit for unit in units if unit not in _shared])
-            _shared.update(units)
+    def compile_all() -> None:
+        nonlocal has_reported
+        if not has_reported:
+            has_reported = True
+            _report_and_compile([unit for unit in units if unit not in _compiled_units])
+            _compiled_units.update(units)
 
-    with tell_before_compiling(compile_first):
+    with tell_before_compiling(compile_all):
         yield
 
 
 def with_warm_up(*units: str) -> Callable[[Callable[_Taken, _Given]], Callable[_Taken, _Given]]:
     """Return a decorator that runs a function of the public API under `warm_up`."""
 
-    def decorate(verb: Callable[_Taken, _Given]) -> Callable[_Taken, _Given]:
-        @functools.wraps(verb)
-        def warmed(*args: _Taken.args, **kwargs: _Taken.kwargs) -> _Given:
+    def decorate(function: Callable[_Taken, _Given]) -> Callable[_Taken, _Given]:
+        @functools.wraps(function)
+        def with_kernels(*args: _Taken.args, **kwargs: _Taken.kwargs) -> _Given:
             with warm_up(*units):
-                return verb(*args, **kwargs)
+                return function(*args, **kwargs)
 
-        return warmed
+        return with_kernels
 
     return decorate
 
@@ -153,8 +155,8 @@ def _report_and_compile(units: list[str]) -> None:
         return
     if TEMPORARY:
         say(f"compiling the numeric kernels for this command alone: {WANTED} cannot be written; {_CACHE_DIR_HINT}")
-    title = TITLE if TEMPORARY else TITLE + KEPT
-    if not (units and sys.executable and is_received()):
+    title = TITLE if TEMPORARY else TITLE + _CACHE_NOTE
+    if not (units and sys.executable and has_receiver()):
         say(f"{title} ...")
     if not units or not sys.executable:
         return

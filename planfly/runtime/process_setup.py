@@ -11,7 +11,7 @@ _Given = TypeVar("_Given")
 # Total number of values in all frames within `with_large_stack`; Numba recurses some 500 frames deep.
 _STACK_VALUES = 2**17
 # Environment variable of a process set up by `prepare_process`, inherited by its child processes.
-_MARK = "PLANFLY_OWN_PROCESS"
+_OWN_PROCESS_VARIABLE = "PLANFLY_OWN_PROCESS"
 
 
 def prepare_process() -> None:
@@ -21,7 +21,7 @@ def prepare_process() -> None:
     enough for a second thread.
     """
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    os.environ[_MARK] = "1"
+    os.environ[_OWN_PROCESS_VARIABLE] = "1"
     prepare_child()
 
 
@@ -31,13 +31,13 @@ def prepare_child() -> None:
     Garbage collection in the processes of a short campaign took a sixth of its time.  If address space is limited,
     import nothing that does not fit (`world.address_space`).
     """
-    if _MARK in os.environ:
+    if _OWN_PROCESS_VARIABLE in os.environ:
         gc.set_threshold(200_000, 50, 50)
         watch_address_space()
 
 
 def watch_address_space() -> None:
-    """Import only modules that fit if the address space of this process is limited."""
+    """If the address space of this process is limited, import only modules that fit."""
     limit = limit_of_address_space()
     if limit is None:
         return
@@ -65,15 +65,15 @@ def limit_of_address_space() -> int | None:
 def with_large_stack(work: Callable[[], _Given]) -> _Given:
     """Run work with its frames in one large piece of memory, and return its result.
 
-    CPython keeps frames in pieces of 16 KB and returns the last one as soon as it is empty.  Numba's recursion crosses
+    CPython keeps frames in pieces of 16 KB and frees the last piece as soon as it is empty.  Numba's recursion crosses
     the boundary between two pieces so often that a sixth of its time went into pages that the operating system took
     back and provided again.  A frame with many values gets a piece of their size, and inner frames share it.
 
     >>> with_large_stack(lambda: 7)
     7
     """
-    roomy = _run.__code__.replace(co_stacksize=_STACK_VALUES)
-    return FunctionType(roomy, globals())(work)
+    large_frame_code = _run.__code__.replace(co_stacksize=_STACK_VALUES)
+    return FunctionType(large_frame_code, globals())(work)
 
 
 def _run(work: Callable[[], _Given]) -> _Given:

@@ -18,7 +18,7 @@ Advance = Callable[[float, float, str], None]
 class Receiver(NamedTuple):
     """Receiver of progress.
 
-    stage: begins a stage by its title and its kind, and returns the function that takes its progress.
+    stage: begins a stage with its title and its kind, and returns the function that takes its progress.
     say: takes a line that belongs to no stage.
     """
 
@@ -31,7 +31,7 @@ _receiver: ContextVar[Receiver | None] = ContextVar("receiver", default=None)
 
 
 @contextmanager
-def received_by(receiver: Receiver) -> Iterator[None]:
+def send_progress_to(receiver: Receiver) -> Iterator[None]:
     """Send the progress of the work inside to a receiver."""
     token = _receiver.set(receiver)
     try:
@@ -49,7 +49,7 @@ def stage(title: str, kind: str = "") -> AbstractContextManager[Advance]:
     ...     advance(1.0, 2.0, "half")
     """
     receiver = _receiver.get()
-    return contextlib.nullcontext(_ignore) if receiver is None else receiver.stage(title, kind or title)
+    return contextlib.nullcontext(_ignore_progress) if receiver is None else receiver.stage(title, kind or title)
 
 
 def say(line: str) -> None:
@@ -64,14 +64,14 @@ def say(line: str) -> None:
     logging.getLogger("planfly").warning(line)
 
 
-def say_replaced(*files: Path) -> None:
-    """Report each existing file that is replaced: the flight of a program may replace the flight of a law."""
+def report_replaced(*files: Path) -> None:
+    """Report each existing file that is replaced; for example, a program's flight may replace a simulated flight."""
     for file in files:
         if file.exists():
             say(f"{file} is there: replaced")
 
 
-def is_received() -> bool:
+def has_receiver() -> bool:
     """Return True if stages are shown.
 
     >>> is_received()
@@ -80,7 +80,7 @@ def is_received() -> bool:
     return _receiver.get() is not None
 
 
-def _ignore(_done: float, _total: float, _remark: str) -> None:
+def _ignore_progress(_done: float, _total: float, _remark: str) -> None:
     pass
 
 
@@ -97,7 +97,7 @@ def progress(callback: Callable[[str, float, float, str], None]) -> AbstractCont
     """
 
     @contextmanager
-    def begin(title: str, _kind: str) -> Iterator[Advance]:
+    def begin_stage(title: str, _kind: str) -> Iterator[Advance]:
         yield lambda done, total, remark: callback(title, done, total, remark)
 
-    return received_by(Receiver(begin, lambda line: callback(line, 0.0, 0.0, "")))
+    return send_progress_to(Receiver(begin_stage, lambda line: callback(line, 0.0, 0.0, "")))

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Unpack
 
 from planfly.arguments import check_arguments
 from planfly.flight_options import MissionOptions, takes_options
-from planfly.kernel_units.unit_kernels import BOTH
+from planfly.kernel_units.unit_kernels import PLANNING_AND_FLYING
 from planfly.runtime.first_start import with_warm_up
 from planfly.studio.session import open_session
 from world.errors import PlanflyError
@@ -37,7 +37,7 @@ def _never_stop() -> bool:
 
 
 @needs_extra("studio")
-@with_warm_up(*BOTH)
+@with_warm_up(*PLANNING_AND_FLYING)
 @takes_options
 def open_studio(
     what: str | Path = "jacksboro",

@@ -101,9 +101,9 @@ def plan(asked: PlanAsked, advance: Advance) -> list[FrontPlan]:
     # Between two items of a mission, the path must join the leg after the second.
     onward = asked.ends is not None
     if asked.ways > 1:
-        front = make_pareto_plans(scenario, airframe, seed, asked.ways, advance, stop=stop, onward=onward)
+        front = make_pareto_plans(scenario, airframe, seed, asked.ways, advance, stop=stop, continues=onward)
         return list(front.plans) or [front.default]
-    made = make_plan(scenario, airframe, seed, asked.algorithm, advance, stop=stop, onward=onward)
+    made = make_plan(scenario, airframe, seed, asked.algorithm, advance, stop=stop, continues=onward)
     # A single path needs no comparison, so quantities that take longer to compute are left out.
     length = float(np.linalg.norm(np.diff(made.waypoints, axis=0), axis=1).sum())
     clearance = float(made.certificate.clearance) + scenario.limits.min_clearance_m

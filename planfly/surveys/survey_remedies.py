@@ -39,7 +39,7 @@ _MIN_AIRSPEED_RATIO = 1.1
 class SurveyRemedy:
     """Change of a survey with which it was flown and passed.
 
-    kind: what is changed.  name: the name of the parameter, if one is changed.
+    kind: kind of the change.  name: name of the changed parameter; "" for other kinds.
     current, value: turn-around in m, interleave stride (fly every n-th line), course in degrees, value of the
     parameter, or airspeed in m/s.
     unit: unit of both.
@@ -66,7 +66,7 @@ class SurveyRemedy:
 class NearMiss:
     """Change that was flown and did not pass, with the most usable lines.
 
-    what: the change, in words.
+    what: description of the change.
     usable, lines: usable photo lines and all photo lines.
     verdict: verdict on the flight.
     """
@@ -82,7 +82,7 @@ class TriedRemedies:
     """Result of the trials: the changes with which all lines can be used.
 
     nearest: the best change that did not pass, if none passed; None if none was better than the mission itself.
-    kept: why no other layout was tried, in words; "" if layouts were tried.
+    kept: reason why no other layout was tried; "" if layouts were tried.
     """
 
     remedies: tuple[SurveyRemedy, ...] = ()
@@ -103,42 +103,44 @@ def survey_remedies(
     """
     if _all_lines_usable(verdict) or not surveys_of(setup):
         return TriedRemedies()
-    tried = _Trials(setup, airframe, verdict, on_trial)
-    longer = tried.turn_around()
-    found = [
-        tried.side(),
-        longer,
-        tried.every(math.inf if longer is None else longer.value),
-        tried.course(),
-        tried.parameter(),
-        tried.airspeed() or tried.mission_airspeed(),
+    trials = _Trials(setup, airframe, verdict, on_trial)
+    longer_turn_around = trials.turn_around()
+    candidates = [
+        trials.side(),
+        longer_turn_around,
+        trials.every(math.inf if longer_turn_around is None else longer_turn_around.value),
+        trials.course(),
+        trials.parameter(),
+        trials.airspeed() or trials.mission_airspeed(),
     ]
-    if not any(found):
-        found.append(tried.parameter_and_turn_around() or tried.airspeed_and_turn_around())
-    remedies = tuple(one for one in found if one is not None)
-    return TriedRemedies(remedies, None if remedies else tried.nearest, tried.kept)
+    if not any(candidates):
+        candidates.append(trials.parameter_and_turn_around() or trials.airspeed_and_turn_around())
+    remedies = tuple(remedy for remedy in candidates if remedy is not None)
+    return TriedRemedies(remedies, None if remedies else trials.nearest, trials.kept)
 
 
 def _worst_margins(verdict: Verdict) -> dict[str, float]:
     """Return the minimum margin of each rule that fails; -inf if a failure has no margin."""
-    worst: dict[str, float] = {}
-    for item in verdict.findings:
-        if item.ok is False:
-            margin = -math.inf if item.margin is None else item.margin
-            worst[item.rule] = min(margin, worst.get(item.rule, math.inf))
-    return worst
+    margins: dict[str, float] = {}
+    for finding in verdict.findings:
+        if finding.ok is False:
+            margin = -math.inf if finding.margin is None else finding.margin
+            margins[finding.rule] = min(margin, margins.get(finding.rule, math.inf))
+    return margins
 
 
 def _count_usable(verdict: Verdict) -> tuple[int, int]:
     """Return the number of photo lines that a verdict finds usable, and the number of all photo lines."""
-    lines = [item.ok for item in verdict.findings if item.rule == "survey" and not item.check]
-    return sum(ok is True for ok in lines), len(lines)
+    lines = [finding.ok for finding in verdict.findings if finding.rule == "survey" and not finding.check]
+    return sum(is_usable is True for is_usable in lines), len(lines)
 
 
 def _all_lines_usable(verdict: Verdict) -> bool:
     """Return True if all photo lines are usable and their photos overlap."""
     usable, lines = _count_usable(verdict)
-    return 0 < lines == usable and not any(item.rule == "survey" and item.ok is False for item in verdict.findings)
+    return 0 < lines == usable and not any(
+        finding.rule == "survey" and finding.ok is False for finding in verdict.findings
+    )
 
 
 # Verdict on a flight, the mission that was flown, and the length of its path, m.
@@ -155,14 +157,20 @@ class _Trials:
         self, setup: FlightSetup, airframe: Airframe, verdict: Verdict, on_trial: Callable[[str], None]
     ) -> None:
         self._setup, self._airframe, self._on_trial = setup, airframe, on_trial
-        self._worst, self._verdict, self._changed = _worst_margins(verdict), verdict, ""
-        lost = {item.place.index for item in verdict.findings if item.rule == "survey" and item.ok is not True}
-        found = surveys_of(setup)
-        self._numbers = [n for n, one in enumerate(found) if not lost.isdisjoint(range(one.first, one.last))]
-        self._surveys = [found[n] for n in self._numbers]
-        self._now = min(turn_around_of(setup.route, one) for one in self._surveys)
-        kept = (kept_layout(setup.mission, setup.route, one) for one in self._surveys)
-        self.kept = next((why for why in kept if why), "")
+        self._worst_before, self._verdict, self._change_prefix = _worst_margins(verdict), verdict, ""
+        lost_legs = {
+            finding.place.index for finding in verdict.findings if finding.rule == "survey" and finding.ok is not True
+        }
+        all_surveys = surveys_of(setup)
+        self._numbers = [
+            number
+            for number, survey in enumerate(all_surveys)
+            if not lost_legs.isdisjoint(range(survey.first, survey.last))
+        ]
+        self._surveys = [all_surveys[number] for number in self._numbers]
+        self._current_turn_around = min(turn_around_of(setup.route, survey) for survey in self._surveys)
+        reasons = (kept_layout(setup.mission, setup.route, survey) for survey in self._surveys)
+        self.kept = next((reason for reason in reasons if reason), "")
         self.nearest: NearMiss | None = None
 
     # ------------------------------------------------------------------
@@ -174,36 +182,38 @@ class _Trials:
         placed = place_stops(mission, scenario.origin, scenario.terrain, vertical_legs=True)
         return make_setup(scenario, airframe, mission, self._setup.seed, placed=placed)
 
-    def _fly(self, mission: Mission, airframe: Airframe, what: str) -> _FlownMission | None:
+    def _fly(self, mission: Mission, airframe: Airframe, description: str) -> _FlownMission | None:
         """Fly a mission; return None if it has no valid route."""
-        what = self._changed + what
-        self._on_trial(what)
+        description = self._change_prefix + description
+        self._on_trial(description)
         try:
             trial = Trial(self._changed_setup(mission, airframe), airframe.aircraft)
         except PlanflyError:
             return None
-        usable, lines = _count_usable(trial.flown)
-        best, failed = self.nearest, len(trial.flown.failed)
-        before = _count_usable(self._verdict)[0] if best is None else best.usable
-        if usable > before or (best is not None and usable == before and failed < len(best.verdict.failed)):
-            self.nearest = NearMiss(what, usable, lines, trial.flown)
-        return trial.flown, mission, trial.setup.path.length
+        usable, lines = _count_usable(trial.flight_verdict)
+        nearest, failed = self.nearest, len(trial.flight_verdict.failed)
+        best_usable = _count_usable(self._verdict)[0] if nearest is None else nearest.usable
+        if usable > best_usable or (
+            nearest is not None and usable == best_usable and failed < len(nearest.verdict.failed)
+        ):
+            self.nearest = NearMiss(description, usable, lines, trial.flight_verdict)
+        return trial.flight_verdict, mission, trial.setup.path.length
 
-    def _fly_layout(self, layout: SurveyLayout, what: str) -> _FlownMission | None:
+    def _fly_layout(self, layout: SurveyLayout, description: str) -> _FlownMission | None:
         """Fly the surveys in another layout; return None if that layout cannot be made."""
         mission, setup = self._setup.mission, self._setup
         # Start with the last survey, because a changed survey may be detected as two, which renumbers later surveys.
         for number in reversed(self._numbers):
             survey = surveys_of(setup)[number]
-            made = with_layout(mission, setup.route, survey, layout, self._setup.scenario.origin)
-            if made is None:
+            changed_mission = with_layout(mission, setup.route, survey, layout, self._setup.scenario.origin)
+            if changed_mission is None:
                 return None
-            mission = made
+            mission = changed_mission
             try:
                 setup = self._changed_setup(mission, self._airframe)
             except PlanflyError:
                 return None
-        return self._fly(mission, self._airframe, what)
+        return self._fly(mission, self._airframe, description)
 
     def _passes(self, flown: _FlownMission | None) -> TypeGuard[_FlownMission]:
         """Return True if all lines are usable, no other rule fails than before, and no failure is noticeably worse."""
@@ -211,7 +221,7 @@ class _Trials:
             flown is not None
             and _all_lines_usable(flown[0])
             and all(
-                rule in self._worst and worst >= self._worst[rule] - (RULE_WORDS[rule].scale or math.inf)
+                rule in self._worst_before and worst >= self._worst_before[rule] - (RULE_WORDS[rule].scale or math.inf)
                 for rule, worst in _worst_margins(flown[0]).items()
             )
         )
@@ -221,78 +231,97 @@ class _Trials:
 
     def turn_around(self) -> SurveyRemedy | None:
         """Find the shortest turn-around that passes, among those longer than the current one."""
-        return self._shortest_turn_around(1, [one for one in TURN_AROUNDS if one > self._now + 1.0], 0.0)
+        return self._shortest_turn_around(
+            1, [metres for metres in TURN_AROUNDS if metres > self._current_turn_around + 1.0], 0.0
+        )
 
     def side(self) -> SurveyRemedy | None:
         """Try to fly the lines from the other side, so that turns are into the wind."""
         if self._setup.scenario.wind.speed <= 0.0:
             return None
-        flown = self._fly_layout(SurveyLayout(self._now, backwards=True), "the lines from the other side")
-        return SurveyRemedy("side", "", 0.0, 1.0, "", *flown, self._now) if self._passes(flown) else None
+        flown = self._fly_layout(
+            SurveyLayout(self._current_turn_around, backwards=True), "the lines from the other side"
+        )
+        return (
+            SurveyRemedy("side", "", 0.0, 1.0, "", *flown, self._current_turn_around) if self._passes(flown) else None
+        )
 
-    def every(self, at_most: float) -> SurveyRemedy | None:
-        """Find the smallest interleave stride that passes, with turn-arounds shorter than `at_most`, m.
+    def every(self, max_turn_around: float) -> SurveyRemedy | None:
+        """Find the smallest interleave stride that passes, with turn-arounds shorter than `max_turn_around`, m.
 
-        The lead-in to the first line is `at_most`, the turn-around that passes without interleaving.
+        The lead-in to the first line is `max_turn_around`, the turn-around that passes without interleaving.
         """
-        lead_in = at_most if math.isfinite(at_most) else 0.0
-        tried = [self._now, *(one for one in TURN_AROUNDS if self._now + 1.0 < one < at_most)]
-        most = max(len(survey.lines) for survey in self._surveys)
-        found = (self._shortest_turn_around(every, tried, lead_in) for every in INTERLEAVE_STRIDES if 2 * every <= most)
-        return next((one for one in found if one is not None), None)
+        lead_in = max_turn_around if math.isfinite(max_turn_around) else 0.0
+        turn_arounds = [
+            self._current_turn_around,
+            *(metres for metres in TURN_AROUNDS if self._current_turn_around + 1.0 < metres < max_turn_around),
+        ]
+        max_line_count = max(len(survey.lines) for survey in self._surveys)
+        remedies = (
+            self._shortest_turn_around(every, turn_arounds, lead_in)
+            for every in INTERLEAVE_STRIDES
+            if 2 * every <= max_line_count
+        )
+        return next((remedy for remedy in remedies if remedy is not None), None)
 
-    def _shortest_turn_around(self, every: int, tried: Sequence[float], lead_in: float) -> SurveyRemedy | None:
+    def _shortest_turn_around(self, every: int, turn_arounds: Sequence[float], lead_in: float) -> SurveyRemedy | None:
         """Bisect increasing turn-arounds, m, for the shortest that makes all lines usable; return it if it passes.
 
         A turn-around with which the flight runs out of energy before its end is too long.
         """
-        order = "" if every == 1 else f"every {nth(every)} line, "
+        order_text = "" if every == 1 else f"every {nth(every)} line, "
         flights: dict[float, _FlownMission | None] = {}
 
         def long_enough(metres: float) -> bool:
             layout = SurveyLayout(metres, every, lead_in=lead_in)
-            flown = flights[metres] = self._fly_layout(layout, f"{order}turn-arounds of {metres:.0f} m")
+            flown = flights[metres] = self._fly_layout(layout, f"{order_text}turn-arounds of {metres:.0f} m")
             if flown is None:
                 return False
-            too_long = {"completion", "energy"} <= _worst_margins(flown[0]).keys() - self._worst.keys()
-            return too_long or _all_lines_usable(flown[0])
+            runs_out = {"completion", "energy"} <= _worst_margins(flown[0]).keys() - self._worst_before.keys()
+            return runs_out or _all_lines_usable(flown[0])
 
-        least = least_change(tried, long_enough)
-        flown = None if least is None else flights[least]
-        if least is None or not self._passes(flown):
+        shortest = least_change(turn_arounds, long_enough)
+        flown = None if shortest is None else flights[shortest]
+        if shortest is None or not self._passes(flown):
             return None
         if every == 1:
-            return SurveyRemedy("turn-around", "", self._now, least, "m", *flown, least)
-        return SurveyRemedy("every", "", 1.0, float(every), "lines", *flown, least, lead_in)
+            return SurveyRemedy("turn-around", "", self._current_turn_around, shortest, "m", *flown, shortest)
+        return SurveyRemedy("every", "", 1.0, float(every), "lines", *flown, shortest, lead_in)
 
     def course(self) -> SurveyRemedy | None:
         """Try lines along and across the wind; return the shortest route that passes."""
         wind = self._setup.scenario.wind
         if wind.speed <= 0.0:
             return None
-        now, found = self._surveys[0].course, []
-        for course in _other_courses(now, wind.from_course):
-            was, degrees = (math.degrees(one) % 180.0 for one in (now, course))
-            flown = self._fly_layout(SurveyLayout(self._now, 1, course), f"lines on course {degrees:.0f}°")
+        current_course, remedies = self._surveys[0].course, []
+        for course in _other_courses(current_course, wind.from_course):
+            current_degrees, degrees = (math.degrees(angle) % 180.0 for angle in (current_course, course))
+            flown = self._fly_layout(
+                SurveyLayout(self._current_turn_around, 1, course), f"lines on course {degrees:.0f}°"
+            )
             if self._passes(flown):
-                found.append(SurveyRemedy("course", "", was, degrees, "deg", *flown, self._now))
-        return min(found, key=lambda one: one.length, default=None)
+                remedies.append(
+                    SurveyRemedy("course", "", current_degrees, degrees, "deg", *flown, self._current_turn_around)
+                )
+        return min(remedies, key=lambda remedy: remedy.length, default=None)
 
     def parameter(self) -> SurveyRemedy | None:
         """Find an autopilot parameter with which another value passes."""
-        passed: list[_FlownMission] = []
+        passed_flights: list[_FlownMission] = []
 
         def passes(law: Autopilot) -> bool:
             airframe = replace(self._airframe, autopilot=law)
             flown = self._fly(self._setup.mission, airframe, "another parameter of the autopilot")
             if self._passes(flown):
-                passed.append(flown)
+                passed_flights.append(flown)
             return self._passes(flown)
 
-        found = deciding_parameter(self._airframe.autopilot, self._verdict.findings, passes)
-        if found is None:
+        deciding = deciding_parameter(self._airframe.autopilot, self._verdict.findings, passes)
+        if deciding is None:
             return None
-        return SurveyRemedy("parameter", found.name, found.current, found.passing, found.unit, *passed[-1])
+        return SurveyRemedy(
+            "parameter", deciding.name, deciding.current, deciding.passing, deciding.unit, *passed_flights[-1]
+        )
 
     def airspeed(self) -> SurveyRemedy | None:
         """Find the highest reduced airspeed that passes, for a mission that sets no airspeed itself."""
@@ -305,63 +334,73 @@ class _Trials:
     # ------------------------------------------------------------------
     # Two changes together.
 
-    def _turn_around_with(
-        self, changed: str, airframe: Airframe, mission: Mission | None = None
-    ) -> SurveyRemedy | None:
+    def _turn_around_with(self, change: str, airframe: Airframe, mission: Mission | None = None) -> SurveyRemedy | None:
         """Find the shortest turn-around that passes in combination with another change."""
-        other = copy(self)
-        other._airframe, other._changed = airframe, f"{changed}, "
+        trials = copy(self)
+        trials._airframe, trials._change_prefix = airframe, f"{change}, "
         if mission is not None:
-            other._setup = replace(self._setup, mission=mission)
-        found = other.turn_around()
-        self.nearest = other.nearest
-        return found
+            trials._setup = replace(self._setup, mission=mission)
+        remedy = trials.turn_around()
+        self.nearest = trials.nearest
+        return remedy
 
     def parameter_and_turn_around(self) -> SurveyRemedy | None:
         """Try each parameter of the autopilot half way to its farthest value, with longer turn-arounds."""
         law = self._airframe.autopilot
-        values = {} if law.parameters is None else {one.name: one.value for one in law.parameters.values}
-        for name, step, far, unit, _ in law.side_candidates if values else ():
+        values = (
+            {} if law.parameters is None else {parameter.name: parameter.value for parameter in law.parameters.values}
+        )
+        for name, step, farthest, unit, _ in law.side_candidates if values else ():
             current = values[name]
-            value = round(current + math.copysign(step, far - current) * (abs(far - current) // (2.0 * step)), 6)
+            value = round(
+                current + math.copysign(step, farthest - current) * (abs(farthest - current) // (2.0 * step)), 6
+            )
             if value == current:
                 continue
             airframe = replace(self._airframe, autopilot=law.with_parameters(**{name: value}))
-            found = self._turn_around_with(f"{name} {value:g}", airframe)
-            if found is not None:
-                return replace(found, kind="parameter", name=name, current=current, value=value, unit=unit)
+            remedy = self._turn_around_with(f"{name} {value:g}", airframe)
+            if remedy is not None:
+                return replace(remedy, kind="parameter", name=name, current=current, value=value, unit=unit)
         return None
 
     def airspeed_and_turn_around(self) -> SurveyRemedy | None:
         """Try the lowest of the slower airspeeds with longer turn-arounds."""
         for speed, airframe in [*self._slower_airspeeds()][-1:]:
-            found = self._turn_around_with(f"{speed:g} m/s", airframe)
-            if found is not None:
-                return replace(found, kind="airspeed", current=self._airframe.airspeed, value=speed, unit="m/s")
+            remedy = self._turn_around_with(f"{speed:g} m/s", airframe)
+            if remedy is not None:
+                return replace(remedy, kind="airspeed", current=self._airframe.airspeed, value=speed, unit="m/s")
         return None
 
     def mission_airspeed(self) -> SurveyRemedy | None:
         """Try the default airspeed with longer turn-arounds, if the mission sets less than the minimum."""
-        mission, own = self._setup.mission, self._airframe.airspeed
-        slow = [item for item in mission.items if 0.0 < _set_airspeed(item) < self._airframe.aircraft.airspeed_min]
-        if not slow:
+        mission, default_airspeed = self._setup.mission, self._airframe.airspeed
+        slow_items = [
+            item for item in mission.items if 0.0 < _commanded_airspeed(item) < self._airframe.aircraft.airspeed_min
+        ]
+        if not slow_items:
             return None
         items = tuple(
-            replace(item, params=(item.params[0], own, *item.params[2:])) if item in slow else item
+            replace(item, params=(item.params[0], default_airspeed, *item.params[2:])) if item in slow_items else item
             for item in mission.items
         )
-        found = self._turn_around_with(f"{own:g} m/s", self._airframe, replace(mission, items=items))
-        if found is None:
+        remedy = self._turn_around_with(f"{default_airspeed:g} m/s", self._airframe, replace(mission, items=items))
+        if remedy is None:
             return None
-        return replace(found, kind="airspeed", current=min(map(_set_airspeed, slow)), value=own, unit="m/s")
+        return replace(
+            remedy,
+            kind="airspeed",
+            current=min(map(_commanded_airspeed, slow_items)),
+            value=default_airspeed,
+            unit="m/s",
+        )
 
     def _slower_airspeeds(self) -> Iterator[tuple[float, Airframe]]:
         """Yield reduced airspeeds, m/s, and airframes, the fastest first; nothing if the mission sets an airspeed."""
         if any(item.command == Command.DO_CHANGE_SPEED for item in self._setup.mission.items):
             return
-        slowest = _MIN_AIRSPEED_RATIO * self._airframe.aircraft.airspeed_min
-        for speed in (round(2.0 * share * self._airframe.airspeed) / 2.0 for share in AIRSPEED_FACTORS):
-            if speed < slowest:
+        min_speed = _MIN_AIRSPEED_RATIO * self._airframe.aircraft.airspeed_min
+        for speed in (round(2.0 * factor * self._airframe.airspeed) / 2.0 for factor in AIRSPEED_FACTORS):
+            if speed < min_speed:
                 break
             with suppress(PlanflyError):
                 yield speed, load_airframe(with_flight(self._setup.scenario, airspeed_mps=speed))
@@ -376,13 +415,13 @@ def nth(count: int) -> str:
     return {2: "second", 3: "third", 4: "fourth"}.get(count, f"{count}th")
 
 
-def _set_airspeed(item: MissionItem) -> float:
+def _commanded_airspeed(item: MissionItem) -> float:
     """Return the airspeed that an item sets, m/s; 0 for other items, NaN or negative if the item sets no airspeed."""
     return item.params[1] if item.command == Command.DO_CHANGE_SPEED else 0.0
 
 
 def _other_courses(course: float, wind: float) -> Iterator[float]:
     """Yield the courses along and across the wind that differ by more than 15 degrees from the current course."""
-    for other in (wind, wind + 0.5 * math.pi):
-        if abs(math.sin(other - course)) > math.sin(math.radians(15.0)):
-            yield other
+    for new_course in (wind, wind + 0.5 * math.pi):
+        if abs(math.sin(new_course - course)) > math.sin(math.radians(15.0)):
+            yield new_course

@@ -25,24 +25,27 @@ def lines_headline(measures: list[LineMeasure | None]) -> str:
     >>> lines_headline([None, None])
     '0 of 2 photo lines can be used; line 1 is the worst: not flown'
     """
-    good = sum(usable(one) for one in measures)
-    said = f"{good} of {len(measures)} photo lines can be used"
-    if good == len(measures):
-        return said
-    shares = [-1.0 if one is None else one.good for one in measures]
-    worst = min(range(len(shares)), key=lambda k: shares[k])
-    one = measures[worst]
-    return f"{said}; line {worst + 1} is the worst: {'not flown' if one is None else f'{100.0 * one.good:.0f} %'}"
+    usable_count = sum(usable(measure) for measure in measures)
+    summary = f"{usable_count} of {len(measures)} photo lines can be used"
+    if usable_count == len(measures):
+        return summary
+    fractions = [-1.0 if measure is None else measure.good for measure in measures]
+    worst_index = min(range(len(fractions)), key=lambda k: fractions[k])
+    measure = measures[worst_index]
+    return (
+        f"{summary}; line {worst_index + 1} is the worst:"
+        f" {'not flown' if measure is None else f'{100.0 * measure.good:.0f} %'}"
+    )
 
 
 def line_text(number: int, measure: LineMeasure | None) -> str:
     """Describe the length of one photo line, its usable share, and why the rest is not usable."""
     if measure is None:
         return f"line {number:<3} not flown"
-    said = f"line {number:<3} {measure.length:6.0f} m  {100.0 * measure.good:5.1f} % can be used"
-    lacks = lost_text(measure)
-    photos = f"; {measure.missed} of {measure.photos} photos missed" if measure.missed else ""
-    return f"{said}{': ' if lacks else ''}{lacks}{photos}"
+    text = f"line {number:<3} {measure.length:6.0f} m  {100.0 * measure.good:5.1f} % can be used"
+    loss_text = lost_text(measure)
+    photos_text = f"; {measure.missed} of {measure.photos} photos missed" if measure.missed else ""
+    return f"{text}{': ' if loss_text else ''}{loss_text}{photos_text}"
 
 
 def survey_text(survey: Survey) -> str:
@@ -67,28 +70,38 @@ def overlap_lines(measure: OverlapMeasure | None) -> tuple[str, ...]:
     return tuple(texts)
 
 
-def kept_overlap(measure: OverlapMeasure | None) -> bool:
+def has_required_overlap(measure: OverlapMeasure | None) -> bool:
     """Return True if the photos overlap as required; an unknown overlap passes.
 
-    >>> kept_overlap(None)
+    >>> has_required_overlap(None)
     True
     """
     if measure is None:
         return True
     pairs = ((measure.front, measure.camera.front), (measure.side, measure.camera.side))
-    return all(share is None or asked is None or share >= asked - PHOTO_OVERLAP_FRACTION for share, asked in pairs)
+    return all(
+        fraction is None or required is None or fraction >= required - PHOTO_OVERLAP_FRACTION
+        for fraction, required in pairs
+    )
 
 
 def needed_text(survey: Survey, lines: Sequence[LineMeasure | None]) -> str:
     """Describe the places from which lines are usable, which shows the turn-arounds that would be needed."""
-    some = [one for one in lines if one is not None and one.good > 0.0]
-    if not some:
+    usable_lines = [measure for measure in lines if measure is not None and measure.good > 0.0]
+    if not usable_lines:
         return (
             f"no place of its {len(lines)} lines, {survey.spacing:.0f} m apart, can be used: there is no room to turn"
         )
-    late, longest = max(one.late for one in some), max(one.length for one in some)
-    said = f"lines can be used from up to {late:.0f} m behind their begin on; the longest has {longest:.0f} m"
-    return f"{said}, and {len(lines) - len(some)} of {len(lines)} none that can" if len(some) < len(lines) else said
+    latest_start, longest = (
+        max(measure.late for measure in usable_lines),
+        max(measure.length for measure in usable_lines),
+    )
+    text = f"lines can be used from up to {latest_start:.0f} m behind their begin on; the longest has {longest:.0f} m"
+    return (
+        f"{text}, and {len(lines) - len(usable_lines)} of {len(lines)} none that can"
+        if len(usable_lines) < len(lines)
+        else text
+    )
 
 
 def near_miss_text(near: NearMiss) -> str:
@@ -104,17 +117,19 @@ def remedy_text(remedy: SurveyRemedy, length: float) -> str:
         case "turn-around":
             change = f"turn-arounds of {remedy.value:.0f} m instead of {remedy.current:.0f} m"
         case "every":
-            first = f" and {remedy.lead_in:.0f} m onto the first" if remedy.lead_in > remedy.turn_around else ""
-            order = f"every {nth(round(remedy.value))} line first"
-            change = f"{order}, with turn-arounds of {remedy.turn_around:.0f} m{first}"
+            first_line_text = (
+                f" and {remedy.lead_in:.0f} m onto the first" if remedy.lead_in > remedy.turn_around else ""
+            )
+            order_text = f"every {nth(round(remedy.value))} line first"
+            change = f"{order_text}, with turn-arounds of {remedy.turn_around:.0f} m{first_line_text}"
         case "course":
             change = f"lines on course {remedy.value:.0f}° instead of {remedy.current:.0f}°"
         case "parameter":
             change = f"{remedy.name} {remedy.value:g} instead of {remedy.current:g} (--params)"
         case "airspeed":
             # A mission that is too slow is made faster by its items, not by an option.
-            how = f" (--airspeed {remedy.value:g})" if remedy.value < remedy.current else ""
-            change = f"{remedy.value:g} m/s instead of {remedy.current:g} m/s{how}"
+            option_text = f" (--airspeed {remedy.value:g})" if remedy.value < remedy.current else ""
+            change = f"{remedy.value:g} m/s instead of {remedy.current:g} m/s{option_text}"
     if remedy.kind in ("parameter", "airspeed") and not math.isnan(remedy.turn_around):
         change += f", with turn-arounds of {remedy.turn_around:.0f} m"
     return f"{change}: flown, and all lines can be used; {remedy.length / 1000.0:.1f} km, {length / 1000.0:.1f} km now"

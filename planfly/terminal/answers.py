@@ -84,27 +84,27 @@ class AircraftAnswer:
     aircraft: list[AircraftEntry]
 
 
-def aircraft_entry(one: Aircraft, detail: AircraftDetail | None) -> AircraftEntry:
+def aircraft_entry(aircraft: Aircraft, detail: AircraftDetail | None) -> AircraftEntry:
     """Return the metadata of an aircraft, and the facts computed for it."""
     return AircraftEntry(
-        name=one.name,
-        title=one.title,
-        folder=str(one.folder),
-        mass_kg=one.mass,
-        wing_area_m2=one.wing_area,
-        wing_span_m=one.wing_span,
-        airspeed_mps=one.airspeed,
-        airspeed_min_mps=one.airspeed_min,
-        airspeed_max_mps=one.airspeed_max,
-        stall_speed_mps=one.stall_speed,
-        max_bank_deg=round(math.degrees(one.max_bank), 9),
+        name=aircraft.name,
+        title=aircraft.title,
+        folder=str(aircraft.folder),
+        mass_kg=aircraft.mass,
+        wing_area_m2=aircraft.wing_area,
+        wing_span_m=aircraft.wing_span,
+        airspeed_mps=aircraft.airspeed,
+        airspeed_min_mps=aircraft.airspeed_min,
+        airspeed_max_mps=aircraft.airspeed_max,
+        stall_speed_mps=aircraft.stall_speed,
+        max_bank_deg=round(math.degrees(aircraft.max_bank), 9),
         detail=detail,
     )
 
 
 def aircraft_detail(numbers: AircraftNumbers) -> AircraftDetail:
     """Return the facts computed for an aircraft, in the units of the answer."""
-    slow, fast = numbers.envelope.level_speeds(0.0)
+    min_speed, max_speed = numbers.envelope.level_speeds(0.0)
     trims = [
         TrimEntry(
             airspeed_mps=row.trim.airspeed,
@@ -122,8 +122,8 @@ def aircraft_detail(numbers: AircraftNumbers) -> AircraftDetail:
     ]
     return AircraftDetail(
         model_sha256=numbers.model_sha256,
-        level_speed_min_mps=float(slow),
-        level_speed_max_mps=float(fast),
+        level_speed_min_mps=float(min_speed),
+        level_speed_max_mps=float(max_speed),
         trims=trims,
         modes=modes,
         lacking=list(numbers.lacking),

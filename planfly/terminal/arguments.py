@@ -20,17 +20,17 @@ def number(keyword: str) -> Callable[[str], Any]:
     >>> number("seed")("3"), number("max_hours")("1.5")
     (3, 1.5)
     """
-    allowed = RANGES[keyword]
+    allowed_range = RANGES[keyword]
 
     def parse(text: str) -> float:
         value: float = math.nan
-        if not allowed.integer:
+        if not allowed_range.integer:
             with contextlib.suppress(ValueError):
                 value = float(text)
         elif text.isascii() and text.isdigit():
             value = int(text)
-        if not allowed.allows(value):
-            raise argparse.ArgumentTypeError(f"{text!r}: {allowed.expected}")
+        if not allowed_range.allows(value):
+            raise argparse.ArgumentTypeError(f"{text!r}: {allowed_range.expected}")
         return value
 
     return parse
@@ -39,14 +39,14 @@ def number(keyword: str) -> Callable[[str], Any]:
 def wind(text: str) -> tuple[float, float]:
     """Parse SPEED,FROM of a steady wind, m/s and degrees from north."""
     try:
-        speed, source = (float(part) for part in text.split(","))
+        speed, from_deg = (float(part) for part in text.split(","))
     except ValueError:
-        speed, source = math.nan, 0.0
-    if not is_wind(speed, source):
+        speed, from_deg = math.nan, 0.0
+    if not is_wind(speed, from_deg):
         raise argparse.ArgumentTypeError(
             f"{text!r}: expected SPEED,FROM: 0 to 40 m/s, and the degrees that the wind blows from (-360..360)"
         )
-    return speed, source
+    return speed, from_deg
 
 
 def camera(text: str) -> tuple[float, ...]:
@@ -145,7 +145,7 @@ def problems(text: str) -> tuple[int, ...]:
 # Function that proposes values for a word that has been typed in part.
 Completer = Callable[..., Iterable[str]]
 # Environment variable that the script of a shell sets to request completions.
-ASKS_COMPLETION = "_ARGCOMPLETE"
+COMPLETION_VARIABLE = "_ARGCOMPLETE"
 # Supported shells.
 SHELLS = ("bash", "zsh", "fish")
 # Root folder of the embedded files.  It is computed because importing their modules would load NumPy.
@@ -156,8 +156,8 @@ MISSIONS = ("json", "waypoints", "plan", "txt")
 IMPORTED_LOGS = ("BIN", "log", *(suffix[1:] for suffix in SUFFIXES))
 
 
-def completed(action: argparse.Action, completer: Completer) -> argparse.Action:
-    """Attach a completer for its values to an argument, and return the argument."""
+def with_completer(action: argparse.Action, completer: Completer) -> argparse.Action:
+    """Attach a completer to an argument, and return the argument."""
     # argcomplete reads this attribute.
     action.completer = completer  # type: ignore[attr-defined]
     return action
@@ -166,7 +166,7 @@ def completed(action: argparse.Action, completer: Completer) -> argparse.Action:
 def files(*suffixes: str) -> Completer:
     """Return a completer for files with these suffixes, and for folders."""
 
-    def propose(prefix: str, **_about: object) -> Iterable[str]:
+    def propose(prefix: str, **_context: object) -> Iterable[str]:
         from argcomplete.completers import FilesCompleter
 
         return FilesCompleter(suffixes)(prefix)
@@ -174,7 +174,7 @@ def files(*suffixes: str) -> Completer:
     return propose
 
 
-def scenario_words(prefix: str, **_about: object) -> list[str]:
+def complete_scenario(prefix: str, **_context: object) -> list[str]:
     """Return the names of embedded scenarios, and the scenario files, that start with `prefix`.
 
     >>> scenario_words("jack")
@@ -184,7 +184,7 @@ def scenario_words(prefix: str, **_about: object) -> list[str]:
     return [*(name for name in names if name.startswith(prefix)), *files("toml")(prefix)]
 
 
-def aircraft_words(prefix: str, **_about: object) -> list[str]:
+def complete_aircraft(prefix: str, **_context: object) -> list[str]:
     """Return the names of embedded aircraft, and the folders, that start with `prefix`.
 
     >>> aircraft_words("aero")
@@ -194,12 +194,12 @@ def aircraft_words(prefix: str, **_about: object) -> list[str]:
     return [*(name for name in names if name.startswith(prefix)), *files("no-suffix")(prefix)]
 
 
-def mission_or_scenario_words(prefix: str, **about: object) -> list[str]:
+def complete_mission_or_scenario(prefix: str, **context: object) -> list[str]:
     """Return the scenarios, plans and missions that start with `prefix`."""
-    return [*scenario_words(prefix, **about), *files(*MISSIONS)(prefix)]
+    return [*complete_scenario(prefix, **context), *files(*MISSIONS)(prefix)]
 
 
-def answer_shell(parser: argparse.ArgumentParser) -> None:
+def complete_for_shell(parser: argparse.ArgumentParser) -> None:
     """If a shell has requested completions, print them and end the process."""
     import argcomplete
 

@@ -29,22 +29,22 @@ def autopilot_lines(verdicts: Mapping[str, Verdict]) -> list[str]:
     rows = [("", *verdicts), ("verdict", *(_answer_text(verdict) for verdict in verdicts.values()))]
     by_rule = [{rule.words.name: rule for rule in verdict.present().rules} for verdict in verdicts.values()]
     for words in RULE_WORDS.values():
-        found = [rules.get(words.name) for rules in by_rule]
-        if any(found):
-            rows.append((words.title, *map(_rule_summary, found)))
+        findings_by_autopilot = [rules.get(words.name) for rules in by_rule]
+        if any(findings_by_autopilot):
+            rows.append((words.title, *map(_rule_summary, findings_by_autopilot)))
     widths = [max(len(row[k]) for row in rows) for k in range(len(rows[0]))]
     lines = []
     for title, *cells in rows:
         padded = [f"{cell:<{width}}" for cell, width in zip(cells, widths[1:], strict=True)]
         lines.append(f"  {title:<{widths[0]}}{_GAP}{_GAP.join(padded)}".rstrip())
     for name, verdict in verdicts.items():
-        first, *rest = verdict.lines or ("",)
+        first, *other_lines = verdict.lines or ("",)
         # If another parameter value passes, the second line of the verdict names that value.
-        more = f"; {rest[0]}" if rest and not verdict.flyable else ""
-        lines.append(f"{name}: " + coloured(first, STATE_STYLES[verdict.state]) + more)
+        remedy = f"; {other_lines[0]}" if other_lines and not verdict.flyable else ""
+        lines.append(f"{name}: " + coloured(first, STATE_STYLES[verdict.state]) + remedy)
         if verdict.conditions is not None:
-            said = flown_lines(verdict.conditions)
-            lines += [f"  {line}" for line in said]
+            condition_texts = flown_lines(verdict.conditions)
+            lines += [f"  {line}" for line in condition_texts]
     return lines
 
 

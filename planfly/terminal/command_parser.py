@@ -57,7 +57,7 @@ def coloured(text: str, style: Style, stream: TextIO | None = None) -> str:
 # Heading of a paragraph in a help text.
 _HEADING = re.compile(r"^(\S[^\n]*:)(?=$| planfly)", re.MULTILINE)
 # Option anywhere in a help text.
-_NAMED = re.compile(r"(?<![\w/-])--?[a-z][a-z-]*")
+_OPTION_IN_TEXT = re.compile(r"(?<![\w/-])--?[a-z][a-z-]*")
 
 
 def coloured_help(text: str) -> str:
@@ -66,7 +66,7 @@ def coloured_help(text: str) -> str:
     >>> coloured_help("usage: planfly fly [--at TIME]").split("\x1b")
     ['', '[33musage:', '[0m planfly fly [', '[36m--at', '[0m TIME]']
     """
-    for pattern, code in ((_NAMED, _STYLES["hint"]), (_HEADING, _STYLES["warning"])):
+    for pattern, code in ((_OPTION_IN_TEXT, _STYLES["hint"]), (_HEADING, _STYLES["warning"])):
         text = pattern.sub(f"\x1b[{code}m\\g<0>\x1b[0m", text)
     return text
 
@@ -89,7 +89,7 @@ class CommandParser(argparse.ArgumentParser):
         super().__init__(formatter_class=argparse.RawDescriptionHelpFormatter, **settings)
         self._aliases: dict[str, str] = {}
         # Text of the help between the examples and the exit codes; made when the help is printed.
-        self.more: Callable[[], str] = str
+        self.extra_help: Callable[[], str] = str
 
     def error(self, message: str) -> NoReturn:
         """Print the message in one line, like for all other bad input, and exit."""
@@ -97,10 +97,10 @@ class CommandParser(argparse.ArgumentParser):
         self.exit(BAD_INPUT, coloured(line, "bad", sys.stderr) + "\n")
 
     def format_help(self) -> str:
-        """Return the help text, with the paragraph `more`, which is made only when the help is printed."""
-        epilog, more = self.epilog, self.more()
-        if more:
-            self.epilog = (epilog or "").replace(EXIT_CODES, f"{more}\n\n{EXIT_CODES}")
+        """Return the help text, with the paragraph `extra_text`, which is made only when the help is printed."""
+        epilog, extra_text = self.epilog, self.extra_help()
+        if extra_text:
+            self.epilog = (epilog or "").replace(EXIT_CODES, f"{extra_text}\n\n{EXIT_CODES}")
         text = super().format_help()
         self.epilog = epilog
         return coloured_help(text) if wants_colour(sys.stdout) else text
@@ -109,14 +109,14 @@ class CommandParser(argparse.ArgumentParser):
         """Add a group of options, which the help shows under a title, and return it."""
         return self.add_argument_group(title, description)
 
-    def alias(self, keyword: str, option: str) -> None:
-        """Map an option to another keyword of the API in addition to its destination."""
+    def alias_keyword(self, keyword: str, option: str) -> None:
+        """Let errors about the API keyword name the option, as errors about the option's dest do."""
         self._aliases[keyword] = option
 
     def keywords(self) -> dict[str, str]:
-        """Return the options by the API's keywords."""
-        named = {action.dest: action.option_strings[-1] for action in self._actions if action.option_strings}
-        return named | self._aliases
+        """Return the options by API keyword."""
+        options_by_dest = {action.dest: action.option_strings[-1] for action in self._actions if action.option_strings}
+        return options_by_dest | self._aliases
 
     def options(self) -> list[str]:
         """Return the long options of the parser."""
@@ -159,38 +159,42 @@ class LineParser(CommandParser):
         extra: the extra of planfly that the command needs, or "".
         more: further sentences of its help.
         """
-        needs = f"  It needs the extra planfly[{extra}]." if extra else ""
-        shown = f"\n{' ' * len('example: ')}".join(examples)
-        made: CommandParser = self._parsers.add_parser(
+        extra_note = f"  It needs the extra planfly[{extra}]." if extra else ""
+        example_text = f"\n{' ' * len('example: ')}".join(examples)
+        command_parser: CommandParser = self._parsers.add_parser(
             name,
             help=summary,
-            description=f"{summary[0].upper()}{summary[1:]}.{more}{needs}",
-            epilog=f"example: {shown}\n\n{EXIT_CODES}",
+            description=f"{summary[0].upper()}{summary[1:]}.{more}{extra_note}",
+            epilog=f"example: {example_text}\n\n{EXIT_CODES}",
         )
-        self.commands[name] = made
+        self.commands[name] = command_parser
         if self._section not in self._sections:
             self._sections[self._section] = self.add_argument_group(self._section)
         # Entry for the command list that argparse has just made.
         self._sections[self._section]._group_actions.append(self._parsers._choices_actions[-1])
-        return made
+        return command_parser
 
     def parse_args(  # type: ignore[override]
         self, args: Sequence[str] | None = None, namespace: argparse.Namespace | None = None
     ) -> argparse.Namespace:
         """Return the arguments by name.  For bad usage, print one line with a suggestion and raise SystemExit."""
-        words = _with_negatives(sys.argv[1:] if args is None else list(args))
+        words = _join_negative_numbers(sys.argv[1:] if args is None else list(args))
         if words and not words[0].startswith("-") and words[0] not in self.commands:
-            there = did_you_mean(words[0], self.commands) or f"; there are {', '.join(self.commands)}"
-            self.error(f"{words[0]!r}: no such command{there}")
-        parsed, left = self.parse_known_args(words, namespace)
-        if left:
+            hint = did_you_mean(words[0], self.commands) or f"; there are {', '.join(self.commands)}"
+            self.error(f"{words[0]!r}: no such command{hint}")
+        parsed, unknown_words = self.parse_known_args(words, namespace)
+        if unknown_words:
             parser = self.commands[parsed.command]
             # Words after a -- are not options, even if they begin with a dash.
-            after = words[words.index("--") :] if "--" in words else []
-            option = next((word for word in left if word.startswith("-") and word not in after), "").partition("=")[0]
+            words_after_dashes = words[words.index("--") :] if "--" in words else []
+            option = next(
+                (word for word in unknown_words if word.startswith("-") and word not in words_after_dashes), ""
+            ).partition("=")[0]
             if option:
                 parser.error(f"{option}: no such option{did_you_mean(option, parser.options())}")
-            parser.error(f"{next((word for word in left if word != '--'), left[0])}: no such argument")
+            parser.error(
+                f"{next((word for word in unknown_words if word != '--'), unknown_words[0])}: no such argument"
+            )
         return parsed
 
 
@@ -198,15 +202,15 @@ class LineParser(CommandParser):
 _NEGATIVES = re.compile(r"-\.?\d[^=]*")
 
 
-def _with_negatives(words: list[str]) -> list[str]:
+def _join_negative_numbers(words: list[str]) -> list[str]:
     """Return a command line with each negative number joined to the option before it, as in --from=-33.9,18.4."""
-    joined: list[str] = []
+    joined_words: list[str] = []
     for word in words:
-        if _NEGATIVES.fullmatch(word) and joined and _OPTION.fullmatch(joined[-1]):
-            joined[-1] += f"={word}"
+        if _NEGATIVES.fullmatch(word) and joined_words and _OPTION.fullmatch(joined_words[-1]):
+            joined_words[-1] += f"={word}"
         else:
-            joined.append(word)
-    return joined
+            joined_words.append(word)
+    return joined_words
 
 
 # ----------------------------------------------------------------------
@@ -228,10 +232,10 @@ def error_text(error: PlanflyError, parser: CommandParser) -> str:
     'a.gif: exists; --overwrite replaces it'
     """
     options, text = parser.keywords(), str(error)
-    # An error in a scenario that a keyword changed has the keyword as its file.  A real file may have the same name.
-    of_keyword = error.file in options and bool(error.field)
-    begin = f"{error.file}: " if error.file and not of_keyword else ""
-    head = error.file if of_keyword else error.argument
-    if head in options and text.startswith(begin + head):
-        text = begin + options[head] + text[len(begin + head) :]
-    return _KEYWORD.sub(lambda found: options.get(found[1] or found[2], found[0]), text)
+    # An error in a scenario that a keyword changed names the keyword as its file; a real file may have the same name.
+    is_keyword = error.file in options and bool(error.field)
+    prefix = f"{error.file}: " if error.file and not is_keyword else ""
+    head = error.file if is_keyword else error.argument
+    if head in options and text.startswith(prefix + head):
+        text = prefix + options[head] + text[len(prefix + head) :]
+    return _KEYWORD.sub(lambda match: options.get(match[1] or match[2], match[0]), text)

@@ -6,9 +6,9 @@ import unicodedata
 
 from planfly.terminal.command_parser import COLOUR_SEQUENCE
 
-# Categories of Unicode of characters that move the cursor, reverse the text, or are no text.
+# Unicode categories of characters that move the cursor, reverse the text, or are not text.
 _CONTROLS = ("Cc", "Cf", "Cs", "Zl", "Zp")
-# Colours of planfly's own on a stream in colour, and any character beyond plain ASCII, which may be a control.
+# Colour sequences of planfly, and any character beyond plain ASCII, which may be a control character.
 _COLOUR_OR_SPECIAL = re.compile(COLOUR_SEQUENCE + r"|[^\n\t\x20-\x7e]")
 _SPECIAL = re.compile(r"[^\n\t\x20-\x7e]")
 
@@ -24,12 +24,12 @@ def without_controls(text: str, *, colours: bool = False) -> str:
     return (_COLOUR_OR_SPECIAL if colours else _SPECIAL).sub(_escape, text)
 
 
-def _escape(found: re.Match[str]) -> str:
-    text = found[0]
+def _escape(match: re.Match[str]) -> str:
+    text = match[0]
     is_control = len(text) == 1 and unicodedata.category(text) in _CONTROLS
     return text.encode("unicode_escape").decode() if is_control else text
 
 
 def escaped_json(text: str) -> str:
     """Return JSON text with JSON's escapes for control characters in its strings."""
-    return _SPECIAL.sub(lambda found: found[0] if _escape(found) == found[0] else json.dumps(found[0])[1:-1], text)
+    return _SPECIAL.sub(lambda match: match[0] if _escape(match) == match[0] else json.dumps(match[0])[1:-1], text)

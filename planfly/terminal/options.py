@@ -1,6 +1,6 @@
 """Add options that several commands share, and call the API with them.
 
-The destination of an option is the matching keyword of the API, so that `call` passes it without further code.
+The dest of an option is the matching keyword of the API, so that `call` passes it without further code.
 """
 
 import argparse
@@ -14,32 +14,32 @@ from typing import Any, TypeVar
 from planfly.arguments import CHOICES
 from planfly.terminal.arguments import (
     MISSIONS,
-    aircraft_words,
-    completed,
+    complete_aircraft,
+    complete_scenario,
     files,
     number,
-    scenario_words,
     wind,
+    with_completer,
 )
 from planfly.terminal.command_parser import CommandParser, OptionTaker
 from world.airspace.zone_suffixes import SUFFIXES as ZONES
 from world.elevation_formats import EMBEDDED, SUFFIXES
 
-Returned = TypeVar("Returned")
+Result = TypeVar("Returned")
 
 
-def call(function: Callable[..., Returned], args: argparse.Namespace, **more: Any) -> Returned:
+def call(function: Callable[..., Result], args: argparse.Namespace, **overrides: Any) -> Result:
     """Call a function of the API with the options that match its keywords, and return its result.
 
     Options that were not given (None) leave the keyword at its default.
-    more: keywords that override the options.
+    overrides: keywords that override the options.
 
     >>> call(lambda *, seed=1, out="here": (seed, out), argparse.Namespace(seed=3, out=None, json=None))
     (3, 'here')
     """
     keywords = inspect.signature(function).parameters
-    given = {name: value for name, value in vars(args).items() if name in keywords} | more
-    return function(**{name: value for name, value in given.items() if value is not None})
+    arguments = {name: value for name, value in vars(args).items() if name in keywords} | overrides
+    return function(**{name: value for name, value in arguments.items() if value is not None})
 
 
 # ----------------------------------------------------------------------
@@ -47,17 +47,17 @@ def call(function: Callable[..., Returned], args: argparse.Namespace, **more: An
 
 
 def result_options(
-    parser: CommandParser, out: str = "", what: str = "DIR", *, json: bool = True, junit: bool = False
+    parser: CommandParser, out: str = "", placeholder: str = "DIR", *, json: bool = True, junit: bool = False
 ) -> None:
     """Add the options for output files and for the amount of printed text.
 
     out: help text of --out, or "" for a command without this option.
-    what: placeholder for the value of --out.
+    placeholder: placeholder for the value of --out.
     junit: True if the answer of the command is a verdict.
     """
     group = parser.group("results")
     if out:
-        group.add_argument("--out", metavar=what, help=out)
+        group.add_argument("--out", metavar=placeholder, help=out)
     group.add_argument("--overwrite", action="store_true", help="replace named targets that exist")
     if json:
         json_option(group, parser.prog.split()[-1])
@@ -87,11 +87,11 @@ def json_option(group: OptionTaker, command: str) -> None:
 def world_options(parser: CommandParser) -> OptionTaker:
     """Add the options for the world in which a mission is judged, and return their group."""
     group = parser.group("where it flies")
-    completed(
+    with_completer(
         group.add_argument(
             "--scenario", metavar="SCENARIO", help="judge within this scenario: a TOML file or an embedded name"
         ),
-        scenario_words,
+        complete_scenario,
     )
     terrain_option(group)
     fence_option(group)
@@ -101,13 +101,13 @@ def world_options(parser: CommandParser) -> OptionTaker:
 def terrain_option(group: OptionTaker) -> None:
     """Add the option for the terrain."""
     suffixes, names = ", ".join(SUFFIXES), ", ".join(EMBEDDED)
-    words = f"elevation file ({suffixes}), a folder or .vrt of such tiles, or an embedded name: {names}"
-    group.add_argument("--terrain", metavar="DEM", help=words)
+    help_text = f"elevation file ({suffixes}), a folder or .vrt of such tiles, or an embedded name: {names}"
+    group.add_argument("--terrain", metavar="DEM", help=help_text)
 
 
 def fence_option(group: OptionTaker) -> None:
     """Add the option for fences in addition to the mission's own."""
-    found = group.add_argument(
+    option = group.add_argument(
         "--fence",
         metavar="FILE",
         action="append",
@@ -115,7 +115,7 @@ def fence_option(group: OptionTaker) -> None:
         help="also keep within this fence: .fence, .waypoints, .txt or .plan, or zones: .geojson, .json (of ED-269 and "
         "ED-318, too), .kml, .openair, .gpkg; repeatable",
     )
-    completed(found, files("fence", *(suffix[1:] for suffix in ZONES), *MISSIONS))
+    with_completer(option, files("fence", *(suffix[1:] for suffix in ZONES), *MISSIONS))
 
 
 def time_option(group: OptionTaker) -> None:
@@ -128,16 +128,16 @@ def time_option(group: OptionTaker) -> None:
     )
 
 
-def flown_by_options(parser: CommandParser) -> None:
+def aircraft_and_wind_options(parser: CommandParser) -> None:
     """Add the options for the aircraft and the wind."""
     group = parser.group("aircraft and weather")
-    completed(
+    with_completer(
         group.add_argument(
             "--aircraft",
             metavar="AIRCRAFT",
             help="a name that planfly aircraft lists, or a folder (default: aerosonde)",
         ),
-        aircraft_words,
+        complete_aircraft,
     )
     group.add_argument(
         "--airspeed",
@@ -163,16 +163,16 @@ def turbulence_option(group: OptionTaker) -> None:
     )
 
 
-def pilot_options(parser: CommandParser) -> OptionTaker:
+def autopilot_options(parser: CommandParser) -> OptionTaker:
     """Add the options for the autopilot, and return their group."""
     group = parser.group("autopilot")
-    found = group.add_argument(
+    option = group.add_argument(
         "--params",
         metavar="FILE",
         help="parameters of the simulated autopilot, in a file as a ground station saves it; the file also decides the "
         "autopilot if none is named",
     )
-    completed(found, files("param", "parm", "params"))
+    with_completer(option, files("param", "parm", "params"))
     group.add_argument(
         "--autopilot",
         choices=CHOICES["autopilot"],
@@ -190,7 +190,7 @@ def pilot_options(parser: CommandParser) -> OptionTaker:
 
 def steering_options(parser: CommandParser) -> OptionTaker:
     """Add the options for the autopilot and its position errors, and return their group."""
-    group = pilot_options(parser)
+    group = autopilot_options(parser)
     group.add_argument(
         "--nav",
         choices=CHOICES["nav"],
@@ -200,14 +200,14 @@ def steering_options(parser: CommandParser) -> OptionTaker:
     return group
 
 
-def program_option(group: OptionTaker, does: str) -> None:
-    """Add the option for the program of an autopilot.  does: help text."""
-    group.add_argument("--sitl", metavar="PATH", help=does)
+def program_option(group: OptionTaker, help_text: str) -> None:
+    """Add the option for the program of an autopilot.  help_text: help text."""
+    group.add_argument("--sitl", metavar="PATH", help=help_text)
 
 
 def flight_options(parser: CommandParser) -> None:
     """Add the options for a flight's aircraft, weather, autopilot and limits."""
-    flown_by_options(parser)
+    aircraft_and_wind_options(parser)
     group = steering_options(parser)
     program_option(
         group,
@@ -252,10 +252,10 @@ def log_rate_option(group: OptionTaker) -> None:
 def imported_log_options(parser: CommandParser) -> None:
     """Add the options for facts that a log of another program does not state."""
     group = parser.group("an autopilot's log")
-    found = group.add_argument(
+    option = group.add_argument(
         "--plan", metavar="MISSION", help="mission that was to be flown (default: the mission in the log)"
     )
-    completed(found, files(*MISSIONS))
+    with_completer(option, files(*MISSIONS))
     group.add_argument(
         "--flight",
         metavar="N",
@@ -268,15 +268,18 @@ def imported_log_options(parser: CommandParser) -> None:
 
 
 def log_argument(
-    parser: CommandParser, name: str = "log", metavar: str = "LOG.mcap", what: str = "a flight log"
+    parser: CommandParser, name: str = "log", metavar: str = "LOG.mcap", help_text: str = "a flight log"
 ) -> None:
     """Add the argument for a flight log to read."""
-    completed(parser.add_argument(name, metavar=metavar, help=what), files("mcap"))
+    with_completer(parser.add_argument(name, metavar=metavar, help=help_text), files("mcap"))
 
 
 def scenario_argument(parser: CommandParser, **settings: object) -> None:
     """Add the argument for a scenario to plan in."""
-    completed(parser.add_argument("scenario", metavar="SCENARIO", **settings), scenario_words)  # type: ignore[arg-type]
+    with_completer(
+        parser.add_argument("scenario", metavar="SCENARIO", **settings),  # type: ignore[arg-type]
+        complete_scenario,
+    )
 
 
 # ----------------------------------------------------------------------
@@ -296,20 +299,20 @@ def own_link_options(parser: CommandParser, *, bind: str) -> None:
 
 
 @contextlib.contextmanager
-def stop_signals() -> Iterator[Callable[[], bool]]:
-    """Yield a function that returns True after SIGINT or SIGTERM, which then do not interrupt the closing of logs."""
-    asked = False
+def watch_stop_signals() -> Iterator[Callable[[], bool]]:
+    """Yield a function that returns True after SIGINT or SIGTERM; these do not interrupt the closing of logs."""
+    should_stop = False
 
-    def ask(_number: int, _frame: FrameType | None) -> None:
-        nonlocal asked
-        asked = True
+    def request_stop(_number: int, _frame: FrameType | None) -> None:
+        nonlocal should_stop
+        should_stop = True
 
-    kept = {one: signal.signal(one, ask) for one in (signal.SIGINT, signal.SIGTERM)}
+    previous_handlers = {number: signal.signal(number, request_stop) for number in (signal.SIGINT, signal.SIGTERM)}
     try:
-        yield lambda: asked
+        yield lambda: should_stop
     finally:
-        for one, handler in kept.items():
-            signal.signal(one, handler)
+        for number, handler in previous_handlers.items():
+            signal.signal(number, handler)
 
 
 def print_at_once(text: str) -> None:

@@ -16,10 +16,10 @@ from contextvars import ContextVar
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple, TextIO
 
-from planfly.runtime.stages import Advance, Receiver, received_by
+from planfly.runtime.stages import Advance, Receiver, send_progress_to
 from planfly.terminal.command_parser import wants_colour
 from planfly.terminal.control_characters import escaped_json, without_controls
-from planfly.workflow.output_paths import refuse_existing
+from planfly.workflow.output_paths import check_output_file
 from world.errors import PlanflyError
 from world.files import read_at_most, write_whole
 
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from logs.verdict.verdict import Verdict
 
 # ----------------------------------------------------------------------
-# Standard streams: no text of a foreign file controls the terminal, and a closed pipe is tolerated:
+# Standard streams.  No text of a foreign file controls the terminal, and a closed pipe is tolerated:
 # ``planfly check M | head -1`` still exits with the code of the verdict.
 
 
@@ -41,7 +41,7 @@ class _SafeStream(io.TextIOBase):
         self.plain = stream
 
     def writable(self) -> bool:
-        """Return True: the stream always takes text."""
+        """Return True, because the stream always accepts text."""
         return True
 
     def isatty(self) -> bool:
@@ -53,12 +53,12 @@ class _SafeStream(io.TextIOBase):
         return self.plain.fileno()
 
     def write(self, text: str, /) -> int:
-        """Pass the text on."""
+        """Write the text without control characters."""
         self.plain.write(without_controls(text, colours=wants_colour(self.plain)))
         return len(text)
 
     def flush(self) -> None:
-        """Pass on what is buffered."""
+        """Flush the buffered text."""
         self.plain.flush()
 
 
@@ -67,50 +67,50 @@ class _TolerantStream(_SafeStream):
 
     def __init__(self, stream: TextIO) -> None:
         super().__init__(stream)
-        self._gone = False
+        self._reader_has_gone = False
 
     def write(self, text: str, /) -> int:
-        """Pass the text on, or drop it."""
-        if not self._gone:
+        """Write the text, or drop it if the reader has gone."""
+        if not self._reader_has_gone:
             try:
                 super().write(text)
             except BrokenPipeError:
-                self._leave()
+                self._drop_output()
             except OSError as error:
-                raise _named(error) from error
+                raise _with_stream_name(error) from error
         return len(text)
 
     def flush(self) -> None:
-        """Pass on what is buffered, or drop it."""
-        if not self._gone:
+        """Flush the buffered text, or drop it if the reader has gone."""
+        if not self._reader_has_gone:
             try:
                 super().flush()
             except BrokenPipeError:
-                self._leave()
+                self._drop_output()
             except OSError as error:
                 # The interpreter would try to write the buffered text again when it ends.
-                self._leave()
-                raise _named(error) from error
+                self._drop_output()
+                raise _with_stream_name(error) from error
 
-    def _leave(self) -> None:
-        self._gone = True
-        # When the interpreter ends, the buffered text must have somewhere to go.
-        with contextlib.suppress(OSError, ValueError), Path(os.devnull).open("w") as nowhere:
-            os.dup2(nowhere.fileno(), self.fileno())
+    def _drop_output(self) -> None:
+        self._reader_has_gone = True
+        # When the interpreter ends, it flushes the buffered text, which then goes to the null device.
+        with contextlib.suppress(OSError, ValueError), Path(os.devnull).open("w") as null_file:
+            os.dup2(null_file.fileno(), self.fileno())
 
 
-def _named(error: OSError) -> OSError:
+def _with_stream_name(error: OSError) -> OSError:
     return OSError(error.errno, error.strerror, "standard output")
 
 
 def open_standard_streams() -> None:
-    """Open the three standard streams that are closed, and let them take any text.
+    """Open those of the three standard streams that are closed, and let them accept any text.
 
-    If one were closed, the next file to be opened would get its number, and text that a library prints would go there.
+    If one stayed closed, the next file would get its descriptor, and text that a library prints would go to that file.
     """
-    for number in range(3):
+    for descriptor in range(3):
         try:
-            os.fstat(number)
+            os.fstat(descriptor)
         except OSError:
             # This takes the lowest free descriptor.
             os.open(os.devnull, os.O_RDWR)
@@ -167,7 +167,7 @@ class _LastDuration(NamedTuple):
     whole: float
 
 
-def _times_file() -> Path:
+def _durations_file() -> Path:
     # Imported here: the help does not need it.
     from platformdirs import user_cache_dir
 
@@ -176,29 +176,29 @@ def _times_file() -> Path:
 
 def _last_durations() -> dict[str, _LastDuration]:
     """Return the last duration by kind of stage; empty if the file is missing or invalid."""
-    found = {}
+    durations = {}
     with contextlib.suppress(OSError, ValueError, RecursionError):
-        read = json.loads(read_at_most(_times_file(), _MAX_BYTES, "durations"))
-        for kind, taken in read.items() if isinstance(read, dict) else ():
-            numbers = taken if isinstance(taken, list) and len(taken) == 2 else [math.nan]
-            if all(isinstance(one, int | float) and 0.0 <= one < math.inf for one in numbers):
-                found[str(kind)] = _LastDuration(*map(float, numbers))
-    return found
+        stored = json.loads(read_at_most(_durations_file(), _MAX_BYTES, "durations"))
+        for kind, values in stored.items() if isinstance(stored, dict) else ():
+            numbers = values if isinstance(values, list) and len(values) == 2 else [math.nan]
+            if all(isinstance(value, int | float) and 0.0 <= value < math.inf for value in numbers):
+                durations[str(kind)] = _LastDuration(*map(float, numbers))
+    return durations
 
 
-def _keep_time(kind: str, taken: _LastDuration) -> None:
+def _store_duration(kind: str, duration: _LastDuration) -> None:
     """Store the duration of a stage of a kind; a file that cannot be written is ignored silently."""
-    text = json.dumps(_last_durations() | {kind: tuple(float(f"{one:.4g}") for one in taken)}, indent=1)
+    text = json.dumps(_last_durations() | {kind: tuple(float(f"{value:.4g}") for value in duration)}, indent=1)
     with contextlib.suppress(OSError):
-        _times_file().parent.mkdir(parents=True, exist_ok=True)
-        write_whole(_times_file(), text)
+        _durations_file().parent.mkdir(parents=True, exist_ok=True)
+        write_whole(_durations_file(), text)
 
 
 # ----------------------------------------------------------------------
 # Progress: a bar on a terminal, plain lines elsewhere; on standard error, so that results can be piped.
 
 
-def _say(line: str) -> None:
+def _print_line(line: str) -> None:
     print(line, file=sys.stderr, flush=True)
 
 
@@ -209,46 +209,46 @@ _REPORT_INTERVAL_RATIO = 4.0
 # Longest time between two lines, also of a stage that reports nothing, s.
 _MAX_REPORT_INTERVAL_S = 60.0
 # Interval at which a stage checks the clock, s; a stage that reports nothing is named after the first interval.
-_LOOKS_EVERY = 1.0
-# Counter of the stages begun in this process.  The duration of a stage that contains another one is not stored: the
-# inner stage may not occur again.
+_REFRESH_INTERVAL_S = 1.0
+# Counter of the stages begun in this process.  The duration of a stage that contains another stage is not stored,
+# because the inner stage may not occur again.
 _stage_numbers = itertools.count()
 
 
 class _TimeLeft:
     """Time left for a stage, extrapolated from its first report; known from its second report on.
 
-    Until then, the duration of the previous stage of its kind is given.
-    The time before the first report is left out: kernels may have been compiled in it.
+    Until then, the duration of the previous stage of its kind is the estimate.
+    The time before the first report is ignored, because kernels may have been compiled in it.
     """
 
     def __init__(self, kind: str) -> None:
         self._kind, self._number = kind, next(_stage_numbers)
         self._started = time.monotonic()
-        self._first: tuple[float, float] | None = None
+        self._first_report: tuple[float, float] | None = None
         self._done, self._due = 0.0, _FIRST_REPORT_DELAY_S
 
     def estimate(self, done: float, total: float) -> str:
-        """Return the time left in words; "" if no progress since the first report, all done, or total unknown."""
-        if self._first is None:
-            self._first = time.monotonic(), done
-        self._done, more = done, done - self._first[1]
-        if not (more > 0.0 and done < total):
+        """Return the time left as text; "" without progress since the first report, at the end, or without a total."""
+        if self._first_report is None:
+            self._first_report = time.monotonic(), done
+        self._done, units_done = done, done - self._first_report[1]
+        if not (units_done > 0.0 and done < total):
             return ""
-        return f"{_duration(self._passed() * (total - done) / more)} left"
+        return f"{_duration_text(self._measured_time() * (total - done) / units_done)} left"
 
-    def at_first(self, to_do: float) -> str:
-        """Return an estimate in words before any progress is measured.  to_do: units of work, 0 if unknown."""
+    def initial_estimate(self, to_do: float) -> str:
+        """Return an estimate as text before any progress is measured.  to_do: units of work, 0 if unknown."""
         last = _last_durations().get(self._kind)
         if last is not None and to_do > 0.0 and last.each > 0.0:
-            return f"about {_duration(last.each * to_do)}, at the pace of the last time here"
+            return f"about {_duration_text(last.each * to_do)}, at the pace of the last time here"
         if last is not None:
-            return f"the last one here took {_duration(last.whole)}"
+            return f"the last one here took {_duration_text(last.whole)}"
         return "no estimate yet" if to_do > 0.0 else "no estimate"
 
     def is_due(self) -> bool:
         """Return True if the next progress line is due, and schedule the one after it."""
-        passed = self._passed()
+        passed = self._measured_time()
         if passed < self._due:
             return False
         self._due = min(_REPORT_INTERVAL_RATIO * passed, passed + _MAX_REPORT_INTERVAL_S)
@@ -258,20 +258,22 @@ class _TimeLeft:
         """Return the seconds since the stage began."""
         return time.monotonic() - self._started
 
-    def keep(self) -> None:
-        """Store the duration for the next run, unless the stage contained another one, such as a compilation."""
+    def store_duration(self) -> None:
+        """Store the duration for the next run, unless the stage contained another stage, such as a compilation."""
         if next(_stage_numbers) == self._number + 1:
-            units = 0.0 if self._first is None else self._done - self._first[1]
-            _keep_time(self._kind, _LastDuration(self._passed() / units if units > 0.0 else 0.0, self.elapsed()))
+            units = 0.0 if self._first_report is None else self._done - self._first_report[1]
+            _store_duration(
+                self._kind, _LastDuration(self._measured_time() / units if units > 0.0 else 0.0, self.elapsed())
+            )
 
-    def _passed(self) -> float:
-        return 0.0 if self._first is None else time.monotonic() - self._first[0]
+    def _measured_time(self) -> float:
+        return 0.0 if self._first_report is None else time.monotonic() - self._first_report[0]
 
 
-def _duration(seconds: float) -> str:
+def _duration_text(seconds: float) -> str:
     """Return an estimated duration in words.
 
-    >>> _duration(0.4), _duration(89.0), _duration(600.0), _duration(9000.0)
+    >>> _duration_text(0.4), _duration_text(89.0), _duration_text(600.0), _duration_text(9000.0)
     ('1 s', '89 s', '10 min', '2.5 h')
     """
     if seconds < 120.0:
@@ -287,34 +289,34 @@ def progress(title: str, kind: str = "") -> Iterator[Advance]:
     The time left follows the remark, unless the remark states it.  At first, the duration of the previous stage of its
     kind on this machine is shown, or "no estimate".  A total of 0 means that the total is unknown.
     """
-    left = _TimeLeft(kind or title)
-    shown = _Bar(title, left) if sys.stderr.isatty() else _Lines(title, left)
-    with shown, _looked_at(shown):
-        yield shown.advance
-    left.keep()
+    time_left = _TimeLeft(kind or title)
+    display = _Bar(title, time_left) if sys.stderr.isatty() else _Lines(title, time_left)
+    with display, _refreshed_regularly(display):
+        yield display.advance
+    time_left.store_duration()
 
 
 @contextmanager
-def _looked_at(shown: "_Bar | _Lines") -> Iterator[None]:
+def _refreshed_regularly(display: "_Bar | _Lines") -> Iterator[None]:
     """Update the elapsed time of a stage at intervals from a thread, or not at all if no thread can start."""
-    over = threading.Event()
+    ended = threading.Event()
 
-    def look() -> None:
-        # The reader of the stream may be gone: the work itself handles that error.
+    def refresh() -> None:
+        # The reader of the stream may have gone; the work itself handles this error.
         with contextlib.suppress(OSError, ValueError):
-            while not over.wait(_LOOKS_EVERY):
-                shown.look()
+            while not ended.wait(_REFRESH_INTERVAL_S):
+                display.refresh()
 
-    watcher = threading.Thread(target=look, name="progress", daemon=True)
+    thread = threading.Thread(target=refresh, name="progress", daemon=True)
     with contextlib.suppress(RuntimeError):
-        watcher.start()
+        thread.start()
     try:
         yield
     finally:
-        over.set()
+        ended.set()
 
 
-def _joined(*parts: str) -> str:
+def _join_texts(*parts: str) -> str:
     return ", ".join(filter(None, parts))
 
 
@@ -329,18 +331,18 @@ class _Bar:
     It shows the estimate from the previous run until this run is measured.
     """
 
-    def __init__(self, title: str, left: _TimeLeft) -> None:
+    def __init__(self, title: str, time_left: _TimeLeft) -> None:
         from tqdm import tqdm
 
-        self._left, self._lock = left, threading.Lock()
-        self._remark, self._measured = "", False
-        self._at_first = left.at_first(0.0)
-        form = "{desc:<22} {bar:30} {percentage:3.0f} %{postfix}"
+        self._left, self._lock = time_left, threading.Lock()
+        self._remark, self._is_measured = "", False
+        self._initial_estimate = time_left.initial_estimate(0.0)
+        bar_format = "{desc:<22} {bar:30} {percentage:3.0f} %{postfix}"
         file = plain_stream(sys.stderr)
-        self._bar = tqdm(total=100, desc=printable(title), bar_format=form, leave=True, file=file)
+        self._bar = tqdm(total=100, desc=printable(title), bar_format=bar_format, leave=True, file=file)
 
     def __enter__(self) -> None:
-        self.look()
+        self.refresh()
 
     def __exit__(self, error: type[BaseException] | None, *_: object) -> None:
         with self._lock:
@@ -350,25 +352,25 @@ class _Bar:
             self._bar.close()
 
     def advance(self, done: float, total: float, remark: str = "") -> None:
-        """Take the progress of the work."""
+        """Show the progress of the work."""
         with self._lock:
-            share = 100.0 * done / total if total > 0 else 0.0
-            self._bar.update(max(0.0, min(100.0, share) - self._bar.n))
+            percent = 100.0 * done / total if total > 0 else 0.0
+            self._bar.update(max(0.0, min(100.0, percent) - self._bar.n))
             estimate = self._left.estimate(done, total)
             self._remark = remark
             if estimate or _states_time_left(remark) or 0.0 < total <= done:
-                self._measured = True
-            if not self._measured:
-                self._at_first = self._left.at_first(max(0.0, total - done))
-                estimate = self._at_first
-            text = _joined(remark, "" if _states_time_left(remark) else estimate)
+                self._is_measured = True
+            if not self._is_measured:
+                self._initial_estimate = self._left.initial_estimate(max(0.0, total - done))
+                estimate = self._initial_estimate
+            text = _join_texts(remark, "" if _states_time_left(remark) else estimate)
             self._bar.set_postfix_str(printable(text))
 
-    def look(self) -> None:
+    def refresh(self) -> None:
         """Show the elapsed time until progress is measured."""
         with self._lock:
-            if not self._measured and not self._bar.disable:
-                text = _joined(self._remark, self._at_first, f"{self._left.elapsed():.0f} s so far")
+            if not self._is_measured and not self._bar.disable:
+                text = _join_texts(self._remark, self._initial_estimate, f"{self._left.elapsed():.0f} s so far")
                 self._bar.set_postfix_str(printable(text))
 
 
@@ -378,69 +380,79 @@ class _Lines:
     Input that is refused within the first second gets no line.
     """
 
-    def __init__(self, title: str, left: _TimeLeft) -> None:
-        self._title, self._left, self._lock = title, left, threading.Lock()
-        self._remark, self._told = "", 0.0
-        self._begun = self._counted = self._over = False
+    def __init__(self, title: str, time_left: _TimeLeft) -> None:
+        self._title, self._left, self._lock = title, time_left, threading.Lock()
+        self._remark, self._printed_at = "", 0.0
+        self._has_started = self._knows_total = self._is_over = False
 
     def __enter__(self) -> None:
         pass
 
     def __exit__(self, error: type[BaseException] | None, *_: object) -> None:
         with self._lock:
-            self._over = True
+            self._is_over = True
             if error is None:
-                end = f": {self._remark}" if self._remark else ""
-                _say(f"{self._title}: done in {self._left.elapsed():.1f} s{end}")
+                remark_text = f": {self._remark}" if self._remark else ""
+                _print_line(f"{self._title}: done in {self._left.elapsed():.1f} s{remark_text}")
 
     def advance(self, done: float, total: float, remark: str = "") -> None:
-        """Take the progress of the work."""
+        """Print the progress of the work if a line is due."""
         with self._lock:
             self._remark = remark
             estimate = self._left.estimate(done, total)
-            counted, self._counted = self._counted, self._counted or total > 0.0
-            at_first = (
-                "" if counted else remark if _states_time_left(remark) else self._left.at_first(max(0.0, total - done))
+            knew_total, self._knows_total = self._knows_total, self._knows_total or total > 0.0
+            estimate_at_start = (
+                ""
+                if knew_total
+                else remark
+                if _states_time_left(remark)
+                else self._left.initial_estimate(max(0.0, total - done))
             )
-            if not self._begun:
-                self._begin(at_first if _states_time_left(remark) else _joined(remark if total > 0.0 else "", at_first))
-            elif total > 0.0 and not counted:
+            if not self._has_started:
+                self._print_first_line(
+                    estimate_at_start
+                    if _states_time_left(remark)
+                    else _join_texts(remark if total > 0.0 else "", estimate_at_start)
+                )
+            elif total > 0.0 and not knew_total:
                 # The first line was printed before the total was known.
-                self._tell(f"{self._title}: {_joined('' if _states_time_left(remark) else remark, at_first)}")
+                self._print(
+                    f"{self._title}: {_join_texts('' if _states_time_left(remark) else remark, estimate_at_start)}"
+                )
             elif estimate and self._left.is_due():
-                self._tell(f"{self._title}: {_joined(remark, '' if _states_time_left(remark) else estimate)}")
+                self._print(f"{self._title}: {_join_texts(remark, '' if _states_time_left(remark) else estimate)}")
 
-    def look(self) -> None:
+    def refresh(self) -> None:
         """Name a stage that reports nothing, and print its elapsed time at intervals."""
         with self._lock:
-            if self._over:
+            if self._is_over:
                 return
-            if not self._begun:
-                self._begin(self._left.at_first(0.0))
-            elif self._left.elapsed() - self._told >= _MAX_REPORT_INTERVAL_S:
-                self._tell(f"{self._title}: {_joined(self._remark, f'{self._left.elapsed():.0f} s so far')}")
+            if not self._has_started:
+                self._print_first_line(self._left.initial_estimate(0.0))
+            elif self._left.elapsed() - self._printed_at >= _MAX_REPORT_INTERVAL_S:
+                self._print(f"{self._title}: {_join_texts(self._remark, f'{self._left.elapsed():.0f} s so far')}")
 
-    def _begin(self, estimate: str) -> None:
-        self._begun = True
-        self._tell(f"{self._title} ... ({estimate})")
+    def _print_first_line(self, estimate: str) -> None:
+        self._has_started = True
+        self._print(f"{self._title} ... ({estimate})")
 
-    def _tell(self, line: str) -> None:
-        self._told = self._left.elapsed()
-        _say(line)
+    def _print(self, line: str) -> None:
+        self._printed_at = self._left.elapsed()
+        _print_line(line)
 
 
-def _ignore(*_: object) -> None:
+def _ignore_progress(*_: object) -> None:
     pass
 
 
 # Receiver that shows progress on standard error.
-ON_STANDARD_ERROR = Receiver(progress, _say)
+ON_STANDARD_ERROR = Receiver(progress, _print_line)
 # Receiver that shows nothing.
-SILENT = Receiver(lambda *_: contextlib.nullcontext(_ignore), _ignore)
+SILENT = Receiver(lambda *_: contextlib.nullcontext(_ignore_progress), _ignore_progress)
 
 
 # ----------------------------------------------------------------------
-# Destination of the lines and the answer of a command: ``--json FILE``, ``--json -`` and ``--quiet``.
+# Output of the lines and the answer of a command: ``--json FILE``, ``--json -`` and ``--quiet``.
 
 
 def answer_text(answer: object) -> str:
@@ -458,25 +470,25 @@ _output: ContextVar[TextIO | None] = ContextVar("output", default=None)
 
 
 @contextlib.contextmanager
-def asked_output(args: argparse.Namespace) -> Iterator[None]:
-    """Redirect printed lines: to nowhere with --quiet, to standard error if stdout gets the answer.
+def redirected_output(args: argparse.Namespace) -> Iterator[None]:
+    """Redirect printed lines: to nowhere with --quiet, to standard error if standard output gets the answer.
 
-    Raises PlanflyError if the file for the answer exists, or is one that the command reads.
+    Raises PlanflyError if the file for the answer exists, or if the command reads this file.
     """
     answer, quiet = getattr(args, "json", None), getattr(args, "quiet", False)
     for target in (answer, getattr(args, "junit", None)):
         if target not in (None, STANDARD_OUTPUT):
-            _refuse_inputs(Path(target), args)
-            refuse_existing(Path(target), getattr(args, "overwrite", False))
+            _check_not_input(Path(target), args)
+            check_output_file(Path(target), getattr(args, "overwrite", False))
     token = _output.set(sys.stdout)
     try:
-        with contextlib.ExitStack() as opened:
-            opened.enter_context(received_by(SILENT if quiet else ON_STANDARD_ERROR))
+        with contextlib.ExitStack() as contexts:
+            contexts.enter_context(send_progress_to(SILENT if quiet else ON_STANDARD_ERROR))
             if quiet:
-                nowhere = opened.enter_context(Path(os.devnull).open("w", encoding="utf-8"))
-                opened.enter_context(contextlib.redirect_stdout(nowhere))
+                null_file = contexts.enter_context(Path(os.devnull).open("w", encoding="utf-8"))
+                contexts.enter_context(contextlib.redirect_stdout(null_file))
             elif answer == STANDARD_OUTPUT:
-                opened.enter_context(contextlib.redirect_stdout(sys.stderr))
+                contexts.enter_context(contextlib.redirect_stdout(sys.stderr))
             yield
     finally:
         _output.reset(token)
@@ -490,8 +502,8 @@ def give_answer(args: argparse.Namespace, answer: Callable[[], object | str]) ->
     target = getattr(args, "json", None)
     if target is None:
         return
-    made = answer()
-    text = made if isinstance(made, str) else answer_text(made)
+    content = answer()
+    text = content if isinstance(content, str) else answer_text(content)
     if target == STANDARD_OUTPUT:
         print(escaped_json(text), end="", file=_output.get() or sys.stdout)
     else:
@@ -516,12 +528,12 @@ def give_junit_error(args: argparse.Namespace, message: str) -> None:
         write_whole(Path(target), junit_error_text(str(judged), message))
 
 
-def _refuse_inputs(target: Path, args: argparse.Namespace) -> None:
-    """Refuse to write the answer to a file that another argument of the command line names."""
-    named = [
+def _check_not_input(target: Path, args: argparse.Namespace) -> None:
+    """Raise PlanflyError if the answer would be written to a file that another argument of the command line names."""
+    file_names = [
         value for key, value in vars(args).items() if isinstance(value, str) and key not in ("json", "junit", "command")
     ]
-    for name in named:
+    for name in file_names:
         with contextlib.suppress(OSError):
             if target.exists() and target.samefile(name):
                 raise PlanflyError(f"{target}: is the input itself; name another file to write", file=target)

@@ -103,11 +103,11 @@ def fewer_line(front: "Front") -> str:
     """Return a line with the reason why a front has fewer plans than requested."""
     from planner.search.plan_front import NOTICED, NOTICED_CLEARANCE, NOTICED_EXPOSURE
 
-    share, seen, height = f"{NOTICED:.1%}", f"{NOTICED_EXPOSURE:.0%}", f"{NOTICED_CLEARANCE:g} m"
-    refused = f"{front.refused} that were found are not safe when completed, and " if front.refused else ""
+    min_fraction, min_exposure, min_height = f"{NOTICED:.1%}", f"{NOTICED_EXPOSURE:.0%}", f"{NOTICED_CLEARANCE:g} m"
+    refused_text = f"{front.refused} that were found are not safe when completed, and " if front.refused else ""
     return (
-        f"{len(front.plans)} of the {front.asked} asked for: {refused}no other that was found gains more than {share}"
-        f" in length or {front.fourth}, {seen} in exposure or {height} in height"
+        f"{len(front.plans)} of the {front.asked} asked for: {refused_text}no other that was found gains more than"
+        f" {min_fraction} in length or {front.fourth}, {min_exposure} in exposure or {min_height} in height"
     )
 
 
@@ -122,16 +122,19 @@ def front_lines(front: "Front", folder: Path) -> list[str]:
         reasons = [f"  failed  {problem}" for problem in default.certificate.problems]
         return ["no safe plan, so no front", *reasons, f"front     {folder}/ (front.csv, front.json)"]
     conditions = conditions_of_plan(default)
-    compared = f", none better than another in length, exposure, height above ground and {front.fourth} at once"
+    comparison = f", none better than another in length, exposure, height above ground and {front.fourth} at once"
     lines = [
-        "front of 1 safe plan" if len(front.plans) == 1 else f"front of {len(front.plans)} safe plans{compared}",
+        "front of 1 safe plan" if len(front.plans) == 1 else f"front of {len(front.plans)} safe plans{comparison}",
         *condition_lines(conditions),
         autopilot_line(conditions, flown=False),
         "  plan   length km  exposure s  above ground m  energy Wh   time s",
     ]
-    for number, one in enumerate(front.plans, 1):
-        energy = f"{one.energy / 3600.0:11.2f}" if math.isfinite(one.energy) else "          -"
-        values = f"{one.length / 1e3:>12.3f}{one.exposure:>12.2f}{one.clearance:>16.1f}{energy}{one.time:>9.1f}"
+    for number, front_plan in enumerate(front.plans, 1):
+        energy = f"{front_plan.energy / 3600.0:11.2f}" if math.isfinite(front_plan.energy) else "          -"
+        values = (
+            f"{front_plan.length / 1e3:>12.3f}{front_plan.exposure:>12.2f}{front_plan.clearance:>16.1f}{energy}"
+            f"{front_plan.time:>9.1f}"
+        )
         lines.append(f"  {number:>4}{values}")
     if len(front.plans) < front.asked:
         lines.append(f"  note    {fewer_line(front)}")

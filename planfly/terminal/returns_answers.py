@@ -209,22 +209,22 @@ class ReturnsAnswer:
     notes: list[str]
 
 
-def suggestion_entry(found: ReturnsFound, one: Suggested) -> ReturnSuggestion:
+def suggestion_entry(found: ReturnsFound, suggested: Suggested) -> ReturnSuggestion:
     """Return the entry of a suggestion."""
     rally = None
-    if one.remedy.rally is not None:
+    if suggested.remedy.rally is not None:
         rally = []
-        for point in one.remedy.rally:
+        for point in suggested.remedy.rally:
             lat, lon = (float(value) for value in to_geo(found.setup.scenario.origin, point.east, point.north))
             rally.append(
                 RallyEntry(lat_deg=round(lat, 7), lon_deg=round(lon, 7), over_home_m=round(point.up - point.base, 1))
             )
     return ReturnSuggestion(
-        parameters=one.remedy.parameters,
+        parameters=suggested.remedy.parameters,
         rally=rally,
-        safe=one.returns.count("safe"),
-        unsafe=len(one.returns.each) - one.returns.count("safe"),
-        headline=headline(one.returns),
+        safe=suggested.returns.count("safe"),
+        unsafe=len(suggested.returns.each) - suggested.returns.count("safe"),
+        headline=headline(suggested.returns),
     )
 
 
@@ -235,27 +235,27 @@ def program_entry(found: ReturnsFound) -> ByProgram | None:
     names = {log.name: str(log) for log in found.files}
     entries = [
         ProgramReturnEntry(
-            at_s=round(one.law.time, 2),
-            east_m=round(one.law.start[0], 1),
-            north_m=round(one.law.start[1], 1),
-            law=_measured_return(one.law),
-            program=None if one.flown is None else _measured_return(one.flown),
-            agrees=one.agrees,
-            worse=one.worse,
-            reason=one.reason,
-            log=None if one.log is None else names.get(one.log.name),
+            at_s=round(pair.law.time, 2),
+            east_m=round(pair.law.start[0], 1),
+            north_m=round(pair.law.start[1], 1),
+            law=_measured_return(pair.law),
+            program=None if pair.flown is None else _measured_return(pair.flown),
+            agrees=pair.agrees,
+            worse=pair.worse,
+            reason=pair.reason,
+            log=None if pair.log is None else names.get(pair.log.name),
         )
-        for one in found.by_program.each
+        for pair in found.by_program.pairs
     ]
     return ByProgram(version=found.by_program.program, returns=entries)
 
 
-def _measured_return(one: ReturnFlown) -> MeasuredReturn:
+def _measured_return(flown: ReturnFlown) -> MeasuredReturn:
     return MeasuredReturn(
-        kind=one.kind,
-        target=one.target.name,
-        clearance_m=_round_to_tenths(one.clearance),
-        outside_m=_round_to_tenths(one.outside),
+        kind=flown.kind,
+        target=flown.target.name,
+        clearance_m=_round_to_tenths(flown.clearance),
+        outside_m=_round_to_tenths(flown.outside),
     )
 
 
@@ -268,24 +268,24 @@ def glides_entry(found: ReturnsFound) -> GlidesEntry:
     """Return the entry of the places reachable without the engine."""
     glides = found.glides
     entries = []
-    for group in glides.ranges:
-        one = group.least
+    for glide_range in glides.ranges:
+        glide = glide_range.least
         entries.append(
             GlideEntry(
-                first_s=round(group.first, 2),
-                last_s=round(group.last, 2),
-                count=group.count,
-                reach=one.reach,
-                site=group.site if group.site >= 0 else None,
-                least_at_s=round(one.time, 2),
-                left_m=_round_to_tenths(glides.spare(one)),
-                flat_east_m=_round_to_tenths(one.flat_at[0]),
-                flat_north_m=_round_to_tenths(one.flat_at[1]),
-                own=one.own.end,
-                own_target=one.own.target.name,
-                own_over_m=_round_to_tenths(one.own.over),
-                own_short_m=_round_to_tenths(one.own.short),
-                text=glide_range_text(group, glides),
+                first_s=round(glide_range.first, 2),
+                last_s=round(glide_range.last, 2),
+                count=glide_range.count,
+                reach=glide.reach,
+                site=glide_range.site if glide_range.site >= 0 else None,
+                least_at_s=round(glide.time, 2),
+                left_m=_round_to_tenths(glides.spare(glide)),
+                flat_east_m=_round_to_tenths(glide.flat_at[0]),
+                flat_north_m=_round_to_tenths(glide.flat_at[1]),
+                own=glide.own.end,
+                own_target=glide.own.target.name,
+                own_over_m=_round_to_tenths(glide.own.over),
+                own_short_m=_round_to_tenths(glide.own.short),
+                text=glide_range_text(glide_range, glides),
             )
         )
     return GlidesEntry(
@@ -295,8 +295,8 @@ def glides_entry(found: ReturnsFound) -> GlidesEntry:
         margin_m=MARGIN,
         cell_m=_round_to_tenths(glides.cell),
         sites=[
-            GlideSiteEntry(kind=one.kind, number=one.number, east_m=round(one.east, 1), north_m=round(one.north, 1))
-            for one in glides.sites
+            GlideSiteEntry(kind=site.kind, number=site.number, east_m=round(site.east, 1), north_m=round(site.north, 1))
+            for site in glides.sites
         ],
         own_arrives=glides.arrivals,
         home=glides.count("home"),
@@ -308,25 +308,25 @@ def glides_entry(found: ReturnsFound) -> GlidesEntry:
     )
 
 
-def return_entry(found: ReturnsFound, group: ReturnRange) -> ReturnEntry:
+def return_entry(found: ReturnsFound, return_range: ReturnRange) -> ReturnEntry:
     """Return the entry of a range of returns."""
-    one, scenario, number = group.worst, found.setup.scenario, _round_to_tenths
+    worst, scenario, rounded = return_range.worst, found.setup.scenario, _round_to_tenths
 
     return ReturnEntry(
-        first_s=round(group.first, 2),
-        last_s=round(group.last, 2),
-        count=group.count,
-        kind=one.kind,
-        target=one.target.name,
-        reason=one.target.reason,
-        worst_at_s=round(one.time, 2),
-        clearance_m=number(one.clearance),
-        clearance_east_m=number(one.clearance_at[0]),
-        clearance_north_m=number(one.clearance_at[1]),
-        outside_m=number(one.outside),
-        threat=scenario.threats.names[one.threat] if one.kind == "threat" else None,
-        zone=found.returns.airspace.zones[one.zone].name if one.zone >= 0 else None,
-        energy_wh=number(one.energy),
-        left_wh=number(one.left),
-        text=range_text(group, found.returns, scenario),
+        first_s=round(return_range.first, 2),
+        last_s=round(return_range.last, 2),
+        count=return_range.count,
+        kind=worst.kind,
+        target=worst.target.name,
+        reason=worst.target.reason,
+        worst_at_s=round(worst.time, 2),
+        clearance_m=rounded(worst.clearance),
+        clearance_east_m=rounded(worst.clearance_at[0]),
+        clearance_north_m=rounded(worst.clearance_at[1]),
+        outside_m=rounded(worst.outside),
+        threat=scenario.threats.names[worst.threat] if worst.kind == "threat" else None,
+        zone=found.returns.airspace.zones[worst.zone].name if worst.zone >= 0 else None,
+        energy_wh=rounded(worst.energy),
+        left_wh=rounded(worst.left),
+        text=range_text(return_range, found.returns, scenario),
     )

@@ -18,7 +18,7 @@ from world.interruption import Interrupted, interrupt, remove_unfinished
 # Signals that end a command.
 ENDING = (signal.SIGINT, signal.SIGTERM)
 # Time from a signal until the process is ended by force, s, not counting the time that it waited for a processor.
-GRACE = 0.7
+GRACE_S = 0.7
 # Maximum time from a signal until the process is ended by force, including the time waited for a processor, s.
 _MAX_GRACE_S = 10.0
 # Time for which the removal of files is retried, s.
@@ -30,7 +30,7 @@ _COMPILERS = ("numba", "llvmlite")
 
 
 @contextlib.contextmanager
-def ended_by_signals(grace: float = GRACE) -> Iterator[list[int]]:
+def end_on_signals(grace: float = GRACE_S) -> Iterator[list[int]]:
     """Raise `Interrupted` for SIGINT and SIGTERM, and end the process by force ``grace`` seconds after a signal.
 
     Compiled code and compilers can delay Python's signal handlers, and waits for other processes can be long.  A thread
@@ -41,42 +41,44 @@ def ended_by_signals(grace: float = GRACE) -> Iterator[list[int]]:
     Yields a list to which the number of a signal is added when it arrives.
     """
     read, write = _signal_pipe()
-    heard: list[int] = []
-    ended = False
+    received: list[int] = []
+    is_ending = False
 
-    def hear(number: int, frame: FrameType | None = None) -> None:
+    def handle_signal(number: int, frame: FrameType | None = None) -> None:
         # The first signal interrupts the work; the code that then ends the work must not be interrupted.
-        nonlocal ended
-        if ended:
+        nonlocal is_ending
+        if is_ending:
             return
         if _called_by_compiled_code(frame):
             threading.Timer(_RETRY_INTERVAL_S, signal.raise_signal, (number,)).start()
             return
-        ended = True
-        heard.append(number)
+        is_ending = True
+        received.append(number)
         interrupt(number)
 
-    def hear_again(lost: "sys.UnraisableHookArgs") -> None:
+    def raise_again(unraisable: "sys.UnraisableHookArgs") -> None:
         # The exception was raised in a callback of a library, which dropped it.  Raise the signal again a little later.
-        nonlocal ended
-        if isinstance(lost.exc_value, Interrupted):
-            ended = False
-            threading.Timer(_RETRY_INTERVAL_S, signal.raise_signal, (lost.exc_value.number,)).start()
+        nonlocal is_ending
+        if isinstance(unraisable.exc_value, Interrupted):
+            is_ending = False
+            threading.Timer(_RETRY_INTERVAL_S, signal.raise_signal, (unraisable.exc_value.number,)).start()
         else:
-            sys.__unraisablehook__(lost)
+            sys.__unraisablehook__(unraisable)
 
-    watcher = threading.Thread(target=_end_process_after_signal, args=(read, heard, grace), name="signals", daemon=True)
+    watcher = threading.Thread(
+        target=_end_process_after_signal, args=(read, received, grace), name="signals", daemon=True
+    )
     watcher.start()
     # Python's C code writes the number of the signal to the pipe at once, whatever the main thread is doing.
     signal.set_wakeup_fd(write, warn_on_full_buffer=False)
     for number in ENDING:
-        signal.signal(number, hear)
-    sys.unraisablehook = hear_again
+        signal.signal(number, handle_signal)
+    sys.unraisablehook = raise_again
     try:
-        yield heard
+        yield received
     finally:
         # From now on, a signal would only interrupt the end of the program.
-        ended = True
+        is_ending = True
 
 
 def _called_by_compiled_code(frame: FrameType | None) -> bool:
@@ -107,21 +109,23 @@ def _signal_pipe() -> tuple[Callable[[int], bytes], int]:
     return receiver.recv, sender.detach()
 
 
-def _end_process_after_signal(read: Callable[[int], bytes], heard: list[int], grace: float) -> None:
-    """Wait for the first signal, append its number to `heard`, let the command end by itself, then end the process."""
+def _end_process_after_signal(read: Callable[[int], bytes], received: list[int], grace: float) -> None:
+    """Wait for the first signal, append its number to `received`, let the command end itself, then end the process."""
     while (number := read(1)[0]) not in ENDING:
         pass
     # Append the number here, too, because a command may have its own signal handlers.
-    heard.append(number)
-    begun, waited = time.monotonic(), _waited_for_processor()
-    while (passed := time.monotonic() - begun) < _MAX_GRACE_S and passed - _waited_for_processor() + waited < grace:
+    received.append(number)
+    start_time, start_wait = time.monotonic(), _processor_wait_time()
+    while (
+        elapsed := time.monotonic() - start_time
+    ) < _MAX_GRACE_S and elapsed - _processor_wait_time() + start_wait < grace:
         time.sleep(_RETRY_INTERVAL_S)
     with contextlib.suppress(OSError):
         os.write(2, b"planfly: interrupted\n")
     _kill_children_and_exit(128 + number)
 
 
-def _waited_for_processor() -> float:
+def _processor_wait_time() -> float:
     """Return the total time for which the main thread has waited for a processor, s, or 0 if not on Linux."""
     try:
         return int(Path("/proc/self/schedstat").read_text(encoding="ascii").split()[1]) * 1e-9
@@ -138,15 +142,15 @@ def end_process(code: int) -> NoReturn:
 
 
 def _kill_children_and_exit(code: int) -> NoReturn:
-    # Do not import it: without an earlier import there are no children, and an import could wait for another import.
+    # Do not import multiprocessing: if it is not yet imported, there are no children, and an import could block.
     multiprocessing = sys.modules.get("multiprocessing")
-    until = time.monotonic() + _REMOVAL_TIMEOUT_S
-    killed = set[int]()
+    deadline = time.monotonic() + _REMOVAL_TIMEOUT_S
+    killed_ids = set[int]()
     while True:
         for child in multiprocessing.active_children() if multiprocessing is not None else ():
             child.kill()
-            killed.add(child.pid)
+            killed_ids.add(child.pid)
         # A killed child may still complete a file that it was writing, so removing its folder may fail at first.
-        if all([remove_unfinished(), *map(remove_temporary_folders, killed)]) or time.monotonic() > until:
+        if all([remove_unfinished(), *map(remove_temporary_folders, killed_ids)]) or time.monotonic() > deadline:
             os._exit(code)
         time.sleep(_RETRY_INTERVAL_S)

@@ -98,55 +98,57 @@ class SurveyAnswer:
     files: list[str]
 
 
-def photo_line_entry(setup: FlightSetup, line: PhotoLine, one: LineMeasure | None) -> PhotoLineEntry:
+def photo_line_entry(setup: FlightSetup, line: PhotoLine, measure: LineMeasure | None) -> PhotoLineEntry:
     """Return the entry of a photo line, with the measures of the flown line, or None if it was not flown."""
     first, last = (int(setup.route.items[i]) for i in (line.first, line.last))
 
-    def share(value: float | None) -> float | None:
+    def rounded(value: float | None) -> float | None:
         return None if value is None else round(value, 4)
 
     return PhotoLineEntry(
         first_item=first,
         last_item=last,
-        length_m=None if one is None else round(one.length, 1),
-        usable=share(None if one is None else one.good),
-        away=share(None if one is None else one.away),
-        banked=share(None if one is None else one.banked),
-        high=share(None if one is None else one.high),
-        dark=share(None if one is None else one.dark),
-        lost_m=[] if one is None else [(round(low, 1), round(high, 1)) for low, high in one.lost],
-        photos=None if one is None else one.photos,
-        missed=None if one is None else one.missed,
+        length_m=None if measure is None else round(measure.length, 1),
+        usable=rounded(None if measure is None else measure.good),
+        away=rounded(None if measure is None else measure.away),
+        banked=rounded(None if measure is None else measure.banked),
+        high=rounded(None if measure is None else measure.high),
+        dark=rounded(None if measure is None else measure.dark),
+        lost_m=[] if measure is None else [(round(begin, 1), round(end, 1)) for begin, end in measure.lost],
+        photos=None if measure is None else measure.photos,
+        missed=None if measure is None else measure.missed,
     )
 
 
-def overlap_entry(one: OverlapMeasure) -> OverlapEntry:
+def overlap_entry(overlap: OverlapMeasure) -> OverlapEntry:
     """Return the entry of the overlap of a survey."""
-    low, high = sorted(one.pair)
+    first_line, second_line = sorted(overlap.pair)
     return OverlapEntry(
-        front=None if one.front is None else round(one.front, 4),
-        front_asked=one.camera.front,
-        front_line=None if one.front is None else one.line + 1,
-        side=None if one.side is None else round(one.side, 4),
-        side_asked=one.camera.side,
-        side_lines=None if one.side is None else (low + 1, high + 1),
+        front=None if overlap.front is None else round(overlap.front, 4),
+        front_asked=overlap.camera.front,
+        front_line=None if overlap.front is None else overlap.line + 1,
+        side=None if overlap.side is None else round(overlap.side, 4),
+        side_asked=overlap.camera.side,
+        side_lines=None if overlap.side is None else (first_line + 1, second_line + 1),
     )
 
 
-def near_miss_entry(one: NearMiss) -> NearMissEntry:
+def near_miss_entry(near_miss: NearMiss) -> NearMissEntry:
     """Return the entry of the trial that came closest to passing."""
-    return NearMissEntry(what=one.what, usable=one.usable, lines=one.lines, headline=one.verdict.headline)
+    return NearMissEntry(
+        what=near_miss.what, usable=near_miss.usable, lines=near_miss.lines, headline=near_miss.verdict.headline
+    )
 
 
-def survey_remedy_entry(one: SurveyRemedy) -> SurveyRemedyEntry:
+def survey_remedy_entry(remedy: SurveyRemedy) -> SurveyRemedyEntry:
     """Return the entry of a remedy."""
     return SurveyRemedyEntry(
-        kind=one.kind,
-        name=one.name,
-        current=round(one.current, 3),
-        value=round(one.value, 3),
-        unit=one.unit,
-        turn_around_m=None if math.isnan(one.turn_around) else round(one.turn_around, 1),
-        lead_in_m=one.lead_in,
-        length_m=round(one.length, 1),
+        kind=remedy.kind,
+        name=remedy.name,
+        current=round(remedy.current, 3),
+        value=round(remedy.value, 3),
+        unit=remedy.unit,
+        turn_around_m=None if math.isnan(remedy.turn_around) else round(remedy.turn_around, 1),
+        lead_in_m=remedy.lead_in,
+        length_m=round(remedy.length, 1),
     )

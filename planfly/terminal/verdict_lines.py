@@ -9,41 +9,44 @@ from logs.verdict.verdict import Verdict
 from planfly.terminal.command_parser import STATE_STYLES, coloured
 
 # Maximum number of failed findings of a rule that are listed after the worst finding.
-_LISTED = 6
+_MAX_LISTED = 6
 # Sources of a limit that are named after the limit; limits from other sources are planfly's own.
 _LIMIT_SOURCES = ("scenario", "near the field", "aircraft", "autopilot", "mission")
 # Width of the column of rules, characters.
-_TITLES = 2 + max(len(rule.title) for rule in RULE_WORDS.values())
+_TITLE_WIDTH = 2 + max(len(rule.title) for rule in RULE_WORDS.values())
 
 
 def verdict_lines(verdict: Verdict, notes: Iterable[str]) -> list[str]:
     """Return the summary, the failures, each rule's finding closest to its limit, and notes, coloured on a terminal."""
-    shown = verdict.present()
-    lines = [coloured(shown.headline, STATE_STYLES[shown.state]), *shown.details]
-    for rule in shown.failed_rules:
+    presentation = verdict.present()
+    lines = [coloured(presentation.headline, STATE_STYLES[presentation.state]), *presentation.details]
+    for rule in presentation.failed_rules:
         lines += _failed_lines(rule)
-    lines += [f"  open    {rule_word(one.rule)} at {one.where}: {one.reason}" for one in shown.undecided[: 2 * _LISTED]]
+    lines += [
+        f"  open    {rule_word(finding.rule)} at {finding.where}: {finding.reason}"
+        for finding in presentation.undecided[: 2 * _MAX_LISTED]
+    ]
     # One flight would decide all findings with the same suggestion.
-    deciding_flights = dict.fromkeys(one.suggestion for one in shown.undecided if one.suggestions)
+    deciding_flights = dict.fromkeys(finding.suggestion for finding in presentation.undecided if finding.suggestions)
     lines += [coloured("          would tell: ", "hint") + text for text in deciding_flights]
-    for rule in shown.rules:
-        count = f"{shown.zones:,} zones; " if rule.words.name == "fence" and shown.zones > 1 else ""
-        lines.append(f"  {rule.words.title:<{_TITLES}}{count}{_rule_summary(rule)}")
+    for rule in presentation.rules:
+        count = f"{presentation.zones:,} zones; " if rule.words.name == "fence" and presentation.zones > 1 else ""
+        lines.append(f"  {rule.words.title:<{_TITLE_WIDTH}}{count}{_rule_summary(rule)}")
     return [*lines, *(f"  note    {note}" for note in notes)]
 
 
 def _failed_lines(rule: RuleFindings) -> list[str]:
     """Describe the worst failed finding of a rule with its suggested change, and list the other places."""
     worst, *others = rule.failed
-    noun = rule.words.word
-    where = f"{noun}, {len(rule.failed)} of {rule.judged}; the worst at" if others else f"{noun} at"
+    rule_name = rule.words.word
+    where = f"{rule_name}, {len(rule.failed)} of {rule.judged}; the worst at" if others else f"{rule_name} at"
     lines = [coloured("  failed  ", "bad") + f"{where} {worst.where}: {worst.reason}"]
     if worst.suggestions:
         lines.append(coloured("          would pass: ", "hint") + worst.suggestion)
     if others:
-        named = "; ".join(map(_place_and_value, others[:_LISTED]))
-        more = f"; {len(others) - _LISTED} more" if len(others) > _LISTED else ""
-        lines.append(f"          also at {named}{more}")
+        other_places = "; ".join(map(_place_and_value, others[:_MAX_LISTED]))
+        more_text = f"; {len(others) - _MAX_LISTED} more" if len(others) > _MAX_LISTED else ""
+        lines.append(f"          also at {other_places}{more_text}")
     return lines
 
 
@@ -62,7 +65,7 @@ def _rule_summary(rule: RuleFindings) -> str:
     value, limit = closest.compared_texts()
     if not value or not limit:
         return rule.count_text
-    how = "furthest beyond its limit" if closest.ok is False else "closest to its limit"
-    where = "" if closest.place.kind == "flight" else f"{how} at {closest.where}: "
+    relation = "furthest beyond its limit" if closest.ok is False else "closest to its limit"
+    where = "" if closest.place.kind == "flight" else f"{relation} at {closest.where}: "
     source = f", {closest.limit_source}" if closest.limit_source in _LIMIT_SOURCES else ""
     return f"{rule.count_text}; {where}{margin.of} {value} (limit {limit}{source})"

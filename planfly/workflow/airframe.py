@@ -45,7 +45,7 @@ class Airframe:
         return self.limits.max_bank
 
 
-def laid_from_the_ground(plan: Plan, airframe: Airframe, flown: Plan | None = None) -> Plan:
+def with_departure_and_approach(plan: Plan, airframe: Airframe, flown: Plan | None = None) -> Plan:
     """Return a plan with the departure and approach that its scenario requires, if any.
 
     flown: the plan being flown, whose departure is kept; None for a new plan.
@@ -57,16 +57,16 @@ def laid_from_the_ground(plan: Plan, airframe: Airframe, flown: Plan | None = No
     >>> path = np.stack([scenario.start, scenario.destination])
     >>> certificate = Certificate(0.1, math.inf, 0.1, 9.0, 10.0, 50.0, ())
     >>> plan = Plan(scenario, path, np.zeros(4), np.zeros(4), certificate, 7, "umda", 60, np.zeros((0, 3)))
-    >>> laid_from_the_ground(plan, load_airframe(scenario)) is plan
+    >>> with_departure_and_approach(plan, load_airframe(scenario)) is plan
     True
     """
     autopilot, cruise = airframe.autopilot, airframe.airspeed
     law = FinalLaw(
-        airspeed=lambda tail, amsl: autopilot.landing_airspeed(cruise, tail, amsl),
-        slope=lambda height, run, tail, amsl: autopilot.landing_glide(height, run, tail, amsl).slope,
+        airspeed=lambda tailwind, amsl: autopilot.landing_airspeed(cruise, tailwind, amsl),
+        slope=lambda height, distance, tailwind, amsl: autopilot.landing_glide(height, distance, tailwind, amsl).slope,
     )
-    climbed = None if flown is None or flown.ways is None else flown.ways.climb
-    return with_ground_ways(plan, airframe.limits.surely(), law, climbed)
+    flown_climb = None if flown is None or flown.ways is None else flown.ways.climb
+    return with_ground_ways(plan, airframe.limits.surely(), law, flown_climb)
 
 
 def choose_seed(scenario: Scenario, seed: int | None) -> int:
@@ -146,11 +146,11 @@ def cruise_airspeed(scenario: Scenario, aircraft: Aircraft, autopilot: Autopilot
 
     Raises ScenarioError for an airspeed that the aircraft cannot fly.
     """
-    stated, parameters = autopilot.stated_airspeed, autopilot.parameters
+    file_airspeed, parameters = autopilot.stated_airspeed, autopilot.parameters
     if (airspeed := scenario.flight.airspeed_mps) is not None:
         file, field = scenario.name, "flight.airspeed_mps"
-    elif stated is not None and parameters is not None:
-        (airspeed, field), file = stated, parameters.source
+    elif file_airspeed is not None and parameters is not None:
+        (airspeed, field), file = file_airspeed, parameters.source
     else:
         airspeed, file, field = aircraft.airspeed, aircraft.name, "airspeed"
     if not aircraft.airspeed_min <= airspeed <= aircraft.airspeed_max:
@@ -161,9 +161,9 @@ def cruise_airspeed(scenario: Scenario, aircraft: Aircraft, autopilot: Autopilot
 
 def tightened_airframe(airframe: Airframe, scenario: Scenario) -> Airframe:
     """Return an airframe with the limits and the maximum bank of a tightened scenario for the same aircraft."""
-    old = airframe.limits
-    limits = make_limits(scenario, old.envelope, old.airspeed, bank_limit(scenario, airframe.autopilot))
-    return replace(airframe, limits=replace(limits, tracking=old.tracking))
+    old_limits = airframe.limits
+    limits = make_limits(scenario, old_limits.envelope, old_limits.airspeed, bank_limit(scenario, airframe.autopilot))
+    return replace(airframe, limits=replace(limits, tracking=old_limits.tracking))
 
 
 def check_level_flight(aircraft: Aircraft, envelope: Envelope) -> None:

@@ -1,4 +1,4 @@
-"""Write a flight log that survives an interruption; the file is complete up to that moment, or is removed."""
+"""Write a flight log that survives an interruption: the file is complete up to that moment, or is removed."""
 
 import contextlib
 import os
@@ -55,8 +55,8 @@ def predicted_seconds(setup: FlightSetup) -> float:
     >>> bool(abs(predicted_seconds(flown.setup) - flown.track.time[-1]) < 5.0)
     True
     """
-    runs = leg_runs(setup.route.waypoints)
-    speed = runs.sum() / (runs / setup.route.airspeed).sum()
+    leg_lengths = leg_runs(setup.route.waypoints)
+    speed = leg_lengths.sum() / (leg_lengths / setup.route.airspeed).sum()
     return float(setup.path.length / speed)
 
 
@@ -70,7 +70,7 @@ def flight_text(setup: FlightSetup) -> str:
 
 
 def flight_kind(setup: FlightSetup) -> str:
-    """Return the kind of a flight, which names its autopilot; flights of one kind take a similar time per kilometre."""
+    """Return the kind of a flight: its autopilot.  Flights of one kind take a similar time per kilometre."""
     return f"flying by {setup.autopilot.name}"
 
 
@@ -108,7 +108,7 @@ class CrashSafeLog:
         self._is_open = False
         self._locks = contextlib.ExitStack()
         # Do not remove a symbolic link, even if its target does not exist.
-        existed = path.exists() or path.is_symlink()
+        file_existed = path.exists() or path.is_symlink()
         try:
             with uninterrupted(), self._errors_with_file_name():
                 path.touch()
@@ -117,9 +117,9 @@ class CrashSafeLog:
                 self._recorder = Recorder(path, setup, every=every, batch=batch)
                 self._is_open = True
         except BaseException as error:
-            # A signal may have come while the log was opened.
+            # A signal may have arrived while the log was opened.
             self.__exit__(type(error), error, None)
-            if not existed and not self._rows:
+            if not file_existed and not self._rows:
                 path.unlink(missing_ok=True)
             raise
 
@@ -128,17 +128,17 @@ class CrashSafeLog:
         return self
 
     def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+        self, error_type: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
     ) -> None:
         """Close the log if it is still open."""
         with self._locks:
             if self._is_open:
                 self._is_open = False
-                self._close_unfinished(kind)
+                self._close_unfinished(error_type)
 
-    def _close_unfinished(self, kind: type[BaseException] | None) -> None:
+    def _close_unfinished(self, error_type: type[BaseException] | None) -> None:
         with uninterrupted():
-            if kind is None or not issubclass(kind, KeyboardInterrupt):
+            if error_type is None or not issubclass(error_type, KeyboardInterrupt):
                 self._recorder.abandon()
             elif self._rows:
                 self._recorder.finish(self.ended)

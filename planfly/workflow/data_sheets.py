@@ -58,14 +58,14 @@ def stated_parameters(file: Path) -> dict[str, float]:
     Raises ParameterError for a file that cannot be read.
     """
     entries = read_parameter_file(file)
-    found = {}
+    values = {}
     for definition in DEFINITIONS.values():
         if definition.name not in _USED_PARAMETERS:
             continue
         value = _stated_value(entries, definition.name, definition.old)
         if value is not None and abs(value - definition.default) > 1e-6 * max(1.0, abs(definition.default)):
-            found[definition.name] = value
-    return found
+            values[definition.name] = value
+    return values
 
 
 def _stated_value(entries: Mapping[str, Entry], name: str, old: tuple[str, float] | None) -> float | None:
@@ -74,7 +74,7 @@ def _stated_value(entries: Mapping[str, Entry], name: str, old: tuple[str, float
     return entries[old[0]].value * old[1] if old is not None and old[0] in entries else None
 
 
-def with_parameters(sheet: DataSheet, stated: Mapping[str, float]) -> DataSheet:
+def with_parameters(sheet: DataSheet, parameters: Mapping[str, float]) -> DataSheet:
     """Fill the gaps of a sheet from parameters; values of the sheet itself stay.
 
     >>> sheet = DataSheet(2.1, 1.6, 0.0, 0.0)
@@ -82,18 +82,18 @@ def with_parameters(sheet: DataSheet, stated: Mapping[str, float]) -> DataSheet:
     >>> filled.cruise, filled.stall, round(math.degrees(filled.climb), 2)
     (15.0, 10.0, 11.54)
     """
-    made = replace(
+    filled = replace(
         sheet,
-        cruise=sheet.cruise or stated.get("AIRSPEED_CRUISE", 0.0),
-        stall=sheet.stall or stated.get("AIRSPEED_MIN", 0.0) / _MIN_AIRSPEED_STALL_RATIO,
-        bank=sheet.bank or math.radians(stated.get("ROLL_LIMIT_DEG", 0.0)),
-        trim_throttle=sheet.trim_throttle or 0.01 * stated.get("TRIM_THROTTLE", 0.0),
-        sink=sheet.sink or stated.get("TECS_SINK_MIN", 0.0),
+        cruise=sheet.cruise or parameters.get("AIRSPEED_CRUISE", 0.0),
+        stall=sheet.stall or parameters.get("AIRSPEED_MIN", 0.0) / _MIN_AIRSPEED_STALL_RATIO,
+        bank=sheet.bank or math.radians(parameters.get("ROLL_LIMIT_DEG", 0.0)),
+        trim_throttle=sheet.trim_throttle or 0.01 * parameters.get("TRIM_THROTTLE", 0.0),
+        sink=sheet.sink or parameters.get("TECS_SINK_MIN", 0.0),
     )
-    climb = stated.get("TECS_CLMB_MAX", 0.0)
-    if not made.climb and climb and made.cruise > climb:
-        made = replace(made, climb=math.asin(climb / made.cruise))
-    return made
+    climb = parameters.get("TECS_CLMB_MAX", 0.0)
+    if not filled.climb and climb and filled.cruise > climb:
+        filled = replace(filled, climb=math.asin(climb / filled.cruise))
+    return filled
 
 
 # ----------------------------------------------------------------------
@@ -128,34 +128,34 @@ def parse_sheet(
     for name, value in numbers.items():
         if value is None:
             continue
-        _, unit, low, high, factor = RANGES[name]
-        if isinstance(value, bool) or not isinstance(value, int | float) or not low <= value <= high:
-            allowed = f"allowed {low:g}..{high:g} {unit}"
+        _, unit, min_value, max_value, factor = RANGES[name]
+        if isinstance(value, bool) or not isinstance(value, int | float) or not min_value <= value <= max_value:
+            allowed = f"allowed {min_value:g}..{max_value:g} {unit}"
             raise FlightError.of_argument(name, value, allowed, shown=f"{value} {unit}")
         values[name] = value * factor
     volts, energy = _parse_battery(battery) if battery is not None else (0.0, 0.0)
     propeller = _parse_propeller(prop) if prop is not None else (0.0, 0.0)
-    kinds: dict[str, Layout] = {"tail": "tail", "wing": "wing", "vtail": "vtail"}
-    if layout is not None and layout not in kinds:
-        raise FlightError.of_argument("layout", layout, f"{', '.join(kinds)} is expected")
-    known = {"mass": 0.0, "span": 0.0, "cruise": 0.0, "stall": 0.0} | values
-    return DataSheet(**known, volts=volts, energy=energy, propeller=propeller, layout=kinds[layout or "tail"])
+    layouts: dict[str, Layout] = {"tail": "tail", "wing": "wing", "vtail": "vtail"}
+    if layout is not None and layout not in layouts:
+        raise FlightError.of_argument("layout", layout, f"{', '.join(layouts)} is expected")
+    sheet_values = {"mass": 0.0, "span": 0.0, "cruise": 0.0, "stall": 0.0} | values
+    return DataSheet(**sheet_values, volts=volts, energy=energy, propeller=propeller, layout=layouts[layout or "tail"])
 
 
 def _parse_battery(text: str) -> tuple[float, float]:
     match = _BATTERY_PATTERN.fullmatch(text.strip())
-    volts, amount = (_parse_number(match[k]) for k in (1, 2)) if match else (math.nan, math.nan)
+    volts, capacity = (_parse_number(match[k]) for k in (1, 2)) if match else (math.nan, math.nan)
     unit = match[3].lower() if match else ""
-    hours = amount if unit == "wh" else volts * amount * (0.001 if unit == "mah" else 1.0)
+    watt_hours = capacity if unit == "wh" else volts * capacity * (0.001 if unit == "mah" else 1.0)
     if not (
-        _VOLTAGE_RANGE_V[0] <= volts <= _VOLTAGE_RANGE_V[1] and _ENERGY_RANGE_WH[0] <= hours <= _ENERGY_RANGE_WH[1]
+        _VOLTAGE_RANGE_V[0] <= volts <= _VOLTAGE_RANGE_V[1] and _ENERGY_RANGE_WH[0] <= watt_hours <= _ENERGY_RANGE_WH[1]
     ):
         allowed = (
             f"volts and capacity are expected, such as 14.8V,5Ah: {_VOLTAGE_RANGE_V[0]:g}..{_VOLTAGE_RANGE_V[1]:g} V,"
             f" {_ENERGY_RANGE_WH[0]:g}..{_ENERGY_RANGE_WH[1]:g} Wh"
         )
         raise FlightError.of_argument("battery", text, allowed)
-    return volts, 3600.0 * hours
+    return volts, 3600.0 * watt_hours
 
 
 def _parse_propeller(text: str) -> tuple[float, float]:
@@ -180,7 +180,7 @@ def _parse_number(text: str) -> float:
 # ----------------------------------------------------------------------
 # Estimate the standard deviations of the model's factors.
 
-# Standard deviation of each guessed factor, as a fraction, and what the guess is based on.
+# Standard deviation of each guessed factor, as a fraction, and the basis of the guess.
 _SPREADS = {
     "zero-lift-drag": (0.25, "least drag from published aircraft of the class"),
     "induced-drag": (0.20, "span efficiency from published aircraft of the class"),
@@ -206,73 +206,77 @@ STATED_DRAG = 0.15
 _PROPULSION = ("thrust", "motor-speed")
 
 
-def _uncertainty(made: SizedAircraft, aircraft: Aircraft, flown: "Performance", climb: float) -> Uncertainty:
-    """Return standard deviations of the factors that give the steepest climb at least the deviation `climb`.
+def _uncertainty(sized: SizedAircraft, aircraft: Aircraft, performance: "Performance", climb_sd: float) -> Uncertainty:
+    """Return standard deviations of the factors; the steepest climb has at least the deviation `climb_sd`.
 
-    flown: performance of the estimated aircraft.
-    climb: standard deviation of the steepest climb angle, rad.
+    performance: performance of the estimated aircraft.
+    climb_sd: standard deviation of the steepest climb angle, rad.
     """
-    middle = np.array([flown.climb.climb, flown.idle.climb, flown.fastest.airspeed])
+    estimated = np.array([performance.climb.climb, performance.idle.climb, performance.fastest.airspeed])
     spreads = {name: sd for name, (sd, _) in _SPREADS.items()}
-    if made.sheet.sink:
+    if sized.sheet.sink:
         spreads["zero-lift-drag"] = STATED_DRAG
-    moved = {name: _effect_of_factor(aircraft, middle, name, spreads[name]) for name in spreads}
-    driven = math.hypot(*(moved[name][0] for name in _PROPULSION))
-    other = math.hypot(*(change for name, (change, *_) in moved.items() if name not in _PROPULSION))
-    wanted = math.sqrt(max((0.3 * climb) ** 2, climb**2 - other**2))
-    share = min(2.0, max(0.1, wanted / driven if driven > 0.0 else 1.0))
-    spreads |= {name: share * spreads[name] for name in _PROPULSION}
-    descent = math.hypot(*(change for _, change, _ in moved.values()))
-    faster = math.hypot(*(change * (share if name in _PROPULSION else 1.0) for name, (*_, change) in moved.items()))
+    effects = {name: _effect_of_factor(aircraft, estimated, name, spreads[name]) for name in spreads}
+    propulsion_climb = math.hypot(*(effects[name][0] for name in _PROPULSION))
+    other_climb = math.hypot(*(change for name, (change, *_) in effects.items() if name not in _PROPULSION))
+    propulsion_climb_target = math.sqrt(max((0.3 * climb_sd) ** 2, climb_sd**2 - other_climb**2))
+    scale = min(2.0, max(0.1, propulsion_climb_target / propulsion_climb if propulsion_climb > 0.0 else 1.0))
+    spreads |= {name: scale * spreads[name] for name in _PROPULSION}
+    descent_sd = math.hypot(*(change for _, change, _ in effects.values()))
+    top_speed_sd = math.hypot(
+        *(change * (scale if name in _PROPULSION else 1.0) for name, (*_, change) in effects.items())
+    )
     # The sheet states that the aircraft flies level at cruise speed; this limits the deviation of the top speed.
-    faster = min(faster, max(0.0, flown.fastest.airspeed - aircraft.airspeed) / UNDECIDED)
+    top_speed_sd = min(top_speed_sd, max(0.0, performance.fastest.airspeed - aircraft.airspeed) / UNDECIDED)
     quantities = tuple(
         UncertainQuantity(f"ident/{name}", "factor", 1.0, sd, _SPREADS[name][1]) for name, sd in spreads.items()
     )
     # The factors of motor and propeller are limited, but the deviation of the climb must not shrink with them.
-    deviation = max(climb, math.hypot(other, share * driven))
-    guessed = "energy" in made.guessed
-    return Uncertainty("a data sheet", deviation, descent, quantities, POWER_SD, guessed, faster)
+    total_climb_sd = max(climb_sd, math.hypot(other_climb, scale * propulsion_climb))
+    guessed = "energy" in sized.guessed
+    return Uncertainty("a data sheet", total_climb_sd, descent_sd, quantities, POWER_SD, guessed, top_speed_sd)
 
 
-def _effect_of_factor(aircraft: Aircraft, middle: Floats, name: str, sd: float) -> tuple[float, float, float]:
-    """Return how one standard deviation of a factor changes climb and descent, rad, and top speed, m/s.
+def _effect_of_factor(aircraft: Aircraft, estimated: Floats, name: str, sd: float) -> tuple[float, float, float]:
+    """Return the effect of one standard deviation of a factor on climb and descent, rad, and top speed, m/s.
 
     Climb and descent are the steepest path angles at cruise speed.
-    middle: climb angle, descent angle and maximum level airspeed of the estimated aircraft, (3,).
+    estimated: climb angle, descent angle and maximum level airspeed of the estimated aircraft, (3,).
     """
-    found = []
+    varied_values = []
     for sign in (1.0, -1.0):
         fdm = Fdm(aircraft, tried=True, variation=Variation(properties=((f"ident/{name}", 1.0 + sign * sd),)))
         angles = [steepest(fdm, aircraft.airspeed, AMSL) for steepest in (full_throttle, idle)]
-        top = fastest(fdm, AMSL)
-        found.append(
+        fastest_trim = fastest(fdm, AMSL)
+        varied_values.append(
             [
                 *(math.nan if trim is None else trim.climb for trim in angles),
-                math.nan if top is None else top.airspeed,
+                math.nan if fastest_trim is None else fastest_trim.airspeed,
             ]
         )
-    climb, descent, faster = change_of(np.array(found[0]), np.array(found[1]), middle).tolist()
-    return climb, descent, faster
+    climb, descent, top_speed = factor_effect(
+        np.array(varied_values[0]), np.array(varied_values[1]), estimated
+    ).tolist()
+    return climb, descent, top_speed
 
 
-def change_of(more: Floats, less: Floats, middle: Floats) -> Floats:
-    """Return how a factor changes path angles and speeds, (n,).
+def factor_effect(increased: Floats, decreased: Floats, estimated: Floats) -> Floats:
+    """Return the effect of a factor on path angles and speeds, (n,).
 
     A value is NaN if the aircraft cannot be trimmed.  Then the change to the other value applies; if both are NaN, the
     estimated value itself applies.
 
-    more, less: values with the factor increased and decreased, (n,).
-    middle: estimated values, (n,).
+    increased, decreased: values with the factor increased and decreased, (n,).
+    estimated: estimated values, (n,).
 
     >>> more, less = np.array([0.3, math.nan, math.nan]), np.array([0.1, 0.05, math.nan])
-    >>> change_of(more, less, np.array([0.2, 0.2, -0.2])).round(2).tolist()
+    >>> factor_effect(more, less, np.array([0.2, 0.2, -0.2])).round(2).tolist()
     [0.1, 0.15, 0.2]
     """
-    one_sided = np.fmax(np.abs(more - middle), np.abs(less - middle))
-    one_sided = np.where(np.isnan(one_sided), np.abs(middle), one_sided)
-    both: Floats = 0.5 * np.abs(more - less)
-    return np.where(np.isnan(both), one_sided, both)
+    one_sided_change = np.fmax(np.abs(increased - estimated), np.abs(decreased - estimated))
+    one_sided_change = np.where(np.isnan(one_sided_change), np.abs(estimated), one_sided_change)
+    two_sided_change: Floats = 0.5 * np.abs(increased - decreased)
+    return np.where(np.isnan(two_sided_change), one_sided_change, two_sided_change)
 
 
 # ----------------------------------------------------------------------
@@ -301,71 +305,75 @@ def make_data_sheet_folder(
     folder: Path,
     sheet: DataSheet,
     parameters: Path | None = None,
-    made: SizedAircraft | None = None,
+    sized: SizedAircraft | None = None,
     *,
     overwrite: bool = False,
 ) -> Aircraft:
     """Make the folder of an aircraft from its data sheet, completely or not at all.
 
     parameters: file of ArduPlane parameters, which fill the gaps of the sheet.
-    made: sized aircraft, for a class other than the default class of the layout.
+    sized: sized aircraft, for a class other than the default class of the layout.
     overwrite: True replaces the folder of an aircraft.
-    Raises FlightError, in one line with the allowed range, for a sheet of no small aircraft, a folder that exists, and
-    an aircraft that cannot be made to fly; ParameterError for a file that cannot be read; OSError.
+    Raises FlightError, in one line with the allowed range, for a sheet outside the range of small aircraft, a folder
+    that exists, and an aircraft that cannot be made to fly; ParameterError for a file that cannot be read; OSError.
     """
     target = check_new_folder(folder, overwrite=overwrite)
-    stated = {} if parameters is None else stated_parameters(parameters)
-    if made is None:
-        sheet = with_parameters(sheet, stated)
-        _require_numbers(sheet)
-        made = size_aircraft(check_sheet(sheet))
-    with temporary_folder("planfly-sheet-") as place:
-        files = _make_files(made, target.name, place, stated)
+    file_parameters = {} if parameters is None else stated_parameters(parameters)
+    if sized is None:
+        sheet = with_parameters(sheet, file_parameters)
+        _check_required_numbers(sheet)
+        sized = size_aircraft(check_sheet(sheet))
+    with temporary_folder("planfly-sheet-") as draft_folder:
+        files = _make_files(sized, target.name, draft_folder, file_parameters)
     write_own_folder(target, {name: text.encode() for name, text in files.items()})
     return read_aircraft(target)
 
 
-def _require_numbers(sheet: DataSheet) -> None:
+def _check_required_numbers(sheet: DataSheet) -> None:
     for name in ("mass", "span", "cruise", "stall"):
         if not getattr(sheet, name):
-            low, high, unit = RANGES[name][2], RANGES[name][3], RANGES[name][1]
-            allowed = f"a data sheet needs it: {low:g}..{high:g} {unit}"
+            min_value, max_value, unit = RANGES[name][2], RANGES[name][3], RANGES[name][1]
+            allowed = f"a data sheet needs it: {min_value:g}..{max_value:g} {unit}"
             raise FlightError.of_argument(name, None, allowed, shown="")
 
 
-def _make_files(made: SizedAircraft, name: str, place: Path, stated: Mapping[str, float]) -> dict[str, str]:
+def _make_files(
+    sized: SizedAircraft, name: str, draft_folder: Path, file_parameters: Mapping[str, float]
+) -> dict[str, str]:
     """Return the text of each file of the folder, by file name.
 
-    place: temporary folder for a draft of the aircraft, which trims and gains are computed from.
+    draft_folder: temporary folder for a draft of the aircraft, which trims and gains are computed from.
     """
-    draft = place / name
-    draft.mkdir()
-    model = model_xml(name, made.numbers)
-    (draft / f"{name}.xml").write_text(model, encoding="utf-8")
-    sheet = made.sheet
-    (draft / f"{name}.toml").write_text(_metadata_text(made, sheet.stall, sheet.stall, sheet.top), encoding="utf-8")
-    aircraft = read_aircraft(draft)
-    flown = performance_of(Fdm(aircraft, tried=True), aircraft)
+    folder = draft_folder / name
+    folder.mkdir()
+    model = model_xml(name, sized.numbers)
+    (folder / f"{name}.xml").write_text(model, encoding="utf-8")
+    sheet = sized.sheet
+    (folder / f"{name}.toml").write_text(_metadata_text(sized, sheet.stall, sheet.stall, sheet.top), encoding="utf-8")
+    aircraft = read_aircraft(folder)
+    performance = performance_of(Fdm(aircraft, tried=True), aircraft)
     # At the stall the propeller carries part of the weight.  If the model could fly slower, the sheet's stall speed
     # applies.
-    slow = max(sheet.stall, math.ceil(10.0 * flown.slowest.airspeed * math.sqrt(SHEET_DENSITY / SEA_LEVEL)) / 10.0)
-    least = min(max(slow, MIN_SPEED * slow), sheet.cruise)
-    most = max(sheet.cruise, MAX_SPEED * flown.fastest.airspeed)
-    metadata = _metadata_text(made, slow, round(least, 1), math.floor(10.0 * most) / 10.0)
-    (draft / f"{name}.toml").write_text(metadata, encoding="utf-8")
-    aircraft = read_aircraft(draft)
+    stall_speed = max(
+        sheet.stall, math.ceil(10.0 * performance.slowest.airspeed * math.sqrt(SHEET_DENSITY / SEA_LEVEL)) / 10.0
+    )
+    min_airspeed = min(max(stall_speed, MIN_SPEED * stall_speed), sheet.cruise)
+    max_airspeed = max(sheet.cruise, MAX_SPEED * performance.fastest.airspeed)
+    metadata = _metadata_text(sized, stall_speed, round(min_airspeed, 1), math.floor(10.0 * max_airspeed) / 10.0)
+    (folder / f"{name}.toml").write_text(metadata, encoding="utf-8")
+    aircraft = read_aircraft(folder)
     fdm = Fdm(aircraft, tried=True)
-    guessed = "climb" in made.guessed
-    known = _uncertainty(made, aircraft, flown, GUESSED_CLIMB if guessed else STATED_CLIMB)
+    climb_is_guessed = "climb" in sized.guessed
+    uncertainty = _uncertainty(sized, aircraft, performance, GUESSED_CLIMB if climb_is_guessed else STATED_CLIMB)
     return {
         f"{name}.xml": model,
         f"{name}.toml": metadata,
         "gains.toml": gains_text(gains_of_model(aircraft, fdm)),
-        "ardupilot.parm": arduplane_parameters(aircraft, flown, fdm, stated),
-        "ardupilot.toml": servo_text(aircraft, flown),
-        "uncertainty.toml": uncertainty_text(known),
-        DRAWS_FILE: draws_text(draw_quantities(known.quantities)),
-        "README.md": _readme_text(name, made, flown, known, stated),
+        "ardupilot.parm": arduplane_parameters(aircraft, performance, fdm, file_parameters),
+        "ardupilot.toml": servo_text(aircraft, performance),
+        "uncertainty.toml": uncertainty_text(uncertainty),
+        DRAWS_FILE: draws_text(draw_quantities(uncertainty.quantities)),
+        "README.md": _readme_text(name, sized, performance, uncertainty, file_parameters),
     }
 
 
@@ -375,22 +383,22 @@ def performance_of(fdm: Simulator, aircraft: Aircraft) -> Performance:
     level = straight(fdm, cruise, AMSL)
     if level is None:
         raise FlightError.of_argument("cruise", cruise, "no level flight there", shown=f"{cruise:g} m/s")
-    found = {
+    trims = {
         "climb": full_throttle(fdm, cruise, AMSL, level),
         "idle": idle(fdm, cruise, AMSL, level),
         "slowest": slowest(fdm, AMSL, level),
         "fastest": fastest(fdm, AMSL, level),
     }
-    for name, trim in found.items():
+    for name, trim in trims.items():
         if trim is None:
             argument = {"climb": "climb", "idle": "cruise", "slowest": "stall", "fastest": "top"}[name]
             allowed = f"the model holds no such flight ({name}); numbers nearer to those of other aircraft are expected"
             raise FlightError.of_argument(argument, None, allowed, shown="")
-    return Performance(level, **{name: trim for name, trim in found.items() if trim is not None})
+    return Performance(level, **{name: trim for name, trim in trims.items() if trim is not None})
 
 
-def _metadata_text(made: SizedAircraft, stall: float, least: float, most: float) -> str:
-    numbers, sheet = made.numbers, made.sheet
+def _metadata_text(sized: SizedAircraft, stall: float, min_airspeed: float, max_airspeed: float) -> str:
+    numbers, sheet = sized.numbers, sized.sheet
     elevator, aileron, rudder = (math.degrees(value) for value in numbers.throw)
     energy = (
         f"fuel_kg = {sheet.fuel:.6g}\nfuel_mj_per_kg = {FUEL_HEAT / 1e6:g}"
@@ -406,8 +414,8 @@ wing_area_m2 = {numbers.area:.6g}
 wing_span_m = {numbers.span:.6g}
 
 airspeed_mps = {sheet.cruise:.6g}
-airspeed_min_mps = {least:.6g}
-airspeed_max_mps = {most:.6g}
+airspeed_min_mps = {min_airspeed:.6g}
+airspeed_max_mps = {max_airspeed:.6g}
 stall_speed_mps = {stall:.6g}
 
 max_bank_deg = {math.degrees(sheet.bank):.6g}
@@ -428,16 +436,18 @@ motor_lag_s = {numbers.lag[1]:.6g}
 # Write ArduPlane parameters and servos.
 
 
-def arduplane_parameters(aircraft: Aircraft, flown: Performance, fdm: Fdm, stated: Mapping[str, float]) -> str:
-    """Return the text of ``ardupilot.parm``; the values of `stated` replace computed values."""
-    a, b = linearise(fdm, flown.level)
+def arduplane_parameters(
+    aircraft: Aircraft, performance: Performance, fdm: Fdm, file_parameters: Mapping[str, float]
+) -> str:
+    """Return the text of ``ardupilot.parm``; the values of `file_parameters` replace computed values."""
+    a, b = linearise(fdm, performance.level)
     cruise, bank = aircraft.airspeed, aircraft.max_bank
     p, q, elevator, aileron = 3, 4, 0, 1
     # Feed-forward of a rate: 45 degrees divided by the rate that full deflection gives.
     roll_rate = abs(b[p, aileron] / a[p, p]) * aircraft.max_aileron
     pitch_rate = abs(b[q, elevator] / a[q, q]) * aircraft.max_elevator
-    roll, pitch = (min(3.0, max(0.05, math.radians(45.0) / rate)) for rate in (roll_rate, pitch_rate))
-    climb, sink = cruise * math.sin(flown.climb.climb), -cruise * math.sin(flown.idle.climb)
+    roll_gain, pitch_gain = (min(3.0, max(0.05, math.radians(45.0) / rate)) for rate in (roll_rate, pitch_rate))
+    climb, sink = cruise * math.sin(performance.climb.climb), -cruise * math.sin(performance.idle.climb)
     radius = turn_radius(cruise, bank)
     values = {
         "AIRSPEED_CRUISE": round(cruise, 1),
@@ -447,39 +457,39 @@ def arduplane_parameters(aircraft: Aircraft, flown: Performance, fdm: Fdm, state
         "ROLL_LIMIT_DEG": round(math.degrees(bank)),
         "PTCH_LIM_MAX_DEG": round(_MAX_PITCH_DEG),
         "PTCH_LIM_MIN_DEG": -20,
-        "PTCH_TRIM_DEG": round(math.degrees(flown.level.alpha), 1),
+        "PTCH_TRIM_DEG": round(math.degrees(performance.level.alpha), 1),
         "WP_RADIUS": max(15, 5 * round(0.8 * radius / 5.0)),
         "WP_LOITER_RAD": max(40, 5 * round(1.3 * radius / 5.0)),
-        "TRIM_THROTTLE": round(100.0 * flown.level.throttle),
-        "THR_MIN": math.floor(100.0 * idle_throttle(aircraft, fdm, flown.level)),
+        "TRIM_THROTTLE": round(100.0 * performance.level.throttle),
+        "THR_MIN": math.floor(100.0 * idle_throttle(aircraft, fdm, performance.level)),
         "THR_MAX": 100,
         "TECS_CLMB_MAX": round(max(0.5, 0.95 * climb), 1),
         "TECS_SINK_MIN": round(max(0.3, sink), 1),
         "TECS_SINK_MAX": round(max(1.0, 1.5 * sink), 1),
-        "RLL_RATE_FF": round(roll, 3),
-        "RLL_RATE_P": round(0.4 * roll, 3),
-        "RLL_RATE_I": round(0.8 * roll, 3),
+        "RLL_RATE_FF": round(roll_gain, 3),
+        "RLL_RATE_P": round(0.4 * roll_gain, 3),
+        "RLL_RATE_I": round(0.8 * roll_gain, 3),
         "RLL_RATE_D": 0,
-        "PTCH_RATE_FF": round(pitch, 3),
-        "PTCH_RATE_P": round(0.15 * pitch, 3),
-        "PTCH_RATE_I": round(0.4 * pitch, 3),
+        "PTCH_RATE_FF": round(pitch_gain, 3),
+        "PTCH_RATE_P": round(0.15 * pitch_gain, 3),
+        "PTCH_RATE_I": round(0.4 * pitch_gain, 3),
         "PTCH_RATE_D": 0,
     }
-    kept = {name: value for name, value in stated.items() if name in values}
+    replacing = {name: value for name, value in file_parameters.items() if name in values}
     lines = [
         "# ArduPlane's parameters for this aircraft, where they differ from ArduPlane's own defaults.",
         "# Speeds are equivalent airspeeds, m/s; angles in degrees.  A file given with --params comes on top.",
-        *(f"{name} {value:g}" for name, value in (values | kept).items()),
+        *(f"{name} {value:g}" for name, value in (values | replacing).items()),
     ]
     return "\n".join(lines) + "\n"
 
 
-def servo_text(aircraft: Aircraft, flown: Performance) -> str:
+def servo_text(aircraft: Aircraft, performance: Performance) -> str:
     """Return the text of ``ardupilot.toml``, the servo outputs of unmixed controls; the model contains the mixer."""
     elevator, aileron, rudder = (
         math.degrees(value) for value in (aircraft.max_elevator, aircraft.max_aileron, aircraft.max_rudder)
     )
-    middle = math.degrees(flown.level.elevator)
+    elevator_trim = math.degrees(performance.level.elevator)
     return f"""# The servo outputs of an ArduPlane that flies this aircraft, and the control at these pulses.
 # Positive is a trailing edge down (elevator), a roll to the right (ailerons), a yaw to the left (rudder).  Elevons and
 # V-tails are mixed within the model: ArduPlane gives it elevator, aileron and rudder.
@@ -493,7 +503,7 @@ value_deg = [{-aileron:.1f}, 0.0, {aileron:.1f}]
 [elevator]
 output = 2
 pulse_us = [1100, 1500, 1900]
-value_deg = [{middle + elevator:.1f}, {middle:.1f}, {middle - elevator:.1f}]
+value_deg = [{elevator_trim + elevator:.1f}, {elevator_trim:.1f}, {elevator_trim - elevator:.1f}]
 
 [throttle]
 output = 3
@@ -527,15 +537,19 @@ _README_ROWS = (
 
 
 def _readme_text(
-    name: str, made: SizedAircraft, flown: Performance, known: Uncertainty, stated: Mapping[str, float]
+    name: str,
+    sized: SizedAircraft,
+    performance: Performance,
+    uncertainty: Uncertainty,
+    file_parameters: Mapping[str, float],
 ) -> str:
-    sheet = made.sheet
+    sheet = sized.sheet
     drive = "burns fuel; its mass stays the same" if sheet.fuelled else "is electric"
-    climb, sink = math.degrees(flown.climb.climb), -math.degrees(flown.idle.climb)
+    climb, sink = math.degrees(performance.climb.climb), -math.degrees(performance.idle.climb)
     lines = [
         f"# {name}",
         "",
-        f"{made.numbers.title}, made by `planfly aircraft --new` from a data sheet. It {drive}.",
+        f"{sized.numbers.title}, made by `planfly aircraft --new` from a data sheet. It {drive}.",
         "What the sheet does not say was taken from published aircraft of its class, which `aircraft/data_sheet.py` of",
         "planfly names. Where a slope comes near to what the model can do, no verdict of it is to be had.",
         "",
@@ -544,27 +558,31 @@ def _readme_text(
     ]
     for field, title, unit, factor in _README_ROWS:
         if value := factor * getattr(sheet, field):
-            lines.append(f"| {title} | {value:.4g} {unit} | {'guessed' if field in made.guessed else 'stated'} |")
-    if stated:
-        lines += ["", f"Of the parameter file: {', '.join(f'{key} {value:g}' for key, value in stated.items())}."]
+            lines.append(f"| {title} | {value:.4g} {unit} | {'guessed' if field in sized.guessed else 'stated'} |")
+    if file_parameters:
+        lines += [
+            "",
+            f"Of the parameter file: {', '.join(f'{key} {value:g}' for key, value in file_parameters.items())}.",
+        ]
     lines += [
         "",
         f"The model weighs {sheet.mass * GRAVITY:.1f} N, flies level at {sheet.cruise:g} m/s with"
-        f" {100.0 * flown.level.throttle:.0f} % throttle, climbs {climb:.1f} degrees at",
+        f" {100.0 * performance.level.throttle:.0f} % throttle, climbs {climb:.1f} degrees at",
         f"full throttle and sinks {sink:.1f} degrees without (at {AMSL:g} m). Its elevator comes to its stop at"
-        f" {flown.slowest.airspeed:.1f} m/s.",
+        f" {performance.slowest.airspeed:.1f} m/s.",
         "",
         "## What is not known",
         "",
-        f"Standard deviations; the steepest climb's is {math.degrees(known.climb):.1f} degrees, the steepest descent's"
-        f" {math.degrees(known.descent):.1f} degrees, the fastest level flight's {known.fastest:.1f} m/s.",
+        f"Standard deviations; the steepest climb's is {math.degrees(uncertainty.climb):.1f} degrees, the steepest"
+        f" descent's {math.degrees(uncertainty.descent):.1f} degrees, the fastest level flight's"
+        f" {uncertainty.fastest:.1f} m/s.",
         "",
         "| property of the model | factor on | deviation | because |",
         "|---|---|---|---|",
     ]
-    for one in known.quantities:
-        what = FACTORS[one.name.removeprefix("ident/")]
-        lines.append(f"| `{one.name}` | {what} | {100.0 * one.sd:.0f} % | {one.reason} |")
+    for quantity in uncertainty.quantities:
+        factor_text = FACTORS[quantity.name.removeprefix("ident/")]
+        lines.append(f"| `{quantity.name}` | {factor_text} | {100.0 * quantity.sd:.0f} % | {quantity.reason} |")
     lines += [
         "",
         f"`{DRAWS_FILE}` has {DRAWS} aircraft drawn from them; campaigns fly one a flight.",

@@ -26,22 +26,27 @@ def with_file_autopilot(scenario: Scenario, mission: Mission | None = None) -> S
     steering = table.steering.autopilot
     if steering == OWN_GUIDANCE:
         return scenario
-    stated = "" if mission is None else mission.autopilot
-    named = table.autopilot is not None and table.autopilot_from is None
-    if not named and table.params is not None and table.autopilot is None:
+    mission_autopilot = "" if mission is None else mission.autopilot
+    is_named_by_user = table.autopilot is not None and table.autopilot_from is None
+    if not is_named_by_user and table.params is not None and table.autopilot is None:
         scenario = _with_parameter_file_autopilot(scenario, table.params)
         table = scenario.flight
-    if mission is None or not stated:
+    if mission is None or not mission_autopilot:
         return scenario
     if table.autopilot is None:
-        return _set_autopilot(scenario, stated, mission.source)
-    if stated != table.autopilot and table.autopilot in TITLES:
+        return _set_autopilot(scenario, mission_autopilot, mission.source)
+    if mission_autopilot != table.autopilot and table.autopilot in TITLES:
         if table.autopilot_from is None:
-            raise MissionError.from_error(other_autopilot(mission.source, stated, _FIRMWARE[stated], table.autopilot))
-        other = f"{table.autopilot_from} for {TITLES[table.autopilot]}"
+            raise MissionError.from_error(
+                other_autopilot(mission.source, mission_autopilot, _FIRMWARE[mission_autopilot], table.autopilot)
+            )
+        other_file = f"{table.autopilot_from} for {TITLES[table.autopilot]}"
         allowed = "files of one autopilot are expected"
-        message = f"{mission.source}: written for {TITLES[stated]} ({_FIRMWARE[stated]}), and {other}: {allowed}"
-        raise MissionError(message, file=mission.source, field="autopilot", value=stated, allowed=allowed)
+        message = (
+            f"{mission.source}: written for {TITLES[mission_autopilot]} ({_FIRMWARE[mission_autopilot]}),"
+            f" and {other_file}: {allowed}"
+        )
+        raise MissionError(message, file=mission.source, field="autopilot", value=mission_autopilot, allowed=allowed)
     return scenario
 
 
@@ -50,17 +55,17 @@ _FIRMWARE = {ARDUPILOT: "firmwareType 3", PX4: "firmwareType 12"}
 
 
 def _with_parameter_file_autopilot(scenario: Scenario, params: str) -> Scenario:
-    found = read_origin(Path(params))
-    if found.mixed:
+    origin = read_origin(Path(params))
+    if origin.mixed:
         allowed = "--autopilot names the autopilot that is to fly"
-        message = f"{params}: {found.evidence}: {allowed}"
-        raise ParameterError(message, file=params, field="autopilot", value=found.evidence, allowed=allowed)
-    return _set_autopilot(scenario, found.autopilot, params) if found.autopilot else scenario
+        message = f"{params}: {origin.evidence}: {allowed}"
+        raise ParameterError(message, file=params, field="autopilot", value=origin.evidence, allowed=allowed)
+    return _set_autopilot(scenario, origin.autopilot, params) if origin.autopilot else scenario
 
 
 def _set_autopilot(scenario: Scenario, autopilot: str, file: str) -> Scenario:
-    """Return the scenario with an autopilot taken from `file`; the autopilot is stated even if it is the default."""
+    """Return the scenario with an autopilot taken from `file`, which is stated even if it is the default."""
     params = scenario.flight.params
-    made = with_flight(scenario, autopilot=autopilot, params=params)
-    table = made.flight.model_copy(update={"autopilot_from": file})
-    return replace(made, spec=made.spec.model_copy(update={"flight": table}), flight=table)
+    changed = with_flight(scenario, autopilot=autopilot, params=params)
+    table = changed.flight.model_copy(update={"autopilot_from": file})
+    return replace(changed, spec=changed.spec.model_copy(update={"flight": table}), flight=table)

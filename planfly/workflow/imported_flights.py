@@ -42,7 +42,7 @@ from world.scenario import Scenario, load_scenario, with_flight, with_wind
 from world.scenario_tables import FlightTable
 
 # Size of the blocks in which a file is hashed, bytes.
-_BLOCK = 2**20
+_BLOCK_BYTES = 2**20
 # Minimum number of items of a mission.
 _MIN_ITEMS = 2
 
@@ -84,19 +84,19 @@ def import_flight(path: Path, options: LogOptions) -> ImportedFlight:
     """
     plan, fences = options.get("plan"), read_named_fences(options.get("fence") or ())
     flight = make_flight(open_log(path), options.get("flight"))
-    mission, origin_of_mission, planned_in = _planned_mission(path, flight, options)
+    mission, mission_origin, planned_in = _planned_mission(path, flight, options)
     mission = fences.on_mission(mission)
-    plan_heights = plan is not None or flight.mission is None or flight.mission.with_heights
-    if not plan_heights:
+    has_plan_heights = plan is not None or flight.mission is None or flight.mission.with_heights
+    if not has_plan_heights:
         mission = with_flown_heights(mission, flight.lat, flight.lon, flight.up)
-    _refuse_other_autopilot(path, mission, flight.raw.program)
+    _check_plan_autopilot(path, mission, flight.raw.program)
     scenario, placed = _scenario_and_placed_mission(mission, options, planned_in)
     scenario, wind_source = _with_wind_of_log(fences.on_scenario(apply_options(scenario, options)), flight, options)
-    named = (options.get("aircraft"), options.get("scenario"), planned_in)
-    known = any(one is not None for one in named)
-    logged = autopilot_of_log(flight.raw.program, flight.raw.parameters, flight.raw.source)
+    aircraft_options = (options.get("aircraft"), options.get("scenario"), planned_in)
+    aircraft_known = any(option is not None for option in aircraft_options)
+    logged_autopilot = autopilot_of_log(flight.raw.program, flight.raw.parameters, flight.raw.source)
     # A flight by an unknown autopilot is judged with planfly's guidance, which shows what the aircraft can fly.
-    autopilot, refused = logged or (PlanflyGuidance(scenario.flight.steering.guidance), ())
+    autopilot, autopilot_notes = logged_autopilot or (PlanflyGuidance(scenario.flight.steering.guidance), ())
     setup = _flight_setup(scenario, placed, mission, autopilot, flight)
     heights = flight.heights
     if (datum := options.get("datum")) is not None and heights.datum == "unstated":
@@ -104,7 +104,7 @@ def import_flight(path: Path, options: LogOptions) -> ImportedFlight:
     notes = (
         *_describe_gaps(flight),
         *_describe_other_flights(flight),
-        *refused,
+        *autopilot_notes,
         *mission.warnings,
         *_describe_mission_change(flight, mission, options),
     )
@@ -119,9 +119,9 @@ def import_flight(path: Path, options: LogOptions) -> ImportedFlight:
         stretches=flight.stretches,
         heights=heights,
         wind=wind_source,
-        mission=origin_of_mission,
-        plan_heights=plan_heights,
-        aircraft_known=known,
+        mission=mission_origin,
+        plan_heights=has_plan_heights,
+        aircraft_known=aircraft_known,
         begins_in_flight=flight.begins,
         gaps=flight.gaps,
         faults=flight.faults,
@@ -137,10 +137,12 @@ def import_flight(path: Path, options: LogOptions) -> ImportedFlight:
     return ImportedFlight(setup, track, _vehicle_events(flight), verdict, ended)
 
 
-def _refuse_other_autopilot(path: Path, mission: Mission, program: str) -> None:
+def _check_plan_autopilot(path: Path, mission: Mission, program: str) -> None:
     """Raise MissionError if the plan was written for another autopilot than that of the log."""
-    flown = next((name for name, title in TITLES.items() if program.lower().startswith(title[:5].lower())), "")
-    if mission.autopilot and flown and mission.autopilot != flown:
+    flown_autopilot = next(
+        (name for name, title in TITLES.items() if program.lower().startswith(title[:5].lower())), ""
+    )
+    if mission.autopilot and flown_autopilot and mission.autopilot != flown_autopilot:
         allowed = f"the flight of {path} is {program}'s: `plan` names the mission that was flown"
         message = f"{mission.source}: written for {TITLES[mission.autopilot]}: {allowed}"
         raise MissionError(message, file=mission.source, field="autopilot", value=mission.autopilot, allowed=allowed)
@@ -151,8 +153,8 @@ def _planned_mission(path: Path, flight: LoggedFlight, options: LogOptions) -> t
 
     Raises LogError if neither the options nor the log contain the mission.
     """
-    if (named := options.get("plan")) is not None:
-        plan_path, terrain = existing_mission(Path(named)), options.get("terrain")
+    if (named_plan := options.get("plan")) is not None:
+        plan_path, terrain = existing_mission(Path(named_plan)), options.get("terrain")
         if plan_path.suffix.lower() != ".json":
             return read_mission(plan_path), f"of {plan_path.name}", None
         plan = read_plan(plan_path, terrain=None if terrain is None else str(terrain))
@@ -161,23 +163,23 @@ def _planned_mission(path: Path, flight: LoggedFlight, options: LogOptions) -> t
         return mission, f"of {plan_path.name}", scenario
     if flight.mission is None:
         raise LogError(f"{path}: holds no mission: `plan` names the one that was to be flown", file=path)
-    found = flight.mission
-    if found.missing is not None and len(found.mission.items) < _MIN_ITEMS:
-        lacking = [missing_text(found.missing), *found.mission.warnings[:1]]
-        lacking.append("`plan` names the mission that was to be flown")
-        raise LogError(f"{path}: {'; '.join(lacking)}", file=path)
-    when = f", at {found.time:.1f} s" if found.time > 0.0 else ""
-    return found.mission, f"{found.origin} of the log{when}, {len(found.mission.items)} items", None
+    logged = flight.mission
+    if logged.missing is not None and len(logged.mission.items) < _MIN_ITEMS:
+        problems = [missing_text(logged.missing), *logged.mission.warnings[:1]]
+        problems.append("`plan` names the mission that was to be flown")
+        raise LogError(f"{path}: {'; '.join(problems)}", file=path)
+    time_text = f", at {logged.time:.1f} s" if logged.time > 0.0 else ""
+    return logged.mission, f"{logged.origin} of the log{time_text}, {len(logged.mission.items)} items", None
 
 
 def _scenario_and_placed_mission(
     mission: Mission, options: LogOptions, planned_in: Scenario | None
 ) -> tuple[Scenario, PlacedMission]:
     """Return the scenario in which a flight is judged, and the mission placed in that scenario."""
-    scenario, named = planned_in, options.get("scenario")
+    scenario, named_scenario = planned_in, options.get("scenario")
     terrain = None if options.get("terrain") is None else str(options["terrain"])
-    if named is not None:
-        scenario = load_scenario(str(named), terrain)
+    if named_scenario is not None:
+        scenario = load_scenario(str(named_scenario), terrain)
     if scenario is None:
         # The vertical legs are those that ArduPlane flies, so that the flight can be compared with a simulated flight.
         aircraft = flight_entries(options)["aircraft"]
@@ -191,12 +193,12 @@ def _with_wind_of_log(scenario: Scenario, flight: LoggedFlight, options: LogOpti
     """Return the scenario with the mean wind of the flight, and a description of the wind's source."""
     if options.get("wind") is not None:
         return scenario, "as given"
-    found = mean_wind(flight)
-    if found is None:
-        own = "as the scenario has it: the log holds no wind" if options.get("scenario") else ""
-        return scenario, own
-    blown = with_wind(scenario, found.speed, found.from_course, None)
-    return blown, f"from {round(math.degrees(found.from_course)) % 360:03d}°, by {found.source} of the log"
+    wind = mean_wind(flight)
+    if wind is None:
+        source_text = "as the scenario has it: the log holds no wind" if options.get("scenario") else ""
+        return scenario, source_text
+    windy_scenario = with_wind(scenario, wind.speed, wind.from_course, None)
+    return windy_scenario, f"from {round(math.degrees(wind.from_course)) % 360:03d}°, by {wind.source} of the log"
 
 
 def _flight_setup(
@@ -222,14 +224,14 @@ def _flight_setup(
     )
 
 
-def _path_limits(scenario: Scenario, autopilot: Autopilot, flight: LoggedFlight, usual: float) -> Limits:
+def _path_limits(scenario: Scenario, autopilot: Autopilot, flight: LoggedFlight, default_airspeed: float) -> Limits:
     """Return the limits at the airspeed stated by autopilot or scenario; if neither states one, at the flown airspeed.
 
-    usual: airspeed of the aircraft, m/s, used if the log has no airspeed either.
+    default_airspeed: airspeed of the aircraft, m/s, used if the log has no airspeed either.
     """
     aircraft, _ = find_airframe(scenario)
     envelope = load_envelope(aircraft, motor_braking=scenario.flight.motor_braking)
-    airspeed, bank = scenario.flight.airspeed_mps or usual, math.radians(scenario.flight.max_bank_deg)
+    airspeed, bank = scenario.flight.airspeed_mps or default_airspeed, math.radians(scenario.flight.max_bank_deg)
     if autopilot.stated_airspeed is not None:
         airspeed, _ = autopilot.stated_airspeed
     elif scenario.flight.airspeed_mps is None and np.isfinite(flight.columns["airspeed"]).any():
@@ -242,7 +244,7 @@ def _path_limits(scenario: Scenario, autopilot: Autopilot, flight: LoggedFlight,
 def _sha256(path: Path) -> str:
     digest = hashlib.sha256()
     with path.open("rb") as file:
-        while block := file.read(_BLOCK):
+        while block := file.read(_BLOCK_BYTES):
             digest.update(block)
     return digest.hexdigest()
 
@@ -254,9 +256,9 @@ def _describe_gaps(flight: LoggedFlight) -> tuple[str, ...]:
         notes.append(f"the log begins in flight, at {flight.time[0]:.1f} s")
     if flight.ends:
         notes.append(f"the log ends in flight, at {flight.time[-1]:.1f} s")
-    usual = float(np.median(np.diff(flight.time)))
-    if usual > LONGEST_STEP:
-        notes.append(f"the log has a place every {usual:.1f} s: what was between them it does not show")
+    usual_step = float(np.median(np.diff(flight.time)))
+    if usual_step > LONGEST_STEP:
+        notes.append(f"the log has a place every {usual_step:.1f} s: what was between them it does not show")
     return tuple(notes)
 
 
@@ -264,7 +266,9 @@ def _describe_other_flights(flight: LoggedFlight) -> tuple[str, ...]:
     """Describe the other flights that the log contains, in a tuple of one line; empty if there are none."""
     if flight.count == 1:
         return ()
-    others = ", ".join(f"at {start:.0f} s ({along:.0f} s along its mission)" for start, along in flight.others)
+    others = ", ".join(
+        f"at {start:.0f} s ({mission_time:.0f} s along its mission)" for start, mission_time in flight.others
+    )
     return (f"flight {flight.number} of {flight.count} is judged; the others began {others} (--flight N)",)
 
 
@@ -272,13 +276,17 @@ def _describe_mission_change(flight: LoggedFlight, mission: Mission, options: Lo
     """Describe how the mission of the log differs from the plan, in a tuple of one line; empty if they agree."""
     if options.get("plan") is None or flight.mission is None:
         return ()
-    own = flight.mission.mission.items
-    pairs = zip(own, mission.items, strict=False)
-    changed = [one.seq for one, other in pairs if (one.x, one.y, one.alt) != (other.x, other.y, other.alt)]
-    if len(own) == len(mission.items) and not changed:
+    logged_items = flight.mission.mission.items
+    pairs = zip(logged_items, mission.items, strict=False)
+    changed = [
+        logged.seq
+        for logged, planned in pairs
+        if (logged.x, logged.y, logged.alt) != (planned.x, planned.y, planned.alt)
+    ]
+    if len(logged_items) == len(mission.items) and not changed:
         return ()
-    if len(own) != len(mission.items):
-        return (f"the mission of the log has {len(own)} items, the plan {len(mission.items)}",)
+    if len(logged_items) != len(mission.items):
+        return (f"the mission of the log has {len(logged_items)} items, the plan {len(mission.items)}",)
     return (f"{len(changed)} items of the log's own mission lie elsewhere than the plan's, item {changed[0]} first",)
 
 
@@ -286,21 +294,25 @@ def _vehicle_events(flight: LoggedFlight) -> tuple[LogEvent, ...]:
     """Return the vehicle's messages and mode changes during the flight, in order of time."""
     if not len(flight.time):
         return ()
-    low, high = float(flight.time[0]), float(flight.time[-1])
-    said = [(time, text) for time, text in flight.raw.events if text]
-    said += [(mode.time, f"mode {mode.name}") for mode in flight.raw.modes]
+    start_time, end_time = float(flight.time[0]), float(flight.time[-1])
+    messages = [(time, text) for time, text in flight.raw.events if text]
+    messages += [(mode.time, f"mode {mode.name}") for mode in flight.raw.modes]
     clock = flight.clock
-    moved = np.array([time for time, _ in said])
-    if clock is not None and said:
-        moved = clock.on_clock(moved)
-    events = zip(moved.tolist(), said, strict=True)
-    inside = [LogEvent(max(low, time), text, "info") for time, (_, text) in events if low - 60.0 <= time <= high]
-    return tuple(sorted(inside, key=lambda event: event.time))
+    times = np.array([time for time, _ in messages])
+    if clock is not None and messages:
+        times = clock.on_clock(times)
+    events = zip(times.tolist(), messages, strict=True)
+    events_in_flight = [
+        LogEvent(max(start_time, time), text, "info")
+        for time, (_, text) in events
+        if start_time - 60.0 <= time <= end_time
+    ]
+    return tuple(sorted(events_in_flight, key=lambda event: event.time))
 
 
 def _completion_text(verdict: Verdict) -> str:
-    found = next((item for item in verdict.findings if item.rule == "completion"), None)
-    return "not judged" if found is None else found.brief
+    finding = next((candidate for candidate in verdict.findings if candidate.rule == "completion"), None)
+    return "not judged" if finding is None else finding.brief
 
 
 # ----------------------------------------------------------------------
@@ -308,19 +320,25 @@ def _completion_text(verdict: Verdict) -> str:
 
 
 def fly_again(
-    setup: FlightSetup, track: Track, aircraft: str | None, turbulence: str | None, advance: Advance, most: int = 9
+    setup: FlightSetup,
+    track: Track,
+    aircraft: str | None,
+    turbulence: str | None,
+    advance: Advance,
+    max_stretches: int = 9,
 ) -> tuple[Reflight, ...]:
     """Fly each stretch of followed legs again in the wind of the log, and return the comparisons, longest first.
 
     setup: setup of the imported flight, with its source.
     aircraft: aircraft to fly instead of the setup's aircraft; None keeps that.
     turbulence: turbulence to fly in instead of the scenario's; None keeps that.
-    most: maximum number of stretches; if there are more, the longest are flown.
+    max_stretches: maximum number of stretches; if there are more, the longest are flown.
 
     Raises LogError for a flight that followed no part of its mission, and StartError if the model cannot start.
     """
     return tuple(
-        _refly_stretch(setup, legs, aircraft, turbulence, advance) for legs in _followed_legs(setup, track)[:most]
+        _refly_stretch(setup, legs, aircraft, turbulence, advance)
+        for legs in _followed_legs(setup, track)[:max_stretches]
     )
 
 
@@ -333,7 +351,7 @@ def _refly_stretch(
     if model.name != setup.aircraft:
         envelope = load_envelope(model, motor_braking=scenario.flight.motor_braking)
         limits = make_limits(scenario, envelope, setup.airspeed, min(setup.max_bank, envelope.max_bank))
-    own = replace(
+    model_setup = replace(
         legs.requirements.setup,
         scenario=scenario,
         limits=limits,
@@ -343,23 +361,23 @@ def _refly_stretch(
         nav="perfect",
     )
 
-    flight, blocks = Flight(own, model), []
+    flight, blocks = Flight(model_setup, model), []
     length = flight.path.length
     for block in simulate(flight):
         blocks.append(block)
         advance(block.distance, length, f"{block.distance / 1000:.1f} of {length / 1000:.1f} km")
-    flown, ended = track_of(blocks), blocks[-1].ended
-    if len(flown) < 2:
+    track, ended = track_of(blocks), blocks[-1].ended
+    if len(track) < 2:
         raise LogError(f"{scenario.name}: {model.name} flew none of the mission: {ended}", file=scenario.name)
     stands_in = setup.source is not None and not setup.source.aircraft_known and aircraft is None
-    return compare_with_model(own, legs, flown, ended, stands_in=stands_in)
+    return compare_with_model(model_setup, legs, track, ended, stands_in=stands_in)
 
 
 def _followed_legs(setup: FlightSetup, track: Track) -> list[FlownLegs]:
     source = setup.source
     stretches = () if source is None else source.stretches
-    found = [legs for stretch in stretches if (legs := flown_legs(setup, track, stretch)) is not None]
-    if not found:
+    stretch_legs = [legs for stretch in stretches if (legs := flown_legs(setup, track, stretch)) is not None]
+    if not stretch_legs:
         name = "the log" if source is None else source.file
         raise LogError(f"{name}: none of its mission's legs was flown: there is nothing to fly again", file=name)
-    return sorted(found, key=lambda legs: legs.first - legs.last)
+    return sorted(stretch_legs, key=lambda legs: legs.first - legs.last)

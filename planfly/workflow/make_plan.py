@@ -7,9 +7,9 @@ from aircraft.path_limits import Limits
 from logs.verdict.conditions import Conditions, conditions_of
 from logs.verdict.measures.circle_reach import end_loiter_hazards
 from logs.verdict.measures.route_requirements import route_requirements
-from planfly.planning.gust_altitude_margin import keep_height
+from planfly.planning.gust_altitude_margin import ensure_altitude_margin
 from planfly.planning.gust_orbits import limit_waypoint_orbits
-from planfly.workflow.airframe import Airframe, laid_from_the_ground
+from planfly.workflow.airframe import Airframe, with_departure_and_approach
 from planfly.workflow.open_flight import make_setup, mission_of_plan
 from planner.plan import Plan
 from planner.search.plan_path import plan_path
@@ -36,7 +36,7 @@ def make_plan(
     *,
     stop: StopCondition | None = None,
     flown: tuple[Plan, int] | None = None,
-    onward: bool = False,
+    continues: bool = False,
 ) -> Plan:
     """Plan a path within the certain part of the limits of scenario and aircraft.
 
@@ -50,51 +50,61 @@ def make_plan(
 
     stop: stop condition of `planner.search.plan_path.plan_path`.
     flown: the plan being flown, and the leg from which it is replanned; None for a new plan.
-    onward: True if the mission continues beyond the destination of the plan.
+    continues: True if the mission continues beyond the destination of the plan.
     """
     limits = airframe.limits.surely()
 
-    def settle(plan: Plan, search: Search) -> Plan:
-        def few_waypoints(found: Plan, within: Limits) -> Plan:
-            return limit_waypoint_orbits(found, airframe, lambda asked: search(asked, within), within)
+    def complete_plan(plan: Plan, search: Search) -> Plan:
+        def limit_orbits(candidate: Plan, limits_used: Limits) -> Plan:
+            return limit_waypoint_orbits(candidate, airframe, lambda world: search(world, limits_used), limits_used)
 
-        def search_within(kept: Limits) -> Plan:
-            return few_waypoints(search(plan.scenario, kept), kept)
+        def search_within(limits_used: Limits) -> Plan:
+            return limit_orbits(search(plan.scenario, limits_used), limits_used)
 
-        return keep_height(few_waypoints(plan, limits), airframe, search_within)
+        return ensure_altitude_margin(limit_orbits(plan, limits), airframe, search_within)
 
     if flown is not None:
-        old, leg = flown
-        again = replan(
-            scenario, limits, old, leg, seed=seed, algorithm=algorithm, progress=advance, stop=stop, settle=settle
+        old_plan, leg = flown
+        new_plan = replan(
+            scenario,
+            limits,
+            old_plan,
+            leg,
+            seed=seed,
+            algorithm=algorithm,
+            progress=advance,
+            stop=stop,
+            settle=complete_plan,
         )
-        return _with_ground_phases(again, airframe, old, onward=onward)
+        return _with_ground_phases(new_plan, airframe, old_plan, continues=continues)
 
-    def search(world: Scenario, within: Limits) -> Plan:
-        return plan_path(world, within, seed=seed, algorithm=algorithm, progress=advance, stop=stop)
+    def search(world: Scenario, limits_used: Limits) -> Plan:
+        return plan_path(world, limits_used, seed=seed, algorithm=algorithm, progress=advance, stop=stop)
 
     searches = SharedBudget(search)
-    plan = searches.total(settle(searches(scenario, limits), searches))
-    return _with_ground_phases(plan, airframe, onward=onward)
+    plan = searches.total(complete_plan(searches(scenario, limits), searches))
+    return _with_ground_phases(plan, airframe, continues=continues)
 
 
-def finish_plan(plan: Plan, airframe: Airframe, *, onward: bool = False) -> Plan:
-    """Apply the steps of `make_plan` that follow its search to a plan, without another search."""
-    return _with_ground_phases(keep_height(limit_waypoint_orbits(plan, airframe), airframe), airframe, onward=onward)
+def finish_plan(plan: Plan, airframe: Airframe, *, continues: bool = False) -> Plan:
+    """Apply the steps of `make_plan` after its search to a plan, without another search."""
+    return _with_ground_phases(
+        ensure_altitude_margin(limit_waypoint_orbits(plan, airframe), airframe), airframe, continues=continues
+    )
 
 
-def _with_ground_phases(plan: Plan, airframe: Airframe, old: Plan | None = None, *, onward: bool) -> Plan:
+def _with_ground_phases(plan: Plan, airframe: Airframe, old_plan: Plan | None = None, *, continues: bool) -> Plan:
     """Return the plan with its departure and approach, and with the hazards near its final loiter in the certificate.
 
-    old: the plan being flown, or None.
+    old_plan: the plan being flown, or None.
     """
-    plan = laid_from_the_ground(plan, airframe, old)
-    if onward or not airframe.autopilot.loiter_rules.ends_in_circle:
+    plan = with_departure_and_approach(plan, airframe, old_plan)
+    if continues or not airframe.autopilot.loiter_rules.ends_in_circle:
         return plan
     setup = make_setup(plan.scenario, airframe, mission_of_plan(plan, airframe), plan.seed, plan=plan)
     hazards = end_loiter_hazards(route_requirements(setup))
     if hazards is None or not hazards[1]:
         return plan
-    circles = f"{airframe.autopilot.title} circles about the destination, up to {hazards[0]:.0f} m from it"
-    problems = (*plan.certificate.problems, f"{circles}: {', '.join(hazards[1])}")
+    loiter_text = f"{airframe.autopilot.title} circles about the destination, up to {hazards[0]:.0f} m from it"
+    problems = (*plan.certificate.problems, f"{loiter_text}: {', '.join(hazards[1])}")
     return replace(plan, certificate=replace(plan.certificate, problems=problems))

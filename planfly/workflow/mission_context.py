@@ -36,11 +36,11 @@ class JudgedMission:
 
 @dataclass(frozen=True, slots=True)
 class MissionContext:
-    """Everything that a changed mission is judged with.
+    """Context in which a changed mission is judged.
 
-    scenario: its world.  airframe: the aircraft loaded for it.  seed: seed of its flight.
+    scenario: world of the mission.  airframe: aircraft loaded for the mission.  seed: seed of the flight.
     opened: the setup as it was opened, with its plan if there is one.
-    planned: true if the acceptance radii were set by planfly, and follow the turns.
+    planned: True if planfly set the acceptance radii, which then follow the turns.
     """
 
     scenario: Scenario
@@ -51,7 +51,7 @@ class MissionContext:
 
     @classmethod
     def around_setup(cls, setup: FlightSetup) -> "MissionContext":
-        """Return the context of the mission of a setup; it is flown by the law of its autopilot.
+        """Return the context of a setup's mission, flown by the control law of its autopilot.
 
         Raises FlightError if the aircraft is missing.
         """
@@ -75,14 +75,14 @@ class MissionContext:
         placed = self.placed(mission) if placed is None else placed
         heights = {stop.stop.item: float(stop.position[2]) for stop in reversed(placed.stops)}
         items = [mission.items[k] for k in places(mission)]
-        east, north = to_map(self.scenario.origin, [one.lat_deg for one in items], [one.lon_deg for one in items])
-        up = [
-            self._stated_altitude(mission, one, x, y)
-            if one.command in LANDINGS or one.seq not in heights
-            else heights[one.seq]
-            for one, x, y in zip(items, np.asarray(east).tolist(), np.asarray(north).tolist(), strict=True)
+        east, north = to_map(self.scenario.origin, [item.lat_deg for item in items], [item.lon_deg for item in items])
+        altitudes = [
+            self._stated_altitude(mission, item, x, y)
+            if item.command in LANDINGS or item.seq not in heights
+            else heights[item.seq]
+            for item, x, y in zip(items, np.asarray(east).tolist(), np.asarray(north).tolist(), strict=True)
         ]
-        return np.stack([east, north, up], axis=1)
+        return np.stack([east, north, altitudes], axis=1)
 
     def _stated_altitude(self, mission: Mission, item: MissionItem, east: float, north: float) -> float:
         """Return the altitude AMSL that an item states, m; NaN if it states none, or over unknown ground."""
@@ -94,8 +94,8 @@ class MissionContext:
         if item.frame in OVER_HOME:
             if home is None:
                 return math.nan
-            x, y = to_map(self.scenario.origin, home.lat_deg, home.lon_deg)
-            east, north = float(x), float(y)
+            home_east, home_north = to_map(self.scenario.origin, home.lat_deg, home.lon_deg)
+            east, north = float(home_east), float(home_north)
         return math.nan if terrain is None else float(terrain.height(east, north)) + item.alt
 
     def flown(self, mission: Mission) -> frozenset[int]:
@@ -111,37 +111,37 @@ class MissionContext:
         """Adapt the acceptance radii of a planned mission to its turns near an item."""
         if not self.planned:
             return mission
-        own = places(mission)
-        at = int(np.searchsorted(own, index))
-        chain = own[max(0, at - 2) : at + 3]
-        points = self._planned_points(mission, chain)
-        frame = self.airframe
-        radii = acceptance_radii(self.scenario, points, frame.airspeed, frame.max_bank, frame.limits.tracking)
+        item_indices = places(mission)
+        position = int(np.searchsorted(item_indices, index))
+        nearby = item_indices[max(0, position - 2) : position + 3]
+        points = self._planned_points(mission, nearby)
+        airframe = self.airframe
+        radii = acceptance_radii(self.scenario, points, airframe.airspeed, airframe.max_bank, airframe.limits.tracking)
         items = list(mission.items)
-        for k, radius in zip(chain, radii.tolist(), strict=True):
+        for k, radius in zip(nearby, radii.tolist(), strict=True):
             # The turn at an end of the chain is not known, unless it is an end of the mission, which has no turn.
-            inner = k not in (chain[0], chain[-1]) or k in (own[0], own[-1])
-            if inner and items[k].command == Command.NAV_WAYPOINT:
+            has_known_turn = k not in (nearby[0], nearby[-1]) or k in (item_indices[0], item_indices[-1])
+            if has_known_turn and items[k].command == Command.NAV_WAYPOINT:
                 params = items[k].params
                 items[k] = replace(items[k], params=(params[0], radius, *params[2:]))
         return replace(mission, items=tuple(items))
 
-    def _planned_points(self, mission: Mission, chosen: tuple[int, ...]) -> Floats:
+    def _planned_points(self, mission: Mission, indices: tuple[int, ...]) -> Floats:
         """Return the places of a planned mission, AMSL; a landing has the altitude of the item before it."""
-        items = [mission.items[k] for k in chosen]
-        east, north = to_map(self.scenario.origin, [one.lat_deg for one in items], [one.lon_deg for one in items])
-        up = [one.alt for one in items]
+        items = [mission.items[k] for k in indices]
+        east, north = to_map(self.scenario.origin, [item.lat_deg for item in items], [item.lon_deg for item in items])
+        altitudes = [item.alt for item in items]
         for k, item in enumerate(items):
             if item.command in LANDINGS and k:
-                up[k] = up[k - 1]
-        return np.stack([east, north, up], axis=1)
+                altitudes[k] = altitudes[k - 1]
+        return np.stack([east, north, altitudes], axis=1)
 
     # ------------------------------------------------------------------
     # Verdicts.
 
     def setup(self, mission: Mission) -> FlightSetup:
-        """Make the flight setup of a mission.  Raises MissionError for one that cannot be laid out."""
-        # The mission of the setup names its autopilot; its items are the opened ones.
+        """Make the flight setup of a mission.  Raises MissionError for a mission that cannot be laid out."""
+        # The mission of the setup names its autopilot, so compare the items, not the missions.
         if mission.items is self.opened.mission.items and self.scenario is self.opened.scenario:
             return self.opened
         return make_setup(self.scenario, self.airframe, mission, self.seed, placed=self.placed(mission))

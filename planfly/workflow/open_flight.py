@@ -29,7 +29,7 @@ PLAN_FILE = "plan.json"
 def open_flight(source: Plan | str | Path, options: MissionOptions, program: Path | None = None) -> FlightSetup:
     """Make the setup of a plan, or of a plan.json, .waypoints or .plan file.
 
-    The scenario is the named one, the plan's own, or for a mission file one implied by its items.
+    The scenario is the named scenario, the plan's own, or for a mission file a scenario implied by its items.
 
     program: the autopilot program that flies, or None for a simulated autopilot.
     Raises MissionError, ScenarioError, ParameterError or TerrainError.
@@ -43,14 +43,14 @@ def open_flight(source: Plan | str | Path, options: MissionOptions, program: Pat
     """
     if isinstance(source, Plan) or Path(source).suffix.lower() == ".json":
         return _open_plan(source, options, program)
-    fences, named, terrain = (
+    fences, named_world, terrain = (
         read_named_fences(options.get("fence") or ()),
         options.get("scenario"),
         _terrain_option(options),
     )
-    mission = fences.on_mission(for_fixed_wing(read_mission(existing_mission(Path(source)))))
-    if named is not None:
-        scenario = named_scenario(named, options, program)
+    mission = fences.on_mission(check_fixed_wing(read_mission(existing_mission(Path(source)))))
+    if named_world is not None:
+        scenario = named_scenario(named_world, options, program)
         placed = place_stops(mission, scenario.origin, scenario.terrain, vertical_legs=True)
     else:
         implied = implied_scenario(mission, terrain, vertical_legs=True)
@@ -62,7 +62,7 @@ def open_flight(source: Plan | str | Path, options: MissionOptions, program: Pat
 
 def _open_plan(source: Plan | str | Path, options: MissionOptions, program: Path | None) -> FlightSetup:
     """Make the setup of a plan in its own scenario, or of its mission in the scenario that the options name."""
-    fences, named, terrain = (
+    fences, named_world, terrain = (
         read_named_fences(options.get("fence") or ()),
         options.get("scenario"),
         _terrain_option(options),
@@ -73,13 +73,13 @@ def _open_plan(source: Plan | str | Path, options: MissionOptions, program: Path
         plan, file = source if terrain is None else parse_plan(plan_json(source), PLAN_FILE, terrain=terrain), PLAN_FILE
     scenario = fences.on_scenario(apply_options(plan.scenario, options, program))
     airframe, seed = load_airframe(scenario), options.get("seed")
-    mission, number = fences.on_mission(mission_of_plan(plan, airframe, file)), plan.seed if seed is None else seed
-    if named is None:
-        return make_setup(scenario, airframe, mission, number, plan=plan)
+    mission, chosen_seed = fences.on_mission(mission_of_plan(plan, airframe, file)), plan.seed if seed is None else seed
+    if named_world is None:
+        return make_setup(scenario, airframe, mission, chosen_seed, plan=plan)
     # The plan's waypoints are in the map coordinates of its own scenario; in another scenario its mission items are
     # flown, like those of a file.
-    scenario = fences.on_scenario(named_scenario(named, options, program))
-    return make_setup(scenario, load_airframe(scenario), mission, number)
+    scenario = fences.on_scenario(named_scenario(named_world, options, program))
+    return make_setup(scenario, load_airframe(scenario), mission, chosen_seed)
 
 
 def _terrain_option(options: MissionOptions) -> str | None:
@@ -90,8 +90,8 @@ def _terrain_option(options: MissionOptions) -> str | None:
 def existing_mission(path: Path) -> Path:
     """Return the path if its file exists; otherwise raise MissionError, which suggests the most similar name."""
     if not path.is_file():
-        near = did_you_mean(path.name, _mission_file_names(path.parent))
-        raise MissionError(f"{path}: no such file; a plan.json, .waypoints or .plan file is expected{near}", file=path)
+        hint = did_you_mean(path.name, _mission_file_names(path.parent))
+        raise MissionError(f"{path}: no such file; a plan.json, .waypoints or .plan file is expected{hint}", file=path)
     return path
 
 
@@ -103,12 +103,12 @@ def _mission_file_names(folder: Path) -> list[str]:
         return []
 
 
-def for_fixed_wing(mission: Mission) -> Mission:
-    """Return the mission unchanged.  Raises MissionError if it has an item that only other vehicles can fly.
+def check_fixed_wing(mission: Mission) -> Mission:
+    """Return the mission unchanged.  Raises MissionError if an item can only be flown by other vehicles.
 
     >>> from flight.mission.items import MissionItem
     >>> spline = MissionItem(3, 82, 3, (0.0,) * 4, 46.0, 8.0, 75.0)
-    >>> for_fixed_wing(Mission(None, (spline,), source="a.waypoints"))
+    >>> check_fixed_wing(Mission(None, (spline,), source="a.waypoints"))
     Traceback (most recent call last):
         ...
     world.errors.MissionError: a.waypoints: item 3: NAV_SPLINE_WAYPOINT: for a multicopter: planfly flies fixed-wing ...
@@ -151,8 +151,8 @@ def make_setup(
         placed = place_stops(mission, scenario.origin, scenario.terrain)
     route = lay_route(placed, airspeed, fly_over, limits, autopilot.route_rules)
     route = with_end_courses(route, scenario, limits)
-    stated = {} if autopilot.parameters is None else autopilot.parameters.by_origin("file")
-    notes = field_notes(mission, route, scenario, autopilot.return_rules, stated)
+    file_parameters = {} if autopilot.parameters is None else autopilot.parameters.by_origin("file")
+    notes = field_notes(mission, route, scenario, autopilot.return_rules, file_parameters)
     route = replace(route, notes=(*route.notes, *notes)) if notes else route
     return FlightSetup(
         scenario=scenario,

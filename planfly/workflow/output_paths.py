@@ -1,4 +1,4 @@
-"""Check output files and folders, and clear old results of planfly; other files are never overwritten."""
+"""Check output files and folders, and remove old results of planfly; other files are never overwritten."""
 
 import hashlib
 from pathlib import Path
@@ -55,11 +55,11 @@ RETURN_FILES = (
     *(f"worst-return-{k}{suffix}" for k in range(1, MAX_BY_PROGRAM + 1) for suffix in (".mcap", ".BIN")),
 )
 # Maximum number of parts of a flight that are flown again.
-REFLOWN = 9
+MAX_REFLOWN_PARTS = 9
 # Files of each part that is flown again, numbered from the second part on.
 REFLY_FILES = tuple(
     name
-    for ending in ("", *(f"-{number}" for number in range(2, REFLOWN + 1)))
+    for ending in ("", *(f"-{number}" for number in range(2, MAX_REFLOWN_PARTS + 1)))
     for name in (
         f"simulated{ending}.mcap",
         *(f"refly-{kind}{ending}.png" for kind in ("cross-track", "height", "ground-speed", "bank", "energy")),
@@ -67,7 +67,7 @@ REFLY_FILES = tuple(
 )
 
 
-def refuse_existing(path: Path, overwrite: bool, source: Path | None = None) -> None:
+def check_output_file(path: Path, overwrite: bool, source: Path | None = None) -> None:
     """Raise PlanflyError if the target file is the input, is a folder, has no folder, or exists without `overwrite`.
 
     source: the input file, or None.
@@ -82,7 +82,7 @@ def refuse_existing(path: Path, overwrite: bool, source: Path | None = None) -> 
         raise PlanflyError(f"{path}: its folder {path.parent} does not exist", file=path)
 
 
-def refuse_folder(folder: Path, overwrite: bool) -> None:
+def check_output_folder(folder: Path, overwrite: bool) -> None:
     """Raise PlanflyError if the target folder is a file, or is not empty without `overwrite`."""
     if folder.exists() and not folder.is_dir():
         raise PlanflyError(f"{folder}: is a file; a folder is expected", file=folder)
@@ -104,9 +104,9 @@ def prepare_folder(folder: Path, files: tuple[str, ...] = RUN_FILES) -> None:
 
 
 def clean_folder(out: str | Path, files: tuple[str, ...], *, overwrite: bool) -> Path:
-    """Check a target folder with `refuse_folder`, make it, remove old results of planfly, and return its path."""
+    """Check a target folder with `check_output_folder`, make it, remove old results of planfly, and return its path."""
     folder = Path(out)
-    refuse_folder(folder, overwrite)
+    check_output_folder(folder, overwrite)
     prepare_folder(folder, files)
     return folder
 
@@ -128,18 +128,18 @@ def expand_path_pattern(target: str | Path, name: str, seed: int) -> Path:
     >>> str(expand_path_pattern(RUN_FOLDER, "a/b", 3)), str(expand_path_pattern(RUN_FOLDER, "a b", 3))
     ('runs/a-b-c14cdd-seed3', 'runs/a-b-c8687a-seed3')
     """
-    safe = "".join(letter if letter.isalnum() or letter in "-_." else "-" for letter in name).lstrip(".") or "run"
-    if safe != name:
-        safe += f"-{hashlib.sha256(name.encode(errors='surrogatepass')).hexdigest()[:6]}"
-    return Path(str(target).replace("{name}", safe).replace("{seed}", str(seed)))
+    safe_name = "".join(letter if letter.isalnum() or letter in "-_." else "-" for letter in name).lstrip(".") or "run"
+    if safe_name != name:
+        safe_name += f"-{hashlib.sha256(name.encode(errors='surrogatepass')).hexdigest()[:6]}"
+    return Path(str(target).replace("{name}", safe_name).replace("{seed}", str(seed)))
 
 
 def file_target(target: str | Path, name: str, seed: int, *, overwrite: bool, source: Path | None = None) -> Path:
-    """Return the file to write, after the checks of `refuse_existing`.
+    """Return the file to write, after the checks of `check_output_file`.
 
     A pattern whose folder does not exist is not checked; the caller makes the folder.
     """
     path = expand_path_pattern(target, name, seed)
     if path.parent.exists() or not is_pattern(target):
-        refuse_existing(path, overwrite, source)
+        check_output_file(path, overwrite, source)
     return path

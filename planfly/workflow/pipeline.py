@@ -31,7 +31,7 @@ from world.errors import FlightError, StartError
 from world.scenario import Scenario
 
 # Flight time whose rows are written at once, s; its simulation takes about 30 ms.
-BATCH = 60
+BATCH_S = 60
 # Limits of a flight unless others are given.
 _DEFAULT_LIMITS = FlightLimits()
 
@@ -107,13 +107,13 @@ def plan_then_fly(scenario: Scenario, *, seed: int | None = None, log: Path | No
     log: file for the flight log; None writes no log.
     Raises a PlanflyError for bad input.  A plan that cannot be flown gives a verdict, not an error.
     """
-    number = choose_seed(scenario, seed)
+    chosen_seed = choose_seed(scenario, seed)
     airframe = load_airframe(scenario)
-    plan = make_plan(scenario, airframe, number)
+    plan = make_plan(scenario, airframe, chosen_seed)
     mission = replace(mission_of_plan(plan, airframe, "plan"), autopilot=airframe.autopilot.name)
     if not plan.feasible:
         return PlanThenFly(plan, mission, None, judge_plan_only(plan, planned_for(scenario, airframe)))
-    setup = make_setup(scenario, airframe, mission, number, plan=plan)
+    setup = make_setup(scenario, airframe, mission, chosen_seed, plan=plan)
     flown = fly_and_judge(setup, airframe, log)
     return PlanThenFly(plan, mission, flown.track, flown.verdict)
 
@@ -150,15 +150,17 @@ def fly_and_judge(
     requirements = route_requirements(setup)
     reason = reason_not_to_start(requirements)
     if reason:
-        return _unflown(requirements, log, reason, reference)
+        return _judge_unflown(requirements, log, reason, reference)
     try:
         if autopilot is not None:
             return _fly_with_program(task, setup, program_autopilot(autopilot).flying(setup.autopilot, autopilot))
-        how = off_nominal or OffNominal(Variation())
-        flight = Flight(setup, airframe.aircraft, how.variation, start_offset=how.start_offset)
+        off_nominal_flight = off_nominal or OffNominal(Variation())
+        flight = Flight(
+            setup, airframe.aircraft, off_nominal_flight.variation, start_offset=off_nominal_flight.start_offset
+        )
         return _record_and_judge(task, requirements, flight)
     except StartError as error:
-        return _unflown(requirements, log, f"not started: {error.reason}", reference)
+        return _judge_unflown(requirements, log, f"not started: {error.reason}", reference)
 
 
 @dataclass(frozen=True, slots=True)
@@ -203,14 +205,14 @@ def _record_and_judge(task: _Task, requirements: RouteRequirements, flight: Airb
     if task.log is None:
         track, ended = _fly(task, flight, None)
         return _judge_rows(task, requirements, track, ended)
-    with CrashSafeLog(task.log, flight.setup, every=task.every, batch=BATCH) as recorder:
+    with CrashSafeLog(task.log, flight.setup, every=task.every, batch=BATCH_S) as recorder:
         track, recorder.ended = _fly(task, flight, recorder)
         judged = _judge_rows(task, requirements, thin_track(track, task.every), recorder.ended)
         for event in judged.events:
             recorder.event(event.time, event.text, event.level)
         summary = return_summary(flight.setup, judged.track) if task.returns else None
-        drawn = None if summary is None else summary.draw_returns_without_glides()
-        recorder.finish(judged.ended, judged.verdict, judged.reference, drawn)
+        drawn_returns = None if summary is None else summary.draw_returns_without_glides()
+        recorder.finish(judged.ended, judged.verdict, judged.reference, drawn_returns)
     return replace(judged, returns=summary)
 
 
@@ -230,8 +232,10 @@ def _fly(task: _Task, flight: Airborne, recorder: CrashSafeLog | None) -> tuple[
     return track_of(blocks), ended
 
 
-def _unflown(requirements: RouteRequirements, log: Path | None, ended: str, reference: FlyReference) -> JudgedFlight:
-    """Judge a flight without a row; the log of an earlier flight is removed."""
+def _judge_unflown(
+    requirements: RouteRequirements, log: Path | None, ended: str, reference: FlyReference
+) -> JudgedFlight:
+    """Judge a flight without a row, and remove the log of an earlier flight."""
     if log is not None:
         log.unlink(missing_ok=True)
     setup, track = requirements.setup, join_tracks([])
@@ -245,5 +249,5 @@ def _judge_rows(task: _Task, requirements: RouteRequirements, track: Track, ende
     end = float(track.time[-1]) if len(track) else 0.0
     event = LogEvent(end, f"flight ended: {ended}", "info" if ended == "completed" else "error")
     aircraft = task.airframe.aircraft
-    verdict, others = judge_with_reference_flights(requirements, aircraft, track, ended, fly=task.reference)
-    return JudgedFlight(requirements.setup, requirements, track, ended, verdict, (event,), others)
+    verdict, reference_flights = judge_with_reference_flights(requirements, aircraft, track, ended, fly=task.reference)
+    return JudgedFlight(requirements.setup, requirements, track, ended, verdict, (event,), reference_flights)

@@ -20,7 +20,7 @@ from logs.verdict.trials import least_change
 from logs.verdict.verdict import Verdict
 from planfly.workflow.mission_context import JudgedMission, MissionContext
 from planfly.workflow.suggestion_trials import SuggestionTrials, tried_suggestions
-from planfly.workflow.trial_flight import Hurry, Trial, TrialAborted, no_hurry
+from planfly.workflow.trial_flight import AbortCheck, Trial, TrialAborted, never_abort
 
 # ----------------------------------------------------------------------
 # Find the autopilot parameter that decides a failed flight, by flying again with one parameter changed at a time.
@@ -30,17 +30,19 @@ from planfly.workflow.trial_flight import Hurry, Trial, TrialAborted, no_hurry
 _VERTICAL_RULES = ("clearance", "height", "bounds", "slope", "energy", "stall", "speed")
 
 # Function that flies with an autopilot and returns True if the flight passes.
-Passes = Callable[[Autopilot], bool]
+PassesWithAutopilot = Callable[[Autopilot], bool]
 
 
-def deciding_parameter(autopilot: Autopilot, findings: tuple[Finding, ...], passes: Passes) -> DecidingParameter | None:
+def deciding_parameter(
+    autopilot: Autopilot, findings: tuple[Finding, ...], passes: PassesWithAutopilot
+) -> DecidingParameter | None:
     """Return the first parameter that lets the flight pass with another value, and the nearest such value, or None.
 
     findings: findings of the flight that failed.
     passes: flies with the given autopilot and returns True if that flight passes; called about ten times.
 
-    Candidates for the kind of the failure, vertical or lateral, are tried first.  For each candidate the farthest value
-    is flown; if it passes, the nearest passing value is found by bisection.  The returned value was flown and passed.
+    Candidates for the kind of the failure, vertical or lateral, are tried first.  The farthest value of each candidate
+    is flown first; if it passes, bisection finds the nearest passing value.  The returned value was flown and passed.
 
     >>> from flight.autopilots.arduplane.autopilot import ArduPlane
     >>> from flight.autopilots.arduplane.parameters import ArduPilotParameters
@@ -57,69 +59,77 @@ def deciding_parameter(autopilot: Autopilot, findings: tuple[Finding, ...], pass
         # No flight parameter changes the rejection of a mission.
         return None
     values = {parameter.name: parameter.value for parameter in autopilot.parameters.values}
-    heights, sides = autopilot.height_candidates, autopilot.side_candidates
-    for name, step, far, unit, least in (*heights, *sides) if failed.rule in _VERTICAL_RULES else (*sides, *heights):
+    vertical_candidates, lateral_candidates = autopilot.height_candidates, autopilot.side_candidates
+    for name, step, farthest, unit, min_value in (
+        (*vertical_candidates, *lateral_candidates)
+        if failed.rule in _VERTICAL_RULES
+        else (*lateral_candidates, *vertical_candidates)
+    ):
         current = values[name]
 
         def with_value(value: float, name: str = name) -> bool:
             return passes(autopilot.with_parameters(**{name: value}))
 
         # Do not suggest values below the documented range.
-        passing = _nearest_passing_value(max(current, least - step), step, far, with_value)
+        passing = _nearest_passing_value(max(current, min_value - step), step, farthest, with_value)
         if passing is not None:
-            off = _deviation_at_failure(failed, findings)
-            return DecidingParameter(name, current, passing, unit, failed.rule, failed.place, off)
+            deviation = _deviation_at_failure(failed, findings)
+            return DecidingParameter(name, current, passing, unit, failed.rule, failed.place, deviation)
     return None
 
 
-def _nearest_passing_value(current: float, step: float, far: float, passes: Callable[[float], bool]) -> float | None:
-    """Return the passing value nearest to the current value, in steps towards `far`; None if `far` itself fails."""
-    count = int(abs(far - current) / step + 1e-6)
-    sign = 1.0 if far > current else -1.0
-    values = [round(current + sign * k * step, 6) for k in range(1, count + 1)]
+def _nearest_passing_value(
+    current: float, step: float, farthest: float, passes: Callable[[float], bool]
+) -> float | None:
+    """Return the passing value nearest to the current value, in steps towards `farthest`; None if `farthest` fails."""
+    step_count = int(abs(farthest - current) / step + 1e-6)
+    sign = 1.0 if farthest > current else -1.0
+    values = [round(current + sign * k * step, 6) for k in range(1, step_count + 1)]
     if not values or not passes(values[-1]):
         return None
-    nearer = least_change(values[:-1], passes)
-    return values[-1] if nearer is None else nearer
+    nearest = least_change(values[:-1], passes)
+    return values[-1] if nearest is None else nearest
 
 
 def _deviation_at_failure(failed: Finding, findings: tuple[Finding, ...]) -> float | None:
-    """Return the cross-track or altitude error where the flight failed, m, or None if unknown."""
+    """Return the cross-track or altitude error at the place of the failure, m, or None if unknown."""
     if failed.rule == "corridor":
         return failed.flown
     if failed.place.kind != "leg" or failed.rule not in ("clearance", "height"):
         return None
-    slopes = [item for item in findings if item.rule == "slope" and item.place == failed.place]
-    errors = [fact.value for item in slopes for fact in item.facts if fact.what == "height error"]
+    slope_findings = [finding for finding in findings if finding.rule == "slope" and finding.place == failed.place]
+    errors = [fact.value for finding in slope_findings for fact in finding.facts if fact.what == "height error"]
     return errors[0] if errors else None
 
 
-def airframe_answer(setup: FlightSetup, aircraft: Aircraft, hurry: Hurry = no_hurry) -> AirframeAnswer:
+def airframe_answer(setup: FlightSetup, aircraft: Aircraft, should_abort: AbortCheck = never_abort) -> AirframeAnswer:
     """Fly a setup with planfly's guidance and the exact position, and judge that flight.
 
     The flight has the same true airspeeds as a flight by ArduPlane.  ArduPlane treats airspeeds as equivalent
     airspeeds, which are higher true airspeeds at a higher altitude.
-    hurry: see `judge_with_reference_flights`.
+    should_abort: see `judge_with_reference_flights`.
     """
-    same = true_route(setup)
-    trial = Trial(replace(setup, autopilot=PlanflyGuidance(), nav="perfect", route=same), aircraft, hurry)
+    airframe_route = true_route(setup)
+    trial = Trial(
+        replace(setup, autopilot=PlanflyGuidance(), nav="perfect", route=airframe_route), aircraft, should_abort
+    )
     track, ended = trial.flight
     if not len(track):
         return AirframeAnswer(False, f"not flyable: {ended}", (("completion", FLIGHT),))
-    verdict = trial.flown
-    failed = tuple((item.rule, item.place) for item in verdict.findings if item.ok is False)
+    verdict = trial.flight_verdict
+    failed = tuple((finding.rule, finding.place) for finding in verdict.findings if finding.ok is False)
     # Undecided findings on take-off and landing do not apply to this flight.
-    said = "flyable in the air" if verdict.flies and not verdict.flyable else verdict.headline
-    return AirframeAnswer(verdict.flies, said, failed)
+    answer = "flyable in the air" if verdict.flies and not verdict.flyable else verdict.headline
+    return AirframeAnswer(verdict.flies, answer, failed)
 
 
 def find_deciding_parameter(
-    setup: FlightSetup, aircraft: Aircraft, verdict: Verdict, hurry: Hurry = no_hurry
+    setup: FlightSetup, aircraft: Aircraft, verdict: Verdict, should_abort: AbortCheck = never_abort
 ) -> DecidingParameter | None:
     """Find a parameter that lets a failed flight pass with another value, or return None.
 
     verdict: verdict on the flight with the setup's own parameters.
-    hurry: see `judge_with_reference_flights`.
+    should_abort: see `judge_with_reference_flights`.
     About ten flights with the simulated autopilot are needed.  They explain the flight of an autopilot program only if
     the simulated autopilot fails, too; otherwise the result is None.
     """
@@ -127,44 +137,48 @@ def find_deciding_parameter(
         return None
     findings = verdict.findings
     if setup.autopilot.program is not None:
-        own = Trial(replace(setup, autopilot=setup.autopilot.law), aircraft, hurry).flown
-        if own.flies:
+        simulated_verdict = Trial(replace(setup, autopilot=setup.autopilot.law), aircraft, should_abort).flight_verdict
+        if simulated_verdict.flies:
             return None
-        findings = own.findings
+        findings = simulated_verdict.findings
     # Keep the width of the corridor for every radius that is tried.
     scenario = setup.scenario
     limits = scenario.limits.model_copy(update={"corridor_m": setup.corridor})
     spec = scenario.spec.model_copy(update={"limits": limits})
-    same = setup.in_scenario(replace(scenario, spec=spec, limits=limits))
+    same_setup = setup.in_scenario(replace(scenario, spec=spec, limits=limits))
 
     def passes(law: Autopilot) -> bool:
-        flown = Trial(replace(same, autopilot=law), aircraft, hurry).flown
-        return flown.flies and has_room(flown.findings, findings)
+        trial_verdict = Trial(replace(same_setup, autopilot=law), aircraft, should_abort).flight_verdict
+        return trial_verdict.flies and passes_with_margin(trial_verdict.findings, findings)
 
     return deciding_parameter(setup.autopilot, findings, passes)
 
 
 # Cross-track error of a simulated autopilot against the real one, as a fraction of the distance from the legs.  Nine in
 # ten corners that ArduPlane kept are within this error.
-STRAY_SHARE = 0.1
+CROSS_TRACK_ERROR_FRACTION = 0.1
 # Altitude error of a simulated autopilot against the real one, m.  The minimum clearances of 20 ArduPlane climbs are
 # within this error.
-HEIGHT_ERROR = 1.2
+ALTITUDE_ERROR_M = 1.2
 
 
-def has_room(flown: Sequence[Finding], failed: Sequence[Finding]) -> bool:
-    """Return True if each finding that failed now passes with the margin that the simulation error requires.
+def passes_with_margin(trial_findings: Sequence[Finding], failed_findings: Sequence[Finding]) -> bool:
+    """Return True if each failed finding now passes with the margin that the simulation error requires.
 
-    flown: findings of a flight with another parameter value.
-    failed: findings of the flight that failed.
+    trial_findings: findings of a flight with another parameter value.
+    failed_findings: findings of the flight that failed.
     A margin is required in the lateral distance from the legs and in the height above ground.
     """
-    wrong = {(item.rule, item.place) for item in failed if item.ok is False}
-    for item in flown:
-        if (item.rule, item.place) not in wrong or item.margin is None:
+    failed_keys = {(finding.rule, finding.place) for finding in failed_findings if finding.ok is False}
+    for finding in trial_findings:
+        if (finding.rule, finding.place) not in failed_keys or finding.margin is None:
             continue
-        needed = {"corridor": STRAY_SHARE * abs(item.flown or 0.0), "clearance": HEIGHT_ERROR, "height": HEIGHT_ERROR}
-        if item.margin < needed.get(item.rule, -math.inf):
+        required_margins = {
+            "corridor": CROSS_TRACK_ERROR_FRACTION * abs(finding.flown or 0.0),
+            "clearance": ALTITUDE_ERROR_M,
+            "height": ALTITUDE_ERROR_M,
+        }
+        if finding.margin < required_margins.get(finding.rule, -math.inf):
             return False
     return True
 
@@ -180,15 +194,15 @@ def judge_with_reference_flights(
     ended: str,
     *,
     fly: FlyReference = "failed",
-    hurry: Hurry = no_hurry,
+    should_abort: AbortCheck = never_abort,
 ) -> tuple[Verdict, ReferenceFlights | None]:
     """Judge a flight, with reference flights that explain the verdict but do not decide it, and tried suggestions.
 
     requirements: the route requirements of the setup that was flown.  track, ended: the flight and its end.
     fly: cases in which reference flights are flown: "failed" if a finding of the flight fails, "always" also if all
     pass.  A flight of planfly's own guidance has no reference flight, but its suggestions are tried.
-    hurry: called throughout the reference flights; once it returns True they are aborted, and the verdict holds their
-    results up to then.
+    should_abort: called throughout the reference flights; once it returns True, they are aborted, and the verdict holds
+    the results up to that moment.
     """
     setup = requirements.setup
     verdict = judge_flight(setup, track, ended, requirements=requirements)
@@ -197,13 +211,13 @@ def judge_with_reference_flights(
     reference = ReferenceFlights(tried=() if verdict.failed else None)
     with suppress(TrialAborted):
         if setup.autopilot.level != "airframe":
-            reference = replace(reference, airframe=airframe_answer(setup, aircraft, hurry))
+            reference = replace(reference, airframe=airframe_answer(setup, aircraft, should_abort))
         if reference.airframe is not None and reference.airframe.flyable:
-            reference = replace(reference, deciding=find_deciding_parameter(setup, aircraft, verdict, hurry))
+            reference = replace(reference, deciding=find_deciding_parameter(setup, aircraft, verdict, should_abort))
         if verdict.failed:
             judged = JudgedMission(setup.mission, setup, requirements, verdict)
-            passed = SuggestionTrials(MissionContext.around_setup(setup), judged, hurry).passing()
-            reference = replace(reference, tried=tried_suggestions(passed))
+            passed_trials = SuggestionTrials(MissionContext.around_setup(setup), judged, should_abort).passing()
+            reference = replace(reference, tried=tried_suggestions(passed_trials))
     if reference == ReferenceFlights():
         return verdict, None
     return judge_flight(setup, track, ended, reference=reference, requirements=requirements), reference

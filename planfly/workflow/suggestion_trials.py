@@ -1,8 +1,8 @@
 """Trials of the suggestions of a verdict: only those with which their finding passes are offered.
 
 A suggestion is applied to the mission, judged by geometry, and flown if the verdict is on a flight.  It passes if its
-finding is gone and no more findings fail than before.  A step that is too small, such as a height, is enlarged by what
-is still missing.
+finding is gone and no more findings fail than before.  A step that is too small, such as a height, is enlarged by the
+missing part.
 """
 
 from collections.abc import Iterator, Sequence
@@ -20,7 +20,7 @@ from logs.verdict.trials import first_that_passes
 from logs.verdict.verdict import Verdict
 from planfly.workflow.apply_suggestion import apply_suggestion
 from planfly.workflow.mission_context import JudgedMission, MissionContext
-from planfly.workflow.trial_flight import Hurry, Trial, TrialAborted, no_hurry
+from planfly.workflow.trial_flight import AbortCheck, Trial, TrialAborted, never_abort
 from world.errors import PlanflyError
 
 # Greatest number of findings whose suggestions are tried, the worst of each rule first.
@@ -29,43 +29,43 @@ MAX_TRIED_FINDINGS = 6
 MAX_TRIAL_FLIGHTS = 4
 # Greatest number of missions that are tried for one suggestion: the suggestion itself and larger steps.
 _MAX_STEPS = 10
-# Greatest number of failed findings with suggestions: beyond it no single change is worth a trial.
+# Greatest number of failed findings with suggestions; if more fail, no single change is worth a trial.
 _MAX_FAILED = 40
 # Changes by a step, m, which are enlarged while the finding fails.
 _STEPS = frozenset(("height", "descent", "inset", "distance", "north", "east", "south", "west"))
-# Factor on what a step still lacks.
+# Factor on the part that a step still lacks.
 _GROWTH_FACTOR = 1.5
-# Added to what a step still lacks, m.
+# Length added to the part that a step still lacks, m.
 _GROWTH_M = 2.0
 
 
-def finding_key(item: Finding) -> tuple[str, str, int | None, str]:
-    """Return what identifies a finding after a change: rule and place, without item numbers, which may shift."""
-    return item.rule, item.place.kind, item.place.index, item.place.name
+def finding_key(finding: Finding) -> tuple[str, str, int | None, str]:
+    """Return the key of a finding that survives a change: rule and place, without item numbers, which may shift."""
+    return finding.rule, finding.place.kind, finding.place.index, finding.place.name
 
 
-def leaves_no_more(before: Verdict, after: Verdict, item: Finding) -> bool:
+def fails_no_more(before: Verdict, after: Verdict, finding: Finding) -> bool:
     """Return True if a finding does not fail after a change, and no more findings fail than before."""
-    return len(after.failed) <= len(before.failed) and finding_key(item) not in map(finding_key, after.failed)
+    return len(after.failed) <= len(before.failed) and finding_key(finding) not in map(finding_key, after.failed)
 
 
 @dataclass(frozen=True)
 class PassedTrial:
     """A suggestion of a finding that passed its trial, enlarged if necessary, and the setup that it was tried with."""
 
-    item: Finding
+    finding: Finding
     suggestion: Suggestion
     setup: FlightSetup
 
 
-def tried_suggestions(passed: Sequence[PassedTrial]) -> tuple[TriedSuggestions, ...]:
+def tried_suggestions(passed_trials: Sequence[PassedTrial]) -> tuple[TriedSuggestions, ...]:
     """Return the suggestions that passed, by finding."""
-    found: dict[int, list[PassedTrial]] = {}
-    for one in passed:
-        found.setdefault(id(one.item), []).append(one)
+    trials_by_finding: dict[int, list[PassedTrial]] = {}
+    for trial in passed_trials:
+        trials_by_finding.setdefault(id(trial.finding), []).append(trial)
     return tuple(
-        TriedSuggestions(same[0].item.rule, same[0].item.place, tuple(one.suggestion for one in same))
-        for same in found.values()
+        TriedSuggestions(trials[0].finding.rule, trials[0].finding.place, tuple(trial.suggestion for trial in trials))
+        for trials in trials_by_finding.values()
     )
 
 
@@ -80,9 +80,9 @@ def with_tried_suggestions(judged: JudgedMission) -> Verdict:
     """Return the verdict on a mission with only those suggestions that pass a trial."""
     if not judged.verdict.failed:
         return judged.verdict
-    passed = SuggestionTrials(MissionContext.around_setup(judged.setup), judged).passing()
+    passed_trials = SuggestionTrials(MissionContext.around_setup(judged.setup), judged).passing()
     return replace(
-        judged.verdict, findings=with_passing_suggestions(judged.verdict.findings, tried_suggestions(passed))
+        judged.verdict, findings=with_passing_suggestions(judged.verdict.findings, tried_suggestions(passed_trials))
     )
 
 
@@ -91,72 +91,86 @@ class SuggestionTrials:
     """Trials of the suggestions of one verdict.
 
     judged: the mission with its verdict, geometric or flown.
-    hurry: aborts the trials, as for `Trial`.
+    should_abort: aborts the trials, as for `Trial`.
     """
 
     context: MissionContext
     judged: JudgedMission
-    hurry: Hurry = no_hurry
+    should_abort: AbortCheck = never_abort
     _flights_left: int = MAX_TRIAL_FLIGHTS
     _trials: dict[object, Trial] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        self._now = Trial(self.judged.setup, self.context.airframe.aircraft)
+        self._current = Trial(self.judged.setup, self.context.airframe.aircraft)
 
     def passing(self) -> list[PassedTrial]:
         """Try the first suggestion of each finding, then the second of each, and return those that pass."""
-        asked = [(which, k, item) for k, item in enumerate(self._chosen()) for which in range(len(item.suggestions))]
-        passed = []
-        with suppress(TrialAborted):
-            for which, _, item in sorted(asked, key=lambda one: one[:2]):
-                found = self.try_suggestion(item, which)
-                passed += [] if found is None else [found]
-        return passed
-
-    def _chosen(self) -> list[Finding]:
-        """Return the failed findings to try, the worst of each rule first, the most urgent rules first."""
-        rules = [
-            [item for item in rule.failed if item.suggestions] for rule in self.judged.verdict.present().failed_rules
+        requests = [
+            (number, rank, finding)
+            for rank, finding in enumerate(self._findings_to_try())
+            for number in range(len(finding.suggestions))
         ]
-        if sum(map(len, rules)) > _MAX_FAILED:
+        passed_trials = []
+        with suppress(TrialAborted):
+            for number, _, finding in sorted(requests, key=lambda request: request[:2]):
+                passed_trial = self.try_suggestion(finding, number)
+                passed_trials += [] if passed_trial is None else [passed_trial]
+        return passed_trials
+
+    def _findings_to_try(self) -> list[Finding]:
+        """Return the failed findings to try, the worst of each rule first, the most urgent rules first."""
+        findings_by_rule = [
+            [finding for finding in rule.failed if finding.suggestions]
+            for rule in self.judged.verdict.present().failed_rules
+        ]
+        if sum(map(len, findings_by_rule)) > _MAX_FAILED:
             return []
-        ranked = [(rank, item) for rule in rules for rank, item in enumerate(rule)]
-        return [item for _, item in sorted(ranked, key=lambda one: one[0])[:MAX_TRIED_FINDINGS]]
+        ranked = [(rank, finding) for rule in findings_by_rule for rank, finding in enumerate(rule)]
+        return [
+            finding for _, finding in sorted(ranked, key=lambda ranked_finding: ranked_finding[0])[:MAX_TRIED_FINDINGS]
+        ]
 
-    def try_suggestion(self, item: Finding, which: int) -> PassedTrial | None:
+    def try_suggestion(self, finding: Finding, number: int) -> PassedTrial | None:
         """Return a suggestion of a finding, enlarged if necessary, with which its trial passes, or None."""
-        candidates = islice(self._candidates(item, item.suggestions[which]), _MAX_STEPS)
-        found = first_that_passes(candidates, lambda candidate: self._passes(item, candidate[1]))
-        return None if found is None else PassedTrial(item, found[0], found[1].setup)
+        candidates = islice(self._growing_suggestions(finding, finding.suggestions[number]), _MAX_STEPS)
+        passed_candidate = first_that_passes(candidates, lambda candidate: self._passes(finding, candidate[1]))
+        return (
+            None if passed_candidate is None else PassedTrial(finding, passed_candidate[0], passed_candidate[1].setup)
+        )
 
-    def _passes(self, item: Finding, trial: Trial) -> bool:
-        if not leaves_no_more(self._now.geometric, trial.geometric, item):
+    def _passes(self, finding: Finding, trial: Trial) -> bool:
+        if not fails_no_more(self._current.geometry_verdict, trial.geometry_verdict, finding):
             return False
         if self.judged.verdict.level != "flown":
             return True
-        if "flown" not in vars(trial):
+        if "flight_verdict" not in vars(trial):
             self._flights_left -= 1
-        return self._flights_left >= 0 and leaves_no_more(self.judged.verdict, trial.flown, item)
+        return self._flights_left >= 0 and fails_no_more(self.judged.verdict, trial.flight_verdict, finding)
 
-    def _candidates(self, item: Finding, suggestion: Suggestion) -> Iterator[tuple[Suggestion, Trial]]:
+    def _growing_suggestions(self, finding: Finding, suggestion: Suggestion) -> Iterator[tuple[Suggestion, Trial]]:
         """Yield a suggestion and then larger ones, each with its trial."""
-        judged, asked, total = self.judged, item, suggestion
+        judged, grown_finding, total = self.judged, finding, suggestion
         while True:
             try:
-                mission, setup = self._changed(judged, asked, suggestion)
+                mission, setup = self._changed_flight(judged, grown_finding, suggestion)
             except PlanflyError:
                 return
-            made = Trial(setup, self.context.airframe.aircraft, self.hurry)
-            trial = self._trials.setdefault((mission.items, setup.battery), made)
+            new_trial = Trial(setup, self.context.airframe.aircraft, self.should_abort)
+            trial = self._trials.setdefault((mission.items, setup.battery), new_trial)
             yield total, trial
-            after = trial.flown if "flown" in vars(trial) else trial.geometric
-            left = _still_needed(item, total, after)
-            if left is None:
+            after = trial.flight_verdict if "flight_verdict" in vars(trial) else trial.geometry_verdict
+            missing_steps = _missing_steps(finding, total, after)
+            if missing_steps is None:
                 return
-            asked, suggestion = left
-            judged, total = JudgedMission(mission, trial.setup, trial.requirements, after), _merged(total, suggestion)
+            grown_finding, suggestion = missing_steps
+            judged, total = (
+                JudgedMission(mission, trial.setup, trial.requirements, after),
+                _merge_steps(total, suggestion),
+            )
 
-    def _changed(self, judged: JudgedMission, item: Finding, suggestion: Suggestion) -> tuple[Mission, FlightSetup]:
+    def _changed_flight(
+        self, judged: JudgedMission, finding: Finding, suggestion: Suggestion
+    ) -> tuple[Mission, FlightSetup]:
         """Return mission and setup with a suggestion; a shorter flight is tried as a larger store of energy."""
         setup = replace(judged.setup, autopilot=judged.setup.autopilot.law)
         match suggestion:
@@ -164,11 +178,11 @@ class SuggestionTrials:
                 return judged.mission, replace(setup, battery=change.wanted * setup.battery)
             case (Change(what="duration") as change,):
                 return judged.mission, replace(setup, battery=setup.battery / (1.0 - 0.01 * change.wanted))
-        mission = apply_suggestion(self.context, judged, item, suggestion)
+        mission = apply_suggestion(self.context, judged, finding, suggestion)
         return mission, self.context.setup(mission)
 
 
-def _still_needed(item: Finding, suggestion: Suggestion, after: Verdict) -> tuple[Finding, Suggestion] | None:
+def _missing_steps(finding: Finding, suggestion: Suggestion, after: Verdict) -> tuple[Finding, Suggestion] | None:
     """Return the finding that still fails after a suggestion by steps, and the steps that it needs, or None.
 
     If the finding itself is gone, another leg that fails by the same rule needs steps.
@@ -176,20 +190,22 @@ def _still_needed(item: Finding, suggestion: Suggestion, after: Verdict) -> tupl
     kinds = {change.what for change in suggestion}
     if not kinds <= _STEPS:
         return None
-    own = [one for one in after.failed if finding_key(one) == finding_key(item)]
-    legs = [one for one in after.failed if one.rule == item.rule and one.place.kind == "leg"]
-    for one in (*own, *legs):
-        for more in one.suggestions:
-            if {change.what for change in more} == kinds:
-                steps = (replace(change, wanted=_GROWTH_FACTOR * change.wanted + _GROWTH_M) for change in more)
-                return one, tuple(steps)
+    same_finding = [failed for failed in after.failed if finding_key(failed) == finding_key(finding)]
+    same_rule_legs = [failed for failed in after.failed if failed.rule == finding.rule and failed.place.kind == "leg"]
+    for failed in (*same_finding, *same_rule_legs):
+        for needed_suggestion in failed.suggestions:
+            if {change.what for change in needed_suggestion} == kinds:
+                steps = (
+                    replace(change, wanted=_GROWTH_FACTOR * change.wanted + _GROWTH_M) for change in needed_suggestion
+                )
+                return failed, tuple(steps)
     return None
 
 
-def _merged(suggestion: Suggestion, more: Suggestion) -> Suggestion:
+def _merge_steps(suggestion: Suggestion, further_steps: Suggestion) -> Suggestion:
     """Return a suggestion with further steps, each added to the step of the same kind at the same place."""
     steps: dict[object, Change] = {}
-    for change in (*suggestion, *more):
+    for change in (*suggestion, *further_steps):
         key = change.what, change.place.kind, change.place.index
         before = steps[key].wanted if key in steps else 0.0
         steps[key] = replace(change, wanted=float(round(before + change.wanted)))

@@ -25,11 +25,11 @@ MISSILE_BUFFER = 10.0
 # Margin added to the distance by which a flight violated a zone, m.
 ZONE_BUFFER = 5.0
 # Factor on a limit that is already the limit of the aircraft, if the flight fails nevertheless.
-TIGHTENED_SHARE = 0.9
+TIGHTENING_FACTOR = 0.9
 # Minimum bank to which a plan is tightened, degrees.
 MIN_BANK_DEG = 5.0
 # Remark on a round that is followed by another.
-GO_ON = "tightened and planned again"
+NEXT_ROUND_REMARK = "tightened and planned again"
 
 # Keys of the scenario's numbers that can be tightened.
 Tightened = Literal[
@@ -80,7 +80,7 @@ def tightening_text(change: Tightening) -> str:
 def tighten_limits(scenario: Scenario, verdict: Verdict) -> tuple[Scenario, list[Tightening]]:
     """Return the scenario for the next round of planning, and its changes; empty if nothing can be tightened."""
     spec = copy.deepcopy(scenario.to_json())
-    failed = [item for item in verdict.findings if item.ok is False]
+    failed = [finding for finding in verdict.findings if finding.ok is False]
     changes = _tighten_slopes(spec, failed) + _tighten_turns(spec, scenario, failed)
     if not changes:
         # These limits are tightened only if the flight followed slopes and turns.  A flight that cannot follow its plan
@@ -100,108 +100,118 @@ def _tighten_slopes(spec: Spec, failed: list[Finding]) -> list[Tightening]:
     changes = []
     keys: tuple[tuple[Tightened, float], ...] = (("max_climb_deg", 1.0), ("max_dive_deg", -1.0))
     for key, sign in keys:
-        mine = [sign * item.planned for item in failed if item.rule == "slope" and item.planned is not None]
-        steep = [angle for angle in mine if angle > 0.0]
-        if not steep:
+        planned_angles = [
+            sign * finding.planned for finding in failed if finding.rule == "slope" and finding.planned is not None
+        ]
+        steep_angles = [angle for angle in planned_angles if angle > 0.0]
+        if not steep_angles:
             continue
-        now = _limits_table(spec).get(key, "aircraft")
-        by_aircraft = any(item.limit_source == "aircraft" and item.margin and item.margin < 0.0 for item in failed)
-        tighter: float | str = "aircraft"
-        if now == "aircraft" or not by_aircraft:
-            tighter = round(TIGHTENED_SHARE * min([*steep, *([now] if isinstance(now, float) else [])]), 2)
-        _limits_table(spec)[key] = tighter
-        changes.append(Tightening(key, now, tighter))
+        current = _limits_table(spec).get(key, "aircraft")
+        exceeds_aircraft = any(
+            finding.limit_source == "aircraft" and finding.margin and finding.margin < 0.0 for finding in failed
+        )
+        tightened: float | str = "aircraft"
+        if current == "aircraft" or not exceeds_aircraft:
+            tightened = round(
+                TIGHTENING_FACTOR * min([*steep_angles, *([current] if isinstance(current, float) else [])]), 2
+            )
+        _limits_table(spec)[key] = tightened
+        changes.append(Tightening(key, current, tightened))
     return changes
 
 
 def _tighten_turns(spec: Spec, scenario: Scenario, failed: list[Finding]) -> list[Tightening]:
-    if not any(item.rule in ("turn", "waypoint", "corridor") for item in failed):
+    if not any(finding.rule in ("turn", "waypoint", "corridor") for finding in failed):
         return []
-    now = _limits_table(spec).get("max_turn_deg", "aircraft")
-    if now != "aircraft":
+    current = _limits_table(spec).get("max_turn_deg", "aircraft")
+    if current != "aircraft":
         _limits_table(spec)["max_turn_deg"] = "aircraft"
-        return [Tightening("max_turn_deg", now, "aircraft")]
+        return [Tightening("max_turn_deg", current, "aircraft")]
     # Plan with larger arcs; the flight keeps its maximum bank.
     bank = scenario.flight.max_bank_deg
-    tighter = round(TIGHTENED_SHARE * bank, 2)
-    if tighter < MIN_BANK_DEG:
+    tightened = round(TIGHTENING_FACTOR * bank, 2)
+    if tightened < MIN_BANK_DEG:
         return []
-    spec.setdefault("flight", {})["max_bank_deg"] = tighter
-    return [Tightening("max_bank_deg", bank, tighter)]
+    spec.setdefault("flight", {})["max_bank_deg"] = tightened
+    return [Tightening("max_bank_deg", bank, tightened)]
 
 
 def _raise_clearance(spec: Spec, scenario: Scenario, failed: list[Finding]) -> list[Tightening]:
-    short = [-item.margin for item in failed if item.rule == "clearance" and item.margin is not None]
-    if not short:
+    shortfalls = [-finding.margin for finding in failed if finding.rule == "clearance" and finding.margin is not None]
+    if not shortfalls:
         return []
-    now = scenario.limits.min_clearance_m
-    tighter = round(now + max(0.0, *short) + CLEARANCE_BUFFER, 1)
-    _limits_table(spec)["min_clearance_m"] = tighter
-    return [Tightening("min_clearance_m", now, tighter)]
+    current = scenario.limits.min_clearance_m
+    tightened = round(current + max(0.0, *shortfalls) + CLEARANCE_BUFFER, 1)
+    _limits_table(spec)["min_clearance_m"] = tightened
+    return [Tightening("min_clearance_m", current, tightened)]
 
 
 def _lower_max_height(spec: Spec, scenario: Scenario, failed: list[Finding]) -> list[Tightening]:
     """Lower the maximum height above ground in `spec` if the flight exceeded it and can fly lower."""
-    now = scenario.limits.max_height_m
-    over = [-item.margin for item in failed if item.rule == "height" and item.margin is not None]
-    if now is None or not over:
+    current = scenario.limits.max_height_m
+    excesses = [-finding.margin for finding in failed if finding.rule == "height" and finding.margin is not None]
+    if current is None or not excesses:
         return []
-    tighter = round(now - max(0.0, *over) - CLEARANCE_BUFFER, 1)
-    if tighter <= float(_limits_table(spec).get("min_clearance_m", scenario.limits.min_clearance_m)):
+    tightened = round(current - max(0.0, *excesses) - CLEARANCE_BUFFER, 1)
+    if tightened <= float(_limits_table(spec).get("min_clearance_m", scenario.limits.min_clearance_m)):
         return []
-    _limits_table(spec)["max_height_m"] = tighter
-    return [Tightening("max_height_m", now, tighter)]
+    _limits_table(spec)["max_height_m"] = tightened
+    return [Tightening("max_height_m", current, tightened)]
 
 
 def _widen_zone_margin(spec: Spec, scenario: Scenario, failed: list[Finding]) -> list[Tightening]:
     """Widen the margin around zones in `spec` if the flight violated a zone and the plan itself did not."""
-    mine = [item for item in failed if item.rule == "fence" and not (item.planned or 0.0) > ROUNDING_M]
-    deep = [-item.margin for item in mine if item.margin is not None]
-    if not deep:
+    flight_violations = [
+        finding for finding in failed if finding.rule == "fence" and not (finding.planned or 0.0) > ROUNDING_M
+    ]
+    depths = [-finding.margin for finding in flight_violations if finding.margin is not None]
+    if not depths:
         return []
-    asked = scenario.planner.zone_margin_m
-    now = CERTIFIED_ZONE_MARGIN if asked is None else asked
-    tighter = round(now + max(deep) + ZONE_BUFFER, 1)
-    spec.setdefault("planner", {})["zone_margin_m"] = tighter
-    return [Tightening("zone_margin_m", now, tighter)]
+    scenario_margin = scenario.planner.zone_margin_m
+    current = CERTIFIED_ZONE_MARGIN if scenario_margin is None else scenario_margin
+    tightened = round(current + max(depths) + ZONE_BUFFER, 1)
+    spec.setdefault("planner", {})["zone_margin_m"] = tightened
+    return [Tightening("zone_margin_m", current, tightened)]
 
 
 def _enlarge_missiles(spec: Spec, failed: list[Finding]) -> list[Tightening]:
     changes = []
-    for item in failed:
-        if item.planned:
+    for finding in failed:
+        if finding.planned:
             # The plan itself enters the sphere, because the planner found no path outside.  It would find none outside
             # a larger sphere either.
             continue
-        depth = next((-fact.value for fact in item.facts if fact.what == "nearest"), None)
+        depth = next((-fact.value for fact in finding.facts if fact.what == "nearest"), None)
         if depth is None:
             continue
-        threat = spec["threats"][item.place.index]
-        now = threat["kill_radius_m"]
-        threat["kill_radius_m"] = now + round(depth + SUGGESTION_LENGTH_MARGIN_M) + MISSILE_BUFFER
-        changes.append(Tightening("kill_radius_m", now, threat["kill_radius_m"], threat_text(item.place)))
+        threat = spec["threats"][finding.place.index]
+        current = threat["kill_radius_m"]
+        threat["kill_radius_m"] = current + round(depth + SUGGESTION_LENGTH_MARGIN_M) + MISSILE_BUFFER
+        changes.append(Tightening("kill_radius_m", current, threat["kill_radius_m"], threat_text(finding.place)))
     return changes
 
 
 # Changes and results of each round.
 Rounds = list[dict[str, Any]]
-# Function that plans and flies one round in a scenario; it returns the verdict, and whether the plan was flown.
-OneRound = Callable[[Scenario], tuple[Verdict, bool]]
+# Function that plans and flies one round in a scenario; it returns the verdict, and True if the plan was flown.
+FlyRound = Callable[[Scenario], tuple[Verdict, bool]]
 
 
-def refine(scenario: Scenario, most: int, one_round: OneRound, keep: Callable[[int], None]) -> tuple[Verdict, Rounds]:
+def refine(
+    scenario: Scenario, max_rounds: int, fly_round: FlyRound, keep_results: Callable[[int], None]
+) -> tuple[Verdict, Rounds]:
     """Plan and fly in rounds, each with limits tightened by the previous round, until one flies or none can follow.
 
-    most: maximum number of rounds after the first.
-    one_round: plans in a scenario and flies; returns the verdict, and whether the plan was flown.
-    keep: called with the number of a round before another round replaces its results.
+    max_rounds: maximum number of rounds after the first.
+    fly_round: plans in a scenario and flies; returns the verdict, and True if the plan was flown.
+    keep_results: called with the number of a round before another round replaces its results.
 
     Returns the last verdict, and the changes and results of each round in the format of ``rounds.json``.
     """
     rounds: Rounds = []
-    planned_in, changes = scenario, list[Tightening]()
-    for number in range(most + 1):
-        verdict, flown = one_round(planned_in)
+    planning_scenario, changes = scenario, list[Tightening]()
+    for number in range(max_rounds + 1):
+        verdict, flown = fly_round(planning_scenario)
         rounds.append(
             {
                 "round": number,
@@ -212,16 +222,16 @@ def refine(scenario: Scenario, most: int, one_round: OneRound, keep: Callable[[i
                 "next": "",
             }
         )
-        planned_in, changes = tighten_limits(planned_in, verdict)
-        rounds[-1]["next"] = _next_step_remark(verdict, flown, number == most, changes)
-        if rounds[-1]["next"] != GO_ON:
+        planning_scenario, changes = tighten_limits(planning_scenario, verdict)
+        rounds[-1]["next"] = _next_step_remark(verdict, flown, number == max_rounds, changes)
+        if rounds[-1]["next"] != NEXT_ROUND_REMARK:
             break
-        keep(number)
+        keep_results(number)
     return verdict, rounds
 
 
-def _next_step_remark(verdict: Verdict, flown: bool, last: bool, changes: list[Tightening]) -> str:
-    """Return the remark on the step after a round, which is `GO_ON` or the reason to end."""
+def _next_step_remark(verdict: Verdict, flown: bool, is_last: bool, changes: list[Tightening]) -> str:
+    """Return the remark on the step after a round, which is `NEXT_ROUND_REMARK` or the reason to end."""
     if verdict.flyable:
         return "done: it flies"
     if verdict.undecided:
@@ -230,4 +240,4 @@ def _next_step_remark(verdict: Verdict, flown: bool, last: bool, changes: list[T
         return "ended: within these limits no feasible plan was found"
     if not changes:
         return "ended: nothing is left to tighten; the planner knows no path that meets what failed"
-    return "ended: no rounds left" if last else GO_ON
+    return "ended: no rounds left" if is_last else NEXT_ROUND_REMARK

@@ -23,14 +23,14 @@ MAX_ENERGY_RATIO = 2.0
 
 
 class TrialAborted(Exception):
-    """Raised when a trial flight is aborted because `hurry` returned True."""
+    """Raised when a trial flight is aborted because `should_abort` returned True."""
 
 
 # Function that returns True if trial flights should be aborted.
-Hurry = Callable[[], bool]
+AbortCheck = Callable[[], bool]
 
 
-def no_hurry() -> bool:
+def never_abort() -> bool:
     """Return False, so that trials are flown to their end."""
     return False
 
@@ -39,12 +39,12 @@ def no_hurry() -> bool:
 class Trial:
     """A setup that is judged and flown when a verdict is first requested, and only once.
 
-    hurry: called throughout the flight; once it returns True, the flight is aborted with TrialAborted.
+    should_abort: called throughout the flight; once it returns True, the flight is aborted with TrialAborted.
     """
 
     setup: FlightSetup
     aircraft: Aircraft
-    hurry: Hurry = no_hurry
+    should_abort: AbortCheck = never_abort
 
     @cached_property
     def requirements(self) -> RouteRequirements:
@@ -52,7 +52,7 @@ class Trial:
         return route_requirements(self.setup)
 
     @cached_property
-    def geometric(self) -> Verdict:
+    def geometry_verdict(self) -> Verdict:
         """Verdict without a flight."""
         return judge_geometry(self.setup, self.requirements)
 
@@ -66,14 +66,14 @@ class Trial:
         try:
             for block in simulate(Flight(self.setup, self.aircraft)):
                 blocks.append(block)
-                if self.hurry():
+                if self.should_abort():
                     raise TrialAborted
         except StartError as error:
             return join_tracks([]), f"not started: {error.reason}"
         return track_of(blocks), blocks[-1].ended
 
     @cached_property
-    def flown(self) -> Verdict:
+    def flight_verdict(self) -> Verdict:
         """Verdict on the flight."""
         return judge_flight(self.setup, *self.flight, requirements=self.requirements)
 
@@ -85,9 +85,11 @@ def reason_not_to_start(requirements: RouteRequirements) -> str:
     prediction is skipped if even full power throughout needs no more.
     """
     setup = requirements.setup
-    seconds, full = setup.path.length / float(setup.route.airspeed.min()), setup.envelope.power_full
-    full_energy = float(np.nanmax(full, initial=0.0)) * seconds / 3600.0
+    duration, full_power = setup.path.length / float(setup.route.airspeed.min()), setup.envelope.power_full
+    full_energy = float(np.nanmax(full_power, initial=0.0)) * duration / 3600.0
     if full_energy <= MAX_ENERGY_RATIO * setup.battery:
         return ""
-    ratio = predicted_energy(requirements)[0] / setup.battery
-    return f"not started: it takes {ratio:.0f} times the energy carried" if ratio > MAX_ENERGY_RATIO else ""
+    energy_ratio = predicted_energy(requirements)[0] / setup.battery
+    return (
+        f"not started: it takes {energy_ratio:.0f} times the energy carried" if energy_ratio > MAX_ENERGY_RATIO else ""
+    )

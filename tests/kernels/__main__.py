@@ -14,7 +14,7 @@ import tempfile
 from pathlib import Path
 
 from planfly.kernel_units.ready_kernels import MISSION
-from planfly.kernel_units.unit_kernels import BOTH, GLIDING
+from planfly.kernel_units.unit_kernels import GLIDING, PLANNING_AND_FLYING
 from planfly.runtime.first_start import compile_units
 from planfly.runtime.process_setup import prepare_process, with_large_stack
 from planner.search.kernel_calls import FRONT
@@ -99,7 +99,7 @@ def main() -> int:
         (folder / "field.waypoints").write_text(MISSION, encoding="utf-8")
         # The longest of what is beside each other, and no kernel's.
         reading = subprocess.Popen([*PYTEST, "-n", "0", "--collect-only"], cwd=ROOT)
-        compile_units([*BOTH, *GLIDING, FRONT], cache_folder(), lambda _: None)
+        compile_units([*PLANNING_AND_FLYING, *GLIDING, FRONT], cache_folder(), lambda _: None)
         environment = os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
         command = [sys.executable, "-m", "tests.kernels"]
         started = [subprocess.Popen([*command, str(k)], cwd=folder, env=environment) for k in range(len(PROCESSES))]

@@ -10,7 +10,7 @@ import pytest
 
 import planfly
 from planfly.planning import pareto_plans as choice_of_ways
-from planfly.planning.gust_orbits import MAX_EXPECTED_ORBITS, expected_circles, waypoints_in_gusts
+from planfly.planning.gust_orbits import MAX_EXPECTED_ORBITS, expected_orbits, max_waypoints_in_gusts
 from planfly.studio import worker_tasks as works
 from planfly.workflow.airframe import load_airframe
 from planfly.workflow.make_plan import make_plan
@@ -85,7 +85,7 @@ def test_no_plan_has_more_waypoints_than_gusts_allow(way: Callable[[Scenario], P
     airframe, plan = load_airframe(scenario), way(scenario)
     ahead = replace(plan, waypoints=plan.waypoints[plan.flown_legs :])
     assert plan.safe
-    assert 0.0 < expected_circles(ahead, airframe.autopilot, airframe.limits) <= MAX_EXPECTED_ORBITS
+    assert 0.0 < expected_orbits(ahead, airframe.autopilot, airframe.limits) <= MAX_EXPECTED_ORBITS
 
 
 def test_all_give_the_same_plan() -> None:
@@ -113,7 +113,7 @@ def test_each_plan_of_a_front_is_safe_in_gusts(searched: int | None, monkeypatch
     Even if the others are searched for with as many waypoints as in still air, none of the front has them.
     """
     if searched is not None:
-        monkeypatch.setattr(choice_of_ways, "waypoints_in_gusts", lambda plan, airframe: searched)
+        monkeypatch.setattr(choice_of_ways, "max_waypoints_in_gusts", lambda plan, airframe: searched)
     radar = {"name": "radar", "east_m": 2000.0, "north_m": 500.0, "amsl_m": 0.0}
     reach = {"detection_radius_m": 1500.0, "detection_scale_m": 800.0}
     scenario = scenario_of("moderate", threats=[radar | reach], zones=[])
@@ -123,7 +123,7 @@ def test_each_plan_of_a_front_is_safe_in_gusts(searched: int | None, monkeypatch
     assert len(front.plans) >= (3 if searched is None else 1)
     for one in front.plans:
         assert one.plan.safe
-        assert expected_circles(one.plan, airframe.autopilot, airframe.limits) <= MAX_EXPECTED_ORBITS
+        assert expected_orbits(one.plan, airframe.autopilot, airframe.limits) <= MAX_EXPECTED_ORBITS
 
 
 def test_other_plans_have_as_many_waypoints_as_level_flight_allows() -> None:
@@ -134,6 +134,6 @@ def test_other_plans_have_as_many_waypoints_as_level_flight_allows() -> None:
     climb, sink = airframe.limits.rates(150.0)
     wider = replace(airframe, autopilot=airframe.autopilot.with_parameters(NAV_FW_ALT_RAD=12.0))
     assert wider.autopilot.altitude_miss_probability(climb, sink, "moderate") == pytest.approx(0.0083, abs=0.0001)
-    assert waypoints_in_gusts(plan, wider) == 5
+    assert max_waypoints_in_gusts(plan, wider) == 5
     calm = scenario_of("none")
-    assert waypoints_in_gusts(replace(plan, scenario=calm), load_airframe(calm)) == len(plan.waypoints)
+    assert max_waypoints_in_gusts(replace(plan, scenario=calm), load_airframe(calm)) == len(plan.waypoints)

@@ -2,14 +2,14 @@
 
 The probability of failure is a link function of a + b * wind + c . draws.  Three likelihoods are available:
 
-- of the failures alone, a binary regression;
+- of only the failures, a binary regression;
 - of the failures and the margins of passed flights, with one distribution: the share of flights that pass by less than
   a given margin is the same function with k * margin added, so that the margin has the link's distribution with scale
   1/k, in units of the margin's scale.  A failed flight only contributes that it failed, and a flight that passed by a
   scale or more only that it did, so that the distribution need not hold far from failure: a regression censored on both
   sides (Tobin, "Estimation of relationships for limited dependent variables", Econometrica 26, 1958; Rosett and Nelson,
   "Estimation of the two-limit probit regression model", Econometrica 43, 1975);
-- of the margin alone, given that a flight passed: the same regression truncated at zero margin.
+- of only the margin, given that a flight passed: the same regression truncated at zero margin.
 
 Priors are weak and normal, on the logarithm of b and on the other coefficients themselves.  The most informative
 flight, and the evidence for a link and for the prior width of the draws' coefficients, follow from a normal
@@ -101,14 +101,16 @@ class _Probit:
     def information(self, x: Floats, width: float = 0.0) -> Floats:
         from scipy.special import ndtr
 
-        more = x + width
+        upper_predictor = x + width
         # Information of a failure and of a pass by more than the width, then of a pass between them (mean square
         # score).
-        ends = self.density(x) ** 2 / np.maximum(ndtr(x), _MIN_PROBABILITY) + self.density(more) ** 2 / np.maximum(
-            ndtr(-more), _MIN_PROBABILITY
+        end_information = self.density(x) ** 2 / np.maximum(ndtr(x), _MIN_PROBABILITY) + self.density(
+            upper_predictor
+        ) ** 2 / np.maximum(ndtr(-upper_predictor), _MIN_PROBABILITY)
+        pass_information = (
+            ndtr(upper_predictor) - ndtr(x) - upper_predictor * self.density(upper_predictor) + x * self.density(x)
         )
-        between = ndtr(more) - ndtr(x) - more * self.density(more) + x * self.density(x)
-        return ends + np.maximum(between, 0.0)
+        return end_information + np.maximum(pass_information, 0.0)
 
     def derivatives(self, x: Floats, failed: Bools) -> tuple[Floats, Floats]:
         from scipy.special import log_ndtr
@@ -130,8 +132,8 @@ class _ComplementaryLogLog:
     def log_cdf(self, x: Floats) -> Floats:
         with np.errstate(divide="ignore"):
             # For a tiny rate the probability equals the rate.
-            out: Floats = np.where(x < -30.0, x, np.log(-np.expm1(self.log_survival(x))))
-        return out
+            logarithms: Floats = np.where(x < -30.0, x, np.log(-np.expm1(self.log_survival(x))))
+        return logarithms
 
     def log_survival(self, x: Floats) -> Floats:
         return -np.exp(np.minimum(x, _MAX_EXPONENT))
@@ -143,11 +145,13 @@ class _ComplementaryLogLog:
         return np.exp(x - np.exp(np.minimum(x, _MAX_EXPONENT)))
 
     def information(self, x: Floats, width: float = 0.0) -> Floats:
-        rate, more = (np.exp(np.clip(at, -_MAX_EXPONENT, 0.5 * _MAX_EXPONENT)) for at in (x, x + width))
+        rate, upper_rate = (
+            np.exp(np.clip(predictor, -_MAX_EXPONENT, 0.5 * _MAX_EXPONENT)) for predictor in (x, x + width)
+        )
         # As for the probit: rate * ratio * exp(-rate) for failures, integrals over the rate for passes.
-        fails = rate * _rate_ratio(rate) * np.exp(-rate)
-        between = np.maximum(_square_above(rate) - _square_above(more), 0.0)
-        return fails + between + more * more * np.exp(-more)
+        failure_information = rate * _rate_ratio(rate) * np.exp(-rate)
+        pass_information = np.maximum(_square_above(rate) - _square_above(upper_rate), 0.0)
+        return failure_information + pass_information + upper_rate * upper_rate * np.exp(-upper_rate)
 
     def derivatives(self, x: Floats, failed: Bools) -> tuple[Floats, Floats]:
         rate = np.exp(np.clip(x, -_MAX_EXPONENT, 0.5 * _MAX_EXPONENT))
@@ -171,8 +175,8 @@ def _square_above(rate: Floats) -> Floats:
 def _rate_ratio(rate: Floats) -> Floats:
     """Return rate / (exp(rate) - 1): near 1 for a small rate, 0 for a large one."""
     with np.errstate(over="ignore"):
-        out: Floats = rate / np.expm1(rate)
-    return out
+        ratio: Floats = rate / np.expm1(rate)
+    return ratio
 
 
 PROBIT: BinaryLink = _Probit()
@@ -199,28 +203,26 @@ _POINTS_PER_SAMPLE = 2
 _SEED = 1
 
 
-def importance_sample(
-    log_density: Callable[[Floats], Floats], middle: Floats, covariance: Floats, count: int
-) -> Floats:
+def importance_sample(log_density: Callable[[Floats], Floats], mean: Floats, covariance: Floats, count: int) -> Floats:
     """Return (count, k) equally likely points of a distribution, in random order.
 
     The points are spread most evenly in the first coordinate.
     log_density: log-density (n,) of points (n, k), up to a constant; -inf for zero density.
-    middle, covariance: (k,) and (k, k), approximate mean and covariance of the distribution.  count: a power of two.
+    mean, covariance: (k,) and (k, k), approximate mean and covariance of the distribution.  count: a power of two.
     Raises LinAlgError if the covariance is not positive definite.
 
     >>> sample = importance_sample(lambda x: -0.5 * x[:, 0] ** 2, np.ones(1), np.eye(1), 256)
     >>> round(float(sample.std()), 1)
     1.0
     """
-    standard, log_proposal = _t_points(middle.size, _POINTS_PER_SAMPLE * count)
-    points = middle + standard @ np.linalg.cholesky(covariance).T
-    logs = log_density(points) - log_proposal
+    standard, log_proposal = _t_points(mean.size, _POINTS_PER_SAMPLE * count)
+    points = mean + standard @ np.linalg.cholesky(covariance).T
+    log_weights = log_density(points) - log_proposal
     order = np.argsort(points[:, 0], kind="stable")
-    summed = np.cumsum(np.exp(logs - logs.max())[order])
+    cumulative_weights = np.cumsum(np.exp(log_weights - log_weights.max())[order])
     steps = (np.arange(count) + 0.5) / count
-    kept = order[np.searchsorted(summed / summed[-1], steps).clip(0, order.size - 1)]
-    return np.random.default_rng(_SEED).permutation(points[kept])
+    selected = order[np.searchsorted(cumulative_weights / cumulative_weights[-1], steps).clip(0, order.size - 1)]
+    return np.random.default_rng(_SEED).permutation(points[selected])
 
 
 @lru_cache
@@ -229,8 +231,10 @@ def _t_points(size: int, count: int) -> tuple[Floats, Floats]:
     from scipy.stats import chi2, norm, qmc
 
     # With a power of two points, Sobol's sequence is balanced.
-    shares = qmc.Sobol(size + 1, seed=_SEED).random(count).clip(1e-12, 1.0 - 1e-12)
-    points = norm.ppf(shares[:, :size]) / np.sqrt(chi2.ppf(shares[:, size:], _DEGREES_OF_FREEDOM) / _DEGREES_OF_FREEDOM)
+    sobol_points = qmc.Sobol(size + 1, seed=_SEED).random(count).clip(1e-12, 1.0 - 1e-12)
+    points = norm.ppf(sobol_points[:, :size]) / np.sqrt(
+        chi2.ppf(sobol_points[:, size:], _DEGREES_OF_FREEDOM) / _DEGREES_OF_FREEDOM
+    )
     return points, -0.5 * (_DEGREES_OF_FREEDOM + size) * np.log1p((points * points).sum(axis=1) / _DEGREES_OF_FREEDOM)
 
 
@@ -288,14 +292,14 @@ class Outcomes:
         """Flights (n,) that passed by a known margin of less than a scale."""
         return (self.margin > 0.0) & (self.margin < 1.0)
 
-    def without_margin(self) -> "Outcomes":
-        """Return the outcomes with pass or fail alone."""
+    def as_pass_or_fail(self) -> "Outcomes":
+        """Return the outcomes reduced to pass or fail."""
         return Outcomes(self.terms, self.failed, np.zeros_like(self.margin))
 
-    def only_margin(self) -> "Outcomes":
+    def margins_given_pass(self) -> "Outcomes":
         """Return the outcomes of the flights with a known margin, given that they passed."""
-        known = self.margin > 0.0
-        return Outcomes(self.terms[known], self.failed[known], self.margin[known], given_passed=True)
+        has_margin = self.margin > 0.0
+        return Outcomes(self.terms[has_margin], self.failed[has_margin], self.margin[has_margin], given_passed=True)
 
 
 @dataclass(frozen=True)
@@ -319,19 +323,19 @@ class RegressionFit:
         return self._posterior.sample(self._mode)
 
 
-def fit_regression(outcomes: Outcomes, link: BinaryLink, near: RegressionFit | None = None) -> RegressionFit:
+def fit_regression(outcomes: Outcomes, link: BinaryLink, nearby_fit: RegressionFit | None = None) -> RegressionFit:
     """Fit the regression with the prior of the draws' coefficients that has the most evidence.
 
-    near: a fit of the same coefficients, whose mode is an additional start; the posterior of margins alone may have two
-    modes.
+    nearby_fit: a fit of the same coefficients, whose mode is an additional start; the posterior of margins only may
+    have two modes.
 
-    >>> from planfly.campaigns.statistics.censored_regression import PROBIT
-    >>> wind = np.linspace(-5.0, 5.0, 200)
-    >>> margin = 2.0 - wind
-    >>> outcomes = Outcomes(np.column_stack((np.ones(200), wind)), margin < 0.0, margin.clip(0.0, 1.0))
-    >>> fit = fit_regression(outcomes, PROBIT)
-    >>> round(float(-fit.mean[0] / fit.mean[1]), 1)
-    2.0
+        >>> from planfly.campaigns.statistics.censored_regression import PROBIT
+        >>> wind = np.linspace(-5.0, 5.0, 200)
+        >>> margin = 2.0 - wind
+        >>> outcomes = Outcomes(np.column_stack((np.ones(200), wind)), margin < 0.0, margin.clip(0.0, 1.0))
+        >>> fit = fit_regression(outcomes, PROBIT)
+        >>> round(float(-fit.mean[0] / fit.mean[1]), 1)
+        2.0
     """
     # Without drawn quantities there are no coefficients to put a prior on: fit once.
     priors = _DRAW_SIGMAS if outcomes.terms.shape[1] > 2 else _DRAW_SIGMAS[:1]
@@ -339,7 +343,8 @@ def fit_regression(outcomes: Outcomes, link: BinaryLink, near: RegressionFit | N
     for deviation in priors:
         posterior = _Posterior(outcomes, link, deviation)
         fits += [
-            _fit(posterior, at) for at in ([posterior.start()] if near is None else [posterior.start(), near._mode])
+            _fit(posterior, start)
+            for start in ([posterior.start()] if nearby_fit is None else [posterior.start(), nearby_fit._mode])
         ]
     return max(fits, key=lambda fit: fit.log_evidence)
 
@@ -347,30 +352,30 @@ def fit_regression(outcomes: Outcomes, link: BinaryLink, near: RegressionFit | N
 class _Posterior:
     """Posterior of coefficients, with the logarithm of the wind's coefficient.
 
-    The margin's is last, if any is known.
-    deviation: standard deviation of the prior of the draws' coefficients.
+    The margin's coefficient is last, if any margin is known.
+    draw_deviation: standard deviation of the prior of the draws' coefficients.
     """
 
-    def __init__(self, outcomes: Outcomes, link: BinaryLink, deviation: float) -> None:
+    def __init__(self, outcomes: Outcomes, link: BinaryLink, draw_deviation: float) -> None:
         self._outcomes, self._link, self._narrow_passes = outcomes, link, outcomes.narrow
         self.by_margin = bool(self._narrow_passes.any())
         self.size = outcomes.terms.shape[1]
-        deviations = np.full(self.size, deviation)
+        deviations = np.full(self.size, draw_deviation)
         deviations[:2] = _CONSTANT_SIGMA, _WIND_LOG_SIGMA
         # The margin is a regressor of passed flights: F(terms . beta + k * margin) is the share that passes by less.
         self._terms = np.column_stack((outcomes.terms, outcomes.margin)) if self.by_margin else outcomes.terms
         self.deviations = np.append(deviations, _MARGIN_SIGMA) if self.by_margin else deviations
         self._precision = self.deviations**-2
-        self._middle = np.zeros(self.deviations.size)
-        self._middle[1] = np.log(_WIND_MEDIAN)
+        self._prior_mean = np.zeros(self.deviations.size)
+        self._prior_mean[1] = np.log(_WIND_MEDIAN)
 
     def start(self) -> Floats:
         """Return the start of Newton's method."""
-        at = np.zeros(self.deviations.size)
-        at[:2] = _START
+        point = np.zeros(self.deviations.size)
+        point[:2] = _START
         if self.by_margin:
-            at[-1] = _MARGIN_START
-        return at
+            point[-1] = _MARGIN_START
+        return point
 
     def coefficients(self, points: Floats) -> Floats:
         """Return the coefficients of the terms at any number of points."""
@@ -380,22 +385,25 @@ class _Posterior:
 
     def log_density(self, points: Floats) -> Floats:
         """Return the log-density (n,) at n points, up to a constant."""
-        beta, off, failed = self.coefficients(points), points - self._middle, self._outcomes.failed
-        x = self._terms @ beta.T
-        bare = self._outcomes.terms @ beta[:, : self.size].T if self.by_margin else x
+        beta, deviations, failed = self.coefficients(points), points - self._prior_mean, self._outcomes.failed
+        predictor = self._terms @ beta.T
+        predictor_without_margin = self._outcomes.terms @ beta[:, : self.size].T if self.by_margin else predictor
         # Practically impossible, and its logarithm is so large that the other terms would be lost to rounding.
-        possible = (bare[~failed] < _MAX_PREDICTOR).all(axis=0)
-        x, bare = np.where(possible, x, 0.0), np.where(possible, bare, 0.0)
-        logs: Floats = -0.5 * (off * off) @ self._precision
-        logs += self._link.log_cdf(x[failed]).sum(axis=0)
-        logs += self._link.log_survival(x[~failed & ~self._narrow_passes]).sum(axis=0)
+        is_possible = (predictor_without_margin[~failed] < _MAX_PREDICTOR).all(axis=0)
+        predictor, predictor_without_margin = (
+            np.where(is_possible, predictor, 0.0),
+            np.where(is_possible, predictor_without_margin, 0.0),
+        )
+        log_densities: Floats = -0.5 * (deviations * deviations) @ self._precision
+        log_densities += self._link.log_cdf(predictor[failed]).sum(axis=0)
+        log_densities += self._link.log_survival(predictor[~failed & ~self._narrow_passes]).sum(axis=0)
         if self.by_margin:
-            possible &= beta[:, -1] > 0.0
-            logs += self._link.log_density(x[self._narrow_passes]).sum(axis=0)
-            logs += self._narrow_passes.sum() * np.log(np.where(possible, beta[:, -1], 1.0))
+            is_possible &= beta[:, -1] > 0.0
+            log_densities += self._link.log_density(predictor[self._narrow_passes]).sum(axis=0)
+            log_densities += self._narrow_passes.sum() * np.log(np.where(is_possible, beta[:, -1], 1.0))
         if self._outcomes.given_passed:
-            logs -= self._link.log_survival(bare).sum(axis=0)
-        return np.where(possible, logs, -np.inf)
+            log_densities -= self._link.log_survival(predictor_without_margin).sum(axis=0)
+        return np.where(is_possible, log_densities, -np.inf)
 
     def sample(self, mode: Floats) -> Floats:
         """Return (s, size) equally likely coefficients of the terms.
@@ -405,40 +413,43 @@ class _Posterior:
         """
         eigenvalues, axes = np.linalg.eigh(self.slope_and_curvature(mode)[1])
         covariance = axes / np.maximum(np.abs(eigenvalues), _MIN_CURVATURE) @ axes.T
-        best_known = -covariance[0, 1] / (covariance[1, 1] * np.exp(mode[1]))
+        best_known_wind = -covariance[0, 1] / (covariance[1, 1] * np.exp(mode[1]))
         # The change of variables from the constant to that predictor leaves the density unchanged.
-        turn = np.eye(mode.size)
-        turn[0, 1] = best_known * np.exp(mode[1])
-        middle = mode.copy()
-        middle[0] += best_known * np.exp(mode[1])
+        change_of_variables = np.eye(mode.size)
+        change_of_variables[0, 1] = best_known_wind * np.exp(mode[1])
+        mean = mode.copy()
+        mean[0] += best_known_wind * np.exp(mode[1])
 
         def constants(points: Floats) -> Floats:
-            out = points.copy()
-            out[:, 0] -= best_known * self.coefficients(points)[:, 1]
-            return out
+            changed_points = points.copy()
+            changed_points[:, 0] -= best_known_wind * self.coefficients(points)[:, 1]
+            return changed_points
 
         points = importance_sample(
-            lambda points: self.log_density(constants(points)), middle, turn @ covariance @ turn.T, _SAMPLE_SIZE
+            lambda points: self.log_density(constants(points)),
+            mean,
+            change_of_variables @ covariance @ change_of_variables.T,
+            _SAMPLE_SIZE,
         )
         return self.coefficients(constants(points))[:, : self.size]
 
-    def slope_and_curvature(self, at: Floats) -> tuple[Floats, Floats]:
+    def slope_and_curvature(self, point: Floats) -> tuple[Floats, Floats]:
         """Return the first and second derivatives of the negative log-density."""
-        beta, scale = self.coefficients(at), np.ones(at.size)
-        x, terms = self._terms @ beta, self._terms
-        first, second = self._link.derivatives(x, self._outcomes.failed)
+        beta, scale = self.coefficients(point), np.ones(point.size)
+        predictor, terms = self._terms @ beta, self._terms
+        first, second = self._link.derivatives(predictor, self._outcomes.failed)
         if self.by_margin:
-            of_first, of_second = self._link.density_derivatives(x)
+            narrow_first, narrow_second = self._link.density_derivatives(predictor)
             first, second = (
-                np.where(self._narrow_passes, of_first, first),
-                np.where(self._narrow_passes, of_second, second),
+                np.where(self._narrow_passes, narrow_first, first),
+                np.where(self._narrow_passes, narrow_second, second),
             )
         slope, curvature = -terms.T @ first, -(terms * second[:, None]).T @ terms
         if self._outcomes.given_passed:
-            bare = self._outcomes.terms
+            terms_without_margin = self._outcomes.terms
             first, second = self._link.derivatives(self._at_no_margin(beta), self._outcomes.failed)
-            slope[: self.size] += bare.T @ first
-            curvature[: self.size, : self.size] += (bare * second[:, None]).T @ bare
+            slope[: self.size] += terms_without_margin.T @ first
+            curvature[: self.size, : self.size] += (terms_without_margin * second[:, None]).T @ terms_without_margin
         if self.by_margin:
             count = int(self._narrow_passes.sum())
             slope[-1] -= count / beta[-1]
@@ -447,40 +458,40 @@ class _Posterior:
         scale[1] = beta[1]
         slope, curvature = scale * slope, scale[:, None] * curvature * scale
         curvature[1, 1] += slope[1]
-        return slope + self._precision * (at - self._middle), curvature + np.diag(self._precision)
+        return slope + self._precision * (point - self._prior_mean), curvature + np.diag(self._precision)
 
     def _at_no_margin(self, beta: Floats) -> Floats:
         return self._outcomes.terms @ beta[: self.size]
 
 
-def _fit(posterior: _Posterior, at: Floats) -> RegressionFit:
+def _fit(posterior: _Posterior, start: Floats) -> RegressionFit:
     """Find the posterior's mode from a start, and the inverse of its curvature there.
 
     Newton's method with halved steps, and with the absolute eigenvalues of the curvature where the loss is not convex,
-    as may be with margins alone (Nocedal and Wright, Numerical Optimization, 2nd edition, 2006, sections 3.4 and 19.2).
+    as may be with margins only (Nocedal and Wright, Numerical Optimization, 2nd edition, 2006, sections 3.4 and 19.2).
     """
     size = posterior.size
 
     def loss(point: Floats) -> float:
         return -float(posterior.log_density(point[None])[0])
 
-    value = loss(at)
+    value = loss(start)
     for _ in range(_MAX_STEPS):
-        slope, curvature = posterior.slope_and_curvature(at)
+        slope, curvature = posterior.slope_and_curvature(start)
         eigenvalues, axes = np.linalg.eigh(curvature)
         step = axes @ (axes.T @ slope / np.maximum(np.abs(eigenvalues), _MIN_CURVATURE))
         # The margin's coefficient stays positive: limit the step towards 0, where halved steps would end otherwise.
-        towards = step[-1] if posterior.by_margin else 0.0
-        share = min(1.0, _MAX_MARGIN_STEP_FRACTION * at[-1] / towards) if towards > 0.0 else 1.0
-        while not (tried := loss(at - share * step)) <= value and share > _MIN_STEP_FRACTION:
-            share *= 0.5
-        at, value = at - share * step, tried
-        if float(np.abs(share * step).max()) < _STEP_TOLERANCE:
+        margin_step = step[-1] if posterior.by_margin else 0.0
+        fraction = min(1.0, _MAX_MARGIN_STEP_FRACTION * start[-1] / margin_step) if margin_step > 0.0 else 1.0
+        while not (new_value := loss(start - fraction * step)) <= value and fraction > _MIN_STEP_FRACTION:
+            fraction *= 0.5
+        start, value = start - fraction * step, new_value
+        if float(np.abs(fraction * step).max()) < _STEP_TOLERANCE:
             break
-    curvature, beta = posterior.slope_and_curvature(at)[1], posterior.coefficients(at)
+    curvature, beta = posterior.slope_and_curvature(start)[1], posterior.coefficients(start)
     evidence = -value - np.log(posterior.deviations).sum() - 0.5 * float(np.linalg.slogdet(curvature)[1])
     covariance: Floats = np.linalg.inv(curvature)[:size, :size].astype(np.float64)
     covariance[1] *= beta[1]
     covariance[:, 1] *= beta[1]
     by_margin = float(beta[-1]) if posterior.by_margin else 0.0
-    return RegressionFit(beta[:size], covariance, float(evidence), by_margin, posterior, at)
+    return RegressionFit(beta[:size], covariance, float(evidence), by_margin, posterior, start)

@@ -89,8 +89,8 @@ def _interval(successes: int, trials: int, confidence: float, method: str) -> In
 
     if not trials:
         return Interval(0.0, 1.0)
-    found = binomtest(successes, trials).proportion_ci(confidence, method=method)
-    return Interval(float(found.low), float(found.high))
+    interval = binomtest(successes, trials).proportion_ci(confidence, method=method)
+    return Interval(float(interval.low), float(interval.high))
 
 
 # ----------------------------------------------------------------------
@@ -131,22 +131,24 @@ class StoppingBound:
     @property
     def fewest(self) -> int:
         """Number of flights that reach the target without a failure."""
-        return math.ceil((self._enough + _MIXTURE_LOSS) / -math.log(self.target))
+        return math.ceil((self._required_evidence + _MIXTURE_LOSS) / -math.log(self.target))
 
     @property
-    def _enough(self) -> float:
+    def _required_evidence(self) -> float:
         return -math.log1p(-self.confidence)
 
     @cached_property
     def parts(self) -> tuple[tuple[float, float, float], ...]:
         """Weight, a and b of each part of the mixture."""
-        scale, low, high = float(self.fewest), 0.0, 1.0
+        scale, min_failures, max_failures = float(self.fewest), 0.0, 1.0
         for _ in range(_BISECTIONS):
-            middle = 0.5 * (low + high)
-            evidence = _log_mixture(self._parts(scale, middle), self.fewest, 0) - self.fewest * math.log(self.target)
-            low, high = (middle, high) if evidence >= self._enough else (low, middle)
+            failures = 0.5 * (min_failures + max_failures)
+            evidence = _log_mixture(self._parts(scale, failures), self.fewest, 0) - self.fewest * math.log(self.target)
+            min_failures, max_failures = (
+                (failures, max_failures) if evidence >= self._required_evidence else (min_failures, failures)
+            )
         # Slightly less, to cover rounding.
-        return self._parts(scale, 0.999 * low)
+        return self._parts(scale, 0.999 * min_failures)
 
     @staticmethod
     def _parts(scale: float, failures: float) -> tuple[tuple[float, float, float], ...]:
@@ -159,35 +161,35 @@ class StoppingBound:
 
     def excludes(self, successes: int, failures: int, p: float, *, above: bool) -> bool:
         """Return True if p is excluded and the share of successes is above p (or below it if not ``above``)."""
-        share = successes / max(1, successes + failures)
-        beyond = share > p if above else share < p
-        return beyond and self.evidence(successes, failures, p) >= self._enough
+        fraction = successes / max(1, successes + failures)
+        is_beyond = fraction > p if above else fraction < p
+        return is_beyond and self.evidence(successes, failures, p) >= self._required_evidence
 
     def interval(self, successes: int, failures: int) -> Interval:
         """Return the interval of all p that are not excluded, around the share of successes, where E is smallest."""
         trials = successes + failures
         if not trials:
             return Interval(0.0, 1.0)
-        share = successes / trials
-        low = 0.0 if not successes else self._edge(successes, failures, 0.0, share)
-        high = 1.0 if not failures else self._edge(successes, failures, 1.0, share)
-        return Interval(low, high)
+        fraction = successes / trials
+        lower = 0.0 if not successes else self._edge(successes, failures, 0.0, fraction)
+        upper = 1.0 if not failures else self._edge(successes, failures, 1.0, fraction)
+        return Interval(lower, upper)
 
-    def _edge(self, successes: int, failures: int, outside: float, inside: float) -> float:
-        """Find the edge between an excluded p and one that is not, by bisection; return its excluded side."""
+    def _edge(self, successes: int, failures: int, excluded: float, included: float) -> float:
+        """Find the edge between excluded and other values of p by bisection; return its excluded side."""
         for _ in range(_BISECTIONS):
-            middle = 0.5 * (outside + inside)
-            if self.evidence(successes, failures, middle) >= self._enough:
-                outside = middle
+            candidate = 0.5 * (excluded + included)
+            if self.evidence(successes, failures, candidate) >= self._required_evidence:
+                excluded = candidate
             else:
-                inside = middle
-        return outside
+                included = candidate
+        return excluded
 
     def bounds(self, tally: Tally) -> Interval:
-        """Return the interval of a tally: lost flights are failures for its low end, successes for its high end."""
-        low = self.interval(tally.flyable, tally.failed + tally.lost).low
-        high = self.interval(tally.flyable + tally.lost, tally.failed).high
-        return Interval(low, high)
+        """Return the interval of a tally; lost flights are failures for its lower end, successes for its upper end."""
+        lower = self.interval(tally.flyable, tally.failed + tally.lost).low
+        upper = self.interval(tally.flyable + tally.lost, tally.failed).high
+        return Interval(lower, upper)
 
 
 def _times_log(count: int, p: float) -> float:
@@ -268,8 +270,8 @@ class Estimator:
         target, bound = self._goal.target, self._bound
         if bound is None or target is None:
             return False
-        reached = bound.excludes(tally.flyable, tally.failed + tally.lost, target, above=True)
-        return reached or bound.excludes(tally.flyable + tally.lost, tally.failed, target, above=False)
+        is_reached = bound.excludes(tally.flyable, tally.failed + tally.lost, target, above=True)
+        return is_reached or bound.excludes(tally.flyable + tally.lost, tally.failed, target, above=False)
 
     def estimate(self, tally: Tally) -> Estimate:
         """Estimate the probability from a tally."""
@@ -279,8 +281,8 @@ class Estimator:
             lower, upper = interval
         else:
             lower, upper = lower_bound(tally, confidence), upper_bound(tally, confidence)
-            low = clopper_pearson(tally.flyable, tally.flown, confidence).low
-            interval = Interval(low, clopper_pearson(tally.flyable + tally.lost, tally.flown, confidence).high)
+            interval_low = clopper_pearson(tally.flyable, tally.flown, confidence).low
+            interval = Interval(interval_low, clopper_pearson(tally.flyable + tally.lost, tally.flown, confidence).high)
         return Estimate(tally, lower, upper, interval, self._answer(lower, upper))
 
     def _answer(self, lower: float, upper: float) -> Answer:

@@ -53,48 +53,49 @@ class FailureLaws:
     normals: int
 
     @classmethod
-    def up_to(cls, most: float) -> "FailureLaws":
-        """Make the grid for winds up to ``most``, m/s."""
-        means = np.arange(-_GRID_BELOW_MPS, most + _GRID_ABOVE_MPS, _MEAN_STEP_MPS)
-        mean, spread = (grid.ravel() for grid in np.meshgrid(means, _SIGMAS_MPS, indexing="ij"))
+    def up_to(cls, max_speed: float) -> "FailureLaws":
+        """Make the grid for winds up to ``max_speed``, m/s."""
+        means = np.arange(-_GRID_BELOW_MPS, max_speed + _GRID_ABOVE_MPS, _MEAN_STEP_MPS)
+        mean, deviation = (grid.ravel() for grid in np.meshgrid(means, _SIGMAS_MPS, indexing="ij"))
         # Gumbel's distribution for minima: mean = location - gamma * scale, variance = (pi * scale)^2 / 6.
-        scale = spread * np.sqrt(6.0) / np.pi
+        scale = deviation * np.sqrt(6.0) / np.pi
         location = mean + np.euler_gamma * scale
-        return cls(np.concatenate((mean, location)), np.concatenate((spread, scale)), mean.size)
+        return cls(np.concatenate((mean, location)), np.concatenate((deviation, scale)), mean.size)
 
     def log_shares(self, speed: float) -> tuple[Floats, Floats]:
         """Return the logarithms (n,) of the probabilities of failure and of success at a wind, m/s."""
         from scipy.special import log_ndtr
         from scipy.stats import gumbel_l
 
-        x = (speed - self.location) / self.scale
-        normal, gumbel = x[: self.normals], x[self.normals :]
-        fails = np.concatenate((log_ndtr(normal), gumbel_l.logcdf(gumbel)))
-        return fails, np.concatenate((log_ndtr(-normal), gumbel_l.logsf(gumbel)))
+        standard = (speed - self.location) / self.scale
+        normal, gumbel = standard[: self.normals], standard[self.normals :]
+        log_failure = np.concatenate((log_ndtr(normal), gumbel_l.logcdf(gumbel)))
+        return log_failure, np.concatenate((log_ndtr(-normal), gumbel_l.logsf(gumbel)))
 
-    def quantile(self, share: float) -> Floats:
+    def quantile(self, fraction: float) -> Floats:
         """Return the wind (n,) at which this share of flights fails, m/s."""
         from scipy.special import ndtri
         from scipy.stats import gumbel_l
 
-        standard = np.full(self.scale.size, float(gumbel_l.ppf(share)))
-        standard[: self.normals] = float(ndtri(share))
+        standard = np.full(self.scale.size, float(gumbel_l.ppf(fraction)))
+        standard[: self.normals] = float(ndtri(fraction))
         return self.location + standard * self.scale
 
-    def quantile_at(self, share: float, speeds: Floats, flyable: NDArray[np.bool_], parts: Floats) -> Floats:
+    def quantile_at(self, fraction: float, speeds: Floats, flyable: NDArray[np.bool_], probabilities: Floats) -> Floats:
         """Return quantiles (k,) of the posterior of the wind at which this share of flights fails, m/s.
 
-        speeds, flyable: (m,) winds and outcomes of the flights.  parts: (k,) probabilities of the quantiles, 0 to 1.
+        speeds, flyable: (m,) winds and outcomes of the flights.
+        probabilities: (k,) probabilities of the quantiles, 0 to 1.
         """
-        logs = np.zeros(self.location.size)
+        log_weights = np.zeros(self.location.size)
         for speed, counts in _counts_by_wind(speeds, flyable).items():
-            fails, flies = self.log_shares(speed)
-            logs += counts[0] * fails + counts[1] * flies
-        weights = np.exp(logs - logs.max())
-        values = self.quantile(share)
+            log_failure, log_success = self.log_shares(speed)
+            log_weights += counts[0] * log_failure + counts[1] * log_success
+        weights = np.exp(log_weights - log_weights.max())
+        values = self.quantile(fraction)
         order = np.argsort(values, kind="stable")
-        summed = np.cumsum(weights[order] / weights.sum())
-        return values[order][np.minimum(np.searchsorted(summed, parts), values.size - 1)]
+        cumulative = np.cumsum(weights[order] / weights.sum())
+        return values[order][np.minimum(np.searchsorted(cumulative, probabilities), values.size - 1)]
 
 
 def _counts_by_wind(speeds: Floats, flyable: NDArray[np.bool_]) -> dict[float, tuple[int, int]]:
@@ -149,15 +150,17 @@ def fit_mode(terms: Floats, failed: Bools, margin: Floats, link: BinaryLink) -> 
     0.0
     """
     outcomes = Outcomes(terms, failed, np.where(failed, 0.0, margin))
-    one_law = fit_regression(outcomes, link)
+    joint_fit = fit_regression(outcomes, link)
     if not outcomes.narrow.any():
-        return _make_mode(link, one_law, one_law.log_evidence)
-    alone, passes = fit_regression(outcomes.without_margin(), link), outcomes.only_margin()
+        return _make_mode(link, joint_fit, joint_fit.log_evidence)
+    failure_fit, passed_outcomes = fit_regression(outcomes.as_pass_or_fail(), link), outcomes.margins_given_pass()
     # The separate distribution of the margins may have either link.
-    two_laws = alone.log_evidence + max(fit_regression(passes, any_link, one_law).log_evidence for any_link in LINKS)
-    if two_laws > one_law.log_evidence:
-        return _make_mode(link, alone, two_laws)
-    return _make_mode(link, one_law, one_law.log_evidence)
+    separate_evidence = failure_fit.log_evidence + max(
+        fit_regression(passed_outcomes, margin_link, joint_fit).log_evidence for margin_link in LINKS
+    )
+    if separate_evidence > joint_fit.log_evidence:
+        return _make_mode(link, failure_fit, separate_evidence)
+    return _make_mode(link, joint_fit, joint_fit.log_evidence)
 
 
 def _make_mode(link: BinaryLink, fit: RegressionFit, log_evidence: float) -> FailureMode:
@@ -173,11 +176,11 @@ def regressors(speeds: Floats | float, draws: Floats) -> Floats:
 
     speeds: (n,) or one for all, m/s.  draws: (n, d) in standard deviations from their means.
     """
-    out = np.empty((len(draws), 2 + draws.shape[1]))
-    out[:, 0] = 1.0
-    out[:, 1] = np.asarray(speeds) - ORIGIN
-    out[:, 2:] = draws
-    return out
+    terms = np.empty((len(draws), 2 + draws.shape[1]))
+    terms[:, 0] = 1.0
+    terms[:, 1] = np.asarray(speeds) - ORIGIN
+    terms[:, 2:] = draws
+    return terms
 
 
 def fit_modes(
@@ -200,44 +203,54 @@ def fit_modes(
     >>> round(float(10.0 - mode.mean[0] / mode.mean[1]), 1)
     12.0
     """
-    found: list[FailureMode] = []
+    modes: list[FailureMode] = []
     margins = margin or [None] * len(failed)
-    left = np.ones(len(failed), dtype=bool)
-    while counts := Counter(way for here, ways in zip(left, failed, strict=True) if here for way in ways):
+    is_left = np.ones(len(failed), dtype=bool)
+    while counts := Counter(
+        mode
+        for is_remaining, failed_modes in zip(is_left, failed, strict=True)
+        if is_remaining
+        for mode in failed_modes
+    ):
         # Ties are broken by name, as the order of a set differs between processes.
-        common = min(counts, key=lambda way: (-counts[way], repr(way)))
-        so = np.array([common in ways for ways in failed])
-        passed_by = np.array([0.0 if some is None else some.get(common, 1.0) for some in margins])
-        found.append(fit_mode(terms[left], so[left], passed_by[left], link))
-        left &= ~so
-    return tuple(found)
+        most_common = min(counts, key=lambda mode: (-counts[mode], repr(mode)))
+        has_failed = np.array([most_common in failed_modes for failed_modes in failed])
+        passed_margins = np.array(
+            [
+                0.0 if margins_of_flight is None else margins_of_flight.get(most_common, 1.0)
+                for margins_of_flight in margins
+            ]
+        )
+        modes.append(fit_mode(terms[is_left], has_failed[is_left], passed_margins[is_left], link))
+        is_left &= ~has_failed
+    return tuple(modes)
 
 
 def fail_shares(modes: Sequence[FailureMode], terms: Floats) -> Floats:
     """Return the failure probability (n,), in any mode, of flights (n, 2 + d), by the means of the modes."""
-    flies: Floats = np.ones(len(terms))
+    success: Floats = np.ones(len(terms))
     for mode in modes:
-        flies *= mode.link.survival(terms @ mode.mean)
-    return 1.0 - flies
+        success *= mode.link.survival(terms @ mode.mean)
+    return 1.0 - success
 
 
-def boundary_speed(modes: Sequence[FailureMode], draws: Floats, share: float, most: float) -> float:
-    """Find the wind from 0 to ``most`` in which this share of draws (m, d) is expected to fail, m/s, by bisection."""
-    still = [(mode.link, regressors(ORIGIN, draws) @ mode.mean, float(mode.mean[1])) for mode in modes]
+def boundary_speed(modes: Sequence[FailureMode], draws: Floats, failing_fraction: float, max_speed: float) -> float:
+    """Find the wind up to `max_speed`, m/s, in which this fraction of draws (m, d) should fail, by bisection."""
+    mode_predictors = [(mode.link, regressors(ORIGIN, draws) @ mode.mean, float(mode.mean[1])) for mode in modes]
 
-    def fails(speed: float) -> bool:
-        flies: Floats = np.ones(len(draws))
-        for link, x, by_wind in still:
-            flies *= link.survival(x + by_wind * (speed - ORIGIN))
-        return bool(1.0 - flies.mean() >= share)
+    def exceeds_fraction(speed: float) -> bool:
+        success: Floats = np.ones(len(draws))
+        for link, predictor, by_wind in mode_predictors:
+            success *= link.survival(predictor + by_wind * (speed - ORIGIN))
+        return bool(1.0 - success.mean() >= failing_fraction)
 
-    if not fails(most):
-        return most
-    low, high = 0.0, most
-    while high - low > 1e-3:
-        middle = 0.5 * (low + high)
-        low, high = (low, middle) if fails(middle) else (middle, high)
-    return 0.5 * (low + high)
+    if not exceeds_fraction(max_speed):
+        return max_speed
+    lower, upper = 0.0, max_speed
+    while upper - lower > 1e-3:
+        speed_between = 0.5 * (lower + upper)
+        lower, upper = (lower, speed_between) if exceeds_fraction(speed_between) else (speed_between, upper)
+    return 0.5 * (lower + upper)
 
 
 @dataclass(frozen=True)
@@ -256,13 +269,13 @@ def failing_share(modes: Sequence[FailureMode], draws: Floats, speed: float) -> 
     """Return the share of draws (m, d) that is expected to fail in a wind, m/s."""
     terms = regressors(speed, draws)
     predictors = [terms @ mode.mean for mode in modes]
-    flies = [mode.link.survival(x) for mode, x in zip(modes, predictors, strict=True)]
+    success = [mode.link.survival(predictor) for mode, predictor in zip(modes, predictors, strict=True)]
     slopes, by_wind = [], 0.0
     for k, mode in enumerate(modes):
-        others = np.prod(flies[:k] + flies[k + 1 :], axis=0)
-        slopes.append(terms.T @ (mode.link.density(predictors[k]) * others) / len(draws))
+        success_of_others = np.prod(success[:k] + success[k + 1 :], axis=0)
+        slopes.append(terms.T @ (mode.link.density(predictors[k]) * success_of_others) / len(draws))
         by_wind += float(slopes[-1][0] * mode.mean[1])
-    return FailingShare(1.0 - float(np.prod(flies, axis=0).mean()), slopes, by_wind)
+    return FailingShare(1.0 - float(np.prod(success, axis=0).mean()), slopes, by_wind)
 
 
 def boundary_slopes(modes: Sequence[FailureMode], draws: Floats, speed: float) -> list[Floats]:
@@ -270,6 +283,6 @@ def boundary_slopes(modes: Sequence[FailureMode], draws: Floats, speed: float) -
 
     draws: (m, d).  speed: the boundary, m/s.
     """
-    at = failing_share(modes, draws, speed)
+    failing = failing_share(modes, draws, speed)
     # If more wind does not cause more failures, nothing is known about the boundary.
-    return [-one / max(at.by_wind, 1e-9) for one in at.slopes]
+    return [-slope / max(failing.by_wind, 1e-9) for slope in failing.slopes]

@@ -51,12 +51,16 @@ class WeightedModes:
 
 
 def boundary_quantiles(
-    fits: Sequence[WeightedModes], draws: Floats, share: float, most: float, probabilities: Sequence[float]
+    fits: Sequence[WeightedModes],
+    draws: Floats,
+    failing_fraction: float,
+    max_speed: float,
+    probabilities: Sequence[float],
 ) -> list[float]:
-    """Return quantiles of the boundary's posterior, m/s, from 0 to ``most``, at these probabilities, 0 to 1.
+    """Return quantiles of the boundary's posterior, m/s, from 0 to ``max_speed``, at these probabilities, 0 to 1.
 
     draws: (m, d) possible draws, evenly spread also if only the first few are used.
-    share: share of flights that fail at the boundary, above 0 and below 1.
+    failing_fraction: share of flights that fail at the boundary, above 0 and below 1.
 
     >>> from planfly.campaigns.statistics.censored_regression import PROBIT
     >>> sample = np.column_stack((np.linspace(-0.1, 0.1, 101), np.full(101, 0.5)))
@@ -65,36 +69,41 @@ def boundary_quantiles(
     >>> [round(one, 1) for one in boundary_quantiles(modes, np.zeros((1, 0)), 0.5, 20.0, (0.5,))]
     [10.0]
     """
-    speeds = [_boundaries(fit.modes, draws, share, most) for fit in fits]
+    speeds = [_boundaries(fit.modes, draws, failing_fraction, max_speed) for fit in fits]
     weights = np.concatenate(
-        [np.full(some.size, fit.weight / some.size) for fit, some in zip(fits, speeds, strict=True)]
+        [np.full(fit_speeds.size, fit.weight / fit_speeds.size) for fit, fit_speeds in zip(fits, speeds, strict=True)]
     )
-    every = np.concatenate(speeds)
-    order = np.argsort(every, kind="stable")
-    summed = np.cumsum(weights[order]) / weights.sum()
-    return [float(every[order][min(int(np.searchsorted(summed, part)), every.size - 1)]) for part in probabilities]
+    all_speeds = np.concatenate(speeds)
+    order = np.argsort(all_speeds, kind="stable")
+    cumulative = np.cumsum(weights[order]) / weights.sum()
+    return [
+        float(all_speeds[order][min(int(np.searchsorted(cumulative, probability)), all_speeds.size - 1)])
+        for probability in probabilities
+    ]
 
 
-def _boundaries(modes: Sequence[FailureMode], draws: Floats, share: float, most: float) -> Floats:
+def _boundaries(modes: Sequence[FailureMode], draws: Floats, failing_fraction: float, max_speed: float) -> Floats:
     """Return the boundary (n,) of each sample, m/s."""
     # The posteriors of the modes are independent: samples of different modes can be combined in any order.
     samples = [
         np.random.default_rng(number).permutation(mode.sample()) if number else mode.sample()
         for number, mode in enumerate(modes)
     ]
-    few, every = (_Shares(modes, samples, some) for some in (draws[:_BRACKET_DRAWS], draws))
-    low, high = np.zeros(len(samples[0])), np.full(len(samples[0]), most)
-    while (high - low).max() > _BRACKET_WIDTH_MPS:
-        middle = 0.5 * (low + high)
-        fails = few.logarithms(middle) > np.log(share)
-        low, high = np.where(fails, low, middle), np.where(fails, middle, high)
-    speed: Floats = 0.5 * (low + high)
-    before = speed - _BRACKET_WIDTH_MPS
-    off_before = every.logarithms(before) - np.log(share)
+    bracket_shares, all_shares = (_Shares(modes, samples, some_draws) for some_draws in (draws[:_BRACKET_DRAWS], draws))
+    lower, upper = np.zeros(len(samples[0])), np.full(len(samples[0]), max_speed)
+    while (upper - lower).max() > _BRACKET_WIDTH_MPS:
+        speed_between = 0.5 * (lower + upper)
+        is_above = bracket_shares.logarithms(speed_between) > np.log(failing_fraction)
+        lower, upper = np.where(is_above, lower, speed_between), np.where(is_above, speed_between, upper)
+    speed: Floats = 0.5 * (lower + upper)
+    previous_speed = speed - _BRACKET_WIDTH_MPS
+    previous_error = all_shares.logarithms(previous_speed) - np.log(failing_fraction)
     for _ in range(_SECANT_STEPS):
-        off = every.logarithms(speed) - np.log(share)
-        by_wind = np.maximum((off - off_before) / np.where(speed == before, 1.0, speed - before), 1e-9)
-        before, off_before, speed = speed, off, np.clip(speed - off / by_wind, 0.0, most)
+        error = all_shares.logarithms(speed) - np.log(failing_fraction)
+        by_wind = np.maximum(
+            (error - previous_error) / np.where(speed == previous_speed, 1.0, speed - previous_speed), 1e-9
+        )
+        previous_speed, previous_error, speed = speed, error, np.clip(speed - error / by_wind, 0.0, max_speed)
     return speed
 
 
@@ -107,10 +116,10 @@ class _Shares:
 
     def logarithms(self, speeds: Floats) -> Floats:
         """Return the logarithms (n,) of the failing shares, each at its own wind, m/s."""
-        flies = np.ones_like(self._at_origin[0])
-        for mode, sample, x in zip(self._modes, self._samples, self._at_origin, strict=True):
-            flies *= mode.link.survival(x + sample[:, 1] * (speeds - ORIGIN))
-        return np.log(np.maximum(1.0 - flies.mean(axis=0), _MIN_PROBABILITY))
+        success = np.ones_like(self._at_origin[0])
+        for mode, sample, predictor in zip(self._modes, self._samples, self._at_origin, strict=True):
+            success *= mode.link.survival(predictor + sample[:, 1] * (speeds - ORIGIN))
+        return np.log(np.maximum(1.0 - success.mean(axis=0), _MIN_PROBABILITY))
 
 
 @dataclass
@@ -127,9 +136,9 @@ class DrawnNumbers:
 
     def first(self, count: int) -> Floats:
         """Return the first `count` draws (count, d), which are computed once."""
-        have = sum(len(block) for block in self._known)
-        if have < count:
-            self._known.append(self.drawn(have, max(count, have + 500)))
+        known_count = sum(len(block) for block in self._known)
+        if known_count < count:
+            self._known.append(self.drawn(known_count, max(count, known_count + 500)))
         if len(self._known) > 1:
             self._known[:] = [np.concatenate(self._known)]
         return self._known[0][:count] if self._known else self.population[:0]
@@ -210,13 +219,13 @@ class Direction:
         """Return the failure modes for each link, for a direction with both failed and flyable flights."""
         if self._fits is None or self._fits[0] != len(self.speeds):
             terms = regressors(np.array(self.speeds), self.numbers.first(max(self.draws) + 1)[self.draws])
-            every = [fit_modes(terms, self.failed, link, self.margin) for link in LINKS]
-            evidence = np.array([sum(mode.log_evidence for mode in modes) for modes in every])
+            modes_by_link = [fit_modes(terms, self.failed, link, self.margin) for link in LINKS]
+            evidence = np.array([sum(mode.log_evidence for mode in modes) for modes in modes_by_link])
             weights = np.exp(evidence - evidence.max())
             weights /= weights.sum()
             self._fits = (
                 len(self.speeds),
-                tuple(self._fit(modes, float(weight)) for modes, weight in zip(every, weights, strict=True)),
+                tuple(self._fit(modes, float(weight)) for modes, weight in zip(modes_by_link, weights, strict=True)),
             )
         return self._fits[1]
 
@@ -236,28 +245,32 @@ class Direction:
         >>> 9.0 < found.low < found.estimate < found.high < 10.0
         True
         """
-        tail, share = 0.5 * (1.0 - self.confidence), 1.0 - self.target
-        parts = (tail, 0.5, 1.0 - tail)
+        tail, failing_fraction = 0.5 * (1.0 - self.confidence), 1.0 - self.target
+        probabilities = (tail, 0.5, 1.0 - tail)
         if self.all_flew or self.all_failed:
-            flew = np.full(len(self.speeds), self.all_flew)
-            low, middle, high = self._laws.quantile_at(share, np.array(self.speeds), flew, np.array(parts))
+            is_flyable = np.full(len(self.speeds), self.all_flew)
+            lower, median, upper = self._laws.quantile_at(
+                failing_fraction, np.array(self.speeds), is_flyable, np.array(probabilities)
+            )
         else:
-            low, middle, high = boundary_quantiles(self.fits(), self.numbers.population, share, self.most, parts)
-        low, middle, high = (float(min(self.most, max(0.0, one))) for one in (low, middle, high))
-        return WindBoundary(middle, low, high, middle >= self.most - 1e-9)
+            lower, median, upper = boundary_quantiles(
+                self.fits(), self.numbers.population, failing_fraction, self.most, probabilities
+            )
+        lower, median, upper = (float(min(self.most, max(0.0, speed))) for speed in (lower, median, upper))
+        return WindBoundary(median, lower, upper, median >= self.most - 1e-9)
 
     @cached_property
     def _laws(self) -> FailureLaws:
         return FailureLaws.up_to(self.most)
 
 
-def needs_more(found: WindBoundary, flights: int, accuracy: float, fewest: int) -> bool:
+def needs_more_flights(boundary: WindBoundary, flights: int, accuracy: float, min_flights: int) -> bool:
     """Return True if a direction needs more flights: too few, or an interval wider than twice the accuracy.
 
-    >>> needs_more(WindBoundary(9.0, 8.8, 9.2, False), 40, 0.5, 30)
+    >>> needs_more_flights(WindBoundary(9.0, 8.8, 9.2, False), 40, 0.5, 30)
     False
     """
-    return flights < fewest or found.width > 2.0 * accuracy
+    return flights < min_flights or boundary.width > 2.0 * accuracy
 
 
 # ----------------------------------------------------------------------
@@ -292,62 +305,68 @@ _LARGEST_WIND_TOLERANCE_MPS = 0.3
 def next_flights(direction: Direction, count: int) -> list[tuple[float, int]]:
     """Return wind, m/s, and draw of the `count` most informative flights."""
     if direction.all_flew or direction.all_failed:
-        speed = _by_bisection(direction)
+        speed = _bisected_speed(direction)
         draws = _extreme_draws(direction) if speed == direction.most else []
         return [(speed, draw) for draw in (draws + _next_draws(direction, count, draws))[:count]]
     return _most_informative(direction, count)
 
 
-def _by_bisection(direction: Direction) -> float:
-    most = direction.most
+def _bisected_speed(direction: Direction) -> float:
+    max_speed = direction.most
     if not direction.speeds:
-        return _rounded(0.5 * most, most)
+        return _round_to_grid(0.5 * max_speed, max_speed)
     if direction.all_failed:
-        return _rounded(0.5 * min(direction.speeds), most)
-    top = max(direction.speeds)
-    return _rounded(0.5 * (top + most), most) if top < most - _LARGEST_WIND_TOLERANCE_MPS else most
+        return _round_to_grid(0.5 * min(direction.speeds), max_speed)
+    max_flown = max(direction.speeds)
+    return (
+        _round_to_grid(0.5 * (max_flown + max_speed), max_speed)
+        if max_flown < max_speed - _LARGEST_WIND_TOLERANCE_MPS
+        else max_speed
+    )
 
 
-def _next_draws(direction: Direction, count: int, others: list[int]) -> list[int]:
-    """Return the first draws that are neither flown nor among others."""
-    taken = {*direction.draws, *others}
-    out: list[int] = []
+def _next_draws(direction: Direction, count: int, other_draws: list[int]) -> list[int]:
+    """Return the first draws that are neither flown nor in `other_draws`."""
+    used_draws = {*direction.draws, *other_draws}
+    draws: list[int] = []
     index = 0
-    while len(out) < count:
-        if index not in taken:
-            out.append(index)
+    while len(draws) < count:
+        if index not in used_draws:
+            draws.append(index)
         index += 1
-    return out
+    return draws
 
 
 def _extreme_draws(direction: Direction) -> list[int]:
     """Return the draws with the largest and the smallest value of each quantity, without flown draws."""
     numbers = direction.numbers.first(_EXTREME_DRAW_POOL)
-    wanted = [int(pick(numbers[:, k])) for k in range(numbers.shape[1]) for pick in (np.argmax, np.argmin)]
-    return [draw for draw in dict.fromkeys(wanted) if draw not in set(direction.draws)]
+    extreme_draws = [int(select(numbers[:, k])) for k in range(numbers.shape[1]) for select in (np.argmax, np.argmin)]
+    return [draw for draw in dict.fromkeys(extreme_draws) if draw not in set(direction.draws)]
 
 
 def _most_informative(direction: Direction, count: int) -> list[tuple[float, int]]:
-    fits, most, flown = direction.fits(), direction.most, len(direction.draws)
-    least, largest = (
-        [boundary_speed(fit.modes, direction.numbers.population, share, most) for fit in fits]
-        for share in (_MIN_FAILING_SHARE, _MAX_FAILING_SHARE)
+    fits, max_speed, flown_count = direction.fits(), direction.most, len(direction.draws)
+    min_speeds, max_speeds = (
+        [boundary_speed(fit.modes, direction.numbers.population, failing_fraction, max_speed) for fit in fits]
+        for failing_fraction in (_MIN_FAILING_SHARE, _MAX_FAILING_SHARE)
     )
-    speeds = np.unique([_rounded(wind, most) for wind in np.linspace(min(least), max(largest), _WIND_COUNT)])
+    speeds = np.unique(
+        [_round_to_grid(wind, max_speed) for wind in np.linspace(min(min_speeds), max(max_speeds), _WIND_COUNT)]
+    )
     beliefs = [_Belief(fit) for fit in fits]
     # Without drawn quantities all draws are equivalent.
-    compared = _COMPARED_DRAWS if direction.numbers.population.shape[1] else 1
-    out: list[tuple[float, int]] = []
-    for number in range(flown, flown + count):
-        taken = [draw for _, draw in out]
-        draws = _next_draws(direction, 1 if number % _NEXT_DRAW_INTERVAL == 0 else compared, taken)
+    draw_count = _COMPARED_DRAWS if direction.numbers.population.shape[1] else 1
+    flights: list[tuple[float, int]] = []
+    for number in range(flown_count, flown_count + count):
+        used_draws = [draw for _, draw in flights]
+        draws = _next_draws(direction, 1 if number % _NEXT_DRAW_INTERVAL == 0 else draw_count, used_draws)
         drawn = direction.numbers.first(max(draws) + 1)[draws]
         terms = regressors(np.repeat(speeds, len(draws)), np.tile(drawn, (speeds.size, 1)))
         best = int(np.argmax(sum(belief.gains(terms) for belief in beliefs) + _gains_between(fits, terms)))
-        out.append((float(speeds[best // len(draws)]), draws[best % len(draws)]))
+        flights.append((float(speeds[best // len(draws)]), draws[best % len(draws)]))
         for belief in beliefs:
             belief.expect(terms[best])
-    return out
+    return flights
 
 
 def _gains_between(fits: tuple[FailureFit, ...], terms: Floats) -> Floats:
@@ -357,12 +376,12 @@ def _gains_between(fits: tuple[FailureFit, ...], terms: Floats) -> Floats:
     the outcome.
     """
     weights, speeds = (np.array(column) for column in zip(*((fit.weight, fit.speed) for fit in fits), strict=True))
-    off = speeds - weights @ speeds
-    fails = np.array([fail_shares(fit.modes, terms) for fit in fits])
-    failing = np.clip(weights @ fails, 1e-300, 1.0 - 1e-16)
+    deviations = speeds - weights @ speeds
+    failure = np.array([fail_shares(fit.modes, terms) for fit in fits])
+    mean_failure = np.clip(weights @ failure, 1e-300, 1.0 - 1e-16)
     # Mean deviation of the boundary, weighted by failure; for success it has the opposite sign.
-    failed = (weights * off) @ fails
-    return failed**2 / failing + failed**2 / (1.0 - failing)
+    weighted_deviation = (weights * deviations) @ failure
+    return weighted_deviation**2 / mean_failure + weighted_deviation**2 / (1.0 - mean_failure)
 
 
 class _Belief:
@@ -374,26 +393,28 @@ class _Belief:
 
     def gains(self, terms: Floats) -> Floats:
         """Return the expected reduction (n,) of the boundary's variance by each flight (n, 2 + d), m2/s2."""
-        out: Floats = np.zeros(len(terms))
-        for k, info in enumerate(self._informations(terms)):
-            known, slope = terms @ self._covariances[k], self._fit.slopes[k]
-            out += (known @ slope) ** 2 * info / (1.0 + info * (known * terms).sum(axis=1))
-        return self._fit.weight * out
+        gains: Floats = np.zeros(len(terms))
+        for k, information in enumerate(self._informations(terms)):
+            projected, slope = terms @ self._covariances[k], self._fit.slopes[k]
+            gains += (projected @ slope) ** 2 * information / (1.0 + information * (projected * terms).sum(axis=1))
+        return self._fit.weight * gains
 
     def expect(self, row: Floats) -> None:
         """Include a flight (2 + d,) as flown, with unknown outcome."""
-        for k, info in enumerate(self._informations(row[None])):
-            known = self._covariances[k] @ row
-            self._covariances[k] = self._covariances[k] - info * np.outer(known, known) / (1.0 + info * (row @ known))
+        for k, information in enumerate(self._informations(row[None])):
+            projected = self._covariances[k] @ row
+            self._covariances[k] = self._covariances[k] - information * np.outer(projected, projected) / (
+                1.0 + information * (row @ projected)
+            )
 
     def _informations(self, terms: Floats) -> Iterator[Floats]:
         """Yield the information (n,) on each mode: a flight is informative unless it fails in an earlier mode."""
-        reaches: Floats = np.ones(len(terms))
+        reach_probability: Floats = np.ones(len(terms))
         for mode in self._fit.modes:
-            x = terms @ mode.mean
-            yield reaches * mode.link.information(x, mode.by_margin)
-            reaches = reaches * mode.link.survival(x)
+            predictor = terms @ mode.mean
+            yield reach_probability * mode.link.information(predictor, mode.by_margin)
+            reach_probability = reach_probability * mode.link.survival(predictor)
 
 
-def _rounded(speed: float, most: float) -> float:
-    return min(most, max(0.0, round(speed / GRID) * GRID))
+def _round_to_grid(speed: float, max_speed: float) -> float:
+    return min(max_speed, max(0.0, round(speed / GRID) * GRID))

@@ -18,7 +18,7 @@ from aircraft.identification.estimate import (
 )
 from aircraft.identification.parameters import INDEX, NAMES, PARAMETERS
 from aircraft.identification.performance import performance
-from planfly.identification.base_numbers import scaled
+from planfly.identification.base_numbers import scale_model
 from tests.aircraft.identification.flown_truth import TRUTH, flown_truth
 
 TRUE = np.array([TRUTH.parameters()[name] for name in NAMES])
@@ -179,7 +179,7 @@ def test_an_interval_is_of_fit_and_shifts_and_none_wider_than_the_prior() -> Non
 def test_a_mass_that_is_wrong_by_10_percent_leaves_the_climb() -> None:
     """Only thrust and drag over mass are seen: the angle stays, and the drag in newtons goes with the mass."""
     flown = flown_truth()
-    heavy = scaled(flown.base, 1.1 * flown.base.mass, flown.base.span, flown.base.area)
+    heavy = scale_model(flown.base, 1.1 * flown.base.mass, flown.base.span, flown.base.area)
     changed = fit_all(aligned_signals(flown.records, flown.estimate.clocks, heavy), heavy)
     before = performance(flown.base, flown.estimate.values, 25.0, DENSITY)
     after = performance(heavy, changed.values, 25.0, DENSITY)

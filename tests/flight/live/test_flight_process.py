@@ -38,7 +38,7 @@ class MemoryLog:
 
     full: bool = False
     rows: int = 0
-    # How often it asks whether to hurry before it closes.
+    # How often it asks whether to abort before it closes.
     patience: int = 0
     looks: int = 0
     closed: list[str] = field(default_factory=list)
@@ -48,9 +48,9 @@ class MemoryLog:
             raise OSError(28, "No space left on device")
         self.rows += len(block)
 
-    def finish(self, ended: str, hurry: Callable[[], bool]) -> FlightJudged:
+    def finish(self, ended: str, should_abort: Callable[[], bool]) -> FlightJudged:
         for _ in range(self.patience):
-            if hurry():
+            if should_abort():
                 break
             self.looks += 1
             time.sleep(0.01)

@@ -17,7 +17,7 @@ from planfly.campaigns.fly_campaign import fly_campaign, open_store
 from planfly.campaigns.report import OutputDirectory
 from planfly.campaigns.statistics.decision import Estimate, Goal
 from planfly.campaigns.statistics.wind_boundary import Direction
-from planfly.campaigns.tables import DATABASE, AskedFlight, Store, WindsStore
+from planfly.campaigns.tables import DATABASE, RequestedFlight, Store, WindsStore
 from planfly.campaigns.worker_pool import Workers
 from planfly.runtime.stages import Advance
 from tests.planfly.campaigns.made_campaigns import all_fly, short_base, table, write_short
@@ -36,7 +36,7 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> list[tuple[CampaignBase, WindsGoal
     def found(base: CampaignBase, goal: WindsGoal, _: object, store: WindsStore, __: object) -> WindsFound:
         seen.append((base, goal))
         if not store.known():
-            store.add(AskedFlight(0, 0, 5.0, 0), made_row(base))
+            store.add(RequestedFlight(0, 0, 5.0, 0), made_row(base))
         directions = [Direction(goal.most, goal.target, no_numbers(), goal.confidence) for _ in range(goal.directions)]
         for draw, (number, speed, flyable) in enumerate(FLIGHTS):
             directions[number].add(speed, draw, frozenset() if flyable else frozenset({"slope"}))

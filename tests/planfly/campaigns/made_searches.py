@@ -10,8 +10,8 @@ import pytest
 from planfly.campaigns import find_winds as find_winds_module
 from planfly.campaigns.campaign_base import CampaignBase
 from planfly.campaigns.find_winds import WindsFound, WindsGoal, find_winds, open_winds_store
-from planfly.campaigns.flight_requests import FlightRequest, Flown, FlyOne
-from planfly.campaigns.tables import WINDS_DATABASE, WINDS_KIND, AskedFlight, narrow_passes_of, row_of
+from planfly.campaigns.flight_requests import FinishedFlight, FlightRequest, FlyOne
+from planfly.campaigns.tables import WINDS_DATABASE, WINDS_KIND, RequestedFlight, make_flight_row, parse_narrow_passes
 from planfly.campaigns.worker_pool import Workers
 from tests.planfly.campaigns.made_campaigns import made_flight, table
 from tests.soak import SOAK
@@ -25,10 +25,10 @@ class HerePilots:
     def __init__(self, base: CampaignBase, fly: FlyOne) -> None:
         self._base, self._fly = base, fly
 
-    def fly(self, following: Callable[[], FlightRequest | None]) -> Iterator[Flown]:
-        while orders := [one for one in (following() for _ in range(3)) if one is not None]:
+    def fly(self, next_request: Callable[[], FlightRequest | None]) -> Iterator[FinishedFlight]:
+        while orders := [one for one in (next_request() for _ in range(3)) if one is not None]:
             for order in reversed(orders):
-                yield Flown(order, self._fly(self._base, order.index, order.wind))
+                yield FinishedFlight(order, self._fly(self._base, order.index, order.wind))
 
 
 @contextmanager
@@ -65,8 +65,8 @@ def keep_part(base: CampaignBase, whole: Path, part: Path, numbers: set[int], go
         for values in table(whole / WINDS_DATABASE):
             if values[0] in numbers:
                 known = dict(zip(WINDS_KIND.columns, (*values, 0.0, ""), strict=True))
-                row = replace(row_of(known["draw"], known), narrow=narrow_passes_of(known["narrow"]))
-                store.add(AskedFlight(*values[:4]), row)
+                row = replace(make_flight_row(known["draw"], known), narrow=parse_narrow_passes(known["narrow"]))
+                store.add(RequestedFlight(*values[:4]), row)
 
 
 def same(one: tuple[WindsFound, Path], other: tuple[WindsFound, Path]) -> bool:

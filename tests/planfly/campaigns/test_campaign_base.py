@@ -9,7 +9,7 @@ import pytest
 
 from aircraft.catalog import make_own_folder, read_aircraft
 from aircraft.data_sheet import DataSheet
-from planfly.campaigns.campaign_base import CampaignBase, GivenWind, check_middle, open_campaign, vary
+from planfly.campaigns.campaign_base import CampaignBase, GivenWind, check_level_flight_at_medians, open_campaign, vary
 from planfly.campaigns.dispersions import (
     QUANTITIES,
     Dispersions,
@@ -48,10 +48,10 @@ def test_an_aircraft_that_cannot_fly_is_refused(base: CampaignBase, mass: float,
     text += '[drag]\ndistribution = "uniform"\nloc = 2.8\nscale = 0.1\nsource = "x"\n' if not good else ""
     made = replace(base, dispersions=parse_dispersions(text, "mine.toml"))
     if good:
-        check_middle(made)
+        check_level_flight_at_medians(made)
         return
     with pytest.raises(SpreadError, match=r"mine.toml: mass 1.9, drag 2.85: .* no level flight at 25 m/s"):
-        check_middle(made)
+        check_level_flight_at_medians(made)
 
 
 def test_a_missing_mission_is_one_line() -> None:

@@ -12,7 +12,7 @@ from planfly.campaigns.campaign_base import CampaignBase
 from planfly.campaigns.dask_pool import CampaignPlugin, DaskPool, connect
 from planfly.campaigns.flight_requests import LOST, FlightRequest, WorkerError
 from planfly.campaigns.flight_row import FlightRow, lost_row
-from planfly.campaigns.tables import same_flight
+from planfly.campaigns.tables import is_same_flight
 from planfly.campaigns.worker_pool import Workers, worker_pool
 from tests.planfly.campaigns.made_campaigns import made_flight
 
@@ -28,7 +28,7 @@ def test_each_flight_comes_back_once_and_a_foreign_worker_is_refused(
         pool.close()
         assert sorted(one.request.index for one in flown) == list(range(12))
         for request, row in flown:
-            assert same_flight(row, made_flight(base, request.index))
+            assert is_same_flight(row, made_flight(base, request.index))
             assert "://" in row.worker
 
         monkeypatch.setattr("planfly.campaigns.dask_pool.fingerprint", lambda name: {"planfly": "0.0.1"})
@@ -115,7 +115,7 @@ class TwoWorkers(OneWorker):
 def test_names_come_again_but_for_one_that_is_flying(base: CampaignBase, monkeypatch: pytest.MonkeyPatch) -> None:
     """Dask keeps 100,000 names; and of two flights of one name it would fly one."""
     monkeypatch.setattr("distributed.as_completed", lambda loop: LastFirst())
-    monkeypatch.setattr("planfly.campaigns.dask_pool._NAMES", 4)
+    monkeypatch.setattr("planfly.campaigns.dask_pool._TASK_NAME_COUNT", 4)
     client, orders = TwoWorkers(base), iter(range(40))
     flown = list(DaskPool(client, base).fly(lambda: next((FlightRequest(k) for k in orders), None)))
     assert sorted(one.request.index for one in flown) == list(range(40))
@@ -129,12 +129,12 @@ def test_names_come_again_but_for_one_that_is_flying(base: CampaignBase, monkeyp
 def test_dask_flies_what_comes_under_a_name_that_was_flown(
     base: CampaignBase, scheduler: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("planfly.campaigns.dask_pool._NAMES", 16)
+    monkeypatch.setattr("planfly.campaigns.dask_pool._TASK_NAME_COUNT", 16)
     orders = iter(range(200))
     with worker_pool(Workers(None, scheduler), base, made_flight) as pool:
         flown = list(pool.fly(lambda: next((FlightRequest(k) for k in orders), None)))
     assert sorted(one.request.index for one in flown) == list(range(200))
-    assert all(same_flight(row, made_flight(base, request.index)) for request, row in flown)
+    assert all(is_same_flight(row, made_flight(base, request.index)) for request, row in flown)
 
 
 @pytest.mark.parametrize("status", ["error", "finished", "cancelled"])

@@ -22,14 +22,14 @@ from planfly.campaigns.find_winds import (
     WindsFound,
     WindsGoal,
     _Search,
-    asked_flights,
     find_winds,
+    flight_limit,
     open_winds_store,
 )
 from planfly.campaigns.flight_requests import FlyOne
 from planfly.campaigns.flight_row import FlightRow, fly_one, lost_row
 from planfly.campaigns.report import wind_lines
-from planfly.campaigns.tables import WINDS_DATABASE, AskedFlight, FlownFlight, StoreError
+from planfly.campaigns.tables import WINDS_DATABASE, FlownFlight, RequestedFlight, StoreError
 from planfly.campaigns.worker_pool import Workers
 from tests.planfly.campaigns.kills import finish_client, kill_while_it_flies, workers_killed
 from tests.planfly.campaigns.made_campaigns import (
@@ -108,13 +108,13 @@ def test_failures_in_calm_air_are_known_by_rule_and_place(wind_base: CampaignBas
     flown = [(direction, 0.0, failed) for direction in (0, 0, 1)] + [(0, 5.0, failed)] * 20 + [(1, 5.0, failed)] * 20
     flown += [(direction, 20.0, flies) for direction in (2, 3) for _ in range(60)]
     for number, (direction, speed, outcome) in enumerate(flown):
-        search.take(AskedFlight(number, direction, speed, number), outcome)
-    calm = search.found().calm
+        search.add_result(RequestedFlight(number, direction, speed, number), outcome)
+    calm = search.result().calm
     assert calm == CalmFailures(0.0, 3, 3, (RuleFailures("clearance", 3, ((LEG, 3),)),))
     windy = _Search(GOAL, wind_base)
     for number in range(80):
-        windy.take(AskedFlight(number, number % 4, 20.0, number), flies)
-    assert windy.found().calm is None
+        windy.add_result(RequestedFlight(number, number % 4, 20.0, number), flies)
+    assert windy.result().calm is None
 
 
 @pytest.mark.usefixtures("here")
@@ -185,24 +185,24 @@ def test_a_flight_that_did_not_go_on_to_its_end_states_no_margin(
     wind_base: CampaignBase, flown: FlownFlight, margin: dict[Any, float] | None
 ) -> None:
     search = _Search(GOAL, wind_base)
-    search.take(AskedFlight(0, 2, 8.0, 0), flown)
+    search.add_result(RequestedFlight(0, 2, 8.0, 0), flown)
     assert search.directions[2].margin == [margin]
     assert search.directions[2].speeds == [8.0]
 
 
 @pytest.mark.usefixtures("here")
 def test_a_search_that_is_gone_on_with_keeps_its_number_of_flights(wind_base: CampaignBase, tmp_path: Path) -> None:
-    assert asked_flights(None, tmp_path, resume=False) == asked_flights(None, tmp_path, resume=True) == 5000
+    assert flight_limit(None, tmp_path, resume=False) == flight_limit(None, tmp_path, resume=True) == 5000
     searched(wind_base, tmp_path, replace(GOAL, flights=31))
-    assert asked_flights(None, tmp_path, resume=True) == 31
-    assert asked_flights(48, tmp_path, resume=True) == 48
-    assert asked_flights(None, tmp_path, resume=False) == 5000
+    assert flight_limit(None, tmp_path, resume=True) == 31
+    assert flight_limit(48, tmp_path, resume=True) == 48
+    assert flight_limit(None, tmp_path, resume=False) == 5000
 
 
 @pytest.mark.usefixtures("here")
 def test_a_table_whose_flights_do_not_follow_is_refused(wind_base: CampaignBase, tmp_path: Path) -> None:
     with open_winds_store(wind_base, GOAL, tmp_path, resume=False) as store:
-        store.add(AskedFlight(3, 1, 9.9, 0), made_flight(wind_base, 0))
+        store.add(RequestedFlight(3, 1, 9.9, 0), made_flight(wind_base, 0))
     with pytest.raises(StoreError, match="flight 3 does not follow from those before it"):
         searched(wind_base, tmp_path)
     assert len(table(tmp_path / WINDS_DATABASE)) == 1
@@ -217,7 +217,7 @@ def surer_but_in_the_west(base: CampaignBase, index: int, wind: GivenWind | None
 
 @pytest.mark.usefixtures("here")
 def test_progress_tells_what_is_known(wind_base: CampaignBase, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("planfly.campaigns.worker_pool.REPORTED_EVERY", 0.0)
+    monkeypatch.setattr("planfly.campaigns.worker_pool.REPORT_INTERVAL_S", 0.0)
     monkeypatch.setattr(find_winds_module, "FEWEST", 36)
     monkeypatch.setattr(find_winds_module, "ACCURACY", 1.2)
     goal = replace(GOAL, flights=600)

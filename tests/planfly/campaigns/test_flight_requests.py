@@ -7,19 +7,19 @@ from planfly.campaigns.flight_requests import (
     CampaignCopy,
     FlightRequest,
     WorkerError,
+    check_fingerprint,
     code_hash,
     fingerprint,
-    refuse_different,
 )
 from tests.planfly.campaigns.made_campaigns import made_flight
 
 
 def test_the_same_is_let_in_and_each_difference_is_named() -> None:
     mine = fingerprint("aerosonde")
-    refuse_different(mine, dict(mine), "w")
+    check_fingerprint(mine, dict(mine), "w")
     for name in ("planfly", "sources", "model", "jsbsim", "numpy"):
         with pytest.raises(WorkerError, match=f"worker tcp://w:1: {name} other, not"):
-            refuse_different(mine, mine | {name: "other"}, "tcp://w:1")
+            check_fingerprint(mine, mine | {name: "other"}, "tcp://w:1")
 
 
 def test_aircraft_differ_and_a_missing_one_is_no_error_here() -> None:

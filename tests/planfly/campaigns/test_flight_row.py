@@ -25,7 +25,7 @@ from planfly.campaigns.flight_row import (
     narrow_passes,
     waypoint_crossings,
 )
-from planfly.campaigns.tables import same_flight
+from planfly.campaigns.tables import is_same_flight
 from planfly.workflow.airframe import airframe_of
 from planfly.workflow.open_flight import open_flight
 from planfly.workflow.pipeline import fly_and_judge
@@ -192,9 +192,9 @@ def test_the_same_index_gives_the_same_flight_and_log(base: CampaignBase, tmp_pa
     first = fly_one(base, 2, log=tmp_path / "a.mcap")
     fly_one(base, 1)
     again = fly_one(base, 2, log=tmp_path / "b.mcap")
-    assert same_flight(first, again)
+    assert is_same_flight(first, again)
     assert (tmp_path / "a.mcap").read_bytes() == (tmp_path / "b.mcap").read_bytes()
-    assert not same_flight(first, fly_one(base, 1))
+    assert not is_same_flight(first, fly_one(base, 1))
 
 
 def test_the_draw_shows_in_the_flight(base: CampaignBase) -> None:

@@ -19,10 +19,17 @@ from planfly.campaigns import fly_campaign as fly_campaign_module
 from planfly.campaigns.campaign_base import CampaignBase, GivenWind
 from planfly.campaigns.flight_requests import LOST, FlightRequest, FlyOne
 from planfly.campaigns.flight_row import FlightRow, fly_one, lost_row
-from planfly.campaigns.fly_campaign import _FlightTally, _fly_rest, _Pace, fly_campaign, open_store, resumed_goal
+from planfly.campaigns.fly_campaign import (
+    _FlightTally,
+    _fly_remaining,
+    _Pace,
+    fly_campaign,
+    open_store,
+    resumed_goal,
+)
 from planfly.campaigns.statistics.decision import Estimate, Estimator, Goal, Tally, lower_bound
 from planfly.campaigns.summary import summarise
-from planfly.campaigns.tables import DATABASE, StoreError, kept_settings, read_table
+from planfly.campaigns.tables import DATABASE, StoreError, read_stored_settings, read_table
 from planfly.campaigns.worker_pool import WorkerPool, Workers
 from tests.planfly.campaigns.kills import finish_client, kill_while_it_flies, start_client, workers_killed
 from tests.planfly.campaigns.made_campaigns import (
@@ -71,7 +78,7 @@ def test_it_decides_in_the_order_of_indices_whoever_was_quicker(order: int) -> N
     # 59 flights without a failure show 0.95; those beyond are not looked at.
     assert book.decided
     assert book.tally == Tally(59, 0)
-    assert book.following() is None
+    assert book.next_request() is None
 
 
 def test_what_is_known_is_not_sent_again() -> None:
@@ -80,15 +87,15 @@ def test_what_is_known_is_not_sent_again() -> None:
     for known in (0, 1, 3):
         book.add(known, "flyable")
     sent = []
-    while (order := book.following()) is not None:
+    while (order := book.next_request()) is not None:
         sent.append(order.index)
     assert sent == [2, 4, 5]
 
 
 def test_the_last_line_of_progress_counts_every_flight(base: CampaignBase, tmp_path: Path) -> None:
     class AtOnce:
-        def fly(self, following: Callable[[], FlightRequest | None]) -> Iterator[tuple[FlightRequest, FlightRow]]:
-            while (order := following()) is not None:
+        def fly(self, next_request: Callable[[], FlightRequest | None]) -> Iterator[tuple[FlightRequest, FlightRow]]:
+            while (order := next_request()) is not None:
                 yield order, made_flight(base, order.index, None)
 
     goal, told = Goal(None, False, 6), list[tuple[float, float, str]]()
@@ -96,7 +103,7 @@ def test_the_last_line_of_progress_counts_every_flight(base: CampaignBase, tmp_p
     book = _FlightTally(estimator, goal)
     pace = _Pace(goal, estimator, book.tally, lambda *said: told.append(said))
     with open_store(base, goal, tmp_path, resume=False) as store:
-        _fly_rest(cast("WorkerPool", AtOnce()), book, store, pace)
+        _fly_remaining(cast("WorkerPool", AtOnce()), book, store, pace)
     # How many there are is said before the first; they were quicker than another line is due.
     assert [said[:2] for said in told] == [(0.0, 6.0), (6.0, 6.0)]
     assert told[-1][2].startswith("6 flights, P ")
@@ -151,7 +158,7 @@ def test_fewer_flights_than_were_flown_are_refused_and_none_is_lost(base: Campai
         open_store(base, Goal(None, False, 4), tmp_path, resume=True)
     assert table(tmp_path / DATABASE) == before
     # Nor are the refused question's settings kept.
-    assert kept_settings(tmp_path / DATABASE)["flights"] == 5
+    assert read_stored_settings(tmp_path / DATABASE)["flights"] == 5
     assert resumed_goal(None, tmp_path) == Goal(None, False, 5)
     with open_store(base, Goal(None, False, 5), tmp_path, resume=True) as store:
         assert store.tally().flown == 5

@@ -17,7 +17,7 @@ from planfly.campaigns.campaign_base import CampaignBase, GivenWind
 from planfly.campaigns.flight_requests import LOST, FlightRequest, FlyOne
 from planfly.campaigns.flight_row import FlightRow, lost_row
 from planfly.campaigns.local_pool import MAX_FAILED_STARTS, LocalPool
-from planfly.campaigns.tables import same_flight
+from planfly.campaigns.tables import is_same_flight
 from tests.planfly.campaigns.kills import spawned_processes, start_client
 from tests.planfly.campaigns.made_campaigns import made_flight
 from tests.soak import some
@@ -68,7 +68,7 @@ def test_each_flight_comes_back_once_as_one_process_flies_it_and_nothing_listens
     workers = {one.row.worker for one in flown}
     assert {one.row.worker for one in two.fly(requests(4))} <= workers
     assert sorted(one.request.index for one in flown) == list(range(12))
-    assert all(same_flight(row, made_flight(base, request.index)) for request, row in flown)
+    assert all(is_same_flight(row, made_flight(base, request.index)) for request, row in flown)
     assert len(workers) == 2
     assert all(worker.startswith("process ") for worker in workers)
 
@@ -126,7 +126,7 @@ def test_a_flight_that_kills_its_process_is_flown_twice_again_and_then_lost_and_
     assert sorted(path.name for path in tmp_path.iterdir()) == ["3-0", "4-0", "4-1", "4-2"]
     assert rows.pop(4) == lost_row(base, 4, LOST)
     assert sorted(rows) == [0, 1, 2, 3, 5, 6, 7]
-    assert all(same_flight(row, made_flight(base, k)) for k, row in rows.items())
+    assert all(is_same_flight(row, made_flight(base, k)) for k, row in rows.items())
 
 
 def end_at_once(_copy: object) -> None:
@@ -135,7 +135,7 @@ def end_at_once(_copy: object) -> None:
 
 
 def test_processes_that_never_start_are_one_line(base: CampaignBase, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(local_pool, "_begin", end_at_once)
+    monkeypatch.setattr(local_pool, "_initialise_worker", end_at_once)
     monkeypatch.setattr(local_pool, "MAX_FAILED_STARTS", 2)
     assert MAX_FAILED_STARTS > 2
     with pool(1, base, made_flight) as made, pytest.raises(OSError, match="could not be started") as caught:

@@ -19,7 +19,7 @@ from planfly.campaigns.pictures import (
     draw_go_no_go,
     draw_probability,
     draw_tornado,
-    narrowed,
+    narrow_figure,
     speed_bins,
 )
 from planfly.campaigns.statistics.decision import wilson
@@ -194,7 +194,7 @@ PICTURES = {
 @pytest.mark.parametrize("name", PICTURES)
 def test_all_of_a_picture_is_within_a_phones_width(name: str) -> None:
     """Letters of 8 points on 5 inches are 8.4 pixels on 380."""
-    figure = narrowed(PICTURES[name]())
+    figure = narrow_figure(PICTURES[name]())
     width, height = figure.get_size_inches()
     assert width == 5.0
     # In inches.

@@ -18,22 +18,22 @@ from planfly.campaigns.campaign_base import CampaignBase
 from planfly.campaigns.flight_row import FlightRow, fly_one, lost_row
 from planfly.campaigns.fly_campaign import fly_campaign, open_store
 from planfly.campaigns.statistics.decision import Goal, Tally
-from planfly.campaigns.table_repair import Examined, checksum, examine, stored
+from planfly.campaigns.table_repair import Examined, checksum, examine, stored_value
 from planfly.campaigns.tables import (
     CAMPAIGN_KIND,
     DATABASE,
     WINDS_KIND,
-    AskedFlight,
+    RequestedFlight,
     Store,
     StoreError,
     WindsStore,
     count_flights,
-    kept_settings,
     read_shapes,
+    read_stored_settings,
     read_table,
 )
 from planfly.campaigns.worker_pool import Workers
-from planfly.runtime.stages import Receiver, received_by
+from planfly.runtime.stages import Receiver, send_progress_to
 from tests.planfly.campaigns.made_campaigns import made_flight, table
 from tests.soak import note, scaled
 
@@ -82,7 +82,7 @@ def search_of(folder: Path, rows: list[FlightRow]) -> Kept:
     path = folder / "winds.sqlite"
     with opened(path, resume=False) as store:
         for k, row in enumerate(rows):
-            store.add(AskedFlight(k, k % 16, 0.1 * k, row.draw.index), row)
+            store.add(RequestedFlight(k, k % 16, 0.1 * k, row.draw.index), row)
         return Kept(path, opened, WindsStore.known, store.known())
 
 
@@ -106,7 +106,7 @@ def gone_on_with(kept: Kept, path: Path) -> int | None:
     with kept.opened(path) as store:
         assert kept.read(store) == left
     assert count_flights(path) == len(left)
-    assert kept_settings(path)["flights"] == FLIGHTS
+    assert read_stored_settings(path)["flights"] == FLIGHTS
     if isinstance(store, Store):
         assert {len(values) for values in (*read_table(path).values(), *read_shapes(path).values())} == {len(left)}
     return len(left)
@@ -191,7 +191,7 @@ def test_settings_that_are_damaged_are_one_line(kept: Kept, tmp_path: Path, key:
     shutil.copy(kept.path, path)
     with closing(sqlite3.connect(path, isolation_level=None)) as connection:
         connection.execute("UPDATE campaign SET value = REPLACE(value, 'a', 'b') || ' ' WHERE key = ?", (key,))
-    for read in (kept.opened, kept_settings):
+    for read in (kept.opened, read_stored_settings):
         with pytest.raises(StoreError, match=r"c\.sqlite: its settings are damaged"):
             read(path)
 
@@ -209,7 +209,7 @@ def test_what_is_damaged_is_named_and_flown_again(base: CampaignBase, tmp_path: 
         connection.execute("UPDATE flights SET outcome = 'lost', failed = '[]' WHERE flight = 3")
         connection.execute("UPDATE flights SET margin_clearance = 99.0 WHERE flight = 7")
         connection.execute("UPDATE flights SET ended = CAST(X'FFFE' AS TEXT) WHERE flight = 8")
-    with received_by(Receiver(lambda *_: pytest.fail("no stage"), told.append)):
+    with send_progress_to(Receiver(lambda *_: pytest.fail("no stage"), told.append)):
         store = open_store(base, goal, tmp_path / "one", resume=True)
     assert told == [
         f"{path}: flights 3, 7, 8 are damaged and were taken out: 9 flights are whole and stay;"
@@ -224,7 +224,7 @@ def test_what_is_damaged_is_named_and_flown_again(base: CampaignBase, tmp_path: 
 def test_a_checksum_is_of_values_as_sqlite_gives_them_back() -> None:
     """Numpy's numbers, a NaN, which it does not keep, and a zero whose sign it does not keep."""
     values = (np.float64(0.1), 3, np.int64(5), math.nan, -0.0)
-    row = [stored(*one) for one in zip(values, ("REAL", "REAL NOT NULL", "INTEGER", "REAL", "REAL"), strict=True)]
+    row = [stored_value(*one) for one in zip(values, ("REAL", "REAL NOT NULL", "INTEGER", "REAL", "REAL"), strict=True)]
     with closing(sqlite3.connect(":memory:")) as connection:
         connection.execute("CREATE TABLE t (a REAL, b REAL NOT NULL, c INTEGER, d REAL, e REAL)")
         connection.execute("INSERT INTO t VALUES (?, ?, ?, ?, ?)", row)

@@ -18,8 +18,8 @@ from planfly.campaigns.tables import (
     COLUMNS,
     FIXED,
     SHAPES,
-    AskedFlight,
     FlownFlight,
+    RequestedFlight,
     Store,
     StoreError,
     WindsStore,
@@ -63,18 +63,21 @@ def opened(path: Path, *, resume: bool = True, **other: float) -> WindsStore:
 
 
 def test_what_was_asked_for_comes_back_in_order(base: CampaignBase, tmp_path: Path) -> None:
-    later, first = AskedFlight(7, 3, 0.1 * 3, 2), AskedFlight(2, 3, 12.300000000000001, 2)
+    later, first = RequestedFlight(7, 3, 0.1 * 3, 2), RequestedFlight(2, 3, 12.300000000000001, 2)
     narrow = (("slope", Place("leg", 1), 0.1 * 3), ("threat", Place("missile", 0, name="Alfa"), 0.0))
     bad = replace(made_flight(base, 3, GivenWind(15.0, 0.0)), narrow=narrow)
     with opened(tmp_path / "w.sqlite", resume=False) as store:
         store.add(later, all_fly(base, 2))
-        store.add(AskedFlight(8, 3, 15.0, 3), bad)
+        store.add(RequestedFlight(8, 3, 15.0, 3), bad)
         # The draw of another direction's flight: a number of its own.
         store.add(first, lost_row(base, 2, "lost: x"))
         assert list(store.known().items()) == [
             (2, (first, FlownFlight("lost", ()))),
             (7, (later, FlownFlight("flyable", ()))),
-            (8, (AskedFlight(8, 3, 15.0, 3), FlownFlight("not flyable", (("clearance", Place("leg", 1)),), narrow))),
+            (
+                8,
+                (RequestedFlight(8, 3, 15.0, 3), FlownFlight("not flyable", (("clearance", Place("leg", 1)),), narrow)),
+            ),
         ]
         with pytest.raises(StoreError, match="UNIQUE"):
             store.add(first, all_fly(base, 2))

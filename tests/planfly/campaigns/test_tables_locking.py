@@ -19,14 +19,14 @@ from planfly.campaigns.tables import (
     ROW_COLUMNS,
     RUN_DEPENDENT_COLUMNS,
     WINDS_KIND,
-    AskedFlight,
+    RequestedFlight,
     Store,
     StoreError,
     WindsStore,
-    refuse_held,
-    row_of,
+    check_not_locked,
+    is_same_flight,
+    make_flight_row,
     row_values,
-    same_flight,
 )
 from tests.planfly.campaigns.made_campaigns import all_fly, made_flight, table
 
@@ -36,15 +36,15 @@ def test_values_make_the_row_again(base: CampaignBase) -> None:
         values = row_values(row)
         assert tuple(values) == tuple(ROW_COLUMNS)
         # But for its narrow passes, which a search's table keeps for itself.
-        assert row_of(row.draw.index, values) == replace(row, narrow=())
+        assert make_flight_row(row.draw.index, values) == replace(row, narrow=())
 
 
 def test_who_flew_and_how_long_makes_no_other_flight(base: CampaignBase, tmp_path: Path) -> None:
     row = made_flight(base, 1)
     assert RUN_DEPENDENT_COLUMNS == ("seconds", "worker")
-    assert same_flight(row, replace(row, worker="tcp://x", seconds=9.0))
-    assert not same_flight(row, replace(row, ended="x"))
-    assert not same_flight(row, replace(row, draw=replace(row.draw, index=2)))
+    assert is_same_flight(row, replace(row, worker="tcp://x", seconds=9.0))
+    assert not is_same_flight(row, replace(row, ended="x"))
+    assert not is_same_flight(row, replace(row, draw=replace(row.draw, index=2)))
 
 
 # ----------------------------------------------------------------------
@@ -71,7 +71,7 @@ def add_to_search(path: Path, rows: list[FlightRow], *, resume: bool, pages: int
         if pages:
             store._connection.execute(f"PRAGMA max_page_count = {pages}")
         for row in rows:
-            store.add(AskedFlight(row.draw.index, 0, 5.0, row.draw.index), row)
+            store.add(RequestedFlight(row.draw.index, 0, 5.0, row.draw.index), row)
 
 
 def test_what_was_added_stays_after_a_kill(base: CampaignBase, tmp_path: Path) -> None:
@@ -164,16 +164,16 @@ def test_a_held_table_is_refused_and_loses_nothing(base: CampaignBase, tmp_path:
             with pytest.raises(StoreError, match="held by another process"):
                 opened(path, resume=True)
             with pytest.raises(StoreError, match="held by another process"):
-                refuse_held(path)
+                check_not_locked(path)
     if holder == "another program":
         other = sqlite3.connect(path, isolation_level=None)
         other.execute("BEGIN IMMEDIATE")
         with pytest.raises(StoreError, match="held by another process"):
             opened(path, resume=True)
         with pytest.raises(StoreError, match="held by another process"):
-            refuse_held(path)
+            check_not_locked(path)
         other.close()
-    refuse_held(path)
+    check_not_locked(path)
     with opened(path, resume=True) as store:
         assert store.tally() == Tally(1, 0)
 
@@ -184,7 +184,7 @@ def test_a_file_that_is_no_table_is_refused(tmp_path: Path) -> None:
     with pytest.raises(StoreError, match="not a database"):
         opened(path, resume=True)
     # Nor is it anybody's.
-    refuse_held(path)
+    check_not_locked(path)
 
 
 @pytest.mark.parametrize("add", [add_to_campaign, add_to_search])

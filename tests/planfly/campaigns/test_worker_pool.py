@@ -10,7 +10,7 @@ import planfly
 from planfly.campaigns import worker_pool as worker_pool_module
 from planfly.campaigns.campaign_base import CampaignBase
 from planfly.campaigns.worker_pool import (
-    REPORTED_EVERY,
+    REPORT_INTERVAL_S,
     FlightRate,
     SchedulerError,
     Workers,
@@ -104,13 +104,13 @@ def test_flights_that_were_there_before_are_not_counted(monkeypatch: pytest.Monk
     now = 100.0
     monkeypatch.setattr(time, "monotonic", lambda: now)
     rate = FlightRate(40)
-    assert not rate.due()
+    assert not rate.is_due()
     now += 4.0
-    assert rate.a_second(60) == 5.0
-    assert rate.due()
-    assert not rate.due()
-    now += REPORTED_EVERY
-    assert rate.due()
+    assert rate.flights_per_second(60) == 5.0
+    assert rate.is_due()
+    assert not rate.is_due()
+    now += REPORT_INTERVAL_S
+    assert rate.is_due()
 
 
 def test_as_many_processes_are_asked_for_as_there_are_cores(

@@ -13,7 +13,7 @@ from planfly.campaigns.dispersions import default_dispersions
 from planfly.campaigns.flight_row import fly_one
 from planfly.campaigns.fly_campaign import open_store
 from planfly.campaigns.statistics.decision import Goal
-from planfly.campaigns.tables import same_flight
+from planfly.campaigns.tables import is_same_flight
 from planfly.cli import main
 from tests.planfly.campaigns.made_campaigns import write_short
 from tests.planfly.terminal.answers.checked_answers import validate
@@ -129,4 +129,4 @@ def test_a_planned_scenario_goes_on_with_its_plan(tmp_path: Path, scheduler: str
     base = open_campaign(str(scenario), default_dispersions(), {}, planned=out / "plan.json")
     with open_store(base, Goal(0.5, False, 2), out, resume=True) as store:
         assert [row.draw.index for row in store.rows()] == [0, 1]
-        assert all(same_flight(row, fly_one(base, row.draw.index)) for row in store.rows())
+        assert all(is_same_flight(row, fly_one(base, row.draw.index)) for row in store.rows())

@@ -13,7 +13,7 @@ from logs.verdict.returns.return_starts import planned_starts
 from planfly.cli import main
 from planfly.rtl import jsbsim_returns as return_flights
 from planfly.rtl import sitl_returns as program_returns
-from planfly.rtl.sitl_returns import ProgramReturn, ProgramReturns, worst_apart
+from planfly.rtl.sitl_returns import ProgramReturn, ProgramReturns, worst_separated_returns
 from tests.autopilots import need_arduplane, shorten_run_in, write_fake, write_fake_px4
 from tests.logs.verdict.returns.hill import SCENARIO, hill_setup, mission_text
 from tests.soak import SOAK
@@ -32,7 +32,7 @@ def mound(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.chdir(tmp_path)
     if not SOAK:
         shorten_run_in(monkeypatch)
-        monkeypatch.setattr(return_flights, "LEAD", 200.0)
+        monkeypatch.setattr(return_flights, "LEAD_IN_LENGTH_M", 200.0)
     return tmp_path
 
 
@@ -99,7 +99,7 @@ def test_the_worst_are_far_apart_and_what_is_worse_counts(tmp_path: Path) -> Non
     setup = hill_setup(tmp_path)
     world, starts = return_world(setup), planned_starts(setup, 2.0)
     returns = judge_returns(world, starts, 2.0)
-    chosen = worst_apart(world, starts, returns, 4)
+    chosen = worst_separated_returns(world, starts, returns, 4)
     assert len(chosen) == 4
     assert chosen[0][0] == min(returns.each, key=badness)
     east = [one.start[0] for one, _ in chosen]
@@ -109,14 +109,14 @@ def test_the_worst_are_far_apart_and_what_is_worse_counts(tmp_path: Path) -> Non
     # 20 m over the ground all the way in, or none begins there.
     buried = replace(starts, rows=starts.rows.copy())
     buried.rows["up"] = 15.0
-    assert worst_apart(world, buried, returns, 4) == []
+    assert worst_separated_returns(world, buried, returns, 4) == []
     safe, ground = (next(one for one in returns.each if one.kind == kind) for kind in ("safe", "ground"))
     hit = replace(safe, kind="ground", clearance=-3.0)
     both = ProgramReturns("it", (ProgramReturn(safe, hit), ProgramReturn(ground, replace(ground, kind="safe"))))
-    right = both.put_right(returns)
+    right = both.with_worse_results(returns)
     assert right.count("ground") == returns.count("ground") + 1
     assert right.count("safe") == returns.count("safe") - 1
-    assert [one.worse for one in both.each] == [True, False]
+    assert [one.worse for one in both.pairs] == [True, False]
     assert "the simulated outcome, the worse one, counts" in both.lines(returns, setup.scenario)[1]
 
 
@@ -128,5 +128,5 @@ def test_arduplane_returns_as_its_law_does(tmp_path: Path, monkeypatch: pytest.M
     monkeypatch.chdir(tmp_path)
     found = planfly.returns("hill.waypoints", scenario="hill.toml", every=10, sitl=need_arduplane(), points=2)
     assert found.by_program is not None
-    assert found.by_program.each[0].law.kind == "ground"
-    assert all(one.agrees for one in found.by_program.each), found.lines_of_program
+    assert found.by_program.pairs[0].law.kind == "ground"
+    assert all(one.agrees for one in found.by_program.pairs), found.program_lines

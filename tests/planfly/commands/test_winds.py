@@ -18,7 +18,7 @@ from planfly.api import campaigns
 from planfly.campaigns import report
 from planfly.campaigns.campaign_base import CampaignBase
 from planfly.campaigns.find_winds import WindsGoal
-from planfly.campaigns.tables import WINDS_DATABASE, AskedFlight, WindsStore
+from planfly.campaigns.tables import WINDS_DATABASE, RequestedFlight, WindsStore
 from planfly.cli import main
 from planfly.workflow.data_sheets import make_data_sheet_folder
 from tests.planfly.campaigns.made_campaigns import made_flight, table, write_short
@@ -78,7 +78,7 @@ def test_an_interruption_says_what_is_kept_and_how_to_go_on(
 ) -> None:
     def interrupted(base: CampaignBase, _goal: WindsGoal, _workers: object, store: WindsStore, *_: object) -> None:
         for index in range(3):
-            store.add(AskedFlight(index, 0, 5.0, index), made_flight(base, index))
+            store.add(RequestedFlight(index, 0, 5.0, index), made_flight(base, index))
         raise Interrupted(number)
 
     monkeypatch.setattr(campaigns, "find_winds", interrupted)
@@ -111,7 +111,7 @@ def test_one_line_and_nothing_lost(
     words: str,
 ) -> None:
     def left(base: CampaignBase, _goal: WindsGoal, _workers: object, store: WindsStore, *_: object) -> None:
-        store.add(AskedFlight(0, 0, 5.0, 0), made_flight(base, 0))
+        store.add(RequestedFlight(0, 0, 5.0, 0), made_flight(base, 0))
         raise Interrupted(signal.SIGINT)
 
     monkeypatch.chdir(tmp_path)

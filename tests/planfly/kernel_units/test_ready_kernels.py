@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 from planfly.kernel_units import ready_kernels
-from planfly.kernel_units.ready_kernels import do_unit, is_ready
-from planfly.kernel_units.unit_kernels import BOTH, CHOOSING, GLIDING, UNIT_KERNELS, kernels_of
+from planfly.kernel_units.ready_kernels import is_ready, run_unit
+from planfly.kernel_units.unit_kernels import FRONT_PLANNING, GLIDING, PLANNING_AND_FLYING, UNIT_KERNELS, kernels_of
 from world.compile_events import kernel_is_compiled
 from world.kernels import compiled
 
@@ -17,11 +17,11 @@ ROOT = Path(__file__).parents[3]
 # The kernels that a process calls are those with types, where all are in the cache: what they call comes with them.
 CODE = """
 import json, sys
-from planfly.kernel_units.ready_kernels import do_unit
+from planfly.kernel_units.ready_kernels import run_unit
 said = {}
 for unit in sys.argv[1:]:
     said[unit] = []
-    do_unit(unit, said[unit].append)
+    run_unit(unit, said[unit].append)
 rooms = ("aircraft", "flight", "logs", "planner", "world")
 modules = [module for name, module in list(sys.modules.items()) if name.split(".")[0] in rooms]
 every = [one for module in modules for one in vars(module).values() if getattr(one, "signatures", ())]
@@ -34,7 +34,7 @@ def test_units_call_what_is_counted_for_them() -> None:
     missed = 1
     while missed:
         done = subprocess.run(
-            [sys.executable, "-c", CODE, *BOTH, *GLIDING, *CHOOSING],
+            [sys.executable, "-c", CODE, *PLANNING_AND_FLYING, *GLIDING, *FRONT_PLANNING],
             cwd=ROOT,
             capture_output=True,
             text=True,
@@ -43,7 +43,7 @@ def test_units_call_what_is_counted_for_them() -> None:
         missed, said, called = json.loads(done.stdout)
     for unit, lines in said.items():
         assert sorted(lines) == sorted(f"ready {name}" for name in UNIT_KERNELS[unit]), unit
-    assert called == sorted(kernels_of((*BOTH, *GLIDING, *CHOOSING)))
+    assert called == sorted(kernels_of((*PLANNING_AND_FLYING, *GLIDING, *FRONT_PLANNING)))
 
 
 # ----------------------------------------------------------------------
@@ -63,7 +63,7 @@ def test_kernels_are_told_once_as_soon_as_they_are_ready(monkeypatch: pytest.Mon
     monkeypatch.setattr(ready_kernels, "UNIT_KERNELS", {"unit": ("third", "first")})
     monkeypatch.setattr(ready_kernels, "UNITS", {"unit": work})
     monkeypatch.setattr(ready_kernels, "is_ready", ready.__contains__)
-    do_unit("unit", told.append)
+    run_unit("unit", told.append)
     assert told == ["first", "ready first", "second", "third", "ready third"]
 
 

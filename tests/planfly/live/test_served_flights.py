@@ -172,7 +172,7 @@ def _holds_rows(log: Path) -> bool:
 def test_a_circle_without_end_is_logged_in_pieces_about_one_place(
     options: ServeOptions, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(served_flights, "HELD", 30.0)
+    monkeypatch.setattr(served_flights, "LOITER_DURATION_S", 30.0)
     level = mission(options, (0.0, 0.0, 150.0), (2500.0, 0.0, 150.0))
     ours, theirs = Pipe()
     thread = Thread(target=serve_flights, args=(theirs, ServedFlights(replace(options, speed=100.0))))

@@ -9,7 +9,12 @@ import pytest
 import planfly
 from aircraft.path_limits import Limits
 from flight.autopilots.planfly.autopilot import PlanflyGuidance
-from planfly.planning.gust_altitude_margin import find_shortfalls, keep_height, limits_in_gusts, limits_of_others
+from planfly.planning.gust_altitude_margin import (
+    ensure_altitude_margin,
+    find_shortfalls,
+    limits_in_gusts,
+    limits_of_alternatives,
+)
 from planfly.workflow.airframe import Airframe, load_airframe
 from planfly.workflow.make_plan import finish_plan, make_plan
 from planner.evaluation.certify import certify
@@ -70,8 +75,8 @@ def test_who_keeps_it_otherwise_and_calm_air_are_left_as_they_were() -> None:
     ):
         airframe = load_airframe(scenario)
         plan = plan_path(scenario, airframe.limits, seed=SEED)
-        assert keep_height(plan, airframe, lambda limits: pytest.fail("searched for another")) is plan
-        assert limits_of_others(plan, airframe) == airframe.limits
+        assert ensure_altitude_margin(plan, airframe, lambda limits: pytest.fail("searched for another")) is plan
+        assert limits_of_alternatives(plan, airframe) == airframe.limits
 
 
 def needed(airframe: Airframe, climbs: float = 0.0) -> float:
@@ -86,7 +91,7 @@ def test_a_level_path_keeps_what_a_downdraft_may_take(over: float) -> None:
     scenario = scenario_of("moderate", height=height)
     plan = plan_along(airframe, scenario, [scenario.start, scenario.destination])
     assert plan.safe
-    settled = keep_height(plan, airframe)
+    settled = ensure_altitude_margin(plan, airframe)
     assert (settled is plan) is (over > 0.0)
     assert settled.safe is (over > 0.0)
 
@@ -105,7 +110,7 @@ def test_a_climb_leaves_less_and_the_plan_says_how_much_it_lacks() -> None:
     )
     plan = plan_along(airframe, scenario, way + np.array([0.0, 0.0, GROUND]))
     assert plan.safe
-    (problem,) = keep_height(plan, airframe).certificate.problems
+    (problem,) = ensure_altitude_margin(plan, airframe).certificate.problems
     lacks = needed(airframe, 0.5) - 30.0
     assert f"downdrafts may take it {lacks:.0f} m into the clearance of 50 m on leg 1; less turbulence" in problem
 
@@ -121,7 +126,7 @@ def test_near_a_low_end_half_is_kept() -> None:
         return plan_path(scenario, limits, seed=SEED)
 
     first = plan_path(scenario, airframe.limits, seed=SEED)
-    plan = keep_height(first, airframe, search)
+    plan = ensure_altitude_margin(first, airframe, search)
     assert first.safe
     assert plan.safe
     assert len(asked) == 1
@@ -140,7 +145,9 @@ def test_an_end_that_lies_too_low_is_named_and_nothing_is_searched_for(over: flo
     scenario = scenario_of("moderate", height=50.0 + half + over)
     found = plan_path(scenario, airframe.limits, seed=SEED)
     assert found.safe
-    plan = keep_height(found, airframe, None if over > 0.0 else lambda limits: pytest.fail("searched for another"))
+    plan = ensure_altitude_margin(
+        found, airframe, None if over > 0.0 else lambda limits: pytest.fail("searched for another")
+    )
     (problem,) = plan.certificate.problems
     assert ("at its start; less turbulence" in problem) is (over < 0.0)
     assert ("a start that is 1 m higher would help" in problem) is (over < 0.0)
@@ -166,7 +173,7 @@ def test_below_a_height_limit_more_climb_is_left_in_place_of_height() -> None:
     assert plan.safe
     assert not find_shortfalls(plan, airframe)
     level = plan_along(airframe, scenario, [scenario.start, scenario.destination])
-    (problem,) = keep_height(level, airframe).certificate.problems
+    (problem,) = ensure_altitude_margin(level, airframe).certificate.problems
     assert "or a higher limit on its height would help" in problem
 
 
@@ -232,11 +239,11 @@ def test_what_lies_below_counts(tables: dict[str, Any], into: str) -> None:
     airframe = load_airframe(scenario)
     plan = plan_along(airframe, scenario, [scenario.start, scenario.destination])
     assert plan.safe
-    (problem,) = keep_height(plan, airframe).certificate.problems
+    (problem,) = ensure_altitude_margin(plan, airframe).certificate.problems
     assert f"downdrafts may take it {needed(airframe) - 20.0:.0f} m into {into} on leg 0;" in problem
     made = make_plan(scenario, airframe, SEED)
     assert made.safe
-    assert keep_height(made, airframe) is made
+    assert ensure_altitude_margin(made, airframe) is made
 
 
 @pytest.mark.parametrize("tables", [{"zones": [MAST]}, {"threats": [SAM]}], ids=["zone", "missile"])
@@ -286,7 +293,7 @@ def test_a_search_that_was_cut_short_is_not_taken_for_proof() -> None:
 
     shared = SharedBudget(search)
     low = shared(scenario, airframe.limits)
-    refused = keep_height(low, airframe, lambda limits: shared(scenario, limits))
+    refused = ensure_altitude_margin(low, airframe, lambda limits: shared(scenario, limits))
     assert not refused.safe
     assert shared.total(refused).ended == "interrupted"
     assert shared.total(refused).evaluations > 2 * first.evaluations
@@ -307,10 +314,10 @@ def test_plans_beside_one_that_leads_above_a_missile_keep_above_it_too() -> None
     airframe = load_airframe(scenario)
     plan = make_plan(scenario, airframe, SEED)
     assert plan.safe
-    kept = limits_of_others(plan, airframe)
+    kept = limits_of_alternatives(plan, airframe)
     assert kept.reserve_threats == kept.reserve_height > 30.0
     beside = replace(scenario, threats=scenario_of("moderate").threats)
-    assert limits_of_others(make_plan(beside, airframe, SEED), airframe).reserve_height > 30.0
+    assert limits_of_alternatives(make_plan(beside, airframe, SEED), airframe).reserve_height > 30.0
 
 
 @pytest.mark.usefixtures("short_fronts")
@@ -321,10 +328,10 @@ def test_every_command_keeps_it_and_a_front_is_not_left_with_one() -> None:
     airframe = load_airframe(scenario)
     front = planfly.plan_front(scenario, 4, seed=SEED)
     assert len(front.plans) >= 3
-    assert limits_of_others(front.default.plan, airframe).reserve_height > 30.0
+    assert limits_of_alternatives(front.default.plan, airframe).reserve_height > 30.0
     for one in [*(found.plan for found in front.plans), planfly.plan(scenario, seed=SEED)]:
         assert one.safe
-        assert keep_height(one, airframe) is one
+        assert ensure_altitude_margin(one, airframe) is one
 
 
 # --- Updrafts ---
@@ -375,7 +382,7 @@ def test_a_level_path_leaves_what_an_updraft_may_give(over: float) -> None:
     shortfalls = find_shortfalls(plan, airframe)
     assert bool(shortfalls) is (over < 0.0)
     assert {one.gust for one in shortfalls} <= {"updrafts"}
-    assert keep_height(plan, airframe).safe is (over > 0.0)
+    assert ensure_altitude_margin(plan, airframe).safe is (over > 0.0)
 
 
 def test_a_leg_that_sinks_leaves_less() -> None:
@@ -431,7 +438,7 @@ def test_below_a_zone_alone_the_first_search_keeps_from_it() -> None:
 
     found = plan_along(airframe, scenario, [scenario.start, scenario.destination])
     assert found.safe
-    assert keep_height(found, airframe, search).safe
+    assert ensure_altitude_margin(found, airframe, search).safe
     assert [one.reserve_threats > 20.0 for one in asked] == [True]
 
 
@@ -454,7 +461,9 @@ def test_a_plan_below_a_maximum_height_is_made_anew() -> None:
     assert "above the 161 m over ground that are allowed at its start" in problem
     assert "an aircraft that sinks faster or a start that is 2 m lower would help" in problem
     held = band_of(164.0)
-    (problem,) = keep_height(plan_path(held, airframe.limits, seed=SEED), load_airframe(held)).certificate.problems
+    (problem,) = ensure_altitude_margin(
+        plan_path(held, airframe.limits, seed=SEED), load_airframe(held)
+    ).certificate.problems
     assert "on leg " in problem
     assert "an aircraft that sinks faster or a higher limit on its height would help" in problem
 
@@ -464,7 +473,7 @@ def test_an_end_too_near_the_maximum_height_is_not_searched_for() -> None:
     airframe = load_airframe(scenario)
     found = plan_path(scenario, airframe.limits, seed=SEED)
     assert found.safe
-    assert not keep_height(found, airframe, lambda limits: pytest.fail("searched for another")).safe
+    assert not ensure_altitude_margin(found, airframe, lambda limits: pytest.fail("searched for another")).safe
 
 
 def test_with_a_low_maximum_height_a_gentle_way_down_from_the_ends_is_found() -> None:

@@ -10,7 +10,7 @@ import pytest
 
 from flight.autopilots.px4.autopilot import Px4
 from planfly.planning.gust_altitude_margin import find_shortfalls
-from planfly.planning.gust_orbits import MAX_EXPECTED_ORBITS, expected_circles, limit_waypoint_orbits
+from planfly.planning.gust_orbits import MAX_EXPECTED_ORBITS, expected_orbits, limit_waypoint_orbits
 from planfly.workflow.airframe import Airframe, load_airframe
 from planfly.workflow.make_plan import make_plan
 from planner.plan import Plan
@@ -65,7 +65,7 @@ def test_a_way_round_has_as_many_waypoints_as_gusts_allow() -> None:
     search = searching(airframe, asked)
     plan = limit_waypoint_orbits(search(scenario), airframe, search)
     assert plan.safe
-    assert 0.0 < expected_circles(plan, airframe.autopilot, airframe.limits) <= MAX_EXPECTED_ORBITS
+    assert 0.0 < expected_orbits(plan, airframe.autopilot, airframe.limits) <= MAX_EXPECTED_ORBITS
     assert asked[0] == 12
     assert plan.scenario is scenario
 
@@ -84,13 +84,13 @@ def test_circles_are_those_of_all_waypoints_by_what_is_in_hand(airframe_of_x8: A
     aside, along = 4.0 * math.cos(math.radians(20.0)), 4.0 * math.sin(math.radians(20.0))
     rate = slope * (math.sqrt(true_airspeed**2 - aside**2) + along)
     climbing = airframe_of_x8.autopilot.altitude_miss_probability(climb - rate, sink, "moderate")
-    assert expected_circles(plan, airframe_of_x8.autopilot, limits) == pytest.approx(climbing, rel=1e-3)
+    assert expected_orbits(plan, airframe_of_x8.autopilot, limits) == pytest.approx(climbing, rel=1e-3)
     down = plan_of(airframe_of_x8, way * [1.0, 1.0, -1.0] + [0.0, 0.0, 500.0])
     sinking = airframe_of_x8.autopilot.altitude_miss_probability(climb, sink - rate, "moderate")
-    assert expected_circles(down, airframe_of_x8.autopilot, limits) == pytest.approx(sinking, rel=1e-3)
+    assert expected_orbits(down, airframe_of_x8.autopilot, limits) == pytest.approx(sinking, rel=1e-3)
     both = plan_of(airframe_of_x8, np.concatenate([way, [[8000.0, 0.0, 250.0]]]))
     level = airframe_of_x8.autopilot.altitude_miss_probability(climb, sink, "moderate")
-    assert expected_circles(both, airframe_of_x8.autopilot, limits) == pytest.approx(climbing + level, rel=1e-3)
+    assert expected_orbits(both, airframe_of_x8.autopilot, limits) == pytest.approx(climbing + level, rel=1e-3)
     # As a share of all, the wind is much more than that.
     calm = airframe_of_x8.autopilot.altitude_miss_probability(climb - slope * true_airspeed, sink, "moderate")
     assert abs(climbing / calm - 1.0) > 3e-3
@@ -105,7 +105,7 @@ def test_a_plan_that_is_made_anew_for_updrafts_has_few_waypoints_too() -> None:
     assert first.safe
     assert find_shortfalls(first, airframe)
     plan = make_plan(scenario, airframe, SEED)
-    assert expected_circles(plan, airframe.autopilot, limits) <= MAX_EXPECTED_ORBITS
+    assert expected_orbits(plan, airframe.autopilot, limits) <= MAX_EXPECTED_ORBITS
     assert plan.safe or "updrafts may take it" in plan.certificate.problems[0]
 
 
@@ -121,8 +121,8 @@ def test_a_plan_that_needs_more_says_what_would_help(airframe_of_x8: Airframe) -
     assert "in moderate turbulence PX4 circles where gusts have it off a waypoint's height" in problem
     value = float(problem.split("NAV_FW_ALT_RAD of ")[1].split(" m ")[0])
     enough, less = (tight.with_parameters(NAV_FW_ALT_RAD=asked) for asked in (value, value - 5.0))
-    assert expected_circles(plan, enough, airframe.limits) <= MAX_EXPECTED_ORBITS
-    assert expected_circles(plan, less, airframe.limits) > MAX_EXPECTED_ORBITS
+    assert expected_orbits(plan, enough, airframe.limits) <= MAX_EXPECTED_ORBITS
+    assert expected_orbits(plan, less, airframe.limits) > MAX_EXPECTED_ORBITS
 
 
 @pytest.mark.parametrize(("aside", "taken"), [(300.0, True), (2000.0, False)])
@@ -133,7 +133,7 @@ def test_fewer_and_sharper_corners_stay_in_the_corridor(aside: float, taken: boo
     found = plan_path(scenario, airframe_of_x8.limits.surely(), seed=SEED)
     assert found.safe
     corner = replace(found, waypoints=np.array([scenario.start, [4000.0, aside, 150.0], scenario.destination]))
-    assert expected_circles(corner, airframe_of_x8.autopilot, airframe_of_x8.limits) <= MAX_EXPECTED_ORBITS
+    assert expected_orbits(corner, airframe_of_x8.autopilot, airframe_of_x8.limits) <= MAX_EXPECTED_ORBITS
     assert limit_waypoint_orbits(found, airframe_of_x8, lambda _: corner).feasible is taken
     # One that was found with so few waypoints, too.
     settled = limit_waypoint_orbits(corner, airframe_of_x8)

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from planfly.replays.certificates import temporary_certificate
-from planfly.replays.origin_gate import VIEWERS, OriginGate, refusal
+from planfly.replays.origin_gate import VIEWERS, OriginGate, refusal_reason
 
 
 def asked(*headers: str) -> bytes:
@@ -32,7 +32,7 @@ LOCAL = "Host: 127.0.0.1:8765"
     ],
 )
 def test_viewers_and_programs_are_let_in(headers: tuple[str, ...]) -> None:
-    assert refusal(asked(*headers), 8765, VIEWERS) == ""
+    assert refusal_reason(asked(*headers), 8765, VIEWERS) == ""
 
 
 @pytest.mark.parametrize(
@@ -55,7 +55,7 @@ def test_viewers_and_programs_are_let_in(headers: tuple[str, ...]) -> None:
     ],
 )
 def test_pages_of_others_and_other_hosts_are_refused(headers: tuple[str, ...], why: str) -> None:
-    assert refusal(asked(*headers), 8765, VIEWERS) == why
+    assert refusal_reason(asked(*headers), 8765, VIEWERS) == why
 
 
 @contextlib.contextmanager

@@ -12,7 +12,7 @@ import pytest
 from planfly.kernel_units.unit_kernels import kernels_of
 from planfly.runtime import first_start
 from planfly.runtime.first_start import warm_up
-from planfly.runtime.stages import received_by
+from planfly.runtime.stages import send_progress_to
 from planfly.terminal.output import ON_STANDARD_ERROR, SILENT
 from tests.soak import some
 from world.compile_events import kernel_is_compiled
@@ -43,14 +43,14 @@ def shared(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> list[list[str]]:
             tell(done)
 
     monkeypatch.setattr(first_start, "compile_units", compile_units)
-    monkeypatch.setattr(first_start, "_shared", set())
+    monkeypatch.setattr(first_start, "_compiled_units", set())
     monkeypatch.setattr("world.kernels.cache_folder", lambda: tmp_path)
     return asked
 
 
 def test_units_are_counted_before_the_work_goes_on(shared: list[list[str]], capsys: pytest.CaptureFixture[str]) -> None:
     whole = len(kernels_of(("scores", "paper")))
-    with received_by(ON_STANDARD_ERROR), warm_up("scores", "paper"):
+    with send_progress_to(ON_STANDARD_ERROR), warm_up("scores", "paper"):
         assert capsys.readouterr().err == ""
         assert numba.njit(lambda a: a + 1)(1) == 2
         begun, done = capsys.readouterr().err.splitlines()
@@ -68,10 +68,10 @@ def test_units_are_counted_before_the_work_goes_on(shared: list[list[str]], caps
 
 
 def test_nothing_is_said_in_silence(shared: list[list[str]], capsys: pytest.CaptureFixture[str]) -> None:
-    with received_by(SILENT), warm_up("scores"):
+    with send_progress_to(SILENT), warm_up("scores"):
         kernel_is_compiled()
     assert shared == [["scores"]]
-    with received_by(SILENT), warm_up():
+    with send_progress_to(SILENT), warm_up():
         kernel_is_compiled()
     assert capsys.readouterr().err == ""
 
@@ -86,7 +86,7 @@ def test_a_cache_that_cannot_be_written_is_named(
 ) -> None:
     folder = Path("/proc/none/kernels")
     monkeypatch.setattr("world.kernels.cache_folder", lambda: folder)
-    with received_by(ON_STANDARD_ERROR), warm_up("scores"):
+    with send_progress_to(ON_STANDARD_ERROR), warm_up("scores"):
         kernel_is_compiled()
     said = f"compiling the numeric kernels: {folder} cannot be written, and keeps none of them; {WAY_OUT}\n"
     assert (capsys.readouterr().err, shared) == (said, [])

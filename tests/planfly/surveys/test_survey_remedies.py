@@ -50,7 +50,7 @@ class Flights:
 
     def __call__(self, setup: FlightSetup, *_: Any) -> Any:
         self.flown.append(round(turn_around_of(setup.route, surveys_of(setup)[0])))
-        return SimpleNamespace(setup=setup, flown=verdict_of(setup, self.answer))
+        return SimpleNamespace(setup=setup, flight_verdict=verdict_of(setup, self.answer))
 
 
 def opened(path: Path) -> FlightSetup:
@@ -129,7 +129,9 @@ def judged_by(
     """What helps where a rule looks at all of a flight, and at its turn-arounds, m."""
 
     def fly(setup: FlightSetup, *_: Any) -> Any:
-        return SimpleNamespace(setup=setup, flown=verdict_of(setup, lambda metres: (passes(setup, metres), {})))
+        return SimpleNamespace(
+            setup=setup, flight_verdict=verdict_of(setup, lambda metres: (passes(setup, metres), {}))
+        )
 
     mission = opened(path)
     monkeypatch.setattr(remedies, "Trial", fly)

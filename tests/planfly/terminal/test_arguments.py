@@ -15,10 +15,10 @@ from planfly.commands.registry import COMMANDS
 from planfly.terminal import arguments
 from planfly.terminal.arguments import (
     SHELLS,
-    aircraft_words,
-    mission_or_scenario_words,
+    complete_aircraft,
+    complete_mission_or_scenario,
+    complete_scenario,
     number,
-    scenario_words,
     shell_script,
 )
 
@@ -114,8 +114,8 @@ def test_commands_options_and_names(tmp_path: Path) -> None:
 
 def test_asking_loads_nothing_heavy(tmp_path: Path) -> None:
     code = (
-        "import os, sys\nfrom planfly.terminal.arguments import scenario_words, aircraft_words\n"
-        "scenario_words('')\naircraft_words('')\n"
+        "import os, sys\nfrom planfly.terminal.arguments import complete_scenario, complete_aircraft\n"
+        "complete_scenario('')\ncomplete_aircraft('')\n"
         "print([name for name in ('numpy', 'numba', 'pydantic', 'rich') if name in sys.modules])"
     )
     done = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True, cwd=tmp_path)
@@ -124,10 +124,10 @@ def test_asking_loads_nothing_heavy(tmp_path: Path) -> None:
 
 def test_words_begin_as_asked(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-    assert scenario_words("stee") == ["steep"]
-    assert aircraft_words("c1") == ["c172x"]
+    assert complete_scenario("stee") == ["steep"]
+    assert complete_aircraft("c1") == ["c172x"]
     Path("tight.plan").write_text("", encoding="utf-8")
-    assert mission_or_scenario_words("tig") == ["tight", "tight.plan"]
+    assert complete_mission_or_scenario("tig") == ["tight", "tight.plan"]
 
 
 @pytest.mark.parametrize("shell", SHELLS)

@@ -119,7 +119,7 @@ def test_a_parser_knows_its_long_options() -> None:
 def test_commands_are_found_by_name_and_help_shows_groups() -> None:
     line = LineParser("1.0", "What it is.", "first steps: planfly go")
     go = line.command("go", "go there", "planfly go now", "planfly go later")
-    go.more = lambda: "ways:\n  on foot"
+    go.extra_help = lambda: "ways:\n  on foot"
     go.group("how fast").add_argument("--speed", help="in m/s")
     assert line.commands == {"go": go}
     text = go.format_help()

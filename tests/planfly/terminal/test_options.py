@@ -11,12 +11,12 @@ import pytest
 from planfly.commands.registry import build_parser
 from planfly.terminal.command_parser import CommandParser
 from planfly.terminal.options import (
+    aircraft_and_wind_options,
     call,
     flight_options,
-    flown_by_options,
     result_options,
     steering_options,
-    stop_signals,
+    watch_stop_signals,
 )
 
 
@@ -42,16 +42,16 @@ def parser_with(*groups: Callable[[CommandParser], Any]) -> CommandParser:
 
 
 def test_options_that_are_not_given_leave_the_scenario_as_it_is() -> None:
-    args = parser_with(result_options, flown_by_options, steering_options).parse_args([])
+    args = parser_with(result_options, aircraft_and_wind_options, steering_options).parse_args([])
     assert not args.overwrite
     given = (args.aircraft, args.airspeed, args.wind, args.turbulence, args.params, args.guidance, args.nav)
     assert given == (None,) * len(given)
 
 
 def test_a_wind_is_a_speed_and_where_it_blows_from() -> None:
-    assert parser_with(flown_by_options).parse_args(["--wind", "7.5,250"]).wind == (7.5, 250.0)
+    assert parser_with(aircraft_and_wind_options).parse_args(["--wind", "7.5,250"]).wind == (7.5, 250.0)
     with pytest.raises(SystemExit):
-        parser_with(flown_by_options).parse_args(["--turbulence", "severe"])
+        parser_with(aircraft_and_wind_options).parse_args(["--turbulence", "severe"])
 
 
 @pytest.mark.parametrize("line", ["fly m.waypoints --sitl bin/arduplane", "run tight --sitl bin/arduplane"])
@@ -91,12 +91,12 @@ def test_every_command_with_a_result_answers_in_json_or_in_silence(name: str) ->
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_a_signal_asks_to_stop_and_its_handler_comes_back(number: signal.Signals) -> None:
     before = signal.getsignal(number)
-    with stop_signals() as stop:
+    with watch_stop_signals() as stop:
         assert not stop()
         os.kill(os.getpid(), number)
         assert stop()
     assert signal.getsignal(number) is before
-    with pytest.raises(RuntimeError, match="inside"), stop_signals():
+    with pytest.raises(RuntimeError, match="inside"), watch_stop_signals():
         raise RuntimeError("inside")
     assert signal.getsignal(number) is before
 

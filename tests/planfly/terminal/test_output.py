@@ -79,7 +79,7 @@ def test_colours_of_planfly_are_kept(capsys: pytest.CaptureFixture[str], monkeyp
 
 def test_an_answer_on_standard_output_stays_json(capsys: pytest.CaptureFixture[str]) -> None:
     arguments = argparse.Namespace(json="-", quiet=False, command="test")
-    with output.safe_streams(), output.asked_output(arguments):
+    with output.safe_streams(), output.redirected_output(arguments):
         output.give_answer(arguments, lambda: json.dumps({"title": HOSTILE}, ensure_ascii=False) + "\n")
     text = capsys.readouterr().out
     assert json.loads(text) == {"title": HOSTILE}
@@ -187,15 +187,15 @@ def test_input_that_is_refused_first_has_no_line(capsys: pytest.CaptureFixture[s
 # ----------------------------------------------------------------------
 # Before anything is measured: what such a stage took the last time on this machine.
 
-REMEMBER = output._keep_time
+REMEMBER = output._store_duration
 
 
 @pytest.fixture
 def times(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
     """The file of what stages took, which is not there yet."""
     file = tmp_path / "cache" / "durations.json"
-    monkeypatch.setattr(output, "_times_file", lambda: file)
-    monkeypatch.setattr(output, "_keep_time", REMEMBER)
+    monkeypatch.setattr(output, "_durations_file", lambda: file)
+    monkeypatch.setattr(output, "_store_duration", REMEMBER)
     return file
 
 
@@ -263,8 +263,8 @@ def test_a_damaged_file_of_times_is_none(
 
 def test_no_place_to_remember_is_no_error(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     (tmp_path / "file").touch()
-    monkeypatch.setattr(output, "_keep_time", REMEMBER)
-    monkeypatch.setattr(output, "_times_file", lambda: tmp_path / "file" / "durations.json")
+    monkeypatch.setattr(output, "_store_duration", REMEMBER)
+    monkeypatch.setattr(output, "_durations_file", lambda: tmp_path / "file" / "durations.json")
     run(Clock(monkeypatch), "flying", "flying", 2, 1.0)
 
 
@@ -279,8 +279,8 @@ def test_a_stage_that_reports_nothing_is_named_and_timed(
         with shown:
             for _ in range(130):
                 clock.now += 1.0
-                shown.look()
-        left.keep()
+                shown.refresh()
+        left.store_duration()
         lines.append(capsys.readouterr().err.splitlines())
     told = ["drawing: 61 s so far", "drawing: 121 s so far", "drawing: done in 130.0 s"]
     assert lines == [["drawing ... (no estimate)", *told], ["drawing ... (the last one here took 2 min)", *told]]
@@ -293,7 +293,7 @@ def test_what_is_counted_late_has_its_estimate_then(
     run(clock, "flying", "flying", 2, 3.0)
     capsys.readouterr()
     shown = output._Lines("flying", output._TimeLeft("flying"))
-    shown.look()
+    shown.refresh()
     shown.advance(0.0, 4.0, "0 of 4 flights")
     shown.advance(0.0, 4.0, "0 of 4 flights")
     assert capsys.readouterr().err.splitlines() == [
@@ -309,8 +309,8 @@ def test_the_clock_is_looked_at_whatever_the_work_is_at(monkeypatch: pytest.Monk
         said.append(line)
         heard.set()
 
-    monkeypatch.setattr(output, "_LOOKS_EVERY", 0.001)
-    monkeypatch.setattr(output, "_say", say)
+    monkeypatch.setattr(output, "_REFRESH_INTERVAL_S", 0.001)
+    monkeypatch.setattr(output, "_print_line", say)
     with progress("drawing"):
         assert heard.wait(60.0)
     assert said[0] == "drawing ... (no estimate)"

@@ -20,10 +20,10 @@ from world.interruption import unfinished
 PROGRAM = """
 import hashlib, sys, time
 from pathlib import Path
-from planfly.terminal.signal_watch import end_process, ended_by_signals
+from planfly.terminal.signal_watch import end_process, end_on_signals
 from world.interruption import Interrupted, unfinished
 mine = Path(sys.argv[1])
-with ended_by_signals(grace=0.5) as heard:
+with end_on_signals(grace=0.5) as heard:
     with unfinished(mine):
         mine.write_text("half")
         print("begun", flush=True)
@@ -106,10 +106,10 @@ def test_a_kernel_is_not_interrupted_where_numba_makes_its_results(tmp_path: Pat
 
 TIDIES_UP = """
 import os, sys, time
-from planfly.terminal.signal_watch import ended_by_signals
+from planfly.terminal.signal_watch import end_on_signals
 from world.interruption import Interrupted
 os.sched_setaffinity(0, {int(sys.argv[1])})
-with ended_by_signals(grace=0.5):
+with end_on_signals(grace=0.5):
     try:
         print("begun", flush=True)
         time.sleep(30)

@@ -18,7 +18,7 @@ from flight.dynamics.fdm import Fdm, Variation
 from flight.dynamics.trim import fastest, full_throttle, slowest, straight
 from flight.simulation.simulate import Flight, fly_to_end
 from planfly.workflow import data_sheets
-from planfly.workflow.data_sheets import change_of, make_data_sheet_folder, stated_parameters, with_parameters
+from planfly.workflow.data_sheets import factor_effect, make_data_sheet_folder, stated_parameters, with_parameters
 from tests.setups import setup_maker
 from world.errors import FlightError
 
@@ -136,7 +136,7 @@ def test_parameters_are_data(tmp_path: Path) -> None:
 def test_an_angle_that_is_not_flown_is_no_small_change() -> None:
     nan = math.nan
     more, less = np.array([0.3, nan, 0.3, nan]), np.array([0.1, 0.05, nan, nan])
-    found = change_of(more, less, np.array([0.2, 0.2, 0.2, -0.2]))
+    found = factor_effect(more, less, np.array([0.2, 0.2, 0.2, -0.2]))
     # Half of what is between them; to the one; to the other; the whole angle.
     assert found == pytest.approx([0.1, 0.15, 0.1, 0.2])
 

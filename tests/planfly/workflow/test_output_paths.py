@@ -7,11 +7,11 @@ import pytest
 from planfly.workflow.output_paths import (
     RUN_FILES,
     RUN_FOLDER,
+    check_output_file,
+    check_output_folder,
     expand_path_pattern,
     file_target,
     prepare_folder,
-    refuse_existing,
-    refuse_folder,
 )
 from world.errors import PlanflyError
 
@@ -20,8 +20,8 @@ def test_a_named_file_is_refused_where_it_would_destroy(tmp_path: Path) -> None:
     there, link = tmp_path / "there.plan", tmp_path / "link.plan"
     there.write_text("mine", encoding="utf-8")
     link.symlink_to(there)
-    refuse_existing(tmp_path / "new.plan", overwrite=False, source=there)
-    refuse_existing(there, overwrite=True)
+    check_output_file(tmp_path / "new.plan", overwrite=False, source=there)
+    check_output_file(there, overwrite=True)
     for path, overwrite, source, message in (
         (there, False, None, "overwrite=True replaces it"),
         (link, True, there, "is the input itself"),
@@ -29,20 +29,20 @@ def test_a_named_file_is_refused_where_it_would_destroy(tmp_path: Path) -> None:
         (tmp_path / "none" / "a.plan", True, None, "does not exist"),
     ):
         with pytest.raises(PlanflyError, match=message):
-            refuse_existing(path, overwrite, source)
+            check_output_file(path, overwrite, source)
     assert there.read_text(encoding="utf-8") == "mine"
 
 
 def test_a_named_folder_is_refused_unless_it_is_empty(tmp_path: Path) -> None:
-    refuse_folder(tmp_path, overwrite=False)
-    refuse_folder(tmp_path / "new", overwrite=False)
+    check_output_folder(tmp_path, overwrite=False)
+    check_output_folder(tmp_path / "new", overwrite=False)
     file = tmp_path / "mine.txt"
     file.write_text("mine", encoding="utf-8")
     with pytest.raises(PlanflyError, match="not empty; overwrite=True"):
-        refuse_folder(tmp_path, overwrite=False)
+        check_output_folder(tmp_path, overwrite=False)
     with pytest.raises(PlanflyError, match="a folder is expected"):
-        refuse_folder(file, overwrite=True)
-    refuse_folder(tmp_path, overwrite=True)
+        check_output_folder(file, overwrite=True)
+    check_output_folder(tmp_path, overwrite=True)
 
 
 def test_a_run_clears_its_old_results_and_nothing_of_others(tmp_path: Path) -> None:

@@ -30,8 +30,8 @@ from planfly.workflow.reference_flights import (
     airframe_answer,
     deciding_parameter,
     find_deciding_parameter,
-    has_room,
     judge_with_reference_flights,
+    passes_with_margin,
 )
 from tests.setups import setup_maker
 
@@ -55,10 +55,10 @@ def test_a_value_that_is_suggested_passes_with_the_laws_own_error_to_spare(
     failed: Finding, flown: float, margin: float, enough: bool
 ) -> None:
     made = make_finding(failed.rule, LEG, ok=True, reason="", flown=flown, limit=flown, margin=margin)
-    assert has_room((made,), (failed, HEIGHTS)) is enough
+    assert passes_with_margin((made,), (failed, HEIGHTS)) is enough
     # Elsewhere nothing failed, and nothing more is asked for.
-    assert has_room((replace(made, place=Place("leg", 5)),), (failed, HEIGHTS))
-    assert has_room((made,), (HEIGHTS,))
+    assert passes_with_margin((replace(made, place=Place("leg", 5)),), (failed, HEIGHTS))
+    assert passes_with_margin((made,), (HEIGHTS,))
 
 
 class Flights:

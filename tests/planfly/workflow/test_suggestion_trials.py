@@ -17,7 +17,7 @@ from planfly.workflow.suggestion_trials import (
     MAX_TRIAL_FLIGHTS,
     MAX_TRIED_FINDINGS,
     SuggestionTrials,
-    leaves_no_more,
+    fails_no_more,
     tried_suggestions,
     with_tried_suggestions,
 )
@@ -42,11 +42,11 @@ def verdict_of(*findings: Finding, level: str = "flown") -> Verdict:
 
 def test_a_finding_that_is_gone_is_worth_no_other() -> None:
     before = verdict_of(low(1), low(2))
-    assert leaves_no_more(before, verdict_of(low(2), low(3)), low(1))
-    assert not leaves_no_more(before, verdict_of(low(1)), low(1))
-    assert not leaves_no_more(before, verdict_of(low(2), low(3), low(4)), low(1))
+    assert fails_no_more(before, verdict_of(low(2), low(3)), low(1))
+    assert not fails_no_more(before, verdict_of(low(1)), low(1))
+    assert not fails_no_more(before, verdict_of(low(2), low(3), low(4)), low(1))
     # An item that was inserted shifts the numbers of those behind it.
-    assert not leaves_no_more(before, verdict_of(low(1, item=7)), low(1, item=6))
+    assert not fails_no_more(before, verdict_of(low(1, item=7)), low(1, item=6))
 
 
 @dataclass
@@ -62,13 +62,13 @@ class Flights:
 
         class Fake:
             def __init__(self) -> None:
-                self.setup, self.requirements, self.geometric = setup, SESSION.judged.requirements, verdict_of()
+                self.setup, self.requirements, self.geometry_verdict = setup, SESSION.judged.requirements, verdict_of()
 
             def __getattr__(self, name: str) -> Verdict:
-                assert name == "flown"
+                assert name == "flight_verdict"
                 flights.count += 1
-                self.flown = verdict_of(*flights.fails(round(float(up), 3)))
-                return self.flown
+                self.flight_verdict = verdict_of(*flights.fails(round(float(up), 3)))
+                return self.flight_verdict
 
         return Fake()
 
@@ -130,4 +130,4 @@ def test_by_geometry_every_suggestion_that_is_offered_mends() -> None:
     after = {(item.rule, item.place): item.suggestions for item in offered.failed}
     assert after[first.rule, first.place] == first.suggestions[:1]
     for one in SuggestionTrials(desk, judged).passing():
-        assert leaves_no_more(judged.verdict, desk.judge(one.setup.mission).verdict, one.item)
+        assert fails_no_more(judged.verdict, desk.judge(one.setup.mission).verdict, one.finding)

@@ -16,7 +16,7 @@ from planfly.cli import main
 from planfly.workflow.airframe import load_airframe
 from planfly.workflow.make_plan import make_plan
 from planfly.workflow.open_flight import make_setup
-from planfly.workflow.tighten_plan import GO_ON, refine, tighten_limits
+from planfly.workflow.tighten_plan import NEXT_ROUND_REMARK, refine, tighten_limits
 from tests.planfly.conftest import FIELD
 from tests.synthetic import fly_path
 from world.scenario import Scenario, from_spec
@@ -120,7 +120,7 @@ def test_an_autopilot_that_strays_into_a_zones_edge_is_given_more_room() -> None
     _, rounds = refine(scenario, 3, one_round, lambda _: None)
     assert [entry["flyable"] for entry in rounds] == [False, True]
     assert kept[0] < 0.0 < kept[1]
-    assert rounds[0]["next"] == GO_ON
+    assert rounds[0]["next"] == NEXT_ROUND_REMARK
     # Ten metres, what it flew inside, and five more.
     wanted = round(10.0 - kept[0] + 5.0, 1)
     assert rounds[1]["changes"] == [f"planner.zone_margin_m: 10 to {wanted:g}"]

@@ -26,12 +26,14 @@ def test_a_trial_is_flown_when_it_is_asked_for_and_once(monkeypatch: pytest.Monk
 
     monkeypatch.setattr(trial_flight, "Flight", fly)
     trial = Trial(SETUP, AIRCRAFT)
-    assert trial.geometric.level == "geometric"
+    assert trial.geometry_verdict.level == "geometric"
     assert flown == []
-    assert trial.flown is trial.flown
+    assert trial.flight_verdict is trial.flight_verdict
     assert flown == [SETUP]
     assert trial.flight[1] == "not started: no trim"
-    assert [item.reason for item in trial.flown.failed if item.rule == "completion"] == ["not started: no trim"]
+    assert [item.reason for item in trial.flight_verdict.failed if item.rule == "completion"] == [
+        "not started: no trim"
+    ]
 
 
 @pytest.mark.parametrize(("ratio", "reason"), [(1.99, ""), (2.01, "not started: it takes 2 times the energy carried")])
@@ -48,5 +50,5 @@ def test_a_flight_of_more_than_twice_the_energy_carried_is_not_begun(
 def test_a_trial_in_a_hurry_is_aborted() -> None:
     asked = itertools.count()
     with pytest.raises(TrialAborted):
-        _ = Trial(SETUP, AIRCRAFT, lambda: next(asked) == 1).flown
+        _ = Trial(SETUP, AIRCRAFT, lambda: next(asked) == 1).flight_verdict
     assert next(asked) == 2

@@ -155,7 +155,7 @@ def made(count: int, seed: int, law: Any = norm) -> Outcomes:
 @pytest.mark.parametrize("known", [True, False])
 def test_coefficients_are_found(link: BinaryLink, law: Any, known: bool) -> None:
     flights = made(20_000, 2, law)
-    fit = fit_regression(flights if known else flights.without_margin(), link)
+    fit = fit_regression(flights if known else flights.as_pass_or_fail(), link)
     deviations = np.sqrt(np.diag(fit.covariance))
     assert fit.mean == pytest.approx(TRUTH, abs=0.1)
     assert (np.abs(fit.mean - TRUTH) < 4.0 * deviations).all()
@@ -165,7 +165,7 @@ def test_coefficients_are_found(link: BinaryLink, law: Any, known: bool) -> None
 
 @pytest.mark.parametrize("known", [True, False])
 def test_the_covariance_is_that_of_repeated_flights(known: bool) -> None:
-    sets = [made(500, seed) if known else made(500, seed).without_margin() for seed in range(60)]
+    sets = [made(500, seed) if known else made(500, seed).as_pass_or_fail() for seed in range(60)]
     means = np.array([fit_regression(flights, PROBIT).mean for flights in sets])
     told = np.sqrt(np.diag(fit_regression(sets[1], PROBIT).covariance))
     assert means.std(axis=0) == pytest.approx(told, rel=0.4)
@@ -173,7 +173,8 @@ def test_the_covariance_is_that_of_repeated_flights(known: bool) -> None:
 
 def test_margins_make_each_coefficient_surer() -> None:
     some, none = (
-        np.diag(fit_regression(flights, PROBIT).covariance) for flights in (made(300, 1), made(300, 1).without_margin())
+        np.diag(fit_regression(flights, PROBIT).covariance)
+        for flights in (made(300, 1), made(300, 1).as_pass_or_fail())
     )
     assert (some < 0.8 * none).all()
 
@@ -181,13 +182,13 @@ def test_margins_make_each_coefficient_surer() -> None:
 def test_where_all_pass_by_a_scale_who_failed_is_all_there_is() -> None:
     flights = made(300, 4)
     far = replace(flights, margin=np.where(flights.failed, 0.0, 1.0))
-    assert fit_regression(far, PROBIT).mean == pytest.approx(fit_regression(flights.without_margin(), PROBIT).mean)
+    assert fit_regression(far, PROBIT).mean == pytest.approx(fit_regression(flights.as_pass_or_fail(), PROBIT).mean)
 
 
 @pytest.mark.parametrize(("link", "law"), [(PROBIT, norm), (CLOGLOG, gumbel_l)])
 def test_margins_alone_give_the_coefficients_of_the_law_it_has(link: BinaryLink, law: Any) -> None:
     """Whoever failed is left out, and what is left is no longer the law itself but the law cut off at no margin."""
-    fit = fit_regression(made(20_000, 8, law).only_margin(), link)
+    fit = fit_regression(made(20_000, 8, law).margins_given_pass(), link)
     assert (np.abs(fit.mean - TRUTH) < 4.0 * np.sqrt(np.diag(fit.covariance))).all()
     assert np.sqrt(np.diag(fit.covariance)).max() < 0.1
     assert fit.by_margin == pytest.approx(1.0 / SPREAD, rel=0.1)
@@ -209,7 +210,7 @@ def test_the_law_of_margins_alone_is_looked_for_from_where_the_one_law_is_too() 
     for seed in range(6):
         flights = battery_flights(seed)
         one_law = fit_regression(flights, CLOGLOG)
-        near, afar = (fit_regression(flights.only_margin(), CLOGLOG, start) for start in (one_law, None))
+        near, afar = (fit_regression(flights.margins_given_pass(), CLOGLOG, start) for start in (one_law, None))
         found.append(near.log_evidence - afar.log_evidence)
         # Whichever: it is no less than what any simplex finds that starts from the one law.
         highest = minimize(
@@ -222,7 +223,7 @@ def test_the_law_of_margins_alone_is_looked_for_from_where_the_one_law_is_too() 
 
 def test_what_could_as_good_as_never_have_flown_is_impossible_not_certain() -> None:
     """Where a rate is beyond all numbers, its differences with others are none."""
-    posterior = _Posterior(battery_flights(1).only_margin(), CLOGLOG, 1.5)
+    posterior = _Posterior(battery_flights(1).margins_given_pass(), CLOGLOG, 1.5)
     points = np.array([[800.0, 0.0, 0.0, 0.0, 1.0], [40.0, -3.0, 0.0, 0.0, 1.0], [-10.0, -1.0, 0.0, 0.0, 1.0]])
     found = posterior.log_density(points)
     assert (found[:2] == -np.inf).all()
@@ -262,7 +263,8 @@ def test_the_evidence_is_for_the_link_that_flights_follow(known: bool) -> None:
     for law, right, wrong in ((norm, PROBIT, CLOGLOG), (gumbel_l, CLOGLOG, PROBIT)):
         flights = made(6000, 3, law)
         by_right, by_wrong = (
-            fit_regression(flights if known else flights.without_margin(), link).log_evidence for link in (right, wrong)
+            fit_regression(flights if known else flights.as_pass_or_fail(), link).log_evidence
+            for link in (right, wrong)
         )
         assert by_right > by_wrong + 3.0
 
@@ -297,7 +299,7 @@ def test_the_evidence_of_margins_is_the_integral_over_the_prior() -> None:
     fit = fit_regression(outcomes, PROBIT)
     assert fit.by_margin == pytest.approx(2.0, rel=0.15)
     assert fit.log_evidence == pytest.approx(logs_sum(fails, 0.01 * 0.01), abs=0.1)
-    alone = fit_regression(outcomes.only_margin(), PROBIT)
+    alone = fit_regression(outcomes.margins_given_pass(), PROBIT)
     assert alone.log_evidence == pytest.approx(logs_sum(passes, 0.01 * 0.01), abs=0.3)
 
 

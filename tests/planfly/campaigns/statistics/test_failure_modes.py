@@ -102,7 +102,7 @@ def test_the_margins_own_law_says_nothing_for_a_link() -> None:
         [fit_mode(terms, failed, some, link).log_evidence for link in LINKS] for some in (margin, np.zeros(400))
     )
     assert told[0] - told[1] == pytest.approx(bare[0] - bare[1])
-    passes = Outcomes(terms, failed, np.where(failed, 0.0, margin)).only_margin()
+    passes = Outcomes(terms, failed, np.where(failed, 0.0, margin)).margins_given_pass()
     by_itself = max(fit_regression(passes, link).log_evidence for link in LINKS)
     assert told[0] == pytest.approx(bare[0] + by_itself)
 

@@ -16,7 +16,7 @@ from planfly.campaigns.statistics.wind_boundary import (
     WeightedModes,
     WindBoundary,
     boundary_quantiles,
-    needs_more,
+    needs_more_flights,
     next_flights,
 )
 from tests.planfly.campaigns.statistics.made_directions import above, fly, no_numbers, normal_numbers
@@ -105,7 +105,7 @@ def search(draw: Callable[[], float], flights: int = 300) -> WindBoundary:
     direction = Direction(20.0, 0.99, no_numbers())
     while len(direction.speeds) < flights:
         fly(direction, 30, above(draw))
-        if not needs_more(direction.boundary(), len(direction.speeds), 0.25, 150):
+        if not needs_more_flights(direction.boundary(), len(direction.speeds), 0.25, 150):
             break
     return direction.boundary()
 
@@ -297,6 +297,6 @@ def test_what_never_flies_has_no_wind() -> None:
 
 def test_more_is_flown_until_the_interval_is_narrow() -> None:
     wide, narrow = WindBoundary(9.0, 8.5, 9.51, False), WindBoundary(9.0, 8.5, 9.5, False)
-    assert needs_more(wide, 100, 0.5, 30)
-    assert not needs_more(narrow, 30, 0.5, 30)
-    assert needs_more(narrow, 29, 0.5, 30)
+    assert needs_more_flights(wide, 100, 0.5, 30)
+    assert not needs_more_flights(narrow, 30, 0.5, 30)
+    assert needs_more_flights(narrow, 29, 0.5, 30)
