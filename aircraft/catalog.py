@@ -326,7 +326,7 @@ def check_new_folder(folder: Path, *, overwrite: bool = False) -> Path:
     target = folder.absolute()
     if _NAME.fullmatch(target.name) is None or target.name in _RESERVED_NAMES:
         allowed = (
-            f"a folder's name of letters, digits, '.', '_' and '-' is expected, none of {', '.join(_RESERVED_NAMES)}"
+            f"expected a folder name of letters, digits, '.', '_' and '-', other than {', '.join(_RESERVED_NAMES)}"
         )
         raise FlightError(f"{folder}: {allowed}", file=folder, value=target.name, allowed=allowed)
     if overwrite and target.exists() and not target.is_symlink():

@@ -324,7 +324,7 @@ def _refuse_constant(name: str) -> float:
 
 def _check_names(source: str, field: str, given: dict[str, Any], wanted: Sequence[str]) -> None:
     if sorted(given) != sorted(wanted):
-        raise MissionError.at(source, field, sorted(given), f"keys {sorted(wanted)} are expected")
+        raise MissionError.at(source, field, sorted(given), f"expected keys {sorted(wanted)}")
 
 
 def plan_html(plan: Plan) -> str:

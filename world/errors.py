@@ -68,9 +68,9 @@ class PlanflyError(Exception):
         shown: text of the value in the message; None for its str(), "" to omit it.
         file: file that the argument refers to, if any.
 
-        >>> error = FlightError.of_argument("bind", "127.0.0.1:70000", "a port 0..65535 is expected")
+        >>> error = FlightError.of_argument("bind", "127.0.0.1:70000", "expected a port 0..65535")
         >>> print(error, "|", error.field, "|", error.value)
-        bind 127.0.0.1:70000: a port 0..65535 is expected | bind | 127.0.0.1:70000
+        bind 127.0.0.1:70000: expected a port 0..65535 | bind | 127.0.0.1:70000
         """
         begin = f"{file}: " if str(file) else ""
         what = argument if shown == "" else f"{argument} {value if shown is None else shown}"

@@ -65,14 +65,14 @@ def read_at_most(path: Path, most: int, kind: str) -> bytes:
 
     >>> read_at_most(Path("/dev/zero"), 100, "mission")
     Traceback (most recent call last):
-    ValueError: not a plain file: a mission file is expected
+    ValueError: not a plain file; expected a mission file
     """
     status = path.stat()
     if stat.S_ISREG(status.st_mode) and status.st_size > most:
         raise ValueError(f"{status.st_size:,} bytes: a {kind} file has at most {most:,}")
     given = stat.S_ISFIFO(status.st_mode) and str(path).startswith(("/dev/fd/", "/dev/stdin", "/proc/self/fd/"))
     if not (stat.S_ISREG(status.st_mode) or stat.S_ISDIR(status.st_mode) or given):
-        raise ValueError(f"not a plain file: a {kind} file is expected")
+        raise ValueError(f"not a plain file; expected a {kind} file")
     with path.open("rb") as file:
         data = file.read(most + 1)
     if len(data) > most:
@@ -99,7 +99,7 @@ def read_toml(path: Path, kind: str, most: int = 2**20) -> dict[str, Any]:
 
     >>> read_toml(Path("/dev/null"), "gains")
     Traceback (most recent call last):
-    ValueError: not a plain file: a gains file is expected
+    ValueError: not a plain file; expected a gains file
     """
     return toml_table(read_at_most(path, most, kind).decode("utf-8"))
 

@@ -51,8 +51,8 @@ def open_geotiff(file: Path, _name: str) -> RasterFile:
 
 def open_hgt(file: Path, _name: str) -> RasterFile:
     """Open an SRTM tile, whose name gives its position.  Raises TerrainError."""
-    expected = "a name such as N46E008.hgt and the bytes of 1201 x 1201 or 3601 x 3601 heights are expected"
-    return _open(file, "SRTMHGT", f"not a readable SRTM tile: {expected}")
+    expected = "expected a name such as N46E008.hgt and the bytes of 1201 x 1201 or 3601 x 3601 heights"
+    return _open(file, "SRTMHGT", f"not a readable SRTM tile; {expected}")
 
 
 def _open_dataset(file: Path, driver: str) -> Any:
@@ -160,7 +160,7 @@ def _georeferenced(file: Path, shape: tuple[int, int], grid: Grid, crs: str | No
     except ValueError as error:
         raise TerrainError(f"{file}: its reference system cannot be read: {one_line(error)}", file=file) from error
     if (unit or "m").lower() not in METRES or metres != 1.0:
-        raise TerrainError.at(file, "unit of heights", stated if metres != 1.0 else unit, "metres are expected")
+        raise TerrainError.at(file, "unit of heights", stated if metres != 1.0 else unit, "expected metres")
     rows, cols = shape
     middle = a * cols / 2 + b * rows / 2 + c if is_geographic(crs) else math.nan
 

@@ -163,7 +163,7 @@ def find_remote(url: str, folder: Path) -> RemoteFile | None:
                 raise TerrainError(f"{url}: cannot be reached: {_error_text(error)}", file=url) from error
         time.sleep(_PAUSE * 2.0**attempt)
     if not 0 < size <= MAX_BYTES:
-        allowed = f"1 to {MAX_BYTES:,} bytes are expected"
+        allowed = f"expected 1 to {MAX_BYTES:,} bytes"
         raise TerrainError.at(url, "Content-Length", size, allowed, shown=f"{size:,}")
     key = sha256(f"{url}\0{version}\0{size}".encode()).hexdigest()[:16]
     copy = folder / key / url.rpartition("/")[2]

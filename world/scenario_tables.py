@@ -200,7 +200,7 @@ def _file_or_tiles(path: object) -> object:
     listed = path if isinstance(path, list) else [path]
     if path is None or (1 <= len(listed) <= MAX_TILES and all(isinstance(one, str) and one for one in listed)):
         return path
-    raise ValueError(f"a file's name, or a list of 1 to {MAX_TILES}, is expected")
+    raise ValueError(f"expected a file's name, or a list of 1 to {MAX_TILES}")
 
 
 class TerrainTable(ScenarioTable):
@@ -620,7 +620,7 @@ class ReturnsTable(ScenarioTable):
         if not self.require and all(one is None for one in (self.rtl_altitude_m, self.rtl_autoland, self.rally)):
             raise ValueError("require: missing; give require, rtl_altitude_m, rtl_autoland or rally")
         if self.require is not None and len(set(self.require)) < len(self.require):
-            raise ValueError(f"require: {', '.join(self.require)}: each is expected once")
+            raise ValueError(f"require: {', '.join(self.require)}: name each one once")
         return self
 
 

@@ -157,7 +157,7 @@ def cut_from_server(server: str, box: Box, out: Path, cache: Path, told: Told, *
     wide = Box(box.south - 0.001, box.west - 0.001, box.north + 0.001, box.east + 0.001)
     degrees = degrees_of(wide)
     if len(degrees) > MAX_FETCHED:
-        allowed = f"at most {MAX_FETCHED} are fetched: a smaller area is expected"
+        allowed = f"at most {MAX_FETCHED} are fetched; choose a smaller area"
         raise TerrainError(f"{server}: {len(degrees)} tiles: {allowed}", file=server, allowed=allowed)
     found = {}
     for number, degree in enumerate(degrees):
@@ -272,14 +272,14 @@ def _placed(tile: RasterFile, degree: tuple[int, int], box: Box) -> _PlacedTile:
     """Place a tile on its degree, in the same turn of longitude as the area.  Raises TerrainError."""
     dx, turn, west, other_turn, dy, north = tile.grid
     if turn or other_turn or not dx > 0.0 > dy:
-        raise TerrainError(f"{tile.name}: a grid of longitudes and latitudes is expected", file=tile.name)
+        raise TerrainError(f"{tile.name}: expected a grid of longitudes and latitudes", file=tile.name)
     off = max(abs(north - degree[0] - 1.0), abs((west - degree[1] + 180.0) % 360.0 - 180.0))
     if (
         off > _MAX_TILE_OFFSET_DEG
         or abs(dx * tile.shape[1] - 1.0) > _MAX_TILE_OFFSET_DEG
         or abs(-dy * tile.shape[0] - 1.0) > _MAX_TILE_OFFSET_DEG
     ):
-        allowed = f"the degree from {degree[0]} N {degree[1]} E on is expected"
+        allowed = f"expected the degree from {degree[0]} N {degree[1]} E on"
         raise TerrainError(f"{tile.name}: another place: {allowed}", file=tile.name, allowed=allowed)
     turns = round(((box.west + box.east) / 2.0 - (west + dx * tile.shape[1] / 2.0)) / 360.0)
     return _PlacedTile(tile, west + 360.0 * turns, north, dx, -dy)
@@ -294,7 +294,7 @@ def _merge_tiles(tiles: list[_PlacedTile], box: Box) -> tuple[Heights, tuple[flo
     top = math.floor((finest.north - box.north) / finest.dy - 0.5 + _PIXEL_TOLERANCE)
     bottom = math.ceil((finest.north - box.south) / finest.dy - 0.5 - _PIXEL_TOLERANCE) + 1
     if (right - left) * (bottom - top) > MAX_PIXELS:
-        allowed = f"at most {MAX_PIXELS:,} are written: a smaller area is expected"
+        allowed = f"at most {MAX_PIXELS:,} are written; choose a smaller area"
         count = (right - left) * (bottom - top)
         raise TerrainError.at(finest.raster.name, "pixels", count, allowed, shown=f"{count:,}")
     west, north = finest.west + left * finest.dx, finest.north - top * finest.dy

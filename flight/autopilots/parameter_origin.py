@@ -244,8 +244,8 @@ def refuse_unknown(path: Path, autopilot: str, entries: Mapping[str, Entry], kno
     if known or parameter_origin("", entries).autopilot == autopilot:
         return
     names = ", ".join(list(entries)[:_SHOWN_NAMES])
-    allowed = f"a parameter file of {TITLES[autopilot]} is expected"
-    message = f"{path}: {names}: no name that the simulated {_MODELS[autopilot]} knows: {allowed}"
+    allowed = f"expected a parameter file of {TITLES[autopilot]}"
+    message = f"{path}: {names}: not known to the simulated {_MODELS[autopilot]}; {allowed}"
     raise ParameterError(message, file=path, value=names, allowed=allowed)
 
 

@@ -156,7 +156,7 @@ def read_key(path: Path) -> bytes:
         with os.fdopen(os.open(path, os.O_RDONLY | os.O_NONBLOCK), "rb") as file:
             status = os.fstat(file.fileno())
             if not stat.S_ISREG(status.st_mode):
-                raise FlightError(f"{path}: not a plain file: a signing key is expected", file=path)
+                raise FlightError(f"{path}: not a plain file; expected a signing key", file=path)
             own = getattr(os, "getuid", None)
             # Where users have no numbers, modes do not show who can read a file.
             if own is not None and (status.st_uid != own() or stat.S_IMODE(status.st_mode) & 0o077):

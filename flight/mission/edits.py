@@ -46,7 +46,7 @@ def places(mission: Mission) -> tuple[int, ...]:
 def checked_place(mission: Mission, index: int) -> MissionItem:
     """Return the item to edit.  Raises MissionError if the item does not exist or is not a place."""
     if not 0 <= index < len(mission.items):
-        raise MissionError.at(mission.source, "item", index, f"0..{len(mission.items) - 1} is expected")
+        raise MissionError.at(mission.source, "item", index, f"expected 0..{len(mission.items) - 1}")
     item = mission.items[index]
     if not is_place(item):
         raise MissionError.at(mission.source, f"item {item.seq}", item.command, "is no place on the map")

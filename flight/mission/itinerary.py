@@ -208,7 +208,7 @@ def make_itinerary(mission: Mission) -> Itinerary:
         if item.seq not in steps.reached and not (walk.ended and item.command in JUMPS):
             walk.notes.add(NEVER_REACHED, item.seq)
     if not walk.stops:
-        raise MissionError(f"{mission.source}: no item with a position: at least two are expected", file=mission.source)
+        raise MissionError(f"{mission.source}: no item has a position; expected at least two", file=mission.source)
     return Itinerary(
         stops=tuple(walk.stops),
         home=walk.first_home,
@@ -495,8 +495,8 @@ class _ItineraryBuilder:
                 self.leave_open(f"{name} in the air: not flown", item.seq)
             return
         if math.isnan(item.alt):
-            message = f"{self.source}: item {item.seq}: {name} has no altitude: a number is expected"
-            raise MissionError(message, file=self.source, field="altitude", allowed="a number is expected")
+            message = f"{self.source}: item {item.seq}: {name} has no altitude: expected a number"
+            raise MissionError(message, file=self.source, field="altitude", allowed="expected a number")
         self.takeoff = item
         if vertical:
             self.leave_open(f"{name}: not flown straight up", item.seq)
@@ -633,4 +633,4 @@ def _first_position(mission: Mission) -> Home:
     for item in mission.items:
         if item.command in PLACES | TAKEOFFS | LANDINGS and item.has_position:
             return Home(item.lat_deg, item.lon_deg, math.nan)
-    raise MissionError(f"{mission.source}: no item with a position: at least two are expected", file=mission.source)
+    raise MissionError(f"{mission.source}: no item has a position; expected at least two", file=mission.source)

@@ -452,7 +452,7 @@ def _held_above_ground(stop: ItineraryStop) -> float:
 def _refuse_fewer_than_two(source: str, places: int) -> None:
     """Raise MissionError for a route of fewer than two places."""
     if places < 2:
-        message = f"{source}: {places} place to fly to: at least two different ones are expected"
+        message = f"{source}: {places} place to fly to: expected at least two different ones"
         raise MissionError(message, file=source)
 
 

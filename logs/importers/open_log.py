@@ -68,20 +68,20 @@ def open_log(path: Path) -> "RawLog":
 
     >>> open_log(Path("nothing.BIN"))
     Traceback (most recent call last):
-    world.errors.LogError: nothing.BIN: no such file: a log (.ulg, .bin, .tlog, .gpx, .igc, .kml, .kmz) is expected
+    world.errors.LogError: nothing.BIN: no such file; expected a log (.ulg, .bin, .tlog, .gpx, .igc, .kml, .kmz)
     """
     import numpy as np
 
     try:
         if not path.is_file():
-            raise LogError(f"{path}: no such file: a log ({', '.join(SUFFIXES)}) is expected", file=path)
+            raise LogError(f"{path}: no such file; expected a log ({', '.join(SUFFIXES)})", file=path)
         size = path.stat().st_size
         if size > MAX_BYTES:
             raise LogError(f"{path}: {size:,} bytes: at most {MAX_BYTES:,} are read", file=path)
         with path.open("rb") as file:
             head = file.read(_HEAD)
         if not head:
-            raise LogError(f"{path}: empty: a log is expected", file=path)
+            raise LogError(f"{path}: empty; expected a log", file=path)
         known = log_format(path, head)
         if known.extra:
             need_extra(known.extra, f"{path}: reading {known.suffixes[0]} needs")
@@ -112,6 +112,6 @@ def log_format(path: Path, head: bytes) -> LogFormat:
     named = [known for known in FORMATS if path.suffix.lower() in known.suffixes]
     if not fitting and not named:
         names = ", ".join(known.name for known in FORMATS)
-        message = f"not a log that is known (it starts with {head[:8]!r}): {names} is expected"
+        message = f"not a known log format (it starts with {head[:8]!r}); expected {names}"
         raise LogError(f"{path}: {message}", file=path)
     return next((known for known in named if known in fitting), (fitting or named)[0])

@@ -48,7 +48,7 @@ def track_text(path: Path, *, xml: bool) -> str:
     text = _bytes_of(path).decode("utf-8-sig", errors="replace")
     if xml and _DOCUMENT_TYPE.search(text):
         raise LogError(
-            f"{path}: a document type: none is expected in a track, and entities are not expanded", file=path
+            f"{path}: a document type is declared, which a track must not have; entities are not expanded", file=path
         )
     return text
 
@@ -101,7 +101,7 @@ def read_gpx(path: Path) -> RawLog:
     timed = [point for point in points if point.time is not None]
     if len(timed) < 2:
         raise LogError(
-            f"{path}: {len(timed)} track points with a time of {len(points)}: at least 2 are expected", file=path
+            f"{path}: {len(timed)} of {len(points)} track points have a time; expected at least 2", file=path
         )
     # Times without a zone are UTC, the zone of all times in the format.
     times = [point.time if point.time.tzinfo else point.time.replace(tzinfo=UTC) for point in timed if point.time]
@@ -171,7 +171,7 @@ def read_igc(path: Path) -> RawLog:
     lines = re.split(r"\r\n|\n|\r", track_text(path, xml=False))
     rows, unreadable = _fixes(lines)
     if len(rows) < 2:
-        raise LogError(f"{path}: {len(rows)} fixes (B records): at least 2 are expected", file=path)
+        raise LogError(f"{path}: {len(rows)} fixes (B records); expected at least 2", file=path)
     table = np.array(rows)
     time = _unwrap_midnight(table[:, 0])
     gnss, pressure = table[:, 4], table[:, 3]
@@ -298,7 +298,7 @@ def read_kml(path: Path) -> RawLog:
     if len(rows) < 2:
         lines = sum(_name(one) == "LineString" for one in root.iter())
         why = f"; its {lines} lines have no times" if lines else ""
-        raise LogError(f"{path}: {len(rows)} places with a time (gx:Track): at least 2 are expected{why}", file=path)
+        raise LogError(f"{path}: {len(rows)} places with a time (gx:Track); expected at least 2{why}", file=path)
     table = np.array(rows)
     start = _earliest(table[:, 0])
     datum: VerticalDatum = "amsl" if mode == "absolute" else "unstated"
@@ -333,8 +333,8 @@ def _pairs(track: ElementTree.Element, path: Path) -> tuple[list[tuple[str, str]
     if all(name == "when" for name, _ in marks[: last_when + 1]):
         if len(whens) != len(coords):
             raise LogError(
-                f"{path}: a track of {len(whens)} times (when) and {len(coords)} places (gx:coord): as many of both"
-                " are expected",
+                f"{path}: a track of {len(whens)} times (when) and {len(coords)} places (gx:coord): expected"
+                " as many of both",
                 file=path,
             )
         return list(zip(whens, coords, strict=True)), 0

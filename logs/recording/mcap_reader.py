@@ -169,7 +169,7 @@ def _chunk(content: bytes, at: int) -> bytes:
         raise _Damage(f"the chunk at byte {at:,} declares {size:,} bytes: at most {RECORD_LIMIT:,} are read")
     if chunk.compression not in ("zstd", "lz4", ""):
         raise _Damage(
-            f"the chunk at byte {at:,} is compressed with {chunk.compression[:20]!r}: zstd, lz4 or none is expected"
+            f"the chunk at byte {at:,} is compressed with {chunk.compression[:20]!r}: expected zstd, lz4 or none"
         )
     try:
         data = _decompressed(chunk, size)

@@ -120,7 +120,7 @@ def export(
     (['.waypoints', '.kml'], '23 items')
     """
     if not files:
-        raise PlanflyError("export: no file: one at least is expected", field="files")
+        raise PlanflyError("export: expected at least one file", field="files")
     targets = tuple(Path(file) for file in files)
     with contextlib.ExitStack() as place:
         path = _source_path(source, place)
@@ -206,7 +206,7 @@ def _read_log(path: Path, *, coloured: bool) -> _Source:
 def _read_mission(path: Path, options: MissionOptions, *, placed: bool, coloured: bool) -> _Source:
     """Read a plan or a mission file; place the mission in its scenario if a target, a plan or a fence needs this."""
     if not path.is_file():
-        raise MissionError(f"{path}: no such file; a plan.json, mission file or log is expected", file=path)
+        raise MissionError(f"{path}: no such file; expected a plan.json, mission file or log", file=path)
     is_plan, fences = path.suffix.lower() == ".json", read_named_fences(options["fence"])
     if not (placed or is_plan or fences.zones or options["at"] is not None):
         mission = fences.on_mission(read_mission(path))

@@ -239,7 +239,7 @@ def fly_by_each(
     """
     named = list(dict.fromkeys(autopilots))
     if not named:
-        raise ArgumentError.of_argument("autopilots", "", "at least one autopilot is expected")
+        raise ArgumentError.of_argument("autopilots", "", "expected at least one autopilot")
     check_arguments(autopilot=named)
     own = {name: value for name, value in options.items() if name in ("params", "guidance", "autopilot")}
     refuse(_source_name(mission), own, "belongs to one autopilot, and several are named")

@@ -92,7 +92,7 @@ class Optimiser:
             np.empty((len(asked), 0)) if violations is None else _checked_columns("violations", violations, len(asked))
         )
         if not given.shape[1]:
-            raise ValueError("values: no columns: one an objective is expected")
+            raise ValueError("values: no columns; expected one for each objective")
         scores = np.concatenate([np.maximum(broken, 0.0), given], axis=1)
         if self._levels and (scores.shape[1] != self._scores.shape[1] or broken.shape[1] != self._violations):
             raise ValueError("values, violations: other numbers of columns than before")
@@ -201,16 +201,16 @@ def optimise(
     """
     low, high = np.array(lower, dtype=np.float64), np.array(upper, dtype=np.float64)
     if low.ndim != 1 or low.shape != high.shape or not low.size:
-        raise ValueError(f"lower, upper: shapes {low.shape} and {high.shape}: two of (d,) are expected")
+        raise ValueError(f"lower, upper: shapes {low.shape} and {high.shape}: expected two of shape (d,)")
     if not (np.isfinite(low) & np.isfinite(high) & (low < high)).all():
-        raise ValueError("lower, upper: finite numbers, lower below upper, are expected")
+        raise ValueError("lower, upper: expected finite numbers, lower below upper")
     if model not in _MODELS:
         raise ValueError(f"model: {model!r}: allowed {', '.join(_MODELS)}")
     if population < 4 or population % 2:
-        raise ValueError(f"population: {population}: an even number from 4 is expected")
+        raise ValueError(f"population: {population}: expected an even number from 4")
     first = None if initial is None else np.array(initial, dtype=np.float64)
     if first is not None and (first.shape != (population, low.size) or not np.isfinite(first).all()):
-        raise ValueError(f"initial: shape {first.shape}: finite numbers of ({population}, {low.size}) are expected")
+        raise ValueError(f"initial: shape {first.shape}: expected finite numbers of ({population}, {low.size})")
     return Optimiser(low, high, model, population, np.random.default_rng(seed), first)
 
 
@@ -224,5 +224,5 @@ def _checked_columns(name: str, given: ArrayLike, rows: int) -> Floats:
     table = np.array(given, dtype=np.float64)
     table = table[:, np.newaxis] if table.ndim == 1 else table
     if table.ndim != 2 or len(table) != rows:
-        raise ValueError(f"{name}: shape {np.shape(given)}: {rows} rows are expected, one for each point asked for")
+        raise ValueError(f"{name}: shape {np.shape(given)}: expected {rows} rows, one for each point asked for")
     return np.where(np.isnan(table), np.inf, table)

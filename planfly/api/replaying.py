@@ -43,7 +43,7 @@ def replayed_part(log: FlightLog, start: float | None, end: float | None) -> tup
     if first > log.end_time:
         raise LogError.of_argument("start", first, ends, shown=f"{first:g}", file=log.source)
     if last < first:
-        allowed = f"at or after `start`, {first:g} s, is expected"
+        allowed = f"expected `start`, {first:g} s, or later"
         raise LogError.of_argument("end", last, allowed, shown=f"{last:g}", file=log.source)
     return first, last
 
@@ -204,7 +204,7 @@ def play_to_foxglove(
 def _checked_origin(text: str) -> str:
     """Return the origin if browsers would write it like this.  Raises LogError for an invalid origin."""
     if not _ORIGIN.fullmatch(text):
-        allowed = "the origin of a web page is expected, such as https://example.com or http://localhost:8080"
+        allowed = "expected the origin of a web page, such as https://example.com or http://localhost:8080"
         raise LogError.of_argument("allow_origin", text, allowed)
     return text
 

@@ -172,7 +172,7 @@ def _parse_camera(numbers: tuple[float, ...] | None) -> Camera | None:
         found = ()
     if isinstance(numbers, str | bytes) or not is_camera(found):
         raise ArgumentError.of_argument(
-            "camera", numbers, f"{CAMERA}, are expected, as (23.5, 15.6, 16)", shown=repr(numbers)
+            "camera", numbers, f"expected {CAMERA}, such as (23.5, 15.6, 16)", shown=repr(numbers)
         )
     width, height, focal, *asked = found
     front, side = (one / 100.0 for one in asked) if asked else (None, None)
@@ -248,7 +248,7 @@ def _require_survey(setup: FlightSetup) -> None:
     if not surveys_of(setup):
         source = setup.mission.source
         raise MissionError(
-            f"{source}: no survey: at least three lines beside each other are expected, or two with photos along them",
+            f"{source}: no survey; expected at least three lines side by side, or two with photos along them",
             file=source,
         )
 

@@ -235,14 +235,14 @@ def _read_named_draws(table: Any, name: str) -> Draws:
     """Return the aircraft's draws from the file that a dispersions file names, relative to the dispersions file."""
     given = table.get("draws") if isinstance(table, dict) else None
     if not isinstance(given, str) or not given or (isinstance(table, dict) and len(table) > 1):
-        allowed = 'a file of draws is expected, and nothing else, such as draws = "mine/draws.csv"'
+        allowed = 'expected only a file of draws, such as draws = "mine/draws.csv"'
         raise SpreadError.at(name, f"{_AIRCRAFT}.draws", table, allowed, shown="")
     return read_draws(Path(name).parent / Path(given).expanduser(), SpreadError)
 
 
 def _parse_quantity(quantity: Quantity, table: Any, name: str) -> Varying:
     if not isinstance(table, dict):
-        allowed = "a table is expected, with distribution, its parameters, and source"
+        allowed = "expected a table, with distribution, its parameters, and source"
         raise SpreadError.at(name, quantity.name, table, allowed, shown="")
     entries = dict(table)
     distribution, source = entries.pop("distribution", None), entries.pop("source", None)
@@ -268,11 +268,11 @@ def _check_distribution(quantity: Quantity, distribution: Any, name: str) -> Non
     kind = stats.rv_discrete if quantity.integer else stats.rv_continuous
     field = f"{quantity.name}.distribution"
     if not isinstance(distribution, str):
-        allowed = "missing; the name of one of scipy.stats' distributions is expected"
+        allowed = "missing; expected the name of one of scipy.stats' distributions"
         raise SpreadError.at(name, field, distribution, allowed, shown="")
     if not isinstance(getattr(stats, distribution, None), kind):
         sort = "a discrete one, such as randint" if quantity.integer else "a continuous one, such as norm"
-        allowed = f"no distribution of scipy.stats; {sort}, is expected"
+        allowed = f"no distribution of scipy.stats; expected {sort}"
         raise SpreadError.at(name, field, distribution, allowed, shown=repr(distribution))
 
 
@@ -287,7 +287,7 @@ def _check_parameters(distribution: str, entries: dict[str, Any], name: str, qua
             has = f"not a parameter of {distribution}, which has {', '.join(allowed)}"
             raise SpreadError.at(name, f"{quantity}.{key}", value, has, shown="")
         if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
-            raise SpreadError.at(name, f"{quantity}.{key}", value, "a finite number is expected", shown=repr(value))
+            raise SpreadError.at(name, f"{quantity}.{key}", value, "expected a finite number", shown=repr(value))
     missing = [key for key in shapes if key not in entries]
     if missing:
         needs = f"missing; {distribution} needs {', '.join(shapes)}"

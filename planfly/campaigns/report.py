@@ -209,7 +209,7 @@ class OutputDirectory:
                 raise PlanflyError(f"{folder / self.table}: no campaign there to go on with", file=folder / self.table)
             return
         if folder.exists() and not folder.is_dir():
-            raise PlanflyError(f"{folder}: is a file; a folder is expected", file=folder)
+            raise PlanflyError(f"{folder}: is a file; expected a folder", file=folder)
         if self.overwrite or not folder.is_dir() or not any(folder.iterdir()):
             return
         if (folder / self.table).exists():

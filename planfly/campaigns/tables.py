@@ -195,7 +195,7 @@ class LockedTable:
         if "schema" not in known:
             _refuse_damaged(known, self.path)
         if known.get("schema") != schema:
-            raise StoreError(f"{self.path}: schema {known.get('schema')!r}: {schema} is expected", file=self.path)
+            raise StoreError(f"{self.path}: schema {known.get('schema')!r}: expected {schema}", file=self.path)
         _refuse_damaged(known, self.path)
         if known.get("made_of") != self.made_of:
             raise StoreError(

@@ -122,7 +122,7 @@ def _plan_front(args: argparse.Namespace) -> int:
             raise ScenarioError.of_argument(name, value, "not with `front` N, which plans anew by its own search")
     evaluations, seconds = args.budget or (None, None)
     if evaluations is not None:
-        allowed = "with `front` N a number of seconds is expected, as in 10s"
+        allowed = "with `front` N: expected a number of seconds, as in 10s"
         raise ScenarioError.of_argument("budget", evaluations, allowed)
     out = FRONT_FOLDER if args.out is None else args.out
     with _stop_on_interrupt() as stop:

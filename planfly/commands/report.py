@@ -37,7 +37,7 @@ def report(args: argparse.Namespace) -> int:
     if args.layout:
         return _write_layout(args)
     if args.log is None:
-        print("planfly report: a log, or --layout FILE, is expected (see planfly report --help)", file=sys.stderr)
+        print("planfly report: expected a log, or --layout FILE (see planfly report --help)", file=sys.stderr)
         return BAD_INPUT
     source = Path(args.log)
     log = planfly.read_log(source)

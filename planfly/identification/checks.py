@@ -42,7 +42,7 @@ def check_estimate(estimate: Estimate, base: BaseModel, outputs: dict[str, int],
     slope = base.coefficients.lift_alpha * estimate.values[INDEX["lift-slope"]]
     low, high = LIFT_SLOPES
     if not low <= slope <= high:
-        allowed = f"{low:g}..{high:g} is expected: are mass and wing area those of these logs?"
+        allowed = f"expected {low:g}..{high:g}; check the mass and wing area of these logs"
         raise LogError(
             f"{source}: lift slope {slope:.2f} per rad: {allowed}", file=source, value=slope, allowed=allowed
         )
@@ -54,7 +54,7 @@ def check_estimate(estimate: Estimate, base: BaseModel, outputs: dict[str, int],
             raise LogError(f"{source}: {message}", file=source, field=parameter.name, value=value, allowed=allowed)
     change, sd = mass_change(estimate, base)
     if abs(change) > MASS_CHANGE and abs(change) > _MASS_CHANGE_SIGMAS * sd:
-        message = f"the mass seems to change by {100.0 * change:+.0f} % within the logs: one mass is expected"
+        message = f"the mass seems to change by {100.0 * change:+.0f} % within the logs; it must stay the same"
         raise LogError(f"{source}: {message}", file=source, value=change)
 
 

@@ -172,7 +172,7 @@ _SERIES = {
 def _refuse_unusable(log: MotionLog) -> None:
     """Raise LogError for a log that no identification can use."""
     if log.vehicle not in ("plane", "unknown"):
-        raise LogError(f"{log.source}: flown by a {log.vehicle} ({log.program}): a plane is expected", file=log.source)
+        raise LogError(f"{log.source}: flown by a {log.vehicle} ({log.program}): expected a plane", file=log.source)
     named = _SERIES[log.program_kind]
     for samples, name in ((log.inertial, "inertial"), (log.moved, "outputs")):
         if len(samples.time) < 2:
@@ -246,7 +246,7 @@ def log_outputs(log: MotionLog, aircraft: Aircraft) -> dict[str, ServoOutput]:
     if any(elevons):
         _refuse_base_of_elevons(log, aircraft)
     if any(elevons) and not all(elevons):
-        raise LogError(f"{log.source}: one elevon alone: SERVOn_FUNCTION 77 and 78 are expected", file=log.source)
+        raise LogError(f"{log.source}: only one elevon; expected SERVOn_FUNCTION 77 and 78", file=log.source)
     made = {}
     for name, function, largest in (
         ("elevator", _ELEVATOR, -aircraft.max_elevator),
@@ -271,7 +271,7 @@ def log_outputs(log: MotionLog, aircraft: Aircraft) -> dict[str, ServoOutput]:
 
 def _refuse_base_of_elevons(log: MotionLog, aircraft: Aircraft) -> None:
     if not is_flying_wing(aircraft):
-        advice = "a flying wing is expected as base: x8, zagi, or one of planfly aircraft --new FOLDER --layout wing"
+        advice = "expected a flying wing as base: x8, zagi, or one of planfly aircraft --new FOLDER --layout wing"
         message = f"flown with elevons, and the base {aircraft.name} has a tail: {advice}"
         raise LogError(f"{log.source}: {message}", file=log.source)
 

@@ -144,7 +144,7 @@ def refuse_program(program: Path) -> None:
     """Raise ArgumentError for a program whose returns planfly does not simulate and so cannot compare."""
     kind = program_autopilot(program)
     if not issubclass(kind, ArduPlaneSitl):
-        allowed = f"ArduPlane's program is expected: how {kind.title} returns is not flown here"
+        allowed = f"expected ArduPlane's program; returns of {kind.title} are not flown here"
         raise ArgumentError.of_argument("autopilot", str(program), allowed)
 
 

@@ -129,7 +129,7 @@ class Jobs:
         if message.algorithm is not None and message.algorithm not in ALGORITHMS:
             raise PlanflyError.of_argument("algorithm", message.algorithm, f"allowed {', '.join(ALGORITHMS)}")
         if message.algorithm is not None and message.ways > 1:
-            raise PlanflyError.of_argument("ways", message.ways, "one is expected with an algorithm of your own")
+            raise PlanflyError.of_argument("ways", message.ways, "expected 1 with an algorithm of your own")
         asked = PlanAsked(scenario, frame, message.seed, message.algorithm, ways=message.ways)
         if message.first is None or message.last is None:
             if scenario.external:

@@ -418,7 +418,7 @@ async def _receive_text(socket: WebSocket) -> str:
         raise WebSocketDisconnect(received.get("code", 1000))
     text = received.get("text")
     if text is None:
-        raise ValueError("a message in text is expected")
+        raise ValueError("expected a message in text")
     return str(text)
 
 

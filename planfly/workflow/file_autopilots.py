@@ -39,7 +39,7 @@ def with_file_autopilot(scenario: Scenario, mission: Mission | None = None) -> S
         if table.autopilot_from is None:
             raise MissionError.from_error(other_autopilot(mission.source, stated, _FIRMWARE[stated], table.autopilot))
         other = f"{table.autopilot_from} for {TITLES[table.autopilot]}"
-        allowed = "files of one autopilot are expected"
+        allowed = "expected files of one autopilot"
         message = f"{mission.source}: written for {TITLES[stated]} ({_FIRMWARE[stated]}), and {other}: {allowed}"
         raise MissionError(message, file=mission.source, field="autopilot", value=stated, allowed=allowed)
     return scenario

@@ -223,8 +223,8 @@ def test_a_folder_made_from_a_folder_brings_its_engines(tmp_path: Path) -> None:
     [
         ("there", "there: exists; overwrite=True replaces it, or name another folder"),
         ("nowhere/mine", "its folder .*nowhere does not exist"),
-        ("my plane", "a folder's name of letters, digits"),
-        ("gains", "none of ardupilot, draws, gains, posterior, uncertainty, README"),
+        ("my plane", "expected a folder name of letters, digits"),
+        ("gains", "other than ardupilot, draws, gains, posterior, uncertainty, README"),
         ("link", "link: exists"),
     ],
 )

@@ -45,7 +45,7 @@ def test_a_pipe_and_a_device_are_refused_at_once(tmp_path: Path, name: str) -> N
     path = tmp_path / name
     with pytest.raises(MissionError) as caught:
         read_small_file(path, 1000, "mission", MissionError)
-    assert str(caught.value) == f"{path}: not a plain file: a mission file is expected"
+    assert str(caught.value) == f"{path}: not a plain file; expected a mission file"
 
 
 @pytest.mark.parametrize(("size", "ok"), [(1000, True), (1001, False)])

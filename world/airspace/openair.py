@@ -127,7 +127,7 @@ def _finish_block(block: _Block, source: str) -> tuple[str, dict[str, Any] | str
     if not any((*shapes, block.name, block.limits)):
         return where, "without name, limits and shape"
     if sum(shapes) != 1:
-        allowed = "one shape is expected: corners and arcs, a circle, or an airway"
+        allowed = "expected one shape: corners and arcs, a circle, or an airway"
         raise ScenarioError(f"{source}: {where}: {allowed}", file=source, allowed=allowed)
     if block.circle is not None:
         (lat, lon), radius = block.circle
@@ -183,7 +183,7 @@ def _altitude(text: str, key: str) -> dict[str, Any] | None:
         return {"value": float(level[1]), "unit": "FL", "referenceDatum": "STD"}
     found = _ALTITUDE.fullmatch(text)
     if found is None:
-        raise ValueError("a height is expected: 2500ft AMSL, 300m AGL, FL95, GND, UNL")
+        raise ValueError("expected a height: 2500ft AMSL, 300m AGL, FL95, GND, UNL")
     value, unit, datum = float(found[1]), found[2].upper(), found[3].upper()
     reference = "GND" if datum in _ABOVE_GROUND else "STD" if datum == "STD" else "MSL"
     return {"value": value, "unit": "M" if unit == "M" else "FT", "referenceDatum": reference}
@@ -214,7 +214,7 @@ def _read_circle(block: _Block, text: str) -> None:
 def _arc_by_bearings(block: _Block, text: str) -> None:
     parts = text.split(",")
     if len(parts) != 3:
-        raise ValueError("radius, first and last bearing are expected: 5, 270, 290")
+        raise ValueError("expected radius, first and last bearing: 5, 270, 290")
     radius, first, last = _length(parts[0]), _number(parts[1]), _number(parts[2])
     _add_corners(block.corners, _arc(_centre(block), (radius, radius), first, last, block.clockwise))
 
@@ -222,7 +222,7 @@ def _arc_by_bearings(block: _Block, text: str) -> None:
 def _arc_by_points(block: _Block, text: str) -> None:
     found = [_place(match[0]) for match in _COORDINATE.finditer(text)]
     if len(found) != 2:
-        raise ValueError("two points are expected: 39:36:40N 119:46:10W, 39:29:09N 119:36:10W")
+        raise ValueError("expected two points: 39:36:40N 119:46:10W, 39:29:09N 119:36:10W")
     centre = _centre(block)
     (first, near), (last, far) = (_polar(centre, place) for place in found)
     # The end points are kept as stated, even if they do not agree with the centre.
@@ -272,7 +272,7 @@ def _number(text: str) -> float:
     except ValueError:
         value = math.nan
     if not 0.0 <= value < math.inf:
-        raise ValueError("a number from 0 on is expected")
+        raise ValueError("expected a number of at least 0")
     return value
 
 
@@ -288,7 +288,7 @@ def _place(text: str) -> _Place:
     """Parse a latitude and longitude, degrees."""
     found = _COORDINATE.fullmatch(text.strip())
     if found is None:
-        raise ValueError("a place is expected: 45:40:30N 014:18:20E, or 45:40.500N 014:18.333E")
+        raise ValueError("expected a place: 45:40:30N 014:18:20E, or 45:40.500N 014:18.333E")
     lat = _degrees(found["lat"], 90.0) * (-1.0 if found["ns"].upper() == "S" else 1.0)
     lon = _degrees(found["lon"], 180.0) * (-1.0 if found["ew"].upper() == "W" else 1.0)
     return lat, lon
@@ -297,7 +297,7 @@ def _place(text: str) -> _Place:
 def _degrees(text: str, most: float) -> float:
     parts = [_number(part) for part in text.split(":")]
     if len(parts) > 3 or any(part > 60.0 for part in parts[1:]):
-        raise ValueError("degrees, minutes and seconds of 60 at most are expected")
+        raise ValueError("expected degrees, minutes and seconds of at most 60")
     angle = sum(part / 60.0**k for k, part in enumerate(parts))
     if angle > most:
         raise ValueError(f"allowed 0..{most:g} degrees")

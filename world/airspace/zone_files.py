@@ -44,7 +44,7 @@ def geojson_zones(text: str, source: str) -> Iterator[Found]:
     except (ValueError, RecursionError) as error:
         raise ScenarioError(f"{source}: not valid JSON: {str(error).splitlines()[0]}", file=source) from error
     if not isinstance(data, dict):
-        raise ScenarioError(f"{source}: a GeoJSON object is expected, got {type(data).__name__}", file=source)
+        raise ScenarioError(f"{source}: expected a GeoJSON object, got {type(data).__name__}", file=source)
     if is_ed269(data):
         yield from ed269_zones(data, source)
         return
@@ -53,7 +53,7 @@ def geojson_zones(text: str, source: str) -> Iterator[Found]:
     if kind == "FeatureCollection":
         features = data.get("features")
         if not isinstance(features, list):
-            raise ScenarioError(f"{source}: features: a list is expected", file=source, field="features")
+            raise ScenarioError(f"{source}: features: expected a list", file=source, field="features")
         named = [(f"features[{k}]", feature) for k, feature in enumerate(features)]
     elif kind == "Feature":
         named = [("feature", data)]
@@ -85,7 +85,7 @@ def _check_crs(data: dict[str, Any], source: str) -> None:
 
 def _geojson_zone(feature: Any, where: str, number: int, source: str) -> tuple[str, dict[str, Any]]:
     if not isinstance(feature, dict) or feature.get("type") != "Feature":
-        raise ScenarioError(f"{source}: {where}: a Feature is expected", file=source, field=where)
+        raise ScenarioError(f"{source}: {where}: expected a Feature", file=source, field=where)
     properties, geometry = feature.get("properties"), feature.get("geometry")
     properties = properties if isinstance(properties, dict) else {}
     name = properties.get("name") or f"zone {number + 1}"
@@ -112,10 +112,10 @@ def _geojson_zone(feature: Any, where: str, number: int, source: str) -> tuple[s
             rings = [[list(corner) for corner in ring] for part in parts for ring in part]
             return label, entries | {"rings_deg": rings}
     except (TypeError, ValueError, IndexError) as error:
-        allowed = "lists of [longitude, latitude] are expected"
+        allowed = "expected lists of [longitude, latitude]"
         message = f"{source}: {label}: coordinates: {allowed}"
         raise ScenarioError(message, file=source, field="coordinates", allowed=allowed) from error
-    allowed = "a Polygon, MultiPolygon or Point is expected"
+    allowed = "expected a Polygon, MultiPolygon or Point"
     message = f"{source}: {label}: geometry {json.dumps(kind)[:40]}: {allowed}"
     raise ScenarioError(message, file=source, field="geometry", value=kind, allowed=allowed)
 
@@ -175,7 +175,7 @@ def kml_zones(text: str, source: str) -> Iterator[Found]:
     except (ElementTree.ParseError, ValueError) as error:
         raise ScenarioError(f"{source}: not valid XML: {str(error).splitlines()[0]}", file=source) from error
     if _tag(root) != "kml":
-        raise ScenarioError(f"{source}: a <kml> element is expected", file=source)
+        raise ScenarioError(f"{source}: expected a <kml> element", file=source)
     for number, placemark in enumerate((element for element in root.iter() if _tag(element) == "Placemark"), 1):
         name = _kml_text(placemark, "name") or f"zone {number}"
         label = f"Placemark {number}" + (f" ({name})" if name.isprintable() else "")
@@ -201,7 +201,7 @@ def _kml_zone(placemark: _Element, source: str) -> dict[str, Any]:
     if not polygons:
         if len(points) != 1 or "radius_m" not in entries:
             raise ScenarioError(
-                f"{source}: a Polygon is expected, or a Point with radius_m in its ExtendedData", file=source
+                f"{source}: expected a Polygon, or a Point with radius_m in its ExtendedData", file=source
             )
         ((lon, lat, _),) = _coordinates(points[0], source)[:1] or [(math.nan, math.nan, 0.0)]
         return entries | {"lat_deg": lat, "lon_deg": lon}
@@ -248,7 +248,7 @@ def _coordinates(element: _Element, source: str) -> list[tuple[float, float, flo
             try:
                 lon, lat, *rest = (float(part) for part in position.split(","))
             except ValueError as error:
-                allowed = "lon,lat or lon,lat,up is expected"
+                allowed = "expected lon,lat or lon,lat,up"
                 message = f"{source}: coordinates {position[:40]!r}: {allowed}"
                 raise ScenarioError(
                     message, file=source, field="coordinates", value=position, allowed=allowed
@@ -268,7 +268,7 @@ def _extended_data(placemark: _Element, source: str) -> dict[str, Any]:
                 found[key] = float(value)
             except ValueError as error:
                 shown = repr(value[:40])
-                raise ScenarioError.at(source, key, value, "a number is expected", shown=shown) from error
+                raise ScenarioError.at(source, key, value, "expected a number", shown=shown) from error
         elif value:
             found[key] = value
     return found

@@ -180,7 +180,7 @@ class Px4Parameters(ParameterSet):
     def __post_init__(self) -> None:
         """Refuse a version of PX4 that is not known."""
         if self.version not in _VERSIONS:
-            allowed = f"{' or '.join(_VERSIONS)} is expected"
+            allowed = f"expected {' or '.join(_VERSIONS)}"
             message = f"px4_version: {self.version!r}: {allowed}"
             raise ParameterError(message, file=self.source, field="px4_version", value=self.version, allowed=allowed)
 

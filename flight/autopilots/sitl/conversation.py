@@ -97,10 +97,10 @@ class Conversation:
         yield from self._wait_until(lambda: news.vehicle is not None, heard, self._send_heartbeat)
         if news.vehicle != mavlink.MAV_TYPE_FIXED_WING:
             raise FlightError(
-                f"is no {kind}: its heartbeat says vehicle type {news.vehicle}; 1, a fixed wing, flies",
+                f"is no {kind}: its heartbeat says vehicle type {news.vehicle}; expected 1, a fixed wing",
                 field="vehicle type",
                 value=news.vehicle,
-                allowed="1, a fixed wing, flies",
+                allowed="expected 1, a fixed wing",
             )
         for message, interval in wanted.items():
             self._send_command(mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, message, interval)

@@ -95,7 +95,7 @@ def test_a_file_without_a_known_name_is_refused_unless_it_is_the_autopilots_own(
     for text, refused in (("FOO 1\nBAR 2\n", True), ("BATT_CAPACITY 5000\n", False)):
         entries = parse_parameters(text, "a.param")
         if refused:
-            with pytest.raises(ParameterError, match=r"a\.param: FOO, BAR: no name that the simulated ArduPlane knows"):
+            with pytest.raises(ParameterError, match=r"a\.param: FOO, BAR: not known to the simulated ArduPlane"):
                 refuse_unknown(Path("a.param"), "ardupilot", entries, {})
         else:
             refuse_unknown(Path("a.param"), "ardupilot", entries, {})

@@ -258,7 +258,7 @@ def test_stops_at_one_position_are_merged() -> None:
 
 
 def test_refusals_name_the_item() -> None:
-    assert "no item with a position" in refusal("2 178 0 25 -1 0 0 0 0")
+    assert "no item has a position" in refusal("2 178 0 25 -1 0 0 0 0")
     assert "1 place to fly to" in refusal(wp(0, 0))
     assert "1 place to fly to" in refusal(wp(0, 0), wp(0, 0))
     assert "item 1: height above terrain (frame 10): no terrain" in refusal(wp(0, 0, frame=10), wp(0, 900))

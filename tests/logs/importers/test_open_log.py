@@ -82,9 +82,7 @@ def test_what_is_no_log_is_refused_in_a_line(tmp_path: Path, data: bytes) -> Non
 def test_what_neither_its_bytes_nor_its_name_tell_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "a.log"
     path.write_bytes(b"hello, this is no log at all")
-    with pytest.raises(
-        LogError, match=r"not a log that is known \(it starts with b'hello, t'\): PX4 \.ulg, .* expected"
-    ):
+    with pytest.raises(LogError, match=r"not a known log format \(it starts with b'hello, t'\); expected PX4 \.ulg"):
         open_log(path)
 
 

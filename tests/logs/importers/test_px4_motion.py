@@ -240,7 +240,7 @@ def test_controls_of_releases_before_1_14_are_read(tmp_path: Path) -> None:
         ({"CA_AIRFRAME": 2, "CA_ROTOR_COUNT": -1}, "CA_ROTOR_COUNT 0 is of rotors none of which pushes ahead"),
         ({"CA_SV_CS2_TYPE": 7}, "CA_SV_CS2_TYPE 7 is a V-tail: its mix is not modelled"),
         ({"CA_SV_CS3_TYPE": 10}, "CA_SV_CS3_TYPE 10 is flap moves in flight"),
-        ({"CA_AIRFRAME": 3}, "CA_AIRFRAME 3 is a tiltrotor: a plane is expected"),
+        ({"CA_AIRFRAME": 3}, "CA_AIRFRAME 3 is a tiltrotor: expected a plane"),
         ({"CA_SV_CS_COUNT": 2}, "no surface is the elevator's"),
     ],
 )

@@ -104,7 +104,7 @@ def test_only_a_campaign_is_gone_on_with_and_by_its_own_plan(base: CampaignBase,
     asked(tmp_path, resume=True).open(noted)
     assert planned == [tmp_path / "plan.json"]
     assert (tmp_path / DATABASE).exists()
-    with pytest.raises(PlanflyError, match="is a file; a folder is expected"):
+    with pytest.raises(PlanflyError, match="is a file; expected a folder"):
         asked(tmp_path / DATABASE).open(lambda _: base)
 
 

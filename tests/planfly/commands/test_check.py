@@ -255,4 +255,4 @@ def test_an_autopilot_that_is_none_is_refused(capsys: pytest.CaptureFixture[str]
     with pytest.raises(SystemExit) as ended:
         main(["check", "up.waypoints", "--for", "ardupilot,px5"])
     assert ended.value.code == 2
-    assert "argument --for: 'px5': ardupilot, px4, px4-1.16, px4-1.17, planfly is expected" in capsys.readouterr().err
+    assert "argument --for: 'px5': expected ardupilot, px4, px4-1.16, px4-1.17, planfly" in capsys.readouterr().err

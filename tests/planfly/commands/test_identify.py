@@ -148,7 +148,7 @@ def test_the_same_log_twice_is_refused(again: list[str], capsys: pytest.CaptureF
     write_motion(Path("a.BIN"), short_motion())
     shutil.copy("a.BIN", "b.BIN")
     said = refused([*again, *ARGUMENTS, "--out", "./mine"], capsys)
-    assert "b.BIN: the same bytes as a.BIN: each log is expected once" in said
+    assert "b.BIN: the same bytes as a.BIN: name each log once" in said
 
 
 def test_logs_without_current_among_others_are_named() -> None:

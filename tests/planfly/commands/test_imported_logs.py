@@ -324,5 +324,5 @@ def test_a_flight_of_planflys_own_is_refused(tmp_path: Path, capsys: Output) -> 
 def test_another_programs_log_is_to_be_imported_first(command: str, tmp_path: Path, capsys: Output) -> None:
     log = dataflash(tmp_path / "a.BIN")
     assert main([command, str(log)]) == 2
-    way = f"`planfly import {log}` makes the flight log that is expected"
-    assert capsys.readouterr().err == f"planfly: {log}: another program's log: {way}\n"
+    way = f"`planfly import {log}` converts it to a flight log"
+    assert capsys.readouterr().err == f"planfly: {log}: a log of another program; {way}\n"

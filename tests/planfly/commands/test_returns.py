@@ -178,6 +178,6 @@ def test_seconds_out_of_range_are_refused(capsys: pytest.CaptureFixture[str]) ->
     with pytest.raises(SystemExit) as ended:
         main(["returns", "hill.waypoints", "--every", "0"])
     assert ended.value.code == 2
-    assert "seconds from 0.1 to 3,600 are expected" in capsys.readouterr().err
+    assert "expected seconds from 0.1 to 3,600" in capsys.readouterr().err
     with pytest.raises(planfly.ArgumentError, match="every 4000"):
         planfly.returns("hill.waypoints", every=4000)

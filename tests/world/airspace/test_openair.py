@@ -140,7 +140,7 @@ def test_colours_without_an_airspace_are_none(tmp_path: Path) -> None:
     assert [zone.name for zone in found.zones] == ["LAKE (R)"]
     assert found.notes == ["z.openair: 2 zones keep nobody out: without name, limits and shape"]
     path.write_text(f"{colours}{HEAD}", encoding="utf-8")
-    with pytest.raises(ScenarioError, match=r"line 5 \(LAKE\): one shape is expected"):
+    with pytest.raises(ScenarioError, match=r"line 5 \(LAKE\): expected one shape"):
         read_zone_file(path, "z.openair")
 
 
@@ -227,17 +227,18 @@ def test_the_record_of_the_page_is_read_as_it_says() -> None:
 FAULTS = {
     "AN LAKE": "line 1: AN: no airspace has begun: an AC is missing before it",
     HEAD + "AH FL95\n": "line 5: AH 'FL95': an airspace has one lower limit (AL) and one upper limit (AH)",
-    HEAD + "DP 46:00:00N\n": "line 5: DP '46:00:00N': a place is expected",
+    HEAD + "DP 46:00:00N\n": "line 5: DP '46:00:00N': expected a place",
     HEAD + "DP 91:00:00N 008:00:00E\n": "line 5: DP '91:00:00N 008:00:00E': allowed 0..90 degrees",
-    HEAD + "DP 46:61:00N 008:00:00E\n": "line 5: DP '46:61:00N 008:00:00E': degrees, minutes and seconds of 60 at most",
+    HEAD
+    + "DP 46:61:00N 008:00:00E\n": "line 5: DP '46:61:00N 008:00:00E': expected degrees, minutes and seconds of at most 60",
     HEAD + "DC 5\n": "line 5: DC '5': no centre before it (V X=)",
-    HEAD + "V X=46:00:00N 008:00:00E\nDC five": "line 6: DC 'five': a number from 0 on is expected",
+    HEAD + "V X=46:00:00N 008:00:00E\nDC five": "line 6: DC 'five': expected a number of at least 0",
     HEAD + "V D=left": "line 5: V 'D=left': allowed D=+ (clockwise) or D=-",
-    HEAD + "V X=46:00:00N 008:00:00E\nDA 5, 270": "line 6: DA '5, 270': radius, first and last bearing are expected",
+    HEAD + "V X=46:00:00N 008:00:00E\nDA 5, 270": "line 6: DA '5, 270': expected radius, first and last bearing",
     HEAD + "DX 5": "line 5: 'DX': unknown; shapes are DP, DA, DB, DC, DY",
     HEAD + "DY 46:00:00N 008:00:00E": "line 1 (LAKE): DY: an airway has at least two points, and a width before",
-    HEAD: "line 1 (LAKE): one shape is expected",
-    "AC R\nAL ask the tower\n": "line 2: AL 'ask the tower': a height is expected",
+    HEAD: "line 1 (LAKE): expected one shape",
+    "AC R\nAL ask the tower\n": "line 2: AL 'ask the tower': expected a height",
     HEAD + "AA 2026-05-01/2026-04-01": "line 5: AA '2026-05-01/2026-04-01'",
 }
 

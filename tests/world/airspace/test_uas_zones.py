@@ -154,8 +154,8 @@ def test_geometries_and_layers_of_ed_318(tmp_path: Path) -> None:
 
 
 FAULTS: dict[str, tuple[Any, str]] = {
-    "no volume": (ed269(), "features[0]: geometry: a list of volumes is expected"),
-    "a number": (ed269(5), "features[0] (lake): horizontalProjection: a polygon or a circle is expected"),
+    "no volume": (ed269(), "features[0]: geometry: expected a list of volumes"),
+    "a number": (ed269(5), "features[0] (lake): horizontalProjection: expected a polygon or a circle"),
     "no shape": (ed269(volume(None)), "features[0] (lake): horizontalProjection: a polygon or a circle"),
     "a line": (
         ed269(volume({"type": "Line"})),
@@ -163,7 +163,7 @@ FAULTS: dict[str, tuple[Any, str]] = {
     ),
     "no radius": (ed269(volume({"type": "Circle", "center": [8, 46]})), "features[0] (lake): circle: a centre"),
     "a unit": (ed269(volume(unit="FL")), "features[0] (lake): unit of its limits: allowed M, FT"),
-    "a height": (ed269(volume(high="high")), "features[0] (lake): upper limit: a number is expected"),
+    "a height": (ed269(volume(high="high")), "features[0] (lake): upper limit: expected a number"),
     "a datum": (
         ed269(volume(upperVerticalReference="QFE")),
         "features[0] (lake): vertical reference of its upper",
@@ -275,7 +275,7 @@ def test_limits_that_leave_no_height_lose_the_upper_one(
 
 @pytest.mark.parametrize("limit", ["nan", "-inf"])
 def test_a_limit_that_is_no_number_is_refused(limit: str, tmp_path: Path) -> None:
-    with pytest.raises(ScenarioError, match="a number is expected"):
+    with pytest.raises(ScenarioError, match="expected a number"):
         read(ed269(volume(high=limit)), tmp_path)
 
 

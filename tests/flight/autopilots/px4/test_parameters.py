@@ -100,7 +100,7 @@ def test_what_is_stored_is_restored_and_another_version_is_not() -> None:
     stored = StoredParameters(made.values, made.unused, made.source)
     assert Px4Parameters.restore(stored, "1.16") == made
     assert Px4Parameters.restore(stored, "1.17") == replace(made, version="1.17")
-    with pytest.raises(ParameterError, match=r"^px4_version: '1.9': 1.16 or 1.17 is expected$"):
+    with pytest.raises(ParameterError, match=r"^px4_version: '1.9': expected 1.16 or 1.17$"):
         Px4Parameters.restore(stored, "1.9")
     bad = StoredParameters(tuple(one._replace(value=1e9) for one in made.values), (), "mine.params")
     with pytest.raises(ParameterError, match="allowed"):
