@@ -144,7 +144,7 @@ def _place(first: RasterFile, tile: RasterFile) -> tuple[int, int]:
         math.hypot(col[1] - found[1] - (cols - 1), row[1] - found[0] - (rows - 1)),
     )
     if not off <= OFF_GRID:
-        allowed = f"resample both to one grid (gdalwarp)"
+        allowed = "resample both to one grid (gdalwarp)"
         raise TerrainError(
             f"{tile.name}: its pixel grid is offset by {off:.3g} pixels from that of {first.name}: {allowed}",
             file=tile.name,

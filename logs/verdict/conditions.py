@@ -95,7 +95,7 @@ def _autopilot_source(table: FlightTable) -> str:
     """Return a clause that names the file from which a non-default autopilot was taken; "" if there is none."""
     if table.autopilot_from is None or table.steering.autopilot == DEFAULT_AUTOPILOT:
         return ""
-    return f"; taken from {table.autopilot_from}, for nobody named an autopilot"
+    return f"; taken from {table.autopilot_from}, as no autopilot was named"
 
 
 def _airspeed_source(scenario: Scenario, autopilot: Autopilot) -> AirspeedSource:
@@ -144,12 +144,12 @@ def _aircraft_line(made: Conditions) -> str:
         f"{made.airspeed_mps:.3g} m/s {made.airspeed_kind} airspeed ({_AIRSPEED_SOURCE_TEXTS[made.airspeed_source]})"
     )
     if not made.aircraft:
-        return f"Aircraft: nobody named one (--aircraft names yours), so none of its limits are judged; {speed}"
+        return f"Aircraft: not named (--aircraft names yours), so none of its limits are judged; {speed}"
     mass = "" if made.mass_kg is None else f", {made.mass_kg:.3g} kg"
     line = f"Aircraft: {made.aircraft}{mass}, {speed}"
     if made.aircraft_named:
         return line
-    return f"{line}; nobody named an aircraft, so it is the default (--aircraft names yours)"
+    return f"{line}; no aircraft was named, so this is the default (--aircraft names yours)"
 
 
 def _world_line(made: Conditions) -> str:
@@ -192,7 +192,7 @@ def corridor_line(setup: FlightSetup) -> str:
         return line
     metres, leg = gap
     return (
-        f"{line}; it is wider than the {metres:.0f} m between legs {leg} and {leg + 2}: keeping to it does not show"
+        f"{line}; it is wider than the {metres:.0f} m between legs {leg} and {leg + 2}; staying within it does not show"
         " that the lines were flown"
     )
 

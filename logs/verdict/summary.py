@@ -23,7 +23,7 @@ from logs.verdict.wording import deciding_text, disagreement_text, place_text
 _NAMED = 4
 # Introductions of the lines on the other levels.
 _LEVELS = {
-    "geometry": "By geometry alone",
+    "geometry": "By geometry only",
     "airframe": "By the airframe (planfly's guidance, exact navigation)",
 }
 
@@ -53,7 +53,7 @@ def undecided_text(findings: Sequence[Finding]) -> str:
     >>> from logs.verdict.places import Place
     >>> legs = (Place("leg", k, to_item=k + 1) for k in range(2))
     >>> undecided_text([make_finding("slope", leg, ok=None, reason="", check=UNKNOWN_AIRCRAFT) for leg in legs])
-    'slopes on leg 0, to item 1, and leg 1, to item 2, are within what is not known of the aircraft'
+    'slopes on leg 0, to item 1, and leg 1, to item 2, are too close to the limit to judge with what is known of ...'
     """
     open_findings = undecided_findings(findings)
     ways = [
@@ -61,7 +61,7 @@ def undecided_text(findings: Sequence[Finding]) -> str:
         for item in open_findings
         if item.check == UNKNOWN_WAY
     ]
-    circles = f"where {' and '.join(ways[:_NAMED])} is flown, only a flight tells" if ways else ""
+    circles = f"only a flight tells where {' and '.join(ways[:_NAMED])} is flown" if ways else ""
     known = _unknown_aircraft_text([item for item in open_findings if item.check == UNKNOWN_AIRCRAFT])
     beside = [item.brief for item in open_findings if item.check in APART_FROM_FLIGHT]
     items = [item.brief for item in open_findings if item.check == NOT_FLOWN]
@@ -83,14 +83,16 @@ def _unknown_aircraft_text(every: Sequence[Finding]) -> str:
         one = len(subjects) == 1 and (subjects == ["energy"] or speeds == 1)
         are = "is" if one else "are"
         listed = " and ".join(filter(None, [", ".join(subjects[:-1]), subjects[-1]]))
-        return f"{listed} {are} within what is not known of the aircraft"
+        return f"{listed} {are} too close to the limit to judge with what is known of the aircraft"
     if not found:
         return ""
     if len(found) > _NAMED:
-        return f"slopes on {len(found)} legs are within what is not known of the aircraft"
+        return f"slopes on {len(found)} legs are too close to the limit to judge with what is known of the aircraft"
     places = [place_text(item.place) + ("," if item.place.to_item is not None else "") for item in found]
     slopes, are = ("slopes", "are") if len(found) > 1 else ("slope", "is")
-    return f"{slopes} on {' and '.join(places)} {are} within what is not known of the aircraft"
+    return (
+        f"{slopes} on {' and '.join(places)} {are} too close to the limit to judge with what is known of the aircraft"
+    )
 
 
 def first_failed(findings: Sequence[Finding]) -> Finding | None:
@@ -176,13 +178,13 @@ def summary_lines(
     lines += [f"Not judged: {RULE_WORDS[rule].title} ({reason})" for rule, reason in silent.items()]
     # These are the autopilot's own limits, which say nothing about the aircraft.
     lines += [
-        f"PX4 would not take it: {item.reason}"
+        f"PX4 would reject it: {item.reason}"
         for item in findings
         if item.rule == "mission" and item.ok is None and item.check != NOT_FLOWN
     ]
     lack = missing_ends_text(setup.mission, setup.autopilot.mission_checks) if setup.autopilot.refuses else ""
     if lack and not any(item.rule == "mission" for item in findings):
-        lines.append(f"PX4 would not take it: {lack}")
+        lines.append(f"PX4 would reject it: {lack}")
     lines += [
         f"{RULE_WORDS[item.rule].title.capitalize()}: {item.reason}"
         for item in findings
@@ -211,10 +213,10 @@ def _airframe_or_autopilot_lines(
     whose = "" if setup.autopilot.parameters is None else " with these parameters"
     # Other parameters are flown by the law, whoever flew.
     by_law = setup.autopilot.program is not None
-    why = "" if by_law or not whose else ": no single parameter that was tried would pass"
+    why = "" if by_law or not whose else ": with none of the parameters that were tried would it pass"
     if deciding is not None:
         why = f": {deciding_text(deciding)}{', by the simulated flight' if by_law else ''}"
-    return [f"The aircraft can, {setup.autopilot.title}{whose} cannot{why}"]
+    return [f"The aircraft can fly this, but {setup.autopilot.title}{whose} cannot{why}"]
 
 
 def _parameter_lines(setup: FlightSetup, *, flown: bool) -> list[str]:
@@ -238,13 +240,13 @@ def _parameter_lines(setup: FlightSetup, *, flown: bool) -> list[str]:
     more = len(parameters.unused) - len(unused)
     said = f"; not used: {', '.join(unused)}{f', +{more} more' if more else ''}" if unused else ""
     returns = [name for name in parameters.not_flown if name in parameters.by_origin("file")]
-    said += f"; read, not flown: {', '.join(returns)}" if returns else ""
-    said += f"; beyond {setup.autopilot.title}'s documented ranges, flown: {', '.join(parameters.beyond)}" * bool(
+    said += f"; read but not simulated: {', '.join(returns)}" if returns else ""
+    said += f"; beyond {setup.autopilot.title}'s documented ranges, but flown: {', '.join(parameters.beyond)}" * bool(
         parameters.beyond
     )
     return [
-        f"Parameters: {names['file']} of the file, {names['aircraft']} of the aircraft,"
-        f" {names['default']} {setup.autopilot.title}'s defaults{said}",
+        f"Parameters: {names['file']} from the file, {names['aircraft']} from the aircraft,"
+        f" {names['default']} from {setup.autopilot.title}'s defaults{said}",
         *misfits,
     ]
 
@@ -269,7 +271,8 @@ def _terrain_error_lines(findings: Sequence[Finding], setup: FlightSetup) -> lis
         return []
     low, required = min(heights), setup.scenario.limits.min_clearance_m
     return [
-        f"Terrain's stated error: {error:g} m; the lowest clearance is {low:.1f} m, {low - error:.1f} m less that error"
+        f"Terrain's stated error: {error:g} m; the lowest clearance is {low:.1f} m, or {low - error:.1f}"
+        " m with that error subtracted"
         f" ({required:g} m are required)"
     ]
 

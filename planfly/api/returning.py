@@ -136,22 +136,27 @@ class ReturnsFound:
         found = ["by the simulated ArduPlane on a point mass, in the mean wind"]
         if self.returns.again:
             most = max(abs(one) for one in self.returns.again)
-            found.append(f"{len(self.returns.again)} of the least sure flown again in JSBSim: up to {most:.0f} m apart")
+            found.append(
+                f"{len(self.returns.again)} returns close to a limit were flown again in JSBSim; both"
+                f" simulations differ by up to {most:.0f} m"
+            )
         if self.returns.stands_in:
             found.append(f"{self.setup.autopilot.title}'s own return is not simulated: ArduPlane's return stands in")
         if self.setup.envelope.battery_guessed and self.setup.scenario.flight.battery_wh is None:
             found.append("the battery is guessed: energy is not judged; battery_wh in the scenario states it")
         if self.returns.lands:
-            found.append("ways to a landing sequence are judged up to its first item; the landing is not")
+            found.append("a return to a landing sequence is judged up to its first item; the landing is not judged")
         parameters = self.setup.autopilot.parameters
         if parameters is None or not parameters.source:
-            found.append("no parameter file was given: the settings above are not yours, --params states them")
+            found.append(
+                "no parameter file was given: the settings above are not yours; --params names a file with yours"
+            )
         if self.setup.scenario.terrain is None:
             found.append("no terrain was given: --terrain names an elevation file")
         if self.setup.scenario.external:
             found.append("the mission came without a scenario: threats are not known")
         if not self.returns.flown:
-            found.append("from the planned path: nothing was flown, and no energy was used before")
+            found.append("returns begin on the planned path: nothing was flown, and no energy was used before")
         return (*found, *glide_notes(self.glides))
 
     def __repr__(self) -> str:

@@ -178,14 +178,14 @@ def _identify(args: argparse.Namespace) -> int:
     ]
     if given or args.name is not None or args.folder is not None:
         field = "name" if args.name is not None else f"--{given[0]}" if given else "--new"
-        raise PlanflyError(f"--identify goes without {field}: the logs have that", field=field)
+        raise PlanflyError(f"--identify cannot be combined with {field}: it comes from the logs", field=field)
     for field, is_given, instead in (
-        ("--params", args.params is not None, "the logs have the parameters"),
-        ("--from", args.source is not None, "--base names the aircraft to begin with"),
+        ("--params", args.params is not None, "the parameters come from the logs"),
+        ("--from", args.source is not None, "--base names the aircraft to start from"),
         ("--motor-braking", args.motor_braking, "it is a choice of each flight"),
     ):
         if is_given:
-            raise PlanflyError(f"--identify goes without {field}: {instead}", field=field)
+            raise PlanflyError(f"--identify cannot be combined with {field}: {instead}", field=field)
     found = call(planfly.identify_aircraft, args, folder=args.out)
     made, estimate = found.aircraft, found.estimate
     files_made = sorted(file.name for file in made.folder.iterdir())

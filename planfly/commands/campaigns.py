@@ -25,7 +25,7 @@ def campaign_options(line: LineParser) -> None:
     """Add the parser of ``planfly campaign``."""
     parser = line.command(
         "campaign",
-        "fly a mission many times in varied weather and with varied aircraft: how likely is it to fly",
+        "fly a mission many times in varied weather with varied aircraft, to estimate how likely it is to succeed",
         "planfly campaign jacksboro-air --prove 0.99",
         extra="campaigns",
     )
@@ -71,7 +71,11 @@ def winds_options(line: LineParser) -> None:
     )
     _shared_options(parser)
     parser.add_argument(
-        "--prove", metavar="P", type=number("prove"), default=0.99, help="probability to fly with (default: 0.99)"
+        "--prove",
+        metavar="P",
+        type=number("prove"),
+        default=0.99,
+        help="probability of success to prove (default: 0.99)",
     )
     parser.add_argument(
         "--confidence",

@@ -55,7 +55,7 @@ def new(args: argparse.Namespace) -> int:
     file = call(planfly.new_scenario, args)
     print(f"scenario  {file}")
     if args.terrain is None:
-        print("ground    flat, at mean sea level: nobody named an elevation file (--terrain DEM)")
+        print("ground    flat, at mean sea level: no elevation file was named (--terrain DEM)")
     made = planfly.plan(file)
     code = FLYABLE if made.safe else NOT_FLYABLE
     if made.safe:

@@ -109,8 +109,12 @@ class ProgramReturns:
             return "by the program: no return could be flown"
         same = sum(one.agrees for one in self.flown)
         worse = sum(one.worse for one in self.flown)
-        compared = "all of them as simulated" if same == len(self.flown) else f"{same} of them as simulated"
-        compared += f"; {worse} worse than simulated, so that the simulation errs there" if worse else ""
+        compared = (
+            "all of them agree with the simulation"
+            if same == len(self.flown)
+            else f"{same} of them agree with the simulation"
+        )
+        compared += f"; {worse} worse than simulated, where the simulation errs" if worse else ""
         return f"by {self.program} itself: {len(self.flown)} of the worst flown, {compared}"
 
     def lines(self, returns: Returns, scenario: Scenario) -> list[str]:

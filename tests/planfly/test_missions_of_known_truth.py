@@ -245,7 +245,7 @@ def test_the_note_on_a_home_at_zero_says_where_it_comes_from() -> None:
 def test_px4s_distance_to_the_first_waypoint_is_named_as_px4s() -> None:
     verdict = judge_geometry(setup_of(CASES["a first waypoint 12 km from home"]))
     assert verdict.headline == "flyable"
-    assert "PX4 would not take it: first waypoint too far away: 12000 m from home" in verdict.summary
+    assert "PX4 would reject it: first waypoint too far away: 12000 m from home" in verdict.summary
 
 
 FILE = """QGC WPL 110
@@ -258,7 +258,7 @@ FILE = """QGC WPL 110
 @pytest.mark.parametrize(
     ("up", "options", "code", "says"),
     [
-        (500, ["--wind", "30,0"], 4, "the wind leaves no way along leg 0"),
+        (500, ["--wind", "30,0"], 4, "the wind is too strong to hold the course of leg 0"),
         (500, ["--wind", "24,270"], 0, "flyable"),
         (500, ["--wind", "24,270", "--turbulence", "light"], 0, "flyable"),
         (8800, [], 4, "40.0 m/s is above the fastest level flight"),

@@ -58,7 +58,7 @@ def end_loiter_hazards(requirements: RouteRequirements) -> tuple[float, list[str
     held = max(requirements.limits.turn_radius(course, course + math.pi, up, speed) for course in (0.0, math.pi))
     reach = LOITER_SWING_RADII * max(abs(rules.radius), held)
     if not math.isfinite(reach):
-        return reach, ["the wind leaves no way around it"]
+        return reach, ["the wind is too strong to fly this circle"]
     return reach, hazards_within(requirements, requirements.points[-1, :2], up, up, reach)
 
 
@@ -76,13 +76,13 @@ def _ground_hazards(
         found.append("the terrain is not known")
     least = float(np.nanmin(above, initial=math.inf))
     if least < requirements.limits.min_clearance - CLEARANCE_TOLERANCE_M:
-        found.append(f"the ground is {least:.0f} m below")
+        found.append(f"the ground is only {least:.0f} m below")
     if limits.max_height_m is not None:
         # The greatest height above ground is the least height above ground of the same world upside down.
         under, _ = path_clearance(-ground.heights, ground.to_pixel.record, _points_at(rings, -high))
         most = -float(np.nanmin(under, initial=math.inf))
         if most > limits.max_height_m + HEIGHT_TOLERANCE_M:
-            found.append(f"the ground is {most:.0f} m below, over the {limits.max_height_m:.0f} m allowed")
+            found.append(f"the ground is {most:.0f} m below, more than the {limits.max_height_m:.0f} m allowed")
     return found
 
 
@@ -111,7 +111,7 @@ def _zone_hazards(requirements: RouteRequirements, middle: Floats, low: float, h
     for up in np.linspace(low, high, levels):
         visits = path_zones(_moves(_points_at(rings, float(up))), airspace.records, terrain)
         found |= {z for z in range(len(airspace.zones)) if visits[z].depth > ROUNDING_M or visits[z].unknown}
-    return [f"{airspace.zones[z].kind} zone {airspace.zones[z].name or z} is not kept" for z in sorted(found)]
+    return [f"{airspace.zones[z].kind} zone {airspace.zones[z].name or z} may be violated" for z in sorted(found)]
 
 
 def _area_hazards(requirements: RouteRequirements, middle: Floats, reach: float) -> list[str]:

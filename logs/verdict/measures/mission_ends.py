@@ -20,8 +20,8 @@ def missing_ends_text(mission: Mission, limits: MissionChecks) -> str:
         return ""
     if limits.requires == MissionChecks().requires and not limits.stated:
         return "PX4's fixed-wing default refuses a mission without a landing: add one, or set MIS_TKO_LAND_REQ 0"
-    wanted = f"MIS_TKO_LAND_REQ {limits.requires} asks for {_REQUIRED[limits.requires]}"
-    return f"{wanted}, and this has {_present_ends(takeoff, land)}"
+    wanted = f"MIS_TKO_LAND_REQ {limits.requires} requires {_REQUIRED[limits.requires]}"
+    return f"{wanted}, but this mission has {_present_ends(takeoff, land)}"
 
 
 def _present_ends(takeoff: bool, land: bool) -> str:

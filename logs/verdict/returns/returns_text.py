@@ -45,8 +45,8 @@ _SEGMENT_NAMES: dict[Kind, str] = {
 }
 _ACTION_TEXTS = {
     "return": "returns",
-    "land": "by its landing sequence",
-    "autoland": "by mode AUTOLAND, or else it returns",
+    "land": "lands by its landing sequence",
+    "autoland": "lands in mode AUTOLAND, otherwise returns",
     "on": "goes on with its mission",
     "circle": "circles where it is",
     "glide": "glides straight on without its motor, which is no return",
@@ -58,10 +58,10 @@ _ACTION_TEXTS = {
     "never": "set, but no threshold triggers it",
 }
 _OPEN_TEXTS: dict[Open, str] = {
-    "terrain": "TERRAIN_FOLLOW has returns follow the terrain, which is not flown here",
+    "terrain": "with TERRAIN_FOLLOW returns follow the terrain, which is not flown here",
     "law": "the autopilot's own return is not simulated; ArduPlane's return stands in",
     "autoland": "mode AUTOLAND lands by a pattern of its own",
-    "return path": "RTL_AUTOLAND 4 returns by the mission's return path",
+    "return path": "RTL_AUTOLAND 4 returns along the mission's return path",
     "landing": "the landing sequence begins with the landing itself",
 }
 
@@ -91,7 +91,7 @@ def measured_text(one: ReturnFlown, limit: float, scenario: Scenario) -> str:
     if one.kind == "ground":
         parts[-1] += f" at {where}"
     elif not math.isnan(one.clearance):
-        parts.append(f"{one.clearance:.0f} m above ground at the least at {where}")
+        parts.append(f"{one.clearance:.0f} m above ground at the lowest, at {where}")
     if one.threat >= 0 and one.outside <= 0.0:
         parts.append(f"{-one.outside:.0f} m inside the sphere of {scenario.threats.names[one.threat]}")
     elif math.isfinite(one.outside):
@@ -116,7 +116,7 @@ def headline(returns: Returns) -> str:
     >>> headline(Returns((), 1.0, (), 60.0, None, 0.0, True))
     'no place to return from'
     >>> headline(Returns((), 1.0, (), 60.0, None, 0.0, True, open=("terrain",)))
-    'not judged: TERRAIN_FOLLOW has returns follow the terrain, which is not flown here'
+    'not judged: with TERRAIN_FOLLOW returns follow the terrain, which is not flown here'
     """
     reasons = "; ".join(_OPEN_TEXTS[one] for one in returns.open)
     if not returns.each:
@@ -135,7 +135,7 @@ def _judged_text(returns: Returns) -> str:
     aloft = [one for one in returns.each if not one.floor < returns.limit] or returns.each
     lowest = min(aloft, key=lambda one: one.clearance)
     left = min((one.left for one in returns.each if not math.isnan(one.left)), default=math.nan)
-    energy = "" if math.isnan(left) else f", and {left:.0f} Wh are left at the least"
+    energy = "" if math.isnan(left) else f", and at least {left:.0f} Wh are left"
     until = " up to their landing" if returns.lands else ""
     return f"all {total} returns are safe{until}: never lower than {lowest.clearance:.0f} m above ground{energy}"
 
@@ -144,25 +144,25 @@ def no_return_text(returns: Returns) -> str:
     """Describe the place from which the battery no longer permits a return with reserve.
 
     >>> no_return_text(Returns((), 1.0, (), 60.0, None, 0.0, True))
-    'point of no return: not judged, for the energy in the battery is not known'
+    'point of no return: not judged, as the energy in the battery is not known'
     """
     point, name = returns.point_of_no_return, "point of no return"
     reserve = f"the reserve of {returns.reserve:.0f} Wh"
     match point.kind:
         case "battery":
-            return f"{name}: not judged, for the energy in the battery is not known"
+            return f"{name}: not judged, as the energy in the battery is not known"
         case "used":
-            return f"{name}: not judged, for the energy used before is not known"
+            return f"{name}: not judged, as the energy used before is not known"
         case "arrives":
-            return f"{name}: not judged, for no return arrives"
+            return f"{name}: not judged, as no return arrives"
         case "at once":
-            text = f"{name}: before the start, for no return leaves {reserve}"
+            text = f"{name}: before the start, as no return leaves {reserve}"
         case "later":
-            text = f"{name}: {point.time:.0f} s; a return from later on does not leave {reserve}"
+            text = f"{name}: {point.time:.0f} s; a return that starts later does not leave {reserve}"
         case "never":
-            text = f"{name}: none, for every return leaves {reserve} ({point.left:.0f} Wh at the least)"
+            text = f"{name}: none, as every return leaves {reserve} (at least {point.left:.0f} Wh)"
     does = "does" if point.skipped == 1 else "do"
-    return text + (f"; {point.skipped} that {does} not arrive left out" if point.skipped else "")
+    return text + (f"; {point.skipped} that {does} not arrive are left out" if point.skipped else "")
 
 
 def causes_text(causes: tuple[Cause, ...]) -> list[str]:
@@ -206,22 +206,22 @@ def landing_text(returns: Returns) -> list[str]:
     where = f"item{'s' if len(returns.landings) > 1 else ''} {', '.join(str(one.item) for one in returns.landings)}"
     match returns.autoland, bool(returns.landings):
         case 0, True:
-            text = f"{stays}; with DO_LAND_START in the mission ArduPlane does not arm so"
+            text = f"{stays}; with this setting and DO_LAND_START in the mission ArduPlane does not arm"
         case ((1 | 2), False):
             text = f"the mission has no DO_LAND_START: {stays}"
         case 1, True:
-            text = f"from its circle a return goes on to the landing sequence at {where}"
+            text = f"from its circle a return continues to the landing sequence at {where}"
         case 2, True:
             text = f"a return flies straight to the landing sequence at {where}"
         case 3, _:
             text = f"the landing sequence is for go-arounds only: {stays}"
         case 4, _:
-            text = "a return goes by the mission's return path, where it has one"
+            text = "a return follows the mission's return path, if it has one"
         case _:
             text = stays
     lines = [f"RTL_AUTOLAND {returns.autoland}: {text}"]
     if returns.landings:
-        lines.append("within the landing sequence a lost transmitter or station changes nothing")
+        lines.append("within the landing sequence, the loss of transmitter or station changes nothing")
     return lines
 
 
@@ -248,19 +248,19 @@ def _range_outcome_text(one: ReturnFlown, found: ReturnRange, returns: Returns, 
             return f"{worst}violates zone {returns.airspace.zones[one.zone].name}"
         case "lost":
             end = "landing sequence" if one.target.landing is not None else "circle"
-            return f"{worst}does not get to its {end} at {one.target.position[2]:.0f} m AMSL"
+            return f"{worst}does not reach its {end} at {one.target.position[2]:.0f} m AMSL"
         case "energy":
-            leaves = f"leaves {one.left:.0f} Wh, where {returns.reserve:.0f} Wh are to be left"
+            leaves = f"leaves {one.left:.0f} Wh of the required {returns.reserve:.0f} Wh"
             return f"{worst}takes {one.energy:.0f} Wh and {leaves}"
         case "unknown":
             return f"{worst}flies where the elevation is not known"
         case "unsure":
-            return f"{worst}{low} by the point mass, and JSBSim has it or one like it too far from there"
+            return f"{worst}{low} by the point mass, but JSBSim flies it or one near it too far from there"
     if one.floor < returns.limit:
-        low += " (taking off or landing: it begins lower than the least height)"
+        low += " (taking off or landing: it begins below the required height)"
     left = "" if math.isnan(one.left) else f", {one.left:.0f} Wh left"
     outside = "" if math.isinf(one.outside) else f", {one.outside:.0f} m outside every missile's sphere"
-    return f"{worst}{low} at the least{outside}{left}"
+    return f"{worst}{low} at the lowest{outside}{left}"
 
 
 def remedy_text(remedy: Remedy, returns: Returns, scenario: Scenario) -> str:

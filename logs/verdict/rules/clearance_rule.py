@@ -96,7 +96,7 @@ def _home_above_ground_findings(requirements: RouteRequirements, ground: Terrain
         return []
     least = min(one.margin + (one.limit or 0.0) for one in legs if one.margin is not None) - above
     brief = f"the mission's home is {above:.0f} m above the ground there"
-    more = f": armed on that ground, an autopilot flies as much lower, down to {least:.0f} m above ground"
+    more = f": an autopilot that is armed on that ground flies lower by as much, down to {least:.0f} m above ground"
     fault = message(brief, more)
     return [make_finding("clearance", FLIGHT, ok=None, reason=fault.text, faults=[fault], check=GROUND_WAY)]
 

@@ -101,7 +101,7 @@ def imported_completion(setup: FlightSetup, flown: Sequence[FlownLegs], log_comp
         faults.append(message("the log is damaged or unfinished"))
     if not flown:
         stretches = () if setup.source is None else setup.source.stretches
-        why = "none of the mission's legs was flown" if stretches else "no stretch of it followed the mission"
+        why = "none of the mission's legs was flown" if stretches else "no stretch of the flight followed the mission"
         # The flight may have included legs that the log does not hold.
         if missing is not None and stretches:
             unknown.append(f"none of the legs that the log holds was flown: {_absent_text(missing)}")
@@ -124,12 +124,12 @@ def imported_completion(setup: FlightSetup, flown: Sequence[FlownLegs], log_comp
         what = f"{finished} of {every} legs flown"
         ending = f"{stretch_end_text(last.stretch)}, on the way to {_next_waypoint_text(setup, last)}"
         if _ends_in_return(setup, last):
-            known.append(f"{what}, and the return that the mission ends with begun at {last.stretch.end:.1f} s")
+            known.append(f"{what}, and the return at the mission's end began at {last.stretch.end:.1f} s")
         elif last.stretch.ended == "log":
             unknown.append(f"{ending}: {what}")
         else:
             faults.append(message(ending, f": {what}"))
-    unknown += [f"the way to item {stop.item} is not judged: it is not laid out" for stop in setup.route.unjoined]
+    unknown += [f"the path to item {stop.item} is not judged, as it is not laid out" for stop in setup.route.unjoined]
     known += _gaps_text(flown)
     return make_finding(
         "completion",
@@ -189,7 +189,9 @@ def _legs_text(setup: FlightSetup, legs: Iterable[int]) -> str:
 
 
 def _absent_text(missing: MissingItems) -> str:
-    return f"{len(missing.numbers)} {'item' if len(missing.numbers) == 1 else 'items'} of the mission not in the log"
+    return (
+        f"{len(missing.numbers)} {'item' if len(missing.numbers) == 1 else 'items'} of the mission are not in the log"
+    )
 
 
 def _ends_in_return(setup: FlightSetup, legs: FlownLegs) -> bool:

@@ -110,7 +110,7 @@ class _Aborted(NamedTuple):
     climb: minimum height above ground in the climb beyond the landing point, m; inf without a climb.
     after: time from the abort to ground impact, s; NaN without impact.
     entered: sphere or zone that the go-around enters, "" if it enters none.
-    lost: True if the go-around does not get back to the line-up.
+    lost: True if the go-around does not return to the line-up.
     open: text on the unknown part of the path, "" if all is known.
     """
 
@@ -156,7 +156,8 @@ def go_around_findings(
     if not required or setup.source is not None:
         return []
     reason = message(
-        "a go-around is not judged", ": that takes the simulated ArduPlane, a home, known ground and a glide to land by"
+        "a go-around is not judged",
+        ": it needs the simulated ArduPlane, a home, known ground and a glide to the landing point",
     )
     return [make_finding("go_around", FLIGHT, ok=None, reason=reason.text, faults=[reason], check=GROUND_WAY)]
 
@@ -341,7 +342,7 @@ def _judge_go_around(
     climb = float(np.nanmin(low[:rows][ahead[:rows]], initial=math.inf))
     if climb < GO_AROUND_MODEL_ERROR_M and not state.open:
         passes = (
-            f"aborted {state.before:.0f} m before the landing point it passes the ground in its climb by {climb:.0f} m"
+            f"aborted {state.before:.0f} m before the landing point, it passes the ground in its climb by {climb:.0f} m"
         )
         state = state._replace(open=f"{passes}, and may be flown {GO_AROUND_MODEL_ERROR_M:.0f} m lower")
     minimum = _required_heights(ground, goal, 0.5 * (positions[:-1] + positions[1:]))[rows:]
@@ -406,7 +407,7 @@ def _brief_outcome(worst: _Aborted) -> str:
         return "a go-around meets the ground"
     if worst.entered:
         return f"a go-around enters {worst.entered}"
-    return "a go-around does not get back to the line-up" if worst.lost else "a go-around comes too near to the ground"
+    return "a go-around does not return to the line-up" if worst.lost else "a go-around comes too near to the ground"
 
 
 def _outcome_text(worst: _Aborted) -> str:
@@ -418,7 +419,7 @@ def _outcome_text(worst: _Aborted) -> str:
     elif worst.entered:
         does = f"enters {worst.entered}"
     elif worst.lost:
-        does = "does not get back to the line-up"
+        does = "does not return to the line-up"
     else:
         does = f"comes down to {worst.room:.0f} m above ground on the way back"
     return f"{where}{turns} and {does}" if turns else f"{where} {does}"

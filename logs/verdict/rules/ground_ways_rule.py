@@ -225,7 +225,7 @@ def _air_start_finding(place: Place, met: _Obstacles) -> Finding:
         reason, check, ok = f"the ground below {subject} is not known", "", None
     elif met.free:
         reason, check, ok = (
-            f"straight from home: {_clearance_text(met)}; not flown: the flight begins in the air",
+            f"straight from home: {_clearance_text(met)}; not flown, as the flight begins in the air",
             "",
             True,
         )
@@ -356,7 +356,7 @@ def approach_findings(
             f", flares {glide.flare_height:.1f} m over the landing point and {glide.flare_distance:.0f} m before it"
         )
     reason += f"; {_clearance_text(met)} until {EARLY_TOUCHDOWN_DISTANCE_M:.0f} m before it"
-    reason += "" if setup.ground_ways.approach is not None else "; not flown: the flight ends in the air"
+    reason += "" if setup.ground_ways.approach is not None else "; not flown, as the flight ends in the air"
     return [_finding("approach", place, met, True, message(reason))]
 
 

@@ -128,7 +128,7 @@ def end_findings(
     reach, found = hazards
     reason = f"after it {requirements.setup.autopilot.title} circles, up to {reach:.0f} m from it"
     if found:
-        reason += f": {', '.join(found)}: only a flight tells how near it comes"
+        reason += f": {', '.join(found)}; only a flight tells how near it comes"
     return [
         make_finding(
             "loiter",
@@ -159,7 +159,7 @@ def _loiter_finding(
         # If the parameter makes the loiter too tight, the autopilot flies it wider, as at the end of a return.
         bank = _held_bank(requirements, circle, tightest, at)
         if bank <= requirements.limits.max_bank + BANK_TOLERANCE_RAD + 1e-9:
-            facts.append(f"{name} asks for less than the {tightest:.0f} m of the bank limit: flown wider")
+            facts.append(f"{name} is smaller than the {tightest:.0f} m that the bank limit allows: flown wider")
             faults = []
             open_text = "" if aligned is not None else _hazards_text(requirements, circle, tightest)
         else:
@@ -180,7 +180,7 @@ def _loiter_finding(
             and circle.turns >= 1.0
             and mean > circle.radius * (1.0 + LOITER_WIDENING_FRACTION) + WAYPOINT_PASS_MARGIN_M
         ):
-            faults.append(message(f"flown with {mean:.0f} m where {circle.radius:.0f} m is asked for"))
+            faults.append(message(f"flown with {mean:.0f} m where {circle.radius:.0f} m is required"))
     ok: bool | None = not (faults or bad)
     if ok and any(item.ok is None for item in at):
         ok = None
@@ -251,8 +251,8 @@ def _hazards_text(requirements: RouteRequirements, circle: Circle, tightest: flo
     found = hazards_within(requirements, circle.middle, float(heights.min()), float(heights.max()), reach)
     if not found:
         return ""
-    near = f"within the {reach:.0f} m of its middle that it may get to"
-    return f"{near}, {', '.join(found)}: only a flight tells where it is"
+    near = f"it may get {reach:.0f} m from its center, and there"
+    return f"{near}, {', '.join(found)}; only a flight tells where it circles"
 
 
 def _has_reached(requirements: RouteRequirements, aligned: AlignedTrack, circle: Circle) -> bool:
@@ -272,8 +272,8 @@ def _small_radius_faults(requirements: RouteRequirements, circle: Circle, tighte
     speed, bank = float(requirements.route.airspeed[circle.first]), math.degrees(requirements.limits.max_bank)
     needs = f"at {speed:.0f} m/s and {bank:.0f}° bank the aircraft needs {tightest:.0f} m"
     if not math.isfinite(tightest):
-        needs = f"at {speed:.0f} m/s the wind leaves no way around it"
-    return [message(f"radius {circle.radius:.0f} m where {needs} in this wind")]
+        needs = f"at {speed:.0f} m/s the circle cannot be flown"
+    return [message(f"radius {circle.radius:.0f} m; {needs} in this wind")]
 
 
 def _unheld_corners_message(circle: Circle, bad: list[Finding]) -> Message:

@@ -166,7 +166,7 @@ def _unflown_findings(setup: FlightSetup) -> Iterator[Finding]:
     if setup.scenario.returns is not None:
         # Returns from anywhere on the route are judged only to the mission's home.
         left += [
-            (item.seq, f"{command_name(item.command)}: returns are judged to the mission's home alone")
+            (item.seq, f"{command_name(item.command)}: returns are judged only to the mission's home")
             for item in setup.mission.items
             if item.command == C.DO_SET_HOME
         ]
@@ -208,7 +208,7 @@ def _check_validity(mission: Mission) -> Iterator[_Remark]:
             yield (
                 REFUSED,
                 item.seq,
-                f"{name} in frame {item.frame}, above terrain, which PX4 does not take; ArduPlane does",
+                f"{name} in frame {item.frame}, above terrain, which PX4 rejects and ArduPlane accepts",
             )
         elif item.command == C.DO_SET_SERVO and not 0 <= item.params[0] <= PX4_MAX_SERVO_INDEX:
             yield REFUSED, item.seq, f"actuator number {item.params[0]:g} is out of bounds 0..{PX4_MAX_SERVO_INDEX}"

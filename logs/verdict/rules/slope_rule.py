@@ -119,7 +119,7 @@ def _uncertainty_text(requirements: RouteRequirements, leg: int) -> str:
     if abs(planned) <= max(LEVEL_SLOPE_RAD, sure) or not sure < limit < math.inf:
         return ""
     slope, known, give = (math.degrees(angle) for angle in (abs(planned), limit, off))
-    return f"{verb} {slope:.1f}°, and what {envelope.source} says of the limit is {known:.1f}° give or take {give:.1f}°"
+    return f"{verb} {slope:.1f}°; the limit by {envelope.source} is {known:.1f}°, give or take {give:.1f}°"
 
 
 def _steep_arc_faults(requirements: RouteRequirements, leg: int) -> list[Message]:
@@ -137,7 +137,7 @@ def _steep_arc_faults(requirements: RouteRequirements, leg: int) -> list[Message
         f"the arc at {place_text(place)} {verb} {slope:.1f}° for {length:.0f} m, where legs {leg} and {i} have {legs}:"
         f" flown by, it is shorter than the {2.0 * float(requirements.before[i]):.0f} m of leg that it replaces"
     )
-    limit = f"; the aircraft can {math.degrees(math.atan(found.limit)):.1f}° there, {missing:.0f} m less"
+    limit = f"; the aircraft can fly at most {math.degrees(math.atan(found.limit)):.1f}° there, {missing:.0f} m less"
     # A headline names the waypoint, not its item.
     return [Message(asks + limit, asks if place.item is None else f"the arc at {place_text(Place('waypoint', i))}")]
 
@@ -166,17 +166,17 @@ def _limit_text(requirements: RouteRequirements, leg: int, limit: float, source:
     up = float(max(requirements.points[leg, 2], requirements.points[leg + 1, 2]))
     at = f"at {speed:.0f} m/s and {up:.0f} m"
     if limit <= 0.0:
-        return f"{at} the aircraft has no steady flight on this course"
+        return f"{at} the aircraft cannot fly steadily on this course"
     wind = requirements.setup.scenario.wind
     tail, cross = wind.along(float(requirements.courses[leg]), up)
     if math.hypot(tail, cross) < CALM_WIND_MPS:
-        return f"{at} the aircraft can {math.degrees(limit):.1f}° in calm air"
+        return f"{at} the aircraft can fly at most {math.degrees(limit):.1f}° in calm air"
     calm = requirements.setup.envelope.slope_limits(speed, up)[0 if requirements.slopes[leg] >= 0.0 else 1]
     blows = f"{abs(tail):.0f} m/s {'tailwind' if tail > 0.0 else 'headwind'}"
     if abs(cross) > abs(tail):
         blows = f"{abs(cross):.0f} m/s crosswind"
-    calm_text = f"{math.degrees(calm):.1f}°" if math.isfinite(calm) else "nothing"
-    return f"{at} the aircraft can {calm_text} in calm air but {math.degrees(limit):.1f}° in this {blows}"
+    calm_text = f"at most {math.degrees(calm):.1f}°" if math.isfinite(calm) else "no slope"
+    return f"{at} the aircraft can fly {calm_text} in calm air, but {math.degrees(limit):.1f}° in this {blows}"
 
 
 def _distance_text(metres: float) -> str:
@@ -261,7 +261,7 @@ def _performance_faults(requirements: RouteRequirements, leg: int, measure: Slop
         message(
             f"in {ability.seconds:.0f} s at {_throttle_limit(planned)} throttle the aircraft showed that it can {verb}"
             f" {math.degrees(ability.slope):.1f}° at {speed:.0f} m/s here",
-            f"; the leg asks for {math.degrees(abs(planned)):.1f}°",
+            f"; the leg needs {math.degrees(abs(planned)):.1f}°",
         )
     ]
 

@@ -114,8 +114,8 @@ def _command_text(command: float, commanded: float, slowest: float, fastest: flo
     """Describe a commanded airspeed, equivalent and true, among those of level flight; all m/s."""
     true = "" if command == commanded else f" of equivalent airspeed, {commanded:.1f} m/s of true airspeed,"
     if not (math.isfinite(slowest) and math.isfinite(fastest)):
-        return f"{command:.1f} m/s{true} commanded, and no level flight is known"
-    return f"{command:.1f} m/s{true} commanded of {slowest:.1f} to {fastest:.1f} m/s in level flight"
+        return f"{command:.1f} m/s{true} is commanded, and no level flight is known"
+    return f"{command:.1f} m/s{true} is commanded; level flight is possible from {slowest:.1f} to {fastest:.1f} m/s"
 
 
 def _flown_command(requirements: RouteRequirements, leg: int) -> float:
@@ -173,8 +173,8 @@ def _uncertainty_text(requirements: RouteRequirements, leg: int, commanded: floa
     heights = requirements.points[leg : leg + 2, 2].tolist()
     if commanded <= min(sure.level_speeds(up)[1] for up in heights):
         return ""
-    says = f"what {envelope.source} says of the fastest level flight is {fastest:.1f} m/s"
-    return f"{commanded:.1f} m/s commanded, and {says} give or take {envelope.fastest_sd:.1f} m/s"
+    says = f"the fastest level flight by {envelope.source} is {fastest:.1f} m/s"
+    return f"{commanded:.1f} m/s is commanded; {says}, give or take {envelope.fastest_sd:.1f} m/s"
 
 
 def _speed_range_notes(requirements: RouteRequirements, command: float) -> list[str]:
@@ -184,8 +184,8 @@ def _speed_range_notes(requirements: RouteRequirements, command: float) -> list[
     if limits is None or limits.min <= command <= limits.max:
         return []
     taken = f"{limits.min_name} {limits.min:g} to {limits.max_name} {limits.max:g} m/s"
-    does = "flies the nearest for this one" if limits.nearest else "ignores this one"
-    return [f"{autopilot.title} takes speeds from {taken}, and {does}"]
+    does = "flies the nearest one instead" if limits.nearest else "ignores this one"
+    return [f"{autopilot.title} accepts speeds from {taken}, and {does}"]
 
 
 def _short_leg_notes(requirements: RouteRequirements, leg: int, commanded: float) -> list[str]:
@@ -202,8 +202,8 @@ def _short_leg_notes(requirements: RouteRequirements, leg: int, commanded: float
     rate = math.copysign(MAX_STEADY_ACCELERATION_MPS2, change)
     end = math.sqrt(max(0.0, start * start + 2.0 * rate * run)) - start + before
     return [
-        f"from {before:.1f} to {commanded:.1f} m/s takes about {seconds:.0f} s and {needs:.0f} m, and the leg has"
-        f" {run:.0f} m: about {end:.1f} m/s are reached on it"
+        f"from {before:.1f} to {commanded:.1f} m/s takes about {seconds:.0f} s and {needs:.0f} m, but the leg has"
+        f" {run:.0f} m, so about {end:.1f} m/s are reached"
     ]
 
 
@@ -239,7 +239,7 @@ def _level_speed_range(
     slowest, fastest = float(np.max([low for low, _ in speeds])), float(np.min([high for _, high in speeds]))
     faults = []
     if math.isnan(requirements.ground_speed[leg]):
-        faults.append(message(f"the wind leaves no way along leg {leg} at {commanded:.0f} m/s"))
+        faults.append(message(f"the wind is too strong to hold the course of leg {leg} at {commanded:.0f} m/s"))
     top = max(heights)
     if math.isnan(slowest) or math.isnan(fastest):
         faults.append(message(f"no level flight at {top:.0f} m"))

@@ -135,7 +135,7 @@ def _slope_finding(
     ways = requirements.setup.ground_ways
     flown = (ways.take_off if rule == "takeoff" else ways.approach) is not None
     reason = f"{text} of {math.degrees(limit):.1f}°"
-    reason += "" if flown else f"; not flown: the flight {_VERBS[rule]} in the air"
+    reason += "" if flown else f"; not flown, as the flight {_VERBS[rule]} in the air"
     fault = message(
         f"the {_TITLES[rule]} {text}",
         f"; at most {math.degrees(limit):.1f}° can be flown at this speed and in this wind",

@@ -221,7 +221,7 @@ def _detect_faults(approach: Approach, landing: _Landing) -> list[Message]:
         brief = f"comes to rest {half - stop[0]:.0f} m before the strip's end"
         if stop[0] > half:
             brief = f"runs {stop[0] - half:.0f} m beyond the strip's end"
-        faults.append(message(brief, f"; {TOUCHDOWN_ERROR_M:.0f} m are to be left"))
+        faults.append(message(brief, f"; {TOUCHDOWN_ERROR_M:.0f} m must be left"))
     aside = max(abs(touch[1]), abs(stop[1]))
     if aside > side:
         faults.append(message(f"{aside:.0f} m beside the strip's middle", f"; it is {2.0 * side:.0f} m wide"))
@@ -233,7 +233,9 @@ def _short_strip_messages(approach: Approach) -> list[Message]:
     if approach.strip.length > 2.0 * TOUCHDOWN_ERROR_M:
         return []
     brief = f"the strip is {approach.strip.length:.0f} m long"
-    return [message(brief, f"; a touch-down is known within {TOUCHDOWN_ERROR_M:.0f} m either way, which takes more")]
+    return [
+        message(brief, f"; a touch-down is known only within {TOUCHDOWN_ERROR_M:.0f} m either way, which needs more")
+    ]
 
 
 def _undecided_messages(approach: Approach, landing: _Landing, *, gusts: bool) -> list[Message]:
@@ -242,16 +244,16 @@ def _undecided_messages(approach: Approach, landing: _Landing, *, gusts: bool) -
     left = 0.5 * approach.strip.length - max(landing.touch[0], landing.stop[0])
     if gusts and left < GUST_TOUCHDOWN_ERROR_M and not found:
         brief = f"comes down or to rest {left:.0f} m before the strip's end"
-        found.append(message(brief, f"; in turbulence that is known within {GUST_TOUCHDOWN_ERROR_M:.0f} m"))
+        found.append(message(brief, f"; in turbulence the place is known only within {GUST_TOUCHDOWN_ERROR_M:.0f} m"))
     if landing.over > LANDING_POINT_ERROR_M:
         brief = f"the landing point of {_landing_point_text(approach)} is {landing.over:.0f} m above the ground"
-        found.append(message(brief, ": it flares too early, and falls"))
+        found.append(message(brief, ": the aircraft flares too early, and falls"))
     if landing.room < FINAL_APPROACH_CLEARANCE_M:
         brief = f"the final passes the ground by {landing.room:.1f} m"
         found.append(message(brief, f", and may be flown {FINAL_APPROACH_CLEARANCE_M:.0f} m lower than simulated"))
     if landing.towards > MAX_TOUCHDOWN_SINK_MPS:
         brief = f"sinks at {landing.towards:.1f} m/s towards the ground at its touch-down"
-        found.append(message(brief, f"; up to {MAX_TOUCHDOWN_SINK_MPS:g} m/s are known of ArduPlane's landings"))
+        found.append(message(brief, f"; ArduPlane's landings are known with up to {MAX_TOUCHDOWN_SINK_MPS:g} m/s"))
     return found
 
 
@@ -260,8 +262,8 @@ def _describe_landing(approach: Approach, landing: _Landing) -> list[str]:
     before = "before" if landing.along < 0.0 else "beyond"
     known = [f"touches down {abs(landing.along):.0f} m {before} the landing point, {abs(landing.aside):.1f} m aside"]
     known.append(f"comes to rest with {landing.left:.0f} m of the strip left")
-    sinks = f"sinks at {landing.sink:.1f} m/s, {landing.towards:.1f} m/s towards the ground"
-    known.append(f"{sinks}, by a flare that is not judged")
+    sinks = f"sinks at {landing.sink:.1f} m/s at touch-down, {landing.towards:.1f} m/s relative to the sloping ground"
+    known.append(f"{sinks}; the flare itself is not judged")
     if math.isfinite(landing.room):
         known.append(f"the final stays {landing.room:.0f} m above ground or more")
     if approach.tail_wind > 0.1:

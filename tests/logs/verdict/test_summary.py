@@ -102,7 +102,7 @@ def test_who_flew_is_said_with_the_parameters_that_decide_most() -> None:
     ) in lines
     returns = ArduPilotParameters.of_text("RTL_AUTOLAND 1\nTERRAIN_FOLLOW 1\n", "mine.parm")
     lines = lines_by(returns)
-    assert any(line.endswith("defaults; read, not flown: TERRAIN_FOLLOW") for line in lines)
+    assert any(line.endswith("defaults; read but not simulated: TERRAIN_FOLLOW") for line in lines)
 
 
 def test_what_px4_has_no_parameter_for_is_not_used() -> None:

@@ -114,14 +114,14 @@ def test_the_wrong_place_and_the_wrong_order_are_told_in_a_line(tmp_path: Path, 
     assert main(["check", str(log), "--plan", str(wrong_order)]) == 2
     error = capsys.readouterr().err
     assert (
-        error == f"planfly: {log}: not flown by {wrong_order}: another order: the flight passed its items in the order"
+        error == f"planfly: {log}: not a flight of {wrong_order}; the order differs: the flight passed the items as"
         " 3, 2, 1, ...\n"
     )
     elsewhere = tmp_path / "place.waypoints"
     elsewhere.write_text(plan.read_text().replace("46.", "47."))
     assert main(["check", str(log), "--plan", str(elsewhere)]) == 2
     error = capsys.readouterr().err
-    assert "another place: the flight comes no nearer than 110" in error
+    assert "the mission lies elsewhere: the flight never comes within 110" in error
     assert error.count("\n") == 1
 
 

@@ -84,7 +84,7 @@ def test_every_example_may_be_switched_on(law: str, here: Path) -> None:
 def test_without_ground_it_says_so(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["new", "cape", "--from", "-33.9,18.4", "--to=-33.95,18.6"]) == 0
     out = capsys.readouterr().out
-    assert "ground    flat, at mean sea level: nobody named an elevation file (--terrain DEM)" in out
+    assert "ground    flat, at mean sea level: no elevation file was named (--terrain DEM)" in out
 
 
 def test_across_the_date_line() -> None:

@@ -80,11 +80,11 @@ def test_the_autopilot_is_taken_from_the_files(mission: str, options: dict[str, 
     assert judged.setup.autopilot.name == flies
     (line,) = [line for line in judged.verdict.lines if line.startswith("Autopilot: ")]
     taken = flies == "px4" and "autopilot" not in options
-    assert line.endswith(", for nobody named an autopilot") is taken
+    assert line.endswith(", as no autopilot was named") is taken
     if taken:
         file = options.get("params", mission)
         assert line.startswith("Autopilot: the simulated PX4 1.17 with")
-        assert f"; taken from {Path(file).resolve() if file.endswith('params') else file}, for nobody" in line
+        assert f"; taken from {Path(file).resolve() if file.endswith('params') else file}, as no" in line
 
 
 TO_PX4 = "and ArduPlane is to fly: --autopilot px4 simulates PX4 instead"

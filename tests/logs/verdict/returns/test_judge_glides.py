@@ -214,7 +214,7 @@ def test_ranges_hold_every_place_in_order(tmp_path: Path) -> None:
         assert {one.reach for one in inside} == {group.least.reach}
         assert found.spare(group.least) == min(found.spare(one) for one in inside)
     assert sum(found.count(one) for one in ("home", "flat")) == len(found.each)
-    assert "it knows no trees, houses or water" in " ".join(glide_notes(found))
+    assert "which knows no trees, houses or water" in " ".join(glide_notes(found))
 
 
 def test_an_engine_that_burns_fuel_has_a_note(tmp_path: Path) -> None:
@@ -280,4 +280,4 @@ def test_what_is_not_known_of_energy_is_said(tmp_path: Path) -> None:
     deep = starts.at(np.flatnonzero(starts.rows["east"] > 6000.0))
     none = judge_returns(return_world(setup), deep, 20.0)
     assert none.point_of_no_return.kind == "arrives"
-    assert no_return_text(none).endswith("for no return arrives")
+    assert no_return_text(none).endswith("as no return arrives")
