@@ -146,7 +146,7 @@ def load_aircraft(name: str) -> Aircraft:
         near = did_you_mean(name, known)
         # A folder must be given with a slash.
         near = near or (f": did you mean './{name}'?" if Path(name).is_dir() else "")
-        allowed = f"known are {', '.join(known)}, and folders, with a slash"
+        allowed = f"known names: {', '.join(known)}; a folder needs a slash"
         message = f"no aircraft called {name!r}{near} ({allowed})"
         raise FlightError(message, file=name, allowed=allowed)
     return read_aircraft(_ROOT / name)
@@ -212,8 +212,8 @@ def _toml_advice(folder: Path) -> str:
     if not models:
         return ""
     return (
-        f": beside its JSBSim model ({', '.join(models[:3])}) a folder needs {folder.name}.toml;"
-        f" planfly aircraft --new FOLDER makes one with all files to begin with"
+        f": next to its JSBSim model ({', '.join(models[:3])}) the folder needs {folder.name}.toml;"
+        f" planfly aircraft --new FOLDER makes a folder with all files"
     )
 
 
@@ -331,7 +331,7 @@ def check_new_folder(folder: Path, *, overwrite: bool = False) -> Path:
         raise FlightError(f"{folder}: {allowed}", file=folder, value=target.name, allowed=allowed)
     if overwrite and target.exists() and not target.is_symlink():
         if not (target / f"{target.name}.toml").is_file():
-            raise FlightError(f"{folder}: is not the folder of an aircraft, with {target.name}.toml", file=folder)
+            raise FlightError(f"{folder}: not an aircraft's folder: it has no {target.name}.toml", file=folder)
     elif target.exists() or target.is_symlink():
         raise FlightError(f"{folder}: exists; overwrite=True replaces it, or name another folder", file=folder)
     if not target.parent.is_dir():

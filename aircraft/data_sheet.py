@@ -284,7 +284,7 @@ def check_sheet(sheet: DataSheet) -> DataSheet:
         allowed = f"allowed {low:.2f}..{high:.2f} m with a wing of {area:.3g} m2 ({_area_source(sheet)})"
         raise _refused("span", sheet.span, allowed, "m")
     if sheet.fuelled and (sheet.motor or sheet.volts):
-        raise _refused("fuel", sheet.fuel, "goes without --battery and --motor", "kg")
+        raise _refused("fuel", sheet.fuel, "cannot be combined with --battery and --motor", "kg")
     if not _is_within(sheet.fuel, 0.0, 0.6 * sheet.mass):
         raise _refused("fuel", sheet.fuel, f"allowed up to 60 % of the mass, {0.6 * sheet.mass:g} kg", "kg")
     if not sheet.fuelled and not _is_within(sheet.energy, 0.0, MAX_BATTERY * sheet.mass):
@@ -650,9 +650,9 @@ def _solve_by_newton(errors: Callable[[Floats], Floats], x: Floats) -> Floats | 
 
 def _no_propeller(sheet: DataSheet) -> FlightError:
     climb = math.degrees(sheet.climb)
-    allowed = "a steeper climb goes with a higher top speed, a flatter one with a lower"
+    allowed = "a steeper climb needs a higher top speed, a flatter one a lower"
     no = f"no propeller gives it at {sheet.cruise:g} m/s with a top speed of {sheet.top:.3g} m/s"
-    return FlightError.of_argument("climb", climb, f"{no}: {allowed}", shown=f"{climb:.3g} degrees")
+    return FlightError.of_argument("climb", climb, f"{no}; {allowed}", shown=f"{climb:.3g} degrees")
 
 
 def _with_performance(sheet: DataSheet, motor: Drive, drag: Drag) -> DataSheet:
@@ -662,7 +662,7 @@ def _with_performance(sheet: DataSheet, motor: Drive, drag: Drag) -> DataSheet:
     least = RANGES["climb"][2]
     if climb < math.radians(least):
         gives = f"with this propeller and {sheet.volts:g} V it climbs {math.degrees(climb):.1f} degrees at cruise"
-        raise _refused("motor", sheet.motor, f"{gives}: allowed {least:g} degrees and more", "rpm a volt")
+        raise _refused("motor", sheet.motor, f"{gives}; allowed {least:g} degrees and more", "rpm a volt")
     low, high = sheet.cruise, 4.0 * sheet.cruise
     for _ in range(60):
         middle = 0.5 * (low + high)

@@ -128,8 +128,8 @@ class StartError(FlightError):
     source: mission or command that requires it.  reason: why it cannot begin.  field, value, allowed: as in
     `PlanflyError`.
 
-    >>> str(StartError("a.plan", "no way made"))
-    'a.plan: no way made'
+    >>> str(StartError("a.plan", "no progress"))
+    'a.plan: no progress'
     """
 
     def __init__(self, source: str, reason: str, *, field: str = "", value: Any = None, allowed: str = "") -> None:

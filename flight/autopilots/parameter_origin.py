@@ -252,8 +252,8 @@ def refuse_unknown(path: Path, autopilot: str, entries: Mapping[str, Entry], kno
 def other_autopilot(where: str, written_for: str, evidence: str, flying: str) -> ParameterError:
     """Return the error for a file that was written for a different autopilot."""
     because = f" ({evidence})" if evidence else ""
-    allowed = f"{_MODELS[flying]} is to fly: --autopilot {written_for} simulates {_MODELS[written_for]} instead"
-    message = f"{where}: written for {TITLES[written_for]}{because}, and {allowed}"
+    allowed = f"{_MODELS[flying]} is to fly; --autopilot {written_for} simulates {_MODELS[written_for]} instead"
+    message = f"{where}: written for {TITLES[written_for]}{because}, but {allowed}"
     return ParameterError(message, file=where, field="autopilot", value=written_for, allowed=allowed)
 
 

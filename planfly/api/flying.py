@@ -299,7 +299,7 @@ def judge(
         found = read_imported(what, **options)
         return Judged(found.setup, found.verdict, lossy=found.lossy, track=found.track, is_log=True)
     source = _source_name(what)
-    refuse(source, options_of_log(options), "goes with an imported log, not with this file")
+    refuse(source, options_of_log(options), "only with an imported log, not with this file")
     if isinstance(what, FlightLog | FlownMission) or (isinstance(what, str | Path) and is_log(Path(what))):
         refuse_other_flight(source, options)
         refuse(source, {"geometry": geometry or None}, "a flight is judged as it was flown")

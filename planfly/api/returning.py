@@ -205,7 +205,7 @@ def returns(
     if path is not None and is_imported_log(path):
         refuse(str(path), {"seed": options["seed"], "nav": options["nav"]}, _AS_FLOWN)
         return _judge_imported_flight(_read_imported_flight(path, options), asked)
-    refuse(str(path or "mission"), options_of_log(options), "goes with an imported log")
+    refuse(str(path or "mission"), options_of_log(options), "only with an imported log")
     what = read_log(path) if path is not None and is_log(path) else what
     mission = mission_options(options)
     if isinstance(what, FlightLog | FlownMission):

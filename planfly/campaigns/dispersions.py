@@ -227,7 +227,9 @@ def parse_dispersions(text: str, name: str) -> Dispersions:
         return Dispersions(varying, name)
     for one in varying:
         if one.quantity.name in DRAWN:
-            raise SpreadError.at(name, one.quantity.name, None, f"goes without [{_AIRCRAFT}] draws", shown="")
+            raise SpreadError.at(
+                name, one.quantity.name, None, f"cannot be combined with [{_AIRCRAFT}] draws", shown=""
+            )
     return Dispersions(varying, name, _read_named_draws(aircraft, name))
 
 

@@ -60,7 +60,7 @@ def resumed_goal(asked: Goal | None, folder: Path, confidence: float | None = No
     path = folder / DATABASE
     kept = kept_settings(path)
     if not kept:
-        raise StoreError(f"{path}: no campaign there to go on with", file=path)
+        raise StoreError(f"{path}: no campaign there to continue", file=path)
     before = Goal(**{one.name: kept[one.name] for one in fields(Goal) if one.name in kept})
     goal = before if asked is None else asked
     same = (goal.stops, goal.flights) == (before.stops, before.flights)

@@ -206,7 +206,7 @@ class OutputDirectory:
         folder = self.folder
         if self.resume:
             if not (folder / self.table).is_file():
-                raise PlanflyError(f"{folder / self.table}: no campaign there to go on with", file=folder / self.table)
+                raise PlanflyError(f"{folder / self.table}: no campaign there to continue", file=folder / self.table)
             return
         if folder.exists() and not folder.is_dir():
             raise PlanflyError(f"{folder}: is a file; expected a folder", file=folder)
@@ -214,7 +214,7 @@ class OutputDirectory:
             return
         if (folder / self.table).exists():
             raise PlanflyError(
-                f"{folder}: holds a campaign; resume=True goes on with it, overwrite=True replaces it", file=folder
+                f"{folder}: holds a campaign; resume=True continues it, overwrite=True replaces it", file=folder
             )
         if any((folder / name).exists() for name in CAMPAIGN_FILES):
             raise PlanflyError(f"{folder}: holds another campaign; overwrite=True replaces it", file=folder)
@@ -248,7 +248,7 @@ def campaign_folder(out: Path | str | None, table: str, *, resume: bool, overwri
         yield OutputDirectory(Path(out), table, resume, overwrite)
         return
     if resume:
-        allowed = "`out` is missing: the folder of what is to be gone on with"
+        allowed = "`out` is missing: it names the folder of the campaign to continue"
         raise ArgumentError.of_argument("resume", resume, allowed, shown="")
     with tempfile.TemporaryDirectory() as name:
         yield OutputDirectory(Path(name), table, resume=False, overwrite=False)

@@ -314,7 +314,10 @@ def _read_settings(connection: sqlite3.Connection) -> dict[str, str]:
 def _refuse_damaged(known: Mapping[str, str], path: Path) -> None:
     """Raise StoreError for a file with settings that planfly did not write."""
     if known.get("checksum") != checksum(known.get(name) for name in ("schema", "made_of", "settings")):
-        words = "its settings are damaged, or another version's: it cannot be resumed, and --overwrite begins anew"
+        words = (
+            "its settings are damaged or written by another version: the campaign cannot be resumed;"
+            " --overwrite starts again"
+        )
         raise StoreError(f"{path}: {words}", file=path, field="settings")
 
 
@@ -352,7 +355,9 @@ class translated_errors:
             return
         code = getattr(error, "sqlite_errorcode", None)
         if code is not None and code & 0xFF == sqlite3.SQLITE_FULL:
-            raise OSError(errno.ENOSPC, "no space left; the flights before are kept, --resume goes on", str(self._path))
+            raise OSError(
+                errno.ENOSPC, "no space left; finished flights are kept: continue with --resume", str(self._path)
+            )
         if code is not None and code & 0xFF in HELD:
             raise StoreError(f"{self._path}: is held by another process", file=self._path) from error
         raise StoreError(f"{self._path}: {error}", file=self._path) from error

@@ -72,7 +72,9 @@ def aircraft_options(line: LineParser) -> None:
     )
     completed(
         logs.add_argument(
-            "--base", metavar="NAME", help="with --identify: the aircraft that it is most like (default: aerosonde)"
+            "--base",
+            metavar="NAME",
+            help="with --identify: the known aircraft that is most similar (default: aerosonde)",
         ),
         aircraft_words,
     )
@@ -80,7 +82,11 @@ def aircraft_options(line: LineParser) -> None:
         logs.add_argument("--check", metavar="LOG", help="with --identify: another log, to replay with the model"),
         files(".bin", ".BIN", ".ulg"),
     )
-    result_options(parser, "where the pictures go (default: runs/aircraft-NAME, replaced); of --identify, the folder")
+    result_options(
+        parser,
+        "folder for the pictures (default: runs/aircraft-NAME; an existing one is replaced), "
+        "or with --identify the aircraft's folder",
+    )
 
 
 def _data_sheet_options(parser: CommandParser) -> None:
@@ -88,12 +94,12 @@ def _data_sheet_options(parser: CommandParser) -> None:
     numbers = {
         "mass": ("KG", "mass, 0.5 to 25 kg"),
         "span": ("M", "wing span, m"),
-        "area": ("M2", "wing area, m2 (default: what carries the mass at the stall)"),
+        "area": ("M2", "wing area, m2 (default: the area that carries the mass at the stall speed)"),
         "cruise": ("M/S", "usual airspeed"),
         "stall": ("M/S", "airspeed of slowest level flight"),
         "top": ("M/S", "airspeed of fastest level flight (default: 1.4 times the cruise's)"),
         "bank": ("DEG", "steepest bank in turns (default: 35)"),
-        "climb": ("DEG", "steepest climb at cruise (default: 12, or what goes with the top speed)"),
+        "climb": ("DEG", "steepest climb at cruise (default: 12, or the climb that fits the top speed)"),
         "motor": ("KV", "rpm a volt"),
         "fuel": ("KG", "fuel carried, for an aircraft without a battery"),
     }
@@ -113,14 +119,14 @@ def aircraft(args: argparse.Namespace) -> int:
         return _identify(args)
     for name in ("base", "check"):
         if getattr(args, name) is not None:
-            raise PlanflyError.of_argument(name, getattr(args, name), "goes with `logs` LOG", shown="")
+            raise PlanflyError.of_argument(name, getattr(args, name), "only with `logs` LOG", shown="")
     if args.folder is not None:
         return _make_folder(args)
     for name in _DATA_SHEET_KEYWORDS:
         if getattr(args, name) is not None:
-            raise PlanflyError.of_argument(name, getattr(args, name), "goes with `folder` FOLDER", shown="")
+            raise PlanflyError.of_argument(name, getattr(args, name), "only with `folder` FOLDER", shown="")
     if args.source is not None:
-        allowed = "goes with `folder` FOLDER, the folder to make"
+        allowed = "only with `folder` FOLDER, the folder to make"
         raise PlanflyError.of_argument("source", args.source, allowed, shown="")
     if args.name is None:
         listed = list(planfly.aircraft().values())
@@ -149,7 +155,7 @@ def _json_answer(chosen: "Sequence[Aircraft]", numbers: "AircraftNumbers | None"
 
 def _make_folder(args: argparse.Namespace) -> int:
     if args.name is not None:
-        message = f"{args.name}: --new takes the folder alone; --from names the aircraft to begin with"
+        message = f"{args.name}: --new takes only the folder; --from names the aircraft to start from"
         raise PlanflyError(message, field="--new", value=args.folder)
     folder = Path(args.folder)
     made = call(planfly.new_aircraft, args)
@@ -161,7 +167,10 @@ def _make_folder(args: argparse.Namespace) -> int:
     if sheet:
         _print_sheet(made)
     give_answer(args, lambda: _json_answer([made]))
-    print(f"next      planfly aircraft {shlex.quote(str(shown))}, and --aircraft {shlex.quote(str(shown))} flies it")
+    print(
+        f"next      `planfly aircraft {shlex.quote(str(shown))}` shows it; `planfly fly MISSION --aircraft"
+        f" {shlex.quote(str(shown))}` flies it"
+    )
     return FLYABLE
 
 
@@ -169,7 +178,7 @@ def _identify(args: argparse.Namespace) -> int:
     """Identify an aircraft from logs, and make its folder."""
     for name in ("mass", "span", "out"):
         if getattr(args, name) is None:
-            said = "the folder to make" if name == "out" else "of the aircraft as it flew"
+            said = "the folder to make" if name == "out" else f"the {name} of the aircraft as flown"
             raise PlanflyError(f"--identify needs --{name}, {said}", field=f"--{name}")
     given = [
         name
@@ -218,7 +227,9 @@ def _print_unknown(found: "planfly.IdentifiedAircraft") -> None:
     for line in found.estimate.silent():
         print(f"  not seen {line}")
     for lacking in found.without_current:
-        print(f"  current  not used, as {lacking} has none (BAT): identify from the other logs alone to use theirs")
+        print(
+            f"  current  not used, as {lacking} has none (BAT): identify from only the other logs to use their current"
+        )
 
 
 def _print_sheet(made: "Aircraft") -> None:

@@ -19,13 +19,13 @@ def terrain_options(line: LineParser) -> None:
     """Add the parser of ``planfly terrain``."""
     parser = line.command(
         "terrain",
-        "get the ground of an area as a GeoTIFF, from a folder of tiles or the Copernicus DEM's server",
+        "write the ground of an area as a GeoTIFF, from a folder of tiles or the Copernicus DEM's server",
         "planfly terrain --around field.waypoints --out dem.tif",
         "planfly terrain --box 46.4,7.9,46.7,8.3 --source ./tiles --out dem.tif",
     )
     where = parser.group("the area")
     completed(
-        where.add_argument("--around", metavar="MISSION", help=".waypoints or .plan: all of its places"),
+        where.add_argument("--around", metavar="MISSION", help=".waypoints or .plan file: cover all of its places"),
         files(*MISSIONS),
     )
     where.add_argument("--box", metavar="S,W,N,E", type=area, help="edges of the area, degrees")
@@ -37,7 +37,7 @@ def terrain_options(line: LineParser) -> None:
         "--source",
         metavar="DIR|URL",
         help="a folder of tiles or an elevation file; or a server of GLO-30 tiles of the Copernicus DEM (default: the "
-        "public one in Amazon's registry of open data, of which the parts that are needed are fetched, and kept)",
+        "public one in Amazon's registry of open data, from which the needed parts are fetched and kept)",
     )
     tiles.add_argument(
         "--sea",

@@ -283,7 +283,7 @@ def _saved_plan(name: str, desk: EditContext, judged: JudgedMission) -> Saved:
         return Saved(name, plan_json(plan).encode())
     made = certified_plan(desk, judged)
     changed = not desk.planned or planned_mission(made, desk.airframe).items != judged.mission.items
-    losses = ["the items: a plan holds places alone, and its mission is made of them anew"] if changed else []
+    losses = ["the items: a plan holds only places, from which its mission is made again"] if changed else []
     if not made.feasible:
         problem = (made.certificate.problems or ("violations are counted",))[0]
         losses.append(f"it is a plan that is not feasible: {problem}")

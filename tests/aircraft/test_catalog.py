@@ -194,7 +194,7 @@ def test_a_folder_is_replaced_only_if_asked_and_only_if_it_is_an_aircrafts(tmp_p
     assert (folder / "flight.BIN").read_bytes() == b"my log"
     assert not (folder / "uncertainty.toml").exists()
     (tmp_path / "photos").mkdir()
-    with pytest.raises(FlightError, match=r"photos: is not the folder of an aircraft, with photos\.toml"):
+    with pytest.raises(FlightError, match=r"photos: not an aircraft's folder: it has no photos\.toml"):
         make_own_folder(tmp_path / "photos", load_aircraft("zagi"), overwrite=True)
     assert sorted(path.name for path in tmp_path.iterdir()) == ["mine", "photos"]
 

@@ -101,11 +101,11 @@ CASES = {
     ),
     "200 m of climb in 1,500 m from home": Case((wp(0, 1500, 200, command=22), wp(0, 3000, 200)), True, says="flyable"),
     "wind of 30 m/s from ahead": Case(
-        SQUARE[:2], False, ("speed",), ("completion", "speed"), "not started: no way made", tables=wind(30.0, 0.0)
+        SQUARE[:2], False, ("speed",), ("completion", "speed"), "not started: no progress", tables=wind(30.0, 0.0)
     ),
     "wind of 24 m/s across": Case(SQUARE[:2], True, tables=wind(24.0, 270.0)),
     "wind of 26 m/s across": Case(
-        SQUARE[:2], False, ("speed",), ("completion", "speed"), "not started: no way made", tables=wind(26.0, 270.0)
+        SQUARE[:2], False, ("speed",), ("completion", "speed"), "not started: no progress", tables=wind(26.0, 270.0)
     ),
     "8,800 m": Case(
         (wp(0, 0, 8800, frame=0), wp(0, 3000, 8800, frame=0)),
@@ -120,7 +120,7 @@ CASES = {
         False,
         ("speed",),
         ("completion", "speed"),
-        "not started: aerosonde holds no steady flight at 19.0 m/s",
+        "not started: aerosonde cannot hold steady flight at 19.0 m/s",
         # 24.5 m/s of true airspeed.
         equivalent=(True, True),
     ),

@@ -118,7 +118,7 @@ class Conversation:
         news = self._news
         yield from self._wait_until(
             lambda: news.ekf & _REQUIRED_EKF_FLAGS == _REQUIRED_EKF_FLAGS and not news.ekf & lost,
-            Awaited("EKF", POSITION_TIMEOUT_S, "did not come to know where it is (EKF)"),
+            Awaited("EKF", POSITION_TIMEOUT_S, "did not find its position (EKF)"),
             lambda: self._send_command(mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, message, interval),
         )
 

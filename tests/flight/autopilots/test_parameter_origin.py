@@ -67,11 +67,11 @@ def test_a_file_with_names_of_both_is_neithers() -> None:
 @pytest.mark.parametrize(
     ("text", "autopilot", "says"),
     [
-        ("FW_R_TC 0.3\n", "ardupilot", "written for PX4 (FW_R_TC), and ArduPlane is to fly: --autopilot px4"),
+        ("FW_R_TC 0.3\n", "ardupilot", "written for PX4 (FW_R_TC), but ArduPlane is to fly; --autopilot px4"),
         (
             "TECS_CLMB_MAX 3\n",
             "px4",
-            "written for ArduPilot (TECS_CLMB_MAX), and PX4 is to fly: --autopilot ardupilot",
+            "written for ArduPilot (TECS_CLMB_MAX), but PX4 is to fly; --autopilot ardupilot",
         ),
         (
             "WPNAV_SPEED 500\n",

@@ -157,8 +157,8 @@ def test_words_of_a_deciding_parameter(rule: str, off: float | None, text: str) 
 
 def test_a_flight_that_never_began_fails_its_own_level_and_not_geometry(autopilot: FlightSetup) -> None:
     for setup, name in ((autopilot, "autopilot"), (replace(autopilot, autopilot=PlanflyGuidance()), "airframe")):
-        verdict = judge_flight(setup, fly_path(setup).rows(0, 0), "not started: no way made")
+        verdict = judge_flight(setup, fly_path(setup).rows(0, 0), "not started: no progress")
         assert [(level.name, level.flyable) for level in verdict.levels] == [("geometry", True), (name, False)]
         assert verdict.headline == verdict.levels[-1].headline
-        assert "not started: no way made" in verdict.headline
+        assert "not started: no progress" in verdict.headline
         assert verdict.lines[-1] == "By geometry only: flyable"

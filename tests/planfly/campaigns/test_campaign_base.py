@@ -198,7 +198,7 @@ def test_a_file_without_draws_flies_the_folders_or_leaves_slopes_open(sheet: Pat
         ("[aircraft]\n", "aircraft.draws: expected a file of draws"),
         (
             '[aircraft]\ndraws = "foam/draws.csv"\n[drag]\ndistribution = "norm"\nloc = 1\nscale = 0.1\nsource = "x"',
-            "drag: goes without [aircraft] draws",
+            "drag: cannot be combined with [aircraft] draws",
         ),
         ('[aircraft]\ndraws = "other.csv"', "other.csv: draws of another aircraft: "),
     ],

@@ -65,7 +65,7 @@ def asked(folder: Path, *, resume: bool = False, overwrite: bool = False) -> Out
 @pytest.mark.parametrize(
     ("lies_there", "words"),
     [
-        (DATABASE, "holds a campaign; resume=True goes on with it, overwrite=True replaces it"),
+        (DATABASE, "holds a campaign; resume=True continues it, overwrite=True replaces it"),
         ("winds.sqlite", "holds another campaign; overwrite=True replaces it"),
         ("mine.txt", "exists and is not empty; overwrite=True replaces its results"),
     ],
@@ -92,7 +92,7 @@ def test_a_mission_that_cannot_be_opened_leaves_what_lies_there(tmp_path: Path) 
 
 
 def test_only_a_campaign_is_gone_on_with_and_by_its_own_plan(base: CampaignBase, tmp_path: Path) -> None:
-    with pytest.raises(PlanflyError, match=r"campaign.sqlite: no campaign there to go on with"):
+    with pytest.raises(PlanflyError, match=r"campaign.sqlite: no campaign there to continue"):
         asked(tmp_path, resume=True).open(lambda _: base)
     (tmp_path / DATABASE).write_bytes(b"")
     planned: list[Path | None] = []

@@ -251,7 +251,7 @@ def test_options_that_do_not_go_together_are_refused(tmp_path: Path, capsys: Out
     assert main(["check", str(log), "--guidance", "l1"]) == 2
     assert "--guidance: an imported flight is judged by the autopilot" in capsys.readouterr().err
     assert main(["check", str(example_plan(tmp_path)), "--flight", "1"]) == 2
-    assert "--flight: goes with an imported log" in capsys.readouterr().err
+    assert "--flight: only with an imported log" in capsys.readouterr().err
     assert main(["import", str(log), str(log)]) == 2
     assert "is the input itself" in capsys.readouterr().err
 

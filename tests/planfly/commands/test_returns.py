@@ -149,7 +149,7 @@ def test_by_px4s_law_returns_are_not_judged(hill: Path, capsys: pytest.CaptureFi
     ("words", "said"),
     [
         (["none.waypoints"], "none.waypoints"),
-        (["hill.waypoints", "--flight", "2"], "goes with an imported log"),
+        (["hill.waypoints", "--flight", "2"], "only with an imported log"),
         (["homeless.plan"], "home: none is stated"),
     ],
 )

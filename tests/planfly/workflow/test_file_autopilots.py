@@ -87,8 +87,8 @@ def test_the_autopilot_is_taken_from_the_files(mission: str, options: dict[str, 
         assert f"; taken from {Path(file).resolve() if file.endswith('params') else file}, as no" in line
 
 
-TO_PX4 = "and ArduPlane is to fly: --autopilot px4 simulates PX4 instead"
-TO_ARDUPLANE = "and PX4 is to fly: --autopilot ardupilot simulates ArduPlane instead"
+TO_PX4 = "but ArduPlane is to fly; --autopilot px4 simulates PX4 instead"
+TO_ARDUPLANE = "but PX4 is to fly; --autopilot ardupilot simulates ArduPlane instead"
 
 
 @pytest.mark.parametrize(

@@ -197,7 +197,7 @@ def test_a_frame_that_was_before_is_a_new_beginning(port: PhysicsPort, autopilot
     autopilot.send(packet(3))
     port.receive()
     autopilot.send(packet(2))
-    with pytest.raises(FlightError, match="began anew in the air: frame 2 after frame 3"):
+    with pytest.raises(FlightError, match="restarted in the air: frame 2 after frame 3"):
         port.receive()
 
 

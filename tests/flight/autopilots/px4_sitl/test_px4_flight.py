@@ -123,7 +123,7 @@ def test_the_flight_goes_once_around_where_px4_circles_about_its_last_waypoint(f
             ("mute", "said nothing over MAVLink within 30 s"),
             ("copter", "is no PX4: its heartbeat says vehicle type 2"),
             ("ardupilot", "is no PX4: its heartbeat says autopilot 3; expected 12, PX4"),
-            ("no-ekf", "did not come to know where it is (EKF) within 60 s"),
+            ("no-ekf", "did not find its position (EKF) within 60 s"),
             # Without home, which ArduPlane counts, item 1 sets the speed.
             ("refuses", "refused the mission at item 2 (NAV_WAYPOINT): MAV_MISSION_UNSUPPORTED"),
             ("will-not-arm", "refused arming (command 400) within 5 s; it last said: Arming denied: no will"),
