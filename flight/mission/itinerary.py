@@ -201,7 +201,7 @@ def make_itinerary(mission: Mission) -> Itinerary:
             break
     if steps.endless >= 0:
         name = command_name(mission.items[steps.index[steps.endless]].command)
-        walk.notes.add(f"{name} without end: taken once; the flight ends there", steps.endless)
+        walk.notes.add(f"{name} has no end: it is flown once, and the flight ends there", steps.endless)
     for gate in walk.gates:
         walk.notes.by_value.add("CONDITION_GATE: nothing to fly to comes after it, so it is passed at once", gate.item)
     for item in mission.items:
@@ -375,12 +375,12 @@ class _ItineraryBuilder:
                 self._run_as_arduplane(item, run[k + 1 :])
         for item in step.late:
             if item not in step.between:
-                self.notes.usual.add(f"{command_name(item.command)}: run a round early, as ArduPlane does", item.seq)
+                self.notes.usual.add(f"{command_name(item.command)}: run one loop early, as ArduPlane does", item.seq)
         if step.to is not None:
             self._fly_item(step.to)
         else:
             for item in step.between[1:]:
-                text = f"{command_name(item.command)}: not run, for nothing to fly to comes after it"
+                text = f"{command_name(item.command)}: not run, as nothing to fly to comes after it"
                 self.notes.usual.add(text, item.seq)
         for item in run[1:]:
             if item.command == Command.DO_SET_HOME:
@@ -445,11 +445,11 @@ class _ItineraryBuilder:
 
     def _note_wait(self, item: MissionItem) -> None:
         """Note an item after which PX4 waits (`MissionBase::on_active`); ArduPlane does not read that flag."""
-        self.notes.usual.add("autocontinue is 0: flown on, as ArduPlane does", item.seq)
+        self.notes.usual.add("autocontinue is 0: the flight continues, as ArduPlane does", item.seq)
         if item.seq == self.last_seq:
             self.notes.by_value.add("autocontinue is 0 at the mission's end: nothing comes after it", item.seq)
         else:
-            self.leave_open("autocontinue is 0, where PX4 would wait: flown on", item.seq, usual=False)
+            self.leave_open("autocontinue is 0: the flight continues, where PX4 would wait", item.seq, usual=False)
 
     def _fly_item(self, item: MissionItem) -> None:
         """Process a navigation item."""
@@ -620,7 +620,7 @@ class _ItineraryBuilder:
         if speed > 0.0:
             self.airspeed_by_value = speed
             if kind != 0.0:
-                notes.add(f"DO_CHANGE_SPEED of type {kind:g}: flown as airspeed, for no type is read", item.seq)
+                notes.add(f"DO_CHANGE_SPEED of type {kind:g}: flown as airspeed, as its type is not read", item.seq)
             return
         self.airspeed_by_value = math.nan
         notes.add(f"DO_CHANGE_SPEED to {speed:g} m/s: back to the autopilot's own airspeed", item.seq)

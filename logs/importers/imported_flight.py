@@ -213,7 +213,7 @@ def make_flight(raw: RawLog, number: int | None = None) -> LoggedFlight:
     if raw.vehicle in _REFUSED:
         named = f" ({raw.program})" if raw.program else ""
         raise LogError(
-            f"{raw.source}: {_REFUSED[raw.vehicle]} log{named}: flights of aeroplanes are judged", file=raw.source
+            f"{raw.source}: {_REFUSED[raw.vehicle]} log{named}: only flights of aeroplanes are judged", file=raw.source
         )
     series = raw.series["position"]
     if len(series.time) > _MAX_ROWS:
@@ -221,7 +221,7 @@ def make_flight(raw: RawLog, number: int | None = None) -> LoggedFlight:
     places = clean_places(series, raw.clock_jumps)
     spans = flown_spans(places.time, places.lat, places.lon)
     if not spans:
-        raise LogError(f"{raw.source}: no flight in it: {_reason_without_flight(places)}", file=raw.source)
+        raise LogError(f"{raw.source}: contains no flight: {_reason_without_flight(places)}", file=raw.source)
     last = float(places.time[-1])
     modes = [type(one)(float(places.on_clock(np.array([one.time]))[0]), one.name, one.automatic) for one in raw.modes]
     parts = flight_parts(spans, modes, raw.missions, last)

@@ -107,7 +107,7 @@ def log_format(path: Path, head: bytes) -> LogFormat:
     ('.gpx', 'ArduPilot .BIN')
     """
     if re.search(_AS_TEXT, head, re.IGNORECASE):
-        raise LogError(f"{path}: a dataflash log as text: the .BIN that it was made of is read", file=path)
+        raise LogError(f"{path}: a dataflash log as text; planfly reads the .BIN from which it was made", file=path)
     fitting = [known for known in FORMATS if re.search(known.content, head, re.DOTALL | re.IGNORECASE)]
     named = [known for known in FORMATS if path.suffix.lower() in known.suffixes]
     if not fitting and not named:

@@ -48,7 +48,7 @@ class MessageFormats:
         """Add a topic of this format.  Raises LogError for more fields than a log may have."""
         self._total += self.fields(name)
         if self._total > MAX_FIELDS:
-            words = f"the formats of its messages come to more than {MAX_FIELDS:,} fields"
+            words = f"the formats of its messages have more than {MAX_FIELDS:,} fields"
             raise LogError(f"{self._source}: not a PX4 log that can be read: {words}", file=self._source)
 
     def fields(self, name: str) -> int:

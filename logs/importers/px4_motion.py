@@ -221,7 +221,7 @@ def _controls(topics: Topics, parameters: Mapping[str, float]) -> tuple[Samples,
     for axis, row in zip(("elevator", "aileron"), scales, strict=False):
         if not row.any():
             allowed = "expected CA_SV_CSn_TYPE with CA_SV_CSn_TRQ_P and CA_SV_CSn_TRQ_R"
-            raise LogError(f"{topics.source}: no surface is the {axis}'s: {allowed}", file=topics.source)
+            raise LogError(f"{topics.source}: no surface controls the {axis}; {allowed}", file=topics.source)
     sums = np.abs(scales).sum(axis=1, keepdims=True)
     shares = np.nan_to_num(servos.values) @ (scales / np.where(sums > 0.0, sums, 1.0)).T
     # A motor below 2 % of its thrust is stopped, which is NaN (PX4's control allocator).
@@ -243,7 +243,7 @@ def _forward_motors(topics: Topics, airframe: int, parameters: Mapping[str, floa
         ahead = [k for k, (x, z) in enumerate(axes) if x > z]
         if not ahead:
             allowed = "expected one with |CA_ROTORn_AX| above |CA_ROTORn_AZ|"
-            raise _refusal(topics, "CA_ROTOR_COUNT", count, f"of rotors none of which pushes ahead: {allowed}")
+            raise _refusal(topics, "CA_ROTOR_COUNT", count, f"of rotors of which none pushes forward; {allowed}")
         return ahead
     return list(range(count)) or np.flatnonzero(np.isfinite(motors.values).any(axis=0)).tolist()
 

@@ -99,7 +99,7 @@ class SurveyFound:
     def lines_without_remedy(self) -> tuple[str, ...]:
         """Lines that state that no remedy was found, the closest trial, and why no other layout was tried."""
         said = [
-            "no turn-around, order, course, parameter or airspeed alone was found that would help, nor longer"
+            "no single turn-around, order, course, parameter or airspeed was found that would help, nor longer"
             " turn-arounds with another parameter or a slower flight"
         ]
         said += [needed_text(*pair) for pair in zip(self.surveys, self.lines, strict=True)]
@@ -153,7 +153,7 @@ def survey(
         refuse("flight", given, _AS_FLOWN)
         source = what.setup.source
         if source is not None and "attitude" not in source.holds:
-            raise LogError(f"{source.file}: no attitude: how far photos are banked is not known", file=source.file)
+            raise LogError(f"{source.file}: no attitude, so the bank of photos is not known", file=source.file)
         setup = _with_camera(what.setup.in_scenario(_judging_parallel_lines(what.setup.scenario)), taken)
         return _write_results(_judge_flown_survey(setup, what.track, what.ended or ""), out, overwrite)
 

@@ -250,7 +250,7 @@ def _parse_quantity(quantity: Quantity, table: Any, name: str) -> Varying:
     distribution, source = entries.pop("distribution", None), entries.pop("source", None)
     _check_distribution(quantity, distribution, name)
     if not isinstance(source, str) or not source.strip():
-        allowed = "missing; say where the numbers are from"
+        allowed = "missing; state the source of the numbers"
         raise SpreadError.at(name, f"{quantity.name}.source", source, allowed, shown="")
     _check_parameters(str(distribution), entries, name, quantity.name)
     varying = Varying(quantity, str(distribution), tuple((key, float(value)) for key, value in entries.items()), source)
@@ -299,7 +299,7 @@ def _check_parameters(distribution: str, entries: dict[str, Any], name: str, qua
 def _share_inside(varying: Varying, name: str) -> float:
     share = varying.share_inside
     if math.isnan(share):
-        allowed = f"no parameters that {varying.distribution} may have"
+        allowed = f"parameters that {varying.distribution} cannot have"
         raise SpreadError.at(name, varying.quantity.name, _call_text(varying), allowed)
     return share
 

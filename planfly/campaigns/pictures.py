@@ -159,7 +159,10 @@ def draw_probability(bins: Sequence[SpeedBin], target: float | None) -> Figure:
         axes.set_ylim(-0.02, 1.05)
         axes.set_xlabel("mean wind at the start's height (m/s)")
         axes.set_ylabel("share of flyable flights")
-        axes.set_title("Probability against wind speed: line its share, band Wilson's interval, below how many flew")
+        axes.set_title(
+            "Probability against wind speed: the line is the share, the band Wilson's interval, "
+            "below is the number of flights"
+        )
         _style_axes(axes)
     return figure
 

@@ -302,7 +302,7 @@ def fly_row_again(base: CampaignBase, row: FlightRow, log: Path) -> FlightRow:
     """
     again = fly_one(base, row.draw.index, log=log)
     if not same_flight(row, again):
-        message = f"{log}: flight {row.draw.index} comes out otherwise here than where it was flown"
+        message = f"{log}: flight {row.draw.index} has a different outcome here than where it was flown"
         raise PlanflyError(message, file=log, field="flight", value=row.draw.index)
     return again
 
@@ -403,8 +403,8 @@ def _open_lines(found: WindsFound) -> list[str]:
     if not short:
         return []
     return [
-        f"not settled: {len(short)} of {len(found.boundaries)} directions, for want of flights: each takes"
-        f" {FEWEST} at least, and an interval of {2.0 * ACCURACY:g} m/s; with fewer the interval is mostly assumption"
+        f"not settled: {len(short)} of {len(found.boundaries)} directions, for lack of flights: each needs"
+        f" at least {FEWEST}, and an interval of {2.0 * ACCURACY:g} m/s; with fewer, the interval is mostly assumption"
     ]
 
 
@@ -416,7 +416,9 @@ def _lost_lines(found: WindsFound) -> list[str]:
         f"{number} ({found.flights[number][1]:.1f} m/s from {found.from_deg(found.flights[number][0]):g}°)"
         for number in found.lost[:10]
     )
-    return [f"lost      {len(found.lost)} could not be flown, their workers died, and count as not flyable: {named}"]
+    return [
+        f"lost      {len(found.lost)} could not be flown because their workers died, and count as not flyable: {named}"
+    ]
 
 
 def _none_failed_lines(found: WindsFound) -> list[str]:

@@ -55,9 +55,9 @@ class Examined(NamedTuple):
         """Describe the damage and its consequence.
 
         >>> Examined([0, 1, 3], [2]).text()
-        'flight 2 is damaged and was taken out: 3 flights are whole and stay; --resume flies what is missing'
+        'flight 2 is damaged and was taken out: 3 flights are intact and stay; --resume flies the missing ones'
         """
-        stay = f"{len(self.whole)} flights are whole and stay; --resume flies what is missing"
+        stay = f"{len(self.whole)} flights are intact and stay; --resume flies the missing ones"
         behind = ""
         if self.after is not None:
             behind = f", and any after flight {self.after} were lost" if self.after >= 0 else ", and no flight is found"

@@ -199,7 +199,7 @@ class LockedTable:
         _refuse_damaged(known, self.path)
         if known.get("made_of") != self.made_of:
             raise StoreError(
-                f"{self.path}: is of another campaign: its code, mission, aircraft, scenario, dispersions or seed"
+                f"{self.path}: belongs to another campaign: its code, mission, aircraft, scenario, dispersions or seed"
                 f" differs ({known.get('made_of')}, not {self.made_of})",
                 file=self.path,
             )
@@ -207,7 +207,7 @@ class LockedTable:
         for name in self._kind.fixed:
             if before[name] != settings[name]:
                 raise StoreError(
-                    f"{self.path}: {name} {settings[name]}: the flights there were asked for with {before[name]}",
+                    f"{self.path}: {name} {settings[name]}: the flights there were requested with {before[name]}",
                     file=self.path,
                 )
 
@@ -350,7 +350,7 @@ class translated_errors:
         """Raise the converted SQLite error, if there is one."""
         if isinstance(error, UnicodeDecodeError):
             # SQLite quotes the parts of a table definition that it does not understand.
-            raise StoreError(f"{self._path}: is damaged where it says which tables it has", file=self._path) from error
+            raise StoreError(f"{self._path}: is damaged in the list of its tables", file=self._path) from error
         if not isinstance(error, sqlite3.Error):
             return
         code = getattr(error, "sqlite_errorcode", None)

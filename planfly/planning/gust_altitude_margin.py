@@ -143,7 +143,7 @@ def _climb_problem(plan: Plan, airframe: Airframe) -> str:
         return ""
     return (
         f"climbs {climb:.2f} m/s at {amsl:.0f} m at most; with less than {least:.2f} m/s downdrafts of {turbulence}"
-        " turbulence may take it down further than any height allows for; less turbulence, a lower mission or an"
+        " turbulence may push it down further than any height margin covers; less turbulence, a lower mission or an"
         " aircraft that climbs better would help"
     )
 

@@ -50,7 +50,7 @@ def file_inside(folder: Path | None, name: str) -> Path:
     world.errors.MissionError: open: name: '../etc/passwd': expected a file in /tmp
     """
     if folder is None:
-        allowed = "no file was named by the command, so that there is no folder to open from: drop the file here"
+        allowed = "the command named no file, so there is no folder to open from: drop the file here"
         raise MissionError.at("open", "name", name[:60], allowed, shown=repr(name[:60]))
     try:
         inside = folder.resolve(strict=True)

@@ -179,7 +179,7 @@ class Jobs:
             return [{"kind": "stopped", "job": asked.name}, {"kind": "fault", "text": str(answer.value)}]
         if asked.name == "plan" and asked.rev != session.rev:
             self._at_once = False
-            edited = "the mission was changed while its path was searched, and is left as it is: plan again for a path"
+            edited = "the mission was changed during the search for its path, so it stays as it is: plan again"
             return [{"kind": "stopped", "job": "plan"}, {"kind": "fault", "text": edited}]
         return [self._result_message(asked, answer.value, session)]
 

@@ -121,7 +121,7 @@ class Server:
                 await self._run_judging(lambda: self.session.keep(self._kept or Path()))
             except (OSError, PlanflyError) as error:
                 if not self._autosave_error:
-                    self._broadcast({"kind": "fault", "job": "keep", "text": f"what is done here is not kept: {error}"})
+                    self._broadcast({"kind": "fault", "job": "keep", "text": f"edits are not being kept: {error}"})
                 self._autosave_error = str(error)
             else:
                 self._autosave_error = ""
@@ -363,7 +363,7 @@ class Server:
         try:
             data = base64.b64decode(message.data, validate=True)
         except binascii.Error as error:
-            raise MissionError(f"{message.name[:60]}: its bytes did not come whole", field="data") from error
+            raise MissionError(f"{message.name[:60]}: it did not arrive completely", field="data") from error
         return open_dropped(message.name, data, self.session.options)
 
     def _read_parameter_file(self, name: str) -> messages.Settings:
@@ -398,7 +398,7 @@ class Server:
                 {
                     "kind": "fault",
                     "job": "plan",
-                    "text": "the mission was edited meanwhile: its first path is not taken",
+                    "text": "the mission was edited meanwhile, so its first path is not used",
                 }
             )
         except PlanflyError as error:

@@ -48,7 +48,7 @@ def apply_suggestion(context: MissionContext, judged: JudgedMission, item: Findi
     """
     source = judged.mission.source
     if not can_apply(suggestion):
-        raise MissionError(f"{source}: this suggestion is no change of its items", field="suggestion")
+        raise MissionError(f"{source}: this suggestion does not change its items", field="suggestion")
     made = []
     # Away from a missile, try to move a single waypoint first: each one that moves may fail elsewhere.
     for most in (1, None) if any(change.what == "distance" for change in suggestion) else (None,):

@@ -40,7 +40,7 @@ def with_file_autopilot(scenario: Scenario, mission: Mission | None = None) -> S
             raise MissionError.from_error(other_autopilot(mission.source, stated, _FIRMWARE[stated], table.autopilot))
         other = f"{table.autopilot_from} for {TITLES[table.autopilot]}"
         allowed = "expected files of one autopilot"
-        message = f"{mission.source}: written for {TITLES[stated]} ({_FIRMWARE[stated]}), and {other}: {allowed}"
+        message = f"{mission.source}: written for {TITLES[stated]} ({_FIRMWARE[stated]}), but {other}; {allowed}"
         raise MissionError(message, file=mission.source, field="autopilot", value=stated, allowed=allowed)
     return scenario
 

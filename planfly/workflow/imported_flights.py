@@ -141,8 +141,8 @@ def _refuse_other_autopilot(path: Path, mission: Mission, program: str) -> None:
     """Raise MissionError if the plan was written for another autopilot than that of the log."""
     flown = next((name for name, title in TITLES.items() if program.lower().startswith(title[:5].lower())), "")
     if mission.autopilot and flown and mission.autopilot != flown:
-        allowed = f"the flight of {path} is {program}'s: `plan` names the mission that was flown"
-        message = f"{mission.source}: written for {TITLES[mission.autopilot]}: {allowed}"
+        allowed = f"the flight of {path} is {program}'s; `plan` names the mission that was flown"
+        message = f"{mission.source}: written for {TITLES[mission.autopilot]}; {allowed}"
         raise MissionError(message, file=mission.source, field="autopilot", value=mission.autopilot, allowed=allowed)
 
 
@@ -160,7 +160,7 @@ def _planned_mission(path: Path, flight: LoggedFlight, options: LogOptions) -> t
         mission = mission_of_plan(plan, load_airframe(scenario), str(plan_path))
         return mission, f"of {plan_path.name}", scenario
     if flight.mission is None:
-        raise LogError(f"{path}: holds no mission: `plan` names the one that was to be flown", file=path)
+        raise LogError(f"{path}: holds no mission; `plan` names the one that was to be flown", file=path)
     found = flight.mission
     if found.missing is not None and len(found.mission.items) < _MIN_ITEMS:
         lacking = [missing_text(found.missing), *found.mission.warnings[:1]]
@@ -193,7 +193,7 @@ def _with_wind_of_log(scenario: Scenario, flight: LoggedFlight, options: LogOpti
         return scenario, "as given"
     found = mean_wind(flight)
     if found is None:
-        own = "as the scenario has it: the log holds no wind" if options.get("scenario") else ""
+        own = "from the scenario, as the log holds no wind" if options.get("scenario") else ""
         return scenario, own
     blown = with_wind(scenario, found.speed, found.from_course, None)
     return blown, f"from {round(math.degrees(found.from_course)) % 360:03d}°, by {found.source} of the log"
@@ -256,7 +256,7 @@ def _describe_gaps(flight: LoggedFlight) -> tuple[str, ...]:
         notes.append(f"the log ends in flight, at {flight.time[-1]:.1f} s")
     usual = float(np.median(np.diff(flight.time)))
     if usual > LONGEST_STEP:
-        notes.append(f"the log has a place every {usual:.1f} s: what was between them it does not show")
+        notes.append(f"the log has a place every {usual:.1f} s: the flight between them is not known")
     return tuple(notes)
 
 
@@ -361,5 +361,5 @@ def _followed_legs(setup: FlightSetup, track: Track) -> list[FlownLegs]:
     found = [legs for stretch in stretches if (legs := flown_legs(setup, track, stretch)) is not None]
     if not found:
         name = "the log" if source is None else source.file
-        raise LogError(f"{name}: none of its mission's legs was flown: there is nothing to fly again", file=name)
+        raise LogError(f"{name}: none of its mission's legs was flown, so there is nothing to fly again", file=name)
     return sorted(found, key=lambda legs: legs.first - legs.last)

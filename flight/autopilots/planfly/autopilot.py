@@ -51,7 +51,7 @@ class PlanflyGuidance(Autopilot):
         if (aircraft.folder / GAINS_FILE).exists():
             load_gains(aircraft)
             return []
-        return [f"{aircraft.folder / GAINS_FILE}: missing: {aircraft.name} does not fly without gains"]
+        return [f"{aircraft.folder / GAINS_FILE}: missing; {aircraft.name} does not fly without gains"]
 
     @property
     def tick(self) -> Tick:

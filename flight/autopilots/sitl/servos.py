@@ -110,7 +110,7 @@ def load_servo_map(aircraft: Aircraft) -> ServoMap:
         table = read_toml(file, "servos")
     except OSError as error:
         raise FlightError(
-            f"{file}: {error.strerror}: a real autopilot needs to know which servo moves what on {aircraft.name}",
+            f"{file}: {error.strerror}; a real autopilot needs to know what each servo of {aircraft.name} moves",
             file=file,
         ) from error
     except ValueError as error:

@@ -75,7 +75,7 @@ def test_turbulence_is_drawn_in_steps() -> None:
         (GOOD.replace("scale = 0.05", "scale = nan"), "mass.scale: nan: expected a finite number"),
         (GOOD.replace("scale = 0.05", "scale = inf"), "finite"),
         (GOOD.replace("scale = 0.05", "scale = true"), "finite"),
-        (GOOD.replace("scale = 0.05", "scale = -1.0"), "no parameters that norm may have"),
+        (GOOD.replace("scale = 0.05", "scale = -1.0"), "parameters that norm cannot have"),
         (GOOD.replace('"norm"', '"gamma"'), "mass.a: missing; gamma needs a"),
         (GOOD.replace("loc = 1.0", "loc = 9.0"), "0.0 % of it lies within 0.5..2"),
     ],

@@ -54,7 +54,7 @@ def test_files_are_written_and_cleared_and_no_others(
 def test_a_flight_that_comes_out_otherwise_is_told(base: CampaignBase, tmp_path: Path) -> None:
     row = fly_one(base, 1)
     fly_row_again(base, row, tmp_path / "a.mcap")
-    with pytest.raises(PlanflyError, match="comes out otherwise"):
+    with pytest.raises(PlanflyError, match="has a different outcome"):
         fly_row_again(base, made_flight(base, 1), tmp_path / "a.mcap")
 
 
@@ -206,7 +206,7 @@ def test_the_summary_comes_back_and_no_process_stays(base: CampaignBase, tmp_pat
         estimate = Estimator(GOAL).estimate(store.tally())
     children = multiprocessing.active_children()
     # The made flights come out otherwise when they are flown: the error of the other process is this one's.
-    with pytest.raises(Exception, match="flight 0 comes out otherwise"):
+    with pytest.raises(Exception, match="flight 0 has a different outcome"):
         finish_campaign(base, GOAL, estimate, tmp_path, "planfly campaign x")
     assert multiprocessing.active_children() == children
     with open_store(base, GOAL, tmp_path, resume=True) as store, pytest.raises(StoreError, match="held by another"):

@@ -76,7 +76,7 @@ def test_the_same_log_gives_the_same_bytes(tmp_path: Path) -> None:
 def test_a_track_alone_needs_a_plan(tmp_path: Path, capsys: Output) -> None:
     log = kml(tmp_path / "a.kml")
     assert main(["check", str(log)]) == 2
-    said = "holds no mission: --plan names the one that was to be flown"
+    said = "holds no mission; --plan names the one that was to be flown"
     assert capsys.readouterr().err == f"planfly: {log}: {said}\n"
 
 

@@ -336,7 +336,7 @@ def test_a_bad_file_is_one_line(tmp_path: Path, change: tuple[str, str], said: s
 
 
 def test_an_aircraft_without_the_file_says_what_it_is_for(tmp_path: Path) -> None:
-    with pytest.raises(FlightError, match=r"ardupilot.toml: .*: a real autopilot needs to know which servo moves what"):
+    with pytest.raises(FlightError, match=r"ardupilot.toml: .*; a real autopilot needs to know what each servo"):
         load_servo_map(replace(AEROSONDE, folder=tmp_path))
 
 
