@@ -124,7 +124,7 @@ _SHARED_KEYWORDS = {"served_speed": "speed", "front": "count"}
 # Largest sensor size across and along the track, and longest focal length, mm.
 _MAX_CAMERA_SIZES_MM = (1000.0, 1000.0, 10_000.0)
 # Description of the numbers of a camera, in messages.
-CAMERA = "the sensor across the way and along it and the focal length, mm, and maybe overlaps along and across, %"
+CAMERA = "the sensor's size across and along the track and the focal length, mm, maybe overlaps along and across, %"
 
 
 def is_wind(speed: float, from_deg: float) -> bool:

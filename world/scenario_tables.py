@@ -441,9 +441,9 @@ class FlightTable(ScenarioTable):
         if self.guidance is not None and autopilot != OWN_GUIDANCE:
             raise ValueError(f'guidance: not a key of autopilot = "{autopilot}"')
         if self.params is not None and autopilot == OWN_GUIDANCE:
-            raise ValueError('params: not a key of autopilot = "planfly", which guidance alone means')
+            raise ValueError('params: not a key of autopilot = "planfly", which a guidance without autopilot selects')
         if self.px4_version is not None and autopilot != _PX4:
-            raise ValueError(f'px4_version: a key of autopilot = "px4" alone, not of "{autopilot}"')
+            raise ValueError(f'px4_version: only a key of autopilot = "px4", not of "{autopilot}"')
         return self
 
     @property

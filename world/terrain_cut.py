@@ -204,7 +204,7 @@ def _fetch_tile(remote: RemoteFile, box: Box, count: Callable[[int], None]) -> R
         except _UnreadableError as error:
             remote.forget()
             if is_last:
-                message = f"{remote.url}: what the server gives is no GeoTIFF that can be read"
+                message = f"{remote.url}: the server's answer is not a readable GeoTIFF"
                 raise TerrainError(message, file=remote.url) from error
     raise AssertionError
 

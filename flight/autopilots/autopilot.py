@@ -332,7 +332,7 @@ class Autopilot(ABC):
 
         contacts: contact points of the aircraft.
         """
-        raise ValueError(f"{self.title} flies no take-off and no landing")
+        raise ValueError(f"{self.title} flies neither take-off nor landing")
 
     def take_over(self, before: Record, own: Record, here: Floats) -> None:
         """Begin another route at the aircraft's position, and keep the control law's state of the aircraft.

@@ -128,7 +128,7 @@ def fence_shapes(fences: tuple[MissionItem, ...], source: str = "fence") -> list
         if len(shape) < count or any(
             corner.command != item.command or (count > 1 and corner.params[0] != item.params[0]) for corner in shape
         ):
-            problem = ItemProblem("p1", item.params[0], "fewer corners follow than it counts")
+            problem = ItemProblem("p1", item.params[0], "fewer corners follow than it states")
             raise MissionError(**problem.at(source, f"{source}: fence item {item.seq}"))
         shapes.append(shape)
         k += count

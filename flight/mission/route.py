@@ -594,9 +594,7 @@ def _with_gates(placed: PlacedMission, notes: Notes) -> list[PlacedStop]:
             if gate.airspeed == after or (math.isnan(gate.airspeed) and math.isnan(after)):
                 continue
             if not all(one.stop.loiter is None and one.stop.command in PLACES for one in (before, place)):
-                text = (
-                    "CONDITION_GATE next to an item that is no waypoint: the speed after it holds from the leg's start"
-                )
+                text = "CONDITION_GATE not between waypoints: the speed after it holds from the leg's start"
                 notes.add(text, gate.item)
                 continue
             share = _gate_fraction(before.position, place.position, to_map(placed.origin, gate.lat_deg, gate.lon_deg))

@@ -361,7 +361,7 @@ def parse_plan_file(text: str, source: str) -> Mission:
         warnings.append(f"{source}: item {number}: {name} has no position ({len(lost)} such items in all)")
     home = _read_home(file.mission.plannedHomePosition, source)
     if home is None and file.mission.plannedHomePosition is not None:
-        warnings.append(f"{source}: plannedHomePosition is no position: left out; the mission has no home")
+        warnings.append(f"{source}: plannedHomePosition is not a position: left out; the mission has no home")
     if [item.seq for item in items] != list(range(1, len(items) + 1)):
         warnings.append(f"{source}: doJumpId is not 1 to {len(items)}: items are counted by their order")
     mission = Mission(

@@ -222,7 +222,7 @@ def _collect_warnings(rows: list[_Row], home: Home | None, body: list[_Row]) -> 
         )
     if len(body) < len(rows):
         if home is None:
-            found.append(f"{rows[0].where}: home at 0, 0, which is no position: left out; the mission has no home")
+            found.append(f"{rows[0].where}: home at 0, 0, which is not a position: left out; the mission has no home")
         elif first.frame not in (Frame.GLOBAL, Frame.GLOBAL_INT):
             found.append(f"{rows[0].where}: home in frame {first.frame}: its height is taken as above mean sea level")
     counted = "items are counted by their lines, as ground stations do, and jumps go by that count"
@@ -235,7 +235,7 @@ def _collect_warnings(rows: list[_Row], home: Home | None, body: list[_Row]) -> 
     lost = [row for row in body if row.item.command in PLACES | LANDINGS and not row.item.has_position]
     if lost:
         name = command_name(lost[0].item.command)
-        found.append(f"{lost[0].where}: {name} at 0, 0, which is no position ({len(lost)} such items in all)")
+        found.append(f"{lost[0].where}: {name} at 0, 0, which is not a position ({len(lost)} such items in all)")
     return found
 
 

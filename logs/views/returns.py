@@ -58,7 +58,7 @@ def returns_map(setup: FlightSetup, drawn: DrawnReturns) -> MapChart:
 
     layers = way_layers(drawn.by_kind, _LOOKS, lambda one: one.start[:2], said)
     for one in drawn.worst:
-        name = "way of one of the worst, numbered"
+        name = "path of one of the worst returns, numbered"
         layers.append(Layer("line", name, "return-way", one.way[:, 0], one.way[:, 1], words=(said(one.one),)))
     wrong = [one for one in drawn.worst if not one.one.safe]
     if wrong:
@@ -78,7 +78,7 @@ def returns_map(setup: FlightSetup, drawn: DrawnReturns) -> MapChart:
     extent = map_extent(scenario, route, [*ways, np.array([one.start for one in drawn.returns.each])])
     return world_map(
         scenario,
-        "returns to launch from everywhere on the way",
+        "returns to launch from points along the route",
         layers,
         [*labels, *end_labels(scenario, route)],
         extent,
@@ -111,7 +111,7 @@ def worst_returns_chart(setup: FlightSetup, drawn: DrawnReturns) -> Chart | None
     panels = tuple(_profile(scenario, one, number, span) for number, one in enumerate(drawn.worst, 1))
     return Chart(
         f"{shorten(scenario.name, 60)}: the worst returns to launch",
-        "way since it turned back",
+        "distance since it turned back",
         "km",
         panels,
         tall=240,
@@ -137,7 +137,7 @@ def _profile(scenario: Scenario, one: WorstReturn, number: int, span: tuple[floa
     zones, zone_names = zone_bands(scenario.zones, plane)
     cuts, cut_names = threat_cuts(scenario.threats, plane, frozenset())
     layers = [*zones, *cuts, *ground_bands(scenario, plane)]
-    layers.append(Layer("line", "way of the return", "return-way", along, way[:, 2]))
+    layers.append(Layer("line", "path of the return", "return-way", along, way[:, 2]))
     if not one.one.safe:
         nearest = int(np.argmin(np.linalg.norm(way - one.at, axis=1)))
         layers.append(Layer("rings", "where it goes wrong", "fail", along[[nearest]], one.at[[2]], quiet=True))

@@ -174,7 +174,7 @@ def _read_source(path: Path, targets: tuple[Path, ...], options: MissionOptions)
     for target in targets:
         suffix = target.suffix
         if suffix.lower() in LOGS:
-            message = f"{target}: {suffix} is written of a flight log (.mcap), and {path} is none"
+            message = f"{target}: {suffix} is written only from a flight log (.mcap), which {path} is not"
             raise MissionError(message, file=target, field="suffix", value=suffix)
     placed = any(target.suffix.lower() in (*MAPS, *PARAMETERS) for target in targets)
     return _read_mission(path, options, placed=placed, coloured=_needs_kml(targets))

@@ -224,5 +224,5 @@ def _checked_columns(name: str, given: ArrayLike, rows: int) -> Floats:
     table = np.array(given, dtype=np.float64)
     table = table[:, np.newaxis] if table.ndim == 1 else table
     if table.ndim != 2 or len(table) != rows:
-        raise ValueError(f"{name}: shape {np.shape(given)}: expected {rows} rows, one for each point asked for")
+        raise ValueError(f"{name}: shape {np.shape(given)}: expected {rows} rows, one for each requested point")
     return np.where(np.isnan(table), np.inf, table)

@@ -251,14 +251,14 @@ def draw_clearance_fan(
         top.set_ylim(bottom=0.0)
         top.set_ylabel("above ground (m)")
         # The legend is above the panel, where it covers no band, and the title above the legend.
-        top.set_title("Clearance along the way, over all flights", pad=20.0)
+        top.set_title("Clearance along the path, over all flights", pad=20.0)
         top.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=6, columnspacing=1.0, borderaxespad=0.2)
         top.tick_params(labelbottom=False)
         low.fill_between(along, ground, np.nanmin(ground) - 10.0, color=theme.GROUND[1], linewidth=0.0)
         low.plot(along, ground, color=QUIET, linewidth=0.8)
         low.set_xlim(0.0, length / 1000.0)
         low.set_ylabel("ground (m AMSL)")
-        low.set_xlabel("along the way (km)")
+        low.set_xlabel("along the path (km)")
         for axes in (top, low):
             axes.grid(visible=True, color=GRID, linewidth=0.5)
             axes.set_axisbelow(True)

@@ -162,7 +162,7 @@ def _draw_tracks(base: CampaignBase, store: Store) -> list[tuple[Figure, str]]:
         ground = base.scenario.terrain.height(east, north)
         least = base.scenario.limits.min_clearance_m
         figure = draw_clearance_fan(np.array(shapes, dtype=np.float64), failed, ground, float(before[-1]), least)
-        out.append((figure, "Height above ground along the way, over all flights, and the ground itself"))
+        out.append((figure, "Height above ground along the path, over all flights, and the ground itself"))
     crossings = [np.frombuffer(data, np.float32).reshape(-1, 2) for data in store.blobs("crossings", _DRAWN)]
     # The number of stops on a return depends on the wind, so flights without the further stops have NaN.
     crossed = np.full((len(crossings), max(map(len, crossings)), 2), np.nan)

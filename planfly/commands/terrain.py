@@ -59,7 +59,7 @@ def terrain(args: argparse.Namespace) -> int:
     if made.absent:
         named = ", ".join(f"{lat} {lon}" for lat, lon in made.absent[:_NAMED])
         more = f" and {len(made.absent) - _NAMED} more" if len(made.absent) > _NAMED else ""
-        taken = "taken for sea, at 0 m" if args.sea else "open sea, or not published (--sea takes it for sea)"
+        taken = "treated as sea, at 0 m" if args.sea else "open sea, or not published (--sea treats it as sea)"
         print_warnings([f"no tile at {named}{more} (south-west corners, degrees): {taken}"])
     if made.empty:
         print_warnings([f"{made.empty:,} of {rows * cols:,} pixels have no data"])

@@ -158,7 +158,7 @@ _SERIES = {
     },
     "px4": {
         "inertial": "sensor_combined, the inertial sensors",
-        "outputs": "actuator_servos and actuator_motors, nor actuator_controls_0: actuator_outputs alone do not say"
+        "outputs": "actuator_servos and actuator_motors, nor actuator_controls_0: actuator_outputs do not state"
         " what they move",
         "attitude": "vehicle_attitude, the attitude",
         "velocity": "vehicle_local_position, the velocity",

@@ -130,9 +130,9 @@ class ProgramReturns:
             agree = (
                 "they agree"
                 if one.agrees
-                else "the program's outcome counts"
+                else "the program's outcome counts, as it is worse"
                 if one.worse
-                else "the simulated outcome, the worse one, counts"
+                else "the simulated outcome counts, as it is worse"
             )
             flown = measured_text(one.flown, returns.limit, scenario)
             out.append(f"{begins}: simulated {law}; by the program {flown}: {agree}")

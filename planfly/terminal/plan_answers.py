@@ -106,7 +106,7 @@ def fewer_line(front: "Front") -> str:
     share, seen, height = f"{NOTICED:.1%}", f"{NOTICED_EXPOSURE:.0%}", f"{NOTICED_CLEARANCE:g} m"
     refused = f"{front.refused} that were found are not safe when completed, and " if front.refused else ""
     return (
-        f"{len(front.plans)} of the {front.asked} asked for: {refused}no other that was found gains more than {share}"
+        f"{len(front.plans)} of the {front.asked} requested: {refused}no other that was found gains more than {share}"
         f" in length or {front.fourth}, {seen} in exposure or {height} in height"
     )
 

@@ -537,7 +537,7 @@ def _readme_text(
         "",
         f"{made.numbers.title}, made by `planfly aircraft --new` from a data sheet. It {drive}.",
         "What the sheet does not say was taken from published aircraft of its class, which `aircraft/data_sheet.py` of",
-        "planfly names. Where a slope comes near to what the model can do, no verdict of it is to be had.",
+        "planfly names. A slope close to the model's limit is left undecided.",
         "",
         "| | | |",
         "|---|---|---|",

@@ -296,8 +296,8 @@ def _find_climb_out(site: _Site, launch: Launch) -> tuple[ClimbOut | None, str]:
         "on its course" if launch.course is not None else f"on {len({launch.course for launch in launches})} courses"
     )
     if not nearest.tried:
-        return None, f"no way launched {courses} is long enough to climb to the start, {goal - ground:.0f} m over home"
-    return None, f"none of {nearest.tried} ways launched {courses} is free; the nearest: {nearest.problem}"
+        return None, f"no path launched {courses} is long enough to climb to the start, {goal - ground:.0f} m over home"
+    return None, f"none of {nearest.tried} paths launched {courses} is clear; the nearest: {nearest.problem}"
 
 
 def _certify_climb_out(site: _Site, course: float, spots: list[Spot], up: float) -> ClimbOut | Certificate | None:
@@ -543,9 +543,9 @@ def _path_to_line_up(site: _Site, final: _Final) -> tuple[Floats | None, str]:
                 break
     where = f"from the destination to the final on {round(math.degrees(final.course)) % 360}°"
     if not nearest.tried:
-        return None, f"no way {where} is long enough for its turns and {high - goal:.0f} m of descent"
+        return None, f"no path {where} is long enough for its turns and {high - goal:.0f} m of descent"
     remedy = "a higher destination (height_m) or another strip may have one"
-    return None, f"none of {nearest.tried} ways {where} is free: {remedy}; the nearest: {nearest.problem}"
+    return None, f"none of {nearest.tried} paths {where} is clear: {remedy}; the nearest: {nearest.problem}"
 
 
 def _approach_altitudes(site: _Site, spots: list[Spot], share: float, high: float, goal: float) -> Floats:

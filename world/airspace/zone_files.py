@@ -67,7 +67,7 @@ def geojson_zones(text: str, source: str) -> Iterator[Found]:
 
 
 def _no_number(name: str) -> float:
-    raise ValueError(f"{name} is no number of JSON")
+    raise ValueError(f"{name} is not a JSON number")
 
 
 def _check_crs(data: dict[str, Any], source: str) -> None:
@@ -288,10 +288,10 @@ FORMATS: dict[str, Reader] = {
     ".txt": openair_zones,
 }
 # Notes about repairs to authorities' files.
-_CROSSED = "outlines that cross themselves are taken as the area they enclose"
+_CROSSED = "an outline that crosses itself is taken as the area it encloses"
 _EMPTY = "outlines that enclose no area are left out"
-_TURNED = "lower and upper limits that stand the wrong way round are swapped"
-_NO_BAND = "upper limits of 0, or equal to the lower one, are taken for none: no ceiling"
+_TURNED = "lower and upper limits in the wrong order are swapped"
+_NO_BAND = "upper limits of 0, or equal to the lower one, mean no ceiling"
 # Maximum size of a file, bytes.
 MAX_BYTES = 64 * 2**20
 # Maximum number of corners of all zones of a file: arcs of OpenAir make hundreds of corners of a few bytes.
@@ -377,7 +377,7 @@ def read_zone_file(path: Path, source: str, most: int = MAX_ZONES) -> FileZones:
             raise ScenarioError(f"{source}: {where}: its outline encloses no area", file=source, field="rings_deg")
         read.zones.append(_table(entries, f"{source}: {where}"))
     if not read.zones and not free and not mended[_EMPTY]:
-        raise ScenarioError(f"{source}: there is no zone in it", file=source)
+        raise ScenarioError(f"{source}: contains no zone", file=source)
     for reason, count in free.items():
         keep = "1 zone keeps" if count == 1 else f"{count:,} zones keep"
         read.notes.append(f"{source}: {keep} nobody out: {reason}")

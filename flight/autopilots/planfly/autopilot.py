@@ -14,7 +14,7 @@ from world.wind import Turbulence
 
 _LAW_NAMES = {
     "path": "planfly's guidance on the fly-by path",
-    "l1": "L1 as ArduPlane flies it, along the legs",
+    "l1": "L1 along the legs, as in ArduPlane",
     "vector-field": "Beard and McLain's vector field on the fly-by path",
 }
 

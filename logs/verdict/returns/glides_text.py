@@ -8,7 +8,7 @@ from logs.verdict.returns.judge_glides import MARGIN, REACHES, Glide, GlideRange
 _NOT_JUDGED_TEXTS: dict[NotJudged, str] = {
     "terrain": "there is no elevation file",
     "trim": "the model has no trim with the throttle closed",
-    "far": "the way is too long for a map of what lies around it",
+    "far": "the route is too long for a map of its surroundings",
 }
 _COUNT_TEXTS: dict[Reach, str] = {
     "home": "home can be reached from {count}",

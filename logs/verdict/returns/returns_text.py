@@ -47,12 +47,12 @@ _ACTION_TEXTS = {
     "return": "returns",
     "land": "lands by its landing sequence",
     "autoland": "lands in mode AUTOLAND, otherwise returns",
-    "on": "goes on with its mission",
+    "on": "continues its mission",
     "circle": "circles where it is",
-    "glide": "glides straight on without its motor, which is no return",
+    "glide": "glides straight ahead without its motor, which is not a return",
     "parachute": "releases its parachute",
     "terminate": "ends its flight there",
-    "level": "flies level straight on, which is no return",
+    "level": "flies straight and level, which is not a return",
     "guided": "circles at the fence's return point",
     "landed": "has landed",
     "never": "set, but no threshold triggers it",
@@ -174,7 +174,7 @@ def causes_text(causes: tuple[Cause, ...]) -> list[str]:
     >>> for line in causes_text(failsafe_causes(made, has_fence=False)):
     ...     print(line)
     it returns: the pilot's RTL, the mission's end, RC lost (FS_LONG_ACTN 1), station lost (FS_LONG_ACTN 1)
-    it does not: battery low (BATT_FS_LOW_ACT 0), battery critical (BATT_FS_CRT_ACT 0): goes on with its mission
+    it does not: battery low (BATT_FS_LOW_ACT 0), battery critical (BATT_FS_CRT_ACT 0): continues its mission
     """
 
     def stated(cause: Cause) -> str:

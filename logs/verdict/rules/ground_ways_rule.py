@@ -220,7 +220,7 @@ def _find_obstacles(requirements: RouteRequirements, way: Way) -> _Obstacles:
 
 def _air_start_finding(place: Place, met: _Obstacles) -> Finding:
     """Judge the direct climb from home to the first waypoint, not simulated, of a mission that starts in the air."""
-    subject = f"the way up from home to {_item_text(place)}"
+    subject = f"the climb from home to {_item_text(place)}"
     if math.isnan(met.clearance) and not met.entered:
         reason, check, ok = f"the ground below {subject} is not known", "", None
     elif met.free:

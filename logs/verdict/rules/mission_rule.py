@@ -161,7 +161,7 @@ def _unflown_findings(setup: FlightSetup) -> Iterator[Finding]:
     left = [(one.item, one.text) for one in setup.route.open_items]
     if not setup.autopilot.follows_ground:
         held = sorted(set(setup.route.items[np.isfinite(setup.route.above_ground)].tolist()))
-        why = f"its height above terrain is not followed along the leg by {setup.autopilot.title} as it is flown here"
+        why = f"the simulated {setup.autopilot.title} does not follow its height above terrain along the leg"
         left += [(seq, why) for seq in held]
     if setup.scenario.returns is not None:
         # Returns from anywhere on the route are judged only to the mission's home.
@@ -292,7 +292,7 @@ def _check_approach(mission: Mission, origin: GeoOrigin, limits: MissionChecks) 
 def _check_required_ends(mission: Mission, limits: MissionChecks, refuses: bool) -> Iterator[_Remark]:
     lack = missing_ends_text(mission, limits)
     if not lack:
-        yield True, None, "takeoff and landing are as MIS_TKO_LAND_REQ asks for them"
+        yield True, None, "takeoff and landing are as MIS_TKO_LAND_REQ requires"
     elif limits.stated:
         yield REFUSED, None, lack
     else:

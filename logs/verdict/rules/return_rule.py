@@ -95,7 +95,7 @@ def _requirement_findings(requirements: RouteRequirements, starts: Callable[[flo
     # Failures come first, then what is not known.
     found.sort(key=lambda one: (one.ok is not False, one.ok is not None))
     reason, method = "; ".join(one.reason for one in found), "; ".join(one.method for one in found)
-    method = f"from every {every:.0f} s of the way, {method}"
+    method = f"one return every {every:.0f} s of the route, {method}"
     # A verdict that requires them is undecided without them.
     faults, check = ([Message(reason, _NOT_KNOWN)], UNKNOWN_RETURN) if ok is None else ([], "")
     return [
@@ -193,7 +193,7 @@ def _finding(requirements: RouteRequirements, ok: bool | None, outcome: str) -> 
             ok=ok,
             reason=reason,
             faults=faults,
-            method="the autopilot's own way back",
+            method="the autopilot's own return path",
             check=UNKNOWN_RETURN if faults else "",
         )
     ]

@@ -101,8 +101,8 @@ def overlap_text(measure: OverlapMeasure, check: str) -> str:
         where = f"lines {one + 1} and {other + 1}: {measure.between:.0f} m apart, {measure.heights:.0f} m above ground"
     if share is None:
         return ""
-    text = f"{check} {100.0 * share:.0f} % at the least ({where})"
-    return text if specified is None else f"{text}, {100.0 * specified:.0f} % asked for"
+    text = f"{check} {100.0 * share:.0f} % at the lowest ({where})"
+    return text if specified is None else f"{text}, {100.0 * specified:.0f} % required"
 
 
 def _tight_turnaround_findings(requirements: RouteRequirements, survey: Survey) -> list[Finding]:
@@ -127,7 +127,7 @@ def _tight_turnaround_findings(requirements: RouteRequirements, survey: Survey) 
                 f"{ends.get(number, f'turn-around {number}')} is too tight to be flown as drawn, and within"
                 f" {reach:.0f} m of it {'; '.join(found)}: only a flight tells"
             )
-            place, method = requirements.leg(first), "what lies around it"
+            place, method = requirements.leg(first), "its surroundings"
             out.append(make_finding("survey", place, ok=None, reason=reason, check=UNKNOWN_WAY, method=method))
     return out
 

@@ -215,7 +215,7 @@ def _detect_faults(approach: Approach, landing: _Landing) -> list[Message]:
         faults.append(message(brief, ": the aircraft meets it before it flares"))
     if abs(touch[0]) > inside:
         where = "before" if touch[0] < 0.0 else "beyond"
-        brief = f"touches down {abs(touch[0]):.0f} m {where} the strip's middle"
+        brief = f"touches down {abs(touch[0]):.0f} m {where} the strip's center"
         faults.append(message(brief, f"; {max(0.0, half - TOUCHDOWN_ERROR_M):.0f} m are allowed on this strip"))
     if stop[0] > inside:
         brief = f"comes to rest {half - stop[0]:.0f} m before the strip's end"
@@ -224,7 +224,7 @@ def _detect_faults(approach: Approach, landing: _Landing) -> list[Message]:
         faults.append(message(brief, f"; {TOUCHDOWN_ERROR_M:.0f} m must be left"))
     aside = max(abs(touch[1]), abs(stop[1]))
     if aside > side:
-        faults.append(message(f"{aside:.0f} m beside the strip's middle", f"; it is {2.0 * side:.0f} m wide"))
+        faults.append(message(f"{aside:.0f} m off the strip's center line", f"; it is {2.0 * side:.0f} m wide"))
     return faults
 
 

@@ -132,7 +132,7 @@ def _fly_over_notes(requirements: RouteRequirements, i: int, turn: float) -> lis
     lateral = radius * (1.0 - math.cos(turn))
     return [
         f"flown over, because its arc would pass at {offset:.0f} m and its acceptance is {acceptance:.0f} m;"
-        f" that leads up to {lateral:.0f} m beside the next leg"
+        f" that leads up to {lateral:.0f} m off the next leg"
     ]
 
 

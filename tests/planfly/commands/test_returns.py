@@ -150,7 +150,7 @@ def test_by_px4s_law_returns_are_not_judged(hill: Path, capsys: pytest.CaptureFi
     [
         (["none.waypoints"], "none.waypoints"),
         (["hill.waypoints", "--flight", "2"], "only with an imported log"),
-        (["homeless.plan"], "home: none is stated"),
+        (["homeless.plan"], "home: not stated"),
     ],
 )
 def test_bad_input_is_one_line(hill: Path, words: list[str], said: str, capsys: pytest.CaptureFixture[str]) -> None:

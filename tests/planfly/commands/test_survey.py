@@ -100,7 +100,9 @@ def test_a_parameter_that_would_help_is_written_beside_ones_own(
 
 @pytest.mark.parametrize("camera", [(23.5, 15.6), (23.5, 0.0, 16.0), "23.5x15.6,16", (1.0, 1.0, 1.0, 70.0, 100.0), 5])
 def test_a_camera_that_is_none_is_one_line(camera: Any) -> None:
-    with pytest.raises(planfly.PlanflyError, match="the sensor across the way and along it and the focal length, mm"):
+    with pytest.raises(
+        planfly.PlanflyError, match="the sensor's size across and along the track and the focal length, mm"
+    ):
         planfly.survey(FIELD_SURVEY, camera=camera)
 
 

@@ -149,7 +149,7 @@ def test_nobody_there_is_one_line(here: Path, capsys: pytest.CaptureFixture[str]
         ({"length": 0}, "Content-Length: 0: expected 1 to 536,870,912 bytes"),
         ({"length": 10**9}, "Content-Length: 1,000,000,000: expected 1 to 536,870,912 bytes"),
         ({"length": 10**20}, "Content-Length: 100,000,000,000,000,000,000: 1 to"),
-        ({"garbage": True}, "what the server gives is no GeoTIFF that can be read"),
+        ({"garbage": True}, "the server's answer is not a readable GeoTIFF"),
         ({"moved": ("N46", "N47")}, "another place: expected the degree from 46 N 8 E on"),
         ({"odd": True}, "cannot be fetched: the server answers with 'bytes 1-"),
         ({"status": 404}, "no tile of the area is there: open sea, or not such a server"),
@@ -198,9 +198,9 @@ def test_where_no_tile_is_has_no_data_unless_it_is_sea(here: Path, capsys: pytes
     with serving(here / "coast") as server:
         assert main(["terrain", *AREA, "--source", server.url, "--out", "open.tif", "--json", "a.json"]) == 0
         said = capsys.readouterr().err
-        assert "no tile at 46 9, 47 9 (south-west corners, degrees): open sea, or not published (--sea takes" in said
+        assert "no tile at 46 9, 47 9 (south-west corners, degrees): open sea, or not published (--sea treats" in said
         assert main(["terrain", *AREA, "--source", server.url, "--sea", "--out", "sea.tif"]) == 0
-        assert "46 9, 47 9 (south-west corners, degrees): taken for sea, at 0 m" in capsys.readouterr().err
+        assert "46 9, 47 9 (south-west corners, degrees): treated as sea, at 0 m" in capsys.readouterr().err
     for name, value in (("open.tif", -32768.0), ("sea.tif", 0.0)):
         heights, lat, lon = seen(here / name)
         west = lon < 9.0 - 0.5 / ROWS

@@ -79,9 +79,7 @@ def test_limits_the_wrong_way_round_are_swapped_and_said(tmp_path: Path) -> None
     assert (swapped.floor_amsl_m, swapped.ceiling_amsl_m) == pytest.approx((1700 * 0.3048, 19500 * 0.3048 + 400))
     assert (low.floor_agl_m, low.ceiling_agl_m) == (300.0, 1000.0)
     assert (hill.floor_amsl_m, hill.ceiling_agl_m) == (500.0, 300.0)
-    assert found.notes == [
-        "z.openair: lower and upper limits that stand the wrong way round are swapped: R9B (P), LOW (D)"
-    ]
+    assert found.notes == ["z.openair: lower and upper limits in the wrong order are swapped: R9B (P), LOW (D)"]
 
 
 @pytest.mark.parametrize(
@@ -103,7 +101,7 @@ def test_limits_that_leave_no_height_lose_the_upper_one(
     (zone,) = found.zones
     assert (zone.floor_agl_m, zone.ceiling_agl_m) == (None, None)
     assert (zone.floor_amsl_m, zone.ceiling_amsl_m) == pytest.approx(wanted)
-    said = "z.openair: upper limits of 0, or equal to the lower one, are taken for none: no ceiling: R1 (P)"
+    said = "z.openair: upper limits of 0, or equal to the lower one, mean no ceiling: R1 (P)"
     assert found.notes == [said]
 
 
@@ -279,7 +277,7 @@ def test_what_a_file_does_not_hold_as_it_stands_is_said(tmp_path: Path) -> None:
     found = read_zone_file(path, "zones.txt")
     assert found.notes == [
         "zones.txt: 2 zones keep nobody out: class G, open to all",
-        "zones.txt: outlines that cross themselves are taken as the area they enclose: ZÜRICH (R)",
+        "zones.txt: an outline that crosses itself is taken as the area it encloses: ZÜRICH (R)",
     ]
     (zone,) = found.zones
     # Each of the bow's corners, grown by a tenth of a metre, and its middle with a way through.

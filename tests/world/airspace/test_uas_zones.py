@@ -242,7 +242,7 @@ def test_limits_the_wrong_way_round_are_swapped_and_said(tmp_path: Path) -> None
         {"floor_agl_m": 50.0, "ceiling_agl_m": 120.0},
         {"floor_agl_m": 10.0, "ceiling_agl_m": 120.0},
     ]
-    assert found.notes == ["z.json: lower and upper limits that stand the wrong way round are swapped: lake 1/2"]
+    assert found.notes == ["z.json: lower and upper limits in the wrong order are swapped: lake 1/2"]
 
 
 @pytest.mark.parametrize(
@@ -261,7 +261,7 @@ def test_limits_that_leave_no_height_lose_the_upper_one(
     low: float, high: float, datum: str, wanted: dict[str, float], tmp_path: Path
 ) -> None:
     references = {"lowerVerticalReference": datum, "upperVerticalReference": datum}
-    said = ["z.json: upper limits of 0, or equal to the lower one, are taken for none: no ceiling: lake"]
+    said = ["z.json: upper limits of 0, or equal to the lower one, mean no ceiling: lake"]
     for data in (
         ed269(volume(low=low, high=high, **references)),
         ed318(POLYGON | {"layer": layer(low, high, datum)}),
@@ -307,7 +307,7 @@ def test_a_second_ring_that_is_no_hole_is_a_part_of_the_area(case: str, tmp_path
     for ring in zone.rings_deg or []:
         made = made.symmetric_difference(shapely.Polygon(ring))
     assert made.area == pytest.approx(area, rel=1e-3)
-    assert found.notes == ["z.json: outlines that cross themselves are taken as the area they enclose: lake"]
+    assert found.notes == ["z.json: an outline that crosses itself is taken as the area it encloses: lake"]
 
 
 def test_holes_of_a_mended_outline_stay_holes_and_islands_in_them_stay_land(tmp_path: Path) -> None:

@@ -127,8 +127,8 @@ DEEP = "[" * 200_000
 GEOJSON_FAULTS: dict[str, tuple[Any, str]] = {
     "not JSON": ("{", "not valid JSON"),
     "brackets without end": (DEEP, "not valid JSON"),
-    "NaN": (json.dumps(feature("Polygon", [[[8.0, float("nan")], *RING]])), "NaN is no number of JSON"),
-    "infinity": (json.dumps(feature("Point", [8.0, float("inf")], radius_m=9)), "Infinity is no number"),
+    "NaN": (json.dumps(feature("Polygon", [[[8.0, float("nan")], *RING]])), "NaN is not a JSON number"),
+    "infinity": (json.dumps(feature("Point", [8.0, float("inf")], radius_m=9)), "Infinity is not a JSON number"),
     "a list": ("[]", "expected a GeoJSON object, got list"),
     "no features": ('{"type": "FeatureCollection"}', "features: expected a list"),
     "a feature that is none": ('{"type": "FeatureCollection", "features": [5]}', "features[0]: expected a Feature"),
@@ -338,8 +338,8 @@ BAD_FILES = {
     "missing.geojson": (None, "no such file"),
     "zones.kmz": (b"PK", "suffix '.kmz': a file of zones is .geojson, .json, .kml, .openair, .txt or .gpkg"),
     "empty.geojson": (b"", "not valid JSON"),
-    "none.geojson": (b'{"type": "FeatureCollection", "features": []}', "there is no zone in it"),
-    "none.kml": (b"<kml/>", "there is no zone in it"),
+    "none.geojson": (b'{"type": "FeatureCollection", "features": []}', "contains no zone"),
+    "none.kml": (b"<kml/>", "contains no zone"),
     "latin.geojson": (b'{"type": "\xe9"}', "not a text file in UTF-8 (byte 10)"),
     "large.kml": (b" " * (MAX_BYTES + 1), "67,108,865 bytes: a file of zones has at most 67,108,864"),
     "pole.geojson": (

@@ -80,7 +80,7 @@ def test_the_way_to_the_first_waypoint_is_left_open_where_a_wall_stands_in_it() 
     into_it, verdict = judged("climbout", wall(1000.0, up + 2.0), *FAR)
     assert into_it.ok is None
     assert verdict.undecided
-    assert verdict.headline == "not judged in full: the way up from home to item 1 meets the ground"
+    assert verdict.headline == "not judged in full: the climb from home to item 1 meets the ground"
     assert into_it.reason.endswith("2 m into it 1000 m from home, at the steepest climb")
 
 
@@ -183,7 +183,7 @@ def test_a_zone_in_the_way_up_counts_as_ground_does() -> None:
     town = Zone("town", "exclusion", Cylinder(0.0, 300.0, 100.0), ceiling=low)
     assert zoned(town, *TAKEOFF).ok is False
     assert zoned(town, *FAR).ok is None
-    assert "the way up from home to item 1 enters town (exclusion)" in zoned(town, *FAR).reason
+    assert "the climb from home to item 1 enters town (exclusion)" in zoned(town, *FAR).reason
     # Below the climb, beside it, or around home: nothing.
     for free in (
         replace(town, ceiling=ZoneLevel(100.0 + 0.7 * 180.0 * climb(), "amsl")),
