@@ -183,11 +183,11 @@ class AutopilotProgram(DocumentConfig):
     version: str
     """The version that the program states."""
     sha256: str
-    """Of its file."""
+    """SHA-256 of its file."""
     parameters: Mapping[str, float]
-    """Values that the program was given over its own defaults, as it had them."""
+    """Values that replaced the program's own defaults, as the program stored them."""
     changed: Mapping[str, float]
-    """Those of the parameters for which a person's file states another value than the aircraft's."""
+    """Parameters for which the user's file states a different value from the aircraft's."""
     unused: tuple[str, ...] = ()
     """Names in the person's file that the program does not know, or that belong to other hardware."""
 

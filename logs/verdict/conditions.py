@@ -38,31 +38,31 @@ class Conditions(DocumentConfig):
     """Conditions of a verdict or a plan; fields that the log of an imported flight does not state are None."""
 
     aircraft: str
-    """Its name or folder; empty for an imported flight whose aircraft nobody named."""
+    """Name or folder of the aircraft; empty for an imported flight without a named aircraft."""
     mass_kg: float | None
     aircraft_named: bool
     """True if the aircraft was named; if not, it is the default."""
     airspeed_mps: float
-    """Until the mission sets another."""
+    """Airspeed until the mission sets another."""
     airspeed_kind: Literal["true", "equivalent"]
     """true or equivalent."""
     airspeed_source: AirspeedSource
     """scenario (or an option), parameters, aircraft (its cruise speed) or flight (as it was flown)."""
     wind_mps: float | None
     wind_from_deg: float | None
-    """Both null where the wind is what is asked for."""
+    """Both fields of the wind are null if the wind is the result."""
     turbulence: Turbulence | None
-    """null where it was not simulated, as navigation."""
+    """Null if not simulated, like navigation."""
     navigation: Navigation | None
     """perfect, rtk or gnss."""
     autopilot: str
-    """With the settings that decide most."""
+    """Autopilot, with its most important settings."""
     autopilot_version: str
-    """Empty for planfly's own guidance, and where a log's program states it."""
+    """Version of the autopilot; empty for planfly's own guidance, and if the program of a log states it."""
     terrain: str | None
     height_datum: str | None
     zones: int = 0
-    """Of airspace that it is judged by: the scenario's and the mission's fence's."""
+    """Number of zones of the scenario and of the mission's fence."""
 
 
 def conditions_of(scenario: Scenario, aircraft: str, airspeed: float, autopilot: Autopilot) -> Conditions:

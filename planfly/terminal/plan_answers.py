@@ -34,12 +34,12 @@ class PlanAnswer:
     problems: list[str]
     """Reasons why the plan is not feasible."""
     conditions: Conditions
-    """Conditions that the plan was made for."""
+    """Conditions for which the plan was made."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
 class FrontEntry:
-    """One plan of a front, and the criteria it is compared by."""
+    """One plan of a front, and the criteria of its comparison."""
 
     file: str
     length_m: float
