@@ -279,7 +279,7 @@ def hold(path: Path) -> Iterator[None]:
     handle = os.open(lock_file, os.O_RDONLY if file_locks.LOCKS_FOLDERS else os.O_RDWR | os.O_CREAT)
     try:
         if not file_locks.lock_now(handle):
-            raise PlanflyError(f"{path}: another planfly is writing there; name another target", file=path)
+            raise PlanflyError(f"{path}: another planfly process is writing there; name another target", file=path)
         yield
     finally:
         os.close(handle)

@@ -106,7 +106,7 @@ class RemoteFile:
             if answer.status == 200:
                 # A server without range requests sends the whole file; so does a server whose file has changed.
                 if _length(answer) != self.size or _version(answer) != self.version:
-                    raise _IncompleteAnswer("it has changed since it was begun: try again")
+                    raise _IncompleteAnswer("it has changed since the fetch began: try again")
                 begin, end = 0, self.size
             elif answer.headers.get("Content-Range") != f"bytes {begin}-{end - 1}/{self.size}":
                 raise _IncompleteAnswer(f"the server answers with {answer.headers.get('Content-Range')!r}")

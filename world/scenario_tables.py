@@ -535,7 +535,9 @@ class LaunchTable(ScenarioTable):
     @model_validator(mode="after")
     def _pushed(self) -> "LaunchTable":
         if self.method == "runway" and self.speed_mps is not None:
-            raise ValueError(f"speed_mps: {self.speed_mps:g}: not of a runway, where the aircraft's own motor pulls")
+            raise ValueError(
+                f"speed_mps: {self.speed_mps:g}: not allowed for a runway, where the aircraft's own motor pulls"
+            )
         if self.method == "runway" and (self.incline_deg or 0.0) > STEEPEST_RUNWAY:
             raise ValueError(f"incline_deg: {self.incline_deg:g}: allowed 0..{STEEPEST_RUNWAY:g} of a runway")
         return self

@@ -379,7 +379,7 @@ class _Heights:
         """
         if math.isnan(stop.alt):
             if math.isnan(last):
-                message = f"{self.source}: {_stop_name(stop)}: no altitude, and none before to keep"
+                message = f"{self.source}: {_stop_name(stop)}: no altitude, and no earlier item has one to keep"
                 raise MissionError(message, file=self.source, field="altitude")
             return last
         if stop.frame in AMSL:

@@ -174,10 +174,10 @@ def _landing_ground(mission: Mission, route: Route, scenario: Scenario) -> Itera
     length = LandingStrip(0.0, 0.0).length
     if not any(math.isnan(one) for one in slopes):
         along, across = (_slope_text(one) for one in slopes)
-        ground = f"over {length:.0f} m about its point the ground {along} along it, and {across} to the right"
+        ground = f"over {length:.0f} m around its point the ground {along} along it, and {across} to the right"
         if along == across == _LEVEL_TEXT:
-            ground = f"over {length:.0f} m about its point the ground {_LEVEL_TEXT}"
+            ground = f"over {length:.0f} m around its point the ground {_LEVEL_TEXT}"
         if max(abs(one) for one in slopes) > STEEPEST_STRIP:
             ground += f" ({STEEPEST_STRIP:.0%} is the limit for a plan's landing)"
-    unknown = "no [landing] states its strip: touch-down and way to rest are not judged"
+    unknown = "no [landing] states its strip, so touch-down and roll-out are not judged"
     yield f"item {last}: lands on {round(math.degrees(course)) % 360}°{wind}; {ground}; {unknown}"

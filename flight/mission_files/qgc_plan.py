@@ -74,10 +74,10 @@ def expand_items(items: list[Any], source: str, warnings: list[str], plans: list
             made = _landing_items(item, source, place, _last_number(out) + 1)
         else:
             known = f"only SimpleItem, {', '.join(_TRANSECT_KINDS)} and {_LANDING_KIND} are read"
-            allowed = f"{known}; have the ground station turn it into items first"
+            allowed = f"{known}; convert it to items in the ground station first"
             shown = f"{json.dumps(kind)[:40]} {name!r}"
             raise MissionError.at(source, f"{place}.type", name or kind, allowed, shown=shown)
-        warnings.append(f"{source}: {place}: {name} taken as the {len(made)} simple items that it stands for")
+        warnings.append(f"{source}: {place}: {name} replaced by the {len(made)} simple items that it stands for")
         out += made
     return out
 
@@ -97,7 +97,9 @@ def _to_present_form(item: Any, place: str, warnings: list[str]) -> Any:
     height = item.get("Altitude")
     known = isinstance(height, int | float) and not isinstance(height, bool)
     if len(params) == 7 and params[6] is None and item.get("AltitudeMode") == _ALTITUDE_ABOVE_TERRAIN_MODE and known:
-        warnings.append(f"{place}: its height is not calculated yet: taken as {height:g} m above the terrain there")
+        warnings.append(
+            f"{place}: its height is not calculated yet and is taken as {height:g} m above the terrain there"
+        )
         return {**item, "frame": int(Frame.GLOBAL_TERRAIN_ALT), "params": [*params[:6], height]}
     return item
 

@@ -208,7 +208,7 @@ def _collect_warnings(rows: list[_Row], home: Home | None, body: list[_Row]) -> 
         # A fence or rally file may have a home line, as Mission Planner writes it, or none, as MAVProxy does.
         return found
     if not any(row.current for row in rows):
-        found.append("no current item: flown from the first")
+        found.append("no current item: flown from the first item")
     first = rows[0].item
     if len(body) == len(rows):
         found.append(
@@ -225,7 +225,7 @@ def _collect_warnings(rows: list[_Row], home: Home | None, body: list[_Row]) -> 
             found.append(f"{rows[0].where}: home at 0, 0, which is not a position: left out; the mission has no home")
         elif first.frame not in (Frame.GLOBAL, Frame.GLOBAL_INT):
             found.append(f"{rows[0].where}: home in frame {first.frame}: its height is taken as above mean sea level")
-    counted = "items are counted by their lines, as ground stations do, and jumps go by that count"
+    counted = "items are numbered by their lines, as in ground stations, and jumps use these numbers"
     steps = [(after, after.item.seq - before.item.seq) for before, after in pairwise(rows)]
     gaps, falls = [row for row, by in steps if by > 1], [row for row, by in steps if by < 1]
     if gaps:

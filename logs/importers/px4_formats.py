@@ -49,7 +49,7 @@ class MessageFormats:
         self._total += self.fields(name)
         if self._total > MAX_FIELDS:
             words = f"the formats of its messages have more than {MAX_FIELDS:,} fields"
-            raise LogError(f"{self._source}: not a PX4 log that can be read: {words}", file=self._source)
+            raise LogError(f"{self._source}: not a readable PX4 log: {words}", file=self._source)
 
     def fields(self, name: str) -> int:
         """Return the number of fields of a format, including nested ones; more than `MAX_FIELDS` if recursive."""

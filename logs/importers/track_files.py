@@ -68,7 +68,7 @@ def _bytes_of(path: Path) -> bytes:
     # bzip2 raises OSError for bytes that it cannot unpack.
     except (zipfile.BadZipFile, zlib.error, lzma.LZMAError, RuntimeError, EOFError, OSError) as error:
         why = " ".join(str(error).split())[:120]
-        raise LogError(f"{path}: a zipped file that cannot be read: {why}", file=path) from error
+        raise LogError(f"{path}: an unreadable zipped file: {why}", file=path) from error
     if len(data) > MAX_BYTES:
         message = f"{path}: more than {MAX_BYTES:,} bytes unpacked: at most as many are read of a track"
         raise LogError(message, file=path)
@@ -94,9 +94,7 @@ def read_gpx(path: Path) -> RawLog:
     try:
         found = gpxpy.parse(text)
     except (gpxpy.gpx.GPXException, ValueError) as error:
-        raise LogError(
-            f"{path}: not a GPX file that can be read: {' '.join(str(error).split())[:120]}", file=path
-        ) from error
+        raise LogError(f"{path}: not a readable GPX file: {' '.join(str(error).split())[:120]}", file=path) from error
     points = [point for track in found.tracks for segment in track.segments for point in segment.points]
     timed = [point for point in points if point.time is not None]
     if len(timed) < 2:
@@ -279,9 +277,7 @@ def read_kml(path: Path) -> RawLog:
     try:
         root = ElementTree.fromstring(track_text(path, xml=True))
     except (ElementTree.ParseError, ValueError) as error:
-        raise LogError(
-            f"{path}: not a KML file that can be read: {' '.join(str(error).split())[:120]}", file=path
-        ) from error
+        raise LogError(f"{path}: not a readable KML file: {' '.join(str(error).split())[:120]}", file=path) from error
     rows, unreadable, mode = [], 0, "clampToGround"
     for track in root.iter():
         if _name(track) != "Track":

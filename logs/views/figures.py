@@ -189,8 +189,9 @@ FIGURES = (
             "of the distance from the legs."
         ),
         caption=_text(
-            "Bar: planned. Dot: flown. Dash: the limit, the tighter of scenario's and aircraft's, and of a waypoint "
-            "what counts as reached. Ringed: fails."
+            "Bar: planned. Dot: flown. Dash: limit (the tighter of the scenario's and the aircraft's; for a "
+            "waypoint the "
+            "distance that counts as reached). Ringed: fails."
         ),
     ),
     FigureEntry(

@@ -147,7 +147,7 @@ def _source_path(source: FlightLog | FlownMission | Plan | str | Path, place: co
         return Path(source.source)
     if isinstance(source, FlownMission):
         if source.log is None:
-            raise PlanflyError("export: a flight without a log: fly(..., log=FILE) writes one", field="source")
+            raise PlanflyError("export: the flight has no log; fly(..., log=FILE) writes one", field="source")
         return source.log
     return Path(source)
 

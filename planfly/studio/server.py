@@ -309,7 +309,7 @@ class Server:
                 answer = {"name": saved.name, "losses": list(saved.losses), "where": where, "data": content}
                 page.send({"kind": "saved", "unsaved": session.is_unsaved, **answer})
             case messages.Hello():
-                raise ValueError("a page says its token once")
+                raise ValueError("a page must send its token only once")
             case _:
                 await self._change(message)
 
@@ -418,7 +418,7 @@ async def _receive_text(socket: WebSocket) -> str:
         raise WebSocketDisconnect(received.get("code", 1000))
     text = received.get("text")
     if text is None:
-        raise ValueError("expected a message in text")
+        raise ValueError("expected a text message")
     return str(text)
 
 

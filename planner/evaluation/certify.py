@@ -95,7 +95,7 @@ def _leg_length_margin(data: ProblemArrays, waypoints: Floats, problems: list[st
     """
     problems += _worst_and_others(
         [
-            (run, f"leg {i}", f"{run:.1f} m long, at least {CERTIFIED_LEG:g} m are wanted")
+            (run, f"leg {i}", f"{run:.1f} m long, at least {CERTIFIED_LEG:g} m are required")
             for i, run in enumerate(leg_runs(waypoints).tolist())
             if run < CERTIFIED_LEG
         ]
@@ -181,7 +181,7 @@ def _clearance_margin(data: ProblemArrays, waypoints: Floats, problems: list[str
         name = f"turn at waypoint {piece['number']}" if piece["of_arc"] else f"leg {piece['number']}"
         if math.isnan(margin) or not low.get(name, math.inf) <= margin:
             low[name] = margin
-    wanted = f"{data.clearance:g} m and {data.buffer:.1f} m in reserve wanted"
+    wanted = f"{data.clearance:g} m and {data.buffer:.1f} m in reserve required"
     off = [(0.0, name, "leaves the terrain that is known") for name, margin in low.items() if math.isnan(margin)]
     over = [
         (margin, name, f"{margin + data.clearance:.1f} m above ground at its lowest, {wanted}")
@@ -237,7 +237,7 @@ def _airspace_margins(problem: Problem, waypoints: Floats, problems: list[str]) 
                 if z == zone
             ]
         )
-    wanted = f"{space.max_height:g} m allowed, {space.buffer:.1f} m in reserve wanted"
+    wanted = f"{space.max_height:g} m allowed, {space.buffer:.1f} m in reserve required"
     problems += _worst_and_others(
         [
             (left, name, f"{space.max_height - left:.1f} m above ground at its highest, {wanted}")
@@ -254,5 +254,5 @@ def _zone_fault_text(problem: Problem, distance: float, z: int) -> str:
     if distance < 0.0:
         return f"{-distance:.1f} m {'inside' if zone.kind == 'exclusion' else 'outside'} {zone.name}"
     where = "from" if zone.kind == "exclusion" else "inside the edge of"
-    wanted = f"{required['horizontal']:g} m or {required['vertical']:g} m in height wanted"
+    wanted = f"{required['horizontal']:g} m or {required['vertical']:g} m in height required"
     return f"{distance:.1f} m {where} {zone.name}, {wanted}"

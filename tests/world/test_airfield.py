@@ -148,7 +148,7 @@ CASES = {
     ),
     "a runway that pushes": (
         HOME + '[launch]\nmethod = "runway"\nspeed_mps = 20',
-        "launch: speed_mps: 20: not of a runway, where the aircraft's own motor pulls",
+        "launch: speed_mps: 20: not allowed for a runway, where the aircraft's own motor pulls",
     ),
     "no rail": (HOME + '[launch]\nmethod = "catapult"\nlength_m = 0', "launch.length_m: 0: allowed 0.1..3000"),
     "a steep launch": (HOME + '[launch]\nmethod = "hand"\nincline_deg = 46', "launch.incline_deg: 46: allowed 0..45"),

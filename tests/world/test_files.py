@@ -225,7 +225,7 @@ def on_windows(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_a_target_is_kept_to_one_process_where_there_is_no_flock(tmp_path: Path) -> None:
     (tmp_path / "a.mcap").touch()
     for target in (tmp_path / "a.mcap", tmp_path):
-        with hold(target), pytest.raises(PlanflyError, match="another planfly is writing there"), hold(target):
+        with hold(target), pytest.raises(PlanflyError, match="another planfly process is writing there"), hold(target):
             pass
         with hold(target):
             # It stays open to others, who would read it.

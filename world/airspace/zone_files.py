@@ -233,7 +233,7 @@ def _ceiling(polygon: _Element, ups: list[float], source: str) -> tuple[str, flo
         message = f"{source}: altitudeMode {mode[:40]!r}: {allowed}"
         raise ScenarioError(message, file=source, field="altitudeMode", value=mode, allowed=allowed)
     if _kml_text(polygon, "extrude") not in ("1", "true"):
-        message = f"{source}: altitudeMode {mode} without extrude: a sheet in the air holds no airspace"
+        message = f"{source}: altitudeMode {mode} without extrude: a sheet in the air contains no airspace"
         raise ScenarioError(message, file=source, field="altitudeMode", value=mode)
     if not ups or max(ups) - min(ups) > _LEVEL_TOLERANCE_M:
         raise ScenarioError(f"{source}: its corners have different heights: a zone has a level ceiling", file=source)

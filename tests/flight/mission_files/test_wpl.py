@@ -103,8 +103,8 @@ def test_items_whose_seq_jumps_are_counted_as_pymavlink_counts_them(tmp_path: Pa
     assert [stop.item for stop in make_itinerary(mission).stops] == [1, 2, 2, 4]
     (said,) = mission.warnings
     assert said == (
-        "a.waypoints:3: a gap in seq before 3 (4 in all): items are counted by their lines, as ground stations do, and"
-        " jumps go by that count"
+        "a.waypoints:3: a gap in seq before 3 (4 in all): items are numbered by their lines, as in ground stations, and"
+        " jumps use these numbers"
     )
 
 
@@ -120,8 +120,8 @@ def test_items_whose_seq_does_not_rise_are_counted_as_pymavlink_counts_them(tmp_
     ]
     assert [stop.item for stop in make_itinerary(mission).stops] == [1, 2, 2, 4]
     assert [said for said in mission.warnings if "rise" in said] == [
-        "a.waypoints:4: seq 3 does not rise (2 in all): items are counted by their lines, as ground stations do, and"
-        " jumps go by that count"
+        "a.waypoints:4: seq 3 does not rise (2 in all): items are numbered by their lines, as in ground stations, and"
+        " jumps use these numbers"
     ]
 
 

@@ -252,7 +252,7 @@ KML_FAULTS = {
     "a point alone": (document(placemark("<Point><coordinates>8,46</coordinates></Point>")), "expected a Polygon"),
     "a sheet in the air": (
         document(placemark(polygon(mode=ABSOLUTE, up=300.0))),
-        "altitudeMode absolute without extrude: a sheet in the air holds no airspace",
+        "altitudeMode absolute without extrude: a sheet in the air contains no airspace",
     ),
     "a sloping roof": (
         document(placemark(f"<Polygon><extrude>1</extrude>{ABSOLUTE}{ring(up=300.0, last=301.0)}</Polygon>")),
