@@ -97,7 +97,7 @@ def test_who_flew_is_said_with_the_parameters_that_decide_most() -> None:
     assert any("with the parameters of mine.parm (WP_RADIUS 50 m" in line for line in lines)
     known = len(mine.values) - 1
     assert (
-        f"Parameters: 1 of the file, 0 of the aircraft, {known} ArduPlane's defaults;"
+        f"Parameters: 1 from the file, 0 from the aircraft, {known} from ArduPlane's defaults;"
         " not used: FOO0, FOO1, FOO2, FOO3, +2 more"
     ) in lines
     returns = ArduPilotParameters.of_text("RTL_AUTOLAND 1\nTERRAIN_FOLLOW 1\n", "mine.parm")

@@ -196,7 +196,7 @@ def test_arduplane_flies_the_cessna_at_equivalent_airspeeds() -> None:
 @pytest.mark.usefixtures("undrawn")
 def test_a_new_folder_flies_as_the_aircraft_that_it_was_made_from(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["aircraft", "--new", "./mine", "--from", "aerosonde"]) == 0
-    assert "next      planfly aircraft ./mine" in capsys.readouterr().out
+    assert "next      `planfly aircraft ./mine` shows it" in capsys.readouterr().out
     assert main(["aircraft", "./mine"]) == 0
     shown = capsys.readouterr()
     assert "mass     11 kg" in shown.out

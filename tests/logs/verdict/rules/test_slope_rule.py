@@ -290,7 +290,7 @@ def test_the_deviation_that_is_told_is_the_aircrafts() -> None:
     setup = make_setup([[e, n, u + 400] for e, n, u in hill(10.0)], table=unsure(climb_sd=9.0))
     item = of(judge_geometry(setup), "slope", leg(1))
     assert item.ok is None
-    assert "13.7° give or take 9.0°" in item.reason
+    assert "13.7°, give or take 9.0°" in item.reason
 
 
 def test_a_glide_would_tell_of_a_descent() -> None:
