@@ -34,16 +34,15 @@ def survey_options(line: LineParser) -> None:
         metavar="WxH,FOCAL",
         type=camera,
         help="the camera, which looks straight down: size of its sensor across and along the track, and focal "
-        "length, mm, "
-        "as in 23.5x15.6,16; then the required overlaps, along and across, %, as in 23.5x15.6,16,75,60 "
+        "length, mm, as in 23.5x15.6,16; then the required overlaps along and across the lines, in percent, as in "
+        "23.5x15.6,16,75,60 "
         "(default: those of a .plan)",
     )
     group.add_argument(
         "--suggest",
         action="store_true",
         help="look for turn-arounds, an order or a course of the lines, a parameter or an airspeed that makes "
-        "all lines "
-        "be used: each is flown",
+        "all lines usable; each is flown",
     )
     world_options(parser)
     flown_by_options(parser)

@@ -72,9 +72,8 @@ def json_option(group: OptionTaker, command: str) -> None:
     group.add_argument(
         "--json",
         metavar="FILE",
-        help="also write the answer as JSON to FILE; with -, to standard output, and all other output to "
-        "standard error; "
-        f"'planfly help {command} --schema' prints its schema",
+        help="also write the answer as JSON to FILE; with -, to standard output, and all other output to standard "
+        f"error; 'planfly help {command} --schema' prints its schema",
     )
     group.add_argument(
         "--quiet", action="store_true", help="print neither progress nor results; errors and the exit code remain"
