@@ -190,8 +190,7 @@ FIGURES = (
         ),
         caption=_text(
             "Bar: planned. Dot: flown. Dash: limit (the tighter of the scenario's and the aircraft's; for a "
-            "waypoint the "
-            "distance that counts as reached). Ringed: fails."
+            "waypoint the distance that counts as reached). Ringed: fails."
         ),
     ),
     FigureEntry(
@@ -231,8 +230,7 @@ FIGURES = (
             "Lowest safe height: where a return from the flight's height is not safe, the nearest height above "
             "it from which "
             "a return is safe; elsewhere, how low the flight may come before it is not. Left over: the flight's "
-            "height less "
-            "the height that a glide needs; below zero the glide does not arrive."
+            "height less the height that a glide needs; below zero the glide does not arrive."
         ),
     ),
     FigureEntry(

@@ -74,8 +74,7 @@ def returns_options(line: LineParser) -> None:
     result_options(
         parser,
         "folder for pictures: the route coloured by the outcome of returns, the worst returns in profile,"
-        " the lowest height "
-        "from which a return is safe, and the glide's footprint (default: none)",
+        " the lowest height from which a return is safe, and the glide's footprint (default: none)",
     )
 
 
