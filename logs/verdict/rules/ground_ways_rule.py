@@ -285,15 +285,15 @@ def _free_courses_text(requirements: RouteRequirements, begin: tuple[float, floa
     courses = list(range(0, 360, _COURSE_STEP_DEG))
     free = [is_free(math.radians(course)) for course in courses]
     if not any(free):
-        return "; no launch course climbs free"
+        return "; no launch course climbs clear"
     # Begin after a course with obstacles, so that no range is cut at north.
     start = free.index(False) if False in free else 0
     turned = [(courses[k % len(courses)], free[k % len(courses)]) for k in range(start, start + len(courses))]
     ranges = [[course for course, _ in group] for is_one, group in groupby(turned, key=lambda one: one[1]) if is_one]
     widest = max(ranges, key=len)
     if len(widest) == 1:
-        return f"; launched on {widest[0]:03d}° it would climb free"
-    return f"; launched on {widest[0]:03d}° to {widest[-1]:03d}° it would climb free"
+        return f"; launched on {widest[0]:03d}° it would climb clear"
+    return f"; launched on {widest[0]:03d}° to {widest[-1]:03d}° it would climb clear"
 
 
 # ----------------------------------------------------------------------

@@ -119,7 +119,7 @@ def _uncertainty_text(requirements: RouteRequirements, leg: int) -> str:
     if abs(planned) <= max(LEVEL_SLOPE_RAD, sure) or not sure < limit < math.inf:
         return ""
     slope, known, give = (math.degrees(angle) for angle in (abs(planned), limit, off))
-    return f"{verb} {slope:.1f}°; the limit by {envelope.source} is {known:.1f}°, give or take {give:.1f}°"
+    return f"{verb} {slope:.1f}°; the limit according to {envelope.source} is {known:.1f}°, give or take {give:.1f}°"
 
 
 def _steep_arc_faults(requirements: RouteRequirements, leg: int) -> list[Message]:

@@ -173,7 +173,7 @@ def _uncertainty_text(requirements: RouteRequirements, leg: int, commanded: floa
     heights = requirements.points[leg : leg + 2, 2].tolist()
     if commanded <= min(sure.level_speeds(up)[1] for up in heights):
         return ""
-    says = f"the fastest level flight by {envelope.source} is {fastest:.1f} m/s"
+    says = f"the fastest level flight according to {envelope.source} is {fastest:.1f} m/s"
     return f"{commanded:.1f} m/s is commanded; {says}, give or take {envelope.fastest_sd:.1f} m/s"
 
 

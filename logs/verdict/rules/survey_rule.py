@@ -125,7 +125,7 @@ def _tight_turnaround_findings(requirements: RouteRequirements, survey: Survey) 
             ends = {0: "the turn onto the first line", len(ways) - 1: "the turn off the last line"}
             reason = (
                 f"{ends.get(number, f'turn-around {number}')} is too tight to be flown as drawn, and within"
-                f" {reach:.0f} m of it {'; '.join(found)}: only a flight tells"
+                f" {reach:.0f} m of it {'; '.join(found)}: only a flight tells whether it is safe"
             )
             place, method = requirements.leg(first), "its surroundings"
             out.append(make_finding("survey", place, ok=None, reason=reason, check=UNKNOWN_WAY, method=method))

@@ -130,13 +130,13 @@ def test_courses_are_named_on_which_a_launch_would_climb_free() -> None:
     # it from acos(1 / 1.03) = 13.9 degrees on.
     top = 100.0 + 1.03 * 500.0 * climb()
     assert judged("climbout", wall(500.0, top), *TAKEOFF)[0].reason.endswith(
-        "launched on 020° to 340° it would climb free"
+        "launched on 020° to 340° it would climb clear"
     )
 
     def basin(east: Floats, at: Floats) -> Floats:
         return np.where(np.hypot(east, at) > 300.0, 2000.0, 100.0)
 
-    assert judged("climbout", basin, *TAKEOFF)[0].reason.endswith("no launch course climbs free")
+    assert judged("climbout", basin, *TAKEOFF)[0].reason.endswith("no launch course climbs clear")
 
 
 def test_no_ground_stands_in_the_way_for_the_first_50_metres() -> None:

@@ -72,7 +72,7 @@ def test_a_speed_within_what_is_not_known_is_undecided(speed: float, ok: bool | 
         assert (item.ok, item.check) == (ok, "unknown aircraft" if ok is None else "")
         assert verdict.undecided is (ok is None)
         if ok is None:
-            told = "the fastest level flight by a data sheet is 32.0 m/s, give or take 2.0 m/s"
+            told = "the fastest level flight according to a data sheet is 32.0 m/s, give or take 2.0 m/s"
             assert item.reason.startswith(f"30.0 m/s is commanded; {told}")
             assert (
                 "airspeeds on 2 legs are too close to the limit to judge with what is known of the aircraft"
