@@ -140,7 +140,7 @@ WHOLE = "".join(f"PARAMETER_{k} 1\n" for k in range(400))
         ("NAV_ACC_RAD 20", GOOD, None, "or set MIS_TKO_LAND_REQ 0"),
         ("", LANDING, True, "as MIS_TKO_LAND_REQ requires"),
         ("MIS_TKO_LAND_REQ 2", GOOD, False, "MIS_TKO_LAND_REQ 2 requires a landing, but this mission has a takeoff"),
-        (WHOLE, GOOD, False, "MIS_TKO_LAND_REQ 2 asks for a landing"),
+        (WHOLE, GOOD, False, "MIS_TKO_LAND_REQ 2 requires a landing"),
         (WHOLE + "MIS_TKO_LAND_REQ 0", GOOD, True, "as MIS_TKO_LAND_REQ requires"),
         ("MIS_TKO_LAND_REQ 1", GOOD, True, ""),
         (
