@@ -146,7 +146,7 @@ def load_aircraft(name: str) -> Aircraft:
         suggestion = did_you_mean(name, names)
         # A folder must be given with a slash.
         suggestion = suggestion or (f": did you mean './{name}'?" if Path(name).is_dir() else "")
-        allowed = f"known are {', '.join(names)}, and folders, with a slash"
+        allowed = f"known names: {', '.join(names)}; a folder needs a slash"
         message = f"no aircraft called {name!r}{suggestion} ({allowed})"
         raise FlightError(message, file=name, allowed=allowed)
     return read_aircraft(_ROOT / name)
@@ -212,8 +212,8 @@ def _toml_advice(folder: Path) -> str:
     if not models:
         return ""
     return (
-        f": beside its JSBSim model ({', '.join(models[:3])}) a folder needs {folder.name}.toml;"
-        f" planfly aircraft --new FOLDER makes one with all files to begin with"
+        f": next to its JSBSim model ({', '.join(models[:3])}) the folder needs {folder.name}.toml;"
+        f" planfly aircraft --new FOLDER makes a folder with all files"
     )
 
 
@@ -328,12 +328,12 @@ def check_new_folder(folder: Path, *, overwrite: bool = False) -> Path:
     target = folder.absolute()
     if _NAME.fullmatch(target.name) is None or target.name in _RESERVED_NAMES:
         allowed = (
-            f"a folder's name of letters, digits, '.', '_' and '-' is expected, none of {', '.join(_RESERVED_NAMES)}"
+            f"expected a folder name of letters, digits, '.', '_' and '-', other than {', '.join(_RESERVED_NAMES)}"
         )
         raise FlightError(f"{folder}: {allowed}", file=folder, value=target.name, allowed=allowed)
     if overwrite and target.exists() and not target.is_symlink():
         if not (target / f"{target.name}.toml").is_file():
-            raise FlightError(f"{folder}: is not the folder of an aircraft, with {target.name}.toml", file=folder)
+            raise FlightError(f"{folder}: not an aircraft's folder: it has no {target.name}.toml", file=folder)
     elif target.exists() or target.is_symlink():
         raise FlightError(f"{folder}: exists; overwrite=True replaces it, or name another folder", file=folder)
     if not target.parent.is_dir():

@@ -286,7 +286,7 @@ def check_sheet(sheet: DataSheet) -> DataSheet:
         allowed = f"allowed {low:.2f}..{high:.2f} m with a wing of {area:.3g} m2 ({_area_source(sheet)})"
         raise _out_of_range("span", sheet.span, allowed, "m")
     if sheet.fuelled and (sheet.motor or sheet.volts):
-        raise _out_of_range("fuel", sheet.fuel, "goes without --battery and --motor", "kg")
+        raise _out_of_range("fuel", sheet.fuel, "cannot be combined with --battery and --motor", "kg")
     if not _is_within(sheet.fuel, 0.0, 0.6 * sheet.mass):
         raise _out_of_range("fuel", sheet.fuel, f"allowed up to 60 % of the mass, {0.6 * sheet.mass:g} kg", "kg")
     if not sheet.fuelled and not _is_within(sheet.energy, 0.0, MAX_BATTERY * sheet.mass):
@@ -661,20 +661,20 @@ def _solve_by_newton(errors: Callable[[Floats], Floats], x: Floats) -> Floats | 
 
 def _no_propeller(sheet: DataSheet) -> FlightError:
     climb = math.degrees(sheet.climb)
-    allowed = "a steeper climb goes with a higher top speed, a flatter one with a lower"
+    allowed = "a steeper climb needs a higher top speed, a flatter one a lower"
     reason = f"no propeller gives it at {sheet.cruise:g} m/s with a top speed of {sheet.top:.3g} m/s"
-    return FlightError.of_argument("climb", climb, f"{reason}: {allowed}", shown=f"{climb:.3g} degrees")
+    return FlightError.of_argument("climb", climb, f"{reason}; {allowed}", shown=f"{climb:.3g} degrees")
 
 
 def _with_performance(sheet: DataSheet, motor: Drive, drag: Drag) -> DataSheet:
-    """Return the sheet with the climb and top speed of a motor. Raises FlightError if it cannot climb."""
+    """Return the sheet with the climb and top speed of a motor. Raise FlightError if it cannot climb."""
     excess_thrust = motor.thrust(1.0, sheet.cruise, SHEET_DENSITY) - drag(sheet.cruise)
     climb = math.asin(max(-1.0, min(0.95, excess_thrust / _weight(sheet))))
     min_climb_deg = RANGES["climb"][2]
     if climb < math.radians(min_climb_deg):
         result_text = f"with this propeller and {sheet.volts:g} V it climbs {math.degrees(climb):.1f} degrees at cruise"
         raise _out_of_range(
-            "motor", sheet.motor, f"{result_text}: allowed {min_climb_deg:g} degrees and more", "rpm a volt"
+            "motor", sheet.motor, f"{result_text}; allowed {min_climb_deg:g} degrees and more", "rpm a volt"
         )
     low, high = sheet.cruise, 4.0 * sheet.cruise
     for _ in range(60):

@@ -108,7 +108,7 @@ def read_uncertainty(folder: Path) -> Uncertainty | None:
         raise FlightError(f"{file}: {' '.join(str(error).split())}", file=file) from None
     source = table.get("source", "flight logs" if file.name == FILES[0] else "a data sheet")
     if not isinstance(source, str) or not source.strip():
-        raise FlightError.at(str(file), "source", source, "a text is expected", shown=repr(source))
+        raise FlightError.at(str(file), "source", source, "expected a text", shown=repr(source))
     _check_keys(table, file)
     climb, descent = (
         math.radians(_read_number(table, key, file, 0.0, 45.0)) for key in ("climb_sd_deg", "descent_sd_deg")
@@ -119,14 +119,12 @@ def read_uncertainty(folder: Path) -> Uncertainty | None:
             str(file),
             "battery_guessed",
             is_battery_guessed,
-            "true or false is expected",
+            "expected true or false",
             shown=repr(is_battery_guessed),
         )
     entries = table.get("quantity", [])
     if not isinstance(entries, list) or not all(isinstance(entry, dict) for entry in entries):
-        raise FlightError.at(
-            str(file), "quantity", entries, "[[quantity]] tables are expected", shown=repr(entries)[:60]
-        )
+        raise FlightError.at(str(file), "quantity", entries, "expected [[quantity]] tables", shown=repr(entries)[:60])
     quantities = tuple(_read_quantity(entry, file) for entry in entries)
     power = POWER_SD if file.name == FILES[1] else 0.0
     if "power_sd" in table:
@@ -153,7 +151,7 @@ def _read_number(table: dict[str, Any], key: str, file: Path, low: float, high: 
     """Return a number of a table. Raises FlightError for one that is missing or out of range."""
     value = table.get(key)
     if isinstance(value, bool) or not isinstance(value, int | float) or not low <= value <= high:
-        raise FlightError.at(str(file), key, value, f"a number from {low:g} to {high:g} is expected", shown=repr(value))
+        raise FlightError.at(str(file), key, value, f"expected a number from {low:g} to {high:g}", shown=repr(value))
     return float(value)
 
 
@@ -167,7 +165,7 @@ def _read_quantity(entry: dict[str, Any], file: Path) -> UncertainQuantity:
 def _check_name(name: object, file: str, key: str, error: type[PlanflyError] = FlightError) -> None:
     # JSBSim aborts the process on a name with a space in it.
     if not isinstance(name, str) or not name.startswith(_PREFIX) or not name.isascii() or len(name.split()) != 1:
-        raise error.at(file, key, name, f"a property {_PREFIX}NAME is expected", shown=repr(name))
+        raise error.at(file, key, name, f"expected a property {_PREFIX}NAME", shown=repr(name))
 
 
 def uncertainty_text(uncertainty: Uncertainty) -> str:
@@ -259,7 +257,7 @@ def read_draws(path: Path, error: type[PlanflyError] = FlightError) -> Draws:
         allowed = f"lines end with LF or CR LF, and a field has at most {csv.field_size_limit()} characters"
         raise error(f"{path}:{reader.line_num}: {allowed}", file=path, allowed=allowed) from None
     if len(rows) < 2:
-        message = f"{path}: a line of properties and at least one of values are expected"
+        message = f"{path}: expected a line of properties and at least one of values"
         raise error(message, file=path)
     header_line, header = rows[0]
     names = tuple(name.strip() for name in header)
@@ -272,7 +270,7 @@ def read_draws(path: Path, error: type[PlanflyError] = FlightError) -> Draws:
         except ValueError:
             numbers = []
         if len(numbers) != len(names) or not all(map(math.isfinite, numbers)):
-            allowed = f"{len(names)} finite numbers are expected"
+            allowed = f"expected {len(names)} finite numbers"
             raise error(f"{path}:{line_number}: {','.join(row)[:60]}: {allowed}", file=path, value=row, allowed=allowed)
         values.append(numbers)
     return Draws(names, np.array(values), str(path))

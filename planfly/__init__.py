@@ -21,7 +21,7 @@ play_to_foxglove, play_to_stations   the same in other programs
 import_log, refly, recover           another program's log; its mission flown in JSBSim; a damaged log
 returns                              will it come home, from everywhere on its way
 survey                               how much of each photo line of a survey can be used, and what would help
-campaign, campaign_flight, winds     how likely it is to fly; the largest wind from each direction
+campaign, campaign_flight, winds     how likely success is; the largest wind from each direction
 serve                                a MAVLink vehicle for ground stations
 open_studio                          a page on which a mission is dragged, judged, flown and saved
 scenarios, aircraft                  what is embedded

@@ -39,31 +39,31 @@ class Range(NamedTuple):
 
 
 # Range of times, s.
-_TIME_RANGE_S = Range(0.0, 1e7, "seconds, from 0 to 10,000,000, are expected")
+_TIME_RANGE_S = Range(0.0, 1e7, "expected seconds from 0 to 10,000,000")
 # Range of positive numbers.
-_POSITIVE_RANGE = Range(0.0, 1e6, "a number above 0, up to 1,000,000, is expected", above=True)
+_POSITIVE_RANGE = Range(0.0, 1e6, "expected a number above 0, up to 1,000,000", above=True)
 # Range of numbers of items.
-_COUNT_RANGE = Range(1, 1000, "a whole number from 1 to 1,000 is expected", integer=True)
+_COUNT_RANGE = Range(1, 1000, "expected a whole number from 1 to 1,000", integer=True)
 # Range of probabilities to prove.
-_PROBABILITY_RANGE = Range(0.5, 1.0, "at least 0.5 and below 1 is expected", below=True)
+_PROBABILITY_RANGE = Range(0.5, 1.0, "expected at least 0.5 and below 1", below=True)
 
 # Ranges by keyword.  Values that a scenario file also limits (wind, turbulence, airspeed, laws) are checked there.
 RANGES: Mapping[str, Range] = {
-    "seed": Range(0, 2**63 - 1, "a whole number from 0 to 2^63 - 1 is expected", integer=True),
-    "refine": Range(0, 20, "a whole number from 0 to 20 is expected", integer=True),
-    "budget": Range(4, 10**10, "a whole number of evaluations, 4..10^10, is expected", integer=True),
-    "seconds": Range(0.0, 1e6, "a number of seconds above 0, up to 1,000,000, is expected", above=True),
-    "front": Range(2, 100, "a whole number of plans, 2 to 100, is expected", integer=True),
-    "at_leg": Range(0, 10_000, "a leg's number is expected, from 0", integer=True),
+    "seed": Range(0, 2**63 - 1, "expected a whole number from 0 to 2^63 - 1", integer=True),
+    "refine": Range(0, 20, "expected a whole number from 0 to 20", integer=True),
+    "budget": Range(4, 10**10, "expected a whole number of evaluations, 4..10^10", integer=True),
+    "seconds": Range(0.0, 1e6, "expected a number of seconds above 0, up to 1,000,000", above=True),
+    "front": Range(2, 100, "expected a whole number of plans, 2 to 100", integer=True),
+    "at_leg": Range(0, 10_000, "expected a leg's number, from 0", integer=True),
     "airspeed": _POSITIVE_RANGE,
     "max_hours": _POSITIVE_RANGE,
     "max_log": _POSITIVE_RANGE,
     "speed": _POSITIVE_RANGE,
-    "served_speed": Range(0.1, 100.0, "a number from 0.1 to 100 is expected"),
+    "served_speed": Range(0.1, 100.0, "expected a number from 0.1 to 100"),
     "wait": _POSITIVE_RANGE,
     "start": _TIME_RANGE_S,
     "end": _TIME_RANGE_S,
-    "port": Range(0, 65535, "a port, 0..65535, is expected", integer=True),
+    "port": Range(0, 65535, "expected a port 0..65535", integer=True),
     "flight": _COUNT_RANGE,
     "runs": _COUNT_RANGE,
     "jobs": _COUNT_RANGE,
@@ -71,14 +71,14 @@ RANGES: Mapping[str, Range] = {
     "prove": _PROBABILITY_RANGE,
     "at_least": _PROBABILITY_RANGE,
     "confidence": _PROBABILITY_RANGE,
-    "flights": Range(1, 10_000_000, "a whole number from 1 to 10,000,000 is expected", integer=True),
-    "index": Range(0, 10**9 - 1, "a flight's index is expected, from 0", integer=True),
-    "directions": Range(4, 72, "4 to 72 is expected", integer=True),
-    "points": Range(1, MAX_BY_PROGRAM, f"1 to {MAX_BY_PROGRAM} returns are expected", integer=True),
-    "every": Range(0.1, 3600.0, "seconds from 0.1 to 3,600 are expected"),
-    "most": Range(1.0, 40.0, "m/s from 1 to 40 are expected"),
-    "margin": Range(0.0, 100.0, "km, from 0 to 100, are expected"),
-    "height": Range(1.0, 5000.0, "m above ground, from 1 to 5,000, are expected"),
+    "flights": Range(1, 10_000_000, "expected a whole number from 1 to 10,000,000", integer=True),
+    "index": Range(0, 10**9 - 1, "expected a flight's index, from 0", integer=True),
+    "directions": Range(4, 72, "expected 4 to 72", integer=True),
+    "points": Range(1, MAX_BY_PROGRAM, f"expected 1 to {MAX_BY_PROGRAM} returns", integer=True),
+    "every": Range(0.1, 3600.0, "expected seconds from 0.1 to 3,600"),
+    "most": Range(1.0, 40.0, "expected m/s from 1 to 40"),
+    "margin": Range(0.0, 100.0, "expected km from 0 to 100"),
+    "height": Range(1.0, 5000.0, "expected m above ground from 1 to 5,000"),
 }
 # Allowed words by keyword.
 CHOICES: Mapping[str, tuple[Any, ...]] = {
@@ -100,7 +100,7 @@ def check_arguments(**given: Any) -> None:
     >>> check_arguments(seed=3, log_hz=60, max_hours=None)
     >>> check_arguments(directions=3)
     Traceback (most recent call last):
-    world.errors.ArgumentError: directions 3: 4 to 72 is expected
+    world.errors.ArgumentError: directions 3: expected 4 to 72
     """
     for name, value in given.items():
         if value is None:
@@ -109,7 +109,7 @@ def check_arguments(**given: Any) -> None:
             values = value if isinstance(value, tuple | list) else (value,)
             if all(choice in CHOICES[name] for choice in values):
                 continue
-            allowed = f"{', '.join(map(str, CHOICES[name]))} is expected"
+            allowed = f"expected {', '.join(map(str, CHOICES[name]))}"
         elif RANGES[name].allows(value):
             continue
         else:
@@ -124,7 +124,7 @@ _SHARED_KEYWORDS = {"served_speed": "speed", "front": "count"}
 # Largest sensor size across and along the track, and longest focal length, mm.
 _MAX_CAMERA_SIZES_MM = (1000.0, 1000.0, 10_000.0)
 # Description of the numbers of a camera, in messages.
-CAMERA = "the sensor across the way and along it and the focal length, mm, and maybe overlaps along and across, %"
+CAMERA = "the sensor's size across and along the track and the focal length, mm, maybe overlaps along and across, %"
 
 
 def is_wind(speed: float, from_deg: float) -> bool:

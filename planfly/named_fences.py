@@ -29,7 +29,7 @@ class NamedFences:
             return mission
         warnings = mission.warnings
         if mission.fences:
-            warnings = (*warnings, f"its own fence of {len(mission.fences)} items counts beside the one named")
+            warnings = (*warnings, f"its own fence of {len(mission.fences)} items applies in addition to the one named")
         return replace(mission, fences=numbered([*mission.fences, *self.items]), warnings=warnings)
 
     def on_scenario(self, scenario: Scenario) -> Scenario:

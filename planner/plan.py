@@ -328,7 +328,7 @@ def _reject_constant(name: str) -> float:
 
 def _check_names(source: str, field: str, found_names: dict[str, Any], expected_names: Sequence[str]) -> None:
     if sorted(found_names) != sorted(expected_names):
-        raise MissionError.at(source, field, sorted(found_names), f"keys {sorted(expected_names)} are expected")
+        raise MissionError.at(source, field, sorted(found_names), f"expected keys {sorted(expected_names)}")
 
 
 def plan_html(plan: Plan) -> str:

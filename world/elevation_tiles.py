@@ -79,7 +79,7 @@ def _virtual_files(path: Path) -> list[Path]:
             raise TerrainError.at(path, "SourceFilename", name, allowed)
         file = Path(os.path.normpath(Path(folder, name)))
         if not file.is_relative_to(folder):
-            allowed = f"files in the folder of {path.name} or below are expected"
+            allowed = f"expected files in the folder of {path.name} or below"
             raise TerrainError.at(path, "SourceFilename", name, allowed)
         files.append(path.parent / file.relative_to(folder))
     return sorted(set(files))
@@ -137,8 +137,8 @@ def _shift_pixels(
 def _place_on_grid(first: RasterFile, tile: RasterFile) -> tuple[int, int]:
     """Return row and column of a tile's first pixel on the grid of the first tile.  Raises TerrainError."""
     if tile.crs != first.crs:
-        allowed = f"the reference system of {first.name} is expected: tiles lie on one grid"
-        raise TerrainError(f"{tile.name}: another reference system: {allowed}", file=tile.name, allowed=allowed)
+        allowed = f"all tiles need the reference system of {first.name}"
+        raise TerrainError(f"{tile.name}: another reference system; {allowed}", file=tile.name, allowed=allowed)
     rows, cols = tile.shape
     lon, lat = tile.to_place(np.array([0.0, cols - 1.0]), np.array([0.0, rows - 1.0]))
     col, row = first.to_source(lon, lat)
@@ -148,6 +148,10 @@ def _place_on_grid(first: RasterFile, tile: RasterFile) -> tuple[int, int]:
         math.hypot(col[1] - position[1] - (cols - 1), row[1] - position[0] - (rows - 1)),
     )
     if not offset <= OFF_GRID:
-        allowed = f"pixels on those of {first.name} are expected: resample them to one grid (gdalwarp)"
-        raise TerrainError(f"{tile.name}: {offset:.3g} pixels off: {allowed}", file=tile.name, allowed=allowed)
+        allowed = "resample both to one grid (gdalwarp)"
+        raise TerrainError(
+            f"{tile.name}: its pixel grid is offset by {offset:.3g} pixels from that of {first.name}: {allowed}",
+            file=tile.name,
+            allowed=allowed,
+        )
     return position

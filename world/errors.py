@@ -68,9 +68,9 @@ class PlanflyError(Exception):
         shown: text of the value in the message; None for its str(), "" to omit it.
         file: file that the argument refers to, if any.
 
-        >>> error = FlightError.of_argument("bind", "127.0.0.1:70000", "a port 0..65535 is expected")
+        >>> error = FlightError.of_argument("bind", "127.0.0.1:70000", "expected a port 0..65535")
         >>> print(error, "|", error.field, "|", error.value)
-        bind 127.0.0.1:70000: a port 0..65535 is expected | bind | 127.0.0.1:70000
+        bind 127.0.0.1:70000: expected a port 0..65535 | bind | 127.0.0.1:70000
         """
         prefix = f"{file}: " if str(file) else ""
         subject = argument if shown == "" else f"{argument} {value if shown is None else shown}"
@@ -128,8 +128,8 @@ class StartError(FlightError):
     source: mission or command that requires it.  reason: why it cannot begin.  field, value, allowed: as in
     `PlanflyError`.
 
-    >>> str(StartError("a.plan", "no way made"))
-    'a.plan: no way made'
+    >>> str(StartError("a.plan", "no progress"))
+    'a.plan: no progress'
     """
 
     def __init__(self, source: str, reason: str, *, field: str = "", value: Any = None, allowed: str = "") -> None:

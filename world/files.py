@@ -65,14 +65,14 @@ def read_at_most(path: Path, max_bytes: int, kind: str) -> bytes:
 
     >>> read_at_most(Path("/dev/zero"), 100, "mission")
     Traceback (most recent call last):
-    ValueError: not a plain file: a mission file is expected
+    ValueError: not a plain file; expected a mission file
     """
     status = path.stat()
     if stat.S_ISREG(status.st_mode) and status.st_size > max_bytes:
         raise ValueError(f"{status.st_size:,} bytes: a {kind} file has at most {max_bytes:,}")
     is_shell_pipe = stat.S_ISFIFO(status.st_mode) and str(path).startswith(("/dev/fd/", "/dev/stdin", "/proc/self/fd/"))
     if not (stat.S_ISREG(status.st_mode) or stat.S_ISDIR(status.st_mode) or is_shell_pipe):
-        raise ValueError(f"not a plain file: a {kind} file is expected")
+        raise ValueError(f"not a plain file; expected a {kind} file")
     with path.open("rb") as file:
         data = file.read(max_bytes + 1)
     if len(data) > max_bytes:
@@ -99,7 +99,7 @@ def read_toml(path: Path, kind: str, max_bytes: int = 2**20) -> dict[str, Any]:
 
     >>> read_toml(Path("/dev/null"), "gains")
     Traceback (most recent call last):
-    ValueError: not a plain file: a gains file is expected
+    ValueError: not a plain file; expected a gains file
     """
     return toml_table(read_at_most(path, max_bytes, kind).decode("utf-8"))
 
@@ -279,7 +279,7 @@ def hold(path: Path) -> Iterator[None]:
     handle = os.open(lock_file, os.O_RDONLY if file_locks.LOCKS_FOLDERS else os.O_RDWR | os.O_CREAT)
     try:
         if not file_locks.lock_now(handle):
-            raise PlanflyError(f"{path}: another planfly is writing there; name another target", file=path)
+            raise PlanflyError(f"{path}: another planfly process is writing there; name another target", file=path)
         yield
     finally:
         os.close(handle)

@@ -51,8 +51,8 @@ def open_geotiff(file: Path, _name: str) -> RasterFile:
 
 def open_hgt(file: Path, _name: str) -> RasterFile:
     """Open an SRTM tile, whose name gives its position.  Raises TerrainError."""
-    expected = "a name such as N46E008.hgt and the bytes of 1201 x 1201 or 3601 x 3601 heights are expected"
-    return _open_raster_file(file, "SRTMHGT", f"not a readable SRTM tile: {expected}")
+    expected = "expected a name such as N46E008.hgt and the bytes of 1201 x 1201 or 3601 x 3601 heights"
+    return _open_raster_file(file, "SRTMHGT", f"not a readable SRTM tile; {expected}")
 
 
 def _open_dataset(file: Path, driver: str) -> Any:
@@ -163,7 +163,7 @@ def _make_raster_file(
         raise TerrainError(f"{file}: its reference system cannot be read: {one_line(error)}", file=file) from error
     if (unit or "m").lower() not in METRES or unit_length != 1.0:
         raise TerrainError.at(
-            file, "unit of heights", height_unit_name if unit_length != 1.0 else unit, "metres are expected"
+            file, "unit of heights", height_unit_name if unit_length != 1.0 else unit, "expected metres"
         )
     rows, cols = shape
     middle_longitude = a * cols / 2 + b * rows / 2 + c if is_geographic(crs) else math.nan

@@ -107,7 +107,7 @@ def _geoid() -> tuple[str, Any]:
             warnings.simplefilter("ignore", UserWarning)
             if TransformerGroup("EPSG:4979", target, always_xy=True).best_available:
                 return name, Transformer.from_crs("EPSG:4979", target, always_xy=True, only_best=True)
-    raise ValueError("heights count from the ellipsoid, and no grid of a geoid is at hand")
+    raise ValueError("heights count from the ellipsoid, and no geoid grid is available")
 
 
 def _is_depth(crs: str) -> bool:

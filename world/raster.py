@@ -65,7 +65,7 @@ def grid_in_degrees(
         raise TerrainError.at(name, "pixels", heights.size, allowed, shown=f"{heights.size:,}")
     west, east, south, north = edges
     if not (-180.0 <= west < east <= 360.0 and -90.0 <= south < north <= 90.0):
-        allowed = "degrees of longitude -180..360 and latitude -90..90 are expected"
+        allowed = "expected degrees of longitude -180..360 and latitude -90..90"
         raise TerrainError.at(name, "west, east, south, north edge", list(edges), allowed)
     pitch_x, pitch_y = (east - west) / cols, (north - south) / rows
 
@@ -103,7 +103,7 @@ def open_npz(file: Path, name: str) -> RasterFile:
     """
     heights, edges = _read_npz(file, name)
     if heights.ndim != 2 or heights.dtype.kind not in "iuf":
-        allowed = "a 2-D array of numbers is expected"
+        allowed = "expected a 2-D array of numbers"
         shown = f"{heights.dtype} of shape {heights.shape}"
         raise TerrainError.at(name, "elevation", heights.shape, allowed, shown=shown)
     return grid_in_degrees(file, name, heights, _edges(edges, heights.shape[0]))
@@ -207,7 +207,7 @@ def open_raster(path: str, base: Path | None = None, datum: StatedDatum | None =
         raster = _OPENERS[known_format.suffix](file, path)
         return replace(raster, datum=_datum_of(raster, datum))
     expected = _or_list([known_format.name for known_format in FORMATS])
-    raise TerrainError(f"{file}: not an elevation file: {expected} is expected", file=file)
+    raise TerrainError(f"{file}: not an elevation file; expected {expected}", file=file)
 
 
 def open_tiles(paths: Sequence[str], base: Path | None = None, datum: StatedDatum | None = None) -> RasterFile:

@@ -97,7 +97,7 @@ def shift_grid(grid: Grid, rows: int, cols: int) -> Grid:
 def require_min_pixels(name: str | Path, shape: tuple[int, int]) -> None:
     """Raise TerrainError for too few rows or columns to interpolate heights."""
     if min(shape) < 2:
-        raise TerrainError.at(name, "rows, columns", shape, "at least 2 x 2 pixels are expected")
+        raise TerrainError.at(name, "rows, columns", shape, "expected at least 2 x 2 pixels")
 
 
 def file_sha256(path: Path) -> str:

@@ -107,7 +107,7 @@ class RemoteFile:
             if answer.status == 200:
                 # A server without range requests sends the whole file; so does a server whose file has changed.
                 if _content_length(answer) != self.size or _version(answer) != self.version:
-                    raise _IncompleteAnswer("it has changed since it was begun: try again")
+                    raise _IncompleteAnswer("it has changed since the fetch began: try again")
                 begin, end = 0, self.size
             elif answer.headers.get("Content-Range") != f"bytes {begin}-{end - 1}/{self.size}":
                 raise _IncompleteAnswer(f"the server answers with {answer.headers.get('Content-Range')!r}")
@@ -164,7 +164,7 @@ def find_remote(url: str, folder: Path) -> RemoteFile | None:
                 raise TerrainError(f"{url}: cannot be reached: {_error_text(error)}", file=url) from error
         time.sleep(_PAUSE * 2.0**attempt)
     if not 0 < size <= MAX_BYTES:
-        allowed = f"1 to {MAX_BYTES:,} bytes are expected"
+        allowed = f"expected 1 to {MAX_BYTES:,} bytes"
         raise TerrainError.at(url, "Content-Length", size, allowed, shown=f"{size:,}")
     key = sha256(f"{url}\0{version}\0{size}".encode()).hexdigest()[:16]
     copy = folder / key / url.rpartition("/")[2]

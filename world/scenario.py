@@ -106,9 +106,9 @@ class Scenario:
         notes = list(self.spec.zone_notes or ())
         timed_tables = [table for table in self.spec.zones or () if table.times]
         if timed_tables and self.spec.at is None:
-            count = "1 zone has times of activity, and counts"
+            count = "1 zone has times of activity, and is active"
             if len(timed_tables) > 1:
-                count = f"{len(timed_tables):,} zones have times of activity, and count"
+                count = f"{len(timed_tables):,} zones have times of activity, and are active"
             notes.append(f"{count} at all times (--at applies them)")
         elif timed_tables:
             span = " to ".join(f"{time:%Y-%m-%d %H:%M}" for time in parse_span(str(self.spec.at)))

@@ -102,12 +102,12 @@ def make_draft(
     east, north = (float(value) for value in to_map(GeoOrigin(*start), destination.lat, destination.lon))
     length = math.hypot(east, north)
     if not _MIN_LENGTH_M <= length <= _MAX_LENGTH_M:
-        problem = f"{_MIN_LENGTH_M:g} m to {_MAX_LENGTH_M / 1000.0:g} km from `start` are expected"
+        problem = f"expected {_MIN_LENGTH_M:g} m to {_MAX_LENGTH_M / 1000.0:g} km from `start`"
         raise ArgumentError.of_argument("destination", destination, problem, shown=_place_text(destination, length))
     midpoint = to_geo(GeoOrigin(*start), east / 2.0, north / 2.0)
     origin = GeoOrigin(round(float(midpoint[0]), 5), round(float(midpoint[1]), 5))
     if abs(origin.lat_deg) > _MAX_LATITUDE_DEG:
-        problem = f"a way that stays within {_MAX_LATITUDE_DEG:g} degrees of latitude is expected"
+        problem = f"the scenario must lie within {_MAX_LATITUDE_DEG:g}° of latitude"
         raise ArgumentError.of_argument("destination", destination, problem, shown=_place_text(destination))
     endpoints = np.array([to_map(origin, *place) for place in (start, destination)])
     margin = min(max(_MARGIN_FRACTION * length, _MIN_MARGIN_M), _MAX_MARGIN_M)

@@ -49,7 +49,7 @@ def check_scenario(data: Any, source: str) -> ScenarioFile:
     """
     if not isinstance(data, dict):
         raise ScenarioError(
-            f"{source}: scenario: a table of keys is expected, got {type(data).__name__}", file=source, field="scenario"
+            f"{source}: scenario: expected a table of keys, got {type(data).__name__}", file=source, field="scenario"
         )
     try:
         return ScenarioFile.model_validate(data)
@@ -118,9 +118,9 @@ def first_fault(error: ValidationError, data: Any = None, model: type[BaseModel]
     # A check of planfly raises its own error; use its message.
     message = str(first["ctx"]["error"]) if first["type"] == "value_error" else first["msg"]
     if first["type"] == "model_type":
-        message = "a table is expected"
+        message = "expected a table"
     elif first["type"] == "too_short":
-        message = f"at least {first['ctx']['min_length']} expected"
+        message = f"expected at least {first['ctx']['min_length']}"
     value = first.get("input")
     if isinstance(value, dict | list):
         value = None

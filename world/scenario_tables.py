@@ -200,7 +200,7 @@ def _check_paths(path: object) -> object:
     paths = path if isinstance(path, list) else [path]
     if path is None or (1 <= len(paths) <= MAX_TILES and all(isinstance(name, str) and name for name in paths)):
         return path
-    raise ValueError(f"a file's name, or a list of 1 to {MAX_TILES}, is expected")
+    raise ValueError(f"expected a file's name, or a list of 1 to {MAX_TILES}")
 
 
 class TerrainTable(ScenarioTable):
@@ -441,9 +441,9 @@ class FlightTable(ScenarioTable):
         if self.guidance is not None and autopilot != OWN_GUIDANCE:
             raise ValueError(f'guidance: not a key of autopilot = "{autopilot}"')
         if self.params is not None and autopilot == OWN_GUIDANCE:
-            raise ValueError('params: not a key of autopilot = "planfly", which guidance alone means')
+            raise ValueError('params: not a key of autopilot = "planfly", which a guidance without autopilot selects')
         if self.px4_version is not None and autopilot != _PX4:
-            raise ValueError(f'px4_version: a key of autopilot = "px4" alone, not of "{autopilot}"')
+            raise ValueError(f'px4_version: only a key of autopilot = "px4", not of "{autopilot}"')
         return self
 
     @property
@@ -540,7 +540,9 @@ class LaunchTable(ScenarioTable):
     @model_validator(mode="after")
     def _check_launch_values(self) -> "LaunchTable":
         if self.method == "runway" and self.speed_mps is not None:
-            raise ValueError(f"speed_mps: {self.speed_mps:g}: not of a runway, where the aircraft's own motor pulls")
+            raise ValueError(
+                f"speed_mps: {self.speed_mps:g}: not allowed for a runway, where the aircraft's own motor pulls"
+            )
         if self.method == "runway" and (self.incline_deg or 0.0) > STEEPEST_RUNWAY:
             raise ValueError(f"incline_deg: {self.incline_deg:g}: allowed 0..{STEEPEST_RUNWAY:g} of a runway")
         return self
@@ -625,7 +627,7 @@ class ReturnsTable(ScenarioTable):
         if not self.require and all(value is None for value in (self.rtl_altitude_m, self.rtl_autoland, self.rally)):
             raise ValueError("require: missing; give require, rtl_altitude_m, rtl_autoland or rally")
         if self.require is not None and len(set(self.require)) < len(self.require):
-            raise ValueError(f"require: {', '.join(self.require)}: each is expected once")
+            raise ValueError(f"require: {', '.join(self.require)}: name each one once")
         return self
 
 

@@ -159,7 +159,7 @@ def cut_from_server(server: str, box: Box, out: Path, cache: Path, progress: Cut
     fetched_box = Box(box.south - 0.001, box.west - 0.001, box.north + 0.001, box.east + 0.001)
     degrees = degrees_of(fetched_box)
     if len(degrees) > MAX_FETCHED:
-        allowed = f"at most {MAX_FETCHED} are fetched: a smaller area is expected"
+        allowed = f"at most {MAX_FETCHED} are fetched; choose a smaller area"
         raise TerrainError(f"{server}: {len(degrees)} tiles: {allowed}", file=server, allowed=allowed)
     remote_files = {}
     for index, degree in enumerate(degrees):
@@ -206,7 +206,7 @@ def _fetch_tile(remote: RemoteFile, box: Box, count: Callable[[int], None]) -> R
         except _UnreadableError as error:
             remote.forget()
             if is_last:
-                message = f"{remote.url}: what the server gives is no GeoTIFF that can be read"
+                message = f"{remote.url}: the server's answer is not a readable GeoTIFF"
                 raise TerrainError(message, file=remote.url) from error
     raise AssertionError
 
@@ -274,14 +274,14 @@ def _place_tile(tile: RasterFile, degree: tuple[int, int], box: Box) -> _PlacedT
     """Place a tile on its degree, in the same turn of longitude as the area.  Raises TerrainError."""
     dx, column_skew, west, row_skew, dy, north = tile.grid
     if column_skew or row_skew or not dx > 0.0 > dy:
-        raise TerrainError(f"{tile.name}: a grid of longitudes and latitudes is expected", file=tile.name)
+        raise TerrainError(f"{tile.name}: expected a grid of longitudes and latitudes", file=tile.name)
     offset = max(abs(north - degree[0] - 1.0), abs((west - degree[1] + 180.0) % 360.0 - 180.0))
     if (
         offset > _MAX_TILE_OFFSET_DEG
         or abs(dx * tile.shape[1] - 1.0) > _MAX_TILE_OFFSET_DEG
         or abs(-dy * tile.shape[0] - 1.0) > _MAX_TILE_OFFSET_DEG
     ):
-        allowed = f"the degree from {degree[0]} N {degree[1]} E on is expected"
+        allowed = f"expected the degree from {degree[0]} N {degree[1]} E on"
         raise TerrainError(f"{tile.name}: another place: {allowed}", file=tile.name, allowed=allowed)
     turn_count = round(((box.west + box.east) / 2.0 - (west + dx * tile.shape[1] / 2.0)) / 360.0)
     return _PlacedTile(tile, west + 360.0 * turn_count, north, dx, -dy)
@@ -296,7 +296,7 @@ def _merge_tiles(tiles: list[_PlacedTile], box: Box) -> tuple[Heights, tuple[flo
     top = math.floor((finest.north - box.north) / finest.dy - 0.5 + _PIXEL_TOLERANCE)
     bottom = math.ceil((finest.north - box.south) / finest.dy - 0.5 - _PIXEL_TOLERANCE) + 1
     if (right - left) * (bottom - top) > MAX_PIXELS:
-        allowed = f"at most {MAX_PIXELS:,} are written: a smaller area is expected"
+        allowed = f"at most {MAX_PIXELS:,} are written; choose a smaller area"
         count = (right - left) * (bottom - top)
         raise TerrainError.at(finest.raster.name, "pixels", count, allowed, shown=f"{count:,}")
     west, north = finest.west + left * finest.dx, finest.north - top * finest.dy

@@ -203,11 +203,11 @@ class AutopilotProgram(DocumentConfig):
     version: str
     """The version that the program states."""
     sha256: str
-    """Of its file."""
+    """SHA-256 of its file."""
     parameters: Mapping[str, float]
-    """Values that the program was given over its own defaults, as it had them."""
+    """Values that replaced the program's own defaults, as the program stored them."""
     changed: Mapping[str, float]
-    """Those of the parameters for which a person's file states another value than the aircraft's."""
+    """Parameters for which the user's file states a different value from the aircraft's."""
     unused: tuple[str, ...] = ()
     """Names in the person's file that the program does not know, or that belong to other hardware."""
 
@@ -354,7 +354,7 @@ class Autopilot(ABC):
 
         contacts: contact points of the aircraft.
         """
-        raise ValueError(f"{self.title} flies no take-off and no landing")
+        raise ValueError(f"{self.title} flies neither take-off nor landing")
 
     def take_over(self, before: Record, own: Record, here: Floats) -> None:
         """Begin another route at the aircraft's position, and keep the control law's state of the aircraft.

@@ -42,7 +42,7 @@ def load_autopilot(scenario: Scenario, aircraft: Aircraft) -> Autopilot:
     name = scenario.flight.steering.autopilot
     if name not in _LAWS:
         known = " or ".join(f"'{known}'" for known in _LAWS)
-        allowed = f"{known} is expected{did_you_mean(name, sorted(_LAWS))}"
+        allowed = f"expected {known}{did_you_mean(name, sorted(_LAWS))}"
         raise ScenarioError.at(scenario.name, "flight.autopilot", name, allowed, shown=repr(name))
     made, returns = _LAWS[name].load(scenario.flight, aircraft, scenario.name), scenario.returns
     set_by = (None, None) if returns is None else (returns.rtl_altitude, returns.rtl_autoland)

@@ -90,7 +90,7 @@ def parse_parameters(text: str, source: str) -> dict[str, Entry]:
             continue
         if entry.name in found:
             first = found[entry.name].where.number
-            allowed = "each name is expected once"
+            allowed = "name each parameter once"
             raise ParameterError(
                 f"{entry.where}: {entry.name}: already on line {first}: {allowed}",
                 file=source,
@@ -100,7 +100,7 @@ def parse_parameters(text: str, source: str) -> dict[str, Entry]:
             )
         found[entry.name] = entry
     if not found:
-        raise ParameterError(f"{source}: no parameter: lines of a name and a value are expected", file=source)
+        raise ParameterError(f"{source}: no parameter; expected lines of a name and a value", file=source)
     return found
 
 
@@ -112,17 +112,17 @@ def _parse_entry(line: str, where: TextLine) -> Entry:
     else:
         fields = _SEPARATOR_PATTERN.split(line)
         if len(fields) != 2:
-            allowed = "a name and a value are expected, or QGroundControl's five columns"
+            allowed = "expected a name and a value, or QGroundControl's five columns"
             message = f"{where}: {_shorten(line)}: {allowed}"
             raise ParameterError(message, file=where.file, value=line, allowed=allowed)
         name, text = fields
     if not _NAME_PATTERN.fullmatch(name):
-        allowed = f"up to {LONGEST_NAME} capitals, digits and _ are expected"
+        allowed = f"expected up to {LONGEST_NAME} capitals, digits and _"
         message = f"{where}: name {_shorten(name)}: {allowed}"
         raise ParameterError(message, file=where.file, field="name", value=name, allowed=allowed)
     value = float(text) if _NUMBER_PATTERN.fullmatch(text) else math.nan
     if not math.isfinite(value):
-        allowed = "a finite number is expected"
+        allowed = "expected a finite number"
         raise ParameterError(
             f"{where}: {name}: {_shorten(text)}: {allowed}", file=where.file, field=name, value=text, allowed=allowed
         )

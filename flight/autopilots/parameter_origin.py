@@ -244,16 +244,16 @@ def refuse_unknown(path: Path, autopilot: str, entries: Mapping[str, Entry], kno
     if known or parameter_origin("", entries).autopilot == autopilot:
         return
     names = ", ".join(list(entries)[:_SHOWN_NAMES])
-    allowed = f"a parameter file of {TITLES[autopilot]} is expected"
-    message = f"{path}: {names}: no name that the simulated {_MODELS[autopilot]} knows: {allowed}"
+    allowed = f"expected a parameter file of {TITLES[autopilot]}"
+    message = f"{path}: {names}: not known to the simulated {_MODELS[autopilot]}; {allowed}"
     raise ParameterError(message, file=path, value=names, allowed=allowed)
 
 
 def other_autopilot(where: str, written_for: str, evidence: str, flying: str) -> ParameterError:
     """Return the error for a file that was written for a different autopilot."""
     because = f" ({evidence})" if evidence else ""
-    allowed = f"{_MODELS[flying]} is to fly: --autopilot {written_for} simulates {_MODELS[written_for]} instead"
-    message = f"{where}: written for {TITLES[written_for]}{because}, and {allowed}"
+    allowed = f"{_MODELS[flying]} is to fly; --autopilot {written_for} simulates {_MODELS[written_for]} instead"
+    message = f"{where}: written for {TITLES[written_for]}{because}, but {allowed}"
     return ParameterError(message, file=where, field="autopilot", value=written_for, allowed=allowed)
 
 

@@ -95,7 +95,7 @@ class ParameterTable:
                 allowed = f"allowed {definition.low / factor:g}..{definition.high / factor:g}"
                 raise _value_error(entry.where, name, entry.value, allowed)
             if values.setdefault(definition.name, value) != value:
-                allowed = "the same parameter has another value under its other name"
+                allowed = "the same parameter has a different value under its other name"
                 raise _value_error(entry.where, name, entry.value, allowed)
         return values, tuple(unused)
 
@@ -118,13 +118,16 @@ class ParameterTable:
             if definition.low <= value <= definition.high:
                 values[name] = value
             else:
-                notes.append(f"{name} {value:g} of the log is not allowed: the default is taken")
+                notes.append(f"{name} {value:g} of the log is not allowed: the default is used")
         for low, high in self.pairs:
             if low in values and high in values and values[low] >= values[high]:
-                notes.append(f"{low} {values[low]:g} and {high} {values[high]:g} of the log: the defaults are taken")
+                notes.append(
+                    f"{low} {values[low]:g} and {high} {values[high]:g} of the log are not allowed: "
+                    "the defaults are used"
+                )
                 del values[low], values[high]
         if not values:
-            notes.append(f"the log holds no parameters: {self.title}'s defaults are taken")
+            notes.append(f"the log holds no parameters: {self.title}'s defaults are used")
         return values, notes
 
 
@@ -203,7 +206,7 @@ class ParameterSet:
         try:
             return cls._build([("file", values)], source, (), *fields), tuple(notes)
         except ParameterError as error:
-            return cls.defaults(*fields), (*notes, f"{error}: {cls.table.title}'s defaults are taken")
+            return cls.defaults(*fields), (*notes, f"{error}: {cls.table.title}'s defaults are used")
 
     @classmethod
     def _of_aircraft(cls, entries: Mapping[str, Entry]) -> dict[str, float]:

@@ -75,7 +75,7 @@ class ProgramAutopilot(Autopilot):
         Raise ValueError if the autopilot belongs to a recorded flight.
         """
         if self.binary is None:
-            raise ValueError("the program of a recorded flight is not at hand")
+            raise ValueError("the program of a recorded flight is not available here")
         return self.binary
 
     @abstractmethod

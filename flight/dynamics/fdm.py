@@ -334,7 +334,7 @@ class Fdm:
         found = straight(self, airspeed, amsl, climb)
         if found is None:
             raise FlightError(
-                f"{self.aircraft.name} holds no steady flight at {airspeed:.1f} m/s,"
+                f"{self.aircraft.name} cannot hold steady flight at {airspeed:.1f} m/s,"
                 f" {math.degrees(climb):+.1f} degrees to the air and {amsl:.0f} m above sea level",
                 file=self.aircraft.name,
                 field="airspeed",

@@ -238,7 +238,7 @@ def try_model(aircraft: Aircraft) -> None:
     code, reason = _try(str(aircraft.folder), model_hash(aircraft))
     if code not in {0, _REFUSED}:
         how = "hangs" if code is None else "aborts the process"
-        why = reason or "probably over an undefined property"
+        why = reason or "probably because of an undefined property"
         raise FlightError(f"{aircraft.model_file}: JSBSim {how} with this model: {why}", file=aircraft.model_file)
 
 

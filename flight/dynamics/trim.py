@@ -388,7 +388,7 @@ def air_velocity(course: float, climb: float, airspeed: float, wind: Floats) -> 
     speed = tailwind + math.sqrt(square) if airspeed > 0.0 and square > 0.0 else -1.0
     if speed <= 0.0:
         raise FlightError(
-            f"no way made along the course of {math.degrees(course):.0f} degrees:"
+            f"no progress along the course of {math.degrees(course):.0f} degrees:"
             f" airspeed {airspeed:.1f} m/s in {float(np.hypot(wind[0], wind[1])):.1f} m/s of wind",
             field="airspeed",
             value=airspeed,

@@ -99,7 +99,7 @@ def airframe_gains(aircraft: Aircraft, fdm: Fdm | None = None) -> dict[str, floa
 def _level_cruise(aircraft: Aircraft, fdm: Fdm) -> Trim:
     level = straight(fdm, aircraft.airspeed, AMSL)
     if level is None:
-        message = f"{aircraft.name} holds no level flight at {aircraft.airspeed:g} m/s and {AMSL:g} m"
+        message = f"{aircraft.name} cannot hold level flight at {aircraft.airspeed:g} m/s and {AMSL:g} m"
         raise FlightError(message, file=aircraft.model_file, field="airspeed", value=aircraft.airspeed)
     return level
 

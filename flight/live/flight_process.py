@@ -56,9 +56,9 @@ STOPPED = "stopped by the ground station"
 # End of a flight at the shutdown of the vehicle.
 SHUT_DOWN = "stopped: the vehicle was shut down"
 # End of a route that a diversion left; the new mode follows.
-DIVERTED_TEXT = "left, as a ground station asked, for "
+DIVERTED_TEXT = "left at a ground station's request for "
 # End of one log of a loiter that continues.
-STILL_LOITERING_TEXT = "logged until here, and circling on"
+STILL_LOITERING_TEXT = "log ends here; the aircraft keeps circling"
 # Loiters without end are logged in pieces, and end after this number.
 _MAX_LOITER_LOGS = 16
 

@@ -156,12 +156,12 @@ def read_key(path: Path) -> bytes:
         with os.fdopen(os.open(path, os.O_RDONLY | os.O_NONBLOCK), "rb") as file:
             status = os.fstat(file.fileno())
             if not stat.S_ISREG(status.st_mode):
-                raise FlightError(f"{path}: not a plain file: a signing key is expected", file=path)
+                raise FlightError(f"{path}: not a plain file; expected a signing key", file=path)
             own = getattr(os, "getuid", None)
             # Where users have no numbers, modes do not show who can read a file.
             if own is not None and (status.st_uid != own() or stat.S_IMODE(status.st_mode) & 0o077):
                 mode = stat.S_IMODE(status.st_mode)
-                allowed = "a signing key is its owner's alone to read (chmod 600)"
+                allowed = "only its owner may read a signing key (chmod 600)"
                 message = f"{path}: mode {mode:03o}: {allowed}"
                 raise FlightError(message, file=path, field="mode", value=f"{mode:03o}", allowed=allowed)
             data = file.read(_MAX_KEY_BYTES + 1).strip()
@@ -337,16 +337,16 @@ def check_access(access: Access) -> None:
     >>> check_access(Access(("127.0.0.1", 14551), (("127.0.0.1", 14550),)))
     >>> check_access(Access(("0.0.0.0", 14551), ()))
     Traceback (most recent call last):
-    world.errors.FlightError: bind 0.0.0.0:14551: beyond this machine: give `sign_key` or `allow`, ...
+    world.errors.FlightError: bind 0.0.0.0:14551: reaches beyond this machine; give `sign_key` or `allow`, ...
     """
     for name, (host, port) in (("bind", access.bind), *(("to", address) for address in access.to)):
         if is_loopback(host) or access.key is not None:
             continue
         if name == "bind" and not access.allowed:
-            allowed = "beyond this machine: give `sign_key` or `allow`, or bind to 127.0.0.1"
+            allowed = "reaches beyond this machine; give `sign_key` or `allow`, or bind to 127.0.0.1"
             raise FlightError.of_argument(name, f"{host}:{port}", allowed)
         if name == "to" and host not in access.allowed:
-            allowed = f"beyond this machine: give `sign_key`, or `allow` {host}"
+            allowed = f"reaches beyond this machine; give `sign_key`, or `allow` {host}"
             raise FlightError.of_argument(name, f"{host}:{port}", allowed)
     far = [f"{host}:{port}" for host, port in access.to if not is_loopback(host)]
     if far and is_loopback(access.bind[0]):

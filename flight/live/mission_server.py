@@ -196,7 +196,7 @@ def start_problem(mission: Mission, first: int, *, in_flight: bool = False) -> s
         return "the mission has no such item"
     places = [item for item in mission.items if item.seq >= first and item.has_position]
     least = 1 if in_flight else 2
-    return "" if first <= mission.items[0].seq or len(places) >= least else "from there on no leg is left to fly"
+    return "" if first <= mission.items[0].seq or len(places) >= least else "no leg is left to fly from there"
 
 
 def flown_from(mission: Mission, first: int) -> Mission:

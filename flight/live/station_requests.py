@@ -128,7 +128,7 @@ class Parameters:
     def _set_law_parameter(self, entry: Parameter, value: float) -> str:
         """Change a parameter of the control law; return the reason why it was refused, or "" if it was changed."""
         if not math.isfinite(value):
-            return f"{entry.name} {value:g}: a finite number is expected; {entry.value:g} kept"
+            return f"{entry.name} {value:g}: expected a finite number; {entry.value:g} kept"
         # 0.7 travels as 0.699999988: the number that was typed is the shortest one with the same float32.
         stated = self.stated | {entry.name: float(str(np.float32(value)))}
         try:
@@ -421,7 +421,7 @@ _MISSION_CURRENT_PAUSE_S = 3.0
 # MAV_CMD_DO_ORBIT, which pymavlink 2.4.41 does not have.
 _DO_ORBIT = 34
 _NO_GUIDED = "target refused: MAV_CMD_DO_REPOSITION, or a MISSION_ITEM_INT with current 2, sends it to a place"
-_NO_PLACE = "go-to denied: a latitude of -90..90, a longitude of -180..180 and a finite height are expected"
+_NO_PLACE = "go-to denied: expected a latitude of -90..90, a longitude of -180..180 and a finite height"
 # Commands that are equivalent to a mode.
 _MODE_COMMANDS = {mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH: RTL, mavlink.MAV_CMD_NAV_LOITER_UNLIM: LOITER}
 # Commands that do not control this aircraft, with an alternative.

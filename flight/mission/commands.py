@@ -246,13 +246,13 @@ _OPEN = Treatment.OPEN
 _REFUSED = Treatment.REFUSED
 
 # Purposes of commands without an effect on the path.
-CAMERA = "the camera's, nothing to fly"
+CAMERA = "for the camera, nothing to fly"
 # Reason for commands that point a gimbal.
 _GIMBAL = "points a camera, not the aircraft"
 # ArduPlane: `Plane::start_command` does not know such a command, `Plane::verify_command` reports it as done.
-PASSED_OVER = "ArduPlane takes it and passes it over"
+PASSED_OVER = "ArduPlane accepts it and skips it"
 # Reason for conditions.
-_HOLDS_BACK = "holds back the commands behind it; open where one of them is flown"
+_HOLDS_BACK = "delays the commands after it; undecided if one of these is flown"
 
 # Treatment of each command that at least one autopilot accepts; both refuse any other.
 SUPPORT: dict[Command, Support] = {
@@ -285,7 +285,7 @@ SUPPORT: dict[Command, Support] = {
     C.DO_JUMP: Support(_FLOWN, _FLOWN, "a jump to another item"),
     C.DO_CHANGE_SPEED: Support(_FLOWN, _FLOWN, "another airspeed"),
     # `Plane::do_set_home`. PX4 accepts coordinates only in frame 2, where they are not coordinates.
-    C.DO_SET_HOME: Support(_FLOWN, _OPEN, "another home, for the altitudes and returns behind it"),
+    C.DO_SET_HOME: Support(_FLOWN, _OPEN, "another home, for the altitudes and returns after it"),
     # It switches only plain relays, not one with another function such as an ignition (AP_Relay).
     C.DO_SET_RELAY: Support(_NO_EFFECT, _REFUSED, "switches a plain relay"),
     C.DO_REPEAT_RELAY: Support(_NO_EFFECT, _REFUSED, "switches a plain relay"),
@@ -294,9 +294,9 @@ SUPPORT: dict[Command, Support] = {
     C.DO_SET_SERVO: Support(_NO_EFFECT, _REFUSED, "moves a servo that does not steer"),
     C.DO_SET_ACTUATOR: Support(_REFUSED, _NO_EFFECT, "moves a servo that does not steer"),
     C.DO_REPEAT_SERVO: Support(_NO_EFFECT, _REFUSED, "moves a servo that does not steer"),
-    C.DO_RETURN_PATH_START: Support(_NO_EFFECT, _REFUSED, "a mark that returns may go on from"),
+    C.DO_RETURN_PATH_START: Support(_NO_EFFECT, _REFUSED, "a mark from which returns may continue"),
     C.DO_LAND_START: Support(_FLOWN, _FLOWN, "the mark of a landing sequence"),
-    C.DO_GO_AROUND: Support(_NO_EFFECT, _REFUSED, "a mark that a broken off landing goes on from"),
+    C.DO_GO_AROUND: Support(_NO_EFFECT, _REFUSED, "a mark from which an aborted landing continues"),
     C.DO_PAUSE_CONTINUE: Support(_NO_EFFECT, _REFUSED, PASSED_OVER),
     C.DO_SET_REVERSE: Support(_NO_EFFECT, _REFUSED, PASSED_OVER),
     C.DO_SET_ROI_LOCATION: Support(_NO_EFFECT, _NO_EFFECT, _GIMBAL),
@@ -313,13 +313,13 @@ SUPPORT: dict[Command, Support] = {
     C.DO_FENCE_ENABLE: Support(_NO_EFFECT, _REFUSED, "switches the fence, which is judged all the same"),
     C.DO_PARACHUTE: Support(_OPEN, _REFUSED, "may release the parachute, or let it be released"),
     C.DO_INVERTED_FLIGHT: Support(_OPEN, _REFUSED, "ArduPlane flies on inverted"),
-    C.DO_GRIPPER: Support(_NO_EFFECT, _NO_EFFECT, "the payload's; its mass is not flown"),
+    C.DO_GRIPPER: Support(_NO_EFFECT, _NO_EFFECT, "for the payload; its mass is not simulated"),
     # `Plane::autotune_enable`: the roll and pitch gains change in flight.  PX4 1.16 refuses it.
     C.DO_AUTOTUNE_ENABLE: Support(_OPEN, _OPEN, "the autopilot changes its own gains in flight; PX4 from 1.17 on"),
     C.NAV_SET_YAW_SPEED: Support(_NO_EFFECT, _REFUSED, PASSED_OVER),
     C.DO_SET_CAM_TRIGG_INTERVAL: Support(_REFUSED, _NO_EFFECT, CAMERA),
-    C.DO_SET_RESUME_REPEAT_DIST: Support(_NO_EFFECT, _REFUSED, "for a mission that is broken off and resumed"),
-    C.DO_SPRAYER: Support(_NO_EFFECT, _REFUSED, "the payload's, nothing to fly"),
+    C.DO_SET_RESUME_REPEAT_DIST: Support(_NO_EFFECT, _REFUSED, "for a mission that is interrupted and resumed"),
+    C.DO_SPRAYER: Support(_NO_EFFECT, _REFUSED, "for the payload, nothing to fly"),
     C.DO_SEND_SCRIPT_MESSAGE: Support(_OPEN, _REFUSED, "a script on board may do anything"),
     # `RC_Channel::run_aux_function`: its functions include modes, motor stop and returns.
     C.DO_AUX_FUNCTION: Support(_OPEN, _REFUSED, "an auxiliary switch, which may change the mode or stop the motor"),
@@ -343,8 +343,8 @@ SUPPORT: dict[Command, Support] = {
     C.VIDEO_START_CAPTURE: Support(_NO_EFFECT, _NO_EFFECT, CAMERA),
     C.VIDEO_STOP_CAPTURE: Support(_NO_EFFECT, _NO_EFFECT, CAMERA),
     C.DO_VTOL_TRANSITION: Support(_OPEN, _OPEN, "a VTOL aircraft changes between rotors and wing"),
-    C.CONDITION_GATE: Support(_REFUSED, _FLOWN, "PX4 counts the speeds behind it from when it is passed"),
-    C.DO_WINCH: Support(_NO_EFFECT, _NO_EFFECT, "the payload's, nothing to fly"),
+    C.CONDITION_GATE: Support(_REFUSED, _FLOWN, "PX4 applies the speeds after it once it is passed"),
+    C.DO_WINCH: Support(_NO_EFFECT, _NO_EFFECT, "for the payload, nothing to fly"),
     C.NAV_SCRIPT_TIME: Support(_OPEN, _REFUSED, "a script on board flies"),
     C.NAV_ATTITUDE_TIME: Support(_NO_EFFECT, _REFUSED, PASSED_OVER),
 }
@@ -353,7 +353,7 @@ SUPPORT: dict[Command, Support] = {
 MARKS = frozenset({C.DO_RETURN_PATH_START, C.DO_LAND_START, C.DO_GO_AROUND, C.JUMP_TAG})
 
 # Treatment of a command that is not in the table.
-_UNKNOWN = Support(_REFUSED, _REFUSED, "no autopilot takes it in a mission")
+_UNKNOWN = Support(_REFUSED, _REFUSED, "no autopilot accepts it in a mission")
 
 
 def support_of(command: int) -> Support:

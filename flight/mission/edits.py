@@ -46,10 +46,10 @@ def places(mission: Mission) -> tuple[int, ...]:
 def checked_place(mission: Mission, index: int) -> MissionItem:
     """Return the item to edit.  Raises MissionError if the item does not exist or is not a place."""
     if not 0 <= index < len(mission.items):
-        raise MissionError.at(mission.source, "item", index, f"0..{len(mission.items) - 1} is expected")
+        raise MissionError.at(mission.source, "item", index, f"expected 0..{len(mission.items) - 1}")
     item = mission.items[index]
     if not is_place(item):
-        raise MissionError.at(mission.source, f"item {item.seq}", item.command, "is no place on the map")
+        raise MissionError.at(mission.source, f"item {item.seq}", item.command, "is not a place on the map")
     return item
 
 
@@ -139,7 +139,7 @@ def deleted(mission: Mission, index: int) -> Mission:
     """
     checked_place(mission, index)
     if len(places(mission)) <= 2:
-        message = f"{mission.source}: a mission keeps at least two places"
+        message = f"{mission.source}: a mission needs at least two places"
         raise MissionError(message, file=mission.source, field="items")
     seq = mission.items[index].seq
     items = [item for k, item in enumerate(mission.items) if k != index]

@@ -70,9 +70,12 @@ def zone_fences(zones: Sequence[Zone], origin: GeoOrigin) -> tuple[list[MissionI
     if bands:
         notes.append(f"a fence has no floor and no ceiling: {_joined_names(bands)} in the fence at every height")
     if closed:
-        notes.append(f"a fence has no holes in what it excludes: {_joined_names(closed)} in the fence without them")
+        notes.append(f"an excluded area of a fence has no holes: {_joined_names(closed)} in the fence without them")
     if left_out:
-        notes.append(f"every inclusion of a fence counts: {_joined_names(left_out)} left out, being of several parts")
+        notes.append(
+            f"a flight must be inside every inclusion of a fence: {_joined_names(left_out)} left out for having"
+            " several parts"
+        )
     return items, notes
 
 
@@ -125,7 +128,7 @@ def fence_shapes(fences: tuple[MissionItem, ...], source: str = "fence") -> list
         if len(shape) < count or any(
             corner.command != item.command or (count > 1 and corner.params[0] != item.params[0]) for corner in shape
         ):
-            problem = ItemProblem("p1", item.params[0], "fewer corners follow than it counts")
+            problem = ItemProblem("p1", item.params[0], "fewer corners follow than it states")
             raise MissionError(**problem.at(source, f"{source}: fence item {item.seq}"))
         shapes.append(shape)
         k += count

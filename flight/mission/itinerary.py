@@ -201,14 +201,14 @@ def make_itinerary(mission: Mission) -> Itinerary:
             break
     if steps.endless >= 0:
         name = command_name(mission.items[steps.index[steps.endless]].command)
-        walk.notes.add(f"{name} without end: taken once; the flight ends there", steps.endless)
+        walk.notes.add(f"{name} has no end: it is flown once, and the flight ends there", steps.endless)
     for gate in walk.gates:
         walk.notes.by_value.add("CONDITION_GATE: nothing to fly to comes after it, so it is passed at once", gate.item)
     for item in mission.items:
         if item.seq not in steps.reached and not (walk.ended and item.command in JUMPS):
             walk.notes.add(NEVER_REACHED, item.seq)
     if not walk.stops:
-        raise MissionError(f"{mission.source}: no item with a position: at least two are expected", file=mission.source)
+        raise MissionError(f"{mission.source}: no item has a position; expected at least two", file=mission.source)
     return Itinerary(
         stops=tuple(walk.stops),
         home=walk.first_home,
@@ -375,12 +375,12 @@ class _ItineraryBuilder:
                 self._run_as_arduplane(item, run[k + 1 :])
         for item in step.late:
             if item not in step.between:
-                self.notes.usual.add(f"{command_name(item.command)}: run a round early, as ArduPlane does", item.seq)
+                self.notes.usual.add(f"{command_name(item.command)}: run one loop early, as ArduPlane does", item.seq)
         if step.to is not None:
             self._fly_item(step.to)
         else:
             for item in step.between[1:]:
-                text = f"{command_name(item.command)}: not run, for nothing to fly to comes after it"
+                text = f"{command_name(item.command)}: not run, as nothing to fly to comes after it"
                 self.notes.usual.add(text, item.seq)
         for item in run[1:]:
             if item.command == Command.DO_SET_HOME:
@@ -445,11 +445,11 @@ class _ItineraryBuilder:
 
     def _note_wait(self, item: MissionItem) -> None:
         """Note an item after which PX4 waits (`MissionBase::on_active`); ArduPlane does not read that flag."""
-        self.notes.usual.add("autocontinue is 0: flown on, as ArduPlane does", item.seq)
+        self.notes.usual.add("autocontinue is 0: the flight continues, as ArduPlane does", item.seq)
         if item.seq == self.last_seq:
             self.notes.by_value.add("autocontinue is 0 at the mission's end: nothing comes after it", item.seq)
         else:
-            self.leave_open("autocontinue is 0, where PX4 would wait: flown on", item.seq, usual=False)
+            self.leave_open("autocontinue is 0: the flight continues, where PX4 would wait", item.seq, usual=False)
 
     def _fly_item(self, item: MissionItem) -> None:
         """Process a navigation item."""
@@ -495,8 +495,8 @@ class _ItineraryBuilder:
                 self.leave_open(f"{name} in the air: not flown", item.seq)
             return
         if math.isnan(item.alt):
-            message = f"{self.source}: item {item.seq}: {name} has no altitude: a number is expected"
-            raise MissionError(message, file=self.source, field="altitude", allowed="a number is expected")
+            message = f"{self.source}: item {item.seq}: {name} has no altitude: expected a number"
+            raise MissionError(message, file=self.source, field="altitude", allowed="expected a number")
         self.takeoff = item
         if vertical:
             self.leave_open(f"{name}: not flown straight up", item.seq)
@@ -620,7 +620,7 @@ class _ItineraryBuilder:
         if speed > 0.0:
             self.airspeed_by_value = speed
             if kind != 0.0:
-                notes.add(f"DO_CHANGE_SPEED of type {kind:g}: flown as airspeed, for no type is read", item.seq)
+                notes.add(f"DO_CHANGE_SPEED of type {kind:g}: flown as airspeed, as its type is not read", item.seq)
             return
         self.airspeed_by_value = math.nan
         notes.add(f"DO_CHANGE_SPEED to {speed:g} m/s: back to the autopilot's own airspeed", item.seq)
@@ -633,4 +633,4 @@ def _first_position(mission: Mission) -> Home:
     for item in mission.items:
         if item.command in PLACES | TAKEOFFS | LANDINGS and item.has_position:
             return Home(item.lat_deg, item.lon_deg, math.nan)
-    raise MissionError(f"{mission.source}: no item with a position: at least two are expected", file=mission.source)
+    raise MissionError(f"{mission.source}: no item has a position; expected at least two", file=mission.source)

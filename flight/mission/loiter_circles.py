@@ -93,11 +93,11 @@ class LoiterRules:
         """Return a note for people on the loiter that follows the mission's end.
 
         >>> LoiterRules(80.0, "NAV_LOITER_RAD", ends_in_circle=True).end_note()
-        'after the last waypoint it circles about that without end, with NAV_LOITER_RAD, 80 m: flown once'
+        'after the last waypoint the aircraft circles it without end, with NAV_LOITER_RAD, 80 m: flown once'
         """
         name = f"{self.radius_name}, " if self.radius_name else ""
         circle = f"with {name}{abs(self.radius):g} m"
-        return f"after the last waypoint it circles about that without end, {circle}: flown once"
+        return f"after the last waypoint the aircraft circles it without end, {circle}: flown once"
 
 
 # Rules of an autopilot without its own.
@@ -199,7 +199,7 @@ def lay_circles(
         points += laid
         if len(points) > MAX_STOPS:
             item = f"item {node.stop.item}"
-            message = f"{source}: {item}: more than {MAX_STOPS:,} places, circles laid out"
+            message = f"{source}: {item}: with its circles laid out the route has more than {MAX_STOPS:,} waypoints"
             raise MissionError(message, file=source, field=item)
     return points, tuple(unjoined)
 

@@ -379,7 +379,7 @@ class _Heights:
         """
         if math.isnan(stop.alt):
             if math.isnan(last):
-                message = f"{self.source}: {_stop_name(stop)}: no altitude, and none before to keep"
+                message = f"{self.source}: {_stop_name(stop)}: no altitude, and no earlier item has one to keep"
                 raise MissionError(message, file=self.source, field="altitude")
             return last
         if stop.frame in AMSL:
@@ -398,7 +398,7 @@ class _Heights:
         under = math.nan if terrain is None else float(terrain.height(east, north))
         if math.isnan(under):
             asked = f"{self.source}: {_stop_name(stop)}: height above terrain (frame {stop.frame})"
-            lacks = "no terrain is given to count from" if terrain is None else f"{terrain.source} has no data there"
+            lacks = "no terrain is given for it" if terrain is None else f"{terrain.source} has no data there"
             raise MissionError(f"{asked}: {lacks}", file=self.source, field="frame", value=stop.frame)
         return under
 
@@ -477,7 +477,7 @@ def _merge_stops(source: str, kept: PlacedStop, new: PlacedStop, notes: Notes) -
         if after.command not in TAKEOFFS:
             raise MissionError(
                 f"{source}: {_stop_name(after)}: {abs(climb):.1f} m straight {side} {_stop_name(before)}:"
-                " no fixed wing flies that; places differ by 1 m or more across the ground, or in nothing",
+                " no fixed wing flies that; two places must be identical, or at least 1 m apart over the ground",
                 file=source,
                 field=_stop_name(after),
             )

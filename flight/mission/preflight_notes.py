@@ -83,7 +83,7 @@ def _note_distant_home(mission: Mission, scenario: Scenario) -> Iterator[str]:
     east, north = to_map(scenario.origin, home.lat_deg, home.lon_deg)
     away = math.dist((float(east), float(north)), stated[:2])
     if away > HOME_APART:
-        yield f"the mission's home is {away:.0f} m from the scenario's: launched there, heights count from elsewhere"
+        yield f"the mission's home is {away:.0f} m from the scenario's: after a launch there, heights count from there"
 
 
 def _note_rally_points(
@@ -174,10 +174,10 @@ def _landing_ground(mission: Mission, route: Route, scenario: Scenario) -> Itera
     length = LandingStrip(0.0, 0.0).length
     if not any(math.isnan(one) for one in slopes):
         along, across = (_slope_text(one) for one in slopes)
-        ground = f"over {length:.0f} m about its point the ground {along} along it, and {across} to the right"
+        ground = f"over {length:.0f} m around its point the ground {along} along it, and {across} to the right"
         if along == across == _LEVEL_TEXT:
-            ground = f"over {length:.0f} m about its point the ground {_LEVEL_TEXT}"
+            ground = f"over {length:.0f} m around its point the ground {_LEVEL_TEXT}"
         if max(abs(one) for one in slopes) > STEEPEST_STRIP:
-            ground += f" ({STEEPEST_STRIP:.0%} is the most that a plan lands on)"
-    unknown = "no [landing] states its strip: touch-down and way to rest are not judged"
+            ground += f" ({STEEPEST_STRIP:.0%} is the limit for a plan's landing)"
+    unknown = "no [landing] states its strip, so touch-down and roll-out are not judged"
     yield f"item {last}: lands on {round(math.degrees(course)) % 360}°{wind}; {ground}; {unknown}"

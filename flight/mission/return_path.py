@@ -87,7 +87,7 @@ def nearest_landing(here: Place, landings: Sequence[LandingStart]) -> LandingSta
 
 
 # Note on a return that the autopilot continues to a landing sequence, and that the route does not.
-RETURN_NOT_FLOWN_ON = "the return is not flown on to it"
+RETURN_NOT_FLOWN_ON = "the return does not continue to it"
 # A turn with a tangent shorter than this is omitted, m.
 _MIN_TANGENT_M = 1.0
 # Altitude tolerance for leaving the loiter to join the landing sequence, m.

@@ -452,7 +452,7 @@ def _held_above_ground(stop: ItineraryStop) -> float:
 def _refuse_fewer_than_two(source: str, places: int) -> None:
     """Raise MissionError for a route of fewer than two places."""
     if places < 2:
-        message = f"{source}: {places} place to fly to: at least two different ones are expected"
+        message = f"{source}: {places} place to fly to: expected at least two different ones"
         raise MissionError(message, file=source)
 
 
@@ -512,7 +512,7 @@ def _nearest_landing(placed: PlacedMission, here: tuple[float, float, float], no
 
 def _landing_choice_text(placed: PlacedMission) -> str:
     count = len(placed.landing_starts)
-    return f" (the nearest of {count}, height counted)" if count > 1 else ""
+    return f" (the nearest of {count}, with height differences)" if count > 1 else ""
 
 
 def _note_circles(itinerary: Itinerary, kept: list[PlacedStop], loiters: LoiterRules, notes: Notes) -> None:
@@ -567,7 +567,10 @@ def _lay_return(
     )
     notes.add(described_return(target, rules, here[2], onward), stop.item)
     if rules.landing_counts and any(item.command in LANDINGS for item in placed.mission.items):
-        notes.add(f"the mission's landing counts as a place to return to: not flown to; to {target.name}", stop.item)
+        notes.add(
+            f"the mission's landing is also a place to return to, which is not flown: the return is to {target.name}",
+            stop.item,
+        )
     if rules.instead:
         notes.add(rules.instead, stop.item)
     first = len(points) - 1
@@ -591,7 +594,7 @@ def _with_gates(placed: PlacedMission, notes: Notes) -> list[PlacedStop]:
             if gate.airspeed == after or (math.isnan(gate.airspeed) and math.isnan(after)):
                 continue
             if not all(one.stop.loiter is None and one.stop.command in PLACES for one in (before, place)):
-                text = "CONDITION_GATE beside what is no waypoint: the speed after it is flown from the leg's begin"
+                text = "CONDITION_GATE not between waypoints: the speed after it holds from the leg's start"
                 notes.add(text, gate.item)
                 continue
             share = _gate_fraction(before.position, place.position, to_map(placed.origin, gate.lat_deg, gate.lon_deg))

@@ -111,7 +111,7 @@ def read_fence(path: Path) -> tuple[MissionItem, ...]:
     text = _read_text(path)
     fences = parse_fence_points(text, str(path)) if is_point_list(text) else parse_mission(text, str(path)).fences
     if not fences:
-        raise MissionError(f"{path}: no fence in it: items of commands 5001 to 5004 are expected", file=path)
+        raise MissionError(f"{path}: contains no fence; expected items of commands 5001 to 5004", file=path)
     return fences
 
 
@@ -130,10 +130,10 @@ def mission_text(mission: Mission, kind: FileKind) -> str:
 def _read_text(path: Path) -> str:
     data = read_small_file(path, MAX_BYTES, "mission", MissionError)
     if not data.strip():
-        raise MissionError(f"{path}: empty: a mission is expected", file=path)
+        raise MissionError(f"{path}: empty; expected a mission", file=path)
     if data.startswith(_UTF16_MARKS):
         raise MissionError(f"{path}: text in UTF-16: a mission file is UTF-8 or ASCII", file=path)
     if b"\0" in data:
         line = data.count(b"\n", 0, data.index(b"\0")) + 1
-        raise MissionError(f"{path}:{line}: a NUL byte: a text file is expected", file=path)
+        raise MissionError(f"{path}:{line}: contains a NUL byte; expected a text file", file=path)
     return utf8_text(data, path, MissionError)

@@ -47,7 +47,7 @@ _LANDING_KIND = "fwLandingPattern"
 # QGC's altitude mode of a height above terrain, which it sends as an altitude AMSL.
 _ALTITUDE_ABOVE_TERRAIN_MODE = 3
 # Text for a missing coordinate.
-_COORDINATE_TEXT = "latitude, longitude and altitude are expected"
+_COORDINATE_TEXT = "expected latitude, longitude and altitude"
 
 
 def expand_items(items: list[Any], source: str, warnings: list[str], plans: list[SurveyPlan]) -> list[Any]:
@@ -74,10 +74,10 @@ def expand_items(items: list[Any], source: str, warnings: list[str], plans: list
             made = _landing_items(item, source, place, _last_number(out) + 1)
         else:
             known = f"only SimpleItem, {', '.join(_TRANSECT_KINDS)} and {_LANDING_KIND} are read"
-            allowed = f"{known}; have the ground station turn it into items first"
+            allowed = f"{known}; convert it to items in the ground station first"
             shown = f"{json.dumps(kind)[:40]} {name!r}"
             raise MissionError.at(source, f"{place}.type", name or kind, allowed, shown=shown)
-        warnings.append(f"{source}: {place}: {name} taken as the {len(made)} simple items that it stands for")
+        warnings.append(f"{source}: {place}: {name} replaced by the {len(made)} simple items that it stands for")
         out += made
     return out
 
@@ -97,7 +97,9 @@ def _to_present_form(item: Any, place: str, warnings: list[str]) -> Any:
     height = item.get("Altitude")
     known = isinstance(height, int | float) and not isinstance(height, bool)
     if len(params) == 7 and params[6] is None and item.get("AltitudeMode") == _ALTITUDE_ABOVE_TERRAIN_MODE and known:
-        warnings.append(f"{place}: its height is not calculated yet: taken as {height:g} m above the terrain there")
+        warnings.append(
+            f"{place}: its height is not calculated yet and is taken as {height:g} m above the terrain there"
+        )
         return {**item, "frame": int(Frame.GLOBAL_TERRAIN_ALT), "params": [*params[:6], height]}
     return item
 
@@ -107,7 +109,7 @@ def _transect_items(item: dict[str, Any], source: str, place: str, name: str) ->
     items = held.get("Items") if isinstance(held, dict) else None
     if not isinstance(items, list) or not items:
         field, shown = f"{place}.TransectStyleComplexItem.Items", f"{name!r} without its items"
-        allowed = "a list is expected; have the ground station save the plan anew"
+        allowed = "expected a list; save the plan again in the ground station"
         raise MissionError.at(source, field, items, allowed, shown=shown)
     return items
 
@@ -189,7 +191,7 @@ def _landing_items(item: dict[str, Any], source: str, place: str, number: int) -
     radius = item.get("loiterRadius", 0.0)
     if isinstance(radius, bool) or not isinstance(radius, int | float) or not 0.0 <= radius <= 1e5:
         shown = json.dumps(radius)[:40]
-        raise MissionError.at(source, f"{place}.loiterRadius", radius, "0..100000 m is expected", shown=shown)
+        raise MissionError.at(source, f"{place}.loiterRadius", radius, "expected 0..100000 m", shown=shown)
     turn = float(radius) if item.get("loiterClockwise", True) else -float(radius)
     spiral = item.get("useLoiterToAlt", True)
     into = (
@@ -325,7 +327,7 @@ def _autopilot_of(firmware: int | None, source: str) -> str:
     if firmware is None or firmware in _UNNAMED_FIRMWARES:
         return ""
     if firmware not in _FIRMWARES:
-        allowed = "another autopilot (MAV_AUTOPILOT): 3 (ArduPilot), 12 (PX4) or 0 (not stated) is expected"
+        allowed = "another autopilot (MAV_AUTOPILOT): expected 3 (ArduPilot), 12 (PX4) or 0 (not stated)"
         raise MissionError.at(source, "mission.firmwareType", firmware, allowed)
     return _FIRMWARES[firmware]
 
@@ -361,7 +363,7 @@ def parse_plan_file(text: str, source: str) -> Mission:
         warnings.append(f"{source}: item {number}: {name} has no position ({len(lost)} such items in all)")
     home = _read_home(file.mission.plannedHomePosition, source)
     if home is None and file.mission.plannedHomePosition is not None:
-        warnings.append(f"{source}: plannedHomePosition is no position: left out; the mission has no home")
+        warnings.append(f"{source}: plannedHomePosition is not a position: left out; the mission has no home")
     if [item.seq for item in items] != list(range(1, len(items) + 1)):
         warnings.append(f"{source}: doJumpId is not 1 to {len(items)}: items are counted by their order")
     mission = Mission(
@@ -384,10 +386,10 @@ def _check_kind(data: Any, source: str) -> tuple[list[str], list[SurveyPlan]]:
     Return warnings and survey settings.
     """
     if not isinstance(data, dict):
-        message = f'{source}: a JSON object with fileType "Plan" is expected, got {type(data).__name__}'
+        message = f'{source}: expected a JSON object with fileType "Plan", got {type(data).__name__}'
         raise MissionError(message, file=source, field="fileType")
     if (kind := data.get("fileType")) != "Plan":
-        raise MissionError.at(source, "fileType", kind, '"Plan" is expected', shown=json.dumps(kind)[:60])
+        raise MissionError.at(source, "fileType", kind, 'expected "Plan"', shown=json.dumps(kind)[:60])
     warnings, plans = list[str](), list[SurveyPlan]()
     mission = data.get("mission")
     if isinstance(mission, dict) and isinstance(mission.get("items"), list):

@@ -98,13 +98,13 @@ def parse_waypoints(text: str, source: str) -> Mission:
     ]
     if not lines:
         raise MissionError(
-            f"{source}: empty: a first line '{HEADER}' and lines of {len(_COLUMNS)} columns are expected",
+            f"{source}: empty; expected a first line '{HEADER}' and lines of {len(_COLUMNS)} columns",
             file=source,
         )
     number, header = lines[0]
     if header.split() != HEADER.split():
         raise MissionError(
-            f"{source}:{number}: header {_short_repr(header)}: '{HEADER}' is expected",
+            f"{source}:{number}: header {_short_repr(header)}: expected '{HEADER}'",
             file=source,
             field="header",
             value=header,
@@ -133,7 +133,7 @@ def _parse_row(where: TextLine, line: str) -> _Row:
     fields = line.split()
     if len(fields) != len(_COLUMNS):
         raise MissionError(
-            f"{where}: {len(fields)} columns: {len(_COLUMNS)} are expected ({', '.join(_COLUMNS)})", file=where.file
+            f"{where}: {len(fields)} columns: expected {len(_COLUMNS)} ({', '.join(_COLUMNS)})", file=where.file
         )
     values = dict(zip(_COLUMNS, fields, strict=True))
     integers = {name: _parse_integer(where, name, values[name]) for name in _ALLOWED_RANGES}
@@ -167,14 +167,14 @@ def _value_error(where: TextLine, field: str, value: str | int, shown: str, allo
 def _parse_integer(where: TextLine, name: str, text: str) -> int:
     low, high = _ALLOWED_RANGES[name]
     if not _WHOLE_NUMBER.fullmatch(text) or not low <= int(text) <= high:
-        raise _value_error(where, name, text, _short_repr(text), f"a whole number {low}..{high} is expected")
+        raise _value_error(where, name, text, _short_repr(text), f"expected a whole number {low}..{high}")
     return int(text)
 
 
 def _parse_number(where: TextLine, name: str, text: str) -> float:
     if not _NUMBER.fullmatch(text) or not math.isfinite(float(text)):
         hint = " (a decimal comma?)" if "," in text else ""
-        raise _value_error(where, name, text, _short_repr(text), f"a finite number is expected{hint}")
+        raise _value_error(where, name, text, _short_repr(text), f"expected a finite number{hint}")
     # 0.0 for -0.0, which no other form of a mission keeps.
     return float(text) + 0.0
 
@@ -208,7 +208,7 @@ def _collect_warnings(rows: list[_Row], home: Home | None, body: list[_Row]) -> 
         # A fence or rally file may have a home line, as Mission Planner writes it, or none, as MAVProxy does.
         return found
     if not any(row.current for row in rows):
-        found.append("no current item: flown from the first")
+        found.append("no current item: flown from the first item")
     first = rows[0].item
     if len(body) == len(rows):
         found.append(
@@ -222,10 +222,10 @@ def _collect_warnings(rows: list[_Row], home: Home | None, body: list[_Row]) -> 
         )
     if len(body) < len(rows):
         if home is None:
-            found.append(f"{rows[0].where}: home at 0, 0, which is no position: left out; the mission has no home")
+            found.append(f"{rows[0].where}: home at 0, 0, which is not a position: left out; the mission has no home")
         elif first.frame not in (Frame.GLOBAL, Frame.GLOBAL_INT):
             found.append(f"{rows[0].where}: home in frame {first.frame}: its height is taken as above mean sea level")
-    counted = "items are counted by their lines, as ground stations do, and jumps go by that count"
+    counted = "items are numbered by their lines, as in ground stations, and jumps use these numbers"
     steps = [(after, after.item.seq - before.item.seq) for before, after in pairwise(rows)]
     gaps, falls = [row for row, by in steps if by > 1], [row for row, by in steps if by < 1]
     if gaps:
@@ -235,7 +235,7 @@ def _collect_warnings(rows: list[_Row], home: Home | None, body: list[_Row]) -> 
     lost = [row for row in body if row.item.command in PLACES | LANDINGS and not row.item.has_position]
     if lost:
         name = command_name(lost[0].item.command)
-        found.append(f"{lost[0].where}: {name} at 0, 0, which is no position ({len(lost)} such items in all)")
+        found.append(f"{lost[0].where}: {name} at 0, 0, which is not a position ({len(lost)} such items in all)")
     return found
 
 
@@ -355,7 +355,7 @@ def _parse_point(where: TextLine, line: str) -> tuple[float, float]:
     except ValueError:
         lat = lon = math.nan
     if not (math.isfinite(lat) and math.isfinite(lon)):
-        allowed = "a latitude and a longitude are expected"
+        allowed = "expected a latitude and a longitude"
         raise MissionError(f"{where}: {line[:40]!r}: {allowed}", file=where.file, value=line, allowed=allowed)
     problem = position_problem(lat, lon)
     if problem is not None:

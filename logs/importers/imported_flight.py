@@ -213,7 +213,7 @@ def make_flight(raw: RawLog, number: int | None = None) -> LoggedFlight:
     if raw.vehicle in _REFUSED:
         program_text = f" ({raw.program})" if raw.program else ""
         raise LogError(
-            f"{raw.source}: {_REFUSED[raw.vehicle]} log{program_text}: flights of aeroplanes are judged",
+            f"{raw.source}: {_REFUSED[raw.vehicle]} log{program_text}: only flights of aeroplanes are judged",
             file=raw.source,
         )
     series = raw.series["position"]
@@ -222,7 +222,7 @@ def make_flight(raw: RawLog, number: int | None = None) -> LoggedFlight:
     places = clean_places(series, raw.clock_jumps)
     spans = flown_spans(places.time, places.lat, places.lon)
     if not spans:
-        raise LogError(f"{raw.source}: no flight in it: {_reason_without_flight(places)}", file=raw.source)
+        raise LogError(f"{raw.source}: contains no flight: {_reason_without_flight(places)}", file=raw.source)
     last = float(places.time[-1])
     modes = [
         type(mode)(float(places.on_clock(np.array([mode.time]))[0]), mode.name, mode.automatic) for mode in raw.modes

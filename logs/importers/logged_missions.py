@@ -127,7 +127,7 @@ def logged_mission(logged: LoggedItems, source: str, origin: str) -> LoggedMissi
             if item.has_position:
                 home = Home(item.lat_deg, item.lon_deg, item.alt)
             else:
-                warnings.append("item 0: home at 0, 0, which is no position: left out; the mission has no home")
+                warnings.append("item 0: home at 0, 0, which is not a position: left out; the mission has no home")
         else:
             items.append(item)
     if logged.total and not any(item.seq == 0 for item in logged.items):

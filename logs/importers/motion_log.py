@@ -40,7 +40,7 @@ def read_motion(path: Path) -> MotionLog:
     """Read a log's motion.  Raises LogError, in one line, for a file that cannot be read or that is no such log."""
     try:
         if not path.is_file():
-            raise LogError(f"{path}: no such file: a log (.BIN or .ulg) is expected", file=path)
+            raise LogError(f"{path}: no such file; expected a log (.BIN or .ulg)", file=path)
         with path.open("rb") as file:
             head = file.read(7)
             file.seek(0)
@@ -53,7 +53,7 @@ def read_motion(path: Path) -> MotionLog:
 
         return read_px4_motion(path, digest)
     if head[:2] != b"\xa3\x95":
-        allowed = "an ArduPilot .BIN or a PX4 .ulg is expected"
+        allowed = "expected an ArduPilot .BIN or a PX4 .ulg"
         raise LogError(
             f"{path}: not a log of inertial sensors and servo outputs: {allowed}", file=path, allowed=allowed
         )

@@ -68,20 +68,20 @@ def open_log(path: Path) -> "RawLog":
 
     >>> open_log(Path("nothing.BIN"))
     Traceback (most recent call last):
-    world.errors.LogError: nothing.BIN: no such file: a log (.ulg, .bin, .tlog, .gpx, .igc, .kml, .kmz) is expected
+    world.errors.LogError: nothing.BIN: no such file; expected a log (.ulg, .bin, .tlog, .gpx, .igc, .kml, .kmz)
     """
     import numpy as np
 
     try:
         if not path.is_file():
-            raise LogError(f"{path}: no such file: a log ({', '.join(SUFFIXES)}) is expected", file=path)
+            raise LogError(f"{path}: no such file; expected a log ({', '.join(SUFFIXES)})", file=path)
         size = path.stat().st_size
         if size > MAX_BYTES:
             raise LogError(f"{path}: {size:,} bytes: at most {MAX_BYTES:,} are read", file=path)
         with path.open("rb") as file:
             head = file.read(_HEAD)
         if not head:
-            raise LogError(f"{path}: empty: a log is expected", file=path)
+            raise LogError(f"{path}: empty; expected a log", file=path)
         log_type = log_format(path, head)
         if log_type.extra:
             need_extra(log_type.extra, f"{path}: reading {log_type.suffixes[0]} needs")
@@ -107,11 +107,11 @@ def log_format(path: Path, head: bytes) -> LogFormat:
     ('.gpx', 'ArduPilot .BIN')
     """
     if re.search(_AS_TEXT, head, re.IGNORECASE):
-        raise LogError(f"{path}: a dataflash log as text: the .BIN that it was made of is read", file=path)
+        raise LogError(f"{path}: a dataflash log as text; planfly reads the .BIN from which it was made", file=path)
     by_content = [log_type for log_type in FORMATS if re.search(log_type.content, head, re.DOTALL | re.IGNORECASE)]
     by_suffix = [log_type for log_type in FORMATS if path.suffix.lower() in log_type.suffixes]
     if not by_content and not by_suffix:
         names = ", ".join(log_type.name for log_type in FORMATS)
-        message = f"not a log that is known (it starts with {head[:8]!r}): {names} is expected"
+        message = f"not a known log format (it starts with {head[:8]!r}); expected {names}"
         raise LogError(f"{path}: {message}", file=path)
     return next((log_type for log_type in by_suffix if log_type in by_content), (by_content or by_suffix)[0])

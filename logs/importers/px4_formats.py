@@ -48,8 +48,8 @@ class MessageFormats:
         """Add a topic of this format.  Raises LogError for more fields than a log may have."""
         self._total += self.fields(name)
         if self._total > MAX_FIELDS:
-            reason = f"the formats of its messages come to more than {MAX_FIELDS:,} fields"
-            raise LogError(f"{self._source}: not a PX4 log that can be read: {reason}", file=self._source)
+            reason = f"the formats of its messages have more than {MAX_FIELDS:,} fields"
+            raise LogError(f"{self._source}: not a readable PX4 log: {reason}", file=self._source)
 
     def fields(self, name: str) -> int:
         """Return the number of fields of a format, including nested ones; more than `MAX_FIELDS` if recursive."""

@@ -76,7 +76,7 @@ def open_topics(path: Path, names: list[str]) -> "Topics":
     except MemoryError:
         raise LogError(f"{path}: its stated size does not fit into memory", file=path) from None
     except Exception as error:  # of any kind: the library raises errors of struct, its own and plain ones
-        raise LogError(f"{path}: not a PX4 log that can be read: {_one_line(error)}", file=path) from error
+        raise LogError(f"{path}: not a readable PX4 log: {_one_line(error)}", file=path) from error
     return Topics(log, str(path), _damage_of(path))
 
 

@@ -201,7 +201,7 @@ def _controls(topics: Topics, parameters: Mapping[str, float]) -> tuple[Samples,
         return (Samples(old.time, old.values[:, [1, 0, 2, 3]]) if len(old.time) else NONE), False
     airframe = int(parameters.get("CA_AIRFRAME", _WING))
     if airframe not in (_WING, _STANDARD_VTOL):
-        raise _refusal(topics, "CA_AIRFRAME", airframe, f"{_AIRFRAMES.get(airframe, 'unknown')}: a plane is expected")
+        raise _refusal(topics, "CA_AIRFRAME", airframe, f"{_AIRFRAMES.get(airframe, 'unknown')}: expected a plane")
     scales = np.zeros((3, _SERVOS))
     elevons = False
     for k in range(int(np.clip(parameters.get("CA_SV_CS_COUNT", 0.0), 0.0, _SERVOS))):
@@ -220,8 +220,8 @@ def _controls(topics: Topics, parameters: Mapping[str, float]) -> tuple[Samples,
             raise _refusal(topics, f"CA_SV_CS{k}_TYPE", kind, message)
     for axis, row in zip(("elevator", "aileron"), scales, strict=False):
         if not row.any():
-            allowed = "CA_SV_CSn_TYPE with CA_SV_CSn_TRQ_P and CA_SV_CSn_TRQ_R are expected"
-            raise LogError(f"{topics.source}: no surface is the {axis}'s: {allowed}", file=topics.source)
+            allowed = "expected CA_SV_CSn_TYPE with CA_SV_CSn_TRQ_P and CA_SV_CSn_TRQ_R"
+            raise LogError(f"{topics.source}: no surface controls the {axis}; {allowed}", file=topics.source)
     sums = np.abs(scales).sum(axis=1, keepdims=True)
     shares = np.nan_to_num(servos.values) @ (scales / np.where(sums > 0.0, sums, 1.0)).T
     # A motor below 2 % of its thrust is stopped, which is NaN (PX4's control allocator).
@@ -242,8 +242,8 @@ def _forward_motors(topics: Topics, airframe: int, parameters: Mapping[str, floa
         ]
         ahead = [k for k, (x, z) in enumerate(axes) if x > z]
         if not ahead:
-            allowed = "one with |CA_ROTORn_AX| over |CA_ROTORn_AZ| is expected"
-            raise _refusal(topics, "CA_ROTOR_COUNT", count, f"of rotors none of which pushes ahead: {allowed}")
+            allowed = "expected one with |CA_ROTORn_AX| above |CA_ROTORn_AZ|"
+            raise _refusal(topics, "CA_ROTOR_COUNT", count, f"of rotors of which none pushes forward; {allowed}")
         return ahead
     return list(range(count)) or np.flatnonzero(np.isfinite(motors.values).any(axis=0)).tolist()
 

@@ -48,7 +48,7 @@ def track_text(path: Path, *, xml: bool) -> str:
     text = _bytes_of(path).decode("utf-8-sig", errors="replace")
     if xml and _DOCUMENT_TYPE.search(text):
         raise LogError(
-            f"{path}: a document type: none is expected in a track, and entities are not expanded", file=path
+            f"{path}: a document type is declared, which a track must not have; entities are not expanded", file=path
         )
     return text
 
@@ -68,7 +68,7 @@ def _bytes_of(path: Path) -> bytes:
     # bzip2 raises OSError for bytes that it cannot unpack.
     except (zipfile.BadZipFile, zlib.error, lzma.LZMAError, RuntimeError, EOFError, OSError) as error:
         why = " ".join(str(error).split())[:120]
-        raise LogError(f"{path}: a zipped file that cannot be read: {why}", file=path) from error
+        raise LogError(f"{path}: an unreadable zipped file: {why}", file=path) from error
     if len(data) > MAX_BYTES:
         message = f"{path}: more than {MAX_BYTES:,} bytes unpacked: at most as many are read of a track"
         raise LogError(message, file=path)
@@ -94,14 +94,12 @@ def read_gpx(path: Path) -> RawLog:
     try:
         gpx = gpxpy.parse(text)
     except (gpxpy.gpx.GPXException, ValueError) as error:
-        raise LogError(
-            f"{path}: not a GPX file that can be read: {' '.join(str(error).split())[:120]}", file=path
-        ) from error
+        raise LogError(f"{path}: not a readable GPX file: {' '.join(str(error).split())[:120]}", file=path) from error
     points = [point for track in gpx.tracks for segment in track.segments for point in segment.points]
     timed = [point for point in points if point.time is not None]
     if len(timed) < 2:
         raise LogError(
-            f"{path}: {len(timed)} track points with a time of {len(points)}: at least 2 are expected", file=path
+            f"{path}: {len(timed)} of {len(points)} track points have a time; expected at least 2", file=path
         )
     # Times without a zone are UTC, the zone of all times in the format.
     times = [point.time if point.time.tzinfo else point.time.replace(tzinfo=UTC) for point in timed if point.time]
@@ -171,7 +169,7 @@ def read_igc(path: Path) -> RawLog:
     lines = re.split(r"\r\n|\n|\r", track_text(path, xml=False))
     rows, unreadable = _fixes(lines)
     if len(rows) < 2:
-        raise LogError(f"{path}: {len(rows)} fixes (B records): at least 2 are expected", file=path)
+        raise LogError(f"{path}: {len(rows)} fixes (B records); expected at least 2", file=path)
     table = np.array(rows)
     time = _unwrap_midnight(table[:, 0])
     gnss, pressure = table[:, 4], table[:, 3]
@@ -279,9 +277,7 @@ def read_kml(path: Path) -> RawLog:
     try:
         root = ElementTree.fromstring(track_text(path, xml=True))
     except (ElementTree.ParseError, ValueError) as error:
-        raise LogError(
-            f"{path}: not a KML file that can be read: {' '.join(str(error).split())[:120]}", file=path
-        ) from error
+        raise LogError(f"{path}: not a readable KML file: {' '.join(str(error).split())[:120]}", file=path) from error
     rows, unreadable, mode = [], 0, "clampToGround"
     for track in root.iter():
         if _name(track) != "Track":
@@ -298,7 +294,7 @@ def read_kml(path: Path) -> RawLog:
     if len(rows) < 2:
         lines = sum(_name(element) == "LineString" for element in root.iter())
         why = f"; its {lines} lines have no times" if lines else ""
-        raise LogError(f"{path}: {len(rows)} places with a time (gx:Track): at least 2 are expected{why}", file=path)
+        raise LogError(f"{path}: {len(rows)} places with a time (gx:Track); expected at least 2{why}", file=path)
     table = np.array(rows)
     start = _earliest(table[:, 0])
     datum: VerticalDatum = "amsl" if mode == "absolute" else "unstated"
@@ -333,8 +329,8 @@ def _pairs(track: ElementTree.Element, path: Path) -> tuple[list[tuple[str, str]
     if all(name == "when" for name, _ in marks[: last_when + 1]):
         if len(whens) != len(coords):
             raise LogError(
-                f"{path}: a track of {len(whens)} times (when) and {len(coords)} places (gx:coord): as many of both"
-                " are expected",
+                f"{path}: a track of {len(whens)} times (when) and {len(coords)} places (gx:coord): expected"
+                " as many of both",
                 file=path,
             )
         return list(zip(whens, coords, strict=True)), 0

@@ -170,8 +170,7 @@ def _read_chunk(content: bytes, position: int) -> bytes:
         raise _Damage(f"the chunk at byte {position:,} declares {size:,} bytes: at most {RECORD_LIMIT:,} are read")
     if chunk.compression not in ("zstd", "lz4", ""):
         raise _Damage(
-            f"the chunk at byte {position:,} is compressed with {chunk.compression[:20]!r}:"
-            " zstd, lz4 or none is expected"
+            f"the chunk at byte {position:,} is compressed with {chunk.compression[:20]!r}: expected zstd, lz4 or none"
         )
     try:
         data = _decompress(chunk, size)

@@ -293,7 +293,7 @@ def read_log(path: Path | str) -> FlightLog:
     messages = _MessageCollector()
     try:
         if path.exists() and not path.is_file():
-            raise LogError(f"{path}: not a file: a flight log (.mcap) is expected", file=path)
+            raise LogError(f"{path}: not a file; expected a flight log (.mcap)", file=path)
         with path.open("rb") as file:
             _check_magic(file.read(len(MAGIC)), path)
             for data in read_chunks(file, container):
@@ -339,12 +339,12 @@ def read_log(path: Path | str) -> FlightLog:
 
 def _check_magic(magic: bytes, path: Path) -> None:
     if not magic:
-        raise LogError(f"{path}: empty: a flight log (.mcap) is expected", file=path)
+        raise LogError(f"{path}: empty; expected a flight log (.mcap)", file=path)
     if magic != MAGIC:
         if is_imported_log(path):
-            advice = f"`planfly import {path}` makes the flight log that is expected"
-            raise LogError(f"{path}: another program's log: {advice}", file=path)
-        raise LogError(f"{path}: not an MCAP file (it starts with {magic!r}): a flight log is expected", file=path)
+            advice = f"`planfly import {path}` converts it to a flight log"
+            raise LogError(f"{path}: a log of another program; {advice}", file=path)
+        raise LogError(f"{path}: not an MCAP file (it starts with {magic!r}); expected a flight log", file=path)
 
 
 def _usable_rows(rows: StateRecords, waypoints: int) -> tuple[StateRecords, str]:

@@ -166,7 +166,7 @@ class Recorder:
         times = np.ascontiguousarray(rows["time"])
         newest = last_log_time(times, self._newest_ns, EPOCH_NS, LATEST)
         if newest == OUT_OF_RANGE:
-            raise ValueError(f"time {times[0]}..{times[-1]} s: 0..{LATEST:g} is expected")
+            raise ValueError(f"time {times[0]}..{times[-1]} s: expected 0..{LATEST:g}")
         if newest == NOT_INCREASING:
             raise ValueError(f"rows from {times[0]} s on: times must increase by at least 1 ns a row")
         self._newest_ns = newest
@@ -199,9 +199,9 @@ class Recorder:
     def event(self, time: float, text: str, level: str = "info") -> None:
         """Record an event at ``time`` (s); level: debug, info, warning, error or fatal.  Raises ValueError."""
         if level not in scene.LEVELS:
-            raise ValueError(f"level {level!r}: {', '.join(scene.LEVELS)} are expected")
+            raise ValueError(f"level {level!r}: expected {', '.join(scene.LEVELS)}")
         if not 0.0 <= time < LATEST:
-            raise ValueError(f"time {time} s: 0..{LATEST:g} is expected")
+            raise ValueError(f"time {time} s: expected 0..{LATEST:g}")
         log_time = round(time * 1e9) + EPOCH_NS
         message = scene.log_message(log_time, text, level).SerializeToString(deterministic=True)
         self._events.append(single_record(self._channels[EVENT_TOPIC], log_time, message))

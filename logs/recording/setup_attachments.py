@@ -142,7 +142,7 @@ def unpack_terrain(attachments: dict[str, bytes], source: str) -> Terrain:
         )
     blocks = _row_blocks(file.rows, file.cols)
     if len(blocks) != len(file.parts) or any(name not in attachments for name in file.parts):
-        message = f"{source}: {TERRAIN_FILE}: parts: {len(blocks)} are expected, each in the log"
+        message = f"{source}: {TERRAIN_FILE}: parts: expected {len(blocks)}, each in the log"
         raise LogError(message, file=source, field="parts", value=len(file.parts))
     heights = np.empty((file.rows, file.cols), dtype=np.float32)
     for name, (first, last) in zip(file.parts, blocks, strict=True):
@@ -179,7 +179,7 @@ def _unpack(data: bytes, rows: int, cols: int, where: str) -> NDArray[Any]:
     except zstandard.ZstdError as error:
         raise LogError(f"{where}: cannot be decompressed: {error}", file=where) from error
     if len(raw) != size:
-        raise LogError(f"{where}: {rows} x {cols} heights are expected: the size differs", file=where)
+        raise LogError(f"{where}: expected {rows} x {cols} heights: the size differs", file=where)
     bits = np.ascontiguousarray(np.frombuffer(raw, np.uint8).reshape(4, -1).T).view("<u4").reshape(rows, cols)
     return np.cumsum(bits, axis=1, dtype=np.uint32).astype("<u4").view("<f4")
 
@@ -188,7 +188,7 @@ def _check_coefficients(rows: list[list[float]], source: str) -> NDArray[np.floa
     size = len(rows[0])
     if len(rows) != 2 + 2 * size or any(len(row) != size for row in rows) or size < 2:
         shape_text = f"{len(rows)} rows of {size}"
-        raise LogError.at(f"{source}: {TERRAIN_FILE}", "map_to_pixel", shape_text, "2 + 2n rows of n are expected")
+        raise LogError.at(f"{source}: {TERRAIN_FILE}", "map_to_pixel", shape_text, "expected 2 + 2n rows of n")
     if not (math.fabs(rows[1][0]) > 0.0 and math.fabs(rows[1][1]) > 0.0):
         shown = f"half-widths {rows[1][:2]}"
         raise LogError.at(f"{source}: {TERRAIN_FILE}", "map_to_pixel", rows[1][:2], "not above 0", shown=shown)

@@ -159,7 +159,7 @@ class RouteTable(SetupModel):
         ):
             length, expected = len(getattr(self, field)), len(waypoints) - (field == "airspeed")
             if length != expected:
-                raise self.fault(file, field, f"{length} values: {expected} are expected")
+                raise self.fault(file, field, f"{length} values: expected {expected}")
         if self.return_from >= len(waypoints) - 1 or (self.return_from < 0) != (self.return_to is None):
             raise self.fault(file, "return_from", f"{self.return_from}: a waypoint before the last, with its target")
         if self.straight_to >= len(waypoints):
@@ -218,7 +218,7 @@ class EnvelopeTable(SetupModel):
             values = getattr(self, field)
             found_shape = [len(values), *({len(row) for row in values} if len(shape) == 2 else ())]
             if found_shape != shape:
-                raise self.fault(file, field, f"shape {found_shape}: {shape} is expected")
+                raise self.fault(file, field, f"shape {found_shape}: expected {shape}")
         return _from_table(Envelope, self, **empty_powers)
 
 

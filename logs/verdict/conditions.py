@@ -38,31 +38,31 @@ class Conditions(DocumentConfig):
     """Conditions of a verdict or a plan; fields that the log of an imported flight does not state are None."""
 
     aircraft: str
-    """Its name or folder; empty for an imported flight whose aircraft nobody named."""
+    """Name or folder of the aircraft; empty for an imported flight without a named aircraft."""
     mass_kg: float | None
     aircraft_named: bool
     """True if the aircraft was named; if not, it is the default."""
     airspeed_mps: float
-    """Until the mission sets another."""
+    """Airspeed until the mission sets another."""
     airspeed_kind: Literal["true", "equivalent"]
     """true or equivalent."""
     airspeed_source: AirspeedSource
     """scenario (or an option), parameters, aircraft (its cruise speed) or flight (as it was flown)."""
     wind_mps: float | None
     wind_from_deg: float | None
-    """Both null where the wind is what is asked for."""
+    """Both fields of the wind are null if the wind is the result."""
     turbulence: Turbulence | None
-    """null where it was not simulated, as navigation."""
+    """Null if not simulated, like navigation."""
     navigation: Navigation | None
     """perfect, rtk or gnss."""
     autopilot: str
-    """With the settings that decide most."""
+    """Autopilot, with its most important settings."""
     autopilot_version: str
-    """Empty for planfly's own guidance, and where a log's program states it."""
+    """Version of the autopilot; empty for planfly's own guidance, and if the program of a log states it."""
     terrain: str | None
     height_datum: str | None
     zones: int = 0
-    """Of airspace that it is judged by: the scenario's and the mission's fence's."""
+    """Number of zones of the scenario and of the mission's fence."""
 
 
 def conditions_of(scenario: Scenario, aircraft: str, airspeed: float, autopilot: Autopilot) -> Conditions:
@@ -95,7 +95,7 @@ def _autopilot_source(table: FlightTable) -> str:
     """Return a clause that names the file from which a non-default autopilot was taken; "" if there is none."""
     if table.autopilot_from is None or table.steering.autopilot == DEFAULT_AUTOPILOT:
         return ""
-    return f"; taken from {table.autopilot_from}, for nobody named an autopilot"
+    return f"; taken from {table.autopilot_from}, as no autopilot was named"
 
 
 def _airspeed_source(scenario: Scenario, autopilot: Autopilot) -> AirspeedSource:
@@ -145,12 +145,12 @@ def _aircraft_line(conditions: Conditions) -> str:
         f" ({_AIRSPEED_SOURCE_TEXTS[conditions.airspeed_source]})"
     )
     if not conditions.aircraft:
-        return f"Aircraft: nobody named one (--aircraft names yours), so none of its limits are judged; {speed}"
+        return f"Aircraft: not named (--aircraft names yours), so none of its limits are judged; {speed}"
     mass = "" if conditions.mass_kg is None else f", {conditions.mass_kg:.3g} kg"
     line = f"Aircraft: {conditions.aircraft}{mass}, {speed}"
     if conditions.aircraft_named:
         return line
-    return f"{line}; nobody named an aircraft, so it is the default (--aircraft names yours)"
+    return f"{line}; no aircraft was named, so this is the default (--aircraft names yours)"
 
 
 def _world_line(conditions: Conditions) -> str:
@@ -197,7 +197,7 @@ def corridor_line(setup: FlightSetup) -> str:
         return line
     metres, leg = gap
     return (
-        f"{line}; it is wider than the {metres:.0f} m between legs {leg} and {leg + 2}: keeping to it does not show"
+        f"{line}; it is wider than the {metres:.0f} m between legs {leg} and {leg + 2}; staying within it does not show"
         " that the lines were flown"
     )
 

@@ -28,22 +28,22 @@ class FindingDocument(DocumentConfig):
     flown: float | None
     limit: float | None
     limit_source: str
-    """Whose the limit is: scenario, aircraft, mission, autopilot, default, ..."""
+    """Source of the limit: scenario, aircraft, mission, autopilot, default, ..."""
     at_least: bool
-    """True: values of at least the limit pass; false: values of at most the limit."""
+    """True if values of at least the limit pass; false if values of at most the limit pass."""
     passes: str
     """The values that pass in words, with the tolerance: "≤ 8.29 m"; "" without a limit."""
     tolerance: float | None
     margin: float | None
-    """Distance inside the limit; negative: beyond the limit."""
+    """Distance inside the limit; negative beyond the limit."""
     unit: str
-    """Of planned, flown, limit, tolerance and margin."""
+    """Unit of planned, flown, limit, tolerance and margin."""
     method: str
     ok: bool | None
-    """null: not judged, and the reason says why."""
+    """Null if not judged; the reason then says why."""
     reason: str
     suggestions: tuple[Suggestion, ...]
-    """Alternatives, each of changes to make together; any would pass."""
+    """Alternative suggestions, each a list of changes to make together; each alternative would pass."""
     brief: str
     placed: bool
     check: str
@@ -107,13 +107,13 @@ class VerdictDocument(DocumentConfig):
     flyable: bool
     complete: bool
     answer: str
-    """flyable, not flyable, incomplete or not judged in full; of an imported flight flown as planned or not."""
+    """flyable, not flyable, incomplete or not judged in full; for an imported flight flown as planned or not."""
     undecided: bool
-    """True if nothing failed, and something was not judged that had to be."""
+    """True if nothing failed, but something that had to be judged was not."""
     summary: str
-    """Lines for a person, of which the first answers the question."""
+    """Lines for a person; the first line is the answer."""
     conditions: Conditions | None
-    """Conditions that the verdict holds for; null if they are not known."""
+    """Conditions for which the verdict holds; null if they are not known."""
     flown_by: AutopilotProgram | None
     parameters: ParametersDocument | None
     levels: tuple[LevelDocument, ...]

@@ -276,9 +276,9 @@ def judge_unflown(requirements: RouteRequirements, ended: str, *, log_complete: 
     log_complete: True if the record has its end.
 
     >>> from logs.recording.example_log import example_log
-    >>> verdict = judge_unflown(route_requirements(example_log().setup), "not started: no way made against the wind")
+    >>> verdict = judge_unflown(route_requirements(example_log().setup), "not started: no progress against the wind")
     >>> verdict.level, verdict.headline
-    ('geometric', 'not flyable: completion (not started: no way made against the wind), ...')
+    ('geometric', 'not flyable: completion (not started: no progress against the wind), ...')
     """
     setup = requirements.setup
     faults = [message(ended), *([] if log_complete else [message("the log is damaged or unfinished")])]

@@ -49,15 +49,15 @@ class Place(DocumentConfig):
     kind: PlaceKind
     """flight, mission, plan, leg, waypoint, missile, radar, exclusion or inclusion."""
     index: int | None = None
-    """Of the leg, waypoint, threat or zone, from 0, a fence's zones after the scenario's; null for the whole."""
+    """Index of the leg, waypoint, threat or zone, from 0; a fence's zones follow the scenario's. Null for the whole."""
     item: int | None = None
-    """The mission item that a waypoint comes from, or that a check names."""
+    """Mission item from which a waypoint comes, or which a check names."""
     name: str = ""
-    """The name that the scenario gives a threat or a zone; empty for none."""
+    """Name of a threat or a zone in the scenario; empty for none."""
     to_item: int | None = field(default=None, compare=False)
-    """Of a leg: the mission item that it leads to; several legs may lead to one item."""
+    """Mission item to which a leg leads; several legs may lead to one item."""
     number: int | None = field(default=None, compare=False)
-    """Of a leg or waypoint, as the text counts them: corners of one loiter are one stop."""
+    """Number of a leg or waypoint in the texts, where all corners of one loiter are one stop."""
 
 
 FLIGHT = Place("flight")

@@ -56,5 +56,5 @@ def parse_reference_flights(text: str | bytes, source: str) -> ReferenceFlights:
     rules += [entry.rule for entry in (file.deciding, *(file.tried or ())) if entry is not None]
     unknown = [rule for rule in rules if rule not in RULE_WORDS]
     if unknown:
-        raise LogError(f"{source}: {unknown[0]!r} is no rule", file=source, field="rule", value=unknown[0])
+        raise LogError(f"{source}: {unknown[0]!r} is not a rule", file=source, field="rule", value=unknown[0])
     return ReferenceFlights(file.airframe, file.deciding, file.tried)

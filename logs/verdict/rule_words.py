@@ -160,7 +160,7 @@ RULE_WORDS: dict[str, RuleWords] = {
         RuleWords(
             name="waypoint",
             title="waypoints",
-            asks="Was each waypoint reached, by the radius that the mission or the autopilot has for it?",
+            asks="Was each waypoint reached, within the radius that the mission or the autopilot sets for it?",
             margin=Margin("closest approach", "m", 10.0),
             phrase=name_missed_waypoint,
         ),
@@ -181,7 +181,7 @@ RULE_WORDS: dict[str, RuleWords] = {
         RuleWords(
             name="speed",
             title="airspeed",
-            asks="Is each leg's commanded airspeed one of level flight, and does the wind leave a way along the leg?",
+            asks="Is each leg's commanded airspeed one of level flight, and can the leg's course be held in this wind?",
             margin=Margin("airspeed", "m/s", 1.0),
             phrase=name_reason,
             unjudged="airspeed",
@@ -205,7 +205,7 @@ RULE_WORDS: dict[str, RuleWords] = {
             name="climbout",
             title="climb-out",
             noun="climb-out",
-            asks="Is the way up from home to the mission's first place free of ground, missiles and zones?",
+            asks="Is the climb from home to the mission's first place clear of ground, missiles and zones?",
             margin=Margin("height above ground", "m", 10.0),
             phrase=name_reason,
             unjudged="climb-out",
@@ -232,7 +232,7 @@ RULE_WORDS: dict[str, RuleWords] = {
         RuleWords(
             name="approach",
             title="approach",
-            asks="Is the glide to the landing point free of ground, missiles and zones?",
+            asks="Is the glide to the landing point clear of ground, missiles and zones?",
             margin=Margin("height above ground", "m", 10.0),
             phrase=name_reason,
             unjudged="approach",
@@ -241,7 +241,7 @@ RULE_WORDS: dict[str, RuleWords] = {
         RuleWords(
             name="touchdown",
             title="touchdown",
-            asks="Does the aircraft touch down and come to rest on the strip, on a final free of ground, missiles and"
+            asks="Does the aircraft touch down and come to rest on the strip, on a final clear of ground, missiles and"
             " zones?",
             margin=Margin("strip", "m", 20.0),
             phrase=name_reason,

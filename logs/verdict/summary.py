@@ -23,7 +23,7 @@ from logs.verdict.wording import deciding_text, disagreement_text, place_text
 _NAMED = 4
 # Introductions of the lines on the other levels.
 _LEVELS = {
-    "geometry": "By geometry alone",
+    "geometry": "By geometry only",
     "airframe": "By the airframe (planfly's guidance, exact navigation)",
 }
 
@@ -57,7 +57,7 @@ def undecided_text(findings: Sequence[Finding]) -> str:
     >>> from logs.verdict.places import Place
     >>> legs = (Place("leg", k, to_item=k + 1) for k in range(2))
     >>> undecided_text([make_finding("slope", leg, ok=None, reason="", check=UNKNOWN_AIRCRAFT) for leg in legs])
-    'slopes on leg 0, to item 1, and leg 1, to item 2, are within what is not known of the aircraft'
+    'slopes on leg 0, to item 1, and leg 1, to item 2, are too close to the limit to judge with what is known of ...'
     """
     open_findings = undecided_findings(findings)
     paths = [
@@ -65,7 +65,7 @@ def undecided_text(findings: Sequence[Finding]) -> str:
         for finding in open_findings
         if finding.check == UNKNOWN_WAY
     ]
-    path_text = f"where {' and '.join(paths[:_NAMED])} is flown, only a flight tells" if paths else ""
+    path_text = f"only a flight tells where {' and '.join(paths[:_NAMED])} is flown" if paths else ""
     aircraft_text = _unknown_aircraft_text([finding for finding in open_findings if finding.check == UNKNOWN_AIRCRAFT])
     other_briefs = [finding.brief for finding in open_findings if finding.check in APART_FROM_FLIGHT]
     item_briefs = [finding.brief for finding in open_findings if finding.check == NOT_FLOWN]
@@ -87,14 +87,14 @@ def _unknown_aircraft_text(undecided: Sequence[Finding]) -> str:
         is_singular = len(subjects) == 1 and (subjects == ["energy"] or speed_count == 1)
         verb = "is" if is_singular else "are"
         listed = " and ".join(filter(None, [", ".join(subjects[:-1]), subjects[-1]]))
-        return f"{listed} {verb} within what is not known of the aircraft"
+        return f"{listed} {verb} too close to the limit to judge with what is known of the aircraft"
     if not slopes:
         return ""
     if len(slopes) > _NAMED:
-        return f"slopes on {len(slopes)} legs are within what is not known of the aircraft"
+        return f"slopes on {len(slopes)} legs are too close to the limit to judge with what is known of the aircraft"
     places = [place_text(finding.place) + ("," if finding.place.to_item is not None else "") for finding in slopes]
     noun, verb = ("slopes", "are") if len(slopes) > 1 else ("slope", "is")
-    return f"{noun} on {' and '.join(places)} {verb} within what is not known of the aircraft"
+    return f"{noun} on {' and '.join(places)} {verb} too close to the limit to judge with what is known of the aircraft"
 
 
 def first_failed(findings: Sequence[Finding]) -> Finding | None:
@@ -182,13 +182,13 @@ def summary_lines(
     lines += [f"Not judged: {RULE_WORDS[rule].title} ({reason})" for rule, reason in reasons.items()]
     # These are the autopilot's own limits, which say nothing about the aircraft.
     lines += [
-        f"PX4 would not take it: {finding.reason}"
+        f"PX4 would reject it: {finding.reason}"
         for finding in findings
         if finding.rule == "mission" and finding.ok is None and finding.check != NOT_FLOWN
     ]
     missing_ends = missing_ends_text(setup.mission, setup.autopilot.mission_checks) if setup.autopilot.refuses else ""
     if missing_ends and not any(finding.rule == "mission" for finding in findings):
-        lines.append(f"PX4 would not take it: {missing_ends}")
+        lines.append(f"PX4 would reject it: {missing_ends}")
     lines += [
         f"{RULE_WORDS[finding.rule].title.capitalize()}: {finding.reason}"
         for finding in findings
@@ -217,10 +217,10 @@ def _airframe_or_autopilot_lines(
     parameters_note = "" if setup.autopilot.parameters is None else " with these parameters"
     # Other parameters are flown by the law, whoever flew.
     by_law = setup.autopilot.program is not None
-    reason = "" if by_law or not parameters_note else ": no single parameter that was tried would pass"
+    reason = "" if by_law or not parameters_note else ": with none of the parameters that were tried would it pass"
     if deciding is not None:
         reason = f": {deciding_text(deciding)}{', by the simulated flight' if by_law else ''}"
-    return [f"The aircraft can, {setup.autopilot.title}{parameters_note} cannot{reason}"]
+    return [f"The aircraft can fly this, but {setup.autopilot.title}{parameters_note} cannot{reason}"]
 
 
 def _parameter_lines(setup: FlightSetup, *, flown: bool) -> list[str]:
@@ -244,13 +244,13 @@ def _parameter_lines(setup: FlightSetup, *, flown: bool) -> list[str]:
     unnamed_count = len(parameters.unused) - len(unused)
     notes = f"; not used: {', '.join(unused)}{f', +{unnamed_count} more' if unnamed_count else ''}" if unused else ""
     not_flown = [name for name in parameters.not_flown if name in parameters.by_origin("file")]
-    notes += f"; read, not flown: {', '.join(not_flown)}" if not_flown else ""
-    notes += f"; beyond {setup.autopilot.title}'s documented ranges, flown: {', '.join(parameters.beyond)}" * bool(
+    notes += f"; read but not simulated: {', '.join(not_flown)}" if not_flown else ""
+    notes += f"; beyond {setup.autopilot.title}'s documented ranges, but flown: {', '.join(parameters.beyond)}" * bool(
         parameters.beyond
     )
     return [
-        f"Parameters: {counts['file']} of the file, {counts['aircraft']} of the aircraft,"
-        f" {counts['default']} {setup.autopilot.title}'s defaults{notes}",
+        f"Parameters: {counts['file']} from the file, {counts['aircraft']} from the aircraft,"
+        f" {counts['default']} from {setup.autopilot.title}'s defaults{notes}",
         *misfits,
     ]
 
@@ -275,8 +275,8 @@ def _terrain_error_lines(findings: Sequence[Finding], setup: FlightSetup) -> lis
         return []
     lowest, required = min(clearances), setup.scenario.limits.min_clearance_m
     return [
-        f"Terrain's stated error: {error:g} m; the lowest clearance is {lowest:.1f} m,"
-        f" {lowest - error:.1f} m less that error"
+        f"Terrain's stated error: {error:g} m; the lowest clearance is {lowest:.1f} m, or {lowest - error:.1f}"
+        " m with that error subtracted"
         f" ({required:g} m are required)"
     ]
 

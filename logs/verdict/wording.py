@@ -126,7 +126,7 @@ def _rise_text(change: Change) -> str:
 
 def _length_text(change: Change) -> str:
     current = change.current or 0.0
-    instead = "; it goes nowhere now" if current < MIN_LEG_LENGTH_M else f" instead of {current:.0f} m"
+    instead = "; it has no length now" if current < MIN_LEG_LENGTH_M else f" instead of {current:.0f} m"
     return f"{place_text_within(change.place)} {change.wanted:.0f} m long{instead}"
 
 

@@ -74,7 +74,7 @@ def both_along(flights: tuple[NamedFlight, NamedFlight]) -> Chart:
         Panel("cross-track, right +", "m", both([doubles(track.cross_track) for track in tracks]), min_span=0.1),
         Panel("throttle", "%", both([100.0 * doubles(_throttle(track)) for track in tracks])),
     )
-    return Chart("Two flights along their way", "distance flown over the ground", "km", panels)
+    return Chart("Two flights along their paths", "distance flown over the ground", "km", panels)
 
 
 def _roll(track: Track) -> NDArray[np.float32]:

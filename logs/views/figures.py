@@ -138,8 +138,8 @@ def _sentence(line: str) -> str:
 
 
 def _map_caption(subject: Subject) -> str:
-    arcs = " Where they part, at corners, the aircraft flies an arc inside the waypoint."
-    flown = "The broad line is the plan, the thin line on it the flight." + (
+    arcs = " At corners they part: the aircraft flies an arc inside the waypoint."
+    flown = "The broad line is the plan, and the thin line on it is the flight." + (
         arcs if subject.setup.source is None else ""
     )
     return subject.flown(flown, "Nothing was flown: the line is the plan.")
@@ -189,8 +189,8 @@ FIGURES = (
             "of the distance from the legs."
         ),
         caption=_text(
-            "Bar: planned. Dot: flown. Dash: the limit, the tighter of scenario's and aircraft's, and of a waypoint "
-            "what counts as reached. Ringed: fails."
+            "Bar: planned. Dot: flown. Dash: limit (the tighter of the scenario's and the aircraft's; for a "
+            "waypoint the distance that counts as reached). Ringed: fails."
         ),
     ),
     FigureEntry(
@@ -198,10 +198,12 @@ FIGURES = (
         "Returns to launch",
         _of_returns("returns"),
         file=False,
-        alternative=_text("Map, north up: the way coloured by what comes of a return from there; the worst returns."),
+        alternative=_text(
+            "Map, north up: the route coloured by the outcome of a return from there, and the worst returns."
+        ),
         caption=lambda subject: (
             ("" if subject.returns is None else _sentence(headline(subject.returns.returns)))
-            + "The worst are drawn, and stand in profile below by their numbers."
+            + "The worst returns are drawn; their numbers refer to the profiles below."
         ),
     ),
     FigureEntry(
@@ -209,14 +211,15 @@ FIGURES = (
         "The worst returns",
         _of_returns("worst-returns"),
         file=False,
-        alternative=_text("Heights of the worst returns along their ways: terrain, required clearance and spheres."),
+        alternative=_text("Heights along the worst returns: terrain, required clearance and spheres."),
         caption=_text(
-            "Flown by the simulated ArduPlane on a point mass, in the mean wind, from where each turns back."
+            "Simulated with ArduPlane's laws on a point mass, in the mean wind, from the place where each "
+            "return begins."
         ),
     ),
     FigureEntry(
         "return-heights",
-        "Called home, or without its engine",
+        "Called home, or without an engine",
         _of_returns("return-heights"),
         file=False,
         alternative=_text(
@@ -224,9 +227,10 @@ FIGURES = (
             "the height that a glide without the engine has left over."
         ),
         caption=_text(
-            "Least height: where a return from the flight's own height is not safe, the nearest above it from which "
-            "one is; elsewhere, how low the flight may come before that changes. Left over: the flight's height less "
-            "what a glide needs to get there; below zero it does not."
+            "Lowest safe height: where a return from the flight's height is not safe, the nearest height above "
+            "it from which "
+            "a return is safe; elsewhere, how low the flight may come before it is not. Left over: the flight's "
+            "height less the height that a glide needs; below zero the glide does not arrive."
         ),
     ),
     FigureEntry(
@@ -235,13 +239,14 @@ FIGURES = (
         _of_returns("glide"),
         file=False,
         alternative=_text(
-            "Map, north up: from how low above ground home is in reach of a glide, flat ground, and the way coloured "
-            "by what is in reach from there."
+            "Map, north up: the lowest height from which a glide reaches home, flat ground, and the route coloured "
+            "by what can be reached from there."
         ),
         caption=lambda subject: (
             ("" if subject.returns is None else _sentence(glides_headline(subject.returns.glides)))
-            + "Blue: from so low above ground home, or another place that was chosen, is in reach, as far as 3 km "
-            "around the way. Flat ground is flat by the elevation file, which knows no trees, houses or water."
+            + "Blue: the lowest height above ground from which home or another chosen place is in reach, up to 3 km "
+            "from the route. Flat ground is flat according to the elevation file, which knows no trees, houses "
+            "or water."
         ),
     ),
     FigureEntry(

@@ -66,7 +66,7 @@ def footprint_layers(drawn: DrawnReturns, extent: Extent) -> list[Layer]:
         name = f"{place} in reach from {band.up_to:.0f} m above ground"
         layers.append(_area(name, BAND_ROLES[band.up_to], band.parts))
     flat = footprint.landings(*extent)
-    return layers + ([_area("flat ground by the elevation file", "landable", flat)] if flat else [])
+    return layers + ([_area("flat ground according to the elevation file", "landable", flat)] if flat else [])
 
 
 def _area(name: str, role: str, parts: tuple[Part, ...]) -> Layer:

@@ -58,7 +58,7 @@ def returns_map(setup: FlightSetup, drawn: DrawnReturns) -> MapChart:
 
     layers = way_layers(drawn.by_kind, _LOOKS, lambda ret: ret.start[:2], return_text)
     for worst in drawn.worst:
-        name = "way of one of the worst, numbered"
+        name = "path of one of the worst returns, numbered"
         layers.append(
             Layer("line", name, "return-way", worst.way[:, 0], worst.way[:, 1], words=(return_text(worst.flown),))
         )
@@ -80,7 +80,7 @@ def returns_map(setup: FlightSetup, drawn: DrawnReturns) -> MapChart:
     extent = map_extent(scenario, route, [*ways, np.array([ret.start for ret in drawn.returns.each])])
     return world_map(
         scenario,
-        "returns to launch from everywhere on the way",
+        "returns to launch from points along the route",
         layers,
         [*labels, *end_labels(scenario, route)],
         extent,
@@ -113,7 +113,7 @@ def worst_returns_chart(setup: FlightSetup, drawn: DrawnReturns) -> Chart | None
     panels = tuple(_profile(scenario, worst, number, span) for number, worst in enumerate(drawn.worst, 1))
     return Chart(
         f"{shorten(scenario.name, 60)}: the worst returns to launch",
-        "way since it turned back",
+        "distance since it turned back",
         "km",
         panels,
         tall=240,
@@ -139,7 +139,7 @@ def _profile(scenario: Scenario, worst: WorstReturn, number: int, span: tuple[fl
     zones, zone_names = zone_bands(scenario.zones, plane)
     cuts, cut_names = threat_cuts(scenario.threats, plane, frozenset())
     layers = [*zones, *cuts, *ground_bands(scenario, plane)]
-    layers.append(Layer("line", "way of the return", "return-way", along, path[:, 2]))
+    layers.append(Layer("line", "path of the return", "return-way", along, path[:, 2]))
     if not worst.flown.safe:
         nearest = int(np.argmin(np.linalg.norm(path - worst.at, axis=1)))
         layers.append(Layer("rings", "where it goes wrong", "fail", along[[nearest]], worst.at[[2]], quiet=True))

@@ -134,7 +134,7 @@ def new_aircraft(
         return find_aircraft(str(Path(folder).absolute()))
     if source is not None:
         raise PlanflyError.of_argument(
-            "source", source, f"goes without {next(iter(sheet_values))}: a copy has that aircraft's numbers"
+            "source", source, f"cannot be combined with {next(iter(sheet_values))}: a copy has that aircraft's numbers"
         )
     from planfly.workflow.data_sheets import make_data_sheet_folder, parse_sheet
 

@@ -147,7 +147,7 @@ def campaign(
     >>> campaign("paper-07", prove=1.5)
     Traceback (most recent call last):
     ...
-    world.errors.ArgumentError: prove 1.5: at least 0.5 and below 1 is expected
+    world.errors.ArgumentError: prove 1.5: expected at least 0.5 and below 1
     """
     workers_used = _make_workers(workers, scheduler, options["seed"])
     requested = (options["flights"], options["prove"], options["at_least"], options["confidence"])
@@ -250,7 +250,7 @@ def winds(
     >>> winds("paper-07", directions=3)
     Traceback (most recent call last):
     ...
-    world.errors.ArgumentError: directions 3: 4 to 72 is expected
+    world.errors.ArgumentError: directions 3: expected 4 to 72
     """
     confidence, flights, spread = options["confidence"], options["flights"], options["spread"]
     check_arguments(prove=prove, confidence=confidence, directions=directions, most=most, flights=flights)

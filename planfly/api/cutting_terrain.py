@@ -47,7 +47,7 @@ def terrain(
     >>> import planfly
     >>> planfly.terrain("dem.tif", box=(47.0, 8.0, 46.0, 9.0))
     Traceback (most recent call last):
-    world.errors.ArgumentError: box (47.0, 8.0, 46.0, 9.0): south, west, north, east are expected, degrees -84..84 and \
+    world.errors.ArgumentError: box (47.0, 8.0, 46.0, 9.0): expected south, west, north, east, degrees -84..84 and \
 -180..180, south below north
     """
     check_arguments(margin=margin)
@@ -55,7 +55,7 @@ def terrain(
         raise PlanflyError("`around`, `box`: expected one of them", field="around, box")
     target = Path(out)
     if target.suffix.lower() not in (".tif", ".tiff"):
-        raise PlanflyError(f"{target}: a name that ends with .tif is expected", file=target)
+        raise PlanflyError(f"{target}: expected a name that ends with .tif", file=target)
     check_output_file(target, overwrite, Path(around) if around is not None else None)
     area = _widen(_parse_box(box) if box is not None else _mission_box(Path(str(around))), margin)
     source_name = str(source)
@@ -64,7 +64,7 @@ def terrain(
             check_output_file(target, True, Path(source_name))
             return cut_from_files(Path(source_name), area, target)
         if not is_address(source_name):
-            allowed = "a folder, or the address of one by http or https, is expected"
+            allowed = "expected a folder, or the address of one by http or https"
             raise ArgumentError.of_argument("source", source_name, allowed, shown=ascii(source_name))
         with tempfile.TemporaryDirectory() as fallback:
             return cut_from_server(source_name, area, target, _cache_folder(Path(fallback)), advance, sea=sea)
@@ -83,7 +83,7 @@ def _parse_box(edges: Sequence[float]) -> Box:
         and -180.0 <= west <= 180.0
         and west < unwrapped_east <= west + 30.0
     ):
-        allowed = "south, west, north, east are expected, degrees -84..84 and -180..180, south below north"
+        allowed = "expected south, west, north, east, degrees -84..84 and -180..180, south below north"
         raise ArgumentError.of_argument("box", edges, allowed)
     return Box(south, west, north, unwrapped_east)
 

@@ -86,10 +86,10 @@ def new_scenario(
 def _scenario_file(folder: Path, name: str, *, overwrite: bool) -> Path:
     """Return the file to write.  Raises PlanflyError for an invalid folder, and without `overwrite` for an old file."""
     if not name.isprintable() or not 1 <= len(name) <= 100:
-        allowed = "a folder with a name of 1 to 100 printable characters is expected"
+        allowed = "expected a folder with a name of 1 to 100 printable characters"
         raise PlanflyError.of_argument("folder", folder, allowed, shown=ascii(str(folder)))
     if folder.suffix == ".toml" or (folder.exists() and not folder.is_dir()):
-        raise PlanflyError(f"{folder}: a folder is expected; the scenario is written into it", file=folder)
+        raise PlanflyError(f"{folder}: expected a folder; the scenario is written into it", file=folder)
     file = folder / f"{name}.toml"
     if folder.is_dir():
         check_output_file(file, overwrite)
@@ -105,7 +105,7 @@ def _parse_place(keyword: str, coordinates: Sequence[float]) -> Place:
     except (TypeError, ValueError):
         lat = lon = math.nan
     if not is_place(lat, lon):
-        raise ArgumentError.of_argument(keyword, coordinates, "latitude -89..89 and longitude -180..180 are expected")
+        raise ArgumentError.of_argument(keyword, coordinates, "expected latitude -89..89 and longitude -180..180")
     return Place(lat, lon)
 
 

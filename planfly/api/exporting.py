@@ -120,7 +120,7 @@ def export(
     (['.waypoints', '.kml'], '23 items')
     """
     if not files:
-        raise PlanflyError("export: no file: one at least is expected", field="files")
+        raise PlanflyError("export: expected at least one file", field="files")
     targets = tuple(Path(file) for file in files)
     with contextlib.ExitStack() as place:
         path = _source_path(source, place)
@@ -147,7 +147,7 @@ def _source_path(source: FlightLog | FlownMission | Plan | str | Path, place: co
         return Path(source.source)
     if isinstance(source, FlownMission):
         if source.log is None:
-            raise PlanflyError("export: a flight without a log: fly(..., log=FILE) writes one", field="source")
+            raise PlanflyError("export: the flight has no log; fly(..., log=FILE) writes one", field="source")
         return source.log
     return Path(source)
 
@@ -174,7 +174,7 @@ def _read_source(path: Path, targets: tuple[Path, ...], options: MissionOptions)
     for target in targets:
         suffix = target.suffix
         if suffix.lower() in LOGS:
-            message = f"{target}: {suffix} is written of a flight log (.mcap), and {path} is none"
+            message = f"{target}: {suffix} is written only from a flight log (.mcap), which {path} is not"
             raise MissionError(message, file=target, field="suffix", value=suffix)
     needs_world = any(target.suffix.lower() in (*MAPS, *PARAMETERS) for target in targets)
     return _read_mission(path, options, needs_world=needs_world, needs_returns=_needs_kml(targets))
@@ -206,7 +206,7 @@ def _read_log(path: Path, *, needs_returns: bool) -> _Source:
 def _read_mission(path: Path, options: MissionOptions, *, needs_world: bool, needs_returns: bool) -> _Source:
     """Read a plan or a mission file; place the mission in its scenario if a target, a plan or a fence needs this."""
     if not path.is_file():
-        raise MissionError(f"{path}: no such file; a plan.json, mission file or log is expected", file=path)
+        raise MissionError(f"{path}: no such file; expected a plan.json, mission file or log", file=path)
     is_plan, fences = path.suffix.lower() == ".json", read_named_fences(options["fence"])
     if not (needs_world or is_plan or fences.zones or options["at"] is not None):
         mission = fences.on_mission(read_mission(path))

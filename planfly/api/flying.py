@@ -241,7 +241,7 @@ def fly_by_each(
     """
     names = list(dict.fromkeys(autopilots))
     if not names:
-        raise ArgumentError.of_argument("autopilots", "", "at least one autopilot is expected")
+        raise ArgumentError.of_argument("autopilots", "", "expected at least one autopilot")
     check_arguments(autopilot=names)
     per_autopilot_options = {
         name: value for name, value in options.items() if name in ("params", "guidance", "autopilot")
@@ -303,7 +303,7 @@ def judge(
         imported = read_imported(what, **options)
         return Judged(imported.setup, imported.verdict, lossy=imported.lossy, track=imported.track, is_log=True)
     source = _source_name(what)
-    refuse_keywords(source, options_of_log(options), "goes with an imported log, not with this file")
+    refuse_keywords(source, options_of_log(options), "only with an imported log, not with this file")
     if isinstance(what, FlightLog | FlownMission) or (isinstance(what, str | Path) and is_log(Path(what))):
         check_judging_options(source, options)
         refuse_keywords(source, {"geometry": geometry or None}, "a flight is judged as it was flown")

@@ -112,7 +112,7 @@ def identify_aircraft(
     target = check_new_folder(Path(folder), overwrite=overwrite)
     paths = [Path(path) for path in ([logs] if isinstance(logs, str | Path) else logs)]
     if not paths:
-        raise PlanflyError.of_argument("logs", "", "at least one log is expected", shown="")
+        raise PlanflyError.of_argument("logs", "", "expected at least one log", shown="")
     prior = _load_base(base)
     area = prior.wing_area * (span / prior.wing_span) ** 2 if area is None else area
     stated_numbers = {"mass": mass, "span": span, "area": area}
@@ -188,7 +188,7 @@ def _check_distinct(logs: Sequence[MotionLog]) -> None:
     sources: dict[str, str] = {}
     for log in logs:
         if log.sha256 in sources:
-            allowed = "each log is expected once, and another one to check with"
+            allowed = "name each log once, and check with another one"
             raise LogError(
                 f"{log.source}: the same bytes as {sources[log.sha256]}: {allowed}", file=log.source, allowed=allowed
             )

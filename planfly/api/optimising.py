@@ -94,7 +94,7 @@ class Optimiser:
             else _checked_columns("violations", violations, len(points))
         )
         if not objective_values.shape[1]:
-            raise ValueError("values: no columns: one an objective is expected")
+            raise ValueError("values: no columns; expected one for each objective")
         scores = np.concatenate([np.maximum(violation_values, 0.0), objective_values], axis=1)
         if self._levels and (
             scores.shape[1] != self._scores.shape[1] or violation_values.shape[1] != self._violation_count
@@ -206,20 +206,20 @@ def optimise(
     lower_bounds, upper_bounds = np.array(lower, dtype=np.float64), np.array(upper, dtype=np.float64)
     if lower_bounds.ndim != 1 or lower_bounds.shape != upper_bounds.shape or not lower_bounds.size:
         raise ValueError(
-            f"lower, upper: shapes {lower_bounds.shape} and {upper_bounds.shape}: two of (d,) are expected"
+            f"lower, upper: shapes {lower_bounds.shape} and {upper_bounds.shape}: expected two of shape (d,)"
         )
     if not (np.isfinite(lower_bounds) & np.isfinite(upper_bounds) & (lower_bounds < upper_bounds)).all():
-        raise ValueError("lower, upper: finite numbers, lower below upper, are expected")
+        raise ValueError("lower, upper: expected finite numbers, lower below upper")
     if model not in _MODELS:
         raise ValueError(f"model: {model!r}: allowed {', '.join(_MODELS)}")
     if population < 4 or population % 2:
-        raise ValueError(f"population: {population}: an even number from 4 is expected")
+        raise ValueError(f"population: {population}: expected an even number from 4")
     first_points = None if initial is None else np.array(initial, dtype=np.float64)
     if first_points is not None and (
         first_points.shape != (population, lower_bounds.size) or not np.isfinite(first_points).all()
     ):
         raise ValueError(
-            f"initial: shape {first_points.shape}: finite numbers of ({population}, {lower_bounds.size}) are expected"
+            f"initial: shape {first_points.shape}: expected finite numbers of ({population}, {lower_bounds.size})"
         )
     return Optimiser(lower_bounds, upper_bounds, model, population, np.random.default_rng(seed), first_points)
 
@@ -234,7 +234,5 @@ def _checked_columns(name: str, numbers: ArrayLike, row_count: int) -> Floats:
     table = np.array(numbers, dtype=np.float64)
     table = table[:, np.newaxis] if table.ndim == 1 else table
     if table.ndim != 2 or len(table) != row_count:
-        raise ValueError(
-            f"{name}: shape {np.shape(numbers)}: {row_count} rows are expected, one for each point asked for"
-        )
+        raise ValueError(f"{name}: shape {np.shape(numbers)}: expected {row_count} rows, one for each requested point")
     return np.where(np.isnan(table), np.inf, table)

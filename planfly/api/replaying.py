@@ -43,7 +43,7 @@ def replayed_part(log: FlightLog, start: float | None, end: float | None) -> tup
     if start_time > log.end_time:
         raise LogError.of_argument("start", start_time, end_text, shown=f"{start_time:g}", file=log.source)
     if end_time < start_time:
-        allowed = f"at or after `start`, {start_time:g} s, is expected"
+        allowed = f"expected `start`, {start_time:g} s, or later"
         raise LogError.of_argument("end", end_time, allowed, shown=f"{end_time:g}", file=log.source)
     return start_time, end_time
 
@@ -206,7 +206,7 @@ def play_to_foxglove(
 def _checked_origin(text: str) -> str:
     """Return the origin if browsers would write it like this.  Raises LogError for an invalid origin."""
     if not _ORIGIN.fullmatch(text):
-        allowed = "the origin of a web page is expected, such as https://example.com or http://localhost:8080"
+        allowed = "expected the origin of a web page, such as https://example.com or http://localhost:8080"
         raise LogError.of_argument("allow_origin", text, allowed)
     return text
 

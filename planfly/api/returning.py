@@ -141,23 +141,26 @@ class ReturnsFound:
         if self.returns.again:
             max_difference = max(abs(difference) for difference in self.returns.again)
             notes.append(
-                f"{len(self.returns.again)} of the least sure flown again in JSBSim: up to {max_difference:.0f} m apart"
+                f"{len(self.returns.again)} returns close to a limit were flown again in JSBSim; both"
+                f" simulations differ by up to {max_difference:.0f} m"
             )
         if self.returns.stands_in:
             notes.append(f"{self.setup.autopilot.title}'s own return is not simulated: ArduPlane's return stands in")
         if self.setup.envelope.battery_guessed and self.setup.scenario.flight.battery_wh is None:
             notes.append("the battery is guessed: energy is not judged; battery_wh in the scenario states it")
         if self.returns.lands:
-            notes.append("ways to a landing sequence are judged up to its first item; the landing is not")
+            notes.append("a return to a landing sequence is judged up to its first item; the landing is not judged")
         parameters = self.setup.autopilot.parameters
         if parameters is None or not parameters.source:
-            notes.append("no parameter file was given: the settings above are not yours, --params states them")
+            notes.append(
+                "no parameter file was given: the settings above are not yours; --params names a file with yours"
+            )
         if self.setup.scenario.terrain is None:
             notes.append("no terrain was given: --terrain names an elevation file")
         if self.setup.scenario.external:
             notes.append("the mission came without a scenario: threats are not known")
         if not self.returns.flown:
-            notes.append("from the planned path: nothing was flown, and no energy was used before")
+            notes.append("returns begin on the planned path: nothing was flown, and no energy was used before")
         return (*notes, *glide_notes(self.glides))
 
     def __repr__(self) -> str:
@@ -206,7 +209,7 @@ def returns(
     if path is not None and is_imported_log(path):
         refuse_keywords(str(path), {"seed": options["seed"], "nav": options["nav"]}, _RETURNS_AS_FLOWN_TEXT)
         return _judge_imported_flight(_read_imported_flight(path, options), request)
-    refuse_keywords(str(path or "mission"), options_of_log(options), "goes with an imported log")
+    refuse_keywords(str(path or "mission"), options_of_log(options), "only with an imported log")
     what = read_log(path) if path is not None and is_log(path) else what
     flight_options = mission_options(options)
     if isinstance(what, FlightLog | FlownMission):

@@ -61,7 +61,7 @@ def serve(
     serve_options = ServeOptions("" if mission is None else str(mission), speed, Path(log), options)
     served = open_served(serve_options)
     if serve_options.logs.exists() and not serve_options.logs.is_dir():
-        raise PlanflyError.of_argument("log", log, "is a file; a folder is expected")
+        raise PlanflyError.of_argument("log", log, "is a file; expected a folder")
     serve_vehicle(access, serve_options, served, stop, on_message)
 
 
@@ -100,9 +100,9 @@ def _split_addresses(addresses: str | Sequence[str]) -> Sequence[str]:
 def _parse_address(argument: str, text: str) -> tuple[str, int]:
     host, colon, port = text.strip().rpartition(":")
     if not colon and port.isdigit():
-        raise FlightError.of_argument(argument, text, f"IP:PORT is expected, such as 127.0.0.1:{port}")
+        raise FlightError.of_argument(argument, text, f"expected IP:PORT, such as 127.0.0.1:{port}")
     if not port.isdigit() or not 0 <= int(port) <= 65535:
-        raise FlightError.of_argument(argument, text, "IP:PORT is expected, with a port 0..65535")
+        raise FlightError.of_argument(argument, text, "expected IP:PORT, with a port 0..65535")
     return _parse_ip(argument, host.strip("[]")), int(port)
 
 
@@ -110,4 +110,4 @@ def _parse_ip(argument: str, text: str) -> str:
     try:
         return str(ipaddress.ip_address(text))
     except ValueError as error:
-        raise FlightError.of_argument(argument, text, "an IP address is expected") from error
+        raise FlightError.of_argument(argument, text, "expected an IP address") from error

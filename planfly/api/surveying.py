@@ -99,9 +99,9 @@ class SurveyFound:
 
     @property
     def no_remedy_lines(self) -> tuple[str, ...]:
-        """Lines for a search without a remedy: the closest trial, and why no other layout was tried."""
+        """Lines that state that no remedy was found, the closest trial, and why no other layout was tried."""
         texts = [
-            "no turn-around, order, course, parameter or airspeed alone was found that would help, nor longer"
+            "no single turn-around, order, course, parameter or airspeed was found that would help, nor longer"
             " turn-arounds with another parameter or a slower flight"
         ]
         texts += [needed_text(*pair) for pair in zip(self.surveys, self.lines, strict=True)]
@@ -155,7 +155,7 @@ def survey(
         refuse_keywords("flight", fixed_options, _LINES_AS_FLOWN_TEXT)
         source = what.setup.source
         if source is not None and "attitude" not in source.holds:
-            raise LogError(f"{source.file}: no attitude: how far photos are banked is not known", file=source.file)
+            raise LogError(f"{source.file}: no attitude, so the bank of photos is not known", file=source.file)
         setup = _with_camera(what.setup.in_scenario(_judging_parallel_lines(what.setup.scenario)), own_camera)
         return _write_results(_judge_flown_survey(setup, what.track, what.ended or ""), out, overwrite)
 
@@ -174,7 +174,7 @@ def _parse_camera(numbers: tuple[float, ...] | None) -> Camera | None:
         camera_numbers = ()
     if isinstance(numbers, str | bytes) or not is_camera(camera_numbers):
         raise ArgumentError.of_argument(
-            "camera", numbers, f"{CAMERA}, are expected, as (23.5, 15.6, 16)", shown=repr(numbers)
+            "camera", numbers, f"expected {CAMERA}, such as (23.5, 15.6, 16)", shown=repr(numbers)
         )
     width, height, focal, *overlaps = camera_numbers
     front_overlap, side_overlap = (percent / 100.0 for percent in overlaps) if overlaps else (None, None)
@@ -252,7 +252,7 @@ def _require_survey(setup: FlightSetup) -> None:
     if not surveys_of(setup):
         source = setup.mission.source
         raise MissionError(
-            f"{source}: no survey: at least three lines beside each other are expected, or two with photos along them",
+            f"{source}: no survey; expected at least three lines side by side, or two with photos along them",
             file=source,
         )
 

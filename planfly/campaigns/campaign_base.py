@@ -179,7 +179,7 @@ def check_level_flight_at_medians(base: CampaignBase) -> None:
             f"{name} {medians[name]:g}" for name in ("mass", "drag", "control_power") if name in medians
         )
         raise SpreadError(
-            f"{base.dispersions.name}: {factors}: at the middle of these {aircraft.name} holds no level flight at"
+            f"{base.dispersions.name}: {factors}: at the middle of these {aircraft.name} cannot hold level flight at"
             f" {base.airframe.airspeed:g} m/s",
             file=base.dispersions.name,
             value=factors,

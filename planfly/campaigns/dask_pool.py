@@ -145,5 +145,5 @@ class DaskPool:
                 raise RuntimeError(f"flight {request.index}: {type(error).__name__}: {error}") from error
         # On a loaded machine, dask has cancelled a flight whose worker was killed.
         if self._client.status != "running":
-            raise OSError(0, "the scheduler was lost; the flights before are kept, --resume goes on", "--scheduler")
+            raise OSError(0, "the scheduler was lost; finished flights are kept: continue with --resume", "--scheduler")
         return None

@@ -231,7 +231,9 @@ def parse_dispersions(text: str, name: str) -> Dispersions:
         return Dispersions(varying, name)
     for varied in varying:
         if varied.quantity.name in QUANTITIES_OF_DRAWS:
-            raise SpreadError.at(name, varied.quantity.name, None, f"goes without [{_DRAWS_TABLE}] draws", shown="")
+            raise SpreadError.at(
+                name, varied.quantity.name, None, f"cannot be combined with [{_DRAWS_TABLE}] draws", shown=""
+            )
     return Dispersions(varying, name, _read_named_draws(aircraft, name))
 
 
@@ -239,20 +241,20 @@ def _read_named_draws(table: Any, name: str) -> Draws:
     """Return the aircraft's draws from the file that a dispersions file names, relative to the dispersions file."""
     file_name = table.get("draws") if isinstance(table, dict) else None
     if not isinstance(file_name, str) or not file_name or (isinstance(table, dict) and len(table) > 1):
-        allowed = 'a file of draws is expected, and nothing else, such as draws = "mine/draws.csv"'
+        allowed = 'expected only a file of draws, such as draws = "mine/draws.csv"'
         raise SpreadError.at(name, f"{_DRAWS_TABLE}.draws", table, allowed, shown="")
     return read_draws(Path(name).parent / Path(file_name).expanduser(), SpreadError)
 
 
 def _parse_quantity(quantity: Quantity, table: Any, name: str) -> Varying:
     if not isinstance(table, dict):
-        allowed = "a table is expected, with distribution, its parameters, and source"
+        allowed = "expected a table, with distribution, its parameters, and source"
         raise SpreadError.at(name, quantity.name, table, allowed, shown="")
     entries = dict(table)
     distribution, source = entries.pop("distribution", None), entries.pop("source", None)
     _check_distribution(quantity, distribution, name)
     if not isinstance(source, str) or not source.strip():
-        allowed = "missing; say where the numbers are from"
+        allowed = "missing; state the source of the numbers"
         raise SpreadError.at(name, f"{quantity.name}.source", source, allowed, shown="")
     _check_parameters(str(distribution), entries, name, quantity.name)
     varying = Varying(quantity, str(distribution), tuple((key, float(value)) for key, value in entries.items()), source)
@@ -272,11 +274,11 @@ def _check_distribution(quantity: Quantity, distribution: Any, name: str) -> Non
     kind = stats.rv_discrete if quantity.integer else stats.rv_continuous
     field = f"{quantity.name}.distribution"
     if not isinstance(distribution, str):
-        allowed = "missing; the name of one of scipy.stats' distributions is expected"
+        allowed = "missing; expected the name of one of scipy.stats' distributions"
         raise SpreadError.at(name, field, distribution, allowed, shown="")
     if not isinstance(getattr(stats, distribution, None), kind):
         kind_text = "a discrete one, such as randint" if quantity.integer else "a continuous one, such as norm"
-        allowed = f"no distribution of scipy.stats; {kind_text}, is expected"
+        allowed = f"no distribution of scipy.stats; expected {kind_text}"
         raise SpreadError.at(name, field, distribution, allowed, shown=repr(distribution))
 
 
@@ -295,7 +297,7 @@ def _check_parameters(distribution: str, entries: dict[str, Any], name: str, qua
             reason = f"not a parameter of {distribution}, which has {', '.join(allowed)}"
             raise SpreadError.at(name, f"{quantity}.{key}", value, reason, shown="")
         if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
-            raise SpreadError.at(name, f"{quantity}.{key}", value, "a finite number is expected", shown=repr(value))
+            raise SpreadError.at(name, f"{quantity}.{key}", value, "expected a finite number", shown=repr(value))
     missing = [key for key in shape_parameters if key not in entries]
     if missing:
         reason_missing = f"missing; {distribution} needs {', '.join(shape_parameters)}"
@@ -305,7 +307,7 @@ def _check_parameters(distribution: str, entries: dict[str, Any], name: str, qua
 def _checked_fraction_inside(varying: Varying, name: str) -> float:
     fraction = varying.fraction_inside
     if math.isnan(fraction):
-        allowed = f"no parameters that {varying.distribution} may have"
+        allowed = f"parameters that {varying.distribution} cannot have"
         raise SpreadError.at(name, varying.quantity.name, _call_text(varying), allowed)
     return fraction
 

@@ -60,7 +60,7 @@ def resumed_goal(requested: Goal | None, folder: Path, confidence: float | None 
     path = folder / DATABASE
     settings = read_stored_settings(path)
     if not settings:
-        raise StoreError(f"{path}: no campaign there to go on with", file=path)
+        raise StoreError(f"{path}: no campaign there to continue", file=path)
     old_goal = Goal(**{setting.name: settings[setting.name] for setting in fields(Goal) if setting.name in settings})
     goal = old_goal if requested is None else requested
     is_same = (goal.stops, goal.flights) == (old_goal.stops, old_goal.flights)

@@ -172,7 +172,10 @@ def draw_probability(bins: Sequence[SpeedBin], target: float | None) -> Figure:
         axes.set_ylim(-0.02, 1.05)
         axes.set_xlabel("mean wind at the start's height (m/s)")
         axes.set_ylabel("share of flyable flights")
-        axes.set_title("Probability against wind speed: line its share, band Wilson's interval, below how many flew")
+        axes.set_title(
+            "Probability against wind speed: the line is the share, the band Wilson's interval, "
+            "below is the number of flights"
+        )
         _style_axes(axes)
     return figure
 
@@ -269,14 +272,14 @@ def draw_clearance_fan(
         upper_axes.set_ylim(bottom=0.0)
         upper_axes.set_ylabel("above ground (m)")
         # The legend is above the panel, where it covers no band, and the title above the legend.
-        upper_axes.set_title("Clearance along the way, over all flights", pad=20.0)
+        upper_axes.set_title("Clearance along the path, over all flights", pad=20.0)
         upper_axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=6, columnspacing=1.0, borderaxespad=0.2)
         upper_axes.tick_params(labelbottom=False)
         lower_axes.fill_between(distance_km, ground, np.nanmin(ground) - 10.0, color=theme.GROUND[1], linewidth=0.0)
         lower_axes.plot(distance_km, ground, color=QUIET, linewidth=0.8)
         lower_axes.set_xlim(0.0, length / 1000.0)
         lower_axes.set_ylabel("ground (m AMSL)")
-        lower_axes.set_xlabel("along the way (km)")
+        lower_axes.set_xlabel("along the path (km)")
         for axes in (upper_axes, lower_axes):
             axes.grid(visible=True, color=GRID, linewidth=0.5)
             axes.set_axisbelow(True)

@@ -172,7 +172,7 @@ def _draw_tracks(base: CampaignBase, store: Store) -> list[tuple[Figure, str]]:
         figure = draw_clearance_fan(
             np.array(shapes, dtype=np.float64), failed, ground, float(leg_starts[-1]), min_clearance
         )
-        figures.append((figure, "Height above ground along the way, over all flights, and the ground itself"))
+        figures.append((figure, "Height above ground along the path, over all flights, and the ground itself"))
     crossings = [np.frombuffer(data, np.float32).reshape(-1, 2) for data in store.blobs("crossings", _MAX_DRAWN)]
     # The number of stops on a return depends on the wind, so flights without the further stops have NaN.
     all_crossings = np.full((len(crossings), max(map(len, crossings)), 2), np.nan)
@@ -216,15 +216,15 @@ class OutputDirectory:
         folder = self.folder
         if self.resume:
             if not (folder / self.table).is_file():
-                raise PlanflyError(f"{folder / self.table}: no campaign there to go on with", file=folder / self.table)
+                raise PlanflyError(f"{folder / self.table}: no campaign there to continue", file=folder / self.table)
             return
         if folder.exists() and not folder.is_dir():
-            raise PlanflyError(f"{folder}: is a file; a folder is expected", file=folder)
+            raise PlanflyError(f"{folder}: is a file; expected a folder", file=folder)
         if self.overwrite or not folder.is_dir() or not any(folder.iterdir()):
             return
         if (folder / self.table).exists():
             raise PlanflyError(
-                f"{folder}: holds a campaign; resume=True goes on with it, overwrite=True replaces it", file=folder
+                f"{folder}: holds a campaign; resume=True continues it, overwrite=True replaces it", file=folder
             )
         if any((folder / name).exists() for name in CAMPAIGN_FILES):
             raise PlanflyError(f"{folder}: holds another campaign; overwrite=True replaces it", file=folder)
@@ -258,7 +258,7 @@ def campaign_folder(out: Path | str | None, table: str, *, resume: bool, overwri
         yield OutputDirectory(Path(out), table, resume, overwrite)
         return
     if resume:
-        allowed = "`out` is missing: the folder of what is to be gone on with"
+        allowed = "`out` is missing: it names the folder of the campaign to continue"
         raise ArgumentError.of_argument("resume", resume, allowed, shown="")
     with tempfile.TemporaryDirectory() as name:
         yield OutputDirectory(Path(name), table, resume=False, overwrite=False)
@@ -312,7 +312,7 @@ def fly_row_again(base: CampaignBase, row: FlightRow, log: Path) -> FlightRow:
     """
     new_row = fly_one(base, row.draw.index, log=log)
     if not is_same_flight(row, new_row):
-        message = f"{log}: flight {row.draw.index} comes out otherwise here than where it was flown"
+        message = f"{log}: flight {row.draw.index} has a different outcome here than where it was flown"
         raise PlanflyError(message, file=log, field="flight", value=row.draw.index)
     return new_row
 
@@ -416,8 +416,8 @@ def _unsettled_lines(winds: WindsFound) -> list[str]:
     if not unsettled:
         return []
     return [
-        f"not settled: {len(unsettled)} of {len(winds.boundaries)} directions, for want of flights: each takes"
-        f" {FEWEST} at least, and an interval of {2.0 * ACCURACY:g} m/s; with fewer the interval is mostly assumption"
+        f"not settled: {len(unsettled)} of {len(winds.boundaries)} directions, for lack of flights: each needs"
+        f" at least {FEWEST}, and an interval of {2.0 * ACCURACY:g} m/s; with fewer, the interval is mostly assumption"
     ]
 
 
@@ -430,7 +430,8 @@ def _lost_lines(winds: WindsFound) -> list[str]:
         for number in winds.lost[:10]
     )
     return [
-        f"lost      {len(winds.lost)} could not be flown, their workers died, and count as not flyable: {flight_texts}"
+        f"lost      {len(winds.lost)} could not be flown because their workers died, and count as not flyable:"
+        f" {flight_texts}"
     ]
 
 

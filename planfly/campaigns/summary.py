@@ -211,7 +211,7 @@ def campaign_lines(summary: CampaignSummary) -> list[str]:
     lines += failure_lines(summary.by_rule)
     if summary.lost:
         lost_text = ", ".join(map(str, summary.lost[:10]))
-        lines.append(f"  lost    {len(summary.lost)} could not be flown, their workers died: {lost_text}")
+        lines.append(f"  lost    {len(summary.lost)} could not be flown because their workers died: {lost_text}")
     if summary.deciding and summary.low_margin is not None:
         lines.append(
             f"  decides {RULE_WORDS[summary.deciding].title}: one flight in twenty has a margin below"

@@ -55,9 +55,9 @@ class Examined(NamedTuple):
         """Describe the damage and its consequence.
 
         >>> Examined([0, 1, 3], [2]).text()
-        'flight 2 is damaged and was taken out: 3 flights are whole and stay; --resume flies what is missing'
+        'flight 2 is damaged and was taken out: 3 flights are intact and stay; --resume flies the missing ones'
         """
-        kept_text = f"{len(self.whole)} flights are whole and stay; --resume flies what is missing"
+        kept_text = f"{len(self.whole)} flights are intact and stay; --resume flies the missing ones"
         later_text = ""
         if self.after is not None:
             later_text = (

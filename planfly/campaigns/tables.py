@@ -198,12 +198,12 @@ class LockedTable:
             _check_settings_intact(stored_settings, self.path)
         if stored_settings.get("schema") != schema:
             raise StoreError(
-                f"{self.path}: schema {stored_settings.get('schema')!r}: {schema} is expected", file=self.path
+                f"{self.path}: schema {stored_settings.get('schema')!r}: expected {schema}", file=self.path
             )
         _check_settings_intact(stored_settings, self.path)
         if stored_settings.get("made_of") != self.made_of:
             raise StoreError(
-                f"{self.path}: is of another campaign: its code, mission, aircraft, scenario, dispersions or seed"
+                f"{self.path}: belongs to another campaign: its code, mission, aircraft, scenario, dispersions or seed"
                 f" differs ({stored_settings.get('made_of')}, not {self.made_of})",
                 file=self.path,
             )
@@ -211,8 +211,8 @@ class LockedTable:
         for name in self._kind.fixed:
             if stored_request[name] != settings[name]:
                 raise StoreError(
-                    f"{self.path}: {name} {settings[name]}: the flights there were asked for with"
-                    f" {stored_request[name]}",
+                    f"{self.path}: {name} {settings[name]}: the flights there were requested"
+                    f" with {stored_request[name]}",
                     file=self.path,
                 )
 
@@ -321,9 +321,12 @@ def _read_settings(connection: sqlite3.Connection) -> dict[str, str]:
 
 
 def _check_settings_intact(settings: Mapping[str, str], path: Path) -> None:
-    """Raise StoreError if planfly did not write the settings of a file."""
+    """Raise StoreError for a file with settings that planfly did not write."""
     if settings.get("checksum") != checksum(settings.get(name) for name in ("schema", "made_of", "settings")):
-        reason = "its settings are damaged, or another version's: it cannot be resumed, and --overwrite begins anew"
+        reason = (
+            "its settings are damaged or written by another version: the campaign cannot be resumed;"
+            " --overwrite starts again"
+        )
         raise StoreError(f"{path}: {reason}", file=path, field="settings")
 
 
@@ -356,12 +359,14 @@ class converted_errors:
         """Raise the converted SQLite error, if there is one."""
         if isinstance(error, UnicodeDecodeError):
             # SQLite quotes the parts of a table definition that it does not understand.
-            raise StoreError(f"{self._path}: is damaged where it says which tables it has", file=self._path) from error
+            raise StoreError(f"{self._path}: is damaged in the list of its tables", file=self._path) from error
         if not isinstance(error, sqlite3.Error):
             return
         code = getattr(error, "sqlite_errorcode", None)
         if code is not None and code & 0xFF == sqlite3.SQLITE_FULL:
-            raise OSError(errno.ENOSPC, "no space left; the flights before are kept, --resume goes on", str(self._path))
+            raise OSError(
+                errno.ENOSPC, "no space left; finished flights are kept: continue with --resume", str(self._path)
+            )
         if code is not None and code & 0xFF in LOCKED_CODES:
             raise StoreError(f"{self._path}: is held by another process", file=self._path) from error
         raise StoreError(f"{self._path}: {error}", file=self._path) from error

@@ -85,7 +85,7 @@ def checked_address(address: str) -> str:
     except ValueError:
         host = port = None
     if not host or not port or parts.scheme not in ("tcp", "tls"):
-        allowed = "tcp://HOST:PORT on this machine, or tls://HOST:PORT, is expected"
+        allowed = "expected tcp://HOST:PORT on this machine, or tls://HOST:PORT"
         raise SchedulerError.of_argument("scheduler", address, allowed)
     if parts.scheme == "tcp" and not _is_loopback(host):
         allowed = "plain TCP beyond loopback; use tls://, with certificates in dask's configuration"

@@ -72,7 +72,9 @@ def aircraft_options(line: LineParser) -> None:
     )
     with_completer(
         logs.add_argument(
-            "--base", metavar="NAME", help="with --identify: the aircraft that it is most like (default: aerosonde)"
+            "--base",
+            metavar="NAME",
+            help="with --identify: the known aircraft that is most similar (default: aerosonde)",
         ),
         complete_aircraft,
     )
@@ -80,7 +82,11 @@ def aircraft_options(line: LineParser) -> None:
         logs.add_argument("--check", metavar="LOG", help="with --identify: another log, to replay with the model"),
         files(".bin", ".BIN", ".ulg"),
     )
-    result_options(parser, "where the pictures go (default: runs/aircraft-NAME, replaced); of --identify, the folder")
+    result_options(
+        parser,
+        "folder for the pictures (default: runs/aircraft-NAME; an existing one is replaced), "
+        "or with --identify the aircraft's folder",
+    )
 
 
 def _data_sheet_options(parser: CommandParser) -> None:
@@ -88,12 +94,12 @@ def _data_sheet_options(parser: CommandParser) -> None:
     numbers = {
         "mass": ("KG", "mass, 0.5 to 25 kg"),
         "span": ("M", "wing span, m"),
-        "area": ("M2", "wing area, m2 (default: what carries the mass at the stall)"),
+        "area": ("M2", "wing area, m2 (default: the area that carries the mass at the stall speed)"),
         "cruise": ("M/S", "usual airspeed"),
         "stall": ("M/S", "airspeed of slowest level flight"),
         "top": ("M/S", "airspeed of fastest level flight (default: 1.4 times the cruise's)"),
         "bank": ("DEG", "steepest bank in turns (default: 35)"),
-        "climb": ("DEG", "steepest climb at cruise (default: 12, or what goes with the top speed)"),
+        "climb": ("DEG", "steepest climb at cruise (default: 12, or the climb that fits the top speed)"),
         "motor": ("KV", "rpm a volt"),
         "fuel": ("KG", "fuel carried, for an aircraft without a battery"),
     }
@@ -113,14 +119,14 @@ def aircraft(args: argparse.Namespace) -> int:
         return _identify(args)
     for name in ("base", "check"):
         if getattr(args, name) is not None:
-            raise PlanflyError.of_argument(name, getattr(args, name), "goes with `logs` LOG", shown="")
+            raise PlanflyError.of_argument(name, getattr(args, name), "only with `logs` LOG", shown="")
     if args.folder is not None:
         return _make_folder(args)
     for name in _DATA_SHEET_KEYWORDS:
         if getattr(args, name) is not None:
-            raise PlanflyError.of_argument(name, getattr(args, name), "goes with `folder` FOLDER", shown="")
+            raise PlanflyError.of_argument(name, getattr(args, name), "only with `folder` FOLDER", shown="")
     if args.source is not None:
-        allowed = "goes with `folder` FOLDER, the folder to make"
+        allowed = "only with `folder` FOLDER, the folder to make"
         raise PlanflyError.of_argument("source", args.source, allowed, shown="")
     if args.name is None:
         embedded_aircraft = list(planfly.aircraft().values())
@@ -149,7 +155,7 @@ def _json_answer(entries: "Sequence[Aircraft]", numbers: "AircraftNumbers | None
 
 def _make_folder(args: argparse.Namespace) -> int:
     if args.name is not None:
-        message = f"{args.name}: --new takes the folder alone; --from names the aircraft to begin with"
+        message = f"{args.name}: --new takes only the folder; --from names the aircraft to start from"
         raise PlanflyError(message, field="--new", value=args.folder)
     folder = Path(args.folder)
     new_aircraft = call(planfly.new_aircraft, args)
@@ -162,8 +168,8 @@ def _make_folder(args: argparse.Namespace) -> int:
         _print_sheet(new_aircraft)
     give_answer(args, lambda: _json_answer([new_aircraft]))
     print(
-        f"next      planfly aircraft {shlex.quote(str(folder_text))},"
-        f" and --aircraft {shlex.quote(str(folder_text))} flies it"
+        f"next      `planfly aircraft {shlex.quote(str(folder_text))}` shows it; `planfly fly MISSION --aircraft"
+        f" {shlex.quote(str(folder_text))}` flies it"
     )
     return FLYABLE
 
@@ -172,7 +178,7 @@ def _identify(args: argparse.Namespace) -> int:
     """Identify an aircraft from logs, and make its folder."""
     for name in ("mass", "span", "out"):
         if getattr(args, name) is None:
-            reason = "the folder to make" if name == "out" else "of the aircraft as it flew"
+            reason = "the folder to make" if name == "out" else f"the {name} of the aircraft as flown"
             raise PlanflyError(f"--identify needs --{name}, {reason}", field=f"--{name}")
     extra_names = [
         name
@@ -181,14 +187,14 @@ def _identify(args: argparse.Namespace) -> int:
     ]
     if extra_names or args.name is not None or args.folder is not None:
         field = "name" if args.name is not None else f"--{extra_names[0]}" if extra_names else "--new"
-        raise PlanflyError(f"--identify goes without {field}: the logs have that", field=field)
+        raise PlanflyError(f"--identify cannot be combined with {field}: it comes from the logs", field=field)
     for field, is_given, reason_text in (
-        ("--params", args.params is not None, "the logs have the parameters"),
-        ("--from", args.source is not None, "--base names the aircraft to begin with"),
+        ("--params", args.params is not None, "the parameters come from the logs"),
+        ("--from", args.source is not None, "--base names the aircraft to start from"),
         ("--motor-braking", args.motor_braking, "it is a choice of each flight"),
     ):
         if is_given:
-            raise PlanflyError(f"--identify goes without {field}: {reason_text}", field=field)
+            raise PlanflyError(f"--identify cannot be combined with {field}: {reason_text}", field=field)
     identified = call(planfly.identify_aircraft, args, folder=args.out)
     new_aircraft, estimate = identified.aircraft, identified.estimate
     files_made = sorted(file.name for file in new_aircraft.folder.iterdir())
@@ -221,7 +227,9 @@ def _print_unknown(identified: "planfly.IdentifiedAircraft") -> None:
     for line in identified.estimate.silent():
         print(f"  not seen {line}")
     for log_name in identified.without_current:
-        print(f"  current  not used, as {log_name} has none (BAT): identify from the other logs alone to use theirs")
+        print(
+            f"  current  not used, as {log_name} has none (BAT): identify from only the other logs to use their current"
+        )
 
 
 def _print_sheet(aircraft: "Aircraft") -> None:

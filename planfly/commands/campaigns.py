@@ -25,7 +25,7 @@ def campaign_options(line: LineParser) -> None:
     """Add the parser of ``planfly campaign``."""
     parser = line.command(
         "campaign",
-        "fly a mission many times in varied weather and with varied aircraft: how likely is it to fly",
+        "fly a mission many times in varied weather with varied aircraft, to estimate how likely it is to succeed",
         "planfly campaign jacksboro-air --prove 0.99",
         extra="campaigns",
     )
@@ -71,7 +71,11 @@ def winds_options(line: LineParser) -> None:
     )
     _shared_options(parser)
     parser.add_argument(
-        "--prove", metavar="P", type=number("prove"), default=0.99, help="probability to fly with (default: 0.99)"
+        "--prove",
+        metavar="P",
+        type=number("prove"),
+        default=0.99,
+        help="probability of success to prove (default: 0.99)",
     )
     parser.add_argument(
         "--confidence",
@@ -122,7 +126,7 @@ def _shared_options(parser: CommandParser) -> None:
         "--scheduler", metavar="ADDRESS", help="fly on a running dask cluster: tls://HOST:PORT; needs planfly[cluster]"
     )
     parser.add_argument("--resume", action="store_true", help="continue the campaign in --out")
-    result_options(parser, "where the files go (default: runs/<name>-<command>, kept)")
+    result_options(parser, "folder for the files (default: runs/<name>-<command>; an existing one is kept)")
 
 
 def campaign(args: argparse.Namespace) -> int:
@@ -166,7 +170,7 @@ def _refly(args: argparse.Namespace, folder: Path) -> int:
     from logs.verdict.wording import place_text
 
     if args.json:
-        raise PlanflyError("--json: goes with a campaign, not with --refly", field="--json", value=args.json)
+        raise PlanflyError("--json: only with a campaign, not with --refly", field="--json", value=args.json)
     flight = call(planfly.campaign_flight, args, index=args.refly, out=folder)
     print(f"flight {args.refly}: {flight.row.outcome}, ended: {flight.row.ended}, as in the table")
     for rule, place in flight.row.failed:
@@ -190,5 +194,5 @@ def _report_kept_flights(folder: Path, table: str) -> Iterator[Callable[[], int]
         if not (folder / table).is_file():
             raise
         flights = count_flights(folder / table)
-        print(f"planfly: interrupted; {flights} flights are kept in {folder}, --resume goes on", file=sys.stderr)
+        print(f"planfly: interrupted; {flights} flights are kept in {folder}: continue with --resume", file=sys.stderr)
         code = 128 + (stop.number if isinstance(stop, Interrupted) else signal.SIGINT)

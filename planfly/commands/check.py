@@ -33,7 +33,7 @@ def check_options(line: LineParser) -> None:
     """Add the parser of ``planfly check``."""
     parser = line.command(
         "check",
-        "judge a flight by its log (planfly's or an autopilot's), or a mission by flying it; write nothing",
+        "judge a flight from its log (planfly's or an autopilot's), or a mission by flying it, without writing files",
         "planfly check flight.mcap --json verdict.json",
         "planfly check mission.waypoints --terrain jacksboro --json -",
         "planfly check mission.waypoints --terrain jacksboro --geometry",
@@ -54,13 +54,13 @@ def check_options(line: LineParser) -> None:
         dest="autopilots",
         metavar="AUTOPILOT,...",
         type=autopilots,
-        help="fly a mission by several simulated autopilots, and print one table with a column for each: "
+        help="fly a mission with several simulated autopilots, and print one table with a column for each: "
         + ", ".join(CHOICES["autopilot"]),
     )
     group.add_argument(
         "--geometry",
         action="store_true",
-        help="judge a mission by its geometry and the aircraft's envelope alone: quick, and no autopilot flies it",
+        help="judge a mission only by its geometry and the aircraft's envelope, without a flight (quick)",
     )
     result_options(parser, junit=True)
 

@@ -27,7 +27,7 @@ def compare_options(line: LineParser) -> None:
     log_argument(parser, "first", "A.mcap")
     log_argument(parser, "second", "B.mcap", "another")
     parser.add_argument("--svg", action="store_true", help="also write the pictures as SVG")
-    result_options(parser, "write pictures and compare.html there (default: the table alone)")
+    result_options(parser, "folder for pictures and compare.html (default: only the table)")
 
 
 def compare(args: argparse.Namespace) -> int:

@@ -30,8 +30,9 @@ def export_options(line: LineParser) -> None:
         "files",
         metavar="FILE",
         nargs="+",
-        help="files to write: .waypoints, .plan, .fence, .rally, .kml, .gpx, .parm (of take-off, landing and returns);"
-        " of a log also .csv, .parquet (extra planfly[tables]), .tlog (MAVLink; extra planfly[live]), .ulg (PX4)",
+        help="files to write: .waypoints, .plan, .fence, .rally, .kml, .gpx, .parm (parameters for take-off, "
+        "landing and returns);"
+        " from a log also .csv, .parquet (extra planfly[tables]), .tlog (MAVLink; extra planfly[live]), .ulg (PX4)",
     )
     fence_option(parser)
     time_option(parser)

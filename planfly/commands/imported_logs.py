@@ -69,7 +69,7 @@ def refly_options(line: LineParser) -> None:
     """Add the parser of ``planfly refly``."""
     parser = line.command(
         "refly",
-        "fly the mission of an imported flight again in JSBSim, in the wind of its log, and compare the two",
+        "fly the mission of an imported flight again in JSBSim, in the wind of its log, and compare both flights",
         "planfly refly flight.mcap --out refly",
     )
     with_completer(
@@ -82,7 +82,9 @@ def refly_options(line: LineParser) -> None:
         complete_aircraft,
     )
     turbulence_option(parser)
-    result_options(parser, "where the pictures go (default: <log>-refly beside it, replaced)")
+    result_options(
+        parser, "folder for the pictures (default: <log>-refly next to the log; an existing one is replaced)"
+    )
 
 
 def refly(args: argparse.Namespace) -> int:

@@ -16,7 +16,7 @@ def new_options(line: LineParser) -> None:
     """Add the parser of ``planfly new``."""
     parser = line.command(
         "new",
-        "write a commented scenario from one place to another, and plan it once",
+        "write a commented scenario for a flight from one place to another, and plan it once",
         "planfly new ./site --from 46.52,8.01 --to 46.60,8.12 --terrain dem.tif",
         "planfly new ./site --from 46.52,8.01 --to 46.60,8.12 --aircraft x8 --height 100",
     )
@@ -57,7 +57,7 @@ def new(args: argparse.Namespace) -> int:
     file = call(planfly.new_scenario, args)
     print(f"scenario  {file}")
     if args.terrain is None:
-        print("ground    flat, at mean sea level: nobody named an elevation file (--terrain DEM)")
+        print("ground    flat, at mean sea level: no elevation file was named (--terrain DEM)")
     plan = planfly.plan(file)
     code = FLYABLE if plan.safe else NOT_FLYABLE
     if plan.safe:

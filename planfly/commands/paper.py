@@ -42,7 +42,7 @@ def paper_options(line: LineParser) -> None:
         help="algorithm to compare with the two baselines (default: umda, the paper's)",
     )
     parser.add_argument("--jobs", metavar="N", type=number("jobs"), help="processes (default: one per core)")
-    result_options(parser, "where tables and figures go (default: runs/paper, replaced)")
+    result_options(parser, "folder for tables and figures (default: runs/paper; an existing one is replaced)")
 
 
 def paper(args: argparse.Namespace) -> int:

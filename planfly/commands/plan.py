@@ -60,9 +60,11 @@ def plan_options(line: LineParser) -> None:
         "--front",
         metavar="N",
         type=number("front"),
-        help="a choice of up to N plans (2 to 100), none better than another in length, exposure to radars, height "
+        help="plan a choice of up to N plans (2 to 100); none is better than another in length, exposure to "
+        "radars, height "
         'above ground and energy at once (time for energy with [planner] objective = "time"); --out is then a folder '
-        "of plan-1.json ..., front.csv, front.json and pictures (default: runs/<name>-seed<N>-front, replaced)",
+        "of plan-1.json ..., front.csv, front.json and pictures (default: runs/<name>-seed<N>-front; an"
+        " existing one is replaced)",
     )
     again = parser.group("planning again in flight")
     with_completer(
@@ -82,7 +84,9 @@ def plan_options(line: LineParser) -> None:
     )
     aircraft_and_wind_options(parser)
     autopilot_options(parser)
-    result_options(parser, "the plan file (default: runs/<name>-seed<N>/plan.json, replaced)", "FILE")
+    result_options(
+        parser, "the plan file (default: runs/<name>-seed<N>/plan.json; an existing one is replaced)", "FILE"
+    )
 
 
 def _algorithms_help() -> str:
@@ -125,10 +129,10 @@ def _plan_front(args: argparse.Namespace) -> int:
 
     for name in ("old", "algorithm"):
         if (value := getattr(args, name)) is not None:
-            raise ScenarioError.of_argument(name, value, "not with `front` N, which plans anew by its own search")
+            raise ScenarioError.of_argument(name, value, "not with `front` N, which uses a search of its own")
     evaluations, seconds = args.budget or (None, None)
     if evaluations is not None:
-        allowed = "with `front` N a number of seconds is expected, as in 10s"
+        allowed = "with `front` N: expected a number of seconds, as in 10s"
         raise ScenarioError.of_argument("budget", evaluations, allowed)
     out = FRONT_FOLDER if args.out is None else args.out
     with _stop_on_interrupt() as stop:

@@ -15,11 +15,11 @@ def recover_options(line: LineParser) -> None:
     """Add the parser of ``planfly recover``."""
     parser = line.command(
         "recover",
-        "write what can be read of an unfinished or damaged log as a new, complete one",
+        "write a new, complete log from what can be read of an unfinished or damaged one",
         "planfly recover flight.mcap --out recovered.mcap",
     )
     log_argument(parser)
-    result_options(parser, "the new log (default: <log>-recovered.mcap beside it)", "FILE")
+    result_options(parser, "the new log (default: <log>-recovered.mcap next to the log)", "FILE")
 
 
 def recover(args: argparse.Namespace) -> int:

@@ -46,7 +46,7 @@ def replay_options(line: LineParser) -> None:
     """Add the parser of ``planfly replay``."""
     parser = line.command(
         "replay",
-        "replay a flight from its log alone: as instruments on a terminal, as a timeline elsewhere",
+        "replay a flight from its log: as instruments on a terminal, as a timeline elsewhere",
         "planfly replay flight.mcap --speed 20 --from 60",
         "planfly replay flight.mcap --to 127.0.0.1:14550",
     )

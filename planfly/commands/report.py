@@ -23,13 +23,13 @@ def report_options(line: LineParser) -> None:
     """Add the parser of ``planfly report``."""
     parser = line.command(
         "report",
-        "draw the figures and write report.html from a log alone, or write the layout for Foxglove",
+        "draw the figures and write report.html from a log, or write the layout for Foxglove",
         "planfly report flight.mcap --out report --svg",
     )
     with_completer(parser.add_argument("log", metavar="LOG.mcap", nargs="?", help="a flight log"), files("mcap"))
     parser.add_argument("--svg", action="store_true", help="also write the figures as SVG")
     parser.add_argument("--layout", metavar="FILE", help="write only the layout file for Foxglove")
-    result_options(parser, "where the files go (default: <log>-report beside the log, replaced)")
+    result_options(parser, "folder for the files (default: <log>-report next to the log; an existing one is replaced)")
 
 
 def report(args: argparse.Namespace) -> int:
@@ -37,7 +37,7 @@ def report(args: argparse.Namespace) -> int:
     if args.layout:
         return _write_layout(args)
     if args.log is None:
-        print("planfly report: a log, or --layout FILE, is expected (see planfly report --help)", file=sys.stderr)
+        print("planfly report: expected a log, or --layout FILE (see planfly report --help)", file=sys.stderr)
         return BAD_INPUT
     source = Path(args.log)
     log = planfly.read_log(source)
@@ -67,7 +67,7 @@ def _json_answer(written: Sequence[Path], verdict: "Verdict | None", code: int) 
 
 def _write_layout(args: argparse.Namespace) -> int:
     if args.log is not None:
-        message = f"{args.log}: --layout writes the layout alone; name no log with it"
+        message = f"{args.log}: --layout writes only the layout; name no log with it"
         raise PlanflyError(message, file=args.log, field="--layout", value=args.layout)
     file = planfly.foxglove_layout(args.layout, overwrite=args.overwrite)
     print(f"layout    {file}")

@@ -31,8 +31,8 @@ def returns_options(line: LineParser) -> None:
     """Add the parser of ``planfly returns``."""
     parser = line.command(
         "returns",
-        "fly the return to launch from everywhere on the way: say whether each is safe, where it goes and why; and"
-        " what can be reached without the engine",
+        "simulate a return to launch from points all along the route: is each safe, where does it end and why; and"
+        " what can the aircraft reach without its engine",
         "planfly returns mission.waypoints --terrain jacksboro --wind 5,250",
         "planfly returns flight.mcap --every 5 --out pictures",
         "planfly returns flight.mcap --sitl ./arduplane --points 5",
@@ -50,18 +50,20 @@ def returns_options(line: LineParser) -> None:
     group.add_argument(
         "--suggest",
         action="store_true",
-        help="look for the least RTL_ALTITUDE, a climb before the turn or the fewest rally points that make all safe",
+        help="find the lowest RTL_ALTITUDE, a climb before the turn, or the fewest rally points that make all "
+        "returns safe",
     )
     program_option(
         group,
-        "fly the worst returns by ArduPlane itself, too, and say whether it does as simulated: the path of its program,"
+        "also fly the worst returns with ArduPlane itself, and say whether it agrees with the"
+        " simulation: path of its program,"
         " built for software in the loop (extra planfly[live])",
     )
     group.add_argument(
         "--points",
         metavar="N",
         type=number("points"),
-        help="number of the worst returns that the program flies, far apart (default: 3)",
+        help="number of the worst returns that the program flies, spaced far apart (default: 3)",
     )
     imported_log_options(parser)
     world_options(parser)
@@ -71,8 +73,8 @@ def returns_options(line: LineParser) -> None:
     )
     result_options(
         parser,
-        "folder for pictures: the way by what comes of a return, the worst in profile, the least height "
-        "that one is safe from, and the glide's footprint (default: none)",
+        "folder for pictures: the route coloured by the outcome of returns, the worst returns in profile,"
+        " the lowest height from which a return is safe, and the glide's footprint (default: none)",
     )
 
 

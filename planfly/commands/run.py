@@ -48,7 +48,9 @@ def run_options(line: LineParser) -> None:
     terrain_option(planning)
     flight_options(parser)
     log_rate_option(parser.group("the log"))
-    result_options(parser, "where the files go (default: runs/<name>-seed<N>, replaced)", junit=True)
+    result_options(
+        parser, "folder for the files (default: runs/<name>-seed<N>; an existing one is replaced)", junit=True
+    )
 
 
 def run(args: argparse.Namespace) -> int:

@@ -28,7 +28,7 @@ def studio_options(line: LineParser) -> None:
     """Add the parser of ``planfly studio``."""
     parser = line.command(
         "studio",
-        "a page on which a mission is dragged, judged while it is dragged, flown, and saved",
+        "open a page on which you drag a mission while it is judged, fly it, and save it",
         "planfly studio jacksboro",
         "planfly studio mission.waypoints --terrain jacksboro --no-browser",
         extra="studio",

@@ -20,7 +20,7 @@ def survey_options(line: LineParser) -> None:
     """Add the parser of ``planfly survey``."""
     parser = line.command(
         "survey",
-        "fly a survey: say how much of each photo line can be used, and what would help those that are lost",
+        "fly a survey: how much of each photo line can be used, and what would help the lines that are lost",
         "planfly survey field.plan --terrain dem.tif --aircraft x8 --autopilot ardupilot --wind 5,250",
         "planfly survey field.waypoints --suggest --out better",
     )
@@ -33,15 +33,16 @@ def survey_options(line: LineParser) -> None:
         "--camera",
         metavar="WxH,FOCAL",
         type=camera,
-        help="the camera, which looks straight down: its sensor across the way and along it, and its focal length, mm, "
-        "as in 23.5x15.6,16; then the overlaps asked for, along and across, as in 23.5x15.6,16,75,60 "
+        help="the camera, which looks straight down: size of its sensor across and along the track, and focal "
+        "length, mm, as in 23.5x15.6,16; then the required overlaps along and across the lines, in percent, as in "
+        "23.5x15.6,16,75,60 "
         "(default: those of a .plan)",
     )
     group.add_argument(
         "--suggest",
         action="store_true",
-        help="look for turn-arounds, an order or a course of the lines, a parameter or an airspeed with which all can "
-        "be used: each is flown",
+        help="look for turn-arounds, an order or a course of the lines, a parameter or an airspeed that makes "
+        "all lines usable; each is flown",
     )
     world_options(parser)
     aircraft_and_wind_options(parser)

@@ -19,13 +19,15 @@ def terrain_options(line: LineParser) -> None:
     """Add the parser of ``planfly terrain``."""
     parser = line.command(
         "terrain",
-        "get the ground of an area as a GeoTIFF, from a folder of tiles or the Copernicus DEM's server",
+        "write the ground of an area as a GeoTIFF, from a folder of tiles or the Copernicus DEM's server",
         "planfly terrain --around field.waypoints --out dem.tif",
         "planfly terrain --box 46.4,7.9,46.7,8.3 --source ./tiles --out dem.tif",
     )
     area_group = parser.group("the area")
     with_completer(
-        area_group.add_argument("--around", metavar="MISSION", help=".waypoints or .plan: all of its places"),
+        area_group.add_argument(
+            "--around", metavar="MISSION", help=".waypoints or .plan file: cover all of its places"
+        ),
         files(*MISSIONS),
     )
     area_group.add_argument("--box", metavar="S,W,N,E", type=area, help="edges of the area, degrees")
@@ -37,7 +39,7 @@ def terrain_options(line: LineParser) -> None:
         "--source",
         metavar="DIR|URL",
         help="a folder of tiles or an elevation file; or a server of GLO-30 tiles of the Copernicus DEM (default: the "
-        "public one in Amazon's registry of open data, of which the parts that are needed are fetched, and kept)",
+        "public one in Amazon's registry of open data, from which the needed parts are fetched and kept)",
     )
     tile_group.add_argument(
         "--sea",
@@ -59,7 +61,7 @@ def terrain(args: argparse.Namespace) -> int:
     if cut.absent:
         corner_text = ", ".join(f"{lat} {lon}" for lat, lon in cut.absent[:_MAX_NAMED])
         more_text = f" and {len(cut.absent) - _MAX_NAMED} more" if len(cut.absent) > _MAX_NAMED else ""
-        absent_text = "taken for sea, at 0 m" if args.sea else "open sea, or not published (--sea takes it for sea)"
+        absent_text = "treated as sea, at 0 m" if args.sea else "open sea, or not published (--sea treats it as sea)"
         print_warnings([f"no tile at {corner_text}{more_text} (south-west corners, degrees): {absent_text}"])
     if cut.empty:
         print_warnings([f"{cut.empty:,} of {rows * cols:,} pixels have no data"])

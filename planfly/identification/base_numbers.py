@@ -190,7 +190,7 @@ def read_motor(aircraft: Aircraft) -> Motor:
             return _read_propeller_disc(functions, aircraft.battery_voltage)
         return _read_electric_motor(functions, aircraft.battery_voltage)
     except (KeyError, ValueError, IndexError, StopIteration, OSError, ElementTree.ParseError):
-        allowed = "a motor in the form of aircraft/aerosonde/aerosonde.xml or aircraft/x8/x8.xml is expected"
+        allowed = "expected a motor in the form of aircraft/aerosonde/aerosonde.xml or aircraft/x8/x8.xml"
         raise FlightError(
             f"{aircraft.model_file}: its motor cannot be identified: {allowed}",
             file=aircraft.model_file,

@@ -44,7 +44,7 @@ def check_estimate(estimate: Estimate, base: BaseModel, outputs: dict[str, int],
     slope = base.coefficients.lift_alpha * estimate.values[INDEX["lift-slope"]]
     min_value, max_value = LIFT_SLOPE_RANGE
     if not min_value <= slope <= max_value:
-        allowed = f"{min_value:g}..{max_value:g} is expected: are mass and wing area those of these logs?"
+        allowed = f"expected {min_value:g}..{max_value:g}; check the mass and wing area of these logs"
         raise LogError(
             f"{source}: lift slope {slope:.2f} per rad: {allowed}", file=source, value=slope, allowed=allowed
         )
@@ -56,7 +56,7 @@ def check_estimate(estimate: Estimate, base: BaseModel, outputs: dict[str, int],
             raise LogError(f"{source}: {message}", file=source, field=parameter.name, value=value, allowed=allowed)
     change, sd = mass_change(estimate, base)
     if abs(change) > MAX_MASS_CHANGE and abs(change) > _MASS_CHANGE_SIGMAS * sd:
-        message = f"the mass seems to change by {100.0 * change:+.0f} % within the logs: one mass is expected"
+        message = f"the mass seems to change by {100.0 * change:+.0f} % within the logs; it must stay the same"
         raise LogError(f"{source}: {message}", file=source, value=change)
 
 

@@ -79,7 +79,7 @@ def check_base(base: Aircraft) -> None:
     try:
         root = ElementTree.parse(base.model_file).getroot()
     except (OSError, ElementTree.ParseError) as error:
-        message = f"{base.model_file}: {' '.join(str(error).split())}: a JSBSim model is expected"
+        message = f"{base.model_file}: {' '.join(str(error).split())}: expected a JSBSim model"
         raise FlightError(message, file=base.model_file) from None
     for path in _REQUIRED_PARTS:
         _find_part(root, path, base)

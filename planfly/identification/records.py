@@ -168,7 +168,7 @@ _SERIES = {
     },
     "px4": {
         "inertial": "sensor_combined, the inertial sensors",
-        "outputs": "actuator_servos and actuator_motors, nor actuator_controls_0: actuator_outputs alone do not say"
+        "outputs": "actuator_servos and actuator_motors, nor actuator_controls_0: actuator_outputs do not state"
         " what they move",
         "attitude": "vehicle_attitude, the attitude",
         "velocity": "vehicle_local_position, the velocity",
@@ -182,7 +182,7 @@ _SERIES = {
 def _check_usable(log: MotionLog) -> None:
     """Raise LogError for a log that no identification can use."""
     if log.vehicle not in ("plane", "unknown"):
-        raise LogError(f"{log.source}: flown by a {log.vehicle} ({log.program}): a plane is expected", file=log.source)
+        raise LogError(f"{log.source}: flown by a {log.vehicle} ({log.program}): expected a plane", file=log.source)
     series_names = _SERIES[log.program_kind]
     for samples, name in ((log.inertial, "inertial"), (log.moved, "outputs")):
         if len(samples.time) < 2:
@@ -256,7 +256,7 @@ def log_outputs(log: MotionLog, aircraft: Aircraft) -> dict[str, ServoOutput]:
     if any(has_elevons):
         _check_flying_wing_base(log, aircraft)
     if any(has_elevons) and not all(has_elevons):
-        raise LogError(f"{log.source}: one elevon alone: SERVOn_FUNCTION 77 and 78 are expected", file=log.source)
+        raise LogError(f"{log.source}: only one elevon; expected SERVOn_FUNCTION 77 and 78", file=log.source)
     outputs = {}
     for name, function, max_deflection in (
         ("elevator", _ELEVATOR, -aircraft.max_elevator),
@@ -283,7 +283,7 @@ def log_outputs(log: MotionLog, aircraft: Aircraft) -> dict[str, ServoOutput]:
 
 def _check_flying_wing_base(log: MotionLog, aircraft: Aircraft) -> None:
     if not is_flying_wing(aircraft):
-        advice = "a flying wing is expected as base: x8, zagi, or one of planfly aircraft --new FOLDER --layout wing"
+        advice = "expected a flying wing as base: x8, zagi, or one of planfly aircraft --new FOLDER --layout wing"
         message = f"flown with elevons, and the base {aircraft.name} has a tail: {advice}"
         raise LogError(f"{log.source}: {message}", file=log.source)
 

@@ -99,8 +99,8 @@ def open_served(options: ServeOptions) -> ServedScenario:
         return ServedScenario(setup.scenario, airframe_of(setup), setup.seed, setup.mission)
     scenario_name = options.flown.get("scenario")
     if scenario_name is None:
-        allowed = "a mission, or a scenario to wait for an upload in, is expected: `scenario` NAME"
-        raise PlanflyError(f"mission: none is named; {allowed}", field="scenario", allowed=allowed)
+        allowed = "expected a mission, or a scenario in which to wait for an upload: `scenario` NAME"
+        raise PlanflyError(f"mission: not named; {allowed}", field="scenario", allowed=allowed)
     fences = read_named_fences(options.flown.get("fence") or ())
     scenario = named_scenario(scenario_name, options.flown)
     scenario, seed = fences.on_scenario(scenario), options.flown.get("seed")

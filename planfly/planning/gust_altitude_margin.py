@@ -142,9 +142,8 @@ def _climb_problem(plan: Plan, airframe: Airframe) -> str:
     if climb_rate >= min_climb_rate or not airframe.autopilot.gust_sink(climb_rate, turbulence):
         return ""
     return (
-        f"climbs {climb_rate:.2f} m/s at {amsl:.0f} m at most; with less than {min_climb_rate:.2f} m/s"
-        f" downdrafts of {turbulence} turbulence may take it down further than any height allows for;"
-        " less turbulence, a lower mission or an"
+        f"climbs {climb_rate:.2f} m/s at {amsl:.0f} m at most; with less than {min_climb_rate:.2f} m/s downdrafts of"
+        f" {turbulence} turbulence may push it down further than any height margin covers; less turbulence, a lower mission or an"
         " aircraft that climbs better would help"
     )
 

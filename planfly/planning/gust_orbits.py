@@ -161,7 +161,7 @@ def _orbit_problem(plan: Plan, autopilot: Autopilot, limits: Limits) -> str:
     )
     remedy = "Less turbulence" if radius is None else f"{name} of {radius} m"
     return (
-        f"in {plan.scenario.wind.turbulence} turbulence {autopilot.title} circles where gusts have it off a waypoint's"
-        f" height, at one of {count} in {min(orbits, 1.0):.0%} of flights; up to {MAX_EXPECTED_ORBITS:.0%} are taken"
-        f" for safe. {remedy} would help"
+        f"in {plan.scenario.wind.turbulence} turbulence {autopilot.title} circles where gusts push it off a waypoint's"
+        f" height, at one of {count} in {min(orbits, 1.0):.0%} of flights; up to {MAX_EXPECTED_ORBITS:.0%} count"
+        f" as safe. {remedy} would help"
     )

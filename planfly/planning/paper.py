@@ -275,7 +275,8 @@ def table_text(rows: Sequence[TableRow]) -> str:
             f"{row.detection_median:>10.3g}  {row.seconds_median:>6.2f}"
         )
     lines += [
-        "safe: no violation and no kill exposure on the paper's six points a leg; certified: so along the whole path.",
+        "safe: no violation and no kill exposure on the paper's six points a leg; certified: safe along the "
+        "whole path.",
         "PLR: of the safe runs; PKill and PRD: the paper's sums, of all runs; CPU s: median of one run.",
     ]
     return "\n".join(lines)

@@ -45,7 +45,7 @@ def write_movie(
     if kind in SUFFIXES:
         check_output_file(target, overwrite)
     elif kind:
-        allowed = f"{', '.join(SUFFIXES)} or a folder is expected"
+        allowed = f"expected {', '.join(SUFFIXES)} or a folder"
         raise PlanflyError.of_argument("movie", kind, allowed, shown="", file=target)
     else:
         check_output_folder(target, overwrite)

@@ -48,7 +48,7 @@ def refusal_reason(head: bytes, port: int, allowed: Collection[str]) -> str:
     try:
         headers = http.client.parse_headers(io.BytesIO(head.partition(b"\r\n")[2]))
     except http.client.HTTPException:
-        return "a request that is none"
+        return "not a valid request"
     hosts, origins = headers.get_all("Host", []), headers.get_all("Origin", [])
     if [host.strip().lower() for host in hosts] not in [[f"{name}:{port}"] for name in _HOST_NAMES]:
         return f"a request to {_header_text(hosts)}"

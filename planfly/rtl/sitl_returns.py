@@ -110,11 +110,11 @@ class ProgramReturns:
         agreeing_count = sum(pair.agrees for pair in self.flown)
         worse_count = sum(pair.worse for pair in self.flown)
         comparison = (
-            "all of them as simulated"
+            "all of them agree with the simulation"
             if agreeing_count == len(self.flown)
-            else f"{agreeing_count} of them as simulated"
+            else f"{agreeing_count} of them agree with the simulation"
         )
-        comparison += f"; {worse_count} worse than simulated, so that the simulation errs there" if worse_count else ""
+        comparison += f"; {worse_count} worse than simulated, where the simulation errs" if worse_count else ""
         return f"by {self.program} itself: {len(self.flown)} of the worst flown, {comparison}"
 
     def lines(self, returns: Returns, scenario: Scenario) -> list[str]:
@@ -130,9 +130,9 @@ class ProgramReturns:
             agreement = (
                 "they agree"
                 if pair.agrees
-                else "the program's outcome counts"
+                else "the program's outcome counts, as it is worse"
                 if pair.worse
-                else "the simulated outcome, the worse one, counts"
+                else "the simulated outcome counts, as it is worse"
             )
             program_text = measured_text(pair.flown, returns.limit, scenario)
             texts.append(f"{start_text}: simulated {simulated_text}; by the program {program_text}: {agreement}")
@@ -148,7 +148,7 @@ def check_is_arduplane(program: Path) -> None:
     """Raise ArgumentError for a program other than ArduPlane, whose returns planfly does not simulate."""
     kind = program_autopilot(program)
     if not issubclass(kind, ArduPlaneSitl):
-        allowed = f"ArduPlane's program is expected: how {kind.title} returns is not flown here"
+        allowed = f"expected ArduPlane's program; returns of {kind.title} are not flown here"
         raise ArgumentError.of_argument("autopilot", str(program), allowed)
 
 

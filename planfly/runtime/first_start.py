@@ -154,7 +154,7 @@ def _report_and_compile(units: list[str]) -> None:
         say(f"compiling the numeric kernels: {folder} cannot be written, and keeps none of them; {_CACHE_DIR_HINT}")
         return
     if TEMPORARY:
-        say(f"compiling the numeric kernels for this command alone: {WANTED} cannot be written; {_CACHE_DIR_HINT}")
+        say(f"compiling the numeric kernels for this command only: {WANTED} cannot be written; {_CACHE_DIR_HINT}")
     title = TITLE if TEMPORARY else TITLE + _CACHE_NOTE
     if not (units and sys.executable and has_receiver()):
         say(f"{title} ...")

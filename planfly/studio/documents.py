@@ -221,7 +221,9 @@ def save_document(document: Document, desk: EditContext, judged: JudgedMission, 
         return _saved_plan(name, desk, judged)
     if kind == "kml":
         text = kml_text(desk.scenario.name, [plan_line(judged.setup)], map_zones(judged.setup))
-        return Saved(name, _to_bytes(text), ("a map only: the commands, speeds and frames of the items are not in it",))
+        return Saved(
+            name, _to_bytes(text), ("only a map: it does not contain the commands, speeds and frames of the items",)
+        )
     mission = replace(mission, autopilot=judged.setup.autopilot.name)
     text = mission_text(mission, "waypoints" if kind == "waypoints" else "plan")
     losses = (*_format_losses(desk, mission, text, name, kind), *_lost_settings(before, desk))
@@ -238,7 +240,10 @@ def _format_losses(desk: EditContext, mission: Mission, text: str, name: str, ki
     apart: Mapping[str, tuple[int, str]] = {
         "fence items": (len(mission.fences) - len(kept.fences), ".plan holds them"),
         "rally points": (len(mission.rally) - len(kept.rally), ".plan holds them"),
-        "survey plans": (len(mission.survey_plans), "their items stay, what the ground station keeps beside them goes"),
+        "survey plans": (
+            len(mission.survey_plans),
+            "their items stay; what the ground station keeps next to them is lost",
+        ),
     }
     found += [f"{count} {what}: {how}" for what, (count, how) in apart.items() if count > 0]
     if kind == "waypoints" and mission.cruise_speed != kept.cruise_speed and mission.cruise_speed is not None:
@@ -283,7 +288,7 @@ def _saved_plan(name: str, desk: EditContext, judged: JudgedMission) -> Saved:
         return Saved(name, plan_json(plan).encode())
     made = certified_plan(desk, judged)
     changed = not desk.planned or planned_mission(made, desk.airframe).items != judged.mission.items
-    losses = ["the items: a plan holds places alone, and its mission is made of them anew"] if changed else []
+    losses = ["the items: a plan holds only places, from which its mission is made again"] if changed else []
     if not made.feasible:
         problem = (made.certificate.problems or ("violations are counted",))[0]
         losses.append(f"it is a plan that is not feasible: {problem}")
@@ -359,7 +364,7 @@ def _plan_with_ground_phases(desk: EditContext, mission: Mission) -> Plan | None
         made = replace(made, certificate=replace(made.certificate, problems=(*made.certificate.problems, *own)))
         if _have_same_places(planned_mission(made, desk.airframe), mission):
             return made
-    why = "its ways to the ground, or the legs next to them, are not its plan's any more: save a .plan, or plan again"
+    why = "its departure or landing, or a leg next to them, is no longer that of its plan: save a .plan, or plan again"
     raise MissionError(f"{mission.source}: {why}", file=mission.source)
 
 

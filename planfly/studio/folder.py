@@ -47,10 +47,10 @@ def file_inside(folder: Path | None, name: str) -> Path:
     >>> file_inside(Path("/tmp"), "../etc/passwd")
     Traceback (most recent call last):
         ...
-    world.errors.MissionError: open: name: '../etc/passwd': a file in /tmp is expected
+    world.errors.MissionError: open: name: '../etc/passwd': expected a file in /tmp
     """
     if folder is None:
-        allowed = "no file was named by the command, so that there is no folder to open from: drop the file here"
+        allowed = "the command named no file, so there is no folder to open from: drop the file here"
         raise MissionError.at("open", "name", name[:60], allowed, shown=repr(name[:60]))
     try:
         inside = folder.resolve(strict=True)
@@ -59,7 +59,7 @@ def file_inside(folder: Path | None, name: str) -> Path:
     except (OSError, ValueError, RuntimeError):
         there = False
     if not there:
-        raise MissionError.at("open", "name", name[:60], f"a file in {folder} is expected", shown=repr(name[:60]))
+        raise MissionError.at("open", "name", name[:60], f"expected a file in {folder}", shown=repr(name[:60]))
     if path.suffix.lower() not in _READABLE_SUFFIXES:
         raise MissionError.at(
             "open", "suffix", path.suffix, f"allowed {', '.join(_READABLE_SUFFIXES)}", shown=repr(path.suffix)

@@ -48,13 +48,13 @@ def refusal(scope: Scope, port: int) -> tuple[int, str]:
     if len(hosts) != 1 or hosts[0] not in own:
         return 421, "this host is not served here"
     if origins and (len(origins) > 1 or origins[0] != f"http://{hosts[0]}"):
-        return 403, "another page may not ask"
+        return 403, "requests from another page are refused"
     if scope["type"] == "websocket":
-        return (0, "") if origins else (403, "a page says where it is from")
+        return (0, "") if origins else (403, "a page must state its origin")
     if scope.get("method") not in ("GET", "HEAD") or any(name in _BODIES and value != "0" for name, value in headers):
-        return 405, "nothing is sent here"
+        return 405, "only GET and HEAD without a body are answered"
     if sites and sites != ["same-origin"] and sites != ["none"] and not _is_page_visit(scope, headers):
-        return 403, "another page may not ask"
+        return 403, "requests from another page are refused"
     return 0, ""
 
 

@@ -129,7 +129,7 @@ class Jobs:
         if message.algorithm is not None and message.algorithm not in ALGORITHMS:
             raise PlanflyError.of_argument("algorithm", message.algorithm, f"allowed {', '.join(ALGORITHMS)}")
         if message.algorithm is not None and message.ways > 1:
-            raise PlanflyError.of_argument("ways", message.ways, "one is expected with an algorithm of your own")
+            raise PlanflyError.of_argument("ways", message.ways, "expected 1 with an algorithm of your own")
         asked = PlanAsked(scenario, frame, message.seed, message.algorithm, ways=message.ways)
         if message.first is None or message.last is None:
             if scenario.external:
@@ -179,7 +179,7 @@ class Jobs:
             return [{"kind": "stopped", "job": asked.name}, {"kind": "fault", "text": str(answer.value)}]
         if asked.name == "plan" and asked.rev != session.rev:
             self._at_once = False
-            edited = "the mission was changed while its path was searched, and is left as it is: plan again for a path"
+            edited = "the mission was changed during the search for its path, so it stays as it is: plan again"
             return [{"kind": "stopped", "job": "plan"}, {"kind": "fault", "text": edited}]
         return [self._result_message(asked, answer.value, session)]
 

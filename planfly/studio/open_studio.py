@@ -71,9 +71,9 @@ def open_studio(
         session, restored = open_session(target, options, kept)
         if restored:
             back = "; undo takes it back" if session.undo_text else ""
-            on_message(f"what was done before is there again (kept in {kept}){back}")
+            on_message(f"earlier edits are restored (kept in {kept}){back}")
         for file in session.unreadable:
-            on_message(f"{file}: cannot be read as a kept session; it is left as it is, and nothing is kept meanwhile")
+            on_message(f"{file}: cannot be read as a kept session; it stays as it is, and nothing is kept meanwhile")
         # Imported here: only serving needs the extra.
         from planfly.studio.server import Server
 

@@ -55,7 +55,7 @@ INTERNAL = (ArithmeticError, AssertionError, AttributeError, LookupError, TypeEr
 
 def internal_text(error: Exception) -> str:
     """Describe an internal error of planfly in a line."""
-    return f"this did not work, by a fault of planfly's own: {type(error).__name__}: {error}"
+    return f"this failed because of an error in planfly: {type(error).__name__}: {error}"
 
 
 class Cancelled(Exception):

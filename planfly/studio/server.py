@@ -121,7 +121,7 @@ class Server:
                 await self._run_judging(lambda: self.session.keep(self._kept or Path()))
             except (OSError, PlanflyError) as error:
                 if not self._autosave_error:
-                    self._broadcast({"kind": "fault", "job": "keep", "text": f"what is done here is not kept: {error}"})
+                    self._broadcast({"kind": "fault", "job": "keep", "text": f"edits are not being kept: {error}"})
                 self._autosave_error = str(error)
             else:
                 self._autosave_error = ""
@@ -309,7 +309,7 @@ class Server:
                 answer = {"name": saved.name, "losses": list(saved.losses), "where": where, "data": content}
                 page.send({"kind": "saved", "unsaved": session.is_unsaved, **answer})
             case messages.Hello():
-                raise ValueError("a page says its token once")
+                raise ValueError("a page must send its token only once")
             case _:
                 await self._change(message)
 
@@ -363,7 +363,7 @@ class Server:
         try:
             data = base64.b64decode(message.data, validate=True)
         except binascii.Error as error:
-            raise MissionError(f"{message.name[:60]}: its bytes did not come whole", field="data") from error
+            raise MissionError(f"{message.name[:60]}: it did not arrive completely", field="data") from error
         return open_dropped(message.name, data, self.session.options)
 
     def _read_parameter_file(self, name: str) -> messages.Settings:
@@ -398,7 +398,7 @@ class Server:
                 {
                     "kind": "fault",
                     "job": "plan",
-                    "text": "the mission was edited meanwhile: its first path is not taken",
+                    "text": "the mission was edited meanwhile, so its first path is not used",
                 }
             )
         except PlanflyError as error:
@@ -418,7 +418,7 @@ async def _receive_text(socket: WebSocket) -> str:
         raise WebSocketDisconnect(received.get("code", 1000))
     text = received.get("text")
     if text is None:
-        raise ValueError("a message in text is expected")
+        raise ValueError("expected a text message")
     return str(text)
 
 

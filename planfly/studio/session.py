@@ -187,7 +187,7 @@ class Session:
             raise StaleEdit
         plans, between = self.plans
         if not 0 <= message.which < len(plans):
-            raise PlanflyError("that path is not there any more: plan again", field="which")
+            raise PlanflyError("that path no longer exists: plan again", field="which")
         plan = plans[message.which]
         if between is None:
             self._show_plan(plan)
@@ -277,10 +277,10 @@ class Session:
     def _with_suggestion(self, message: Apply) -> tuple[Mission, str]:
         findings = self.judged.verdict.findings
         if not message.finding < len(findings):
-            raise MissionError(f"{self.document.name}: that finding is not there any more", field="finding")
+            raise MissionError(f"{self.document.name}: that finding no longer exists", field="finding")
         item = findings[message.finding]
         if not message.which < len(item.suggestions):
-            raise MissionError(f"{self.document.name}: that suggestion is not there any more", field="suggestion")
+            raise MissionError(f"{self.document.name}: that suggestion no longer exists", field="suggestion")
         passed = SuggestionTrials(self.desk, self.judged).try_suggestion(item, message.which)
         if passed is None:
             # A suggestion that moves no item has a reason of its own.

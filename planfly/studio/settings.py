@@ -59,7 +59,7 @@ def changed_world(scenario: Scenario, asked: Settings) -> Scenario:
         from_deg = float(np.degrees(scenario.wind.from_course)) if asked.wind_from is None else asked.wind_from
         wind = (float(speed), from_deg)
     if asked.aircraft is not None and ("/" in asked.aircraft or "\\" in asked.aircraft):
-        raise PlanflyError("aircraft: a name that planfly aircraft lists is expected", field="aircraft")
+        raise PlanflyError("aircraft: expected a name that planfly aircraft lists", field="aircraft")
     options: FlightOptions = {
         "wind": wind,
         "turbulence": asked.turbulence,
@@ -96,7 +96,7 @@ def changed_parameters(old: SetParameters, scenario: Scenario, asked: Settings) 
         found = read_parameters(scenario, asked.parameter, "parameter")
         if found.unused:
             name, known = found.unused[0], [one.name for one in _autopilot_parameters(scenario).values]
-            allowed = f"a parameter of the simulated autopilot is expected{did_you_mean(name, known)}"
+            allowed = f"expected a parameter of the simulated autopilot{did_you_mean(name, known)}"
             raise PlanflyError(f"parameter: {name}: {allowed}", field="parameter", value=name, allowed=allowed)
         made = SetParameters(values | found.values, made.file, made.unused)
     return made

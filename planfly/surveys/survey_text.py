@@ -64,9 +64,9 @@ def overlap_lines(measure: OverlapMeasure | None) -> tuple[str, ...]:
         return ("overlap not judged: the camera is not known (--camera)",)
     texts = [overlap_text(measure, check) for check in (FRONT, SIDE)]
     if measure.front is None:
-        texts[0] = "front overlap not judged: how far apart photos are taken is not stated, or none can be used"
+        texts[0] = "front overlap not judged: the distance between photos is not stated, or no photo can be used"
     if measure.side is None:
-        texts[1] = "side overlap not judged: no photos that can be used lie beside each other"
+        texts[1] = "side overlap not judged: no usable photos lie side by side"
     return tuple(texts)
 
 
@@ -90,7 +90,8 @@ def needed_text(survey: Survey, lines: Sequence[LineMeasure | None]) -> str:
     usable_lines = [measure for measure in lines if measure is not None and measure.good > 0.0]
     if not usable_lines:
         return (
-            f"no place of its {len(lines)} lines, {survey.spacing:.0f} m apart, can be used: there is no room to turn"
+            f"no place of its {len(lines)} lines, {survey.spacing:.0f} m apart, can be used, as there is no "
+            "room to turn"
         )
     latest_start, longest = (
         max(measure.late for measure in usable_lines),

@@ -160,7 +160,7 @@ class FailedRule:
 
 @dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
 class SensitivityEntry:
-    """Share of the variance of the deciding margin that a quantity explains."""
+    """Share of the deciding margin's variance that a quantity explains."""
 
     quantity: str
     first_order: float | None
@@ -169,7 +169,7 @@ class SensitivityEntry:
 
 @dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
 class CampaignDocument:
-    """planfly campaign: the probability that a mission flies."""
+    """planfly campaign: the probability that a mission is flyable."""
 
     schema: Literal["planfly.campaign-summary/1"]
     name: str

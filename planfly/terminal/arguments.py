@@ -61,7 +61,7 @@ def camera(text: str) -> tuple[float, ...]:
     except ValueError:
         numbers = ()
     if not is_camera(numbers) or sensor.lower().count("x") != 1:
-        raise argparse.ArgumentTypeError(f"{text!r}: WxH,FOCAL or WxH,FOCAL,FRONT,SIDE is expected: {CAMERA}")
+        raise argparse.ArgumentTypeError(f"{text!r}: expected WxH,FOCAL or WxH,FOCAL,FRONT,SIDE: {CAMERA}")
     return numbers
 
 
@@ -73,7 +73,7 @@ def place(text: str) -> tuple[float, float]:
         lat, lon = math.nan, 0.0
     if not is_place(lat, lon):
         raise argparse.ArgumentTypeError(
-            f"{text!r}: LAT,LON is expected: degrees north from -89 to 89, degrees east from -180 to 180"
+            f"{text!r}: expected LAT,LON: degrees north from -89 to 89, degrees east from -180 to 180"
         )
     return lat, lon
 
@@ -85,7 +85,7 @@ def area(text: str) -> tuple[float, ...]:
     except ValueError:
         edges = ()
     if len(edges) != 4:
-        raise argparse.ArgumentTypeError(f"{text!r}: S,W,N,E is expected: south, west, north and east edge, degrees")
+        raise argparse.ArgumentTypeError(f"{text!r}: expected S,W,N,E: south, west, north and east edge, degrees")
     return edges
 
 
@@ -94,7 +94,7 @@ def autopilots(text: str) -> list[str]:
     names = [name.strip() for name in text.split(",")]
     for name in names:
         if name not in CHOICES["autopilot"]:
-            raise argparse.ArgumentTypeError(f"{name!r}: {', '.join(CHOICES['autopilot'])} is expected")
+            raise argparse.ArgumentTypeError(f"{name!r}: expected {', '.join(CHOICES['autopilot'])}")
     return names
 
 
@@ -113,7 +113,7 @@ def budget(text: str) -> tuple[int | None, float | None]:
         return number("budget")(text), None
     except argparse.ArgumentTypeError:
         raise argparse.ArgumentTypeError(
-            f"{text!r}: a number of evaluations (4..10^10), or of seconds such as 2.5s (up to 1,000,000s), is expected"
+            f"{text!r}: expected a number of evaluations (4..10^10), or of seconds such as 2.5s (up to 1,000,000s)"
         ) from None
 
 
@@ -125,7 +125,7 @@ def threat(text: str) -> tuple[float, float, float, float]:
         east = math.nan
     if not (math.isfinite(east) and math.isfinite(north) and kill >= 0.0 and detection >= 0.0):
         raise argparse.ArgumentTypeError(
-            f"{text!r}: EAST,NORTH,KILL,DETECTION is expected: four numbers in m, a radius of 0 for none"
+            f"{text!r}: expected EAST,NORTH,KILL,DETECTION: four numbers in m, a radius of 0 for none"
         )
     return east, north, kill, detection
 
@@ -135,7 +135,7 @@ def problems(text: str) -> tuple[int, ...]:
     parts = [part.strip() for part in text.split(",")]
     numbers = sorted({int(part) for part in parts if part.isdecimal()})
     if not all(part.isdecimal() for part in parts) or not set(numbers) <= set(CHOICES["problems"]):
-        raise argparse.ArgumentTypeError(f"{text!r}: numbers of threats out of 7,15,30,60 are expected")
+        raise argparse.ArgumentTypeError(f"{text!r}: expected numbers of threats out of 7,15,30,60")
     return tuple(numbers)
 
 

@@ -72,8 +72,8 @@ def json_option(group: OptionTaker, command: str) -> None:
     group.add_argument(
         "--json",
         metavar="FILE",
-        help="also write the answer as JSON; with - it goes to standard output, and everything else to standard error "
-        f"(planfly help {command} --schema describes it)",
+        help="also write the answer as JSON to FILE; with -, to standard output, and all other output to standard "
+        f"error; 'planfly help {command} --schema' prints its schema",
     )
     group.add_argument(
         "--quiet", action="store_true", help="print neither progress nor results; errors and the exit code remain"
@@ -169,7 +169,7 @@ def autopilot_options(parser: CommandParser) -> OptionTaker:
     option = group.add_argument(
         "--params",
         metavar="FILE",
-        help="parameters of the simulated autopilot, in a file as a ground station saves it; the file also decides the "
+        help="parameters of the simulated autopilot, in a file that a ground station saved; the file also decides the "
         "autopilot if none is named",
     )
     with_completer(option, files("param", "parm", "params"))
@@ -289,7 +289,9 @@ def scenario_argument(parser: CommandParser, **settings: object) -> None:
 def own_link_options(parser: CommandParser, *, bind: str) -> None:
     """Add the options for a vehicle's MAVLink connection."""
     group = parser.group("the link")
-    group.add_argument("--bind", metavar="IP:PORT", default=bind, help=f"where the vehicle listens (default: {bind})")
+    group.add_argument(
+        "--bind", metavar="IP:PORT", default=bind, help=f"address at which the vehicle listens (default: {bind})"
+    )
     group.add_argument(
         "--allow", metavar="IP,IP", help="addresses of stations on other machines that may talk to the vehicle"
     )

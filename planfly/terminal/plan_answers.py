@@ -34,12 +34,12 @@ class PlanAnswer:
     problems: list[str]
     """Reasons why the plan is not feasible."""
     conditions: Conditions
-    """Conditions that the plan was made for."""
+    """Conditions for which the plan was made."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
 class FrontEntry:
-    """One plan of a front, and the criteria it is compared by."""
+    """One plan of a front, and the criteria of its comparison."""
 
     file: str
     length_m: float
@@ -106,7 +106,7 @@ def fewer_line(front: "Front") -> str:
     min_fraction, min_exposure, min_height = f"{NOTICED:.1%}", f"{NOTICED_EXPOSURE:.0%}", f"{NOTICED_CLEARANCE:g} m"
     refused_text = f"{front.refused} that were found are not safe when completed, and " if front.refused else ""
     return (
-        f"{len(front.plans)} of the {front.asked} asked for: {refused_text}no other that was found gains more than"
+        f"{len(front.plans)} of the {front.asked} requested: {refused_text}no other that was found gains more than"
         f" {min_fraction} in length or {front.fourth}, {min_exposure} in exposure or {min_height} in height"
     )
 

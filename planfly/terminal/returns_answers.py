@@ -17,7 +17,7 @@ from world.frames import to_geo
 
 @dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
 class CauseEntry:
-    """A trigger that takes the aircraft off its mission."""
+    """A trigger that ends the mission, or may end it."""
 
     name: str
     does: str
@@ -99,9 +99,9 @@ class ProgramReturnEntry:
     agrees: bool
     """True if both returns have the same target and the same outcome."""
     worse: bool
-    """True if the outcome by the program is worse; it then replaces the simulated outcome."""
+    """True if the program's outcome is worse and replaces the simulated outcome."""
     reason: str
-    """Reason why the program could not fly it; empty if it flew."""
+    """Reason why the program could not fly the return; empty if it did."""
     log: str | None
 
 
@@ -137,7 +137,7 @@ class GlideEntry:
     own_over_m: float | None
     """Height above ground of that return at its target, m; null if it does not arrive."""
     own_short_m: float | None
-    """Distance of its touchdown from its target, m; null if it does not come down."""
+    """Distance of that return's touchdown from its target, m; null if it does not come down."""
     text: str
 
 

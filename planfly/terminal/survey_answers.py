@@ -15,7 +15,7 @@ from planfly.terminal.verdict_answers import STRICT
 
 @dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
 class PhotoLineEntry:
-    """A photo line, as flown; if it was not flown, all but its items are null.  Shares are of its length."""
+    """A photo line as flown; if not flown, all fields but its items are null.  Shares are fractions of its length."""
 
     first_item: int
     last_item: int
@@ -28,7 +28,7 @@ class PhotoLineEntry:
     high: float | None
     dark: float | None
     lost_m: list[tuple[float, float]]
-    """Segments that cannot be used, m from the begin of the line."""
+    """Segments that cannot be used, m from the start of the line."""
     photos: int | None
     missed: int | None
 

@@ -170,5 +170,5 @@ def check_level_flight(aircraft: Aircraft, envelope: Envelope) -> None:
     """Raise FlightError if the aircraft cannot fly level at any airspeed and altitude of its envelope."""
     if not np.isfinite(envelope.level_speed_max - envelope.level_speed_min).any():
         amsl = f"{envelope.amsl[0]:.0f} to {envelope.amsl[-1]:.0f} m above sea level"
-        message = f"{aircraft.name} holds no level flight at any airspeed, from {amsl}"
+        message = f"{aircraft.name} cannot hold level flight at any airspeed, from {amsl}"
         raise FlightError(message, file=aircraft.name, field="airspeed")

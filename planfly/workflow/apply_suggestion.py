@@ -50,9 +50,9 @@ def apply_suggestion(
     """
     source = judged.mission.source
     if not can_apply(suggestion):
-        raise MissionError(f"{source}: this suggestion is no change of its items", field="suggestion")
+        raise MissionError(f"{source}: this suggestion does not change its items", field="suggestion")
     missions = []
-    # To avoid a missile, try to move a single waypoint first, because each moved waypoint may fail elsewhere.
+    # Away from a missile, try to move a single waypoint first: each one that moves may fail elsewhere.
     for max_moves in (1, None) if any(change.what == "distance" for change in suggestion) else (None,):
         edited = _EditedMission(context, judged, max_moves)
         for change in suggestion:

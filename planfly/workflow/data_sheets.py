@@ -137,7 +137,7 @@ def parse_sheet(
     propeller = _parse_propeller(prop) if prop is not None else (0.0, 0.0)
     layouts: dict[str, Layout] = {"tail": "tail", "wing": "wing", "vtail": "vtail"}
     if layout is not None and layout not in layouts:
-        raise FlightError.of_argument("layout", layout, f"{', '.join(layouts)} is expected")
+        raise FlightError.of_argument("layout", layout, f"expected {', '.join(layouts)}")
     sheet_values = {"mass": 0.0, "span": 0.0, "cruise": 0.0, "stall": 0.0} | values
     return DataSheet(**sheet_values, volts=volts, energy=energy, propeller=propeller, layout=layouts[layout or "tail"])
 
@@ -151,7 +151,7 @@ def _parse_battery(text: str) -> tuple[float, float]:
         _VOLTAGE_RANGE_V[0] <= volts <= _VOLTAGE_RANGE_V[1] and _ENERGY_RANGE_WH[0] <= watt_hours <= _ENERGY_RANGE_WH[1]
     ):
         allowed = (
-            f"volts and capacity are expected, such as 14.8V,5Ah: {_VOLTAGE_RANGE_V[0]:g}..{_VOLTAGE_RANGE_V[1]:g} V,"
+            f"expected volts and capacity, such as 14.8V,5Ah: {_VOLTAGE_RANGE_V[0]:g}..{_VOLTAGE_RANGE_V[1]:g} V,"
             f" {_ENERGY_RANGE_WH[0]:g}..{_ENERGY_RANGE_WH[1]:g} Wh"
         )
         raise FlightError.of_argument("battery", text, allowed)
@@ -163,7 +163,7 @@ def _parse_propeller(text: str) -> tuple[float, float]:
     diameter, pitch = (_parse_number(match[k]) for k in (1, 2)) if match else (math.nan, math.nan)
     if not (_DIAMETER_IN[0] <= diameter <= _DIAMETER_IN[1] and 0.25 * diameter <= pitch <= 1.5 * diameter):
         allowed = (
-            f"inches of diameter and pitch are expected, such as 12x6: {_DIAMETER_IN[0]:g}..{_DIAMETER_IN[1]:g},"
+            f"expected inches of diameter and pitch, such as 12x6: {_DIAMETER_IN[0]:g}..{_DIAMETER_IN[1]:g},"
             " and a quarter to one and a half of that"
         )
         raise FlightError.of_argument("prop", text, allowed)
@@ -392,7 +392,7 @@ def performance_of(fdm: Simulator, aircraft: Aircraft) -> Performance:
     for name, trim in trims.items():
         if trim is None:
             argument = {"climb": "climb", "idle": "cruise", "slowest": "stall", "fastest": "top"}[name]
-            allowed = f"the model holds no such flight ({name}); numbers nearer to those of other aircraft are expected"
+            allowed = f"the model cannot fly this ({name}); give numbers closer to those of other aircraft"
             raise FlightError.of_argument(argument, None, allowed, shown="")
     return Performance(level, **{name: trim for name, trim in trims.items() if trim is not None})
 
@@ -551,7 +551,7 @@ def _readme_text(
         "",
         f"{sized.numbers.title}, made by `planfly aircraft --new` from a data sheet. It {drive}.",
         "What the sheet does not say was taken from published aircraft of its class, which `aircraft/data_sheet.py` of",
-        "planfly names. Where a slope comes near to what the model can do, no verdict of it is to be had.",
+        "planfly names. A slope close to the model's limit is left undecided.",
         "",
         "| | | |",
         "|---|---|---|",

@@ -41,10 +41,10 @@ def with_file_autopilot(scenario: Scenario, mission: Mission | None = None) -> S
                 other_autopilot(mission.source, mission_autopilot, _FIRMWARE[mission_autopilot], table.autopilot)
             )
         other_file = f"{table.autopilot_from} for {TITLES[table.autopilot]}"
-        allowed = "files of one autopilot are expected"
+        allowed = "expected files of one autopilot"
         message = (
             f"{mission.source}: written for {TITLES[mission_autopilot]} ({_FIRMWARE[mission_autopilot]}),"
-            f" and {other_file}: {allowed}"
+            f" but {other_file}; {allowed}"
         )
         raise MissionError(message, file=mission.source, field="autopilot", value=mission_autopilot, allowed=allowed)
     return scenario

@@ -131,7 +131,7 @@ def import_flight(path: Path, options: LogOptions) -> ImportedFlight:
     setup = replace(setup, source=source)
     track = track_of_flight(flight, scenario.origin)
     if plan is not None and (mismatch := plan_mismatch(setup, track)) is not None:
-        raise MissionError(f"{path}: not flown by {plan}: {mismatch.text}", file=path)
+        raise MissionError(f"{path}: not a flight of {plan}; {mismatch.text}", file=path)
     verdict = judge_flight(setup, track, "")
     ended = "completed" if verdict.complete else _completion_text(verdict)
     return ImportedFlight(setup, track, _vehicle_events(flight), verdict, ended)
@@ -143,8 +143,8 @@ def _check_plan_autopilot(path: Path, mission: Mission, program: str) -> None:
         (name for name, title in TITLES.items() if program.lower().startswith(title[:5].lower())), ""
     )
     if mission.autopilot and flown_autopilot and mission.autopilot != flown_autopilot:
-        allowed = f"the flight of {path} is {program}'s: `plan` names the mission that was flown"
-        message = f"{mission.source}: written for {TITLES[mission.autopilot]}: {allowed}"
+        allowed = f"the flight of {path} is {program}'s; `plan` names the mission that was flown"
+        message = f"{mission.source}: written for {TITLES[mission.autopilot]}; {allowed}"
         raise MissionError(message, file=mission.source, field="autopilot", value=mission.autopilot, allowed=allowed)
 
 
@@ -162,7 +162,7 @@ def _planned_mission(path: Path, flight: LoggedFlight, options: LogOptions) -> t
         mission = mission_of_plan(plan, load_airframe(scenario), str(plan_path))
         return mission, f"of {plan_path.name}", scenario
     if flight.mission is None:
-        raise LogError(f"{path}: holds no mission: `plan` names the one that was to be flown", file=path)
+        raise LogError(f"{path}: holds no mission; `plan` names the one that was to be flown", file=path)
     logged = flight.mission
     if logged.missing is not None and len(logged.mission.items) < _MIN_ITEMS:
         problems = [missing_text(logged.missing), *logged.mission.warnings[:1]]
@@ -195,7 +195,7 @@ def _with_wind_of_log(scenario: Scenario, flight: LoggedFlight, options: LogOpti
         return scenario, "as given"
     wind = mean_wind(flight)
     if wind is None:
-        source_text = "as the scenario has it: the log holds no wind" if options.get("scenario") else ""
+        source_text = "from the scenario, as the log holds no wind" if options.get("scenario") else ""
         return scenario, source_text
     windy_scenario = with_wind(scenario, wind.speed, wind.from_course, None)
     return windy_scenario, f"from {round(math.degrees(wind.from_course)) % 360:03d}°, by {wind.source} of the log"
@@ -258,7 +258,7 @@ def _describe_gaps(flight: LoggedFlight) -> tuple[str, ...]:
         notes.append(f"the log ends in flight, at {flight.time[-1]:.1f} s")
     usual_step = float(np.median(np.diff(flight.time)))
     if usual_step > LONGEST_STEP:
-        notes.append(f"the log has a place every {usual_step:.1f} s: what was between them it does not show")
+        notes.append(f"the log has a place every {usual_step:.1f} s: the flight between them is not known")
     return tuple(notes)
 
 
@@ -379,5 +379,5 @@ def _followed_legs(setup: FlightSetup, track: Track) -> list[FlownLegs]:
     stretch_legs = [legs for stretch in stretches if (legs := flown_legs(setup, track, stretch)) is not None]
     if not stretch_legs:
         name = "the log" if source is None else source.file
-        raise LogError(f"{name}: none of its mission's legs was flown: there is nothing to fly again", file=name)
+        raise LogError(f"{name}: none of its mission's legs was flown, so there is nothing to fly again", file=name)
     return sorted(stretch_legs, key=lambda legs: legs.first - legs.last)

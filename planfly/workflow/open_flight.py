@@ -91,7 +91,7 @@ def existing_mission(path: Path) -> Path:
     """Return the path if its file exists; otherwise raise MissionError, which suggests the most similar name."""
     if not path.is_file():
         hint = did_you_mean(path.name, _mission_file_names(path.parent))
-        raise MissionError(f"{path}: no such file; a plan.json, .waypoints or .plan file is expected{hint}", file=path)
+        raise MissionError(f"{path}: no such file; expected a plan.json, .waypoints or .plan file{hint}", file=path)
     return path
 
 

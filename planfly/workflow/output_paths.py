@@ -75,7 +75,7 @@ def check_output_file(path: Path, overwrite: bool, source: Path | None = None) -
     if source is not None and path.exists() and source.exists() and path.samefile(source):
         raise PlanflyError(f"{path}: is the input itself; name another file to write", file=path)
     if path.is_dir():
-        raise PlanflyError(f"{path}: is a folder; a file name is expected", file=path)
+        raise PlanflyError(f"{path}: is a folder; expected a file name", file=path)
     if path.exists() and not overwrite:
         raise PlanflyError(f"{path}: exists; overwrite=True replaces it", file=path)
     if not path.parent.exists():
@@ -85,7 +85,7 @@ def check_output_file(path: Path, overwrite: bool, source: Path | None = None) -
 def check_output_folder(folder: Path, overwrite: bool) -> None:
     """Raise PlanflyError if the target folder is a file, or is not empty without `overwrite`."""
     if folder.exists() and not folder.is_dir():
-        raise PlanflyError(f"{folder}: is a file; a folder is expected", file=folder)
+        raise PlanflyError(f"{folder}: is a file; expected a folder", file=folder)
     if not overwrite and folder.is_dir() and any(folder.iterdir()):
         raise PlanflyError(f"{folder}: exists and is not empty; overwrite=True replaces its results", file=folder)
 

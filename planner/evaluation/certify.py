@@ -99,7 +99,7 @@ def _leg_length_margin(data: ProblemArrays, waypoints: Floats, problems: list[st
     """
     problems += _summarise_faults(
         [
-            (length, f"leg {i}", f"{length:.1f} m long, at least {CERTIFIED_LEG:g} m are wanted")
+            (length, f"leg {i}", f"{length:.1f} m long, at least {CERTIFIED_LEG:g} m are required")
             for i, length in enumerate(leg_runs(waypoints).tolist())
             if length < CERTIFIED_LEG
         ]
@@ -187,7 +187,7 @@ def _clearance_margin(data: ProblemArrays, waypoints: Floats, problems: list[str
         name = f"turn at waypoint {piece['number']}" if piece["of_arc"] else f"leg {piece['number']}"
         if math.isnan(margin) or not min_margins.get(name, math.inf) <= margin:
             min_margins[name] = margin
-    required_text = f"{data.clearance:g} m and {data.buffer:.1f} m in reserve wanted"
+    required_text = f"{data.clearance:g} m and {data.buffer:.1f} m in reserve required"
     off_terrain = [
         (0.0, name, "leaves the terrain that is known") for name, margin in min_margins.items() if math.isnan(margin)
     ]
@@ -247,7 +247,7 @@ def _airspace_margins(problem: Problem, waypoints: Floats, problems: list[str]) 
                 if z == zone
             ]
         )
-    required_text = f"{space.max_height:g} m allowed, {space.buffer:.1f} m in reserve wanted"
+    required_text = f"{space.max_height:g} m allowed, {space.buffer:.1f} m in reserve required"
     problems += _summarise_faults(
         [
             (
@@ -268,5 +268,5 @@ def _zone_fault_text(problem: Problem, distance: float, z: int) -> str:
     if distance < 0.0:
         return f"{-distance:.1f} m {'inside' if zone.kind == 'exclusion' else 'outside'} {zone.name}"
     relation = "from" if zone.kind == "exclusion" else "inside the edge of"
-    required_text = f"{required['horizontal']:g} m or {required['vertical']:g} m in height wanted"
+    required_text = f"{required['horizontal']:g} m or {required['vertical']:g} m in height required"
     return f"{distance:.1f} m {relation} {zone.name}, {required_text}"

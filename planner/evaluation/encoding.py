@@ -252,7 +252,7 @@ def route_encoding(space: Space, route: Floats) -> Encoding:
 def frames_of(encoding: Encoding) -> WaypointFrames:
     """Return the frames of an encoding's waypoints. Raises ValueError for an encoding without frames."""
     if encoding.frames is None:
-        raise ValueError(f"{encoding.name}: an encoding without frames along a way")
+        raise ValueError(f"{encoding.name}: an encoding without frames along a route")
     return encoding.frames
 
 

@@ -46,7 +46,7 @@ ALGORITHMS: dict[str, Algorithm] = {
     for algorithm in (
         Algorithm(
             "fda-seeded",
-            "the default: grid routes, past obstacles on other sides too, shortened; generations where none is safe",
+            "the default: grid routes on all sides of obstacles, shortened; generations only if none is safe",
             graded=True,
             seeded=True,
             tightened=True,

@@ -318,10 +318,13 @@ def _find_climb_out(site: _Site, launch: Launch) -> tuple[ClimbOut | None, str]:
     if not best_rejected.count:
         return (
             None,
-            f"no way launched {courses} is long enough to climb to the start,"
+            f"no path launched {courses} is long enough to climb to the start,"
             f" {start_altitude - home_altitude:.0f} m over home",
         )
-    return None, f"none of {best_rejected.count} ways launched {courses} is free; the nearest: {best_rejected.problem}"
+    return (
+        None,
+        f"none of {best_rejected.count} paths launched {courses} is clear; the nearest: {best_rejected.problem}",
+    )
 
 
 def _make_climb_out(
@@ -621,12 +624,12 @@ def _find_path_to_line_up(site: _Site, final: _Final) -> tuple[Floats | None, st
     if not best_rejected.count:
         return (
             None,
-            f"no way {route_text} is long enough for its turns and {end_altitude - line_up_altitude:.0f} m of descent",
+            f"no path {route_text} is long enough for its turns and {end_altitude - line_up_altitude:.0f} m of descent",
         )
     remedy = "a higher destination (height_m) or another strip may have one"
     return (
         None,
-        f"none of {best_rejected.count} ways {route_text} is free: {remedy}; the nearest: {best_rejected.problem}",
+        f"none of {best_rejected.count} paths {route_text} is clear: {remedy}; the nearest: {best_rejected.problem}",
     )
 
 

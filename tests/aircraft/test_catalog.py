@@ -194,7 +194,7 @@ def test_a_folder_is_replaced_only_if_asked_and_only_if_it_is_an_aircrafts(tmp_p
     assert (folder / "flight.BIN").read_bytes() == b"my log"
     assert not (folder / "uncertainty.toml").exists()
     (tmp_path / "photos").mkdir()
-    with pytest.raises(FlightError, match=r"photos: is not the folder of an aircraft, with photos\.toml"):
+    with pytest.raises(FlightError, match=r"photos: not an aircraft's folder: it has no photos\.toml"):
         make_own_folder(tmp_path / "photos", load_aircraft("zagi"), overwrite=True)
     assert sorted(path.name for path in tmp_path.iterdir()) == ["mine", "photos"]
 
@@ -223,8 +223,8 @@ def test_a_folder_made_from_a_folder_brings_its_engines(tmp_path: Path) -> None:
     [
         ("there", "there: exists; overwrite=True replaces it, or name another folder"),
         ("nowhere/mine", "its folder .*nowhere does not exist"),
-        ("my plane", "a folder's name of letters, digits"),
-        ("gains", "none of ardupilot, draws, gains, posterior, uncertainty, README"),
+        ("my plane", "expected a folder name of letters, digits"),
+        ("gains", "other than ardupilot, draws, gains, posterior, uncertainty, README"),
         ("link", "link: exists"),
     ],
 )

@@ -101,11 +101,11 @@ CASES = {
     ),
     "200 m of climb in 1,500 m from home": Case((wp(0, 1500, 200, command=22), wp(0, 3000, 200)), True, says="flyable"),
     "wind of 30 m/s from ahead": Case(
-        SQUARE[:2], False, ("speed",), ("completion", "speed"), "not started: no way made", tables=wind(30.0, 0.0)
+        SQUARE[:2], False, ("speed",), ("completion", "speed"), "not started: no progress", tables=wind(30.0, 0.0)
     ),
     "wind of 24 m/s across": Case(SQUARE[:2], True, tables=wind(24.0, 270.0)),
     "wind of 26 m/s across": Case(
-        SQUARE[:2], False, ("speed",), ("completion", "speed"), "not started: no way made", tables=wind(26.0, 270.0)
+        SQUARE[:2], False, ("speed",), ("completion", "speed"), "not started: no progress", tables=wind(26.0, 270.0)
     ),
     "8,800 m": Case(
         (wp(0, 0, 8800, frame=0), wp(0, 3000, 8800, frame=0)),
@@ -120,7 +120,7 @@ CASES = {
         False,
         ("speed",),
         ("completion", "speed"),
-        "not started: aerosonde holds no steady flight at 19.0 m/s",
+        "not started: aerosonde cannot hold steady flight at 19.0 m/s",
         # 24.5 m/s of true airspeed.
         equivalent=(True, True),
     ),
@@ -210,7 +210,7 @@ def test_a_corner_whose_arc_would_miss_its_waypoint_is_flown_over(turn_deg: floa
     for verdict in (judge_geometry(setup), flown.verdict):
         reason = turn_of(verdict).reason
         assert f"flown over, because its arc would pass at {passes:.0f} m and its acceptance is 10 m" in reason
-        assert f"up to {beside:.0f} m beside the next leg" in reason
+        assert f"up to {beside:.0f} m off the next leg" in reason
     (at,) = [item for item in flown.verdict.findings if item.rule == "waypoint" and item.place.index == 1]
     assert at.flown is not None
     assert at.flown < 10.0
@@ -245,7 +245,7 @@ def test_the_note_on_a_home_at_zero_says_where_it_comes_from() -> None:
 def test_px4s_distance_to_the_first_waypoint_is_named_as_px4s() -> None:
     verdict = judge_geometry(setup_of(CASES["a first waypoint 12 km from home"]))
     assert verdict.headline == "flyable"
-    assert "PX4 would not take it: first waypoint too far away: 12000 m from home" in verdict.summary
+    assert "PX4 would reject it: first waypoint too far away: 12000 m from home" in verdict.summary
 
 
 FILE = """QGC WPL 110
@@ -258,7 +258,7 @@ FILE = """QGC WPL 110
 @pytest.mark.parametrize(
     ("up", "options", "code", "says"),
     [
-        (500, ["--wind", "30,0"], 4, "the wind leaves no way along leg 0"),
+        (500, ["--wind", "30,0"], 4, "the wind is too strong to hold the course of leg 0"),
         (500, ["--wind", "24,270"], 0, "flyable"),
         (500, ["--wind", "24,270", "--turbulence", "light"], 0, "flyable"),
         (8800, [], 4, "40.0 m/s is above the fastest level flight"),

@@ -104,7 +104,7 @@ KINDS: dict[str, tuple[Maker, tuple[int, ...], str]] = {
     "take-off": (take_off, (4,), "climb-out"),
     "landing": (landing, (4,), "approach"),
     "return": (going_back, (4,), "clearance"),
-    "first leg": (from_the_air, (3, 4), "the way up from home"),
+    "first leg": (from_the_air, (3, 4), "the climb from home"),
 }
 
 

@@ -132,7 +132,7 @@ CASES = {
     "a launch without home": ('[launch]\nmethod = "hand"', "home: missing; [launch] needs it"),
     "an empty home": ("[home]", 'home: position: missing; give place = "start"'),
     "a home in the air": (HOME + "amsl_m = 9", "home: amsl_m: home stands on the scenario's ground"),
-    "two landings": (HOME + "[[landing]]\neast_m = 0\nnorth_m = 0", "landing: a table is expected"),
+    "two landings": (HOME + "[[landing]]\neast_m = 0\nnorth_m = 0", "landing: expected a table"),
     "a landing without home": ("[landing]\neast_m = 0\nnorth_m = 0", "home: missing; [landing] needs it"),
     "home nowhere": ("[home]\neast_m = 0", "home: position: give east_m and north_m, or lat_deg and lon_deg"),
     "home twice": ('[home]\nplace = "start"\neast_m = 0', 'home: place: give place = "start" or a position, not both'),
@@ -148,7 +148,7 @@ CASES = {
     ),
     "a runway that pushes": (
         HOME + '[launch]\nmethod = "runway"\nspeed_mps = 20',
-        "launch: speed_mps: 20: not of a runway, where the aircraft's own motor pulls",
+        "launch: speed_mps: 20: not allowed for a runway, where the aircraft's own motor pulls",
     ),
     "no rail": (HOME + '[launch]\nmethod = "catapult"\nlength_m = 0', "launch.length_m: 0: allowed 0.1..3000"),
     "a steep launch": (HOME + '[launch]\nmethod = "hand"\nincline_deg = 46', "launch.incline_deg: 46: allowed 0..45"),
@@ -167,7 +167,7 @@ CASES = {
     "a return that does not arm": ("[returns]\nrtl_autoland = 0", "returns.rtl_autoland: 0: allowed 1, 2 or 3"),
     "a true number": ("[returns]\nrtl_autoland = true", "returns.rtl_autoland: true: allowed 1, 2 or 3"),
     "a number that is not whole": ("[returns]\nrtl_autoland = 2.0", "returns.rtl_autoland: 2.0: allowed 1, 2 or 3"),
-    "no rally": ("[returns]\nrally = []", "returns.rally: at least 1 expected"),
+    "no rally": ("[returns]\nrally = []", "returns.rally: expected at least 1"),
     "a return underground": ("[returns]\nrtl_altitude_m = -1", "returns.rtl_altitude_m: -1: allowed 1..9000"),
     "rally without a height": (
         "[returns]\nrally = [{east_m = 0, north_m = 0}]",

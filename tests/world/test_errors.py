@@ -116,7 +116,7 @@ def test_what_is_not_known_is_empty() -> None:
     "error",
     [
         ScenarioError.at("a.toml", "seed", -1, "0 or more"),
-        StartError("a.plan", "no way made", field="course", value=1.5),
+        StartError("a.plan", "no progress", field="course", value=1.5),
         LogError("empty"),
     ],
 )

@@ -45,7 +45,7 @@ def test_a_pipe_and_a_device_are_refused_at_once(tmp_path: Path, name: str) -> N
     path = tmp_path / name
     with pytest.raises(MissionError) as caught:
         read_small_file(path, 1000, "mission", MissionError)
-    assert str(caught.value) == f"{path}: not a plain file: a mission file is expected"
+    assert str(caught.value) == f"{path}: not a plain file; expected a mission file"
 
 
 @pytest.mark.parametrize(("size", "ok"), [(1000, True), (1001, False)])
@@ -225,7 +225,7 @@ def on_windows(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_a_target_is_kept_to_one_process_where_there_is_no_flock(tmp_path: Path) -> None:
     (tmp_path / "a.mcap").touch()
     for target in (tmp_path / "a.mcap", tmp_path):
-        with hold(target), pytest.raises(PlanflyError, match="another planfly is writing there"), hold(target):
+        with hold(target), pytest.raises(PlanflyError, match="another planfly process is writing there"), hold(target):
             pass
         with hold(target):
             # It stays open to others, who would read it.

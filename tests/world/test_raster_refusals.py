@@ -35,7 +35,7 @@ from world.raster import open_raster
 
 def test_heights_that_are_not_in_metres_are_refused(tmp_path: Path) -> None:
     datum = write_in_crs(tmp_path / "datum.tif", "EPSG:32632+6360")
-    assert_refused(datum, "unit of heights: US survey foot: metres are expected")
+    assert_refused(datum, "unit of heights: US survey foot: expected metres")
     path = write_geotiff(tmp_path / "unit.tif")
     for unit, taken in (("ft", False), ("Meters", True), ("m", True)):
         with rasterio.open(path, "r+") as out:
@@ -43,7 +43,7 @@ def test_heights_that_are_not_in_metres_are_refused(tmp_path: Path) -> None:
         if taken:
             assert read_window(path).heights.size
         else:
-            assert_refused(path, "unit of heights: ft: metres are expected")
+            assert_refused(path, "unit of heights: ft: expected metres")
 
 
 @pytest.mark.parametrize("of_band", [True, False])
@@ -67,7 +67,7 @@ def test_feet_that_a_tag_states_are_refused(key: str, value: str, taken: bool, o
     if taken:
         assert read_window(path).heights.size
     else:
-        assert_refused(path, f"unit of heights: {re.escape(value)} \\(tag {key}\\): metres are expected")
+        assert_refused(path, f"unit of heights: {re.escape(value)} \\(tag {key}\\): expected metres")
 
 
 VRT = """<VRTDataset rasterXSize="2" rasterYSize="2"><VRTRasterBand dataType="Float32" band="1"><SimpleSource>

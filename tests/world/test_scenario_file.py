@@ -65,7 +65,7 @@ def test_one_fault_one_line(case: str, tmp_path: Path) -> None:
         (b"\x00\x01\x02\xff\xfe" * 50, "not a text file in UTF-8"),
         (b"\x89HDF\r\n\x1a\n" + bytes(200), "not a text file in UTF-8"),
         (bytes(300), "not valid TOML"),
-        (b"limits = 5\n" + SMALL.encode(), "limits: 5: a table is expected"),
+        (b"limits = 5\n" + SMALL.encode(), "limits: 5: expected a table"),
         (b"threats = 5\n" + SMALL.encode(), "threats: 5: Input should be a valid list"),
         (b"x = " + b"[" * 100_000, "not valid TOML"),
     ],
@@ -104,5 +104,5 @@ def test_a_dictionary_that_is_checked_is_not_changed() -> None:
     file = check_scenario(data, "x")
     assert data == kept
     assert check_scenario(file.model_dump(mode="json", exclude_none=True), "x") == file
-    with pytest.raises(ScenarioError, match="a table of keys is expected, got list"):
+    with pytest.raises(ScenarioError, match="expected a table of keys, got list"):
         check_scenario([1], "x")

@@ -69,7 +69,7 @@ def _plain_columns(columns: dict[str, Any]) -> dict[str, Any]:
 
 
 def _read_shape(blob: Any, code: str, source: str) -> dict[str, Any]:
-    allowed = "a polygon, a multipolygon or a point is expected"
+    allowed = "expected a polygon, a multipolygon or a point"
     try:
         if blob[:2] != b"GP":
             raise ValueError

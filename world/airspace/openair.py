@@ -130,7 +130,7 @@ def _finish_block(block: _Block, source: str) -> tuple[str, dict[str, Any] | str
     if not any((*shapes, block.name, block.limits)):
         return location, "without name, limits and shape"
     if sum(shapes) != 1:
-        allowed = "one shape is expected: corners and arcs, a circle, or an airway"
+        allowed = "expected one shape: corners and arcs, a circle, or an airway"
         raise ScenarioError(f"{source}: {location}: {allowed}", file=source, allowed=allowed)
     if block.circle is not None:
         (lat, lon), radius = block.circle
@@ -186,7 +186,7 @@ def _parse_limit(text: str, key: str) -> dict[str, Any] | None:
         return {"value": float(level_match[1]), "unit": "FL", "referenceDatum": "STD"}
     match = _ALTITUDE.fullmatch(text)
     if match is None:
-        raise ValueError("a height is expected: 2500ft AMSL, 300m AGL, FL95, GND, UNL")
+        raise ValueError("expected a height: 2500ft AMSL, 300m AGL, FL95, GND, UNL")
     value, unit, datum = float(match[1]), match[2].upper(), match[3].upper()
     reference = "GND" if datum in _ABOVE_GROUND else "STD" if datum == "STD" else "MSL"
     return {"value": value, "unit": "M" if unit == "M" else "FT", "referenceDatum": reference}
@@ -217,7 +217,7 @@ def _read_circle(block: _Block, text: str) -> None:
 def _read_arc_by_bearings(block: _Block, text: str) -> None:
     parts = text.split(",")
     if len(parts) != 3:
-        raise ValueError("radius, first and last bearing are expected: 5, 270, 290")
+        raise ValueError("expected radius, first and last bearing: 5, 270, 290")
     radius, first_bearing, last_bearing = _parse_length(parts[0]), _parse_number(parts[1]), _parse_number(parts[2])
     _add_corners(
         block.corners,
@@ -228,7 +228,7 @@ def _read_arc_by_bearings(block: _Block, text: str) -> None:
 def _read_arc_by_points(block: _Block, text: str) -> None:
     ends = [_parse_place(match[0]) for match in _COORDINATE.finditer(text)]
     if len(ends) != 2:
-        raise ValueError("two points are expected: 39:36:40N 119:46:10W, 39:29:09N 119:36:10W")
+        raise ValueError("expected two points: 39:36:40N 119:46:10W, 39:29:09N 119:36:10W")
     centre = _required_centre(block)
     (first_bearing, first_radius), (last_bearing, last_radius) = (
         _bearing_and_distance(centre, place) for place in ends
@@ -280,7 +280,7 @@ def _parse_number(text: str) -> float:
     except ValueError:
         value = math.nan
     if not 0.0 <= value < math.inf:
-        raise ValueError("a number from 0 on is expected")
+        raise ValueError("expected a number of at least 0")
     return value
 
 
@@ -296,7 +296,7 @@ def _parse_place(text: str) -> _Place:
     """Parse a latitude and longitude, degrees."""
     match = _COORDINATE.fullmatch(text.strip())
     if match is None:
-        raise ValueError("a place is expected: 45:40:30N 014:18:20E, or 45:40.500N 014:18.333E")
+        raise ValueError("expected a place: 45:40:30N 014:18:20E, or 45:40.500N 014:18.333E")
     lat = _parse_degrees(match["lat"], 90.0) * (-1.0 if match["ns"].upper() == "S" else 1.0)
     lon = _parse_degrees(match["lon"], 180.0) * (-1.0 if match["ew"].upper() == "W" else 1.0)
     return lat, lon
@@ -305,7 +305,7 @@ def _parse_place(text: str) -> _Place:
 def _parse_degrees(text: str, max_degrees: float) -> float:
     parts = [_parse_number(part) for part in text.split(":")]
     if len(parts) > 3 or any(part > 60.0 for part in parts[1:]):
-        raise ValueError("degrees, minutes and seconds of 60 at most are expected")
+        raise ValueError("expected degrees, minutes and seconds of at most 60")
     angle = sum(part / 60.0**k for k, part in enumerate(parts))
     if angle > max_degrees:
         raise ValueError(f"allowed 0..{max_degrees:g} degrees")

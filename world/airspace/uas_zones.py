@@ -67,7 +67,7 @@ def ed269_zones(data: Mapping[str, Any], source: str) -> Iterator[_FoundZone]:
         location = f"{key}[{k}]"
         volumes = feature.get("geometry") if isinstance(feature, dict) else None
         if not isinstance(volumes, list) or not volumes:
-            raise _value_error(source, location, "geometry", "a list of volumes is expected")
+            raise _value_error(source, location, "geometry", "expected a list of volumes")
         name = _one_line_name(feature.get("name")) or _one_line_name(feature.get("identifier")) or f"zone {k + 1}"
         location += f" ({name})"
         if (restriction := _upper_word(feature.get("restriction"))) == _NO_RESTRICTION:
@@ -88,7 +88,7 @@ def _features(data: Mapping[str, Any]) -> Any:
 def _ed269_volume(volume: Any, source: str) -> dict[str, Any]:
     shape = volume.get("horizontalProjection") if isinstance(volume, dict) else None
     if not isinstance(shape, dict):
-        raise _value_error(source, "", "horizontalProjection", "a polygon or a circle is expected")
+        raise _value_error(source, "", "horizontalProjection", "expected a polygon or a circle")
     unit = volume.get("uomDimensions")
     limits = {
         f"{side}Limit": _parse_limit(
@@ -185,7 +185,7 @@ def _parse_limit(value: Any, unit: Any, datum: Any, side: str, source: str) -> d
         height = math.nan
     # An infinite upper limit means no limit.
     if not height > -math.inf:
-        raise _value_error(source, "", f"{side} limit", "a number is expected")
+        raise _value_error(source, "", f"{side} limit", "expected a number")
     if side == "upper" and height >= _UNLIMITED_VALUE:
         return None
     if _upper_word(unit) not in _UNITS:
@@ -200,9 +200,9 @@ def _rings(coordinates: Any, source: str) -> list[list[list[float]]]:
     try:
         rings = [[[float(corner[1]), float(corner[0])] for corner in ring] for ring in coordinates]
     except (TypeError, ValueError, IndexError, KeyError, OverflowError) as error:
-        raise _value_error(source, "", "coordinates", "lists of [longitude, latitude] are expected") from error
+        raise _value_error(source, "", "coordinates", "expected lists of [longitude, latitude]") from error
     if not rings:
-        raise _value_error(source, "", "coordinates", "at least one ring is expected")
+        raise _value_error(source, "", "coordinates", "expected at least one ring")
     return rings
 
 
@@ -210,9 +210,7 @@ def _circle(centre: Any, radius: Any, source: str) -> dict[str, float]:
     try:
         return {"lat_deg": float(centre[1]), "lon_deg": float(centre[0]), "radius_m": float(radius)}
     except (TypeError, ValueError, IndexError, KeyError, OverflowError) as error:
-        raise _value_error(
-            source, "", "circle", "a centre [longitude, latitude] and a radius, m, are expected"
-        ) from error
+        raise _value_error(source, "", "circle", "expected a centre [longitude, latitude] and a radius, m") from error
 
 
 def _one_line_name(value: Any) -> str:
@@ -239,7 +237,7 @@ def _times(applicability: Any, source: str) -> list[str]:
     if applicability is None:
         return []
     if not isinstance(applicability, list) or not all(isinstance(entry, dict) for entry in applicability):
-        raise _value_error(source, "", "applicability", "a list of periods is expected")
+        raise _value_error(source, "", "applicability", "expected a list of periods")
     periods: list[Period] = []
     for entry in applicability:
         try:
@@ -250,7 +248,7 @@ def _times(applicability: Any, source: str) -> list[str]:
             schedule = entry.get("schedule") or entry.get("dailyPeriod") or [{}]
             periods += [_daily_period(start, end, day_entry) for day_entry in schedule]
         except (AttributeError, KeyError, TypeError, ValueError, OverflowError) as error:
-            allowed = "dates and times by ISO 8601, and days MON to SUN or ANY, are expected"
+            allowed = "expected dates and times by ISO 8601, and days MON to SUN or ANY"
             raise _value_error(source, "", "applicability", allowed) from error
     if any(period == Period() for period in periods):
         return []

@@ -133,7 +133,7 @@ def _faa_limits(properties: Mapping[str, Any], source: str) -> dict[str, Any]:
         try:
             height = float(value)
         except (TypeError, ValueError) as error:
-            raise ScenarioError.at(source, f"{side}_VAL", value, "a number is expected", shown="") from error
+            raise ScenarioError.at(source, f"{side}_VAL", value, "expected a number", shown="") from error
         if height != _FAA_NOT_APPLICABLE:
             unit, datum = properties.get(f"{side}_UOM"), properties.get(f"{side}_CODE")
             limits[key] = {"value": height, "unit": unit, "referenceDatum": datum}
@@ -143,11 +143,11 @@ def _faa_limits(properties: Mapping[str, Any], source: str) -> dict[str, Any]:
 def _limit_entry(value: Any, key: str, kind: Any, source: str) -> dict[str, float]:
     """Convert a limit in openAIP's form to a table entry; empty for the ground as a floor."""
     if not isinstance(value, dict):
-        allowed = "a table of value, unit and referenceDatum is expected"
+        allowed = "expected a table of value, unit and referenceDatum"
         raise ScenarioError.at(source, key, value, allowed, shown="")
     height, unit, datum = value.get("value"), value.get("unit"), value.get("referenceDatum")
     if isinstance(height, bool) or not isinstance(height, int | float) or not math.isfinite(height):
-        raise ScenarioError.at(source, f"{key}.value", height, "a number is expected", shown="")
+        raise ScenarioError.at(source, f"{key}.value", height, "expected a number", shown="")
     # A list, for example, is not hashable and cannot be looked up.
     if not isinstance(unit, int | str) or unit not in _UNITS:
         allowed = f"allowed {', '.join(map(str, _UNITS))}"
@@ -159,7 +159,7 @@ def _limit_entry(value: Any, key: str, kind: Any, source: str) -> dict[str, floa
     if datum_name == "agl" and metres <= 0.0:
         if side == "floor":
             return {}
-        raise ScenarioError.at(source, key, value, "above 0 is expected: nothing lies below the ground", shown="")
+        raise ScenarioError.at(source, key, value, "expected a value above 0: nothing lies below the ground", shown="")
     if _UNITS[unit] == _UNITS["FL"]:
         datum_name = "standard"
     if datum_name in _INEXACT_DATUMS:

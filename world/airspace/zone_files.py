@@ -44,7 +44,7 @@ def geojson_zones(text: str, source: str) -> Iterator[Found]:
     except (ValueError, RecursionError) as error:
         raise ScenarioError(f"{source}: not valid JSON: {str(error).splitlines()[0]}", file=source) from error
     if not isinstance(data, dict):
-        raise ScenarioError(f"{source}: a GeoJSON object is expected, got {type(data).__name__}", file=source)
+        raise ScenarioError(f"{source}: expected a GeoJSON object, got {type(data).__name__}", file=source)
     if is_ed269(data):
         yield from ed269_zones(data, source)
         return
@@ -53,7 +53,7 @@ def geojson_zones(text: str, source: str) -> Iterator[Found]:
     if kind == "FeatureCollection":
         features = data.get("features")
         if not isinstance(features, list):
-            raise ScenarioError(f"{source}: features: a list is expected", file=source, field="features")
+            raise ScenarioError(f"{source}: features: expected a list", file=source, field="features")
         features_by_place = [(f"features[{k}]", feature) for k, feature in enumerate(features)]
     elif kind == "Feature":
         features_by_place = [("feature", data)]
@@ -67,7 +67,7 @@ def geojson_zones(text: str, source: str) -> Iterator[Found]:
 
 
 def _reject_constant(name: str) -> float:
-    raise ValueError(f"{name} is no number of JSON")
+    raise ValueError(f"{name} is not a JSON number")
 
 
 def _check_crs(data: dict[str, Any], source: str) -> None:
@@ -85,7 +85,7 @@ def _check_crs(data: dict[str, Any], source: str) -> None:
 
 def _geojson_zone(feature: Any, location: str, index: int, source: str) -> tuple[str, dict[str, Any]]:
     if not isinstance(feature, dict) or feature.get("type") != "Feature":
-        raise ScenarioError(f"{source}: {location}: a Feature is expected", file=source, field=location)
+        raise ScenarioError(f"{source}: {location}: expected a Feature", file=source, field=location)
     properties, geometry = feature.get("properties"), feature.get("geometry")
     properties = properties if isinstance(properties, dict) else {}
     name = properties.get("name") or f"zone {index + 1}"
@@ -112,10 +112,10 @@ def _geojson_zone(feature: Any, location: str, index: int, source: str) -> tuple
             rings = [[list(corner) for corner in ring] for part in parts for ring in part]
             return label, entries | {"rings_deg": rings}
     except (TypeError, ValueError, IndexError) as error:
-        allowed = "lists of [longitude, latitude] are expected"
+        allowed = "expected lists of [longitude, latitude]"
         message = f"{source}: {label}: coordinates: {allowed}"
         raise ScenarioError(message, file=source, field="coordinates", allowed=allowed) from error
-    allowed = "a Polygon, MultiPolygon or Point is expected"
+    allowed = "expected a Polygon, MultiPolygon or Point"
     message = f"{source}: {label}: geometry {json.dumps(kind)[:40]}: {allowed}"
     raise ScenarioError(message, file=source, field="geometry", value=kind, allowed=allowed)
 
@@ -175,7 +175,7 @@ def kml_zones(text: str, source: str) -> Iterator[Found]:
     except (ElementTree.ParseError, ValueError) as error:
         raise ScenarioError(f"{source}: not valid XML: {str(error).splitlines()[0]}", file=source) from error
     if _tag_name(root) != "kml":
-        raise ScenarioError(f"{source}: a <kml> element is expected", file=source)
+        raise ScenarioError(f"{source}: expected a <kml> element", file=source)
     for number, placemark in enumerate((element for element in root.iter() if _tag_name(element) == "Placemark"), 1):
         name = _kml_text(placemark, "name") or f"zone {number}"
         label = f"Placemark {number}" + (f" ({name})" if name.isprintable() else "")
@@ -201,7 +201,7 @@ def _kml_zone(placemark: _Element, source: str) -> dict[str, Any]:
     if not polygons:
         if len(points) != 1 or "radius_m" not in entries:
             raise ScenarioError(
-                f"{source}: a Polygon is expected, or a Point with radius_m in its ExtendedData", file=source
+                f"{source}: expected a Polygon, or a Point with radius_m in its ExtendedData", file=source
             )
         ((lon, lat, _),) = _positions(points[0], source)[:1] or [(math.nan, math.nan, 0.0)]
         return entries | {"lat_deg": lat, "lon_deg": lon}
@@ -233,7 +233,7 @@ def _ceiling(polygon: _Element, heights: list[float], source: str) -> tuple[str,
         message = f"{source}: altitudeMode {mode[:40]!r}: {allowed}"
         raise ScenarioError(message, file=source, field="altitudeMode", value=mode, allowed=allowed)
     if _kml_text(polygon, "extrude") not in ("1", "true"):
-        message = f"{source}: altitudeMode {mode} without extrude: a sheet in the air holds no airspace"
+        message = f"{source}: altitudeMode {mode} without extrude: a sheet in the air contains no airspace"
         raise ScenarioError(message, file=source, field="altitudeMode", value=mode)
     if not heights or max(heights) - min(heights) > _LEVEL_TOLERANCE_M:
         raise ScenarioError(f"{source}: its corners have different heights: a zone has a level ceiling", file=source)
@@ -248,7 +248,7 @@ def _positions(element: _Element, source: str) -> list[tuple[float, float, float
             try:
                 lon, lat, *altitudes = (float(part) for part in position.split(","))
             except ValueError as error:
-                allowed = "lon,lat or lon,lat,up is expected"
+                allowed = "expected lon,lat or lon,lat,up"
                 message = f"{source}: coordinates {position[:40]!r}: {allowed}"
                 raise ScenarioError(
                     message, file=source, field="coordinates", value=position, allowed=allowed
@@ -270,7 +270,7 @@ def _extended_data(placemark: _Element, source: str) -> dict[str, Any]:
                 entries[key] = float(value)
             except ValueError as error:
                 shown = repr(value[:40])
-                raise ScenarioError.at(source, key, value, "a number is expected", shown=shown) from error
+                raise ScenarioError.at(source, key, value, "expected a number", shown=shown) from error
         elif value:
             entries[key] = value
     return entries
@@ -290,10 +290,10 @@ FORMATS: dict[str, Reader] = {
     ".txt": openair_zones,
 }
 # Notes about repairs to authorities' files.
-_SELF_CROSSING = "outlines that cross themselves are taken as the area they enclose"
+_SELF_CROSSING = "an outline that crosses itself is taken as the area it encloses"
 _EMPTY = "outlines that enclose no area are left out"
-_SWAPPED = "lower and upper limits that stand the wrong way round are swapped"
-_NO_BAND = "upper limits of 0, or equal to the lower one, are taken for none: no ceiling"
+_SWAPPED = "lower and upper limits in the wrong order are swapped"
+_NO_BAND = "upper limits of 0, or equal to the lower one, mean no ceiling"
 # Maximum size of a file, bytes.
 MAX_BYTES = 64 * 2**20
 # Maximum number of corners of all zones of a file: arcs of OpenAir make hundreds of corners of a few bytes.
@@ -381,7 +381,7 @@ def read_zone_file(path: Path, source: str, max_zones: int = MAX_ZONES) -> FileZ
             raise ScenarioError(f"{source}: {location}: its outline encloses no area", file=source, field="rings_deg")
         file_zones.zones.append(_zone_table(entries, f"{source}: {location}"))
     if not file_zones.zones and not unrestricted and not repaired_names[_EMPTY]:
-        raise ScenarioError(f"{source}: there is no zone in it", file=source)
+        raise ScenarioError(f"{source}: contains no zone", file=source)
     for reason, count in unrestricted.items():
         subject = "1 zone keeps" if count == 1 else f"{count:,} zones keep"
         file_zones.notes.append(f"{source}: {subject} nobody out: {reason}")

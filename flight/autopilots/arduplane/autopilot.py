@@ -409,10 +409,14 @@ _COURSE_SPEED_MPS = 5.0
 
 # Continuation of an RTL, by RTL_AUTOLAND; with 3 the landing sequence is for go-arounds alone.
 _LANDS: dict[int, Literal["", "circle", "straight"]] = {1: "circle", 2: "straight"}
-_RETURN_PATH = "RTL_AUTOLAND 4 goes by the mission's return path or landing sequence: not flown, it stays in its circle"
+_RETURN_PATH = (
+    "RTL_AUTOLAND 4 returns along the mission's return path or landing sequence: not flown, it stays in its circle"
+)
 
 # `Plane::verify_loiter_heading` lines up with the place of the next item; an RTL item has no place, which is 0 N 0 E.
-_BEFORE_RETURN = "ArduPlane leaves its circle heading for 0° N 0° E, and returns from there: flown heading for home"
+_BEFORE_RETURN = (
+    "ArduPlane leaves its circle on the heading to 0° N 0° E, and returns from there: flown on the heading to home"
+)
 
 # ArduPlane treats a radius up to this as no radius, m.
 _NO_RADIUS_M = 1.0
@@ -461,4 +465,4 @@ def _bank_limit_note(bank: float) -> str:
     """
     if bank <= 0.0:
         return ""
-    return f"NAVL1_LIM_BANK {bank:g} is not flown: circles are as wide as without it, where ArduPlane's may be narrower"
+    return f"NAVL1_LIM_BANK {bank:g} is not flown: circles are as wide as without it, but ArduPlane's may be narrower"

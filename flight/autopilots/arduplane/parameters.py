@@ -185,7 +185,7 @@ class ArduPilotParameters(ParameterSet):
     ('THR_MAX 50 of the file is below TRIM_THROTTLE 60 of the file',)
     >>> made, notes = ArduPilotParameters.of_log({"LIM_ROLL_CD": 4500.0, "WP_RADIUS": -5.0}, "a.BIN")
     >>> made.by_origin("file"), notes
-    ({'ROLL_LIMIT_DEG': 45.0}, ('WP_RADIUS -5 of the log is not allowed: the default is taken',))
+    ({'ROLL_LIMIT_DEG': 45.0}, ('WP_RADIUS -5 of the log is not allowed: the default is used',))
 
     navl1_period: s.  navl1_xtrack_i: 1/s.
     wp_radius: m, turns begin this far before a right angle.  wp_max_radius: m, 0 for no limit.

@@ -41,7 +41,7 @@ class ArduPlaneSitl(ProgramAutopilot, ArduPlane):
         if (aircraft.folder / SERVO_FILE).exists():
             load_servo_map(aircraft)
             return []
-        return [f"{aircraft.folder / SERVO_FILE}: missing: --sitl needs to know which servo moves what"]
+        return [f"{aircraft.folder / SERVO_FILE}: missing; --sitl needs to know what each servo moves"]
 
     @property
     def law(self) -> ArduPlane:

@@ -131,7 +131,7 @@ class PhysicsPort:
                     self._frame = packet.frame
                     return packet
                 if packet.frame < self._frame:
-                    message = f"began anew in the air: frame {packet.frame} after frame {self._frame}"
+                    message = f"restarted in the air: frame {packet.frame} after frame {self._frame}"
                     raise FlightError(message, field="frame", value=packet.frame)
                 # A request that was sent while the answer was on its way has its answer.
                 if self._clock() - self._answered > _CROSSING_TIME_S:

@@ -14,7 +14,7 @@ from world.wind import Turbulence
 
 _LAW_NAMES = {
     "path": "planfly's guidance on the fly-by path",
-    "l1": "L1 as ArduPlane flies it, along the legs",
+    "l1": "L1 along the legs, as in ArduPlane",
     "vector-field": "Beard and McLain's vector field on the fly-by path",
 }
 
@@ -51,7 +51,7 @@ class PlanflyGuidance(Autopilot):
         if (aircraft.folder / GAINS_FILE).exists():
             load_gains(aircraft)
             return []
-        return [f"{aircraft.folder / GAINS_FILE}: missing: {aircraft.name} does not fly without gains"]
+        return [f"{aircraft.folder / GAINS_FILE}: missing; {aircraft.name} does not fly without gains"]
 
     @property
     def tick(self) -> Tick:

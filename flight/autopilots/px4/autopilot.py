@@ -63,9 +63,12 @@ _NEUTRAL = {
 }
 # By RTL_TYPE: the part of it that is not flown.
 _RTL_TYPES_NOT_FLOWN = {
-    2: "RTL_TYPE 2, along the mission to its landing or back: flown as 1, to the nearest rally point or home",
-    3: "RTL_TYPE 3, to the nearest of home, rally points and the mission's landing: flown as 0, to no landing",
-    4: "RTL_TYPE 4, along the mission to its landing or back: flown as 1, to the nearest rally point or home",
+    2: "RTL_TYPE 2, a return along the mission to its landing or back, is flown as 1, to the nearest rally "
+    "point or home",
+    3: "RTL_TYPE 3, a return to the nearest of home, rally points and the mission's landing, is flown as 0, to "
+    "no landing",
+    4: "RTL_TYPE 4, a return along the mission to its landing or back, is flown as 1, to the nearest rally "
+    "point or home",
 }
 
 # RTL_TYPE of a return along the mission.

@@ -187,7 +187,7 @@ class Px4Parameters(ParameterSet):
     ('FW_AIRSPD_TRIM 25 of the file is above FW_AIRSPD_MAX 20 of the defaults',)
     >>> made, notes = Px4Parameters.of_log({"NAV_ACC_RAD": -5.0, "FW_R_LIM": 45.0}, "a.ulg", "1.16")
     >>> made.by_origin("file"), notes
-    ({'FW_R_LIM': 45.0}, ('NAV_ACC_RAD -5 of the log is not allowed: the default is taken',))
+    ({'FW_R_LIM': 45.0}, ('NAV_ACC_RAD -5 of the log is not allowed: the default is used',))
     """
 
     table: ClassVar[ParameterTable] = TABLE
@@ -197,7 +197,7 @@ class Px4Parameters(ParameterSet):
     def __post_init__(self) -> None:
         """Refuse a version of PX4 that is not known."""
         if self.version not in _VERSIONS:
-            allowed = f"{' or '.join(_VERSIONS)} is expected"
+            allowed = f"expected {' or '.join(_VERSIONS)}"
             message = f"px4_version: {self.version!r}: {allowed}"
             raise ParameterError(message, file=self.source, field="px4_version", value=self.version, allowed=allowed)
 

@@ -40,7 +40,7 @@ class Px4Preflight(Conversation):
         """
         yield from self._identify("PX4", _MESSAGE_INTERVALS_US, parameters)
         if self._news.autopilot != mavlink.MAV_AUTOPILOT_PX4:
-            autopilot, allowed = self._news.autopilot, f"{mavlink.MAV_AUTOPILOT_PX4}, PX4, is expected"
+            autopilot, allowed = self._news.autopilot, f"expected {mavlink.MAV_AUTOPILOT_PX4}, PX4"
             message = f"is no PX4: its heartbeat says autopilot {autopilot}; {allowed}"
             raise FlightError(message, field="autopilot", value=autopilot, allowed=allowed)
 

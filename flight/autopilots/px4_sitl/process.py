@@ -42,7 +42,7 @@ def px4_launch(
     """
     source = startup_files(binary)
     if source is None:
-        allowed = f"its start-up files are expected beside it, as the folder {STARTUP} of its build"
+        allowed = f"expected its start-up files next to it, in the folder {STARTUP} of its build"
         raise FlightError(f"{binary}: {allowed}", file=binary, field=STARTUP, allowed=allowed)
 
     def prepare(folder: Path) -> Launch:

@@ -97,10 +97,10 @@ class Conversation:
         yield from self._wait_until(lambda: news.vehicle is not None, heard, self._send_heartbeat)
         if news.vehicle != mavlink.MAV_TYPE_FIXED_WING:
             raise FlightError(
-                f"is no {kind}: its heartbeat says vehicle type {news.vehicle}; 1, a fixed wing, flies",
+                f"is no {kind}: its heartbeat says vehicle type {news.vehicle}; expected 1, a fixed wing",
                 field="vehicle type",
                 value=news.vehicle,
-                allowed="1, a fixed wing, flies",
+                allowed="expected 1, a fixed wing",
             )
         for message, interval in wanted.items():
             self._send_command(mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, message, interval)
@@ -118,7 +118,7 @@ class Conversation:
         news = self._news
         yield from self._wait_until(
             lambda: news.ekf & _REQUIRED_EKF_FLAGS == _REQUIRED_EKF_FLAGS and not news.ekf & lost,
-            Awaited("EKF", POSITION_TIMEOUT_S, "did not come to know where it is (EKF)"),
+            Awaited("EKF", POSITION_TIMEOUT_S, "did not find its position (EKF)"),
             lambda: self._send_command(mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, message, interval),
         )
 

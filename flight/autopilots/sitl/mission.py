@@ -82,7 +82,7 @@ def _unchanged_mission(setup: FlightSetup, ways: GroundWays) -> UploadedMission:
     """Return the mission as in its file, with its home; a home without an altitude is put on the ground."""
     home, mission = setup.mission.home, setup.mission
     if home is None or ways.take_off is None or ways.approach is None:
-        raise ValueError("a mission from the ground to the ground has a home, a take-off and a landing")
+        raise ValueError("a mission from the ground to the ground needs a home, a take-off and a landing")
     if math.isnan(home.alt):
         home = replace(home, alt=ways.take_off.base)
     known = []

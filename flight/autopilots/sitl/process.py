@@ -37,14 +37,14 @@ def check_binary(binary: Path, kind: str) -> str:
     ...     check_binary(Path("missing/arduplane"), "ArduPlane")
     ... except FlightError as error:
     ...     print(error)
-    missing/arduplane: no such file; the program of ArduPlane for software in the loop is expected
+    missing/arduplane: no such file; expected the program of ArduPlane for software in the loop
     """
     if not binary.exists():
         raise FlightError(
-            f"{binary}: no such file; the program of {kind} for software in the loop is expected", file=binary
+            f"{binary}: no such file; expected the program of {kind} for software in the loop", file=binary
         )
     if not binary.is_file():
-        raise FlightError(f"{binary}: not a file; the program of {kind} is expected", file=binary)
+        raise FlightError(f"{binary}: not a file; expected the program of {kind}", file=binary)
     if not os.access(binary, os.X_OK):
         raise FlightError(f"{binary}: not executable (chmod +x)", file=binary)
     try:

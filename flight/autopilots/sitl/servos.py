@@ -110,13 +110,13 @@ def load_servo_map(aircraft: Aircraft) -> ServoMap:
         table = read_toml(file, "servos")
     except OSError as error:
         raise FlightError(
-            f"{file}: {error.strerror}: a real autopilot needs to know which servo moves what on {aircraft.name}",
+            f"{file}: {error.strerror}; a real autopilot needs to know what each servo of {aircraft.name} moves",
             file=file,
         ) from error
     except ValueError as error:
         raise FlightError(f"{file}: {' '.join(str(error).split())}", file=file) from error
     if set(table) != set(FUNCTIONS):
-        raise FlightError(f"{file}: tables {', '.join(sorted(table))}: {', '.join(FUNCTIONS)} are expected", file=file)
+        raise FlightError(f"{file}: tables {', '.join(sorted(table))}: expected {', '.join(FUNCTIONS)}", file=file)
     try:
         outputs = {name: _parse_output(name, entry) for name, entry in table.items()}
     except ValueError as error:
@@ -128,15 +128,15 @@ def _parse_output(name: str, entry: Any) -> ServoOutput:
     unit = _UNITS[name]
     key = f"value_{unit}" if unit else "value"
     if not isinstance(entry, dict) or set(entry) != {"output", "pulse_us", key}:
-        raise ValueError(f"{name}: keys output, pulse_us and {key} are expected")
+        raise ValueError(f"{name}: expected keys output, pulse_us and {key}")
     number, pulses, values = entry["output"], entry["pulse_us"], entry[key]
     if isinstance(number, bool) or not isinstance(number, int) or not 1 <= number <= _MAX_OUTPUT:
         raise ValueError(f"{name}.output = {number!r}: allowed 1..{_MAX_OUTPUT}")
     for label, numbers in (("pulse_us", pulses), (key, values)):
         if not (isinstance(numbers, list) and len(numbers) >= 2 and all(map(_is_number, numbers))):
-            raise ValueError(f"{name}.{label} = {numbers!r}: two finite numbers or more are expected")
+            raise ValueError(f"{name}.{label} = {numbers!r}: expected two finite numbers or more")
     if len(pulses) != len(values) or any(b <= a for a, b in pairwise(pulses)):
-        raise ValueError(f"{name}.pulse_us = {pulses!r}: increasing, and as many as {key}, are expected")
+        raise ValueError(f"{name}.pulse_us = {pulses!r}: expected increasing numbers, as many as in {key}")
     factor = math.radians(1.0) if unit else 1.0
     return ServoOutput(number, tuple(map(float, pulses)), tuple(factor * value for value in values))
 

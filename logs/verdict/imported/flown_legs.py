@@ -162,8 +162,8 @@ class PlanMismatch:
         """Text of the reason."""
         if self.kind == "place":
             far = f"{self.distance / 1000.0:.1f} km" if self.distance >= 1000.0 else f"{self.distance:.0f} m"
-            return f"another place: the flight comes no nearer than {far} to any of its waypoints"
-        return f"another order: the flight passed its items in the order {', '.join(map(str, self.order))}, ..."
+            return f"the mission lies elsewhere: the flight never comes within {far} of its waypoints"
+        return f"the order differs: the flight passed the items as {', '.join(map(str, self.order))}, ..."
 
 
 def plan_mismatch(setup: FlightSetup, track: Track) -> PlanMismatch | None:
@@ -177,7 +177,7 @@ def plan_mismatch(setup: FlightSetup, track: Track) -> PlanMismatch | None:
     >>> setup = replace(log.setup, source=source)
     >>> far = replace(log.track, position=log.track.position + np.array([0.0, 9000.0, 0.0]))
     >>> plan_mismatch(setup, log.track) is None, plan_mismatch(setup, far).text
-    (True, 'another place: the flight comes no nearer than 8.9 km to any of its waypoints')
+    (True, 'the mission lies elsewhere: the flight never comes within 8.9 km of its waypoints')
     """
     source = setup.source
     stretches = () if source is None else source.stretches

@@ -82,7 +82,7 @@ def _judged_lines(source: ImportedLog, flown: Sequence[FlownLegs], numbers: Sequ
     numbers: number of each leg of the route, as in `flight.mission.route.Route.leg_numbers`.
     """
     if not source.stretches:
-        return ["Judged: nothing, for no stretch followed the mission"]
+        return ["Judged: nothing, as no stretch of the flight followed the mission"]
     by_start = {legs.stretch.start: legs for legs in flown}
     lines = []
     for stretch in source.stretches:
@@ -137,7 +137,7 @@ def rows_text(faults: RowFaults, gaps: int) -> str:
         (faults.doubled, "doubled"),
         (faults.unordered, "out of order"),
         (faults.unusable, "without a place or a time"),
-        (faults.glitches, "glitches of position"),
+        (faults.glitches, "position glitches"),
     )
     texts = [f"{count} {name}" for count, name in counts if count]
     if faults.clock_jumps:

@@ -62,7 +62,7 @@ def end_loiter_hazards(requirements: RouteRequirements) -> tuple[float, list[str
     )
     reach = LOITER_SWING_RADII * max(abs(rules.radius), min_radius)
     if not math.isfinite(reach):
-        return reach, ["the wind leaves no way around it"]
+        return reach, ["the wind is too strong to fly this circle"]
     return reach, hazards_within(requirements, requirements.points[-1, :2], altitude, altitude, reach)
 
 
@@ -80,15 +80,15 @@ def _ground_hazards(
         hazards.append("the terrain is not known")
     min_clearance = float(np.nanmin(clearances, initial=math.inf))
     if min_clearance < requirements.limits.min_clearance - CLEARANCE_TOLERANCE_M:
-        hazards.append(f"the ground is {min_clearance:.0f} m below")
+        hazards.append(f"the ground is only {min_clearance:.0f} m below")
     if limits.max_height_m is not None:
-        # The maximum height above ground is the minimum height above ground of the inverted world.
+        # The greatest height above ground is the least height above ground of the same world upside down.
         inverted_clearances, _ = path_clearance(
             -ground.heights, ground.to_pixel.record, _points_at(rings, -max_altitude)
         )
         max_height = -float(np.nanmin(inverted_clearances, initial=math.inf))
         if max_height > limits.max_height_m + HEIGHT_TOLERANCE_M:
-            hazards.append(f"the ground is {max_height:.0f} m below, over the {limits.max_height_m:.0f} m allowed")
+            hazards.append(f"the ground is {max_height:.0f} m below, more than the {limits.max_height_m:.0f} m allowed")
     return hazards
 
 
@@ -128,7 +128,7 @@ def _zone_hazards(
             if visits[number].depth > ROUNDING_M or visits[number].unknown
         }
     return [
-        f"{airspace.zones[number].kind} zone {airspace.zones[number].name or number} is not kept"
+        f"{airspace.zones[number].kind} zone {airspace.zones[number].name or number} may be violated"
         for number in sorted(zone_numbers)
     ]
 

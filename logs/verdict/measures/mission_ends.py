@@ -22,8 +22,8 @@ def missing_ends_text(mission: Mission, limits: MissionChecks) -> str:
         return ""
     if limits.requires == MissionChecks().requires and not limits.stated:
         return "PX4's fixed-wing default refuses a mission without a landing: add one, or set MIS_TKO_LAND_REQ 0"
-    requirement = f"MIS_TKO_LAND_REQ {limits.requires} asks for {_REQUIRED[limits.requires]}"
-    return f"{requirement}, and this has {_present_ends(has_takeoff, has_landing)}"
+    requirement = f"MIS_TKO_LAND_REQ {limits.requires} requires {_REQUIRED[limits.requires]}"
+    return f"{requirement}, but this mission has {_present_ends(has_takeoff, has_landing)}"
 
 
 def _present_ends(has_takeoff: bool, has_landing: bool) -> str:

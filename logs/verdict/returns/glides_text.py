@@ -8,19 +8,19 @@ from logs.verdict.returns.judge_glides import MARGIN, REACHES, Glide, GlideRange
 _NOT_JUDGED_TEXTS: dict[NotJudged, str] = {
     "terrain": "there is no elevation file",
     "trim": "the model has no trim with the throttle closed",
-    "far": "the way is too long for a map of what lies around it",
+    "far": "the route is too long for a map of its surroundings",
 }
 _COUNT_TEXTS: dict[Reach, str] = {
     "home": "home can be reached from {count}",
     "site": "a rally point or landing place, but not home, from {count}",
-    "flat": "flat ground alone from {count}",
+    "flat": "only flat ground from {count}",
     "nothing": "nothing from {count}",
-    "unknown": "from {count} it is not known",
+    "unknown": "from {count} the reach is not known",
 }
 _REACH_TEXTS: dict[Reach, str] = {
     "home": "home is in reach",
     "site": "a rally point or landing place is in reach",
-    "flat": "flat ground alone is in reach",
+    "flat": "only flat ground is in reach",
     "nothing": "nothing is in reach",
     "unknown": "what is in reach is not known",
 }
@@ -85,19 +85,19 @@ def glide_range_text(glide_range: GlideRange, glides: Glides) -> str:
 def _reach_text(glide_range: GlideRange, glides: Glides) -> str:
     glide = glide_range.least
     spare = glides.spare(glide)
-    when = "" if glide_range.count == 1 else f" at the least, from {glide.time:.0f} s"
+    when = "" if glide_range.count == 1 else f" at worst, from {glide.time:.0f} s"
     match glide.reach:
         case "home" | "site":
             return f"{site_text(glides.sites[glide_range.site])}, {spare:.0f} m left over{when}"
         case "flat":
             east, north, up = glide.flat_at
             where = f"such as at {east:.0f} m east, {north:.0f} m north, {up:.0f} m AMSL"
-            return f"flat ground alone, {where}, {spare:.0f} m left over{when}"
+            return f"only flat ground, {where}, {spare:.0f} m left over{when}"
         case "nothing":
-            missing = "no way leads anywhere" if math.isinf(spare) else f"{-spare:.0f} m are missing at the most"
+            missing = "no path leads anywhere" if math.isinf(spare) else f"{-spare:.0f} m are missing at most"
             return f"nothing, {missing}"
         case "unknown":
-            return "not known, for it is beyond the elevation data"
+            return "not known, as it lies beyond the elevation data"
 
 
 def _own_return_text(glide: Glide) -> str:
@@ -107,7 +107,9 @@ def _own_return_text(glide: Glide) -> str:
             return f"; ArduPlane's own return arrives over {name}"
         case "low":
             lowest = min(glide.own.over, glide.own.clearance)
-            return f"; ArduPlane's own return comes {lowest:.0f} m above ground, and {MARGIN:.0f} m are asked"
+            return (
+                f"; ArduPlane's own return comes down to {lowest:.0f} m above ground, below the required {MARGIN:.0f} m"
+            )
         case "ground":
             return f"; ArduPlane's own return comes down {glide.own.short / 1000.0:.1f} km from {name}"
         case "threat":
@@ -123,10 +125,11 @@ def glide_notes(glides: Glides) -> list[str]:
     if not glides.each:
         return []
     notes = [
-        f"without the engine: on for {ENGINE_FAILURE_REACTION_S:.0f} s, then at AIRSPEED_MIN {glides.airspeed:g} m/s,"
-        f" {MARGIN:.0f} m above ground all the way, outside missiles' spheres, through zones",
-        "flat by the elevation file: it knows no trees, houses or water",
+        f"without the engine the aircraft flies on for {ENGINE_FAILURE_REACTION_S:.0f} s, then glides at"
+        f" AIRSPEED_MIN {glides.airspeed:g} m/s,"
+        f" {MARGIN:.0f} m above ground or higher, outside missiles' spheres, but through zones",
+        "ground is flat according to the elevation file, which knows no trees, houses or water",
     ]
     if glides.fuel:
-        notes.append("glides are those of the closed throttle: how much an engine that stands brakes is not known")
+        notes.append("glides are flown with the throttle closed, as the drag of a stopped engine is not known")
     return notes

@@ -382,7 +382,7 @@ def return_world(setup: FlightSetup) -> ReturnWorld:
     places = return_places(setup.mission, setup.scenario.origin, setup.scenario.terrain)
     if not places:
         source = setup.mission.source
-        message = f"{source}: home: none is stated, so there is nowhere to return to"
+        message = f"{source}: home: not stated, so there is nowhere to return to"
         raise MissionError(message, file=source, field="home")
     aircraft: Aircraft = find_again(setup.aircraft, setup.scenario.flight.aircraft)
     setup_parameters = setup.autopilot.law.parameters

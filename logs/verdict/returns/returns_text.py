@@ -45,23 +45,23 @@ _SEGMENT_NAMES: dict[Kind, str] = {
 }
 _ACTION_TEXTS = {
     "return": "returns",
-    "land": "by its landing sequence",
-    "autoland": "by mode AUTOLAND, or else it returns",
-    "on": "goes on with its mission",
+    "land": "lands by its landing sequence",
+    "autoland": "lands in mode AUTOLAND, otherwise returns",
+    "on": "continues its mission",
     "circle": "circles where it is",
-    "glide": "glides straight on without its motor, which is no return",
+    "glide": "glides straight ahead without its motor, which is not a return",
     "parachute": "releases its parachute",
     "terminate": "ends its flight there",
-    "level": "flies level straight on, which is no return",
+    "level": "flies straight and level, which is not a return",
     "guided": "circles at the fence's return point",
     "landed": "has landed",
     "never": "set, but no threshold triggers it",
 }
 _OPEN_TEXTS: dict[Open, str] = {
-    "terrain": "TERRAIN_FOLLOW has returns follow the terrain, which is not flown here",
+    "terrain": "with TERRAIN_FOLLOW returns follow the terrain, which is not flown here",
     "law": "the autopilot's own return is not simulated; ArduPlane's return stands in",
     "autoland": "mode AUTOLAND lands by a pattern of its own",
-    "return path": "RTL_AUTOLAND 4 returns by the mission's return path",
+    "return path": "RTL_AUTOLAND 4 returns along the mission's return path",
     "landing": "the landing sequence begins with the landing itself",
 }
 
@@ -91,7 +91,7 @@ def measured_text(ret: ReturnFlown, limit: float, scenario: Scenario) -> str:
     if ret.kind == "ground":
         parts[-1] += f" at {where}"
     elif not math.isnan(ret.clearance):
-        parts.append(f"{ret.clearance:.0f} m above ground at the least at {where}")
+        parts.append(f"{ret.clearance:.0f} m above ground at the lowest, at {where}")
     if ret.threat >= 0 and ret.outside <= 0.0:
         parts.append(f"{-ret.outside:.0f} m inside the sphere of {scenario.threats.names[ret.threat]}")
     elif math.isfinite(ret.outside):
@@ -116,7 +116,7 @@ def headline(returns: Returns) -> str:
     >>> headline(Returns((), 1.0, (), 60.0, None, 0.0, True))
     'no place to return from'
     >>> headline(Returns((), 1.0, (), 60.0, None, 0.0, True, open=("terrain",)))
-    'not judged: TERRAIN_FOLLOW has returns follow the terrain, which is not flown here'
+    'not judged: with TERRAIN_FOLLOW returns follow the terrain, which is not flown here'
     """
     reasons = "; ".join(_OPEN_TEXTS[reason] for reason in returns.open)
     if not returns.each:
@@ -137,7 +137,7 @@ def _judged_text(returns: Returns) -> str:
     high_returns = [ret for ret in returns.each if not ret.floor < returns.limit] or returns.each
     lowest = min(high_returns, key=lambda ret: ret.clearance)
     least_left = min((ret.left for ret in returns.each if not math.isnan(ret.left)), default=math.nan)
-    energy = "" if math.isnan(least_left) else f", and {least_left:.0f} Wh are left at the least"
+    energy = "" if math.isnan(least_left) else f", and at least {least_left:.0f} Wh are left"
     until_text = " up to their landing" if returns.lands else ""
     return f"all {total} returns are safe{until_text}: never lower than {lowest.clearance:.0f} m above ground{energy}"
 
@@ -146,25 +146,25 @@ def no_return_text(returns: Returns) -> str:
     """Describe the place from which the battery no longer permits a return with reserve.
 
     >>> no_return_text(Returns((), 1.0, (), 60.0, None, 0.0, True))
-    'point of no return: not judged, for the energy in the battery is not known'
+    'point of no return: not judged, as the energy in the battery is not known'
     """
     point, name = returns.point_of_no_return, "point of no return"
     reserve = f"the reserve of {returns.reserve:.0f} Wh"
     match point.kind:
         case "battery":
-            return f"{name}: not judged, for the energy in the battery is not known"
+            return f"{name}: not judged, as the energy in the battery is not known"
         case "used":
-            return f"{name}: not judged, for the energy used before is not known"
+            return f"{name}: not judged, as the energy used before is not known"
         case "arrives":
-            return f"{name}: not judged, for no return arrives"
+            return f"{name}: not judged, as no return arrives"
         case "at once":
-            text = f"{name}: before the start, for no return leaves {reserve}"
+            text = f"{name}: before the start, as no return leaves {reserve}"
         case "later":
-            text = f"{name}: {point.time:.0f} s; a return from later on does not leave {reserve}"
+            text = f"{name}: {point.time:.0f} s; a return that starts later does not leave {reserve}"
         case "never":
-            text = f"{name}: none, for every return leaves {reserve} ({point.left:.0f} Wh at the least)"
+            text = f"{name}: none, as every return leaves {reserve} (at least {point.left:.0f} Wh)"
     verb = "does" if point.skipped == 1 else "do"
-    return text + (f"; {point.skipped} that {verb} not arrive left out" if point.skipped else "")
+    return text + (f"; {point.skipped} that {verb} not arrive are left out" if point.skipped else "")
 
 
 def causes_text(causes: tuple[Cause, ...]) -> list[str]:
@@ -176,7 +176,7 @@ def causes_text(causes: tuple[Cause, ...]) -> list[str]:
     >>> for line in causes_text(failsafe_causes(made, has_fence=False)):
     ...     print(line)
     it returns: the pilot's RTL, the mission's end, RC lost (FS_LONG_ACTN 1), station lost (FS_LONG_ACTN 1)
-    it does not: battery low (BATT_FS_LOW_ACT 0), battery critical (BATT_FS_CRT_ACT 0): goes on with its mission
+    it does not: battery low (BATT_FS_LOW_ACT 0), battery critical (BATT_FS_CRT_ACT 0): continues its mission
     """
 
     def setting_text(cause: Cause) -> str:
@@ -210,22 +210,22 @@ def landing_text(returns: Returns) -> list[str]:
     )
     match returns.autoland, bool(returns.landings):
         case 0, True:
-            text = f"{stays_text}; with DO_LAND_START in the mission ArduPlane does not arm so"
+            text = f"{stays_text}; with this setting and DO_LAND_START in the mission ArduPlane does not arm"
         case ((1 | 2), False):
             text = f"the mission has no DO_LAND_START: {stays_text}"
         case 1, True:
-            text = f"from its circle a return goes on to the landing sequence at {items_text}"
+            text = f"from its circle a return continues to the landing sequence at {items_text}"
         case 2, True:
             text = f"a return flies straight to the landing sequence at {items_text}"
         case 3, _:
             text = f"the landing sequence is for go-arounds only: {stays_text}"
         case 4, _:
-            text = "a return goes by the mission's return path, where it has one"
+            text = "a return follows the mission's return path, if it has one"
         case _:
             text = stays_text
     lines = [f"RTL_AUTOLAND {returns.autoland}: {text}"]
     if returns.landings:
-        lines.append("within the landing sequence a lost transmitter or station changes nothing")
+        lines.append("within the landing sequence, the loss of transmitter or station changes nothing")
     return lines
 
 
@@ -261,21 +261,21 @@ def _range_outcome_text(
             return f"{prefix}violates zone {returns.airspace.zones[worst_return.zone].name}"
         case "lost":
             end = "landing sequence" if worst_return.target.landing is not None else "circle"
-            return f"{prefix}does not get to its {end} at {worst_return.target.position[2]:.0f} m AMSL"
+            return f"{prefix}does not reach its {end} at {worst_return.target.position[2]:.0f} m AMSL"
         case "energy":
-            leaves = f"leaves {worst_return.left:.0f} Wh, where {returns.reserve:.0f} Wh are to be left"
+            leaves = f"leaves {worst_return.left:.0f} Wh of the required {returns.reserve:.0f} Wh"
             return f"{prefix}takes {worst_return.energy:.0f} Wh and {leaves}"
         case "unknown":
             return f"{prefix}flies where the elevation is not known"
         case "unsure":
-            return f"{prefix}{height_text} by the point mass, and JSBSim has it or one like it too far from there"
+            return f"{prefix}{height_text} by the point mass, but JSBSim flies it or one near it too far from there"
     if worst_return.floor < returns.limit:
-        height_text += " (taking off or landing: it begins lower than the least height)"
+        height_text += " (taking off or landing: it begins below the required height)"
     energy_text = "" if math.isnan(worst_return.left) else f", {worst_return.left:.0f} Wh left"
     sphere_text = (
         "" if math.isinf(worst_return.outside) else f", {worst_return.outside:.0f} m outside every missile's sphere"
     )
-    return f"{prefix}{height_text} at the least{sphere_text}{energy_text}"
+    return f"{prefix}{height_text} at the lowest{sphere_text}{energy_text}"
 
 
 def remedy_text(remedy: Remedy, returns: Returns, scenario: Scenario) -> str:

@@ -100,7 +100,9 @@ def _home_above_ground_findings(
         return []
     min_height = min(finding.margin + (finding.limit or 0.0) for finding in legs if finding.margin is not None) - height
     brief = f"the mission's home is {height:.0f} m above the ground there"
-    rest = f": armed on that ground, an autopilot flies as much lower, down to {min_height:.0f} m above ground"
+    rest = (
+        f": an autopilot that is armed on that ground flies lower by as much, down to {min_height:.0f} m above ground"
+    )
     fault = message(brief, rest)
     return [make_finding("clearance", FLIGHT, ok=None, reason=fault.text, faults=[fault], check=GROUND_WAY)]
 

@@ -103,7 +103,9 @@ def imported_completion(setup: FlightSetup, flown: Sequence[FlownLegs], log_comp
         faults.append(message("the log is damaged or unfinished"))
     if not flown:
         stretches = () if setup.source is None else setup.source.stretches
-        reason = "none of the mission's legs was flown" if stretches else "no stretch of it followed the mission"
+        reason = (
+            "none of the mission's legs was flown" if stretches else "no stretch of the flight followed the mission"
+        )
         # The flight may have included legs that the log does not hold.
         if missing is not None and stretches:
             unknown_texts.append(f"none of the legs that the log holds was flown: {_absent_text(missing)}")
@@ -129,14 +131,14 @@ def imported_completion(setup: FlightSetup, flown: Sequence[FlownLegs], log_comp
         count_text = f"{finished_count} of {leg_count} legs flown"
         ending = f"{stretch_end_text(last_stretch.stretch)}, on the way to {_next_waypoint_text(setup, last_stretch)}"
         if _ends_in_return(setup, last_stretch):
-            notes.append(
-                f"{count_text}, and the return that the mission ends with begun at {last_stretch.stretch.end:.1f} s"
-            )
+            notes.append(f"{count_text}, and the return at the mission's end began at {last_stretch.stretch.end:.1f} s")
         elif last_stretch.stretch.ended == "log":
             unknown_texts.append(f"{ending}: {count_text}")
         else:
             faults.append(message(ending, f": {count_text}"))
-    unknown_texts += [f"the way to item {stop.item} is not judged: it is not laid out" for stop in setup.route.unjoined]
+    unknown_texts += [
+        f"the path to item {stop.item} is not judged, as it is not laid out" for stop in setup.route.unjoined
+    ]
     notes += _gaps_text(flown)
     return make_finding(
         "completion",
@@ -200,7 +202,9 @@ def _legs_text(setup: FlightSetup, legs: Iterable[int]) -> str:
 
 
 def _absent_text(missing: MissingItems) -> str:
-    return f"{len(missing.numbers)} {'item' if len(missing.numbers) == 1 else 'items'} of the mission not in the log"
+    return (
+        f"{len(missing.numbers)} {'item' if len(missing.numbers) == 1 else 'items'} of the mission are not in the log"
+    )
 
 
 def _ends_in_return(setup: FlightSetup, legs: FlownLegs) -> bool:

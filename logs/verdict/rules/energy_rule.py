@@ -39,7 +39,7 @@ def energy_findings(
     if used == 0.0 and predicted == 0.0:
         # A model without a reading of power reads as 0 W.
         used, predicted = math.nan, math.nan
-        reason = "the aircraft's model states no power, so that no energy is known"
+        reason = "the aircraft's model states no power, so the energy is not known"
     elif math.isnan(used):
         reason = "the aircraft's power is not known at these speeds" if geometric else "nothing was flown"
     else:
@@ -51,9 +51,9 @@ def energy_findings(
                 f"the battery is guessed: state --battery with the aircraft, or the scenario's battery_wh; {reason}"
             )
         elif is_uncertain:
-            reason += f"; what {setup.envelope.source} says of the power is give or take {setup.envelope.power_sd:.0%}"
+            reason += f"; the power according to {setup.envelope.source} is known to {setup.envelope.power_sd:.0%}"
         elif used > usable:
-            reason += f"; {ENERGY_RESERVE_FRACTION:.0%} are to be left"
+            reason += f"; {ENERGY_RESERVE_FRACTION:.0%} must be left"
     return [
         make_finding(
             "energy",

@@ -110,7 +110,7 @@ class _Aborted(NamedTuple):
     climb: minimum height above ground in the climb beyond the landing point, m; inf without a climb.
     after: time from the abort to ground impact, s; NaN without impact.
     entered: sphere or zone that the go-around enters, "" if it enters none.
-    lost: True if the go-around does not get back to the line-up.
+    lost: True if the go-around does not return to the line-up.
     open: text on the unknown part of the path, "" if all is known.
     """
 
@@ -156,7 +156,8 @@ def go_around_findings(
     if not is_required or setup.source is not None:
         return []
     reason = message(
-        "a go-around is not judged", ": that takes the simulated ArduPlane, a home, known ground and a glide to land by"
+        "a go-around is not judged",
+        ": it needs the simulated ArduPlane, a home, known ground and a glide to the landing point",
     )
     return [make_finding("go_around", FLIGHT, ok=None, reason=reason.text, faults=[reason], check=GROUND_WAY)]
 
@@ -378,7 +379,7 @@ def _judge_go_around(
     climb = float(np.nanmin(heights[:rows][is_beyond_point[:rows]], initial=math.inf))
     if climb < GO_AROUND_MODEL_ERROR_M and not aborted.open:
         passing_text = (
-            f"aborted {aborted.before:.0f} m before the landing point it passes the ground in its climb by"
+            f"aborted {aborted.before:.0f} m before the landing point, it passes the ground in its climb by"
             f" {climb:.0f} m"
         )
         aborted = aborted._replace(open=f"{passing_text}, and may be flown {GO_AROUND_MODEL_ERROR_M:.0f} m lower")
@@ -446,7 +447,7 @@ def _brief_outcome(worst: _Aborted) -> str:
         return "a go-around meets the ground"
     if worst.entered:
         return f"a go-around enters {worst.entered}"
-    return "a go-around does not get back to the line-up" if worst.lost else "a go-around comes too near to the ground"
+    return "a go-around does not return to the line-up" if worst.lost else "a go-around comes too near to the ground"
 
 
 def _outcome_text(worst: _Aborted) -> str:
@@ -458,7 +459,7 @@ def _outcome_text(worst: _Aborted) -> str:
     elif worst.entered:
         outcome = f"enters {worst.entered}"
     elif worst.lost:
-        outcome = "does not get back to the line-up"
+        outcome = "does not return to the line-up"
     else:
         outcome = f"comes down to {worst.room:.0f} m above ground on the way back"
     return f"{abort_text}{turn_text} and {outcome}" if turn_text else f"{abort_text} {outcome}"

@@ -239,13 +239,13 @@ def _find_obstacles(requirements: RouteRequirements, path: Way) -> _Obstacles:
 
 
 def _air_start_finding(place: Place, obstacles: _Obstacles) -> Finding:
-    """Judge the direct climb from home to the first waypoint, not simulated, for a mission that starts in the air."""
-    subject = f"the way up from home to {_item_text(place)}"
+    """Judge the direct climb from home to the first waypoint, not simulated, of a mission that starts in the air."""
+    subject = f"the climb from home to {_item_text(place)}"
     if math.isnan(obstacles.clearance) and not obstacles.entered:
         reason, check, ok = f"the ground below {subject} is not known", "", None
     elif obstacles.free:
         reason, check, ok = (
-            f"straight from home: {_clearance_text(obstacles)}; not flown: the flight begins in the air",
+            f"straight from home: {_clearance_text(obstacles)}; not flown, as the flight begins in the air",
             "",
             True,
         )
@@ -327,7 +327,7 @@ def _free_courses_text(
     courses = list(range(0, 360, _COURSE_STEP_DEG))
     free = [is_free(math.radians(course)) for course in courses]
     if not any(free):
-        return "; no launch course climbs free"
+        return "; no launch course climbs clear"
     # Begin after a course with obstacles, so that no range is cut at north.
     start = free.index(False) if False in free else 0
     courses_from_start = [
@@ -340,8 +340,8 @@ def _free_courses_text(
     ]
     widest = max(ranges, key=len)
     if len(widest) == 1:
-        return f"; launched on {widest[0]:03d}° it would climb free"
-    return f"; launched on {widest[0]:03d}° to {widest[-1]:03d}° it would climb free"
+        return f"; launched on {widest[0]:03d}° it would climb clear"
+    return f"; launched on {widest[0]:03d}° to {widest[-1]:03d}° it would climb clear"
 
 
 # ----------------------------------------------------------------------
@@ -423,7 +423,7 @@ def approach_findings(
             f", flares {glide.flare_height:.1f} m over the landing point and {glide.flare_distance:.0f} m before it"
         )
     reason += f"; {_clearance_text(obstacles)} until {EARLY_TOUCHDOWN_DISTANCE_M:.0f} m before it"
-    reason += "" if setup.ground_ways.approach is not None else "; not flown: the flight ends in the air"
+    reason += "" if setup.ground_ways.approach is not None else "; not flown, as the flight ends in the air"
     return [_finding("approach", place, obstacles, True, message(reason))]
 
 

@@ -60,9 +60,7 @@ def _launch_finding(requirements: RouteRequirements, ground: FlownGround, take_o
     runway_left = _remaining_runway(requirements, take_off, position)
     if runway_left < RUNWAY_MARGIN_M:
         brief = f"leaves the ground {take_off.launch.run - runway_left:.0f} m from home"
-        runway_text = (
-            f"; the runway is {take_off.launch.run:.0f} m long, of which {RUNWAY_MARGIN_M:.0f} m are to be left"
-        )
+        runway_text = f"; the runway is {take_off.launch.run:.0f} m long, of which {RUNWAY_MARGIN_M:.0f} m must be left"
         faults.append(message(brief, runway_text))
     if clearance < LAUNCH_CLEARANCE_M:
         faults.append(

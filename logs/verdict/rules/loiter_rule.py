@@ -136,7 +136,7 @@ def end_findings(
     reach, descriptions = hazards
     reason = f"after it {requirements.setup.autopilot.title} circles, up to {reach:.0f} m from it"
     if descriptions:
-        reason += f": {', '.join(descriptions)}: only a flight tells how near it comes"
+        reason += f": {', '.join(descriptions)}; only a flight tells how near it comes"
     return [
         make_finding(
             "loiter",
@@ -167,7 +167,7 @@ def _loiter_finding(
         # If the parameter makes the loiter too tight, the autopilot flies it wider, as at the end of a return.
         bank = _held_bank(requirements, circle, min_radius, corner_findings)
         if bank <= requirements.limits.max_bank + BANK_TOLERANCE_RAD + 1e-9:
-            facts.append(f"{name} asks for less than the {min_radius:.0f} m of the bank limit: flown wider")
+            facts.append(f"{name} is smaller than the {min_radius:.0f} m that the bank limit allows: flown wider")
             faults = []
             open_text = "" if aligned is not None else _hazards_text(requirements, circle, min_radius)
         else:
@@ -188,7 +188,7 @@ def _loiter_finding(
             and circle.turns >= 1.0
             and mean_radius > circle.radius * (1.0 + LOITER_WIDENING_FRACTION) + WAYPOINT_PASS_MARGIN_M
         ):
-            faults.append(message(f"flown with {mean_radius:.0f} m where {circle.radius:.0f} m is asked for"))
+            faults.append(message(f"flown with {mean_radius:.0f} m where {circle.radius:.0f} m is required"))
     ok: bool | None = not (faults or failed)
     if ok and any(finding.ok is None for finding in corner_findings):
         ok = None
@@ -261,8 +261,8 @@ def _hazards_text(requirements: RouteRequirements, circle: Circle, min_radius: f
     hazards = hazards_within(requirements, circle.middle, float(heights.min()), float(heights.max()), reach)
     if not hazards:
         return ""
-    reach_text = f"within the {reach:.0f} m of its middle that it may get to"
-    return f"{reach_text}, {', '.join(hazards)}: only a flight tells where it is"
+    reach_text = f"it may get {reach:.0f} m from its center, and there"
+    return f"{reach_text}, {', '.join(hazards)}; only a flight tells where it circles"
 
 
 def _has_reached(requirements: RouteRequirements, aligned: AlignedTrack, circle: Circle) -> bool:
@@ -282,8 +282,8 @@ def _small_radius_faults(requirements: RouteRequirements, circle: Circle, min_ra
     speed, bank = float(requirements.route.airspeed[circle.first]), math.degrees(requirements.limits.max_bank)
     need_text = f"at {speed:.0f} m/s and {bank:.0f}° bank the aircraft needs {min_radius:.0f} m"
     if not math.isfinite(min_radius):
-        need_text = f"at {speed:.0f} m/s the wind leaves no way around it"
-    return [message(f"radius {circle.radius:.0f} m where {need_text} in this wind")]
+        need_text = f"at {speed:.0f} m/s the circle cannot be flown"
+    return [message(f"radius {circle.radius:.0f} m; {need_text} in this wind")]
 
 
 def _unheld_corners_message(circle: Circle, failed: list[Finding]) -> Message:

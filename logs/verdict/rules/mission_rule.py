@@ -158,14 +158,12 @@ def _unflown_findings(setup: FlightSetup) -> Iterator[Finding]:
     unflown = [(open_item.item, open_item.text) for open_item in setup.route.open_items]
     if not setup.autopilot.follows_ground:
         items_above_terrain = sorted(set(setup.route.items[np.isfinite(setup.route.above_ground)].tolist()))
-        reason = (
-            f"its height above terrain is not followed along the leg by {setup.autopilot.title} as it is flown here"
-        )
+        reason = f"the simulated {setup.autopilot.title} does not follow its height above terrain along the leg"
         unflown += [(seq, reason) for seq in items_above_terrain]
     if setup.scenario.returns is not None:
         # Returns from anywhere on the route are judged only to the mission's home.
         unflown += [
-            (item.seq, f"{command_name(item.command)}: returns are judged to the mission's home alone")
+            (item.seq, f"{command_name(item.command)}: returns are judged only to the mission's home")
             for item in setup.mission.items
             if item.command == C.DO_SET_HOME
         ]
@@ -224,7 +222,7 @@ def _check_validity(mission: Mission) -> Iterator[_Remark]:
             yield (
                 REFUSED,
                 item.seq,
-                f"{name} in frame {item.frame}, above terrain, which PX4 does not take; ArduPlane does",
+                f"{name} in frame {item.frame}, above terrain, which PX4 rejects and ArduPlane accepts",
             )
     if mission.items and mission.items[0].command == C.NAV_LAND:
         yield REFUSED, mission.items[0].seq, "starts with landing"
@@ -296,7 +294,7 @@ def _check_approach(mission: Mission, origin: GeoOrigin, limits: MissionChecks) 
 def _check_required_ends(mission: Mission, limits: MissionChecks, refuses: bool) -> Iterator[_Remark]:
     missing_ends = missing_ends_text(mission, limits)
     if not missing_ends:
-        yield True, None, "takeoff and landing are as MIS_TKO_LAND_REQ asks for them"
+        yield True, None, "takeoff and landing are as MIS_TKO_LAND_REQ requires"
     elif limits.stated:
         yield REFUSED, None, missing_ends
     else:

@@ -97,7 +97,7 @@ def _requirement_findings(requirements: RouteRequirements, starts: Callable[[flo
     # Failures come first, then what is not known.
     answers.sort(key=lambda answer: (answer.ok is not False, answer.ok is not None))
     reason, method = "; ".join(answer.reason for answer in answers), "; ".join(answer.method for answer in answers)
-    method = f"from every {interval:.0f} s of the way, {method}"
+    method = f"one return every {interval:.0f} s of the route, {method}"
     # A verdict that requires them is undecided without them.
     faults, check = ([Message(reason, _NOT_KNOWN)], UNKNOWN_RETURN) if ok is None else ([], "")
     return [
@@ -195,7 +195,7 @@ def _finding(requirements: RouteRequirements, ok: bool | None, outcome: str) -> 
             ok=ok,
             reason=reason,
             faults=faults,
-            method="the autopilot's own way back",
+            method="the autopilot's own return path",
             check=UNKNOWN_RETURN if faults else "",
         )
     ]

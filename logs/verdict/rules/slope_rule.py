@@ -120,7 +120,7 @@ def _uncertainty_text(requirements: RouteRequirements, leg: int) -> str:
         return ""
     slope, limit_deg, deviation_deg = (math.degrees(angle) for angle in (abs(planned), limit, deviation))
     return (
-        f"{verb} {slope:.1f}°, and what {envelope.source} says of the limit is {limit_deg:.1f}°"
+        f"{verb} {slope:.1f}°; the limit according to {envelope.source} is {limit_deg:.1f}°,"
         f" give or take {deviation_deg:.1f}°"
     )
 
@@ -141,7 +141,9 @@ def _steep_arc_faults(requirements: RouteRequirements, leg: int) -> list[Message
         f" {legs}: flown by, it is shorter than the {2.0 * float(requirements.before[corner]):.0f} m of leg"
         " that it replaces"
     )
-    limit = f"; the aircraft can {math.degrees(math.atan(arc.limit)):.1f}° there, {missing_height:.0f} m less"
+    limit = (
+        f"; the aircraft can fly at most {math.degrees(math.atan(arc.limit)):.1f}° there, {missing_height:.0f} m less"
+    )
     # A headline names the waypoint, not its item.
     return [
         Message(
@@ -174,17 +176,19 @@ def _limit_text(requirements: RouteRequirements, leg: int, limit: float, source:
     altitude = float(max(requirements.points[leg, 2], requirements.points[leg + 1, 2]))
     condition = f"at {speed:.0f} m/s and {altitude:.0f} m"
     if limit <= 0.0:
-        return f"{condition} the aircraft has no steady flight on this course"
+        return f"{condition} the aircraft cannot fly steadily on this course"
     wind = requirements.setup.scenario.wind
     tailwind, crosswind = wind.along(float(requirements.courses[leg]), altitude)
     if math.hypot(tailwind, crosswind) < CALM_WIND_MPS:
-        return f"{condition} the aircraft can {math.degrees(limit):.1f}° in calm air"
+        return f"{condition} the aircraft can fly at most {math.degrees(limit):.1f}° in calm air"
     calm_limit = requirements.setup.envelope.slope_limits(speed, altitude)[0 if requirements.slopes[leg] >= 0.0 else 1]
     wind_text = f"{abs(tailwind):.0f} m/s {'tailwind' if tailwind > 0.0 else 'headwind'}"
     if abs(crosswind) > abs(tailwind):
         wind_text = f"{abs(crosswind):.0f} m/s crosswind"
-    calm_text = f"{math.degrees(calm_limit):.1f}°" if math.isfinite(calm_limit) else "nothing"
-    return f"{condition} the aircraft can {calm_text} in calm air but {math.degrees(limit):.1f}° in this {wind_text}"
+    calm_text = f"at most {math.degrees(calm_limit):.1f}°" if math.isfinite(calm_limit) else "no slope"
+    return (
+        f"{condition} the aircraft can fly {calm_text} in calm air, but {math.degrees(limit):.1f}° in this {wind_text}"
+    )
 
 
 def _distance_text(metres: float) -> str:
@@ -281,7 +285,7 @@ def _performance_faults(requirements: RouteRequirements, leg: int, measure: Slop
         message(
             f"in {ability.seconds:.0f} s at {_throttle_limit(planned)} throttle the aircraft showed that it can {verb}"
             f" {math.degrees(ability.slope):.1f}° at {speed:.0f} m/s here",
-            f"; the leg asks for {math.degrees(abs(planned)):.1f}°",
+            f"; the leg needs {math.degrees(abs(planned)):.1f}°",
         )
     ]
 

@@ -117,8 +117,9 @@ def _command_text(command: float, commanded: float, slowest: float, fastest: flo
     """Describe a commanded airspeed, equivalent and true, and the range of airspeeds in level flight, m/s."""
     true_speed_text = "" if command == commanded else f" of equivalent airspeed, {commanded:.1f} m/s of true airspeed,"
     if not (math.isfinite(slowest) and math.isfinite(fastest)):
-        return f"{command:.1f} m/s{true_speed_text} commanded, and no level flight is known"
-    return f"{command:.1f} m/s{true_speed_text} commanded of {slowest:.1f} to {fastest:.1f} m/s in level flight"
+        return f"{command:.1f} m/s{true_speed_text} is commanded, and no level flight is known"
+    level_text = f"level flight is possible from {slowest:.1f} to {fastest:.1f} m/s"
+    return f"{command:.1f} m/s{true_speed_text} is commanded; {level_text}"
 
 
 def _flown_command(requirements: RouteRequirements, leg: int) -> float:
@@ -176,8 +177,8 @@ def _uncertainty_text(requirements: RouteRequirements, leg: int, commanded: floa
     altitudes = requirements.points[leg : leg + 2, 2].tolist()
     if commanded <= min(certain_envelope.level_speeds(altitude)[1] for altitude in altitudes):
         return ""
-    limit_text = f"what {envelope.source} says of the fastest level flight is {fastest:.1f} m/s"
-    return f"{commanded:.1f} m/s commanded, and {limit_text} give or take {envelope.fastest_sd:.1f} m/s"
+    limit_text = f"the fastest level flight according to {envelope.source} is {fastest:.1f} m/s"
+    return f"{commanded:.1f} m/s is commanded; {limit_text}, give or take {envelope.fastest_sd:.1f} m/s"
 
 
 def _speed_range_notes(requirements: RouteRequirements, command: float) -> list[str]:
@@ -187,8 +188,8 @@ def _speed_range_notes(requirements: RouteRequirements, command: float) -> list[
     if limits is None or limits.min <= command <= limits.max:
         return []
     range_text = f"{limits.min_name} {limits.min:g} to {limits.max_name} {limits.max:g} m/s"
-    behaviour = "flies the nearest for this one" if limits.nearest else "ignores this one"
-    return [f"{autopilot.title} takes speeds from {range_text}, and {behaviour}"]
+    behaviour = "flies the nearest one instead" if limits.nearest else "ignores this one"
+    return [f"{autopilot.title} accepts speeds from {range_text}, and {behaviour}"]
 
 
 def _short_leg_notes(requirements: RouteRequirements, leg: int, commanded: float) -> list[str]:
@@ -210,7 +211,7 @@ def _short_leg_notes(requirements: RouteRequirements, leg: int, commanded: float
     )
     return [
         f"from {previous_speed:.1f} to {commanded:.1f} m/s takes about {duration:.0f} s and {needed_length:.0f} m,"
-        f" and the leg has {run:.0f} m: about {end_speed:.1f} m/s are reached on it"
+        f" but the leg has {run:.0f} m, so about {end_speed:.1f} m/s are reached"
     ]
 
 
@@ -249,7 +250,7 @@ def _level_speed_range(
     )
     faults = []
     if math.isnan(requirements.ground_speed[leg]):
-        faults.append(message(f"the wind leaves no way along leg {leg} at {commanded:.0f} m/s"))
+        faults.append(message(f"the wind is too strong to hold the course of leg {leg} at {commanded:.0f} m/s"))
     max_altitude = max(altitudes)
     if math.isnan(slowest) or math.isnan(fastest):
         faults.append(message(f"no level flight at {max_altitude:.0f} m"))

@@ -105,8 +105,8 @@ def overlap_text(measure: OverlapMeasure, check: str) -> str:
         )
     if overlap is None:
         return ""
-    text = f"{check} {100.0 * overlap:.0f} % at the least ({where})"
-    return text if required is None else f"{text}, {100.0 * required:.0f} % asked for"
+    text = f"{check} {100.0 * overlap:.0f} % at the lowest ({where})"
+    return text if required is None else f"{text}, {100.0 * required:.0f} % required"
 
 
 def _tight_turnaround_findings(requirements: RouteRequirements, survey: Survey) -> list[Finding]:
@@ -129,9 +129,9 @@ def _tight_turnaround_findings(requirements: RouteRequirements, survey: Survey) 
             end_names = {0: "the turn onto the first line", len(turnarounds) - 1: "the turn off the last line"}
             reason = (
                 f"{end_names.get(number, f'turn-around {number}')} is too tight to be flown as drawn, and within"
-                f" {reach:.0f} m of it {'; '.join(hazards)}: only a flight tells"
+                f" {reach:.0f} m of it {'; '.join(hazards)}: only a flight tells whether it is safe"
             )
-            place, method = requirements.leg(first), "what lies around it"
+            place, method = requirements.leg(first), "its surroundings"
             findings.append(make_finding("survey", place, ok=None, reason=reason, check=UNKNOWN_WAY, method=method))
     return findings
 

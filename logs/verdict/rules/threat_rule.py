@@ -148,7 +148,7 @@ def _sphere_finding(place: Place, plan: _Visit, track: _Visit | None, radius: fl
             "threat",
             place,
             ok=True,
-            reason=f"reported; detection has no limit: {facts}",
+            reason=f"for information only, detection is not limited: {facts}",
             planned=plan.inside,
             flown=flown,
             unit="s",

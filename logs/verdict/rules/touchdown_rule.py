@@ -223,17 +223,17 @@ def _detect_faults(approach: Approach, landing: _Landing) -> list[Message]:
         faults.append(message(brief, ": the aircraft meets it before it flares"))
     if abs(touch[0]) > allowed_distance:
         where = "before" if touch[0] < 0.0 else "beyond"
-        brief = f"touches down {abs(touch[0]):.0f} m {where} the strip's middle"
+        brief = f"touches down {abs(touch[0]):.0f} m {where} the strip's center"
         faults.append(message(brief, f"; {max(0.0, half_length - TOUCHDOWN_ERROR_M):.0f} m are allowed on this strip"))
     if stop[0] > allowed_distance:
         brief = f"comes to rest {half_length - stop[0]:.0f} m before the strip's end"
         if stop[0] > half_length:
             brief = f"runs {stop[0] - half_length:.0f} m beyond the strip's end"
-        faults.append(message(brief, f"; {TOUCHDOWN_ERROR_M:.0f} m are to be left"))
+        faults.append(message(brief, f"; {TOUCHDOWN_ERROR_M:.0f} m must be left"))
     lateral_offset = max(abs(touch[1]), abs(stop[1]))
     if lateral_offset > half_width:
         faults.append(
-            message(f"{lateral_offset:.0f} m beside the strip's middle", f"; it is {2.0 * half_width:.0f} m wide")
+            message(f"{lateral_offset:.0f} m off the strip's center line", f"; it is {2.0 * half_width:.0f} m wide")
         )
     return faults
 
@@ -243,7 +243,9 @@ def _short_strip_messages(approach: Approach) -> list[Message]:
     if approach.strip.length > 2.0 * TOUCHDOWN_ERROR_M:
         return []
     brief = f"the strip is {approach.strip.length:.0f} m long"
-    return [message(brief, f"; a touch-down is known within {TOUCHDOWN_ERROR_M:.0f} m either way, which takes more")]
+    return [
+        message(brief, f"; a touch-down is known only within {TOUCHDOWN_ERROR_M:.0f} m either way, which needs more")
+    ]
 
 
 def _undecided_messages(approach: Approach, landing: _Landing, *, has_gusts: bool) -> list[Message]:
@@ -252,16 +254,18 @@ def _undecided_messages(approach: Approach, landing: _Landing, *, has_gusts: boo
     strip_left = 0.5 * approach.strip.length - max(landing.touch[0], landing.stop[0])
     if has_gusts and strip_left < GUST_TOUCHDOWN_ERROR_M and not messages:
         brief = f"comes down or to rest {strip_left:.0f} m before the strip's end"
-        messages.append(message(brief, f"; in turbulence that is known within {GUST_TOUCHDOWN_ERROR_M:.0f} m"))
+        messages.append(
+            message(brief, f"; in turbulence the place is known only within {GUST_TOUCHDOWN_ERROR_M:.0f} m")
+        )
     if landing.over > LANDING_POINT_ERROR_M:
         brief = f"the landing point of {_landing_point_text(approach)} is {landing.over:.0f} m above the ground"
-        messages.append(message(brief, ": it flares too early, and falls"))
+        messages.append(message(brief, ": the aircraft flares too early, and falls"))
     if landing.room < FINAL_APPROACH_CLEARANCE_M:
         brief = f"the final passes the ground by {landing.room:.1f} m"
         messages.append(message(brief, f", and may be flown {FINAL_APPROACH_CLEARANCE_M:.0f} m lower than simulated"))
     if landing.towards > MAX_TOUCHDOWN_SINK_MPS:
         brief = f"sinks at {landing.towards:.1f} m/s towards the ground at its touch-down"
-        messages.append(message(brief, f"; up to {MAX_TOUCHDOWN_SINK_MPS:g} m/s are known of ArduPlane's landings"))
+        messages.append(message(brief, f"; ArduPlane's landings are known with up to {MAX_TOUCHDOWN_SINK_MPS:g} m/s"))
     return messages
 
 
@@ -270,8 +274,10 @@ def _describe_landing(approach: Approach, landing: _Landing) -> list[str]:
     direction = "before" if landing.along < 0.0 else "beyond"
     notes = [f"touches down {abs(landing.along):.0f} m {direction} the landing point, {abs(landing.aside):.1f} m aside"]
     notes.append(f"comes to rest with {landing.left:.0f} m of the strip left")
-    sink_text = f"sinks at {landing.sink:.1f} m/s, {landing.towards:.1f} m/s towards the ground"
-    notes.append(f"{sink_text}, by a flare that is not judged")
+    sink_text = (
+        f"sinks at {landing.sink:.1f} m/s at touch-down, {landing.towards:.1f} m/s relative to the sloping ground"
+    )
+    notes.append(f"{sink_text}; the flare itself is not judged")
     if math.isfinite(landing.room):
         notes.append(f"the final stays {landing.room:.0f} m above ground or more")
     if approach.tail_wind > 0.1:

@@ -52,7 +52,7 @@ def _finding(
     # A neighbouring turn that needs more than the whole leg is itself at fault: going straight on needs no length.
     limit = max(limit, 0.0)
     if requirements.runs[i - 1 : i + 1].min() < MIN_LEG_LENGTH_M:
-        reason = "a leg beside it goes straight up or down, which has no course to turn from or to"
+        reason = "a neighbouring leg is vertical and has no course, so the turn cannot be judged"
         return make_finding("turn", requirements.waypoint(i), ok=None, reason=reason, unit="deg")
     faults, facts = (
         [],
@@ -63,7 +63,9 @@ def _finding(
         if lateral is None:
             faults.append(_sharp_turn_message(requirements, i, planned, limit, source))
         else:
-            facts.append(f"a negligible kink: the way without it passes it at {lateral:.1f} m and can be flown")
+            facts.append(
+                f"a negligible kink: the path without this waypoint passes it at {lateral:.1f} m and can be flown"
+            )
     facts += _fly_over_notes(requirements, i, planned)
     method, angle, tolerance = "route", None, PLAN_TOLERANCE_RAD
     if measure is not None:
@@ -106,7 +108,7 @@ def _unflown_turn_text(
     Either the flight ended before the turn, or the autopilot skipped a neighbouring leg.
     """
     if measure.corner is not None:
-        return "its legs were not flown in turn"
+        return "its legs were not flown one after the other"
     if aligned is None or int(aligned.track.leg.max()) < i:
         return "the flight did not get past it"
     active_times = [float(np.count_nonzero(aligned.track.leg == leg)) * aligned.tick for leg in (i - 1, i)]
@@ -115,7 +117,7 @@ def _unflown_turn_text(
     radius = reach(requirements, leg + 1).radius
     return (
         f"{requirements.setup.autopilot.title} was on {place_text_within(requirements.leg(leg))} of {run:.0f} m for"
-        f" {active_time:.1f} s, since it counts a waypoint as reached from {radius:.0f} m"
+        f" {active_time:.1f} s, because it counts a waypoint as reached from {radius:.0f} m"
     )
 
 
@@ -130,7 +132,7 @@ def _fly_over_notes(requirements: RouteRequirements, i: int, turn: float) -> lis
     lateral = radius * (1.0 - math.cos(turn))
     return [
         f"flown over, because its arc would pass at {offset:.0f} m and its acceptance is {acceptance:.0f} m;"
-        f" that leads up to {lateral:.0f} m beside the next leg"
+        f" that leads up to {lateral:.0f} m off the next leg"
     ]
 
 
@@ -141,12 +143,12 @@ def _sharp_turn_message(requirements: RouteRequirements, i: int, planned: float,
     speed, bank = float(max(requirements.route.airspeed[i - 1 : i + 1])), math.degrees(requirements.limits.max_bank)
     radius = float(requirements.radius[i])
     if not math.isfinite(radius):
-        return message(f"{turn_text} where the wind leaves no way along a leg at {speed:.0f} m/s")
+        return message(f"{turn_text} where the wind is too strong to hold the course of a leg at {speed:.0f} m/s")
     if requirements.setup.route.arcs[i] > 0.0:
         return message(
             f"circles with radius {radius:.0f} m",
-            f"; at {speed:.0f} m/s and {bank:.0f}° bank the aircraft turns with {requirements.tightest[i]:.0f} m on"
-            " these courses in this wind",
+            f"; at {speed:.0f} m/s and {bank:.0f}° bank the smallest turn radius on these courses"
+            f" in this wind is {requirements.tightest[i]:.0f} m",
         )
     length_text = "no length of leg is enough"
     if requirements.after[i] < MAX_FLY_BY_OFFSET_RADII * radius:

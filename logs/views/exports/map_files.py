@@ -162,7 +162,7 @@ def glide_shapes(setup: FlightSetup, drawn: DrawnReturns) -> list[MapZone]:
         for role in [BAND_ROLES[band.up_to]]
     ]
     flat = footprint.landings()
-    return [*shapes, *([shape("flat ground by the elevation file", "landable", flat)] if flat else [])]
+    return [*shapes, *([shape("flat ground according to the elevation file", "landable", flat)] if flat else [])]
 
 
 def _geographic(setup: FlightSetup, ring: Floats) -> Floats:

@@ -151,7 +151,7 @@ def scenario_facts(setup: FlightSetup) -> Facts:
         lat, lon = geographic(scenario, point)
         facts.append((name, f"{_position(float(lat), float(lon))}, {quantity(float(point[2]), 'm')} AMSL"))
     if terrain is None:
-        facts.append(("Terrain", "none was given; nothing is said about the ground"))
+        facts.append(("Terrain", "none was given, so the ground is not judged"))
     else:
         error = f", stated error {quantity(terrain.vertical_error, 'm')}" if terrain.vertical_error is not None else ""
         facts.append(("Terrain", f"{terrain.source}, every {quantity(terrain.spacing, 'm')}; {terrain.datum}{error}"))

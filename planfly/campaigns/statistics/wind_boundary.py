@@ -199,7 +199,7 @@ class Direction:
         margin: None if its margins are unknown.  Raises ValueError for a wind out of range.
         """
         if not 0.0 <= speed <= self.most:
-            raise ValueError(f"speed: {speed}: 0 to {self.most:g} m/s is expected")
+            raise ValueError(f"speed: {speed}: expected 0 to {self.most:g} m/s")
         self.speeds.append(speed)
         self.draws.append(draw)
         self.failed.append(failed)

@@ -106,7 +106,7 @@ def test_a_name_that_is_not_listed_is_one_line() -> None:
     assert laws[:2] == ["ardupilot", "planfly"]
     expected = " or ".join(f"'{name}'" for name in laws)
     assert str(refused.value) == (
-        f"tight: flight.autopilot: 'ardupilott': {expected} is expected: did you mean 'ardupilot'?"
+        f"tight: flight.autopilot: 'ardupilott': expected {expected}: did you mean 'ardupilot'?"
     )
     assert (refused.value.field, refused.value.value) == ("flight.autopilot", "ardupilott")
 

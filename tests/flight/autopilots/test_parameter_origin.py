@@ -67,11 +67,11 @@ def test_a_file_with_names_of_both_is_neithers() -> None:
 @pytest.mark.parametrize(
     ("text", "autopilot", "says"),
     [
-        ("FW_R_TC 0.3\n", "ardupilot", "written for PX4 (FW_R_TC), and ArduPlane is to fly: --autopilot px4"),
+        ("FW_R_TC 0.3\n", "ardupilot", "written for PX4 (FW_R_TC), but ArduPlane is to fly; --autopilot px4"),
         (
             "TECS_CLMB_MAX 3\n",
             "px4",
-            "written for ArduPilot (TECS_CLMB_MAX), and PX4 is to fly: --autopilot ardupilot",
+            "written for ArduPilot (TECS_CLMB_MAX), but PX4 is to fly; --autopilot ardupilot",
         ),
         (
             "WPNAV_SPEED 500\n",
@@ -95,7 +95,7 @@ def test_a_file_without_a_known_name_is_refused_unless_it_is_the_autopilots_own(
     for text, refused in (("FOO 1\nBAR 2\n", True), ("BATT_CAPACITY 5000\n", False)):
         entries = parse_parameters(text, "a.param")
         if refused:
-            with pytest.raises(ParameterError, match=r"a\.param: FOO, BAR: no name that the simulated ArduPlane knows"):
+            with pytest.raises(ParameterError, match=r"a\.param: FOO, BAR: not known to the simulated ArduPlane"):
                 refuse_unknown(Path("a.param"), "ardupilot", entries, {})
         else:
             refuse_unknown(Path("a.param"), "ardupilot", entries, {})

@@ -190,7 +190,7 @@ def test_a_start_with_little_power_to_spare_is_found() -> None:
     state = again.read()
     assert (state.airspeed, state.amsl) == pytest.approx((16.8433, 2355.4), abs=0.05)
     # Its fastest level flight at this height is 17.6 m/s.
-    with pytest.raises(FlightError, match=r"holds no steady flight at 18\.5 m/s"):
+    with pytest.raises(FlightError, match=r"cannot hold steady flight at 18\.5 m/s"):
         fdm.start(45.0, 0.0, 2355.4, 0.7, 18.5)
 
 

@@ -307,7 +307,7 @@ def test_the_air_and_the_wind_add_up_to_the_course() -> None:
     [(25.0, (-25.1, 0.0, 0.0)), (25.0, (0.0, 25.1, 0.0)), (0.0, (0.0, 0.0, 0.0)), (-5.0, (9, 0, 0))],
 )
 def test_a_wind_that_leaves_no_way_is_refused(airspeed: float, wind: tuple[float, float, float]) -> None:
-    with pytest.raises(FlightError, match=f"no way made along the course of 0 degrees: airspeed {airspeed:.1f} m/s"):
+    with pytest.raises(FlightError, match=f"no progress along the course of 0 degrees: airspeed {airspeed:.1f} m/s"):
         air_velocity(0.0, 0.0, airspeed, np.array(wind))
 
 

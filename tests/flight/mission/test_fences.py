@@ -190,7 +190,7 @@ def test_a_hole_of_an_exclusion_is_closed_and_said() -> None:
     zones = [Zone("ring", "exclusion", make_polygon([SQUARE, HOLE]))]
     assert not inside(zones, 450.0, 450.0)
     assert zone_fences(zones, ORIGIN)[1] == [
-        "a fence has no holes in what it excludes: ring is in the fence without them"
+        "an excluded area of a fence has no holes: ring is in the fence without them"
     ]
 
 
@@ -199,7 +199,7 @@ def test_parts_of_an_exclusion_are_polygons_and_an_inclusion_of_parts_is_left_ou
     assert [inside([Zone("it", "exclusion", both)], *p) for p in ((450.0, 450.0), (2400.0, 100.0))] == [False, False]
     items, notes = zone_fences([Zone("it", "inclusion", both)], ORIGIN)
     assert items == []
-    assert notes == ["every inclusion of a fence counts: it is left out, being of several parts"]
+    assert notes == ["a flight must be inside every inclusion of a fence: it is left out for having several parts"]
 
 
 def test_floors_and_ceilings_are_said() -> None:

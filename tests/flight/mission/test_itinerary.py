@@ -41,8 +41,8 @@ def test_speeds_count_for_the_legs_after_them() -> None:
     ("change", "airspeed", "noted"),
     [
         ("0 22 -1", 22.0, None),
-        ("1 22 -1", 22.0, "DO_CHANGE_SPEED of type 1: flown as airspeed, for no type is read"),
-        ("2 22 80", 22.0, "DO_CHANGE_SPEED of type 2: flown as airspeed, for no type is read"),
+        ("1 22 -1", 22.0, "DO_CHANGE_SPEED of type 1: flown as airspeed, as its type is not read"),
+        ("2 22 80", 22.0, "DO_CHANGE_SPEED of type 2: flown as airspeed, as its type is not read"),
         ("0 0 -1", 25.0, "DO_CHANGE_SPEED to 0 m/s: back to the autopilot's own airspeed"),
         ("0 -1 -1", 25.0, "DO_CHANGE_SPEED to -1 m/s: back to the autopilot's own airspeed"),
         ("0 -2 -1", 25.0, "DO_CHANGE_SPEED to -2 m/s: back to the autopilot's own airspeed"),
@@ -94,7 +94,7 @@ def test_a_gate_changes_the_speed_where_its_plane_cuts_the_leg() -> None:
         (
             (wp(0, 0), wp(0, 900, command=4501), "2 178 0 20 -1 0 0 0 0", wp(0, 1800, command=17, p="0 0 100 0")),
             None,
-            ["item 2: CONDITION_GATE beside what is no waypoint: the speed after it is flown from the leg's begin"],
+            ["item 2: CONDITION_GATE not between waypoints: the speed after it holds from the leg's start"],
         ),
     ],
 )
@@ -112,8 +112,8 @@ def test_gates_that_leave_their_leg_whole(
 def test_what_is_the_cameras_is_not_called_not_flown() -> None:
     items = wp(0, 0), "2 206 25 0 1 0 0 0 0", wp(0, 900), "2 203 0 0 0 0 1 0 0", "2 181 0 1 0 0 0 0 0", wp(0, 1800)
     assert route(*items).notes == (
-        "item 2: DO_SET_CAM_TRIGG_DIST: the camera's, nothing to fly",
-        "item 4: DO_DIGICAM_CONTROL: the camera's, nothing to fly",
+        "item 2: DO_SET_CAM_TRIGG_DIST: for the camera, nothing to fly",
+        "item 4: DO_DIGICAM_CONTROL: for the camera, nothing to fly",
         "item 5: DO_SET_RELAY: not flown",
     )
 
@@ -124,7 +124,7 @@ def test_jumps_are_followed_as_often_as_they_say() -> None:
     assert route(*corners, "2 177 1 0 0 0 0 0 0").items.tolist() == [1, 2, 3]
     endless = route(*corners, "2 177 2 -1 0 0 0 0 0")
     assert endless.items.tolist() == [1, 2, 3, 2, 3]
-    assert endless.notes == ("item 4: DO_JUMP without end: taken once; the flight ends there",)
+    assert endless.notes == ("item 4: DO_JUMP has no end: it is flown once, and the flight ends there",)
     assert (endless.endless, route(*corners, "2 177 2 2 0 0 0 0 0").endless) == (4, -1)
     # What follows a jump without end is never flown.
     beyond = route(*corners, "2 177 2 -1 0 0 0 0 0", wp(0, 0))

@@ -91,7 +91,7 @@ def test_commands_behind_a_spent_jump_run_a_round_early_in_arduplane_and_in_thei
     assert flown.items.tolist() == [1, 2, 3, 4, 2, 3, 4, 2, 3, 4, 8, 9]
     # ArduPilot #30376: at the begin of the last round the jump's counter is used up, and item 7 runs.
     assert flown.airspeed.tolist() == [25.0] * 3 + [22.0] * 3 + [30.0] * 5
-    assert flown.notes == ("item 7: DO_CHANGE_SPEED: run a round early, as ArduPlane does",)
+    assert flown.notes == ("item 7: DO_CHANGE_SPEED: run one loop early, as ArduPlane does",)
     by_px4 = make_route(mission(*items), ORIGIN, None, 25.0, False, rules=RouteRules(reads_as_px4=True))
     assert by_px4.airspeed.tolist() == [25.0] * 3 + [22.0] * 6 + [30.0] * 2
     assert by_px4.notes == ()
@@ -120,7 +120,7 @@ def test_a_tag_leads_to_the_first_item_of_its_number_wherever_the_jump_stands() 
     assert back.items.tolist() == [1, 3, 4, 6, 3, 4, 6, 3, 4, 6]
     endless = route(wp(0, 0), "2 600 4 0 0 0 0 0 0", wp(0, 900), wp(900, 900), "2 601 4 -1 0 0 0 0 0")
     assert endless.items.tolist() == [1, 3, 4, 3, 4]
-    assert "item 5: DO_JUMP_TAG without end: taken once; the flight ends there" in endless.notes
+    assert "item 5: DO_JUMP_TAG has no end: it is flown once, and the flight ends there" in endless.notes
     assert "DO_JUMP_TAG p1 7: the mission has no JUMP_TAG 7" in refusal(wp(0, 0), wp(0, 900), "2 601 7 1 0 0 0 0 0")
     with pytest.raises(MissionError, match="p2 -3"):
         parse_mission("QGC WPL 110\n0 1 0 16 0 0 0 0 36.5 -84.2 300 1\n1 0 2 601 4 -3 0 0 0 0 0 1", "a.waypoints")

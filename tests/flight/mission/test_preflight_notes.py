@@ -66,10 +66,10 @@ def test_a_landing_without_a_strip_tells_its_course_wind_and_ground() -> None:
     """Landed to the east: what rises to the north falls to the right."""
     (said,) = landed_on(sloped(0.03, 0.02), Wind(4.0, math.radians(90.0)))
     assert said == (
-        "item 4: lands on 90°, against 4.0 m/s of wind; over 200 m about its point the ground rises by 3.0% along it, "
-        "and falls by 2.0% to the right; no [landing] states its strip: touch-down and way to rest are not judged"
+        "item 4: lands on 90°, against 4.0 m/s of wind; over 200 m around its point the ground rises by 3.0% along it, "
+        "and falls by 2.0% to the right; no [landing] states its strip, so touch-down and roll-out are not judged"
     )
-    assert "about its point the ground is level; no [landing]" in landed_on(sloped(0.0, 0.0), Wind(0.0, 0.0))[0]
+    assert "around its point the ground is level; no [landing]" in landed_on(sloped(0.0, 0.0), Wind(0.0, 0.0))[0]
     assert (
         "the ground rises by 3.0% along it, and is level to the right"
         in landed_on(sloped(0.03, 0.0), Wind(0.0, 0.0))[0]
@@ -82,7 +82,7 @@ def test_a_landing_without_a_strip_tells_its_course_wind_and_ground() -> None:
 @pytest.mark.parametrize(("east", "north", "told"), [(0.099, 0.0, False), (0.101, 0.0, True), (0.0, -0.101, True)])
 def test_ground_that_no_plan_would_land_on_is_told(east: float, north: float, told: bool) -> None:
     (said,) = landed_on(sloped(east, north), Wind(0.0, 0.0))
-    assert ("(10% is the most that a plan lands on)" in said) is told
+    assert ("(10% is the limit for a plan's landing)" in said) is told
     # It leaves the verdict open, too.
     setup = setup_of(*WAY, home="36.5 -84.2 100")
     setup = replace(setup, scenario=replace(setup.scenario, terrain=sloped(east, north)))

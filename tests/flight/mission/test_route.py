@@ -258,7 +258,7 @@ def test_stops_at_one_position_are_merged() -> None:
 
 
 def test_refusals_name_the_item() -> None:
-    assert "no item with a position" in refusal("2 178 0 25 -1 0 0 0 0")
+    assert "no item has a position" in refusal("2 178 0 25 -1 0 0 0 0")
     assert "1 place to fly to" in refusal(wp(0, 0))
     assert "1 place to fly to" in refusal(wp(0, 0), wp(0, 0))
     assert "item 1: height above terrain (frame 10): no terrain" in refusal(wp(0, 0, frame=10), wp(0, 900))
@@ -280,7 +280,7 @@ def test_null_in_a_plan_keeps_what_is() -> None:
     assert "item 2: NAV_WAYPOINT without a position" in flown.notes[0]
     assert flown.notes[1] == "item 3: NAV_WAYPOINT without an altitude: keeps the last height"
     first[6] = None
-    with pytest.raises(MissionError, match="item 1: no altitude, and none before to keep"):
+    with pytest.raises(MissionError, match="item 1: no altitude, and no earlier item has one to keep"):
         make_route(parse_mission(json.dumps(data), "a.plan"), ORIGIN, None, 25.0, False)
 
 

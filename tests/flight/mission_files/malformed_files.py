@@ -44,7 +44,7 @@ BAD_WPL = {
     "longitude-181": (wpl(at={9: "-180.5"}), ":3: longitude -180.5: allowed -180..180"),
     "swapped": (wpl(at={8: "-112.2", 9: "36.5"}), "latitude and longitude swapped?"),
     "home-latitude": (wpl().replace("\t36.5\t", "\t136.5\t", 1), ":2: latitude 136.5"),
-    "decimal-comma": (wpl(at={10: "12,5"}), ":3: altitude '12,5': a finite number is expected (a decimal comma?)"),
+    "decimal-comma": (wpl(at={10: "12,5"}), ":3: altitude '12,5': expected a finite number (a decimal comma?)"),
     "word": (wpl(at={9: "west"}), ":3: longitude 'west'"),
     "hex": (wpl(at={4: "0x10"}), ":3: p1 '0x10'"),
     "underscore": (wpl(at={10: "1_000"}), ":3: altitude '1_000'"),
@@ -67,7 +67,7 @@ BAD_WPL = {
 
 
 BAD_BYTES = {
-    "nul": (b"QGC WPL 110\n0\t1\0", ":2: a NUL byte"),
+    "nul": (b"QGC WPL 110\n0\t1\0", ":2: contains a NUL byte"),
     "utf-16": ("QGC WPL 110\n".encode("utf-16"), "UTF-16"),
     "latin-1": (b"QGC WPL 110\n# H\xf6he\n", ":2: not a text file in UTF-8"),
     "zip": (b"PK\x03\x04" + bytes(range(256)), "NUL"),
@@ -107,7 +107,7 @@ BAD_PLAN = {
     "nan": (json.dumps(plan_data(params=[0, 0, 0, 0, math.nan, 0, 0])), "NaN is not a number"),
     "overflow": (json.dumps(plan_data()).replace("36.5", "1e999"), "mission.items.0.params.4"),
     "long-integer": (json.dumps(plan_data()).replace("36.5", "9" * 400), "mission.items.0.params.4"),
-    "other-file": (with_key("fileType", "Mission"), 'fileType: "Mission": "Plan" is expected'),
+    "other-file": (with_key("fileType", "Mission"), 'fileType: "Mission": expected "Plan"'),
     "version": (with_key("version", 3), "version: 3"),
     "no-mission": ({"fileType": "Plan", "version": 1}, "mission: Field required"),
     "mission-version": (with_key("mission.version", 1), "mission.version: 1"),

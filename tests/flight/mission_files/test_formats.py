@@ -27,7 +27,7 @@ DIALECTS = {
     "mission_planner.waypoints": (10, 5, []),
     "mission_planner_land.waypoints": (7, 6, []),
     "qgc.waypoints": (11, 5, []),
-    "qgc_amsl.plan": (6, 5, ["item 2: NAV_WAYPOINT has no position", "plannedHomePosition is no position"]),
+    "qgc_amsl.plan": (6, 5, ["item 2: NAV_WAYPOINT has no position", "plannedHomePosition is not a position"]),
     "qgc_takeoff.plan": (11, 7, []),
 }
 

@@ -36,7 +36,7 @@ def test_a_survey_is_its_items(name: str) -> None:
     mission = parse_mission(plan_with(simple(1, 36.4), survey, simple(5, 36.6)), "a.plan")
     assert [item.seq for item in mission.items] == [1, 2, 3, 4, 5]
     assert [item.x for item in mission.items] == [364_000_000, 365_000_000, 365_100_000, 365_200_000, 366_000_000]
-    assert mission.warnings == (f"a.plan: mission.items.1: {name} taken as the 3 simple items that it stands for",)
+    assert mission.warnings == (f"a.plan: mission.items.1: {name} replaced by the 3 simple items that it stands for",)
 
 
 # QGroundControl's custom camera of 6.17 mm by 4.55 mm, 4,000 by 3,000 pixels, behind 4.5 mm.  From 50 m it writes
@@ -214,7 +214,7 @@ def test_a_height_that_is_counted_from_the_terrain_and_not_calculated_is_above_t
     mission = parse_mission(plan_with(simple(1, 36.4), late, done), "a.plan")
     assert [(item.frame, item.alt) for item in mission.items] == [(3, 100.0), (10, 150.0), (0, 100.0)]
     assert mission.warnings == (
-        "a.plan: mission.items.1: its height is not calculated yet: taken as 150 m above the terrain there",
+        "a.plan: mission.items.1: its height is not calculated yet and is taken as 150 m above the terrain there",
     )
 
 

@@ -312,7 +312,7 @@ def test_u_turn_comes_back(make_setup: MakeSetup, aerosonde: Aircraft) -> None:
 def test_a_wind_that_cannot_be_beaten_ends(make_setup: MakeSetup, aerosonde: Aircraft) -> None:
     # 30 m/s from ahead of an aircraft that holds 25.
     setup = make_setup([[0, 0, 500], [0, 1500, 500]], wind=(30.0, 0.0))
-    with pytest.raises(FlightError, match=r"^made: no way made along the course of -?0 degrees") as caught:
+    with pytest.raises(FlightError, match=r"^made: no progress along the course of -?0 degrees") as caught:
         fly_to_end(Flight(setup, aerosonde))
     assert "\n" not in str(caught.value)
 

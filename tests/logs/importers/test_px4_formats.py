@@ -56,7 +56,7 @@ def test_formats_that_grow_are_refused_before_they_do(case: str, tmp_path: Path)
     with pytest.raises(LogError) as caught:
         read_px4(path)
     assert str(caught.value) == (
-        f"{path}: not a PX4 log that can be read: the formats of its messages come to more than {MAX_FIELDS:,} fields"
+        f"{path}: not a readable PX4 log: the formats of its messages have more than {MAX_FIELDS:,} fields"
     )
     assert time.process_time() - started < at_most(3.0)
 

@@ -101,7 +101,7 @@ def test_a_vtols_throttle_is_that_of_the_rotors_that_push(tmp_path: Path) -> Non
     vtol = {"CA_AIRFRAME": 2, "CA_ROTOR_COUNT": 5, "CA_ROTOR4_AX": 1.0, "CA_ROTOR4_AZ": 0.0}
     topics = with_motors((0, 0.2), (1, 0.2), (2, 0.2), (3, 0.2), (4, 0.7))
     assert changed(tmp_path, topics, vtol).controls.values[:, 3] == pytest.approx(0.7)
-    with pytest.raises(LogError, match="CA_ROTOR_COUNT 5 is of rotors none of which pushes ahead") as refused:
+    with pytest.raises(LogError, match="CA_ROTOR_COUNT 5 is of rotors of which none pushes forward") as refused:
         changed(tmp_path, topics, vtol | {"CA_ROTOR4_AX": 0.0, "CA_ROTOR4_AZ": -1.0})
     assert "\n" not in str(refused.value)
 
@@ -142,7 +142,7 @@ def test_parameters_that_are_no_numbers_are_not_there(tmp_path: Path, name: str,
 
 
 def test_a_count_of_surfaces_that_is_no_number_is_none(tmp_path: Path) -> None:
-    with pytest.raises(LogError, match="no surface is the elevator's"):
+    with pytest.raises(LogError, match="no surface controls the elevator"):
         changed(tmp_path, px4_topics(short_motion()), {"CA_SV_CS_COUNT": float("nan")})
 
 
@@ -237,11 +237,11 @@ def test_controls_of_releases_before_1_14_are_read(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("parameters", "said"),
     [
-        ({"CA_AIRFRAME": 2, "CA_ROTOR_COUNT": -1}, "CA_ROTOR_COUNT 0 is of rotors none of which pushes ahead"),
+        ({"CA_AIRFRAME": 2, "CA_ROTOR_COUNT": -1}, "CA_ROTOR_COUNT 0 is of rotors of which none pushes forward"),
         ({"CA_SV_CS2_TYPE": 7}, "CA_SV_CS2_TYPE 7 is a V-tail: its mix is not modelled"),
         ({"CA_SV_CS3_TYPE": 10}, "CA_SV_CS3_TYPE 10 is flap moves in flight"),
-        ({"CA_AIRFRAME": 3}, "CA_AIRFRAME 3 is a tiltrotor: a plane is expected"),
-        ({"CA_SV_CS_COUNT": 2}, "no surface is the elevator's"),
+        ({"CA_AIRFRAME": 3}, "CA_AIRFRAME 3 is a tiltrotor: expected a plane"),
+        ({"CA_SV_CS_COUNT": 2}, "no surface controls the elevator"),
     ],
 )
 def test_mixes_that_are_not_modelled_are_named(tmp_path: Path, parameters: dict[str, float], said: str) -> None:

@@ -178,7 +178,7 @@ def altered(setup: FlightSetup, change: Callable[[dict[str, Any]], None]) -> Att
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        (lambda data: data["route"]["items"].append(3), r"route\.items: 5 values: 4 are expected"),
+        (lambda data: data["route"]["items"].append(3), r"route\.items: 5 values: expected 4"),
         (lambda data: data["route"].update(waypoints_east_north_amsl_m=[[0.0, 0.0, 9.0]]), "waypoints"),
         (lambda data: data["route"].update(waypoints_east_north_amsl_m=[[0.0, 0.0, 9.0]] * 4), "without horizontal"),
         (lambda data: data["envelope"]["climb_rad"].pop(), r"envelope\.climb_rad: shape \[2, 2\]: \[3, 2\]"),

@@ -31,13 +31,13 @@ def test_an_aircraft_that_nobody_named_is_said_to_be_the_default() -> None:
     unnamed = replace(setup.scenario, flight=FlightTable(aircraft_by_default=True))
     line, _ = lines_of(setup.in_scenario(unnamed))
     assert line.startswith("Aircraft: aerosonde, 11 kg, ")
-    assert line.endswith("; nobody named an aircraft, so it is the default (--aircraft names yours)")
+    assert line.endswith("; no aircraft was named, so this is the default (--aircraft names yours)")
     # An option that says nothing of the aircraft names none either.
     line, _ = lines_of(setup.in_scenario(with_flight(unnamed, airspeed_mps=24.0)))
-    assert "nobody named" in line
+    assert "no aircraft was named" in line
     assert "(as stated)" in line
     line, _ = lines_of(setup.in_scenario(with_flight(unnamed, aircraft="aerosonde")))
-    assert "nobody" not in line
+    assert "as this is the default" not in line
 
 
 def test_weather_and_ground() -> None:
@@ -118,7 +118,7 @@ def test_an_imported_flight_is_told_as_far_as_its_log_goes() -> None:
     setup = replace(setup.in_scenario(replace(setup.scenario, flight=FlightTable())), source=source)
     lines = lines_of(setup)
     assert lines[0] == (
-        "Aircraft: nobody named one (--aircraft names yours), so none of its limits are judged;"
+        "Aircraft: not named (--aircraft names yours), so none of its limits are judged;"
         " 25.2 m/s true airspeed (as it was flown)"
     )
     assert "turbulence" not in lines[1]
@@ -160,7 +160,8 @@ def test_a_corridor_that_nobody_stated_says_what_it_is_made_of_and_what_it_is_wi
     assert setup.corridor == 30.0
     default = "Corridor: 30 m to either side of the legs, planfly's default ([limits] corridor_m states one)"
     assert corridor_line(survey) == (
-        f"{default}; it is wider than the 20 m between legs 0 and 2: keeping to it does not show that the lines were"
+        f"{default}; it is wider than the 20 m between legs 0 and 2; staying within it does not show that"
+        " the lines were"
         " flown"
     )
     assert corridor_line(replace(setup, route=replace(setup.route, waypoints=lines(31.0)))) == default

@@ -230,7 +230,7 @@ def test_what_does_not_fit_is_refused_in_a_line(data: bytes, said: str) -> None:
 def test_a_rule_that_there_is_not_is_refused() -> None:
     place = {"kind": "leg", "index": 1, "item": None, "name": ""}
     airframe = {"flyable": False, "headline": "", "failed": [["juggling", place]]}
-    with pytest.raises(LogError, match="'juggling' is no rule"):
+    with pytest.raises(LogError, match="'juggling' is not a rule"):
         parse_reference_flights(changed(airframe=airframe), "a.mcap")
 
 

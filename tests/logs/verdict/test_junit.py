@@ -55,7 +55,7 @@ def test_a_failure_has_the_words_of_the_terminal_and_its_class_those_of_data() -
 
 @pytest.mark.parametrize(("flyable", "failures"), [(True, 0), (False, 1)])
 def test_what_was_not_judged_in_full_is_no_success(flyable: bool, failures: int) -> None:
-    """Nothing failed, but slopes are within what is not known of the aircraft: exit code 3, and no green case."""
+    """Nothing failed, but slopes are too close to the limit to judge: exit code 3, and no green case."""
     text = junit_text({"m": verdict(flyable=flyable, line="not judged in full: slopes")})
     assert len(list(ElementTree.fromstring(text).iter("failure"))) == failures
 

@@ -83,7 +83,7 @@ def test_a_verdict_has_the_levels_that_were_asked(autopilot: FlightSetup) -> Non
         assert verdict.levels[-1].headline == verdict.headline
     three = asked["geometry", "airframe", "autopilot"]
     assert three.lines[-2:] == (
-        "By geometry alone: flyable; flight and geometry agree on every finding that both have",
+        "By geometry only: flyable; flight and geometry agree on every finding that both have",
         "By the airframe (planfly's guidance, exact navigation): flyable; both flights agree",
     )
 
@@ -92,7 +92,8 @@ def test_where_only_the_autopilot_fails_the_second_line_says_so(autopilot: Fligh
     verdict = aside(autopilot, 70.0, ReferenceFlights(PASSED, DECIDING))
     assert verdict.lines[:2] == (
         "not flyable: corridor on leg 1, to item 2 (70 m > 60 m)",
-        "The aircraft can, ArduPlane with these parameters cannot: NAVL1_PERIOD 17 takes it 70 m off leg 1; 14 would"
+        "The aircraft can fly this, but ArduPlane with these parameters cannot: NAVL1_PERIOD 17 takes it"
+        " 70 m off leg 1; 14 would"
         " pass",
     )
     assert [level.flyable for level in verdict.levels] == [True, True, False]
@@ -107,7 +108,7 @@ def test_where_only_the_autopilot_fails_the_second_line_says_so(autopilot: Fligh
     assert written["deciding_parameter"]["name"] == "NAVL1_PERIOD"
     assert written["deciding_parameter"]["text"] == deciding_text(DECIDING)
     undecided = aside(autopilot, 70.0, ReferenceFlights(PASSED))
-    assert undecided.lines[1].endswith("cannot: no single parameter that was tried would pass")
+    assert undecided.lines[1].endswith("cannot: with none of the parameters that were tried would it pass")
 
 
 def test_what_decides_a_real_autopilots_flight_is_what_its_law_shows(autopilot: FlightSetup) -> None:
@@ -153,8 +154,8 @@ def test_words_of_a_deciding_parameter(rule: str, off: float | None, text: str) 
 
 def test_a_flight_that_never_began_fails_its_own_level_and_not_geometry(autopilot: FlightSetup) -> None:
     for setup, name in ((autopilot, "autopilot"), (replace(autopilot, autopilot=PlanflyGuidance()), "airframe")):
-        verdict = judge_flight(setup, fly_path(setup).rows(0, 0), "not started: no way made")
+        verdict = judge_flight(setup, fly_path(setup).rows(0, 0), "not started: no progress")
         assert [(level.name, level.flyable) for level in verdict.levels] == [("geometry", True), (name, False)]
         assert verdict.headline == verdict.levels[-1].headline
-        assert "not started: no way made" in verdict.headline
-        assert verdict.lines[-1] == "By geometry alone: flyable"
+        assert "not started: no progress" in verdict.headline
+        assert verdict.lines[-1] == "By geometry only: flyable"

@@ -81,7 +81,7 @@ def test_where_the_levels_disagree_both_are_named() -> None:
     assert not verdict.flyable
     assert [level.flyable for level in verdict.levels] == [True, False]
     assert Disagreement("corridor", leg(0), "geometry", there=True, here=False) in verdict.levels[0].disagreements
-    assert "By geometry alone: flyable" in verdict.summary
+    assert "By geometry only: flyable" in verdict.summary
 
 
 # ----------------------------------------------------------------------

@@ -97,12 +97,12 @@ def test_who_flew_is_said_with_the_parameters_that_decide_most() -> None:
     assert any("with the parameters of mine.parm (WP_RADIUS 50 m" in line for line in lines)
     known = len(mine.values) - 1
     assert (
-        f"Parameters: 1 of the file, 0 of the aircraft, {known} ArduPlane's defaults;"
+        f"Parameters: 1 from the file, 0 from the aircraft, {known} from ArduPlane's defaults;"
         " not used: FOO0, FOO1, FOO2, FOO3, +2 more"
     ) in lines
     returns = ArduPilotParameters.of_text("RTL_AUTOLAND 1\nTERRAIN_FOLLOW 1\n", "mine.parm")
     lines = lines_by(returns)
-    assert any(line.endswith("defaults; read, not flown: TERRAIN_FOLLOW") for line in lines)
+    assert any(line.endswith("defaults; read but not simulated: TERRAIN_FOLLOW") for line in lines)
 
 
 def test_what_px4_has_no_parameter_for_is_not_used() -> None:

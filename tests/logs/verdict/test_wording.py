@@ -115,7 +115,7 @@ def test_places(place: Place, text: str) -> None:
     ("change", "text"),
     [
         (LONGER, "make leg 1 300 m long instead of 150 m"),
-        (Change("length", leg(1), 0.2, 300.0, "m"), "make leg 1 300 m long; it goes nowhere now"),
+        (Change("length", leg(1), 0.2, 300.0, "m"), "make leg 1 300 m long; it has no length now"),
         (Change("rise", leg(2), 60.0, 44.0, "m"), "climb 44 m on leg 2 instead of 60 m"),
         (Change("rise", leg(2), -60.0, -44.0, "m"), "fall 44 m on leg 2 instead of 60 m"),
         (Change("rise", leg(2), None, -0.0, "m"), "fall 0 m on leg 2"),

@@ -73,7 +73,7 @@ CASES: dict[str, tuple[Callable[[], object], _Known]] = {
     ),
     "a .plan": (
         lambda: planfly.check(_file("a.plan", '{"fileType": "Fence"}')),
-        _Known("a.plan", "fileType", "Fence", '"Plan" is expected'),
+        _Known("a.plan", "fileType", "Fence", 'expected "Plan"'),
     ),
     "a complex item of a .plan": (
         lambda: planfly.check(
@@ -98,7 +98,7 @@ CASES: dict[str, tuple[Callable[[], object], _Known]] = {
     ),
     "a spread": (
         lambda: _spread('[mass]\ndistribution = "norm"\nloc = "one"\nsource = "a guess"'),
-        _Known("a.toml", "mass.loc", "one", "a finite number is expected"),
+        _Known("a.toml", "mass.loc", "one", "expected a finite number"),
     ),
     "a spread's distribution": (
         lambda: _spread('[mass]\ndistribution = "gauss"\nsource = "a guess"'),

@@ -110,7 +110,7 @@ def test_a_plan_for_px4_without_a_landing_is_exported_with_a_word(path: planfly.
 def test_bad_exports_write_nothing(path: planfly.Plan, tmp_path: Path) -> None:
     with pytest.raises(planfly.MissionError, match="suffix"):
         planfly.export(path, tmp_path / "a.waypoints", tmp_path / "a.doc")
-    with pytest.raises(planfly.PlanflyError, match="one at least"):
+    with pytest.raises(planfly.PlanflyError, match="expected at least one file"):
         planfly.export(path)
     assert list(tmp_path.iterdir()) == []
     planfly.export(path, tmp_path / "a.plan")

@@ -20,12 +20,12 @@ def test_addresses_are_split_and_normalised(to: str | list[str]) -> None:
 @pytest.mark.parametrize(
     ("given", "message"),
     [
-        ((STATION, "127.0.0.1"), "bind 127.0.0.1: IP:PORT is expected"),
-        ((STATION, "127.0.0.1:65536"), "bind 127.0.0.1:65536: IP:PORT is expected"),
-        ((f"{STATION},", VEHICLE), "to : IP:PORT is expected"),
-        (("14550", VEHICLE), "to 14550: IP:PORT is expected, such as 127.0.0.1:14550"),
-        (("localhost:14550", VEHICLE), "to localhost: an IP address is expected"),
-        ((STATION, VEHICLE, "me"), "allow me: an IP address is expected"),
+        ((STATION, "127.0.0.1"), "bind 127.0.0.1: expected IP:PORT"),
+        ((STATION, "127.0.0.1:65536"), "bind 127.0.0.1:65536: expected IP:PORT"),
+        ((f"{STATION},", VEHICLE), "to : expected IP:PORT"),
+        (("14550", VEHICLE), "to 14550: expected IP:PORT, such as 127.0.0.1:14550"),
+        (("localhost:14550", VEHICLE), "to localhost: expected an IP address"),
+        ((STATION, VEHICLE, "me"), "allow me: expected an IP address"),
         # The link's own rule: nobody beyond this machine without a key or a list.
         ((STATION, "0.0.0.0:14580"), "bind 0.0.0.0:14580: beyond this machine"),
     ],

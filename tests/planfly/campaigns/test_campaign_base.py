@@ -194,11 +194,11 @@ def test_a_file_without_draws_flies_the_folders_or_leaves_slopes_open(sheet: Pat
     ("text", "told"),
     [
         ('[aircraft]\ndraws = "none.csv"', "none.csv: cannot be read"),
-        ("[aircraft]\ndraws = 3", "aircraft.draws: a file of draws is expected"),
-        ("[aircraft]\n", "aircraft.draws: a file of draws is expected"),
+        ("[aircraft]\ndraws = 3", "aircraft.draws: expected a file of draws"),
+        ("[aircraft]\n", "aircraft.draws: expected a file of draws"),
         (
             '[aircraft]\ndraws = "foam/draws.csv"\n[drag]\ndistribution = "norm"\nloc = 1\nscale = 0.1\nsource = "x"',
-            "drag: goes without [aircraft] draws",
+            "drag: cannot be combined with [aircraft] draws",
         ),
         ('[aircraft]\ndraws = "other.csv"', "other.csv: draws of another aircraft: "),
     ],

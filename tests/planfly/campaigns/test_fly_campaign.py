@@ -123,7 +123,7 @@ def test_the_table_is_the_same_for_any_workers_and_after_a_stop(base: CampaignBa
 
 
 def test_a_campaign_that_is_gone_on_with_keeps_its_goal(base: CampaignBase, tmp_path: Path) -> None:
-    with pytest.raises(StoreError, match="no campaign there to go on with"):
+    with pytest.raises(StoreError, match="no campaign there to continue"):
         resumed_goal(None, tmp_path)
     asked = Goal(0.9, False, 40, 0.8)
     with open_store(base, asked, tmp_path, resume=False):

@@ -54,7 +54,7 @@ def test_files_are_written_and_cleared_and_no_others(
 def test_a_flight_that_comes_out_otherwise_is_told(base: CampaignBase, tmp_path: Path) -> None:
     row = fly_one(base, 1)
     fly_row_again(base, row, tmp_path / "a.mcap")
-    with pytest.raises(PlanflyError, match="comes out otherwise"):
+    with pytest.raises(PlanflyError, match="has a different outcome"):
         fly_row_again(base, made_flight(base, 1), tmp_path / "a.mcap")
 
 
@@ -65,7 +65,7 @@ def asked(folder: Path, *, resume: bool = False, overwrite: bool = False) -> Out
 @pytest.mark.parametrize(
     ("lies_there", "words"),
     [
-        (DATABASE, "holds a campaign; resume=True goes on with it, overwrite=True replaces it"),
+        (DATABASE, "holds a campaign; resume=True continues it, overwrite=True replaces it"),
         ("winds.sqlite", "holds another campaign; overwrite=True replaces it"),
         ("mine.txt", "exists and is not empty; overwrite=True replaces its results"),
     ],
@@ -92,7 +92,7 @@ def test_a_mission_that_cannot_be_opened_leaves_what_lies_there(tmp_path: Path) 
 
 
 def test_only_a_campaign_is_gone_on_with_and_by_its_own_plan(base: CampaignBase, tmp_path: Path) -> None:
-    with pytest.raises(PlanflyError, match=r"campaign.sqlite: no campaign there to go on with"):
+    with pytest.raises(PlanflyError, match=r"campaign.sqlite: no campaign there to continue"):
         asked(tmp_path, resume=True).open(lambda _: base)
     (tmp_path / DATABASE).write_bytes(b"")
     planned: list[Path | None] = []
@@ -104,7 +104,7 @@ def test_only_a_campaign_is_gone_on_with_and_by_its_own_plan(base: CampaignBase,
     asked(tmp_path, resume=True).open(noted)
     assert planned == [tmp_path / "plan.json"]
     assert (tmp_path / DATABASE).exists()
-    with pytest.raises(PlanflyError, match="is a file; a folder is expected"):
+    with pytest.raises(PlanflyError, match="is a file; expected a folder"):
         asked(tmp_path / DATABASE).open(lambda _: base)
 
 
@@ -206,7 +206,7 @@ def test_the_summary_comes_back_and_no_process_stays(base: CampaignBase, tmp_pat
         estimate = Estimator(GOAL).estimate(store.tally())
     children = multiprocessing.active_children()
     # The made flights come out otherwise when they are flown: the error of the other process is this one's.
-    with pytest.raises(Exception, match="flight 0 comes out otherwise"):
+    with pytest.raises(Exception, match="flight 0 has a different outcome"):
         finish_campaign(base, GOAL, estimate, tmp_path, "planfly campaign x")
     assert multiprocessing.active_children() == children
     with open_store(base, GOAL, tmp_path, resume=True) as store, pytest.raises(StoreError, match="held by another"):

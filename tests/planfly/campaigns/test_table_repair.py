@@ -212,8 +212,8 @@ def test_what_is_damaged_is_named_and_flown_again(base: CampaignBase, tmp_path: 
     with send_progress_to(Receiver(lambda *_: pytest.fail("no stage"), told.append)):
         store = open_store(base, goal, tmp_path / "one", resume=True)
     assert told == [
-        f"{path}: flights 3, 7, 8 are damaged and were taken out: 9 flights are whole and stay;"
-        " --resume flies what is missing"
+        f"{path}: flights 3, 7, 8 are damaged and were taken out: 9 flights are intact and stay;"
+        " --resume flies the missing ones"
     ]
     with store:
         assert store.tally().flown == 9
@@ -235,14 +235,14 @@ def test_a_checksum_is_of_values_as_sqlite_gives_them_back() -> None:
 
 
 def test_many_damaged_flights_are_counted() -> None:
-    assert Examined([3], [], sound=False).text().startswith("is damaged: 1 flights are whole")
+    assert Examined([3], [], sound=False).text().startswith("is damaged: 1 flights are intact")
     assert (
         Examined([0, 2], [1], sound=False, after=2)
         .text()
         .startswith(
-            "flight 1 is damaged and was taken out, and any after flight 2 were lost: 2 flights are whole and stay;"
+            "flight 1 is damaged and was taken out, and any after flight 2 were lost: 2 flights are intact and stay;"
         )
     )
     found = Examined([], [], sound=False, after=-1).text()
-    assert found.startswith("is damaged, and no flight is found: 0 flights are whole and stay;")
+    assert found.startswith("is damaged, and no flight is found: 0 flights are intact and stay;")
     assert Examined([], list(range(20))).text().startswith("flights 0, 1, 2, 3, 4, 5, 6, 7 and 12 more are damaged")

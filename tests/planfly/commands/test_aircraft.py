@@ -82,7 +82,7 @@ def test_a_model_that_cannot_be_loaded_is_refused_with_jsbsims_reason(capsys: py
         assert reason in said
     Path("mine/mine.toml").unlink()
     assert main(["aircraft", "./mine"]) == 2
-    assert "planfly aircraft --new FOLDER makes one" in capsys.readouterr().err
+    assert "planfly aircraft --new FOLDER makes a folder" in capsys.readouterr().err
 
 
 def test_a_new_aircraft_replaces_another_one_only_with_overwrite(capsys: pytest.CaptureFixture[str]) -> None:
@@ -152,8 +152,8 @@ def test_braking_is_steeper(capsys: pytest.CaptureFixture[str]) -> None:
         (["full"], "did you mean './full'?"),
         (["--new", "./full"], "full: exists; --overwrite replaces it, or name another folder"),
         (["--new", "./mine", "--from", "zeppelin"], "no aircraft called 'zeppelin'"),
-        (["mine", "--new", "./mine"], "--new takes the folder alone"),
-        (["--from", "aerosonde"], "--from: goes with --new"),
+        (["mine", "--new", "./mine"], "--new takes only the folder"),
+        (["--from", "aerosonde"], "--from: only with --new"),
     ],
 )
 def test_a_bad_name_or_folder_is_one_line(
@@ -196,7 +196,7 @@ def test_arduplane_flies_the_cessna_at_equivalent_airspeeds() -> None:
 @pytest.mark.usefixtures("undrawn")
 def test_a_new_folder_flies_as_the_aircraft_that_it_was_made_from(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["aircraft", "--new", "./mine", "--from", "aerosonde"]) == 0
-    assert "next      planfly aircraft ./mine" in capsys.readouterr().out
+    assert "next      `planfly aircraft ./mine` shows it" in capsys.readouterr().out
     assert main(["aircraft", "./mine"]) == 0
     shown = capsys.readouterr()
     assert "mass     11 kg" in shown.out
@@ -281,16 +281,16 @@ def test_a_data_sheet_makes_a_folder_that_is_described(
         (("--mass", "2.1"), "--span: a data sheet needs it: 0.5..6 m"),
         ((*SIX, "--mass", "60"), "--mass 60.0 kg: allowed 0.5..25 kg"),
         ((*SIX, "--stall", "14"), "--stall 14 m/s: allowed 5.25..13.05 m/s at a cruise speed of 15 m/s"),
-        ((*SIX, "--battery", "12"), "--battery 12: volts and capacity are expected, such as 14.8V,5Ah"),
+        ((*SIX, "--battery", "12"), "--battery 12: expected volts and capacity, such as 14.8V,5Ah"),
         # 300 Wh a kilogram of 2.1 kg.
         ((*SIX, "--battery", "14.8V,631Wh"), "--battery 631 Wh: allowed up to 630 Wh with a mass of 2.1 kg, 300 Wh/kg"),
-        ((*SIX, "--prop", "12"), "--prop 12: inches of diameter and pitch are expected, such as 12x6"),
-        ((*SIX, "--from", "c172x"), "--from c172x: goes without mass"),
+        ((*SIX, "--prop", "12"), "--prop 12: expected inches of diameter and pitch, such as 12x6"),
+        ((*SIX, "--from", "c172x"), "--from c172x: cannot be combined with mass"),
         # Given as nothing is given all the same.
-        (("--from", "c172x", "--mass", "0"), "--from c172x: goes without mass"),
-        (("--from", "c172x", "--prop", ""), "--from c172x: goes without prop"),
+        (("--from", "c172x", "--mass", "0"), "--from c172x: cannot be combined with mass"),
+        (("--from", "c172x", "--prop", ""), "--from c172x: cannot be combined with prop"),
         ((*SIX, "--fuel", "0"), "--fuel 0.0 kg: allowed 0.05..12 kg"),
-        (("--battery", ""), "--battery : volts and capacity are expected"),
+        (("--battery", ""), "--battery : expected volts and capacity"),
         ((*SIX, "--params", ""), "cannot be read"),
         ((*SIX, "--params", "none.parm"), "none.parm: cannot be read"),
         ((*SIX, "--climb", "nan"), "--climb nan degrees: allowed 2..35 degrees"),
@@ -307,7 +307,7 @@ def test_a_bad_data_sheet_is_one_line(argv: tuple[str, ...], told: str, capsys: 
 
 def test_a_data_sheet_needs_a_folder(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["aircraft", *SIX]) == 2
-    assert "--mass: goes with --new FOLDER" in capsys.readouterr().err
+    assert "--mass: only with --new FOLDER" in capsys.readouterr().err
 
 
 def test_an_aircraft_that_holds_no_level_flight_is_refused(
@@ -321,5 +321,5 @@ def test_an_aircraft_that_holds_no_level_flight_is_refused(
     )
     assert main(["aircraft", "aerosonde", "--out", str(tmp_path / "a")]) == 2
     line = capsys.readouterr().err.splitlines()[-1]
-    assert line == "planfly: aerosonde holds no level flight at any airspeed, from 0 to 9000 m above sea level"
+    assert line == "planfly: aerosonde cannot hold level flight at any airspeed, from 0 to 9000 m above sea level"
     assert not (tmp_path / "a").exists()

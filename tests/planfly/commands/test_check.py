@@ -32,7 +32,7 @@ def test_a_climb_on_the_spot_is_judged_and_not_flyable(
     rise, angle = abs(up - 200), "89.9" if up == 210.5 else "90.0"
     assert abs(failed[0]["planned"]) == pytest.approx(float(angle), abs=0.1)
     assert f"leg 1 {verb} {rise:g} m on the spot, {angle}°; at 2" in failed[0]["reason"]
-    assert "m long; it goes nowhere now" in failed[0]["suggestion"]
+    assert "m long; it has no length now" in failed[0]["suggestion"]
     assert main(["fly", str(mission), "--log", str(tmp_path / "flight.mcap")]) == 4
     assert "on the spot" in capsys.readouterr().out
 
@@ -226,7 +226,7 @@ def test_several_autopilots_are_told_in_one_table(tmp_path: Path, capsys: pytest
     assert any(line.split()[0] == "mission" and line.endswith("failed") for line in said)
     assert said[-8].startswith("ardupilot: flyable")
     assert said[-7].startswith(
-        "  Aircraft: aerosonde, 11 kg, 25 m/s equivalent airspeed (its cruise speed); nobody named"
+        "  Aircraft: aerosonde, 11 kg, 25 m/s equivalent airspeed (its cruise speed); no aircraft was named"
     )
     assert said[-5].startswith("  Flown by: the simulated ArduPlane 4.6 with its default parameters")
     assert any("px4: not flyable: mission" in line for line in said[-5:])
@@ -255,4 +255,4 @@ def test_an_autopilot_that_is_none_is_refused(capsys: pytest.CaptureFixture[str]
     with pytest.raises(SystemExit) as ended:
         main(["check", "up.waypoints", "--for", "ardupilot,px5"])
     assert ended.value.code == 2
-    assert "argument --for: 'px5': ardupilot, px4, px4-1.16, px4-1.17, planfly is expected" in capsys.readouterr().err
+    assert "argument --for: 'px5': expected ardupilot, px4, px4-1.16, px4-1.17, planfly" in capsys.readouterr().err

@@ -90,7 +90,7 @@ FAULTS = [
     ("panic", 2, "panicked: Failed to load defaults"),
     ("refuses", 2, "refused the mission at item 2 (NAV_WAYPOINT): MAV_MISSION_UNSUPPORTED"),
     ("crash-in-air", 1, "ended with exit code 1"),
-    ("reboot", 1, "began anew in the air: frame 1 after frame"),
+    ("reboot", 1, "restarted in the air: frame 1 after frame"),
 ]
 
 

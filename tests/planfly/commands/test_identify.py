@@ -102,15 +102,21 @@ def test_a_log_becomes_a_folder_that_flies(
         (["--identify", "a.BIN", "--span", "2.9", "--out", "./mine"], "--identify needs --mass"),
         (["--identify", "a.BIN", "--mass", "13", "--span", "2.9"], "--identify needs --out, the folder to make"),
         (["--identify", "no.BIN", *ARGUMENTS, "--out", "./mine"], "no.BIN: no such file"),
-        (["--identify", "a.BIN", *ARGUMENTS, "--cruise", "20", "--out", "./mine"], "goes without --cruise"),
-        (["--identify", "a.BIN", *ARGUMENTS, "--params", "a.parm", "--out", "./mine"], "goes without --params"),
+        (["--identify", "a.BIN", *ARGUMENTS, "--cruise", "20", "--out", "./mine"], "cannot be combined with --cruise"),
+        (
+            ["--identify", "a.BIN", *ARGUMENTS, "--params", "a.parm", "--out", "./mine"],
+            "cannot be combined with --params",
+        ),
         (["--identify", "a.BIN", *ARGUMENTS, "--from", "x8", "--out", "./mine"], "--base names the aircraft"),
-        (["--identify", "a.BIN", *ARGUMENTS, "--motor-braking", "--out", "./mine"], "goes without --motor-braking"),
+        (
+            ["--identify", "a.BIN", *ARGUMENTS, "--motor-braking", "--out", "./mine"],
+            "cannot be combined with --motor-braking",
+        ),
         (["--identify", "a.BIN", "--mass", "2", "--span", "2.9", "--out", "./mine"], "near enough to aerosonde"),
         (["--identify", "a.BIN", "--mass", "99", "--span", "2.9", "--out", "./mine"], "allowed 0.3..50 kg"),
         (["--identify", "a.BIN", *ARGUMENTS, "--battery", "12", "--out", "./mine"], "volts and capacity"),
         (["--identify", "a.BIN", *ARGUMENTS, "--out", "./mine"], "0.0 min of it are flight on the wing"),
-        (["aerosonde", "--check", "a.BIN"], "goes with --identify"),
+        (["aerosonde", "--check", "a.BIN"], "only with --identify"),
     ],
 )
 def test_bad_input_is_one_line_and_leaves_nothing(
@@ -148,7 +154,7 @@ def test_the_same_log_twice_is_refused(again: list[str], capsys: pytest.CaptureF
     write_motion(Path("a.BIN"), short_motion())
     shutil.copy("a.BIN", "b.BIN")
     said = refused([*again, *ARGUMENTS, "--out", "./mine"], capsys)
-    assert "b.BIN: the same bytes as a.BIN: each log is expected once" in said
+    assert "b.BIN: the same bytes as a.BIN: name each log once" in said
 
 
 def test_logs_without_current_among_others_are_named() -> None:

@@ -76,7 +76,7 @@ def test_the_same_log_gives_the_same_bytes(tmp_path: Path) -> None:
 def test_a_track_alone_needs_a_plan(tmp_path: Path, capsys: Output) -> None:
     log = kml(tmp_path / "a.kml")
     assert main(["check", str(log)]) == 2
-    said = "holds no mission: --plan names the one that was to be flown"
+    said = "holds no mission; --plan names the one that was to be flown"
     assert capsys.readouterr().err == f"planfly: {log}: {said}\n"
 
 
@@ -114,14 +114,14 @@ def test_the_wrong_place_and_the_wrong_order_are_told_in_a_line(tmp_path: Path, 
     assert main(["check", str(log), "--plan", str(wrong_order)]) == 2
     error = capsys.readouterr().err
     assert (
-        error == f"planfly: {log}: not flown by {wrong_order}: another order: the flight passed its items in the order"
+        error == f"planfly: {log}: not a flight of {wrong_order}; the order differs: the flight passed the items as"
         " 3, 2, 1, ...\n"
     )
     elsewhere = tmp_path / "place.waypoints"
     elsewhere.write_text(plan.read_text().replace("46.", "47."))
     assert main(["check", str(log), "--plan", str(elsewhere)]) == 2
     error = capsys.readouterr().err
-    assert "another place: the flight comes no nearer than 110" in error
+    assert "the mission lies elsewhere: the flight never comes within 110" in error
     assert error.count("\n") == 1
 
 
@@ -251,7 +251,7 @@ def test_options_that_do_not_go_together_are_refused(tmp_path: Path, capsys: Out
     assert main(["check", str(log), "--guidance", "l1"]) == 2
     assert "--guidance: an imported flight is judged by the autopilot" in capsys.readouterr().err
     assert main(["check", str(example_plan(tmp_path)), "--flight", "1"]) == 2
-    assert "--flight: goes with an imported log" in capsys.readouterr().err
+    assert "--flight: only with an imported log" in capsys.readouterr().err
     assert main(["import", str(log), str(log)]) == 2
     assert "is the input itself" in capsys.readouterr().err
 
@@ -324,5 +324,5 @@ def test_a_flight_of_planflys_own_is_refused(tmp_path: Path, capsys: Output) -> 
 def test_another_programs_log_is_to_be_imported_first(command: str, tmp_path: Path, capsys: Output) -> None:
     log = dataflash(tmp_path / "a.BIN")
     assert main([command, str(log)]) == 2
-    way = f"`planfly import {log}` makes the flight log that is expected"
-    assert capsys.readouterr().err == f"planfly: {log}: another program's log: {way}\n"
+    way = f"`planfly import {log}` converts it to a flight log"
+    assert capsys.readouterr().err == f"planfly: {log}: a log of another program; {way}\n"

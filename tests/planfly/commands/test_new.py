@@ -84,7 +84,7 @@ def test_every_example_may_be_switched_on(law: str, here: Path) -> None:
 def test_without_ground_it_says_so(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["new", "cape", "--from", "-33.9,18.4", "--to=-33.95,18.6"]) == 0
     out = capsys.readouterr().out
-    assert "ground    flat, at mean sea level: nobody named an elevation file (--terrain DEM)" in out
+    assert "ground    flat, at mean sea level: no elevation file was named (--terrain DEM)" in out
 
 
 def test_across_the_date_line() -> None:
@@ -116,10 +116,10 @@ def test_where_there_is_no_way_it_says_why_and_leaves_the_file(here: Path, capsy
 @pytest.mark.parametrize(
     ("more", "said"),
     [
-        (["--from", "46,8", "--to", "49,8"], "planfly: --to 49,8, 334 km away: 100 m to 300 km from --from"),
-        (["--from", "91,8", "--to", "46,8"], "argument --from: '91,8': LAT,LON is expected: degrees north"),
-        (["--from", "46", "--to", "46,8"], "argument --from: '46': LAT,LON is expected"),
-        (["--from", "46,8", "--to", "46,8"], "--to 46,8, 0 km away: 100 m to 300 km from --from are expected"),
+        (["--from", "46,8", "--to", "49,8"], "planfly: --to 49,8, 334 km away: expected 100 m to 300 km from --from"),
+        (["--from", "91,8", "--to", "46,8"], "argument --from: '91,8': expected LAT,LON: degrees north"),
+        (["--from", "46", "--to", "46,8"], "argument --from: '46': expected LAT,LON"),
+        (["--from", "46,8", "--to", "46,8"], "--to 46,8, 0 km away: expected 100 m to 300 km from --from"),
         (["--from", "46,8"], "the following arguments are required: --to"),
         (["--from", "46,8", "--to", "46,8.1", "--height", "0"], "argument --height: '0': m above ground"),
         (["--from", "46,8", "--to", "46,8.1", "--aircraft", "x9"], "x9"),
@@ -164,7 +164,7 @@ def test_names_and_places_that_are_none_are_told_in_python_too(here: Path) -> No
     for name in ("a\x7fb", "a\nb", "x" * 101, "caf\udce9"):
         with pytest.raises(planfly.PlanflyError, match="a folder with a name of 1 to 100 printable characters"):
             planfly.new_scenario(name, (46.0, 8.0), (46.0, 8.1))
-    with pytest.raises(planfly.PlanflyError, match=r"^destination .*: a way that stays within 89 degrees of latitude"):
+    with pytest.raises(planfly.PlanflyError, match=r"^destination .*: the scenario must lie within 89° of latitude"):
         planfly.new_scenario("pole", (88.9, 0.0), (88.95, 170.0))
     assert list(here.iterdir()) == []
     file = planfly.new_scenario("b q'u é", (46.0, 8.0), (46.0, 8.1))
@@ -181,8 +181,8 @@ def test_what_lies_there_stays(here: Path, capsys: pytest.CaptureFixture[str]) -
     assert (here / "site" / "notes.txt").read_text(encoding="ascii") == "mine"
     for folder, said in (
         ("site", "site/site.toml: exists; --overwrite replaces it"),
-        ("site/notes.txt", "site/notes.txt: a folder is expected"),
-        ("my.toml", "my.toml: a folder is expected"),
+        ("site/notes.txt", "site/notes.txt: expected a folder"),
+        ("my.toml", "my.toml: expected a folder"),
         ("no/site", "no/site: its folder no does not exist"),
     ):
         assert main(["new", folder, *ends]) == 2

@@ -44,7 +44,7 @@ def test_a_front_without_choices_says_so(tmp_path: Path, capsys: pytest.CaptureF
     text = capsys.readouterr().out
     assert text.startswith("front of 1 safe plan\n")
     assert (
-        "  note    1 of the 10 asked for: no other that was found gains more than 0.1% in length or energy, 1% in "
+        "  note    1 of the 10 requested: no other that was found gains more than 0.1% in length or energy, 1% in "
         "exposure or 1 m in height\n"
     ) in text
     assert [file.name for file in folder.glob("plan-*")] == ["plan-1.json"]
@@ -56,10 +56,10 @@ def test_a_front_without_choices_says_so(tmp_path: Path, capsys: pytest.CaptureF
 @pytest.mark.parametrize(
     ("options", "line"),
     [
-        (["--front", "1"], "argument --front: '1': a whole number of plans, 2 to 100, is expected"),
-        (["--front", "101"], "argument --front: '101': a whole number of plans, 2 to 100, is expected"),
+        (["--front", "1"], "argument --front: '1': expected a whole number of plans, 2 to 100"),
+        (["--front", "101"], "argument --front: '101': expected a whole number of plans, 2 to 100"),
         (["--front", "5", "--algorithm", "umda"], "--algorithm umda: not with --front N"),
-        (["--front", "5", "--budget", "900"], "--budget 900: with --front N a number of seconds is expected"),
+        (["--front", "5", "--budget", "900"], "--budget 900: with --front N: expected a number of seconds"),
     ],
 )
 def test_what_does_not_go_with_a_front_is_refused_in_a_line(

@@ -48,8 +48,8 @@ def test_a_mission_and_its_log_say_the_same(hill: Path, log: bytes, capsys: pyte
     assert answer["conditions"]["aircraft"] == "aerosonde"
     assert answer["ranges"][0]["kind"] == "ground"
     assert "engine out: of 13 places home can be reached from" in out
-    assert "point of no return: none, for every return leaves the reserve of" in out
-    assert "it knows no trees, houses or water" in out
+    assert "point of no return: none, as every return leaves the reserve of" in out
+    assert "which knows no trees, houses or water" in out
     glides = answer["engine_out"]
     assert sum(glides[kind] for kind in ("home", "site", "flat", "nothing", "unknown")) == 13
     assert sum(one["count"] for one in glides["ranges"]) == 13
@@ -123,7 +123,7 @@ def test_returns_that_follow_the_terrain_end_with_3(hill: Path, capsys: pytest.C
     asked = ["returns", "hill.waypoints", "--scenario", "hill.toml", "--every", "40", "--params", "mine.parm"]
     assert main([*asked, "--suggest"]) == 3
     out = capsys.readouterr().out
-    assert out.startswith("returns   not judged: TERRAIN_FOLLOW has returns follow the terrain")
+    assert out.startswith("returns   not judged: with TERRAIN_FOLLOW returns follow the terrain")
     assert "safe" not in out
     assert "ArduPlane's own return, which would follow the terrain, is not flown" in out
 
@@ -149,8 +149,8 @@ def test_by_px4s_law_returns_are_not_judged(hill: Path, capsys: pytest.CaptureFi
     ("words", "said"),
     [
         (["none.waypoints"], "none.waypoints"),
-        (["hill.waypoints", "--flight", "2"], "goes with an imported log"),
-        (["homeless.plan"], "home: none is stated"),
+        (["hill.waypoints", "--flight", "2"], "only with an imported log"),
+        (["homeless.plan"], "home: not stated"),
     ],
 )
 def test_bad_input_is_one_line(hill: Path, words: list[str], said: str, capsys: pytest.CaptureFixture[str]) -> None:
@@ -178,6 +178,6 @@ def test_seconds_out_of_range_are_refused(capsys: pytest.CaptureFixture[str]) ->
     with pytest.raises(SystemExit) as ended:
         main(["returns", "hill.waypoints", "--every", "0"])
     assert ended.value.code == 2
-    assert "seconds from 0.1 to 3,600 are expected" in capsys.readouterr().err
+    assert "expected seconds from 0.1 to 3,600" in capsys.readouterr().err
     with pytest.raises(planfly.ArgumentError, match="every 4000"):
         planfly.returns("hill.waypoints", every=4000)

@@ -53,7 +53,7 @@ def test_a_return_that_a_program_flies_as_the_law_does_agrees(
         monkeypatch.setattr(program_returns, "fly_and_judge", by_law)
     flat = [word.replace("mound.toml", "flat.toml") for word in ASKED]
     assert main([*flat, "--sitl", str(write_fake(mound)), "--out", "drawn"]) == 0
-    assert " itself: 1 of the worst flown, all of them as simulated" in capsys.readouterr().out
+    assert " itself: 1 of the worst flown, all of them agree with the simulation" in capsys.readouterr().out
     (one,) = json.loads((mound / "a.json").read_text(encoding="utf-8"))["by_program"]["returns"]
     assert (one["agrees"], one["worse"], one["reason"]) == (True, False, "")
     assert one["program"]["kind"] == one["law"]["kind"] == "safe"
@@ -71,8 +71,8 @@ def test_harm_that_a_program_does_counts_where_the_law_does_none(
     out = capsys.readouterr().out
     assert "returns 1 hits the ground" in out
     program = "by ArduPlane V0.0-fake (0badc0de) itself: 1 of the worst flown"
-    assert f"{program}, 0 of them as simulated; 1 worse than simulated" in out
-    assert "the program's outcome counts" in out
+    assert f"{program}, 0 of them agree with the simulation; 1 worse than simulated" in out
+    assert "the program's outcome counts, as it is worse" in out
     answer = json.loads((mound / "a.json").read_text(encoding="utf-8"))
     (one,) = answer["by_program"]["returns"]
     assert (one["law"]["kind"], one["program"]["kind"], one["worse"]) == ("safe", "ground", True)
@@ -85,7 +85,7 @@ def test_harm_that_a_program_does_counts_where_the_law_does_none(
 
 def test_no_program_but_arduplanes_is_flown(mound: Path, capsys: pytest.CaptureFixture[str]) -> None:
     for program, said in (
-        (write_fake_px4(mound), "ArduPlane's program is expected: how PX4 returns is not flown here"),
+        (write_fake_px4(mound), "expected ArduPlane's program; returns of PX4 are not flown here"),
         (mound / "none", "no such file"),
     ):
         assert main(["returns", "mound.waypoints", "--sitl", str(program)]) == 2
@@ -117,7 +117,7 @@ def test_the_worst_are_far_apart_and_what_is_worse_counts(tmp_path: Path) -> Non
     assert right.count("ground") == returns.count("ground") + 1
     assert right.count("safe") == returns.count("safe") - 1
     assert [one.worse for one in both.pairs] == [True, False]
-    assert "the simulated outcome, the worse one, counts" in both.lines(returns, setup.scenario)[1]
+    assert "the simulated outcome counts, as it is worse" in both.lines(returns, setup.scenario)[1]
 
 
 @pytest.mark.client

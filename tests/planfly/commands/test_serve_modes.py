@@ -102,7 +102,7 @@ def test_it_holds_goes_elsewhere_goes_on_and_returns(serve: Callable[..., Served
 def follow_each_other(logs: list[FlightLog]) -> None:
     """The logs of the flight above: what is flown in each, and that the aircraft flies on from one to the next."""
     modes = ["LOITER", "GUIDED", "AUTO", "RTL"]
-    left = [f"left, as a ground station asked, for {mode}" for mode in modes]
+    left = [f"left at a ground station's request for {mode}" for mode in modes]
     assert [log.ended for log in logs] == [*left, "completed"]
     items = [[1, 2, 3], [-1, 0], [-1, 0], [-1, 2, 3], [-1, 0]]
     assert [[one.seq for one in log.setup.mission.items] for log in logs] == items

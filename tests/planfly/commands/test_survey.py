@@ -74,7 +74,7 @@ def test_a_flight_and_its_log_say_the_same(tmp_path: Path, capsys: pytest.Captur
     assert main(asked) == 4
     out = capsys.readouterr().out
     assert "front overlap 8" in out
-    assert "95 % asked for" in out
+    assert "95 % required" in out
     [found] = json.loads((tmp_path / "a.json").read_text(encoding="utf-8"))["overlaps"]
     assert (found["front"], found["front_asked"]) == (pytest.approx(seen.front, abs=1e-3), 0.95)
     assert (found["side"], found["side_asked"]) == (pytest.approx(seen.side, abs=1e-3), 0.6)
@@ -100,7 +100,9 @@ def test_a_parameter_that_would_help_is_written_beside_ones_own(
 
 @pytest.mark.parametrize("camera", [(23.5, 15.6), (23.5, 0.0, 16.0), "23.5x15.6,16", (1.0, 1.0, 1.0, 70.0, 100.0), 5])
 def test_a_camera_that_is_none_is_one_line(camera: Any) -> None:
-    with pytest.raises(planfly.PlanflyError, match="the sensor across the way and along it and the focal length, mm"):
+    with pytest.raises(
+        planfly.PlanflyError, match="the sensor's size across and along the track and the focal length, mm"
+    ):
         planfly.survey(FIELD_SURVEY, camera=camera)
 
 
@@ -111,6 +113,6 @@ def test_what_is_no_survey_is_one_line(tmp_path: Path, capsys: pytest.CaptureFix
     short.write_text("\n".join(rows[:7]) + "\n", encoding="ascii")
     assert main(["survey", str(short), "--out", str(tmp_path / "out")]) == 2
     said = capsys.readouterr().err
-    assert "no survey: at least three lines beside each other are expected, or two with photos along them" in said
+    assert "no survey; expected at least three lines side by side, or two with photos along them" in said
     assert said.count("\n") == 1
     assert not (tmp_path / "out").exists()

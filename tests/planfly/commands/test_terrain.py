@@ -146,11 +146,11 @@ def test_nobody_there_is_one_line(here: Path, capsys: pytest.CaptureFixture[str]
         ({"status": 500}, "cannot be fetched: the server answers 500 Internal Server Error"),
         ({"status": 401}, "cannot be fetched: the server answers 401 Unauthorized"),
         ({"status": 403}, "cannot be fetched: the server answers 403 Forbidden"),
-        ({"length": 0}, "Content-Length: 0: 1 to 536,870,912 bytes are expected"),
-        ({"length": 10**9}, "Content-Length: 1,000,000,000: 1 to 536,870,912 bytes are expected"),
+        ({"length": 0}, "Content-Length: 0: expected 1 to 536,870,912 bytes"),
+        ({"length": 10**9}, "Content-Length: 1,000,000,000: expected 1 to 536,870,912 bytes"),
         ({"length": 10**20}, "Content-Length: 100,000,000,000,000,000,000: 1 to"),
-        ({"garbage": True}, "what the server gives is no GeoTIFF that can be read"),
-        ({"moved": ("N46", "N47")}, "another place: the degree from 46 N 8 E on is expected"),
+        ({"garbage": True}, "the server's answer is not a readable GeoTIFF"),
+        ({"moved": ("N46", "N47")}, "another place: expected the degree from 46 N 8 E on"),
         ({"odd": True}, "cannot be fetched: the server answers with 'bytes 1-"),
         ({"status": 404}, "no tile of the area is there: open sea, or not such a server"),
     ],
@@ -198,9 +198,9 @@ def test_where_no_tile_is_has_no_data_unless_it_is_sea(here: Path, capsys: pytes
     with serving(here / "coast") as server:
         assert main(["terrain", *AREA, "--source", server.url, "--out", "open.tif", "--json", "a.json"]) == 0
         said = capsys.readouterr().err
-        assert "no tile at 46 9, 47 9 (south-west corners, degrees): open sea, or not published (--sea takes" in said
+        assert "no tile at 46 9, 47 9 (south-west corners, degrees): open sea, or not published (--sea treats" in said
         assert main(["terrain", *AREA, "--source", server.url, "--sea", "--out", "sea.tif"]) == 0
-        assert "46 9, 47 9 (south-west corners, degrees): taken for sea, at 0 m" in capsys.readouterr().err
+        assert "46 9, 47 9 (south-west corners, degrees): treated as sea, at 0 m" in capsys.readouterr().err
     for name, value in (("open.tif", -32768.0), ("sea.tif", 0.0)):
         heights, lat, lon = seen(here / name)
         west = lon < 9.0 - 0.5 / ROWS
@@ -379,11 +379,11 @@ def test_around_a_mission_is_home_and_all_its_places(here: Path) -> None:
     [
         ([], "planfly: --around, --box: expected one of them"),
         (["--box", "46,8,47,9", "--around", "m.waypoints"], "expected one of them"),
-        (["--box", "46,8,47"], "argument --box: '46,8,47': S,W,N,E is expected"),
-        (["--box", "47,8,46,9"], "--box (47.0, 8.0, 46.0, 9.0): south, west, north, east are expected"),
-        (["--box", "46,8,nan,9"], "south, west, north, east are expected"),
-        (["--box", "46,8,47,9", "--margin", "-1"], "argument --margin: '-1': km, from 0 to 100, are expected"),
-        (["--box", "46,8,47,9", "--out", "dem.png"], "dem.png: a name that ends with .tif is expected"),
+        (["--box", "46,8,47"], "argument --box: '46,8,47': expected S,W,N,E"),
+        (["--box", "47,8,46,9"], "--box (47.0, 8.0, 46.0, 9.0): expected south, west, north, east"),
+        (["--box", "46,8,nan,9"], "expected south, west, north, east"),
+        (["--box", "46,8,47,9", "--margin", "-1"], "argument --margin: '-1': expected km from 0 to 100"),
+        (["--box", "46,8,47,9", "--out", "dem.png"], "dem.png: expected a name that ends with .tif"),
         (
             ["--box", "46,8,47,9", "--source", "ftp://x/y"],
             "--source 'ftp://x/y': a folder, or the address of one by http",

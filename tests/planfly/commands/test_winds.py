@@ -61,7 +61,7 @@ def test_a_short_mission_has_its_chart_stopped_or_not(
     assert (data["flights"], len(data["directions"])) == (8, 4)
     assert "wind_speed" not in data["spread"]
     assert main([*line, "--out", str(out)]) == 2
-    assert "--resume goes on with it" in capsys.readouterr().err
+    assert "--resume continues it" in capsys.readouterr().err
     # As a kill leaves it: a round with gaps, and no chart.
     again = tmp_path / "again"
     again.mkdir()
@@ -84,7 +84,7 @@ def test_an_interruption_says_what_is_kept_and_how_to_go_on(
     monkeypatch.setattr(campaigns, "find_winds", interrupted)
     assert main([*line, "--out", str(tmp_path / "out")]) == 128 + number
     told = capsys.readouterr().err.splitlines()
-    assert told[-1] == f"planfly: interrupted; 3 flights are kept in {tmp_path / 'out'}, --resume goes on"
+    assert told[-1] == f"planfly: interrupted; 3 flights are kept in {tmp_path / 'out'}: continue with --resume"
     assert [path.name for path in (tmp_path / "out").iterdir()] == [WINDS_DATABASE]
     assert len(table(tmp_path / "out" / WINDS_DATABASE)) == 3
 
@@ -93,11 +93,11 @@ def test_an_interruption_says_what_is_kept_and_how_to_go_on(
     ("more", "words"),
     [
         (["--resume", "--seed", "2"], "another campaign"),
-        (["--resume", "--prove", "0.9"], "target 0.9: the flights there were asked for with 0.99"),
+        (["--resume", "--prove", "0.9"], "target 0.9: the flights there were requested with 0.99"),
         (["--resume", "--most", "30"], "most 30.0: the flights there"),
-        (["--resume", "--out", "campaign"], "no campaign there to go on with"),
+        (["--resume", "--out", "campaign"], "no campaign there to continue"),
         (["--out", "campaign"], "holds another campaign; --overwrite replaces it"),
-        ([], "--resume goes on with it"),
+        ([], "--resume continues it"),
         (["--resume"], "held by another process"),
         (["--overwrite"], "held by another process"),
     ],

@@ -114,7 +114,7 @@ def test_elevons_are_half_their_sum_and_difference(tmp_path: Path) -> None:
 
 def test_one_elevon_alone_is_refused(tmp_path: Path) -> None:
     wing = planfly.new_aircraft(tmp_path / "foam", mass=2.1, span=1.6, cruise=15.0, stall=10.0, layout="wing")
-    with pytest.raises(LogError, match="one elevon alone: SERVOn_FUNCTION 77 and 78 are expected"):
+    with pytest.raises(LogError, match="only one elevon; expected SERVOn_FUNCTION 77 and 78"):
         flight_records(changed({"SERVO1_FUNCTION": 77.0}), wing)
 
 

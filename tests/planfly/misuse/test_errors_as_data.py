@@ -49,11 +49,11 @@ CASES: dict[str, tuple[Callable[[Path], object], str, str, Any, str]] = {
     "an algorithm": (lambda _: find_algorithm("ga", "a.toml"), "a.toml", "planner.algorithm", "ga", "not known"),
     "a whole number of a mission": (
         lambda _: parse_waypoints(f"{HEADER}\n{_ITEM.replace('16', '1.5', 1)}\n", "a.waypoints"),
-        *("a.waypoints", "command", "1.5", "a whole number 0..65535 is expected"),
+        *("a.waypoints", "command", "1.5", "expected a whole number 0..65535"),
     ),
     "a number of a mission": (
         lambda _: parse_waypoints(f"{HEADER}\n{_ITEM.replace('8.0', '8,0')}\n", "a.waypoints"),
-        *("a.waypoints", "longitude", "8,0", "a finite number is expected (a decimal comma?)"),
+        *("a.waypoints", "longitude", "8,0", "expected a finite number (a decimal comma?)"),
     ),
     "the header of a mission": (
         lambda _: parse_waypoints("QGC WPL 999\n", "a.waypoints"),
@@ -69,7 +69,7 @@ CASES: dict[str, tuple[Callable[[Path], object], str, str, Any, str]] = {
     ),
     "a parameter's text": (
         lambda _: parse_parameters("WP_RADIUS wide\n", "a.parm"),
-        *("a.parm", "WP_RADIUS", "wide", "a finite number is expected"),
+        *("a.parm", "WP_RADIUS", "wide", "expected a finite number"),
     ),
     "a parameter's range": (
         lambda folder: _params(folder, _PARAMETERS.format("200")),

@@ -196,7 +196,7 @@ def test_a_command_ends_at_once_and_whole(case: Case, inputs: Path, tmp_path: Pa
     assert "Traceback" not in said
     if case.argv[0] in ("campaign", "winds"):
         (line,) = (line for line in said.splitlines() if "interrupted" in line)
-        assert line.endswith("--resume goes on")
+        assert line.endswith("continue with --resume")
         assert "Warning" not in said
     if case.argv[0] == "fly":
         log = read_log(tmp_path / "work" / "f.mcap")

@@ -222,7 +222,9 @@ def test_two_runs_into_one_folder(folder: Path, capsys: pytest.CaptureFixture[st
     (folder / "out").mkdir()
     with hold(folder / "out"):
         assert main(["run", "tight", "--out", "out"]) == 2
-    assert capsys.readouterr().err.endswith("planfly: out: another planfly is writing there; name another target\n")
+    assert capsys.readouterr().err.endswith(
+        "planfly: out: another planfly process is writing there; name another target\n"
+    )
     assert list((folder / "out").iterdir()) == []
     with hold(folder / "out"):
         pass
@@ -233,7 +235,7 @@ def test_two_flights_into_one_log(folder: Path) -> None:
     path, setup = folder / "f.mcap", example_log().setup
     with CrashSafeLog(path, setup) as first:
         size = path.stat().st_size
-        with pytest.raises(PlanflyError, match=r"f\.mcap: another planfly is writing there"):
+        with pytest.raises(PlanflyError, match=r"f\.mcap: another planfly process is writing there"):
             CrashSafeLog(path, setup)
         assert path.stat().st_size == size
         del first

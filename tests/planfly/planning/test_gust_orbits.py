@@ -118,7 +118,7 @@ def test_a_plan_that_needs_more_says_what_would_help(airframe_of_x8: Airframe) -
     plan = limit_waypoint_orbits(found, airframe)
     assert not plan.feasible
     (problem,) = plan.certificate.problems
-    assert "in moderate turbulence PX4 circles where gusts have it off a waypoint's height" in problem
+    assert "in moderate turbulence PX4 circles where gusts push it off a waypoint's height" in problem
     value = float(problem.split("NAV_FW_ALT_RAD of ")[1].split(" m ")[0])
     enough, less = (tight.with_parameters(NAV_FW_ALT_RAD=asked) for asked in (value, value - 5.0))
     assert expected_orbits(plan, enough, airframe.limits) <= MAX_EXPECTED_ORBITS

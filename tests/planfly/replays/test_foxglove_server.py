@@ -223,7 +223,7 @@ def test_a_page_of_another_site_is_refused_and_told_once(gate: tuple[subprocess.
 def test_what_is_no_origin_is_one_line(log_path: Path, origin: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["replay", str(log_path), "--foxglove", "--port", "0", "--allow-origin", origin]) == 2
     printed = capsys.readouterr().err
-    assert printed.startswith(f"planfly: --allow-origin {origin}: the origin of a web page is expected")
+    assert printed.startswith(f"planfly: --allow-origin {origin}: expected the origin of a web page")
     assert printed.count("\n") == 1
 
 

@@ -51,7 +51,7 @@ def test_viewers_and_programs_are_let_in(headers: tuple[str, ...]) -> None:
         # Nothing that a terminal would take for an order.
         ((LOCAL, "Origin: \x1b[2J"), "a page of \\x1b[2J"),
         ((LOCAL, "Origin: " + "x" * 500), "a page of " + "x" * 80),
-        (("X: y",) * 500, "a request that is none"),
+        (("X: y",) * 500, "not a valid request"),
     ],
 )
 def test_pages_of_others_and_other_hosts_are_refused(headers: tuple[str, ...], why: str) -> None:

@@ -124,7 +124,7 @@ def test_a_user_who_can_write_no_cache_gets_results_and_the_way_out(given: dict[
     )
     assert done.returncode == 0, done.stderr
     (line,) = (one for one in done.stderr.splitlines() if "cannot be written" in one)
-    assert line.startswith("compiling the numeric kernels for this command alone: ")
+    assert line.startswith("compiling the numeric kernels for this command only: ")
     assert line.endswith(WAY_OUT)
     made, *_ = (one.removeprefix("made ") for one in done.stderr.splitlines() if one.startswith("made "))
     assert not Path(made).exists()

@@ -80,15 +80,15 @@ def test_the_autopilot_is_taken_from_the_files(mission: str, options: dict[str, 
     assert judged.setup.autopilot.name == flies
     (line,) = [line for line in judged.verdict.lines if line.startswith("Autopilot: ")]
     taken = flies == "px4" and "autopilot" not in options
-    assert line.endswith(", for nobody named an autopilot") is taken
+    assert line.endswith(", as no autopilot was named") is taken
     if taken:
         file = options.get("params", mission)
         assert line.startswith("Autopilot: the simulated PX4 1.17 with")
-        assert f"; taken from {Path(file).resolve() if file.endswith('params') else file}, for nobody" in line
+        assert f"; taken from {Path(file).resolve() if file.endswith('params') else file}, as no" in line
 
 
-TO_PX4 = "and ArduPlane is to fly: --autopilot px4 simulates PX4 instead"
-TO_ARDUPLANE = "and PX4 is to fly: --autopilot ardupilot simulates ArduPlane instead"
+TO_PX4 = "but ArduPlane is to fly; --autopilot px4 simulates PX4 instead"
+TO_ARDUPLANE = "but PX4 is to fly; --autopilot ardupilot simulates ArduPlane instead"
 
 
 @pytest.mark.parametrize(
@@ -101,8 +101,8 @@ TO_ARDUPLANE = "and PX4 is to fly: --autopilot ardupilot simulates ArduPlane ins
         ),
         ("px4.plan --autopilot ardupilot", f"px4.plan: written for PX4 (firmwareType 12), {TO_PX4}"),
         ("plane.plan --autopilot px4", f"plane.plan: written for ArduPilot (firmwareType 3), {TO_ARDUPLANE}"),
-        ("px4.plan --params plane.param", "px4.plan: written for PX4 (firmwareType 12), and"),
-        ("plane.plan --params px4.params", "plane.plan: written for ArduPilot (firmwareType 3), and"),
+        ("px4.plan --params plane.param", "px4.plan: written for PX4 (firmwareType 12), but"),
+        ("plane.plan --params px4.params", "plane.plan: written for ArduPilot (firmwareType 3), but"),
         ("m.waypoints --params copter.param", "copter.param: parameters of a multicopter or helicopter (ArduPilot): "),
         ("m.waypoints --params mixed.param", "FW_R_TC is PX4's and TECS_CLMB_MAX ArduPilot's: --autopilot names"),
         ("copter.plan", "copter.plan: mission.vehicleType: 2: a multicopter or helicopter"),

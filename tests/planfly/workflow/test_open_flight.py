@@ -92,7 +92,7 @@ def test_fences_join_the_missions_own_and_each_other(mission: Path, capsys: pyte
     Path("b.geojson").write_text(feature(705.0), encoding="ascii")
     command = ["check", str(mission), "--fence", "a.fence", "--fence", "b.geojson", "--json", "v.json"]
     assert main(command) == 4
-    assert "its own fence of 1 items counts beside the one named" in capsys.readouterr().err
+    assert "its own fence of 1 items applies in addition to the one named" in capsys.readouterr().err
     found = json.loads(Path("v.json").read_text(encoding="utf-8"))["findings"]
     failed = [item["where"] for item in found if item["rule"] == "fence" and item["ok"] is False]
     assert failed == ["mill (exclusion)", "fence item 1 (exclusion)"]
@@ -178,14 +178,14 @@ def test_the_time_of_a_log_is_its_own(mission: Path, capsys: pytest.CaptureFixtu
     assert "f.mcap: --at 2026-05-03T10:00Z: a log is exported with the zones of its own time" in capsys.readouterr().err
     for command in (["export", str(mission), "map.kml"], ["serve", str(mission), "--bind", "127.0.0.1:0"]):
         assert main([*command, "--at", "tomorrow"]) == 2
-        expected = "a time by ISO 8601 is expected, as 2026-05-01T10:00+02:00"
+        expected = "expected a time by ISO 8601, as 2026-05-01T10:00+02:00"
         assert capsys.readouterr().err == f"planfly: --at tomorrow: {expected}\n"
     assert main(["export", str(mission), "map.kml", "--at", "2026-05-01T10:00Z/soon"]) == 2
     assert capsys.readouterr().err == f"planfly: --at 2026-05-01T10:00Z/soon: 'soon': {expected}\n"
 
 
 def test_a_file_that_holds_no_fence_is_named(mission: Path) -> None:
-    with pytest.raises(MissionError, match=r"leg\.waypoints: no fence in it"):
+    with pytest.raises(MissionError, match=r"leg\.waypoints: contains no fence"):
         read_named_fences([str(mission)])
 
 
@@ -300,13 +300,13 @@ def test_a_plan_is_opened_in_its_own_scenario_unless_another_is_named(short_miss
 
 
 def test_what_is_not_there_names_what_is_expected(tmp_path: Path) -> None:
-    with pytest.raises(MissionError, match=r"no such file; a plan\.json, \.waypoints or \.plan file is expected"):
+    with pytest.raises(MissionError, match=r"no such file; expected a plan\.json, \.waypoints or \.plan file"):
         open_flight(tmp_path / "none.plan", {})
 
 
 def test_a_mission_that_lies_beside_the_name_is_named(short_mission: Path) -> None:
     (short_mission.parent / "m.waypoints.bak").write_text("", encoding="ascii")
-    with pytest.raises(MissionError, match=r"file is expected: did you mean 'm\.waypoints'\?$"):
+    with pytest.raises(MissionError, match=r"expected file: did you mean 'm\.waypoints'\?$"):
         open_flight(short_mission.with_name("n.waypoints"), {})
-    with pytest.raises(MissionError, match=r"file is expected$"):
+    with pytest.raises(MissionError, match=r"expected file$"):
         open_flight(short_mission.parent / "nowhere" / "m.waypoints", {})

@@ -40,7 +40,7 @@ def test_a_named_folder_is_refused_unless_it_is_empty(tmp_path: Path) -> None:
     file.write_text("mine", encoding="utf-8")
     with pytest.raises(PlanflyError, match="not empty; overwrite=True"):
         check_output_folder(tmp_path, overwrite=False)
-    with pytest.raises(PlanflyError, match="a folder is expected"):
+    with pytest.raises(PlanflyError, match="expected a folder"):
         check_output_folder(file, overwrite=True)
     check_output_folder(tmp_path, overwrite=True)
 

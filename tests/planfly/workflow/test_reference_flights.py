@@ -207,7 +207,9 @@ def test_the_aircraft_can_and_arduplane_cannot(flown: tuple[JudgedFlight, Path])
     # And what the start of the climb takes.
     assert deciding.off == pytest.approx(-3.0 * climb, abs=2.5)
     second = judged.verdict.lines[1]
-    assert second.startswith("The aircraft can, ArduPlane with these parameters cannot: TECS_HDEM_TCONST 3 puts it ")
+    assert second.startswith(
+        "The aircraft can fly this, but ArduPlane with these parameters cannot: TECS_HDEM_TCONST 3 puts it "
+    )
     assert second.endswith(f"m low on leg 1, to item 2; {deciding.passing:g} would pass")
 
 

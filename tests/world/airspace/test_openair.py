@@ -79,9 +79,7 @@ def test_limits_the_wrong_way_round_are_swapped_and_said(tmp_path: Path) -> None
     assert (swapped.floor_amsl_m, swapped.ceiling_amsl_m) == pytest.approx((1700 * 0.3048, 19500 * 0.3048 + 400))
     assert (low.floor_agl_m, low.ceiling_agl_m) == (300.0, 1000.0)
     assert (hill.floor_amsl_m, hill.ceiling_agl_m) == (500.0, 300.0)
-    assert found.notes == [
-        "z.openair: lower and upper limits that stand the wrong way round are swapped: R9B (P), LOW (D)"
-    ]
+    assert found.notes == ["z.openair: lower and upper limits in the wrong order are swapped: R9B (P), LOW (D)"]
 
 
 @pytest.mark.parametrize(
@@ -103,7 +101,7 @@ def test_limits_that_leave_no_height_lose_the_upper_one(
     (zone,) = found.zones
     assert (zone.floor_agl_m, zone.ceiling_agl_m) == (None, None)
     assert (zone.floor_amsl_m, zone.ceiling_amsl_m) == pytest.approx(wanted)
-    said = "z.openair: upper limits of 0, or equal to the lower one, are taken for none: no ceiling: R1 (P)"
+    said = "z.openair: upper limits of 0, or equal to the lower one, mean no ceiling: R1 (P)"
     assert found.notes == [said]
 
 
@@ -140,7 +138,7 @@ def test_colours_without_an_airspace_are_none(tmp_path: Path) -> None:
     assert [zone.name for zone in found.zones] == ["LAKE (R)"]
     assert found.notes == ["z.openair: 2 zones keep nobody out: without name, limits and shape"]
     path.write_text(f"{colours}{HEAD}", encoding="utf-8")
-    with pytest.raises(ScenarioError, match=r"line 5 \(LAKE\): one shape is expected"):
+    with pytest.raises(ScenarioError, match=r"line 5 \(LAKE\): expected one shape"):
         read_zone_file(path, "z.openair")
 
 
@@ -227,17 +225,17 @@ def test_the_record_of_the_page_is_read_as_it_says() -> None:
 FAULTS = {
     "AN LAKE": "line 1: AN: no airspace has begun: an AC is missing before it",
     HEAD + "AH FL95\n": "line 5: AH 'FL95': an airspace has one lower limit (AL) and one upper limit (AH)",
-    HEAD + "DP 46:00:00N\n": "line 5: DP '46:00:00N': a place is expected",
+    HEAD + "DP 46:00:00N\n": "line 5: DP '46:00:00N': expected a place",
     HEAD + "DP 91:00:00N 008:00:00E\n": "line 5: DP '91:00:00N 008:00:00E': allowed 0..90 degrees",
-    HEAD + "DP 46:61:00N 008:00:00E\n": "line 5: DP '46:61:00N 008:00:00E': degrees, minutes and seconds of 60 at most",
+    HEAD + "DP 46:61:00N 008:00:00E\n": "line 5: DP '46:61:00N 008:00:00E': expected degrees, minutes and seconds",
     HEAD + "DC 5\n": "line 5: DC '5': no centre before it (V X=)",
-    HEAD + "V X=46:00:00N 008:00:00E\nDC five": "line 6: DC 'five': a number from 0 on is expected",
+    HEAD + "V X=46:00:00N 008:00:00E\nDC five": "line 6: DC 'five': expected a number of at least 0",
     HEAD + "V D=left": "line 5: V 'D=left': allowed D=+ (clockwise) or D=-",
-    HEAD + "V X=46:00:00N 008:00:00E\nDA 5, 270": "line 6: DA '5, 270': radius, first and last bearing are expected",
+    HEAD + "V X=46:00:00N 008:00:00E\nDA 5, 270": "line 6: DA '5, 270': expected radius, first and last bearing",
     HEAD + "DX 5": "line 5: 'DX': unknown; shapes are DP, DA, DB, DC, DY",
     HEAD + "DY 46:00:00N 008:00:00E": "line 1 (LAKE): DY: an airway has at least two points, and a width before",
-    HEAD: "line 1 (LAKE): one shape is expected",
-    "AC R\nAL ask the tower\n": "line 2: AL 'ask the tower': a height is expected",
+    HEAD: "line 1 (LAKE): expected one shape",
+    "AC R\nAL ask the tower\n": "line 2: AL 'ask the tower': expected a height",
     HEAD + "AA 2026-05-01/2026-04-01": "line 5: AA '2026-05-01/2026-04-01'",
 }
 
@@ -279,7 +277,7 @@ def test_what_a_file_does_not_hold_as_it_stands_is_said(tmp_path: Path) -> None:
     found = read_zone_file(path, "zones.txt")
     assert found.notes == [
         "zones.txt: 2 zones keep nobody out: class G, open to all",
-        "zones.txt: outlines that cross themselves are taken as the area they enclose: ZÜRICH (R)",
+        "zones.txt: an outline that crosses itself is taken as the area it encloses: ZÜRICH (R)",
     ]
     (zone,) = found.zones
     # Each of the bow's corners, grown by a tenth of a metre, and its middle with a way through.

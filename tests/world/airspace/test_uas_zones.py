@@ -154,8 +154,8 @@ def test_geometries_and_layers_of_ed_318(tmp_path: Path) -> None:
 
 
 FAULTS: dict[str, tuple[Any, str]] = {
-    "no volume": (ed269(), "features[0]: geometry: a list of volumes is expected"),
-    "a number": (ed269(5), "features[0] (lake): horizontalProjection: a polygon or a circle is expected"),
+    "no volume": (ed269(), "features[0]: geometry: expected a list of volumes"),
+    "a number": (ed269(5), "features[0] (lake): horizontalProjection: expected a polygon or a circle"),
     "no shape": (ed269(volume(None)), "features[0] (lake): horizontalProjection: a polygon or a circle"),
     "a line": (
         ed269(volume({"type": "Line"})),
@@ -163,7 +163,7 @@ FAULTS: dict[str, tuple[Any, str]] = {
     ),
     "no radius": (ed269(volume({"type": "Circle", "center": [8, 46]})), "features[0] (lake): circle: a centre"),
     "a unit": (ed269(volume(unit="FL")), "features[0] (lake): unit of its limits: allowed M, FT"),
-    "a height": (ed269(volume(high="high")), "features[0] (lake): upper limit: a number is expected"),
+    "a height": (ed269(volume(high="high")), "features[0] (lake): upper limit: expected a number"),
     "a datum": (
         ed269(volume(upperVerticalReference="QFE")),
         "features[0] (lake): vertical reference of its upper",
@@ -242,7 +242,7 @@ def test_limits_the_wrong_way_round_are_swapped_and_said(tmp_path: Path) -> None
         {"floor_agl_m": 50.0, "ceiling_agl_m": 120.0},
         {"floor_agl_m": 10.0, "ceiling_agl_m": 120.0},
     ]
-    assert found.notes == ["z.json: lower and upper limits that stand the wrong way round are swapped: lake 1/2"]
+    assert found.notes == ["z.json: lower and upper limits in the wrong order are swapped: lake 1/2"]
 
 
 @pytest.mark.parametrize(
@@ -261,7 +261,7 @@ def test_limits_that_leave_no_height_lose_the_upper_one(
     low: float, high: float, datum: str, wanted: dict[str, float], tmp_path: Path
 ) -> None:
     references = {"lowerVerticalReference": datum, "upperVerticalReference": datum}
-    said = ["z.json: upper limits of 0, or equal to the lower one, are taken for none: no ceiling: lake"]
+    said = ["z.json: upper limits of 0, or equal to the lower one, mean no ceiling: lake"]
     for data in (
         ed269(volume(low=low, high=high, **references)),
         ed318(POLYGON | {"layer": layer(low, high, datum)}),
@@ -275,7 +275,7 @@ def test_limits_that_leave_no_height_lose_the_upper_one(
 
 @pytest.mark.parametrize("limit", ["nan", "-inf"])
 def test_a_limit_that_is_no_number_is_refused(limit: str, tmp_path: Path) -> None:
-    with pytest.raises(ScenarioError, match="a number is expected"):
+    with pytest.raises(ScenarioError, match="expected a number"):
         read(ed269(volume(high=limit)), tmp_path)
 
 
@@ -307,7 +307,7 @@ def test_a_second_ring_that_is_no_hole_is_a_part_of_the_area(case: str, tmp_path
     for ring in zone.rings_deg or []:
         made = made.symmetric_difference(shapely.Polygon(ring))
     assert made.area == pytest.approx(area, rel=1e-3)
-    assert found.notes == ["z.json: outlines that cross themselves are taken as the area they enclose: lake"]
+    assert found.notes == ["z.json: an outline that crosses itself is taken as the area it encloses: lake"]
 
 
 def test_holes_of_a_mended_outline_stay_holes_and_islands_in_them_stay_land(tmp_path: Path) -> None:

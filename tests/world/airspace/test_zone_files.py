@@ -58,10 +58,10 @@ FAULTS: dict[str, tuple[dict[str, Any], str]] = {
     "a key misspelt": ({"ceiling_m": 100.0}, "ceiling_m: unknown; known are kind, floor_amsl_m"),
     "another misspelt": ({"radius": 100.0}, "radius: unknown"),
     "a limit that is a number": ({"upperLimit": 100.0}, "upperLimit: a table of value, unit and referenceDatum"),
-    "no value": ({"upperLimit": {"unit": 1, "referenceDatum": 1}}, "upperLimit.value: a number"),
-    "a truth": ({"upperLimit": limit(True, 1, 1)}, "upperLimit.value: a number"),
+    "no value": ({"upperLimit": {"unit": 1, "referenceDatum": 1}}, "upperLimit.value: expected a number"),
+    "a truth": ({"upperLimit": limit(True, 1, 1)}, "upperLimit.value: expected a number"),
     "a unit": ({"upperLimit": limit(5, 2, 1)}, "upperLimit.unit: allowed 0, M, 1, FT, 6, FL"),
-    "a height of the FAA's": ({"LOWER_VAL": "SFC", "LOWER_UOM": "FT"}, "LOWER_VAL: a number is expected"),
+    "a height of the FAA's": ({"LOWER_VAL": "SFC", "LOWER_UOM": "FT"}, "LOWER_VAL: expected a number"),
     "a list of units": ({"upperLimit": limit(5, [1], 1)}, "upperLimit.unit: allowed"),
     "a datum": ({"lowerLimit": limit(5, 1, "QFE")}, "lowerLimit.referenceDatum: allowed 0, GND, AGL, SFC, 1, MSL"),
     "a flight level of an inclusion": ({"kind": "inclusion", "upperLimit": limit(65, 6, 2)}, "bounds no inclusion"),
@@ -127,14 +127,14 @@ DEEP = "[" * 200_000
 GEOJSON_FAULTS: dict[str, tuple[Any, str]] = {
     "not JSON": ("{", "not valid JSON"),
     "brackets without end": (DEEP, "not valid JSON"),
-    "NaN": (json.dumps(feature("Polygon", [[[8.0, float("nan")], *RING]])), "NaN is no number of JSON"),
-    "infinity": (json.dumps(feature("Point", [8.0, float("inf")], radius_m=9)), "Infinity is no number"),
-    "a list": ("[]", "a GeoJSON object is expected, got list"),
-    "no features": ('{"type": "FeatureCollection"}', "features: a list is expected"),
-    "a feature that is none": ('{"type": "FeatureCollection", "features": [5]}', "features[0]: a Feature is expected"),
-    "a line": (json.dumps(feature("LineString", RING)), 'feature (lake): geometry "LineString": a Polygon'),
-    "no geometry": ('{"type": "Feature", "geometry": null}', "geometry null: a Polygon"),
-    "a geometry of no kind": ('{"type": ["Polygon"]}', 'geometry ["Polygon"]: a Polygon'),
+    "NaN": (json.dumps(feature("Polygon", [[[8.0, float("nan")], *RING]])), "NaN is not a JSON number"),
+    "infinity": (json.dumps(feature("Point", [8.0, float("inf")], radius_m=9)), "Infinity is not a JSON number"),
+    "a list": ("[]", "expected a GeoJSON object, got list"),
+    "no features": ('{"type": "FeatureCollection"}', "features: expected a list"),
+    "a feature that is none": ('{"type": "FeatureCollection", "features": [5]}', "features[0]: expected a Feature"),
+    "a line": (json.dumps(feature("LineString", RING)), 'feature (lake): geometry "LineString": expected a Polygon'),
+    "no geometry": ('{"type": "Feature", "geometry": null}', "geometry null: expected a Polygon"),
+    "a geometry of no kind": ('{"type": ["Polygon"]}', 'geometry ["Polygon"]: expected a Polygon'),
     "a point alone": (json.dumps(feature("Point", [8.0, 46.0])), "feature (lake): radius_m: missing"),
     "a ring too deep": (json.dumps(feature("Polygon", [[RING]])), "feature (lake): coordinates: lists of"),
     "a ring too flat": (json.dumps(feature("Polygon", RING)), "coordinates: lists of [longitude, latitude]"),
@@ -243,16 +243,16 @@ def test_a_point_with_a_radius_by_either_kind_of_data() -> None:
 
 KML_FAULTS = {
     "not XML": ("<kml>", "not valid XML"),
-    "no KML": ("<gpx/>", "a <kml> element is expected"),
+    "no KML": ("<gpx/>", "expected a <kml> element"),
     "an entity": (
         '<!DOCTYPE kml [<!ENTITY a "aaaa"><!ENTITY b "&a;&a;&a;">]><kml>&b;</kml>',
         "a document type is declared: not allowed",
     ),
-    "a line": (document(placemark("<LineString/>", "road")), "Placemark 1 (road): a Polygon is expected"),
-    "a point alone": (document(placemark("<Point><coordinates>8,46</coordinates></Point>")), "a Polygon is expected"),
+    "a line": (document(placemark("<LineString/>", "road")), "Placemark 1 (road): expected a Polygon"),
+    "a point alone": (document(placemark("<Point><coordinates>8,46</coordinates></Point>")), "expected a Polygon"),
     "a sheet in the air": (
         document(placemark(polygon(mode=ABSOLUTE, up=300.0))),
-        "altitudeMode absolute without extrude: a sheet in the air holds no airspace",
+        "altitudeMode absolute without extrude: a sheet in the air contains no airspace",
     ),
     "a sloping roof": (
         document(placemark(f"<Polygon><extrude>1</extrude>{ABSOLUTE}{ring(up=300.0, last=301.0)}</Polygon>")),
@@ -266,11 +266,14 @@ KML_FAULTS = {
         document(placemark(polygon(mode=ABSOLUTE, extrude=True, up=300.0) + polygon())),
         "its polygons have different heights",
     ),
-    "a number that is none": (document(placemark(polygon() + data(floor_agl_m="low"))), "floor_agl_m: 'low': a number"),
+    "a number that is none": (
+        document(placemark(polygon() + data(floor_agl_m="low"))),
+        "floor_agl_m: 'low': expected a number",
+    ),
     "a key misspelt": (document(placemark(polygon() + data(ceiling="90"))), "ceiling: unknown; known are kind"),
     "coordinates of text": (
         document(placemark(polygon().replace("8.000,46.000,0", "8,north"))),
-        "coordinates '8,north': lon,lat or lon,lat,up is expected",
+        "coordinates '8,north': expected lon,lat or lon,lat,up",
     ),
 }
 
@@ -335,8 +338,8 @@ BAD_FILES = {
     "missing.geojson": (None, "no such file"),
     "zones.kmz": (b"PK", "suffix '.kmz': a file of zones is .geojson, .json, .kml, .openair, .txt or .gpkg"),
     "empty.geojson": (b"", "not valid JSON"),
-    "none.geojson": (b'{"type": "FeatureCollection", "features": []}', "there is no zone in it"),
-    "none.kml": (b"<kml/>", "there is no zone in it"),
+    "none.geojson": (b'{"type": "FeatureCollection", "features": []}', "contains no zone"),
+    "none.kml": (b"<kml/>", "contains no zone"),
     "latin.geojson": (b'{"type": "\xe9"}', "not a text file in UTF-8 (byte 10)"),
     "large.kml": (b" " * (MAX_BYTES + 1), "67,108,865 bytes: a file of zones has at most 67,108,864"),
     "pole.geojson": (
@@ -462,7 +465,7 @@ def test_an_upper_limit_at_the_ground_is_refused(tmp_path: Path) -> None:
     """It would keep nobody out, and nobody would be told."""
     path = tmp_path / "z.geojson"
     path.write_text(json.dumps(openaip((0, "FT", "GND"), (0, "FT", "GND"))), encoding="utf-8")
-    with pytest.raises(ScenarioError, match=r"upperCeiling: above 0 is expected: nothing lies below the ground$"):
+    with pytest.raises(ScenarioError, match=r"upperCeiling: expected a value above 0: nothing lies below the ground$"):
         zone_files.read_zone_file(path, "z.geojson")
 
 

@@ -100,7 +100,7 @@ def test_a_circle_that_a_parameter_makes_too_tight_is_no_fault_of_the_mission() 
     assert item.planned is not None
     assert item.limit is not None
     assert item.planned < 65.0 < 110.0 < item.limit
-    assert "WP_LOITER_RAD asks for less than the 116 m of the bank limit: flown wider" in item.reason
+    assert "WP_LOITER_RAD is smaller than the 116 m that the bank limit allows: flown wider" in item.reason
 
 
 @pytest.mark.parametrize("flight", ["time", "to-height"])
@@ -171,7 +171,8 @@ def test_the_course_on_which_arduplane_leaves_a_circle_before_a_return_is_said()
     for lines, said in (((around, back), True), ((around, onward, back), False), ((around, onward), False)):
         notes = setup_by_law(mission(wp(0, -2000, 500), *lines)).route.notes
         assert (
-            any(note.startswith("item 2: ArduPlane leaves its circle heading for 0° N 0° E") for note in notes) == said
+            any(note.startswith("item 2: ArduPlane leaves its circle on the heading to 0° N 0° E") for note in notes)
+            == said
         )
 
 

@@ -69,7 +69,7 @@ def test_one_parameter_under_both_names_must_agree() -> None:
     assert ArduPilotParameters.of_text("LIM_ROLL_CD 3500\nROLL_LIMIT_DEG 35\n", "a").roll_limit == pytest.approx(
         math.radians(35.0)
     )
-    with pytest.raises(ParameterError, match=r"a:2: ROLL_LIMIT_DEG: 36: the same parameter has another value"):
+    with pytest.raises(ParameterError, match=r"a:2: ROLL_LIMIT_DEG: 36: the same parameter has a different value"):
         ArduPilotParameters.of_text("LIM_ROLL_CD 3500\nROLL_LIMIT_DEG 36\n", "a")
 
 
@@ -166,7 +166,7 @@ def test_older_names_and_units_are_taken() -> None:
 def test_what_is_not_allowed_is_told_and_the_default_taken() -> None:
     found, notes = parameters(WP_RADIUS=-5.0, NAVL1_PERIOD=20.0)
     assert (found.wp_radius, found.navl1_period) == (90.0, 20.0)
-    assert notes == ("WP_RADIUS -5 of the log is not allowed: the default is taken",)
+    assert notes == ("WP_RADIUS -5 of the log is not allowed: the default is used",)
 
 
 def test_a_least_beyond_its_most_gives_way() -> None:
@@ -177,4 +177,4 @@ def test_a_least_beyond_its_most_gives_way() -> None:
 
 def test_a_log_without_parameters_says_that_defaults_are_taken() -> None:
     _, notes = parameters()
-    assert notes == ("the log holds no parameters: ArduPlane's defaults are taken",)
+    assert notes == ("the log holds no parameters: ArduPlane's defaults are used",)

@@ -197,7 +197,7 @@ def test_a_frame_that_was_before_is_a_new_beginning(port: PhysicsPort, autopilot
     autopilot.send(packet(3))
     port.receive()
     autopilot.send(packet(2))
-    with pytest.raises(FlightError, match="began anew in the air: frame 2 after frame 3"):
+    with pytest.raises(FlightError, match="restarted in the air: frame 2 after frame 3"):
         port.receive()
 
 
@@ -315,11 +315,17 @@ def test_full_pulses_are_the_aircrafts_full_throws(name: str) -> None:
         (("[rudder]", "[flaps]"), "tables aileron, elevator, flaps, throttle: elevator, aileron, rudder, throttle are"),
         (("output = 5", "output = 0"), "throttle.output = 0: allowed 1..32"),
         (("output = 5", "output = true"), "throttle.output = True: allowed 1..32"),
-        (("[1000, 1400, 2000]", "[1000, 2000, 1400]"), "elevator.pulse_us = .*: increasing, and as many as value_deg"),
-        (("[1000, 1400, 2000]", "[1000, 1400]"), "elevator.pulse_us = .*: increasing, and as many as value_deg"),
-        (("[1000, 1400, 2000]", "[1000]"), "elevator.pulse_us = .*: two finite numbers or more"),
-        (("value = [0.0, 1.0]", "value = [0.0, nan]"), "throttle.value = .*: two finite numbers or more"),
-        (("value = [0.0", "value_deg = [0.0"), "throttle: keys output, pulse_us and value are expected"),
+        (
+            ("[1000, 1400, 2000]", "[1000, 2000, 1400]"),
+            "elevator.pulse_us = .*: expected increasing numbers, as many as in value_deg",
+        ),
+        (
+            ("[1000, 1400, 2000]", "[1000, 1400]"),
+            "elevator.pulse_us = .*: expected increasing numbers, as many as in value_deg",
+        ),
+        (("[1000, 1400, 2000]", "[1000]"), "elevator.pulse_us = .*: expected two finite numbers or more"),
+        (("value = [0.0, 1.0]", "value = [0.0, nan]"), "throttle.value = .*: expected two finite numbers or more"),
+        (("value = [0.0", "value_deg = [0.0"), "throttle: expected keys output, pulse_us and value"),
         (("[aileron]", "[aileron"), "ardupilot.toml: .*line"),
     ],
 )
@@ -330,7 +336,7 @@ def test_a_bad_file_is_one_line(tmp_path: Path, change: tuple[str, str], said: s
 
 
 def test_an_aircraft_without_the_file_says_what_it_is_for(tmp_path: Path) -> None:
-    with pytest.raises(FlightError, match=r"ardupilot.toml: .*: a real autopilot needs to know which servo moves what"):
+    with pytest.raises(FlightError, match=r"ardupilot.toml: .*; a real autopilot needs to know what each servo"):
         load_servo_map(replace(AEROSONDE, folder=tmp_path))
 
 

@@ -286,7 +286,7 @@ def test_an_estimator_without_a_place_is_waited_for_a_minute(autopilot: Autopilo
     # All but the place above the sea, then all, but without satellites.
     for flags in (EKF_GOOD & ~mavlink.ESTIMATOR_POS_VERT_ABS, EKF_GOOD | mavlink.ESTIMATOR_CONST_POS_MODE):
         autopilot.news.ekf, started = flags, clock.time
-        with pytest.raises(FlightError, match=r"did not come to know where it is \(EKF\) within 60 s"):
+        with pytest.raises(FlightError, match=r"did not find its position \(EKF\) within 60 s"):
             clock.go_through(preflight(autopilot, clock).prepare(MISSION))
         assert clock.time - started == pytest.approx(60.0, abs=0.3)
 

@@ -28,7 +28,7 @@ def test_a_scenario_names_it_and_its_version(aerosonde: Aircraft) -> None:
     assert newest.acceptance_radius == 10.0
     assert older.acceptance_radius == pytest.approx(56.0)
     assert "the simulated PX4 1.17 with its default parameters (NAV_ACC_RAD 10 m" in newest.described("aerosonde")
-    with pytest.raises(ScenarioError, match='px4_version: a key of autopilot = "px4" alone, not of "planfly"'):
+    with pytest.raises(ScenarioError, match='px4_version: only a key of autopilot = "px4", not of "planfly"'):
         with_flight(tight, px4_version="1.16")
 
 

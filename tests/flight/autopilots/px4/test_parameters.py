@@ -100,7 +100,7 @@ def test_what_is_stored_is_restored_and_another_version_is_not() -> None:
     stored = StoredParameters(made.values, made.unused, made.source)
     assert Px4Parameters.restore(stored, "1.16") == made
     assert Px4Parameters.restore(stored, "1.17") == replace(made, version="1.17")
-    with pytest.raises(ParameterError, match=r"^px4_version: '1.9': 1.16 or 1.17 is expected$"):
+    with pytest.raises(ParameterError, match=r"^px4_version: '1.9': expected 1.16 or 1.17$"):
         Px4Parameters.restore(stored, "1.9")
     bad = StoredParameters(tuple(one._replace(value=1e9) for one in made.values), (), "mine.params")
     with pytest.raises(ParameterError, match="allowed"):
@@ -118,10 +118,10 @@ def test_a_logs_parameters_are_read_to_single_precision() -> None:
     assert (made["NPFG_SW_DST_MLT"], notes) == (0.32, ())
     for logged in ({}, {"FW_AIRSPD_MIN": 9.0, "FW_AIRSPD_MAX": 8.0}):
         _, notes = Px4Parameters.of_log(logged, "a.ulg", "1.16")
-        assert notes[-1] == "the log holds no parameters: PX4's defaults are taken"
+        assert notes[-1] == "the log holds no parameters: PX4's defaults are used"
     made, notes = Px4Parameters.of_log({"FW_AIRSPD_MIN": 25.0}, "a.ulg", "1.16")
     assert made == Px4Parameters.defaults("1.16")
-    assert "must be below FW_AIRSPD_MAX 20: PX4's defaults are taken" in notes[0]
+    assert "must be below FW_AIRSPD_MAX 20: PX4's defaults are used" in notes[0]
 
 
 @pytest.mark.parametrize("deviations", [(0.07, 0.2, 0.2), (1.0, 0.5, 0.1)])

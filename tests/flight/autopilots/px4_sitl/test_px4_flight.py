@@ -122,8 +122,8 @@ def test_the_flight_goes_once_around_where_px4_circles_about_its_last_waypoint(f
             ("crash-in-air", "ended with exit code 1"),
             ("mute", "said nothing over MAVLink within 30 s"),
             ("copter", "is no PX4: its heartbeat says vehicle type 2"),
-            ("ardupilot", "is no PX4: its heartbeat says autopilot 3; 12, PX4, is expected"),
-            ("no-ekf", "did not come to know where it is (EKF) within 60 s"),
+            ("ardupilot", "is no PX4: its heartbeat says autopilot 3; expected 12, PX4"),
+            ("no-ekf", "did not find its position (EKF) within 60 s"),
             # Without home, which ArduPlane counts, item 1 sets the speed.
             ("refuses", "refused the mission at item 2 (NAV_WAYPOINT): MAV_MISSION_UNSUPPORTED"),
             ("will-not-arm", "refused arming (command 400) within 5 s; it last said: Arming denied: no will"),
@@ -164,7 +164,7 @@ def test_a_program_without_its_start_up_files_is_one_line(tmp_path: Path) -> Non
     program = tmp_path / "px4"
     program.write_text("#!/bin/sh\nexit 0\n", encoding="utf-8")
     program.chmod(0o755)
-    with pytest.raises(FlightError, match=r"px4: its start-up files are expected beside it, as the folder etc of"):
+    with pytest.raises(FlightError, match=r"px4: expected its start-up files next to it, in the folder etc of"):
         fly(make_setup(), program)
     assert left_behind() == []
 

@@ -165,7 +165,7 @@ def test_what_the_aircraft_is_not_known_well_enough_for_is_left_open(tmp_path: P
     verdict = judge_flight(replace(flight.setup, limits=limits), flight.track, "")
     assert verdict.undecided
     assert [level.undecided for level in verdict.levels] == [True]
-    assert verdict.headline.startswith("not judged in full: airspeeds on 2 legs are within what is not known")
+    assert verdict.headline.startswith("not judged in full: airspeeds on 2 legs are too close to the limit to judge")
     told = json.loads(verdict_json(verdict))
     assert (told["answer"], told["undecided"], told["flyable"]) == ("not judged in full", True, False)
 
@@ -197,8 +197,8 @@ def test_a_log_that_ends_on_the_way_says_nothing_of_the_rest(tmp_path: Path) -> 
 
 def test_a_flight_without_auto_is_not_judged(tmp_path: Path) -> None:
     flight = judged(tmp_path, with_modes((20.0, "FBWA")))
-    assert flight.verdict.headline == "not flown as planned: completion (no stretch of it followed the mission)"
-    assert "Judged: nothing, for no stretch followed the mission" in flight.verdict.lines
+    assert flight.verdict.headline == "not flown as planned: completion (no stretch of the flight followed the mission)"
+    assert "Judged: nothing, as no stretch of the flight followed the mission" in flight.verdict.lines
 
 
 def test_two_stretches_are_judged_together(tmp_path: Path) -> None:
@@ -232,7 +232,7 @@ def test_a_return_that_the_mission_ends_with_completes_it(tmp_path: Path, mode: 
 def test_each_fault_of_rows_is_counted_by_name() -> None:
     faults = RowFaults(doubled=1, unordered=2, unusable=3, glitches=4, clock_jumps=(5.0, 6.0))
     assert rows_text(faults, 2) == (
-        "2 gaps, 1 doubled, 2 out of order, 3 without a place or a time, 4 glitches of position,"
+        "2 gaps, 1 doubled, 2 out of order, 3 without a place or a time, 4 position glitches,"
         " 2 jumps of the clock (at 5.0 s, 6.0 s)"
     )
 

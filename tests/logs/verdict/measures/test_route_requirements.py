@@ -306,7 +306,7 @@ def test_the_other_legs_limit_counts_too(from_deg: float) -> None:
     limits = [limit_by_hand(course, 9.0, from_deg) for course in (0.0, 100.0)]
     assert (limits[0] < limits[1]) is (from_deg == 180.0)
     item = of(judge_geometry(setup), "slope", leg(0))
-    printed = re.search(r"the aircraft can ([\d.]+)° there", item.reason)
+    printed = re.search(r"the aircraft can fly at most ([\d.]+)° there", item.reason)
     assert printed is not None, item.reason
     assert abs(math.tan(math.radians(float(printed[1]))) - sum(limits) / 2.0) < 2e-3
     found = steep_arc(route_requirements(setup), 0)

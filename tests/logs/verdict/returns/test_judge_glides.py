@@ -147,7 +147,7 @@ def test_a_scenario_that_requires_it_fails_where_nothing_is_in_reach(tmp_path: P
     assert (near.ok, far.ok) == (True, False)
     assert "without the engine: of 181 places home can be reached from 181" in near.reason
     assert ", nothing from " in far.reason
-    assert far.method == "from every 1 s of the way, glides that keep 30 m above ground"
+    assert far.method == "one return every 1 s of the route, glides that keep 30 m above ground"
     # Flat ground counts, for it is somewhere to land.
     assert demanded(tmp_path).ok is True
     assert not [one for one in judge_geometry(hill_setup(tmp_path, BARRED)).findings if one.rule == "return"]
@@ -202,7 +202,7 @@ def test_taking_off_is_left_out_and_what_is_not_known_is_undecided(tmp_path: Pat
     homeless = replace(setup, mission=replace(setup.mission, home=None))
     (nowhere,) = [one for one in judge_geometry(homeless).findings if one.rule == "return"]
     assert nowhere.ok is None
-    assert "home: none is stated" in nowhere.reason
+    assert "home: not stated" in nowhere.reason
 
 
 def test_ranges_hold_every_place_in_order(tmp_path: Path) -> None:
@@ -214,7 +214,7 @@ def test_ranges_hold_every_place_in_order(tmp_path: Path) -> None:
         assert {one.reach for one in inside} == {group.least.reach}
         assert found.spare(group.least) == min(found.spare(one) for one in inside)
     assert sum(found.count(one) for one in ("home", "flat")) == len(found.each)
-    assert "it knows no trees, houses or water" in " ".join(glide_notes(found))
+    assert "which knows no trees, houses or water" in " ".join(glide_notes(found))
 
 
 def test_an_engine_that_burns_fuel_has_a_note(tmp_path: Path) -> None:
@@ -280,4 +280,4 @@ def test_what_is_not_known_of_energy_is_said(tmp_path: Path) -> None:
     deep = starts.at(np.flatnonzero(starts.rows["east"] > 6000.0))
     none = judge_returns(return_world(setup), deep, 20.0)
     assert none.point_of_no_return.kind == "arrives"
-    assert no_return_text(none).endswith("for no return arrives")
+    assert no_return_text(none).endswith("as no return arrives")

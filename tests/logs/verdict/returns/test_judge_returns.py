@@ -255,7 +255,7 @@ def test_where_it_is_required_one_is_flown_from_each_second(tmp_path: Path) -> N
     (failed,) = [one for one in verdict.failed if one.rule == "return"]
     # 6.5 km at the 25 m/s that are commanded.
     assert int(failed.reason.split()[1]) == pytest.approx(6500.0 / 25.0, abs=2.0)
-    assert failed.method.startswith("from every 1 s of the way, ")
+    assert failed.method.startswith("one return every 1 s of the route, ")
 
 
 def test_where_the_ground_is_not_known_it_is_undecided_where_it_is_required(tmp_path: Path) -> None:
@@ -291,5 +291,5 @@ def test_a_guessed_battery_is_not_judged_and_a_note_says_so(tmp_path: Path) -> N
 
 def test_without_a_home_there_is_nowhere_to_return_to(tmp_path: Path) -> None:
     setup = hill_setup(tmp_path)
-    with pytest.raises(MissionError, match="home: none is stated"):
+    with pytest.raises(MissionError, match="home: not stated"):
         return_world(replace(setup, mission=replace(setup.mission, home=None)))

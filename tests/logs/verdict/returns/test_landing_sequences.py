@@ -78,8 +78,8 @@ def test_without_a_landing_sequence_a_return_stays_in_its_circle(tmp_path: Path,
 
 def test_what_each_value_says(tmp_path: Path) -> None:
     said = [landing_text(judged(tmp_path, RTL_AUTOLAND=value))[0] for value in range(5)]
-    assert "does not arm so" in said[0]
-    assert said[1].endswith("from its circle a return goes on to the landing sequence at item 4")
+    assert "ArduPlane does not arm" in said[0]
+    assert said[1].endswith("from its circle a return continues to the landing sequence at item 4")
     assert "for go-arounds only" in said[3]
     assert judged(tmp_path, RTL_AUTOLAND=3).each[0].target.name == "home"
     by_path = judged(tmp_path, RTL_AUTOLAND=4)
@@ -120,7 +120,7 @@ def test_a_battery_that_lands_goes_another_way_than_rtl(tmp_path: Path) -> None:
     assert kinds["home"] == {"safe"}
     assert "ground" in kinds["the landing sequence at item 4"]
     lines = causes_text(both.causes)
-    assert "it lands: battery low (BATT_FS_LOW_ACT 2): by its landing sequence" in lines
+    assert "it lands: battery low (BATT_FS_LOW_ACT 2): lands by its landing sequence" in lines
     assert "the mission's end: has landed" in lines[-1]
     # Nothing triggers it, and it is not flown.
     unset = judged(tmp_path, RTL_AUTOLAND=0, BATT_FS_LOW_ACT=2, BATT_MONITOR=0)

@@ -87,7 +87,10 @@ def test_both_levels_show_it_and_it_decides_nothing() -> None:
         item = of(verdict, "clearance", leg(0))
         assert item.ok is True
         assert "54.0 m less the terrain's stated error of 16 m, less than the 60 m required" in item.reason
-        assert "Terrain's stated error: 16 m; the lowest clearance is 70.0 m, 54.0 m less that error" in verdict.summary
+        assert (
+            "Terrain's stated error: 16 m; the lowest clearance is 70.0 m, or 54.0 m with that error subtracted"
+            in verdict.summary
+        )
     high = make_setup(LEVEL, terrain=STATED, limits={"min_clearance_m": 50.0})
     assert "than the 50 m required" not in of(judge_geometry(high), "clearance").reason
 

@@ -93,8 +93,10 @@ def test_energy_within_what_is_not_known_is_undecided(share: float, ok: bool | N
     item = of(verdict, "energy")
     assert (item.ok, verdict.undecided) == (ok, ok is None)
     if ok is None:
-        assert "what a data sheet says of the power is give or take 25%" in item.reason
-        assert verdict.headline.startswith("not judged in full: energy is within what is not known of the aircraft")
+        assert "the power according to a data sheet is known to 25%" in item.reason
+        assert verdict.headline.startswith(
+            "not judged in full: energy is too close to the limit to judge with what is known of the aircraft"
+        )
 
 
 def test_a_headwind_takes_longer_and_a_slope_over_the_ground_is_steeper_in_it() -> None:

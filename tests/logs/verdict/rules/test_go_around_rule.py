@@ -117,7 +117,7 @@ def test_a_go_around_that_does_not_get_back_fails() -> None:
     # As fast against the wind as that blows: south of the field it gets nowhere.
     found, _ = go_around(LEVEL, *landing(p="60 0 0 0"), wind={"speed_mps": 25.0, "from_deg": 180.0}, **REQUIRED)
     assert found.ok is False
-    assert found.reason.startswith("a go-around does not get back to the line-up: ")
+    assert found.reason.startswith("a go-around does not return to the line-up: ")
 
 
 def test_a_go_around_goes_to_the_landing_sequence_that_is_nearest_where_its_climb_is_over() -> None:

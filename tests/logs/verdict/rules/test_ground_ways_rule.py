@@ -80,7 +80,7 @@ def test_the_way_to_the_first_waypoint_is_left_open_where_a_wall_stands_in_it() 
     into_it, verdict = judged("climbout", wall(1000.0, up + 2.0), *FAR)
     assert into_it.ok is None
     assert verdict.undecided
-    assert verdict.headline == "not judged in full: the way up from home to item 1 meets the ground"
+    assert verdict.headline == "not judged in full: the climb from home to item 1 meets the ground"
     assert into_it.reason.endswith("2 m into it 1000 m from home, at the steepest climb")
 
 
@@ -130,13 +130,13 @@ def test_courses_are_named_on_which_a_launch_would_climb_free() -> None:
     # it from acos(1 / 1.03) = 13.9 degrees on.
     top = 100.0 + 1.03 * 500.0 * climb()
     assert judged("climbout", wall(500.0, top), *TAKEOFF)[0].reason.endswith(
-        "launched on 020° to 340° it would climb free"
+        "launched on 020° to 340° it would climb clear"
     )
 
     def basin(east: Floats, at: Floats) -> Floats:
         return np.where(np.hypot(east, at) > 300.0, 2000.0, 100.0)
 
-    assert judged("climbout", basin, *TAKEOFF)[0].reason.endswith("no launch course climbs free")
+    assert judged("climbout", basin, *TAKEOFF)[0].reason.endswith("no launch course climbs clear")
 
 
 def test_no_ground_stands_in_the_way_for_the_first_50_metres() -> None:
@@ -183,7 +183,7 @@ def test_a_zone_in_the_way_up_counts_as_ground_does() -> None:
     town = Zone("town", "exclusion", Cylinder(0.0, 300.0, 100.0), ceiling=low)
     assert zoned(town, *TAKEOFF).ok is False
     assert zoned(town, *FAR).ok is None
-    assert "the way up from home to item 1 enters town (exclusion)" in zoned(town, *FAR).reason
+    assert "the climb from home to item 1 enters town (exclusion)" in zoned(town, *FAR).reason
     # Below the climb, beside it, or around home: nothing.
     for free in (
         replace(town, ceiling=ZoneLevel(100.0 + 0.7 * 180.0 * climb(), "amsl")),

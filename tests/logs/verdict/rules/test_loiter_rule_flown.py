@@ -92,7 +92,7 @@ def test_a_circle_flown_more_than_a_quarter_and_10_m_wider_is_told(mean: float, 
     _, aligned, _ = laid(setup, mean - 200.0, begins=1000.0)
     item = of(judge(setup, aligned.track), "loiter")
     assert item.flown == pytest.approx(mean, abs=0.9)
-    assert (f"flown with {mean:.0f} m where 200 m is asked for" in item.reason) is told
+    assert (f"flown with {mean:.0f} m where 200 m is required" in item.reason) is told
 
 
 def finding(rule: str, place: Place, ok: bool | None, margin: float | None) -> Finding:
@@ -173,4 +173,4 @@ def test_a_circle_where_the_wind_leaves_no_way_around_says_so() -> None:
     (circle,) = circles(requirements)
     (one,) = fold_loiters(requirements, None, [finding("turn", requirements.waypoint(circle.first), True, 1.0)])
     assert one.ok is False
-    assert "at 25 m/s the wind leaves no way around it" in one.reason
+    assert "at 25 m/s the circle cannot be flown" in one.reason

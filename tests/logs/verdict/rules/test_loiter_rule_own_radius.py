@@ -98,10 +98,10 @@ def test_a_missile_where_a_wider_circle_may_lead_leaves_geometry_open(away: floa
     item = of(verdict, "loiter")
     assert (item.ok, verdict.flyable, verdict.undecided) == ((True, True, False) if away > 0 else (None, False, True))
     if away < 0.0:
-        assert "the missile m reaches it: only a flight tells" in item.reason
+        assert "the missile m reaches it; only a flight tells" in item.reason
         assert (
             verdict.headline
-            == "not judged in full: where the circle at waypoint 1 (item 2) is flown, only a flight tells"
+            == "not judged in full: only a flight tells where the circle at waypoint 1 (item 2) is flown"
         )
 
 
@@ -126,7 +126,7 @@ def test_the_areas_edge_beside_it_leaves_geometry_open(north: float, open_: bool
 def test_a_wind_that_leaves_no_way_around_is_no_matter_of_the_radius() -> None:
     item = of(judge_geometry(loiter(TIME, OWN, wind={"speed_mps": 30.0, "from_deg": 270.0})), "loiter")
     assert item.ok is False
-    assert "the wind leaves no way around it" in item.reason
+    assert "the wind is too strong to fly this circle" in item.reason
 
 
 def test_a_circle_that_a_steep_roll_limit_holds_is_not_flown_wider() -> None:
@@ -170,7 +170,7 @@ def test_a_stated_circle_flown_half_again_as_wide_fails() -> None:
     assert item.ok is False
     assert item.flown is not None
     assert item.flown > 1.25 * 136.0 + 10.0
-    assert "m is asked for" in item.reason
+    assert "m is required" in item.reason
 
 
 def test_the_bank_that_was_flown_counts_before_the_one_that_could_be() -> None:

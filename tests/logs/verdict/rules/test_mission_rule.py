@@ -114,7 +114,7 @@ def test_px4_refuses(case: str) -> None:
 def test_px4s_own_limits_are_named_and_are_no_verdict_on_the_aircraft(case: str) -> None:
     check, lines, _, _ = REFUSED[case]
     verdict = judge_geometry(setup_of(*lines))
-    named = [line for line in verdict.lines if line.startswith("PX4 would not take it: ") and check in line]
+    named = [line for line in verdict.lines if line.startswith("PX4 would reject it: ") and check in line]
     assert len(named) == (0 if case in NOBODY else 1), verdict.lines
     assert not [item for item in verdict.findings if item.rule == "mission" and item.ok is False] or case in NOBODY
 
@@ -144,12 +144,17 @@ WHOLE = "".join(f"PARAMETER_{k} 1\n" for k in range(400))
     [
         ("", GOOD, None, "PX4's fixed-wing default refuses a mission without a landing: add one, or set MIS_TKO_LA"),
         ("NAV_ACC_RAD 20", GOOD, None, "or set MIS_TKO_LAND_REQ 0"),
-        ("", LANDING, True, "as MIS_TKO_LAND_REQ asks"),
-        ("MIS_TKO_LAND_REQ 2", GOOD, False, "MIS_TKO_LAND_REQ 2 asks for a landing, and this has a takeoff"),
-        (WHOLE, GOOD, False, "MIS_TKO_LAND_REQ 2 asks for a landing"),
-        (WHOLE + "MIS_TKO_LAND_REQ 0", GOOD, True, "as MIS_TKO_LAND_REQ asks"),
+        ("", LANDING, True, "as MIS_TKO_LAND_REQ requires"),
+        ("MIS_TKO_LAND_REQ 2", GOOD, False, "MIS_TKO_LAND_REQ 2 requires a landing, but this mission has a takeoff"),
+        (WHOLE, GOOD, False, "MIS_TKO_LAND_REQ 2 requires a landing"),
+        (WHOLE + "MIS_TKO_LAND_REQ 0", GOOD, True, "as MIS_TKO_LAND_REQ requires"),
         ("MIS_TKO_LAND_REQ 1", GOOD, True, ""),
-        ("MIS_TKO_LAND_REQ 1", GOOD[1:], False, "asks for a takeoff, and this has neither a takeoff nor a landing"),
+        (
+            "MIS_TKO_LAND_REQ 1",
+            GOOD[1:],
+            False,
+            "requires a takeoff, but this mission has neither a takeoff nor a landing",
+        ),
         ("MIS_TKO_LAND_REQ 3", GOOD, False, "a takeoff and a landing"),
         ("MIS_TKO_LAND_REQ 3", LANDING, True, ""),
         ("MIS_TKO_LAND_REQ 4", GOOD, False, "both or neither"),
@@ -164,7 +169,7 @@ def test_px4_asks_for_a_takeoff_or_a_landing(text: str, lines: tuple[str, ...], 
 
 def test_without_a_landing_a_default_px4_flies_and_the_verdict_says_so() -> None:
     verdict = judge_geometry(replace(setup_of(*GOOD), autopilot=Px4(Px4Parameters.defaults())))
-    said = "PX4 would not take it: PX4's fixed-wing default refuses a mission without a landing"
+    said = "PX4 would reject it: PX4's fixed-wing default refuses a mission without a landing"
     # Its take-off is not flown, and leaves the verdict open.
     assert verdict.undecided
     assert not verdict.failed

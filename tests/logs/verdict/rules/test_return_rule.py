@@ -180,7 +180,7 @@ def test_a_return_that_goes_on_to_what_is_not_flown_is_left_open(autoland: int) 
         assert verdict.headline.startswith("not judged in full: the landing at waypoint 2 (item 3) is not judged; ")
         assert verdict.headline.endswith("where the return leads to is not known")
         assert "item 5 begins with the landing itself" in of(verdict, "return").reason
-        assert of(verdict, "landing").reason == "the return is not flown on to it"
+        assert of(verdict, "landing").reason == "the return does not continue to it"
     # As without RTL_AUTOLAND, and as to a sequence that can be flown, nothing is open.
     assert not judge_geometry(by_arduplane(setup_of(*WAY, *lands, home=HOME), RTL_AUTOLAND=0)).undecided
     assert not judge_geometry(by_arduplane(setup_of(*WAY, *flown_on, home=HOME), RTL_AUTOLAND=autoland)).undecided

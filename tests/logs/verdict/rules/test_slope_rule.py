@@ -41,7 +41,9 @@ def test_a_steep_leg_is_explained() -> None:
     verdict = judge(setup, fly_path(setup))
     assert verdict.summary.startswith("not flyable: slope on leg 1, to item 2 (18.3° > 13.8°)")
     reason = of(verdict, "slope", leg(1)).reason
-    assert reason.startswith("leg 1 climbs 18.3° for 1.4 km; at 25 m/s and 763 m the aircraft can 13.7° in calm air")
+    assert reason.startswith(
+        "leg 1 climbs 18.3° for 1.4 km; at 25 m/s and 763 m the aircraft can fly at most 13.7° in calm air"
+    )
 
 
 def test_wind_flattens_the_limit_and_is_named() -> None:
@@ -50,7 +52,7 @@ def test_wind_flattens_the_limit_and_is_named() -> None:
     item = of(judge_geometry(setup), "slope", leg(1))
     wanted = math.degrees(math.atan2(25 * math.sin(math.radians(13.7)), 25 * math.cos(math.radians(13.7)) + 10))
     assert item.limit == pytest.approx(wanted, abs=0.01)
-    assert "13.7° in calm air but 9.8° in this 10 m/s tailwind" in item.reason
+    assert "13.7° in calm air, but 9.8° in this 10 m/s tailwind" in item.reason
     assert not judge_geometry(make_setup(hill(14.0), wind={"speed_mps": 8.0, "from_deg": 0.0})).summary.count("slope")
 
 
@@ -146,7 +148,7 @@ def test_the_arc_and_both_legs_are_named() -> None:
     assert item.brief == "the arc at waypoint 1"
     assert "have 7.0° and 6.0°" in item.reason
     missing = (math.tan(steep) - math.tan(math.radians(7.8))) * length
-    assert f"the aircraft can 7.8° there, {missing:.0f} m less" in item.reason
+    assert f"the aircraft can fly at most 7.8° there, {missing:.0f} m less" in item.reason
 
 
 def test_its_suggestion_passes() -> None:
@@ -245,15 +247,14 @@ def test_a_slope_within_what_is_not_known_is_undecided() -> None:
     for verdict in (judge(setup, fly_path(setup)), judge_geometry(setup)):
         item = of(verdict, "slope", leg(1))
         assert (item.ok, item.check) == (None, "unknown aircraft")
-        assert item.reason.startswith(
-            "climbs 10.0°, and what a data sheet says of the limit is 13.7° give or take 3.0°"
-        )
+        assert item.reason.startswith("climbs 10.0°; the limit according to a data sheet is 13.7°, give or take 3.0°")
         # Over 20 s the gusts of 15 s average out, and the speed has settled for 15 of them.
         told = [(change.what, change.wanted, change.unit) for one in item.suggestions for change in one]
         assert told == [("full throttle", 20.0, "s")]
         assert (verdict.flyable, verdict.undecided, verdict.complete) == (False, True, True)
         assert verdict.headline == (
-            "not judged in full: slope on leg 1, to item 2, is within what is not known of the aircraft;"
+            "not judged in full: slope on leg 1, to item 2, is too close to the limit to judge with what"
+            " is known of the aircraft;"
             " an aircraft from a data sheet"
         )
         assert verdict.levels[0].undecided
@@ -281,7 +282,7 @@ def test_a_scenarios_tighter_limit_does_not_make_the_aircraft_known() -> None:
         assert verdict.undecided is (ok is None)
         if ok is None:
             # What the aircraft can, not what the scenario allows.
-            assert "says of the limit is 13.7° give or take 3.0°" in item.reason
+            assert "the limit according to a data sheet is 13.7°, give or take 3.0°" in item.reason
 
 
 def test_the_deviation_that_is_told_is_the_aircrafts() -> None:
@@ -289,7 +290,7 @@ def test_the_deviation_that_is_told_is_the_aircrafts() -> None:
     setup = make_setup([[e, n, u + 400] for e, n, u in hill(10.0)], table=unsure(climb_sd=9.0))
     item = of(judge_geometry(setup), "slope", leg(1))
     assert item.ok is None
-    assert "13.7° give or take 9.0°" in item.reason
+    assert "13.7°, give or take 9.0°" in item.reason
 
 
 def test_a_glide_would_tell_of_a_descent() -> None:

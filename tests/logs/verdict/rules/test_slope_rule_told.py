@@ -97,7 +97,7 @@ def test_an_ability_too_small_is_told_with_its_direction(
         item = judged(SlopeMeasure(ability=shown, finished=True), monkeypatch, slope, envelope=envelope)
         assert item.ok is False
         wanted = what or "idle throttle the aircraft showed that it can sink"
-        assert f"in 20 s at {wanted} 4.0° at 25 m/s here; the leg asks for 6.0°" in item.reason
+        assert f"in 20 s at {wanted} 4.0° at 25 m/s here; the leg needs 6.0°" in item.reason
 
 
 def test_height_above_and_below_the_leg(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -137,7 +137,7 @@ def test_the_wind_on_a_steep_leg_is_named_beside_what_calm_air_allows(
     assert abs(item.limit or 0.0) == pytest.approx(limit, abs=0.01)
     asks = f"leg 1 {'climbs' if slope > 0.0 else 'falls'} {abs(slope):.1f}° for 2.0 km; at 25 m/s"
     assert item.reason.startswith(asks)
-    assert f"{math.degrees(calm):.1f}° in calm air but" in item.reason
+    assert f"{math.degrees(calm):.1f}° in calm air, but" in item.reason
     assert f"in this {blows}" in item.reason
 
 

@@ -207,7 +207,7 @@ def test_overlap_as_drawn_is_what_was_asked_for() -> None:
         assert (front.limit, side.limit) == pytest.approx((65.0, 50.0))
         assert (front.ok, side.ok) == (True, True)
     assert (
-        "front overlap 75 % at the least (line 1: photos 50 m apart, 100 m above ground), 75 % asked for"
+        "front overlap 75 % at the lowest (line 1: photos 50 m apart, 100 m above ground), 75 % required"
         in front.reason
     )
     # Without a camera nothing is said of it.
@@ -225,7 +225,7 @@ def test_lines_apart_overlap_less(aside: float, ok: bool) -> None:
     side = overlaps(judge(setup, fly_path(setup, radius=FITS, across=left)))["side overlap"]
     assert side.flown == pytest.approx(100.0 * (1.0 - (200.0 + aside) / 500.0), abs=0.2)
     assert side.ok is ok
-    assert f"lines 1 and 2: {200.0 + aside:.0f} m apart, 100 m above ground), 60 % asked for" in side.reason
+    assert f"lines 1 and 2: {200.0 + aside:.0f} m apart, 100 m above ground), 60 % required" in side.reason
 
 
 def second(s: np.ndarray) -> np.ndarray:

@@ -29,7 +29,7 @@ def test_where_it_touches_down_is_measured_along_and_across_the_landing() -> Non
     assert known["strip left"] == pytest.approx(300.0 - (500.0 - track.position[-1, 0]), abs=0.1)
     assert one.ok is True
     assert "4.3 m/s of tail wind" in one.reason
-    assert "by a flare that is not judged" in one.reason
+    assert "the flare itself is not judged" in one.reason
 
 
 def test_the_sink_towards_rising_ground_counts_its_slope() -> None:

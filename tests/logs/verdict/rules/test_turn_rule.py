@@ -138,7 +138,9 @@ def test_a_jog_that_the_corridor_has_room_for(aside: float, corridor: float, ok:
     verdict = judge_geometry(setup)
     assert [of(verdict, "turn", waypoint(k)).ok for k in (1, 2)] == [ok, ok]
     if ok:
-        assert "a negligible kink: the way without it passes it at" in of(verdict, "turn", waypoint(1)).reason
+        assert (
+            "a negligible kink: the path without this waypoint passes it at" in of(verdict, "turn", waypoint(1)).reason
+        )
 
 
 def test_a_corner_between_short_legs_is_no_jog_where_the_way_without_it_turns_as_sharply() -> None:
@@ -167,7 +169,7 @@ def test_a_leg_that_the_autopilot_left_at_once_is_the_reason_that_is_given() -> 
         leg = np.select([track.time < track.time[start], track.time < track.time[start] + seconds], [1, 2], last)
         return _unflown_turn_text(requirements, 2, TurnMeasure(), align_track(requirements, replace(track, leg=leg)))
 
-    counts = "since it counts a waypoint as reached from"
+    counts = "because it counts a waypoint as reached from"
     assert f"{short.autopilot.title} was on leg 2, to item 3, of 40 m for 1.0 s, {counts}" in why(1.0, 3)
     assert f"was on leg 2, to item 3, of 40 m for 0.0 s, {counts}" in why(0.0, 3)
     assert why(0.0, 1) == "the flight did not get past it"

@@ -242,7 +242,7 @@ def test_any_flights_have_an_answer(seed: int) -> None:
 
 def test_a_wind_that_is_none_is_not_taken_in() -> None:
     for speed in (-0.1, 20.1, float("nan")):
-        with pytest.raises(ValueError, match="0 to 20 m/s is expected"):
+        with pytest.raises(ValueError, match="expected 0 to 20 m/s"):
             Direction(20.0, 0.99, no_numbers()).add(speed, 0, frozenset())
 
 
