@@ -16,7 +16,7 @@ from planfly.terminal.options import (
     terrain_option,
 )
 from planfly.terminal.output import give_answer, give_junit
-from planfly.terminal.results import print_returns, print_verdict
+from planfly.terminal.results import print_engine, print_returns, print_verdict
 
 if TYPE_CHECKING:
     from planfly import Round, RunResult
@@ -82,6 +82,7 @@ def _json_answer(result: "RunResult", refined: bool, code: int) -> object:
 def _print_round(done: "Round") -> None:
     print_verdict(done.verdict, done.notes)
     print_returns(done.returns_line)
+    print_engine(done.engine)
     files = "plan.json, mission.waypoints, mission.plan, verdict.json; nothing was flown"
     if done.flown:
         flight = "flight.mcap" if done.has_log else "no flight"
