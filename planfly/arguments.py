@@ -86,6 +86,7 @@ CHOICES: Mapping[str, tuple[Any, ...]] = {
     "guidance": ("path", "l1", "vector-field"),
     "autopilot": ("ardupilot", "px4", "px4-1.16", "px4-1.17", "planfly"),
     "nav": ("perfect", "rtk", "gnss"),
+    "engine": ("auto", "jsbsim"),
     "log_hz": (60, 30, 20, 10),
     "datum": ("amsl", "ellipsoid"),
     "problems": (7, 15, 30, 60),

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Annotated, Literal, ParamSpec, TypedDict, TypeVar, cast, get_args, get_type_hints
 
 from flight.autopilots.catalog import program_autopilot
-from flight.simulation.setup import VerticalDatum
+from flight.simulation.setup import EngineChoice, VerticalDatum
 from planfly.arguments import check_arguments, is_wind
 from planfly.workflow.file_autopilots import with_file_autopilot
 from world.errors import ArgumentError
@@ -108,6 +108,7 @@ class SimulationOptions(TypedDict, total=False):
     """Autopilot of a simulated flight, its recording, and its limits.
 
     sitl: the program of ArduPlane or PX4 built for software in the loop, which then flies the mission.
+    engine: "auto" flies the compiled flight model if it equals JSBSim in every bit, "jsbsim" flies JSBSim.
     log_hz: rows per second in the log.
     max_hours: simulated hours after which the flight is stopped.  max_log: size of the log at which it is stopped, MB.
     levels: True also flies a mission that passes with planfly's guidance, as is done for one that fails, and compares
@@ -115,6 +116,7 @@ class SimulationOptions(TypedDict, total=False):
     """
 
     sitl: str | Path | None
+    engine: Annotated[EngineChoice, "auto"]
     log_hz: Annotated[Literal[10, 20, 30, 60], 60]
     max_hours: Annotated[float, MAX_HOURS]
     max_log: Annotated[float, MAX_MEGABYTES]

@@ -22,6 +22,7 @@ import numpy as np
 from aircraft.catalog import Aircraft
 from aircraft.contacts import Contact
 from aircraft.tracking import TrackingError
+from flight.dynamics.instructions import Code
 from flight.mission.ground_ways import GroundWays
 from flight.mission.loiter_circles import USUAL_LOITERS, LoiterRules
 from flight.mission.return_path import USUAL_RULES, ReturnRules
@@ -29,12 +30,16 @@ from flight.mission.route import RouteRules
 from world.arrays import Floats, Heights
 from world.errors import ScenarioError
 from world.json_schema import DocumentConfig
-from world.kernels import Record
+from world.kernels import Record, Records
 from world.scenario_tables import FlightTable, Guidance, Navigation
 from world.wind import Turbulence
 
 # One tick of the compiled loop, on the block of a `flight.simulation.tick.Workspace`: a key of `ENDS`, 0 to fly on.
 Tick = Callable[[Floats, Heights], int]
+
+# A number of ticks, each followed by the steps of a compiled model: block, heights, then frames, numbers and code of a
+# `flight.dynamics.compiled_model.CompiledModel`, and the number; returns the last tick's status.
+Loop = Callable[[Floats, Heights, Records, Floats, Code, int], int]
 
 # Question that a flight answers: can the aircraft fly it at all, or can it fly it with an autopilot.
 Level = Literal["airframe", "autopilot"]
@@ -340,6 +345,11 @@ class Autopilot(ABC):
     @abstractmethod
     def tick(self) -> Tick:
         """Compiled function for one tick of its law."""
+
+    @property
+    def loop(self) -> Loop | None:
+        """Compiled loop of its law with a compiled model, or None if its flights are flown by JSBSim alone."""
+        return None
 
     def begin(self, memory: Record, own: Record) -> None:
         """Initialise the records of its control law before the first tick.

@@ -13,6 +13,7 @@ import os
 import struct
 import sys
 import tempfile
+from array import array
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -248,6 +249,7 @@ class Fdm:
     gear: gear for ground contact if the model has none; None for a flight in the air only.
 
     properties: JSBSim's own properties by name, in its units.
+    dt: time step, s.
 
     Raise FlightError for a model that is missing, refused by `flight.dynamics.model_check`, or not loadable, and for an
     undefined property that the model or this class reads.
@@ -268,6 +270,10 @@ class Fdm:
             raise FlightError(f"rate_hz = {rate_hz} is not a positive number", field="rate_hz", value=rate_hz)
         self.aircraft = aircraft
         self.dt = 1.0 / rate_hz
+        self.flat_earth = flat_earth
+        self._gear = gear
+        # Roll, pitch and yaw of all evaluations, one after the other.
+        self._attitudes = array("d")
         self._exec = _new_instance(aircraft, self.dt, flat_earth, tried or aircraft.embedded, gear)
         access = PropertyAccess(self._exec.get_property_manager(), aircraft.model_file)
         self.properties = access
@@ -450,6 +456,15 @@ class Fdm:
             run=self._run,
         )
 
+    def model_text(self) -> bytes:
+        """Return the XML of the model with its contacts."""
+        model = self.aircraft.model_file.read_bytes()
+        return model if self._gear is None else with_contacts(model, self.aircraft, self._gear)
+
+    def attitudes(self) -> Floats:
+        """Return roll, pitch and yaw (n, 3), rad, of all evaluations of initial conditions, in order."""
+        return np.array(self._attitudes).reshape(-1, 3)
+
     def specific_force(self) -> tuple[float, float, float]:
         """Return the specific force along the body axes, as measured at the center of gravity, m/s^2."""
         x, y, z = self._forces
@@ -506,6 +521,7 @@ class Fdm:
         commands: Iterable[float],
         settle: bool = False,
     ) -> Floats:
+        self._attitudes.extend(angles)
         # Trim status bypasses the lag of the actuators.
         self.write(commands)
         for setter, value in zip(self._ic_motion, (*angles, *(velocity / FOOT), *pqr), strict=True):

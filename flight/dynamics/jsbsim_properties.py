@@ -128,6 +128,10 @@ class PropertyAccess:
             return setter
         return lambda value: setter(value * (above if value > 0.0 else below))
 
+    def read(self, name: str) -> float:
+        """Return the present value of a property. Raise FlightError if it is undefined."""
+        return self.getter(name)()
+
     def set(self, name: str, value: float) -> None:
         """Set a property once."""
         self.setter(name)(value)

@@ -318,7 +318,9 @@ def _run_flight(
 ) -> bool:
     """Fly in real time, and return False if the process is to end."""
     try:
-        flight = Flight(prepared.setup, factory.aircraft, local_map=prepared.local_map)
+        # A diverted flight continues in the same instance of JSBSim.
+        live = replace(prepared.setup, engine="jsbsim")
+        flight = Flight(live, factory.aircraft, local_map=prepared.local_map)
         log = factory.open_log(prepared.setup, AUTO)
     except (PlanflyError, OSError) as error:
         send_event(connection, FlightEnded(f"not started: {error}"))

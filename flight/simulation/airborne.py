@@ -6,6 +6,7 @@ by a program of its own.
 
 import math
 from abc import ABC, abstractmethod
+from functools import partial
 
 import numpy as np
 
@@ -47,7 +48,10 @@ class Airborne(ABC):
     memory: memory of the guidance, a record of `flight.guidance.inner_loops.GUIDANCE_MEMORY`.
     fdm: the simulated aircraft.
     max_ticks: time limit, ticks.
+    engine: flight model that flies, and the reason, as in "JSBSim, as chosen".
     """
+
+    engine: str = "JSBSim, for a flight by a program"
 
     def __init__(
         self,
@@ -71,8 +75,15 @@ class Airborne(ABC):
         self.dt = self._steps / setup.fdm_hz
         self._gains = gains
         self._lay_out(setup, aircraft, local_map or LocalMap.around(setup))
-        braking = setup.scenario.flight.motor_braking
-        self.fdm = Fdm(aircraft, rate_hz=setup.fdm_hz, motor_braking=braking, variation=variation, gear=gear)
+        self._new_fdm = partial(
+            Fdm,
+            aircraft,
+            rate_hz=setup.fdm_hz,
+            motor_braking=setup.scenario.flight.motor_braking,
+            variation=variation,
+            gear=gear,
+        )
+        self.fdm = self._new_fdm()
 
     def _lay_out(self, setup: FlightSetup, aircraft: Aircraft, local_map: LocalMap) -> None:
         """Make the workspace for a route, and set the time limit of the flight."""

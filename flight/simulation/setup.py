@@ -191,6 +191,8 @@ class ImportedLog:
 
 # JSBSim steps per second, except in campaigns.
 FDM_HZ: Literal[120] = 120
+# Flight model that flies: "auto" is the compiled model if it equals JSBSim, "jsbsim" is JSBSim.
+EngineChoice = Literal["auto", "jsbsim"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -209,6 +211,7 @@ class FlightSetup:
     nav: accuracy of the navigation, a key of `flight.guidance.navigation_error.ERRORS`.
     guidance_hz: guidance ticks per second, and track rows per second.
     fdm_hz: steps of JSBSim per second.
+    engine: flight model that flies; both give the same flight.
     source: the imported log that the flight comes from; None for a flight by planfly.
     path: reference path from route and limits.
     """
@@ -225,6 +228,7 @@ class FlightSetup:
     nav: Navigation = "perfect"
     guidance_hz: Literal[30, 60] = 60
     fdm_hz: Literal[60, 120] = FDM_HZ
+    engine: EngineChoice = field(default="auto", compare=False)
     source: ImportedLog | None = None
     path: FlyByPath = field(init=False, repr=False, compare=False)
 

@@ -9,9 +9,11 @@ from typing import NamedTuple
 
 from aircraft.catalog import Aircraft
 from aircraft.contacts import contacts_of
-from flight.autopilots.autopilot import Autopilot, Tick
-from flight.dynamics.fdm import Fdm, LoopAccess, Variation
+from flight.autopilots.autopilot import Autopilot
+from flight.dynamics.compiled_model import PROOF_STEPS, CompiledModel
+from flight.dynamics.fdm import JSBSIM_VERSION, Fdm, Variation
 from flight.dynamics.jsbsim_properties import Getter, Setter
+from flight.dynamics.model_program import UnsupportedModel
 from flight.dynamics.trim import straight
 from flight.guidance.gains import load_gains
 from flight.guidance.path import FlyByPath
@@ -19,7 +21,7 @@ from flight.mission.ground_ways import GroundWays
 from flight.simulation.airborne import Airborne
 from flight.simulation.local_map import LocalMap
 from flight.simulation.setup import FlightSetup
-from flight.simulation.start import find_release, gear_of, release
+from flight.simulation.start import Start, find_release, gear_of, release
 from flight.simulation.tick import READ_FIELDS, Workspace
 from flight.simulation.track import Rows, Track, as_track, join_rows
 from world.errors import StartError
@@ -257,7 +259,8 @@ class Flight(Airborne):
         law = self._law(setup).law
         law.begin(self.memory, self._workspace.own)
         self._start_disturbances(setup)
-        self._loop = self._make_loop(self.fdm.loop_access(), law.tick)
+        self._compiled, self.engine = self._choose_engine(law)
+        self._loop = self._make_loop(law)
 
     def divert(self, setup: FlightSetup, local_map: LocalMap) -> None:
         """Leave the route for another setup's route, which begins at the aircraft's position; its time begins at 0.
@@ -278,7 +281,7 @@ class Flight(Airborne):
         law = setup.autopilot.law
         law.begin(self.memory, self._workspace.own)
         law.take_over(own, self._workspace.own, setup.route.waypoints[0])
-        self._loop = self._make_loop(self.fdm.loop_access(), law.tick)
+        self._loop = self._make_loop(law)
 
     def _begin(self, setup: FlightSetup, model: Fdm, reference: float) -> None:
         """Trim the aircraft at the route's start, and initialise the controls of guidance with the model.
@@ -293,16 +296,21 @@ class Flight(Airborne):
         if level is None:
             reason = f"no level flight at {reference:.1f} m/s and {start.amsl:.0f} m AMSL"
             raise StartError(setup.aircraft, reason, field="airspeed", value=reference)
-        self._start_trimmed(setup.mission.source, start)
+        self._start_fdm = partial(self._begin_motion, setup, start, level.elevator)
+        self._start_fdm()
         memory = self.memory
         memory.trim_elevator, memory.trim_alpha = level.elevator, level.alpha
         memory.trim_throttle = (straight(model, start.airspeed, start.amsl) or level).throttle
         memory.last_airspeed = -1.0
         memory.stall_speed = self.fdm.aircraft.stall_speed
+
+    def _begin_motion(self, setup: FlightSetup, start: Start, elevator: float) -> None:
+        """Start the aircraft trimmed, or release it with this elevator for a take-off."""
+        self._start_trimmed(setup.mission.source, start)
         if self._ways.take_off is not None:
-            throttle, elevator = self._from_ground.released_throttle, level.elevator
             begin = find_release(setup, self.map, self._ground, self.fdm.aircraft, self._ways.take_off)
-            self._work.commands = release(self.fdm, begin, (elevator, 0.0, 0.0, throttle))
+            commands = (elevator, 0.0, 0.0, self._from_ground.released_throttle)
+            self._work.commands = release(self.fdm, begin, commands)
             self._work.air.wind_north, self._work.air.wind_east = begin.wind[:2]
 
     def _law(self, setup: FlightSetup) -> Autopilot:
@@ -311,18 +319,39 @@ class Flight(Airborne):
     def _fly(self, count: int) -> int:
         return self._loop(count)
 
-    def _make_loop(self, access: LoopAccess, tick: Tick) -> Callable[[int], int]:
+    def _choose_engine(self, law: Autopilot) -> tuple[CompiledModel | None, str]:
+        """Return the compiled model if it may fly, or None for JSBSim, and which flies for which reason."""
+        if self.setup.engine == "jsbsim":
+            return None, "JSBSim, as chosen"
+        if law.loop is None:
+            return None, "JSBSim, since contact with the ground is not compiled"
+        gusts, terrain = self._windy, bool(self._ground.known)
+        try:
+            model = CompiledModel(self.fdm, READ_FIELDS, self._steps, gusts=gusts, terrain=terrain)
+        except UnsupportedModel as unsupported:
+            return None, f"JSBSim, since the compiled model does not cover {unsupported}"
+        if differences := model.find_differences():
+            # Start again, since the comparison has moved the aircraft.
+            self.fdm = self._new_fdm()
+            self._start_fdm()
+            return None, f"JSBSim, since the compiled model differs from it in {differences[0]}"
+        return model, f"compiled model, equal to JSBSim {JSBSIM_VERSION} in every bit of {PROOF_STEPS} steps"
+
+    def _make_loop(self, law: Autopilot) -> Callable[[int], int]:
         """Return a function that flies a number of ticks into the workspace's rows and returns the last status."""
-        work, space = self._work, self._workspace
+        work, space, access = self._work, self._workspace, self.fdm.loop_access()
         work.state_factors = access.factors[0]
         work.scale_above, work.scale_below = (tuple(scales) for scales in zip(*access.scales, strict=True))
+        if self._compiled is not None and law.loop is not None:
+            model = self._compiled
+            return partial(law.loop, space.block, self._ground.heights, model.frames, model.numbers, model.code)
         # Not set: gusts in still air, and ground that is not known.
         used = (True, True, True, True, self._windy, self._windy, self._windy, self._ground.known)
         setters = [setter if use else _discard for setter, use in zip(access.setters, used, strict=True)]
         return make_loop(
             [access.getters[field] for field in READ_FIELDS],
             setters,
-            partial(tick, space.block, self._ground.heights),
+            partial(law.tick, space.block, self._ground.heights),
             space,
             access.run,
             self._steps,

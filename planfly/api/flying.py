@@ -37,7 +37,7 @@ from planfly.workflow.airframe import airframe_of
 from planfly.workflow.crash_safe_log import FlightLimits, flight_kind, flight_text
 from planfly.workflow.open_flight import open_flight
 from planfly.workflow.output_paths import FLY_LOG, LOG_FIGURES, check_output_file, file_target, prepare_folder
-from planfly.workflow.pipeline import PlanThenFly, autopilot_log, fly_and_judge
+from planfly.workflow.pipeline import JudgedFlight, PlanThenFly, autopilot_log, fly_and_judge
 from planfly.workflow.suggestion_trials import judge_mission
 from planner.plan import Plan
 from world.errors import ArgumentError, ScenarioError
@@ -60,6 +60,7 @@ class FlownMission:
     log: the file of the flight log; None if no log was requested or nothing was flown.
     autopilot_log: the autopilot program's own log, next to the flight log, if such a program flew.
     returns: returns from a few places of the flight, as recorded in the log; None without a log.
+    engine: flight model that flew, and the reason; "" if nothing was flown.
     """
 
     setup: FlightSetup
@@ -70,6 +71,7 @@ class FlownMission:
     log: Path | None = None
     autopilot_log: Path | None = None
     returns: ReturnSummary | None = None
+    engine: str = ""
 
     @property
     def mission(self) -> Mission:
@@ -166,7 +168,7 @@ def fly(
     overwrite: bool = True,
     **options: Unpack[FlyOptions],
 ) -> FlownMission:
-    """Fly a plan or a mission file in JSBSim, and judge the flight.
+    """Fly a plan or a mission file, and judge the flight.
 
     mission: a `Plan`, or the path of a plan.json, .waypoints or .plan file.
     log: MCAP file for the flight; {name} and {seed} in it stand for the mission's name and the seed; None writes none.
@@ -187,6 +189,7 @@ def fly(
     guidance: planfly's own guidance ("path", "l1", "vector-field") instead of the simulated ArduPlane.
     nav: "perfect", "rtk" or "gnss".
     sitl: the program of ArduPlane or PX4 built for software in the loop (SITL), which then flies the mission.
+    engine: "auto" flies the compiled flight model if it equals JSBSim in every bit, "jsbsim" flies JSBSim.
 
     log_hz: rows per second in the log.
     max_hours, max_log: limits of flight time, h, and log size, MB, at which a flight is stopped.
@@ -201,8 +204,9 @@ def fly(
     """
     limits = FlightLimits(options["max_hours"], options["max_log"])
     check_arguments(seed=options["seed"], log_hz=options["log_hz"], max_hours=limits.hours, max_log=limits.megabytes)
+    check_arguments(engine=options["engine"])
     program = named_program(options["sitl"])
-    setup = open_flight(mission, options, program)
+    setup = replace(open_flight(mission, options, program), engine=options["engine"])
     target = None if log is None else _prepare_log_file(log, setup, mission, program, overwrite)
     with stage(f"flying {flight_text(setup)}", flight_kind(setup)) as advance:
         flown = fly_and_judge(
@@ -216,10 +220,23 @@ def fly(
             reference="always" if options["levels"] else "failed",
             returns=target is not None,
         )
-    target = target if len(flown.track) else None
-    program_log = None if target is None or program is None else autopilot_log(target, program)
+    return _flown_mission(flown, target, program)
+
+
+def _flown_mission(flown: JudgedFlight, log: Path | None, program: Path | None) -> FlownMission:
+    """Return the result of a flight; a flight that did not start has no log and no flight model."""
+    log = log if len(flown.track) else None
+    program_log = None if log is None or program is None else autopilot_log(log, program)
     return FlownMission(
-        flown.setup, flown.track, flown.verdict, flown.ended, flown.events, target, program_log, flown.returns
+        flown.setup,
+        flown.track,
+        flown.verdict,
+        flown.ended,
+        flown.events,
+        log,
+        program_log,
+        flown.returns,
+        flown.engine if len(flown.track) else "",
     )
 
 

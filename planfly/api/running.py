@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any, Unpack
 
 from flight.mission_files.formats import mission_kind, mission_text
+from flight.simulation.setup import EngineChoice
 from logs.recording.setup_attachments import package_versions
 from logs.verdict.judge_flight import judge_plan_only
 from logs.verdict.verdict import Verdict, verdict_json
@@ -51,6 +52,7 @@ class Round:
     notes: notes on the scenario's zones and the mission's route.
     has_log: True if a flight log was written.
     returns_line: returns from a few places of the flight, in one line; "" if nothing was flown.
+    engine: flight model that flew, and the reason; "" if nothing was flown.
     """
 
     number: int
@@ -61,6 +63,7 @@ class Round:
     notes: tuple[str, ...] = ()
     has_log: bool = False
     returns_line: str = ""
+    engine: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,6 +107,7 @@ class _Task:
     reference: cases in which reference flights are flown.
     limits: limits of the flight time and of the size of the log.
     every: the log keeps one row out of this many.
+    engine: flight model that flies.
     """
 
     scenario: Scenario
@@ -115,6 +119,7 @@ class _Task:
     limits: FlightLimits
     every: int
     reference: FlyReference
+    engine: EngineChoice
 
 
 @with_warm_up(*PLANNING_AND_FLYING, *GLIDING)
@@ -151,6 +156,7 @@ def run(
     check_arguments(
         seed=seed, refine=refine, log_hz=options["log_hz"], max_hours=limits.hours, max_log=limits.megabytes
     )
+    check_arguments(engine=options["engine"])
     program = named_program(options["sitl"])
     world = named_scenario(scenario, options, program)
     chosen_seed, airframe = choose_seed(world, seed), load_airframe(world)
@@ -162,7 +168,16 @@ def run(
     repeat_command = command_line(scenario_name, chosen_seed, changed_options)
     reference: FlyReference = "always" if options["levels"] else "failed"
     task = _Task(
-        world, airframe, chosen_seed, repeat_command, folder, program, limits, 60 // options["log_hz"], reference
+        world,
+        airframe,
+        chosen_seed,
+        repeat_command,
+        folder,
+        program,
+        limits,
+        60 // options["log_hz"],
+        reference,
+        options["engine"],
     )
     with contextlib.ExitStack() as locks:
         return _fly_rounds(task, refine, locks, on_round)
@@ -240,7 +255,7 @@ def _fly_round(task: _Task, plan: Plan, number: int) -> Round:
         verdict = judge_plan_only(plan, planned_for(task.scenario, airframe))
         write_whole(folder / "verdict.json", verdict_json(verdict))
         return Round(number, (), verdict, flown=False, folder=folder)
-    setup = make_setup(task.scenario, airframe, mission, task.seed, plan=plan)
+    setup = replace(make_setup(task.scenario, airframe, mission, task.seed, plan=plan), engine=task.engine)
     with stage(f"flying {flight_text(setup)}", flight_kind(setup)) as advance:
         flown = fly_and_judge(
             setup,
@@ -270,7 +285,15 @@ def _fly_round(task: _Task, plan: Plan, number: int) -> Round:
     notes = (*setup.scenario.notes, *setup.notes)
     has_log = len(flown.track) > 0
     return Round(
-        number, (), flown.verdict, flown=True, folder=folder, notes=notes, has_log=has_log, returns_line=summary.line
+        number,
+        (),
+        flown.verdict,
+        flown=True,
+        folder=folder,
+        notes=notes,
+        has_log=has_log,
+        returns_line=summary.line,
+        engine=flown.engine if has_log else "",
     )
 
 

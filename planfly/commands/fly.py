@@ -10,7 +10,7 @@ from planfly.terminal.command_parser import LineParser, coloured
 from planfly.terminal.exit_codes import verdict_code
 from planfly.terminal.options import call, flight_options, log_rate_option, result_options, world_options
 from planfly.terminal.output import give_answer, give_junit
-from planfly.terminal.results import print_returns, print_verdict, print_warnings
+from planfly.terminal.results import print_engine, print_returns, print_verdict, print_warnings
 from planfly.workflow.output_paths import FLY_LOG
 
 if TYPE_CHECKING:
@@ -53,6 +53,7 @@ def fly(args: argparse.Namespace) -> int:
     if flown.log is None:
         print("log       none: nothing was flown")
     else:
+        print_engine(flown.engine)
         print(f"log       {flown.log}")
         if flown.autopilot_log is not None:
             print(f"          {flown.autopilot_log} (the autopilot's own)")

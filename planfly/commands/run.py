@@ -16,7 +16,7 @@ from planfly.terminal.options import (
     terrain_option,
 )
 from planfly.terminal.output import give_answer, give_junit
-from planfly.terminal.results import print_returns, print_verdict
+from planfly.terminal.results import print_engine, print_returns, print_verdict
 
 if TYPE_CHECKING:
     from planfly import Round, RunResult
@@ -85,6 +85,7 @@ def _json_answer(result: "RunResult", refined: bool, code: int) -> object:
 def _print_round(finished: "Round") -> None:
     print_verdict(finished.verdict, finished.notes)
     print_returns(finished.returns_line)
+    print_engine(finished.engine)
     files = "plan.json, mission.waypoints, mission.plan, verdict.json; nothing was flown"
     if finished.flown:
         flight = "flight.mcap" if finished.has_log else "no flight"

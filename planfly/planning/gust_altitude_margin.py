@@ -143,8 +143,8 @@ def _climb_problem(plan: Plan, airframe: Airframe) -> str:
         return ""
     return (
         f"climbs {climb_rate:.2f} m/s at {amsl:.0f} m at most; with less than {min_climb_rate:.2f} m/s downdrafts of"
-        f" {turbulence} turbulence may push it down further than any height margin covers; less turbulence, a lower mission or an"
-        " aircraft that climbs better would help"
+        f" {turbulence} turbulence may push it down further than any height margin covers; less turbulence, a lower"
+        " mission or an aircraft that climbs better would help"
     )
 
 

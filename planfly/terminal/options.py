@@ -215,6 +215,12 @@ def flight_options(parser: CommandParser) -> None:
         "loop (extra planfly[live])",
     )
     group.add_argument(
+        "--engine",
+        choices=CHOICES["engine"],
+        default="auto",
+        help="flight model: auto flies the compiled model if it equals JSBSim in every bit (default), jsbsim JSBSim",
+    )
+    group.add_argument(
         "--levels",
         action="store_true",
         help="if the flight passes, also fly the mission by planfly's guidance, and say whether the two flights agree "

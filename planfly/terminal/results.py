@@ -25,6 +25,12 @@ def print_returns(line: str) -> None:
         print(f"returns   {line} (more: planfly returns)")
 
 
+def print_engine(engine: str) -> None:
+    """Print the flight model that flew and the reason, unless nothing was flown."""
+    if engine:
+        print(f"model     {engine}")
+
+
 def print_warnings(warnings: Iterable[str]) -> None:
     """Print warnings on standard error."""
     for warning in warnings:

@@ -86,6 +86,7 @@ class JudgedFlight:
     ended: "completed", or the reason for an early end.
     verdict: the verdict on the rows of `track`.
     events: entries of the log in addition to the rows.
+    engine: flight model that flew, and the reason; "" for a flight that did not start.
     reference: the results of reference flights; None if none were flown.
     returns: returns from a few places of the flight; None if they were not requested.
     """
@@ -96,6 +97,7 @@ class JudgedFlight:
     ended: str
     verdict: Verdict
     events: tuple[LogEvent, ...]
+    engine: str = ""
     reference: ReferenceFlights | None = None
     returns: ReturnSummary | None = None
 
@@ -204,10 +206,11 @@ def _record_and_judge(task: _Task, requirements: RouteRequirements, flight: Airb
     flight.max_ticks = min(flight.max_ticks, task.limits.max_ticks(flight.dt))
     if task.log is None:
         track, ended = _fly(task, flight, None)
-        return _judge_rows(task, requirements, track, ended)
+        return _judge_rows(task, requirements, track, ended, flight.engine)
     with CrashSafeLog(task.log, flight.setup, every=task.every, batch=BATCH_S) as recorder:
         track, recorder.ended = _fly(task, flight, recorder)
-        judged = _judge_rows(task, requirements, thin_track(track, task.every), recorder.ended)
+        rows = thin_track(track, task.every)
+        judged = _judge_rows(task, requirements, rows, recorder.ended, flight.engine)
         for event in judged.events:
             recorder.event(event.time, event.text, event.level)
         summary = return_summary(flight.setup, judged.track) if task.returns else None
@@ -245,9 +248,12 @@ def _judge_unflown(
     return JudgedFlight(setup, requirements, track, ended, verdict, ())
 
 
-def _judge_rows(task: _Task, requirements: RouteRequirements, track: Track, ended: str) -> JudgedFlight:
+def _judge_rows(task: _Task, requirements: RouteRequirements, track: Track, ended: str, engine: str) -> JudgedFlight:
     end = float(track.time[-1]) if len(track) else 0.0
-    event = LogEvent(end, f"flight ended: {ended}", "info" if ended == "completed" else "error")
+    events = (
+        LogEvent(0.0, f"flight model: {engine}", "info"),
+        LogEvent(end, f"flight ended: {ended}", "info" if ended == "completed" else "error"),
+    )
     aircraft = task.airframe.aircraft
     verdict, reference_flights = judge_with_reference_flights(requirements, aircraft, track, ended, fly=task.reference)
-    return JudgedFlight(requirements.setup, requirements, track, ended, verdict, (event,), reference_flights)
+    return JudgedFlight(requirements.setup, requirements, track, ended, verdict, events, engine, reference_flights)

@@ -13,7 +13,7 @@ from aircraft.tracking import TrackingError
 from flight.autopilots.arduplane.ground_law import ARDUPLANE_GROUND, CONTACTS, IN_AIR, TAKING_OFF, ground_tick
 from flight.autopilots.arduplane.landing import go_around_height, landing_airspeed, landing_glide
 from flight.autopilots.arduplane.launch import motor_start, takeoff_slew
-from flight.autopilots.arduplane.law import ARDUPLANE, arduplane_tick
+from flight.autopilots.arduplane.law import ARDUPLANE, arduplane_loop, arduplane_tick
 from flight.autopilots.arduplane.navigator import LOITER_ALTITUDE_TOLERANCE_M, MAX_ACCEPTANCE_M, turn_distance
 from flight.autopilots.arduplane.open_settings import describe_open_settings
 from flight.autopilots.arduplane.parameters import (
@@ -28,6 +28,7 @@ from flight.autopilots.autopilot import (
     Autopilot,
     GroundAutopilot,
     LandingGlide,
+    Loop,
     MissionParts,
     SpeedLimits,
     StoredAutopilot,
@@ -126,6 +127,11 @@ class ArduPlane(Autopilot):
     def tick(self) -> Tick:
         """Compiled function for one tick of the law."""
         return arduplane_tick
+
+    @property
+    def loop(self) -> Loop | None:
+        """Compiled loop of the law with a compiled model."""
+        return arduplane_loop
 
     def begin(self, memory: Record, own: Record) -> None:
         """Write the parameters into the memory."""
@@ -341,6 +347,11 @@ class ArduPlaneFromGround(ArduPlane, GroundAutopilot):
     def tick(self) -> Tick:
         """Compiled function for one tick of the law."""
         return ground_tick
+
+    @property
+    def loop(self) -> Loop | None:
+        """None: contact with the ground is not compiled."""
+        return None
 
     @property
     def motor_start(self) -> float:

@@ -7,10 +7,12 @@ import numpy as np
 from aircraft.envelope import GRAVITY
 from flight.autopilots.arduplane.navigator import navigate_legs, target_of
 from flight.autopilots.arduplane.parameters import ARDUPILOT_PARAMETERS
+from flight.dynamics.instructions import Code
 from flight.guidance.equivalent_airspeed import true_by_equivalent
 from flight.guidance.inner_loops import follow_roll, steer_elevator
 from flight.guidance.path import find_on_path, leave_sharp_corners, profile
 from flight.mission.itinerary import UNLIMITED
+from flight.simulation.compiled_loop import advance_model, read_state
 from flight.simulation.tick import (
     MISSED_ROUTE_DISTANCE_M,
     NOT_A_NUMBER,
@@ -563,6 +565,18 @@ def arduplane_tick(block: Floats, heights: Heights) -> int:
         work.timing.dt,
     )
     return end_tick(work)
+
+
+@compiled
+def arduplane_loop(block: Floats, heights: Heights, frames: Records, numbers: Floats, code: Code, count: int) -> int:
+    """Fly up to a number of ticks with a `flight.dynamics.compiled_model.CompiledModel`, and return the last status."""
+    for _ in range(count):
+        read_state(block, numbers, code)
+        status = arduplane_tick(block, heights)
+        if status != 0:
+            return status
+        advance_model(block, frames[0], numbers, code)
+    return 0
 
 
 @inner

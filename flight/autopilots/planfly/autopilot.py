@@ -4,9 +4,9 @@ from dataclasses import dataclass
 from typing import ClassVar, Self
 
 from aircraft.catalog import Aircraft
-from flight.autopilots.autopilot import Autopilot, Level, StoredAutopilot, Tick
+from flight.autopilots.autopilot import Autopilot, Level, Loop, StoredAutopilot, Tick
 from flight.autopilots.gust_height import height_in_gusts
-from flight.autopilots.planfly.law import LAWS, planfly_tick
+from flight.autopilots.planfly.law import LAWS, planfly_loop, planfly_tick
 from flight.guidance.gains import GAINS_FILE, load_gains
 from world.kernels import Record
 from world.scenario_tables import FlightTable, Guidance
@@ -57,6 +57,11 @@ class PlanflyGuidance(Autopilot):
     def tick(self) -> Tick:
         """Compiled function for one tick, of all three laws."""
         return planfly_tick
+
+    @property
+    def loop(self) -> Loop:
+        """Compiled loop of the law with a compiled model."""
+        return planfly_loop
 
     def begin(self, memory: Record, own: Record) -> None:
         """Select the lateral law."""

@@ -12,6 +12,7 @@ import math
 
 from aircraft.envelope import GRAVITY
 from aircraft.tracking import density_factor
+from flight.dynamics.instructions import Code
 from flight.guidance.inner_loops import follow_roll, roll_model, steer_elevator
 from flight.guidance.lateral_reference_laws import (
     WAYPOINT_RADIUS,
@@ -23,6 +24,7 @@ from flight.guidance.lateral_reference_laws import (
     l1_reached,
 )
 from flight.guidance.path import find_on_path, max_curvature, mean_curvature, profile
+from flight.simulation.compiled_loop import advance_model, read_state
 from flight.simulation.tick import NOT_A_NUMBER, PATH_ROW, WORKSPACE, WORKSPACE_NUMBERS, begin_tick, end_tick
 from world.arrays import Floats, Heights
 from world.geometry import wrap
@@ -87,6 +89,18 @@ def planfly_tick(block: Floats, heights: Heights) -> int:
         work.timing.dt,
     )
     return end_tick(work)
+
+
+@compiled
+def planfly_loop(block: Floats, heights: Heights, frames: Records, numbers: Floats, code: Code, count: int) -> int:
+    """Fly up to a number of ticks with a `flight.dynamics.compiled_model.CompiledModel`, and return the last status."""
+    for _ in range(count):
+        read_state(block, numbers, code)
+        status = planfly_tick(block, heights)
+        if status != 0:
+            return status
+        advance_model(block, frames[0], numbers, code)
+    return 0
 
 
 @inner

@@ -11,6 +11,7 @@ from aircraft.catalog import Aircraft
 from aircraft.tracking import TrackingError
 from flight.autopilots.autopilot import (
     Autopilot,
+    Loop,
     MissionChecks,
     MissionParts,
     SpeedLimits,
@@ -20,7 +21,7 @@ from flight.autopilots.autopilot import (
 )
 from flight.autopilots.gust_height import height_in_updrafts
 from flight.autopilots.px4.lateral import MAX_SWITCH_DISTANCE
-from flight.autopilots.px4.law import PX4, px4_tick
+from flight.autopilots.px4.law import PX4, px4_loop, px4_tick
 from flight.autopilots.px4.parameters import HEIGHT_CANDIDATES, SIDE_CANDIDATES, Px4Parameters
 from flight.autopilots.px4.tracking_error import altitude_miss_probability, tracking_error
 from flight.guidance.equivalent_airspeed import true_by_equivalent
@@ -134,6 +135,11 @@ class Px4(Autopilot):
     def tick(self) -> Tick:
         """Compiled function for one tick of the law."""
         return px4_tick
+
+    @property
+    def loop(self) -> Loop:
+        """Compiled loop of the law with a compiled model."""
+        return px4_loop
 
     def begin(self, memory: Record, own: Record) -> None:
         """Write the parameters into the memory."""

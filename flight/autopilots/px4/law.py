@@ -13,9 +13,11 @@ from flight.autopilots.px4.lateral import wanted_bank
 from flight.autopilots.px4.navigator import flown_to, is_last, navigate
 from flight.autopilots.px4.parameters import PX4_PARAMETERS
 from flight.autopilots.px4.tecs import update_tecs
+from flight.dynamics.instructions import Code
 from flight.guidance.equivalent_airspeed import true_by_equivalent
 from flight.guidance.inner_loops import follow_roll, steer_elevator
 from flight.guidance.path import find_on_path, leave_sharp_corners, profile
+from flight.simulation.compiled_loop import advance_model, read_state
 from flight.simulation.tick import (
     NOT_A_NUMBER,
     PATH_ROW,
@@ -109,6 +111,18 @@ def px4_tick(block: Floats, heights: Heights) -> int:
         work.timing.dt,
     )
     return end_tick(work)
+
+
+@compiled
+def px4_loop(block: Floats, heights: Heights, frames: Records, numbers: Floats, code: Code, count: int) -> int:
+    """Fly up to a number of ticks with a `flight.dynamics.compiled_model.CompiledModel`, and return the last status."""
+    for _ in range(count):
+        read_state(block, numbers, code)
+        status = px4_tick(block, heights)
+        if status != 0:
+            return status
+        advance_model(block, frames[0], numbers, code)
+    return 0
 
 
 @inner

@@ -250,7 +250,7 @@ def test_a_seed_of_the_wind_wins(make_setup: MakeSetup, aerosonde: Aircraft) -> 
 
 
 def test_not_a_number(make_setup: MakeSetup, aerosonde: Aircraft) -> None:
-    flight = Flight(make_setup(WAY), aerosonde)
+    flight = Flight(replace(make_setup(WAY), engine="jsbsim"), aerosonde)
     for _ in range(8):
         rows, ended = flight.block(60)
         assert not ended

@@ -30,7 +30,8 @@ def test_a_thinned_log_holds_the_rows_that_were_judged(tmp_path: Path) -> None:
     log = read_log(tmp_path / "f.mcap")
     assert log.complete
     assert log.ended == whole.ended == "completed"
-    assert [event.text for event in log.events] == ["flight ended: completed"]
+    assert [event.text for event in log.events] == [f"flight model: {thin.engine}", "flight ended: completed"]
+    assert thin.engine.startswith("compiled model")
     assert len(log.track) == len(thin.track) < len(whole.track) / 2
     assert log.track.position.tobytes() == thin.track.position.tobytes()
     kept = np.isin(whole.track.time, thin.track.time)

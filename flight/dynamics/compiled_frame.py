@@ -1,0 +1,448 @@
+"""Step a flight as JSBSim does, to the last bit: motion, gravity, atmosphere, wind, aerodynamics and forces.
+
+A step has JSBSim's order (FGFDMExec): Propagate, Inertial, Atmosphere, Winds, FCS, Auxiliary, Aerodynamics,
+GroundReactions, ExternalReactions, Aircraft, Accelerations. Propagate integrates the accelerations of the previous
+step, and the flight controls read the air data of the previous step. Units are JSBSim's: feet, slugs, pounds, rad and
+s. Facts and constants are those of JSBSim 1.3.
+"""
+
+import math
+
+import numpy as np
+
+from flight.dynamics.instructions import Code, run_instructions
+from flight.dynamics.jsbsim_properties import FOOT
+from flight.dynamics.vectors import (
+    Matrix,
+    Vector,
+    add,
+    cross,
+    euler_angles,
+    matrix_of,
+    matrix_of_quaternion,
+    product,
+    product_back,
+    quaternion_of_angles,
+    quaternion_of_matrix,
+    quaternion_product,
+    quaternion_rate,
+    rotation,
+    scale,
+    set_matrix,
+    set_vector,
+    subtract,
+    transform,
+    transform_back,
+    unit_quaternion,
+    vector_of,
+)
+from world.arrays import Floats
+from world.kernels import Record, Records, compiled, inlined, inner, record_dtype
+
+_VECTOR = (np.float64, (3,))
+_MATRIX = (np.float64, (3, 3))
+# State of a flight between two steps; its numbers are the first registers of a model.
+FRAME = record_dtype(
+    "dt",  # s
+    "time",  # s
+    # Motion, in inertial axes with the center of the earth at rest (ECI).
+    "attitude_real",  # of the quaternion to the body's axes
+    ("attitude", *_VECTOR),  # the other parts of it
+    "attitude_rate_real",  # 1/s
+    ("attitude_rate", *_VECTOR),
+    ("inertial_rates", *_VECTOR),  # about the body's axes, rad/s
+    ("angular_acceleration", *_VECTOR),  # about the body's axes, rad/s^2
+    ("position", *_VECTOR),  # ft
+    ("velocity", *_VECTOR),  # ft/s
+    ("velocity_before", *_VECTOR),
+    ("velocity_two_before", *_VECTOR),
+    ("acceleration", *_VECTOR),  # ft/s^2
+    ("acceleration_before", *_VECTOR),
+    ("specific_force", *_VECTOR),  # along the body's axes, ft/s^2
+    # Place.
+    "earth_angle",  # rad, from inertial axes to axes fixed to the earth (ECEF)
+    "earth_sin",
+    "earth_cos",
+    ("place", *_VECTOR),  # ft, ECEF
+    "radius",  # ft
+    "geocentric_latitude",  # rad
+    "latitude",  # rad, geodetic
+    "longitude",  # rad
+    "altitude",  # ft, radius above the ellipsoid's radius
+    "geodetic_altitude",  # ft
+    "terrain",  # ft, altitude of the ground
+    ("gravity", *_VECTOR),  # ft/s^2, ECEF
+    # Axes: north, east and down are local.
+    ("inertial_to_body", *_MATRIX),
+    ("local_to_body", *_MATRIX),
+    ("earth_to_body", *_MATRIX),
+    ("earth_to_local", *_MATRIX),
+    # Motion relative to the earth.
+    ("body_velocity", *_VECTOR),  # ft/s
+    ("rates", *_VECTOR),  # rad/s
+    ("ground_velocity", *_VECTOR),  # ft/s, north, east, down
+    "roll",  # rad
+    "pitch",
+    "yaw",
+    # Air.
+    "temperature",  # degrees Rankine
+    "pressure",  # lbf/ft^2
+    "density",  # slug/ft^3
+    ("wind", *_VECTOR),  # ft/s, north, east, down
+    ("gust", *_VECTOR),  # ft/s, added to the wind
+    ("air_rates", *_VECTOR),  # rad/s
+    "airspeed",  # ft/s
+    "alpha",  # rad
+    "beta",
+    "load_factor",
+    "dynamic_pressure",  # lbf/ft^2
+    "pressure_area",  # lbf
+    "span_time",  # s, span by twice the airspeed
+    "chord_time",
+    # Sums of the aerodynamic functions.
+    ("aero_force", *_VECTOR),  # lbf, in stability axes: drag, side force, lift
+    ("aero_moment", *_VECTOR),  # lbf ft, about the body's axes
+    # Aircraft.
+    "mass",  # slugs
+    ("inertia", *_MATRIX),  # slug ft^2
+    ("inverse_inertia", *_MATRIX),
+    ("aero_arm", *_VECTOR),  # ft, from the center of gravity to the aerodynamic reference point
+    "wing_area",  # ft^2
+    "wing_span",  # ft
+    "wing_chord",
+)
+# Registers of the frame.
+FRAME_NUMBERS = FRAME.itemsize // 8
+# The code begins with the number of steps in a tick and the first number of each of its sections, which follow one
+# another.
+STEPS = 0
+FCS_BEGIN = 1
+AERO_BEGIN = 2
+EXTERNAL_BEGIN = 3
+# External forces and moments.
+FORCES_BEGIN = 4
+# Registers of `flight.simulation.tick.READ_FIELDS`.
+READS_BEGIN = 5
+# Registers of the fields of `flight.simulation.tick.OUTPUT`.
+WRITES_BEGIN = 6
+CODE_END = 7
+# Length of this header.
+CODE_HEADER = 8
+# Numbers of an external force or moment: register of its magnitude, and first register of its axes.
+FORCE_NUMBERS = 2
+# Registers of the axes of an external force or moment.
+FORCE_DIRECTION = 0
+MOMENT_DIRECTION = 3
+# Arm from the center of gravity, ft.
+FORCE_ARM = 6
+# Number of these registers.
+FORCE_REGISTERS = 9
+
+# ----------------------------------------------------------------------
+# Earth, gravity and atmosphere.
+
+# Rotation rate of the earth, rad/s.
+EARTH_RATE = 0.00007292115
+# Semi-major axis of the earth's ellipsoid, ft.
+SEMI_MAJOR = 20925646.32546
+# Semi-minor axis of the earth's ellipsoid, ft.
+SEMI_MINOR = 20855486.5951
+# Gravitational parameter of the earth, ft^3/s^2.
+GRAVITY_PARAMETER = 14.0764417572e15
+# Dynamic form factor of the earth.
+J2 = 1.08262982e-03
+# Ratio of the axes.
+_AXES_RATIO = SEMI_MINOR / SEMI_MAJOR
+_AXES_RATIO_2 = _AXES_RATIO * _AXES_RATIO
+# Square of the first eccentricity.
+_ECCENTRICITY_2 = 1.0 - _AXES_RATIO_2
+_SEMI_MAJOR_ECCENTRICITY_2 = SEMI_MAJOR * _ECCENTRICITY_2
+
+# Slugs in a kilogram, as JSBSim's atmosphere has them.
+_SLUGS = 0.06852168
+# Standard gravity, ft/s^2.
+STANDARD_GRAVITY = 9.80665 / FOOT
+# Gas constant of dry air, ft lbf/(slug R).
+_GAS_CONSTANT = (8.31432 * _SLUGS / ((FOOT * FOOT) * 1.8)) / (28.9645 * _SLUGS / 1000.0)
+# Radius of the earth for geopotential altitudes, ft.
+_GEOPOTENTIAL_RADIUS = 6356766.0 / FOOT
+# Geopotential altitude of the tropopause, ft.
+_TROPOPAUSE = 36089.2388
+# Temperature at sea level and in the stratosphere, degrees Rankine.
+_SEA_LEVEL_TEMPERATURE = 518.67
+_STRATOSPHERE_TEMPERATURE = 389.97
+# Pressure at sea level, lbf/ft^2.
+_SEA_LEVEL_PRESSURE = 2116.228
+# Temperature gradient of the troposphere, R/ft.
+_LAPSE_RATE = (_STRATOSPHERE_TEMPERATURE - _SEA_LEVEL_TEMPERATURE) / (_TROPOPAUSE - 0.0) - 0.0
+_PRESSURE_EXPONENT = STANDARD_GRAVITY / (_GAS_CONSTANT * _LAPSE_RATE)
+# Pressure at the tropopause, lbf/ft^2.
+_TROPOPAUSE_PRESSURE = _SEA_LEVEL_PRESSURE * math.pow(
+    _SEA_LEVEL_TEMPERATURE / (_SEA_LEVEL_TEMPERATURE + _LAPSE_RATE * (_TROPOPAUSE - 0.0)), _PRESSURE_EXPONENT
+)
+# Airspeed below which there are no angles of flow, ft/s.
+_MIN_AIRSPEED = 0.001
+# Square of the airspeed in the plane of symmetry below which there is no angle of attack, ft^2/s^2.
+_MIN_SYMMETRIC_AIRSPEED_2 = 1e-6
+
+
+@inner
+def step(frame: Record, numbers: Floats, code: Code) -> None:
+    """Advance by one step.
+
+    frame: the record of `FRAME` at the start of the numbers.
+    numbers: registers of the model.
+    code: sections as stated above.
+    """
+    _integrate(frame)
+    _update_place(frame)
+    _update_motion(frame)
+    _update_gravity(frame)
+    _update_atmosphere(frame)
+    run_instructions(numbers, code, code[FCS_BEGIN], code[AERO_BEGIN])
+    _update_air_data(frame)
+    run_instructions(numbers, code, code[AERO_BEGIN], code[EXTERNAL_BEGIN])
+    force, moment = _aerodynamic_forces(frame)
+    run_instructions(numbers, code, code[EXTERNAL_BEGIN], code[FORCES_BEGIN])
+    external_force, external_moment = _external_forces(numbers, code)
+    _accelerate(frame, add(force, external_force), add(moment, external_moment))
+
+
+@inner
+def _integrate(frame: Record) -> None:
+    """Integrate the motion: attitude and rates by Euler's method, velocity and position by Adams and Bashforth's."""
+    dt = frame.dt
+    real = frame.attitude_real + dt * frame.attitude_rate_real
+    others = add(vector_of(frame.attitude), scale(dt, vector_of(frame.attitude_rate)))
+    attitude = unit_quaternion((real, others))
+    frame.attitude_real = attitude[0]
+    set_vector(frame.attitude, attitude[1])
+    set_vector(
+        frame.inertial_rates, add(vector_of(frame.inertial_rates), scale(dt, vector_of(frame.angular_acceleration)))
+    )
+    velocity, before, two_before = frame.velocity, frame.velocity_before, frame.velocity_two_before
+    twelfth = (1.0 / 12.0) * dt
+    for k in range(3):
+        frame.position[k] += twelfth * (23.0 * velocity[k] - 16.0 * before[k] + 5.0 * two_before[k])
+        two_before[k], before[k] = before[k], velocity[k]
+        velocity[k] += dt * (1.5 * frame.acceleration[k] - 0.5 * frame.acceleration_before[k])
+        frame.acceleration_before[k] = frame.acceleration[k]
+    frame.earth_angle += EARTH_RATE * dt
+    frame.time += dt
+
+
+@inner
+def _update_place(frame: Record) -> None:
+    """Compute the place on the ellipsoid, by Fukushima's method of 2006 in one iteration, and the local axes."""
+    cos, sin = math.cos(frame.earth_angle), math.sin(frame.earth_angle)
+    frame.earth_cos, frame.earth_sin = cos, sin
+    place = transform(rotation(cos, sin), vector_of(frame.position))
+    set_vector(frame.place, place)
+    x, y, z = place
+    radius = math.sqrt(x * x + y * y + z * z)
+    equatorial = math.sqrt(x * x + y * y)
+    geocentric = math.atan2(z, equatorial)
+    s0 = abs(z)
+    zc, c0 = _AXES_RATIO * s0, _AXES_RATIO * equatorial
+    c02, s02 = c0 * c0, s0 * s0
+    a02 = c02 + s02
+    a0 = math.sqrt(a02)
+    a03 = a02 * a0
+    s1 = zc * a03 + _SEMI_MAJOR_ECCENTRICITY_2 * s02 * s0
+    c1 = equatorial * a03 - _SEMI_MAJOR_ECCENTRICITY_2 * c02 * c0
+    cs0c0 = _SEMI_MAJOR_ECCENTRICITY_2 * c0 * s0
+    b0 = 1.5 * cs0c0 * ((equatorial * s0 - zc * c0) * a0 - cs0c0)
+    s1 = s1 * a03 - b0 * s0
+    cc = _AXES_RATIO * (c1 * a03 - b0 * c0)
+    s12, cc2 = s1 * s1, cc * cc
+    norm = math.sqrt(s12 + cc2)
+    sign = 1.0 if z >= 0.0 else -1.0
+    frame.radius, frame.geocentric_latitude = radius, geocentric
+    frame.latitude, frame.longitude = sign * math.atan(s1 / cc), math.atan2(y, x)
+    frame.geodetic_altitude = (equatorial * cc + s0 * s1 - SEMI_MAJOR * math.sqrt(_AXES_RATIO_2 * s12 + cc2)) / norm
+    cos_geocentric = math.cos(geocentric)
+    frame.altitude = radius - SEMI_MAJOR * _AXES_RATIO / math.sqrt(
+        1.0 - _ECCENTRICITY_2 * cos_geocentric * cos_geocentric
+    )
+    cos_lat, sin_lat = cc / norm, sign * s1 / norm
+    sin_lon, cos_lon = y / equatorial, x / equatorial
+    set_matrix(frame.earth_to_local, _local_axes(sin_lat, cos_lat, sin_lon, cos_lon))
+
+
+@inlined
+def _local_axes(sin_lat: float, cos_lat: float, sin_lon: float, cos_lon: float) -> Matrix:
+    """Return the matrix from axes fixed to the earth to north, east and down."""
+    return (
+        (-cos_lon * sin_lat, -sin_lon * sin_lat, cos_lat),
+        (-sin_lon, cos_lon, 0.0),
+        (-cos_lon * cos_lat, -sin_lon * cos_lat, -sin_lat),
+    )
+
+
+@inner
+def _update_motion(frame: Record) -> None:
+    """Compute the axes of the body, and its motion relative to the earth."""
+    to_earth = rotation(frame.earth_cos, frame.earth_sin)
+    quaternion = (frame.attitude_real, vector_of(frame.attitude))
+    to_body = matrix_of_quaternion(quaternion)
+    local_to_body = product_back(to_body, product(matrix_of(frame.earth_to_local), to_earth))
+    set_matrix(frame.inertial_to_body, to_body)
+    set_matrix(frame.local_to_body, local_to_body)
+    set_matrix(frame.earth_to_body, product_back(to_body, to_earth))
+    turning = cross((0.0, 0.0, EARTH_RATE), vector_of(frame.position))
+    body_velocity = transform(to_body, subtract(vector_of(frame.velocity), turning))
+    set_vector(frame.body_velocity, body_velocity)
+    inertial_rates = vector_of(frame.inertial_rates)
+    set_vector(frame.rates, subtract(inertial_rates, transform(to_body, (0.0, 0.0, EARTH_RATE))))
+    rate = quaternion_rate(quaternion, inertial_rates)
+    frame.attitude_rate_real = rate[0]
+    set_vector(frame.attitude_rate, rate[1])
+    # JSBSim's angles are those of the quaternion of this matrix.
+    angles = euler_angles(matrix_of_quaternion(quaternion_of_matrix(local_to_body)))
+    frame.roll, frame.pitch, frame.yaw = angles[0], angles[1], angles[2]
+    set_vector(frame.ground_velocity, transform_back(local_to_body, body_velocity))
+
+
+@inner
+def _update_gravity(frame: Record) -> None:
+    """Compute the gravity of the flattened earth."""
+    radius = frame.radius
+    sin_lat = math.sin(frame.geocentric_latitude)
+    ratio = SEMI_MAJOR / radius
+    common = 1.5 * J2 * ratio * ratio
+    across = 1.0 - 5.0 * (sin_lat * sin_lat)
+    along = 3.0 - 5.0 * (sin_lat * sin_lat)
+    pull = GRAVITY_PARAMETER / (radius * radius)
+    place, gravity = frame.place, frame.gravity
+    gravity[0] = -pull * ((1.0 + (common * across)) * place[0] / radius)
+    gravity[1] = -pull * ((1.0 + (common * across)) * place[1] / radius)
+    gravity[2] = -pull * ((1.0 + (common * along)) * place[2] / radius)
+
+
+@inner
+def _update_atmosphere(frame: Record) -> None:
+    """Compute the air of the standard atmosphere of 1976, below 20 km."""
+    height = (frame.altitude * _GEOPOTENTIAL_RADIUS) / (_GEOPOTENTIAL_RADIUS + frame.altitude)
+    if height < _TROPOPAUSE:
+        if height <= 0.0:
+            temperature = _SEA_LEVEL_TEMPERATURE + height * _LAPSE_RATE
+        else:
+            share = (height - 0.0) / _TROPOPAUSE
+            temperature = share * (_STRATOSPHERE_TEMPERATURE - _SEA_LEVEL_TEMPERATURE) + _SEA_LEVEL_TEMPERATURE
+        ratio = _SEA_LEVEL_TEMPERATURE / (_SEA_LEVEL_TEMPERATURE + _LAPSE_RATE * height)
+        pressure = _SEA_LEVEL_PRESSURE * math.pow(ratio, _PRESSURE_EXPONENT)
+    else:
+        temperature = _STRATOSPHERE_TEMPERATURE
+        exponent = -STANDARD_GRAVITY * (height - _TROPOPAUSE) / (_GAS_CONSTANT * temperature)
+        pressure = _TROPOPAUSE_PRESSURE * math.exp(exponent)
+    frame.temperature, frame.pressure = temperature, pressure
+    frame.density = pressure / (_GAS_CONSTANT * temperature)
+
+
+@inner
+def _update_air_data(frame: Record) -> None:
+    """Compute airspeed, angles of flow, pressures and the load factor of the previous step."""
+    wind = add(vector_of(frame.wind), vector_of(frame.gust))
+    u, v, w = subtract(vector_of(frame.body_velocity), transform(matrix_of(frame.local_to_body), wind))
+    symmetric_2 = u * u + w * w
+    airspeed_2 = symmetric_2 + v * v
+    airspeed = math.sqrt(airspeed_2)
+    alpha = beta = 0.0
+    if airspeed > _MIN_AIRSPEED:
+        beta = math.atan2(v, math.sqrt(symmetric_2))
+        if symmetric_2 >= _MIN_SYMMETRIC_AIRSPEED_2:
+            alpha = math.atan2(w, u)
+    frame.airspeed, frame.alpha, frame.beta = airspeed, alpha, beta
+    set_vector(frame.air_rates, vector_of(frame.rates))
+    frame.dynamic_pressure = 0.5 * frame.density * airspeed_2
+    frame.load_factor = -(frame.specific_force[2] * (1.0 / STANDARD_GRAVITY))
+    twice = 2.0 * airspeed
+    if twice != 0.0:
+        frame.span_time = frame.wing_span / twice
+        frame.chord_time = frame.wing_chord / twice
+    frame.pressure_area = frame.wing_area * frame.dynamic_pressure
+
+
+@inlined
+def _aerodynamic_forces(frame: Record) -> tuple[Vector, Vector]:
+    """Return the aerodynamic force along the body's axes, and its moment about the center of gravity."""
+    cos, sin = math.cos(frame.alpha), math.sin(frame.alpha)
+    drag, side, lift = vector_of(frame.aero_force)
+    force = transform(((cos, 0.0, -sin), (0.0, 1.0, 0.0), (sin, 0.0, cos)), (-drag, side, -lift))
+    return force, add(vector_of(frame.aero_moment), cross(vector_of(frame.aero_arm), force))
+
+
+@inlined
+def _external_forces(numbers: Floats, code: Code) -> tuple[Vector, Vector]:
+    """Return the sums of the external forces along the body's axes and of their moments."""
+    force, moment = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+    for k in range(code[FORCES_BEGIN], code[READS_BEGIN], FORCE_NUMBERS):
+        magnitude, axes = numbers[code[k]], int(code[k + 1])
+        one = scale(magnitude, _vector_at(numbers, axes + FORCE_DIRECTION))
+        own = scale(magnitude, _vector_at(numbers, axes + MOMENT_DIRECTION))
+        force = add(force, one)
+        moment = add(moment, add(own, cross(_vector_at(numbers, axes + FORCE_ARM), one)))
+    return force, moment
+
+
+@inlined
+def _vector_at(numbers: Floats, begin: int) -> Vector:
+    """Return three registers as a vector."""
+    return numbers[begin], numbers[begin + 1], numbers[begin + 2]
+
+
+@inner
+def _accelerate(frame: Record, force: Vector, moment: Vector) -> None:
+    """Compute the accelerations of the next step."""
+    inertial_rates = vector_of(frame.inertial_rates)
+    spin = cross(inertial_rates, transform(matrix_of(frame.inertia), inertial_rates))
+    set_vector(frame.angular_acceleration, transform(matrix_of(frame.inverse_inertia), subtract(moment, spin)))
+    specific = scale(1.0 / frame.mass, force)
+    set_vector(frame.specific_force, specific)
+    gravity = transform_back(rotation(frame.earth_cos, frame.earth_sin), vector_of(frame.gravity))
+    set_vector(frame.acceleration, add(transform_back(matrix_of(frame.inertial_to_body), specific), gravity))
+
+
+# ----------------------------------------------------------------------
+# Calls from Python.
+
+
+@compiled
+def step_often(frames: Records, numbers: Floats, code: Code, count: int) -> None:
+    """Advance by a number of steps.
+
+    frames: (1,) of `FRAME`, at the start of the numbers.
+    """
+    for _ in range(count):
+        step(frames[0], numbers, code)
+
+
+@compiled
+def begin_attitude(frames: Records, angles: Floats) -> None:
+    """Set the attitude of the frame as JSBSim's initial conditions leave it.
+
+    FGInitialCondition keeps a quaternion, which cannot be read. Each angle that is set changes one Euler angle of that
+    quaternion, so that it depends on all angles that were ever set, in its last bits.
+
+    frames: (1,) of `FRAME` with the position, the rates and the angle of the earth.
+    angles: (n, 3) roll, pitch and yaw of all evaluations of an instance, rad.
+    """
+    frame: Record = frames[0]
+    local = (1.0, (0.0, 0.0, 0.0))
+    for row in range(angles.shape[0]):
+        for k in range(3):
+            roll, pitch, yaw = euler_angles(matrix_of_quaternion(local))
+            value = angles[row, k]
+            if k == 0:
+                local = quaternion_of_angles(value, pitch, yaw)
+            elif k == 1:
+                local = quaternion_of_angles(roll, value, yaw)
+            else:
+                local = quaternion_of_angles(roll, pitch, value)
+    _update_place(frame)
+    inertial_to_local = product(matrix_of(frame.earth_to_local), rotation(frame.earth_cos, frame.earth_sin))
+    attitude = quaternion_product(quaternion_of_matrix(inertial_to_local), local)
+    rate = quaternion_rate(attitude, vector_of(frame.inertial_rates))
+    frame.attitude_real, frame.attitude_rate_real = attitude[0], rate[0]
+    set_vector(frame.attitude, attitude[1])
+    set_vector(frame.attitude_rate, rate[1])

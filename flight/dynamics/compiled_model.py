@@ -1,0 +1,219 @@
+"""Fly a model in compiled code instead of JSBSim, if both are equal in every bit.
+
+A `CompiledModel` takes over the state of a JSBSim instance at the start of a flight. Its `find_differences` then steps
+both with moving commands and gusts, and compares every register that JSBSim states as a property.
+"""
+
+import math
+from collections.abc import Sequence
+from itertools import accumulate
+
+import numpy as np
+
+from flight.dynamics.compiled_frame import CODE_HEADER, FRAME, FRAME_NUMBERS, begin_attitude, step_often
+from flight.dynamics.fdm import Fdm
+from flight.dynamics.instructions import LOWER_LIMIT, Code
+from flight.dynamics.jsbsim_properties import FORCES, GUST, MASS, MODEL_FIELDS, STATE_PROPERTIES, WIND
+from flight.dynamics.model_program import (
+    FRAME_PROPERTIES,
+    ModelProgram,
+    UnsupportedModel,
+    frame_register,
+    translate,
+)
+from world.arrays import Floats
+from world.kernels import Record, Records
+
+# Steps for which both engines are compared.
+PROOF_STEPS = 240
+# Steps between two comparisons, after which the commands move.
+_PROOF_STRIDE = 10
+# Movement of the surfaces to either side of their trimmed position, rad: their rate limits act.
+_PROOF_SURFACE_RAD = 0.15
+# Movement of the throttle to either side of its trimmed position.
+_PROOF_THROTTLE = 0.2
+# Gusts to either side, ft/s.
+_PROOF_GUST_FPS = 3.0
+# Feet in an inch, as JSBSim has them.
+_INCH = 1.0 / 12.0
+
+# Properties of JSBSim that state numbers of the frame, for fields with several numbers.
+_VECTORS = {
+    "position": tuple(f"position/eci-{axis}-ft" for axis in "xyz"),
+    "velocity": tuple(f"velocities/eci-{axis}-fps" for axis in "xyz"),
+    "acceleration": tuple(f"accelerations/{axis}idot-ft_sec2" for axis in "uvw"),
+    "inertial_rates": tuple(f"velocities/{axis}i-rad_sec" for axis in "pqr"),
+    "angular_acceleration": tuple(f"accelerations/{axis}idot-rad_sec2" for axis in "pqr"),
+    "ground_velocity": tuple(f"velocities/v-{axis}-fps" for axis in ("north", "east", "down")),
+    "wind": WIND,
+    "gust": GUST,
+}
+# The same for fields of one number.
+_NUMBERS = {
+    "time": "simulation/sim-time-sec",
+    "earth_angle": "position/epa-rad",
+    "latitude": "position/lat-geod-rad",
+    "longitude": "position/long-gc-rad",
+    "altitude": "position/h-sl-ft",
+    "roll": "attitude/phi-rad",
+    "pitch": "attitude/theta-rad",
+    "yaw": "attitude/psi-rad",
+    "load_factor": "accelerations/Nz",
+}
+
+
+class CompiledModel:
+    """A flight of a compiled model, which continues a flight in JSBSim.
+
+    numbers: registers.
+    frames: (1,) of `flight.dynamics.compiled_frame.FRAME`, the first registers.
+    code: sections as `flight.dynamics.compiled_frame` describes them.
+    properties: register of each property of JSBSim that has one.
+    """
+
+    def __init__(self, fdm: Fdm, reads: Sequence[str], steps: int, *, gusts: bool, terrain: bool) -> None:
+        """Take over the state of an aircraft at the start of its flight, before the first step.
+
+        reads: fields of `flight.dynamics.state.STATE` that are read each tick.
+        steps: steps in a tick.
+        gusts, terrain: True if gusts, or the altitude of the ground, are set each tick.
+
+        Raise UnsupportedModel for a model that is not covered.
+        """
+        if fdm.flat_earth:
+            raise UnsupportedModel("a flat earth")
+        program = translate(fdm.model_text())
+        self._fdm, self._program = fdm, program
+        self.properties = _frame_properties() | program.properties
+        # Two more: a zero that is read for a quantity that the aircraft lacks, and one for outputs that are not used.
+        self.numbers: Floats = np.array([*program.numbers, 0.0, 0.0])
+        zero = len(program.numbers)
+        access = fdm.properties
+        self._getters = {name: (register, access.getter(name)) for name, register in self.properties.items()}
+        commands = (self._register(command.name) for command in fdm.aircraft.model.commands)
+        outputs = (*commands, *map(self._register, GUST), frame_register("terrain"))
+        used = (True, True, True, True, gusts, gusts, gusts, terrain)
+        writes = [register if use else zero + 1 for register, use in zip(outputs, used, strict=True)]
+        self.frames: Records = self.numbers[:FRAME_NUMBERS].view(FRAME)
+        self.code = _pack(program, [self._reading(field, zero) for field in reads], writes, steps)
+        self._begin()
+
+    def find_differences(self) -> list[str]:
+        """Step both engines and return the properties that differ in any bit; the compiled state is as before.
+
+        JSBSim is left somewhere else, and cannot fly on if there is a difference.
+        """
+        begun = self.numbers.copy()
+        found = self.differences()
+        for turn in range(PROOF_STEPS // _PROOF_STRIDE):
+            if found:
+                break
+            self._move_inputs(begun, turn)
+            self._fdm.step(_PROOF_STRIDE)
+            step_often(self.frames, self.numbers, self.code, _PROOF_STRIDE)
+            found = self.differences()
+        self.numbers[:] = begun
+        return found
+
+    # ----------------------------------------------------------------------
+
+    def _register(self, name: str) -> int:
+        if name not in self.properties:
+            raise UnsupportedModel(f"property {name}")
+        return self.properties[name]
+
+    def _reading(self, field: str, zero: int) -> int:
+        """Return the register of a field of the state."""
+        if field in STATE_PROPERTIES:
+            return self._register(STATE_PROPERTIES[field][0])
+        name = self._fdm.aircraft.model.readings[MODEL_FIELDS.index(field)].name
+        return self._register(name) if name else zero
+
+    def _begin(self) -> None:
+        """Take over the state of JSBSim."""
+        read, numbers = self._fdm.properties.read, self.numbers
+        for register, getter in self._getters.values():
+            numbers[register] = getter()
+        frame: Record = self.frames[0]
+        frame.dt, frame.mass = self._fdm.dt, read(MASS)
+        inertia = {axes: read(f"inertia/i{axes}-slugs_ft2") for axes in ("xx", "yy", "zz", "xy", "xz", "yz")}
+        frame.inertia, frame.inverse_inertia = _inertia_matrices(**inertia)
+        frame.specific_force = [1.0 / frame.mass * read(name) for name in FORCES]
+        # Initial conditions fill the past of the integrators with their derivatives.
+        frame.velocity_before, frame.velocity_two_before = frame.velocity, frame.velocity
+        frame.acceleration_before = frame.acceleration
+        centre = [read(f"inertia/cg-{axis}-in") for axis in "xyz"]
+        frame.aero_arm = _arm([read(f"metrics/aero-rp-{axis}-in") for axis in "xyz"], centre)
+        for force in self._program.forces:
+            base = f"external_reactions/{force.name}"
+            direction = [read(f"{base}/{axis}") for axis in ("lmn" if force.is_moment else "xyz")]
+            axes = [0.0] * 3 + direction + [0.0] * 3
+            if not force.is_moment:
+                axes = direction + [0.0] * 3 + _arm([read(f"{base}/location-{axis}-in") for axis in "xyz"], centre)
+            numbers[force.axes : force.axes + len(axes)] = axes
+        for block in self._program.actuators:
+            numbers[block.begin : block.begin + LOWER_LIMIT] = _actuator_numbers(
+                numbers[block.source], *block[2:], frame.dt
+            )
+        begin_attitude(self.frames, self._fdm.attitudes())
+
+    def _move_inputs(self, begun: Floats, turn: int) -> None:
+        """Set commands and gusts in both engines, in another combination each turn."""
+        moves = [_PROOF_SURFACE_RAD] * 3 + [_PROOF_THROTTLE] + [_PROOF_GUST_FPS] * 3
+        scales = [command.above for command in self._fdm.aircraft.model.commands] + [1.0] * 3
+        names = [*(command.name for command in self._fdm.aircraft.model.commands), *GUST]
+        for k, (name, move, scale) in enumerate(zip(names, moves, scales, strict=True)):
+            # Of Gray's code, so that few inputs move at a time and all combinations come.
+            side = 1.0 if (turn ^ (turn >> 1)) >> k % 5 & 1 else -1.0
+            register = self.properties[name]
+            self.numbers[register] = begun[register] + side * move * scale
+            self._fdm.properties.set(name, self.numbers[register])
+
+    def differences(self) -> list[str]:
+        """Return the properties that differ in any bit at present."""
+        numbers = self.numbers.tolist()
+        return [name for name, (register, get) in self._getters.items() if not _equal(numbers[register], get())]
+
+
+def _equal(one: float, other: float) -> bool:
+    return one == other or (math.isnan(one) and math.isnan(other))
+
+
+def _frame_properties() -> dict[str, int]:
+    """Return the registers of the frame's properties."""
+    several = {name: frame_register(field, k) for field, names in _VECTORS.items() for k, name in enumerate(names)}
+    single = {name: frame_register(field) for field, name in _NUMBERS.items()}
+    return several | single | {name: frame_register(*place) for name, place in FRAME_PROPERTIES.items()}
+
+
+def _pack(program: ModelProgram, reads: Sequence[int], writes: Sequence[int], steps: int) -> Code:
+    """Return the code: its header, and its sections in order."""
+    forces = [number for force in program.forces for number in (force.magnitude, force.axes)]
+    sections = (program.fcs, program.aero, program.external, forces, reads, writes)
+    bounds = accumulate(map(len, sections), initial=CODE_HEADER)
+    return np.array([steps, *bounds, *(number for section in sections for number in section)], dtype=np.uint32)
+
+
+def _arm(place: Sequence[float], centre: Sequence[float]) -> list[float]:
+    """Return the arm along the body's axes, ft, from the center of gravity to a place, both in JSBSim's inches."""
+    return [_INCH * (centre[0] - place[0]), _INCH * (place[1] - centre[1]), _INCH * (centre[2] - place[2])]
+
+
+def _inertia_matrices(xx: float, yy: float, zz: float, xy: float, xz: float, yz: float) -> tuple[Floats, Floats]:
+    """Return the inertia matrix and its inverse from the inertia properties of JSBSim.
+
+    The sign of xz differs from the sign of the others, as in FGMassBalance.
+    """
+    ixz = -xz
+    k1, k2, k3 = yy * zz - yz * yz, yz * ixz + xy * zz, xy * yz + yy * ixz
+    factor = 1.0 / (xx * k1 - xy * k2 - ixz * k3)
+    k1, k2, k3 = k1 * factor, k2 * factor, k3 * factor
+    k4, k5, k6 = (zz * xx - ixz * ixz) * factor, (xy * ixz + yz * xx) * factor, (xx * yy - xy * xy) * factor
+    matrix = [[xx, -xy, -ixz], [-xy, yy, -yz], [-ixz, -yz, zz]]
+    return np.array(matrix), np.array([[k1, k2, k3], [k2, k4, k5], [k3, k5, k6]])
+
+
+def _actuator_numbers(source: float, lag: float, rate: float, dt: float) -> list[float]:
+    """Return the memory and the factors of an actuator; initial conditions let its input through."""
+    divisor = 2.0 + dt * lag
+    return [source, source, source, dt * lag / divisor, (2.0 - dt * lag) / divisor, dt * rate]
