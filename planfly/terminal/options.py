@@ -25,7 +25,7 @@ from planfly.terminal.command_parser import CommandParser, OptionTaker
 from world.airspace.zone_suffixes import SUFFIXES as ZONES
 from world.elevation_formats import EMBEDDED, SUFFIXES
 
-Result = TypeVar("Returned")
+Result = TypeVar("Result")
 
 
 def call(function: Callable[..., Result], args: argparse.Namespace, **overrides: Any) -> Result:
