@@ -202,8 +202,6 @@ def with_passing_suggestions(
     [False, True]
     """
     if tried is None:
-        return tuple(findings)
-    if tried is None:
         return findings
     passed = {(one.rule, one.place): one.suggestions for one in tried}
     return tuple(

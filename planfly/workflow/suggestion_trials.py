@@ -91,7 +91,7 @@ class SuggestionTrials:
     """Trials of the suggestions of one verdict.
 
     judged: the mission with its verdict, geometric or flown.
-    hurry: aborts the trials, as for `Trial`.
+    hurry: called before each trial and throughout its flight, as for `Trial`.
     """
 
     context: MissionContext
@@ -142,6 +142,8 @@ class SuggestionTrials:
         """Yield a suggestion and then larger ones, each with its trial."""
         judged, asked, total = self.judged, item, suggestion
         while True:
+            if self.hurry():
+                raise TrialAborted
             try:
                 mission, setup = self._changed(judged, asked, suggestion)
             except PlanflyError:
