@@ -38,7 +38,7 @@ from planfly.campaigns.pictures import (
     narrowed,
     speed_bins,
 )
-from planfly.campaigns.statistics.decision import Estimate, Goal, Tally, lower_bound
+from planfly.campaigns.statistics.decision import Estimate, Goal, Tally, lower_bound, wilson
 from planfly.campaigns.statistics.wind_boundary import needs_more
 from planfly.campaigns.summary import (
     CampaignSummary,
@@ -112,9 +112,14 @@ def _render_page(template: str, **values: object) -> str:
 def winds_page(name: str, figure: Figure, found: WindsFound, rows: Sequence[tuple[str, ...]], command: str) -> bytes:
     """Return the page of a go/no-go chart, and change the figure to its narrow layout."""
     picture = _draw_both_widths(figure, "Go/no-go chart: wind from each direction")
-    answer, lines = "" if found.calm is None else "missed", wind_lines(found)
     page = _render_page(
-        "winds.html", name=name, picture=picture, answer=answer, lines=lines, rows=rows, command=command
+        "winds.html",
+        name=name,
+        picture=picture,
+        answer=winds_state(found),
+        lines=wind_lines(found),
+        rows=rows,
+        command=command,
     )
     return page.encode("utf-8")
 
@@ -396,10 +401,23 @@ def _interval_text(low: float, high: float, most: float) -> str:
     return f"{low:.1f} to {f'over {most:g}' if high >= most - 1e-9 else f'{high:.1f}'}"
 
 
+def _unsettled_directions(found: WindsFound) -> list[int]:
+    """Return the directions with too few flights."""
+    counts = Counter(direction for direction, _, _ in found.flights)
+    return [k for k, one in enumerate(found.boundaries) if needs_more(one, counts[k], ACCURACY, FEWEST)]
+
+
+def winds_state(found: WindsFound) -> str:
+    """Return the state of the answer: "missed" in calm air, "undecided" for want of flights, or "" for boundaries."""
+    calm = found.calm
+    if calm is not None and wilson(calm.flights - calm.failed, calm.flights)[1] < found.goal.target:
+        return "missed"
+    return "undecided" if calm is not None or _unsettled_directions(found) else ""
+
+
 def _open_lines(found: WindsFound) -> list[str]:
     """Return a line about directions with too few flights, if there are any."""
-    counts = Counter(direction for direction, _, _ in found.flights)
-    short = [k for k, one in enumerate(found.boundaries) if needs_more(one, counts[k], ACCURACY, FEWEST)]
+    short = _unsettled_directions(found)
     if not short:
         return []
     return [
