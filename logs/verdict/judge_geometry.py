@@ -204,8 +204,6 @@ def with_passing_suggestions(
     [False, True]
     """
     if tried is None:
-        return tuple(findings)
-    if tried is None:
         return findings
     passed = {(suggested.rule, suggested.place): suggested.suggestions for suggested in tried}
     return tuple(

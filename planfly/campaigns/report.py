@@ -38,7 +38,7 @@ from planfly.campaigns.pictures import (
     narrow_figure,
     speed_bins,
 )
-from planfly.campaigns.statistics.decision import Estimate, Goal, Tally, lower_bound
+from planfly.campaigns.statistics.decision import Estimate, Goal, Tally, lower_bound, wilson
 from planfly.campaigns.statistics.wind_boundary import needs_more_flights
 from planfly.campaigns.summary import (
     CampaignSummary,
@@ -112,9 +112,14 @@ def _render_page(template: str, **values: object) -> str:
 def winds_page(name: str, figure: Figure, winds: WindsFound, rows: Sequence[tuple[str, ...]], command: str) -> bytes:
     """Return the page of a go/no-go chart, and change the figure to its narrow layout."""
     picture = _draw_both_widths(figure, "Go/no-go chart: wind from each direction")
-    answer, lines = "" if winds.calm is None else "missed", wind_lines(winds)
     page = _render_page(
-        "winds.html", name=name, picture=picture, answer=answer, lines=lines, rows=rows, command=command
+        "winds.html",
+        name=name,
+        picture=picture,
+        answer=winds_state(winds),
+        lines=wind_lines(winds),
+        rows=rows,
+        command=command,
     )
     return page.encode("utf-8")
 
@@ -407,12 +412,25 @@ def _interval_text(lower: float, upper: float, max_speed: float) -> str:
     return f"{lower:.1f} to {f'over {max_speed:g}' if upper >= max_speed - 1e-9 else f'{upper:.1f}'}"
 
 
-def _unsettled_lines(winds: WindsFound) -> list[str]:
-    """Return a line about directions with too few flights, if there are any."""
+def _unsettled_directions(winds: WindsFound) -> list[int]:
+    """Return the directions with too few flights."""
     counts = Counter(direction for direction, _, _ in winds.flights)
-    unsettled = [
+    return [
         k for k, boundary in enumerate(winds.boundaries) if needs_more_flights(boundary, counts[k], ACCURACY, FEWEST)
     ]
+
+
+def winds_state(winds: WindsFound) -> str:
+    """Return the state of the answer: "missed" in calm air, "undecided" for lack of flights, "" for boundaries."""
+    calm = winds.calm
+    if calm is not None and wilson(calm.flights - calm.failed, calm.flights)[1] < winds.goal.target:
+        return "missed"
+    return "undecided" if calm is not None or _unsettled_directions(winds) else ""
+
+
+def _unsettled_lines(winds: WindsFound) -> list[str]:
+    """Return a line about directions with too few flights, if there are any."""
+    unsettled = _unsettled_directions(winds)
     if not unsettled:
         return []
     return [

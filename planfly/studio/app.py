@@ -14,7 +14,7 @@ from planfly.studio.server import Server
 _TYPES = {".html": "text/html", ".css": "text/css", ".js": "text/javascript", ".svg": "image/svg+xml"}
 FILES = (
     *("studio.html", "studio.css", "studio.js", "link.js", "axes.js", "map.js", "profile.js", "hands.js", "panel.js"),
-    *("scene.js", "settings.js", "icon.svg"),
+    *("scene.js", "settings.js", "legend.js", "icon.svg"),
 )
 
 

@@ -28,12 +28,23 @@ LONG = "long"
 
 @dataclass
 class _ActiveWork:
-    """Work in progress.  rev: revision of the mission that it is done for."""
+    """Work in progress.
+
+    rev: revision of the mission that it is done for.
+    reported: time of the last progress report, s.
+    share: largest share done that was reported, 0 to 1.
+    """
 
     number: int
     name: str
     rev: int
     reported: float = 0.0
+    share: float = 0.0
+
+    @property
+    def message(self) -> Json:
+        """Message to the pages about the work; its number tells it from earlier work of the same name."""
+        return {"kind": "working", "job": self.name, "number": self.number, "rev": self.rev, "share": self.share}
 
 
 @dataclass
@@ -48,6 +59,8 @@ class Jobs:
     pack: Callable[[Work | None], bytes] = pickle.dumps
     _pilots: dict[str, Pilot] = field(default_factory=dict)
     _asked: dict[str, _ActiveWork] = field(default_factory=dict)
+    # Names of works that were replaced by other work and have not ended yet, by their numbers.
+    _replaced: dict[int, str] = field(default_factory=dict)
     _number: int = 0
     _flown: Json | None = None
     _figures: Figures | None = None
@@ -84,9 +97,16 @@ class Jobs:
         }
 
     def shown(self) -> list[Json]:
-        """Return the messages for a new page about results and tasks in progress."""
-        under_way = [{"kind": "working", "job": one.name, "rev": one.rev} for one in self._asked.values()]
-        return [*([self._flown] if self._flown is not None else []), *self._others, *under_way]
+        """Return the messages for a new page about results."""
+        return [*([self._flown] if self._flown is not None else []), *self._others]
+
+    def under_way(self) -> list[Json]:
+        """Return the messages for a new page about tasks in progress."""
+        return [one.message for one in self._asked.values()]
+
+    def plans_first_path(self, session: Session) -> bool:
+        """Return True while the path of an opened scenario is searched, and its mission is a placeholder."""
+        return self._at_once and not session.is_changed
 
     def forget(self) -> None:
         """Cancel all tasks and drop all results, because another mission was opened."""
@@ -146,6 +166,9 @@ class Jobs:
 
     def _send_work(self, pilot: str, name: str, function: str, payload: Any, rev: int) -> None:
         self._number += 1
+        before = self._asked.get(pilot)
+        if before is not None and before.name != name:
+            self._replaced[before.number] = before.name
         self._asked[pilot] = _ActiveWork(self._number, name, rev)
         self._pilot(pilot).ask(Work(self._number, function, payload))
 
@@ -160,34 +183,50 @@ class Jobs:
     # Answers.
 
     def answered(self, pilot: str, answer: Answer, session: Session) -> list[Json]:
-        """Return the messages to the pages for an answer; empty if a newer task was requested."""
+        """Return the messages to the pages for an answer; of a task that was replaced by other work only its end."""
         asked = self._asked.get(pilot)
         if asked is None or asked.number != answer.number:
-            return []
+            ended = None if answer.kind == "progress" else self._replaced.pop(answer.number, None)
+            return [] if ended is None else [self._stopped_message(ended)]
         if answer.kind == "progress":
             now = time.monotonic()
             if now - asked.reported < _REPORT_INTERVAL_S:
                 return []
             asked.reported = now
             done, total, remark = answer.value
-            share = min(1.0, done / total) if total > 0.0 else 0.0
-            return [{"kind": "working", "job": asked.name, "rev": asked.rev, "share": round(share, 3), "text": remark}]
+            # A search that begins another stage starts to count from zero.
+            asked.share = max(asked.share, round(min(1.0, done / total), 3) if total > 0.0 else 0.0)
+            return [asked.message | {"text": remark}]
         del self._asked[pilot]
         if answer.kind == "cancelled":
-            return [{"kind": "stopped", "job": asked.name}]
+            return [self._stopped_message(asked.name)]
         if answer.kind == "fault":
-            return [{"kind": "stopped", "job": asked.name}, {"kind": "fault", "text": str(answer.value)}]
+            return [self._stopped_message(asked.name), {"kind": "fault", "text": str(answer.value)}]
         if asked.name == "plan" and asked.rev != session.rev:
-            self._at_once = False
             edited = "the mission was changed during the search for its path, so it stays as it is: plan again"
-            return [{"kind": "stopped", "job": "plan"}, {"kind": "fault", "text": edited}]
+            return [self._stopped_message("plan"), {"kind": "fault", "text": edited}]
         return [self._result_message(asked, answer.value, session)]
+
+    def _stopped_message(self, name: str) -> Json:
+        """Return the message that a work has ended without a result."""
+        if name == "plan":
+            self._at_once = False
+        return {"kind": "stopped", "job": name}
 
     def _result_message(self, asked: _ActiveWork, value: Any, session: Session) -> Json:
         if asked.name == "fly":
             before, self._figures = self._figures, value.pop("figures")
+            judged = value.pop("judged")
+            if judged and asked.rev == session.rev:
+                self._send_work(
+                    PILOT, "trials", "planfly.studio.worker_tasks.try_suggestions", (session.desk, judged), asked.rev
+                )
             self._flown = {"kind": "flown", "rev": asked.rev, **value, "changes": changes(before, self._figures)}
             return self._flown
+        if asked.name == "trials":
+            session.flown_trials = asked.rev, value["missions"]
+            self._flown = (self._flown or {}) | {"findings": value["findings"]}
+            return {"kind": "tried", "rev": asked.rev, "findings": value["findings"]}
         if asked.name == "plan":
             session.plans = ([one.plan for one in value], session.plans[1])
             return {"kind": "ways", "rev": asked.rev, "ways": ways_json(value), "at_once": self._at_once}

@@ -108,12 +108,13 @@ class Step(_Message):
 
 
 class Apply(_Message):
-    """Application of a suggestion of a finding."""
+    """Application of a suggestion of a finding.  flown: true for a finding of the flight."""
 
     kind: Literal["apply"]
     rev: _Rev
     finding: _Index
     which: Annotated[int, Field(ge=0, le=20)]
+    flown: bool = False
 
 
 class Settings(_Message):

@@ -233,10 +233,13 @@ class Server:
     async def _show_all(self, page: Page) -> None:
         page.send({"kind": "choices", **self.jobs.choices(), **folder_json(self._folder)})
         page.send(self.session.world_shown())
-        page.send(self.session.sheet())
-        for message in self.jobs.shown():
+        for message in (*self.jobs.under_way(), self._sheet(), *self.jobs.shown()):
             page.send(message)
         await self._show_ground(page)
+
+    def _sheet(self) -> Json:
+        """Return the mission as page data; "planning" is true for a placeholder whose path is searched."""
+        return {**self.session.sheet(), "planning": self.jobs.plans_first_path(self.session)}
 
     async def _show_ground(self, page: Page) -> None:
         """Send the terrain of the current world to a page, once for each world and for light or dark."""
@@ -285,7 +288,7 @@ class Server:
             await self._dispatch(page, message)
         except StaleEdit:
             page.send({"kind": "stale"})
-            page.send(self.session.sheet())
+            page.send(self._sheet())
         except PlanflyError as error:
             page.send({"kind": "fault", "text": str(error)})
         except INTERNAL as error:
@@ -321,7 +324,7 @@ class Server:
             await self._run_judging(lambda: self._apply_change(message))
             if session.rev == rev:
                 return
-            shown = await self._run_judging(session.sheet)
+            shown = await self._run_judging(self._sheet)
         if session.world_rev != world:
             self._broadcast(session.world_shown())
         self._broadcast(shown)

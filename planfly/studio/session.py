@@ -52,6 +52,8 @@ class Session:
     rev: revision, which increases with every change.
     judged: the current mission with its verdict.
     plans: planned paths to choose from, with the items that they would replace.
+    flown_trials: missions with suggestions that passed a trial flight, by numbers of finding and suggestion, and the
+    revision that was flown.
     world_rev: revision of the world, which increases with every change of it.
     document_rev: number that increases with every opened document.
     named: file named on the command line, the only file that is overwritten.
@@ -68,6 +70,7 @@ class Session:
     rev: int = 1
     world_rev: int = 1
     plans: tuple[list[Plan], tuple[int, int] | None] = field(default_factory=lambda: ([], None))
+    flown_trials: tuple[int, dict[tuple[int, int], Mission]] = field(default_factory=lambda: (0, {}))
     kept_rev: int = 0
     # Autosave files that cannot be read.
     unreadable: list[Path] = field(default_factory=list)
@@ -275,6 +278,8 @@ class Session:
         return mission, f"delete {len(set(ks))} item{'s' if len(set(ks)) != 1 else ''}"
 
     def _with_suggestion(self, message: Apply) -> tuple[Mission, str]:
+        if message.flown:
+            return self._with_flown_suggestion(message)
         findings = self.judged.verdict.findings
         if not message.finding < len(findings):
             raise MissionError(f"{self.document.name}: that finding no longer exists", field="finding")
@@ -291,6 +296,14 @@ class Session:
             )
         mission = replace(passed.setup.mission, autopilot=self.mission.autopilot)
         return mission, f"apply a suggestion of {item.rule}"
+
+    def _with_flown_suggestion(self, message: Apply) -> tuple[Mission, str]:
+        """Return the mission with a suggestion of the flight, as its trial was flown."""
+        rev, missions = self.flown_trials
+        found = missions.get((message.finding, message.which)) if rev == self.rev else None
+        if found is None:
+            raise MissionError(f"{self.document.name}: that suggestion is not there any more", field="suggestion")
+        return replace(found, autopilot=self.mission.autopilot), "apply a suggestion of the flight"
 
     def _with_part_replaced(self, plan: Plan, first: int, last: int) -> Mission:
         """Return the mission with the items between two items replaced by the waypoints of a planned path."""

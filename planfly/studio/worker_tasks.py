@@ -1,10 +1,11 @@
-"""Fly a mission or plan a path in the studio's worker processes.
+"""Fly a mission, try the suggestions of its findings, or plan a path in the studio's worker processes.
 
 Arguments are pickled, and results are plain data.  Returns and campaigns, which take longer, are in
 `planfly.studio.long_worker_tasks`.
 """
 
 import math
+import pickle
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -15,6 +16,7 @@ import numpy as np
 
 from flight.mission.items import Mission
 from flight.simulation.track import Track
+from logs.verdict.judge_geometry import with_passing_suggestions
 from logs.views.failures import track_distance
 from planfly.planning.pareto_plans import make_pareto_plans
 from planfly.studio.changes import flight_figures
@@ -23,8 +25,11 @@ from planfly.studio.pilot import Advance
 from planfly.studio.states import place_states
 from planfly.studio.view_model import findings_json, rounded, states_json, verdict_json
 from planfly.workflow.airframe import Airframe
+from planfly.workflow.apply_suggestion import can_apply
 from planfly.workflow.make_plan import make_plan
+from planfly.workflow.mission_context import JudgedMission
 from planfly.workflow.pipeline import fly_and_judge
+from planfly.workflow.suggestion_trials import MAX_TRIAL_FLIGHTS, SuggestionTrials, tried_suggestions
 from planner.search.plan_front import FrontPlan
 from world.arrays import Floats
 from world.scenario import Scenario, from_spec
@@ -38,15 +43,21 @@ _MAX_DRAWN_ROWS = 1_500
 
 
 def fly(payload: tuple[EditContext, Mission], advance: Advance) -> dict[str, Any]:
-    """Fly a mission with its simulated autopilot, judge the flight, and return the results as page data."""
+    """Fly a mission with its simulated autopilot, judge the flight, and return the results as page data.
+
+    Its findings are without suggestions, which `try_suggestions` tries: a failed flight's "judged" is for it, pickled.
+    """
     desk, mission = payload
     setup = desk.setup(mission)
     flown = fly_and_judge(setup, desk.airframe, None, advance, reference="never")
+    judged = JudgedMission(mission, setup, flown.requirements, flown.verdict)
+    untried = replace(flown.verdict, findings=with_passing_suggestions(flown.verdict.findings, ()))
     states = place_states(flown.requirements, flown.verdict.findings)
     seconds = round(float(flown.track.time[-1]), 1) if len(flown.track) else 0.0
     return {
         "verdict": verdict_json(flown.verdict),
-        "findings": findings_json(flown.verdict),
+        "findings": findings_json(untried),
+        "judged": pickle.dumps(judged) if flown.verdict.failed else b"",
         "states": states_json(states, 0, setup.route.legs),
         "violated": {"threats": sorted(states.threats), "zones": sorted(states.zones)},
         "ended": flown.ended,
@@ -55,6 +66,30 @@ def fly(payload: tuple[EditContext, Mission], advance: Advance) -> dict[str, Any
         "figures": flight_figures(mission, setup.route, flown.verdict.findings, seconds),
         **_track_json(setup.route.waypoints, flown.track, flown.verdict.leg_ends),
     }
+
+
+def try_suggestions(payload: tuple[EditContext, bytes], advance: Advance) -> dict[str, Any]:
+    """Return the findings of a flight as page data, with the suggestions that pass a trial flight, and their missions.
+
+    The missions are by numbers of finding and suggestion; a suggestion that changes no item has none.
+    """
+    desk, pickled = payload
+    judged: JudgedMission = pickle.loads(pickled)
+
+    def report() -> bool:
+        advance(0.0, MAX_TRIAL_FLIGHTS, "trying suggestions")
+        return False
+
+    passed = SuggestionTrials(desk, judged, report).passing()
+    findings = with_passing_suggestions(judged.verdict.findings, tried_suggestions(passed))
+    missions = {
+        (number, which): one.setup.mission
+        for number, item in enumerate(judged.verdict.findings)
+        for which, suggestion in enumerate(findings[number].suggestions)
+        for one in passed
+        if one.finding is item and one.suggestion == suggestion and can_apply(suggestion)
+    }
+    return {"findings": findings_json(replace(judged.verdict, findings=findings)), "missions": missions}
 
 
 def _track_json(route: Floats, track: Track, leg_ends: Sequence[float]) -> dict[str, Any]:

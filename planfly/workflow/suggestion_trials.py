@@ -91,7 +91,7 @@ class SuggestionTrials:
     """Trials of the suggestions of one verdict.
 
     judged: the mission with its verdict, geometric or flown.
-    should_abort: aborts the trials, as for `Trial`.
+    should_abort: called before each trial and throughout its flight, as for `Trial`.
     """
 
     context: MissionContext
@@ -151,6 +151,8 @@ class SuggestionTrials:
         """Yield a suggestion and then larger ones, each with its trial."""
         judged, grown_finding, total = self.judged, finding, suggestion
         while True:
+            if self.should_abort():
+                raise TrialAborted
             try:
                 mission, setup = self._changed_flight(judged, grown_finding, suggestion)
             except PlanflyError:

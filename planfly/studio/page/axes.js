@@ -38,9 +38,10 @@ export class View {
     const { east, north, scale } = this;
     return `translate(${-east * scale} ${north * scale}) scale(${scale} ${-scale})`;
   }
-  fit([[west, east], [south, north]], padding = 28) {
+  // rim: pixels left free above and below.
+  fit([[west, east], [south, north]], rim = 28) {
     const wide = Math.max(1, east - west), tall = Math.max(1, north - south);
-    const free = [Math.max(40, this.width - 2 * padding), Math.max(40, this.height - 2 * padding)];
+    const free = [Math.max(40, this.width - 2 * 28), Math.max(40, this.height - 2 * rim)];
     this.scale = Math.min(free[0] / wide, free[1] / tall);
     this.east = (west + east) / 2 - this.width / 2 / this.scale;
     this.north = (south + north) / 2 + this.height / 2 / this.scale;

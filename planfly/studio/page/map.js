@@ -5,6 +5,8 @@ import { Labels, View, clear, groundAt, plain, step, svg } from "/axes.js";
 const DENSE = 80;
 // Legs of the straight line between the waypoints that are one shape: what is dragged has its own drawn anew.
 const CHUNK = 6;
+// Pixels that legend, compass and scale take at the lower edge.
+const TOOLS = 76;
 
 export class MapView {
   constructor(root) {
@@ -232,7 +234,10 @@ export class MapView {
       const [east, north] = this.at.get(item.k);
       labels.block(this.view.x(east), this.view.y(north), 7);
     }
-    labels.taken.push([this.view.width - 150, this.view.height - 34, this.view.width, this.view.height]);
+    for (const one of this.middles) labels.block(one.x, one.y, 6);
+    // The scale with the compass above it, and the legend.
+    labels.taken.push([this.view.width - 200, this.view.height - TOOLS, this.view.width, this.view.height]);
+    labels.taken.push([0, this.view.height - TOOLS, 110, this.view.height]);
     const by = items.length > DENSE ? Math.ceil(items.length / 40) : 1;
     items.forEach((item, i) => {
       const [east, north] = this.at.get(item.k), state = this.marks[i].classList;
@@ -255,7 +260,7 @@ export class MapView {
 
   name(labels, x, y, text, kind, away) {
     if (!this.inside(x, y, 2)) return;
-    const width = 6.4 * text.length + 4, height = 14;
+    const width = (kind === "number" ? 7.8 : 6.4) * text.length + 4, height = 14;
     const places = away ? [[away, -height / 2], [-away - width, -height / 2], [-width / 2, -away - height], [-width / 2, away]] : [[-width / 2, -height / 2]];
     for (const [dx, dy] of places) {
       if (!this.inside(x + dx, y + dy, 0) || !labels.free(x + dx, y + dy, width, height)) continue;
@@ -311,15 +316,21 @@ export class MapView {
   }
 
   extentOf(points) {
-    const east = points.map((p) => p[0]), north = points.map((p) => p[1]);
-    return [[Math.min(...east), Math.max(...east)], [Math.min(...north), Math.max(...north)]];
+    const [east, north] = [[Infinity, -Infinity], [Infinity, -Infinity]];
+    for (const p of points) [east, north].forEach((side, i) => {
+      side[0] = Math.min(side[0], p[i]);
+      side[1] = Math.max(side[1], p[i]);
+    });
+    return [east, north];
   }
 
+  // The whole mission: its items, and the path with its arcs and circles.
   fit() {
-    const shown = this.model.items.map((item) => item.at);
+    const { items, route, path } = this.model, shown = [...items.map((item) => item.at), ...route];
+    for (const flat of path) for (let i = 0; i < flat.length; i += 3) shown.push([flat[i], flat[i + 1]]);
     const [east, north] = this.extentOf(shown);
-    const rim = 0.08 * Math.max(east[1] - east[0], north[1] - north[0], 400);
-    this.view.fit([[east[0] - rim, east[1] + rim], [north[0] - rim, north[1] + rim]]);
+    const rim = 0.04 * Math.max(east[1] - east[0], north[1] - north[0], 400);
+    this.view.fit([[east[0] - rim, east[1] + rim], [north[0] - rim, north[1] + rim]], TOOLS);
     this.layOut();
   }
 }

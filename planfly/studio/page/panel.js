@@ -97,6 +97,13 @@ export class Panel {
     this.drawVerdict();
   }
 
+  // What passed its trial flight.
+  tried(message) {
+    if (!this.flight || this.flight.rev !== message.rev) return;
+    this.flight.findings = message.findings;
+    this.drawVerdict();
+  }
+
   select(k) {
     this.boxes.items.querySelectorAll("tr[data-k]").forEach((row) => row.classList.toggle("selected", Number(row.dataset.k) === k));
   }
@@ -109,8 +116,9 @@ export class Panel {
 
   buildVerdict() {
     const { now, flight } = this;
-    if (!now) return;
+    if (!now) return undefined;
     const box = clear(this.boxes.verdict), stale = flight && flight.rev !== now.rev;
+    if (now.planning) return box.append(element("section", { class: "card" }, element("h2", {}, "Planning a path"), element("p", { class: "more" }, "or drag an end to plan by hand")));
     box.append(this.answerOf("Geometry", answerText(now.verdict), now.verdict, "every leg and corner against what the aircraft can do"));
     if (flight) {
       const part = this.answerOf("Flown", answerText(flight.verdict, stale), flight.verdict, `${flight.autopilot}, ${duration(flight.seconds)}${stale ? ", before the last change" : ""}`);
@@ -120,9 +128,12 @@ export class Panel {
     }
     const failed = this.listed(now.findings, false), flownFailed = flight && !stale ? this.listed(flight.findings, true) : [];
     if (failed.length) box.append(element("h2", {}, "To mend"), element("ul", { class: "findings" }, ...failed));
-    if (flownFailed.length) box.append(element("h2", {}, "To mend, as flown"), element("ul", { class: "findings" }, ...flownFailed));
+    if (flownFailed.length) {
+      const trying = this.app.now.work.trials ? element("p", { class: "more" }, "Changes that would help are being flown \u2026") : null;
+      box.append(element("h2", {}, "To mend, as flown"), ...(trying ? [trying] : []), element("ul", { class: "findings" }, ...flownFailed));
+    }
     const passed = now.findings.filter((one) => one.ok);
-    if (passed.length) box.append(element("h2", {}, "Closest to its limit, by rule"), element("ul", { class: "findings passed" }, ...passed.map((one) => this.finding(one, true))));
+    if (passed.length) box.append(element("h2", {}, "Closest to its limit, by rule"), element("ul", { class: "findings passed" }, ...passed.map((one) => this.finding(one, false))));
     if (now.notes.length) box.append(element("h2", {}, "Notes"), element("ul", { class: "notes" }, ...now.notes.slice(0, 20).map((text) => element("li", {}, text))));
     const long = element("div", { class: "asks" },
       element("h2", {}, "Ask more"),
@@ -131,6 +142,7 @@ export class Panel {
     box.append(long);
     if (this.home) box.append(this.result("Return to launch", this.home));
     if (this.odds) box.append(this.result("Flights in this weather", this.odds));
+    return undefined;
   }
 
   ask(job, words, more) {
@@ -149,9 +161,9 @@ export class Panel {
     return findings.filter((one) => one.ok !== true).map((one) => this.finding(one, flown));
   }
 
-  finding(one, quiet) {
-    const { rev } = this.now, suggestions = quiet ? [] : one.suggestions.map((each, which) => element("li", {},
-      each.apply ? element("button", { type: "button", class: "apply", onclick: () => this.app.commit({ kind: "apply", rev, finding: one.number, which }) }, "Apply") : element("span", { class: "hand" }, "by hand"),
+  finding(one, flown) {
+    const { rev } = this.now, suggestions = one.suggestions.map((each, which) => element("li", {},
+      each.apply ? element("button", { type: "button", class: "apply", onclick: () => this.app.commit({ kind: "apply", rev, finding: one.number, which, flown }) }, "Apply") : element("span", { class: "hand" }, "by hand"),
       element("span", {}, each.text)));
     const whole = ["flight", "mission", "plan"].includes(one.kind) && !/\d/.test(one.where);
     const place = whole ? "" : one.index === null ? element("b", {}, one.where) : element("button", { type: "button", class: "place", title: "Show it on the map", onclick: () => this.app.goTo(one) }, one.where);
@@ -317,14 +329,16 @@ export class Panel {
 
   // ---- long works
 
-  working({ job, share, text }) {
+  working({ job, share, text }, begins) {
+    if (job === "trials" && begins) this.drawVerdict();
     for (const button of document.querySelectorAll(`button[data-job="${job}"]`)) {
-      button.dataset.share = share === undefined ? "" : `${Math.round(100 * share)} %`;
+      button.dataset.share = `${Math.round(100 * share)} %`;
       button.title = text || "";
     }
   }
 
   stopped(job) {
+    if (job === "trials") this.drawVerdict();
     for (const button of document.querySelectorAll(`button[data-job="${job}"]`)) delete button.dataset.share;
   }
 

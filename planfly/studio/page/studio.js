@@ -2,6 +2,7 @@
 
 import { clear, element, groundAt, plain } from "/axes.js";
 import { Hands } from "/hands.js";
+import { drawCompass, drawLegend } from "/legend.js";
 import { Link } from "/link.js";
 import { MapView } from "/map.js";
 import { Panel, answerText } from "/panel.js";
@@ -20,6 +21,8 @@ function onWorld(world) {
   map.setWorld(world);
   setGround();
   panel.world(world);
+  drawLegend($("legend").querySelector("ul"), world);
+  drawCompass($("compass"), world.settings);
   if (now.model) drawAll();
 }
 
@@ -32,8 +35,9 @@ function setGround() {
   scene?.show(now);
 }
 
-function onSheet(sheet) {
-  const before = now.sheet;
+function onSheet(sent) {
+  const before = now.sheet, sheet = sent.planning ? unjudged(sent) : sent;
+  now.sent = sent;
   const same = sameItems(before, sheet), opened = before && isOther(before, sheet);
   now.sheet = now.model = sheet;
   now.committed = false;
@@ -68,12 +72,26 @@ function onSheet(sheet) {
     $(side).disabled = !sheet[side];
     $(side).title = sheet[side] ? `${side === "undo" ? "Undo" : "Redo"}: ${sheet[side]}` : side === "undo" ? "Nothing to undo" : "Nothing to redo";
   }
-  say(`Geometry: ${sheet.verdict.headline}`);
+  say(sheet.planning ? "Planning a path" : `Geometry: ${sheet.verdict.headline}`);
   document.documentElement.dataset.rev = sheet.rev;
   // Who has made an edit knows how.
   $("begin").hidden = Boolean(sheet.undo || sheet.redo);
   if (now.nudged && !now.queue.length) app.flush();
   else pump();
+}
+
+// The straight line that stands for a path while one is searched: nobody asks whether it can be flown.
+function unjudged(sheet) {
+  const open = (states) => states.map(() => ["open", ""]);
+  return {
+    ...sheet, findings: [], violated: { threats: [], zones: [] }, verdict: { ...sheet.verdict, state: "none", lines: [], headline: "" },
+    states: { legs: open(sheet.states.legs), corners: open(sheet.states.corners) },
+  };
+}
+
+// The search has ended without a path: the line is judged as any other mission.
+function planningEnded(job) {
+  if (job === "plan" && now.sheet?.planning) onSheet({ ...now.sent, planning: false });
 }
 
 // Whether both have the same items, but for one that may stand elsewhere: numbers of items mean the same in both.
@@ -204,16 +222,18 @@ function onFlown(flown) {
 }
 
 function onWorking(work) {
+  const begins = !now.work[work.job];
   now.work[work.job] = work;
   progress();
   answers();
-  panel.working(work);
+  panel.working(work, begins);
 }
 
 // What fails beside the edits (a flight, a plan, a disk that is full) leaves them as they are.
 function onFault({ text, job }) {
   complain(text);
   panel.drawSettings();
+  planningEnded(job);
   if (job !== undefined || link.before === "stopped") return;
   app.refused();
   if (now.dragging) {
@@ -227,6 +247,7 @@ function onStopped({ job }) {
   progress();
   answers();
   panel.stopped(job);
+  planningEnded(job);
 }
 
 function isStale() {
@@ -257,7 +278,6 @@ function drawAll() {
 function answers() {
   const { model, flown } = now;
   if (!model) return;
-  const unplanned = model.items.length === 2 && now.work.plan;
   const state = now.fault ? "fail" : model.verdict.state;
   const failing = [...model.states.legs, ...model.states.corners].filter((one) => one[0] === "fail").length;
   let words = answerText(model.verdict);
@@ -266,7 +286,8 @@ function answers() {
     shown = failing ? "fail" : "checking";
     words = failing ? `${failing} ${failing === 1 ? "place fails" : "places fail"}` : "checking \u2026";
   }
-  setAnswer("geometry", unplanned ? "none" : shown, unplanned ? "planning \u2026" : now.fault || words, model.verdict.headline);
+  if (model.planning) setAnswer("geometry", "none", "planning \u2026", "");
+  else setAnswer("geometry", shown, now.fault || words, model.verdict.headline);
   const work = now.work.fly;
   if (work && !now.dragging) setAnswer("flown", "checking", `flying ${Math.round(100 * (work.share || 0))} %`, work.text || "");
   else if (!flown) setAnswer("flown", "none", "not yet", "");
@@ -288,11 +309,16 @@ function showName(name, unsaved) {
 }
 
 function progress() {
-  const works = Object.values(now.work).filter(Boolean);
+  const works = Object.values(now.work).filter(Boolean), bar = $("progress");
   $("stop").hidden = !works.length;
-  const long = works.find((one) => one.job !== "fly") || works[0];
-  $("progress").hidden = !long;
-  if (long) $("progress").firstElementChild.style.width = `${Math.round(100 * (long.share || 0.02))}%`;
+  // What is tried by flight has no known end.
+  const long = works.find((one) => !["fly", "trials"].includes(one.job)) || now.work.fly;
+  bar.hidden = !long;
+  if (!long) return;
+  // Each work has a bar of its own, or the next one's would shrink from where the last one's was.
+  if (bar.dataset.number !== String(long.number)) bar.replaceChildren(element("i"));
+  bar.dataset.number = long.number;
+  bar.firstElementChild.style.width = `${Math.max(2, Math.round(100 * long.share))}%`;
 }
 
 let saidTimer = 0;
@@ -450,11 +476,13 @@ const panel = new Panel(app);
 const hands = new Hands(app);
 const link = new Link({
   open: () => complain(""),
-  lost: (text) => { app.refused(); complain(text, true); },
+  // What goes on is said with the next connection.
+  lost: (text) => { app.refused(); now.work = {}; progress(); answers(); complain(text, true); },
   world: onWorld,
   sheet: onSheet,
   preview: onPreview,
   flown: onFlown,
+  tried: (message) => { now.work.trials = null; progress(); panel.tried(message); },
   working: onWorking,
   stopped: onStopped,
   choices: (message) => panel.choices(message),

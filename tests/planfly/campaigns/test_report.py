@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from logs.verdict.places import Place
+from logs.views.report.page import page_template
 from planfly.campaigns.campaign_base import CampaignBase
 from planfly.campaigns.failure_counts import RuleFailures
 from planfly.campaigns.find_winds import FEWEST, CalmFailures, WindsFound, WindsGoal
@@ -21,6 +22,7 @@ from planfly.campaigns.report import (
     fly_row_again,
     spokes,
     wind_lines,
+    winds_state,
     write_files,
     write_winds,
 )
@@ -148,6 +150,21 @@ def test_rules_that_fail_in_calm_air_are_named_with_their_places() -> None:
         "does not fly with P >= 0.9, by best estimate, even in calm air",
         "in 0.3 m/s, the weakest wind flown, 3 of 4 flights fail",
     ]
+
+
+def test_the_page_is_red_only_where_flights_show_that_calm_air_is_missed() -> None:
+    """Of 4 flights none that flies shows P < 0.9 (at most 0.49 at 95 %), one of which fails does not."""
+    settled = tuple((k, 5.0, True) for k in range(4) for _ in range(FEWEST))
+    narrow = tuple(WindBoundary(5.0, 4.9, 5.1, False) for _ in range(4))
+    assert winds_state(FOUND) == "undecided"
+    assert winds_state(replace(FOUND, flights=settled, boundaries=narrow)) == ""
+    for failed, state in ((4, "missed"), (1, "undecided"), (0, "undecided")):
+        assert winds_state(replace(FOUND, calm=CalmFailures(0.0, 4, failed, ()))) == state
+    page = page_template("winds.html", "planfly.campaigns").render(
+        name="x", colours="", picture="", answer="undecided", lines=["not settled"], rows=[], command="x"
+    )
+    assert '<div class="answer undecided">' in page
+    assert re.search(r"\.undecided \{ border-color: var\(--open\)", page)
 
 
 def test_what_flights_show_by_themselves_where_none_failed() -> None:

@@ -29,12 +29,20 @@ STATE = "document.getElementById('{}').dataset.state"
 READY = "document.querySelectorAll('.mark').length > 1 && document.querySelector('#map-box image[href]') !== null"
 CENTRE = """(() => {{ const r = document.querySelectorAll({0})[{1}].getBoundingClientRect();
  return [r.x + r.width / 2, r.y + r.height / 2]; }})()"""
-# Pairs of names that stand over each other, and the tools of the page that are smaller than a finger's tip.
+# Pairs of names that stand over each other, or over a dot or a diamond.
 OVERLAPS = """(() => { let n = 0;
  const boxes = [...document.querySelectorAll('.names text')].map((one) => one.getBoundingClientRect());
- boxes.forEach((a, i) => boxes.slice(i + 1).forEach((b) => {
+ const marks = [...document.querySelectorAll('.mark .dot, .diamonds path')].map((one) => one.getBoundingClientRect());
+ boxes.forEach((a, i) => [...boxes.slice(i + 1), ...marks].forEach((b) => {
  n += a.left < b.right - 1 && b.left < a.right - 1 && a.top < b.bottom - 2 && b.top < a.bottom - 2; }));
  return n; })()"""
+# Parts of the mission that the map does not show, or that lie under its legend and its compass.
+UNSEEN = """(() => { const [box, ...tools] = ['#map', '#legend', '#compass'].map((one) =>
+ document.querySelector(one).getBoundingClientRect());
+ const parts = [...document.querySelectorAll('.mark .dot, .legs path')].map((one) => one.getBoundingClientRect());
+ return parts.filter((a) =>
+ a.left < box.left || a.right > box.right || a.top < box.top || a.bottom > box.bottom ||
+ tools.some((b) => a.left < b.right && b.left < a.right && a.top < b.bottom && b.top < a.bottom)).length; })()"""
 UNNAMED = """[...document.querySelectorAll('button, input, select, [role=button]')].filter((one) =>
  one.checkVisibility() && !(one.ariaLabel || one.textContent.trim() || one.labels?.length || one.title))
  .map((one) => one.outerHTML)"""
@@ -178,7 +186,13 @@ def test_it_opens_with_the_mission_and_asks_for_nothing_elsewhere(page: Browser,
     assert [one for one in page.requests if not one.startswith((own, "blob:"))] == []
     assert page.problems == []
     assert page.value(OVERLAPS) == 0
+    assert page.value(UNSEEN) == 0
     assert page.value(UNNAMED) == []
+    lines = page.value("[...document.querySelectorAll('#legend li')].map((one) => one.textContent)")
+    assert {"passes", "near a limit", "fails", "not judged in full", "flown", "missile\u2019s reach"} <= set(lines)
+    # The wind of the scenario; the arrow points to where it blows.
+    assert page.value("document.getElementById('compass').ariaLabel") == "North is up; wind 5.0 m/s from 250\u00b0"
+    assert page.value("document.querySelector('#compass .wind').getAttribute('transform')") == "rotate(250)"
 
 
 def test_a_waypoint_is_dragged_judged_flown_and_undone(page: Browser) -> None:
@@ -304,6 +318,16 @@ def test_a_suggestion_is_applied_by_its_button(page: Browser) -> None:
     assert failed
     page.value("document.querySelector('#panel-verdict .apply').click()")
     page.wait_for("document.getElementById('undo').title.startsWith('Undo: apply a suggestion')")
+    undo_all(page)
+
+
+def test_a_suggestion_of_the_flight_is_offered_once_it_was_flown_and_applied(page: Browser) -> None:
+    page.value("document.getElementById('tab-verdict').click()")
+    own = "[...document.querySelectorAll('#panel-verdict h2')].find((one) => one.textContent === 'To mend, as flown')"
+    apply = f"{own}?.nextElementSibling.querySelector('.apply')"
+    page.wait_for(f"{apply} && document.getElementById('stop').hidden", 150.0)
+    page.value(f"{apply}.click()")
+    page.wait_for("document.getElementById('undo').title === 'Undo: apply a suggestion of the flight'")
     undo_all(page)
 
 

@@ -1,0 +1,38 @@
+// What the lines of the map mean, and a compass with the wind.
+
+import { clear, element, svg } from "/axes.js";
+
+const LINES = [
+  ["leg ok", "passes"], ["leg near", "near a limit"], ["leg open", "not judged in full"], ["leg fail", "fails"], ["track", "flown"],
+  ["straight", "between waypoints"],
+];
+
+// The lines that this world can show, each once.
+export function drawLegend(box, world) {
+  const kinds = new Set(world.zones.map((zone) => zone.kind));
+  const shown = [
+    ...LINES,
+    ...(world.threats.some((one) => one.kill) ? [["missile", "missile\u2019s reach"]] : []),
+    ...(world.threats.some((one) => one.detection) ? [["radar", "radar\u2019s reach"]] : []),
+    ...(kinds.has("exclusion") ? [["zone exclusion", "zone to stay out of"]] : []),
+    ...(kinds.has("inclusion") ? [["zone inclusion", "zone to stay in"]] : []),
+    ...(world.bounds ? [["area", "edge of the area"]] : []),
+  ];
+  clear(box).append(...shown.map(([look, words]) => {
+    const line = svg("svg", { viewBox: "0 0 28 10", class: "world", "aria-hidden": "true" });
+    svg("path", { d: "M1 5H27", class: look }, line);
+    return element("li", {}, line, words);
+  }));
+}
+
+// North is up; the arrow points where the wind blows to.
+export function drawCompass(box, { wind_speed: speed, wind_from: from }) {
+  const words = speed > 0 ? `wind ${speed.toFixed(1)} m/s from ${String(Math.round(from) % 360).padStart(3, "0")}\u00b0` : "no wind";
+  const dial = svg("svg", { viewBox: "-24 -32 48 56", "aria-hidden": "true" });
+  svg("circle", { r: 20 }, dial);
+  svg("path", { d: "M0-20V-13" }, dial);
+  svg("text", { y: -22, "text-anchor": "middle" }, dial).textContent = "N";
+  if (speed > 0) svg("path", { d: "M0-14V14M-5 7 0 14 5 7", class: "wind", transform: `rotate(${from})` }, dial);
+  clear(box).append(dial, element("span", {}, words));
+  box.setAttribute("aria-label", `North is up; ${words}`);
+}

@@ -1,0 +1,126 @@
+"""Works of the studio's processes: what pages are told of their progress and end, and trials after a failed flight."""
+
+from typing import Any
+
+import pytest
+
+from planfly.flight_options import MissionOptions
+from planfly.studio import jobs as jobs_module
+from planfly.studio import messages
+from planfly.studio.documents import open_document
+from planfly.studio.jobs import LONG, PILOT, Jobs
+from planfly.studio.pilot import Answer, Work
+from planfly.studio.session import Session
+from planfly.studio.worker_tasks import fly, try_suggestions
+from tests.planfly.studio.drafts import drawn_session
+from world.errors import MissionError
+
+
+class Asked:
+    """Takes the place of a process, and keeps what it was asked."""
+
+    def __init__(self) -> None:
+        self.works: list[Work] = []
+
+    def ask(self, work: Work) -> None:
+        self.works.append(work)
+
+    def start(self) -> None:
+        """Start nothing."""
+
+
+@pytest.fixture
+def jobs(monkeypatch: pytest.MonkeyPatch) -> Jobs:
+    monkeypatch.setattr(jobs_module, "_REPORT_INTERVAL_S", 0.0)
+    made = Jobs(lambda name, answer: None)
+    made._pilots.update({PILOT: Asked(), LONG: Asked()})  # type: ignore[dict-item]
+    return made
+
+
+def asked(jobs: Jobs, pilot: str) -> list[Work]:
+    return jobs._pilots[pilot].works  # type: ignore[attr-defined, no-any-return]
+
+
+def test_a_work_that_another_replaces_is_said_to_have_stopped(jobs: Jobs) -> None:
+    session = drawn_session(8, 8)
+    jobs.ask("returns", session)
+    jobs.ask("campaign", session)
+    first, second = asked(jobs, LONG)
+    assert jobs.answered(LONG, Answer(first.number, "progress", (1.0, 2.0, "")), session) == []
+    assert jobs.answered(LONG, Answer(first.number, "cancelled"), session) == [{"kind": "stopped", "job": "returns"}]
+    assert jobs.answered(LONG, Answer(first.number, "cancelled"), session) == []
+    # One that is asked for again goes on for the pages.
+    jobs.ask("campaign", session)
+    assert jobs.answered(LONG, Answer(second.number, "cancelled"), session) == []
+
+
+def test_progress_never_runs_backwards_and_is_told_to_new_pages(jobs: Jobs) -> None:
+    session = drawn_session(8, 8)
+    jobs.ask("campaign", session)
+    (work,) = asked(jobs, LONG)
+    shares = []
+    for done, total in ((1.0, 4.0), (3.0, 4.0), (1.0, 9.0), (0.0, 0.0), (8.0, 9.0)):
+        (message,) = jobs.answered(LONG, Answer(work.number, "progress", (done, total, "on")), session)
+        shares.append(message["share"])
+    assert shares == [0.25, 0.75, 0.75, 0.75, 0.889]
+    assert [(one["job"], one["share"]) for one in jobs.under_way()] == [("campaign", 0.889)]
+    jobs.ask("campaign", session)
+    assert jobs.under_way()[0]["share"] == 0.0
+    assert jobs.under_way()[0]["number"] != work.number
+
+
+def test_a_scenario_is_planned_first_and_not_judged_meanwhile(jobs: Jobs) -> None:
+    session = Session.of(open_document("tight", MissionOptions()), MissionOptions())
+    jobs.start(session)
+    assert jobs.plans_first_path(session)
+    (work,) = asked(jobs, LONG)
+    jobs.answered(LONG, Answer(work.number, "fault", "no"), session)
+    assert not jobs.plans_first_path(session)
+
+
+def answer_of(jobs: Jobs, session: Session, function: Any) -> dict[str, Any]:
+    work = asked(jobs, PILOT)[-1]
+    value = function(work.payload, lambda done, total, remark: None)
+    (message,) = jobs.answered(PILOT, Answer(work.number, "done", value), session)
+    return message
+
+
+def test_what_failed_in_flight_is_offered_with_changes_that_were_flown(jobs: Jobs) -> None:
+    session = drawn_session(8, 8)
+    jobs.fly(session)
+    before = answer_of(jobs, session, fly)
+    # The flight's own list offers nothing that was not tried.
+    assert before["verdict"]["failed"]
+    assert [one["suggestions"] for one in before["findings"] if one["suggestions"]] == []
+    assert asked(jobs, PILOT)[-1].function.endswith("try_suggestions")
+    tried = answer_of(jobs, session, try_suggestions)
+    offered = [
+        (one, which) for one in tried["findings"] for which, each in enumerate(one["suggestions"]) if each["apply"]
+    ]
+    assert offered
+    assert jobs.shown()[0]["findings"] == tried["findings"]
+    finding, which = offered[0]
+    apply = messages.Apply(kind="apply", rev=session.rev, finding=finding["number"], which=which, flown=True)
+    session.edit(apply)
+    jobs.fly(session)
+    after = answer_of(jobs, session, fly)
+    assert after["verdict"]["failed"] <= before["verdict"]["failed"]
+    failing = [(one["rule"], one["where"]) for one in after["findings"] if one["ok"] is False]
+    assert (finding["rule"], finding["where"]) not in failing
+    # Of another revision nothing is applied.
+    with pytest.raises(MissionError, match="not there any more"):
+        session.edit(apply.model_copy(update={"rev": session.rev}))
+
+
+def test_trials_end_when_other_work_comes() -> None:
+    session = drawn_session(8, 8)
+    flown = fly((session.desk, session.mission), lambda done, total, remark: None)
+
+    class Ended(Exception):
+        pass
+
+    def other(done: float, total: float, remark: str) -> None:
+        raise Ended
+
+    with pytest.raises(Ended):
+        try_suggestions((session.desk, flown["judged"]), other)
