@@ -19,6 +19,7 @@ WAYPOINT = record_dtype(
     "turn",  # rad, positive in either direction
     ("fly_over", np.bool_),
     "acceptance",  # m; 0 if the mission states none
+    "pass_by",  # m that ArduPlane flies on beyond it along the leg
     "airspeed",  # m/s, of the leg
     "up",  # m AMSL
     "circle",  # m, radius of the loiter that it is a corner of, positive to the right; 0 for none

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from aircraft.path_limits import BLEND_ACCELERATION, Limits
 from flight.guidance.lateral_reference_laws import WAYPOINT
 from flight.mission.items import Command, Mission, MissionItem
-from flight.mission.itinerary import loiter_of
+from flight.mission.itinerary import loiter_of, pass_by_distance
 from flight.mission.route import SHARPEST_FLY_BY_RAD, Route, ends_at_plain_waypoint
 from world.arrays import Floats
 from world.geometry import leg_courses, leg_runs, signed_turns, tangent_length, wrap
@@ -406,13 +406,14 @@ def waypoint_records(route: Route, mission: Mission | None = None, *, fly_over: 
     # A stated acceptance radius switches legs, whatever the scenario states.
     waypoints["fly_over"] = fly_over & (route.acceptance == 0.0) & (route.arcs == 0.0)
     waypoints["acceptance"] = route.acceptance
+    items = {} if mission is None else {item.seq: item for item in mission.items}
+    waypoints["pass_by"] = [pass_by_distance(items[seq]) if seq in items else 0.0 for seq in route.items.tolist()]
     waypoints["over_ground"] = np.isfinite(route.above_ground)
     waypoints["above_ground"] = np.nan_to_num(route.above_ground)
     waypoints["airspeed"] = np.append(route.airspeed, route.airspeed[-1])
     waypoints["up"] = route.waypoints[:, 2]
     waypoints["item"], waypoints["stop"] = route.items, route.stops
     _set_circles(waypoints[1:-1], route)
-    items = {} if mission is None else {item.seq: item for item in mission.items}
     _set_loiters(waypoints, items)
     gates = [seq for seq, item in items.items() if item.command == Command.CONDITION_GATE]
     waypoints["gate"] = np.isin(route.items, gates)

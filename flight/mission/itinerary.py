@@ -93,6 +93,24 @@ def loiter_of(item: MissionItem) -> Loiter | None:
     return None
 
 
+# Longest distance that ArduPlane flies on beyond a waypoint, m: it is stored as whole metres in a byte.
+_MAX_PASS_BY_M = 255
+
+
+def pass_by_distance(item: MissionItem) -> float:
+    """Return the distance that ArduPlane flies on beyond a waypoint, m; 0 for any other item.
+
+    It is the third parameter of NAV_WAYPOINT in whole metres (`AP_Mission::mavlink_int_to_mission_cmd`).
+
+    >>> place = (0, 36.5, 8.0, 700.0)
+    >>> made = [MissionItem(1, 16, place[0], (0.0, 0.0, p3, 0.0), *place[1:]) for p3 in (150.9, 300.0, math.nan, -50.0)]
+    >>> [pass_by_distance(item) for item in made]
+    [150.0, 255.0, 0.0, 0.0]
+    """
+    beyond = item.params[2]
+    return float(min(_MAX_PASS_BY_M, int(beyond))) if item.command == Command.NAV_WAYPOINT and beyond >= 1.0 else 0.0
+
+
 class OpenItem(NamedTuple):
     """An item that changes the flight path, but is not simulated as the autopilot flies it.
 
@@ -530,9 +548,12 @@ class _ItineraryBuilder:
             if item.params[0] > 0.0:
                 # No fixed wing holds: ArduPlane stores no time, PX4 (`MissionBlock::get_time_inside`) reads none.
                 self.notes.add("NAV_WAYPOINT with a time to hold: flown through", item.seq)
-            if item.params[2] > 0.0:
-                # `Plane::verify_nav_wp`; PX4 does not read it.
-                self.leave_open(f"{name} with a distance to fly on beyond it: not flown", item.seq, by_value=False)
+            if beyond := pass_by_distance(item):
+                self.notes.usual.add(f"{name} with {beyond:.0f} m to fly on beyond it, as ArduPlane does", item.seq)
+            elif item.params[2] <= -1.0:
+                # Converting a negative number to an unsigned one gives 0 on ARM and 255 on a PC; PX4 does not read it.
+                text = f"{name} with {item.params[2]:g} m to fly on beyond it: flown as 0, where ArduPlane may fly 255 m"
+                self.leave_open(text, item.seq, by_value=False)
         elif item.command == Command.NAV_SPLINE_WAYPOINT:
             self.leave_open(f"{name}: flown as a straight waypoint", item.seq)
         elif item.command == Command.NAV_LOITER_UNLIM:

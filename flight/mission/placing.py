@@ -19,7 +19,15 @@ from flight.mission.items import (
     MissionItem,
     Notes,
 )
-from flight.mission.itinerary import Itinerary, ItineraryStop, Loiter, OpenItem, loiter_of, make_itinerary
+from flight.mission.itinerary import (
+    Itinerary,
+    ItineraryStop,
+    Loiter,
+    OpenItem,
+    loiter_of,
+    make_itinerary,
+    pass_by_distance,
+)
 from flight.mission.loiter_circles import PlacedStop
 from flight.mission.return_path import LandingStart, ReturnPlace
 from world.arrays import Floats
@@ -264,7 +272,8 @@ def _position_of(item: MissionItem, origin: GeoOrigin, heights: "_Heights") -> t
 def _place_start(item: MissionItem, origin: GeoOrigin, heights: "_Heights") -> LandingStart:
     place, loiter = _position_of(item, origin, heights), loiter_of(item)
     radius = (loiter or Loiter(0.0)).radius
-    return LandingStart(item.seq, place, place, loiter is not None, radius, lands=item.command in LANDINGS)
+    lands, beyond = item.command in LANDINGS, pass_by_distance(item)
+    return LandingStart(item.seq, place, place, loiter is not None, radius, lands=lands, pass_by=beyond)
 
 
 def landing_places(mission: Mission, origin: GeoOrigin) -> tuple[tuple[int, float, float], ...]:

@@ -63,6 +63,7 @@ class LandingStart(NamedTuple):
     radius: loiter radius, m, negative to the left, 0 if none is stated.
     lands: True if the item is the landing itself.
     onward: the places after it up to the landing; their own ``onward`` is empty.
+    pass_by: distance that ArduPlane flies on beyond the place, m.
     """
 
     item: int
@@ -72,6 +73,7 @@ class LandingStart(NamedTuple):
     radius: float = 0.0
     lands: bool = False
     onward: tuple["LandingStart", ...] = ()
+    pass_by: float = 0.0
 
 
 def nearest_landing(here: Place, landings: Sequence[LandingStart]) -> LandingStart | None:

@@ -37,6 +37,15 @@ def test_speeds_count_for_the_legs_after_them() -> None:
     )
 
 
+def test_a_distance_to_fly_on_beyond_a_waypoint_is_flown_and_a_negative_one_leaves_the_verdict_open() -> None:
+    flown = route(wp(0, 0), wp(0, 900, p="0 0 150.9 0"), wp(900, 900, p="0 0 -50 0"), wp(900, 1800))
+    assert flown.notes == (
+        "item 2: NAV_WAYPOINT with 150 m to fly on beyond it, as ArduPlane does",
+        "item 3: NAV_WAYPOINT with -50 m to fly on beyond it: flown as 0, where ArduPlane may fly 255 m",
+    )
+    assert [one.item for one in flown.open_items] == [3]
+
+
 @pytest.mark.parametrize(
     ("change", "airspeed", "noted"),
     [
