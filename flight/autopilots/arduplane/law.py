@@ -181,6 +181,8 @@ _SPEED_RATE_FRACTION = 0.5
 # the demand touch the limit now and then: the band is three standard deviations.  Climbs at full throttle depend on it:
 # with 0.003 to 0.005 the least clearances of 20 ArduPlane flights are met within 1.2 m; without it one is 9 m off.
 _SATURATION_BAND_FRACTION = 0.003
+# An RTL that climbs before its turn demands this much more than the climb, m.
+_RTL_CLIMB_EXTRA_M = 10.0
 # Underspeed begins below this ratio of airspeed to AIRSPEED_MIN ...
 _UNDERSPEED_RATIO = 0.9
 # ... with the throttle at or above this fraction of its maximum.
@@ -320,9 +322,12 @@ def _return_altitude(estimated: Record, b: Record, parameters: Record, own: Reco
     The slope leads from where the RTL began to the center of its loiter; on the loiter the target's altitude applies
     (`Plane::setup_glide_slope`, `Mode::update_target_altitude`).  The slope down to a rally point is computed as if the
     point's altitude above home were an altitude AMSL, and never exceeds the altitude at which the RTL began
-    (`Plane::set_offset_altitude_location`, `Plane::constrain_target_altitude_location`; seen in 20 flights).
+    (`Plane::set_offset_altitude_location`, `Plane::constrain_target_altitude_location`; seen in 20 flights).  Until the
+    climb that precedes the turn is done, the demand lies above the start and the target (`Plane::update_alt`).
     """
     end: float = b.up
+    if not own.climbed:
+        return max(own.from_up, end) + parameters.rtl_climb_min + _RTL_CLIMB_EXTRA_M
     fall = own.from_up - end
     slope_fall = fall + b.slope_base
     if own.on_circle or fall <= 0.0 or abs(slope_fall) < parameters.glide_slope_min:

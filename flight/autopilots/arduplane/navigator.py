@@ -302,7 +302,7 @@ def _navigate_rtl(estimated: Record, b: Record, parameters: Record, own: Record,
 
     The aircraft turns to the center of the RTL loiter at once, from any leg; the radius grows with altitude as the
     square of the ratio of true to equivalent airspeed (`AP_L1_Control::loiter_radius`).  Until the initial climb is
-    done, bank is limited to LEVEL_ROLL_LIMIT; only then the altitude slope begins.
+    done, bank is limited to LEVEL_ROLL_LIMIT; only then the altitude slope begins, at the aircraft.
     """
     if not own.returning:
         own.returning = True

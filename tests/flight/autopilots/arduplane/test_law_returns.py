@@ -152,15 +152,34 @@ def test_it_banks_little_before_it_has_climbed_what_it_has_to() -> None:
     assert navigated(own, flying(up=549.9), way, RTL_CLIMB_MIN=50.0).side_acceleration == pytest.approx(most)
     assert navigated(own, flying(up=550.1), way, RTL_CLIMB_MIN=50.0).climbed
     assert navigated(own, flying(up=550.1), way, RTL_CLIMB_MIN=50.0).side_acceleration > most
-    # Above its target it does so too, and then it never has.
+    # Above its target it does so too, and turns normally from there.
     low = navigated(memory(), flying(up=500.0), back(100.0), RTL_CLIMB_MIN=50.0)
     assert low.side_acceleration == pytest.approx(most)
+    assert navigated(low, flying(up=550.1), back(100.0), RTL_CLIMB_MIN=50.0).side_acceleration > most
     # Bit 4 of FLIGHT_OPTIONS: up to the target's height, whatever RTL_CLIMB_MIN says.
     bit4 = {"FLIGHT_OPTIONS": 16.0, "RTL_CLIMB_MIN": 50.0}
     own = navigated(memory(), flying(up=699.0), way, **bit4)
     assert own.side_acceleration == pytest.approx(most)
     assert navigated(own, flying(up=700.5), way, **bit4).side_acceleration > most
     assert navigated(memory(), flying(up=710.0), way, FLIGHT_OPTIONS=8.0 + 32.0).side_acceleration > most
+
+
+@pytest.mark.parametrize(
+    ("target", "values", "demand"),
+    [
+        (100.0, {"RTL_CLIMB_MIN": 30.0}, 500.0 + 30.0 + 10.0),
+        (700.0, {"RTL_CLIMB_MIN": 30.0}, 700.0 + 30.0 + 10.0),
+        (700.0, {"FLIGHT_OPTIONS": 16.0}, 700.0 + 10.0),
+        (700.0, {"FLIGHT_OPTIONS": 16.0, "RTL_CLIMB_MIN": 30.0}, 700.0 + 30.0 + 10.0),
+        (100.0, {"FLIGHT_OPTIONS": 16.0}, 500.0),  # above its target already: on the slope
+    ],
+)
+def test_before_its_turn_it_demands_the_climb_above_start_and_target(
+    target: float, values: dict[str, float], demand: float
+) -> None:
+    """`Plane::update_alt` adds RTL_CLIMB_MIN and 10 m to the higher of the target and the altitude at the start."""
+    way, here = back(target), flying(up=500.0)
+    assert asked(navigated(memory(), here, way, **values), here, way, **values) == pytest.approx(demand)
 
 
 def test_the_slope_begins_where_the_climb_has_ended() -> None:
