@@ -21,6 +21,7 @@ WAYPOINT = record_dtype(
     "acceptance",  # m; 0 if the mission states none
     "pass_by",  # m that ArduPlane flies on beyond it along the leg
     "airspeed",  # m/s, of the leg
+    "min_ground_speed",  # m/s, on the leg to it; 0 or less for none
     "up",  # m AMSL
     "circle",  # m, radius of the loiter that it is a corner of, positive to the right; 0 for none
     "centre_east",  # m, of that circle

@@ -411,6 +411,7 @@ def waypoint_records(route: Route, mission: Mission | None = None, *, fly_over: 
     waypoints["over_ground"] = np.isfinite(route.above_ground)
     waypoints["above_ground"] = np.nan_to_num(route.above_ground)
     waypoints["airspeed"] = np.append(route.airspeed, route.airspeed[-1])
+    waypoints["min_ground_speed"] = np.nan_to_num(route.min_ground_speed)
     waypoints["up"] = route.waypoints[:, 2]
     waypoints["item"], waypoints["stop"] = route.items, route.stops
     _set_circles(waypoints[1:-1], route)

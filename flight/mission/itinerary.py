@@ -148,6 +148,8 @@ class ItineraryStop:
     loiter: the loiter about it, or None.
     airspeed_by_value: airspeed as PX4 reads the items.
     gates: gates on the leg to it, in order.
+    min_ground_speed: ground speed for which ArduPlane raises its airspeed on that leg, m/s; 0 or less for none, NaN for
+        the autopilot's own.
     """
 
     item: int
@@ -161,6 +163,7 @@ class ItineraryStop:
     loiter: Loiter | None = None
     airspeed_by_value: float = math.nan
     gates: tuple[Gate, ...] = ()
+    min_ground_speed: float = math.nan
 
 
 @dataclass(frozen=True, slots=True)
@@ -369,7 +372,7 @@ class _ItineraryBuilder:
     def __init__(self, mission: Mission) -> None:
         self.source = mission.source
         self.last_seq = mission.items[-1].seq if mission.items else -1
-        self.airspeed = self.airspeed_by_value = math.nan
+        self.airspeed = self.airspeed_by_value = self.min_ground_speed = math.nan
         self.notes = _NotesOfBothReadings()
         # Dictionaries without duplicates that keep their order.
         self.open: dict[OpenItem, None] = {}
@@ -492,7 +495,7 @@ class _ItineraryBuilder:
             alt, frame = self.home.alt + alt, int(Frame.GLOBAL)
         return ItineraryStop(
             *(item.seq, item.command, lat, lon, alt, frame),
-            *(self.airspeed, acceptance, loiter, self.airspeed_by_value, gates),
+            *(self.airspeed, acceptance, loiter, self.airspeed_by_value, gates, self.min_ground_speed),
         )
 
     def _add_gate(self, item: MissionItem) -> None:
@@ -624,9 +627,10 @@ class _ItineraryBuilder:
         if kind not in (0.0, 1.0):
             notes.add(f"DO_CHANGE_SPEED of type {kind:g}, neither airspeed nor ground speed: ignored", item.seq)
         elif kind == 1.0:
-            # It sets the minimum ground speed (MIN_GROUNDSPEED), and keeps the airspeed.
-            self.leave_open("DO_CHANGE_SPEED of ground speed: flown as airspeed", item.seq, by_value=False)
-            self.airspeed = speed if speed > 0.0 else self.airspeed
+            # The airspeed stays.
+            self.min_ground_speed = 0.0 if math.isnan(speed) else speed
+            text = f"DO_CHANGE_SPEED of ground speed: sets MIN_GROUNDSPEED to {self.min_ground_speed:g} m/s"
+            notes.add(f"{text}, for which ArduPlane raises its airspeed", item.seq)
         elif speed == -2.0:
             self.airspeed = math.nan
         elif speed > 0.0:

@@ -44,6 +44,10 @@ from world.scenario import Scenario
 from world.terrain import Terrain
 
 
+# Columns of a route that are NaN where nothing is stated.
+ROUTE_COLUMNS_WITH_NAN = ("above_ground", "min_ground_speed")
+
+
 @dataclass(frozen=True, slots=True)
 class Route:
     """Waypoints in flying order; leg i goes from waypoint i to i + 1.
@@ -71,6 +75,8 @@ class Route:
     unjoined: stops that the autopilot flies to, and that the waypoints lack, since no tangent joins them to a circle.
     open_items: items that change the flight path, and that are not flown as the autopilot would.
     above_ground: (w,) height above ground that is held along the leg to the waypoint, m; NaN for a straight leg.
+    min_ground_speed: (w,) ground speed for which ArduPlane raises its airspeed on the leg to the waypoint, m/s; 0 or
+        less for none, NaN for the autopilot's own.
     """
 
     waypoints: Floats
@@ -91,6 +97,7 @@ class Route:
     unjoined: tuple[Unjoined, ...] = ()
     open_items: tuple[OpenItem, ...] = ()
     above_ground: Floats = field(default_factory=lambda: np.zeros(0))
+    min_ground_speed: Floats = field(default_factory=lambda: np.zeros(0))
 
     def __post_init__(self) -> None:
         """Fill in default arrays, and lock all arrays."""
@@ -99,9 +106,13 @@ class Route:
         if len(self.stops) != len(self.waypoints):
             changes = np.flatnonzero((np.diff(self.items) != 0) | (self.items[1:] < 0))
             object.__setattr__(self, "stops", np.searchsorted(changes, np.arange(len(self.items))))
-        if len(self.above_ground) != len(self.waypoints):
-            object.__setattr__(self, "above_ground", np.full(len(self.waypoints), math.nan))
-        for name in ("waypoints", "airspeed", "acceptance", "fly_over", "items", "arcs", "stops", "above_ground"):
+        for name in ROUTE_COLUMNS_WITH_NAN:
+            if len(getattr(self, name)) != len(self.waypoints):
+                object.__setattr__(self, name, np.full(len(self.waypoints), math.nan))
+        for name in (
+            *("waypoints", "airspeed", "acceptance", "fly_over", "items", "arcs", "stops"),
+            *ROUTE_COLUMNS_WITH_NAN,
+        ):
             array = np.array(getattr(self, name))
             array.setflags(write=False)
             object.__setattr__(self, name, array)
@@ -159,7 +170,7 @@ def part_of_route(route: Route, first: int, last: int) -> Route:
         items=route.items[points],
         arcs=route.arcs[points],
         stops=route.stops[points],
-        above_ground=route.above_ground[points],
+        **{name: getattr(route, name)[points] for name in ROUTE_COLUMNS_WITH_NAN},
         endless=-1,
         takeoff_ground=route.takeoff_ground if first == 0 else math.nan,
         landing_ground=route.landing_ground if last == route.legs else math.nan,
@@ -309,7 +320,10 @@ def with_end_courses(route: Route, scenario: Scenario, limits: Limits) -> Route:
         fly_over=np.pad(route.fly_over, (head, tail), mode="edge"),
         items=np.pad(route.items, (head, tail), constant_values=-1),
         arcs=np.pad(route.arcs, (head, tail)),
-        above_ground=np.pad(route.above_ground, (head, tail), constant_values=math.nan),
+        **{
+            name: np.pad(getattr(route, name), (head, tail), constant_values=math.nan)
+            for name in ROUTE_COLUMNS_WITH_NAN
+        },
         stops=np.concatenate([np.arange(head), route.stops + head, route.stops[-1:] + head + np.arange(1, tail + 1)]),
         started=started,
         return_from=route.return_from + (head if route.return_from >= 0 else 0),
@@ -438,6 +452,7 @@ def lay_route(
         takeoff_ground=placed.takeoff_ground,
         landing_ground=placed.landing_ground if landing is None else landing.ground,
         above_ground=np.array([_held_above_ground(stop) for stop in stops]),
+        min_ground_speed=np.array([stop.min_ground_speed for stop in stops]),
         unjoined=unjoined if loiters.at_middle else (),  # An autopilot that flies on tangents leaves these out.
         open_items=_open_items(placed.itinerary, landing, reads_as_px4),
         **back,

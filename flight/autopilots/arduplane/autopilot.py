@@ -55,13 +55,12 @@ _LEG_FIELDS = (
 
 
 # Neutral values of parameters that change the flight of a mission and are not simulated: an altitude offset,
-# soaring, lift motors, turns by rudder alone, a minimum ground speed, and flight without an airspeed sensor.
+# soaring, lift motors, turns by rudder alone, and flight without an airspeed sensor.
 _NEUTRAL = {
     "ALT_OFFSET": 0.0,
     "SOAR_ENABLE": 0.0,
     "Q_ENABLE": 0.0,
     "RUDDER_ONLY": 0.0,
-    "MIN_GROUNDSPEED": 0.0,
     "ARSPD_USE": 1.0,
 }
 
@@ -296,6 +295,11 @@ class ArduPlane(Autopilot):
     def speed_limits(self) -> SpeedLimits | None:
         """AIRSPEED_MIN and AIRSPEED_MAX."""
         return SpeedLimits(self.parameters.airspeed_min, self.parameters.airspeed_max, "AIRSPEED_MIN", "AIRSPEED_MAX")
+
+    @property
+    def min_ground_speed(self) -> float:
+        """MIN_GROUNDSPEED."""
+        return self.parameters.ground_speed_min
 
     def speeds_flown(self, commanded: Floats, cruise: float) -> Floats:
         """Return the last accepted speed for each leg."""

@@ -24,6 +24,7 @@ import numpy as np
 from flight.autopilots.arduplane.law import (
     ARDUPILOT_MEMORY,
     NAVIGATION_TICK,
+    airspeed_target,
     begin_law,
     fly_as_ardupilot,
     follow_attitude,
@@ -187,7 +188,7 @@ def ground_tick(block: Floats, heights: Heights) -> int:
             ground.stage = ON_GLIDE
     else:
         find_on_path(work.estimated, pieces, work.memory)
-        _tick_landing(work, own)
+        _tick_landing(work, own, waypoints[memory.leg + 1])
     fill_tick(work)
     return ended(work, ground)
 
@@ -349,8 +350,11 @@ def _begin_first_leg(
 
 
 @inner
-def _tick_landing(work: Record, own: Record) -> None:
-    """Run one tick of the landing."""
+def _tick_landing(work: Record, own: Record, point: Record) -> None:
+    """Run one tick of the landing.
+
+    point: waypoint of the landing point.
+    """
     state, estimated, ground, memory = work.state, work.estimated, own.ground, own.memory
     dt, staged = work.timing.dt, own.staged
     factor = true_by_equivalent(estimated.up)
@@ -362,11 +366,12 @@ def _tick_landing(work: Record, own: Record) -> None:
         _update_stage(estimated, own.parameters, ground, memory, left)
         _demand_glide(estimated, own.parameters, ground, memory, left[0])
         _set_landing_parameters(estimated, own.parameters, staged, ground, left[1])
-        work.memory.speed_command = ground.airspeed * factor
+        wanted = airspeed_target(state, estimated, ground.airspeed, point, own.parameters, memory, factor)
+        work.memory.speed_command = wanted * factor
         if ground.stage == FLARING:
             # Slow and without throttle it must not be in underspeed: the flare ignores it.
             memory.throttle_demand = 0.0
-        update_tecs(state, estimated, staged, memory, ground.airspeed * factor, factor, NAVIGATION_TICK)
+        update_tecs(state, estimated, staged, memory, wanted * factor, factor, NAVIGATION_TICK)
     work.memory.height_error = estimated.up - memory.height_demand
     before = work.commands.throttle
     follow_attitude(state, estimated, work.gains, work.memory, staged, memory, factor, work.commands, dt)

@@ -80,6 +80,7 @@ ARDUPILOT_MEMORY = record_dtype(
     "acceleration",  # m/s^2, along the nose, mean removed
     "acceleration_mean",
     "airspeed_demand",  # m/s, within its rate limits
+    "ground_speed_rise",  # m/s, equivalent, by which the airspeed was last raised for a minimum ground speed
     # Energy.
     "energy_rate_error",  # m^2/s^3, STE rate error, smoothed
     "throttle_before",  # 0..1, last throttle without its integrator
@@ -181,6 +182,8 @@ _SPEED_RATE_FRACTION = 0.5
 # the demand touch the limit now and then: the band is three standard deviations.  Climbs at full throttle depend on it:
 # with 0.003 to 0.005 the least clearances of 20 ArduPlane flights are met within 1.2 m; without it one is 9 m off.
 _SATURATION_BAND_FRACTION = 0.003
+# A rise of the airspeed for a minimum ground speed falls no less than this, m/s.
+_GROUND_SPEED_HYSTERESIS_MPS = 1.2
 # An RTL that climbs before its turn demands this much more than the climb, m.
 _RTL_CLIMB_EXTRA_M = 10.0
 # Underspeed begins below this ratio of airspeed to AIRSPEED_MIN ...
@@ -381,6 +384,29 @@ def is_underspeed(estimated: Record, parameters: Record, own: Record, slowest: f
     is_full_throttle = own.throttle_demand >= _FULL_THROTTLE_FRACTION * parameters.throttle_max
     own.under = (is_slow and is_full_throttle) or (own.under and estimated.up < own.height_demand)
     return own.under
+
+
+@inner
+def airspeed_target(
+    state: Record, estimated: Record, stated: float, b: Record, parameters: Record, own: Record, factor: float
+) -> float:
+    """Return the equivalent airspeed to fly for a stated one, raised for a minimum ground speed, within limits, m/s.
+
+    b: the leg's end, with the minimum ground speed.
+
+    What the ground speed along the heading lacks is added to the measured airspeed.  The rise is in whole m/s, and
+    falls only if it is to fall by more than a hysteresis (`Plane::calc_airspeed_errors`,
+    `Plane::calc_gndspeed_undershoot`).
+    """
+    wanted = stated
+    if b.min_ground_speed > 0.0:
+        ahead = estimated.velocity_east * math.sin(state.yaw) + estimated.velocity_north * math.cos(state.yaw)
+        needed = (own.airspeed_read + b.min_ground_speed - ahead) / factor
+        rise = float(math.floor(max(0.0, needed - stated) + 0.5))
+        if rise >= own.ground_speed_rise or own.ground_speed_rise - rise >= _GROUND_SPEED_HYSTERESIS_MPS:
+            own.ground_speed_rise = rise
+        wanted += own.ground_speed_rise
+    return min(parameters.airspeed_max, max(parameters.airspeed_min, wanted))
 
 
 @inner
@@ -631,7 +657,8 @@ def fly_as_ardupilot(
             memory.piece += 1
         leave_sharp_corners(pieces, memory, own.leg)
         demand_height(estimated, waypoints[own.leg + 1], parameters, own, NAVIGATION_TICK)
-        wanted = min(parameters.airspeed_max, max(parameters.airspeed_min, waypoints[own.leg].airspeed))
+        stated, b = waypoints[own.leg].airspeed, waypoints[own.leg + 1]
+        wanted = airspeed_target(state, estimated, stated, b, parameters, own, factor)
         memory.speed_command = wanted * factor
         update_tecs(state, estimated, parameters, own, wanted * factor, factor, NAVIGATION_TICK)
     follow_attitude(state, estimated, gains, memory, parameters, own, factor, commands, dt)

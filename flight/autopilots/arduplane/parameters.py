@@ -233,8 +233,9 @@ class ArduPilotParameters(ParameterSet):
     fence_type: bits of the limits that its fence has: 1 and 8 altitudes, 2 a circle about home, 4 the mission's fence.
     altitude_offset: m, added to the altitudes of mission items.  soaring, quadplane, rudder_only: 1 if it soars, has
         lift motors, or steers by the rudder alone; none of these four is flown.
-    ground_speed_min: m/s, 0 for none.  airspeed_use: 1 with an airspeed sensor.  roll_rate_p to pitch_rate_ff: gains of
-        the rate controllers.  None of these is flown.
+    ground_speed_min: m/s, for which the airspeed is raised; 0 for none.
+    airspeed_use: 1 with an airspeed sensor.  roll_rate_p to pitch_rate_ff: gains of the rate controllers.  None of
+        these is flown.
     throttle_failsafe to fence_auto_enable: causes to leave the mission, and the reactions; see
         `flight.autopilots.arduplane.failsafes`.
     """

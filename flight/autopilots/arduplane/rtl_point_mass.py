@@ -24,6 +24,7 @@ from flight.autopilots.arduplane.law import (
     PITCH_LAG,
     ROLL_LAG,
     SPEED_SUM,
+    airspeed_target,
     demand_height,
     roll_demand,
     update_tecs,
@@ -244,7 +245,7 @@ def _make_stages(
     """
     places = truncate_at_first_loiter(() if landing is None else (landing, *landing.onward))
     stages: Records = np.zeros((target is not None) + len(places), WAYPOINT)
-    stages["airspeed"] = aircraft.record.airspeed
+    stages["airspeed"], stages["min_ground_speed"] = aircraft.record.airspeed, parameters.ground_speed_min
     if target is not None:
         first = stages[0]
         first.centre_east, first.centre_north, first.up, first.circle, first.slope_base = target
@@ -496,7 +497,7 @@ def _load_stage(stages: Records, at: int, waypoints: Records, estimated: Record,
         b.east, b.north, b.turn, b.airspeed = stage.east, stage.north, stage.turn, stage.airspeed
         b.centre_east, b.centre_north, b.up, b.circle = stage.centre_east, stage.centre_north, stage.up, stage.circle
         b.returns, b.slope_base, b.straight = stage.returns, stage.slope_base, stage.straight
-        b.pass_by = stage.pass_by
+        b.pass_by, b.min_ground_speed = stage.pass_by, stage.min_ground_speed
     own.from_east, own.from_north, own.from_up = estimated.east, estimated.north, estimated.up
     if reached and not past_line(estimated, stages[at - 1].east, stages[at - 1].north, stage.east, stage.north):
         own.from_east, own.from_north, own.from_up = stages[at - 1].east, stages[at - 1].north, stages[at - 1].up
@@ -558,7 +559,7 @@ def _update_demands(
         # On a loiter of the mission its altitude applies at once (`Plane::update_loiter`).
         own.from_up = b.up
     demand_height(estimated, b, parameters, own, dt)
-    wanted = min(parameters.airspeed_max, max(parameters.airspeed_min, b.airspeed))
+    wanted = airspeed_target(state, estimated, b.airspeed, b, parameters, own, factor)
     _demand_throttle_and_pitch(state, estimated, parameters, own, aircraft, excess, wanted, factor, unpowered, dt)
 
 

@@ -161,6 +161,9 @@ def _find_held_speed(
         return None
     if off > 0.0 and float(requirements.ground_speed[leg]) < MIN_GROUND_SPEED_MPS:
         return None
+    if off > 0.0 and requirements.setup.min_ground_speeds[leg + 1] > 0.0:
+        # The airspeed is raised for a minimum ground speed.
+        return None
     return _HeldSpeed(speed, allowed, tolerance)
 
 

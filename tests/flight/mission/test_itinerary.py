@@ -28,10 +28,12 @@ def test_speeds_count_for_the_legs_after_them() -> None:
         "2 178 0 0 -1 0 0 0 0",
         wp(0, 5400),
     )
-    assert flown.airspeed.tolist() == [25.0, 22.0, 28.0, 28.0, 25.0, 25.0]
+    assert flown.airspeed.tolist() == [25.0, 22.0, 22.0, 22.0, 25.0, 25.0]
+    # Of type 1 it is the least ground speed from there on, which is left as it is by a change of airspeed.
+    assert np.array_equal(flown.min_ground_speed, [math.nan] * 3 + [28.0] * 4, equal_nan=True)
     assert flown.notes == (
         "item 5: DO_CHANGE_SPEED's throttle: ignored",
-        "item 5: DO_CHANGE_SPEED of ground speed: flown as airspeed",
+        "item 5: DO_CHANGE_SPEED of ground speed: sets MIN_GROUNDSPEED to 28 m/s, for which ArduPlane raises its airspeed",
         "item 6: DO_CHANGE_SPEED of type 2, neither airspeed nor ground speed: ignored",
         "item 12: DO_CHANGE_SPEED to 0 m/s: ignored",
     )

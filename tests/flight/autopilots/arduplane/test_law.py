@@ -14,6 +14,7 @@ from aircraft.envelope import GRAVITY
 from benchmarks.against_arduplane import BINARY, compare, flown_figures
 from flight.autopilots.arduplane.autopilot import ArduPlane
 from flight.autopilots.arduplane.law import (
+    airspeed_target,
     AIRSPEED_READING,
     ARDUPILOT_MEMORY,
     ROLL_LAG,
@@ -359,6 +360,37 @@ KEPT: list[dict[str, Any]] = json.loads(
 @pytest.fixture(scope="module")
 def usual(aerosonde: Aircraft) -> ArduPilotParameters:
     return ArduPilotParameters.load(aerosonde)
+
+
+@pytest.mark.parametrize(
+    ("least", "ground", "before", "target"),
+    [
+        (0.0, 10.0, 0.0, 25.0),  # no minimum
+        (18.0, 18.4, 0.0, 25.0),  # fast enough
+        (18.0, 17.4, 0.0, 26.0),  # 0.6 m/s are missing: in whole m/s, 1
+        (18.0, 17.6, 0.0, 25.0),
+        (18.0, 14.6, 0.0, 28.0),
+        (18.0, 15.6, 3.0, 28.0),  # 2 are missing: the rise of 3 falls by 1.2 or more, or not
+        (18.0, 16.6, 3.0, 26.0),
+        (18.0, 5.0, 0.0, 32.0),  # AIRSPEED_MAX
+    ],
+)
+def test_the_airspeed_is_raised_for_a_minimum_ground_speed(
+    least: float, ground: float, before: float, target: float
+) -> None:
+    """At 25 m/s through the air, northwards (`Plane::calc_airspeed_errors` of 4.6.3)."""
+    own = memory(airspeed_read=25.0, ground_speed_rise=before)
+    here = record(MOTION, velocity_north=ground, velocity_east=9.0)
+    way = waypoints((0, 0, 500), (0, 5000, 500), min_ground_speed=least)
+    made = airspeed_target(state(), here, 25.0, way[1], parameters(AIRSPEED_MAX=32.0), own, 1.0)
+    assert made == pytest.approx(target)
+
+
+def test_what_the_ground_speed_lacks_is_an_equivalent_airspeed() -> None:
+    # 27.5 m/s of true airspeed are 25 at 1.1: 4.4 m/s over the ground are 4 of equivalent airspeed.
+    own, here = memory(airspeed_read=27.5), record(MOTION, velocity_north=13.6)
+    way = waypoints((0, 0, 500), (0, 5000, 500), min_ground_speed=18.0)
+    assert airspeed_target(state(), here, 25.0, way[1], parameters(AIRSPEED_MAX=32.0), own, 1.1) == pytest.approx(29.0)
 
 
 def test_it_holds_an_equivalent_airspeed(
