@@ -40,6 +40,7 @@ WAYPOINT = record_dtype(
     "slope_base",  # m, see `flight.mission.return_path.ReturnCircle`
     ("over_ground", np.bool_),  # True if the leg to it follows the ground
     "above_ground",  # m, height above ground at the end of such a leg
+    "home_up",  # m AMSL, home while the leg to it is flown; NaN if unknown
 )
 
 

@@ -410,6 +410,7 @@ def waypoint_records(route: Route, mission: Mission | None = None, *, fly_over: 
     waypoints["pass_by"] = [pass_by_distance(items[seq]) if seq in items else 0.0 for seq in route.items.tolist()]
     waypoints["over_ground"] = np.isfinite(route.above_ground)
     waypoints["above_ground"] = np.nan_to_num(route.above_ground)
+    waypoints["home_up"] = route.home_up
     waypoints["airspeed"] = np.append(route.airspeed, route.airspeed[-1])
     waypoints["min_ground_speed"] = np.nan_to_num(route.min_ground_speed)
     waypoints["up"] = route.waypoints[:, 2]

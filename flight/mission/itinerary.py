@@ -150,6 +150,7 @@ class ItineraryStop:
     gates: gates on the leg to it, in order.
     min_ground_speed: ground speed for which ArduPlane raises its airspeed on that leg, m/s; 0 or less for none, NaN for
         the autopilot's own.
+    home_up: altitude of home on that leg, m AMSL; NaN if the mission's home does not state it.
     """
 
     item: int
@@ -164,6 +165,7 @@ class ItineraryStop:
     airspeed_by_value: float = math.nan
     gates: tuple[Gate, ...] = ()
     min_ground_speed: float = math.nan
+    home_up: float = math.nan
 
 
 @dataclass(frozen=True, slots=True)
@@ -495,7 +497,7 @@ class _ItineraryBuilder:
             alt, frame = self.home.alt + alt, int(Frame.GLOBAL)
         return ItineraryStop(
             *(item.seq, item.command, lat, lon, alt, frame),
-            *(self.airspeed, acceptance, loiter, self.airspeed_by_value, gates, self.min_ground_speed),
+            *(self.airspeed, acceptance, loiter, self.airspeed_by_value, gates, self.min_ground_speed, self.home.alt),
         )
 
     def _add_gate(self, item: MissionItem) -> None:

@@ -64,6 +64,7 @@ class LandingStart(NamedTuple):
     lands: True if the item is the landing itself.
     onward: the places after it up to the landing; their own ``onward`` is empty.
     pass_by: distance that ArduPlane flies on beyond the place, m.
+    home_up: altitude of home, m AMSL, NaN if unknown.
     """
 
     item: int
@@ -74,6 +75,7 @@ class LandingStart(NamedTuple):
     lands: bool = False
     onward: tuple["LandingStart", ...] = ()
     pass_by: float = 0.0
+    home_up: float = math.nan
 
 
 def nearest_landing(here: Place, landings: Sequence[LandingStart]) -> LandingStart | None:

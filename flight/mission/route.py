@@ -45,7 +45,7 @@ from world.terrain import Terrain
 
 
 # Columns of a route that are NaN where nothing is stated.
-ROUTE_COLUMNS_WITH_NAN = ("above_ground", "min_ground_speed")
+ROUTE_COLUMNS_WITH_NAN = ("above_ground", "min_ground_speed", "home_up")
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,6 +77,7 @@ class Route:
     above_ground: (w,) height above ground that is held along the leg to the waypoint, m; NaN for a straight leg.
     min_ground_speed: (w,) ground speed for which ArduPlane raises its airspeed on the leg to the waypoint, m/s; 0 or
         less for none, NaN for the autopilot's own.
+    home_up: (w,) altitude of home on the leg to the waypoint, m AMSL; NaN if unknown.
     """
 
     waypoints: Floats
@@ -98,6 +99,7 @@ class Route:
     open_items: tuple[OpenItem, ...] = ()
     above_ground: Floats = field(default_factory=lambda: np.zeros(0))
     min_ground_speed: Floats = field(default_factory=lambda: np.zeros(0))
+    home_up: Floats = field(default_factory=lambda: np.zeros(0))
 
     def __post_init__(self) -> None:
         """Fill in default arrays, and lock all arrays."""
@@ -453,6 +455,7 @@ def lay_route(
         landing_ground=placed.landing_ground if landing is None else landing.ground,
         above_ground=np.array([_held_above_ground(stop) for stop in stops]),
         min_ground_speed=np.array([stop.min_ground_speed for stop in stops]),
+        home_up=np.array([placed.home_up if math.isnan(stop.home_up) else stop.home_up for stop in stops]),
         unjoined=unjoined if loiters.at_middle else (),  # An autopilot that flies on tangents leaves these out.
         open_items=_open_items(placed.itinerary, landing, reads_as_px4),
         **back,

@@ -140,6 +140,7 @@ class RouteTable(SetupModel):
     straight_to: Annotated[int, Field(ge=-1, alias="straight_to_waypoint")] = -1
     unjoined: Annotated[tuple[Unjoined, ...], Field(alias="unjoined_item_circle_is_circle")] = ()
     above_ground: Annotated[list[_Height], Field(alias="above_ground_m"), _LISTED] = []
+    home_up: Annotated[list[_Height], Field(alias="home_amsl_m"), _LISTED] = []
     min_ground_speed: Annotated[list[_Height], Field(alias="min_ground_speed_mps"), _LISTED] = []
     open_items: Annotated[tuple[OpenItem, ...], Field(alias="open_items_item_text")] = ()
 

@@ -50,7 +50,7 @@ from world.wind import Turbulence
 # aircraft.
 _LEG_FIELDS = (
     *("leg", "cross_track_sum", "on_circle", "loitering", "stayed", "circled", "bearing", "at_height", "next_look"),
-    *("up_before", "over", "waited", "left_for", "returning", "climbed", "ground_leg"),
+    *("up_before", "over", "waited", "left_for", "returning", "climbed", "ground_leg", "sloped_leg"),
 )
 
 

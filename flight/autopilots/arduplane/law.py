@@ -6,7 +6,7 @@ import numpy as np
 
 from aircraft.envelope import GRAVITY
 from flight.autopilots.arduplane.navigator import navigate_legs, target_of
-from flight.autopilots.arduplane.parameters import ARDUPILOT_PARAMETERS
+from flight.autopilots.arduplane.parameters import ARDUPILOT_PARAMETERS, IMMEDIATE_CLIMB
 from flight.dynamics.instructions import Code
 from flight.guidance.equivalent_airspeed import true_by_equivalent
 from flight.guidance.inner_loops import follow_roll, steer_elevator
@@ -59,6 +59,7 @@ ARDUPILOT_MEMORY = record_dtype(
     "ground",  # m AMSL, terrain at the aircraft
     "rise_ahead",  # m, added to the altitude of a leg above terrain because of the terrain ahead
     ("ground_leg", np.int64),  # current leg above terrain, plus one; 0 before the first
+    ("sloped_leg", np.int64),  # current leg with a slope between altitudes, plus one; 0 before the first
     "from_above_ground",  # m, height above ground at which that leg began
     "height_asked",  # m, altitude setpoint of the leg, frozen while the aircraft cannot follow it
     "height_limited",  # m, the same after the rate limit
@@ -229,12 +230,29 @@ def demand_height(estimated: Record, b: Record, parameters: Record, own: Record,
 
 
 @inner
+def _climbs_at_once(up: float, rise: float, b: Record, parameters: Record) -> bool:
+    """Return True if a leg that begins at an altitude (m AMSL) is a step, not a slope (`Plane::setup_alt_slope`).
+
+    rise: height of the leg's end above the aircraft, m.  b: the leg's end.
+
+    It is a step unless it leads down, if it begins low over home or every climb is one.
+    """
+    if rise < 0.0:
+        return False
+    return bool(int(parameters.flight_options) & IMMEDIATE_CLIMB) or up - b.home_up <= parameters.climb_slope_height
+
+
+@inner
 def _leg_altitude(estimated: Record, b: Record, parameters: Record, own: Record) -> float:
     """Return the altitude on the leg's slope at the aircraft, or of the leg's end if the leg is a step.
 
     The slope of a leg to a loiter leads to the loiter's center; on the loiter the loiter's altitude applies.
     """
     end: float = b.up
+    if own.sloped_leg != own.leg + 1:
+        own.sloped_leg = own.leg + 1
+        if _climbs_at_once(estimated.up, end - estimated.up, b, parameters):
+            own.from_up = end
     if own.on_circle:
         return end
     altitude_change = end - own.from_up
@@ -270,6 +288,8 @@ def _leg_altitude_above_terrain(estimated: Record, b: Record, parameters: Record
     end, here = b.above_ground, estimated.up - own.ground
     if own.ground_leg != own.leg + 1:
         own.ground_leg, own.from_above_ground = own.leg + 1, here
+        if _climbs_at_once(estimated.up, end - here, b, parameters):
+            own.from_above_ground = end
     end_e, end_n = target_of(b)
     leg_e, leg_n = end_e - own.from_east, end_n - own.from_north
     run = max(1e-6, leg_e * leg_e + leg_n * leg_n)

@@ -85,7 +85,43 @@ def test_small_changes_of_height_are_steps_and_others_slopes(rise: float, expect
 def test_the_least_slope_is_glide_slope_min() -> None:
     assert demanded(memory(), 500.0, 520.0, GLIDE_SLOPE_MIN=21.0) == 520.0
     assert demanded(memory(), 500.0, 520.0, GLIDE_SLOPE_MIN=19.0) == pytest.approx(510.0)
-    assert demanded(memory(), 500.0, 504.0, GLIDE_SLOPE_MIN=0.0) == pytest.approx(502.0)
+    # 0 disables slopes (`Plane::set_offset_altitude_location`).
+    assert demanded(memory(), 500.0, 600.0, GLIDE_SLOPE_MIN=0.0) == 600.0
+    assert demanded(memory(), 500.0, 400.0, GLIDE_SLOPE_MIN=0.0) == 400.0
+
+
+@pytest.mark.parametrize(
+    ("over_home", "end", "options", "expected"),
+    [
+        (20.0, 600.0, 0, 600.0),  # a climb that begins at 20 m over home or below is a step
+        (20.1, 600.0, 0, 550.0),
+        (-30.0, 600.0, 0, 600.0),  # also below home
+        (20.0, 400.0, 0, 450.0),  # a descent is a slope from any height
+        (100.0, 600.0, 1 << 14, 600.0),  # FLIGHT_OPTIONS bit 14: every climb
+        (100.0, 600.0, 1 << 13, 550.0),
+        (100.0, 400.0, 1 << 14, 450.0),
+        (math.nan, 600.0, 0, 550.0),  # no home is known
+    ],
+)
+def test_a_climb_that_begins_low_over_home_is_a_step(
+    over_home: float, end: float, options: int, expected: float
+) -> None:
+    """`Plane::setup_glide_slope`; what applies at the leg's begin applies to all of it."""
+    own = memory()
+    (b,) = waypoints((0, 1000, end), home_up=500.0 - over_home)
+    made = parameters(FLIGHT_OPTIONS=float(options), GLIDE_SLOPE_THR=0.0)
+    for north, up in ((0.0, 500.0), (500.0, 540.0)):
+        demand_height(flying(0.0, north, up), b, made, own, DT)
+    assert own.height_asked == pytest.approx(expected)
+
+
+def test_each_leg_is_a_step_or_a_slope_by_the_height_at_its_own_begin() -> None:
+    own, made = memory(), parameters()
+    for leg, over_home, expected in ((0, 10.0, 600.0), (1, 30.0, 550.0)):
+        own.leg, own.from_up = leg, 500.0
+        (b,) = waypoints((0, 1000, 600.0), home_up=500.0 - over_home)
+        demand_height(flying(0.0, 500.0, 500.0), b, made, own, DT)
+        assert own.height_asked == pytest.approx(expected)
 
 
 def test_before_and_past_a_leg_its_ends_heights_hold() -> None:
