@@ -428,9 +428,23 @@ def waypoint_records(route: Route, mission: Mission | None = None, *, fly_over: 
         names = ("centre_east", "centre_north", "up", "circle", "slope_base")
         for name, value in zip(names, route.return_to, strict=True):
             back[name] = value
-        # How the next leg turns is unknown: assume a right angle, as at a mission's end.
-        waypoints["turn"][route.return_from] = 0.5 * math.pi
+    last = route.return_from if route.return_to is not None else route.straight_to - 1
+    if last >= 0:
+        waypoints["turn"][last] = _turn_before_return(route, last, items)
     return waypoints
+
+
+def _turn_before_return(route: Route, index: int, items: dict[int, MissionItem]) -> float:
+    """Return the turn at the waypoint before a return that ArduPlane computes, rad; a right angle if it is unknown.
+
+    The return's item has no place, which is read as 0 N, 0 E (`AP_Mission::get_next_ground_course_cd`,
+    `Location::get_bearing_to`).
+    """
+    item = items.get(int(route.items[index]))
+    if index == 0 or item is None or not item.has_position:
+        return 0.5 * math.pi
+    north = -item.lat_deg / math.cos(math.radians(0.5 * item.lat_deg))
+    return float(abs(wrap(math.atan2(-item.lon_deg, north) - float(leg_courses(route.waypoints)[index - 1]))))
 
 
 def _set_circles(corners: Records, route: Route) -> None:

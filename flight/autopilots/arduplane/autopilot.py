@@ -407,7 +407,6 @@ class ArduPlaneFromGround(ArduPlane, GroundAutopilot):
         glide = self.landing_glide(approach.begin - up, approach.run, approach.tail_wind, up)
         ground.lands, ground.landing_leg = True, approach.leg
         ground.east, ground.north, ground.up = approach.point
-        ground.home = approach.base
         ground.begin, ground.slope = approach.begin, glide.slope
         ground.flare_height, ground.flare_distance = glide.flare_height, glide.flare_distance
         ground.airspeed = landing_airspeed(self.parameters, approach.tail_wind)

@@ -85,7 +85,7 @@ DEFINITIONS = {
     "takeoff_ground_speed": Definition("TKOFF_THR_MINSPD", 0.0, 0.0, 100.0),
     "takeoff_rotation": Definition("TKOFF_ROTATE_SPD", 0.0, 0.0, 100.0),
     "takeoff_ground_pitch": Definition("TKOFF_GND_PITCH", 5.0, -10.0, 20.0, _RAD_PER_DEG),
-    "takeoff_level_height": Definition("TKOFF_LVL_ALT", 5.0, 0.0, 1000.0),
+    "takeoff_level_height": Definition("TKOFF_LVL_ALT", 10.0, 0.0, 1000.0),
     "takeoff_leveling": Definition("TKOFF_PLIM_SEC", 2.0, 0.0, 100.0),
     "takeoff_slew": Definition("TKOFF_THR_SLEW", 0.0, -1.0, 127.0, _PER_PERCENT),
     "takeoff_throttle": Definition("TKOFF_THR_MAX", 0.0, 0.0, 100.0, _PER_PERCENT),

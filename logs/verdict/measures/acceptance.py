@@ -50,7 +50,7 @@ def reach(requirements: RouteRequirements, i: int) -> Reach:
 
     The mission's own radius applies, otherwise the autopilot's radius.  ArduPlane turns to the next leg at WP_RADIUS
     for a right angle or a sharper corner and at a fraction of it for a gentler corner.  At the mission's end, and where
-    a return to launch begins, it uses all of WP_RADIUS.
+    a return to launch begins, all of WP_RADIUS is allowed.
     """
     setup, own = requirements.setup, float(requirements.fly_by_offset[i]) + WAYPOINT_PASS_MARGIN_M
     stated = float(setup.route.acceptance[i])

@@ -4,6 +4,7 @@ Every eighth of them, one that hits the ground among them; all with PLANFLY_SOAK
 """
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -192,7 +193,7 @@ def test_the_slope_begins_where_the_climb_has_ended() -> None:
 def test_a_return_is_flown_in_one_leg_at_the_cruise_speed() -> None:
     setup = return_setup("rtl-def-00")
     records = waypoint_records(setup.route)
-    # It begins as early as at a right angle, the mission's end.
+    # It begins as early as at a right angle, the mission's end, if no item says where.
     assert records["turn"][1] == pytest.approx(0.5 * math.pi)
     assert records["returns"].tolist() == [False, False, *[True] * (len(records) - 2)]
     assert set(records["centre_east"][2:].round()) == {9500.0}
@@ -200,6 +201,23 @@ def test_a_return_is_flown_in_one_leg_at_the_cruise_speed() -> None:
     assert (setup.route.airspeed[1:] == setup.airspeed).all()
     own = memory(leg=0)
     assert navigated(own, flying(EAST, NORTH), back(100.0)).leg == 0
+
+
+def test_the_turn_before_a_return_is_one_to_0_north_0_east() -> None:
+    """At r1's last waypoint, 36.28° N 84.10° W, ArduPlane 4.6.3 on a course of 126.3° turned 12.5 m before it.
+
+    The bearing to 0° N 0° E is atan2(84.10, -36.27 / cos 18.14°) = 114.4°: 11.9 of 90 degrees of 90 m, and 7 % for the
+    height's air density, are 12.7 m.
+    """
+    setup = return_setup("rtl-def-00")
+    seq = int(setup.route.items[1])
+    (item,) = (one for one in setup.mission.items if one.seq == seq)
+    item = replace(item, lat_deg=36.2712892, lon_deg=-84.1011091)
+    for course, turn in ((126.3, 11.9), (114.4, 0.0), (24.0, 90.4), (-65.6, 180.0)):
+        way = np.array(setup.route.waypoints)
+        way[0] = way[1] - 900.0 * np.array([math.sin(math.radians(course)), math.cos(math.radians(course)), 0.0])
+        records = waypoint_records(replace(setup.route, waypoints=way), replace(setup.mission, items=(item,)))
+        assert math.degrees(records["turn"][1]) == pytest.approx(turn, abs=0.1)
 
 
 def test_the_parameters_decide_where_it_goes_and_how_high() -> None:
