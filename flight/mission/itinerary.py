@@ -497,7 +497,9 @@ class _ItineraryBuilder:
             alt, frame = self.home.alt + alt, int(Frame.GLOBAL)
         return ItineraryStop(
             *(item.seq, item.command, lat, lon, alt, frame),
-            *(self.airspeed, acceptance, loiter, self.airspeed_by_value, gates, self.min_ground_speed, self.home.alt),
+            *(self.airspeed, acceptance, loiter, self.airspeed_by_value, gates),
+            min_ground_speed=self.min_ground_speed,
+            home_up=self.home.alt,
         )
 
     def _add_gate(self, item: MissionItem) -> None:
@@ -557,7 +559,9 @@ class _ItineraryBuilder:
                 self.notes.usual.add(f"{name} with {beyond:.0f} m to fly on beyond it, as ArduPlane does", item.seq)
             elif item.params[2] <= -1.0:
                 # Converting a negative number to an unsigned one gives 0 on ARM and 255 on a PC; PX4 does not read it.
-                text = f"{name} with {item.params[2]:g} m to fly on beyond it: flown as 0, where ArduPlane may fly 255 m"
+                text = (
+                    f"{name} with {item.params[2]:g} m to fly on beyond it: flown as 0, where ArduPlane may fly 255 m"
+                )
                 self.leave_open(text, item.seq, by_value=False)
         elif item.command == Command.NAV_SPLINE_WAYPOINT:
             self.leave_open(f"{name}: flown as a straight waypoint", item.seq)
@@ -631,8 +635,9 @@ class _ItineraryBuilder:
         elif kind == 1.0:
             # The airspeed stays.
             self.min_ground_speed = 0.0 if math.isnan(speed) else speed
-            text = f"DO_CHANGE_SPEED of ground speed: sets MIN_GROUNDSPEED to {self.min_ground_speed:g} m/s"
-            notes.add(f"{text}, for which ArduPlane raises its airspeed", item.seq)
+            notes.add(
+                f"DO_CHANGE_SPEED of ground speed: sets MIN_GROUNDSPEED to {self.min_ground_speed:g} m/s", item.seq
+            )
         elif speed == -2.0:
             self.airspeed = math.nan
         elif speed > 0.0:

@@ -43,7 +43,6 @@ from world.geometry import fly_by_offset, leg_courses, signed_turns, wrap
 from world.scenario import Scenario
 from world.terrain import Terrain
 
-
 # Columns of a route that are NaN where nothing is stated.
 ROUTE_COLUMNS_WITH_NAN = ("above_ground", "min_ground_speed", "home_up")
 
@@ -314,6 +313,9 @@ def with_end_courses(route: Route, scenario: Scenario, limits: Limits) -> Route:
     acceptance = np.array(route.acceptance)
     acceptance[:head], acceptance[len(acceptance) - tail :] = 0.0, 0.0
     chain = [point for point in (lead_in, *points, lead_out) if point is not None]
+    padded: dict[str, Any] = {
+        name: np.pad(getattr(route, name), (head, tail), constant_values=math.nan) for name in ROUTE_COLUMNS_WITH_NAN
+    }
     return replace(
         route,
         waypoints=np.array(chain),
@@ -322,10 +324,7 @@ def with_end_courses(route: Route, scenario: Scenario, limits: Limits) -> Route:
         fly_over=np.pad(route.fly_over, (head, tail), mode="edge"),
         items=np.pad(route.items, (head, tail), constant_values=-1),
         arcs=np.pad(route.arcs, (head, tail)),
-        **{
-            name: np.pad(getattr(route, name), (head, tail), constant_values=math.nan)
-            for name in ROUTE_COLUMNS_WITH_NAN
-        },
+        **padded,
         stops=np.concatenate([np.arange(head), route.stops + head, route.stops[-1:] + head + np.arange(1, tail + 1)]),
         started=started,
         return_from=route.return_from + (head if route.return_from >= 0 else 0),
@@ -453,13 +452,20 @@ def lay_route(
         endless=placed.itinerary.endless,
         takeoff_ground=placed.takeoff_ground,
         landing_ground=placed.landing_ground if landing is None else landing.ground,
-        above_ground=np.array([_held_above_ground(stop) for stop in stops]),
-        min_ground_speed=np.array([stop.min_ground_speed for stop in stops]),
-        home_up=np.array([placed.home_up if math.isnan(stop.home_up) else stop.home_up for stop in stops]),
+        **_columns_with_nan(stops, placed.home_up),
         unjoined=unjoined if loiters.at_middle else (),  # An autopilot that flies on tangents leaves these out.
         open_items=_open_items(placed.itinerary, landing, reads_as_px4),
         **back,
     )
+
+
+def _columns_with_nan(stops: list[ItineraryStop], home_up: float) -> dict[str, Any]:
+    """Return the columns of `ROUTE_COLUMNS_WITH_NAN`; home_up is used where a stop states no altitude of home, m."""
+    return {
+        "above_ground": np.array([_held_above_ground(stop) for stop in stops]),
+        "min_ground_speed": np.array([stop.min_ground_speed for stop in stops]),
+        "home_up": np.array([home_up if math.isnan(stop.home_up) else stop.home_up for stop in stops]),
+    }
 
 
 def _held_above_ground(stop: ItineraryStop) -> float:

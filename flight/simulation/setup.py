@@ -260,7 +260,7 @@ class FlightSetup:
 
     @property
     def min_ground_speeds(self) -> Floats:
-        """Ground speed for which the autopilot raises its airspeed on the leg to each waypoint, (w,) m/s; 0 for none."""
+        """Minimum ground speeds on the leg to each waypoint, (w,) m/s; 0 or less for none."""
         stated = self.route.min_ground_speed
         return np.where(np.isnan(stated), self.autopilot.min_ground_speed, stated)
 

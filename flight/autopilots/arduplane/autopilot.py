@@ -397,10 +397,21 @@ class ArduPlaneFromGround(ArduPlane, GroundAutopilot):
         ground.motor = self.motor_start
         ground.slew, ground.full = takeoff_slew(made), made.takeoff_throttle or made.throttle_max
         ground.base, ground.top, ground.low = take_off.base, take_off.top, take_off.home[2]
-        ground.pitch, ground.leg = take_off.pitch, take_off.waypoint
+        ground.pitch, ground.leg = self._climb_pitch(take_off), take_off.waypoint
         # Start when it moved at 5 m/s, at which its course over the ground is known.
         pushed = take_off.acceleration
         ground.fast = max(0.0, take_off.speed - _COURSE_SPEED_MPS) / pushed if pushed else 0.0
+
+    def _climb_pitch(self, take_off: TakeOff) -> float:
+        """Return the pitch of the climb, rad: the item's, or the highest if the motor runs before the push.
+
+        TECS runs with the motor, and the push winds its integrator up to the highest pitch: two flights of ArduPlane
+        4.6.3.  In five flights whose motor the push started it was the item's.
+        """
+        if self.motor_start > -math.inf or take_off.acceleration <= 0.0:
+            return take_off.pitch
+        made = self.parameters
+        return max(take_off.pitch, min(made.pitch_limit_max, made.tecs_pitch_max or math.inf))
 
     def _begin_landing(self, approach: Approach, ground: Record) -> None:
         up = float(approach.point[2])

@@ -105,7 +105,10 @@ def navigate_legs(
 
 @inner
 def _end_of_leg(b: Record, own: Record) -> tuple[float, float]:
-    """Return east and north (m) of the leg's end, which lies `pass_by` m beyond the waypoint (`Plane::verify_nav_wp`)."""
+    """Return east and north (m) of the leg's end, which lies beyond b if b has a pass-by distance.
+
+    `Plane::verify_nav_wp` moves the waypoint on along the leg.
+    """
     leg_e, leg_n = b.east - own.from_east, b.north - own.from_north
     run = math.hypot(leg_e, leg_n)
     if b.pass_by <= 0.0 or run <= 0.0:

@@ -6,7 +6,7 @@ from typing import ClassVar, Self
 
 from aircraft.catalog import Aircraft
 from flight.autopilots.arduplane.autopilot import ArduPlane
-from flight.autopilots.autopilot import StoredAutopilot
+from flight.autopilots.autopilot import MissionParts, StoredAutopilot
 from flight.autopilots.program import ProgramAutopilot, ProgramFlight
 from flight.autopilots.sitl.servos import SERVO_FILE, load_servo_map
 from flight.simulation.setup import FlightSetup
@@ -46,9 +46,9 @@ class ArduPlaneSitl(ProgramAutopilot, ArduPlane):
             return []
         return [f"{aircraft.folder / SERVO_FILE}: missing: --sitl needs to know which servo moves what"]
 
-    def settings_not_flown(self, *, returns: bool) -> list[str]:
+    def settings_not_flown(self, mission: MissionParts) -> list[str]:
         """Return the settings that the program does not get, or that its flight does not show."""
-        settings = super().settings_not_flown(returns=returns)
+        settings = super().settings_not_flown(mission)
         return [text for text in settings if not text.startswith(_FLOWN_BY_PROGRAM)]
 
     @property

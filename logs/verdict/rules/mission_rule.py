@@ -169,7 +169,10 @@ def _unflown_findings(setup: FlightSetup) -> Iterator[Finding]:
         ]
         if not setup.autopilot.reads_as_px4:
             left += [
-                (item.seq, "DO_CHANGE_SPEED of ground speed: returns are judged with the autopilot's own MIN_GROUNDSPEED")
+                (
+                    item.seq,
+                    "DO_CHANGE_SPEED of ground speed: returns are judged with the autopilot's own MIN_GROUNDSPEED",
+                )
                 for item in setup.mission.items
                 if item.command == C.DO_CHANGE_SPEED and item.params[0] == 1.0
             ]

@@ -202,7 +202,8 @@ def test_a_climb_before_the_turn_is_flown_to_a_lower_target_too(course: float, t
     top = int(np.argmax(way[:, 2]))
     assert way[top, 2] == pytest.approx(530.0, abs=0.1)
     # 30 m at a slope of 0.1, be it within the turn or, where that is short, on the straight leg after it.
-    assert flown[top] == pytest.approx(300.0, abs=5.0)
+    # The corners of an arc lie outside it, by up to 2 %.
+    assert flown[top] == pytest.approx(300.0, rel=0.02)
     assert (arcs[top:] == 100.0).any() == (course == 90.0)
     # From there on the slope leads down to the target.
     middle = float(np.interp(0.5 * (flown[top] + flown[arcs == 120.0][0]), flown, way[:, 2]))

@@ -14,10 +14,10 @@ from aircraft.envelope import GRAVITY
 from benchmarks.against_arduplane import BINARY, compare, flown_figures
 from flight.autopilots.arduplane.autopilot import ArduPlane
 from flight.autopilots.arduplane.law import (
-    airspeed_target,
     AIRSPEED_READING,
     ARDUPILOT_MEMORY,
     ROLL_LAG,
+    airspeed_target,
     demand_height,
     follow_attitude,
     roll_demand,
@@ -46,7 +46,9 @@ def test_a_fresh_memory_is_on_the_first_leg_and_has_flown_nothing() -> None:
 
 def test_counts_are_whole_and_all_else_are_numbers() -> None:
     kinds = {name: ARDUPILOT_MEMORY[name] for name in field_names(ARDUPILOT_MEMORY)}
-    assert {name for name, kind in kinds.items() if kind == np.int64} == {"leg", "held", "left_for", "ground_leg"}
+    assert {name for name, kind in kinds.items() if kind == np.int64} == {
+        *("leg", "held", "left_for", "ground_leg", "sloped_leg"),
+    }
     truths = {name for name, kind in kinds.items() if kind == np.bool_}
     assert truths == {
         "begun",

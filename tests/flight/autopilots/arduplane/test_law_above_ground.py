@@ -14,9 +14,7 @@ from world.kernels import Record
 DT = 0.1
 
 
-def asked(
-    own: Record, north: float, up: float, above: float = 100.0, home: float = math.nan, **values: float
-) -> float:
+def asked(own: Record, north: float, up: float, above: float = 100.0, home: float = math.nan, **values: float) -> float:
     """Return the altitude that a leg of 1,000 m to a height above ground asks for, m AMSL."""
     (b,) = waypoints((0, 1000, 0), over_ground=True, above_ground=above, home_up=home)
     demand_height(flying(0.0, north, up), b, parameters(**values), own, DT)

@@ -1,5 +1,6 @@
 """What an autopilot gets of a mission: places above the sea, jumps to where they lead, and one place more."""
 
+import math
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any

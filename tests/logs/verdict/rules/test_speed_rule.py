@@ -142,7 +142,7 @@ def test_a_commanded_speed_that_is_not_held_fails(setup: FlightSetup) -> None:
 
 
 def test_a_speed_that_is_raised_for_a_minimum_ground_speed_is_held() -> None:
-    """33 m/s instead of 25 on legs that have a minimum ground speed, by the mission or MIN_GROUNDSPEED; 17 are too slow."""
+    """33 m/s instead of 25 on legs with a minimum ground speed, by the mission or MIN_GROUNDSPEED; 17 are too slow."""
     plain = make_setup(STRAIGHT)
     law = ArduPlane(ArduPilotParameters.defaults().changed(AIRSPEED_MAX=40.0, MIN_GROUNDSPEED=20.0))
     by_mission = replace(plain, route=replace(plain.route, min_ground_speed=np.full(3, 20.0)))
