@@ -480,6 +480,11 @@ class Autopilot(ABC):
         """Airspeeds that it accepts from a mission; None for no limits."""
         return None
 
+    @property
+    def min_ground_speed(self) -> float:
+        """Ground speed for which it raises its airspeed until the mission sets another one, m/s; 0 for none."""
+        return 0.0
+
     def speeds_flown(self, commanded: Floats, cruise: float) -> Floats:
         """Return the airspeed that it flies on each leg for the commanded airspeeds (l,), (l,) m/s.
 

@@ -19,7 +19,9 @@ WAYPOINT = record_dtype(
     "turn",  # rad, positive in either direction
     ("fly_over", np.bool_),
     "acceptance",  # m; 0 if the mission states none
+    "pass_by",  # m that ArduPlane flies on beyond it along the leg
     "airspeed",  # m/s, of the leg
+    "min_ground_speed",  # m/s, on the leg to it; 0 or less for none
     "up",  # m AMSL
     "circle",  # m, radius of the loiter that it is a corner of, positive to the right; 0 for none
     "centre_east",  # m, of that circle
@@ -38,6 +40,7 @@ WAYPOINT = record_dtype(
     "slope_base",  # m, see `flight.mission.return_path.ReturnCircle`
     ("over_ground", np.bool_),  # True if the leg to it follows the ground
     "above_ground",  # m, height above ground at the end of such a leg
+    "home_up",  # m AMSL, home while the leg to it is flown; NaN if unknown
 )
 
 

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from aircraft.path_limits import BLEND_ACCELERATION, Limits
 from flight.guidance.lateral_reference_laws import WAYPOINT
 from flight.mission.items import Command, Mission, MissionItem
-from flight.mission.itinerary import loiter_of
+from flight.mission.itinerary import loiter_of, pass_by_distance
 from flight.mission.route import SHARPEST_FLY_BY_RAD, Route, ends_at_plain_waypoint
 from world.arrays import Floats
 from world.geometry import leg_courses, leg_runs, signed_turns, tangent_length, wrap
@@ -406,13 +406,16 @@ def waypoint_records(route: Route, mission: Mission | None = None, *, fly_over: 
     # A stated acceptance radius switches legs, whatever the scenario states.
     waypoints["fly_over"] = fly_over & (route.acceptance == 0.0) & (route.arcs == 0.0)
     waypoints["acceptance"] = route.acceptance
+    items = {} if mission is None else {item.seq: item for item in mission.items}
+    waypoints["pass_by"] = [pass_by_distance(items[seq]) if seq in items else 0.0 for seq in route.items.tolist()]
     waypoints["over_ground"] = np.isfinite(route.above_ground)
     waypoints["above_ground"] = np.nan_to_num(route.above_ground)
+    waypoints["home_up"] = route.home_up
     waypoints["airspeed"] = np.append(route.airspeed, route.airspeed[-1])
+    waypoints["min_ground_speed"] = np.nan_to_num(route.min_ground_speed)
     waypoints["up"] = route.waypoints[:, 2]
     waypoints["item"], waypoints["stop"] = route.items, route.stops
     _set_circles(waypoints[1:-1], route)
-    items = {} if mission is None else {item.seq: item for item in mission.items}
     _set_loiters(waypoints, items)
     gates = [seq for seq, item in items.items() if item.command == Command.CONDITION_GATE]
     waypoints["gate"] = np.isin(route.items, gates)
@@ -425,9 +428,23 @@ def waypoint_records(route: Route, mission: Mission | None = None, *, fly_over: 
         names = ("centre_east", "centre_north", "up", "circle", "slope_base")
         for name, value in zip(names, route.return_to, strict=True):
             back[name] = value
-        # How the next leg turns is unknown: assume a right angle, as at a mission's end.
-        waypoints["turn"][route.return_from] = 0.5 * math.pi
+    last = route.return_from if route.return_to is not None else route.straight_to - 1
+    if last >= 0:
+        waypoints["turn"][last] = _turn_before_return(route, last, items)
     return waypoints
+
+
+def _turn_before_return(route: Route, index: int, items: dict[int, MissionItem]) -> float:
+    """Return the turn at the waypoint before a return that ArduPlane computes, rad; a right angle if it is unknown.
+
+    The return's item has no place, which is read as 0 N, 0 E (`AP_Mission::get_next_ground_course_cd`,
+    `Location::get_bearing_to`).
+    """
+    item = items.get(int(route.items[index]))
+    if index == 0 or item is None or not item.has_position:
+        return 0.5 * math.pi
+    north = -item.lat_deg / math.cos(math.radians(0.5 * item.lat_deg))
+    return float(abs(wrap(math.atan2(-item.lon_deg, north) - float(leg_courses(route.waypoints)[index - 1]))))
 
 
 def _set_circles(corners: Records, route: Route) -> None:

@@ -93,6 +93,24 @@ def loiter_of(item: MissionItem) -> Loiter | None:
     return None
 
 
+# Longest distance that ArduPlane flies on beyond a waypoint, m: it is stored as whole metres in a byte.
+_MAX_PASS_BY_M = 255
+
+
+def pass_by_distance(item: MissionItem) -> float:
+    """Return the distance that ArduPlane flies on beyond a waypoint, m; 0 for any other item.
+
+    It is the third parameter of NAV_WAYPOINT in whole metres (`AP_Mission::mavlink_int_to_mission_cmd`).
+
+    >>> place = (0, 36.5, 8.0, 700.0)
+    >>> made = [MissionItem(1, 16, place[0], (0.0, 0.0, p3, 0.0), *place[1:]) for p3 in (150.9, 300.0, math.nan, -50.0)]
+    >>> [pass_by_distance(item) for item in made]
+    [150.0, 255.0, 0.0, 0.0]
+    """
+    beyond = item.params[2]
+    return float(min(_MAX_PASS_BY_M, int(beyond))) if item.command == Command.NAV_WAYPOINT and beyond >= 1.0 else 0.0
+
+
 class OpenItem(NamedTuple):
     """An item that changes the flight path, but is not simulated as the autopilot flies it.
 
@@ -130,6 +148,9 @@ class ItineraryStop:
     loiter: the loiter about it, or None.
     airspeed_by_value: airspeed as PX4 reads the items.
     gates: gates on the leg to it, in order.
+    min_ground_speed: ground speed for which ArduPlane raises its airspeed on that leg, m/s; 0 or less for none, NaN for
+        the autopilot's own.
+    home_up: altitude of home on that leg, m AMSL; NaN if the mission's home does not state it.
     """
 
     item: int
@@ -143,6 +164,8 @@ class ItineraryStop:
     loiter: Loiter | None = None
     airspeed_by_value: float = math.nan
     gates: tuple[Gate, ...] = ()
+    min_ground_speed: float = math.nan
+    home_up: float = math.nan
 
 
 @dataclass(frozen=True, slots=True)
@@ -351,7 +374,7 @@ class _ItineraryBuilder:
     def __init__(self, mission: Mission) -> None:
         self.source = mission.source
         self.last_seq = mission.items[-1].seq if mission.items else -1
-        self.airspeed = self.airspeed_by_value = math.nan
+        self.airspeed = self.airspeed_by_value = self.min_ground_speed = math.nan
         self.notes = _NotesOfBothReadings()
         # Dictionaries without duplicates that keep their order.
         self.open: dict[OpenItem, None] = {}
@@ -475,6 +498,8 @@ class _ItineraryBuilder:
         return ItineraryStop(
             *(item.seq, item.command, lat, lon, alt, frame),
             *(self.airspeed, acceptance, loiter, self.airspeed_by_value, gates),
+            min_ground_speed=self.min_ground_speed,
+            home_up=self.home.alt,
         )
 
     def _add_gate(self, item: MissionItem) -> None:
@@ -530,9 +555,14 @@ class _ItineraryBuilder:
             if item.params[0] > 0.0:
                 # No fixed wing holds: ArduPlane stores no time, PX4 (`MissionBlock::get_time_inside`) reads none.
                 self.notes.add("NAV_WAYPOINT with a time to hold: flown through", item.seq)
-            if item.params[2] > 0.0:
-                # `Plane::verify_nav_wp`; PX4 does not read it.
-                self.leave_open(f"{name} with a distance to fly on beyond it: not flown", item.seq, by_value=False)
+            if beyond := pass_by_distance(item):
+                self.notes.usual.add(f"{name} with {beyond:.0f} m to fly on beyond it, as ArduPlane does", item.seq)
+            elif item.params[2] <= -1.0:
+                # Converting a negative number to an unsigned one gives 0 on ARM and 255 on a PC; PX4 does not read it.
+                text = (
+                    f"{name} with {item.params[2]:g} m to fly on beyond it: flown as 0, where ArduPlane may fly 255 m"
+                )
+                self.leave_open(text, item.seq, by_value=False)
         elif item.command == Command.NAV_SPLINE_WAYPOINT:
             self.leave_open(f"{name}: flown as a straight waypoint", item.seq)
         elif item.command == Command.NAV_LOITER_UNLIM:
@@ -603,9 +633,11 @@ class _ItineraryBuilder:
         if kind not in (0.0, 1.0):
             notes.add(f"DO_CHANGE_SPEED of type {kind:g}, neither airspeed nor ground speed: ignored", item.seq)
         elif kind == 1.0:
-            # It sets the minimum ground speed (MIN_GROUNDSPEED), and keeps the airspeed.
-            self.leave_open("DO_CHANGE_SPEED of ground speed: flown as airspeed", item.seq, by_value=False)
-            self.airspeed = speed if speed > 0.0 else self.airspeed
+            # The airspeed stays.
+            self.min_ground_speed = 0.0 if math.isnan(speed) else speed
+            notes.add(
+                f"DO_CHANGE_SPEED of ground speed: sets MIN_GROUNDSPEED to {self.min_ground_speed:g} m/s", item.seq
+            )
         elif speed == -2.0:
             self.airspeed = math.nan
         elif speed > 0.0:

@@ -19,7 +19,15 @@ from flight.mission.items import (
     MissionItem,
     Notes,
 )
-from flight.mission.itinerary import Itinerary, ItineraryStop, Loiter, OpenItem, loiter_of, make_itinerary
+from flight.mission.itinerary import (
+    Itinerary,
+    ItineraryStop,
+    Loiter,
+    OpenItem,
+    loiter_of,
+    make_itinerary,
+    pass_by_distance,
+)
 from flight.mission.loiter_circles import PlacedStop
 from flight.mission.return_path import LandingStart, ReturnPlace
 from world.arrays import Floats
@@ -70,6 +78,7 @@ class PlacedMission:
         the mission does not end with a return.
     landings: landing sequences that such a return may continue to, and that are flown.
     landing_starts: starts of all landing sequences, including those that no return continues to.
+    home_up: altitude of the mission's home, m AMSL: stated, or the ground there; NaN if unknown.
     """
 
     mission: Mission
@@ -82,6 +91,7 @@ class PlacedMission:
     return_places: tuple[ReturnPlace, ...] = ()
     landings: tuple[PlacedLanding, ...] = ()
     landing_starts: tuple[LandingStart, ...] = ()
+    home_up: float = math.nan
 
 
 def place_stops(
@@ -133,6 +143,7 @@ def place_stops(
         places,
         landings,
         tuple(start for _, start in marked),
+        heights.known_home(),
     )
 
 
@@ -264,7 +275,12 @@ def _position_of(item: MissionItem, origin: GeoOrigin, heights: "_Heights") -> t
 def _place_start(item: MissionItem, origin: GeoOrigin, heights: "_Heights") -> LandingStart:
     place, loiter = _position_of(item, origin, heights), loiter_of(item)
     radius = (loiter or Loiter(0.0)).radius
-    return LandingStart(item.seq, place, place, loiter is not None, radius, lands=item.command in LANDINGS)
+    return LandingStart(
+        *(item.seq, place, place, loiter is not None, radius),
+        lands=item.command in LANDINGS,
+        pass_by=pass_by_distance(item),
+        home_up=heights.known_home(),
+    )
 
 
 def landing_places(mission: Mission, origin: GeoOrigin) -> tuple[tuple[int, float, float], ...]:
@@ -431,6 +447,10 @@ class _Heights:
             if abs(float(east)) <= MAP_EXTENT and abs(float(north)) <= MAP_EXTENT:
                 return float(self.terrain.height(east, north))
         return math.nan
+
+    def known_home(self) -> float:
+        """Return the altitude of home, or of the ground there if home states none, m AMSL; NaN if unknown."""
+        return self.ground_at_home() if math.isnan(self.home.alt) else self.home.alt
 
     def _find_home(self, home: Home) -> float:
         under = self.ground_at_home()

@@ -63,6 +63,8 @@ class LandingStart(NamedTuple):
     radius: loiter radius, m, negative to the left, 0 if none is stated.
     lands: True if the item is the landing itself.
     onward: the places after it up to the landing; their own ``onward`` is empty.
+    pass_by: distance that ArduPlane flies on beyond the place, m.
+    home_up: altitude of home, m AMSL, NaN if unknown.
     """
 
     item: int
@@ -72,6 +74,8 @@ class LandingStart(NamedTuple):
     radius: float = 0.0
     lands: bool = False
     onward: tuple["LandingStart", ...] = ()
+    pass_by: float = 0.0
+    home_up: float = math.nan
 
 
 def nearest_landing(here: Place, landings: Sequence[LandingStart]) -> LandingStart | None:
@@ -102,7 +106,8 @@ class ReturnRules:
 
     height: height above home at the end of the return, m; NaN to keep the altitude at which it turns back.
     radius: loiter radius there, m, negative to the left; 0 for the aircraft's own radius.
-    climb_first: height gain before it turns with its full bank limit, m; inf for the whole missing height, 0 for none.
+    climb_first: height gain before it turns with its full bank limit, m, even above its target; inf for the whole
+        missing height, 0 for none.
     first_bank: bank limit during that climb, rad.
     sink: maximum descent rate, m/s.
     least_slope: height difference below which a descent is flown as a step, at once, m.
@@ -245,14 +250,12 @@ def described_return(target: ReturnTarget, rules: ReturnRules, up: float, onward
     first = ""
     if rules.climb_first > 0.0 and not (math.isinf(rules.climb_first) and rise < -1.0):
         bank = math.degrees(rules.first_bank)
-        first = f"; banks no more than {bank:.0f} degrees before it has climbed {min(rules.climb_first, rise):.0f} m"
+        gain = rise if math.isinf(rules.climb_first) else rules.climb_first
+        first = f"; banks no more than {bank:.0f} degrees before it has climbed {gain:.0f} m"
         if math.isinf(rules.climb_first) and rise <= 1.0:
             first = f"; banks no more than {bank:.0f} degrees until it is above that height"
-        if rise < rules.climb_first < math.inf:
-            first = (
-                f"; banks no more than {bank:.0f} degrees all the way, as it never climbs the"
-                f" {rules.climb_first:.0f} m of RTL_CLIMB_MIN"
-            )
+        if gain > max(0.0, rise):
+            first += ", even above that height"
     ends = f"from its circle on to {onward}" if onward else f"circles for {UNLIMITED:.0f} s; the mission ends there"
     return (
         f"NAV_RETURN_TO_LAUNCH: to {target.name}, {_distance_text(target.distance)} away{reason}, {way}"
@@ -277,7 +280,7 @@ def lay_return(
     The turn takes the shorter direction. Altitudes of a descent lie on the straight slope from the start of the turn to
     the target, by the position along that line, no steeper than the aircraft can fly; a climb or a small descent begins
     at once. The remaining height difference is flown in the loiter, which then lasts
-    `flight.mission.itinerary.UNLIMITED` s.
+    `flight.mission.itinerary.UNLIMITED` s.  A climb before the turn is flown whatever the target's altitude is.
     """
     here = before[-1].position
     course = _course(before[-2].position, here) if len(before) > 1 else _course(here, target.position)
@@ -311,6 +314,8 @@ class _ReturnBuilder:
         self._stop, self._circle, self._slope_base = circle.stop, circle, slope_base
         self._least_slope, self._ability, self._dive, self._onward = least_slope, ability, dive, onward
         self._at = self._slope_from = here
+        # Altitude of the climb before the turn, m; it may lie above the target.
+        self._first_climb_to = -math.inf
 
     @property
     def _is_step(self) -> bool:
@@ -322,11 +327,7 @@ class _ReturnBuilder:
 
     def turn_gently(self, course: float, rules: ReturnRules) -> float:
         """Fly the arc at the first bank limit while that limit applies, and return the course at its end."""
-        climb = (
-            min(rules.climb_first, max(0.0, self._height_difference))
-            if math.isinf(rules.climb_first)
-            else rules.climb_first
-        )
+        climb = max(0.0, self._height_difference) if math.isinf(rules.climb_first) else rules.climb_first
         if climb <= 0.0:
             return course
         wide = self._ability.turn_radius(course, course + math.pi, self._at[2])
@@ -335,14 +336,23 @@ class _ReturnBuilder:
         if arc is None:
             return course
         node, part, onward = arc
-        # A height gain that is never reached never lifts the limit.
-        length = climb / self._ability.climb if self._height_difference >= climb else math.inf
-        sweep = min(part, length / wide)
+        sweep = min(part, climb / self._ability.climb / wide)
+        self._first_climb_to = self._at[2] + climb
         self._add_arc(node, course, sweep)
         end = course + math.copysign(sweep, node.turn)
         self._add_waypoint(*on_rim(node, end), 0.0)
-        self._slope_from = self._at
+        if sweep == part and self._first_climb_to > self._circle.up:
+            self._climb_on(onward)
+        self._first_climb_to, self._slope_from = -math.inf, self._at
         return onward if sweep == part else end
+
+    def _climb_on(self, course: float) -> None:
+        """Fly straight on to the end of the first climb, or to the loiter if that is nearer."""
+        east, north = on_rim(self._circle, course)
+        run = (self._first_climb_to - self._at[2]) / self._ability.climb
+        run = min(run, math.hypot(east - self._at[0], north - self._at[1]) - _MIN_TANGENT_M)
+        if run > _MIN_TANGENT_M:
+            self._add_waypoint(self._at[0] + run * math.sin(course), self._at[1] + run * math.cos(course), 0.0)
 
     def turn(self, course: float) -> None:
         """Fly the turn to the target, the straight leg, and the loiter there."""
@@ -441,11 +451,11 @@ class _ReturnBuilder:
     def _add_waypoint(self, east: float, north: float, arc: float, *, on_circle: bool = False) -> None:
         """Add a waypoint at the altitude that the return has at this position."""
         run = math.hypot(east - self._at[0], north - self._at[1])
-        up, end = self._at[2], self._circle.up
-        if end >= up:
-            up = min(end, up + self._ability.climb * run)
+        up, top = self._at[2], max(self._circle.up, self._first_climb_to)
+        if top >= up:
+            up = min(top, up + self._ability.climb * run)
         else:
-            wanted = end if on_circle else self._slope_altitude(east, north)
+            wanted = self._circle.up if on_circle else self._slope_altitude(east, north)
             up = max(min(up, wanted), up - self._dive * run)
         self._at = (east, north, up)
         self.points.append(RoutePoint(self._stop, self._at, arc))

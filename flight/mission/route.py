@@ -43,6 +43,9 @@ from world.geometry import fly_by_offset, leg_courses, signed_turns, wrap
 from world.scenario import Scenario
 from world.terrain import Terrain
 
+# Columns of a route that are NaN where nothing is stated.
+ROUTE_COLUMNS_WITH_NAN = ("above_ground", "min_ground_speed", "home_up")
+
 
 @dataclass(frozen=True, slots=True)
 class Route:
@@ -71,6 +74,9 @@ class Route:
     unjoined: stops that the autopilot flies to, and that the waypoints lack, since no tangent joins them to a circle.
     open_items: items that change the flight path, and that are not flown as the autopilot would.
     above_ground: (w,) height above ground that is held along the leg to the waypoint, m; NaN for a straight leg.
+    min_ground_speed: (w,) ground speed for which ArduPlane raises its airspeed on the leg to the waypoint, m/s; 0 or
+        less for none, NaN for the autopilot's own.
+    home_up: (w,) altitude of home on the leg to the waypoint, m AMSL; NaN if unknown.
     """
 
     waypoints: Floats
@@ -91,6 +97,8 @@ class Route:
     unjoined: tuple[Unjoined, ...] = ()
     open_items: tuple[OpenItem, ...] = ()
     above_ground: Floats = field(default_factory=lambda: np.zeros(0))
+    min_ground_speed: Floats = field(default_factory=lambda: np.zeros(0))
+    home_up: Floats = field(default_factory=lambda: np.zeros(0))
 
     def __post_init__(self) -> None:
         """Fill in default arrays, and lock all arrays."""
@@ -99,9 +107,13 @@ class Route:
         if len(self.stops) != len(self.waypoints):
             changes = np.flatnonzero((np.diff(self.items) != 0) | (self.items[1:] < 0))
             object.__setattr__(self, "stops", np.searchsorted(changes, np.arange(len(self.items))))
-        if len(self.above_ground) != len(self.waypoints):
-            object.__setattr__(self, "above_ground", np.full(len(self.waypoints), math.nan))
-        for name in ("waypoints", "airspeed", "acceptance", "fly_over", "items", "arcs", "stops", "above_ground"):
+        for name in ROUTE_COLUMNS_WITH_NAN:
+            if len(getattr(self, name)) != len(self.waypoints):
+                object.__setattr__(self, name, np.full(len(self.waypoints), math.nan))
+        for name in (
+            *("waypoints", "airspeed", "acceptance", "fly_over", "items", "arcs", "stops"),
+            *ROUTE_COLUMNS_WITH_NAN,
+        ):
             array = np.array(getattr(self, name))
             array.setflags(write=False)
             object.__setattr__(self, name, array)
@@ -159,7 +171,7 @@ def part_of_route(route: Route, first: int, last: int) -> Route:
         items=route.items[points],
         arcs=route.arcs[points],
         stops=route.stops[points],
-        above_ground=route.above_ground[points],
+        **{name: getattr(route, name)[points] for name in ROUTE_COLUMNS_WITH_NAN},
         endless=-1,
         takeoff_ground=route.takeoff_ground if first == 0 else math.nan,
         landing_ground=route.landing_ground if last == route.legs else math.nan,
@@ -301,6 +313,9 @@ def with_end_courses(route: Route, scenario: Scenario, limits: Limits) -> Route:
     acceptance = np.array(route.acceptance)
     acceptance[:head], acceptance[len(acceptance) - tail :] = 0.0, 0.0
     chain = [point for point in (lead_in, *points, lead_out) if point is not None]
+    padded: dict[str, Any] = {
+        name: np.pad(getattr(route, name), (head, tail), constant_values=math.nan) for name in ROUTE_COLUMNS_WITH_NAN
+    }
     return replace(
         route,
         waypoints=np.array(chain),
@@ -309,7 +324,7 @@ def with_end_courses(route: Route, scenario: Scenario, limits: Limits) -> Route:
         fly_over=np.pad(route.fly_over, (head, tail), mode="edge"),
         items=np.pad(route.items, (head, tail), constant_values=-1),
         arcs=np.pad(route.arcs, (head, tail)),
-        above_ground=np.pad(route.above_ground, (head, tail), constant_values=math.nan),
+        **padded,
         stops=np.concatenate([np.arange(head), route.stops + head, route.stops[-1:] + head + np.arange(1, tail + 1)]),
         started=started,
         return_from=route.return_from + (head if route.return_from >= 0 else 0),
@@ -437,11 +452,20 @@ def lay_route(
         endless=placed.itinerary.endless,
         takeoff_ground=placed.takeoff_ground,
         landing_ground=placed.landing_ground if landing is None else landing.ground,
-        above_ground=np.array([_held_above_ground(stop) for stop in stops]),
+        **_columns_with_nan(stops, placed.home_up),
         unjoined=unjoined if loiters.at_middle else (),  # An autopilot that flies on tangents leaves these out.
         open_items=_open_items(placed.itinerary, landing, reads_as_px4),
         **back,
     )
+
+
+def _columns_with_nan(stops: list[ItineraryStop], home_up: float) -> dict[str, Any]:
+    """Return the columns of `ROUTE_COLUMNS_WITH_NAN`; home_up is used where a stop states no altitude of home, m."""
+    return {
+        "above_ground": np.array([_held_above_ground(stop) for stop in stops]),
+        "min_ground_speed": np.array([stop.min_ground_speed for stop in stops]),
+        "home_up": np.array([home_up if math.isnan(stop.home_up) else stop.home_up for stop in stops]),
+    }
 
 
 def _held_above_ground(stop: ItineraryStop) -> float:

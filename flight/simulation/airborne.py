@@ -98,6 +98,7 @@ class Airborne(ABC):
         waypoints["ends"] &= setup.autopilot.loiter_rules.ends_in_circle
         self._airspeeds = setup.autopilot.speeds_flown(setup.route.airspeed, setup.airspeed)
         waypoints["airspeed"] = np.append(self._airspeeds, self._airspeeds[-1])
+        waypoints["min_ground_speed"] = setup.min_ground_speeds
         self._workspace = Workspace(self._gains, self.path, waypoints, self._law(setup).own)
         self._work = self._workspace.record
         self._work.position_map, self._work.north_map = self.map.position.record, self.map.angle.record

@@ -6,6 +6,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
 
+import numpy as np
+
 from aircraft.envelope import Envelope
 from aircraft.path_limits import Limits
 from aircraft.tracking import corridor_half_width
@@ -255,6 +257,12 @@ class FlightSetup:
     def airspeed(self) -> float:
         """Airspeed until the mission sets another, m/s."""
         return self.limits.airspeed
+
+    @property
+    def min_ground_speeds(self) -> Floats:
+        """Minimum ground speeds on the leg to each waypoint, (w,) m/s; 0 or less for none."""
+        stated = self.route.min_ground_speed
+        return np.where(np.isnan(stated), self.autopilot.min_ground_speed, stated)
 
     @property
     def max_bank(self) -> float:

@@ -18,7 +18,7 @@ from flight.mission.items import Camera, Home, Mission, MissionItem, SurveyPlan
 from flight.mission.itinerary import OpenItem
 from flight.mission.loiter_circles import Unjoined
 from flight.mission.return_path import ReturnCircle
-from flight.mission.route import Route
+from flight.mission.route import ROUTE_COLUMNS_WITH_NAN, Route
 from world.errors import LogError
 from world.geometry import leg_runs
 
@@ -31,7 +31,7 @@ _Finites = Annotated[list[Finite], _LISTED]
 _Column = Annotated[list[float], _LISTED]
 _Table = Annotated[list[list[float]], _LISTED]  # by airspeed, then by height
 _Place = Annotated[list[Finite], Field(min_length=3, max_length=3)]
-# A height that may be unknown: NaN in the dataclass, null in the file.
+# A height or another value that may be unknown: NaN in the dataclass, null in the file.
 _Height = Annotated[Finite | None, BeforeValidator(lambda value: None if value != value else value)]
 
 
@@ -140,6 +140,8 @@ class RouteTable(SetupModel):
     straight_to: Annotated[int, Field(ge=-1, alias="straight_to_waypoint")] = -1
     unjoined: Annotated[tuple[Unjoined, ...], Field(alias="unjoined_item_circle_is_circle")] = ()
     above_ground: Annotated[list[_Height], Field(alias="above_ground_m"), _LISTED] = []
+    home_up: Annotated[list[_Height], Field(alias="home_amsl_m"), _LISTED] = []
+    min_ground_speed: Annotated[list[_Height], Field(alias="min_ground_speed_mps"), _LISTED] = []
     open_items: Annotated[tuple[OpenItem, ...], Field(alias="open_items_item_text")] = ()
 
     def route(self, file: str) -> Route:
@@ -155,7 +157,7 @@ class RouteTable(SetupModel):
             "acceptance",
             "fly_over",
             "items",
-            *(name for name in ("arcs", "stops", "above_ground") if getattr(self, name)),
+            *(name for name in ("arcs", "stops", *ROUTE_COLUMNS_WITH_NAN) if getattr(self, name)),
         ):
             length, expected = len(getattr(self, field)), len(waypoints) - (field == "airspeed")
             if length != expected:
@@ -169,8 +171,9 @@ class RouteTable(SetupModel):
         circle = None if self.return_to is None else ReturnCircle(*self.return_to)
         items = np.array(self.items, dtype=np.int64)
         stops = np.array(self.stops, dtype=np.int64)
-        above_ground = np.array([math.nan if height is None else height for height in self.above_ground])
-        columns = {"waypoints": waypoints, "items": items, "stops": stops, "above_ground": above_ground}
+        columns = {"waypoints": waypoints, "items": items, "stops": stops}
+        for name in ROUTE_COLUMNS_WITH_NAN:
+            columns[name] = np.array([math.nan if value is None else value for value in getattr(self, name)])
         return _from_table(Route, self, return_to=circle, **columns, **ground_heights)
 
 

@@ -50,18 +50,17 @@ from world.wind import Turbulence
 # aircraft.
 _LEG_FIELDS = (
     *("leg", "cross_track_sum", "on_circle", "loitering", "stayed", "circled", "bearing", "at_height", "next_look"),
-    *("up_before", "over", "waited", "left_for", "returning", "climbed", "ground_leg"),
+    *("up_before", "over", "waited", "left_for", "returning", "climbed", "ground_leg", "sloped_leg"),
 )
 
 
 # Neutral values of parameters that change the flight of a mission and are not simulated: an altitude offset,
-# soaring, lift motors, turns by rudder alone, a minimum ground speed, and flight without an airspeed sensor.
+# soaring, lift motors, turns by rudder alone, and flight without an airspeed sensor.
 _NEUTRAL = {
     "ALT_OFFSET": 0.0,
     "SOAR_ENABLE": 0.0,
     "Q_ENABLE": 0.0,
     "RUDDER_ONLY": 0.0,
-    "MIN_GROUNDSPEED": 0.0,
     "ARSPD_USE": 1.0,
 }
 
@@ -297,6 +296,11 @@ class ArduPlane(Autopilot):
         """AIRSPEED_MIN and AIRSPEED_MAX."""
         return SpeedLimits(self.parameters.airspeed_min, self.parameters.airspeed_max, "AIRSPEED_MIN", "AIRSPEED_MAX")
 
+    @property
+    def min_ground_speed(self) -> float:
+        """MIN_GROUNDSPEED."""
+        return self.parameters.ground_speed_min
+
     def speeds_flown(self, commanded: Floats, cruise: float) -> Floats:
         """Return the last accepted speed for each leg."""
         return speeds_flown(commanded, cruise, self.parameters)
@@ -393,17 +397,27 @@ class ArduPlaneFromGround(ArduPlane, GroundAutopilot):
         ground.motor = self.motor_start
         ground.slew, ground.full = takeoff_slew(made), made.takeoff_throttle or made.throttle_max
         ground.base, ground.top, ground.low = take_off.base, take_off.top, take_off.home[2]
-        ground.pitch, ground.leg = take_off.pitch, take_off.waypoint
+        ground.pitch, ground.leg = self._climb_pitch(take_off), take_off.waypoint
         # Start when it moved at 5 m/s, at which its course over the ground is known.
         pushed = take_off.acceleration
         ground.fast = max(0.0, take_off.speed - _COURSE_SPEED_MPS) / pushed if pushed else 0.0
+
+    def _climb_pitch(self, take_off: TakeOff) -> float:
+        """Return the pitch of the climb, rad: the item's, or the highest if the motor runs before the push.
+
+        TECS runs with the motor, and the push winds its integrator up to the highest pitch: two flights of ArduPlane
+        4.6.3.  In five flights whose motor the push started it was the item's.
+        """
+        if self.motor_start > -math.inf or take_off.acceleration <= 0.0:
+            return take_off.pitch
+        made = self.parameters
+        return max(take_off.pitch, min(made.pitch_limit_max, made.tecs_pitch_max or math.inf))
 
     def _begin_landing(self, approach: Approach, ground: Record) -> None:
         up = float(approach.point[2])
         glide = self.landing_glide(approach.begin - up, approach.run, approach.tail_wind, up)
         ground.lands, ground.landing_leg = True, approach.leg
         ground.east, ground.north, ground.up = approach.point
-        ground.home = approach.base
         ground.begin, ground.slope = approach.begin, glide.slope
         ground.flare_height, ground.flare_distance = glide.flare_height, glide.flare_distance
         ground.airspeed = landing_airspeed(self.parameters, approach.tail_wind)

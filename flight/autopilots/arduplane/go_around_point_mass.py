@@ -120,7 +120,7 @@ def fly_go_arounds(
 
     def fly(k: int, landing: LandingStart) -> Floats:
         ends = np.concatenate([straight_on(starts[k]), _make_stages((landing, *landing.onward), parameters)])
-        ends["airspeed"] = aircraft.record.airspeed
+        ends["airspeed"], ends["min_ground_speed"] = aircraft.record.airspeed, parameters.ground_speed_min
         most = most_seconds(starts[k], ends[1:], aircraft) + max(0.0, top - float(starts[k]["up"]))
         way = np.zeros((int(most) + 2, 3))
         fly_stages(

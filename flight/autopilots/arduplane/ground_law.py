@@ -24,6 +24,7 @@ import numpy as np
 from flight.autopilots.arduplane.law import (
     ARDUPILOT_MEMORY,
     NAVIGATION_TICK,
+    airspeed_target,
     begin_law,
     fly_as_ardupilot,
     follow_attitude,
@@ -102,7 +103,6 @@ GROUND_STATE = record_dtype(
     "east",  # m, of the landing point
     "north",
     "up",  # m AMSL
-    "home",  # m AMSL, of home
     "begin",  # m AMSL, of the waypoint before
     "slope",
     "flare_height",  # m above the landing point, start of the flare
@@ -110,8 +110,9 @@ GROUND_STATE = record_dtype(
     "airspeed",  # m/s, equivalent
     "entry_sink",  # m/s, sink rate at the start of the flare
     "entry_height",  # m above the landing point, at the start of the flare
-    "flare_adjusted",  # m above home, altitude demand of the flare that continues the glide's demand
-    "flare_ideal",  # m above the landing point, altitude demand of the flare that continues the actual height
+    ("flares_by_demand", np.bool_),  # True if the flare begins with the demanded sink rate, False with the flown one
+    "flare_adjusted",  # m AMSL, altitude demand of the flare that continues the glide's demand
+    "flare_ideal",  # m AMSL, altitude demand of the flare that continues the flown altitude
 )
 ARDUPLANE_GROUND = record_dtype(
     ("memory", ARDUPILOT_MEMORY),
@@ -187,7 +188,7 @@ def ground_tick(block: Floats, heights: Heights) -> int:
             ground.stage = ON_GLIDE
     else:
         find_on_path(work.estimated, pieces, work.memory)
-        _tick_landing(work, own)
+        _tick_landing(work, own, waypoints[memory.leg + 1])
     fill_tick(work)
     return ended(work, ground)
 
@@ -349,8 +350,11 @@ def _begin_first_leg(
 
 
 @inner
-def _tick_landing(work: Record, own: Record) -> None:
-    """Run one tick of the landing."""
+def _tick_landing(work: Record, own: Record, point: Record) -> None:
+    """Run one tick of the landing.
+
+    point: waypoint of the landing point.
+    """
     state, estimated, ground, memory = work.state, work.estimated, own.ground, own.memory
     dt, staged = work.timing.dt, own.staged
     factor = true_by_equivalent(estimated.up)
@@ -362,11 +366,12 @@ def _tick_landing(work: Record, own: Record) -> None:
         _update_stage(estimated, own.parameters, ground, memory, left)
         _demand_glide(estimated, own.parameters, ground, memory, left[0])
         _set_landing_parameters(estimated, own.parameters, staged, ground, left[1])
-        work.memory.speed_command = ground.airspeed * factor
+        wanted = airspeed_target(state, estimated, ground.airspeed, point, own.parameters, memory, factor)
+        work.memory.speed_command = wanted * factor
         if ground.stage == FLARING:
             # Slow and without throttle it must not be in underspeed: the flare ignores it.
             memory.throttle_demand = 0.0
-        update_tecs(state, estimated, staged, memory, ground.airspeed * factor, factor, NAVIGATION_TICK)
+        update_tecs(state, estimated, staged, memory, wanted * factor, factor, NAVIGATION_TICK)
     work.memory.height_error = estimated.up - memory.height_demand
     before = work.commands.throttle
     follow_attitude(state, estimated, work.gains, work.memory, staged, memory, factor, work.commands, dt)
@@ -435,8 +440,9 @@ def _update_stage(
     )
     if (ground.stage == APPROACHING and (flare_height_reached or flare_time_reached)) or share >= 1.0:
         ground.stage = FLARING
-        ground.entry_sink, ground.entry_height = sink, height
-        ground.flare_adjusted, ground.flare_ideal = memory.height_demand - ground.home, height
+        ground.entry_sink = -memory.height_rate if ground.flares_by_demand else sink
+        ground.entry_height = height
+        ground.flare_adjusted, ground.flare_ideal = memory.height_demand, estimated.up
 
 
 @inner
@@ -460,11 +466,8 @@ def _demand_glide(estimated: Record, parameters: Record, ground: Record, memory:
         memory.height_rate = -ground.entry_sink * (1.0 - share) - last * share
         ground.flare_adjusted += memory.height_rate * NAVIGATION_TICK
         ground.flare_ideal += memory.height_rate * NAVIGATION_TICK
-        # As in `AP_TECS::_update_height_demand`, which mixes a height over home with a height over the landing point:
-        # on a field lower than home it demands more altitude, by up to twice the difference, and on a higher field
-        # less.
-        over_home = ground.flare_adjusted * (1.0 - share) + ground.flare_ideal * share
-        memory.height_demand = ground.home + over_home + (ground.home - ground.up)
+        # As in `AP_TECS::_update_height_demand` since 4.6.3.
+        memory.height_demand = ground.flare_adjusted * (1.0 - share) + ground.flare_ideal * share
     memory.height_asked, memory.height_limited = memory.height_demand, memory.height_demand
 
 

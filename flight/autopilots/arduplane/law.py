@@ -6,7 +6,7 @@ import numpy as np
 
 from aircraft.envelope import GRAVITY
 from flight.autopilots.arduplane.navigator import navigate_legs, target_of
-from flight.autopilots.arduplane.parameters import ARDUPILOT_PARAMETERS
+from flight.autopilots.arduplane.parameters import ARDUPILOT_PARAMETERS, IMMEDIATE_CLIMB
 from flight.dynamics.instructions import Code
 from flight.guidance.equivalent_airspeed import true_by_equivalent
 from flight.guidance.inner_loops import follow_roll, steer_elevator
@@ -59,6 +59,7 @@ ARDUPILOT_MEMORY = record_dtype(
     "ground",  # m AMSL, terrain at the aircraft
     "rise_ahead",  # m, added to the altitude of a leg above terrain because of the terrain ahead
     ("ground_leg", np.int64),  # current leg above terrain, plus one; 0 before the first
+    ("sloped_leg", np.int64),  # current leg with a slope between altitudes, plus one; 0 before the first
     "from_above_ground",  # m, height above ground at which that leg began
     "height_asked",  # m, altitude setpoint of the leg, frozen while the aircraft cannot follow it
     "height_limited",  # m, the same after the rate limit
@@ -80,6 +81,7 @@ ARDUPILOT_MEMORY = record_dtype(
     "acceleration",  # m/s^2, along the nose, mean removed
     "acceleration_mean",
     "airspeed_demand",  # m/s, within its rate limits
+    "ground_speed_rise",  # m/s, equivalent, by which the airspeed was last raised for a minimum ground speed
     # Energy.
     "energy_rate_error",  # m^2/s^3, STE rate error, smoothed
     "throttle_before",  # 0..1, last throttle without its integrator
@@ -181,6 +183,10 @@ _SPEED_RATE_FRACTION = 0.5
 # the demand touch the limit now and then: the band is three standard deviations.  Climbs at full throttle depend on it:
 # with 0.003 to 0.005 the least clearances of 20 ArduPlane flights are met within 1.2 m; without it one is 9 m off.
 _SATURATION_BAND_FRACTION = 0.003
+# A rise of the airspeed for a minimum ground speed falls no less than this, m/s.
+_GROUND_SPEED_HYSTERESIS_MPS = 1.2
+# An RTL that climbs before its turn demands this much more than the climb, m.
+_RTL_CLIMB_EXTRA_M = 10.0
 # Underspeed begins below this ratio of airspeed to AIRSPEED_MIN ...
 _UNDERSPEED_RATIO = 0.9
 # ... with the throttle at or above this fraction of its maximum.
@@ -224,12 +230,29 @@ def demand_height(estimated: Record, b: Record, parameters: Record, own: Record,
 
 
 @inner
+def _climbs_at_once(up: float, rise: float, b: Record, parameters: Record) -> bool:
+    """Return True if a leg that begins at an altitude (m AMSL) is a step, not a slope (`Plane::setup_alt_slope`).
+
+    rise: height of the leg's end above the aircraft, m.  b: the leg's end.
+
+    It is a step unless it leads down, if it begins low over home or every climb is one.
+    """
+    if rise < 0.0:
+        return False
+    return bool(int(parameters.flight_options) & IMMEDIATE_CLIMB) or up - b.home_up <= parameters.climb_slope_height
+
+
+@inner
 def _leg_altitude(estimated: Record, b: Record, parameters: Record, own: Record) -> float:
     """Return the altitude on the leg's slope at the aircraft, or of the leg's end if the leg is a step.
 
     The slope of a leg to a loiter leads to the loiter's center; on the loiter the loiter's altitude applies.
     """
     end: float = b.up
+    if own.sloped_leg != own.leg + 1:
+        own.sloped_leg = own.leg + 1
+        if _climbs_at_once(estimated.up, end - estimated.up, b, parameters):
+            own.from_up = end
     if own.on_circle:
         return end
     altitude_change = end - own.from_up
@@ -265,6 +288,8 @@ def _leg_altitude_above_terrain(estimated: Record, b: Record, parameters: Record
     end, here = b.above_ground, estimated.up - own.ground
     if own.ground_leg != own.leg + 1:
         own.ground_leg, own.from_above_ground = own.leg + 1, here
+        if _climbs_at_once(estimated.up, end - here, b, parameters):
+            own.from_above_ground = end
     end_e, end_n = target_of(b)
     leg_e, leg_n = end_e - own.from_east, end_n - own.from_north
     run = max(1e-6, leg_e * leg_e + leg_n * leg_n)
@@ -320,9 +345,12 @@ def _return_altitude(estimated: Record, b: Record, parameters: Record, own: Reco
     The slope leads from where the RTL began to the center of its loiter; on the loiter the target's altitude applies
     (`Plane::setup_glide_slope`, `Mode::update_target_altitude`).  The slope down to a rally point is computed as if the
     point's altitude above home were an altitude AMSL, and never exceeds the altitude at which the RTL began
-    (`Plane::set_offset_altitude_location`, `Plane::constrain_target_altitude_location`; seen in 20 flights).
+    (`Plane::set_offset_altitude_location`, `Plane::constrain_target_altitude_location`; seen in 20 flights).  Until the
+    climb that precedes the turn is done, the demand lies above the start and the target (`Plane::update_alt`).
     """
     end: float = b.up
+    if not own.climbed:
+        return max(own.from_up, end) + parameters.rtl_climb_min + _RTL_CLIMB_EXTRA_M
     fall = own.from_up - end
     slope_fall = fall + b.slope_base
     if own.on_circle or fall <= 0.0 or abs(slope_fall) < parameters.glide_slope_min:
@@ -376,6 +404,29 @@ def is_underspeed(estimated: Record, parameters: Record, own: Record, slowest: f
     is_full_throttle = own.throttle_demand >= _FULL_THROTTLE_FRACTION * parameters.throttle_max
     own.under = (is_slow and is_full_throttle) or (own.under and estimated.up < own.height_demand)
     return own.under
+
+
+@inner
+def airspeed_target(
+    state: Record, estimated: Record, stated: float, b: Record, parameters: Record, own: Record, factor: float
+) -> float:
+    """Return the equivalent airspeed to fly for a stated one, raised for a minimum ground speed, within limits, m/s.
+
+    b: the leg's end, with the minimum ground speed.
+
+    What the ground speed along the heading lacks is added to the measured airspeed.  The rise is in whole m/s, and
+    falls only if it is to fall by more than a hysteresis (`Plane::calc_airspeed_errors`,
+    `Plane::calc_gndspeed_undershoot`).
+    """
+    wanted = stated
+    if b.min_ground_speed > 0.0:
+        ahead = estimated.velocity_east * math.sin(state.yaw) + estimated.velocity_north * math.cos(state.yaw)
+        needed = (own.airspeed_read + b.min_ground_speed - ahead) / factor
+        rise = float(math.floor(max(0.0, needed - stated) + 0.5))
+        if rise >= own.ground_speed_rise or own.ground_speed_rise - rise >= _GROUND_SPEED_HYSTERESIS_MPS:
+            own.ground_speed_rise = rise
+        wanted += own.ground_speed_rise
+    return min(parameters.airspeed_max, max(parameters.airspeed_min, wanted))
 
 
 @inner
@@ -626,7 +677,8 @@ def fly_as_ardupilot(
             memory.piece += 1
         leave_sharp_corners(pieces, memory, own.leg)
         demand_height(estimated, waypoints[own.leg + 1], parameters, own, NAVIGATION_TICK)
-        wanted = min(parameters.airspeed_max, max(parameters.airspeed_min, waypoints[own.leg].airspeed))
+        stated, b = waypoints[own.leg].airspeed, waypoints[own.leg + 1]
+        wanted = airspeed_target(state, estimated, stated, b, parameters, own, factor)
         memory.speed_command = wanted * factor
         update_tecs(state, estimated, parameters, own, wanted * factor, factor, NAVIGATION_TICK)
     follow_attitude(state, estimated, gains, memory, parameters, own, factor, commands, dt)

@@ -94,12 +94,26 @@ def navigate_legs(
         _fly_loiter(estimated, waypoints, b, parameters, own, length, speed, air_density_factor, dt)
         return
     own.on_circle = False
-    _follow_line(estimated, b.east, b.north, parameters, own, length, speed, dt, b.straight)
+    end_e, end_n = _end_of_leg(b, own)
+    _follow_line(estimated, end_e, end_n, parameters, own, length, speed, dt, b.straight)
     turn = _turn_angle_at(waypoints, b, own)
     if own.leg + 2 < waypoints.shape[0] and _is_leg_over(
-        estimated, b, turn, parameters, own, length, air_density_factor
+        estimated, b, end_e, end_n, turn, parameters, own, length, air_density_factor
     ):
         _begin_leg(estimated, waypoints, own.leg + 1, own)
+
+
+@inner
+def _end_of_leg(b: Record, own: Record) -> tuple[float, float]:
+    """Return east and north (m) of the leg's end, which lies beyond b if b has a pass-by distance.
+
+    `Plane::verify_nav_wp` moves the waypoint on along the leg.
+    """
+    leg_e, leg_n = b.east - own.from_east, b.north - own.from_north
+    run = math.hypot(leg_e, leg_n)
+    if b.pass_by <= 0.0 or run <= 0.0:
+        return b.east, b.north
+    return b.east + b.pass_by * leg_e / run, b.north + b.pass_by * leg_n / run
 
 
 @inner
@@ -171,25 +185,31 @@ def _begin_leg(estimated: Record, waypoints: Records, leg: int, own: Record) -> 
 def _is_leg_over(
     estimated: Record,
     b: Record,
+    end_e: float,
+    end_n: float,
     turn: float,
     parameters: Record,
     own: Record,
     length: float,
     air_density_factor: float,
 ) -> bool:
-    """Return True if the leg to b is over, because b is within the turn distance or the line across b is passed.
+    """Return True if the leg to b is over, because its end is within the turn distance or the line across it is passed.
 
+    end_e, end_n: end of the leg, m; it lies beyond b if b has a pass-by distance, and is then flown to.
     turn: of the route at b, rad.
     """
-    distance = math.hypot(b.east - estimated.east, b.north - estimated.north)
-    passed = past_line(estimated, own.from_east, own.from_north, b.east, b.north)
-    if parameters.wp_max_radius > 0.0 and distance > parameters.wp_max_radius:
-        if passed:
+    passed = past_line(estimated, own.from_east, own.from_north, end_e, end_n)
+    if (
+        parameters.wp_max_radius > 0.0
+        and math.hypot(b.east - estimated.east, b.north - estimated.north) > parameters.wp_max_radius
+    ):
+        if passed and b.pass_by <= 0.0:
             # Passed beyond WP_MAX_RADIUS: it turns back to the waypoint.
             own.from_east, own.from_north = estimated.east, estimated.north
         return False
-    if b.fly_over:
+    if b.fly_over or (b.pass_by > 0.0 and b.acceptance < 1.0):
         return passed
+    distance = math.hypot(end_e - estimated.east, end_n - estimated.north)
     reach = turn_distance(b.acceptance, turn, parameters.wp_radius, length, air_density_factor)
     return passed or distance <= reach
 
@@ -285,7 +305,7 @@ def _navigate_rtl(estimated: Record, b: Record, parameters: Record, own: Record,
 
     The aircraft turns to the center of the RTL loiter at once, from any leg; the radius grows with altitude as the
     square of the ratio of true to equivalent airspeed (`AP_L1_Control::loiter_radius`).  Until the initial climb is
-    done, bank is limited to LEVEL_ROLL_LIMIT; only then the altitude slope begins.
+    done, bank is limited to LEVEL_ROLL_LIMIT; only then the altitude slope begins, at the aircraft.
     """
     if not own.returning:
         own.returning = True

@@ -51,6 +51,7 @@ DEFINITIONS = {
     "throttle_slew": Definition("THR_SLEWRATE", 100.0, 0.0, 500.0, _PER_PERCENT),
     "glide_slope_min": Definition("GLIDE_SLOPE_MIN", 15.0, 0.0, 1000.0),
     "glide_slope_threshold": Definition("GLIDE_SLOPE_THR", 5.0, 0.0, 100.0),
+    "climb_slope_height": Definition("CLIMB_SLOPE_HGT", 20.0, 0.0, 1000.0),
     "tecs_climb_max": Definition("TECS_CLMB_MAX", 5.0, 0.1, 100.0),
     "tecs_sink_min": Definition("TECS_SINK_MIN", 2.0, 0.1, 100.0),
     "tecs_sink_max": Definition("TECS_SINK_MAX", 5.0, 0.0, 100.0),
@@ -84,7 +85,7 @@ DEFINITIONS = {
     "takeoff_ground_speed": Definition("TKOFF_THR_MINSPD", 0.0, 0.0, 100.0),
     "takeoff_rotation": Definition("TKOFF_ROTATE_SPD", 0.0, 0.0, 100.0),
     "takeoff_ground_pitch": Definition("TKOFF_GND_PITCH", 5.0, -10.0, 20.0, _RAD_PER_DEG),
-    "takeoff_level_height": Definition("TKOFF_LVL_ALT", 5.0, 0.0, 1000.0),
+    "takeoff_level_height": Definition("TKOFF_LVL_ALT", 10.0, 0.0, 1000.0),
     "takeoff_leveling": Definition("TKOFF_PLIM_SEC", 2.0, 0.0, 100.0),
     "takeoff_slew": Definition("TKOFF_THR_SLEW", 0.0, -1.0, 127.0, _PER_PERCENT),
     "takeoff_throttle": Definition("TKOFF_THR_MAX", 0.0, 0.0, 100.0, _PER_PERCENT),
@@ -126,6 +127,8 @@ DEFINITIONS = {
 }
 # Bit of FLIGHT_OPTIONS: an RTL climbs to its altitude before it turns.
 CLIMB_BEFORE_TURN = 1 << 4
+# Bit of FLIGHT_OPTIONS: every climb of a mission is a step.
+IMMEDIATE_CLIMB = 1 << 14
 # Bit of TERRAIN_FOLLOW: every mode.
 _FOLLOW_ALWAYS_BIT = 1 << 0
 # Bit of TERRAIN_FOLLOW: RTL.
@@ -195,8 +198,9 @@ class ArduPilotParameters(ParameterSet):
     airspeed_cruise, airspeed_min, airspeed_max: m/s, equivalent airspeeds.
     stall_prevention: 1 if bank is limited, and minimum airspeed raised, for the load factor; 0 if not.
     throttle_min, throttle_max, throttle_cruise: 0..1.  throttle_slew: of the throttle's range, 1/s, 0 for no limit.
-    glide_slope_min: m, a leg that climbs or sinks less is flown as a step.
+    glide_slope_min: m, a leg that climbs or sinks less is flown as a step; inf, for a parameter of 0, for every leg.
     glide_slope_threshold: m above a climbing slope at which the slope is redrawn, 0 for never.
+    climb_slope_height: m over home, up to which a climb that begins there is a step.
     tecs_climb_max, tecs_sink_min, tecs_sink_max: m/s.
     tecs_time: s.  tecs_vertical_acceleration: m/s^2.  tecs_speed_frequency: rad/s.
     tecs_roll_to_throttle: m/s of climb that a bank of 45 degrees costs.
@@ -204,7 +208,7 @@ class ArduPilotParameters(ParameterSet):
     tecs_height_demand_time: s, lag of the altitude demand.
     rtl_altitude: m over home, negative for the current altitude.  rtl_radius: m, 0 for wp_loiter_rad.
     rtl_climb_min: m that an RTL climbs before it turns.  level_roll_limit: rad, its bank limit meanwhile.
-    flight_options: bits; with bit 4 an RTL climbs to its altitude before it turns.
+    flight_options: bits; with bit 4 an RTL climbs to its altitude before it turns, with bit 14 climbs are steps.
     rally_limit: m, the nearest rally point is not flown to if it is further away; 0 for no limit.
     rally_includes_home: 1 if an RTL goes home when home is nearer than any rally point; 0 if not.
     rtl_autoland: 0 if an RTL stays in its loiter; with 1 it continues to the mission's landing sequence, with 2 it goes
@@ -233,8 +237,9 @@ class ArduPilotParameters(ParameterSet):
     fence_type: bits of the limits that its fence has: 1 and 8 altitudes, 2 a circle about home, 4 the mission's fence.
     altitude_offset: m, added to the altitudes of mission items.  soaring, quadplane, rudder_only: 1 if it soars, has
         lift motors, or steers by the rudder alone; none of these four is flown.
-    ground_speed_min: m/s, 0 for none.  airspeed_use: 1 with an airspeed sensor.  roll_rate_p to pitch_rate_ff: gains of
-        the rate controllers.  None of these is flown.
+    ground_speed_min: m/s, for which the airspeed is raised; 0 for none.
+    airspeed_use: 1 with an airspeed sensor.  roll_rate_p to pitch_rate_ff: gains of the rate controllers.  None of
+        these is flown.
     throttle_failsafe to fence_auto_enable: causes to leave the mission, and the reactions; see
         `flight.autopilots.arduplane.failsafes`.
     """
@@ -265,6 +270,7 @@ class ArduPilotParameters(ParameterSet):
     throttle_slew: float = field(init=False)
     glide_slope_min: float = field(init=False)
     glide_slope_threshold: float = field(init=False)
+    climb_slope_height: float = field(init=False)
     tecs_climb_max: float = field(init=False)
     tecs_sink_min: float = field(init=False)
     tecs_sink_max: float = field(init=False)
@@ -342,6 +348,8 @@ class ArduPilotParameters(ParameterSet):
         """Convert the values to SI."""
         for (name, definition), parameter in zip(DEFINITIONS.items(), self.values, strict=False):
             object.__setattr__(self, name, parameter.value * definition.to_si)
+        # GLIDE_SLOPE_MIN 0 disables slopes (`Plane::set_offset_altitude_location`).
+        object.__setattr__(self, "glide_slope_min", self.glide_slope_min or math.inf)
 
     @property
     def climbs_before_turn(self) -> bool:

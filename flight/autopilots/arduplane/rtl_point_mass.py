@@ -24,6 +24,7 @@ from flight.autopilots.arduplane.law import (
     PITCH_LAG,
     ROLL_LAG,
     SPEED_SUM,
+    airspeed_target,
     demand_height,
     roll_demand,
     update_tecs,
@@ -244,7 +245,7 @@ def _make_stages(
     """
     places = truncate_at_first_loiter(() if landing is None else (landing, *landing.onward))
     stages: Records = np.zeros((target is not None) + len(places), WAYPOINT)
-    stages["airspeed"] = aircraft.record.airspeed
+    stages["airspeed"], stages["min_ground_speed"] = aircraft.record.airspeed, parameters.ground_speed_min
     if target is not None:
         first = stages[0]
         first.centre_east, first.centre_north, first.up, first.circle, first.slope_base = target
@@ -272,6 +273,7 @@ def truncate_at_first_loiter(places: Sequence[LandingStart]) -> Sequence[Landing
 def fill_stage(stage: Record, landing: LandingStart, parameters: ArduPilotParameters) -> None:
     """Fill a stage with a place of a landing sequence, which is a waypoint or the center of a loiter."""
     stage.east, stage.north, stage.up = stage.centre_east, stage.centre_north, stage.up = landing.place
+    stage.pass_by, stage.home_up = landing.pass_by, landing.home_up
     # The turn to its next leg is unknown: use a right angle, as at a mission's end.
     stage.turn = 0.5 * math.pi
     stage.circle = (landing.radius or parameters.loiter_radius) if landing.circles else 0.0
@@ -495,6 +497,7 @@ def _load_stage(stages: Records, at: int, waypoints: Records, estimated: Record,
         b.east, b.north, b.turn, b.airspeed = stage.east, stage.north, stage.turn, stage.airspeed
         b.centre_east, b.centre_north, b.up, b.circle = stage.centre_east, stage.centre_north, stage.up, stage.circle
         b.returns, b.slope_base, b.straight = stage.returns, stage.slope_base, stage.straight
+        b.pass_by, b.min_ground_speed, b.home_up = stage.pass_by, stage.min_ground_speed, stage.home_up
     own.from_east, own.from_north, own.from_up = estimated.east, estimated.north, estimated.up
     if reached and not past_line(estimated, stages[at - 1].east, stages[at - 1].north, stage.east, stage.north):
         own.from_east, own.from_north, own.from_up = stages[at - 1].east, stages[at - 1].north, stages[at - 1].up
@@ -502,7 +505,7 @@ def _load_stage(stages: Records, at: int, waypoints: Records, estimated: Record,
         after, course = stages[at + 1], math.atan2(stage.east - own.from_east, stage.north - own.from_north)
         turn = abs(wrap(math.atan2(after.east - stage.east, after.north - stage.north) - course))
         waypoints[1].turn, waypoints[2].turn = turn, turn
-    own.leg, own.on_circle, own.cross_track_sum = 0, False, 0.0
+    own.leg, own.sloped_leg, own.on_circle, own.cross_track_sum = 0, 0, False, 0.0
 
 
 @inner
@@ -556,7 +559,7 @@ def _update_demands(
         # On a loiter of the mission its altitude applies at once (`Plane::update_loiter`).
         own.from_up = b.up
     demand_height(estimated, b, parameters, own, dt)
-    wanted = min(parameters.airspeed_max, max(parameters.airspeed_min, b.airspeed))
+    wanted = airspeed_target(state, estimated, b.airspeed, b, parameters, own, factor)
     _demand_throttle_and_pitch(state, estimated, parameters, own, aircraft, excess, wanted, factor, unpowered, dt)
 
 

@@ -6,10 +6,13 @@ from typing import ClassVar, Self
 
 from aircraft.catalog import Aircraft
 from flight.autopilots.arduplane.autopilot import ArduPlane
-from flight.autopilots.autopilot import StoredAutopilot
+from flight.autopilots.autopilot import MissionParts, StoredAutopilot
 from flight.autopilots.program import ProgramAutopilot, ProgramFlight
 from flight.autopilots.sitl.servos import SERVO_FILE, load_servo_map
 from flight.simulation.setup import FlightSetup
+
+# Settings that the program gets from the user's file, and flies where the control law does not.
+_FLOWN_BY_PROGRAM = ("ARSPD_USE", "RLL_RATE_P", "PTCH_RATE_P")
 
 
 @dataclass(frozen=True)
@@ -42,6 +45,11 @@ class ArduPlaneSitl(ProgramAutopilot, ArduPlane):
             load_servo_map(aircraft)
             return []
         return [f"{aircraft.folder / SERVO_FILE}: missing; --sitl needs to know what each servo moves"]
+
+    def settings_not_flown(self, mission: MissionParts) -> list[str]:
+        """Return the settings that the program does not get, or that its flight does not show."""
+        settings = super().settings_not_flown(mission)
+        return [text for text in settings if not text.startswith(_FLOWN_BY_PROGRAM)]
 
     @property
     def law(self) -> ArduPlane:

@@ -100,7 +100,11 @@ def _place_item(
     last = route.waypoints[rows[-1]]
     loiter = loiter_of(item)
     if loiter is None:
-        return _make_waypoint(item.seq, last, float(route.acceptance[rows[-1]]), origin)
+        made = _make_waypoint(item.seq, last, float(route.acceptance[rows[-1]]), origin)
+        if item.command != Command.NAV_WAYPOINT:
+            return made
+        hold, _, pass_by, yaw = (0.0 if math.isnan(value) else value for value in item.params)
+        return replace(made, params=(hold, made.params[1], pass_by, yaw))
     lat, lon = item.lat_deg, item.lon_deg
     if not item.has_position:
         centre = next(place for place in reversed(before) if place.has_position and is_navigation(place.command))

@@ -50,7 +50,7 @@ def reach(requirements: RouteRequirements, i: int) -> Reach:
 
     The mission's own radius applies, or else the autopilot's radius.  ArduPlane turns to the next leg at WP_RADIUS for
     a right angle or a sharper corner, and at a fraction of WP_RADIUS for a gentler corner.  At the mission's end, and
-    where a return to launch begins, it uses the full WP_RADIUS.
+    where a return to launch begins, up to the full WP_RADIUS is allowed.
     """
     setup, path_radius = requirements.setup, float(requirements.fly_by_offset[i]) + WAYPOINT_PASS_MARGIN_M
     mission_radius = float(setup.route.acceptance[i])

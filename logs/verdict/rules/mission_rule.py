@@ -167,6 +167,15 @@ def _unflown_findings(setup: FlightSetup) -> Iterator[Finding]:
             for item in setup.mission.items
             if item.command == C.DO_SET_HOME
         ]
+        if not setup.autopilot.reads_as_px4:
+            unflown += [
+                (
+                    item.seq,
+                    "DO_CHANGE_SPEED of ground speed: returns are judged with the autopilot's own MIN_GROUNDSPEED",
+                )
+                for item in setup.mission.items
+                if item.command == C.DO_CHANGE_SPEED and item.params[0] == 1.0
+            ]
     slopes = landing_slopes(setup.mission, setup.route, setup.scenario)
     if setup.source is None and slopes is not None and max(map(abs, slopes)) > STEEPEST_STRIP:
         steepest = f"{max(map(abs, slopes)):.1%}, and at most {STEEPEST_STRIP:.0%} can be landed on"

@@ -165,6 +165,9 @@ def _find_held_speed(
         return None
     if error > 0.0 and float(requirements.ground_speed[leg]) < MIN_GROUND_SPEED_MPS:
         return None
+    if error > 0.0 and requirements.setup.min_ground_speeds[leg + 1] > 0.0:
+        # The airspeed is raised for a minimum ground speed.
+        return None
     return _HeldSpeed(speed, allowed_error, tolerance)
 
 

@@ -28,13 +28,24 @@ def test_speeds_count_for_the_legs_after_them() -> None:
         "2 178 0 0 -1 0 0 0 0",
         wp(0, 5400),
     )
-    assert flown.airspeed.tolist() == [25.0, 22.0, 28.0, 28.0, 25.0, 25.0]
+    assert flown.airspeed.tolist() == [25.0, 22.0, 22.0, 22.0, 25.0, 25.0]
+    # Of type 1 it is the least ground speed from there on, which is left as it is by a change of airspeed.
+    assert np.array_equal(flown.min_ground_speed, [math.nan] * 3 + [28.0] * 4, equal_nan=True)
     assert flown.notes == (
         "item 5: DO_CHANGE_SPEED's throttle: ignored",
-        "item 5: DO_CHANGE_SPEED of ground speed: flown as airspeed",
+        "item 5: DO_CHANGE_SPEED of ground speed: sets MIN_GROUNDSPEED to 28 m/s",
         "item 6: DO_CHANGE_SPEED of type 2, neither airspeed nor ground speed: ignored",
         "item 12: DO_CHANGE_SPEED to 0 m/s: ignored",
     )
+
+
+def test_a_distance_to_fly_on_beyond_a_waypoint_is_flown_and_a_negative_one_leaves_the_verdict_open() -> None:
+    flown = route(wp(0, 0), wp(0, 900, p="0 0 150.9 0"), wp(900, 900, p="0 0 -50 0"), wp(900, 1800))
+    assert flown.notes == (
+        "item 2: NAV_WAYPOINT with 150 m to fly on beyond it, as ArduPlane does",
+        "item 3: NAV_WAYPOINT with -50 m to fly on beyond it: flown as 0, where ArduPlane may fly 255 m",
+    )
+    assert [one.item for one in flown.open_items] == [3]
 
 
 @pytest.mark.parametrize(

@@ -77,7 +77,11 @@ def test_why_it_goes_there_is_said() -> None:
     climb = choose_target(ReturnRules(includes_home=True), (0.0, 1500.0, 380.0), HOME, RALLY)
     told = described_return(climb, ReturnRules(climb_first=50.0), 380.0)
     assert "nearer than rally point 1, which is 2.5 km away (RALLY_INCL_HOME 1)" in told
-    assert "climbing 20 m at once to 400 m AMSL; banks no more than 5 degrees all the way" in told
+    first = "banks no more than 5 degrees before it has climbed 50 m, even above that height;"
+    assert f"climbing 20 m at once to 400 m AMSL; {first}" in told
+    assert f"sinking 500 m on a straight slope to 400 m AMSL; {first}" in described_return(
+        climb, ReturnRules(climb_first=50.0), 900.0
+    )
     assert "before it has climbed 20 m" in described_return(climb, ReturnRules(climb_first=math.inf), 380.0)
     assert "banks" not in described_return(far, ReturnRules(climb_first=math.inf), 900.0)
     # At its height already, give or take what a height is known to: how long it banks little is anybody's guess.
@@ -183,12 +187,28 @@ def test_a_climb_before_the_turn_is_a_wide_arc() -> None:
     angle = 2.0 * math.asin(math.hypot(*way[end, :2]) / (2.0 * wide))
     assert angle * wide == pytest.approx(300.0, abs=1.0)
     assert (arcs == 100.0).any()
-    # All that is missing, 200 m, is 2 km of it: most of the turn.  A height that is never reached, all of the turn.
+    # All that is missing, 200 m, is 2 km of it: most of the turn.
     assert not (laid(90.0, (0.0, 8000.0, 700.0), ReturnRules(climb_first=math.inf))[1] == 100.0).any()
-    assert not (laid(90.0, (0.0, 8000.0, 510.0), ReturnRules(climb_first=30.0))[1] == 100.0).any()
-    assert np.isclose(laid(90.0, (0.0, 8000.0, 300.0), ReturnRules(climb_first=30.0))[1], wide).any()
     # Nothing is climbed on the way down to a height that is below already.
     assert not np.isclose(laid(90.0, (0.0, 8000.0, 300.0), ReturnRules(climb_first=math.inf))[1], wide).any()
+
+
+@pytest.mark.parametrize("target", [510.0, 300.0])
+@pytest.mark.parametrize("course", [90.0, 3.0])
+def test_a_climb_before_the_turn_is_flown_to_a_lower_target_too(course: float, target: float) -> None:
+    """ArduPlane demands RTL_CLIMB_MIN and 10 m above its start (`Plane::update_alt`), and turns from there as usual."""
+    way, arcs = laid(course, (0.0, 8000.0, target), ReturnRules(climb_first=30.0))
+    flown = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(way[:, :2], axis=0).T))])
+    top = int(np.argmax(way[:, 2]))
+    assert way[top, 2] == pytest.approx(530.0, abs=0.1)
+    # 30 m at a slope of 0.1, be it within the turn or, where that is short, on the straight leg after it.
+    # The corners of an arc lie outside it, by up to 2 %.
+    assert flown[top] == pytest.approx(300.0, rel=0.02)
+    assert (arcs[top:] == 100.0).any() == (course == 90.0)
+    # From there on the slope leads down to the target.
+    middle = float(np.interp(0.5 * (flown[top] + flown[arcs == 120.0][0]), flown, way[:, 2]))
+    assert middle == pytest.approx(0.5 * (530.0 + target), abs=5.0 if target == 300.0 else 11.0)
+    assert way[-1, 2] == target
 
 
 @pytest.mark.parametrize("away", [0.0, 30.0, 119.0, 125.0, 180.0, 260.0, 400.0])

@@ -21,7 +21,11 @@ from world.wind import Wind
 
 FOLDER = Path(__file__).with_name("kept_sequences")
 FLIGHTS: dict[str, dict[str, Any]] = json.loads((FOLDER / "flights.json").read_text(encoding="utf-8"))
-PARAMETERS = {"TKOFF_THR_MINACC": 15.0, "LAND_PITCH_DEG": 3.0, "LAND_FLARE_SEC": 3.0, "TECS_LAND_ARSPD": 20.0}
+PARAMETERS = {
+    **{"TKOFF_THR_MINACC": 15.0, "LAND_PITCH_DEG": 3.0, "LAND_FLARE_SEC": 3.0, "TECS_LAND_ARSPD": 20.0},
+    # The default of the release that flew them.
+    "TKOFF_LVL_ALT": 5.0,
+}
 
 
 @functools.cache

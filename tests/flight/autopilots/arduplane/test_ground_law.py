@@ -10,6 +10,7 @@ from flight.simulation.tick import ENDS, GROUND, NO_MOTOR
 from tests.flight.autopilots.arduplane.flown_grounds import (
     FLIGHTS,
     HOME,
+    LATER_M,
     Flown,
     circuit,
     fly,
@@ -50,7 +51,7 @@ def test_take_offs_are_those_of_arduplane(flight: str) -> None:
 
 @flights
 def test_landings_are_those_of_arduplane(flight: str) -> None:
-    """Slope within 0.2 degrees, flare within 2 m and 25 m, as is asked of the law; touch-down within 6 m, 16 m of d."""
+    """Slope within 0.2 degrees, flare within 2 m and 25 m; the touch-down later by the flare that 4.6.0-dev lacked."""
     flown, real = fly_kept(flight), kept(flight, "landing")
     approach, track = flown.approach, flown.track
     glide = flown.setup.autopilot.landing_glide(
@@ -77,10 +78,10 @@ def test_landings_are_those_of_arduplane(flight: str) -> None:
     assert track.position[k, 2] - approach.point[2] == pytest.approx(glide.flare_height, abs=2.0)
     mine = approach.place(np.asarray(track.position[touch(flown)], dtype=np.float64))
     down = int(np.argmax(real["amsl_m"] - real["ground_m"] < 0.35))
-    assert float(mine[0]) == pytest.approx(along[down], abs=16.0 if flight == "d" else 6.0)
+    assert -16.0 * (flight == "d") < float(mine[0]) - along[down] < LATER_M
     assert float(mine[1]) == pytest.approx(aside[down], abs=1.0)
     rest = approach.place(np.asarray(track.position[-1], dtype=np.float64))
-    assert float(rest[0]) == pytest.approx(along[-1], abs=20.0)
+    assert -20.0 < float(rest[0]) - along[-1] < LATER_M
 
 
 def test_a_launch_below_minacc_never_gets_its_motor() -> None:
@@ -90,6 +91,17 @@ def test_a_launch_below_minacc_never_gets_its_motor() -> None:
     assert flown.flight.ended == ENDS[GROUND]
     assert flown.track.controls[:, 3].max() == 0.0
     assert flown.track.position[-1, 0] < 30.0
+
+
+def test_a_motor_that_runs_on_the_rail_climbs_at_the_highest_pitch() -> None:
+    """ArduPlane 4.6.3 (low10, g3): TECS_PITCH_MAX 15 and PTCH_TRIM_DEG 3.3, where the item states 12 and 10 degrees.
+
+    With TKOFF_THR_MINACC 15 the motor starts later, and the kept flights climb at the item's pitch.
+    """
+    for least, pitch in ((0.0, 15.0), (15.0, 10.0)):
+        track = fly(circuit(RAIL, None, wind=(0.0, 0.0), TKOFF_THR_MINACC=least)).track
+        rows = (track.time > 5.0) & (track.time < 6.0)
+        assert math.degrees(float(track.attitude[rows, 1].mean())) == pytest.approx(pitch + 3.3, abs=0.7)
 
 
 def test_a_runway_is_left_at_rotate_speed_and_the_climb_is_steep_only_then() -> None:
@@ -158,19 +170,20 @@ def test_a_throttle_without_a_limit_is_closed_at_once_in_the_flare() -> None:
     assert track.commands[down:, 3].max() == 0.0
 
 
-def test_on_a_field_lower_than_home_the_flare_balloons() -> None:
-    """ArduPlane mixes heights over home and over the field: on lower fields its flare rises (seen in three flights)."""
-    setup, rises = circuit(None, STRIP, wind=(3.0, 270.0)), []
-    for lower in (0.0, 60.0):
+def test_the_flare_is_the_same_on_a_field_lower_or_higher_than_home() -> None:
+    """Up to 4.6.2 ArduPlane mixed heights over home and over the field: its flare rose on lower fields."""
+    setup, flares = circuit(None, STRIP, wind=(3.0, 270.0)), []
+    for lower in (0.0, 60.0, -40.0):
         home = setup.mission.home
         assert home is not None
         items = tuple(replace(item, alt=item.alt - lower) for item in setup.mission.items)
         mission = replace(setup.mission, home=replace(home, alt=home.alt + lower), items=items)
         track = fly(make_ground_setup(setup.scenario, mission)).track
         flare = int(np.argmax((track.time > 60.0) & (track.position[:, 0] < 600.0) & (track.commands[:, 3] == 0.0)))
-        rises.append(float(track.position[flare:, 2].max() - track.position[flare, 2]))
-    assert rises[0] < 0.5
-    assert rises[1] > 3.0
+        flares.append(track.position[flare : flare + 300, 2])
+    assert flares[0].max() - flares[0][0] < 0.5
+    for other in flares[1:]:
+        assert np.abs(other - flares[0]).max() < 0.1
 
 
 def test_home_is_where_kept_flights_began() -> None:

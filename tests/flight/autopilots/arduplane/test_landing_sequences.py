@@ -10,7 +10,7 @@ from flight.autopilots.arduplane.rtl_point_mass import RETURN_GROUND_IMPACT, RET
 from flight.mission.ground_ways import Approach
 from flight.mission.placing import landing_sequence
 from logs.verdict.returns.judge_returns import return_world
-from tests.flight.autopilots.arduplane.flown_grounds import Flown
+from tests.flight.autopilots.arduplane.flown_grounds import LATER_M, Flown
 from tests.flight.autopilots.arduplane.kept_sequences import flown_sequence, kept_sequence, kept_setup
 from world.arrays import Floats
 from world.kernels import Records
@@ -46,7 +46,7 @@ def test_returns_go_on_to_the_landing_as_arduplane_does(flight: str) -> None:
 
 @returns
 def test_returns_touch_down_where_arduplane_does(flight: str) -> None:
-    """Touch-down within 6 m, slope within 0.2 degrees."""
+    """Slope within 0.2 degrees, and the touch-down later by the flare that 4.6.0-dev lacked on a field above home."""
     flown, real = flown_sequence(flight), kept_sequence(flight)
     approach, track = flown.approach, flown.track
     there = np.stack([real["east_m"], real["north_m"]], axis=1)
@@ -54,7 +54,7 @@ def test_returns_touch_down_where_arduplane_does(flight: str) -> None:
     down = int(np.argmax((real["amsl_m"] - real["ground_m"] < 0.35) & (along > -200.0)))
     touched = int(np.argmax((track.time > 60.0) & (track.clearance < track.clearance[-1] + 0.02)))
     mine = approach.place(np.asarray(track.position[touched], dtype=np.float64))
-    assert float(mine[0]) == pytest.approx(along[down], abs=6.0)
+    assert 0.0 < float(mine[0]) - along[down] < LATER_M
     assert float(mine[1]) == pytest.approx(aside[down], abs=1.0)
     slopes = [
         on_glide(approach, there, real["amsl_m"]),

@@ -17,6 +17,7 @@ from flight.autopilots.arduplane.law import (
     AIRSPEED_READING,
     ARDUPILOT_MEMORY,
     ROLL_LAG,
+    airspeed_target,
     demand_height,
     follow_attitude,
     roll_demand,
@@ -45,7 +46,9 @@ def test_a_fresh_memory_is_on_the_first_leg_and_has_flown_nothing() -> None:
 
 def test_counts_are_whole_and_all_else_are_numbers() -> None:
     kinds = {name: ARDUPILOT_MEMORY[name] for name in field_names(ARDUPILOT_MEMORY)}
-    assert {name for name, kind in kinds.items() if kind == np.int64} == {"leg", "held", "left_for", "ground_leg"}
+    assert {name for name, kind in kinds.items() if kind == np.int64} == {
+        *("leg", "held", "left_for", "ground_leg", "sloped_leg"),
+    }
     truths = {name for name, kind in kinds.items() if kind == np.bool_}
     assert truths == {
         "begun",
@@ -84,7 +87,43 @@ def test_small_changes_of_height_are_steps_and_others_slopes(rise: float, expect
 def test_the_least_slope_is_glide_slope_min() -> None:
     assert demanded(memory(), 500.0, 520.0, GLIDE_SLOPE_MIN=21.0) == 520.0
     assert demanded(memory(), 500.0, 520.0, GLIDE_SLOPE_MIN=19.0) == pytest.approx(510.0)
-    assert demanded(memory(), 500.0, 504.0, GLIDE_SLOPE_MIN=0.0) == pytest.approx(502.0)
+    # 0 disables slopes (`Plane::set_offset_altitude_location`).
+    assert demanded(memory(), 500.0, 600.0, GLIDE_SLOPE_MIN=0.0) == 600.0
+    assert demanded(memory(), 500.0, 400.0, GLIDE_SLOPE_MIN=0.0) == 400.0
+
+
+@pytest.mark.parametrize(
+    ("over_home", "end", "options", "expected"),
+    [
+        (20.0, 600.0, 0, 600.0),  # a climb that begins at 20 m over home or below is a step
+        (20.1, 600.0, 0, 550.0),
+        (-30.0, 600.0, 0, 600.0),  # also below home
+        (20.0, 400.0, 0, 450.0),  # a descent is a slope from any height
+        (100.0, 600.0, 1 << 14, 600.0),  # FLIGHT_OPTIONS bit 14: every climb
+        (100.0, 600.0, 1 << 13, 550.0),
+        (100.0, 400.0, 1 << 14, 450.0),
+        (math.nan, 600.0, 0, 550.0),  # no home is known
+    ],
+)
+def test_a_climb_that_begins_low_over_home_is_a_step(
+    over_home: float, end: float, options: int, expected: float
+) -> None:
+    """`Plane::setup_glide_slope`; what applies at the leg's begin applies to all of it."""
+    own = memory()
+    (b,) = waypoints((0, 1000, end), home_up=500.0 - over_home)
+    made = parameters(FLIGHT_OPTIONS=float(options), GLIDE_SLOPE_THR=0.0)
+    for north, up in ((0.0, 500.0), (500.0, 540.0)):
+        demand_height(flying(0.0, north, up), b, made, own, DT)
+    assert own.height_asked == pytest.approx(expected)
+
+
+def test_each_leg_is_a_step_or_a_slope_by_the_height_at_its_own_begin() -> None:
+    own, made = memory(), parameters()
+    for leg, over_home, expected in ((0, 10.0, 600.0), (1, 30.0, 550.0)):
+        own.leg, own.from_up = leg, 500.0
+        (b,) = waypoints((0, 1000, 600.0), home_up=500.0 - over_home)
+        demand_height(flying(0.0, 500.0, 500.0), b, made, own, DT)
+        assert own.height_asked == pytest.approx(expected)
 
 
 def test_before_and_past_a_leg_its_ends_heights_hold() -> None:
@@ -359,6 +398,37 @@ KEPT: list[dict[str, Any]] = json.loads(
 @pytest.fixture(scope="module")
 def usual(aerosonde: Aircraft) -> ArduPilotParameters:
     return ArduPilotParameters.load(aerosonde)
+
+
+@pytest.mark.parametrize(
+    ("least", "ground", "before", "target"),
+    [
+        (0.0, 10.0, 0.0, 25.0),  # no minimum
+        (18.0, 18.4, 0.0, 25.0),  # fast enough
+        (18.0, 17.4, 0.0, 26.0),  # 0.6 m/s are missing: in whole m/s, 1
+        (18.0, 17.6, 0.0, 25.0),
+        (18.0, 14.6, 0.0, 28.0),
+        (18.0, 15.6, 3.0, 28.0),  # 2 are missing: the rise of 3 falls by 1.2 or more, or not
+        (18.0, 16.6, 3.0, 26.0),
+        (18.0, 5.0, 0.0, 32.0),  # AIRSPEED_MAX
+    ],
+)
+def test_the_airspeed_is_raised_for_a_minimum_ground_speed(
+    least: float, ground: float, before: float, target: float
+) -> None:
+    """At 25 m/s through the air, northwards (`Plane::calc_airspeed_errors` of 4.6.3)."""
+    own = memory(airspeed_read=25.0, ground_speed_rise=before)
+    here = record(MOTION, velocity_north=ground, velocity_east=9.0)
+    way = waypoints((0, 0, 500), (0, 5000, 500), min_ground_speed=least)
+    made = airspeed_target(state(), here, 25.0, way[1], parameters(AIRSPEED_MAX=32.0), own, 1.0)
+    assert made == pytest.approx(target)
+
+
+def test_what_the_ground_speed_lacks_is_an_equivalent_airspeed() -> None:
+    # 27.5 m/s of true airspeed are 25 at 1.1: 4.4 m/s over the ground are 4 of equivalent airspeed.
+    own, here = memory(airspeed_read=27.5), record(MOTION, velocity_north=13.6)
+    way = waypoints((0, 0, 500), (0, 5000, 500), min_ground_speed=18.0)
+    assert airspeed_target(state(), here, 25.0, way[1], parameters(AIRSPEED_MAX=32.0), own, 1.1) == pytest.approx(29.0)
 
 
 def test_it_holds_an_equivalent_airspeed(

@@ -14,9 +14,9 @@ from world.kernels import Record
 DT = 0.1
 
 
-def asked(own: Record, north: float, up: float, above: float = 100.0, **values: float) -> float:
+def asked(own: Record, north: float, up: float, above: float = 100.0, home: float = math.nan, **values: float) -> float:
     """Return the altitude that a leg of 1,000 m to a height above ground asks for, m AMSL."""
-    (b,) = waypoints((0, 1000, 0), over_ground=True, above_ground=above)
+    (b,) = waypoints((0, 1000, 0), over_ground=True, above_ground=above, home_up=home)
     demand_height(flying(0.0, north, up), b, parameters(**values), own, DT)
     return float(own.height_asked)
 
@@ -35,6 +35,13 @@ def test_a_change_below_glide_slope_min_is_a_step_and_any_other_a_slope(above: f
     own = memory(ground=400.0)
     asked(own, 0.0, 500.0, above)
     assert asked(own, 500.0, 500.0, above) == pytest.approx(expected)
+
+
+@pytest.mark.parametrize(("home", "expected"), [(480.0, 600.0), (479.0, 550.0)])
+def test_a_climb_that_begins_low_over_home_is_a_step(home: float, expected: float) -> None:
+    own = memory(ground=400.0)
+    asked(own, 0.0, 500.0, 200.0, home)
+    assert asked(own, 500.0, 500.0, 200.0, home) == pytest.approx(expected)
 
 
 def test_a_descent_leaves_out_what_it_descends_of_the_rise_ahead() -> None:

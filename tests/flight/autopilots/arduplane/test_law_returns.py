@@ -4,6 +4,7 @@ Every eighth of them, one that hits the ground among them; all with PLANFLY_SOAK
 """
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -152,15 +153,34 @@ def test_it_banks_little_before_it_has_climbed_what_it_has_to() -> None:
     assert navigated(own, flying(up=549.9), way, RTL_CLIMB_MIN=50.0).side_acceleration == pytest.approx(most)
     assert navigated(own, flying(up=550.1), way, RTL_CLIMB_MIN=50.0).climbed
     assert navigated(own, flying(up=550.1), way, RTL_CLIMB_MIN=50.0).side_acceleration > most
-    # Above its target it does so too, and then it never has.
+    # Above its target it does so too, and turns normally from there.
     low = navigated(memory(), flying(up=500.0), back(100.0), RTL_CLIMB_MIN=50.0)
     assert low.side_acceleration == pytest.approx(most)
+    assert navigated(low, flying(up=550.1), back(100.0), RTL_CLIMB_MIN=50.0).side_acceleration > most
     # Bit 4 of FLIGHT_OPTIONS: up to the target's height, whatever RTL_CLIMB_MIN says.
     bit4 = {"FLIGHT_OPTIONS": 16.0, "RTL_CLIMB_MIN": 50.0}
     own = navigated(memory(), flying(up=699.0), way, **bit4)
     assert own.side_acceleration == pytest.approx(most)
     assert navigated(own, flying(up=700.5), way, **bit4).side_acceleration > most
     assert navigated(memory(), flying(up=710.0), way, FLIGHT_OPTIONS=8.0 + 32.0).side_acceleration > most
+
+
+@pytest.mark.parametrize(
+    ("target", "values", "demand"),
+    [
+        (100.0, {"RTL_CLIMB_MIN": 30.0}, 500.0 + 30.0 + 10.0),
+        (700.0, {"RTL_CLIMB_MIN": 30.0}, 700.0 + 30.0 + 10.0),
+        (700.0, {"FLIGHT_OPTIONS": 16.0}, 700.0 + 10.0),
+        (700.0, {"FLIGHT_OPTIONS": 16.0, "RTL_CLIMB_MIN": 30.0}, 700.0 + 30.0 + 10.0),
+        (100.0, {"FLIGHT_OPTIONS": 16.0}, 500.0),  # above its target already: on the slope
+    ],
+)
+def test_before_its_turn_it_demands_the_climb_above_start_and_target(
+    target: float, values: dict[str, float], demand: float
+) -> None:
+    """`Plane::update_alt` adds RTL_CLIMB_MIN and 10 m to the higher of the target and the altitude at the start."""
+    way, here = back(target), flying(up=500.0)
+    assert asked(navigated(memory(), here, way, **values), here, way, **values) == pytest.approx(demand)
 
 
 def test_the_slope_begins_where_the_climb_has_ended() -> None:
@@ -173,7 +193,7 @@ def test_the_slope_begins_where_the_climb_has_ended() -> None:
 def test_a_return_is_flown_in_one_leg_at_the_cruise_speed() -> None:
     setup = return_setup("rtl-def-00")
     records = waypoint_records(setup.route)
-    # It begins as early as at a right angle, the mission's end.
+    # It begins as early as at a right angle, the mission's end, if no item says where.
     assert records["turn"][1] == pytest.approx(0.5 * math.pi)
     assert records["returns"].tolist() == [False, False, *[True] * (len(records) - 2)]
     assert set(records["centre_east"][2:].round()) == {9500.0}
@@ -181,6 +201,23 @@ def test_a_return_is_flown_in_one_leg_at_the_cruise_speed() -> None:
     assert (setup.route.airspeed[1:] == setup.airspeed).all()
     own = memory(leg=0)
     assert navigated(own, flying(EAST, NORTH), back(100.0)).leg == 0
+
+
+def test_the_turn_before_a_return_is_one_to_0_north_0_east() -> None:
+    """At r1's last waypoint, 36.28° N 84.10° W, ArduPlane 4.6.3 on a course of 126.3° turned 12.5 m before it.
+
+    The bearing to 0° N 0° E is atan2(84.10, -36.27 / cos 18.14°) = 114.4°: 11.9 of 90 degrees of 90 m, and 7 % for the
+    height's air density, are 12.7 m.
+    """
+    setup = return_setup("rtl-def-00")
+    seq = int(setup.route.items[1])
+    (item,) = (one for one in setup.mission.items if one.seq == seq)
+    item = replace(item, lat_deg=36.2712892, lon_deg=-84.1011091)
+    for course, turn in ((126.3, 11.9), (114.4, 0.0), (24.0, 90.4), (-65.6, 180.0)):
+        way = np.array(setup.route.waypoints)
+        way[0] = way[1] - 900.0 * np.array([math.sin(math.radians(course)), math.cos(math.radians(course)), 0.0])
+        records = waypoint_records(replace(setup.route, waypoints=way), replace(setup.mission, items=(item,)))
+        assert math.degrees(records["turn"][1]) == pytest.approx(turn, abs=0.1)
 
 
 def test_the_parameters_decide_where_it_goes_and_how_high() -> None:

@@ -49,6 +49,33 @@ def test_it_turns_within_a_stated_acceptance(north: float, leg: int) -> None:
     assert own.leg == leg
 
 
+@pytest.mark.parametrize(
+    ("acceptance", "north", "leg"),
+    [
+        (0.0, 1149.0, 0),  # no turn distance: to the line across the point 150 m beyond the waypoint
+        (0.0, 1151.0, 1),
+        (0.9, 1149.0, 0),  # less than a metre is none
+        (20.0, 1129.0, 0),  # a stated acceptance applies to that point
+        (20.0, 1131.0, 1),
+    ],
+)
+def test_it_flies_on_beyond_a_waypoint_by_its_pass_by_distance(acceptance: float, north: float, leg: int) -> None:
+    """`Plane::verify_nav_wp` moves the waypoint on along the leg, and the next leg still begins at the waypoint."""
+    way = waypoints((0, 0, 500), (0, 1000, 500), (1000, 1000, 500), turn=RIGHT_ANGLE, acceptance=acceptance)
+    way["pass_by"] = 150.0
+    own = memory()
+    navigate_legs(flying(0.0, north), way, parameters(), own, 1.0, 0.1)
+    assert (own.leg, own.from_north) == (leg, 1000.0 * leg)
+
+
+def test_a_pass_by_beyond_the_greatest_radius_is_flown_on_along_the_leg() -> None:
+    # WP_MAX_RADIUS applies to the waypoint: 160 m beyond it the leg goes on, and its line stays.
+    way = waypoints((0, 0, 500), (0, 1000, 500), (1000, 1000, 500), turn=RIGHT_ANGLE, pass_by=150.0)
+    own = memory()
+    navigate_legs(flying(0.0, 1160.0), way, parameters(WP_MAX_RADIUS=100.0), own, 1.0, 0.1)
+    assert (own.leg, own.from_north) == (0, 0.0)
+
+
 def test_past_the_line_across_a_waypoint_the_leg_is_over() -> None:
     way = waypoints((0, 0, 500), (0, 1000, 500), (1000, 1000, 500), turn=RIGHT_ANGLE)
     assert past_line(flying(300.0, 1000.1), 0.0, 0.0, 0.0, 1000.0)

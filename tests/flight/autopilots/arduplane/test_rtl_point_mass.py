@@ -28,9 +28,10 @@ from world.kernels import Records, read_only
 from world.wind import Wind
 
 # Law less flight of ArduPlane, where the least clearance before the circle is compared, m (issue 35).
-CLEARANCE = {"default": (-5.0, 5.0), "climbs": (-13.0, 8.0), "rally": (-10.0, 10.0)}
-# Point mass against the whole law in JSBSim, m: of the one flight that climbs first they are 10.0 m apart, the law
-# 4.3 m below ArduPlane's flight and the point mass 5.7 m above it.
+# Of the flight that climbs to RTL_ALTITUDE first, 330 m above ground, the point mass is 8.6 m above ArduPlane's flight
+# and the law 1.4 m below it.
+CLEARANCE = {"default": (-5.0, 5.0), "climbs": (-13.0, 9.0), "rally": (-10.0, 10.0)}
+# Point mass against the whole law in JSBSim, m.
 APART = {"default": 3.0, "climbs": 11.0, "rally": 3.0}
 ASIDE, HEIGHT, ARRIVAL = 80.0, 20.0, 4.0
 

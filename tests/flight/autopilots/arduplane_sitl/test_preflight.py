@@ -1,5 +1,6 @@
 """What an autopilot gets of a mission: places above the sea, jumps to where they lead, and one place more."""
 
+import math
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
@@ -75,6 +76,16 @@ def test_places_are_above_the_sea_and_one_more_is_straight_on() -> None:
 def test_an_acceptance_radius_goes_with_its_waypoint() -> None:
     setup = setup_of(place(1, 0.0), place(2, 900.0, params=(0.0, 35.0, 0.0, 0.0)), place(3, 1900.0))
     assert [item.params[1] for item in uploaded_mission(setup).items] == [0.0, 35.0, 0.0, 0.0]
+
+
+def test_a_waypoint_is_uploaded_with_what_its_file_says() -> None:
+    """Its time to hold, the distance to fly on beyond it, and its yaw; only a NaN becomes 0."""
+    stated = (5.0, 35.0, 150.0, math.nan)
+    setup = setup_of(place(1, 0.0), place(2, 900.0, params=stated), place(3, 1900.0, params=(0.0, 0.0, -40.0, 90.0)))
+    assert [item.params for item in uploaded_mission(setup).items[1:3]] == [
+        (5.0, 35.0, 150.0, 0.0),
+        (0.0, 0.0, -40.0, 90.0),
+    ]
 
 
 def test_what_cannot_be_in_the_air_is_a_waypoint_where_the_route_has_it() -> None:

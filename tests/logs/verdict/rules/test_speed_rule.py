@@ -144,6 +144,17 @@ def test_a_commanded_speed_that_is_not_held_fails(setup: FlightSetup) -> None:
     assert item.margin == pytest.approx(-1.5, abs=0.01)
 
 
+def test_a_speed_that_is_raised_for_a_minimum_ground_speed_is_held() -> None:
+    """33 m/s instead of 25 on legs with a minimum ground speed, by the mission or MIN_GROUNDSPEED; 17 are too slow."""
+    plain = make_setup(STRAIGHT)
+    law = ArduPlane(ArduPilotParameters.defaults().changed(AIRSPEED_MAX=40.0, MIN_GROUNDSPEED=20.0))
+    by_mission = replace(plain, route=replace(plain.route, min_ground_speed=np.full(3, 20.0)))
+    for setup, fast in ((plain, False), (by_mission, True), (replace(plain, autopilot=law), True)):
+        for off, ok in ((8.0, fast), (-8.0, False)):
+            track = fly_path(setup, airspeed=lambda s, off=off: 0.0 * s + off)
+            assert of(judge(setup, track), "speed", leg(0)).ok is ok
+
+
 def test_a_speed_that_is_taken_up_late_is_held() -> None:
     """The second half of a leg counts: 8 m/s too slow over the first 1,300 m of 3,000 are over by then."""
     setup = make_setup(STRAIGHT)
