@@ -69,7 +69,7 @@ class FigureEntry:
     view: function that builds its description; None if there is nothing to draw.
     alternative: text for readers who cannot see it.
     caption: explanation of the figure.
-    file: True if the figure is also written as a file.
+    still: True if the page embeds the figure as a picture too, for readers without scripts.
     """
 
     name: str
@@ -77,7 +77,7 @@ class FigureEntry:
     view: Callable[[Subject], View | None]
     alternative: Callable[[Subject], str]
     caption: Callable[[Subject], str]
-    file: bool = True
+    still: bool = False
 
 
 def _paths(subject: Subject) -> dict[str, Any]:
@@ -153,6 +153,7 @@ FIGURES = (
         _map,
         alternative=lambda subject: f"Map, north up: {subject.things}",
         caption=_map_caption,
+        still=True,
     ),
     FigureEntry(
         "profile",
@@ -169,6 +170,7 @@ FIGURES = (
             + "A sphere is cut where the path runs through its column of air; the path is within reach only where its "
             "line lies inside the cut."
         ),
+        still=True,
     ),
     FigureEntry(
         "scene",
@@ -197,7 +199,6 @@ FIGURES = (
         "returns",
         "Returns to launch",
         _of_returns("returns"),
-        file=False,
         alternative=_text(
             "Map, north up: the route coloured by the outcome of a return from there, and the worst returns."
         ),
@@ -210,7 +211,6 @@ FIGURES = (
         "worst-returns",
         "The worst returns",
         _of_returns("worst-returns"),
-        file=False,
         alternative=_text("Heights along the worst returns: terrain, required clearance and spheres."),
         caption=_text(
             "Simulated with ArduPlane's laws on a point mass, in the mean wind, from the place where each "
@@ -221,7 +221,6 @@ FIGURES = (
         "return-heights",
         "Called home, or without an engine",
         _of_returns("return-heights"),
-        file=False,
         alternative=_text(
             "Over time: the flight's height by what comes of a return, the least height from which one is safe, and "
             "the height that a glide without the engine has left over."
@@ -237,7 +236,6 @@ FIGURES = (
         "glide",
         "Without its engine",
         _of_returns("glide"),
-        file=False,
         alternative=_text(
             "Map, north up: the lowest height from which a glide reaches home, flat ground, and the route coloured "
             "by what can be reached from there."
@@ -253,7 +251,6 @@ FIGURES = (
         "survey",
         "Photo lines",
         _of_flight(survey_chart),
-        file=False,
         alternative=_text(
             "Each survey's photo lines from above, laid level: what can be used, what is lost, and the flown track."
         ),
@@ -266,7 +263,6 @@ FIGURES = (
         "time",
         "Over time",
         _of_flight(time_chart),
-        file=False,
         alternative=_text(
             "Plots over time: airspeed, bank, load factor, cross-track error, height error, height above ground."
         ),
@@ -279,7 +275,6 @@ FIGURES = (
         "exposure",
         "Exposure",
         _of_flight(exposure_chart),
-        file=False,
         alternative=_text(
             "Plots along the flown distance: strength and sum of the exposure to missiles and to radars."
         ),
@@ -292,7 +287,6 @@ FIGURES = (
         "controls",
         "Controls",
         _of_flight(control_chart),
-        file=False,
         alternative=_text(
             "Plots over time: elevator, aileron, rudder and throttle, commanded and as they stood, with their limits."
         ),
@@ -302,7 +296,6 @@ FIGURES = (
         "energy",
         "Energy",
         _of_flight(energy_chart),
-        file=False,
         alternative=_text(
             "Plots over time: battery energy used, power, current, and the aircraft's energy as a height."
         ),
@@ -364,25 +357,19 @@ def view_json(view: View) -> dict[str, Any]:
 
 
 def draw_figures(setup: FlightSetup, track: Track | None, verdict: Verdict) -> dict[str, "Figure"]:
-    """Draw all figures by name, figures with a file first; figures without data are left out."""
-    views = figure_views(subject_of(setup, track, verdict))
-    order = sorted(FIGURES, key=lambda entry: not entry.file)
-    return {entry.name: draw(views[entry.name]) for entry in order if entry.name in views}
+    """Draw all figures by name; figures without data are left out."""
+    return {name: draw(view) for name, view in figure_views(subject_of(setup, track, verdict)).items()}
 
 
 def draw_pictures(views: Mapping[str, View], *, svg: bool = False) -> dict[str, bytes]:
     """Render figures, each 1500 px wide: file names (`map.png`) and bytes.
 
-    svg: True to render the figures with a file as `map.svg` and so on, too.
+    svg: True to render each figure as SVG (`map.svg`), too.
     """
     from logs.views.drawing import png_bytes, svg_bytes
 
     figures = {name: draw(view) for name, view in views.items()}
     found = {f"{name}.png": png_bytes(figure) for name, figure in figures.items()}
     if svg:
-        found |= {
-            f"{entry.name}.svg": svg_bytes(figures[entry.name])
-            for entry in FIGURES
-            if entry.file and entry.name in figures
-        }
+        found |= {f"{name}.svg": svg_bytes(figure) for name, figure in figures.items()}
     return found

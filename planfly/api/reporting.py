@@ -84,15 +84,17 @@ def report(
     source: Source,
     out: str | Path,
     *,
+    pictures: bool = False,
     svg: bool = False,
     overwrite: bool = False,
     command: str = "planfly.report",
 ) -> WrittenReport:
-    """Write ``report.html`` and its figures into a folder, which is made if it is missing.
+    """Write ``report.html``, ``map.png`` and ``profile.png`` into a folder, which is made if it is missing.
 
     source: see `planfly.figures`.
     out: the folder.
-    svg: True also writes the figures as SVG.
+    pictures: True writes every figure of the page as PNG.
+    svg: True also writes the same figures as SVG.
     overwrite: True replaces results in the folder.
     command: the command line that repeats the report, shown on the page.
     Raises a `planfly.PlanflyError` for bad input, and without `overwrite` for a folder that is not empty.
@@ -101,7 +103,7 @@ def report(
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     written = planfly.report(planfly.plan("tight", seed=1), folder)
     >>> written.page.name, len(written.files)
-    ('report.html', 6)
+    ('report.html', 3)
     """
     from logs.recording.setup_attachments import package_versions
     from logs.views.report.page import write_report
@@ -116,6 +118,7 @@ def report(
             content.verdict,
             ended=content.ended,
             events=content.events,
+            every_picture=pictures,
             svg=svg,
             versions=content.versions or package_versions(),
             command=command,

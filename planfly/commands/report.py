@@ -23,11 +23,12 @@ def report_options(line: LineParser) -> None:
     """Add the parser of ``planfly report``."""
     parser = line.command(
         "report",
-        "draw the figures and write report.html from a log, or write the layout for Foxglove",
-        "planfly report flight.mcap --out report --svg",
+        "write report.html, map.png and profile.png from a log, or write the layout for Foxglove",
+        "planfly report flight.mcap --out report --pictures",
     )
     with_completer(parser.add_argument("log", metavar="LOG.mcap", nargs="?", help="a flight log"), files("mcap"))
-    parser.add_argument("--svg", action="store_true", help="also write the figures as SVG")
+    parser.add_argument("--pictures", action="store_true", help="write every figure of the page as PNG")
+    parser.add_argument("--svg", action="store_true", help="also write the same figures as SVG")
     parser.add_argument("--layout", metavar="FILE", help="write only the layout file for Foxglove")
     result_options(parser, "folder for the files (default: <log>-report next to the log; an existing one is replaced)")
 
@@ -44,6 +45,7 @@ def report(args: argparse.Namespace) -> int:
     written = planfly.report(
         log,
         args.out or source.with_name(f"{source.stem}-report"),
+        pictures=args.pictures,
         svg=args.svg,
         overwrite=args.overwrite or args.out is None,
         command=f"planfly report {args.log}",

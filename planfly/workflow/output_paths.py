@@ -25,15 +25,15 @@ RUN_FILES = (
     "verdict.json",
     "map.png",
     "profile.png",
-    "scene.png",
-    "turns.png",
-    "envelope.png",
     "report.html",
 )
-# Names of the figures of a report.
-_FIGURES = ("map", "profile", "scene", "turns", "envelope")
-# Files of a report and a comparison, including figures as SVG.
-LOG_FIGURES = ("report.html", *(f"{name}.{kind}" for name in _FIGURES for kind in ("png", "svg")))
+# Names of the figures of a report, as in `logs.views.figures.FIGURES`.
+REPORT_FIGURES = (
+    *("map", "profile", "scene", "turns", "returns", "worst-returns", "return-heights", "glide", "survey"),
+    *("time", "exposure", "controls", "energy", "envelope"),
+)
+# Files of a report, including all figures as PNG and SVG.
+LOG_FIGURES = ("report.html", *(f"{name}.{kind}" for name in REPORT_FIGURES for kind in ("png", "svg")))
 # Files of `planfly.compare`.
 COMPARE_FILES = (
     *(f"compare-{name}.{kind}" for kind in ("png", "svg") for name in ("map", "profile")),
@@ -96,8 +96,10 @@ def prepare_folder(folder: Path, files: tuple[str, ...] = RUN_FILES) -> None:
     rounds = sorted(folder.glob("round-[0-9]*")) if files is RUN_FILES else []
     if files is RUN_FILES:
         (folder / "rounds.json").unlink(missing_ok=True)
+    # Pictures that `planfly report --pictures` drew of an earlier run are old, too.
+    pictures = [f"{name}.png" for name in REPORT_FIGURES] if files is RUN_FILES else []
     for directory in (folder, *rounds):
-        for name in files:
+        for name in (*files, *pictures):
             (directory / name).unlink(missing_ok=True)
         if directory != folder and not any(directory.iterdir()):
             directory.rmdir()

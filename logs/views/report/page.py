@@ -1,14 +1,15 @@
 """Write the report of a flight: one self-contained HTML page, and its pictures as files.
 
-The page contains its pictures, style, data and two scripts (its own and plotly.js), which its policy lists by hash; it
-makes no network requests.  Without scripts and on paper, still pictures replace the 3-D view and the charts.
+The page contains its data, style and two scripts (its own and plotly.js), which its policy lists by hash; it makes no
+network requests.  It prints its charts and its 3-D view as they are drawn.  Without scripts it shows the map and the
+profile as pictures.
 """
 
 import base64
 import gzip
 import hashlib
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from importlib import resources
@@ -52,7 +53,7 @@ class ReportPicture:
     title: its heading.
     alternative: text for readers who cannot see it.
     caption: explanation of the picture.
-    data: its data URL in the page.
+    data: the still picture as a data URL; "" if the figure has none.
     """
 
     identifier: str
@@ -62,10 +63,10 @@ class ReportPicture:
     data: str
 
 
-def report_pictures(subject: Subject, pictures: Mapping[str, bytes]) -> list[ReportPicture]:
-    """List the pictures in the order of the page; pictures that were not drawn are left out.
+def report_pictures(subject: Subject, names: Collection[str], stills: Mapping[str, bytes]) -> list[ReportPicture]:
+    """List the figures with these names in the order of the page.
 
-    pictures: PNG bytes by file name.
+    stills: PNG bytes of still pictures, by file name.
     """
     return [
         ReportPicture(
@@ -73,10 +74,10 @@ def report_pictures(subject: Subject, pictures: Mapping[str, bytes]) -> list[Rep
             title=entry.title,
             alternative=entry.alternative(subject),
             caption=entry.caption(subject),
-            data=picture_address(pictures[f"{entry.name}.png"]),
+            data=picture_address(stills[f"{entry.name}.png"]) if entry.still else "",
         )
         for entry in FIGURES
-        if f"{entry.name}.png" in pictures
+        if entry.name in names
     ]
 
 
@@ -205,17 +206,19 @@ def write_report(
     versions: Mapping[str, str],
     command: str,
     events: Sequence["LogEvent"] = (),
+    every_picture: bool = False,
     svg: bool = False,
     returns: DrawnReturns | None = None,
 ) -> list[Path]:
-    """Write the files of `logs.views.figures.FIGURES` and ``report.html`` into a folder, created if missing.
+    """Write ``report.html``, ``map.png`` and ``profile.png`` into a folder, created if missing.
 
     track: None for a plan that was not flown.
     ended: how the flight ended, as in its log; None if unknown.
     versions: versions of planfly and the packages it depends on.
     command: the command line that repeats the flight.
     events: lines of the log, shown with their times.
-    svg: True to write the figures as SVG, too.
+    every_picture: True to write every figure of `logs.views.figures.FIGURES` as PNG.
+    svg: True to write the same figures as SVG, too.
     returns: returns of the flight or the plan; None to draw none.
 
     Everything is drawn before the first file is written; each file is written whole or not at all.
@@ -230,17 +233,16 @@ def write_report(
     ...         Path(folder), setup, None, judge_geometry(setup), ended=None, versions={}, command="planfly check"
     ...     )
     >>> [path.name for path in paths]
-    ['map.png', 'profile.png', 'scene.png', 'turns.png', 'envelope.png', 'report.html']
+    ['map.png', 'profile.png', 'report.html']
     """
     track = None if track is None or not len(track) else with_legs(track, verdict.leg_ends)
     subject = subject_of(setup, track, verdict, returns)
     views = figure_views(subject)
-    pictures = figures.draw_pictures(views, svg=svg)
+    drawn = {entry.name for entry in FIGURES if every_picture or entry.still}
+    pictures = figures.draw_pictures({name: view for name, view in views.items() if name in drawn}, svg=svg)
     page = _page(setup, subject, views, pictures, ended=ended, versions=versions, command=command, events=events)
     out_dir.mkdir(parents=True, exist_ok=True)
-    as_files = {f"{entry.name}.{kind}" for entry in FIGURES if entry.file for kind in ("png", "svg")}
-    files = {name: data for name, data in pictures.items() if name in as_files}
-    files["report.html"] = page.encode("utf-8")
+    files = {**pictures, "report.html": page.encode("utf-8")}
     for name, data in files.items():
         write_whole(out_dir / name, data)
     return [out_dir / name for name in files]
@@ -260,7 +262,7 @@ def _page(
     track, verdict = subject.track, subject.verdict
     failed = failures(verdict, len(setup.route.waypoints))
     rows = finding_rows(verdict.findings, verdict.deciding)
-    shown = report_pictures(subject, pictures)
+    shown = report_pictures(subject, page_charts(views), pictures)
     failing, lines, badge = failed_groups(verdict), verdict.lines or ("",), badge_of(verdict)
     return page_template("report.html").render(
         name=setup.scenario.name,
@@ -313,10 +315,7 @@ def _page_data(setup: FlightSetup, track: Track | None, views: Mapping[str, View
 
 
 def page_charts(views: Mapping[str, View]) -> dict[str, Any]:
-    """Return the charts that the scripts draw, by name of the figure.
-
-    A chart without panels stays a picture.
-    """
+    """Return the charts that the scripts draw, by name of the figure; charts without panels are left out."""
     return {name: view_json(view) for name, view in views.items() if not isinstance(view, Chart) or view.panels}
 
 

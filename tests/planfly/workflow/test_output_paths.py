@@ -4,7 +4,9 @@ from pathlib import Path
 
 import pytest
 
+from logs.views.figures import FIGURES
 from planfly.workflow.output_paths import (
+    REPORT_FIGURES,
     RUN_FILES,
     RUN_FOLDER,
     check_output_file,
@@ -50,7 +52,7 @@ def test_a_run_clears_its_old_results_and_nothing_of_others(tmp_path: Path) -> N
     mixed = tmp_path / "round-2"
     for folder in (tmp_path, old, mixed):
         folder.mkdir(exist_ok=True)
-        for name in RUN_FILES:
+        for name in (*RUN_FILES, "scene.png", "energy.png"):
             (folder / name).write_text("old", encoding="utf-8")
     for kept in (tmp_path / "mine.txt", mixed / "mine.txt", tmp_path / "map.svg"):
         kept.write_text("mine", encoding="utf-8")
@@ -112,3 +114,7 @@ def test_a_patterns_folder_may_be_missing_and_a_named_files_may_not(tmp_path: Pa
         file_target(tmp_path / "{name}-{seed}" / "plan.json", "a/b", 3, overwrite=False)
     with pytest.raises(PlanflyError, match="does not exist"):
         file_target(tmp_path / "none" / "plan.json", "a/b", 3, overwrite=True)
+
+
+def test_every_figure_of_a_report_is_cleared_with_it() -> None:
+    assert list(REPORT_FIGURES) == [entry.name for entry in FIGURES]

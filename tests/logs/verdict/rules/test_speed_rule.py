@@ -155,6 +155,16 @@ def test_a_speed_that_is_raised_for_a_minimum_ground_speed_is_held() -> None:
             assert of(judge(setup, track), "speed", leg(0)).ok is ok
 
 
+@pytest.mark.parametrize(("max_airspeed", "held"), [(26.0, True), (31.0, False)])
+def test_a_held_airspeed_is_compared_with_the_one_that_arduplane_accepts(max_airspeed: float, held: bool) -> None:
+    """ArduPlane ignores a DO_CHANGE_SPEED above AIRSPEED_MAX (`Plane::do_change_speed`) and keeps 25 m/s."""
+    made = make_setup(STRAIGHT, speeds=[25.0, 30.0], terrain={"kind": "flat", "amsl_m": -400.0})
+    parameters = ArduPilotParameters.defaults().changed(AIRSPEED_MIN=18.0, AIRSPEED_MAX=max_airspeed)
+    setup = replace(made, autopilot=ArduPlane(parameters))
+    at_25 = fly_path(made, airspeed=lambda s: np.where(s > 3000.0, -5.0, 0.0))
+    assert of(judge(setup, at_25), "speed", leg(1)).ok is held
+
+
 def test_a_speed_that_is_taken_up_late_is_held() -> None:
     """The second half of a leg counts: 8 m/s too slow over the first 1,300 m of 3,000 are over by then."""
     setup = make_setup(STRAIGHT)

@@ -1,6 +1,6 @@
-"""The page of a report works in a browser: wide and narrow, by mouse and keys, light and dark, and without a script."""
+"""The page of a report works in a browser: wide and narrow, by mouse and keys, light and dark, on paper, without scripts."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -11,12 +11,11 @@ from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track
 from logs.recording.reader import FlightLog, read_log
 from logs.verdict.judge_flight import judge_flight
-from logs.views import drawing, figures
-from logs.views.figures import View, draw_pictures
 from logs.views.report.compare import compare_logs, write_comparison
 from logs.views.report.identification import identification_page
 from logs.views.report.page import write_report
 from tests.browser import Browser
+from tests.logs.blank_pictures import draw_nothing
 from tests.logs.views.report.page_in_browser import (
     apart,
     changed,
@@ -53,16 +52,10 @@ def page(tmp_path_factory: pytest.TempPathFactory, browser: Browser, setup: Flig
     arguments: dict[str, Any] = {"ended": "completed", "versions": {"planfly": "0"}, "command": "planfly run small"}
     with pytest.MonkeyPatch.context() as patch:
         if not SOAK:
-            patch.setattr(figures, "draw_pictures", scene_alone)
+            draw_nothing(patch)
         page = write_report(folder, setup, track, verdict, **arguments)[-1]
     browser.open(page)
     return page
-
-
-def scene_alone(views: Mapping[str, View], *, svg: bool = False) -> dict[str, bytes]:
-    """Blank pictures, but for the one that stands for the view: the others are drawn in tests of their own."""
-    blank = drawing.png_bytes(drawing.new_figure(1.0))
-    return {f"{name}.png": blank for name in views} | draw_pictures({"scene": views["scene"]}, svg=svg)
 
 
 def middle(browser: Browser, element: str) -> tuple[float, float, float, float]:
@@ -291,24 +284,39 @@ def test_narrow_page_fits_a_phone(browser: Browser) -> None:
 
 
 @pytest.mark.usefixtures("page")
-def test_on_paper_the_still_picture_stands(browser: Browser) -> None:
+def test_paper_has_every_chart_in_its_width_and_a_copy_of_the_view(browser: Browser) -> None:
+    """Also the charts that nobody scrolled to; A4 between margins of 14 mm is 182 mm or 688 px wide."""
     prefer(browser, "light", 1200)
+    until(browser, "window.Plotly")
     browser.call("Emulation.setEmulatedMedia", media="print")
-    assert browser.value("getComputedStyle(document.querySelector('#view3d')).display") == "none"
-    assert browser.value("getComputedStyle(document.querySelector('.still')).display") == "block"
+    browser.value("window.dispatchEvent(new Event('beforeprint'))")
+    until(browser, "[...document.querySelectorAll('.chart')].every(e => e.querySelector('.main-svg'))")
     shown = "[...document.querySelectorAll('SELECTOR')].map(e => getComputedStyle(e).display)"
-    assert set(browser.value(shown.replace("SELECTOR", ".chart, .player, .key"))) == {"none"}
-    assert set(browser.value(shown.replace("SELECTOR", ".picture"))) == {"block"}
+    assert set(browser.value(shown.replace("SELECTOR", ".chart"))) == {"block"}
+    assert set(browser.value(shown.replace("SELECTOR", ".picture, .player, .key"))) == {"none"}
+    charts = "[...document.querySelectorAll('.chart .main-svg')]"
+    widths = browser.value(f"{charts}.map(e => e.getBoundingClientRect().width)")
+    assert 600 < min(widths) <= max(widths) <= 688
+    # The copy holds what WebGL drew: terrain, sky and lines have many colours.
+    copied = """(() => { const c = document.querySelector('.view .paper'), colours = new Set();
+        const data = c.getContext('2d').getImageData(0, 0, c.width, c.height).data;
+        for (let k = 0; k < data.length; k += 4000) colours.add(data.slice(k, k + 4).join());
+        return colours.size; })()"""
+    assert browser.value(copied) > 20
+    browser.value("window.dispatchEvent(new Event('afterprint'))")
+    browser.call("Emulation.setEmulatedMedia", media="screen")
 
 
-def test_without_a_script_the_still_picture_stands(browser: Browser, page: Path) -> None:
+def test_without_a_script_map_and_profile_are_pictures_and_the_rest_says_how_to_draw_it(
+    browser: Browser, page: Path
+) -> None:
     prefer(browser, "light", 1200)
     browser.call("Emulation.setScriptExecutionDisabled", value=True)
     browser.open(page)
-    still = browser.value("getComputedStyle(document.querySelector('.still')).display")
-    assert still == "block"
     assert browser.value("getComputedStyle(document.querySelector('#view3d')).display") == "none"
-    assert spread(browser.picture(".still")) > 60
+    assert browser.value("document.querySelectorAll('.picture img').length") == 2
+    assert "planfly report LOG --pictures" in browser.value("document.querySelector('.still').textContent")
+    assert browser.value("getComputedStyle(document.querySelector('.still')).display") == "block"
     browser.call("Emulation.setScriptExecutionDisabled", value=False)
 
 

@@ -1,10 +1,12 @@
-// Draws the page's charts: each when it comes near the screen, anew when width or colours change.
+// Draws the page's charts: each when it comes near the screen, again when width or colours change, all when it prints.
+
+const PRINT_WIDTH = 680; // px, width of A4 between margins of 14 mm
 
 function startCharts(charts, world) {
   const { theme, clock } = world, holders = [...document.querySelectorAll(".chart")].filter((holder) => charts[holder.dataset.chart]);
   if (!holders.length || !("DecompressionStream" in window)) return; // the pictures stay
   const drawn = new Map();
-  let library = null;
+  let library = null, loaded = null;
   for (const holder of holders) {
     holder.closest("figure").classList.add("charted");
     // What follows stays where it is when the chart comes.
@@ -17,12 +19,18 @@ function startCharts(charts, world) {
     throw error;
   }
 
+  function load() {
+    library = library || loadPlotly().then((plotly) => { loaded = plotly; return plotly; }).catch(giveUp);
+    return library;
+  }
   async function draw(holder) {
-    const chart = charts[holder.dataset.chart], width = Math.floor(holder.clientWidth);
+    const width = Math.floor(holder.clientWidth);
     if (!width || drawn.get(holder) === width) return;
     drawn.set(holder, width);
-    library = library || loadPlotly().catch(giveUp);
-    const plotly = await library;
+    await place(await load(), holder, width);
+  }
+  async function place(plotly, holder, width) {
+    const chart = charts[holder.dataset.chart];
     const figure = chart.panels ? panelFigure(chart, theme, width) : mapFigure(chart, world, theme, width);
     if (chart.timed && clock) figure.layout.shapes.push(cursor(figure.layout));
     await plotly.react(holder, figure.traces, figure.layout, CHART_CONFIG);
@@ -72,6 +80,19 @@ function startCharts(charts, world) {
     }
   }
   holders.forEach((holder) => near.observe(holder));
+  // Printing waits for nothing: the library is there before, and each chart is drawn at once in the width of the paper.
+  window.addEventListener("load", () => window.setTimeout(load, 500));
+  window.addEventListener("beforeprint", () => {
+    for (const holder of holders) {
+      if (loaded) place(loaded, holder, PRINT_WIDTH);
+      else holder.closest("figure").classList.remove("charted");
+    }
+  });
+  window.addEventListener("afterprint", () => {
+    for (const holder of holders) holder.closest("figure").classList.add("charted");
+    for (const holder of holders) drawn.set(holder, 0);
+    again(true);
+  });
   let later = 0;
   window.addEventListener("resize", () => { window.clearTimeout(later); later = window.setTimeout(() => again(false), 150); });
   theme.onChange(() => again(true));

@@ -77,6 +77,13 @@ function startView(root, { scene, ground, moments, model, theme, clock }) {
     waiting = true;
     window.requestAnimationFrame(() => { waiting = false; draw(); });
   }
+  // Paper gets a copy of both canvases: one that was drawn by WebGL may be empty when it is printed.
+  window.addEventListener("beforeprint", () => {
+    draw();
+    const paper = root.querySelector("canvas.paper"), pen = paper.getContext("2d");
+    paper.width = canvas.width; paper.height = canvas.height;
+    for (const layer of [canvas, over]) pen.drawImage(layer, 0, 0);
+  });
   bindHands(over, root.parentNode.querySelectorAll("button[data-do]"), camera, redraw);
   canvas.addEventListener("webglcontextlost", (event) => {
     event.preventDefault();
