@@ -27,6 +27,7 @@ open_studio                          a page on which a mission is dragged, judge
 scenarios, aircraft                  what is embedded
 terrain                              the ground of an area as a file, from tiles or from the Copernicus DEM's server
 new_scenario                         a commented scenario of one's own, from here to there over this ground
+make_scenario                        a scenario with other threats (arrays, a data frame) and other values, in Python
 describe_aircraft, new_aircraft      trims, modes and envelope; a folder for an aircraft of one's own
 identify_aircraft                    that folder from flight logs, with what is not known of it
 paper_tables, optimise               the paper's section V; the planner's optimisers alone, by ask and tell
@@ -79,6 +80,7 @@ if TYPE_CHECKING:
     from planfly.api.imported import import_log as import_log
     from planfly.api.imported import recover as recover
     from planfly.api.imported import refly as refly
+    from planfly.api.making_scenarios import make_scenario as make_scenario
     from planfly.api.optimising import BestFound as BestFound
     from planfly.api.optimising import Optimiser as Optimiser
     from planfly.api.optimising import optimise as optimise
@@ -128,6 +130,7 @@ if TYPE_CHECKING:
     from world.errors import ScenarioError as ScenarioError
     from world.errors import StartError as StartError
     from world.errors import TerrainError as TerrainError
+    from world.scenario import Scenario as Scenario
 
 # The module of each public name.
 _HOMES = {
@@ -180,6 +183,7 @@ _HOMES = {
             "recover",
             "refly",
         ),
+        "planfly.api.making_scenarios": ("make_scenario",),
         "planfly.api.optimising": (
             "BestFound",
             "Optimiser",
@@ -249,6 +253,7 @@ _HOMES = {
             "StartError",
             "TerrainError",
         ),
+        "world.scenario": ("Scenario",),
     }.items()
     for name in names
 }

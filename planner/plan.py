@@ -10,13 +10,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import IntEnum
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, NamedTuple
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from planner.ground_ways import GroundWays, GroundWaysFile, ground_ways_json
-from world.arrays import Floats, Ints
+from world.arrays import Floats
 from world.errors import MissionError
 from world.files import read_small_file
 from world.html_table import html_table
@@ -45,6 +45,24 @@ class Objective(IntEnum):
     KILL_EXPOSURE = 1
     DETECTION_EXPOSURE = 2
     HEIGHT_SUM = 3
+
+
+class Violations(NamedTuple):
+    """Numbers of violations of a path, in the order of `Violation`."""
+
+    turn: int
+    slope: int
+    terrain: int
+    bounds: int
+
+
+class Objectives(NamedTuple):
+    """Objectives of a path, in the order of `Objective`: length / straight line, and three sums over its points."""
+
+    length_ratio: float
+    kill_exposure: float
+    detection_exposure: float
+    height_sum: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,7 +105,7 @@ class Plan:
 
     scenario: the scenario of the plan.
     waypoints: (w, 3) world m.
-    violations, objectives: (4,) by `Violation` and (4,) by `Objective`, always at the paper's six points per leg.
+    violations, objectives: always at the paper's six points per leg.
     certificate: certificate of the whole path, or of the part after the flown legs.
     seed, algorithm, evaluations: seed, algorithm and number of evaluations of the search.
     history: (g, 3) length ratio, kill exposure and violations (for graded algorithms the number of kinds violated) of
@@ -100,8 +118,8 @@ class Plan:
 
     scenario: Scenario
     waypoints: Floats
-    violations: Ints
-    objectives: Floats
+    violations: Violations
+    objectives: Objectives
     certificate: Certificate
     seed: int
     algorithm: str
@@ -112,21 +130,18 @@ class Plan:
     ways: GroundWays | None = None
 
     def __post_init__(self) -> None:
-        """Lock the arrays."""
-        for name, dtype in (
-            ("waypoints", np.float64),
-            ("violations", np.int64),
-            ("objectives", np.float64),
-            ("history", np.float64),
-        ):
-            array = np.array(getattr(self, name), dtype=dtype)
+        """Lock the arrays, and name the scores, which may be given as any four numbers."""
+        for name in ("waypoints", "history"):
+            array = np.array(getattr(self, name), dtype=np.float64)
             array.setflags(write=False)
             object.__setattr__(self, name, array)
+        object.__setattr__(self, "violations", Violations(*map(int, self.violations)))
+        object.__setattr__(self, "objectives", Objectives(*map(float, self.objectives)))
 
     @property
     def feasible(self) -> bool:
         """True if the path meets all four constraints, at the paper's points and continuously."""
-        return self.certificate.ok and not self.violations.any()
+        return self.certificate.ok and not any(self.violations)
 
     @property
     def safe(self) -> bool:
@@ -139,7 +154,7 @@ class Plan:
         return "safe" if self.safe else "feasible, but inside a missile's reach" if self.feasible else "not feasible"
 
     def __repr__(self) -> str:
-        ratio = self.objectives[Objective.LENGTH_RATIO]
+        ratio = self.objectives.length_ratio
         return f"<Plan {self.scenario.name}: {len(self.waypoints)} waypoints, {self.state}, {ratio:.4f} times straight>"
 
     def _repr_html_(self) -> str:
@@ -221,8 +236,8 @@ def plan_json(plan: Plan) -> str:
         "safe": plan.safe,
         "waypoints_east_north_amsl_m": plan.waypoints.tolist(),
         **({} if plan.ways is None else {"ground_ways": ground_ways_json(plan.ways)}),
-        "violations": {column.name.lower(): int(plan.violations[column]) for column in Violation},
-        "objectives": {column.name.lower(): float(plan.objectives[column]) for column in Objective},
+        "violations": plan.violations._asdict(),
+        "objectives": plan.objectives._asdict(),
         "certificate": {
             "turn_margin_rad": certificate.turn,
             "turn_room_m": _or_none(certificate.available_length),
@@ -263,8 +278,8 @@ def parse_plan(
         plan_file = _PlanFile.model_validate(data)
     except ValidationError as error:
         raise MissionError(**first_fault(error, data).at(source)) from error
-    _check_names(source, "violations", plan_file.violations, [column.name.lower() for column in Violation])
-    _check_names(source, "objectives", plan_file.objectives, [column.name.lower() for column in Objective])
+    _check_names(source, "violations", plan_file.violations, Violations._fields)
+    _check_names(source, "objectives", plan_file.objectives, Objectives._fields)
     waypoints = np.array(plan_file.waypoints_east_north_amsl_m)
     # With another terrain the ends keep their planned altitudes.
     scenario_spec = (
@@ -289,8 +304,8 @@ def parse_plan(
     return Plan(
         scenario=scenario,
         waypoints=waypoints,
-        violations=np.array([plan_file.violations[column.name.lower()] for column in Violation]),
-        objectives=np.array([plan_file.objectives[column.name.lower()] for column in Objective]),
+        violations=Violations(**plan_file.violations),
+        objectives=Objectives(**plan_file.objectives),
         certificate=certificate,
         seed=plan_file.seed,
         algorithm=plan_file.algorithm,
@@ -336,7 +351,7 @@ def plan_html(plan: Plan) -> str:
     certificate = plan.certificate
     rows = [
         ("waypoints", len(plan.waypoints)),
-        ("length / straight line", f"{plan.objectives[Objective.LENGTH_RATIO]:.4f}"),
+        ("length / straight line", f"{plan.objectives.length_ratio:.4f}"),
         ("clearance to spare", f"{certificate.clearance:.1f} m"),
         (
             "outside missiles' reach by",

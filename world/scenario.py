@@ -46,6 +46,10 @@ from world.wind import Wind
 # ----------------------------------------------------------------------
 # The scenario, from an embedded name, a file, a plan or a log.
 
+# Scale of a threat whose scale is not stated, as a ratio of its kill radius.
+KILL_SCALE_RATIO = 1.0 / 4.0
+# Scale of a threat whose scale is not stated, as a ratio of its detection radius.
+DETECTION_SCALE_RATIO = 1.0 / 3.0
 # Width of terrain that is kept around the area, m: a flight may overshoot a corner at the map's edge.
 GROUND_BUFFER = 1000.0
 
@@ -556,8 +560,8 @@ def with_threats(
         return float(np.median(scale[has_radius] / radius[has_radius])) if has_radius.any() else default
 
     threats = scenario.threats
-    kill_ratio = scale_ratio(threats.kill_radius, threats.kill_scale, 1.0 / 4.0)
-    detection_ratio = scale_ratio(threats.detection_radius, threats.detection_scale, 1.0 / 3.0)
+    kill_ratio = scale_ratio(threats.kill_radius, threats.kill_scale, KILL_SCALE_RATIO)
+    detection_ratio = scale_ratio(threats.detection_radius, threats.detection_scale, DETECTION_SCALE_RATIO)
     tables = [*scenario.spec.threats, *existing]
     for index, (east, north, kill, detection) in enumerate(added):
         data: dict[str, Any] = {"name": f"pop-up {len(existing) + index + 1}", "east_m": east, "north_m": north}

@@ -99,13 +99,21 @@ def clean_style() -> Iterator[None]:
         yield
 
 
+class NotebookFigure(Figure):
+    """A figure that a notebook shows without pyplot."""
+
+    def _repr_png_(self) -> bytes:
+        """Return the picture that a notebook shows."""
+        return png_bytes(self)
+
+
 def new_figure(height: float) -> Figure:
     """Make an empty figure of the common width, `height` inches tall, with its own canvas (no pyplot state).
 
     >>> new_figure(4.0).get_size_inches().tolist()
     [10.0, 4.0]
     """
-    figure = Figure(figsize=(WIDTH, height), dpi=DPI, facecolor=theme.colour("paper"))
+    figure = NotebookFigure(figsize=(WIDTH, height), dpi=DPI, facecolor=theme.colour("paper"))
     FigureCanvasAgg(figure)
     return figure
 

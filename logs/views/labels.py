@@ -18,6 +18,8 @@ Box = tuple[float, float, float, float]
 
 # Cost of covering another label: above the cost of any distance and any covered lines.
 _OVERLAP_COST = 200.0
+# Cost of standing on the wrong side of a label whose point is near: above the cost of a covered line.
+_ORDER_COST = 50.0
 # Distances tried for a framed label beyond its gap, in label heights; a line to its point allows long distances.
 _FRAMED_DISTANCES = (0.0, 1.0, 2.2, 3.4, 4.6, 6.0, 7.5, 9.0, 11.0)
 # Distances tried for an unframed label.
@@ -33,11 +35,13 @@ class LabelPlacer:
     """Greedy placement in pixels on one axes, whose limits and position must be final.
 
     lines: (n, 2) pixel positions that labels should not cover.  boxes: areas of the labels already placed.
+    points: pixel positions of these labels' points.
     """
 
     axes: Any
     lines: Floats = field(default_factory=lambda: np.zeros((0, 2)))
     boxes: list[Box] = field(default_factory=list)
+    points: list[tuple[float, float]] = field(default_factory=list)
 
     def avoid(self, east: ArrayLike, north: ArrayLike, spacing: float = 6.0) -> None:
         """Keep labels off a line through these data positions, sampled every `spacing` pixels."""
@@ -85,12 +89,14 @@ class LabelPlacer:
         ):
             for rank, direction in enumerate((prefer, *_DIRECTIONS)):
                 box = self._box(px, py, width, height, gap + heights * height, direction)
-                cost = self._cost(box) + 0.05 * rank + 1.5 * ring
+                order = 0.0 if "bbox" in style else self._order_cost(box, px, py)
+                cost = self._cost(box) + order + 0.05 * rank + 1.5 * ring
                 if cost < best_cost:
                     best, best_cost, moved = box, cost, ring
         if optional and any(_overlap(best, other) for other in self.boxes):
             return
         self.boxes.append(best)
+        self.points.append((px, py))
         middle = self.axes.transData.inverted().transform((0.5 * (best[0] + best[2]), 0.5 * (best[1] + best[3])))
         artist = self.axes.text(
             middle[0],
@@ -133,6 +139,21 @@ class LabelPlacer:
             middle_x + 0.5 * width,
             middle_y + 0.5 * height,
         )
+
+    def _order_cost(self, box: Box, x: float, y: float) -> float:
+        """Return the cost of a box that stands on the wrong side of labels of near points.
+
+        A framed label needs no order, because it has a line to its point.
+        """
+        cost = 0.0
+        for other, (other_x, other_y) in zip(self.boxes, self.points, strict=True):
+            dx, dy = x - other_x, y - other_y
+            if math.hypot(dx, dy) > box[2] - box[0] + other[2] - other[0]:
+                continue
+            across, up = box[0] + box[2] - other[0] - other[2], box[1] + box[3] - other[1] - other[3]
+            if dx * across + dy * up < 0.0:
+                cost += _ORDER_COST
+        return cost
 
     def _cost(self, box: Box) -> float:
         frame = self.axes.get_window_extent()

@@ -63,14 +63,15 @@ def figures(source: Source) -> "dict[str, Figure]":
     """Return the pictures of a flight, or of a plan that was not flown, as matplotlib figures by name.
 
     source: a flight log or its path, a result of `planfly.fly`, or a `Plan`.
+    A notebook shows each figure as a picture.
     The names are "map", "profile", "scene", "turns", "envelope", and for a flight also "time", "exposure", "controls"
     and "energy".
     Raises a `planfly.PlanflyError` for bad input.
 
     >>> import planfly
     >>> drawn = planfly.figures(planfly.plan("tight", seed=1))
-    >>> type(drawn["map"])
-    <class 'matplotlib.figure.Figure'>
+    >>> drawn["map"]._repr_png_()[1:4]
+    b'PNG'
     """
     # Imported here: only pictures need matplotlib.
     from logs.views.figures import draw_figures

@@ -52,8 +52,6 @@ def new_options(line: LineParser) -> None:
 
 def new(args: argparse.Namespace) -> int:
     """Write the scenario, and plan a path in it; return 4 if the plan is not safe, but keep the file."""
-    from planner.plan import Objective
-
     file = call(planfly.new_scenario, args)
     print(f"scenario  {file}")
     if args.terrain is None:
@@ -61,7 +59,7 @@ def new(args: argparse.Namespace) -> int:
     plan = planfly.plan(file)
     code = FLYABLE if plan.safe else NOT_FLYABLE
     if plan.safe:
-        ratio = float(plan.objectives[Objective.LENGTH_RATIO])
+        ratio = plan.objectives.length_ratio
         safe = coloured("plans     safe", "good")
         print(f"{safe}: {len(plan.waypoints)} waypoints, {ratio:.3f} times the straight line")
     else:

@@ -157,7 +157,6 @@ def _plan_front(args: argparse.Namespace) -> int:
 def _json_answer(plan: "Plan", target: "Path", code: int) -> object:
     from planfly.api.planning import conditions_of_plan
     from planfly.terminal.plan_answers import PlanAnswer
-    from planner.plan import Objective
 
     return PlanAnswer(
         exit_code=code,
@@ -167,7 +166,7 @@ def _json_answer(plan: "Plan", target: "Path", code: int) -> object:
         safe=plan.safe,
         feasible=plan.feasible,
         waypoints=len(plan.waypoints),
-        length_ratio=float(plan.objectives[Objective.LENGTH_RATIO]),
+        length_ratio=plan.objectives.length_ratio,
         algorithm=plan.algorithm,
         evaluations=plan.evaluations,
         ended=plan.ended,
@@ -210,10 +209,9 @@ def _print_plan(plan: "Plan") -> None:
     """Print the properties of a plan."""
     from logs.verdict.conditions import autopilot_line, condition_lines
     from planfly.api.planning import conditions_of_plan
-    from planner.plan import Objective
 
     state = "safe" if plan.safe else "feasible, but inside a missile's reach" if plan.feasible else "no feasible plan"
-    length = float(plan.objectives[Objective.LENGTH_RATIO])
+    length = plan.objectives.length_ratio
     print(f"{state}: {len(plan.waypoints)} waypoints, {length:.3f} times the straight line, algorithm {plan.algorithm}")
     conditions = conditions_of_plan(plan)
     print("\n".join([*condition_lines(conditions), autopilot_line(conditions, flown=False)]))

@@ -20,7 +20,7 @@ from planfly.runtime.stages import stage
 from planfly.workflow.airframe import load_airframe
 from planfly.workflow.make_plan import Advance, make_plan
 from planfly.workflow.output_paths import check_output_folder, prepare_folder
-from planner.plan import Objective, Violation
+from planner.plan import Objectives, Violations
 from planner.search.algorithms import find_algorithm
 from world.arrays import Floats
 from world.files import hold, write_whole
@@ -46,7 +46,7 @@ class SeededPlan:
 
     threats: number of threats in the problem.
     waypoints: world coordinates, m, (w, 3).
-    violations, objectives: counts and values on the paper's points, (4,).
+    violations, objectives: counts and values on the paper's points.
     certified: True if the continuous check passes and no missile reaches the path.
     kill_probability, detection_probability: values of `exposure_probability`.
     history: length ratio, kill exposure and violations of the best path after each generation, (g, 3).
@@ -57,8 +57,8 @@ class SeededPlan:
     algorithm: str
     seed: int
     waypoints: Floats
-    violations: tuple[int, ...]
-    objectives: tuple[float, ...]
+    violations: Violations
+    objectives: Objectives
     certified: bool
     kill_probability: float
     detection_probability: float
@@ -69,7 +69,7 @@ class SeededPlan:
     @property
     def safe(self) -> bool:
         """True if safe by the paper's definition, without violation or kill exposure on its six points per leg."""
-        return not any(self.violations) and self.objectives[Objective.KILL_EXPOSURE] == 0.0
+        return not any(self.violations) and self.objectives.kill_exposure == 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -140,8 +140,8 @@ def plan_once(threats: int, algorithm: str, seed: int) -> SeededPlan:
         algorithm=algorithm,
         seed=seed,
         waypoints=plan.waypoints,
-        violations=tuple(int(value) for value in plan.violations),
-        objectives=tuple(float(value) for value in plan.objectives),
+        violations=plan.violations,
+        objectives=plan.objectives,
         certified=plan.safe,
         kill_probability=exposure_probability(scenario, plan.waypoints, "kill"),
         detection_probability=exposure_probability(scenario, plan.waypoints, "detection"),
@@ -221,8 +221,8 @@ def table(plans: Sequence[SeededPlan]) -> list[TableRow]:
 
 
 def _table_row(group: list[SeededPlan]) -> TableRow:
-    lengths = [seeded_plan.objectives[Objective.LENGTH_RATIO] for seeded_plan in group if seeded_plan.safe]
-    kills = _column(group, lambda seeded_plan: seeded_plan.objectives[Objective.KILL_EXPOSURE])
+    lengths = [seeded_plan.objectives.length_ratio for seeded_plan in group if seeded_plan.safe]
+    kills = _column(group, lambda seeded_plan: seeded_plan.objectives.kill_exposure)
     return TableRow(
         threats=group[0].threats,
         algorithm=group[0].algorithm,
@@ -235,7 +235,7 @@ def _table_row(group: list[SeededPlan]) -> TableRow:
         kill_worst=float(kills.max()),
         kill_probability_worst=float(_column(group, lambda seeded_plan: seeded_plan.kill_probability).max()),
         detection_median=float(
-            np.median(_column(group, lambda seeded_plan: seeded_plan.objectives[Objective.DETECTION_EXPOSURE]))
+            np.median(_column(group, lambda seeded_plan: seeded_plan.objectives.detection_exposure))
         ),
         seconds_median=float(np.median(_column(group, lambda seeded_plan: seeded_plan.seconds))),
     )
@@ -319,9 +319,9 @@ def _plan_row(seeded_plan: SeededPlan) -> dict[str, Any]:
         "safe": seeded_plan.safe,
         "certified": seeded_plan.certified,
     }
-    row |= {f"violations_{kind.name.lower()}": seeded_plan.violations[kind] for kind in Violation}
-    row |= {kind.name.lower(): seeded_plan.objectives[kind] for kind in Objective}
+    row |= {f"violations_{name}": count for name, count in seeded_plan.violations._asdict().items()}
     return row | {
+        **seeded_plan.objectives._asdict(),
         "kill_probability": seeded_plan.kill_probability,
         "detection_probability": seeded_plan.detection_probability,
         "evaluations": seeded_plan.evaluations,
@@ -334,8 +334,8 @@ _PLAN_COLUMNS = [
     "seed",
     "safe",
     "certified",
-    *(f"violations_{kind.name.lower()}" for kind in Violation),
-    *(kind.name.lower() for kind in Objective),
+    *(f"violations_{name}" for name in Violations._fields),
+    *Objectives._fields,
     "kill_probability",
     "detection_probability",
     "evaluations",
@@ -363,7 +363,7 @@ def write_figures(folder: Path, plans: Sequence[SeededPlan]) -> None:
         first_algorithm = next(iter(groups))
         lines = {
             name: [
-                PaperPath(seeded_plan.waypoints, seeded_plan.objectives[Objective.LENGTH_RATIO], seeded_plan.safe)
+                PaperPath(seeded_plan.waypoints, seeded_plan.objectives.length_ratio, seeded_plan.safe)
                 for seeded_plan in group
             ]
             for name, group in groups.items()

@@ -28,7 +28,7 @@ from planfly.workflow.open_flight import make_setup, mission_of_plan, open_fligh
 from planner.evaluation.certify import certify
 from planner.evaluation.paper_scores import paper_scores
 from planner.evaluation.problem import make_problem
-from planner.plan import Certificate, Plan, plan_json
+from planner.plan import Certificate, Objectives, Plan, Violations, plan_json
 from world.arrays import Floats
 from world.elevation_formats import EMBEDDED
 from world.errors import LogError, MissionError, PlanflyError
@@ -184,7 +184,8 @@ def straight_plan(scenario: Scenario, seed: int) -> Plan:
     """Return the straight line from start to destination as a plan that is not certified."""
     line = np.stack([scenario.start, scenario.destination])
     certificate = Certificate(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, ("not planned yet",))
-    return Plan(scenario, line, np.zeros(4, dtype=np.int64), np.zeros(4), certificate, seed, "", 0, np.zeros((0, 3)))
+    counts, objectives = Violations(0, 0, 0, 0), Objectives(1.0, 0.0, 0.0, 0.0)
+    return Plan(scenario, line, counts, objectives, certificate, seed, "", 0, np.zeros((0, 3)))
 
 
 def planned_mission(plan: Plan, airframe: Airframe) -> Mission:
@@ -336,9 +337,8 @@ def _scored_plan(desk: EditContext, waypoints: Floats) -> Plan:
     problem = make_problem(desk.scenario, desk.airframe.limits.surely())
     certificate = certify(problem, waypoints)
     counts, objectives = paper_scores(problem.certified, waypoints[None])
-    return Plan(
-        desk.scenario, waypoints, counts[0], objectives[0], certificate, desk.seed, "edited", 0, np.zeros((0, 3))
-    )
+    scores = Violations(*counts[0]), Objectives(*objectives[0])
+    return Plan(desk.scenario, waypoints, *scores, certificate, desk.seed, "edited", 0, np.zeros((0, 3)))
 
 
 def _plan_with_ground_phases(desk: EditContext, mission: Mission) -> Plan | None:

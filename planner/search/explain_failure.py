@@ -246,7 +246,7 @@ def explain_failure(plan: Plan, limits: Limits | None = None) -> list[str]:
     if limits is not None:
         problem = make_problem(scenario, limits if algorithm is None else limits_for(algorithm, limits))
         certificate = certify(problem, plan.waypoints)
-        if certificate.ok and certificate.kill_distance > 0.0 and not plan.violations.any():
+        if certificate.ok and certificate.kill_distance > 0.0 and not any(plan.violations):
             # The search has found a path; the fault concerns the autopilot, and the certificate states it.
             return []
         lines += closed_bands(problem) or ([] if lines else _describe_margin_walls(problem))

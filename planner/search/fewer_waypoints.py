@@ -8,7 +8,7 @@ from aircraft.path_limits import Limits
 from planner.evaluation.certify import certify
 from planner.evaluation.paper_scores import paper_scores
 from planner.evaluation.problem import CERTIFIED_KILL_MARGIN, Problem, make_problem
-from planner.plan import Certificate, Plan
+from planner.plan import Certificate, Objectives, Plan, Violations
 from planner.search.algorithms import find_algorithm, limits_for
 from world.arrays import Floats
 
@@ -36,7 +36,11 @@ def drop_waypoints(plan: Plan, limits: Limits) -> Plan:
         waypoints, certificate = shorter
         violations, objectives = paper_scores(problem.certified, waypoints[None])
         plan = replace(
-            plan, waypoints=waypoints, certificate=certificate, violations=violations[0], objectives=objectives[0]
+            plan,
+            waypoints=waypoints,
+            certificate=certificate,
+            violations=Violations(*violations[0]),
+            objectives=Objectives(*objectives[0]),
         )
     return plan
 

@@ -25,7 +25,7 @@ from planner.evaluation.threat_index import make_missile_index
 from planner.evaluation.travel_cost import TravelCost, energy_cost, time_cost
 from planner.optimisers.front_sampling import FrontSampling
 from planner.optimisers.hypervolume import covering_order
-from planner.plan import Objective, Plan
+from planner.plan import Objective, Objectives, Plan, Violations
 from planner.search.algorithms import find_algorithm, limits_for
 from planner.search.plan_path import plan_path
 from planner.search.replan import with_waypoints
@@ -473,8 +473,8 @@ def _make_plan(task: FrontTask, path: Floats, template: Plan) -> Plan:
     return replace(
         template,
         waypoints=path,
-        violations=counts[0],
-        objectives=objectives[0],
+        violations=Violations(*counts[0]),
+        objectives=Objectives(*objectives[0]),
         certificate=certify(task.problem, path),
         ways=None,
     )

@@ -15,7 +15,7 @@ from planner.evaluation.certify import kill_distance
 from planner.evaluation.encoding import ENCODINGS
 from planner.evaluation.paper_scores import paper_scores
 from planner.evaluation.problem import CERTIFIED_KILL_MARGIN, make_problem
-from planner.plan import Certificate, Plan
+from planner.plan import Certificate, Objectives, Plan, Violations
 from planner.search.algorithms import find_algorithm, limits_for
 from planner.search.generations import may_try_again, path_generations, waypoint_generations
 from planner.search.infeasibility_proof import is_closed
@@ -122,8 +122,8 @@ def plan_path(
     return Plan(
         scenario=scenario,
         waypoints=waypoints,
-        violations=violations[0],
-        objectives=objectives[0],
+        violations=Violations(*violations[0]),
+        objectives=Objectives(*objectives[0]),
         certificate=certificate,
         seed=seed,
         algorithm=found_algorithm.name,

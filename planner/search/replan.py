@@ -9,7 +9,7 @@ import numpy as np
 from aircraft.path_limits import Limits
 from planner.evaluation.paper_scores import paper_scores
 from planner.evaluation.problem import make_problem
-from planner.plan import Plan
+from planner.plan import Objectives, Plan, Violations
 from planner.search.algorithms import find_algorithm, limits_for
 from planner.search.explain_failure import violated_zones
 from planner.search.plan_path import plan_path
@@ -96,8 +96,8 @@ def replan(
         new_plan,
         scenario=scenario,
         waypoints=waypoints,
-        violations=violations[0],
-        objectives=objectives[0],
+        violations=Violations(*violations[0]),
+        objectives=Objectives(*objectives[0]),
         flown_legs=leg,
     )
 

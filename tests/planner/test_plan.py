@@ -114,9 +114,22 @@ def test_feasible_is_counted_and_continuous_and_safe_is_outside_missiles_too() -
 
 def test_arrays_are_locked() -> None:
     plan = made()
-    for name in ("waypoints", "violations", "objectives", "history"):
+    for name in ("waypoints", "history"):
         with pytest.raises(ValueError, match="read-only"):
             getattr(plan, name)[0] = 1
+
+
+def test_scores_have_names_in_the_order_of_their_columns() -> None:
+    plan = made(violations=np.array([1.0, 2.0, 3.0, 4.0]))
+    assert plan.objectives._asdict() == {
+        "length_ratio": 1.01,
+        "kill_exposure": 0.0,
+        "detection_exposure": 2.5,
+        "height_sum": 900.0,
+    }
+    assert (plan.violations.turn, plan.violations.bounds) == (1, 4)
+    assert [name.upper() for name in plan.objectives._fields] == [item.name for item in Objective]
+    assert [name.upper() for name in plan.violations._fields] == [item.name for item in Violation]
 
 
 def _without(key: str) -> Callable[[dict[str, Any]], None]:

@@ -71,9 +71,20 @@ def test_a_label_that_moved_away_points_to_its_place(axes: Any) -> None:
     assert not axes.lines
     point = axes.transData.transform((50.0, 50.0))
     placer.boxes.append((point[0] - 60.0, point[1] - 20.0, point[0] + 60.0, point[1] + 20.0))
+    placer.points.append((point[0], point[1]))
     placer.place("12", 50.0, 50.0)
     (leader,) = axes.lines
     np.testing.assert_allclose(leader.get_xydata()[-1], (50.0, 50.0))
+
+
+@pytest.mark.parametrize("east", [1.0, -1.0])
+def test_labels_of_near_points_stand_in_the_order_of_their_points(axes: Any, east: float) -> None:
+    placer = LabelPlacer(axes)
+    placer.place("2", 50.0, 50.0)
+    placer.place("3", 50.0 + east, 50.0)
+    second, third = boxes(axes)
+    assert not second.overlaps(third)
+    assert np.sign(third.x0 + third.x1 - second.x0 - second.x1) == np.sign(east)
 
 
 def test_a_label_keeps_off_a_line_that_it_is_told_of(axes: Any) -> None:
@@ -94,6 +105,7 @@ def test_an_optional_label_gives_way_and_one_without_a_place_is_left_out(axes: A
     placer.place("nowhere", np.nan, 50.0)
     assert not axes.texts
     placer.boxes.append((-1e6, -1e6, 1e6, 1e6))
+    placer.points.append((0.0, 0.0))
     placer.place("optional", 50.0, 50.0, optional=True)
     assert not axes.texts
     placer.place("needed", 50.0, 50.0)

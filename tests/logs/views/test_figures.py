@@ -12,7 +12,7 @@ import pytest
 from logs import theme
 from logs.verdict.places import Place
 from logs.verdict.verdict import Verdict
-from logs.views.drawing import png_bytes, write_png
+from logs.views.drawing import new_figure, png_bytes, write_png
 from tests.logs.views.figure_data import (
     ALL,
     FAILED,
@@ -106,3 +106,10 @@ def test_no_pyplot_and_no_matplotlib_before_a_drawing() -> None:
         "import logs.views.figures; assert 'matplotlib.pyplot' not in sys.modules"
     )
     subprocess.run([sys.executable, "-c", code], check=True, cwd=Path(__file__).parents[3])
+
+
+def test_a_notebook_shows_a_figure_as_its_picture() -> None:
+    """Without pyplot, as IPython asks for it: by the method of its class."""
+    figure = new_figure(1.0)
+    assert type(figure)._repr_png_(figure) == png_bytes(figure)
+    assert png_bytes(figure).startswith(b"\x89PNG")

@@ -1,0 +1,93 @@
+"""Make a scenario in Python, from another scenario with other threats and other values in its tables."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from planfly.flight_options import named_scenario
+from world.errors import ArgumentError
+from world.scenario import DETECTION_SCALE_RATIO, KILL_SCALE_RATIO, Scenario, from_spec, with_threats
+
+# Tables of a position, which replace another position as a whole.
+_POSITIONS = ("start", "destination", "home")
+# Tables from which the terrain is made.
+_TERRAIN_TABLES = frozenset(("terrain", "area", "origin"))
+_THREATS_EXPECTED = (
+    "expected a data frame or a mapping of columns named as the keys of [[threats]], a list of mappings with these"
+    " keys, or an array (n, 4) of east, north, kill radius and detection radius, m"
+)
+
+
+def make_scenario(
+    base: Scenario | str | Path,
+    *,
+    threats: Mapping[str, ArrayLike] | Sequence[Mapping[str, Any]] | ArrayLike | None = None,
+    **tables: Any,
+) -> Scenario:
+    """Return a scenario with other threats and other values, for `planfly.plan`, `planfly.fly` and all others.
+
+    base: an embedded name, a TOML file's path, or a `Scenario`.
+    threats: the threats that replace those of the base; None keeps them.  A pandas data frame or a mapping of columns,
+    named as the keys of [[threats]]; a list of mappings with these keys; or an array (n, 4) of east, north, kill radius
+    and detection radius, m.  A radius that is 0 or missing means no such zone; a scale that is missing is a quarter of
+    the kill radius and a third of the detection radius.
+    tables: values of other tables, as mappings with the keys of a scenario file, and its name and description; other
+    keys of a table stay, except for a position, which is replaced as a whole.
+    Raises a `planfly.PlanflyError` for values that a scenario file must not have.
+
+    >>> import planfly
+    >>> sites = {"east_m": [900.0, 1500.0], "north_m": [90.0, -90.0], "kill_radius_m": [60.0, 60.0]}
+    >>> scenario = planfly.make_scenario("tight", threats=sites, wind={"speed_mps": 4.0, "from_deg": 270.0})
+    >>> scenario.threats.kill_scale.tolist(), scenario.wind.speed
+    ([15.0, 15.0], 4.0)
+    """
+    known = named_scenario(base, {})
+    spec = known.to_json()
+    for name, values in tables.items():
+        merged = isinstance(values, Mapping) and isinstance(spec.get(name), dict) and name not in _POSITIONS
+        spec[name] = spec[name] | dict(values) if merged else values
+    rows = None if threats is None else _threat_rows(threats)
+    if rows is not None:
+        spec["threats"] = [] if isinstance(rows, np.ndarray) else rows
+    ground = known.terrain if _TERRAIN_TABLES.isdisjoint(tables) else None
+    made = from_spec(spec, "make_scenario", ground=ground, external=known.external)
+    return with_threats(made, rows.tolist(), "threats") if isinstance(rows, np.ndarray) else made
+
+
+def _threat_rows(threats: Any) -> list[dict[str, Any]] | np.ndarray:
+    """Return threats as tables of a scenario file, or as an array (n, 4).  Raises ArgumentError for anything else."""
+    try:
+        if isinstance(threats, Mapping):
+            columns = {name: np.asarray(values).tolist() for name, values in threats.items()}
+            rows = [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
+        elif hasattr(threats, "to_dict"):
+            rows = threats.to_dict("records")
+        elif len(threats) and all(isinstance(row, Mapping) for row in threats):
+            rows = [dict(row) for row in threats]
+        else:
+            array = np.asarray(threats, dtype=np.float64)
+            return array.reshape(-1, 4) if array.size == 0 or array.shape[1:] == (4,) else _refuse(threats)
+        return [_threat_table(row) for row in rows]
+    except ArgumentError:
+        raise
+    except (TypeError, ValueError):
+        return _refuse(threats)
+
+
+def _refuse(threats: Any) -> Any:
+    raise ArgumentError.of_argument("threats", type(threats).__name__, _THREATS_EXPECTED)
+
+
+def _threat_table(row: Mapping[str, Any]) -> dict[str, Any]:
+    """Return one threat without missing values and zones of radius 0, and with its scales."""
+    table = {key: value for key, value in row.items() if value is not None and value == value}
+    for kind, ratio in (("kill", KILL_SCALE_RATIO), ("detection", DETECTION_SCALE_RATIO)):
+        radius, scale = f"{kind}_radius_m", f"{kind}_scale_m"
+        if table.get(radius) == 0.0:
+            table = {key: value for key, value in table.items() if key not in (radius, scale)}
+        elif radius in table:
+            table.setdefault(scale, ratio * table[radius])
+    return table

@@ -1,0 +1,89 @@
+"""A scenario made in Python: its threats from arrays and data frames, other values, and what is refused."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+import planfly
+from world.scenario import load_scenario
+
+ROWS = [
+    {"name": "a", "east_m": 900.0, "north_m": 90.0, "kill_radius_m": 60.0, "kill_scale_m": 20.0},
+    {"name": "b", "east_m": 1500.0, "north_m": -90.0, "detection_radius_m": 300.0},
+]
+COLUMNS = {
+    "name": ["a", "b"],
+    "east_m": np.array([900.0, 1500.0]),
+    "north_m": np.array([90.0, -90.0]),
+    "kill_radius_m": np.array([60.0, np.nan]),
+    "kill_scale_m": np.array([20.0, np.nan]),
+    "detection_radius_m": np.array([0.0, 300.0]),
+}
+
+
+def frame() -> Any:
+    import pandas as pd
+
+    return pd.DataFrame(COLUMNS)
+
+
+@pytest.mark.parametrize("made", [lambda: ROWS, lambda: COLUMNS, frame], ids=["rows", "columns", "data frame"])
+def test_threats_come_from_rows_columns_and_data_frames(made: Any) -> None:
+    threats = planfly.make_scenario("tight", threats=made()).threats
+    assert list(threats.names) == ["a", "b"]
+    assert threats.position[:, :2].tolist() == [[900.0, 90.0], [1500.0, -90.0]]
+    assert threats.kill_radius.tolist() == [60.0, 0.0]
+    assert threats.detection_radius.tolist() == [0.0, 300.0]
+    # A stated scale, and a third of the detection radius.
+    assert (threats.kill_scale[0], threats.detection_scale[1]) == (20.0, 100.0)
+
+
+def test_threats_come_from_an_array_of_places_and_radii() -> None:
+    threats = planfly.make_scenario("tight", threats=np.array([[900, 90, 60, 0], [1500, -90, 0, 300]])).threats
+    assert threats.kill_radius.tolist() == [60.0, 0.0]
+    assert threats.kill_scale[0] == 15.0
+    assert len(planfly.make_scenario("tight", threats=[]).threats) == 0
+
+
+def test_other_tables_are_changed_key_by_key_and_positions_as_a_whole() -> None:
+    base = load_scenario("tight")
+    made = planfly.make_scenario(
+        base,
+        name="mine",
+        wind={"speed_mps": 4.0, "from_deg": 90.0},
+        start={"east_m": 10.0, "north_m": 5.0, "amsl_m": 75.0},
+    )
+    assert (made.name, made.wind.speed, made.start.tolist()) == ("mine", 4.0, [10.0, 5.0, 75.0])
+    assert made.limits == base.limits
+    assert made.threats.names == base.threats.names
+    assert planfly.make_scenario(base).to_json() == base.to_json()
+    assert planfly.make_scenario(base, limits={"min_clearance_m": 40.0}).limits.max_turn_deg == base.limits.max_turn_deg
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"threats": [[1.0, 2.0]]}, "threats list: expected a data frame"),
+        ({"threats": 7}, "threats int: expected a data frame"),
+        ({"threats": {"east_m": [1.0, 2.0], "north_m": [1.0]}}, "threats dict: expected a data frame"),
+        ({"threats": [{"east_m": 900.0, "north_m": 90.0}]}, "a threat has a missile, a radar, or both"),
+        ({"threats": [{**ROWS[0], "colour": "red"}]}, "colour"),
+        ({"wind": {"speed_mps": 400.0}}, "wind.speed_mps: 400"),
+        ({"winds": {"speed_mps": 4.0}}, "winds"),
+    ],
+)
+def test_values_that_no_scenario_may_have_are_refused_in_a_line(changes: dict[str, Any], said: str) -> None:
+    with pytest.raises(planfly.PlanflyError, match=said) as refused:
+        planfly.make_scenario("tight", **changes)
+    assert "\n" not in str(refused.value)
+
+
+def test_a_plan_keeps_clear_of_threats_that_were_given() -> None:
+    free = planfly.plan("tight", seed=1)
+    middle = free.waypoints[len(free.waypoints) // 2]
+    scenario = planfly.make_scenario("tight", threats=[[middle[0], middle[1], 45.0, 0.0]])
+    path = planfly.plan(scenario, seed=1)
+    assert path.objectives.kill_exposure == 0.0
+    assert path.safe
+    assert path.certificate.kill_distance > 0.0
