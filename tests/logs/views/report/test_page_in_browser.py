@@ -1,4 +1,4 @@
-"""The page of a report works in a browser: wide and narrow, by mouse and keys, light and dark, on paper, without scripts."""
+"""The page of a report works in a browser: wide, narrow, by mouse and keys, light, dark, on paper, without scripts."""
 
 from collections.abc import Iterator
 from pathlib import Path
