@@ -23,10 +23,14 @@ from flight.autopilots.planfly.autopilot import PlanflyGuidance
 from flight.dynamics.fdm import Fdm, Variation
 from flight.guidance.gains import Gains, load_gains
 from flight.simulation import simulate as simulation
-from flight.simulation.setup import FDM_HZ, FlightSetup
+from flight.simulation.setup import FDM_HZ, EngineChoice, FlightSetup
 from flight.simulation.simulate import Flight, SimulatedFlight, fly_to_end
+from planfly.workflow.airframe import load_airframe
+from planfly.workflow.make_plan import make_plan
+from planfly.workflow.open_flight import make_setup, mission_of_plan
 from tests.setups import MakeSetup, setup_maker, standard
 from world.arrays import Floats
+from world.scenario import load_scenario
 
 # Time after the start that is excluded, s.
 SETTLING = 5.0
@@ -200,22 +204,32 @@ class LoopCost:
     least: float
 
 
+# Engines of the rows, and how their names say so.
+_ENGINES: dict[EngineChoice, str] = {"auto": "", "jsbsim": " in JSBSim"}
 # Flight time of the turns of closed loop and bare JSBSim, s.
 TURN = 10
 
 
-def loop_cost(guidance_hz: int, rounds: int = 7, seconds: int = 240, *, ardupilot: bool = False) -> LoopCost:
+def loop_cost(
+    guidance_hz: int,
+    rounds: int = 7,
+    seconds: int = 240,
+    *,
+    ardupilot: bool = False,
+    engine: EngineChoice = "auto",
+) -> LoopCost:
     """Compare the CPU time of the closed loop with bare JSBSim, without the set-up, in the median round.
 
     Both step the same configuration at the same rate, in turns of ten seconds of flight, so that both are slowed down
     alike on a busy machine.
 
     ardupilot: True to fly ArduPlane's law instead of planfly's guidance.
+    engine: flight model of the closed loop.
     """
     ratios, closed, bares = [], [], []
     autopilot = ArduPlane(ArduPilotParameters.load(aerosonde())) if ardupilot else PlanflyGuidance()
     for _ in range(rounds):
-        setup = replace(windy(1), guidance_hz=cast("Any", guidance_hz), autopilot=autopilot)
+        setup = replace(windy(1), guidance_hz=cast("Any", guidance_hz), autopilot=autopilot, engine=engine)
         flight = Flight(setup, aerosonde())
         flight.block(guidance_hz)
         bare = Fdm(aerosonde(), rate_hz=FDM_HZ)
@@ -235,6 +249,46 @@ def loop_cost(guidance_hz: int, rounds: int = 7, seconds: int = 240, *, ardupilo
     return LoopCost(*(float(np.median(found)) for found in (ratios, closed, bares)), least=min(ratios))
 
 
+@dataclass(frozen=True, slots=True)
+class EngineCost:
+    """CPU time of the demo's flight in the air in each engine, s: the least of the rounds.
+
+    seconds: length of the flight, s.
+    """
+
+    seconds: float
+    jsbsim: float
+    compiled: float
+
+
+def demo_setup() -> FlightSetup:
+    """Return the setup of the demo in the air, planned with seed 1."""
+    scenario = load_scenario("jacksboro-air")
+    airframe = load_airframe(scenario)
+    plan = make_plan(scenario, airframe, 1)
+    return make_setup(scenario, airframe, mission_of_plan(plan, airframe, "plan"), 1, plan=plan)
+
+
+def engine_cost(setup: FlightSetup, rounds: int = 5) -> EngineCost:
+    """Fly a setup in both engines in turns, without its start, and require that both give the same bytes."""
+    spent: dict[EngineChoice, list[float]] = {"jsbsim": [], "auto": []}
+    tracks: dict[EngineChoice, bytes] = {}
+    seconds = 0.0
+    for _ in range(rounds):
+        for engine, found in spent.items():
+            flight = Flight(replace(setup, engine=engine), load_aircraft(setup.aircraft))
+            if engine == "auto" and not flight.engine.startswith("compiled"):
+                raise RuntimeError(flight.engine)
+            started = time.process_time()
+            flown = fly_to_end(flight)
+            found.append(time.process_time() - started)
+            tracks[engine] = flown.track.position.tobytes() + flown.track.commands.tobytes()
+            seconds = float(flown.track.time[-1])
+    if tracks["jsbsim"] != tracks["auto"]:
+        raise RuntimeError("the engines differ")
+    return EngineCost(seconds, min(spent["jsbsim"]), min(spent["auto"]))
+
+
 # Limit and aim, by the row's name or the end of it; rows without them are for information.
 NEEDED = {
     "calm: cross_rms, median": (0.10, 0.05),
@@ -252,10 +306,11 @@ NEEDED = {
     "straight legs, vector field, best-tuned / ours": (3.0, 5.0),
     "feasible missions: turning angles off the plan, most, deg": (0.1, 0.05),
     "feasible missions: slopes off the plan, most, deg": (0.15, 0.1),
-    "closed loop / bare JSBSim at 60 Hz": (1.40, 1.15),
-    "closed loop / bare JSBSim at 30 Hz": (1.15, 1.05),
-    "ArduPlane's law / bare JSBSim at 60 Hz": (1.40, 1.15),
-    "real-time factor at 60 Hz": (1300.0, 2100.0),
+    "closed loop / bare JSBSim at 60 Hz": (0.30, 0.17),
+    "closed loop in JSBSim / bare JSBSim at 60 Hz": (1.40, 1.15),
+    "closed loop in JSBSim / bare JSBSim at 30 Hz": (1.15, 1.05),
+    "demo in the air, compiled, CPU s": (0.22, 0.12),
+    "real-time factor at 60 Hz": (6000.0, 11000.0),
 }
 
 
@@ -283,12 +338,24 @@ def rows(seeds: int = 20) -> dict[str, float]:
     off = angles(range(5 * seeds), 0.1)
     found["feasible missions: turning angles off the plan, most, deg"] = float(off.turns.max())
     found["feasible missions: slopes off the plan, most, deg"] = float(off.slopes.max())
+    return found | engine_rows()
+
+
+def engine_rows() -> dict[str, float]:
+    """Return the rows of the cost of a flight in both engines."""
+    found = {}
     for hz in (60, 30):
-        cost = loop_cost(hz)
-        found[f"closed loop / bare JSBSim at {hz} Hz"] = cost.ratio
-        found[f"real-time factor at {hz} Hz"] = cost.closed
-    found["real-time factor of bare JSBSim"] = cost.bare
-    found["ArduPlane's law / bare JSBSim at 60 Hz"] = loop_cost(60, ardupilot=True).ratio
+        for engine, where in _ENGINES.items():
+            cost = loop_cost(hz, engine=engine)
+            found[f"closed loop{where} / bare JSBSim at {hz} Hz"] = cost.ratio
+            found[f"real-time factor{where} at {hz} Hz"] = cost.closed
+            found["real-time factor of bare JSBSim"] = cost.bare
+    for engine, where in _ENGINES.items():
+        found[f"ArduPlane's law{where} / bare JSBSim at 60 Hz"] = loop_cost(60, ardupilot=True, engine=engine).ratio
+    demo = engine_cost(demo_setup())
+    found[f"demo in the air, {demo.seconds:.0f} s, JSBSim, CPU s"] = demo.jsbsim
+    found["demo in the air, compiled, CPU s"] = demo.compiled
+    found["demo in the air, compiled / JSBSim"] = demo.compiled / demo.jsbsim
     return found
 
 

@@ -37,9 +37,9 @@ from world.wind import Turbulence
 # One tick of the compiled loop, on the block of a `flight.simulation.tick.Workspace`: a key of `ENDS`, 0 to fly on.
 Tick = Callable[[Floats, Heights], int]
 
-# A number of ticks, each followed by the steps of a compiled model: block, heights, then frames, numbers and code of a
-# `flight.dynamics.compiled_model.CompiledModel`, and the number; returns the last tick's status.
-Loop = Callable[[Floats, Heights, Records, Floats, Code, int], int]
+# A number of ticks, each followed by the steps of a compiled model: block, heights, frames, numbers, code, contacts and
+# frictions of a `flight.dynamics.compiled_model.CompiledModel`, and the number; returns the last tick's status.
+Loop = Callable[[Floats, Heights, Records, Floats, Code, Records, Records, int], int]
 
 # Question that a flight answers: can the aircraft fly it at all, or can it fly it with an autopilot.
 Level = Literal["airframe", "autopilot"]

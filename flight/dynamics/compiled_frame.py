@@ -10,6 +10,8 @@ import math
 
 import numpy as np
 
+from flight.dynamics.earth import AXES_RATIO, EARTH_RATE, ECCENTRICITY_2, SEMI_MAJOR, geodetic
+from flight.dynamics.ground_contact import contact_forces, friction_accelerations
 from flight.dynamics.instructions import Code, run_instructions
 from flight.dynamics.jsbsim_properties import FOOT
 from flight.dynamics.vectors import (
@@ -110,6 +112,8 @@ FRAME = record_dtype(
     "wing_area",  # ft^2
     "wing_span",  # ft
     "wing_chord",
+    ("centre", *_VECTOR),  # in, center of gravity in the structure
+    "contact_reach",  # ft, height below which a contact may touch the ground
 )
 # Registers of the frame.
 FRAME_NUMBERS = FRAME.itemsize // 8
@@ -139,25 +143,12 @@ FORCE_ARM = 6
 FORCE_REGISTERS = 9
 
 # ----------------------------------------------------------------------
-# Earth, gravity and atmosphere.
+# Atmosphere.
 
-# Rotation rate of the earth, rad/s.
-EARTH_RATE = 0.00007292115
-# Semi-major axis of the earth's ellipsoid, ft.
-SEMI_MAJOR = 20925646.32546
-# Semi-minor axis of the earth's ellipsoid, ft.
-SEMI_MINOR = 20855486.5951
 # Gravitational parameter of the earth, ft^3/s^2.
 GRAVITY_PARAMETER = 14.0764417572e15
 # Dynamic form factor of the earth.
 J2 = 1.08262982e-03
-# Ratio of the axes.
-_AXES_RATIO = SEMI_MINOR / SEMI_MAJOR
-_AXES_RATIO_2 = _AXES_RATIO * _AXES_RATIO
-# Square of the first eccentricity.
-_ECCENTRICITY_2 = 1.0 - _AXES_RATIO_2
-_SEMI_MAJOR_ECCENTRICITY_2 = SEMI_MAJOR * _ECCENTRICITY_2
-
 # Slugs in a kilogram, as JSBSim's atmosphere has them.
 _SLUGS = 0.06852168
 # Standard gravity, ft/s^2.
@@ -187,12 +178,13 @@ _MIN_SYMMETRIC_AIRSPEED_2 = 1e-6
 
 
 @inner
-def step(frame: Record, numbers: Floats, code: Code) -> None:
+def step(frame: Record, numbers: Floats, code: Code, contacts: Records, frictions: Records) -> None:
     """Advance by one step.
 
     frame: the record of `FRAME` at the start of the numbers.
     numbers: registers of the model.
     code: sections as stated above.
+    contacts, frictions: of `flight.dynamics.ground_contact`; there may be no contacts.
     """
     _integrate(frame)
     _update_place(frame)
@@ -203,9 +195,14 @@ def step(frame: Record, numbers: Floats, code: Code) -> None:
     _update_air_data(frame)
     run_instructions(numbers, code, code[AERO_BEGIN], code[EXTERNAL_BEGIN])
     force, moment = _aerodynamic_forces(frame)
+    ground_force, ground_moment, count = contact_forces(frame, contacts, frictions)
     run_instructions(numbers, code, code[EXTERNAL_BEGIN], code[FORCES_BEGIN])
     external_force, external_moment = _external_forces(numbers, code)
-    _accelerate(frame, add(force, external_force), add(moment, external_moment))
+    force = add(add(force, ground_force), external_force)
+    moment = add(add(moment, ground_moment), external_moment)
+    _accelerate(frame, force, moment)
+    if count > 0:
+        _rub(frame, contacts, frictions, count)
 
 
 @inner
@@ -233,7 +230,7 @@ def _integrate(frame: Record) -> None:
 
 @inner
 def _update_place(frame: Record) -> None:
-    """Compute the place on the ellipsoid, by Fukushima's method of 2006 in one iteration, and the local axes."""
+    """Compute the place on the ellipsoid, and the local axes."""
     cos, sin = math.cos(frame.earth_angle), math.sin(frame.earth_angle)
     frame.earth_cos, frame.earth_sin = cos, sin
     place = transform(rotation(cos, sin), vector_of(frame.position))
@@ -242,29 +239,13 @@ def _update_place(frame: Record) -> None:
     radius = math.sqrt(x * x + y * y + z * z)
     equatorial = math.sqrt(x * x + y * y)
     geocentric = math.atan2(z, equatorial)
-    s0 = abs(z)
-    zc, c0 = _AXES_RATIO * s0, _AXES_RATIO * equatorial
-    c02, s02 = c0 * c0, s0 * s0
-    a02 = c02 + s02
-    a0 = math.sqrt(a02)
-    a03 = a02 * a0
-    s1 = zc * a03 + _SEMI_MAJOR_ECCENTRICITY_2 * s02 * s0
-    c1 = equatorial * a03 - _SEMI_MAJOR_ECCENTRICITY_2 * c02 * c0
-    cs0c0 = _SEMI_MAJOR_ECCENTRICITY_2 * c0 * s0
-    b0 = 1.5 * cs0c0 * ((equatorial * s0 - zc * c0) * a0 - cs0c0)
-    s1 = s1 * a03 - b0 * s0
-    cc = _AXES_RATIO * (c1 * a03 - b0 * c0)
-    s12, cc2 = s1 * s1, cc * cc
-    norm = math.sqrt(s12 + cc2)
-    sign = 1.0 if z >= 0.0 else -1.0
     frame.radius, frame.geocentric_latitude = radius, geocentric
-    frame.latitude, frame.longitude = sign * math.atan(s1 / cc), math.atan2(y, x)
-    frame.geodetic_altitude = (equatorial * cc + s0 * s1 - SEMI_MAJOR * math.sqrt(_AXES_RATIO_2 * s12 + cc2)) / norm
+    frame.latitude, frame.geodetic_altitude, sin_lat, cos_lat = geodetic(place)
+    frame.longitude = math.atan2(y, x)
     cos_geocentric = math.cos(geocentric)
-    frame.altitude = radius - SEMI_MAJOR * _AXES_RATIO / math.sqrt(
-        1.0 - _ECCENTRICITY_2 * cos_geocentric * cos_geocentric
+    frame.altitude = radius - SEMI_MAJOR * AXES_RATIO / math.sqrt(
+        1.0 - ECCENTRICITY_2 * cos_geocentric * cos_geocentric
     )
-    cos_lat, sin_lat = cc / norm, sign * s1 / norm
     sin_lon, cos_lon = y / equatorial, x / equatorial
     set_matrix(frame.earth_to_local, _local_axes(sin_lat, cos_lat, sin_lon, cos_lon))
 
@@ -403,18 +384,35 @@ def _accelerate(frame: Record, force: Vector, moment: Vector) -> None:
     set_vector(frame.acceleration, add(transform_back(matrix_of(frame.inertial_to_body), specific), gravity))
 
 
+@inner
+def _rub(frame: Record, contacts: Records, frictions: Records, count: int) -> None:
+    """Add the friction of the contacts to the accelerations."""
+    to_body = matrix_of(frame.inertial_to_body)
+    turning = transform(to_body, (0.0, 0.0, EARTH_RATE))
+    rates = add(vector_of(frame.rates), scale(2.0, turning))
+    body = subtract(vector_of(frame.specific_force), cross(rates, vector_of(frame.body_velocity)))
+    outward = cross((0.0, 0.0, EARTH_RATE), cross((0.0, 0.0, EARTH_RATE), vector_of(frame.position)))
+    body = subtract(body, transform(to_body, outward))
+    body = add(body, transform(matrix_of(frame.earth_to_body), vector_of(frame.gravity)))
+    angular = add(vector_of(frame.angular_acceleration), cross(vector_of(frame.inertial_rates), turning))
+    push, twist = friction_accelerations(frame, contacts, frictions, count, body, angular)
+    set_vector(frame.specific_force, add(vector_of(frame.specific_force), push))
+    set_vector(frame.acceleration, add(vector_of(frame.acceleration), transform_back(to_body, push)))
+    set_vector(frame.angular_acceleration, add(vector_of(frame.angular_acceleration), twist))
+
+
 # ----------------------------------------------------------------------
 # Calls from Python.
 
 
 @compiled
-def step_often(frames: Records, numbers: Floats, code: Code, count: int) -> None:
+def step_often(frames: Records, numbers: Floats, code: Code, contacts: Records, frictions: Records, count: int) -> None:
     """Advance by a number of steps.
 
     frames: (1,) of `FRAME`, at the start of the numbers.
     """
     for _ in range(count):
-        step(frames[0], numbers, code)
+        step(frames[0], numbers, code, contacts, frictions)
 
 
 @compiled

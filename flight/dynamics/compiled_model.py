@@ -12,8 +12,9 @@ import numpy as np
 
 from flight.dynamics.compiled_frame import CODE_HEADER, FRAME, FRAME_NUMBERS, begin_attitude, step_often
 from flight.dynamics.fdm import Fdm
+from flight.dynamics.ground_contact import CONTACT, FRICTION
 from flight.dynamics.instructions import LOWER_LIMIT, Code
-from flight.dynamics.jsbsim_properties import FORCES, GUST, MASS, MODEL_FIELDS, STATE_PROPERTIES, WIND
+from flight.dynamics.jsbsim_properties import FOOT, FORCES, GUST, MASS, MODEL_FIELDS, STATE_PROPERTIES, TERRAIN, WIND
 from flight.dynamics.model_program import (
     FRAME_PROPERTIES,
     ModelProgram,
@@ -34,6 +35,13 @@ _PROOF_SURFACE_RAD = 0.15
 _PROOF_THROTTLE = 0.2
 # Gusts to either side, ft/s.
 _PROOF_GUST_FPS = 3.0
+# Turn from which on contacts touch the ground, and how deep the lowest one is pressed into it, ft.
+_PROOF_TURN_ON_GROUND = 16
+_PROOF_DEPTH_FT = 0.05
+# Height above the reach of the contacts in which they are computed nevertheless, ft.
+_REACH_MARGIN_FT = 1.0
+# Fields of a contact by their properties.
+_CONTACT_FIELDS = {"compression": "compression-ft", "compression_speed": "compression-velocity-fps"}
 # Feet in an inch, as JSBSim has them.
 _INCH = 1.0 / 12.0
 
@@ -68,6 +76,7 @@ class CompiledModel:
     numbers: registers.
     frames: (1,) of `flight.dynamics.compiled_frame.FRAME`, the first registers.
     code: sections as `flight.dynamics.compiled_frame` describes them.
+    contacts, frictions: of `flight.dynamics.ground_contact`.
     properties: register of each property of JSBSim that has one.
     """
 
@@ -94,6 +103,13 @@ class CompiledModel:
         outputs = (*commands, *map(self._register, GUST), frame_register("terrain"))
         used = (True, True, True, True, gusts, gusts, gusts, terrain)
         writes = [register if use else zero + 1 for register, use in zip(outputs, used, strict=True)]
+        self.contacts: Records = np.zeros(len(program.contacts), CONTACT)
+        self.frictions: Records = np.zeros(2 * len(program.contacts), FRICTION)
+        self._pressed = [
+            (number, field, access.getter(f"{contact.base}/{name}"))
+            for number, contact in enumerate(program.contacts)
+            for field, name in _CONTACT_FIELDS.items()
+        ]
         self.frames: Records = self.numbers[:FRAME_NUMBERS].view(FRAME)
         self.code = _pack(program, [self._reading(field, zero) for field in reads], writes, steps)
         self._begin()
@@ -103,17 +119,22 @@ class CompiledModel:
 
         JSBSim is left somewhere else, and cannot fly on if there is a difference.
         """
-        begun = self.numbers.copy()
+        begun, contacts = self.numbers.copy(), self.contacts.copy()
         found = self.differences()
         for turn in range(PROOF_STEPS // _PROOF_STRIDE):
             if found:
                 break
             self._move_inputs(begun, turn)
             self._fdm.step(_PROOF_STRIDE)
-            step_often(self.frames, self.numbers, self.code, _PROOF_STRIDE)
+            step_often(*self.arrays, _PROOF_STRIDE)
             found = self.differences()
-        self.numbers[:] = begun
+        self.numbers[:], self.contacts[:] = begun, contacts
         return found
+
+    @property
+    def arrays(self) -> tuple[Records, Floats, Code, Records, Records]:
+        """Arguments of a `flight.autopilots.autopilot.Loop`."""
+        return self.frames, self.numbers, self.code, self.contacts, self.frictions
 
     # ----------------------------------------------------------------------
 
@@ -155,7 +176,22 @@ class CompiledModel:
             numbers[block.begin : block.begin + LOWER_LIMIT] = _actuator_numbers(
                 numbers[block.source], *block[2:], frame.dt
             )
+        self._begin_contacts(centre)
         begin_attitude(self.frames, self._fdm.attitudes())
+
+    def _begin_contacts(self, centre: Sequence[float]) -> None:
+        """Take over the contacts, which must be above the ground: the memory of their friction cannot be read."""
+        read, frame = self._fdm.properties.read, self.frames[0]
+        frame.centre, frame.terrain = centre, self._fdm.terrain_amsl / FOOT
+        for contact, data in zip(self.contacts, self._program.contacts, strict=True):
+            if read(f"{data.base}/WOW"):
+                raise UnsupportedModel("a start on the ground")
+            contact.place = [read(f"{data.base}/{axis}-position") for axis in "xyz"]
+            contact.arm = _arm(contact.place, centre)
+            for field in data._fields[1:]:
+                contact[field] = getattr(data, field)
+        arms = np.linalg.norm(self.contacts["arm"], axis=1)
+        frame.contact_reach = float(np.max(arms, initial=0.0)) + _REACH_MARGIN_FT
 
     def _move_inputs(self, begun: Floats, turn: int) -> None:
         """Set commands and gusts in both engines, in another combination each turn."""
@@ -168,11 +204,19 @@ class CompiledModel:
             register = self.properties[name]
             self.numbers[register] = begun[register] + side * move * scale
             self._fdm.properties.set(name, self.numbers[register])
+        if len(self.contacts) and turn >= _PROOF_TURN_ON_GROUND:
+            # The ground is raised until the lowest point of the aircraft touches it.
+            depths = (self.contacts["arm"] @ self.frames[0].local_to_body)[:, 2]
+            frame = self.frames[0]
+            frame.terrain = frame.geodetic_altitude - float(depths.max()) + _PROOF_DEPTH_FT
+            self._fdm.properties.set(TERRAIN, frame.terrain)
 
     def differences(self) -> list[str]:
         """Return the properties that differ in any bit at present."""
         numbers = self.numbers.tolist()
-        return [name for name, (register, get) in self._getters.items() if not _equal(numbers[register], get())]
+        found = [name for name, (register, get) in self._getters.items() if not _equal(numbers[register], get())]
+        contacts = self.contacts
+        return found + [field for k, field, get in self._pressed if not _equal(float(contacts[k][field]), get())]
 
 
 def _equal(one: float, other: float) -> bool:

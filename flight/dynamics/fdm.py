@@ -456,6 +456,11 @@ class Fdm:
             run=self._run,
         )
 
+    @property
+    def terrain_amsl(self) -> float:
+        """Altitude of the ground in the initial conditions, m."""
+        return self._at[2]
+
     def model_text(self) -> bytes:
         """Return the XML of the model with its contacts."""
         model = self.aircraft.model_file.read_bytes()

@@ -13,6 +13,7 @@ from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 
 from flight.dynamics.compiled_frame import FORCE_REGISTERS, FRAME, FRAME_NUMBERS
+from flight.dynamics.ground_contact import MAX_CONTACTS
 from flight.dynamics.instructions import LOWER_LIMIT, Operation
 
 # Properties of JSBSim that are numbers of the frame: field, and element of a field with several.
@@ -93,6 +94,23 @@ class ExternalForce(NamedTuple):
     axes: int
 
 
+class ContactData(NamedTuple):
+    """Numbers of a contact.
+
+    base: path of its properties.
+    spring: lbf/ft.
+    damping: lbf s/ft.
+    """
+
+    base: str
+    is_wheel: bool
+    spring: float
+    damping: float
+    static_friction: float
+    dynamic_friction: float
+    rolling_friction: float
+
+
 @dataclass(frozen=True, slots=True)
 class ModelProgram:
     """Registers and instructions of a model.
@@ -109,6 +127,7 @@ class ModelProgram:
     properties: dict[str, int]
     actuators: tuple[ActuatorBlock, ...]
     forces: tuple[ExternalForce, ...]
+    contacts: tuple[ContactData, ...]
 
 
 def frame_register(name: str, element: int = 0) -> int:
@@ -127,19 +146,24 @@ def translate(model: bytes) -> ModelProgram:
 
     Raise UnsupportedModel with the reason for a model that is not covered.
     """
-    root = ElementTree.fromstring(model)
+    try:
+        root = ElementTree.fromstring(model)
+    except ElementTree.ParseError as error:
+        raise UnsupportedModel(f"XML with an error: {error}") from None
     sections = {one.tag: one for one in root}
     known = {*_DATA_SECTIONS, "ground_reactions", "propulsion", *_SECTIONS}
     if len(sections) != len(root) or not sections.keys() <= known:
         raise UnsupportedModel(f"the section <{next((one.tag for one in root if one.tag not in known), root[-1].tag)}>")
     if any("file" in one.attrib for one in root.iter()):
         raise UnsupportedModel("a file that the model includes")
-    for name in ("ground_reactions", "propulsion"):
-        if len(sections.get(name, ())):
-            raise UnsupportedModel(f"<{sections[name][0].tag}> in <{name}>")
+    if len(sections.get("propulsion", ())):
+        raise UnsupportedModel(f"<{sections['propulsion'][0].tag}> in <propulsion>")
     if missing := [name for name in _SECTIONS if name not in sections]:
         raise UnsupportedModel(f"a model without <{missing[0]}>")
-    return _Translator([sections[name] for name in _SECTIONS]).program()
+    contacts = [_contact(one, number) for number, one in enumerate(sections.get("ground_reactions", ()))]
+    if len(contacts) > MAX_CONTACTS:
+        raise UnsupportedModel(f"{len(contacts)} contacts")
+    return _Translator([sections[name] for name in _SECTIONS], contacts).program()
 
 
 # Sections with instructions.
@@ -154,6 +178,7 @@ class _Translator:
     """
 
     sections: Sequence[Element]
+    contacts: Sequence[ContactData]
     numbers: list[float] = field(default_factory=lambda: [0.0] * FRAME_NUMBERS)
     properties: dict[str, int] = field(default_factory=dict)
     actuators: list[ActuatorBlock] = field(default_factory=list)
@@ -169,7 +194,7 @@ class _Translator:
         aero = self._instructions(self._aerodynamics, aerodynamics)
         external = self._instructions(self._external_reactions, reactions)
         numbers, actuators, forces = tuple(self.numbers), tuple(self.actuators), tuple(self.forces)
-        return ModelProgram(numbers, fcs, aero, external, self.properties, actuators, forces)
+        return ModelProgram(numbers, fcs, aero, external, self.properties, actuators, forces, tuple(self.contacts))
 
     def _instructions(self, translate_section: Callable[[Element], None], section: Element) -> tuple[int, ...]:
         """Return the instructions of a section."""
@@ -247,7 +272,7 @@ class _Translator:
             raise UnsupportedModel("a table of more than one variable")
         _check(variables[0], attributes={"lookup"})
         _check(data[0])
-        numbers = [float(one) for one in _text(data[0]).split()]
+        numbers = [_float(data[0], one) for one in _text(data[0]).split()]
         keys = numbers[::2]
         if variables[0].get("lookup", "row") != "row" or len(numbers) % 2 or len(keys) < 2 or keys != sorted(set(keys)):
             raise UnsupportedModel("a table whose rows are not pairs with growing keys")
@@ -343,6 +368,39 @@ class _Translator:
             self.forces.append(ExternalForce(one.get("name", ""), is_moment, magnitude, axes))
 
 
+# Pounds per foot in a newton per meter, as JSBSim has them.
+_LBF_FT = 1.0 / 14.5939
+# Numbers of a contact and their units.
+_CONTACT_NUMBERS = {
+    "spring_coeff": ("N/M", _LBF_FT),
+    "damping_coeff": ("N/M/SEC", _LBF_FT),
+    "static_friction": (None, 1.0),
+    "dynamic_friction": (None, 1.0),
+    "rolling_friction": (None, 1.0),
+}
+# What a contact does not have: it neither steers, nor brakes, nor retracts.
+_CONTACT_LACKS = {"max_steer": "0", "brake_group": "NONE", "retractable": "0"}
+
+
+def _contact(element: Element, number: int) -> ContactData:
+    """Return the numbers of a contact, whose place is read from its properties."""
+    kind = element.get("type", "")
+    if element.tag != "contact" or kind not in ("BOGEY", "STRUCTURE"):
+        raise UnsupportedModel(f"<{element.tag} type={kind!r}> in <ground_reactions>")
+    _check(element, attributes={"type", "name"}, children={"location", *_CONTACT_NUMBERS, *_CONTACT_LACKS})
+    values = []
+    for name, (unit, factor) in _CONTACT_NUMBERS.items():
+        one = element.find(name)
+        if one is None or one.get("unit") != unit:
+            raise UnsupportedModel(f"<contact> without <{name}> in the unit {unit}")
+        values.append(_number(one, attributes={"unit"}) * factor)
+    for name, value in _CONTACT_LACKS.items():
+        if element.findtext(name, value).strip() != value:
+            raise UnsupportedModel(f"<{name}> {element.findtext(name)}")
+    wheel = kind == "BOGEY"
+    return ContactData(f"{'gear' if wheel else 'contact'}/unit[{number}]", wheel, *values)
+
+
 # Components of a channel.
 _COMPONENTS = {"actuator", "fcs_function"}
 # All operations, and all elements with a value.
@@ -364,13 +422,18 @@ def _text(element: Element) -> str:
     return (element.text or "").strip()
 
 
-def _number(element: Element) -> float:
+def _number(element: Element, *, attributes: Iterable[str] = ()) -> float:
     """Return an element's number. Raise UnsupportedModel for a property or anything else."""
-    _check(element)
+    _check(element, attributes=attributes)
+    return _float(element, _text(element))
+
+
+def _float(element: Element, text: str) -> float:
+    """Return a number in an element. Raise UnsupportedModel for anything else."""
     try:
-        return float(_text(element))
+        return float(text)
     except ValueError:
-        raise UnsupportedModel(f"{_text(element)!r} instead of a number in <{element.tag}>") from None
+        raise UnsupportedModel(f"{text!r} instead of a number in <{element.tag}>") from None
 
 
 def _clip_limits(element: Element) -> tuple[float, float] | None:

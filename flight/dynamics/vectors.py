@@ -82,6 +82,15 @@ def cross(a: Vector, b: Vector) -> Vector:
 
 
 @inlined
+def unit(v: Vector) -> Vector:
+    """Return a vector scaled to length 1; a zero vector stays."""
+    length = math.sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2])
+    if length == 0.0:
+        return v
+    return scale(1.0 / length, v)
+
+
+@inlined
 def transform(m: Matrix, v: Vector) -> Vector:
     """Return the product of a matrix and a vector."""
     return dot(m[0], v), dot(m[1], v), dot(m[2], v)

@@ -9,7 +9,7 @@ from flight.dynamics.compiled_frame import CODE_END, READS_BEGIN, STEPS, WRITES_
 from flight.dynamics.instructions import Code
 from flight.simulation.tick import WORKSPACE
 from world.arrays import Floats
-from world.kernels import Record, inner
+from world.kernels import Record, Records, inner
 
 _FIELDS: Any = WORKSPACE.fields
 # First numbers of the state and of the outputs in the block of a workspace.
@@ -26,10 +26,12 @@ def read_state(block: Floats, numbers: Floats, code: Code) -> None:
 
 
 @inner
-def advance_model(block: Floats, frame: Record, numbers: Floats, code: Code) -> None:
+def advance_model(
+    block: Floats, frame: Record, numbers: Floats, code: Code, contacts: Records, frictions: Records
+) -> None:
     """Copy the outputs of the workspace to the model, and step it to the next tick."""
     begin = code[WRITES_BEGIN]
     for k in range(code[CODE_END] - begin):
         numbers[code[begin + k]] = block[_OUTPUT_BEGIN + k]
     for _ in range(code[STEPS]):
-        step(frame, numbers, code)
+        step(frame, numbers, code, contacts, frictions)

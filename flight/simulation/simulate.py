@@ -24,7 +24,7 @@ from flight.simulation.setup import FlightSetup
 from flight.simulation.start import Start, find_release, gear_of, release
 from flight.simulation.tick import READ_FIELDS, Workspace
 from flight.simulation.track import Rows, Track, as_track, join_rows
-from world.errors import StartError
+from world.errors import FlightError, StartError
 
 # ----------------------------------------------------------------------
 # The flight loop: read JSBSim, do a tick, set JSBSim, step it, with as little Python between as there can be.
@@ -324,12 +324,14 @@ class Flight(Airborne):
         if self.setup.engine == "jsbsim":
             return None, "JSBSim, as chosen"
         if law.loop is None:
-            return None, "JSBSim, since contact with the ground is not compiled"
+            return None, f"JSBSim, since {law.title} has no compiled loop"
         gusts, terrain = self._windy, bool(self._ground.known)
         try:
             model = CompiledModel(self.fdm, READ_FIELDS, self._steps, gusts=gusts, terrain=terrain)
         except UnsupportedModel as unsupported:
             return None, f"JSBSim, since the compiled model does not cover {unsupported}"
+        except (FlightError, ArithmeticError) as error:
+            return None, f"JSBSim, since the compiled model cannot begin: {error}"
         if differences := model.find_differences():
             # Start again, since the comparison has moved the aircraft.
             self.fdm = self._new_fdm()
@@ -344,7 +346,7 @@ class Flight(Airborne):
         work.scale_above, work.scale_below = (tuple(scales) for scales in zip(*access.scales, strict=True))
         if self._compiled is not None and law.loop is not None:
             model = self._compiled
-            return partial(law.loop, space.block, self._ground.heights, model.frames, model.numbers, model.code)
+            return partial(law.loop, space.block, self._ground.heights, *model.arrays)
         # Not set: gusts in still air, and ground that is not known.
         used = (True, True, True, True, self._windy, self._windy, self._windy, self._ground.known)
         setters = [setter if use else _discard for setter, use in zip(access.setters, used, strict=True)]

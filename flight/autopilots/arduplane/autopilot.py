@@ -10,7 +10,14 @@ import numpy as np
 from aircraft.catalog import Aircraft
 from aircraft.contacts import Contact
 from aircraft.tracking import TrackingError
-from flight.autopilots.arduplane.ground_law import ARDUPLANE_GROUND, CONTACTS, IN_AIR, TAKING_OFF, ground_tick
+from flight.autopilots.arduplane.ground_law import (
+    ARDUPLANE_GROUND,
+    CONTACTS,
+    IN_AIR,
+    TAKING_OFF,
+    ground_loop,
+    ground_tick,
+)
 from flight.autopilots.arduplane.landing import go_around_height, landing_airspeed, landing_glide
 from flight.autopilots.arduplane.launch import motor_start, takeoff_slew
 from flight.autopilots.arduplane.law import ARDUPLANE, arduplane_loop, arduplane_tick
@@ -128,7 +135,7 @@ class ArduPlane(Autopilot):
         return arduplane_tick
 
     @property
-    def loop(self) -> Loop | None:
+    def loop(self) -> Loop:
         """Compiled loop of the law with a compiled model."""
         return arduplane_loop
 
@@ -353,9 +360,9 @@ class ArduPlaneFromGround(ArduPlane, GroundAutopilot):
         return ground_tick
 
     @property
-    def loop(self) -> Loop | None:
-        """None: contact with the ground is not compiled."""
-        return None
+    def loop(self) -> Loop:
+        """Compiled loop of the law with a compiled model."""
+        return ground_loop
 
     @property
     def motor_start(self) -> float:

@@ -32,9 +32,11 @@ from flight.autopilots.arduplane.law import (
     update_tecs,
 )
 from flight.autopilots.arduplane.parameters import ARDUPILOT_PARAMETERS
+from flight.dynamics.instructions import Code
 from flight.guidance.equivalent_airspeed import true_by_equivalent
 from flight.guidance.lateral_reference_laws import l1_acceleration, l1_angles, l1_integrate, l1_length
 from flight.guidance.path import find_on_path
+from flight.simulation.compiled_loop import advance_model, read_state
 from flight.simulation.tick import (
     COMPLETED,
     END_BATTERY_EMPTY,
@@ -191,6 +193,27 @@ def ground_tick(block: Floats, heights: Heights) -> int:
         _tick_landing(work, own, waypoints[memory.leg + 1])
     fill_tick(work)
     return ended(work, ground)
+
+
+@compiled
+def ground_loop(
+    block: Floats,
+    heights: Heights,
+    frames: Records,
+    numbers: Floats,
+    code: Code,
+    contacts: Records,
+    frictions: Records,
+    count: int,
+) -> int:
+    """Fly up to a number of ticks with a `flight.dynamics.compiled_model.CompiledModel`, and return the last status."""
+    for _ in range(count):
+        read_state(block, numbers, code)
+        status = ground_tick(block, heights)
+        if status != 0:
+            return status
+        advance_model(block, frames[0], numbers, code, contacts, frictions)
+    return 0
 
 
 @inner

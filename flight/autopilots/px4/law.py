@@ -114,14 +114,23 @@ def px4_tick(block: Floats, heights: Heights) -> int:
 
 
 @compiled
-def px4_loop(block: Floats, heights: Heights, frames: Records, numbers: Floats, code: Code, count: int) -> int:
+def px4_loop(
+    block: Floats,
+    heights: Heights,
+    frames: Records,
+    numbers: Floats,
+    code: Code,
+    contacts: Records,
+    frictions: Records,
+    count: int,
+) -> int:
     """Fly up to a number of ticks with a `flight.dynamics.compiled_model.CompiledModel`, and return the last status."""
     for _ in range(count):
         read_state(block, numbers, code)
         status = px4_tick(block, heights)
         if status != 0:
             return status
-        advance_model(block, frames[0], numbers, code)
+        advance_model(block, frames[0], numbers, code, contacts, frictions)
     return 0
 
 

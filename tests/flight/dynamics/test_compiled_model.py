@@ -1,11 +1,14 @@
 """The compiled model steps as JSBSim does, to the last bit, and a difference is noticed."""
 
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from aircraft.catalog import Aircraft, load_aircraft
+from aircraft.data_sheet import DataSheet
+from aircraft.model_writer import Layout
 from flight.dynamics.compiled_frame import FCS_BEGIN, step_often
 from flight.dynamics.compiled_model import CompiledModel
 from flight.dynamics.fdm import Fdm, Variation
@@ -13,6 +16,7 @@ from flight.dynamics.instructions import Operation
 from flight.dynamics.jsbsim_properties import GUST
 from flight.dynamics.model_program import UnsupportedModel, frame_register
 from flight.simulation.tick import READ_FIELDS
+from planfly.workflow.data_sheets import make_data_sheet_folder
 from tests.soak import SOAK
 
 # Of flight, s.
@@ -50,7 +54,7 @@ def first_difference(fdm: Fdm, model: CompiledModel, seconds: float) -> tuple[in
             fdm.properties.set(name, value)
             model.numbers[model.properties[name]] = value
         fdm.step(STEPS)
-        step_often(model.frames, model.numbers, model.code, STEPS)
+        step_often(*model.arrays, STEPS)
         if found := model.differences():
             return tick, found
     return None
@@ -62,6 +66,20 @@ def test_every_tick_equals_jsbsims(name: str, hz: int) -> None:
     fdm, model = begun(load_aircraft(name), hz)
     assert first_difference(fdm, model, SECONDS) is None
     assert fdm.properties.read("position/h-sl-ft") > 1000.0
+
+
+@pytest.mark.skipif(not SOAK, reason="takes seconds to make an aircraft: in make soak")
+@pytest.mark.parametrize("layout", ["wing", "tail"])
+@pytest.mark.parametrize("mass", [0.9, 2.1, 6.0])
+def test_every_tick_of_an_aircraft_from_a_data_sheet_equals_jsbsims(
+    layout: Layout, mass: float, tmp_path: Path
+) -> None:
+    span = 1.25 * mass ** (1.0 / 3.0)
+    aircraft = make_data_sheet_folder(
+        tmp_path / "own", DataSheet(mass=mass, span=span, cruise=15.0, stall=10.0, layout=layout)
+    )
+    fdm, model = begun(aircraft)
+    assert first_difference(fdm, model, SECONDS) is None
 
 
 def test_a_varied_aircraft_equals_jsbsims() -> None:

@@ -8,6 +8,7 @@ from flight.dynamics.instructions import Operation
 from flight.dynamics.model_program import ModelProgram, UnsupportedModel, frame_register, translate
 
 ALPHA = frame_register("alpha")
+VARIABLE = "<independentVar lookup='row'> aero/alpha-rad </independentVar>"
 
 
 def model(function: str = "<v> 1 </v>", *, fcs: str = "", aero: str = "", external: str = "", more: str = "") -> bytes:
@@ -51,8 +52,7 @@ def test_a_minus_sign_before_a_property_changes_its_sign() -> None:
 
 
 def test_a_table_keeps_its_rows() -> None:
-    variable = "<independentVar lookup='row'> aero/alpha-rad </independentVar>"
-    table = f"<table>{variable}<tableData> 0 5\n 1 7\n 3 6 </tableData></table>"
+    table = f"<table>{VARIABLE}<tableData> 0 5\n 1 7\n 3 6 </tableData></table>"
     program, ((operation, _, (key, begin, rows)),) = of_function(table)
     assert (operation, key, rows) == (Operation.TABLE, ALPHA, 3)
     assert program.numbers[begin : begin + 6] == (0.0, 5.0, 1.0, 7.0, 3.0, 6.0)
@@ -108,10 +108,18 @@ def test_all_aircraft_but_one_are_covered() -> None:
         (model("<p> aero/mag-beta-rad </p>"), "property aero/mag-beta-rad"),
         (model("<p apply='t'> aero/alpha-rad </p>"), "<p apply=...>"),
         (model("<v> 1 </v> <v> 2 </v>"), "<function> of 2 values"),
+        (model("<v> one </v>"), "'one' instead of a number in <v>"),
+        (model(f"<table>{VARIABLE}<tableData> 0 1 1 x </tableData></table>"), "'x' instead of a number in <tableData>"),
+        (model(f"<table>{VARIABLE}<tableData> 1 1 0 2 </tableData></table>"), "growing keys"),
+        (model(f"<table>{VARIABLE}{VARIABLE}<tableData> 1 1 0 2 </tableData></table>"), "more than one variable"),
+        (b"<fdm_config>", "XML with an error"),
         (model(more="<output/>"), "the section <output>"),
         (model(more="<system file='a'/>"), "the section <system>"),
         (model().replace(b"<propulsion/>", b"<propulsion><tank/></propulsion>"), "<tank> in <propulsion>"),
-        (model().replace(b"<ground_reactions/>", b"<ground_reactions><contact/></ground_reactions>"), "<contact>"),
+        (
+            model().replace(b"<ground_reactions/>", b"<ground_reactions><contact/></ground_reactions>"),
+            "<contact type=''>",
+        ),
         (model().replace(b'"STABILITY"', b'"WIND"'), "<axis name='X'> in the frame WIND"),
         (model(aero="<axis name='LIFT'/>"), "<axis name='LIFT'>"),
         (model(fcs="<pid name='a/b'/>"), "<pid> in <channel>"),
