@@ -71,16 +71,21 @@ def find_misfits(values: Iterable[ParameterValue], orders: Iterable[tuple[str, .
     >>> find_misfits(made, [("THR_MIN", "TRIM_THROTTLE")])
     ('TRIM_THROTTLE 60 of the file is below THR_MIN 74 of the aircraft',)
     """
-    known = {value.name: value for value in values}
-    found = []
+    by_name = {value.name: value for value in values}
+    misfits = []
     for order in orders:
-        for low, high in pairwise(known[name] for name in order if name in known):
-            if low.value <= high.value or "file" not in (low.origin, high.origin):
+        for lower, higher in pairwise(by_name[name] for name in order if name in by_name):
+            if lower.value <= higher.value or "file" not in (lower.origin, higher.origin):
                 continue
-            first, word, second = (high, "below", low) if high.origin == "file" else (low, "above", high)
-            texts = (f"{one.name} {one.value:g} of {_SOURCE_NAMES[one.origin]}" for one in (first, second))
-            found.append(f" is {word} ".join(texts))
-    return tuple(found)
+            file_value, relation, other_value = (
+                (higher, "below", lower) if higher.origin == "file" else (lower, "above", higher)
+            )
+            texts = (
+                f"{parameter.name} {parameter.value:g} of {_SOURCE_NAMES[parameter.origin]}"
+                for parameter in (file_value, other_value)
+            )
+            misfits.append(f" is {relation} ".join(texts))
+    return tuple(misfits)
 
 
 class Parameters(Protocol):
@@ -98,23 +103,23 @@ class Parameters(Protocol):
 
     @property
     def values(self) -> tuple[ParameterValue, ...]:
-        """As above."""
+        """See the class."""
 
     @property
     def unused(self) -> tuple[str, ...]:
-        """As above."""
+        """See the class."""
 
     @property
     def source(self) -> str:
-        """As above."""
+        """See the class."""
 
     @property
     def beyond(self) -> tuple[str, ...]:
-        """As above."""
+        """See the class."""
 
     @property
     def misfits(self) -> tuple[str, ...]:
-        """As above."""
+        """See the class."""
 
     def changed(self, **values: float) -> Self:
         """Return a copy with other values for some parameters."""
@@ -244,12 +249,12 @@ class StoredAutopilot(NamedTuple):
 class Autopilot(ABC):
     """Autopilot of a flight, with its settings; subclasses are frozen dataclasses.
 
-    name: as in `[flight] autopilot`.
-    title: as in texts.
-    level: the question that its flight answers.  At "airframe" it stands for the aircraft alone; at "autopilot" its
+    name: its name in `[flight] autopilot`.
+    title: its name in texts.
+    level: the question that its flight answers.  At "airframe" it stands only for the aircraft; at "autopilot" its
         verdict is compared with a reference flight by planfly's guidance.
     parameters: None for an autopilot without parameters.
-    program: that flew it; None for a law and before the flight.
+    program: program that flew it; None for a law and before the flight.
     own: type of the record that its law has in addition to `flight.guidance.inner_loops.GUIDANCE_MEMORY`, or None.
     cruise_parameter: parameter of its cruise airspeed; "" if it has no such parameter.
     equivalent_airspeeds: True if commanded airspeeds are equivalent airspeeds, which are lower than true ones at
@@ -291,7 +296,7 @@ class Autopilot(ABC):
     def load(cls, table: FlightTable, aircraft: Aircraft, scenario: str) -> Self:
         """Return the autopilot of a scenario's [flight] table; `scenario` is the scenario's name in messages.
 
-        Raise ScenarioError for an entry that it does not accept, and ParameterError for a bad parameter file.
+        Raises ScenarioError if it does not accept an entry, and ParameterError if the parameter file is invalid.
         """
         if table.params is not None:
             allowed = f'not a key of autopilot = "{cls.name}", which has no parameters'
@@ -302,7 +307,7 @@ class Autopilot(ABC):
     def restore(cls, stored: StoredAutopilot) -> Self:
         """Return the autopilot that a log stores.
 
-        Raise ParameterError for a value that is not allowed.
+        Raises ParameterError if a value is not allowed.
         """
         return cls()
 
@@ -330,7 +335,7 @@ class Autopilot(ABC):
     def missing_files(cls, aircraft: Aircraft) -> list[str]:
         """Describe the files that this autopilot needs and an aircraft's folder lacks, in sentences.
 
-        Raise PlanflyError for a broken file.
+        Raises PlanflyError if a file is invalid.
         """
         return []
 
@@ -462,7 +467,7 @@ class Autopilot(ABC):
         """
         return self
 
-    def go_around_height(self, asked: float, takeoff: float) -> float | None:
+    def go_around_height(self, stated_height: float, takeoff_height: float) -> float | None:
         """Return the height above home (m) to which it climbs before it goes around, or None if unknown.
 
         asked: height that the landing item states, m; 0 if it states none.
@@ -517,8 +522,12 @@ class Autopilot(ABC):
     @property
     def stated_airspeed(self) -> tuple[float, str] | None:
         """Cruise airspeed (m/s) in the user's parameter file, and the parameter; None if not stated."""
-        stated = {} if self.parameters is None else self.parameters.by_origin("file")
-        return (stated[self.cruise_parameter], self.cruise_parameter) if self.cruise_parameter in stated else None
+        file_values = {} if self.parameters is None else self.parameters.by_origin("file")
+        return (
+            (file_values[self.cruise_parameter], self.cruise_parameter)
+            if self.cruise_parameter in file_values
+            else None
+        )
 
     @property
     def stated_bank(self) -> float | None:
@@ -583,8 +592,8 @@ def describe_program(program: AutopilotProgram, aircraft: str, named: int = 8) -
     named: number of changed parameters to name.
     """
     changed = [f"{name} {value:g}" for name, value in program.changed.items()]
-    more = f", +{len(changed) - named} more" if len(changed) > named else ""
+    rest_text = f", +{len(changed) - named} more" if len(changed) > named else ""
     return (
         f"{program.version} (sha256 {program.sha256[:8]}...), {len(program.parameters)} parameters set for"
-        f" {Path(aircraft).name}, changed: {', '.join(changed[:named]) or 'none'}{more}"
+        f" {Path(aircraft).name}, changed: {', '.join(changed[:named]) or 'none'}{rest_text}"
     )
