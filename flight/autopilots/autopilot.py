@@ -321,7 +321,10 @@ class Autopilot(ABC):
     ) -> tuple[Self, tuple[str, ...]] | None:
         """Return the autopilot that wrote a log, and notes on its parameters, or None for another autopilot's log.
 
-        program: name of the flown program in the log.  parameters: by name.  source: the log's file.
+        program: name of the flown program in the log.
+        parameters: values by name.
+        source: the log's file.
+
         The notes name the parameters that could not be used.
         """
         return None
@@ -343,7 +346,7 @@ class Autopilot(ABC):
 
     @property
     def law(self) -> "Autopilot":
-        """Autopilot whose control law flies if no program does; it is the autopilot itself unless that is a program."""
+        """The autopilot itself, or for a program the autopilot whose control law models it."""
         return self
 
     @property
@@ -353,7 +356,7 @@ class Autopilot(ABC):
 
     @property
     def loop(self) -> Loop | None:
-        """Compiled loop of its law with a compiled model, or None if its flights are flown by JSBSim alone."""
+        """Compiled loop of its law with a compiled model, or None if only JSBSim flies it."""
         return None
 
     def begin(self, memory: Record, own: Record) -> None:
@@ -393,10 +396,10 @@ class Autopilot(ABC):
 
     @property
     def acceptance_radius(self) -> float | None:
-        """Distance (m) from a waypoint at which it turns to the next leg if the mission states none.
+        """Distance from a waypoint at which it turns to the next leg if the mission states none, m.
 
         None for an autopilot that follows the fly-by path.  Any other flies from leg to leg, and has reached a waypoint
-        also where it passes the line across the leg there.
+        also if it passes the line across the leg there.
         """
         return None
 
@@ -425,10 +428,12 @@ class Autopilot(ABC):
         return True
 
     def turn_distance(self, turn: float, amsl: float) -> float:
-        """Return the maximum distance (m) before a waypoint at which it turns to the next leg.
+        """Return the maximum distance before a waypoint at which it turns to the next leg, m.
 
         It is 0 for an autopilot that follows the fly-by path.
-        turn: rad, positive; pi at the mission's end.  amsl: altitude of the waypoint, m.
+
+        turn: turn at the waypoint, rad, positive; pi at the mission's end.
+        amsl: altitude of the waypoint, m.
         """
         return 0.0
 
@@ -440,7 +445,8 @@ class Autopilot(ABC):
         """Return the glide from the waypoint before the landing point, straight to the point and without a flare.
 
         height, run: height of that waypoint above the landing point, and its distance before it, m, both positive.
-        tail_wind: m/s, negative for a head wind.  amsl: altitude of the landing point, m.
+        tail_wind: m/s, negative for a head wind.
+        amsl: altitude of the landing point, m.
 
         >>> from flight.autopilots.planfly.autopilot import PlanflyGuidance
         >>> PlanflyGuidance().landing_glide(50.0, 1000.0, 0.0, 0.0)
@@ -451,7 +457,9 @@ class Autopilot(ABC):
     def landing_airspeed(self, cruise: float, tail_wind: float, amsl: float) -> float:
         """Return the true airspeed on the glide to a landing point, m/s: the cruise airspeed.
 
-        cruise: m/s.  tail_wind: m/s, negative for a head wind.  amsl: altitude of the landing point, m.
+        cruise: m/s.
+        tail_wind: m/s, negative for a head wind.
+        amsl: altitude of the landing point, m.
         """
         return cruise
 
@@ -468,10 +476,10 @@ class Autopilot(ABC):
         return self
 
     def go_around_height(self, stated_height: float, takeoff_height: float) -> float | None:
-        """Return the height above home (m) to which it climbs before it goes around, or None if unknown.
+        """Return the height above home to which it climbs to go around, m, or None if unknown.
 
-        asked: height that the landing item states, m; 0 if it states none.
-        takeoff: height of the mission's take-off above home, m; 0 without a take-off.
+        stated_height: height that the landing item states, m; 0 if it states none.
+        takeoff_height: height of the mission's take-off above home, m; 0 without a take-off.
         """
         return None
 
@@ -487,7 +495,7 @@ class Autopilot(ABC):
 
     @property
     def min_ground_speed(self) -> float:
-        """Ground speed for which it raises its airspeed until the mission sets another one, m/s; 0 for none."""
+        """Minimum ground speed until the mission sets another one, m/s; 0 for none. It raises its airspeed for it."""
         return 0.0
 
     def speeds_flown(self, commanded: Floats, cruise: float) -> Floats:
@@ -542,7 +550,7 @@ class Autopilot(ABC):
     def tracking_error(
         self, airspeed: float, nav: Navigation, *, fly_over: bool = False, turbulence: Turbulence = "none"
     ) -> TrackingError | None:
-        """Return its deviations from the legs, for which a plan reserves a margin; None if it holds its path.
+        """Return its deviations from the legs; None if it holds its path.  A plan reserves a margin for them.
 
         airspeed: commanded airspeed, m/s.
         nav: accuracy of navigation.

@@ -34,7 +34,7 @@ GUIDANCE_MEMORY = record_dtype(
     "last_velocity_north",
     "last_velocity_up",
     "unexplained_acceleration",  # m/s^2 to the right that bank and ailerons do not explain
-    "path_bank",  # rad and rad/s, model roll for the path's curvature alone
+    "path_bank",  # rad and rad/s, model roll only for the path's curvature
     "path_bank_rate",
     "aside",  # m right of the path and m/s, offset caused by that roll
     "aside_rate",

@@ -122,7 +122,7 @@ def l1_acceleration(angle: float, speed: float, length: float, damping: float) -
 def l1_reached(estimated: Record, a: Record, b: Record, length: float, radius: float) -> bool:
     """Return True if L1 switches to the next leg, within the turn distance of b or past the line across the leg at b.
 
-    estimated: as for `l1_angles`.
+    estimated: a record of `flight.guidance.navigation_error.MOTION`.
     a, b: the leg's ends, of `WAYPOINT`.
     radius: turn distance for a right angle, m; smaller turns start later.
     """

@@ -84,7 +84,7 @@ def find_on_path(estimated: Record, pieces: Records, memory: Record) -> float:
     """Update the position along the path in the memory, and return the path's course at that position, rad.
 
     estimated: a record of `flight.guidance.navigation_error.MOTION`.
-    pieces: of `PIECE`.
+    pieces: records of `PIECE`.
     memory: a record of `flight.guidance.inner_loops.GUIDANCE_MEMORY`.
     """
     index = memory.piece
@@ -280,7 +280,9 @@ def fly_by_path(route: Route, limits: Limits, terrain: Terrain | None = None, sw
 
 
 def reversals(route: Route) -> NDArray[np.int64]:
-    """Return the indices of fly-over waypoints that reverse the course, so that a turn to either side is possible.
+    """Return the indices of fly-over waypoints at which the course reverses.
+
+    A turn to either side is possible there.
 
     >>> way = np.array([[0.0, 0.0, 90.0], [0.0, 900.0, 90.0], [60.0, 0.0, 90.0], [900.0, 0.0, 90.0]])
     >>> over = np.array([False, True, True, False])

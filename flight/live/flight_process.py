@@ -126,7 +126,7 @@ class ProcessReady:
 class MissionJudged:
     """Event: a mission has been judged.
 
-    number: of the request.
+    number: number of the request.
     possible: True if the mission can be started at all.
     flyable: False if a finding of its geometry failed.
     texts: texts about it for stations.
@@ -228,7 +228,7 @@ class FlightFactory(Protocol):
     def open_log(self, setup: FlightSetup, mode: int) -> LogSink:
         """Open the log of the next flight.
 
-        mode: as in `DivertFlight`.
+        mode: ArduPlane's number, see `DivertFlight`.
         """
 
 
@@ -402,7 +402,7 @@ class _LoggedFlight:
     def finish(self, ended: str, should_abort: Callable[[], bool]) -> list[FlightJudged]:
         """Judge each route, and close its log.
 
-        should_abort: as in `LogSink.finish`.
+        should_abort: see `LogSink.finish`.
         """
         endings = (*self._ends, ended)
         return [log.finish(end_reason, should_abort) for log, end_reason in zip(self._logs, endings, strict=True)]

@@ -29,7 +29,7 @@ from world.errors import FlightError
 from world.running_clock import RunningClock
 
 # ----------------------------------------------------------------------
-# MAVLink frames in datagrams: found, checked and decoded, for arbitrary bytes.
+# MAVLink frames in datagrams of arbitrary bytes: find, check and decode them.
 
 # First byte of a MAVLink 1 frame.
 MAGIC_V1 = 0xFE
@@ -47,7 +47,8 @@ MAX_FRAMES = 64
 class MavlinkFrame:
     """One frame with a good checksum.
 
-    raw: the whole frame.  signed: True if a signature is attached, good or not.
+    raw: the whole frame.
+    signed: True if a signature is attached, valid or not.
     """
 
     raw: bytes
@@ -190,8 +191,10 @@ class Refused(Enum):
 class Signing:
     """Signs outgoing frames and checks incoming ones.
 
-    key: 32 bytes.  link: the link id of this end.  newest: the largest timestamp sent or trusted.  clock: the largest
-    timestamp of this machine's clock, which setting the clock back does not lower.
+    key: 32 bytes.
+    link: link id of this end.
+    newest: largest timestamp sent or trusted.
+    clock: largest timestamp of this machine's clock; it does not fall if the clock is set back.
     """
 
     key: bytes
@@ -275,8 +278,9 @@ _MAX_DATAGRAMS_PER_POLL = 200
 class Peer:
     """A station that has identified itself.
 
-    periods: s between messages, None for a message that is off.  due: next time of each.
-    parameter: the next parameter to send, if the station requested all parameters.
+    periods: intervals between messages, s; None for a message that is off.
+    due: next time of each message.
+    parameter: number of the next parameter to send, if the station requested all parameters.
     """
 
     address: Address
@@ -299,13 +303,13 @@ class Dropped:
     """Number of dropped frames by reason.
 
     address: datagrams from an address that is not allowed.
-    unsigned, forged: without a signature, and with a signature that does not match the key.
-    replayed: signed by the key, and no newer than an earlier frame of its stream.
-    old: first frame of a stream, and older than a minute.
-    future: signed by the key, and more than a day ahead of this machine's clock.
-    streams: from a stream beyond the number of stored streams.
-    stranger: from another machine that has sent no HEARTBEAT.
-    others: to another system, or from the vehicle itself.
+    unsigned, forged: frames without a signature, and with a signature that does not match the key.
+    replayed: frames signed by the key, but no newer than an earlier frame of their stream.
+    old: first frames of a stream that are older than a minute.
+    future: frames signed by the key, but more than a day ahead of this machine's clock.
+    streams: frames of a stream beyond the number of stored streams.
+    stranger: frames from another machine that has sent no HEARTBEAT.
+    others: frames to another system, or from the vehicle itself.
     """
 
     address: int = 0
@@ -365,8 +369,9 @@ def is_loopback(host: str) -> bool:
 class Link:
     """The socket and its peers.
 
-    clock: for the silence of peers and the times of messages, also for users of the link; it never goes back, and
-    stands still while the process does.  wall: s since 1970, for signatures.
+    clock: function for the silence of peers and the times of messages, also for users of the link; it never goes back,
+        and stops while the process is stopped.
+    wall: function for the time since 1970, s, for signatures.
     """
 
     def __init__(

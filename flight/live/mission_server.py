@@ -40,7 +40,7 @@ _INT32_MAX = 2**31 - 1
 
 
 class MissionType(IntEnum):
-    """MAV_MISSION_TYPE, which says to which of a vehicle's three lists an item belongs."""
+    """MAV_MISSION_TYPE: the list of the vehicle to which an item belongs."""
 
     MISSION = 0
     FENCE = 1
@@ -96,7 +96,7 @@ def from_message(message: Any, source: str) -> MissionItem:
     ``source`` names the sender in error messages.
 
     INT32_MAX in an integer x or y is NaN (MAVLink's "unset").  A float's latitude and longitude are rounded to the
-    nearest 1e-7 degrees.  Raise MissionError with one line that names item, field, value, and the allowed values.
+    nearest 1e-7 degrees.  Raises MissionError with one line that names item, field, value, and allowed values.
     """
     command, frame = int(message.command), int(message.frame)
     has_coordinates = is_located(command, frame)
@@ -541,7 +541,7 @@ def _placement_problem(item: MissionItem, kind: MissionType) -> str:
 
 
 def _refusal_result(message: Any) -> int:
-    """Return the MAV_MISSION_RESULT that names the invalid number of an item that `from_message` refused."""
+    """Return the MAV_MISSION_RESULT for the invalid number in an item that `from_message` refused."""
     degree_scale = 1.0 if message.get_type() == "MISSION_ITEM" else 1e7
     if abs(message.x) > 90.0 * degree_scale:
         return int(mavlink.MAV_MISSION_INVALID_PARAM5_X)

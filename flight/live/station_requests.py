@@ -36,11 +36,12 @@ _FIXED_REASON = "is fixed by the aircraft or the scenario"
 
 @dataclass(frozen=True, slots=True)
 class Parameter:
-    """One parameter; values travel as float32.
+    """One parameter; values are sent as float32.
 
     low, high: range that a station may set; high is None for a fixed parameter.
     fixed: reason why it is fixed.
-    flies: True for a parameter of the flying control law, which is set on the ground; the mission is then judged again.
+    flies: True for a parameter of the control law, which may be set only on the ground; the mission is then judged
+        again.
     """
 
     name: str
@@ -129,7 +130,7 @@ class Parameters:
         """Change a parameter of the control law; return the reason why it was refused, or "" if it was changed."""
         if not math.isfinite(value):
             return f"{entry.name} {value:g}: expected a finite number; {entry.value:g} kept"
-        # 0.7 travels as 0.699999988: the number that was typed is the shortest one with the same float32.
+        # 0.7 is sent as 0.699999988: the typed number is the shortest one with the same float32.
         stated_values = self.stated | {entry.name: float(str(np.float32(value)))}
         try:
             values = self.flown(stated_values)
@@ -160,7 +161,7 @@ def vehicle_parameters(
     max_bank_deg: degrees.
     system: the vehicle's MAVLink system id.
     speed: speed of the flight relative to real time.
-    flown: as in `Parameters`; its names replace the vehicle's own.
+    flown: function as in `Parameters`; its names replace the vehicle's own.
     not_flown: parameters of the control law that are not flown; they cannot be set.
 
     >>> parameters = vehicle_parameters(

@@ -90,7 +90,7 @@ def at_height(mission: Mission, index: int, amsl: float, now: float) -> Mission:
 
 
 def next_index(mission: Mission, after: int) -> int:
-    """Return the index for a waypoint inserted behind a place, which is after all actions at that place.
+    """Return the index for a waypoint inserted behind a place, after all actions at that place.
 
     >>> way = [MissionItem(k, c, 3, (0.0,) * 4, 46.0, 8.0, 75.0) for k, c in ((1, 16), (2, 206), (3, 16))]
     >>> next_index(Mission(None, tuple(way)), 0)

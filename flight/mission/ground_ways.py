@@ -214,7 +214,7 @@ def _find_approach(scenario: Scenario, mission: Mission, route: Route) -> tuple[
 
 
 def airborne_route(route: Route, ways: GroundWays, first_leg_start: Floats | None) -> Route:
-    """Return the part of a route that is flown in the air, to which the usual rules apply.
+    """Return the airborne part of a route, to which the usual rules apply.
 
     first_leg_start: (3,) m, point at which the take-off ended and the first leg begins; None for the route's start.
 

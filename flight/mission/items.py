@@ -14,7 +14,7 @@ from flight.mission.commands import Command as Command
 
 @dataclass(slots=True)
 class Notes:
-    """Notes by text, each with the items it is about, in the order they came up.
+    """Notes by text, each with its items, in the order in which they were added.
 
     >>> notes = Notes()
     >>> for seq in (9, 3, 4, 5):
@@ -80,8 +80,8 @@ TAKEOFFS = frozenset({C.NAV_TAKEOFF, C.NAV_VTOL_TAKEOFF})
 LANDINGS = frozenset({C.NAV_LAND, C.NAV_VTOL_LAND})
 # Commands that jump to another item.
 JUMPS = frozenset({C.DO_JUMP, C.DO_JUMP_TAG})
-# Navigation commands for other vehicles, with the kind of vehicle. ArduPlane goes on to the next command
-# (`Plane::start_command`), so that a piece of the path is missing; except QuadPlanes, which land to place a payload.
+# Navigation commands for other vehicles, with the kind of vehicle. ArduPlane continues with the next command
+# (`Plane::start_command`), so that a piece of the path is missing; only QuadPlanes land to place a payload.
 OTHER_VEHICLES = {
     C.NAV_SPLINE_WAYPOINT: "a multicopter",
     C.NAV_GUIDED_ENABLE: "a multicopter or a rover",
@@ -243,8 +243,8 @@ class SurveyPlan:
     """Settings of a survey that a ground station stores in addition to its items.
 
     photo: distance between photos that its items state, m, which identifies it; 0 for none, None for any survey.
-    turn_around: how far its lines extend beyond their photos, m.
-    camera: None if only distances are known.
+    turn_around: extension of its lines beyond their photos, m.
+    camera: camera, or None if only distances are known.
     """
 
     photo: float | None

@@ -70,7 +70,7 @@ class PlacedLanding(NamedTuple):
 class PlacedMission:
     """Places of a mission on the map about ``origin``, with altitudes AMSL.
 
-    stops: in flying order; a stop at the position of the one before is merged with it.
+    stops: stops in flying order; a stop at the position of the previous stop is merged with it.
     notes: notes from placing them, after the itinerary's notes.
     takeoff_ground: altitude of the ground at home, m, NaN if unknown or if nothing takes off.
     landing_ground: altitude of the landing place, m, NaN if unknown or if nothing lands.

@@ -76,7 +76,7 @@ def _note_tail_winds(route: Route, scenario: Scenario) -> Iterator[str]:
 
 
 def _note_distant_home(mission: Mission, scenario: Scenario) -> Iterator[str]:
-    """Note a mission's home that is far from the scenario's home, where the launch is."""
+    """Note a mission's home that is far from the launch at the scenario's home."""
     home, scenario_home = mission.home, scenario.home
     if home is None or scenario_home is None:
         return
@@ -154,9 +154,9 @@ def _slope_text(slope: float) -> str:
 
 
 def landing_slopes(mission: Mission, route: Route, scenario: Scenario) -> tuple[float, float] | None:
-    """Return the slopes of the ground along and across a landing for which the scenario states no strip, m per m.
+    """Return the slopes of the ground along and across a landing without a stated strip, m per m.
 
-    NaN if the ground is not known; None without such a landing.
+    Return NaN if the ground is not known, and None if there is no such landing.
     """
     last_item = int(route.items[-1])
     has_landing = any(item.seq == last_item and item.command == Command.NAV_LAND for item in mission.items)
@@ -169,7 +169,7 @@ def landing_slopes(mission: Mission, route: Route, scenario: Scenario) -> tuple[
 
 
 def _note_landing_ground(mission: Mission, route: Route, scenario: Scenario) -> Iterator[str]:
-    """Note the known ground at a landing for which the scenario states no strip."""
+    """Note the known ground at a landing without a stated strip."""
     last_item = int(route.items[-1])
     slopes = landing_slopes(mission, route, scenario)
     if slopes is None:

@@ -394,8 +394,8 @@ def make_route(
     rules: rules by which the autopilot flies a route.
 
     Without TAKEOFF the route starts at the first position item; with one, over home at that item's altitude. Every leg
-    has a horizontal length of at least `flight.mission.placing.SAME_PLACE`. Raise MissionError, naming the item, for a
-    place that cannot be laid out, and for a mission of fewer than two positions.
+    has a horizontal length of at least `flight.mission.placing.SAME_PLACE`. Raises MissionError, naming the item, if a
+    place cannot be laid out, or if the mission has fewer than two positions.
 
     >>> from flight.mission.items import Command, Frame, MissionItem
     >>> items = [
@@ -420,7 +420,7 @@ def lay_route(
 ) -> Route:
     """Return the route through the places of a mission; arguments as for `make_route`.
 
-    Raise MissionError for fewer than two places, and for a loiter too wide or too long to lay out.
+    Raises MissionError for fewer than two places, or for a loiter too wide or too long to lay out.
 
     >>> from flight.mission.items import Command, Frame, MissionItem
     >>> items = [MissionItem(k, Command.NAV_WAYPOINT, Frame.GLOBAL, (0.0,) * 4, 36.5 + k, 8.0, 700.0) for k in (0, 1)]
@@ -656,7 +656,10 @@ def _with_gates(placed: PlacedMission, notes: Notes) -> list[PlacedStop]:
 
 
 def _gate_fraction(a: Floats, b: Floats, gate: tuple[Any, Any]) -> float:
-    """Return the fraction of the leg from a to b at which the plane of a gate (east, north, m) cuts it."""
+    """Return the fraction of the leg from a to b at which a gate's plane cuts it.
+
+    gate: east and north, m.
+    """
     gate_to_end = b[:2] - np.array([float(gate[0]), float(gate[1])])
     length_along_normal = float((b[:2] - a[:2]) @ gate_to_end)
     # Measured backwards from b, whose distance from the plane is its distance from the gate.

@@ -27,13 +27,13 @@ _LEAD_LENGTH_TOLERANCE_M = 1.0
 class SurveyLayout(NamedTuple):
     """Settings for flying a survey.
 
-    turn_around: distance from each line's end to where its turn begins, and from the turn's end to the next line's
+    turn_around: distance from each line's end to the start of its turn, and from the turn's end to the next line's
         start, m; 0 for none.
     every: interleave stride; 2 flies every second line first and then the others from the same side on, 3 every third.
     course: course of the lines, rad; None to keep it.
     backwards: True to begin with the line on the other side.
-    lead_in: straight distance before the first line, m, where that is more, since the first line is entered from any
-        direction.
+    lead_in: straight distance before the first line, m, if it exceeds ``turn_around``, since the first line is entered
+        from any direction.
     """
 
     turn_around: float
@@ -107,25 +107,29 @@ def with_layout(
         return None
     items, lines = _survey_items(mission, route, survey), list[_Line]()
     for photo_line, (first, end) in zip(survey.lines, items.lines, strict=True):
-        corners, own = route.waypoints[photo_line.first : photo_line.last + 1, :2], mission.items[first:end]
-        steps = [item for item in own if is_navigation(item.command)]
+        corners, line_items = route.waypoints[photo_line.first : photo_line.last + 1, :2], mission.items[first:end]
+        steps = [item for item in line_items if is_navigation(item.command)]
         if _waypoint_of_item(mission, route)[steps[0].seq] != photo_line.first:
-            own = (_make_waypoint(steps[0], corners[0], origin), *own)
-        lines.append(_Line(corners, own))
+            line_items = (_make_waypoint(steps[0], corners[0], origin), *line_items)
+        lines.append(_Line(corners, line_items))
     if layout.course is not None:
-        turned = _lines_on_course(lines, survey, layout.course, origin)
-        if turned is None:
+        turned_lines = _lines_on_course(lines, survey, layout.course, origin)
+        if turned_lines is None:
             return None
-        lines = turned
-    longest = max(_lead_lengths(route, survey)) + _LEAD_LENGTH_TOLERANCE_M
+        lines = turned_lines
+    max_lead_length = max(_lead_lengths(route, survey)) + _LEAD_LENGTH_TOLERANCE_M
     (first, _), (_, end) = items.lines[0], items.lines[-1]
-    made = [*mission.items[: items.before]]
-    made += _without_leads(mission, route, mission.items[items.before : first], survey.lines[0].first, longest)
+    new_items = [*mission.items[: items.before]]
+    new_items += _without_leads(
+        mission, route, mission.items[items.before : first], survey.lines[0].first, max_lead_length
+    )
     for number, line in enumerate(_order_lines(lines, layout)):
-        made += _items_with_turn_arounds(line, layout.turn_around, layout.lead_in if number == 0 else 0.0, origin)
-    made += _without_leads(mission, route, mission.items[end : items.behind], survey.lines[-1].last, longest)
+        new_items += _items_with_turn_arounds(line, layout.turn_around, layout.lead_in if number == 0 else 0.0, origin)
+    new_items += _without_leads(
+        mission, route, mission.items[end : items.behind], survey.lines[-1].last, max_lead_length
+    )
     # Renumber all items: two items with one number would be ambiguous.
-    numbered = [replace(item, seq=k) for k, item in enumerate([*made, *mission.items[items.behind :]], 1)]
+    numbered = [replace(item, seq=seq) for seq, item in enumerate([*new_items, *mission.items[items.behind :]], 1)]
     return renumbered(replace(mission, items=tuple(numbered)))
 
 

@@ -377,7 +377,7 @@ def _is_turn_around(chain: Sequence[_Line], line: _Line, runs: _Runs) -> bool:
 
 
 def _follow_lines(runs: _Runs, start: int) -> list[_Line]:
-    """Return the lines that follow each other from a run on; the first line may begin before that run."""
+    """Return the lines of a chain that starts at a run; the first line may begin before that run."""
     chain = [(start, start)]
     while True:
         first_run, last_run = chain[-1]
@@ -471,7 +471,7 @@ def _line_gaps(positions: Floats) -> list[float]:
 
 
 def _camera_part(run: tuple[int, int], camera: Floats) -> PhotoLine:
-    """Return the part of a run on which the camera is on, or the whole run if it is never on."""
+    """Return the part of a run with the camera on, or the whole run if the camera is never on."""
     first_waypoint, last_waypoint = run
     photo_legs = np.flatnonzero(camera[first_waypoint:last_waypoint] != 0.0)
     if not photo_legs.size:

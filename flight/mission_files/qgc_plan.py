@@ -122,7 +122,7 @@ def _transect_items(item: dict[str, Any], source: str, place: str, name: str) ->
 
 
 class _CameraCalc(BaseModel):
-    """QGC's camera of a survey (`CameraCalc.cc`), given by name, by lens and sensor, or by distances alone."""
+    """QGC's camera of a survey (`CameraCalc.cc`), given by name, by lens and sensor, or only by distances."""
 
     # QGC writes whole numbers as integers.
     model_config = ConfigDict(extra="ignore", allow_inf_nan=False, frozen=True)

@@ -124,7 +124,7 @@ class Gap:
 
 @dataclass(frozen=True, slots=True)
 class MissingItems:
-    """Items of a mission that its log lacks, or stores in a form that no autopilot could interpret.
+    """Items of a mission that its log lacks, or stores in an unusable form.
 
     numbers: numbers of those items, rising, as in the judged mission.
     total: number of the mission's items, including home if the autopilot counts it; 0 if the log does not say.
@@ -202,11 +202,11 @@ class FlightSetup:
     """Inputs of a flight, which are mission, aircraft, autopilot and world; the log stores all of them.
 
     scenario: the world, and the requirements for the flight.
-    mission: its items, as read or exported.
+    mission: the mission, as read or exported.
     route: the waypoints that result from the mission.
-    limits: of scenario and aircraft together, made where the aircraft is loaded.
+    limits: limits of scenario and aircraft together, made where the aircraft is loaded.
     aircraft: its name in the catalog, or its folder.
-    battery: energy carried, Wh.
+    battery: energy that the aircraft carries, Wh.
     seed: seed of the flight; the turbulence's stream comes from it unless the scenario's wind has its own.
     plan: None for a mission from outside.
     autopilot: the autopilot with its settings.

@@ -328,7 +328,7 @@ def end_return(motion: Record, waypoint: Record, memory: Record, dt: float) -> N
 
     motion: a record of `flight.guidance.navigation_error.MOTION`.
     waypoint: any waypoint of the return, a record of `flight.guidance.lateral_reference_laws.WAYPOINT`.
-    memory: of `flight.guidance.inner_loops.GUIDANCE_MEMORY`.
+    memory: a record of `flight.guidance.inner_loops.GUIDANCE_MEMORY`.
     """
     memory.returning = True
     offset_east, offset_north = motion.east - waypoint.centre_east, motion.north - waypoint.centre_north
@@ -355,9 +355,9 @@ def end_around(motion: Record, memory: Record, dt: float) -> None:
     flies loops next to the waypoint, and the bearing may take one loop or three to go around.
 
     motion: a record of `flight.guidance.navigation_error.MOTION`.
-    memory: of `flight.guidance.inner_loops.GUIDANCE_MEMORY`.
+    memory: a record of `flight.guidance.inner_loops.GUIDANCE_MEMORY`.
     """
-    # However wide the loiter is flown, the mission's end is not missed.
+    # The mission's end is not missed, however wide the loiter is flown.
     memory.returning = True
     course = math.atan2(motion.velocity_east, motion.velocity_north)
     if memory.circled > 0.0:
@@ -480,7 +480,7 @@ def _fill_row(
 def _fill_wind(row: Record, state: Record, cos: float, sin: float) -> None:
     """Set the row's wind in map axes.
 
-    cos, sin: of the map course of true north.
+    cos, sin: cosine and sine of the map course of true north.
     """
     wind = row.wind
     wind[0] = state.wind_east * cos + state.wind_north * sin

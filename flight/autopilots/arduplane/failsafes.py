@@ -66,7 +66,7 @@ _FENCE_REACTION: dict[int, FailsafeAction] = {0: "on", 1: "return", 6: "guided",
 def failsafe_causes(
     parameters: ArduPilotParameters, *, has_fence: bool, has_landing: bool = False, ends_landed: bool = False
 ) -> tuple[Cause, ...]:
-    """Return the causes that can end an aircraft's mission in AUTO, in the order in which pilots usually ask.
+    """Return the causes that can end a mission in AUTO, in the order of interest to pilots.
 
     has_fence: True if the mission carries a fence.
     has_landing: True if it has a landing sequence; without one a landing is an RTL.

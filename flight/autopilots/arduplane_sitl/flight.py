@@ -38,7 +38,7 @@ class AutopilotFlight(SitlFlight):
 
     autopilot: autopilot that flies the setup instead of the setup's own; it has ArduPlane's parameters and the
         program's file.
-    user_parameters: by ArduPlane's names; None takes the parameters of the scenario's file.
+    user_parameters: the user's parameters by ArduPlane's names; None takes those of the scenario's file.
     """
 
     def __init__(

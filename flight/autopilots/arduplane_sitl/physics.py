@@ -182,7 +182,7 @@ def _do_nothing() -> None:
 
 
 class JsonLockstep(Lockstep):
-    """Exchange over a `PhysicsPort`, on which servo outputs request a frame and the motion answers it.
+    """Exchange over a `PhysicsPort`: servo outputs request a frame, and the motion answers it.
 
     servos: outputs of the controls.  The other parameters are those of `Lockstep`.
     """

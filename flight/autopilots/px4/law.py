@@ -145,7 +145,7 @@ def fly_as_px4(
 
     wind: velocity of the air, m/s.
     parameters: a record of `flight.autopilots.px4.parameters.PX4_PARAMETERS`.
-    own: of `flight.autopilots.px4.law.PX4_MEMORY`.
+    own: a record of `flight.autopilots.px4.law.PX4_MEMORY`.
     The other parameters are those of `flight.autopilots.planfly.law.guide`.
 
     The path is only the reference against which the track is measured; the law does not use it.

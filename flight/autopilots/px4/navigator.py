@@ -66,9 +66,11 @@ def navigate(
 
     estimated: a record of `flight.guidance.navigation_error.MOTION`.
     waypoints: (w,) of `flight.guidance.lateral_reference_laws.WAYPOINT`.
-    wind: velocity of the air, m/s.  airspeed_demand: m/s.
-    parameters: of `flight.autopilots.px4.parameters.PX4_PARAMETERS`.
-    own: of `flight.autopilots.px4.law.PX4_MEMORY`.  dt: s.
+    wind: velocity of the air, m/s.
+    airspeed_demand: m/s.
+    parameters: a record of `flight.autopilots.px4.parameters.PX4_PARAMETERS`.
+    own: a record of `flight.autopilots.px4.law.PX4_MEMORY`.
+    dt: s.
     """
     target = flown_to(waypoints, own)
     b = waypoints[target]

@@ -69,7 +69,7 @@ class Px4Preflight(Conversation):
         yield from self._wait_until(lambda: self._news.mode == MISSION_MODE and self._news.armed, mission_mode)
 
     def accompany(self) -> None:
-        """Send a heartbeat, to which it answers, and joystick inputs at rest with closed throttle."""
+        """Send a heartbeat, which it answers, and joystick inputs at rest with closed throttle."""
         self._send_heartbeat()
         self._link.send(mavlink.MAVLink_manual_control_message(SYSTEM, 0, 0, 0, 0, 0))
 

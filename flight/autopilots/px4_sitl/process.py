@@ -34,7 +34,7 @@ def px4_launch(
 ) -> Callable[[Path], Launch]:
     """Return a function that prepares a folder for PX4's program and returns its command line.
 
-    parameters: by name.
+    parameters: values by name.
     simulator_port: port on this machine of the physics (TCP).
     own_port, link_port: ports on which it receives MAVLink, and to which it sends it (UDP).
 

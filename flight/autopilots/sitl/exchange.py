@@ -26,10 +26,12 @@ _METRES_PER_RADIAN = math.degrees(METRES_A_DEGREE)
 class BodyMotion(NamedTuple):
     """Motion of the aircraft, as it is given to the autopilot's sensors.
 
-    time: s.  roll_rate..yaw_rate: rad/s about the body's axes.
+    time: s.
+    roll_rate..yaw_rate: rad/s about the body's axes.
     force_x..force_z: specific force along the body's axes, m/s^2; at rest 0, 0, -9.81.
     north, east, down: m from the place that ArduPilot calls home, on its sphere.
-    roll, pitch, yaw: rad, from true north.  velocity_*: m/s over the ground.
+    roll, pitch, yaw: rad, from true north.
+    velocity_*: m/s over the ground.
     airspeed: m/s, true.
     """
 
@@ -77,9 +79,9 @@ def place_on_sphere(north: float, east: float, from_lat: float, from_lon: float)
 # ----------------------------------------------------------------------
 # The rail on which an autopilot's flight starts: in the air, or the rail of a launch.
 #
-# The autopilot's estimator has to settle with the aircraft at rest, and an aircraft in the air is not at rest.  So it
-# stands on a level rail, at the attitude of its trimmed flight, until the autopilot is ready; then it is pushed along
-# the rail to the speed of that flight, and let go.  For a take-off the rail is the catapult or the throwing hand, with
+# The autopilot's estimator has to settle with the aircraft at rest.  The aircraft therefore stands on a level rail, at
+# the attitude of its trimmed flight, until the autopilot is ready; then it is pushed along the rail to the speed of
+# that flight, and released.  For a take-off the rail is the catapult or the throwing hand, with
 # its incline and acceleration; on a runway the aircraft stands where it begins.
 
 # Acceleration along the rail, m/s^2.
@@ -218,8 +220,8 @@ class Lockstep(ABC):
 
     home: origin of positions.
     poll: function that is called every `LOOK_FRAMES` frames.
-    time: of the exchange, s.
-    error: of its GNSS receiver, m and m/s: north, east, up of the position, then of the velocity.
+    time: time of the exchange, s.
+    error: error of its GNSS receiver: north, east, up of the position, m, then of the velocity, m/s.
     """
 
     def __init__(self, fdm: Fdm, workspace: Workspace, home: Home, poll: Callable[[], None]) -> None:
@@ -251,7 +253,8 @@ class Lockstep(ABC):
     def _send_motion(self, motion: tuple[float, ...], battery: tuple[float, float] | None) -> None:
         """Send the motion of the aircraft after that frame.
 
-        motion: the numbers of a `BodyMotion`.  battery: volts and amperes, None for an aircraft without a battery.
+        motion: numbers of a `BodyMotion`.
+        battery: volts and amperes; None for an aircraft without a battery.
         """
 
     def _battery(self) -> tuple[float, float] | None:
@@ -308,7 +311,9 @@ class Lockstep(ABC):
         """Return a function that flies up to a number of ticks and returns the last status.
 
         It is used like the loop in `flight.simulation.simulate`.
-        tick: `flight.autopilots.sitl.flight.autopilot_tick` on the workspace.  steps: frames of a tick.
+
+        tick: `flight.autopilots.sitl.flight.autopilot_tick` on the workspace.
+        steps: frames of a tick.
         gusts, ground: True to set the tick's gusts and ground in JSBSim.
         """
         workspace, fdm, receive_commands, step = self._workspace, self._fdm, self._receive_commands, self.step

@@ -90,8 +90,9 @@ def autopilot_tick(block: Floats, heights: Heights) -> int:
 def place_on_path(true: Record, pieces: Records, nodes: Records, memory: Record) -> None:  # pragma: no cover
     """Fill leg, distance, cross-track and altitude error of the memory from the nearest path piece.
 
-    The search starts at the last piece.  A piece against the direction of flight is not begun, because the way
-    back of an out-and-back leg lies on the way out.
+    The search starts at the last piece.  It skips pieces against the direction of flight, because both directions of an
+    out-and-back leg lie on one line.
+
     true: a record of `flight.guidance.navigation_error.MOTION`.
     """
     nearest_piece, min_distance, distance, cross_track = memory.piece, math.inf, 0.0, 0.0
@@ -123,7 +124,7 @@ def end_circling(true: Record, corner: Record, memory: Record, dt: float) -> Non
 
     true: a record of `flight.guidance.navigation_error.MOTION`.
     corner: a corner of the circle, of `flight.guidance.lateral_reference_laws.WAYPOINT`.
-    memory: of `flight.guidance.inner_loops.GUIDANCE_MEMORY`; its `circled` is the time in s.
+    memory: a record of `flight.guidance.inner_loops.GUIDANCE_MEMORY`; its `circled` is the time in s.
     """
     offset_east, offset_north = true.east - corner.centre_east, true.north - corner.centre_north
     distance = max(0.1, math.hypot(offset_east, offset_north))
@@ -135,7 +136,7 @@ def end_circling(true: Record, corner: Record, memory: Record, dt: float) -> Non
         and tangential_speed > abs(radial_speed)
     ):
         memory.circled += dt
-    # However wide it flies, it has not missed the mission's end.
+    # An aircraft that loiters at the mission's end, however wide, has not missed it.
     memory.returning = True
     memory.done = memory.circled > UNLIMITED
 
@@ -318,7 +319,7 @@ class SitlFlight(ProgramFlight):
                 return
 
     def _poll_link(self) -> None:
-        """Read the autopilot's messages, of which the item being flown is the most important."""
+        """Read the autopilot's messages, and update whether its last leg is flown."""
         self._link.poll()
         self._workspace.on_last_leg[0] = self._is_ending
 

@@ -28,9 +28,9 @@ class AutopilotNews:
     mission_item: number of the item being flown.
     reached: number of the last item reached.
     texts: STATUSTEXT, in order.
-    parameters: by name, as it has them.
-    acknowledged: the result by command, MAV_RESULT.
-    requested: the mission item that it requested last.
+    parameters: its parameters by name.
+    acknowledged: MAV_RESULT by command.
+    requested: number of the mission item that it requested last.
     mission_result: MAV_MISSION_RESULT of the upload.
     version: AUTOPILOT_VERSION.flight_sw_version.
     """
@@ -233,7 +233,10 @@ class UdpLink(AutopilotLink):
 
 
 def free_ports(count: int) -> list[int]:
-    """Return ports that are free now, for sockets of the program that nothing connects to."""
+    """Return UDP ports that are free now.
+
+    The program opens sockets on them to which nothing connects.
+    """
     sockets = [socket.socket(socket.AF_INET, socket.SOCK_DGRAM) for _ in range(count)]
     try:
         for udp_socket in sockets:

@@ -57,10 +57,10 @@ def check_binary(binary: Path, kind: str) -> str:
 class Launch:
     """Command line and environment of a program.
 
-    arguments: after its name.
-    environment: in addition to this process's environment.
-    logs: pattern of its own log below its folder.
-    leaves: files outside of that folder that it leaves behind.
+    arguments: arguments after its name.
+    environment: variables in addition to this process's environment.
+    logs: pattern of its own logs below its folder.
+    leaves: files that it leaves behind outside of that folder.
     """
 
     arguments: tuple[str, ...]

@@ -34,7 +34,7 @@ class ServoOutput:
 
     @property
     def rest(self) -> float:
-        """Pulse at the center of the throw, which is the knot whose value is nearest to zero."""
+        """Pulse at the center of the throw: the knot with the value nearest to zero."""
         return min(zip(self.pulses, self.values, strict=True), key=lambda knot: abs(knot[1]))[0]
 
     def value(self, pulse: float) -> float:
