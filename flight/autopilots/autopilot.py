@@ -71,16 +71,21 @@ def find_misfits(values: Iterable[ParameterValue], orders: Iterable[tuple[str, .
     >>> find_misfits(made, [("THR_MIN", "TRIM_THROTTLE")])
     ('TRIM_THROTTLE 60 of the file is below THR_MIN 74 of the aircraft',)
     """
-    known = {value.name: value for value in values}
-    found = []
+    by_name = {value.name: value for value in values}
+    misfits = []
     for order in orders:
-        for low, high in pairwise(known[name] for name in order if name in known):
-            if low.value <= high.value or "file" not in (low.origin, high.origin):
+        for lower, higher in pairwise(by_name[name] for name in order if name in by_name):
+            if lower.value <= higher.value or "file" not in (lower.origin, higher.origin):
                 continue
-            first, word, second = (high, "below", low) if high.origin == "file" else (low, "above", high)
-            texts = (f"{one.name} {one.value:g} of {_SOURCE_NAMES[one.origin]}" for one in (first, second))
-            found.append(f" is {word} ".join(texts))
-    return tuple(found)
+            file_value, relation, other_value = (
+                (higher, "below", lower) if higher.origin == "file" else (lower, "above", higher)
+            )
+            texts = (
+                f"{parameter.name} {parameter.value:g} of {_SOURCE_NAMES[parameter.origin]}"
+                for parameter in (file_value, other_value)
+            )
+            misfits.append(f" is {relation} ".join(texts))
+    return tuple(misfits)
 
 
 class Parameters(Protocol):
@@ -98,23 +103,23 @@ class Parameters(Protocol):
 
     @property
     def values(self) -> tuple[ParameterValue, ...]:
-        """As above."""
+        """See the class."""
 
     @property
     def unused(self) -> tuple[str, ...]:
-        """As above."""
+        """See the class."""
 
     @property
     def source(self) -> str:
-        """As above."""
+        """See the class."""
 
     @property
     def beyond(self) -> tuple[str, ...]:
-        """As above."""
+        """See the class."""
 
     @property
     def misfits(self) -> tuple[str, ...]:
-        """As above."""
+        """See the class."""
 
     def changed(self, **values: float) -> Self:
         """Return a copy with other values for some parameters."""
@@ -244,12 +249,12 @@ class StoredAutopilot(NamedTuple):
 class Autopilot(ABC):
     """Autopilot of a flight, with its settings; subclasses are frozen dataclasses.
 
-    name: as in `[flight] autopilot`.
-    title: as in texts.
-    level: the question that its flight answers.  At "airframe" it stands for the aircraft alone; at "autopilot" its
+    name: its name in `[flight] autopilot`.
+    title: its name in texts.
+    level: the question that its flight answers.  At "airframe" it stands only for the aircraft; at "autopilot" its
         verdict is compared with a reference flight by planfly's guidance.
     parameters: None for an autopilot without parameters.
-    program: that flew it; None for a law and before the flight.
+    program: program that flew it; None for a law and before the flight.
     own: type of the record that its law has in addition to `flight.guidance.inner_loops.GUIDANCE_MEMORY`, or None.
     cruise_parameter: parameter of its cruise airspeed; "" if it has no such parameter.
     equivalent_airspeeds: True if commanded airspeeds are equivalent airspeeds, which are lower than true ones at
@@ -291,7 +296,7 @@ class Autopilot(ABC):
     def load(cls, table: FlightTable, aircraft: Aircraft, scenario: str) -> Self:
         """Return the autopilot of a scenario's [flight] table; `scenario` is the scenario's name in messages.
 
-        Raise ScenarioError for an entry that it does not accept, and ParameterError for a bad parameter file.
+        Raises ScenarioError if it does not accept an entry, and ParameterError if the parameter file is invalid.
         """
         if table.params is not None:
             allowed = f'not a key of autopilot = "{cls.name}", which has no parameters'
@@ -302,7 +307,7 @@ class Autopilot(ABC):
     def restore(cls, stored: StoredAutopilot) -> Self:
         """Return the autopilot that a log stores.
 
-        Raise ParameterError for a value that is not allowed.
+        Raises ParameterError if a value is not allowed.
         """
         return cls()
 
@@ -316,7 +321,10 @@ class Autopilot(ABC):
     ) -> tuple[Self, tuple[str, ...]] | None:
         """Return the autopilot that wrote a log, and notes on its parameters, or None for another autopilot's log.
 
-        program: name of the flown program in the log.  parameters: by name.  source: the log's file.
+        program: name of the flown program in the log.
+        parameters: values by name.
+        source: the log's file.
+
         The notes name the parameters that could not be used.
         """
         return None
@@ -330,7 +338,7 @@ class Autopilot(ABC):
     def missing_files(cls, aircraft: Aircraft) -> list[str]:
         """Describe the files that this autopilot needs and an aircraft's folder lacks, in sentences.
 
-        Raise PlanflyError for a broken file.
+        Raises PlanflyError if a file is invalid.
         """
         return []
 
@@ -338,7 +346,7 @@ class Autopilot(ABC):
 
     @property
     def law(self) -> "Autopilot":
-        """Autopilot whose control law flies if no program does; it is the autopilot itself unless that is a program."""
+        """The autopilot itself, or for a program the autopilot whose control law models it."""
         return self
 
     @property
@@ -348,7 +356,7 @@ class Autopilot(ABC):
 
     @property
     def loop(self) -> Loop | None:
-        """Compiled loop of its law with a compiled model, or None if its flights are flown by JSBSim alone."""
+        """Compiled loop of its law with a compiled model, or None if only JSBSim flies it."""
         return None
 
     def begin(self, memory: Record, own: Record) -> None:
@@ -388,10 +396,10 @@ class Autopilot(ABC):
 
     @property
     def acceptance_radius(self) -> float | None:
-        """Distance (m) from a waypoint at which it turns to the next leg if the mission states none.
+        """Distance from a waypoint at which it turns to the next leg if the mission states none, m.
 
         None for an autopilot that follows the fly-by path.  Any other flies from leg to leg, and has reached a waypoint
-        also where it passes the line across the leg there.
+        also if it passes the line across the leg there.
         """
         return None
 
@@ -420,10 +428,12 @@ class Autopilot(ABC):
         return True
 
     def turn_distance(self, turn: float, amsl: float) -> float:
-        """Return the maximum distance (m) before a waypoint at which it turns to the next leg.
+        """Return the maximum distance before a waypoint at which it turns to the next leg, m.
 
         It is 0 for an autopilot that follows the fly-by path.
-        turn: rad, positive; pi at the mission's end.  amsl: altitude of the waypoint, m.
+
+        turn: turn at the waypoint, rad, positive; pi at the mission's end.
+        amsl: altitude of the waypoint, m.
         """
         return 0.0
 
@@ -435,7 +445,8 @@ class Autopilot(ABC):
         """Return the glide from the waypoint before the landing point, straight to the point and without a flare.
 
         height, run: height of that waypoint above the landing point, and its distance before it, m, both positive.
-        tail_wind: m/s, negative for a head wind.  amsl: altitude of the landing point, m.
+        tail_wind: m/s, negative for a head wind.
+        amsl: altitude of the landing point, m.
 
         >>> from flight.autopilots.planfly.autopilot import PlanflyGuidance
         >>> PlanflyGuidance().landing_glide(50.0, 1000.0, 0.0, 0.0)
@@ -446,7 +457,9 @@ class Autopilot(ABC):
     def landing_airspeed(self, cruise: float, tail_wind: float, amsl: float) -> float:
         """Return the true airspeed on the glide to a landing point, m/s: the cruise airspeed.
 
-        cruise: m/s.  tail_wind: m/s, negative for a head wind.  amsl: altitude of the landing point, m.
+        cruise: m/s.
+        tail_wind: m/s, negative for a head wind.
+        amsl: altitude of the landing point, m.
         """
         return cruise
 
@@ -462,11 +475,11 @@ class Autopilot(ABC):
         """
         return self
 
-    def go_around_height(self, asked: float, takeoff: float) -> float | None:
-        """Return the height above home (m) to which it climbs before it goes around, or None if unknown.
+    def go_around_height(self, stated_height: float, takeoff_height: float) -> float | None:
+        """Return the height above home to which it climbs to go around, m, or None if unknown.
 
-        asked: height that the landing item states, m; 0 if it states none.
-        takeoff: height of the mission's take-off above home, m; 0 without a take-off.
+        stated_height: height that the landing item states, m; 0 if it states none.
+        takeoff_height: height of the mission's take-off above home, m; 0 without a take-off.
         """
         return None
 
@@ -482,7 +495,7 @@ class Autopilot(ABC):
 
     @property
     def min_ground_speed(self) -> float:
-        """Ground speed for which it raises its airspeed until the mission sets another one, m/s; 0 for none."""
+        """Minimum ground speed until the mission sets another one, m/s; 0 for none. It raises its airspeed for it."""
         return 0.0
 
     def speeds_flown(self, commanded: Floats, cruise: float) -> Floats:
@@ -517,8 +530,12 @@ class Autopilot(ABC):
     @property
     def stated_airspeed(self) -> tuple[float, str] | None:
         """Cruise airspeed (m/s) in the user's parameter file, and the parameter; None if not stated."""
-        stated = {} if self.parameters is None else self.parameters.by_origin("file")
-        return (stated[self.cruise_parameter], self.cruise_parameter) if self.cruise_parameter in stated else None
+        file_values = {} if self.parameters is None else self.parameters.by_origin("file")
+        return (
+            (file_values[self.cruise_parameter], self.cruise_parameter)
+            if self.cruise_parameter in file_values
+            else None
+        )
 
     @property
     def stated_bank(self) -> float | None:
@@ -533,7 +550,7 @@ class Autopilot(ABC):
     def tracking_error(
         self, airspeed: float, nav: Navigation, *, fly_over: bool = False, turbulence: Turbulence = "none"
     ) -> TrackingError | None:
-        """Return its deviations from the legs, for which a plan reserves a margin; None if it holds its path.
+        """Return its deviations from the legs; None if it holds its path.  A plan reserves a margin for them.
 
         airspeed: commanded airspeed, m/s.
         nav: accuracy of navigation.
@@ -583,8 +600,8 @@ def describe_program(program: AutopilotProgram, aircraft: str, named: int = 8) -
     named: number of changed parameters to name.
     """
     changed = [f"{name} {value:g}" for name, value in program.changed.items()]
-    more = f", +{len(changed) - named} more" if len(changed) > named else ""
+    rest_text = f", +{len(changed) - named} more" if len(changed) > named else ""
     return (
         f"{program.version} (sha256 {program.sha256[:8]}...), {len(program.parameters)} parameters set for"
-        f" {Path(aircraft).name}, changed: {', '.join(changed[:named]) or 'none'}{more}"
+        f" {Path(aircraft).name}, changed: {', '.join(changed[:named]) or 'none'}{rest_text}"
     )

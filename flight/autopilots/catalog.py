@@ -32,7 +32,7 @@ _PROGRAMS = tuple(kind for kind in AUTOPILOTS if issubclass(kind, ProgramAutopil
 def load_autopilot(scenario: Scenario, aircraft: Aircraft) -> Autopilot:
     """Return the autopilot that a scenario names, with its settings.
 
-    Raise ScenarioError for a name that is not listed, and as `Autopilot.load` does.
+    Raises ScenarioError if the name is not listed, and as `Autopilot.load` does.
 
     >>> from aircraft.catalog import load_aircraft
     >>> from world.scenario import load_scenario
@@ -41,16 +41,16 @@ def load_autopilot(scenario: Scenario, aircraft: Aircraft) -> Autopilot:
     """
     name = scenario.flight.steering.autopilot
     if name not in _LAWS:
-        known = " or ".join(f"'{known}'" for known in _LAWS)
-        allowed = f"expected {known}{did_you_mean(name, sorted(_LAWS))}"
+        known_names = " or ".join(f"'{known_names}'" for known_names in _LAWS)
+        allowed = f"expected {known_names}{did_you_mean(name, sorted(_LAWS))}"
         raise ScenarioError.at(scenario.name, "flight.autopilot", name, allowed, shown=repr(name))
-    made, returns = _LAWS[name].load(scenario.flight, aircraft, scenario.name), scenario.returns
-    set_by = (None, None) if returns is None else (returns.rtl_altitude, returns.rtl_autoland)
-    asked = made.with_scenario_rtl_settings(
-        *set_by, lands=scenario.landing is not None, lower=_field_depth_below_home(scenario)
+    autopilot, returns = _LAWS[name].load(scenario.flight, aircraft, scenario.name), scenario.returns
+    rtl_settings = (None, None) if returns is None else (returns.rtl_altitude, returns.rtl_autoland)
+    with_returns = autopilot.with_scenario_rtl_settings(
+        *rtl_settings, lands=scenario.landing is not None, lower=_field_depth_below_home(scenario)
     )
-    _refuse_conflict(scenario, made, asked)
-    return asked
+    _check_no_conflict(scenario, autopilot, with_returns)
+    return with_returns
 
 
 def _field_depth_below_home(scenario: Scenario) -> float:
@@ -58,18 +58,21 @@ def _field_depth_below_home(scenario: Scenario) -> float:
     landing, home = scenario.landing, scenario.home
     if landing is None or home is None or scenario.terrain is None:
         return 0.0
-    lower = float(home[2] - scenario.terrain.height(landing.east, landing.north))
-    return 0.0 if math.isnan(lower) else lower
+    depth = float(home[2] - scenario.terrain.height(landing.east, landing.north))
+    return 0.0 if math.isnan(depth) else depth
 
 
-def _refuse_conflict(scenario: Scenario, made: Autopilot, asked: Autopilot) -> None:
-    """Raise ScenarioError if a scenario and the user's parameter file state different values."""
-    if made.parameters is None or asked.parameters is None:
+def _check_no_conflict(scenario: Scenario, autopilot: Autopilot, with_returns: Autopilot) -> None:
+    """Raise ScenarioError if a scenario and the user's parameter file state different values.
+
+    with_returns: the autopilot with the RTL settings of the scenario.
+    """
+    if autopilot.parameters is None or with_returns.parameters is None:
         return
-    values = asked.parameters.by_origin("file")
-    for name, stated in made.parameters.by_origin("file").items():
-        if not math.isclose(values[name], stated, rel_tol=1e-6, abs_tol=1e-6):
-            allowed = f"{made.parameters.source} states {name} {stated:g}"
+    values = with_returns.parameters.by_origin("file")
+    for name, stated_value in autopilot.parameters.by_origin("file").items():
+        if not math.isclose(values[name], stated_value, rel_tol=1e-6, abs_tol=1e-6):
+            allowed = f"{autopilot.parameters.source} states {name} {stated_value:g}"
             raise ScenarioError.at(scenario.name, f"returns ({name})", values[name], allowed, shown=f"{values[name]:g}")
 
 
@@ -96,11 +99,11 @@ def autopilot_of_log(
 def restore_autopilot(name: str | None, stored: StoredAutopilot) -> Autopilot:
     """Return the autopilot that a log stores.
 
-    Raise ParameterError for a value that is not allowed, KeyError for an unknown name.
+    Raises ParameterError if a value is not allowed, and KeyError if the name is unknown.
     name: None if the stored settings imply it.
     """
-    kinds = _LAWS if stored.program is None else {kind.name: kind for kind in _PROGRAMS}
-    return kinds[name or _implied_name(stored)].restore(stored)
+    classes = _LAWS if stored.program is None else {kind.name: kind for kind in _PROGRAMS}
+    return classes[name or _implied_name(stored)].restore(stored)
 
 
 def stored_name(autopilot: Autopilot) -> str | None:

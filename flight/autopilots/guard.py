@@ -55,7 +55,7 @@ class Guard:
     def __init__(self) -> None:
         read, write = os.pipe()
         with os.fdopen(read, "rb") as end:
-            self._words = os.fdopen(write, "wb", buffering=0)
+            self._pipe = os.fdopen(write, "wb", buffering=0)
             # It has a session of its own: a signal to planfly's process group does not end it.
             self._process = subprocess.Popen(
                 [sys.executable, "-I", "-S", "-c", _GUARD_SOURCE],
@@ -80,7 +80,7 @@ class Guard:
 
     def _write_line(self, line: str) -> None:
         with contextlib.suppress(BrokenPipeError):
-            self._words.write(f"{line}\n".encode())
+            self._pipe.write(f"{line}\n".encode())
 
     def __enter__(self) -> Self:
         """Return the guard itself."""
@@ -91,5 +91,5 @@ class Guard:
     ) -> None:
         """End the guard process."""
         self._write_line("done")
-        self._words.close()
+        self._pipe.close()
         self._process.wait()

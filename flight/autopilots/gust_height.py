@@ -27,7 +27,9 @@ def gust_deviation(turbulence: Turbulence) -> float:
 
 
 def height_in_gusts(rate: float, turbulence: Turbulence) -> float:
-    """Return the height (m) by which a one-in-a-hundred gust displaces an aircraft that opposes it at a rate (m/s).
+    """Return the height by which a one-in-a-hundred gust displaces an aircraft, m.
+
+    rate: climb or sink rate with which the aircraft opposes the gust, m/s.
 
     >>> round(height_in_gusts(2.0, "moderate"), 1), height_in_gusts(4.0, "moderate"), height_in_gusts(0.0, "none")
     (19.1, 0.0, 0.0)

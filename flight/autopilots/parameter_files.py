@@ -47,7 +47,7 @@ class Entry:
 def read_parameter_file(path: Path) -> dict[str, Entry]:
     """Read a parameter file, and return its entries by name in the order of the file.
 
-    Raise ParameterError, in one line, for a file that cannot be read and as `parse_parameters` does.
+    Raises ParameterError, in one line, if the file cannot be read, and as `parse_parameters` does.
     """
     data = read_small_file(path, MAX_BYTES, "parameter", ParameterError)
     return parse_parameters(utf8_text(data, path, ParameterError), str(path))
@@ -67,9 +67,9 @@ def parameters_text(values: Mapping[str, float], title: str) -> str:
 def parse_parameters(text: str, source: str) -> dict[str, Entry]:
     r"""Read the text of a parameter file, in any of the formats; ``source`` names it in messages.
 
-    Raise ParameterError with file, line, field, value and what is allowed, for a line in no known format, a value that
-    is not a finite number, a name that occurs twice, and a file without a parameter.  If several components of a
-    vehicle have the same name, the autopilot's value is taken.  A name that is too long is read like any unknown name.
+    Raises ParameterError with file, line, field, value and allowed values if a line has no known format, a value is not
+    a finite number, a name occurs twice, or the file has no parameter.  If several components of a vehicle have the
+    same name, the autopilot's value is taken.  A name that is too long is read like any unknown name.
 
     >>> found = parse_parameters("# Vehicle 1\n1\t1\tWP_RADIUS\t90.0\t9\n", "qgc.params")
     >>> found["WP_RADIUS"].value, str(found["WP_RADIUS"].where)
@@ -77,31 +77,31 @@ def parse_parameters(text: str, source: str) -> dict[str, Entry]:
     >>> list(parse_parameters("WP_RADIUS 90  # m\nTHR_MAX,100\n", "any.parm"))
     ['WP_RADIUS', 'THR_MAX']
     """
-    found: dict[str, Entry] = {}
+    entries: dict[str, Entry] = {}
     for number, text_line in enumerate(re.split(r"\r\n|\n|\r", text), 1):
         line = text_line.partition("#")[0].strip()
         if not line:
             continue
         entry = _parse_entry(line, TextLine(source, number))
-        if entry.name in found and found[entry.name].component != entry.component:
+        if entry.name in entries and entries[entry.name].component != entry.component:
             # Two devices of one vehicle: the autopilot's value is the one that flies.
             if entry.component == AUTOPILOT:
-                found[entry.name] = entry
+                entries[entry.name] = entry
             continue
-        if entry.name in found:
-            first = found[entry.name].where.number
+        if entry.name in entries:
+            first_line = entries[entry.name].where.number
             allowed = "name each parameter once"
             raise ParameterError(
-                f"{entry.where}: {entry.name}: already on line {first}: {allowed}",
+                f"{entry.where}: {entry.name}: already on line {first_line}: {allowed}",
                 file=source,
                 field=entry.name,
                 value=entry.value,
                 allowed=allowed,
             )
-        found[entry.name] = entry
-    if not found:
+        entries[entry.name] = entry
+    if not entries:
         raise ParameterError(f"{source}: no parameter; expected lines of a name and a value", file=source)
-    return found
+    return entries
 
 
 def _parse_entry(line: str, where: TextLine) -> Entry:

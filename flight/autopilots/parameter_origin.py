@@ -44,7 +44,7 @@ _PX4_NAMES = _compile_names(
     "RTL_CONE_ RTL_DESCEND_ALT RTL_LAND_DELAY RTL_LOITER_RAD RTL_MIN_DIST RTL_RETURN_ALT RTL_TYPE RWTO_ SDLOG_ SENS_ "
     "SER_ SYS_ THR_MDL_FAC TRIG_ TRIM_PITCH TRIM_ROLL TRIM_YAW UUV_ VT_ WEIGHT_BASE WEIGHT_GROSS WV_"
 )
-# Names of ArduPilot's aeroplanes alone; ArduPlane's VTOL parameters begin with Q_.
+# Names that only ArduPilot's aeroplanes have; ArduPlane's VTOL parameters begin with Q_.
 _ARDUPLANE_NAMES = _compile_names(
     "AIRSPEED_CRUISE AIRSPEED_MAX AIRSPEED_MIN ALT_CTRL_ALG ALT_HOLD_ ALT_OFFSET ARSPD_ CRUISE_ALT_FLOOR DSPOILER_ "
     "DSPOILR_ ELEVON_ FBW[AB]_ FLAP_ FS_LONG_ FS_SHORT_ GLIDE_SLOPE_ GROUND_STEER_ KFF_ LAND_FLARE_ LAND_PF_ "
@@ -85,7 +85,7 @@ _PX4_VEHICLES: Mapping[str, re.Pattern[str]] = {
     "a submarine": _compile_names("UUV_"),
 }
 _VTOL = "a VTOL aircraft"
-# Names of a PX4 VTOL alone: PX4's navigator asks for VT_B_ in every vehicle.
+# Names that only a PX4 VTOL has: PX4's navigator reads VT_B_ in every vehicle.
 _PX4_VTOL = _compile_names("VT_ARSP_ VT_FW_ VT_F_ VT_TRANS_ VT_TYPE")
 # Words of a "# Vehicle:" header; the first match decides: vehicle names of QGroundControl and MAVLink.
 _VEHICLE_WORDS: tuple[tuple[str, str], ...] = (
@@ -150,20 +150,20 @@ def parameter_origin(text: str, entries: Mapping[str, Entry]) -> ParameterOrigin
     elif program is not None:
         header = ARDUPILOT
     names = {PX4: _matching(entries, _PX4_NAMES.fullmatch), ARDUPILOT: _matching(entries, _is_ardupilot)}
-    votes = {one: len(names[one]) + (_HEADER_WEIGHT if one == header else 0) for one in TITLES}
-    most = max(TITLES, key=lambda one: votes[one])
-    least = min(votes.values())
-    if not votes[most]:
+    votes = {autopilot: len(names[autopilot]) + (_HEADER_WEIGHT if autopilot == header else 0) for autopilot in TITLES}
+    winner = max(TITLES, key=lambda autopilot: votes[autopilot])
+    min_votes = min(votes.values())
+    if not votes[winner]:
         return ParameterOrigin("")
-    if votes[most] < _CLEAR_MAJORITY * least:
-        shown = f"{names[PX4][0] if names[PX4] else 'its header'} is PX4's"
-        other = names[ARDUPILOT][0] if names[ARDUPILOT] else "its header"
-        return ParameterOrigin("", "", f"{shown} and {other} ArduPilot's", mixed=True)
-    evidence = ", ".join(names[most][:_SHOWN_NAMES])
-    if most == header:
+    if votes[winner] < _CLEAR_MAJORITY * min_votes:
+        px4_text = f"{names[PX4][0] if names[PX4] else 'its header'} is PX4's"
+        ardupilot_text = names[ARDUPILOT][0] if names[ARDUPILOT] else "its header"
+        return ParameterOrigin("", "", f"{px4_text} and {ardupilot_text} ArduPilot's", mixed=True)
+    evidence = ", ".join(names[winner][:_SHOWN_NAMES])
+    if winner == header:
         evidence = f'"# Stack: {stack[1][:40]}"' if stack is not None else program[1] if program is not None else ""
-    vehicle = _px4_vehicle(text, entries) if most == PX4 else _ardupilot_vehicle(text, entries)
-    return ParameterOrigin(most, vehicle, evidence)
+    vehicle = _px4_vehicle(text, entries) if winner == PX4 else _ardupilot_vehicle(text, entries)
+    return ParameterOrigin(winner, vehicle, evidence)
 
 
 def _matching(names: Iterable[str], matches: Callable[[str], object]) -> list[str]:
@@ -177,22 +177,22 @@ def _is_ardupilot(name: str) -> bool:
 
 def _header_vehicle(text: str) -> str | None:
     """Return the vehicle that a file's header states, "" for an aeroplane, or None if the header states no vehicle."""
-    found = _VEHICLE.search(text)
-    if found is not None:
-        return next((kind for words, kind in _VEHICLE_WORDS if re.search(words, found[1], re.I)), None)
+    match = _VEHICLE.search(text)
+    if match is not None:
+        return next((kind for pattern, kind in _VEHICLE_WORDS if re.search(pattern, match[1], re.I)), None)
     program = _PROGRAM.search(text)
     return None if program is None else _PROGRAMS[program[1].lower()]
 
 
 def _vehicle_by_majority(
-    text: str, entries: Mapping[str, Entry], plane: re.Pattern[str], others: Mapping[str, re.Pattern[str]]
+    text: str, entries: Mapping[str, Entry], plane_names: re.Pattern[str], other_vehicles: Mapping[str, re.Pattern[str]]
 ) -> str:
     """Return the vehicle with the most names; in a tie, an aeroplane."""
-    stated = _header_vehicle(text)
-    votes = {"": len(_matching(entries, plane.fullmatch))}
-    votes |= {kind: len(_matching(entries, names.fullmatch)) for kind, names in others.items()}
-    if stated is not None:
-        votes[stated] = votes.get(stated, 0) + _HEADER_WEIGHT
+    header_kind = _header_vehicle(text)
+    votes = {"": len(_matching(entries, plane_names.fullmatch))}
+    votes |= {kind: len(_matching(entries, names.fullmatch)) for kind, names in other_vehicles.items()}
+    if header_kind is not None:
+        votes[header_kind] = votes.get(header_kind, 0) + _HEADER_WEIGHT
     return max(votes, key=lambda kind: votes[kind])
 
 
@@ -216,7 +216,7 @@ def _ardupilot_vehicle(text: str, entries: Mapping[str, Entry]) -> str:
 def read_origin(path: Path) -> ParameterOrigin:
     """Return the autopilot and the vehicle that the parameter file at a path was written for.
 
-    Raise ParameterError for a file that cannot be read.
+    Raises ParameterError if the file cannot be read.
     """
     text = _read_text(path)
     return parameter_origin(text, parse_parameters(text, str(path)))
@@ -225,17 +225,17 @@ def read_origin(path: Path) -> ParameterOrigin:
 def read_parameters_for(path: Path, autopilot: str) -> dict[str, Entry]:
     """Read a parameter file for a flight with the autopilot of the given name.
 
-    Raise ParameterError for a file that cannot be read, and for a file of another autopilot or another vehicle.
+    Raises ParameterError if the file cannot be read, or if it is for another autopilot or another vehicle.
     """
     text = _read_text(path)
     entries = parse_parameters(text, str(path))
-    found = parameter_origin(text, entries)
-    if found.autopilot not in ("", autopilot):
-        raise other_autopilot(f"{path}", found.autopilot, found.evidence, autopilot)
-    if found.vehicle:
+    origin = parameter_origin(text, entries)
+    if origin.autopilot not in ("", autopilot):
+        raise other_autopilot(f"{path}", origin.autopilot, origin.evidence, autopilot)
+    if origin.vehicle:
         allowed = "planfly flies fixed-wing aircraft"
-        message = f"{path}: parameters of {found.vehicle} ({TITLES[found.autopilot]}): {allowed}"
-        raise ParameterError(message, file=path, field="vehicle", value=found.vehicle, allowed=allowed)
+        message = f"{path}: parameters of {origin.vehicle} ({TITLES[origin.autopilot]}): {allowed}"
+        raise ParameterError(message, file=path, field="vehicle", value=origin.vehicle, allowed=allowed)
     return entries
 
 
@@ -251,9 +251,9 @@ def refuse_unknown(path: Path, autopilot: str, entries: Mapping[str, Entry], kno
 
 def other_autopilot(where: str, written_for: str, evidence: str, flying: str) -> ParameterError:
     """Return the error for a file that was written for a different autopilot."""
-    because = f" ({evidence})" if evidence else ""
+    evidence_text = f" ({evidence})" if evidence else ""
     allowed = f"{_MODELS[flying]} is to fly; --autopilot {written_for} simulates {_MODELS[written_for]} instead"
-    message = f"{where}: written for {TITLES[written_for]}{because}, but {allowed}"
+    message = f"{where}: written for {TITLES[written_for]}{evidence_text}, but {allowed}"
     return ParameterError(message, file=where, field="autopilot", value=written_for, allowed=allowed)
 
 

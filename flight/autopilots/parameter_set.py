@@ -81,7 +81,7 @@ class ParameterTable:
     def read(self, entries: Mapping[str, Entry]) -> tuple[dict[str, float], tuple[str, ...]]:
         """Return the values by present name and in present units, and the names that the control law does not read.
 
-        Raises ParameterError for a value that is not accepted, and for two values of one parameter.
+        Raises ParameterError if a value is not accepted, or if one parameter has two values.
         """
         values: dict[str, float] = {}
         unused = []
@@ -89,10 +89,10 @@ class ParameterTable:
             if name not in self.by_any_name:
                 unused.append(name)
                 continue
-            definition, factor = self.by_any_name[name]
-            value = entry.value * factor
+            definition, unit_factor = self.by_any_name[name]
+            value = entry.value * unit_factor
             if not definition.low <= value <= definition.high:
-                allowed = f"allowed {definition.low / factor:g}..{definition.high / factor:g}"
+                allowed = f"allowed {definition.low / unit_factor:g}..{definition.high / unit_factor:g}"
                 raise _value_error(entry.where, name, entry.value, allowed)
             if values.setdefault(definition.name, value) != value:
                 allowed = "the same parameter has a different value under its other name"
@@ -119,13 +119,13 @@ class ParameterTable:
                 values[name] = value
             else:
                 notes.append(f"{name} {value:g} of the log is not allowed: the default is used")
-        for low, high in self.pairs:
-            if low in values and high in values and values[low] >= values[high]:
+        for minimum, maximum in self.pairs:
+            if minimum in values and maximum in values and values[minimum] >= values[maximum]:
                 notes.append(
-                    f"{low} {values[low]:g} and {high} {values[high]:g} of the log are not allowed: "
+                    f"{minimum} {values[minimum]:g} and {maximum} {values[maximum]:g} of the log are not allowed: "
                     "the defaults are used"
                 )
-                del values[low], values[high]
+                del values[minimum], values[maximum]
         if not values:
             notes.append(f"the log holds no parameters: {self.title}'s defaults are used")
         return values, notes
@@ -160,19 +160,19 @@ class ParameterSet:
     def load(cls, aircraft: Aircraft, path: Path | str | None = None, *fields: Any) -> Self:
         """Return an aircraft's parameters from a file, from the aircraft's own file, and from the defaults.
 
-        Raises ParameterError, in one line, for a file that cannot be read or contains a value that is not allowed.
+        Raises ParameterError, in one line, if a file cannot be read or contains a value that is not allowed.
         """
-        stated: list[Stated] = []
+        sources: list[Stated] = []
         unused: tuple[str, ...] = ()
         if path is not None:
             entries = read_parameters_for(Path(path), cls.table.autopilot)
             values, unused = cls.table.read(entries)
             refuse_unknown(Path(path), cls.table.autopilot, entries, values)
-            stated.append(("file", values))
-        file = aircraft.folder / AIRCRAFT_FILE
-        if file.exists():
-            stated.append(("aircraft", cls._of_aircraft(read_parameter_file(file))))
-        return cls._build(stated, "" if path is None else str(path), unused, *fields)
+            sources.append(("file", values))
+        aircraft_file = aircraft.folder / AIRCRAFT_FILE
+        if aircraft_file.exists():
+            sources.append(("aircraft", cls._of_aircraft(read_parameter_file(aircraft_file))))
+        return cls._build(sources, "" if path is None else str(path), unused, *fields)
 
     @classmethod
     def of_text(cls, text: str, source: str, *fields: Any) -> Self:
@@ -184,7 +184,7 @@ class ParameterSet:
     def restore(cls, stored: StoredParameters, *fields: Any) -> Self:
         """Return recorded parameters; a parameter that was not yet recorded has its default.
 
-        Raises ParameterError for a value that is not allowed.
+        Raises ParameterError if a value is not allowed.
         """
         origins: dict[Origin, dict[str, float]] = {"file": {}, "aircraft": {}, "default": {}}
         for name, value, origin in stored.values:
@@ -219,26 +219,28 @@ class ParameterSet:
         return True
 
     @classmethod
-    def _build(cls, stated: list[Stated], source: str, unused: tuple[str, ...], *fields: Any) -> Self:
-        """Take each parameter from the first source that states it, and refuse a minimum above its maximum."""
+    def _build(cls, sources: list[Stated], source: str, unused: tuple[str, ...], *fields: Any) -> Self:
+        """Take each parameter from the first source that states it, and check each minimum against its maximum."""
 
         def find(definition: Definition) -> ParameterValue:
-            for origin, values in stated:
+            for origin, values in sources:
                 value = values.get(definition.name)
                 if value is not None and cls._counts_as_set(definition, value):
                     return ParameterValue(definition.name, value, origin)
             return ParameterValue(definition.name, definition.default, "default")
 
-        others = [parameter for parameter in map(find, cls.table.when_stated.values()) if parameter.origin != "default"]
-        made = cls((*map(find, cls.table.definitions), *others), unused, source, *fields)
-        found = {name: value for name, value, _ in made.values}
-        for low, high in cls.table.pairs:
-            if found[low] >= found[high]:
-                value, allowed = found[low], f"must be below {high} {found[high]:g}"
-                where = source or AIRCRAFT_FILE
-                message = f"{where}: {low} {value:g}: {allowed}"
-                raise ParameterError(message, file=where, field=low, value=value, allowed=allowed)
-        return made
+        stated_extras = [
+            parameter for parameter in map(find, cls.table.when_stated.values()) if parameter.origin != "default"
+        ]
+        parameter_set = cls((*map(find, cls.table.definitions), *stated_extras), unused, source, *fields)
+        value_by_name = {name: value for name, value, _ in parameter_set.values}
+        for minimum, maximum in cls.table.pairs:
+            if value_by_name[minimum] >= value_by_name[maximum]:
+                value, allowed = value_by_name[minimum], f"must be below {maximum} {value_by_name[maximum]:g}"
+                source_name = source or AIRCRAFT_FILE
+                message = f"{source_name}: {minimum} {value:g}: {allowed}"
+                raise ParameterError(message, file=source_name, field=minimum, value=value, allowed=allowed)
+        return parameter_set
 
     def __getitem__(self, name: str) -> float:
         """Return a parameter's value by the autopilot's name, in SI and radians; its default if it is not held."""
@@ -249,23 +251,23 @@ class ParameterSet:
         """Return the same parameters with other values, by the autopilot's names and in its units."""
         if unknown := sorted(set(values) - self.table.by_name.keys()):
             raise ValueError(f"{unknown[0]}: not a parameter of the simulated autopilot")
-        made = {parameter.name: parameter for parameter in self.values}
-        made |= {name: ParameterValue(name, value, "file") for name, value in values.items()}
-        return replace(self, values=tuple(made.values()))
+        by_name = {parameter.name: parameter for parameter in self.values}
+        by_name |= {name: ParameterValue(name, value, "file") for name, value in values.items()}
+        return replace(self, values=tuple(by_name.values()))
 
     def by_origin(self, origin: Origin) -> dict[str, float]:
         """Return the values from one source, by name and in the autopilot's units."""
-        return {name: value for name, value, stated in self.values if stated == origin}
+        return {name: value for name, value, value_origin in self.values if value_origin == origin}
 
     @property
     def beyond(self) -> tuple[str, ...]:
         """Values of the file outside their documented ranges, which are flown all the same, with the ranges."""
-        found = []
+        texts = []
         for name, value in self.by_origin("file").items():
-            low, high = self.table.by_name[name].documented or (-math.inf, math.inf)
-            if not low <= value <= high:
-                found.append(f"{name} {value:g} ({low:g}..{high:g})")
-        return tuple(found)
+            minimum, maximum = self.table.by_name[name].documented or (-math.inf, math.inf)
+            if not minimum <= value <= maximum:
+                texts.append(f"{name} {value:g} ({minimum:g}..{maximum:g})")
+        return tuple(texts)
 
     @property
     def misfits(self) -> tuple[str, ...]:
@@ -278,5 +280,5 @@ def _value_error(where: TextLine | str, name: str, value: float, allowed: str) -
 
     where: the line of the value, or the source of recorded parameters, which the message does not name.
     """
-    at, file = (f"{where}: ", where.file) if isinstance(where, TextLine) else ("", where)
-    return ParameterError(f"{at}{name}: {value:g}: {allowed}", file=file, field=name, value=value, allowed=allowed)
+    prefix, file = (f"{where}: ", where.file) if isinstance(where, TextLine) else ("", where)
+    return ParameterError(f"{prefix}{name}: {value:g}: {allowed}", file=file, field=name, value=value, allowed=allowed)

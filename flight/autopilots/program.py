@@ -21,7 +21,7 @@ class ProgramFlight(Airborne, AbstractContextManager["ProgramFlight"]):
     def prepare(self) -> None:
         """Make the program accept the mission and fly to the first waypoint.
 
-        Raise FlightError if it fails.
+        Raises FlightError if it fails.
         """
 
     @abstractmethod
@@ -72,7 +72,7 @@ class ProgramAutopilot(Autopilot):
     def file(self) -> Path:
         """The program's file.
 
-        Raise ValueError if the autopilot belongs to a recorded flight.
+        Raises ValueError if the autopilot belongs to a recorded flight.
         """
         if self.binary is None:
             raise ValueError("the program of a recorded flight is not available here")
@@ -82,5 +82,5 @@ class ProgramAutopilot(Autopilot):
     def start(self, setup: FlightSetup, aircraft: Aircraft) -> ProgramFlight:
         """Start the program for a flight.
 
-        Raise FlightError if it does not start.
+        Raises FlightError if it does not start.
         """

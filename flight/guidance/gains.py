@@ -143,7 +143,7 @@ _UNIT_FACTORS = {
 
 
 def load_gains(aircraft: Aircraft) -> Gains:
-    """Read the gains next to an aircraft's model. Raise FlightError for a missing, unknown or bad entry.
+    """Read the gains next to an aircraft's model. Raises FlightError if an entry is missing, unknown or invalid.
 
     >>> from aircraft.catalog import load_aircraft
     >>> load_gains(load_aircraft("aerosonde")).reference_airspeed
@@ -162,13 +162,13 @@ def load_gains(aircraft: Aircraft) -> Gains:
             raise FlightError(f"{file}: {key} = {value!r} is not a finite number", file=file, field=key, value=value)
         unit = next((unit for unit in _UNIT_FACTORS if key.endswith(unit)), "")
         values[key.removesuffix(unit)] = float(value) * _UNIT_FACTORS.get(unit, 1.0)
-    known = {item.name for item in fields(Gains)}
-    wanted = {item.name for item in fields(Gains) if item.default is MISSING}
-    missing, unknown = sorted(wanted - set(values)), sorted(set(values) - known)
+    gain_names = {gain.name for gain in fields(Gains)}
+    required_names = {gain.name for gain in fields(Gains) if gain.default is MISSING}
+    missing, unknown = sorted(required_names - set(values)), sorted(set(values) - gain_names)
     if missing or unknown:
         raise FlightError(
             f"{file}: missing {', '.join(missing) or 'nothing'}; unknown {', '.join(unknown) or 'nothing'}"
-            f"{did_you_mean(unknown[0], sorted(known - set(values))) if unknown else ''}",
+            f"{did_you_mean(unknown[0], sorted(gain_names - set(values))) if unknown else ''}",
             file=file,
             field=(missing + unknown)[0],
         )

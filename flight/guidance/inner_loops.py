@@ -34,7 +34,7 @@ GUIDANCE_MEMORY = record_dtype(
     "last_velocity_north",
     "last_velocity_up",
     "unexplained_acceleration",  # m/s^2 to the right that bank and ailerons do not explain
-    "path_bank",  # rad and rad/s, model roll for the path's curvature alone
+    "path_bank",  # rad and rad/s, model roll only for the path's curvature
     "path_bank_rate",
     "aside",  # m right of the path and m/s, offset caused by that roll
     "aside_rate",
@@ -62,83 +62,95 @@ GUIDANCE_MEMORY = record_dtype(
 
 @inner
 def steer_elevator(
-    state: Record, gains: Record, memory: Record, commands: Record, climb_rate: float, push: float
+    state: Record, gains: Record, memory: Record, commands: Record, climb_rate: float, acceleration: float
 ) -> None:
-    """Set the elevator for an upward acceleration ``push`` (m/s^2) by way of load factor and angle of attack.
+    """Set the elevator for an upward acceleration, through load factor and angle of attack.
 
     climb_rate: m/s.
+    acceleration: m/s^2, positive upwards.
     """
     airspeed = max(8.0, state.airspeed)
     # Lift responds more slowly than roll: use the bank predicted by the lead.
     roll = state.roll
-    banked = roll + gains.load_lead * memory.bank_rate
-    climb = math.asin(min(1.0, max(-1.0, climb_rate / airspeed)))
-    load = (push / GRAVITY + math.cos(climb)) / max(0.4, math.cos(banked))
-    load = min(3.0, max(0.0, load))
-    pressure = (gains.reference_airspeed / airspeed) ** 2
-    alpha = gains.alpha_per_g * (load * pressure - 1.0)
+    predicted_bank = roll + gains.load_lead * memory.bank_rate
+    climb_angle = math.asin(min(1.0, max(-1.0, climb_rate / airspeed)))
+    load_factor = (acceleration / GRAVITY + math.cos(climb_angle)) / max(0.4, math.cos(predicted_bank))
+    load_factor = min(3.0, max(0.0, load_factor))
+    inverse_pressure_ratio = (gains.reference_airspeed / airspeed) ** 2
+    alpha = gains.alpha_per_g * (load_factor * inverse_pressure_ratio - 1.0)
     alpha = min(0.25 - memory.trim_alpha, max(-0.12 - memory.trim_alpha, alpha))
-    turn_rate = GRAVITY / airspeed * math.tan(banked) * math.sin(banked)
-    pitch_rate = turn_rate + push / airspeed * math.cos(roll)
-    scale = gains.reference_airspeed / airspeed
+    turn_rate = GRAVITY / airspeed * math.tan(predicted_bank) * math.sin(predicted_bank)
+    pitch_rate = turn_rate + acceleration / airspeed * math.cos(roll)
+    inverse_speed_ratio = gains.reference_airspeed / airspeed
     commands.elevator = (
         memory.trim_elevator
         + gains.elevator_per_alpha * alpha
-        + gains.elevator_per_pitch_rate * scale * pitch_rate
-        + gains.pitch_rate_gain * scale * (state.pitch_rate - pitch_rate)
+        + gains.elevator_per_pitch_rate * inverse_speed_ratio * pitch_rate
+        + gains.pitch_rate_gain * inverse_speed_ratio * (state.pitch_rate - pitch_rate)
     )
 
 
 @inner
-def roll_model(wanted: float, bank: float, rate: float, gains: Record, dt: float) -> tuple[float, float, float]:
+def roll_model(
+    bank_demand: float, bank: float, roll_rate: float, gains: Record, dt: float
+) -> tuple[float, float, float]:
     """Advance the model roll by one tick, and return its bank (rad), roll rate and roll acceleration.
 
     The model is a critically damped oscillator with limits of roll rate and roll acceleration.
     """
     frequency = gains.roll_frequency
     limit = gains.roll_acceleration_max
-    change = min(limit, max(-limit, frequency * (frequency * (wanted - bank) - 2.0 * rate)))
+    roll_acceleration = min(limit, max(-limit, frequency * (frequency * (bank_demand - bank) - 2.0 * roll_rate)))
     limit = gains.roll_rate_max
-    change = min((limit - rate) / dt, max((-limit - rate) / dt, change))
-    rate += change * dt
-    return bank + rate * dt, rate, change
+    roll_acceleration = min((limit - roll_rate) / dt, max((-limit - roll_rate) / dt, roll_acceleration))
+    roll_rate += roll_acceleration * dt
+    return bank + roll_rate * dt, roll_rate, roll_acceleration
 
 
 @inner
 def follow_roll(
-    state: Record, gains: Record, memory: Record, commands: Record, bank: float, rate: float, turn: float, dt: float
+    state: Record,
+    gains: Record,
+    memory: Record,
+    commands: Record,
+    bank: float,
+    roll_rate: float,
+    roll_acceleration: float,
+    dt: float,
 ) -> None:
     """Set aileron and rudder so that the aircraft follows a given roll.
 
     bank: rad.
-    rate: roll rate, rad/s.
-    turn: roll acceleration, rad/s^2.
+    roll_rate: rad/s.
+    roll_acceleration: rad/s^2.
 
     The ailerons get the deflection for this roll, the feedback of the remaining error, and the compensation of gusts
     and propeller torque, estimated from the roll that the ailerons do not explain.
     """
     airspeed = max(8.0, state.airspeed)
-    scale = gains.reference_airspeed / airspeed
-    memory.bank, memory.bank_rate = bank, rate
-    per_rate, per_acceleration = (
-        gains.aileron_per_roll_rate * scale,
-        gains.aileron_per_roll_acceleration * scale * scale,
+    inverse_speed_ratio = gains.reference_airspeed / airspeed
+    memory.bank, memory.bank_rate = bank, roll_rate
+    aileron_per_rate, aileron_per_acceleration = (
+        gains.aileron_per_roll_rate * inverse_speed_ratio,
+        gains.aileron_per_roll_acceleration * inverse_speed_ratio * inverse_speed_ratio,
     )
-    rolled = (
-        per_acceleration * (state.roll_rate - memory.last_roll_rate) / dt + per_rate * state.roll_rate - state.aileron
+    disturbance = (
+        aileron_per_acceleration * (state.roll_rate - memory.last_roll_rate) / dt
+        + aileron_per_rate * state.roll_rate
+        - state.aileron
     )
     memory.last_roll_rate = state.roll_rate
-    memory.roll_disturbance += (rolled - memory.roll_disturbance) * min(1.0, dt / gains.roll_disturbance_lag)
+    memory.roll_disturbance += (disturbance - memory.roll_disturbance) * min(1.0, dt / gains.roll_disturbance_lag)
     commands.aileron = (
-        per_rate * rate
-        + (per_acceleration + gains.aileron_lead * per_rate) * turn
-        + gains.roll_gain * scale * scale * (memory.bank - state.roll)
-        + gains.roll_rate_gain * scale * scale * (rate - state.roll_rate)
+        aileron_per_rate * roll_rate
+        + (aileron_per_acceleration + gains.aileron_lead * aileron_per_rate) * roll_acceleration
+        + gains.roll_gain * inverse_speed_ratio * inverse_speed_ratio * (memory.bank - state.roll)
+        + gains.roll_rate_gain * inverse_speed_ratio * inverse_speed_ratio * (roll_rate - state.roll_rate)
         - memory.roll_disturbance
     )
     yaw_rate = GRAVITY / airspeed * math.sin(state.roll) * math.cos(state.pitch)
     commands.rudder = (
-        -gains.rudder_per_yaw_rate * scale * yaw_rate
-        - gains.yaw_rate_gain * scale * (yaw_rate - state.yaw_rate)
+        -gains.rudder_per_yaw_rate * inverse_speed_ratio * yaw_rate
+        - gains.yaw_rate_gain * inverse_speed_ratio * (yaw_rate - state.yaw_rate)
         - gains.sideslip_gain * (state.beta - memory.sideslip)
     )

@@ -84,28 +84,28 @@ def l1_angles(
 
     The second angle is NaN while the aircraft heads straight for a waypoint. Both are positive if it has to turn left.
     """
-    leg_e, leg_n = b_east - a_east, b_north - a_north
-    run = max(1e-6, math.hypot(leg_e, leg_n))
-    leg_e, leg_n = leg_e / run, leg_n / run
-    from_e, from_n = estimated.east - a_east, estimated.north - a_north
-    along = from_e * leg_e + from_n * leg_n
-    cross = from_e * leg_n - from_n * leg_e
-    distance = math.hypot(from_e, from_n)
+    leg_east, leg_north = b_east - a_east, b_north - a_north
+    leg_length = max(1e-6, math.hypot(leg_east, leg_north))
+    leg_east, leg_north = leg_east / leg_length, leg_north / leg_length
+    from_a_east, from_a_north = estimated.east - a_east, estimated.north - a_north
+    distance_along = from_a_east * leg_east + from_a_north * leg_north
+    cross_track = from_a_east * leg_north - from_a_north * leg_east
+    distance = math.hypot(from_a_east, from_a_north)
     course = math.atan2(estimated.velocity_east, estimated.velocity_north)
-    if distance > length and along < -_CAPTURE_SINE * max(1.0, distance):
-        return wrap(course - math.atan2(-from_e, -from_n)), math.nan
-    if along > run + _PASSED_TIME_S * math.hypot(estimated.velocity_east, estimated.velocity_north):
+    if distance > length and distance_along < -_CAPTURE_SINE * max(1.0, distance):
+        return wrap(course - math.atan2(-from_a_east, -from_a_north)), math.nan
+    if distance_along > leg_length + _PASSED_TIME_S * math.hypot(estimated.velocity_east, estimated.velocity_north):
         return wrap(course - math.atan2(b_east - estimated.east, b_north - estimated.north)), math.nan
-    aim = math.asin(min(_CAPTURE_SINE, max(-_CAPTURE_SINE, cross / max(0.1, length))))
-    return wrap(course - math.atan2(leg_e, leg_n)), aim
+    aim_angle = math.asin(min(_CAPTURE_SINE, max(-_CAPTURE_SINE, cross_track / max(0.1, length))))
+    return wrap(course - math.atan2(leg_east, leg_north)), aim_angle
 
 
 @inner
-def l1_integrate(aim: float, total: float, gain: float, dt: float) -> float:
+def l1_integrate(aim_angle: float, integrator: float, gain: float, dt: float) -> float:
     """Return the cross-track integrator after a tick, rad."""
-    if math.isnan(aim) or abs(aim) >= _INTEGRATION_LIMIT_RAD:
-        return total
-    return min(_MAX_INTEGRATOR_RAD, max(-_MAX_INTEGRATOR_RAD, total + aim * gain * dt))
+    if math.isnan(aim_angle) or abs(aim_angle) >= _INTEGRATION_LIMIT_RAD:
+        return integrator
+    return min(_MAX_INTEGRATOR_RAD, max(-_MAX_INTEGRATOR_RAD, integrator + aim_angle * gain * dt))
 
 
 @inner
@@ -122,30 +122,31 @@ def l1_acceleration(angle: float, speed: float, length: float, damping: float) -
 def l1_reached(estimated: Record, a: Record, b: Record, length: float, radius: float) -> bool:
     """Return True if L1 switches to the next leg, within the turn distance of b or past the line across the leg at b.
 
-    estimated: as for `l1_angles`.
+    estimated: a record of `flight.guidance.navigation_error.MOTION`.
     a, b: the leg's ends, of `WAYPOINT`.
     radius: turn distance for a right angle, m; smaller turns start later.
     """
-    leg_e, leg_n = b.east - a.east, b.north - a.north
-    to_e, to_n = b.east - estimated.east, b.north - estimated.north
-    if to_e * leg_e + to_n * leg_n <= 0.0:
+    leg_east, leg_north = b.east - a.east, b.north - a.north
+    to_b_east, to_b_north = b.east - estimated.east, b.north - estimated.north
+    if to_b_east * leg_east + to_b_north * leg_north <= 0.0:
         return True
-    distance = min(radius, length) * min(1.0, b.turn / (0.5 * math.pi))
-    return not b.fly_over and math.hypot(to_e, to_n) <= distance
+    turn_distance = min(radius, length) * min(1.0, b.turn / (0.5 * math.pi))
+    return not b.fly_over and math.hypot(to_b_east, to_b_north) <= turn_distance
 
 
 @inner
 def field_course(
-    course: float, cross: float, curvature: float, approach: float, path_gain: float, orbit_gain: float
+    course: float, cross_track: float, curvature: float, approach: float, path_gain: float, orbit_gain: float
 ) -> float:
     """Return the course that the vector field commands next to a path, rad.
 
     course: course of the path here, rad.
-    cross: distance to the right of the path, m.
+    cross_track: distance to the right of the path, m.
     curvature: 1/m, positive to the right.
     """
     if curvature == 0.0:
-        return course - approach * 2.0 / math.pi * math.atan(path_gain * cross)
-    # Outside a right turn is left of it: cross is then negative, and -cross * curvature is distance over radius.
+        return course - approach * 2.0 / math.pi * math.atan(path_gain * cross_track)
+    # Outside a right turn is left of it: cross_track is then negative, and -cross_track * curvature is distance over
+    # radius.
     side = math.copysign(1.0, curvature)
-    return course + side * math.atan(-orbit_gain * cross * curvature)
+    return course + side * math.atan(-orbit_gain * cross_track * curvature)

@@ -80,17 +80,17 @@ def at_airspeed(airspeed: float) -> dict[str, float]:
     The gains of control surfaces stay unchanged, because they are scaled with airspeed elsewhere.
     """
     ratio = airspeed / 25.0
-    found: dict[str, float] = {}
+    gains: dict[str, float] = {}
     for name, value in ROUND_FIGURES.items():
-        power = next((power for end, power in _AIRSPEED_POWERS.items() if name.endswith(end)), 0)
-        found[name] = value * ratio**power
-    return found
+        power = next((power for suffix, power in _AIRSPEED_POWERS.items() if name.endswith(suffix)), 0)
+        gains[name] = value * ratio**power
+    return gains
 
 
 def airframe_gains(aircraft: Aircraft, fdm: Fdm | None = None) -> dict[str, float]:
     """Return the gains of the airframe, from its linear model in level cruise.
 
-    Raise FlightError for an aircraft that cannot hold level flight at cruise.
+    Raises FlightError if the aircraft cannot hold level flight at cruise.
     """
     fdm = Fdm(aircraft) if fdm is None else fdm
     return _gains_of_matrices(aircraft, *linearise(fdm, _level_cruise(aircraft, fdm)))
@@ -109,8 +109,8 @@ def _gains_of_matrices(aircraft: Aircraft, a: Floats, b: Floats) -> dict[str, fl
     _, v, w, p, q, r = range(6)
     elevator, aileron, rudder = range(3)
     # Steady yaw rate without sideslip: ailerons and rudder balance the rolling and yawing moments of the yaw rate.
-    steered = abs(b[r, rudder]) > 1e-6
-    hold = least_squares(b[np.ix_([p, r], [aileron, rudder])], -a[[p, r], r])[1] if steered else 0.0
+    has_rudder = abs(b[r, rudder]) > 1e-6
+    rudder_per_yaw_rate = least_squares(b[np.ix_([p, r], [aileron, rudder])], -a[[p, r], r])[1] if has_rudder else 0.0
     return {
         "reference_airspeed": speed,
         "alpha_per_g": -9.80665 / (a[w, w] * speed),
@@ -118,7 +118,7 @@ def _gains_of_matrices(aircraft: Aircraft, a: Floats, b: Floats) -> dict[str, fl
         "elevator_per_pitch_rate": -a[q, q] / b[q, elevator],
         "aileron_per_roll_rate": -a[p, p] / b[p, aileron],
         "aileron_per_roll_acceleration": 1.0 / b[p, aileron],
-        "rudder_per_yaw_rate": -float(hold),
+        "rudder_per_yaw_rate": -float(rudder_per_yaw_rate),
         "side_per_sideslip": -a[v, v] * speed,
         "side_per_aileron": b[v, aileron],
     }
@@ -143,40 +143,43 @@ def gains_of_model(aircraft: Aircraft, fdm: Fdm | None = None) -> Gains:
 
     fdm: simulation of the aircraft with its engine at rest; None creates one.
 
-    Raise FlightError as `airframe_gains` does.
+    Raises FlightError as `airframe_gains` does.
     """
     fdm = Fdm(aircraft) if fdm is None else fdm
     level = _level_cruise(aircraft, fdm)
     a, b = linearise(fdm, level)
-    own = _gains_of_matrices(aircraft, a, b)
-    placed = (
-        at_airspeed(aircraft.airspeed) | own | _FIXED_GAINS | {"throttle_idle": idle_throttle(aircraft, fdm, level)}
+    airframe = _gains_of_matrices(aircraft, a, b)
+    gains = (
+        at_airspeed(aircraft.airspeed)
+        | airframe
+        | _FIXED_GAINS
+        | {"throttle_idle": idle_throttle(aircraft, fdm, level)}
     )
     _, _, _, p, q, r = range(6)
     elevator, aileron, rudder = range(3)
     # Roll: two poles as fast as the servo allows.
-    fastest = _SERVO_PHASE_RAD / aircraft.surface_lag
-    frequency = min(fastest, placed["roll_frequency"])
+    max_frequency = _SERVO_PHASE_RAD / aircraft.surface_lag
+    frequency = min(max_frequency, gains["roll_frequency"])
     power, damping = b[p, aileron], -a[p, p]
-    placed["roll_frequency"] = frequency
-    placed["roll_gain"] = frequency**2 / power
-    placed["roll_rate_gain"] = max(0.2 * frequency, 2.0 * _DAMPING_RATIO * frequency - damping) / power
-    placed["roll_rate_max"] = min(placed["roll_rate_max"], 0.6 * aircraft.max_aileron * power / damping)
-    placed["roll_acceleration_max"] = min(placed["roll_acceleration_max"], 0.5 * aircraft.max_aileron * power)
+    gains["roll_frequency"] = frequency
+    gains["roll_gain"] = frequency**2 / power
+    gains["roll_rate_gain"] = max(0.2 * frequency, 2.0 * _DAMPING_RATIO * frequency - damping) / power
+    gains["roll_rate_max"] = min(gains["roll_rate_max"], 0.6 * aircraft.max_aileron * power / damping)
+    gains["roll_acceleration_max"] = min(gains["roll_acceleration_max"], 0.5 * aircraft.max_aileron * power)
     # Pitch: damping of the short period, as far as the servo lag leaves it damping.
     stiffness = max(1.0, -a[q, 2] * aircraft.airspeed)
-    missing = 2.0 * _DAMPING_RATIO * math.sqrt(stiffness) + a[q, q] + a[2, 2]
-    placed["pitch_rate_gain"] = min(max(0.0, missing), fastest) / -b[q, elevator]
+    missing_damping = 2.0 * _DAMPING_RATIO * math.sqrt(stiffness) + a[q, q] + a[2, 2]
+    gains["pitch_rate_gain"] = min(max(0.0, missing_damping), max_frequency) / -b[q, elevator]
     steering = -b[r, rudder]
     if steering > 1e-6:
-        placed["yaw_rate_gain"] = 1.5 * placed["cross_track_frequency"] / steering
-        placed["sideslip_gain"] = 0.5
-        placed["sideslip_max"] = math.radians(3.0)
+        gains["yaw_rate_gain"] = 1.5 * gains["cross_track_frequency"] / steering
+        gains["sideslip_gain"] = 0.5
+        gains["sideslip_max"] = math.radians(3.0)
     else:
-        placed["yaw_rate_gain"] = placed["sideslip_gain"] = placed["side_gain"] = 0.0
-    placed["slow_margin"] = 0.16 * aircraft.airspeed
-    placed["arc_slowing_max"] = 0.08 * aircraft.airspeed
-    return Gains(**placed)
+        gains["yaw_rate_gain"] = gains["sideslip_gain"] = gains["side_gain"] = 0.0
+    gains["slow_margin"] = 0.16 * aircraft.airspeed
+    gains["arc_slowing_max"] = 0.08 * aircraft.airspeed
+    return Gains(**gains)
 
 
 # Unit suffixes of the keys in a file, by gain; gains without one are plain numbers.
@@ -220,15 +223,15 @@ _UNIT_SUFFIXES = {
 
 def gains_text(gains: Gains) -> str:
     """Return the text of a ``gains.toml`` without default values."""
-    usual = {item.name: item.default for item in fields(Gains)}
+    defaults = {gain.name: gain.default for gain in fields(Gains)}
     lines = [
         "# Gains of the guidance and inner loops; flight/guidance/gains.py says what each means.",
         "# They follow from the linear model in level cruise by the rule of flight/guidance/model_gains.py.",
         "",
     ]
-    for item in fields(Gains):
-        value, unit = getattr(gains, item.name), _UNIT_SUFFIXES.get(item.name, "")
-        if value != usual[item.name]:
-            shown = math.degrees(value) if "_deg" in unit else value
-            lines.append(f"{item.name}{unit} = {float(f'{shown:.4g}')!r}")
+    for gain in fields(Gains):
+        value, unit = getattr(gains, gain.name), _UNIT_SUFFIXES.get(gain.name, "")
+        if value != defaults[gain.name]:
+            shown_value = math.degrees(value) if "_deg" in unit else value
+            lines.append(f"{gain.name}{unit} = {float(f'{shown_value:.4g}')!r}")
     return "\n".join(lines) + "\n"

@@ -69,7 +69,7 @@ def _step_error(
     # The second lag's variance is half of the first lag's variance.
     scale = sigma * math.sqrt(2.0)
     first, second = lags.first, lags.second
-    before = first[axis]
-    first[axis] = decay * before + math.sqrt(1.0 - decay * decay) * noise[axis]
-    second[axis] = decay * second[axis] + (1.0 - decay) * 0.5 * (before + first[axis])
+    previous = first[axis]
+    first[axis] = decay * previous + math.sqrt(1.0 - decay * decay) * noise[axis]
+    second[axis] = decay * second[axis] + (1.0 - decay) * 0.5 * (previous + first[axis])
     return scale * second[axis], scale * (first[axis] - second[axis]) / time_constant

@@ -57,22 +57,26 @@ def project(piece: Record, east: float, north: float) -> tuple[float, float, flo
     The cross-track error is positive to the right.
     """
     course, curvature = piece.course, piece.curvature
-    de, dn = east - piece.east, north - piece.north
+    offset_east, offset_north = east - piece.east, north - piece.north
     if curvature == 0.0:
         return (
-            de * math.sin(course) + dn * math.cos(course),
-            de * math.cos(course) - dn * math.sin(course),
+            offset_east * math.sin(course) + offset_north * math.cos(course),
+            offset_east * math.cos(course) - offset_north * math.sin(course),
             course,
         )
     # From the center, which lies right of the start by 1 / curvature.
-    ve = de - math.cos(course) / curvature
-    vn = dn + math.sin(course) / curvature
+    center_to_east = offset_east - math.cos(course) / curvature
+    center_to_north = offset_north + math.sin(course) / curvature
     side = math.copysign(1.0, curvature)
-    here = math.atan2(side * vn, -side * ve)
-    turned = wrap(here - course) * side
-    if turned < -0.5 * math.pi:
-        turned += 2.0 * math.pi
-    return turned / abs(curvature), side * (1.0 / abs(curvature) - math.hypot(ve, vn)), here
+    path_course = math.atan2(side * center_to_north, -side * center_to_east)
+    angle = wrap(path_course - course) * side
+    if angle < -0.5 * math.pi:
+        angle += 2.0 * math.pi
+    return (
+        angle / abs(curvature),
+        side * (1.0 / abs(curvature) - math.hypot(center_to_east, center_to_north)),
+        path_course,
+    )
 
 
 @inner
@@ -80,20 +84,20 @@ def find_on_path(estimated: Record, pieces: Records, memory: Record) -> float:
     """Update the position along the path in the memory, and return the path's course at that position, rad.
 
     estimated: a record of `flight.guidance.navigation_error.MOTION`.
-    pieces: of `PIECE`.
+    pieces: records of `PIECE`.
     memory: a record of `flight.guidance.inner_loops.GUIDANCE_MEMORY`.
     """
-    k = memory.piece
-    along, cross, course = project(pieces[k], estimated.east, estimated.north)
-    while along > pieces[k].length and k + 1 < pieces.shape[0]:
-        k += 1
-        along, cross, course = project(pieces[k], estimated.east, estimated.north)
-    piece = pieces[k]
-    memory.piece = k
-    memory.distance = piece.start + along
+    index = memory.piece
+    distance, cross_track, course = project(pieces[index], estimated.east, estimated.north)
+    while distance > pieces[index].length and index + 1 < pieces.shape[0]:
+        index += 1
+        distance, cross_track, course = project(pieces[index], estimated.east, estimated.north)
+    piece = pieces[index]
+    memory.piece = index
+    memory.distance = piece.start + distance
     memory.leg = piece.leg + (1 if memory.distance > piece.leg_change else 0)
-    memory.cross_track = cross
-    memory.done = k + 1 == pieces.shape[0] and along >= piece.length
+    memory.cross_track = cross_track
+    memory.done = index + 1 == pieces.shape[0] and distance >= piece.length
     return course
 
 
@@ -114,16 +118,16 @@ def leave_sharp_corners(pieces: Records, memory: Record, leg: int) -> None:
 @inner
 def mean_curvature(pieces: Records, k: int, start: float, end: float) -> float:
     """Return the mean curvature of the path between two distances, both at or after piece ``k``, 1/m."""
-    total = 0.0
+    turn = 0.0
     for i in range(k, pieces.shape[0]):
         piece = pieces[i]
-        low = max(start, piece.start)
-        high = min(end, piece.start + piece.length)
-        if high > low:
-            total += piece.curvature * (high - low)
+        overlap_start = max(start, piece.start)
+        overlap_end = min(end, piece.start + piece.length)
+        if overlap_end > overlap_start:
+            turn += piece.curvature * (overlap_end - overlap_start)
         if piece.start > end:
             break
-    return total / (end - start)
+    return turn / (end - start)
 
 
 @inner
@@ -132,31 +136,37 @@ def max_curvature(pieces: Records, k: int, start: float, end: float) -> float:
 
     Both distances are at or after piece ``k``.
     """
-    sharpest = 0.0
+    largest = 0.0
     for i in range(k, pieces.shape[0]):
         piece = pieces[i]
         if piece.start > end:
             break
         if piece.start + piece.length > start:
-            sharpest = max(sharpest, abs(piece.curvature))
-    return sharpest
+            largest = max(largest, abs(piece.curvature))
+    return largest
 
 
 @compiled
 def profile(nodes: Records, s: float) -> tuple[float, float, float]:
     """Return altitude (m), slope (tangent) and slope change per meter of the altitude profile at ``s``."""
-    k = 0
-    while k + 1 < nodes.shape[0] and nodes[k + 1].distance <= s:
-        k += 1
-    for i in range(k, min(k + 2, nodes.shape[0])):
+    index = 0
+    while index + 1 < nodes.shape[0] and nodes[index + 1].distance <= s:
+        index += 1
+    for i in range(index, min(index + 2, nodes.shape[0])):
         node = nodes[i]
-        half = node.half_length
-        if half > 0.0 and abs(s - node.distance) < half:
-            before = nodes[max(i - 1, 0)].slope
-            bend = (node.slope - before) / (2.0 * half)
-            x = s - node.distance + half
-            return node.height + before * (x - half) + 0.5 * bend * x * x, before + bend * x, bend
-    node = nodes[k]
+        half_length = node.half_length
+        if half_length > 0.0 and abs(s - node.distance) < half_length:
+            previous_slope = nodes[max(i - 1, 0)].slope
+            slope_rate = (node.slope - previous_slope) / (2.0 * half_length)
+            blend_distance = s - node.distance + half_length
+            return (
+                node.height
+                + previous_slope * (blend_distance - half_length)
+                + 0.5 * slope_rate * blend_distance * blend_distance,
+                previous_slope + slope_rate * blend_distance,
+                slope_rate,
+            )
+    node = nodes[index]
     return node.height + node.slope * (s - node.distance), node.slope, 0.0
 
 
@@ -218,47 +228,61 @@ def fly_by_path(route: Route, limits: Limits, terrain: Terrain | None = None, sw
     """
     points = route.waypoints
     courses, runs, turns = leg_courses(points), leg_runs(points), _turn_angles(route, swing)
-    tangents, radii, back = _arcs_at_waypoints(route, limits, courses, runs, turns)
-    back *= swing != "none"
+    tangents, radii, return_lengths = _arcs_at_waypoints(route, limits, courses, runs, turns)
+    return_lengths *= swing != "none"
     pieces: list[tuple[float, ...]] = []
     nodes: list[tuple[float, float]] = [(0.0, float(points[0, 2]))]
     # A loiter that the flight begins on may end where it begins.
     slopes = np.divide(np.diff(points[:, 2]), runs, out=np.zeros_like(runs), where=runs > 0.0)
-    at, begin = 0.0, points[0, :2].copy()
+    distance, piece_start = 0.0, points[0, :2].copy()
     for leg in range(route.legs):
-        straight = runs[leg] - tangents[leg] - back[leg] - tangents[leg + 1]
+        straight_length = runs[leg] - tangents[leg] - return_lengths[leg] - tangents[leg + 1]
         course = float(courses[leg])
         if terrain is not None and math.isfinite(route.above_ground[leg + 1]):
-            nodes += _ground_following_corners(route, terrain, leg, begin, course, at, straight)
-        if straight > 1e-6 or not pieces:
-            pieces.append((at, straight, *begin, course, 0.0, leg, math.inf))
-            at += straight
+            nodes += _ground_following_corners(route, terrain, leg, piece_start, course, distance, straight_length)
+        if straight_length > 1e-6 or not pieces:
+            pieces.append((distance, straight_length, *piece_start, course, 0.0, leg, math.inf))
+            distance += straight_length
         corner = points[leg + 1]
-        begin = corner[:2] - tangents[leg + 1] * np.array([math.sin(course), math.cos(course)])
-        nodes.append((at, float(corner[2] - slopes[leg] * tangents[leg + 1])))
+        piece_start = corner[:2] - tangents[leg + 1] * np.array([math.sin(course), math.cos(course)])
+        nodes.append((distance, float(corner[2] - slopes[leg] * tangents[leg + 1])))
         if leg + 1 == route.legs:
             continue
-        turn, after = float(turns[leg]), float(courses[leg + 1])
-        if back[leg + 1] > 0.0:
+        turn, next_course = float(turns[leg]), float(courses[leg + 1])
+        if return_lengths[leg + 1] > 0.0:
             # Through the waypoint, and back to the next leg on arcs.
-            for place, heading, curvature, length in _fly_over_arcs(corner[:2], course, turn, radii[leg + 1]):
-                pieces.append((at, length, *place, heading, curvature, leg + 1, math.inf))
-                at += length
-            begin = corner[:2] + back[leg + 1] * np.array([math.sin(after), math.cos(after)])
-            nodes.append((at, float(corner[2] + slopes[leg + 1] * back[leg + 1])))
+            for arc_start, heading, curvature, length in _fly_over_arcs(corner[:2], course, turn, radii[leg + 1]):
+                pieces.append((distance, length, *arc_start, heading, curvature, leg + 1, math.inf))
+                distance += length
+            piece_start = corner[:2] + return_lengths[leg + 1] * np.array(
+                [math.sin(next_course), math.cos(next_course)]
+            )
+            nodes.append((distance, float(corner[2] + slopes[leg + 1] * return_lengths[leg + 1])))
             continue
         if tangents[leg + 1] == 0.0:
             continue
         length = radii[leg + 1] * abs(turn)
-        pieces.append((at, length, *begin, course, math.copysign(1.0 / radii[leg + 1], turn), leg, at + length / 2))
-        at += length
-        begin = corner[:2] + tangents[leg + 1] * np.array([math.sin(after), math.cos(after)])
-        nodes.append((at, float(corner[2] + slopes[leg + 1] * tangents[leg + 1])))
-    return FlyByPath(np.array(pieces, PIECE), _altitude_profile(nodes, limits, route), float(at))
+        pieces.append(
+            (
+                distance,
+                length,
+                *piece_start,
+                course,
+                math.copysign(1.0 / radii[leg + 1], turn),
+                leg,
+                distance + length / 2,
+            )
+        )
+        distance += length
+        piece_start = corner[:2] + tangents[leg + 1] * np.array([math.sin(next_course), math.cos(next_course)])
+        nodes.append((distance, float(corner[2] + slopes[leg + 1] * tangents[leg + 1])))
+    return FlyByPath(np.array(pieces, PIECE), _altitude_profile(nodes, limits, route), float(distance))
 
 
 def reversals(route: Route) -> NDArray[np.int64]:
-    """Return the indices of fly-over waypoints that reverse the course, so that a turn to either side is possible.
+    """Return the indices of fly-over waypoints at which the course reverses.
+
+    A turn to either side is possible there.
 
     >>> way = np.array([[0.0, 0.0, 90.0], [0.0, 900.0, 90.0], [60.0, 0.0, 90.0], [900.0, 0.0, 90.0]])
     >>> over = np.array([False, True, True, False])
@@ -279,27 +303,29 @@ def _turn_angles(route: Route, swing: Swing) -> Floats:
 
 
 def _ground_following_corners(
-    route: Route, terrain: Terrain, leg: int, begin: Floats, course: float, at: float, straight: float
+    route: Route, terrain: Terrain, leg: int, begin: Floats, course: float, start_distance: float, length: float
 ) -> list[tuple[float, float]]:
     """Return corners (distance along the path, altitude; m) of the altitude profile of a leg above ground.
 
     The height above ground changes linearly from its value at the leg's start to the stated value at its end.
 
     begin: (2,) m, start of the leg's straight part.
-    at: distance of that start along the path, m.
-    straight: length of the straight part, m.
+    start_distance: distance of that start along the path, m.
+    length: length of the straight part, m.
     """
-    first, end = route.waypoints[leg], float(route.above_ground[leg + 1])
-    start = float(first[2]) - float(terrain.height(first[0], first[1]))
-    if not math.isfinite(start):
-        start = end
+    leg_start, end_height = route.waypoints[leg], float(route.above_ground[leg + 1])
+    start_height = float(leg_start[2]) - float(terrain.height(leg_start[0], leg_start[1]))
+    if not math.isfinite(start_height):
+        start_height = end_height
     corners = []
-    for along in np.arange(0.5 * GROUND_STEP_M, straight - 0.5 * GROUND_STEP_M, GROUND_STEP_M).tolist():
+    for along in np.arange(0.5 * GROUND_STEP_M, length - 0.5 * GROUND_STEP_M, GROUND_STEP_M).tolist():
         east, north = begin[0] + along * math.sin(course), begin[1] + along * math.cos(course)
-        share = math.hypot(east - first[0], north - first[1]) / math.dist(first[:2], route.waypoints[leg + 1, :2])
+        fraction = math.hypot(east - leg_start[0], north - leg_start[1]) / math.dist(
+            leg_start[:2], route.waypoints[leg + 1, :2]
+        )
         ground = float(terrain.height(east, north))
         if math.isfinite(ground):
-            corners.append((at + along, ground + start + share * (end - start)))
+            corners.append((start_distance + along, ground + start_height + fraction * (end_height - start_height)))
     return corners
 
 
@@ -312,7 +338,7 @@ def _arcs_at_waypoints(
     waypoints that are flown over, the length of the next leg until the path is back on it, 0 if that leg is too short.
     """
     count = len(route.waypoints)
-    tangents, radii, back = np.zeros(count), np.zeros(count), np.zeros(count)
+    tangents, radii, return_lengths = np.zeros(count), np.zeros(count), np.zeros(count)
     for i in range(1, count - 1):
         turn = abs(float(turns[i - 1]))
         if turn < 1e-6:
@@ -324,24 +350,24 @@ def _arcs_at_waypoints(
         if not route.fly_over[i]:
             tangents[i] = tangent_length(turn, radius)
         elif math.isfinite(radius):
-            radii[i], back[i] = radius, radius * (math.sin(turn) + 2.0 * math.sin(_overshoot_angle(turn)))
-    sharp = np.concatenate([[False], np.abs(turns) > SHARPEST_FLY_BY_RAD, [False]])
-    short = tangents[:-1] + tangents[1:] > runs
-    tangents[sharp & (np.append(short, False) | np.append(False, short))] = 0.0
+            radii[i], return_lengths[i] = radius, radius * (math.sin(turn) + 2.0 * math.sin(_overshoot_angle(turn)))
+    is_sharp = np.concatenate([[False], np.abs(turns) > SHARPEST_FLY_BY_RAD, [False]])
+    is_short = tangents[:-1] + tangents[1:] > runs
+    tangents[is_sharp & (np.append(is_short, False) | np.append(False, is_short))] = 0.0
     # A leg that cannot be flown in this wind has no radius; draw the longest arc that fits.
     tangents[1:-1] = np.minimum(tangents[1:-1], np.minimum(runs[:-1], runs[1:]))
-    wanted = tangents.copy()
+    full_tangents = tangents.copy()
     for leg in range(len(runs)):
-        both = wanted[leg] + wanted[leg + 1]
-        if both > runs[leg]:
-            share = runs[leg] / both
-            tangents[leg] = min(tangents[leg], wanted[leg] * share)
-            tangents[leg + 1] = min(tangents[leg + 1], wanted[leg + 1] * share)
-    drawn = np.flatnonzero(tangents)
-    radii[drawn] = tangents[drawn] / np.tan(np.abs(turns[drawn - 1]) / 2)
+        required = full_tangents[leg] + full_tangents[leg + 1]
+        if required > runs[leg]:
+            fraction = runs[leg] / required
+            tangents[leg] = min(tangents[leg], full_tangents[leg] * fraction)
+            tangents[leg + 1] = min(tangents[leg + 1], full_tangents[leg + 1] * fraction)
+    arc_indices = np.flatnonzero(tangents)
+    radii[arc_indices] = tangents[arc_indices] / np.tan(np.abs(turns[arc_indices - 1]) / 2)
     # A leg that is too short for its return arcs keeps a sharp corner.
-    back[:-1][back[:-1] + tangents[1:] > runs] = 0.0
-    return tangents, radii, back
+    return_lengths[:-1][return_lengths[:-1] + tangents[1:] > runs] = 0.0
+    return tangents, radii, return_lengths
 
 
 def _overshoot_angle(turn: float) -> float:
@@ -357,38 +383,38 @@ def _fly_over_arcs(
 ) -> list[tuple[Floats, float, float, float]]:
     """Return the arcs of a fly-over turn, each as start (2,) m, course at the start (rad), curvature (1/m), length (m).
 
-    Two arcs turn past the next leg's course, each by an angle small enough for `flight.guidance.path.project` to tell
-    its direction, and the third leads back onto that leg.
+    Two arcs turn past the next leg's course, and the third leads back onto that leg. The first turn is divided because
+    `flight.guidance.path.project` cannot tell the direction of a larger angle.
 
     turn: rad, positive to the right.
     """
-    side, beyond = math.copysign(1.0, turn), _overshoot_angle(abs(turn))
-    half = 0.5 * (abs(turn) + beyond)
-    arcs, place, heading = [], corner, course
-    for angle, towards in ((half, side), (half, side), (beyond, -side)):
-        arcs.append((place, heading, towards / radius, radius * angle))
-        end = heading + towards * angle
-        step = math.cos(heading) - math.cos(end), math.sin(end) - math.sin(heading)
-        place, heading = place + towards * radius * np.array(step), end
+    side, overshoot = math.copysign(1.0, turn), _overshoot_angle(abs(turn))
+    half_angle = 0.5 * (abs(turn) + overshoot)
+    arcs, arc_start, heading = [], corner, course
+    for angle, arc_side in ((half_angle, side), (half_angle, side), (overshoot, -side)):
+        arcs.append((arc_start, heading, arc_side / radius, radius * angle))
+        end_course = heading + arc_side * angle
+        step = math.cos(heading) - math.cos(end_course), math.sin(end_course) - math.sin(heading)
+        arc_start, heading = arc_start + arc_side * radius * np.array(step), end_course
     return arcs
 
 
 def _altitude_profile(corners: list[tuple[float, float]], limits: Limits, route: Route) -> Records:
     """Return the corners of the altitude profile with the parabolas that blend them."""
-    at, up = np.array(corners).T
-    keep = np.concatenate([[True], np.diff(at) > 1e-3])
+    distances, altitudes = np.array(corners).T
+    is_kept = np.concatenate([[True], np.diff(distances) > 1e-3])
     # Of two corners at the same distance keep the later one, which is on the next leg.
-    at, up = at[keep], up[keep]
-    slopes = np.diff(up) / np.diff(at)
-    after = np.concatenate([slopes, slopes[-1:]])
-    change = np.concatenate([[0.0], np.diff(slopes), [0.0]])
+    distances, altitudes = distances[is_kept], altitudes[is_kept]
+    slopes = np.diff(altitudes) / np.diff(distances)
+    next_slopes = np.concatenate([slopes, slopes[-1:]])
+    slope_changes = np.concatenate([[0.0], np.diff(slopes), [0.0]])
     speed = float(route.airspeed.max()) + limits.wind.strongest(route.waypoints[:, 2])
-    half = np.abs(change) * speed**2 / (2.0 * BLEND_ACCELERATION)
-    gaps = np.diff(at)
+    half_lengths = np.abs(slope_changes) * speed**2 / (2.0 * BLEND_ACCELERATION)
+    gaps = np.diff(distances)
     available = 0.5 * np.minimum(np.concatenate([[np.inf], gaps]), np.concatenate([gaps, [np.inf]]))
-    nodes: Records = np.empty(at.size, NODE)
-    nodes["distance"], nodes["height"], nodes["slope"] = at, up, after
-    nodes["half_length"] = np.minimum(half, available)
+    nodes: Records = np.empty(distances.size, NODE)
+    nodes["distance"], nodes["height"], nodes["slope"] = distances, altitudes, next_slopes
+    nodes["half_length"] = np.minimum(half_lengths, available)
     return nodes
 
 
@@ -423,14 +449,14 @@ def waypoint_records(route: Route, mission: Mission | None = None, *, fly_over: 
     if route.straight_to >= 0:
         waypoints["straight"][route.straight_to] = True
     if route.return_to is not None:
-        back = waypoints[route.return_from + 1 : route.return_until]
-        back["returns"] = True
+        return_waypoints = waypoints[route.return_from + 1 : route.return_until]
+        return_waypoints["returns"] = True
         names = ("centre_east", "centre_north", "up", "circle", "slope_base")
         for name, value in zip(names, route.return_to, strict=True):
-            back[name] = value
-    last = route.return_from if route.return_to is not None else route.straight_to - 1
-    if last >= 0:
-        waypoints["turn"][last] = _turn_before_return(route, last, items)
+            return_waypoints[name] = value
+    last_before_return = route.return_from if route.return_to is not None else route.straight_to - 1
+    if last_before_return >= 0:
+        waypoints["turn"][last_before_return] = _turn_before_return(route, last_before_return, items)
     return waypoints
 
 
@@ -452,10 +478,10 @@ def _set_circles(corners: Records, route: Route) -> None:
     turns, courses = signed_turns(route.waypoints), leg_courses(route.waypoints)
     corners["circle"] = np.where(np.abs(turns) < 1e-6, 0.0, np.copysign(route.arcs[1:-1], turns))
     # The center lies at a right angle to the course halfway through the turn.
-    middle = courses[:-1] + 0.5 * turns
-    out = corners["circle"] / np.cos(0.5 * turns)
-    corners["centre_east"] = corners["east"] + out * np.cos(middle)
-    corners["centre_north"] = corners["north"] - out * np.sin(middle)
+    mid_course = courses[:-1] + 0.5 * turns
+    signed_radius = corners["circle"] / np.cos(0.5 * turns)
+    corners["centre_east"] = corners["east"] + signed_radius * np.cos(mid_course)
+    corners["centre_north"] = corners["north"] - signed_radius * np.sin(mid_course)
     # A loiter's altitude is its item's altitude, which the last of its corners has.
     stops = route.stops[1:-1]
     for i in range(len(corners) - 2, -1, -1):
@@ -487,10 +513,10 @@ def _points_at(path: FlyByPath, distances: Floats) -> Floats:
     """Return the points (n, 3) of the path at distances (n,) along it, m."""
     pieces = path.pieces[_piece_index(path, distances)]
     course, curvature, along = pieces["course"], pieces["curvature"], distances - pieces["start"]
-    straight = curvature == 0.0
-    bent, turned = np.where(straight, 1.0, curvature), course + curvature * along
-    east = np.where(straight, along * np.sin(course), (np.cos(course) - np.cos(turned)) / bent)
-    north = np.where(straight, along * np.cos(course), (np.sin(turned) - np.sin(course)) / bent)
+    is_straight = curvature == 0.0
+    nonzero_curvature, course_at = np.where(is_straight, 1.0, curvature), course + curvature * along
+    east = np.where(is_straight, along * np.sin(course), (np.cos(course) - np.cos(course_at)) / nonzero_curvature)
+    north = np.where(is_straight, along * np.cos(course), (np.sin(course_at) - np.sin(course)) / nonzero_curvature)
     up = [profile(path.nodes, float(s))[0] for s in distances]
     return np.column_stack([pieces["east"] + east, pieces["north"] + north, up])
 
@@ -506,17 +532,17 @@ def path_polyline(path: FlyByPath) -> tuple[Floats, NDArray[np.int64]]:
     >>> points.tolist(), legs.tolist()
     ([[0.0, 0.0, 500.0], [0.0, 900.0, 500.0]], [0])
     """
-    stops = [0.0, path.length]
+    unsorted_distances = [0.0, path.length]
     columns = (path.pieces[name].tolist() for name in ("start", "length", "curvature", "leg_change"))
     for start, length, curvature, leg_change in zip(*columns, strict=True):
-        parts = max(1, math.ceil(abs(curvature) * length / CHORD))
-        stops += [start + length * k / parts for k in range(parts + 1)]
+        chord_count = max(1, math.ceil(abs(curvature) * length / CHORD))
+        unsorted_distances += [start + length * index / chord_count for index in range(chord_count + 1)]
         if math.isfinite(leg_change):
-            stops.append(leg_change)
+            unsorted_distances.append(leg_change)
     for node in path.nodes:
-        stops += [node.distance + node.half_length * share for share in (-1.0, -0.5, 0.0, 0.5, 1.0)]
-    inside = np.clip(np.array(stops), 0.0, path.length)
-    distances = np.unique(np.round(inside, 6))
+        unsorted_distances += [node.distance + node.half_length * fraction for fraction in (-1.0, -0.5, 0.0, 0.5, 1.0)]
+    clipped_distances = np.clip(np.array(unsorted_distances), 0.0, path.length)
+    distances = np.unique(np.round(clipped_distances, 6))
     points = _points_at(path, distances)
     middles = 0.5 * (distances[1:] + distances[:-1])
     pieces = path.pieces[_piece_index(path, middles)]
@@ -536,8 +562,8 @@ def arc_point(piece: Record, along: float) -> tuple[float, float]:
     course, curvature = piece.course, piece.curvature
     if curvature == 0.0:
         return piece.east + along * math.sin(course), piece.north + along * math.cos(course)
-    turned = course + curvature * along
+    course_at = course + curvature * along
     return (
-        piece.east + (math.cos(course) - math.cos(turned)) / curvature,
-        piece.north + (math.sin(turned) - math.sin(course)) / curvature,
+        piece.east + (math.cos(course) - math.cos(course_at)) / curvature,
+        piece.north + (math.sin(course_at) - math.sin(course)) / curvature,
     )

@@ -72,14 +72,14 @@ class ArmingState:
         """True if the flight is to be started: armed, in AUTO, and judged."""
         return self.armed and self.mode == AUTO and not self.flying and not self.judging and self.judged is not None
 
-    def arm(self, on: bool, param2: float) -> CommandResult:
+    def arm(self, should_arm: bool, param2: float) -> CommandResult:
         """Arm or disarm (MAV_CMD_COMPONENT_ARM_DISARM).
 
         IN_PROGRESS: repeat the command after the verdict.
         """
-        forced = param2 in _FORCE_VALUES
-        if not on:
-            if self.flying and not forced:
+        is_forced = param2 in _FORCE_VALUES
+        if not should_arm:
+            if self.flying and not is_forced:
                 return CommandResult(
                     DENIED, "in flight: a forced disarm (param2 21196; MAVProxy: disarm force) ends the flight"
                 )
@@ -90,7 +90,7 @@ class ArmingState:
             return CommandResult(ACCEPTED)
         if self.judging:
             return CommandResult(IN_PROGRESS)
-        reason = self._arming_refusal(forced)
+        reason = self._arming_refusal(is_forced)
         if reason:
             return CommandResult(DENIED, f"arming denied: {reason}")
         self.armed = True
@@ -101,8 +101,8 @@ class ArmingState:
     def set_mode(self, mode: int) -> CommandResult:
         """Change to one of ArduPlane's modes."""
         if mode not in MODE_NAMES:
-            known = mavlink.enums["PLANE_MODE"].get(mode)
-            name = known.name.removeprefix("PLANE_MODE_") if known else f"mode {mode}"
+            plane_mode = mavlink.enums["PLANE_MODE"].get(mode)
+            name = plane_mode.name.removeprefix("PLANE_MODE_") if plane_mode else f"mode {mode}"
             return CommandResult(DENIED, f"{name} denied: this vehicle has {', '.join(MODE_NAMES.values())}")
         if self.flying:
             return self._divert(mode)
@@ -119,11 +119,11 @@ class ArmingState:
             return CommandResult(DENIED, "start denied: not armed")
         return self.set_mode(AUTO)
 
-    def pause(self, goes_on: bool) -> CommandResult:
+    def pause(self, should_continue: bool) -> CommandResult:
         """Loiter at the aircraft's position, or continue the mission (MAV_CMD_DO_PAUSE_CONTINUE)."""
         if self.flying:
-            return self._divert(AUTO if goes_on else LOITER)
-        return CommandResult(ACCEPTED) if goes_on else CommandResult(DENIED, "pause denied: not in flight")
+            return self._divert(AUTO if should_continue else LOITER)
+        return CommandResult(ACCEPTED) if should_continue else CommandResult(DENIED, "pause denied: not in flight")
 
     def go_to(self, place: Place) -> CommandResult:
         """Fly to a place and loiter there, in GUIDED."""
@@ -143,7 +143,7 @@ class ArmingState:
         self.mission_state = ACTIVE if mode == AUTO else PAUSED
 
     def _divert(self, mode: int) -> CommandResult:
-        """Fly on in another mode; the current mode stays if it is the same."""
+        """Continue the flight in another mode; nothing changes if it is the current mode."""
         if mode == MANUAL:
             return CommandResult(DENIED, "MANUAL denied: nobody has the sticks; a forced disarm ends the flight")
         if mode != self.mode:
@@ -182,12 +182,12 @@ class ArmingState:
         self.mission_state = COMPLETE if completed and self.mode == AUTO else NOT_STARTED
         self.mode, self.place = MANUAL, None
 
-    def _arming_refusal(self, forced: bool) -> str:
+    def _arming_refusal(self, is_forced: bool) -> str:
         if self.judged is None:
             return ""
         if not self.judged.possible:
             return "the mission cannot be flown"
-        if not (self.judged.flyable or self.force or forced):
+        if not (self.judged.flyable or self.force or is_forced):
             return "the mission is judged not flyable; set PFLY_FORCE 1 to fly it all the same"
         return ""
 

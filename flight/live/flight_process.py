@@ -126,7 +126,7 @@ class ProcessReady:
 class MissionJudged:
     """Event: a mission has been judged.
 
-    number: of the request.
+    number: number of the request.
     possible: True if the mission can be started at all.
     flyable: False if a finding of its geometry failed.
     texts: texts about it for stations.
@@ -208,7 +208,7 @@ class PreparedFlight:
 
 
 class FlightFactory(Protocol):
-    """Application's part of the flight process.
+    """The application's part of the flight process.
 
     speed: speed of the flight relative to real time.
     """
@@ -222,13 +222,13 @@ class FlightFactory(Protocol):
     def divert(self, request: DivertFlight, here: Floats) -> PreparedFlight:
         """Return the requested route from a position (3,) on the map.
 
-        Raise PlanflyError if there is no such route.
+        Raises PlanflyError if there is no such route.
         """
 
     def open_log(self, setup: FlightSetup, mode: int) -> LogSink:
         """Open the log of the next flight.
 
-        mode: as in `DivertFlight`.
+        mode: ArduPlane's number, see `DivertFlight`.
         """
 
 
@@ -281,22 +281,22 @@ def read_event(data: bytes) -> Snapshot | Event:
 
 
 class _RequestQueue:
-    """Requests in the order in which they came."""
+    """Queue of the requests in the order of their arrival."""
 
     def __init__(self, connection: Connection) -> None:
         self._connection = connection
-        self._early: deque[object] = deque()
+        self._queued: deque[object] = deque()
 
     def next(self) -> object:
         """Return the next request, waiting for it.
 
-        Raise EOFError if the link is gone.
+        Raises EOFError if the link is gone.
         """
-        return self._early.popleft() if self._early else self._connection.recv()
+        return self._queued.popleft() if self._queued else self._connection.recv()
 
     def waiting(self) -> object:
         """Return the next request without blocking, or None; return EndFlight(quit=True) if the link is gone."""
-        if not self._early and not self._connection.poll():
+        if not self._queued and not self._connection.poll():
             return None
         try:
             return self.next()
@@ -307,43 +307,43 @@ class _RequestQueue:
         """Return True if a request or a closed link asks the process to end; no request is removed."""
         try:
             while self._connection.poll():
-                self._early.append(self._connection.recv())
+                self._queued.append(self._connection.recv())
         except (EOFError, BrokenPipeError, ConnectionResetError):
             return True
-        return any(isinstance(request, EndFlight) and request.quit for request in self._early)
+        return any(isinstance(request, EndFlight) and request.quit for request in self._queued)
 
 
 def _run_flight(
     connection: Connection, requests: _RequestQueue, prepared: PreparedFlight, factory: FlightFactory
 ) -> bool:
-    """Fly in real time, and return False if the process is to end."""
+    """Fly in real time; return False if the process is to end."""
     try:
         # A diverted flight continues in the same instance of JSBSim.
-        live = replace(prepared.setup, engine="jsbsim")
-        flight = Flight(live, factory.aircraft, local_map=prepared.local_map)
+        live_setup = replace(prepared.setup, engine="jsbsim")
+        flight = Flight(live_setup, factory.aircraft, local_map=prepared.local_map)
         log = factory.open_log(prepared.setup, AUTO)
     except (PlanflyError, OSError) as error:
         send_event(connection, FlightEnded(f"not started: {error}"))
         send_event(connection, FlightJudged(False, (StatusText(f"flight not started: {error}", CRITICAL),)))
         return True
-    flown = _LoggedFlight(connection, requests, factory, flight, log)
+    logged_flight = _LoggedFlight(connection, requests, factory, flight, log)
     try:
-        ended, go_on = flown.run_in_real_time()
-        if go_on:
+        ended, should_continue = logged_flight.run_in_real_time()
+        if should_continue:
             send_event(connection, FlightEnded(ended))
-        judged = flown.finish(ended, requests.ending if go_on else lambda: True)
+        judged = logged_flight.finish(ended, requests.ending if should_continue else lambda: True)
     except OSError as error:
-        flown.abandon()
+        logged_flight.abandon()
         # A pipe that broke ends the process; a full disk ends the flight.
         if isinstance(error, BrokenPipeError | ConnectionResetError):
             raise
         send_event(connection, FlightEnded(f"log: {error.strerror}"))
         text = f"flight ended: its log cannot be written: {error.strerror}"
         judged = [FlightJudged(False, (StatusText(text, CRITICAL),))]
-        go_on = True
-    for one in judged:
-        send_event(connection, one)
-    return go_on
+        should_continue = True
+    for event in judged:
+        send_event(connection, event)
+    return should_continue
 
 
 class _LoggedFlight:
@@ -365,15 +365,15 @@ class _LoggedFlight:
     def run_in_real_time(self) -> tuple[str, bool]:
         """Step the flight by the clock; return the reason why it ended, and True if the process continues."""
         clock, speed = time.monotonic, self._factory.speed
-        started = begun = clock()
-        ticks, flushed, beat = 0, started, 0
-        ended, go_on = "", True
+        time_origin = start_time = clock()
+        ticks, last_flush, beat_count = 0, time_origin, 0
+        ended, should_continue = "", True
         while not ended:
             now = clock()
-            due = int((now - started) * speed / TICK) - ticks
+            due = int((now - time_origin) * speed / TICK) - ticks
             max_due = max(1, int(_MAX_DELAY_S * speed / TICK))
             if due > max_due:
-                started += (due - max_due) * TICK / speed
+                time_origin += (due - max_due) * TICK / speed
                 due = max_due
             if due > 0:
                 rows, ended = self._flight.block(due)
@@ -387,25 +387,25 @@ class _LoggedFlight:
             request = self._requests.waiting()
             if isinstance(request, EndFlight):
                 ended = ended or (SHUT_DOWN if request.quit else STOPPED)
-                go_on = not request.quit
+                should_continue = not request.quit
             elif isinstance(request, DivertFlight) and not ended:
                 self._divert(request)
-            if self._pending and (ended or now - flushed >= FLUSH_PERIOD):
+            if self._pending and (ended or now - last_flush >= FLUSH_PERIOD):
                 self._write()
-                flushed = now
+                last_flush = now
             if not ended:
-                beat += 1
-                time.sleep(max(0.0, begun + beat / SNAPSHOT_RATE - clock()))
-                beat = max(beat, int((clock() - begun) * SNAPSHOT_RATE))
-        return ended, go_on
+                beat_count += 1
+                time.sleep(max(0.0, start_time + beat_count / SNAPSHOT_RATE - clock()))
+                beat_count = max(beat_count, int((clock() - start_time) * SNAPSHOT_RATE))
+        return ended, should_continue
 
     def finish(self, ended: str, should_abort: Callable[[], bool]) -> list[FlightJudged]:
         """Judge each route, and close its log.
 
-        should_abort: as in `LogSink.finish`.
+        should_abort: see `LogSink.finish`.
         """
         endings = (*self._ends, ended)
-        return [log.finish(how, should_abort) for log, how in zip(self._logs, endings, strict=True)]
+        return [log.finish(end_reason, should_abort) for log, end_reason in zip(self._logs, endings, strict=True)]
 
     def abandon(self) -> None:
         """Close the logs as they are."""
@@ -427,10 +427,10 @@ class _LoggedFlight:
             self._loiter = replace(request, place=place)
         send_event(self._connection, FlightDiverted(request.mode, "", tuple(int(item) for item in route.items)))
 
-    def _begin_route(self, request: DivertFlight, left: str) -> bool:
-        """Begin a route at the aircraft's position, with its own log, and return False if there is no such route.
+    def _begin_route(self, request: DivertFlight, end_reason: str) -> bool:
+        """Begin a route at the aircraft's position, with its own log; return False if there is no such route.
 
-        left: text on the end of the current route.
+        end_reason: text on the end of the current route.
         """
         try:
             prepared = self._factory.divert(request, self._flight.position)
@@ -443,5 +443,5 @@ class _LoggedFlight:
         self._flight.divert(prepared.setup, prepared.local_map)
         self._snapshots = SnapshotMaker(prepared.setup, prepared.local_map)
         self._logs.append(log)
-        self._ends.append(left)
+        self._ends.append(end_reason)
         return True

@@ -29,7 +29,7 @@ from world.errors import FlightError
 from world.running_clock import RunningClock
 
 # ----------------------------------------------------------------------
-# MAVLink frames in datagrams: found, checked and decoded, for arbitrary bytes.
+# MAVLink frames in datagrams of arbitrary bytes: find, check and decode them.
 
 # First byte of a MAVLink 1 frame.
 MAGIC_V1 = 0xFE
@@ -47,7 +47,8 @@ MAX_FRAMES = 64
 class MavlinkFrame:
     """One frame with a good checksum.
 
-    raw: the whole frame.  signed: True if a signature is attached, good or not.
+    raw: the whole frame.
+    signed: True if a signature is attached, valid or not.
     """
 
     raw: bytes
@@ -58,7 +59,7 @@ class MavlinkFrame:
 
 
 class Decoder:
-    """Decodes frames of the dialect, and ignores damaged frames and bytes outside frames."""
+    """Decoder of the dialect's frames, which ignores damaged frames and bytes outside frames."""
 
     def __init__(self) -> None:
         self._mav = mavlink.MAVLink(None)
@@ -72,47 +73,47 @@ class Decoder:
 
 
 def split_frames(data: bytes) -> list[MavlinkFrame]:
-    """Return the whole frames in a datagram, in order; damaged ones are skipped."""
-    found: list[MavlinkFrame] = []
+    """Return the complete frames in a datagram, in order; damaged frames are skipped."""
+    frames: list[MavlinkFrame] = []
     data = data[:LARGEST]
-    at = 0
-    while at < len(data) and len(found) < MAX_FRAMES:
-        frame = _parse_frame_at(data, at) if data[at] in (MAGIC_V1, MAGIC_V2) else None
+    offset = 0
+    while offset < len(data) and len(frames) < MAX_FRAMES:
+        frame = _parse_frame_at(data, offset) if data[offset] in (MAGIC_V1, MAGIC_V2) else None
         if frame is None:
-            at += 1
+            offset += 1
         else:
-            found.append(frame)
-            at += len(frame.raw)
-    return found
+            frames.append(frame)
+            offset += len(frame.raw)
+    return frames
 
 
-def _parse_frame_at(data: bytes, at: int) -> MavlinkFrame | None:
-    """Return the frame that starts at an offset, or None if no whole frame starts there."""
-    is_v2 = data[at] == MAGIC_V2
-    head = 10 if is_v2 else 6
-    if len(data) - at < head + 2:
+def _parse_frame_at(data: bytes, offset: int) -> MavlinkFrame | None:
+    """Return the frame that starts at an offset, or None if no complete frame starts there."""
+    is_v2 = data[offset] == MAGIC_V2
+    header_size = 10 if is_v2 else 6
+    if len(data) - offset < header_size + 2:
         return None
-    flags = data[at + 2] if is_v2 else 0
+    flags = data[offset + 2] if is_v2 else 0
     # Any other flag changes the frame in a way that is not known here, and the standard says to drop it.
     if flags & ~SIGNED:
         return None
-    end = at + head + data[at + 1] + 2
-    size = end + (SIGNATURE if flags else 0)
-    if size > len(data):
+    end = offset + header_size + data[offset + 1] + 2
+    frame_end = end + (SIGNATURE if flags else 0)
+    if frame_end > len(data):
         return None
     if is_v2:
-        system, component = data[at + 5], data[at + 6]
-        number = data[at + 7] | data[at + 8] << 8 | data[at + 9] << 16
+        system, component = data[offset + 5], data[offset + 6]
+        number = data[offset + 7] | data[offset + 8] << 8 | data[offset + 9] << 16
     else:
-        system, component, number = data[at + 3], data[at + 4], data[at + 5]
+        system, component, number = data[offset + 3], data[offset + 4], data[offset + 5]
     message_class = mavlink.mavlink_map.get(number)
     if message_class is None:
         return None
-    crc = x25crc(data[at + 1 : end - 2])
+    crc = x25crc(data[offset + 1 : end - 2])
     crc.accumulate(bytes([message_class.crc_extra]))
     if crc.crc != _CRC_FORMAT.unpack_from(data, end - 2)[0]:
         return None
-    return MavlinkFrame(data[at:size], number, system, component, bool(flags))
+    return MavlinkFrame(data[offset:frame_end], number, system, component, bool(flags))
 
 
 # ----------------------------------------------------------------------
@@ -140,8 +141,8 @@ _MAX_KEY_BYTES = 1024
 def read_key(path: Path) -> bytes:
     """Read a signing key of 32 bytes: 64 hexadecimal digits, or a passphrase that is hashed with SHA-256.
 
-    MAVProxy's "signing setup" and Mission Planner hash a passphrase in the same way.  Raise FlightError for a file that
-    another user could read, that cannot be read, or that holds fewer than 8 or more than 1024 bytes.
+    MAVProxy's "signing setup" and Mission Planner hash a passphrase in the same way.  Raises FlightError if the file
+    cannot be read, if another user could read it, or if it holds fewer than 8 or more than 1024 bytes.
 
     >>> import tempfile
     >>> with tempfile.NamedTemporaryFile() as file:  # made for its owner alone
@@ -157,9 +158,9 @@ def read_key(path: Path) -> bytes:
             status = os.fstat(file.fileno())
             if not stat.S_ISREG(status.st_mode):
                 raise FlightError(f"{path}: not a plain file; expected a signing key", file=path)
-            own = getattr(os, "getuid", None)
+            own_user_id = getattr(os, "getuid", None)
             # Where users have no numbers, modes do not show who can read a file.
-            if own is not None and (status.st_uid != own() or stat.S_IMODE(status.st_mode) & 0o077):
+            if own_user_id is not None and (status.st_uid != own_user_id() or stat.S_IMODE(status.st_mode) & 0o077):
                 mode = stat.S_IMODE(status.st_mode)
                 allowed = "only its owner may read a signing key (chmod 600)"
                 message = f"{path}: mode {mode:03o}: {allowed}"
@@ -190,8 +191,10 @@ class Refused(Enum):
 class Signing:
     """Signs outgoing frames and checks incoming ones.
 
-    key: 32 bytes.  link: the link id of this end.  newest: the largest timestamp sent or trusted.  clock: the largest
-    timestamp of this machine's clock, which setting the clock back does not lower.
+    key: 32 bytes.
+    link: link id of this end.
+    newest: largest timestamp sent or trusted.
+    clock: largest timestamp of this machine's clock; it does not fall if the clock is set back.
     """
 
     key: bytes
@@ -203,35 +206,36 @@ class Signing:
     def refuses(self, frame: MavlinkFrame, wall: float) -> Refused | None:
         """Return the reason to distrust a frame, or None if it is signed with the key and newer than its stream.
 
-        A stream is a system, its component and its link id.  wall: s since 1970.  A frame with a bad signature leaves
-        no trace.
+        A stream is a system, its component and its link id.  A frame with a bad signature changes nothing.
+
+        wall: time since 1970, s.
         """
         if not frame.signed:
             return Refused.UNSIGNED
-        body, tag = frame.raw[:-6], frame.raw[-6:]
-        if not hmac.compare_digest(hashlib.sha256(self.key + body).digest()[:6], tag):
+        body, signature = frame.raw[:-6], frame.raw[-6:]
+        if not hmac.compare_digest(hashlib.sha256(self.key + body).digest()[:6], signature):
             return Refused.FORGED
         link = frame.raw[-SIGNATURE]
-        stamp = int.from_bytes(frame.raw[-12:-6], "little")
+        timestamp = int.from_bytes(frame.raw[-12:-6], "little")
         stream = (frame.system, frame.component, link)
-        last = self._streams.get(stream)
-        # Compared with this machine's clock, not with trusted timestamps: a series of frames cannot lead into the
-        # future.
+        last_timestamp = self._streams.get(stream)
+        # Compared with this machine's clock, not with trusted timestamps, so that a series of frames cannot move the
+        # limit into the future.
         self.clock = max(self.clock, _signing_timestamp(wall))
-        if stamp > self.clock + _MAX_LEAD_UNITS:
+        if timestamp > self.clock + _MAX_LEAD_UNITS:
             return Refused.FUTURE
-        if last is None:
+        if last_timestamp is None:
             # Compared with this machine's clock, not with others' timestamps: a station whose clock is ahead locks no
             # other out.
-            if stamp + _MAX_LAG_UNITS < _signing_timestamp(wall):
+            if timestamp + _MAX_LAG_UNITS < _signing_timestamp(wall):
                 return Refused.OLD
             if len(self._streams) >= _MAX_STREAMS:
                 return Refused.STREAMS
-        elif stamp <= last:
+        elif timestamp <= last_timestamp:
             return Refused.REPLAYED
-        self._streams[stream] = stamp
+        self._streams[stream] = timestamp
         # The clock may have been set back before the start: running stations expect timestamps later than their last.
-        self.newest = max(self.newest, stamp)
+        self.newest = max(self.newest, timestamp)
         return None
 
     def sign(self, packed: bytes, wall: float) -> bytes:
@@ -274,8 +278,9 @@ _MAX_DATAGRAMS_PER_POLL = 200
 class Peer:
     """A station that has identified itself.
 
-    periods: s between messages, None for a message that is off.  due: next time of each.
-    parameter: the next parameter to send, if the station requested all parameters.
+    periods: intervals between messages, s; None for a message that is off.
+    due: next time of each message.
+    parameter: number of the next parameter to send, if the station requested all parameters.
     """
 
     address: Address
@@ -298,13 +303,13 @@ class Dropped:
     """Number of dropped frames by reason.
 
     address: datagrams from an address that is not allowed.
-    unsigned, forged: without a signature, and with a signature that does not match the key.
-    replayed: signed by the key, and no newer than an earlier frame of its stream.
-    old: first frame of a stream, and older than a minute.
-    future: signed by the key, and more than a day ahead of this machine's clock.
-    streams: from a stream beyond the number of stored streams.
-    stranger: from another machine that has sent no HEARTBEAT.
-    others: to another system, or from the vehicle itself.
+    unsigned, forged: frames without a signature, and with a signature that does not match the key.
+    replayed: frames signed by the key, but no newer than an earlier frame of their stream.
+    old: first frames of a stream that are older than a minute.
+    future: frames signed by the key, but more than a day ahead of this machine's clock.
+    streams: frames of a stream beyond the number of stored streams.
+    stranger: frames from another machine that has sent no HEARTBEAT.
+    others: frames to another system, or from the vehicle itself.
     """
 
     address: int = 0
@@ -332,7 +337,7 @@ def check_access(access: Access) -> None:
     """Check that access to the vehicle from other machines is protected.
 
     Beyond loopback, an address to listen at needs a key or a list of allowed addresses, and an address to send to needs
-    a key or must be on that list.  Raise FlightError, which names the argument to give.
+    a key or must be on that list.  Raises FlightError, which names the argument to give, if it is not protected.
 
     >>> check_access(Access(("127.0.0.1", 14551), (("127.0.0.1", 14550),)))
     >>> check_access(Access(("0.0.0.0", 14551), ()))
@@ -348,9 +353,11 @@ def check_access(access: Access) -> None:
         if name == "to" and host not in access.allowed:
             allowed = f"reaches beyond this machine; give `sign_key`, or `allow` {host}"
             raise FlightError.of_argument(name, f"{host}:{port}", allowed)
-    far = [f"{host}:{port}" for host, port in access.to if not is_loopback(host)]
-    if far and is_loopback(access.bind[0]):
-        allowed = f"cannot reach {far[0]} from there; bind to an address of this machine's network, or 0.0.0.0"
+    remote_addresses = [f"{host}:{port}" for host, port in access.to if not is_loopback(host)]
+    if remote_addresses and is_loopback(access.bind[0]):
+        allowed = (
+            f"cannot reach {remote_addresses[0]} from there; bind to an address of this machine's network, or 0.0.0.0"
+        )
         raise FlightError.of_argument("bind", f"{access.bind[0]}:{access.bind[1]}", allowed)
 
 
@@ -362,8 +369,9 @@ def is_loopback(host: str) -> bool:
 class Link:
     """The socket and its peers.
 
-    clock: for the silence of peers and the times of messages, also for users of the link; it never goes back, and
-    stands still while the process does.  wall: s since 1970, for signatures.
+    clock: function for the silence of peers and the times of messages, also for users of the link; it never goes back,
+        and stops while the process is stopped.
+    wall: function for the time since 1970, s, for signatures.
     """
 
     def __init__(
@@ -371,7 +379,7 @@ class Link:
     ) -> None:
         """Open the socket.
 
-        Raise FlightError if that is not possible.
+        Raises FlightError if that is not possible.
         """
         check_access(access)
         self.access = access
@@ -411,7 +419,7 @@ class Link:
 
     def receive(self) -> list[tuple[Any, Peer]]:
         """Return the received messages of stations, each with its sender; everything else is dropped."""
-        found: list[tuple[Any, Peer]] = []
+        messages: list[tuple[Any, Peer]] = []
         for _ in range(_MAX_DATAGRAMS_PER_POLL):
             try:
                 data, source = self._socket.recvfrom(LARGEST)
@@ -420,15 +428,15 @@ class Link:
             except OSError:
                 # A station's port is closed: its ICMP answer comes up here.
                 continue
-            found += self.take(data, (str(source[0]), int(source[1])))
-        return found
+            messages += self.take(data, (str(source[0]), int(source[1])))
+        return messages
 
     def take(self, data: bytes, source: Address) -> list[tuple[Any, Peer]]:
         """Return the messages of one datagram, and register its sender as a peer if it contains a HEARTBEAT."""
         if self.access.allowed and not is_loopback(source[0]) and source[0] not in self.access.allowed:
             self.dropped.address += 1
             return []
-        found = []
+        messages = []
         for frame in split_frames(data):
             if frame.system == SYSTEM or frame.system == 0:
                 self.dropped.others += 1
@@ -451,8 +459,8 @@ class Link:
                 self.dropped.others += 1
             else:
                 peer.system, peer.component = frame.system, frame.component
-                found.append((message, peer))
-        return found
+                messages.append((message, peer))
+        return messages
 
     def _is_local_request(self, message: Any, source: Address) -> bool:
         """Return True if a message from this machine, which need not send heartbeats, addresses the vehicle."""
@@ -465,8 +473,8 @@ class Link:
         if host in self._strangers or len(self._strangers) >= _MAX_NAMED_STRANGERS or not self._is_for_vehicle(message):
             return
         self._strangers.add(host)
-        full = "" if len(self.peers) < MAX_PEERS else f", and {MAX_PEERS} stations are served already"
-        self._notices.append(f"{host} sends {message.get_type()} and no HEARTBEAT{full}: it is not answered")
+        full_text = "" if len(self.peers) < MAX_PEERS else f", and {MAX_PEERS} stations are served already"
+        self._notices.append(f"{host} sends {message.get_type()} and no HEARTBEAT{full_text}: it is not answered")
 
     def _notice_clock_ahead(self, host: str) -> None:
         """Add a notice, once for each address with the key, that one of the two clocks is wrong."""
@@ -479,8 +487,8 @@ class Link:
 
     def notices(self) -> list[str]:
         """Return the notices since the last call about senders without an answer."""
-        found, self._notices = self._notices, []
-        return found
+        notices, self._notices = self._notices, []
+        return notices
 
     def _count_dropped(self, reason: Refused) -> None:
         dropped = self.dropped
@@ -498,10 +506,10 @@ class Link:
         if peer is None:
             if len(self.peers) >= MAX_PEERS:
                 return None
-            # One sequence of frames per station: a station takes a second one for lost packets.
+            # Each station gets one sequence of frames: it would take a second sequence for lost packets.
             peer = Peer(source, system, component, now, self._frame_sequence(source))
             # Spread over the first tenth of a second, so that not everything is sent at once.
-            peer.due = {name: now + 0.1 * k / len(PERIODS) for k, name in enumerate(PERIODS)}
+            peer.due = {name: now + 0.1 * index / len(PERIODS) for index, name in enumerate(PERIODS)}
             self.peers[source] = peer
         peer.heard = now
         return peer

@@ -40,7 +40,7 @@ _INT32_MAX = 2**31 - 1
 
 
 class MissionType(IntEnum):
-    """MAV_MISSION_TYPE, which says to which of a vehicle's three lists an item belongs."""
+    """MAV_MISSION_TYPE: the list of the vehicle to which an item belongs."""
 
     MISSION = 0
     FENCE = 1
@@ -96,14 +96,14 @@ def from_message(message: Any, source: str) -> MissionItem:
     ``source`` names the sender in error messages.
 
     INT32_MAX in an integer x or y is NaN (MAVLink's "unset").  A float's latitude and longitude are rounded to the
-    nearest 1e-7 degrees.  Raise MissionError with one line that names item, field, value, and the allowed values.
+    nearest 1e-7 degrees.  Raises MissionError with one line that names item, field, value, and allowed values.
     """
     command, frame = int(message.command), int(message.frame)
-    located = is_located(command, frame)
+    has_coordinates = is_located(command, frame)
     if message.get_type() == "MISSION_ITEM":
-        lat, lon = (on_grid(value) if located else value + 0.0 for value in (message.x, message.y))
+        lat, lon = (on_grid(value) if has_coordinates else value + 0.0 for value in (message.x, message.y))
     else:
-        scale = 1e7 if located else 1.0
+        scale = 1e7 if has_coordinates else 1.0
         lat, lon = (math.nan if value == _INT32_MAX else value / scale for value in (message.x, message.y))
     params = tuple(float(value) for value in (message.param1, message.param2, message.param3, message.param4))
     p1, p2, p3, p4 = (value + 0.0 for value in params)
@@ -124,18 +124,18 @@ def from_message(message: Any, source: str) -> MissionItem:
 # Missions as numbered by stations, and as flown: home, seq and jumps converted between both.
 
 
-def uploaded(lists: dict[MissionType, tuple[MissionItem, ...]], own: Home) -> tuple[Mission, int]:
+def uploaded(lists: dict[MissionType, tuple[MissionItem, ...]], own_home: Home) -> tuple[Mission, int]:
     """Return the mission of the lists, and the offset between its items' seq and the stations' numbers.
 
     Item 0 is home, as in ArduPilot, if it is a waypoint above mean sea level, or one with no parameter set: MAVSDK's
     `mission` plugin sends no home, and its waypoints are relative and have a radius.
-    ``own``: the vehicle's home, for a mission without home.
+    own_home: the vehicle's home, for a mission without home.
     """
     items = lists[MissionType.MISSION]
-    home = own
+    home = own_home
     if items and _is_home(items[0]):
-        first = items[0]
-        home = Home(first.lat_deg, first.lon_deg, first.alt) if first.has_position else own
+        home_item = items[0]
+        home = Home(home_item.lat_deg, home_item.lon_deg, home_item.alt) if home_item.has_position else own_home
         items = items[1:]
         shift = 0
     else:
@@ -165,25 +165,25 @@ def listed(mission: Mission) -> tuple[tuple[MissionItem, ...], ...]:
     ([0, 1, 2], (), ())
     """
     home = mission.home
-    first = MissionItem(0, int(Command.NAV_WAYPOINT), int(Frame.GLOBAL), (0.0,) * 4, 0.0, 0.0, 0.0)
+    home_item = MissionItem(0, int(Command.NAV_WAYPOINT), int(Frame.GLOBAL), (0.0,) * 4, 0.0, 0.0, 0.0)
     if home is not None:
-        first = replace(first, lat_deg=home.lat_deg, lon_deg=home.lon_deg, alt=home.alt)
-    numbers = {item.seq: k for k, item in enumerate(mission.items, 1)}
-    items = [first]
+        home_item = replace(home_item, lat_deg=home.lat_deg, lon_deg=home.lon_deg, alt=home.alt)
+    number_by_seq = {item.seq: number for number, item in enumerate(mission.items, 1)}
+    items = [home_item]
     for item in mission.items:
         params = item.params
         if item.command == Command.DO_JUMP:
-            params = (float(numbers.get(int(params[0]), 65535)), *params[1:])
-        items.append(replace(item, seq=numbers[item.seq], params=params))
+            params = (float(number_by_seq.get(int(params[0]), 65535)), *params[1:])
+        items.append(replace(item, seq=number_by_seq[item.seq], params=params))
     return (
         tuple(items),
-        tuple(replace(item, seq=k) for k, item in enumerate(mission.fences)),
-        tuple(replace(item, seq=k) for k, item in enumerate(mission.rally)),
+        tuple(replace(item, seq=number) for number, item in enumerate(mission.fences)),
+        tuple(replace(item, seq=number) for number, item in enumerate(mission.rally)),
     )
 
 
 def start_problem(mission: Mission, first: int, *, in_flight: bool = False) -> str:
-    """Return the reason why a mission cannot be flown from the item with this seq on, or "" if it can.
+    """Return the reason why a mission cannot be flown from the item with seq ``first``, or "" if it can.
 
     in_flight: True if the leg from the aircraft to the item will be its first leg.
 
@@ -195,12 +195,14 @@ def start_problem(mission: Mission, first: int, *, in_flight: bool = False) -> s
     if not mission.items or not 0 <= first <= mission.items[-1].seq:
         return "the mission has no such item"
     places = [item for item in mission.items if item.seq >= first and item.has_position]
-    least = 1 if in_flight else 2
-    return "" if first <= mission.items[0].seq or len(places) >= least else "no leg is left to fly from there"
+    min_place_count = 1 if in_flight else 2
+    return "" if first <= mission.items[0].seq or len(places) >= min_place_count else "no leg is left to fly from there"
 
 
 def flown_from(mission: Mission, first: int) -> Mission:
-    """Return the mission from the item with this seq on, with the last speed before it and its numbers.
+    """Return the mission from the item with seq ``first``, preceded by the last speed change before it.
+
+    Items keep their numbers.
 
     >>> place = MissionItem(1, 16, 0, (0.0,) * 4, 46.0, 8.0, 75.0)
     >>> speed = MissionItem(2, 178, 2, (0.0, 22.0, -1.0, 0.0), 0.0, 0.0, 0.0)
@@ -208,8 +210,8 @@ def flown_from(mission: Mission, first: int) -> Mission:
     >>> [item.seq for item in flown_from(way, 4).items], flown_from(way, 1) == way
     ([2, 4], True)
     """
-    before = [item for item in mission.items if item.seq < first]
-    speeds = [item for item in before if item.command == Command.DO_CHANGE_SPEED][-1:]
+    earlier = [item for item in mission.items if item.seq < first]
+    speeds = [item for item in earlier if item.command == Command.DO_CHANGE_SPEED][-1:]
     return replace(mission, items=(*speeds, *(item for item in mission.items if item.seq >= first)))
 
 
@@ -319,10 +321,11 @@ def _refuse_go_to(_receive_item: MissionItem) -> str:
 class MissionServer:
     """Three lists of items and their transfers.
 
-    lists: the vehicle's items, seq from 0 on; item 0 of a mission may be home.  changed: the lists that an upload
-    replaced since the caller last cleared it.  locked: reason why the mission may not change now, "" if it may.
-    go_to: flies to an item's place, at its altitude, and loiters there; latitude and longitude are NaN for the
-    aircraft's position.  Returns the reason why it does not, or "" if it does.
+    lists: the vehicle's items, seq from 0 on; item 0 of a mission may be home.
+    changed: lists that an upload replaced since the caller last cleared this set.
+    locked: reason why the mission may not change now, "" if it may.
+    go_to: function that flies to an item's place, at its altitude, and loiters there; latitude and longitude are NaN
+        for the aircraft's position.  It returns the reason for a refusal, or "".
     """
 
     lists: dict[MissionType, tuple[MissionItem, ...]] = field(default_factory=lambda: dict.fromkeys(MissionType, ()))
@@ -366,11 +369,11 @@ class MissionServer:
                 upload.repeated = True
                 upload.asked_in_vain += not upload.items
                 replies.append(self._request(upload, kind, now))
-        for kind, done in self._finished.items():
-            if done.left > 0 and now - done.asked >= CONFIRM:
-                done.left -= 1
-                done.asked = now
-                replies.append(_request(done.station, done.count - 1, kind))
+        for kind, finished in self._finished.items():
+            if finished.left > 0 and now - finished.asked >= CONFIRM:
+                finished.left -= 1
+                finished.asked = now
+                replies.append(_request(finished.station, finished.count - 1, kind))
         return replies
 
     def _begin_upload(self, message: Any, station: Station, kind: MissionType, now: float) -> list[MissionReply]:
@@ -406,11 +409,11 @@ class MissionServer:
         if message.current in _GUIDED and (upload is None or upload.station != station):
             return [self._handle_go_to(message, station, kind)]
         if upload is None or upload.station != station:
-            done = self._finished.get(kind)
-            known = done is not None and (done.station, done.count) == (station, message.seq + 1)
-            if done is not None and known and now - done.acknowledged >= ACK_AGAIN:
-                # Its last item again: the ACK was lost.
-                done.acknowledged = now
+            finished = self._finished.get(kind)
+            is_last_item = finished is not None and (finished.station, finished.count) == (station, message.seq + 1)
+            if finished is not None and is_last_item and now - finished.acknowledged >= ACK_AGAIN:
+                # The station repeats its last item, because the ACK was lost.
+                finished.acknowledged = now
                 return [self._ack(station, mavlink.MAV_MISSION_ACCEPTED, kind)]
             return []
         upload.heard = now
@@ -421,9 +424,9 @@ class MissionServer:
             item = from_message(message, _NAMES[kind])
         except MissionError as error:
             return [self._reject_upload(upload, kind, _refusal_result(message), str(error))]
-        wrong = _placement_problem(item, kind)
-        if wrong:
-            return [self._reject_upload(upload, kind, mavlink.MAV_MISSION_UNSUPPORTED, wrong)]
+        placement_problem = _placement_problem(item, kind)
+        if placement_problem:
+            return [self._reject_upload(upload, kind, mavlink.MAV_MISSION_UNSUPPORTED, placement_problem)]
         upload.items.append(item)
         upload.floats = message.get_type() == "MISSION_ITEM"
         upload.wait = min(max(RETRY, 1.5 * (now - upload.first_asked)), SLOWEST_RETRY)
@@ -434,8 +437,8 @@ class MissionServer:
         self.lists[kind] = tuple(upload.items)
         self.changed.add(kind)
         self._finished[kind] = _Finished(station, upload.count, now, now, CONFIRMATIONS if upload.repeated else 0)
-        floats = message.get_type() == "MISSION_ITEM"
-        return [self._ack(station, mavlink.MAV_MISSION_ACCEPTED, kind, _FLOAT_WARNING if floats else "")]
+        is_float = message.get_type() == "MISSION_ITEM"
+        return [self._ack(station, mavlink.MAV_MISSION_ACCEPTED, kind, _FLOAT_WARNING if is_float else "")]
 
     def _send_count(self, _message: Any, station: Station, kind: MissionType, _now: float) -> list[MissionReply]:
         count = len(self.lists[kind])
@@ -461,18 +464,20 @@ class MissionServer:
     def _clear_list(self, message: Any, station: Station, kind: MissionType, now: float) -> list[MissionReply]:
         return self._clear(station, (kind,), kind, now)
 
-    def _clear(self, station: Station, kinds: tuple[MissionType, ...], named: int, now: float) -> list[MissionReply]:
+    def _clear(
+        self, station: Station, kinds: tuple[MissionType, ...], acknowledged_type: int, now: float
+    ) -> list[MissionReply]:
         for kind in kinds:
             refusal = self._upload_refusal(station, kind, now)
             if refusal:
-                return [self._ack(station, mavlink.MAV_MISSION_DENIED, named, refusal)]
+                return [self._ack(station, mavlink.MAV_MISSION_DENIED, acknowledged_type, refusal)]
         for kind in kinds:
             self._uploads.pop(kind, None)
             self._finished.pop(kind, None)
             if self.lists[kind]:
                 self.lists[kind] = ()
                 self.changed.add(kind)
-        return [self._ack(station, mavlink.MAV_MISSION_ACCEPTED, named)]
+        return [self._ack(station, mavlink.MAV_MISSION_ACCEPTED, acknowledged_type)]
 
     def _cancel_upload(self, message: Any, station: Station, kind: MissionType, now: float) -> list[MissionReply]:
         """Free the lock of a station that cancels its upload (MISSION_ACK with an error)."""
@@ -488,9 +493,9 @@ class MissionServer:
 
     def _stop_confirmations(self, station: Station) -> None:
         """Stop requests to a station for its finished uploads, because it sends other messages now."""
-        for done in self._finished.values():
-            if done.station == station:
-                done.left = 0
+        for finished in self._finished.values():
+            if finished.station == station:
+                finished.left = 0
 
     def _upload_refusal(self, station: Station, kind: MissionType, now: float) -> str:
         if self.locked and kind == MissionType.MISSION:
@@ -520,27 +525,27 @@ class MissionServer:
 
 
 def _request(
-    station: Station, seq: int, kind: MissionType, form: Any = mavlink.MAVLink_mission_request_int_message
+    station: Station, seq: int, kind: MissionType, message_class: Any = mavlink.MAVLink_mission_request_int_message
 ) -> MissionReply:
-    return MissionReply(station, form(station.system, station.component, seq, int(kind)))
+    return MissionReply(station, message_class(station.system, station.component, seq, int(kind)))
 
 
 def _placement_problem(item: MissionItem, kind: MissionType) -> str:
     """Return the reason why an item does not belong in a list, or "" if it does."""
-    fits = (
+    is_allowed = (
         item.command in _ALLOWED_COMMANDS[kind]
         if kind in _ALLOWED_COMMANDS
         else item.command not in _ALLOWED_COMMANDS[MissionType.FENCE]
     )
-    return "" if fits else f"{_NAMES[kind]}: item {item.seq}: command {item.command} does not belong there"
+    return "" if is_allowed else f"{_NAMES[kind]}: item {item.seq}: command {item.command} does not belong there"
 
 
 def _refusal_result(message: Any) -> int:
-    """Return the MAV_MISSION_RESULT that names the invalid number of an item that `from_message` refused."""
-    degree = 1.0 if message.get_type() == "MISSION_ITEM" else 1e7
-    if abs(message.x) > 90.0 * degree:
+    """Return the MAV_MISSION_RESULT for the invalid number in an item that `from_message` refused."""
+    degree_scale = 1.0 if message.get_type() == "MISSION_ITEM" else 1e7
+    if abs(message.x) > 90.0 * degree_scale:
         return int(mavlink.MAV_MISSION_INVALID_PARAM5_X)
-    if abs(message.y) > 180.0 * degree:
+    if abs(message.y) > 180.0 * degree_scale:
         return int(mavlink.MAV_MISSION_INVALID_PARAM6_Y)
     return int(mavlink.MAV_MISSION_INVALID)
 

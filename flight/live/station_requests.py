@@ -36,11 +36,12 @@ _FIXED_REASON = "is fixed by the aircraft or the scenario"
 
 @dataclass(frozen=True, slots=True)
 class Parameter:
-    """One parameter; values travel as float32.
+    """One parameter; values are sent as float32.
 
     low, high: range that a station may set; high is None for a fixed parameter.
     fixed: reason why it is fixed.
-    flies: True for a parameter of the flying control law, which is set on the ground; the mission is then judged again.
+    flies: True for a parameter of the control law, which may be set only on the ground; the mission is then judged
+        again.
     """
 
     name: str
@@ -59,8 +60,8 @@ def _no_flown_parameters(_stated: Mapping[str, float]) -> Mapping[str, float]:
 class Parameters:
     """Parameters by number and by name, with the autopilot's name if it has the same parameter.
 
-    flown: returns the law's parameters by name, for the values that stations have stated.  Raises PlanflyError for
-    values that are not allowed.
+    flown: function that returns the law's parameters by name, for the values that stations have stated.  It raises
+        PlanflyError if a value is not allowed.
     stated: values of the law's parameters that stations have set.
     """
 
@@ -71,22 +72,22 @@ class Parameters:
 
     def __post_init__(self) -> None:
         """Index the names."""
-        self._numbers = {entry.name: k for k, entry in enumerate(self.entries)}
+        self._numbers = {entry.name: number for number, entry in enumerate(self.entries)}
 
     def __getitem__(self, name: str) -> float:
         """Return the value of a parameter.
 
-        Raise KeyError for an unknown name.
+        Raises KeyError for an unknown name.
         """
         return self.entries[self._numbers[name]].value
 
     def put(self, name: str, value: float) -> None:
         """Change a value from within planfly.
 
-        Raise KeyError for an unknown name.
+        Raises KeyError for an unknown name.
         """
-        k = self._numbers[name]
-        self.entries[k] = replace(self.entries[k], value=value)
+        number = self._numbers[name]
+        self.entries[number] = replace(self.entries[number], value=value)
 
     def message(self, number: int) -> Any:
         """Return PARAM_VALUE of a parameter, by number."""
@@ -113,15 +114,15 @@ class Parameters:
         if number is None:
             return None, f"{_decode_name(name)}: no such parameter"
         entry = self.entries[number]
-        kept = f"{entry.value:g} kept"
+        kept_text = f"{entry.value:g} kept"
         if entry.flies:
             if in_flight:
-                return number, f"{entry.name} {value:g} refused in flight, which is logged with one set; {kept}"
+                return number, f"{entry.name} {value:g} refused in flight, which is logged with one set; {kept_text}"
             return number, self._set_law_parameter(entry, value)
         if entry.high is None:
-            return number, f"{entry.name} {entry.fixed}: {kept}"
+            return number, f"{entry.name} {entry.fixed}: {kept_text}"
         if not (math.isfinite(value) and entry.low <= value <= entry.high):
-            return number, f"{entry.name} {value:g}: allowed {entry.low:g}..{entry.high:g}; {kept}"
+            return number, f"{entry.name} {value:g}: allowed {entry.low:g}..{entry.high:g}; {kept_text}"
         self.put(entry.name, value)
         return number, ""
 
@@ -129,17 +130,17 @@ class Parameters:
         """Change a parameter of the control law; return the reason why it was refused, or "" if it was changed."""
         if not math.isfinite(value):
             return f"{entry.name} {value:g}: expected a finite number; {entry.value:g} kept"
-        # 0.7 travels as 0.699999988: the number that was typed is the shortest one with the same float32.
-        stated = self.stated | {entry.name: float(str(np.float32(value)))}
+        # 0.7 is sent as 0.699999988: the typed number is the shortest one with the same float32.
+        stated_values = self.stated | {entry.name: float(str(np.float32(value)))}
         try:
-            values = self.flown(stated)
+            values = self.flown(stated_values)
         except PlanflyError as error:
             return f"{error}; {entry.value:g} kept"
-        if values[entry.name] != stated[entry.name]:
+        if values[entry.name] != stated_values[entry.name]:
             return f"{entry.name} {_FIXED_REASON}: {entry.value:g} kept"
-        self.stated = stated
-        for name, flown in values.items():
-            self.put(name, flown)
+        self.stated = stated_values
+        for name, law_value in values.items():
+            self.put(name, law_value)
         return ""
 
 
@@ -160,7 +161,7 @@ def vehicle_parameters(
     max_bank_deg: degrees.
     system: the vehicle's MAVLink system id.
     speed: speed of the flight relative to real time.
-    flown: as in `Parameters`; its names replace the vehicle's own.
+    flown: function as in `Parameters`; its names replace the vehicle's own.
     not_flown: parameters of the control law that are not flown; they cannot be set.
 
     >>> parameters = vehicle_parameters(
@@ -176,7 +177,7 @@ def vehicle_parameters(
     >>> parameters.set(b"TRIM_PITCH_CD", 3.0)[1]
     'TRIM_PITCH_CD is read, but no flight shows it: 2 kept'
     """
-    own = [
+    vehicle_entries = [
         Parameter("AIRSPEED_CRUISE", airspeed),
         Parameter("AIRSPEED_MAX", fastest),
         Parameter("AIRSPEED_MIN", slowest),
@@ -190,10 +191,10 @@ def vehicle_parameters(
         Parameter("SIM_SPEEDUP", speed),
         Parameter("SYSID_THISMAV", float(system)),
     ]
-    entries = {entry.name: entry for entry in own}
-    unseen = set(not_flown)
+    entries = {entry.name: entry for entry in vehicle_entries}
+    unflown_names = set(not_flown)
     for name, value in flown({}).items():
-        entries[name] = Parameter(name, value, fixed="is read, but no flight shows it", flies=name not in unseen)
+        entries[name] = Parameter(name, value, fixed="is read, but no flight shows it", flies=name not in unflown_names)
     return Parameters([entries[name] for name in sorted(entries)], flown)
 
 
@@ -256,9 +257,9 @@ class Requests:
         """Answer the arm commands that waited for the verdict."""
         waiting, self._waiting = self._waiting, []
         replies: list[Response] = []
-        for item in waiting:
-            reply = self.arming.arm(item.param1 == 1.0, item.param2)
-            replies += self._acknowledge(item.peer, item.system, item.component, _ARM_COMMAND, reply)
+        for command in waiting:
+            reply = self.arming.arm(command.param1 == 1.0, command.param2)
+            replies += self._acknowledge(command.peer, command.system, command.component, _ARM_COMMAND, reply)
         return replies
 
     def _on_command(self, message: Any, peer: Peer, now: float) -> list[Response]:
@@ -273,12 +274,12 @@ class Requests:
                     reply = CommandResult(mavlink.MAV_RESULT_TEMPORARILY_REJECTED)
             return self._acknowledge(peer, system, component, number, reply)
         if number in _MESSAGE_COMMANDS:
-            reply, extra = self._run_message_command(number, message, peer, now)
+            reply, messages = self._run_message_command(number, message, peer, now)
         else:
-            reply, extra = self._run_flight_command(number, message), []
+            reply, messages = self._run_flight_command(number, message), []
         return [
             *self._acknowledge(peer, system, component, number, reply),
-            *(PeerMessage(peer, item) for item in extra),
+            *(PeerMessage(peer, extra_message) for extra_message in messages),
         ]
 
     def _run_flight_command(self, number: int, message: Any) -> CommandResult:
@@ -300,21 +301,23 @@ class Requests:
     def _run_message_command(
         self, number: int, message: Any, peer: Peer, now: float
     ) -> tuple[CommandResult, list[Any]]:
-        named = _MESSAGE_COMMANDS[number]
-        wanted = _to_integer(message.param1) if named is None else named
-        kind = mavlink.mavlink_map.get(wanted)
-        name = kind.msgname if kind is not None else ""
+        implied_number = _MESSAGE_COMMANDS[number]
+        requested_number = _to_integer(message.param1) if implied_number is None else implied_number
+        message_class = mavlink.mavlink_map.get(requested_number)
+        name = message_class.msgname if message_class is not None else ""
         if number == mavlink.MAV_CMD_SET_MESSAGE_INTERVAL:
-            kind = mavlink.mavlink_map.get(_to_integer(message.param1))
-            return self._set_interval(kind.msgname if kind else "", message.param2, peer, now), []
+            message_class = mavlink.mavlink_map.get(_to_integer(message.param1))
+            return self._set_interval(message_class.msgname if message_class else "", message.param2, peer, now), []
         if number == mavlink.MAV_CMD_GET_MESSAGE_INTERVAL:
-            wanted = _to_integer(message.param1)
-            kind = mavlink.mavlink_map.get(wanted)
-            period = peer.periods.get(kind.msgname) if kind is not None else None
+            requested_number = _to_integer(message.param1)
+            message_class = mavlink.mavlink_map.get(requested_number)
+            period = peer.periods.get(message_class.msgname) if message_class is not None else None
             interval = -1 if period is None else round(period * 1e6)
-            return CommandResult(ACCEPTED), [mavlink.MAVLink_message_interval_message(wanted & 0xFFFF, interval)]
-        found = telemetry_message(name, self.status)
-        return (CommandResult(ACCEPTED), [found]) if found is not None else (CommandResult(UNSUPPORTED), [])
+            return CommandResult(ACCEPTED), [
+                mavlink.MAVLink_message_interval_message(requested_number & 0xFFFF, interval)
+            ]
+        reply = telemetry_message(name, self.status)
+        return (CommandResult(ACCEPTED), [reply]) if reply is not None else (CommandResult(UNSUPPORTED), [])
 
     def _set_interval(self, name: str, interval: float, peer: Peer, now: float) -> CommandResult:
         if name not in PERIODS:
@@ -347,7 +350,7 @@ class Requests:
         if reply.result == ACCEPTED:
             return [PeerMessage(peer, telemetry_message("MISSION_CURRENT", self.status))]
         # The message has no refusal, and MAVSDK repeats it without end, at each MISSION_CURRENT of another item; it
-        # gives up if it gets none during its timeout.  One that was on its way already still traps it.
+        # gives up if it gets none during its timeout.  One sent before the refusal still causes the repetition.
         peer.due["MISSION_CURRENT"] = now + _MISSION_CURRENT_PAUSE_S
         return [StatusText(reply.text, WARNING)]
 
@@ -412,7 +415,7 @@ def _parse_place(message: Any) -> Place | None:
 
 
 def _to_integer(value: float) -> int:
-    """Return the integer in a command's float parameter, or -1 if it is not one."""
+    """Return the integer in a command's float parameter, or -1 if it is not an integer."""
     return int(value) if math.isfinite(value) and 0 <= value < 2**24 else -1
 
 

@@ -69,7 +69,7 @@ class Snapshot:
     def unpack(data: bytes) -> "Snapshot":
         """Return the snapshot from the bytes of `pack`.
 
-        Raise struct.error for another number of bytes.
+        Raises struct.error for any other number of bytes.
         """
         return Snapshot(*_SNAPSHOT_FORMAT.unpack(data))
 
@@ -83,7 +83,7 @@ _SNAPSHOT_FORMAT = struct.Struct(f"<{len(fields(Snapshot))}d")
 
 
 class SnapshotMaker:
-    """Makes snapshots of the rows of one flight.
+    """Maker of snapshots from the rows of one flight.
 
     Positions become latitude and longitude, and vectors and courses on the map become true ones.
 
@@ -97,12 +97,12 @@ class SnapshotMaker:
     def before_start(self, setup: FlightSetup) -> Snapshot:
         """Return the snapshot of an aircraft that waits at the route's start, on the course of its first leg."""
         points = setup.route.waypoints
-        step = points[1] - points[0]
+        first_leg = points[1] - points[0]
         terrain = setup.scenario.terrain
         ground = math.nan if terrain is None else float(terrain.height(points[0, 0], points[0, 1]))
         row: Record = np.zeros(1, TRACK_ROW)[0]
         row.position = points[0]
-        row.attitude[2] = math.atan2(step[0], step[1])
+        row.attitude[2] = math.atan2(first_leg[0], first_leg[1])
         row.clearance = points[0, 2] - ground
         row.leg = -1.0
         return self.snapshot(row)
@@ -111,10 +111,10 @@ class SnapshotMaker:
         """Return the snapshot of a flown row, a record of `flight.simulation.track.TRACK_ROW`."""
         east, north, amsl = (float(value) for value in row.position)
         lat, lon = (float(value) for value in to_geo(self._origin, east, north))
-        # A map course is the true course plus this angle.
-        turn = self._map.convergence(lat, lon) if math.isfinite(lat) and math.isfinite(lon) else 0.0
-        v_east, v_north, v_up = _to_true(row.velocity, turn)
-        wind_east, wind_north, _ = _to_true(row.wind, turn)
+        # A map course is the true course plus the convergence.
+        convergence = self._map.convergence(lat, lon) if math.isfinite(lat) and math.isfinite(lon) else 0.0
+        v_east, v_north, v_up = _to_true(row.velocity, convergence)
+        wind_east, wind_north, _ = _to_true(row.wind, convergence)
         roll, pitch, yaw = (float(value) for value in row.attitude)
         p, q, r = (float(value) for value in row.rates)
         return Snapshot(
@@ -128,7 +128,7 @@ class SnapshotMaker:
             v_down=-v_up,
             roll=roll,
             pitch=pitch,
-            yaw=_wrap_angle(yaw - turn),
+            yaw=_wrap_angle(yaw - convergence),
             p=p,
             q=q,
             r=r,
@@ -142,10 +142,13 @@ class SnapshotMaker:
         )
 
 
-def _to_true(vector: Floats, turn: float) -> tuple[float, float, float]:
-    """Rotate a vector east, north and up on the map to true east, north and up."""
+def _to_true(vector: Floats, convergence: float) -> tuple[float, float, float]:
+    """Rotate a vector from the map's east, north and up to true east, north and up.
+
+    convergence: map course minus true course, rad.
+    """
     east, north, up = (float(value) for value in vector)
-    cos, sin = math.cos(turn), math.sin(turn)
+    cos, sin = math.cos(convergence), math.sin(convergence)
     return east * cos - north * sin, north * cos + east * sin, up
 
 
@@ -189,13 +192,13 @@ def status_texts(text: str, severity: int, number: int) -> list[Any]:
     [(7, 0, 50), (7, 1, 50), (7, 2, 20)]
     """
     data = text.replace("°", " deg").encode("ascii", "replace")[:_MAX_TEXT_BYTES]
-    pieces = [data[at : at + _CHUNK_BYTES] for at in range(0, len(data), _CHUNK_BYTES)]
+    pieces = [data[start : start + _CHUNK_BYTES] for start in range(0, len(data), _CHUNK_BYTES)]
     if len(pieces) <= 1:
         return [mavlink.MAVLink_statustext_message(severity, data)]
     # A text ends with the first piece that is not full.
     if len(pieces[-1]) == _CHUNK_BYTES:
         pieces.append(b"")
-    return [mavlink.MAVLink_statustext_message(severity, piece, number, k) for k, piece in enumerate(pieces)]
+    return [mavlink.MAVLink_statustext_message(severity, piece, number, index) for index, piece in enumerate(pieces)]
 
 
 # ArduPlane's number for MANUAL (custom_mode of HEARTBEAT).
@@ -381,7 +384,7 @@ def _mission_current_message(status: Status) -> Any:
 
 def _sys_status_message(status: Status) -> Any:
     health = _SENSORS | (_PREARM if status.ready else 0)
-    share = max(0.0, 1.0 - status.snapshot.energy / status.battery)
+    remaining_fraction = max(0.0, 1.0 - status.snapshot.energy / status.battery)
     present = _SENSORS | _PREARM
     return mavlink.MAVLink_sys_status_message(
         present,
@@ -390,7 +393,7 @@ def _sys_status_message(status: Status) -> Any:
         min(1000, round(status.load * 1000)),
         44_400,
         _to_int16(status.snapshot.current * 100),
-        round(share * 100),
+        round(remaining_fraction * 100),
         0,
         0,
         0,

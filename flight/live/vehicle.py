@@ -60,9 +60,10 @@ ShowText = Callable[[str], None]
 
 
 class Downlink:
-    """Sends to every station that has sent a heartbeat.
+    """Sender of messages to every station that has sent a heartbeat.
 
-    show: also gets each text.  pause: longest sleep of the caller, s.
+    show: function that also gets each text.
+    pause: longest sleep of the caller, s.
     """
 
     def __init__(self, link: Link, status: Status, parameters: Parameters, show: ShowText, pause: float) -> None:
@@ -72,15 +73,15 @@ class Downlink:
         self._parameters = parameters
         self._show = show
         self._pause = pause
-        self._texts = 0
+        self._text_count = 0
         self._next_heartbeat = link.clock()
 
     def send_text(self, text: str, severity: int = INFO) -> None:
         """Send a text to every station, and show it at the terminal."""
         self._show(text)
-        self._texts = self._texts % 65535 + 1
+        self._text_count = self._text_count % 65535 + 1
         for peer in self._link.peers.values():
-            for piece in status_texts(text, severity, self._texts):
+            for piece in status_texts(text, severity, self._text_count):
                 self._link.send(piece, peer)
 
     def send_to_all(self, message: Any) -> None:
@@ -94,7 +95,7 @@ class Downlink:
 
     def wait(self, now: float, patience: float) -> float:
         """Return the time until the next message is due, s, at most ``patience``."""
-        due = min((at for peer in self._link.peers.values() for at in peer.due.values()), default=now + patience)
+        due = min((time for peer in self._link.peers.values() for time in peer.due.values()), default=now + patience)
         return max(0.0, min(patience, due - now, self._next_heartbeat - now))
 
     def tick(self, now: float) -> None:
@@ -125,9 +126,9 @@ class Downlink:
     def _stream_parameters(self, peer: Peer) -> None:
         if peer.parameter is None:
             return
-        last, entries = int(peer.parameter), self._parameters.entries
+        first_number, entries = int(peer.parameter), self._parameters.entries
         peer.parameter += max(1.0, PARAMETERS_PER_SECOND * self._pause)
-        for number in range(last, min(int(peer.parameter), len(entries))):
+        for number in range(first_number, min(int(peer.parameter), len(entries))):
             self._link.send(self._parameters.message(number), peer)
         if peer.parameter >= len(entries):
             peer.parameter = None
@@ -144,28 +145,28 @@ class MissionProgress:
     first: the station's number of the item at which the next flight starts; 0 for the whole mission.
     """
 
-    def __init__(self, server: MissionServer, arming: ArmingState, status: Status, down: Downlink) -> None:
+    def __init__(self, server: MissionServer, arming: ArmingState, status: Status, downlink: Downlink) -> None:
         """Start with a mission that is flown as a whole, from its first item."""
         self._server = server
         self._arming = arming
         self._status = status
-        self._down = down
+        self._downlink = downlink
         self._leg = -1
         # Seq of the item at each waypoint of a diverted route, or None on the judged mission.
-        self._way: tuple[int, ...] | None = None
+        self._route_items: tuple[int, ...] | None = None
         self.shift = 0
         self.first = 0
 
     def started(self) -> None:
         """Start the progress of a flight that begins."""
-        self._leg, self._way = -1, None
+        self._leg, self._route_items = -1, None
 
     def diverted(self, items: tuple[int, ...]) -> None:
         """Start the progress on another route.
 
         items: seq of the mission's item at each waypoint; empty for a route outside the mission.
         """
-        self._leg, self._way = -1, items
+        self._leg, self._route_items = -1, items
 
     def at_start(self) -> None:
         """Set the current item of a mission that is not being flown to the mission's start."""
@@ -195,17 +196,17 @@ class MissionProgress:
     def send_current(self) -> None:
         """Send the current item."""
         message: Any = telemetry_message("MISSION_CURRENT", self._status)
-        self._down.send_to_all(message)
+        self._downlink.send_to_all(message)
 
     def _report_reached(self, waypoint: int) -> None:
         items = self._waypoint_items()
         if 0 <= waypoint < len(items) and items[waypoint] >= 0:
-            self._down.send_to_all(mavlink.MAVLink_mission_item_reached_message(self._station_number(waypoint)))
+            self._downlink.send_to_all(mavlink.MAVLink_mission_item_reached_message(self._station_number(waypoint)))
 
     def _waypoint_items(self) -> tuple[int, ...]:
         """Return the seq of the item at each waypoint of the flown mission, -1 for no item."""
-        if self._way is not None:
-            return self._way
+        if self._route_items is not None:
+            return self._route_items
         return () if self._arming.judged is None else self._arming.judged.items
 
     def _station_number(self, waypoint: int) -> int:
@@ -247,37 +248,37 @@ class Vehicle:
         """Start the flight process.
 
         link: the stations.
-        spawn: starts a flight process, and returns the link's end of its pipe.
+        spawn: function that starts a flight process, and returns the link's end of its pipe.
         parameters: parameters that stations may read, and partly set.
         standby: the aircraft before it has a mission.
         battery: Wh when full.
-        show: shows a text at the terminal.
+        show: function that shows a text at the terminal.
         """
         self.link = link
         self.arming = ArmingState()
         self.server = MissionServer(go_to=self._go_to)
         self.status = Status(standby.snapshot, standby.home, battery=battery)
-        self.down = Downlink(link, self.status, parameters, show, _MAX_WAIT_S)
+        self.downlink = Downlink(link, self.status, parameters, show, _MAX_WAIT_S)
         self.requests = Requests(self.arming, parameters, self.status, self._set_start_item)
         self._standby = standby
         self._spawn = spawn
-        # Crashes in a row, without becoming ready in between.
-        self._deaths = 0
+        # Number of crashes since the process was last ready.
+        self._crash_count = 0
         self._flight = spawn()
         self._ready = False
         self._parameters = parameters
         self._show = show
         self._clock = link.clock
-        self._born = self._clock()
+        self._start_time = self._clock()
         # Number of the mission that is judged or flown.
-        self._number = 0
-        self._outstanding = self._brief = False
-        # Upload in which the start item of the next flight was chosen.
-        self._chosen_in: tuple[MissionItem, ...] = ()
+        self._mission_number = 0
+        self._awaits_verdict = self._is_brief = False
+        # Upload for which the start item of the next flight was chosen.
+        self._start_item_upload: tuple[MissionItem, ...] = ()
         # Parameters of the law with which the mission is judged and flown.
-        self._flown_with: tuple[tuple[str, float], ...] = ()
-        self._last_text, self._last_text_at = "", 0.0
-        self._progress = MissionProgress(self.server, self.arming, self.status, self.down)
+        self._law_parameters: tuple[tuple[str, float], ...] = ()
+        self._last_text, self._last_text_time = "", 0.0
+        self._progress = MissionProgress(self.server, self.arming, self.status, self.downlink)
 
     def load(self, mission: Mission) -> None:
         """Load a mission from a file, as if a station had uploaded it."""
@@ -296,23 +297,23 @@ class Vehicle:
             self.step(_MAX_WAIT_S)
 
     def close(self) -> None:
-        """Make the flight process, if it is ready, end its flight; show its last texts at the terminal."""
-        until = self._clock() + CLOSING
+        """End the flight and its process, and show the process's last texts at the terminal."""
+        deadline = self._clock() + CLOSING
         with contextlib.suppress(OSError, EOFError):
             if self._ready:
                 self._flight.send(EndFlight(quit=True))
-            while self._ready and self._flight.poll(max(0.0, until - self._clock())):
-                found = read_event(self._flight.recv_bytes())
-                if isinstance(found, FlightJudged):
-                    self._send_texts(found.texts)
+            while self._ready and self._flight.poll(max(0.0, deadline - self._clock())):
+                event = read_event(self._flight.recv_bytes())
+                if isinstance(event, FlightJudged):
+                    self._send_texts(event.texts)
         self._flight.close()
 
     def step(self, patience: float) -> None:
         """Wait for an event, at most ``patience`` s, and handle it."""
         watched: list[Any] = [self.link, self._flight]
-        readable: list[Any] = wait(watched, self.down.wait(self._clock(), patience))
+        readable: list[Any] = wait(watched, self.downlink.wait(self._clock(), patience))
         now = self._clock()
-        self.status.boot, self.status.wall = now - self._born, time.time()
+        self.status.boot, self.status.wall = now - self._start_time, time.time()
         if self._flight in readable:
             self._receive_events()
         if self.link in readable:
@@ -323,9 +324,9 @@ class Vehicle:
         for reply in self.server.tick(now):
             self._send_reply(reply.station, reply.message, reply.text)
         self._judge_changes()
-        self.down.tick(now)
-        used = self._clock() - now
-        self.status.load += 0.01 * (used / max(used, patience) - self.status.load)
+        self.downlink.tick(now)
+        busy_time = self._clock() - now
+        self.status.load += 0.01 * (busy_time / max(busy_time, patience) - self.status.load)
 
     def _handle_message(self, message: Any, peer: Peer, now: float) -> None:
         self.server.locked = "in flight: the mission cannot change" if self.arming.flying else ""
@@ -334,7 +335,7 @@ class Vehicle:
             self._send_reply(reply.station, reply.message, reply.text)
         self._judge_changes()
         self._send_responses(self.requests.handle(message, peer, now))
-        if self._flown_with != tuple(self._parameters.stated.items()) and self.server.lists[MissionType.MISSION]:
+        if self._law_parameters != tuple(self._parameters.stated.items()) and self.server.lists[MissionType.MISSION]:
             self.server.changed.add(MissionType.MISSION)
             self._judge_changes()
         self._apply_state()
@@ -345,21 +346,21 @@ class Vehicle:
                 self.link.send(response.message, response.peer)
                 continue
             now = self._clock()
-            # A station that repeats a request soon gets the text once.
-            if self._last_text != response.text or now - self._last_text_at > _REPEATED_TEXT_TIME_S:
-                self.down.send_text(*response)
-            self._last_text, self._last_text_at = response.text, now
+            # A text is sent once if the station soon repeats its request.
+            if self._last_text != response.text or now - self._last_text_time > _REPEATED_TEXT_TIME_S:
+                self.downlink.send_text(*response)
+            self._last_text, self._last_text_time = response.text, now
 
     def _send_texts(self, texts: tuple[StatusText, ...]) -> None:
         for text in texts:
-            self.down.send_text(*text)
+            self.downlink.send_text(*text)
 
     def _send_reply(self, station: Station, message: Any, text: str) -> None:
         peer = next((peer for address, peer in self.link.peers.items() if address == station.address), None)
         if peer is not None:
             self.link.send(message, peer)
         if text:
-            self.down.send_text(text, WARNING)
+            self.downlink.send_text(text, WARNING)
 
     def _apply_state(self) -> None:
         if self.arming.end_requested:
@@ -371,37 +372,37 @@ class Vehicle:
         if self.arming.starts:
             self.arming.flight_started()
             self._progress.started()
-            self.down.send_text("mission started")
+            self.downlink.send_text("mission started")
             self._send_request(StartFlight())
         self._refresh()
 
     def _judge_changes(self) -> None:
         """Request a verdict on a changed mission, which includes a changed fence and changed rally points."""
         # One request at a time: stations that upload faster than missions are judged must not fill the pipe.
-        if not self.server.changed or self.arming.flying or self._outstanding:
+        if not self.server.changed or self.arming.flying or self._awaits_verdict:
             return
         changed = set(self.server.changed)
         self.server.changed.clear()
         totals = {"MIS_TOTAL": MissionType.MISSION, "FENCE_TOTAL": MissionType.FENCE, "RALLY_TOTAL": MissionType.RALLY}
         for name, kind in totals.items():
             self._parameters.put(name, float(len(self.server.lists[kind])))
-        self._number += 1
+        self._mission_number += 1
         if not self.server.lists[MissionType.MISSION]:
             self.arming.mission_cleared()
             self.status.snapshot, self.status.home = self._standby
             self._send_responses(self.requests.verdict_came())
             self._refresh()
             return
-        if self.server.lists[MissionType.MISSION] is not self._chosen_in:
+        if self.server.lists[MissionType.MISSION] is not self._start_item_upload:
             self._progress.first = 0
         mission, self._progress.shift = uploaded(self.server.lists, self._standby.home)
         mission = flown_from(mission, self._progress.first - self._progress.shift)
         # A changed fence or changed rally points need not repeat the texts about the mission.
-        self._brief = MissionType.MISSION not in changed and (self._brief or not self.arming.judging)
+        self._is_brief = MissionType.MISSION not in changed and (self._is_brief or not self.arming.judging)
         self.arming.mission_uploaded()
-        self._outstanding = True
-        self._flown_with = tuple(self._parameters.stated.items())
-        self._send_request(JudgeMission(mission, self._number, self._flown_with))
+        self._awaits_verdict = True
+        self._law_parameters = tuple(self._parameters.stated.items())
+        self._send_request(JudgeMission(mission, self._mission_number, self._law_parameters))
         self._refresh()
 
     def _divert(self, place: Place) -> None:
@@ -413,17 +414,17 @@ class Vehicle:
         self._send_request(DivertFlight(self.arming.mode, mission, place))
 
     def _go_to(self, item: MissionItem) -> str:
-        """Fly to an item's place, and return the reason why this is refused, or ""."""
+        """Fly to an item's place; return the reason why this is refused, or "" if it is accepted."""
         return self.arming.go_to(Place(item.lat_deg, item.lon_deg, item.alt, item.frame)).text
 
     def _handle_diversion(self, event: FlightDiverted) -> None:
         if event.problem:
-            wanted, self.arming.mode = self.arming.mode, event.mode
+            requested_mode, self.arming.mode = self.arming.mode, event.mode
             self.arming.diverted(event.mode)
-            self.down.send_text(f"{MODE_NAMES[wanted]} refused: {event.problem}", WARNING)
+            self.downlink.send_text(f"{MODE_NAMES[requested_mode]} refused: {event.problem}", WARNING)
         else:
             self._progress.diverted(event.items if event.mode == AUTO else ())
-            self.down.send_text(f"flying in {MODE_NAMES[event.mode]}")
+            self.downlink.send_text(f"flying in {MODE_NAMES[event.mode]}")
         self._refresh()
 
     def _set_start_item(self, seq: int) -> CommandResult:
@@ -442,9 +443,9 @@ class Vehicle:
             return CommandResult(ACCEPTED)
         if problem:
             return CommandResult(DENIED, f"item {seq} refused: {problem}")
-        first = 0 if seq - shift <= mission.items[0].seq else seq
-        if first != self._progress.first:
-            self._progress.first, self._chosen_in = first, self.server.lists[MissionType.MISSION]
+        start_item = 0 if seq - shift <= mission.items[0].seq else seq
+        if start_item != self._progress.first:
+            self._progress.first, self._start_item_upload = start_item, self.server.lists[MissionType.MISSION]
             self.server.changed.add(MissionType.MISSION)
             self._judge_changes()
         return CommandResult(ACCEPTED)
@@ -465,8 +466,8 @@ class Vehicle:
     def _restart_process(self) -> None:
         """Start another flight process after a crash, because an abort of JSBSim must not end the vehicle."""
         self._flight.close()
-        self._deaths += 1
-        if self._deaths >= _MAX_CRASHES:
+        self._crash_count += 1
+        if self._crash_count >= _MAX_CRASHES:
             raise ChildProcessError(errno.ECHILD, "keeps dying", "the process that flies")
         self._flight = self._spawn()
         self._ready = False
@@ -474,7 +475,7 @@ class Vehicle:
             self._handle_flight_end("lost: the process that flew it has died")
         if self.server.lists[MissionType.MISSION]:
             text = StatusText("the process that flies has died; upload the mission again", CRITICAL)
-            self._handle_verdict(MissionJudged(self._number, False, False, (text,)))
+            self._handle_verdict(MissionJudged(self._mission_number, False, False, (text,)))
 
     def _handle_event(self, event: Snapshot | Event) -> None:
         if isinstance(event, Snapshot):
@@ -488,26 +489,26 @@ class Vehicle:
         elif isinstance(event, FlightEnded):
             self._handle_flight_end(event.ended)
         elif isinstance(event, ProcessReady):
-            self._deaths = 0
+            self._crash_count = 0
             self._ready = True
             self._show("ready")
         else:
             self._send_texts(event.texts)
 
     def _handle_verdict(self, judged: MissionJudged) -> None:
-        if judged.number != self._number:
+        if judged.number != self._mission_number:
             return
-        self._outstanding = False
+        self._awaits_verdict = False
         if self.server.changed:
             # The verdict is about a mission that was replaced.
             self._judge_changes()
             return
-        before = self.arming.judged
-        if not self._brief or before is None or before.texts != judged.texts:
+        previous = self.arming.judged
+        if not self._is_brief or previous is None or previous.texts != judged.texts:
             self._send_texts(judged.texts)
-        disarmed = self.arming.mission_judged(judged)
-        if disarmed:
-            self.down.send_text(disarmed, WARNING)
+        disarm_reason = self.arming.mission_judged(judged)
+        if disarm_reason:
+            self.downlink.send_text(disarm_reason, WARNING)
         if judged.start is not None and judged.home is not None:
             self.status.snapshot, self.status.home = judged.start, judged.home
         self._progress.at_start()
@@ -520,7 +521,7 @@ class Vehicle:
             self._progress.completed()
         self.arming.flight_ended(completed)
         self._refresh()
-        self.down.send_text(f"flight {ended}; disarmed", INFO if completed else CRITICAL)
+        self.downlink.send_text(f"flight {ended}; disarmed", INFO if completed else CRITICAL)
         self._progress.send_current()
         if self._progress.first:
             # The next flight is the whole mission again.
@@ -531,7 +532,7 @@ class Vehicle:
         arming, status = self.arming, self.status
         if (status.mode, status.armed, status.flying) != (arming.mode, arming.armed, arming.flying):
             # A change is sent at once.
-            self.down.heartbeat_now()
+            self.downlink.heartbeat_now()
         status.mode, status.armed, status.flying = arming.mode, arming.armed, arming.flying
         status.ready, status.mission_state = arming.armable or arming.armed, arming.mission_state
         self._progress.refresh()

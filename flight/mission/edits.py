@@ -44,7 +44,7 @@ def places(mission: Mission) -> tuple[int, ...]:
 
 
 def checked_place(mission: Mission, index: int) -> MissionItem:
-    """Return the item to edit.  Raises MissionError if the item does not exist or is not a place."""
+    """Return the place to edit.  Raises MissionError if there is no such item or it is not a place."""
     if not 0 <= index < len(mission.items):
         raise MissionError.at(mission.source, "item", index, f"expected 0..{len(mission.items) - 1}")
     item = mission.items[index]
@@ -90,7 +90,7 @@ def at_height(mission: Mission, index: int, amsl: float, now: float) -> Mission:
 
 
 def next_index(mission: Mission, after: int) -> int:
-    """Return the index for a waypoint inserted behind a place, which is after all actions at that place.
+    """Return the index for a waypoint inserted behind a place, after all actions at that place.
 
     >>> way = [MissionItem(k, c, 3, (0.0,) * 4, 46.0, 8.0, 75.0) for k, c in ((1, 16), (2, 206), (3, 16))]
     >>> next_index(Mission(None, tuple(way)), 0)
@@ -115,21 +115,21 @@ def inserted(mission: Mission, after: int, lat_deg: float, lon_deg: float, heigh
     >>> [(item.seq, item.lat_deg) for item in longer.items]
     [(1, 46.0), (2, 46.01), (3, 46.0)]
     """
-    before = checked_place(mission, after)
+    place = checked_place(mission, after)
     if len(mission.items) >= MAX_EDITED:
         raise MissionError(f"{mission.source}: {MAX_EDITED} items: no more can be edited here", file=mission.source)
-    radius = before.params[1] if before.command == Command.NAV_WAYPOINT else 0.0
+    radius = place.params[1] if place.command == Command.NAV_WAYPOINT else 0.0
     index = next_index(mission, after)
-    new = MissionItem(
+    waypoint = MissionItem(
         mission.items[index - 1].seq + 1,
         int(Command.NAV_WAYPOINT),
-        before.frame,
+        place.frame,
         (0.0, radius, 0.0, 0.0),
         on_grid(lat_deg),
         on_grid(lon_deg),
-        before.alt if height is None else _round_to_milli(height),
+        place.alt if height is None else _round_to_milli(height),
     )
-    return _with_inserted_item(mission, index, new)
+    return _with_inserted_item(mission, index, waypoint)
 
 
 def deleted(mission: Mission, index: int) -> Mission:
@@ -154,17 +154,20 @@ def at_speed(mission: Mission, index: int, airspeed: float, after: float) -> Mis
     airspeed, after: m/s.
     """
     checked_place(mission, index)
-    own = index > 0 and mission.items[index - 1].command == Command.DO_CHANGE_SPEED
-    if own:
+    has_own_speed = index > 0 and mission.items[index - 1].command == Command.DO_CHANGE_SPEED
+    if has_own_speed:
         change = mission.items[index - 1]
-        now = replace(change, params=(change.params[0], _round_to_milli(airspeed), *change.params[2:]))
-        mission, at = _with_item(mission, index - 1, now), index
+        new_change = replace(change, params=(change.params[0], _round_to_milli(airspeed), *change.params[2:]))
+        mission, place_index = _with_item(mission, index - 1, new_change), index
     else:
-        mission, at = _with_inserted_item(mission, index, _speed_item(mission.items[index].seq, airspeed)), index + 1
-    followed = mission.items[at + 1 :]
-    if not any(is_place(item) for item in followed) or followed[0].command == Command.DO_CHANGE_SPEED:
+        mission, place_index = (
+            _with_inserted_item(mission, index, _speed_item(mission.items[index].seq, airspeed)),
+            index + 1,
+        )
+    following = mission.items[place_index + 1 :]
+    if not any(is_place(item) for item in following) or following[0].command == Command.DO_CHANGE_SPEED:
         return mission
-    return _with_inserted_item(mission, at + 1, _speed_item(mission.items[at].seq + 1, after))
+    return _with_inserted_item(mission, place_index + 1, _speed_item(mission.items[place_index].seq + 1, after))
 
 
 def _speed_item(seq: int, airspeed: float) -> MissionItem:
@@ -181,8 +184,8 @@ def _with_item(mission: Mission, index: int, item: MissionItem) -> Mission:
 def _with_inserted_item(mission: Mission, index: int, item: MissionItem) -> Mission:
     """Return the mission with an item inserted and later items renumbered.  Raises MissionError for an invalid item."""
     _check_item(mission, item)
-    kept = [_renumber(one, item.seq - 1, 1) for one in mission.items]
-    return replace(mission, items=(*kept[:index], item, *kept[index:]))
+    renumbered_items = [_renumber(other, item.seq - 1, 1) for other in mission.items]
+    return replace(mission, items=(*renumbered_items[:index], item, *renumbered_items[index:]))
 
 
 def _check_item(mission: Mission, item: MissionItem) -> None:
@@ -191,12 +194,12 @@ def _check_item(mission: Mission, item: MissionItem) -> None:
         raise MissionError(**problem.at(mission.source, f"{mission.source}: item {item.seq}"))
 
 
-def _renumber(item: MissionItem, beyond: int, by: int) -> MissionItem:
-    """Return the item with its number and its jump target increased by `by`, each only if it is above `beyond`."""
+def _renumber(item: MissionItem, after_seq: int, shift: int) -> MissionItem:
+    """Return the item with its number and its jump target increased by `shift` if they are above `after_seq`."""
     params = item.params
-    if item.command == Command.DO_JUMP and params[0] > beyond:
-        params = (params[0] + by, *params[1:])
-    seq = item.seq + by if item.seq > beyond else item.seq
+    if item.command == Command.DO_JUMP and params[0] > after_seq:
+        params = (params[0] + shift, *params[1:])
+    seq = item.seq + shift if item.seq > after_seq else item.seq
     return item if seq == item.seq and params is item.params else replace(item, seq=seq, params=params)
 
 

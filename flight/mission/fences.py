@@ -96,9 +96,9 @@ def _ring_items(ring: Ring, command: Command, origin: GeoOrigin) -> Iterator[Mis
 
 
 def _joined_names(names: list[str]) -> str:
-    """Return up to three names, and the number of others."""
-    more = f" and {len(names) - 3} more" if len(names) > 3 else ""
-    return ", ".join(names[:3]) + more + (" is" if len(names) == 1 else " are")
+    """Return up to three names, the number of the others, and the verb."""
+    rest_text = f" and {len(names) - 3} more" if len(names) > 3 else ""
+    return ", ".join(names[:3]) + rest_text + (" is" if len(names) == 1 else " are")
 
 
 # ----------------------------------------------------------------------
@@ -117,7 +117,7 @@ _MAX_NAMES = 12
 def fence_shapes(fences: tuple[MissionItem, ...], source: str = "fence") -> list[tuple[MissionItem, ...]]:
     """Group fence items into shapes, each the corners of one polygon or a single circle.
 
-    Raise MissionError for a polygon with fewer corners than stated.
+    Raises MissionError if a polygon has fewer corners than stated.
     """
     shapes = []
     k = 0
@@ -143,7 +143,7 @@ def fence_problem(
     fences: items 5001..5004, a polygon's corners together.
     east, north: m on the map about ``origin``.
 
-    A position must be inside all inclusions. Raise MissionError for a polygon with fewer corners than stated.
+    A position must be inside all inclusions. Raises MissionError if a polygon has fewer corners than stated.
 
     >>> radius = (500.0, 0.0, 0.0, 0.0)
     >>> circle = MissionItem(0, Command.NAV_FENCE_CIRCLE_INCLUSION, Frame.GLOBAL, radius, 36.5, -84.2, 0.0)
@@ -158,13 +158,13 @@ def fence_problem(
         lat, lon = [corner.lat_deg for corner in shape], [corner.lon_deg for corner in shape]
         corners_east, corners_north = to_map(origin, lat, lon)
         if item.command in POLYGONS:
-            inside = _in_polygon(np.asarray(corners_east), np.asarray(corners_north), east, north)
+            is_inside = _in_polygon(np.asarray(corners_east), np.asarray(corners_north), east, north)
             name = "polygon"
         else:
-            inside = math.hypot(east - float(corners_east[0]), north - float(corners_north[0])) <= item.params[0]
+            is_inside = math.hypot(east - float(corners_east[0]), north - float(corners_north[0])) <= item.params[0]
             name = f"circle of {item.params[0]:.0f} m"
-        if inside != (item.command in INCLUSIONS):
-            return f"{'outside an inclusion' if not inside else 'inside an exclusion'} {name}", item.seq
+        if is_inside != (item.command in INCLUSIONS):
+            return f"{'outside an inclusion' if not is_inside else 'inside an exclusion'} {name}", item.seq
     return None
 
 
@@ -194,17 +194,17 @@ def with_fences(mission: Mission, scenario: Scenario, passes: PassTest) -> tuple
     (west, east), (south, north) = scenario.bounds
     corners = np.array([[west, south], [east, south], [east, north], [west, north]])
     fences = [fence_item(scenario.origin, Command.NAV_FENCE_POLYGON_VERTEX_INCLUSION, 4.0, point) for point in corners]
-    missiles, crossed = _split_by_altitude(_missile_zones(scenario), scenario.origin, passes)
-    zones, passed = _split_by_altitude(scenario.zones, scenario.origin, passes)
-    fences += zone_fences(missiles, scenario.origin)[0]
-    items, of_zones = zone_fences(zones, scenario.origin)
+    missile_zones, crossed_missiles = _split_by_altitude(_missile_zones(scenario), scenario.origin, passes)
+    zones, passed_zones = _split_by_altitude(scenario.zones, scenario.origin, passes)
+    fences += zone_fences(missile_zones, scenario.origin)[0]
+    items, zone_notes = zone_fences(zones, scenario.origin)
     fences += items
     notes = []
-    if missiles:
-        count = "1 missile sphere" if len(missiles) == 1 else f"{len(missiles)} missile spheres"
-        became = "became an exclusion circle" if len(missiles) == 1 else "became exclusion circles"
-        notes.append(f"{count} {became}: a fence has no height, so that each is a cylinder")
-    left_out = [*crossed, *passed]
+    if missile_zones:
+        count = "1 missile sphere" if len(missile_zones) == 1 else f"{len(missile_zones)} missile spheres"
+        change_text = "became an exclusion circle" if len(missile_zones) == 1 else "became exclusion circles"
+        notes.append(f"{count} {change_text}: a fence has no height, so that each is a cylinder")
+    left_out = [*crossed_missiles, *passed_zones]
     if left_out:
         names = ", ".join(left_out[:_MAX_NAMES]) + (
             f" and {len(left_out) - _MAX_NAMES} more" if len(left_out) > _MAX_NAMES else ""
@@ -213,15 +213,15 @@ def with_fences(mission: Mission, scenario: Scenario, passes: PassTest) -> tuple
             f"left out of the fence, as the mission passes above or below: {names}; a fence has no height, and an"
             " autopilot with it in its fence refuses the mission or breaks it off"
         )
-    notes += of_zones
+    notes += zone_notes
     if scenario.limits.max_height_m is not None:
-        above = f"{scenario.limits.max_height_m:g} m above ground"
-        notes.append(f"a fence does not follow the ground: the greatest height of {above} is not in it")
-    every = numbered([*fences, *mission.fences])
+        limit_text = f"{scenario.limits.max_height_m:g} m above ground"
+        notes.append(f"a fence does not follow the ground: the greatest height of {limit_text} is not in it")
+    all_fences = numbered([*fences, *mission.fences])
     # A mission that begins or ends on the ground keeps its rally points: its last position is where it lands.
-    grounded = bool(mission.rally) or scenario.launch is not None or scenario.landing is not None
-    rally = mission.rally if grounded else numbered(_ends_as_rally_points(mission))
-    return replace(mission, fences=every, rally=rally), tuple(notes)
+    keeps_rally = bool(mission.rally) or scenario.launch is not None or scenario.landing is not None
+    rally = mission.rally if keeps_rally else numbered(_ends_as_rally_points(mission))
+    return replace(mission, fences=all_fences, rally=rally), tuple(notes)
 
 
 def _missile_zones(scenario: Scenario) -> list[Zone]:
@@ -236,13 +236,13 @@ def _missile_zones(scenario: Scenario) -> list[Zone]:
 
 def _split_by_altitude(zones: Sequence[Zone], origin: GeoOrigin, passes: PassTest) -> tuple[list[Zone], list[str]]:
     """Return the zones that stay fences at every altitude, and the names of the others."""
-    kept, passed = [], []
+    remaining, passed_names = [], []
     for zone in zones:
         if zone.kind == "exclusion" and passes(numbered(zone_fences([zone], origin)[0])):
-            passed.append(zone.name)
+            passed_names.append(zone.name)
         else:
-            kept.append(zone)
-    return kept, passed
+            remaining.append(zone)
+    return remaining, passed_names
 
 
 def _ends_as_rally_points(mission: Mission) -> list[MissionItem]:
@@ -281,12 +281,12 @@ def numbered(items: Sequence[MissionItem]) -> tuple[MissionItem, ...]:
 
 def _in_polygon(corners_east: Floats, corners_north: Floats, east: float, north: float) -> bool:
     """Return True if a position lies in a polygon, by counting the crossings of a ray to the east."""
-    e0, n0 = corners_east, corners_north
-    e1, n1 = np.roll(e0, -1), np.roll(n0, -1)
-    spans = (n0 > north) != (n1 > north)
-    rise = np.where(spans, n1 - n0, 1.0)
-    at = e0 + (north - n0) / rise * (e1 - e0)
-    return bool((spans & (at > east)).sum() % 2)
+    start_east, start_north = corners_east, corners_north
+    end_east, end_north = np.roll(start_east, -1), np.roll(start_north, -1)
+    is_crossed = (start_north > north) != (end_north > north)
+    rise = np.where(is_crossed, end_north - start_north, 1.0)
+    crossing_east = start_east + (north - start_north) / rise * (end_east - start_east)
+    return bool((is_crossed & (crossing_east > east)).sum() % 2)
 
 
 # ----------------------------------------------------------------------
@@ -298,8 +298,8 @@ def fence_zones(fences: tuple[MissionItem, ...], origin: GeoOrigin, source: str 
 
     source: name of the mission in messages.
 
-    Each zone is named after its first item. Raise MissionError for a polygon with fewer corners than stated, and for an
-    invalid shape.
+    Each zone is named after its first item. Raises MissionError if a polygon has fewer corners than stated, or if a
+    shape is invalid.
 
     >>> from flight.mission.items import Command, Frame
     >>> radius = (500.0, 0.0, 0.0, 0.0)

@@ -59,23 +59,27 @@ def plan_mission(
     >>> [(item.command, item.params[1]) for item in mission.items]  # speed, then acceptance radii
     [(178, 25.0), (16, 10.0), (16, 20.0), (16, 10.0)]
     """
-    ways = plan.ways or GroundWays()
-    points = _mission_places(plan, ways)
+    ground_ways = plan.ways or GroundWays()
+    points = _mission_places(plan, ground_ways)
     radii = acceptance_radii(plan.scenario, points, airspeed, max_bank, tracking)
     home = _home_position(plan)
     builder = _ItemBuilder(plan.scenario.origin)
-    if ways.climb is not None:
-        builder.add(Command.NAV_TAKEOFF, (LAUNCH_PITCH, 0.0, 0.0, 0.0), np.append(ways.climb.home[:2], ways.climb.up))
+    if ground_ways.climb is not None:
+        builder.add(
+            Command.NAV_TAKEOFF,
+            (LAUNCH_PITCH, 0.0, 0.0, 0.0),
+            np.append(ground_ways.climb.home[:2], ground_ways.climb.up),
+        )
     builder.add(Command.DO_CHANGE_SPEED, (0.0, _round_to_thousandths(airspeed), -1.0, 0.0))
-    first = 0 if ways.climb is None else 1
-    last = len(points) if ways.descent is None else len(points) - 3
-    for k in range(first, last):
-        builder.add(Command.NAV_WAYPOINT, (0.0, float(radii[k]), 0.0, 0.0), points[k])
-    if ways.descent is not None:
+    first_waypoint = 0 if ground_ways.climb is None else 1
+    end_waypoint = len(points) if ground_ways.descent is None else len(points) - 3
+    for index in range(first_waypoint, end_waypoint):
+        builder.add(Command.NAV_WAYPOINT, (0.0, float(radii[index]), 0.0, 0.0), points[index])
+    if ground_ways.descent is not None:
         builder.add(Command.DO_LAND_START, (0.0,) * 4)
-        for k in (last, last + 1):
-            builder.add(Command.NAV_WAYPOINT, (0.0, float(radii[k]), 0.0, 0.0), points[k])
-        builder.add(Command.NAV_LAND, (ways.descent.go_around, 0.0, 0.0, 0.0), ways.descent.point)
+        for index in (end_waypoint, end_waypoint + 1):
+            builder.add(Command.NAV_WAYPOINT, (0.0, float(radii[index]), 0.0, 0.0), points[index])
+        builder.add(Command.NAV_LAND, (ground_ways.descent.go_around, 0.0, 0.0, 0.0), ground_ways.descent.point)
     returns = plan.scenario.returns
     rally = () if returns is None else tuple(_rally_items(plan.scenario.origin, returns.rally, home))
     return Mission(
@@ -108,30 +112,30 @@ def _mission_places(plan: Plan, ways: GroundWays) -> Floats:
     The landing point has the line-up's altitude.
     """
     parts = [plan.waypoints]
-    if (up := ways.climb) is not None:
-        parts = [np.append(up.home[:2], up.up)[None], up.waypoints, *parts]
-    if (down := ways.descent) is not None:
-        over = np.append(down.point[:2], down.line_up[-1, 2])
-        parts = [*parts, down.waypoints, down.line_up, over[None]]
+    if (climb := ways.climb) is not None:
+        parts = [np.append(climb.home[:2], climb.up)[None], climb.waypoints, *parts]
+    if (descent := ways.descent) is not None:
+        above_landing = np.append(descent.point[:2], descent.line_up[-1, 2])
+        parts = [*parts, descent.waypoints, descent.line_up, above_landing[None]]
     return np.concatenate(parts)
 
 
 def _home_position(plan: Plan) -> Home:
     """Return the scenario's home, or the ground below the start, or the start if the ground is unknown."""
-    scenario, first = plan.scenario, plan.waypoints[0]
-    place = scenario.home if scenario.home is not None else first
-    lat, lon = to_geo(scenario.origin, place[:1], place[1:2])
-    under = math.nan if scenario.terrain is None else float(scenario.terrain.height(place[0], place[1]))
-    up = float(place[2]) if math.isnan(under) else under
-    return Home(on_grid(float(lat[0])), on_grid(float(lon[0])), _round_to_thousandths(up))
+    scenario, start = plan.scenario, plan.waypoints[0]
+    position = scenario.home if scenario.home is not None else start
+    lat, lon = to_geo(scenario.origin, position[:1], position[1:2])
+    ground = math.nan if scenario.terrain is None else float(scenario.terrain.height(position[0], position[1]))
+    altitude = float(position[2]) if math.isnan(ground) else ground
+    return Home(on_grid(float(lat[0])), on_grid(float(lon[0])), _round_to_thousandths(altitude))
 
 
 def _rally_items(origin: GeoOrigin, points: Floats, home: Home) -> Iterator[MissionItem]:
     """Yield rally points (n, 3) m as items, with heights above home, as ground stations write them."""
     for number, (east, north, up) in enumerate(points.tolist()):
         lat, lon = to_geo(origin, east, north)
-        place = on_grid(float(lat)), on_grid(float(lon)), _round_to_thousandths(up - home.alt)
-        yield MissionItem(number, int(Command.NAV_RALLY_POINT), int(Frame.GLOBAL_RELATIVE_ALT), (0.0,) * 4, *place)
+        position = on_grid(float(lat)), on_grid(float(lon)), _round_to_thousandths(up - home.alt)
+        yield MissionItem(number, int(Command.NAV_RALLY_POINT), int(Frame.GLOBAL_RELATIVE_ALT), (0.0,) * 4, *position)
 
 
 def acceptance_radii(
@@ -144,13 +148,17 @@ def acceptance_radii(
     if tracking is not None:
         return _turn_distances(scenario, points, airspeed, tracking)
     wind = max(math.hypot(*scenario.wind.at(float(amsl))) for amsl in points[:, 2])
-    turns, pull = turning_angles(points), GRAVITY * math.tan(max_bank)
+    turns, lateral_acceleration = turning_angles(points), GRAVITY * math.tan(max_bank)
     radii = np.full(len(points), ACCEPTANCE_TOLERANCE)
-    radii[1:-1] += _fly_by_offsets(np.minimum(turns, _MAX_OFFSET_TURN_RAD), (airspeed + wind) ** 2 / pull)
+    radii[1:-1] += _fly_by_offsets(
+        np.minimum(turns, _MAX_OFFSET_TURN_RAD), (airspeed + wind) ** 2 / lateral_acceleration
+    )
     # Arcs are drawn with a margin for a gust. The limit on the turn keeps the offset finite: a U-turn has no arc.
     gust = 0.1 * W20[scenario.wind.turbulence]
-    arcs = _fly_by_offsets(np.minimum(turns, _MAX_ARC_TURN_RAD), (airspeed + wind + gust) ** 2 / pull)
-    radii[1:-1] = np.maximum(radii[1:-1], arcs)
+    arc_offsets = _fly_by_offsets(
+        np.minimum(turns, _MAX_ARC_TURN_RAD), (airspeed + wind + gust) ** 2 / lateral_acceleration
+    )
+    radii[1:-1] = np.maximum(radii[1:-1], arc_offsets)
     return np.ceil(radii - 1e-6)
 
 
@@ -163,8 +171,8 @@ def _turn_distances(scenario: Scenario, points: Floats, airspeed: float, trackin
     """Return the acceptance radii for the highest ground speed between the two courses of each corner, (w,) whole m."""
     radii = np.full(len(points), tracking.corner_acceptance(0.0, airspeed))
     speeds = corner_speeds(scenario, points, airspeed)
-    for i, (turn, fastest) in enumerate(zip(turning_angles(points), speeds, strict=True), 1):
-        radii[i] = tracking.corner_acceptance(float(turn), fastest)
+    for index, (turn, speed) in enumerate(zip(turning_angles(points), speeds, strict=True), 1):
+        radii[index] = tracking.corner_acceptance(float(turn), speed)
     return np.round(radii)
 
 
@@ -175,16 +183,16 @@ def corner_speeds(scenario: Scenario, points: Floats, airspeed: float) -> list[f
     """
     courses, speeds = leg_courses(points), []
     for i in range(1, len(points) - 1):
-        up = float(points[i, 2])
-        east, north = scenario.wind.at(up)
-        speed = airspeed * air_density_factor(up)
-        between = courses[i - 1] + wrap(courses[i] - courses[i - 1]) * np.linspace(0.0, 1.0, 5)
-        over_ground = [
+        altitude = float(points[i, 2])
+        east, north = scenario.wind.at(altitude)
+        speed = airspeed * air_density_factor(altitude)
+        turn_courses = courses[i - 1] + wrap(courses[i] - courses[i - 1]) * np.linspace(0.0, 1.0, 5)
+        ground_speeds = [
             ground_speed(speed, east * math.sin(c) + north * math.cos(c), east * math.cos(c) - north * math.sin(c))
-            for c in between.tolist()
+            for c in turn_courses.tolist()
         ]
         # The ground speed is NaN on a course that cannot be held.
-        speeds.append(max((v for v in over_ground if v > 0.0), default=speed))
+        speeds.append(max((v for v in ground_speeds if v > 0.0), default=speed))
     return speeds
 
 

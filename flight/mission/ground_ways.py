@@ -58,21 +58,21 @@ class TakeOff:
 
         On a runway the position is on the ground; the caller adds the height at which the aircraft stands.
         """
-        launch, along = self.launch, np.array([math.sin(self.course), math.cos(self.course)])
+        launch, direction = self.launch, np.array([math.sin(self.course), math.cos(self.course)])
         if launch.method == "runway":
             return self.home.copy(), np.zeros(3)
-        level, rise = math.cos(launch.incline), math.sin(launch.incline)
-        run = launch.run if launch.method == "catapult" else 0.0
-        above = _RAIL_HEIGHT_M + run * rise if launch.method == "catapult" else _HAND_RELEASE_HEIGHT_M
-        place = np.array([*(self.home[:2] + run * level * along), self.home[2] + above])
-        return place, self.speed * np.array([*(level * along), rise])
+        cos_incline, sin_incline = math.cos(launch.incline), math.sin(launch.incline)
+        rail_length = launch.run if launch.method == "catapult" else 0.0
+        height = _RAIL_HEIGHT_M + rail_length * sin_incline if launch.method == "catapult" else _HAND_RELEASE_HEIGHT_M
+        position = np.array([*(self.home[:2] + rail_length * cos_incline * direction), self.home[2] + height])
+        return position, self.speed * np.array([*(cos_incline * direction), sin_incline])
 
     def described(self) -> str:
         """Describe the start of the flight in words."""
-        how = {"catapult": "from a catapult", "hand": "by hand", "runway": "on a runway"}[self.launch.method]
+        method_text = {"catapult": "from a catapult", "hand": "by hand", "runway": "on a runway"}[self.launch.method]
         course = math.degrees(self.course) % 360.0
         return (
-            f"NAV_TAKEOFF (item {self.item}): launched {how} at home, {self.home[2]:.1f} m AMSL, on course"
+            f"NAV_TAKEOFF (item {self.item}): launched {method_text} at home, {self.home[2]:.1f} m AMSL, on course"
             f" {course:.0f} degrees; the first leg begins above {self.top:.1f} m AMSL"
         )
 
@@ -103,11 +103,11 @@ class Approach:
     base: float
 
     def place(self, position: Floats) -> tuple[Floats, Floats]:
-        """Return how far positions (n, 3) lie past the landing point, and to the right of its course, (n,) m each."""
+        """Return the distances of positions (n, 3) past the landing point and right of its course, (n,) m each."""
         return _along_and_right(position, self.point, self.course)
 
     def on_strip(self, position: Floats) -> tuple[Floats, Floats]:
-        """Return how far positions (n, 3) lie along the strip from its center, and to its right, (n,) m each.
+        """Return the distances of positions (n, 3) from the strip's center along it and to its right, (n,) m each.
 
         The strip lies where the scenario has it, on its stated course, or on the landing's course if none is stated. A
         landing against the stated course uses the same strip.
@@ -119,7 +119,7 @@ class Approach:
 
 
 def _along_and_right(position: Floats, begin: Floats, course: float) -> tuple[Floats, Floats]:
-    """Return how far positions (n, 3) lie ahead of a point on a course (rad), and to the right of the course, m."""
+    """Return the distances of positions (n, 3) from a point along a course (rad) and to the right of it, m."""
     east, north = position[..., 0] - begin[0], position[..., 1] - begin[1]
     sin, cos = math.sin(course), math.cos(course)
     return east * sin + north * cos, east * cos - north * sin
@@ -150,38 +150,38 @@ def find_ground_ways(scenario: Scenario, mission: Mission, route: Route, slowest
     >>> bool(find_ground_ways(load_scenario("tight"), Mission(None, ()), None, 15.0))
     False
     """
-    no_start = no_end = ""
+    take_off_problem = approach_problem = ""
     take_off = approach = None
     if scenario.launch is not None:
-        take_off, no_start = _find_take_off(scenario, mission, route, slowest)
+        take_off, take_off_problem = _find_take_off(scenario, mission, route, slowest)
     if scenario.landing is not None:
-        approach, no_end = _find_approach(scenario, mission, route)
-    return GroundWays(take_off, approach, tuple(note for note in (no_start, no_end) if note))
+        approach, approach_problem = _find_approach(scenario, mission, route)
+    return GroundWays(take_off, approach, tuple(note for note in (take_off_problem, approach_problem) if note))
 
 
 def _find_take_off(scenario: Scenario, mission: Mission, route: Route, slowest: float) -> tuple[TakeOff | None, str]:
     """Return the take-off, or the reason why none is flown."""
     launch, base = scenario.launch, home_place(mission, scenario.origin, scenario.terrain)
     items = {item.seq: item for item in mission.items if item.command == Command.NAV_TAKEOFF}
-    numbers = route.items.tolist()
-    first = next((k for k, seq in enumerate(numbers) if seq >= 0), 0)
-    if launch is None or not items or numbers[first] not in items:
+    route_items = route.items.tolist()
+    index = next((k for k, seq in enumerate(route_items) if seq >= 0), 0)
+    if launch is None or not items or route_items[index] not in items:
         return None, "[launch]: the mission does not begin with a NAV_TAKEOFF: its flight begins in the air"
     if base is None:
         return None, "[launch]: the mission has no home to take off from: its flight begins in the air"
-    if first + 1 >= len(numbers):
+    if index + 1 >= len(route_items):
         return None, "[launch]: nothing comes after the take-off: it is not flown"
-    item, here = items[numbers[first]], np.array([base.east, base.north])
-    ground = scenario.terrain.height(*here) if scenario.terrain is not None else base.up
+    item, home_position = items[route_items[index]], np.array([base.east, base.north])
+    ground = scenario.terrain.height(*home_position) if scenario.terrain is not None else base.up
     if math.isnan(ground):
         return None, "[launch]: the ground at home is not known: the flight begins in the air"
     # ArduPlane does not fly to a take-off item's own position: the next item is the first place.
-    ahead = route.waypoints[first + 1, :2] - here
-    course = launch.course if launch.course is not None else math.atan2(ahead[0], ahead[1])
-    home = np.array([*here, float(ground)])
-    top, pitch = float(route.waypoints[first, 2]), climb_pitch(item)
-    speed, pushed = launch.release_speed(slowest), launch.acceleration(slowest)
-    return TakeOff(launch, item.seq, home, course, top, base.up, pitch, first, speed, pushed), ""
+    first_leg = route.waypoints[index + 1, :2] - home_position
+    course = launch.course if launch.course is not None else math.atan2(first_leg[0], first_leg[1])
+    home = np.array([*home_position, float(ground)])
+    end_altitude, pitch = float(route.waypoints[index, 2]), climb_pitch(item)
+    speed, acceleration = launch.release_speed(slowest), launch.acceleration(slowest)
+    return TakeOff(launch, item.seq, home, course, end_altitude, base.up, pitch, index, speed, acceleration), ""
 
 
 def climb_pitch(item: MissionItem) -> float:
@@ -192,41 +192,47 @@ def climb_pitch(item: MissionItem) -> float:
 
 def _find_approach(scenario: Scenario, mission: Mission, route: Route) -> tuple[Approach | None, str]:
     """Return the landing, or the reason why none is flown."""
-    strip, last = scenario.landing, route.legs
+    strip, last_leg = scenario.landing, route.legs
     items = {item.seq: item for item in mission.items if item.command == Command.NAV_LAND}
-    if strip is None or not items or int(route.items[last]) not in items or last < 2:
+    if strip is None or not items or int(route.items[last_leg]) not in items or last_leg < 2:
         reason = "the mission does not end with two places and a NAV_LAND at a third"
         return None, f"[landing]: {reason}: its flight ends in the air"
-    up = route.landing_ground
-    begin, end = route.waypoints[last - 1], route.waypoints[last]
-    if math.isnan(up):
+    ground = route.landing_ground
+    leg_start, leg_end = route.waypoints[last_leg - 1], route.waypoints[last_leg]
+    if math.isnan(ground):
         return None, "[landing]: the height of the landing point is not known: the flight ends in the air"
-    if begin[2] <= up:
+    if leg_start[2] <= ground:
         return None, "[landing]: the approach begins no higher than the landing point: the flight ends in the air"
-    step = end[:2] - begin[:2]
-    course, run = math.atan2(step[0], step[1]), float(np.hypot(*step))
-    point = np.array([end[0], end[1], up])
-    wind, home = scenario.wind.along(course, up)[0], home_place(mission, scenario.origin, scenario.terrain)
-    base = up if home is None else home.up
-    return Approach(strip, int(route.items[last]), last - 1, point, course, run, float(begin[2]), wind, base), ""
+    final_leg = leg_end[:2] - leg_start[:2]
+    course, length = math.atan2(final_leg[0], final_leg[1]), float(np.hypot(*final_leg))
+    point = np.array([leg_end[0], leg_end[1], ground])
+    wind, home = scenario.wind.along(course, ground)[0], home_place(mission, scenario.origin, scenario.terrain)
+    base = ground if home is None else home.up
+    return Approach(
+        strip, int(route.items[last_leg]), last_leg - 1, point, course, length, float(leg_start[2]), wind, base
+    ), ""
 
 
-def airborne_route(route: Route, ways: GroundWays, begun: Floats | None) -> Route:
-    """Return the part of a route that is flown in the air, to which the usual rules apply.
+def airborne_route(route: Route, ways: GroundWays, first_leg_start: Floats | None) -> Route:
+    """Return the airborne part of a route, to which the usual rules apply.
 
-    begun: (3,) m, where the take-off ended and the first leg begins; None for the start of the route.
+    first_leg_start: (3,) m, point at which the take-off ended and the first leg begins; None for the route's start.
 
     The leg to the landing point is left out; numbers of legs and waypoints stay.
     """
     points = np.array(route.waypoints)
-    if ways.take_off is not None and begun is not None:
-        points[: ways.take_off.waypoint + 1] = begun
+    if ways.take_off is not None and first_leg_start is not None:
+        points[: ways.take_off.waypoint + 1] = first_leg_start
         # Waypoints before it are not flown: place each slightly before the next, so that every leg has a length.
-        for k in range(ways.take_off.waypoint - 1, -1, -1):
-            step = points[k + 1, :2] - points[k + 2, :2]
-            points[k, :2] += step / max(1e-6, float(np.hypot(*step)))
-    moved = replace(route, waypoints=points, notes=flown_notes(route, ways))
-    return moved if ways.approach is None or ways.approach.leg < 1 else part_of_route(moved, 0, ways.approach.leg)
+        for index in range(ways.take_off.waypoint - 1, -1, -1):
+            next_leg = points[index + 1, :2] - points[index + 2, :2]
+            points[index, :2] += next_leg / max(1e-6, float(np.hypot(*next_leg)))
+    moved_route = replace(route, waypoints=points, notes=flown_notes(route, ways))
+    return (
+        moved_route
+        if ways.approach is None or ways.approach.leg < 1
+        else part_of_route(moved_route, 0, ways.approach.leg)
+    )
 
 
 def shown_waypoints(route: Route, ways: GroundWays) -> Floats:

@@ -47,7 +47,7 @@ def implied_scenario(
     The area is the box of the positions flown to and their loiters, with a margin of 2 km, clipped at the tile's edge;
     for a mission that ends with a return it includes the nearest rally point. Start and destination are the first and
     last of these positions. If they are not above ground they are raised to 1 m, as a scenario requires, while the
-    route (and its verdict) keeps the mission's altitudes. Raise MissionError, and TerrainError if the mission leaves
+    route (and its verdict) keeps the mission's altitudes. Raises MissionError, or TerrainError if the mission leaves
     the tile.
 
     >>> from flight.mission.items import Command, Frame, MissionItem
@@ -62,18 +62,20 @@ def implied_scenario(
     flight = flight or FlightTable(aircraft_by_default=True)
     itinerary = make_itinerary(mission)
     origin = mission_origin(mission, itinerary.stops)
-    box, flown = _area_and_flown_box(mission, itinerary, origin)
-    terrain, table, box = _load_terrain(terrain_path, origin, box, flown)
+    area, flown_box = _area_and_flown_box(mission, itinerary, origin)
+    terrain, table, area = _load_terrain(terrain_path, origin, area, flown_box)
     placed = place_stops(mission, origin, terrain, itinerary=itinerary, vertical_legs=vertical_legs)
-    top = max(float(place.position[2]) for place in placed.stops)
+    highest = max(float(place.position[2]) for place in placed.stops)
     if terrain is not None:
-        top = max(top, float(np.nanmax(terrain.heights)))
+        highest = max(highest, float(np.nanmax(terrain.heights)))
     spec = ScenarioFile(
         name=_scenario_name(mission.source),
         description="Made around a mission that came without a scenario",
         origin=OriginTable(lat_deg=origin.lat_deg, lon_deg=origin.lon_deg),
         terrain=table,
-        area=AreaTable(east_m=box[0].tolist(), north_m=box[1].tolist(), ceiling_amsl_m=min(top + AREA_BUFFER, HIGHEST)),
+        area=AreaTable(
+            east_m=area[0].tolist(), north_m=area[1].tolist(), ceiling_amsl_m=min(highest + AREA_BUFFER, HIGHEST)
+        ),
         start=_raised_above_ground(placed.stops[0].position, terrain),
         destination=_raised_above_ground(placed.stops[-1].position, terrain),
         flight=flight,
@@ -86,11 +88,11 @@ def mission_origin(mission: Mission, stops: tuple[ItineraryStop, ...]) -> GeoOri
 
     stops: stops of the mission's itinerary.
 
-    Home is used if it is within 100 km of that position. Raise MissionError beyond 89 degrees of latitude.
+    Home is used if it is within 100 km of that position. Raises MissionError beyond 89 degrees of latitude.
     """
-    first = stops[0]
-    positions = [item for item in mission.items if item.has_position and item.seq >= first.item]
-    lat, lon = (positions[0].lat_deg, positions[0].lon_deg) if positions else (first.lat_deg, first.lon_deg)
+    first_stop = stops[0]
+    positions = [item for item in mission.items if item.has_position and item.seq >= first_stop.item]
+    lat, lon = (positions[0].lat_deg, positions[0].lon_deg) if positions else (first_stop.lat_deg, first_stop.lon_deg)
     if abs(lat) > 89.0:
         allowed = "a mission is flown within -89..89 degrees"
         message = f"{mission.source}: latitude {lat:.7f}: {allowed}"
@@ -108,39 +110,41 @@ def _area_and_flown_box(mission: Mission, itinerary: Itinerary, origin: GeoOrigi
     """Return the area, and the smallest box of the positions flown to; both (2, 2) [[e0, e1], [n0, n1]] m."""
     stops = itinerary.stops
     points = on_map(mission.source, stops, origin)
-    flown = np.stack([points.min(axis=0), points.max(axis=0)], axis=1)
-    around = AREA_BUFFER + max(abs(stop.loiter.radius) if stop.loiter is not None else 0.0 for stop in stops)
-    area = flown
+    flown_box = np.stack([points.min(axis=0), points.max(axis=0)], axis=1)
+    margin = AREA_BUFFER + max(abs(stop.loiter.radius) if stop.loiter is not None else 0.0 for stop in stops)
+    area = flown_box
     if itinerary.returns and (rally := rally_stops(mission)):
         # Which rally points are in range is unknown here: take the nearest to where the return begins.
-        far = on_map(mission.source, rally, origin)
-        away = np.hypot(*(far - points[max(0, len(points) - 2)]).T)
-        if away.min() <= _MAX_HOME_DISTANCE_M:
-            nearest = far[[int(np.argmin(away))]].T
-            area = np.stack([np.minimum(flown[:, 0], nearest[:, 0]), np.maximum(flown[:, 1], nearest[:, 0])], axis=1)
-    return np.clip(area + np.array([-around, around]), -MAP_EXTENT, MAP_EXTENT), flown
+        rally_positions = on_map(mission.source, rally, origin)
+        distances = np.hypot(*(rally_positions - points[max(0, len(points) - 2)]).T)
+        if distances.min() <= _MAX_HOME_DISTANCE_M:
+            nearest = rally_positions[[int(np.argmin(distances))]].T
+            area = np.stack(
+                [np.minimum(flown_box[:, 0], nearest[:, 0]), np.maximum(flown_box[:, 1], nearest[:, 0])], axis=1
+            )
+    return np.clip(area + np.array([-margin, margin]), -MAP_EXTENT, MAP_EXTENT), flown_box
 
 
 def _load_terrain(
-    path: str | None, origin: GeoOrigin, box: Floats, flown: Floats
+    path: str | None, origin: GeoOrigin, area: Floats, flown_box: Floats
 ) -> tuple[Terrain | None, TerrainTable, Floats]:
     """Return the terrain, its table, and the area clipped at the tile's edge."""
     if path is None:
-        return None, TerrainTable(kind="none"), box
+        return None, TerrainTable(kind="none"), area
     raster = open_raster(path)
     tile = tile_bounds(raster, origin)
-    inside = np.stack([np.maximum(box[:, 0], tile[:, 0]), np.minimum(box[:, 1], tile[:, 1])], axis=1)
-    if not ((inside[:, 0] <= flown[:, 0]) & (flown[:, 1] <= inside[:, 1])).all():
+    clipped_area = np.stack([np.maximum(area[:, 0], tile[:, 0]), np.minimum(area[:, 1], tile[:, 1])], axis=1)
+    if not ((clipped_area[:, 0] <= flown_box[:, 0]) & (flown_box[:, 1] <= clipped_area[:, 1])).all():
         lons, lats = raster.corners.T
         raise TerrainError(
-            f"{path}: the mission flies to {_position_text(*to_geo(origin, *flown))}; the terrain covers"
+            f"{path}: the mission flies to {_position_text(*to_geo(origin, *flown_box))}; the terrain covers"
             f" {_position_text(lats, lons)}",
             file=path,
         )
     file = Path(path)
-    found = str(file.resolve()) if file.is_file() else path
-    table = TerrainTable(kind="dem", path=found, sha256=raster.sha256)
-    return read_terrain(raster, origin, inside, GROUND_BUFFER), table, inside
+    terrain_path = str(file.resolve()) if file.is_file() else path
+    table = TerrainTable(kind="dem", path=terrain_path, sha256=raster.sha256)
+    return read_terrain(raster, origin, clipped_area, GROUND_BUFFER), table, clipped_area
 
 
 def _position_text(lats: Floats, lons: Floats) -> str:
@@ -155,5 +159,5 @@ def _raised_above_ground(point: Floats, terrain: Terrain | None) -> EndTable:
 
 
 def _scenario_name(source: str) -> str:
-    name = "".join(ch if ch.isprintable() else "?" for ch in re.split(r"[/\\]", source)[-1])
+    name = "".join(character if character.isprintable() else "?" for character in re.split(r"[/\\]", source)[-1])
     return name[:100] or "mission"

@@ -14,7 +14,7 @@ from flight.mission.commands import Command as Command
 
 @dataclass(slots=True)
 class Notes:
-    """Notes by text, each with the items it is about, in the order they came up.
+    """Notes by text, each with its items, in the order in which they were added.
 
     >>> notes = Notes()
     >>> for seq in (9, 3, 4, 5):
@@ -33,22 +33,22 @@ class Notes:
 
     def lines(self) -> tuple[str, ...]:
         """Return one line per note: "items 3-5, 9: DO_SET_SERVO: not flown"."""
-        found = []
+        lines = []
         for text, items in self._items.items():
             numbers = sorted(set(items))
             label = f"item{'s' if len(numbers) > 1 else ''} {_ranges(numbers)}: " if numbers else ""
-            found.append(label + text)
-        return tuple(found)
+            lines.append(label + text)
+        return tuple(lines)
 
 
 def _ranges(numbers: list[int]) -> str:
     """Return sorted numbers as "3-5, 9"."""
-    parts: list[list[int]] = []
+    ranges: list[list[int]] = []
     for number in numbers:
-        if not parts or number > parts[-1][1] + 1:
-            parts.append([number, number])
-        parts[-1][1] = number
-    return ", ".join(str(low) if low == high else f"{low}-{high}" for low, high in parts)
+        if not ranges or number > ranges[-1][1] + 1:
+            ranges.append([number, number])
+        ranges[-1][1] = number
+    return ", ".join(str(first) if first == last else f"{first}-{last}" for first, last in ranges)
 
 
 # Largest number of items in a mission file, far beyond what any autopilot stores.
@@ -80,8 +80,8 @@ TAKEOFFS = frozenset({C.NAV_TAKEOFF, C.NAV_VTOL_TAKEOFF})
 LANDINGS = frozenset({C.NAV_LAND, C.NAV_VTOL_LAND})
 # Commands that jump to another item.
 JUMPS = frozenset({C.DO_JUMP, C.DO_JUMP_TAG})
-# Navigation commands for other vehicles, with the kind of vehicle. ArduPlane goes on to the next command
-# (`Plane::start_command`), so that a piece of the path is missing; except QuadPlanes, which land to place a payload.
+# Navigation commands for other vehicles, with the kind of vehicle. ArduPlane continues with the next command
+# (`Plane::start_command`), so that a piece of the path is missing; only QuadPlanes land to place a payload.
 OTHER_VEHICLES = {
     C.NAV_SPLINE_WAYPOINT: "a multicopter",
     C.NAV_GUIDED_ENABLE: "a multicopter or a rover",
@@ -243,8 +243,8 @@ class SurveyPlan:
     """Settings of a survey that a ground station stores in addition to its items.
 
     photo: distance between photos that its items state, m, which identifies it; 0 for none, None for any survey.
-    turn_around: how far its lines extend beyond their photos, m.
-    camera: None if only distances are known.
+    turn_around: extension of its lines beyond their photos, m.
+    camera: camera, or None if only distances are known.
     """
 
     photo: float | None
@@ -296,8 +296,8 @@ def renumbered(mission: Mission) -> Mission:
     for item in mission.items:
         params = item.params
         if item.command == Command.DO_JUMP:
-            nowhere = max(params[0], len(numbers) + 1.0)
-            params = (float(numbers.get(int(params[0]), nowhere)), *params[1:])
+            missing_number = max(params[0], len(numbers) + 1.0)
+            params = (float(numbers.get(int(params[0]), missing_number)), *params[1:])
         items.append(replace(item, seq=numbers[item.seq], params=params))
     return replace(mission, items=tuple(items))
 
@@ -309,13 +309,13 @@ def shifted(items: Iterable[MissionItem], shift: int) -> tuple[MissionItem, ...]
     >>> [(item.seq, item.params[0]) for item in shifted([jump], 1)]
     [(4, 2.0)]
     """
-    moved = []
+    shifted_items = []
     for item in items:
         params = item.params
         if item.command == Command.DO_JUMP:
             params = (params[0] + shift, *params[1:])
-        moved.append(replace(item, seq=item.seq + shift, params=params))
-    return tuple(moved)
+        shifted_items.append(replace(item, seq=item.seq + shift, params=params))
+    return tuple(shifted_items)
 
 
 class ItemProblem(NamedTuple):
@@ -343,8 +343,8 @@ class ItemProblem(NamedTuple):
 def position_problem(lat_deg: float, lon_deg: float) -> ItemProblem | None:
     """Return the fault of a latitude and longitude in degrees, or None."""
     if abs(lat_deg) > 90.0:
-        swapped = " (latitude and longitude swapped?)" if abs(lon_deg) <= 90.0 else ""
-        return ItemProblem("latitude", lat_deg, f"allowed -90..90 degrees{swapped}")
+        hint = " (latitude and longitude swapped?)" if abs(lon_deg) <= 90.0 else ""
+        return ItemProblem("latitude", lat_deg, f"allowed -90..90 degrees{hint}")
     if abs(lon_deg) > 180.0:
         return ItemProblem("longitude", lon_deg, "allowed -180..180 degrees")
     return None
@@ -358,14 +358,14 @@ def item_problem(item: MissionItem) -> ItemProblem | None:
     """
     if item.frame not in _FRAMES:
         return ItemProblem("frame", item.frame, f"allowed {', '.join(map(str, _FRAMES))}")
-    for k, value in enumerate(item.params, 1):
+    for number, value in enumerate(item.params, 1):
         if abs(value) > _MAX_FLOAT32:
-            return ItemProblem(f"p{k}", value, "beyond what MAVLink carries (3.4e38)")
+            return ItemProblem(f"p{number}", value, "beyond what MAVLink carries (3.4e38)")
     if is_located(item.command, item.frame):
-        wrong = position_problem(item.lat_deg, item.lon_deg)
-        if wrong is None and not (_MIN_ALTITUDE_M <= item.alt <= _MAX_ALTITUDE_M or math.isnan(item.alt)):
-            wrong = ItemProblem("altitude", item.alt, f"allowed {_MIN_ALTITUDE_M:.0f}..{_MAX_ALTITUDE_M:.0f} m")
-        return wrong or _count_problem(item)
+        problem = position_problem(item.lat_deg, item.lon_deg)
+        if problem is None and not (_MIN_ALTITUDE_M <= item.alt <= _MAX_ALTITUDE_M or math.isnan(item.alt)):
+            problem = ItemProblem("altitude", item.alt, f"allowed {_MIN_ALTITUDE_M:.0f}..{_MAX_ALTITUDE_M:.0f} m")
+        return problem or _count_problem(item)
     for name, value in (("latitude", item.lat_deg), ("longitude", item.lon_deg)):
         if abs(value) > _MAX_INT32:
             return ItemProblem(name, value, "beyond what MISSION_ITEM_INT carries (2147483647)")

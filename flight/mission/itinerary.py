@@ -107,12 +107,16 @@ def pass_by_distance(item: MissionItem) -> float:
     >>> [pass_by_distance(item) for item in made]
     [150.0, 255.0, 0.0, 0.0]
     """
-    beyond = item.params[2]
-    return float(min(_MAX_PASS_BY_M, int(beyond))) if item.command == Command.NAV_WAYPOINT and beyond >= 1.0 else 0.0
+    stated_distance = item.params[2]
+    return (
+        float(min(_MAX_PASS_BY_M, int(stated_distance)))
+        if item.command == Command.NAV_WAYPOINT and stated_distance >= 1.0
+        else 0.0
+    )
 
 
 class OpenItem(NamedTuple):
-    """An item that changes the flight path, but is not simulated as the autopilot flies it.
+    """An item that changes the flight path, and that is not simulated as the autopilot flies it.
 
     item: seq of the mission item.
     text: its command, and the part that is not flown.
@@ -207,43 +211,45 @@ class Itinerary:
 def make_itinerary(mission: Mission) -> Itinerary:
     """Unroll a mission as an autopilot would.
 
-    Raise MissionError for a mission without a position, for a jump to a missing item, and for a mission that unrolls to
-    more than `MAX_STOPS` places.
+    Raises MissionError if no item has a position, if a jump leads to a missing item, or if the mission unrolls to more
+    than `MAX_STOPS` places.
     """
-    walk, steps = _ItineraryBuilder(mission), _Steps(mission)
+    builder, steps = _ItineraryBuilder(mission), _Steps(mission)
     for step in steps:
-        walk.take(step)
-        if len(walk.stops) > MAX_STOPS:
+        builder.take(step)
+        if len(builder.stops) > MAX_STOPS:
             seq = step.to.seq if step.to is not None else mission.items[-1].seq
             raise MissionError(
                 f"{mission.source}: item {seq}: more than {MAX_STOPS:,} places to fly to, jumps unrolled",
                 file=mission.source,
                 field=f"item {seq}",
             )
-        if walk.ended:
+        if builder.ended:
             break
     if steps.endless >= 0:
         name = command_name(mission.items[steps.index[steps.endless]].command)
-        walk.notes.add(f"{name} has no end: it is flown once, and the flight ends there", steps.endless)
-    for gate in walk.gates:
-        walk.notes.by_value.add("CONDITION_GATE: nothing to fly to comes after it, so it is passed at once", gate.item)
+        builder.notes.add(f"{name} has no end: it is flown once, and the flight ends there", steps.endless)
+    for gate in builder.gates:
+        builder.notes.by_value.add(
+            "CONDITION_GATE: nothing to fly to comes after it, so it is passed at once", gate.item
+        )
     for item in mission.items:
-        if item.seq not in steps.reached and not (walk.ended and item.command in JUMPS):
-            walk.notes.add(NEVER_REACHED, item.seq)
-    if not walk.stops:
+        if item.seq not in steps.reached and not (builder.ended and item.command in JUMPS):
+            builder.notes.add(NEVER_REACHED, item.seq)
+    if not builder.stops:
         raise MissionError(f"{mission.source}: no item has a position; expected at least two", file=mission.source)
     return Itinerary(
-        stops=tuple(walk.stops),
-        home=walk.first_home,
-        has_home=walk.has_home,
-        takeoff=walk.takeoff,
-        notes=walk.notes.usual.lines(),
+        stops=tuple(builder.stops),
+        home=builder.first_home,
+        has_home=builder.has_home,
+        takeoff=builder.takeoff,
+        notes=builder.notes.usual.lines(),
         endless=steps.endless,
-        landing=walk.landing,
-        notes_by_value=walk.notes.by_value.lines(),
-        open_items=tuple(walk.open),
-        open_by_value=tuple(walk.open_by_value),
-        last_home=walk.home,
+        landing=builder.landing,
+        notes_by_value=builder.notes.by_value.lines(),
+        open_items=tuple(builder.open),
+        open_by_value=tuple(builder.open_by_value),
+        last_home=builder.home,
     )
 
 
@@ -285,57 +291,60 @@ class _Steps:
 
     def __iter__(self) -> Iterator[_Step]:
         """Iterate over the navigation items, counting jumps."""
-        k: int | None = 0
-        while k is not None:
-            between: list[int] = []
-            k = self._next_item(k, counting=True)
-            while k is not None and not is_navigation(self.items[k].command):
-                between.append(k)
-                k = self._next_item(k + 1, counting=True)
-            late = self._late_commands(between[0]) if between and k is not None else []
-            self.reached |= {self.items[one].seq for one in late}
+        index: int | None = 0
+        while index is not None:
+            skipped: list[int] = []
+            index = self._next_item(index, counting=True)
+            while index is not None and not is_navigation(self.items[index].command):
+                skipped.append(index)
+                index = self._next_item(index + 1, counting=True)
+            late_commands = self._late_commands(skipped[0]) if skipped and index is not None else []
+            self.reached |= {self.items[command].seq for command in late_commands}
             yield _Step(
-                tuple(self.items[one] for one in between),
-                self.items[between[0]] if between else None,
-                tuple(self.items[one] for one in late),
-                None if k is None else self.items[k],
+                tuple(self.items[command] for command in skipped),
+                self.items[skipped[0]] if skipped else None,
+                tuple(self.items[command] for command in late_commands),
+                None if index is None else self.items[index],
             )
-            k = None if k is None else k + 1
+            index = None if index is None else index + 1
 
-    def _late_commands(self, first: int) -> list[int]:
-        """Return the indices of the commands after the first that ArduPlane runs on the leg to an item."""
-        found: list[int] = []
-        k = self._next_item(first + 1, counting=False)
-        while k is not None and k not in found and not is_navigation(self.items[k].command):
-            found.append(k)
-            k = self._next_item(k + 1, counting=False)
-        return found
+    def _late_commands(self, early: int) -> list[int]:
+        """Return the indices of the commands that ArduPlane runs on the leg to an item.
 
-    def _next_item(self, k: int, *, counting: bool) -> int | None:
+        early: index of the command that it has already run before that leg.
+        """
+        commands: list[int] = []
+        index = self._next_item(early + 1, counting=False)
+        while index is not None and index not in commands and not is_navigation(self.items[index].command):
+            commands.append(index)
+            index = self._next_item(index + 1, counting=False)
+        return commands
+
+    def _next_item(self, index: int, *, counting: bool) -> int | None:
         """Return the index of the next item, following jumps, or None at the end (`get_next_cmd`)."""
-        first = -1
-        while k < len(self.items):
-            item = self.items[k]
+        first_jump = -1
+        while index < len(self.items):
+            item = self.items[index]
             if counting:
-                self._check_length(item)
+                self._count_item(item)
             if item.command not in JUMPS:
-                return k
+                return index
             target, repeats = self._jump_target(item), int(item.params[1])
-            if not counting and k == first:
+            if not counting and index == first_jump:
                 return None
-            first = k if first < 0 else first
-            if counting and repeats < 0 and k in self.taken:
+            first_jump = index if first_jump < 0 else first_jump
+            if counting and repeats < 0 and index in self.taken:
                 self.endless = item.seq
                 return None
-            if repeats < 0 or self.taken.get(k, 0) < repeats:
+            if repeats < 0 or self.taken.get(index, 0) < repeats:
                 if counting:
-                    self.taken[k] = self.taken.get(k, 0) + 1
-                k = target
+                    self.taken[index] = self.taken.get(index, 0) + 1
+                index = target
             else:
-                k += 1
+                index += 1
         return None
 
-    def _check_length(self, item: MissionItem) -> None:
+    def _count_item(self, item: MissionItem) -> None:
         self.reached.add(item.seq)
         self._walked += 1
         if self._walked > _MAX_STEPS:
@@ -346,14 +355,14 @@ class _Steps:
             )
 
     def _jump_target(self, jump: MissionItem) -> int:
-        """Return the index that a jump leads to. Raise MissionError if there is no such item."""
-        tagged, number = jump.command == Command.DO_JUMP_TAG, int(jump.params[0])
-        places = self.tags if tagged else self.index
-        if number not in places:
-            lack = f"JUMP_TAG {number}" if tagged else f"item {number}"
-            problem = ItemProblem(f"{command_name(jump.command)} p1", number, f"the mission has no {lack}")
+        """Return the index of a jump's target. Raises MissionError if there is no such item."""
+        is_tag_jump, number = jump.command == Command.DO_JUMP_TAG, int(jump.params[0])
+        index_by_number = self.tags if is_tag_jump else self.index
+        if number not in index_by_number:
+            missing_name = f"JUMP_TAG {number}" if is_tag_jump else f"item {number}"
+            problem = ItemProblem(f"{command_name(jump.command)} p1", number, f"the mission has no {missing_name}")
             raise MissionError(**problem.at(self.mission.source, f"{self.mission.source}: item {jump.seq}"))
-        return places[number]
+        return index_by_number[number]
 
 
 class _NotesOfBothReadings:
@@ -391,11 +400,11 @@ class _ItineraryBuilder:
         """Process the commands before a navigation item, and the item."""
         for item in step.between:
             self._run_as_px4(item)
-        run = () if step.early is None else (step.early, *step.late)
-        for k, item in enumerate(run):
+        run_commands = () if step.early is None else (step.early, *step.late)
+        for index, item in enumerate(run_commands):
             # A home that is set on a leg does not move the altitude of the item that is already flown to.
-            if k == 0 or item.command != Command.DO_SET_HOME:
-                self._run_as_arduplane(item, run[k + 1 :])
+            if index == 0 or item.command != Command.DO_SET_HOME:
+                self._run_as_arduplane(item, run_commands[index + 1 :])
         for item in step.late:
             if item not in step.between:
                 self.notes.usual.add(f"{command_name(item.command)}: run one loop early, as ArduPlane does", item.seq)
@@ -405,24 +414,24 @@ class _ItineraryBuilder:
             for item in step.between[1:]:
                 text = f"{command_name(item.command)}: not run, as nothing to fly to comes after it"
                 self.notes.usual.add(text, item.seq)
-        for item in run[1:]:
+        for item in run_commands[1:]:
             if item.command == Command.DO_SET_HOME:
                 self._set_home(item)
 
     def leave_open(self, text: str, seq: int, *, usual: bool = True, by_value: bool = True) -> None:
-        """Note an item that changes the path and is not flown, in ArduPlane's reading, PX4's reading or both."""
-        for counts, notes, left in (
+        """Note an item that changes the path and is not flown, in either or both autopilots' readings."""
+        for applies, notes, open_items in (
             (usual, self.notes.usual, self.open),
             (by_value, self.notes.by_value, self.open_by_value),
         ):
-            if counts:
+            if applies:
                 notes.add(text, seq)
-                left[OpenItem(seq, text)] = None
+                open_items[OpenItem(seq, text)] = None
 
-    def _run_as_arduplane(self, item: MissionItem, behind: Sequence[MissionItem]) -> None:
+    def _run_as_arduplane(self, item: MissionItem, following: Sequence[MissionItem]) -> None:
         """Run a command as ArduPlane does.
 
-        behind: commands that are run after it on the leg to the same item.
+        following: commands that are run after it on the leg to the same item.
         """
         if item.command == Command.DO_CHANGE_SPEED:
             self._change_speed_as_arduplane(item)
@@ -431,11 +440,13 @@ class _ItineraryBuilder:
         elif item.command == Command.CONDITION_GATE:
             self.leave_open(f"{command_name(item.command)}: not flown", item.seq, by_value=False)
         elif item.command in (Command.CONDITION_DELAY, Command.CONDITION_DISTANCE):
-            held = [one for one in behind if one.command in (Command.DO_CHANGE_SPEED, Command.DO_SET_HOME)]
+            delayed = [
+                command for command in following if command.command in (Command.DO_CHANGE_SPEED, Command.DO_SET_HOME)
+            ]
             text = f"{command_name(item.command)}: not flown"
-            if held:
-                delayed = f"; {command_name(held[0].command)} (item {held[0].seq}) is flown without the delay"
-                self.leave_open(text + delayed, item.seq, by_value=False)
+            if delayed:
+                delay_text = f"; {command_name(delayed[0].command)} (item {delayed[0].seq}) is flown without the delay"
+                self.leave_open(text + delay_text, item.seq, by_value=False)
             else:
                 self.notes.usual.add(text, item.seq)
         else:
@@ -511,9 +522,9 @@ class _ItineraryBuilder:
 
     def _add_take_off(self, item: MissionItem) -> None:
         name = command_name(item.command)
-        vertical = item.command == Command.NAV_VTOL_TAKEOFF
+        is_vertical = item.command == Command.NAV_VTOL_TAKEOFF
         if self.stops:
-            if item.has_position and not vertical:
+            if item.has_position and not is_vertical:
                 self.leave_open(f"{name} in the air: flown through as a waypoint", item.seq)
                 self.stops.append(self._make_stop(item))
             else:
@@ -523,16 +534,16 @@ class _ItineraryBuilder:
             message = f"{self.source}: item {item.seq}: {name} has no altitude: expected a number"
             raise MissionError(message, file=self.source, field="altitude", allowed="expected a number")
         self.takeoff = item
-        if vertical:
+        if is_vertical:
             self.leave_open(f"{name}: not flown straight up", item.seq)
         home = self.first_home
         over_home = replace(self._make_stop(item), lat_deg=home.lat_deg, lon_deg=home.lon_deg)
-        goes_on = item.has_position and (item.lat_deg, item.lon_deg) != (home.lat_deg, home.lon_deg)
-        if goes_on and vertical:
+        has_own_place = item.has_position and (item.lat_deg, item.lon_deg) != (home.lat_deg, home.lon_deg)
+        if has_own_place and is_vertical:
             # ArduPlane climbs where it stands and continues at that altitude (QuadPlane::takeoff_controller and
             # verify_vtol_takeoff); its fixed wings skip the item.
             self.notes.add(f"{name}: its place is not flown to, as in ArduPlane; PX4 would", item.seq)
-        if goes_on and not vertical:
+        if has_own_place and not is_vertical:
             self.stops += [replace(over_home, item=-1), self._make_stop(item)]
         else:
             self.stops.append(over_home)
@@ -555,8 +566,8 @@ class _ItineraryBuilder:
             if item.params[0] > 0.0:
                 # No fixed wing holds: ArduPlane stores no time, PX4 (`MissionBlock::get_time_inside`) reads none.
                 self.notes.add("NAV_WAYPOINT with a time to hold: flown through", item.seq)
-            if beyond := pass_by_distance(item):
-                self.notes.usual.add(f"{name} with {beyond:.0f} m to fly on beyond it, as ArduPlane does", item.seq)
+            if pass_by := pass_by_distance(item):
+                self.notes.usual.add(f"{name} with {pass_by:.0f} m to fly on beyond it, as ArduPlane does", item.seq)
             elif item.params[2] <= -1.0:
                 # Converting a negative number to an unsigned one gives 0 on ARM and 255 on a PC; PX4 does not read it.
                 text = (
@@ -603,7 +614,7 @@ class _ItineraryBuilder:
             self.leave_open(f"{name}: not flown straight down", item.seq)
 
     def _set_home(self, item: MissionItem) -> None:
-        """Set another home, as ArduPlane does (`Plane::do_set_home`), for the altitudes and returns after it."""
+        """Set the home of all later altitudes and returns, as ArduPlane does (`Plane::do_set_home`)."""
         name = command_name(item.command)
         if item.params[0] == 1.0:
             if self.stops:
@@ -614,18 +625,18 @@ class _ItineraryBuilder:
         if not item.has_position:
             self.notes.usual.add(f"{name} without a position: ignored, as ArduPlane does", item.seq)
             return
-        up = item.alt + self.home.alt if item.frame in OVER_HOME else item.alt if item.frame in AMSL else math.nan
-        if math.isnan(up):
+        altitude = item.alt + self.home.alt if item.frame in OVER_HOME else item.alt if item.frame in AMSL else math.nan
+        if math.isnan(altitude):
             self.leave_open(f"{name} to an altitude that is not known: not flown", item.seq, by_value=False)
             return
-        self.home = Home(item.lat_deg, item.lon_deg, up)
+        self.home = Home(item.lat_deg, item.lon_deg, altitude)
 
     def _change_speed_as_arduplane(self, item: MissionItem) -> None:
         """Read a speed change as ArduPlane does (`Plane::do_change_speed`)."""
         kind, speed, throttle = item.params[:3]
         notes = self.notes.usual
-        applies = kind == 1.0 or (kind == 0.0 and (speed > 0.0 or speed == -2.0))
-        if throttle > 0.0 and not applies:
+        sets_speed = kind == 1.0 or (kind == 0.0 and (speed > 0.0 or speed == -2.0))
+        if throttle > 0.0 and not sets_speed:
             # If no speed is set, TRIM_THROTTLE is changed.
             self.leave_open("DO_CHANGE_SPEED's throttle: not flown", item.seq, by_value=False)
         elif throttle > 0.0:

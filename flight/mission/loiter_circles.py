@@ -154,12 +154,12 @@ class Node:
     up: float
     turn: float = 0.0
 
-    def away(self, other: "Node") -> float:
+    def distance_to(self, other: "Node") -> float:
         """Return the distance between the centers, m."""
         return math.hypot(other.east - self.east, other.north - self.north)
 
 
-def lay_circles(
+def lay_out_waypoints(
     source: str,
     stops: list[PlacedStop],
     notes: Notes,
@@ -167,36 +167,39 @@ def lay_circles(
     slopes: SpiralSlopes,
     rules: LoiterRules = USUAL_LOITERS,
 ) -> tuple[list[RoutePoint], tuple[Unjoined, ...]]:
-    """Lay out the waypoints of a route through points and around circles.
+    """Lay out the waypoints of a route along straight legs and around loiter circles.
 
-    Return them, and the stops that are not laid out as stated.
+    Return the waypoints, and the stops that could not be laid out as stated.
 
     source: name of the mission in errors.
-    own_radius, slopes: abilities of the aircraft.
+    own_radius: the aircraft's own loiter radius at an airspeed and altitude.
+    slopes: steepest climb and descent of the aircraft in a spiral.
     rules: loiter rules of the autopilot.
 
-    Stops inside a circle before or after them are left out, with a note, since no straight leg joins them. Raise
-    MissionError for a loiter too wide or too long to lay out.
+    Stops inside a circle before or after them are left out, with a note, since no straight leg joins them. Raises
+    MissionError if a loiter is too wide or too long to lay out.
     """
     unjoined: list[Unjoined] = []
     nodes = _make_nodes(source, stops, notes, own_radius, rules, unjoined)
     courses = [tangent_course(a, b) for a, b in pairwise(nodes)]
     points: list[RoutePoint] = []
     up = float(stops[0].position[2])
-    for k, node in enumerate(nodes):
+    for index, node in enumerate(nodes):
         if node.turn == 0.0:
             up = node.up
             points.append(RoutePoint(node.stop, (node.east, node.north, up)))
             continue
-        into = courses[k - 1] if k else (courses[k] if k < len(courses) else 0.0)
-        onward = courses[k] if k < len(courses) else None
-        run = math.hypot(node.east - points[-1].position[0], node.north - points[-1].position[1]) if points else 0.0
-        tightest = own_radius(node.stop.airspeed, node.up) if rules.lines_up else 0.0
-        laid = _corners_around(source, node, into, onward, up, run, tightest, slopes, rules)
-        if not k:
-            laid.insert(0, RoutePoint(node.stop, (*on_rim(node, into), laid[0].position[2])))
-        up = laid[-1].position[2]
-        points += laid
+        entry_course = courses[index - 1] if index else (courses[index] if index < len(courses) else 0.0)
+        exit_course = courses[index] if index < len(courses) else None
+        leg_length = (
+            math.hypot(node.east - points[-1].position[0], node.north - points[-1].position[1]) if points else 0.0
+        )
+        min_radius = own_radius(node.stop.airspeed, node.up) if rules.lines_up else 0.0
+        corners = _corners_around(source, node, entry_course, exit_course, up, leg_length, min_radius, slopes, rules)
+        if not index:
+            corners.insert(0, RoutePoint(node.stop, (*on_rim(node, entry_course), corners[0].position[2])))
+        up = corners[-1].position[2]
+        points += corners
         if len(points) > MAX_STOPS:
             item = f"item {node.stop.item}"
             message = f"{source}: {item}: with its circles laid out the route has more than {MAX_STOPS:,} waypoints"
@@ -216,97 +219,116 @@ def _make_nodes(
 
     Append the stops that no tangent joins to ``unjoined``.
 
-    A flight that takes off inside its first circle begins on that circle: no part of its take-off is flown.
+    If the take-off lies inside the first circle, the flight begins on that circle, without any part of the take-off.
     """
     nodes: list[Node] = []
     for stop, (east, north, up) in stops:
         node = Node(stop, float(east), float(north), float(up))
         if stop.loiter is not None:
             node = replace(node, turn=_signed_radius(source, stop, stop.loiter, float(up), notes, own_radius, rules))
-            while nodes and nodes[-1].turn == 0.0 and nodes[-1].away(node) < abs(node.turn) + _MIN_TANGENT_CLEARANCE_M:
+            while (
+                nodes
+                and nodes[-1].turn == 0.0
+                and nodes[-1].distance_to(node) < abs(node.turn) + _MIN_TANGENT_CLEARANCE_M
+            ):
                 inside = nodes.pop()
                 _note_left_out(inside.stop, node.stop, notes)
                 # An autopilot that steers to the center passes a place there, and a take-off there needs no leg.
-                on_the_way = inside.away(node) < _SAME_PLACE_M and abs(inside.up - node.up) <= _SAME_ALTITUDE_M
-                if inside.stop.item >= 0 and inside.stop.command not in TAKEOFFS and not on_the_way:
+                is_passed_anyway = (
+                    inside.distance_to(node) < _SAME_PLACE_M and abs(inside.up - node.up) <= _SAME_ALTITUDE_M
+                )
+                if inside.stop.item >= 0 and inside.stop.command not in TAKEOFFS and not is_passed_anyway:
                     unjoined.append(Unjoined(inside.stop.item, stop.item, is_circle=False))
-        before = nodes[-1] if nodes else None
-        if before is not None and before.turn != 0.0 and not is_joined(before, node):
+        previous = nodes[-1] if nodes else None
+        if previous is not None and previous.turn != 0.0 and not is_joined(previous, node):
             if node.turn == 0.0:
-                _note_left_out(stop, before.stop, notes)
-                unjoined.append(Unjoined(stop.item, before.stop.item, is_circle=False))
+                _note_left_out(stop, previous.stop, notes)
+                unjoined.append(Unjoined(stop.item, previous.stop.item, is_circle=False))
                 continue
-            # Two loiters of one stated radius about one place may differ by the growth at their altitudes.
-            wide, own = abs(before.turn) / rules.growth(before.up), abs(node.turn) / rules.growth(node.up)
-            one_side = math.copysign(1.0, before.turn) == math.copysign(1.0, node.turn)
-            if before.away(node) >= _SAME_PLACE_M or abs(wide - own) >= _SAME_PLACE_M or not one_side:
-                unjoined.append(Unjoined(stop.item, before.stop.item, is_circle=True))
-            notes.add(
-                f"its circle has no tangent from that of item {before.stop.item}: flown on that circle", stop.item
+            # Two loiters with the same stated radius and place may differ by the growth at their altitudes.
+            previous_stated_radius, stated_radius = (
+                abs(previous.turn) / rules.growth(previous.up),
+                abs(node.turn) / rules.growth(node.up),
             )
-            node = replace(node, east=before.east, north=before.north, turn=before.turn)
+            is_same_direction = math.copysign(1.0, previous.turn) == math.copysign(1.0, node.turn)
+            if (
+                previous.distance_to(node) >= _SAME_PLACE_M
+                or abs(previous_stated_radius - stated_radius) >= _SAME_PLACE_M
+                or not is_same_direction
+            ):
+                unjoined.append(Unjoined(stop.item, previous.stop.item, is_circle=True))
+            notes.add(
+                f"its circle has no tangent from that of item {previous.stop.item}: flown on that circle", stop.item
+            )
+            node = replace(node, east=previous.east, north=previous.north, turn=previous.turn)
         nodes.append(node)
     return nodes
 
 
 def _note_left_out(stop: ItineraryStop, circle: ItineraryStop, notes: Notes) -> None:
-    name = f"lies inside the circle of item {circle.item}, which is joined on a tangent: not flown to"
-    notes.add(name if stop.item >= 0 else f"home {name}", stop.item if stop.item >= 0 else None)
+    text = f"lies inside the circle of item {circle.item}, which is joined on a tangent: not flown to"
+    notes.add(text if stop.item >= 0 else f"home {text}", stop.item if stop.item >= 0 else None)
 
 
 def _signed_radius(
     source: str, stop: ItineraryStop, loiter: Loiter, up: float, notes: Notes, own_radius: OwnRadius, rules: LoiterRules
 ) -> float:
     """Return the signed radius of a loiter, m."""
-    radius, stated = rules.radius_of(loiter), abs(loiter.radius)
+    radius, stated_radius = rules.radius_of(loiter), abs(loiter.radius)
     if radius > WIDEST:
         allowed = f"allowed up to {WIDEST:,.0f}"
         message = f"{source}: item {stop.item}: loiter radius {radius:g} m: {allowed}"
         raise MissionError(message, file=source, field="loiter radius", value=radius, allowed=allowed)
-    grows = rules.growth(up)
+    growth = rules.growth(up)
     if radius == 0.0 and rules.radius != 0.0:
-        left = rules.radius < 0.0 or loiter.radius < 0.0
-        side = " to the left" if left else ""
-        why = f"its radius of {stated:g} m is not read" if stated > 0.0 else "loiter without a radius"
-        notes.add(f"{why}: flown with {rules.radius_name}, {abs(rules.radius):g} m{side}", stop.item)
-        return math.copysign(max(TIGHTEST, abs(rules.radius) * grows), -1.0 if left else 1.0)
+        is_left = rules.radius < 0.0 or loiter.radius < 0.0
+        direction_text = " to the left" if is_left else ""
+        reason = f"its radius of {stated_radius:g} m is not read" if stated_radius > 0.0 else "loiter without a radius"
+        notes.add(f"{reason}: flown with {rules.radius_name}, {abs(rules.radius):g} m{direction_text}", stop.item)
+        return math.copysign(max(TIGHTEST, abs(rules.radius) * growth), -1.0 if is_left else 1.0)
     if radius == 0.0:
         radius = own_radius(stop.airspeed, up)
         notes.add(f"loiter without a radius: flown with {radius:.0f} m", stop.item)
     elif radius < TIGHTEST:
         notes.add(f"loiter radius below {TIGHTEST:.0f} m: flown with {TIGHTEST:.0f} m", stop.item)
         radius = TIGHTEST
-    elif round(radius * grows) != round(stated):
-        notes.add(f"loiter radius {stated:g} m: flown with {radius * grows:.0f} m at this height", stop.item)
-    return math.copysign(radius * grows, loiter.radius)
+    elif round(radius * growth) != round(stated_radius):
+        notes.add(f"loiter radius {stated_radius:g} m: flown with {radius * growth:.0f} m at this height", stop.item)
+    return math.copysign(radius * growth, loiter.radius)
 
 
 def is_joined(a: Node, b: Node) -> bool:
-    """Return True if a tangent joins a circle to another circle or point, or both are the same circle."""
-    apart = a.away(b)
-    return apart > abs(b.turn - a.turn) + _MIN_TANGENT_CLEARANCE_M or (apart < 1.0 and abs(a.turn - b.turn) < 1.0)
+    """Return True if a tangent joins two circles or points, or if both are the same circle."""
+    distance = a.distance_to(b)
+    return distance > abs(b.turn - a.turn) + _MIN_TANGENT_CLEARANCE_M or (distance < 1.0 and abs(a.turn - b.turn) < 1.0)
 
 
 def tangent_course(a: Node, b: Node) -> float:
     """Return the course of the tangent from a circle or point to the next, rad; 0 for the same circle."""
-    apart = a.away(b)
-    if apart < 1.0:
+    distance = a.distance_to(b)
+    if distance < 1.0:
         return 0.0
     bearing = math.atan2(b.east - a.east, b.north - a.north)
     # Across the tangent, the centers are b.turn - a.turn apart.
-    return bearing - math.asin(min(1.0, max(-1.0, (b.turn - a.turn) / apart)))
+    return bearing - math.asin(min(1.0, max(-1.0, (b.turn - a.turn) / distance)))
 
 
-def on_rim(node: Node, course: float, out: float = 1.0) -> tuple[float, float]:
-    """Return the point on a circle where its course is ``course``, or ``out`` radii from the center."""
+def on_rim(node: Node, course: float, radius_ratio: float = 1.0) -> tuple[float, float]:
+    """Return the point (east, north, m) of a circle at which the course along it is ``course``.
+
+    radius_ratio: distance of the point from the center, as a ratio to the radius.
+    """
     return (
-        node.east - node.turn * out * math.cos(course),
-        node.north + node.turn * out * math.sin(course),
+        node.east - node.turn * radius_ratio * math.cos(course),
+        node.north + node.turn * radius_ratio * math.sin(course),
     )
 
 
-def circle_corners(node: Node, into: float, sweep: float) -> list[tuple[float, float]]:
-    """Return the corners (east, north, m) around a circle, joined on a course and flown by an angle, rad.
+def circle_corners(node: Node, entry_course: float, sweep: float) -> list[tuple[float, float]]:
+    """Return the corners (east, north, m) of the polygon around a circle.
+
+    entry_course: course at which the circle is joined, rad.
+    sweep: angle that is flown around it, rad.
 
     >>> point = ItineraryStop(1, 16, 0.0, 0.0, 0.0, 0, 25.0)
     >>> [(round(e), round(n)) for e, n in circle_corners(Node(point, 100.0, 0.0, 0.0, 100.0), 0.0, math.pi / 2.0)]
@@ -314,62 +336,76 @@ def circle_corners(node: Node, into: float, sweep: float) -> list[tuple[float, f
     """
     count = max(1, math.ceil(sweep / CORNER - 1e-9))
     step, side = sweep / count, math.copysign(1.0, node.turn)
-    return [on_rim(node, into + side * (k + 0.5) * step, 1.0 / math.cos(0.5 * step)) for k in range(count)]
+    return [
+        on_rim(node, entry_course + side * (index + 0.5) * step, 1.0 / math.cos(0.5 * step)) for index in range(count)
+    ]
 
 
 def _corners_around(
     source: str,
     node: Node,
-    into: float,
-    onward: float | None,
-    up: float,
-    run: float,
-    tightest: float,
+    entry_course: float,
+    exit_course: float | None,
+    previous_altitude: float,
+    leg_length: float,
+    min_radius: float,
     slopes: SpiralSlopes,
     rules: LoiterRules,
 ) -> list[RoutePoint]:
     """Return the corners around a circle that the path joins on one course and leaves on another.
 
-    into, onward: those courses, rad; ``onward`` is None at the mission's end.
+    entry_course, exit_course: courses at the tangents, rad; ``exit_course`` is None at the mission's end.
+    previous_altitude: altitude at the start of the leg before, m AMSL.
+    leg_length: length of that leg, m.
+    min_radius: the aircraft's own radius, m, to which a smaller circle is widened in flight; 0 if unknown.
 
-    up: altitude at the start of the leg before, m AMSL.
-    run: length of that leg, m.
-    tightest: the aircraft's own radius, m, to which a smaller circle is widened in flight; 0 if unknown.
-
-    For an autopilot that leaves as soon as its time is over, the circle ends at the last tangent before that.
+    For an autopilot that leaves as soon as the loiter's time is over, the circle ends at the last tangent before that.
     """
     radius, side = abs(node.turn), math.copysign(1.0, node.turn)
-    first, wanted = node.up, 0.0
+    entry_altitude, required_sweep = node.up, 0.0
     loiter = node.stop.loiter
     if loiter is not None and loiter.to_height:
-        climb, dive = slopes(node.stop.airspeed, max(up, node.up))
-        climb, dive = min(climb, rules.climb / node.stop.airspeed), min(dive, rules.sink / node.stop.airspeed)
-        first = up if rules.holds_height else min(max(node.up, up - dive * run), up + climb * run)
-        missing = max(0.0, abs(node.up - first) - rules.short)
-        if missing > 0.0:
+        climb_slope, dive_slope = slopes(node.stop.airspeed, max(previous_altitude, node.up))
+        climb_slope, dive_slope = (
+            min(climb_slope, rules.climb / node.stop.airspeed),
+            min(dive_slope, rules.sink / node.stop.airspeed),
+        )
+        entry_altitude = (
+            previous_altitude
+            if rules.holds_height
+            else min(
+                max(node.up, previous_altitude - dive_slope * leg_length), previous_altitude + climb_slope * leg_length
+            )
+        )
+        altitude_change = max(0.0, abs(node.up - entry_altitude) - rules.short)
+        if altitude_change > 0.0:
             # Altitudes are interpolated between the corners, of which there is one more than intervals.
-            wanted = missing / (climb if node.up > first else dive) / radius + CORNER
+            required_sweep = (
+                altitude_change / (climb_slope if node.up > entry_altitude else dive_slope) / radius + CORNER
+            )
     elif loiter is not None:
-        wanted = loiter.sweep(node.stop.airspeed, max(radius, tightest))
+        required_sweep = loiter.sweep(node.stop.airspeed, max(radius, min_radius))
         if rules.lines_up:
-            wanted = max(0.0, wanted - _TURN_TO_TANGENT_RAD)
-    sweep = wanted
-    if onward is not None:
-        part = (side * (onward - into)) % (2.0 * math.pi)
-        early = LINED_UP if rules.lines_up else 1e-9
-        more = (wanted - part - early) / (2.0 * math.pi)
-        at_once = rules.at_middle and not rules.lines_up and loiter is not None and not loiter.to_height
-        more = math.floor(more) if at_once else math.ceil(more)
-        sweep = part + 2.0 * math.pi * max(0, more)
+            required_sweep = max(0.0, required_sweep - _TURN_TO_TANGENT_RAD)
+    sweep = required_sweep
+    if exit_course is not None:
+        sweep_to_exit = (side * (exit_course - entry_course)) % (2.0 * math.pi)
+        exit_tolerance = LINED_UP if rules.lines_up else 1e-9
+        extra_turns = (required_sweep - sweep_to_exit - exit_tolerance) / (2.0 * math.pi)
+        leaves_at_once = rules.at_middle and not rules.lines_up and loiter is not None and not loiter.to_height
+        extra_turns = math.floor(extra_turns) if leaves_at_once else math.ceil(extra_turns)
+        sweep = sweep_to_exit + 2.0 * math.pi * max(0, extra_turns)
     if sweep > MAX_STOPS * CORNER:
         turns, allowed = sweep / (2.0 * math.pi), f"at most {MAX_STOPS * CORNER / (2.0 * math.pi):,.0f} are flown"
         item = f"item {node.stop.item}"
         raise MissionError.at(source, item, turns, allowed, shown=f"{turns:,.0f} turns to loiter")
-    corners = circle_corners(node, into, sweep)
+    corners = circle_corners(node, entry_course, sweep)
     points = []
-    for k, (east, north) in enumerate(corners):
-        share = 1.0 if len(corners) == 1 else k / (len(corners) - 1)
-        points.append(RoutePoint(node.stop, (east, north, first + share * (node.up - first)), radius))
-    if onward is None and sweep > 0.0:
-        points.append(RoutePoint(node.stop, (*on_rim(node, into + side * sweep), node.up)))
+    for index, (east, north) in enumerate(corners):
+        fraction = 1.0 if len(corners) == 1 else index / (len(corners) - 1)
+        points.append(
+            RoutePoint(node.stop, (east, north, entry_altitude + fraction * (node.up - entry_altitude)), radius)
+        )
+    if exit_course is None and sweep > 0.0:
+        points.append(RoutePoint(node.stop, (*on_rim(node, entry_course + side * sweep), node.up)))
     return points

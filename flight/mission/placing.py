@@ -70,7 +70,7 @@ class PlacedLanding(NamedTuple):
 class PlacedMission:
     """Places of a mission on the map about ``origin``, with altitudes AMSL.
 
-    stops: in flying order; a stop at the position of the one before is merged with it.
+    stops: stops in flying order; a stop at the position of the previous stop is merged with it.
     notes: notes from placing them, after the itinerary's notes.
     takeoff_ground: altitude of the ground at home, m, NaN if unknown or if nothing takes off.
     landing_ground: altitude of the landing place, m, NaN if unknown or if nothing lands.
@@ -106,11 +106,11 @@ def place_stops(
 
     terrain: None if unknown; heights above terrain are then an error.
     itinerary: the mission's itinerary if it has been made already.
-    vertical_legs: True to make a leg of `VERTICAL_STEP` m of a position straight above or below the one before it,
-        which the verdict's slope rule then refuses; otherwise such a position is an error.
+    vertical_legs: True to turn a position straight above or below the one before it into a leg of `VERTICAL_STEP` m,
+        which then fails the verdict's slope rule; otherwise such a position is an error.
 
-    Two stops of the result are at least `SAME_PLACE` apart across the ground, or `VERTICAL_STEP` if vertical. Raise
-    MissionError, naming the item, for a stop that cannot be placed.
+    Successive stops of the result are at least `SAME_PLACE` apart across the ground, or `VERTICAL_STEP` if vertical.
+    Raises MissionError, naming the item, if a stop cannot be placed.
 
     >>> from flight.mission.items import Command, Frame, MissionItem
     >>> items = [MissionItem(k, Command.NAV_WAYPOINT, Frame.GLOBAL, (0.0,) * 4, 36.5, 8.0, 700.0) for k in (1, 2)]
@@ -125,13 +125,16 @@ def place_stops(
     stops = _place_stops(mission.source, itinerary, origin, heights, vertical_legs)
     takeoff_ground = math.nan if itinerary.takeoff is None else heights.ground_at_home()
     landing_ground = heights.touchdown(itinerary)
-    back, heights_back, home = mission, heights, itinerary.last_home or itinerary.home
+    return_mission, return_heights, home = mission, heights, itinerary.last_home or itinerary.home
     if home is not itinerary.home:
         # A return and its landing sequence use the home that a DO_SET_HOME set.
-        back, heights_back = replace(mission, home=home), _Heights(mission.source, home, origin, terrain, notes)
-    places = _place_returns(back, home, origin, heights_back) if itinerary.returns else ()
-    marked = tuple(_landing_starts(back, origin, heights_back)) if itinerary.returns else ()
-    landings = _place_landings(back, origin, heights_back, marked)
+        return_mission, return_heights = (
+            replace(mission, home=home),
+            _Heights(mission.source, home, origin, terrain, notes),
+        )
+    places = _place_returns(return_mission, home, origin, return_heights) if itinerary.returns else ()
+    numbered_starts = tuple(_landing_starts(return_mission, origin, return_heights)) if itinerary.returns else ()
+    landings = _place_landings(return_mission, origin, return_heights, numbered_starts)
     return PlacedMission(
         mission,
         origin,
@@ -142,7 +145,7 @@ def place_stops(
         landing_ground,
         places,
         landings,
-        tuple(start for _, start in marked),
+        tuple(start for _, start in numbered_starts),
         heights.known_home(),
     )
 
@@ -150,7 +153,7 @@ def place_stops(
 def return_places(mission: Mission, origin: GeoOrigin, terrain: Terrain | None) -> tuple[ReturnPlace, ...]:
     """Return home and the rally points of a mission on the map, home first; empty without a home.
 
-    Raise MissionError, naming the rally point, for one beyond the largest map.
+    Raises MissionError, naming the rally point, if it is beyond the largest map.
 
     >>> from flight.mission.items import Command, Frame, MissionItem
     >>> items = (MissionItem(1, Command.NAV_WAYPOINT, Frame.GLOBAL, (0.0,) * 4, 36.5, 8.0, 700.0),)
@@ -196,44 +199,44 @@ def _landing_starts(mission: Mission, origin: GeoOrigin, heights: "_Heights") ->
 
     A DO_LAND_START with nothing to fly to after it is left out.
     """
-    for k, mark in enumerate(mission.items):
-        first = next((one for one in mission.items[k + 1 :] if _is_flown_to(one)), None)
-        if mark.command != Command.DO_LAND_START or first is None:
+    for index, mark in enumerate(mission.items):
+        first_item = next((item for item in mission.items[index + 1 :] if _is_flown_to(item)), None)
+        if mark.command != Command.DO_LAND_START or first_item is None:
             continue
-        place = _place_start(first, origin, heights)
-        onward = _places_to_landing(mission.items[k + 1 :], origin, heights)[1:]
-        counted = _position_of(mark, origin, heights) if mark.has_position else place.place
-        yield k, place._replace(mark=counted, onward=onward)
+        start = _place_start(first_item, origin, heights)
+        next_places = _places_to_landing(mission.items[index + 1 :], origin, heights)[1:]
+        mark_position = _position_of(mark, origin, heights) if mark.has_position else start.place
+        yield index, start._replace(mark=mark_position, onward=next_places)
 
 
 def _place_landings(
-    mission: Mission, origin: GeoOrigin, heights: "_Heights", marked: Sequence[tuple[int, LandingStart]]
+    mission: Mission, origin: GeoOrigin, heights: "_Heights", numbered_starts: Sequence[tuple[int, LandingStart]]
 ) -> tuple[PlacedLanding, ...]:
     """Return a mission's landing sequences, without those that begin with the landing or cannot be placed."""
-    found = []
-    for k, start in marked:
+    landings = []
+    for index, start in numbered_starts:
         if start.lands:
             continue
         try:
-            itinerary = make_itinerary(replace(mission, items=mission.items[k:]))
+            itinerary = make_itinerary(replace(mission, items=mission.items[index:]))
             stops = _place_stops(mission.source, itinerary, origin, heights, vertical_legs=False)
         except MissionError:
             continue
         if itinerary.landing is not None and len(stops) > 1:
-            found.append(
+            landings.append(
                 PlacedLanding(start, tuple(stops), heights.touchdown(itinerary), itinerary.notes, itinerary.open_items)
             )
-    return tuple(found)
+    return tuple(landings)
 
 
 def landing_sequence(
     mission: Mission, origin: GeoOrigin, terrain: Terrain | None, first: int
 ) -> tuple[LandingStart, ...]:
-    """Return the places of a landing sequence, from item `first` up to the landing, without the landing itself.
+    """Return the places of a landing sequence from an item up to the landing, which is not included.
 
-    first: number of the first item.
+    first: number of that item.
 
-    Return no places for a mission without a home.
+    A mission without a home has no such places.
 
     >>> from flight.mission.items import Command, Frame, MissionItem
     >>> over, none = int(Frame.GLOBAL_RELATIVE_ALT), (0.0,) * 4
@@ -253,13 +256,13 @@ def _places_to_landing(
     items: Sequence[MissionItem], origin: GeoOrigin, heights: "_Heights"
 ) -> tuple[LandingStart, ...]:
     """Return the places of items up to the first landing."""
-    found = []
+    places = []
     for item in items:
         if item.command in LANDINGS:
             break
         if _is_flown_to(item):
-            found.append(_place_start(item, origin, heights))
-    return tuple(found)
+            places.append(_place_start(item, origin, heights))
+    return tuple(places)
 
 
 def _is_flown_to(item: MissionItem) -> bool:
@@ -291,13 +294,13 @@ def landing_places(mission: Mission, origin: GeoOrigin) -> tuple[tuple[int, floa
     >>> landing_places(Mission(None, (land,)), GeoOrigin(36.5, 8.0))
     ((2, 0.0, 0.0),)
     """
-    found = []
+    places = []
     for item in mission.items:
         if item.command in LANDINGS and item.has_position:
             stop = ItineraryStop(item.seq, item.command, item.lat_deg, item.lon_deg, item.alt, item.frame, math.nan)
             east, north = on_map(mission.source, (stop,), origin)[0].tolist()
-            found.append((item.seq, float(east), float(north)))
-    return tuple(found)
+            places.append((item.seq, float(east), float(north)))
+    return tuple(places)
 
 
 def rally_stops(mission: Mission) -> tuple[ItineraryStop, ...]:
@@ -318,7 +321,7 @@ def rally_stops(mission: Mission) -> tuple[ItineraryStop, ...]:
 def _place_returns(mission: Mission, home: Home, origin: GeoOrigin, heights: "_Heights") -> tuple[ReturnPlace, ...]:
     """Return home and the rally points on the map.
 
-    Raise MissionError, naming the rally point, for one beyond the largest map.
+    Raises MissionError, naming the rally point, if it is beyond the largest map.
     """
     east, north = to_map(origin, home.lat_deg, home.lon_deg)
     launch = ReturnPlace(float(east), float(north), heights.home_amsl())
@@ -339,33 +342,39 @@ def _place_stops(
 ) -> list[PlacedStop]:
     """Return the stops on the map, merging a stop with the one before at the same position."""
     notes = heights.notes
-    flat = on_map(source, itinerary.stops, origin)
-    kept: list[PlacedStop] = []
-    for stop, (east, north) in zip(itinerary.stops, flat, strict=True):
-        last = float(kept[-1].position[2]) if kept else math.nan
-        new = PlacedStop(stop, np.array([east, north, heights.amsl(stop, float(east), float(north), last)]))
-        circles = stop.loiter is not None or bool(kept and kept[-1].stop.loiter is not None)
-        circles = circles or stop.command == Command.NAV_RETURN_TO_LAUNCH
-        if kept and not circles and math.dist(kept[-1].position[:2], new.position[:2]) < SAME_PLACE:
-            if vertical_legs and _is_vertical(kept[-1], new):
-                kept.append(PlacedStop(stop, _offset_vertical_leg(kept, new.position)))
+    map_positions = on_map(source, itinerary.stops, origin)
+    placed_stops: list[PlacedStop] = []
+    for stop, (east, north) in zip(itinerary.stops, map_positions, strict=True):
+        previous_altitude = float(placed_stops[-1].position[2]) if placed_stops else math.nan
+        new = PlacedStop(
+            stop, np.array([east, north, heights.amsl(stop, float(east), float(north), previous_altitude)])
+        )
+        is_loiter_or_return = stop.loiter is not None or bool(placed_stops and placed_stops[-1].stop.loiter is not None)
+        is_loiter_or_return = is_loiter_or_return or stop.command == Command.NAV_RETURN_TO_LAUNCH
+        if (
+            placed_stops
+            and not is_loiter_or_return
+            and math.dist(placed_stops[-1].position[:2], new.position[:2]) < SAME_PLACE
+        ):
+            if vertical_legs and _is_vertical(placed_stops[-1], new):
+                placed_stops.append(PlacedStop(stop, _offset_vertical_leg(placed_stops, new.position)))
                 continue
-            kept[-1] = PlacedStop(_merge_stops(source, kept[-1], new, notes), kept[-1].position)
+            placed_stops[-1] = PlacedStop(_merge_stops(source, placed_stops[-1], new, notes), placed_stops[-1].position)
         else:
-            kept.append(new)
-    return kept
+            placed_stops.append(new)
+    return placed_stops
 
 
 def on_map(source: str, stops: tuple[ItineraryStop, ...], origin: GeoOrigin) -> Floats:
     """Return east and north of each stop, (n, 2) m.
 
-    Raise MissionError, naming the item, for a stop beyond the largest map.
+    Raises MissionError, naming the item, if a stop is beyond the largest map.
     """
     east, north = to_map(origin, [stop.lat_deg for stop in stops], [stop.lon_deg for stop in stops])
     points = np.stack([east, north], axis=1)
-    far = ~(np.abs(points) <= MAP_EXTENT).all(axis=1)
-    if far.any():
-        stop = stops[int(np.argmax(far))]
+    is_outside = ~(np.abs(points) <= MAP_EXTENT).all(axis=1)
+    if is_outside.any():
+        stop = stops[int(np.argmax(is_outside))]
         raise MissionError(
             f"{source}: {_stop_name(stop)}: latitude {stop.lat_deg:.7f}, longitude {stop.lon_deg:.7f}: more than"
             f" {MAP_EXTENT / 1000:.0f} km from the map's origin at {origin.lat_deg:.5f}, {origin.lon_deg:.5f}"
@@ -388,40 +397,40 @@ class _Heights:
         self.home = home
         self._home_amsl: float | None = None
 
-    def amsl(self, stop: ItineraryStop, east: float, north: float, last: float) -> float:
+    def amsl(self, stop: ItineraryStop, east: float, north: float, previous_altitude: float) -> float:
         """Return the altitude of a stop, m AMSL.
 
-        last: altitude of the stop before, NaN at the first.
+        previous_altitude: altitude of the stop before, m AMSL, NaN at the first.
         """
         if math.isnan(stop.alt):
-            if math.isnan(last):
+            if math.isnan(previous_altitude):
                 message = f"{self.source}: {_stop_name(stop)}: no altitude, and no earlier item has one to keep"
                 raise MissionError(message, file=self.source, field="altitude")
-            return last
+            return previous_altitude
         if stop.frame in AMSL:
-            height = stop.alt
+            altitude = stop.alt
         elif stop.frame in OVER_HOME:
-            height = self.home_amsl() + stop.alt
+            altitude = self.home_amsl() + stop.alt
         else:
-            height = self._ground_below(stop, east, north) + stop.alt
-        if not LOWEST <= height <= HIGHEST:
+            altitude = self._ground_below(stop, east, north) + stop.alt
+        if not LOWEST <= altitude <= HIGHEST:
             allowed = f"allowed {LOWEST:.0f}..{HIGHEST:.0f}"
-            raise MissionError.at(self.source, _stop_name(stop), height, allowed, shown=f"{height:.1f} m AMSL")
-        return height
+            raise MissionError.at(self.source, _stop_name(stop), altitude, allowed, shown=f"{altitude:.1f} m AMSL")
+        return altitude
 
     def _ground_below(self, stop: ItineraryStop, east: float, north: float) -> float:
         terrain = self.terrain
-        under = math.nan if terrain is None else float(terrain.height(east, north))
-        if math.isnan(under):
-            asked = f"{self.source}: {_stop_name(stop)}: height above terrain (frame {stop.frame})"
-            lacks = "no terrain is given for it" if terrain is None else f"{terrain.source} has no data there"
-            raise MissionError(f"{asked}: {lacks}", file=self.source, field="frame", value=stop.frame)
-        return under
+        ground = math.nan if terrain is None else float(terrain.height(east, north))
+        if math.isnan(ground):
+            request = f"{self.source}: {_stop_name(stop)}: height above terrain (frame {stop.frame})"
+            reason = "no terrain is given for it" if terrain is None else f"{terrain.source} has no data there"
+            raise MissionError(f"{request}: {reason}", file=self.source, field="frame", value=stop.frame)
+        return ground
 
     def home_amsl(self) -> float:
         """Return the altitude that heights above home are relative to, m AMSL."""
         if self._home_amsl is None:
-            self._home_amsl = self._find_home(self.home)
+            self._home_amsl = self._find_home_amsl(self.home)
         return self._home_amsl
 
     def touchdown(self, itinerary: Itinerary) -> float:
@@ -432,12 +441,12 @@ class _Heights:
         stop = itinerary.landing
         if stop is None or math.isnan(stop.alt):
             return math.nan
-        known = stop.frame in AMSL or self.terrain is not None
+        is_known = stop.frame in AMSL or self.terrain is not None
         if stop.frame in OVER_HOME:
-            before = itinerary.stops[-2].frame if len(itinerary.stops) > 1 else stop.frame
-            known = known or not math.isnan(self.home.alt) or before in OVER_HOME
+            previous_frame = itinerary.stops[-2].frame if len(itinerary.stops) > 1 else stop.frame
+            is_known = is_known or not math.isnan(self.home.alt) or previous_frame in OVER_HOME
         east, north = to_map(self.origin, stop.lat_deg, stop.lon_deg)
-        return self.amsl(stop, float(east), float(north), math.nan) if known else math.nan
+        return self.amsl(stop, float(east), float(north), math.nan) if is_known else math.nan
 
     def ground_at_home(self) -> float:
         """Return the altitude of the ground at home, NaN if unknown."""
@@ -452,59 +461,61 @@ class _Heights:
         """Return the altitude of home, or of the ground there if home states none, m AMSL; NaN if unknown."""
         return self.ground_at_home() if math.isnan(self.home.alt) else self.home.alt
 
-    def _find_home(self, home: Home) -> float:
-        under = self.ground_at_home()
+    def _find_home_amsl(self, home: Home) -> float:
+        ground = self.ground_at_home()
         if not math.isnan(home.alt):
-            if abs(home.alt - under) > _HOME_ALTITUDE_TOLERANCE_M:
-                unset = "" if home.alt else "; ground stations write 0 where no home was set"
+            if abs(home.alt - ground) > _HOME_ALTITUDE_TOLERANCE_M:
+                hint = "" if home.alt else "; ground stations write 0 where no home was set"
                 self.notes.add(
-                    f"home is at {home.alt:.1f} m AMSL, and the ground there at {under:.1f} m:"
-                    f" heights over home count from the former{unset}"
+                    f"home is at {home.alt:.1f} m AMSL, and the ground there at {ground:.1f} m:"
+                    f" heights over home count from the former{hint}"
                 )
             return home.alt
-        if math.isnan(under):
+        if math.isnan(ground):
             self.notes.add("no home height, and no terrain to take one from: heights over home count from 0 m AMSL")
             return 0.0
         self.notes.add(
-            f"no home height: taken as the ground at {home.lat_deg:.7f}, {home.lon_deg:.7f}, {under:.1f} m AMSL"
+            f"no home height: taken as the ground at {home.lat_deg:.7f}, {home.lon_deg:.7f}, {ground:.1f} m AMSL"
         )
-        return under
+        return ground
 
 
-def _is_vertical(kept: PlacedStop, new: PlacedStop) -> bool:
+def _is_vertical(previous: PlacedStop, new: PlacedStop) -> bool:
     """Return True if a stop is straight above or below the one before, and is not a take-off."""
-    return abs(float(new.position[2] - kept.position[2])) >= SAME_PLACE and new.stop.command not in TAKEOFFS
+    return abs(float(new.position[2] - previous.position[2])) >= SAME_PLACE and new.stop.command not in TAKEOFFS
 
 
-def _offset_vertical_leg(kept: list[PlacedStop], point: Floats) -> Floats:
+def _offset_vertical_leg(stops: list[PlacedStop], point: Floats) -> Floats:
     """Return the last position, moved by `VERTICAL_STEP` m along its course and to the altitude of `point`.
 
     Without a course the last position is moved to the east.
     """
     course = math.pi / 2.0
-    if len(kept) > 1:
-        course = float(leg_courses(np.array([kept[-2].position, kept[-1].position]))[0])
-    east, north, _ = kept[-1].position
+    if len(stops) > 1:
+        course = float(leg_courses(np.array([stops[-2].position, stops[-1].position]))[0])
+    east, north, _ = stops[-1].position
     return np.array([east + VERTICAL_STEP * math.sin(course), north + VERTICAL_STEP * math.cos(course), point[2]])
 
 
-def _merge_stops(source: str, kept: PlacedStop, new: PlacedStop, notes: Notes) -> ItineraryStop:
+def _merge_stops(source: str, previous: PlacedStop, new: PlacedStop, notes: Notes) -> ItineraryStop:
     """Merge a stop with the one before it at the same place; return the merged stop."""
-    before, after = kept.stop, new.stop
-    climb = float(new.position[2] - kept.position[2])
+    before, new_stop = previous.stop, new.stop
+    climb = float(new.position[2] - previous.position[2])
     if abs(climb) >= SAME_PLACE:
-        side = "above" if climb > 0.0 else "below"
-        if after.command not in TAKEOFFS:
+        direction = "above" if climb > 0.0 else "below"
+        if new_stop.command not in TAKEOFFS:
             raise MissionError(
-                f"{source}: {_stop_name(after)}: {abs(climb):.1f} m straight {side} {_stop_name(before)}:"
+                f"{source}: {_stop_name(new_stop)}: {abs(climb):.1f} m straight {direction} {_stop_name(before)}:"
                 " no fixed wing flies that; two places must be identical, or at least 1 m apart over the ground",
                 file=source,
-                field=_stop_name(after),
+                field=_stop_name(new_stop),
             )
-        notes.add(f"the {abs(climb):.0f} m to climb or sink on the spot are flown on the leg that follows", after.item)
+        notes.add(
+            f"the {abs(climb):.0f} m to climb or sink on the spot are flown on the leg that follows", new_stop.item
+        )
     else:
-        notes.add(f"at the place of {_stop_name(before)}: merged with it", after.item)
-    return before if before.item >= 0 else after
+        notes.add(f"at the place of {_stop_name(before)}: merged with it", new_stop.item)
+    return before if before.item >= 0 else new_stop
 
 
 def _stop_name(stop: ItineraryStop) -> str:

@@ -41,21 +41,21 @@ def field_notes(
     rules: return rules of the autopilot.
     parameters: the autopilot's parameters by name, as far as they are stated.
     """
-    beyond: tuple[str, ...] = ()
+    rally_problems: tuple[str, ...] = ()
     try:
         places = return_places(mission, scenario.origin, scenario.terrain)
     except MissionError as error:
         # Rally points left over from another field: only a return would fly to them, and such a return is refused
         # itself.
-        places, beyond = (), (str(error),)
+        places, rally_problems = (), (str(error),)
     return (
-        *beyond,
+        *rally_problems,
         *_note_tail_winds(route, scenario),
         *_note_distant_home(mission, scenario),
         *_note_rally_points(places[1:], route, scenario, rules),
         *_note_low_return(places[:1], scenario, rules),
         *_note_forbidden_landing_sequence(mission, parameters),
-        *_landing_ground(mission, route, scenario),
+        *_note_landing_ground(mission, route, scenario),
     )
 
 
@@ -65,25 +65,28 @@ def _note_tail_winds(route: Route, scenario: Scenario) -> Iterator[str]:
     launch, landing = scenario.launch, scenario.landing
     ends = []
     if launch is not None and not math.isnan(route.takeoff_ground):
-        stated = launch.course
-        ends.append(("launch", float(courses[0]) if stated is None else stated, route.takeoff_ground))
+        stated_course = launch.course
+        ends.append(("launch", float(courses[0]) if stated_course is None else stated_course, route.takeoff_ground))
     if landing is not None and not math.isnan(route.landing_ground):
         ends.append(("landing", float(courses[-1]), route.landing_ground))
-    for name, course, up in ends:
-        tail = scenario.wind.along(course, up)[0]
-        if tail > CALM:
-            yield f"{name}: {tail:.1f} m/s of wind from behind on {round(math.degrees(course)) % 360}°"
+    for name, course, altitude in ends:
+        tail_wind = scenario.wind.along(course, altitude)[0]
+        if tail_wind > CALM:
+            yield f"{name}: {tail_wind:.1f} m/s of wind from behind on {round(math.degrees(course)) % 360}°"
 
 
 def _note_distant_home(mission: Mission, scenario: Scenario) -> Iterator[str]:
-    """Note a mission's home that is far from the scenario's home, where the launch is."""
-    home, stated = mission.home, scenario.home
-    if home is None or stated is None:
+    """Note a mission's home that is far from the launch at the scenario's home."""
+    home, scenario_home = mission.home, scenario.home
+    if home is None or scenario_home is None:
         return
     east, north = to_map(scenario.origin, home.lat_deg, home.lon_deg)
-    away = math.dist((float(east), float(north)), stated[:2])
-    if away > HOME_APART:
-        yield f"the mission's home is {away:.0f} m from the scenario's: after a launch there, heights count from there"
+    distance = math.dist((float(east), float(north)), scenario_home[:2])
+    if distance > HOME_APART:
+        yield (
+            f"the mission's home is {distance:.0f} m from the scenario's:"
+            " after a launch there, heights count from there"
+        )
 
 
 def _note_rally_points(
@@ -92,22 +95,27 @@ def _note_rally_points(
     """Note rally points below ground, and those beyond the distance limit of every return from the route."""
     for point in points:
         name = f"rally point {point.number}"
-        under = math.nan if scenario.terrain is None else float(scenario.terrain.height(point.east, point.north))
-        up = point.up + rules.rally_height
-        if up <= under:
-            yield f"{name} is {under - up:.0f} m under the ground there: {up:.0f} m AMSL, the ground {under:.0f} m"
-        away = _distance_from_path(route.waypoints, (point.east, point.north))
-        if 0.0 < rules.rally_limit < away:
+        ground = math.nan if scenario.terrain is None else float(scenario.terrain.height(point.east, point.north))
+        altitude = point.up + rules.rally_height
+        if altitude <= ground:
+            yield (
+                f"{name} is {ground - altitude:.0f} m under the ground there:"
+                f" {altitude:.0f} m AMSL, the ground {ground:.0f} m"
+            )
+        distance = _distance_from_path(route.waypoints, (point.east, point.north))
+        if 0.0 < rules.rally_limit < distance:
             limit = f"RALLY_LIMIT_KM {rules.rally_limit / 1000.0:g}"
-            yield f"{name} is {away / 1000.0:.1f} km from the mission or more, beyond {limit}: no return flies to it"
+            yield (
+                f"{name} is {distance / 1000.0:.1f} km from the mission or more, beyond {limit}: no return flies to it"
+            )
 
 
-def _distance_from_path(way: Floats, spot: tuple[float, float]) -> float:
+def _distance_from_path(waypoints: Floats, point: tuple[float, float]) -> float:
     """Return the smallest horizontal distance of a point from a path (w, 3), m."""
-    begin, step = way[:-1, :2], np.diff(way[:, :2], axis=0)
-    length2 = np.maximum(1e-12, (step**2).sum(axis=1))
-    share = np.clip(((np.array(spot) - begin) * step).sum(axis=1) / length2, 0.0, 1.0)
-    return float(np.hypot(*(begin + share[:, None] * step - np.array(spot)).T).min())
+    leg_starts, leg_vectors = waypoints[:-1, :2], np.diff(waypoints[:, :2], axis=0)
+    squared_lengths = np.maximum(1e-12, (leg_vectors**2).sum(axis=1))
+    fractions = np.clip(((np.array(point) - leg_starts) * leg_vectors).sum(axis=1) / squared_lengths, 0.0, 1.0)
+    return float(np.hypot(*(leg_starts + fractions[:, None] * leg_vectors - np.array(point)).T).min())
 
 
 def _note_low_return(home: tuple[ReturnPlace, ...], scenario: Scenario, rules: ReturnRules) -> Iterator[str]:
@@ -115,9 +123,11 @@ def _note_low_return(home: tuple[ReturnPlace, ...], scenario: Scenario, rules: R
     if not home or scenario.terrain is None or math.isnan(rules.height):
         return
     radius = max(MIN_CIRCLE, abs(rules.radius))
-    angle = np.linspace(0.0, 2.0 * math.pi, _DIRECTION_COUNT, endpoint=False)
-    reach = np.linspace(0.0, radius, _RING_COUNT)[:, None]
-    ground = scenario.terrain.height(home[0].east + reach * np.sin(angle), home[0].north + reach * np.cos(angle))
+    angles = np.linspace(0.0, 2.0 * math.pi, _DIRECTION_COUNT, endpoint=False)
+    distances = np.linspace(0.0, radius, _RING_COUNT)[:, None]
+    ground = scenario.terrain.height(
+        home[0].east + distances * np.sin(angles), home[0].north + distances * np.cos(angles)
+    )
     highest = float(np.nanmax(ground, initial=-math.inf)) - home[0].up
     if highest >= rules.height:
         yield (
@@ -128,9 +138,9 @@ def _note_low_return(home: tuple[ReturnPlace, ...], scenario: Scenario, rules: R
 
 def _note_forbidden_landing_sequence(mission: Mission, parameters: Mapping[str, float]) -> Iterator[str]:
     """Note a landing sequence that a parameter forbids: ArduPlane's check before arming (AP_Arming.cpp)."""
-    marks = [item.seq for item in mission.items if item.command == Command.DO_LAND_START]
-    if marks and parameters.get("RTL_AUTOLAND") == 0.0:
-        yield f"item {marks[0]}: DO_LAND_START with RTL_AUTOLAND 0: ArduPlane does not arm"
+    start_numbers = [item.seq for item in mission.items if item.command == Command.DO_LAND_START]
+    if start_numbers and parameters.get("RTL_AUTOLAND") == 0.0:
+        yield f"item {start_numbers[0]}: DO_LAND_START with RTL_AUTOLAND 0: ArduPlane does not arm"
 
 
 # Text for level ground.
@@ -144,13 +154,13 @@ def _slope_text(slope: float) -> str:
 
 
 def landing_slopes(mission: Mission, route: Route, scenario: Scenario) -> tuple[float, float] | None:
-    """Return the slopes of the ground along and across a landing for which the scenario states no strip, m per m.
+    """Return the slopes of the ground along and across a landing without a stated strip, m per m.
 
-    NaN if the ground is not known; None without such a landing.
+    Return NaN if the ground is not known, and None if there is no such landing.
     """
-    last = int(route.items[-1])
-    lands = any(item.seq == last and item.command == Command.NAV_LAND for item in mission.items)
-    if scenario.landing is not None or not lands:
+    last_item = int(route.items[-1])
+    has_landing = any(item.seq == last_item and item.command == Command.NAV_LAND for item in mission.items)
+    if scenario.landing is not None or not has_landing:
         return None
     if scenario.terrain is None:
         return math.nan, math.nan
@@ -158,26 +168,26 @@ def landing_slopes(mission: Mission, route: Route, scenario: Scenario) -> tuple[
     return strip_slopes(scenario.terrain, LandingStrip(east, north), float(leg_courses(route.waypoints)[-1]))
 
 
-def _landing_ground(mission: Mission, route: Route, scenario: Scenario) -> Iterator[str]:
-    """Note what is known of the ground at a landing for which the scenario states no strip."""
-    last = int(route.items[-1])
+def _note_landing_ground(mission: Mission, route: Route, scenario: Scenario) -> Iterator[str]:
+    """Note the known ground at a landing without a stated strip."""
+    last_item = int(route.items[-1])
     slopes = landing_slopes(mission, route, scenario)
     if slopes is None:
         return
     course = float(leg_courses(route.waypoints)[-1])
     wind = ""
     if not math.isnan(route.landing_ground):
-        tail = scenario.wind.along(course, route.landing_ground)[0]
-        wind = f", with {tail:.1f} m/s of wind from behind" if tail > CALM else wind
-        wind = f", against {-tail:.1f} m/s of wind" if tail < -CALM else wind
+        tail_wind = scenario.wind.along(course, route.landing_ground)[0]
+        wind = f", with {tail_wind:.1f} m/s of wind from behind" if tail_wind > CALM else wind
+        wind = f", against {-tail_wind:.1f} m/s of wind" if tail_wind < -CALM else wind
     ground = "the ground there is not known"
     length = LandingStrip(0.0, 0.0).length
-    if not any(math.isnan(one) for one in slopes):
-        along, across = (_slope_text(one) for one in slopes)
+    if not any(math.isnan(slope) for slope in slopes):
+        along, across = (_slope_text(slope) for slope in slopes)
         ground = f"over {length:.0f} m around its point the ground {along} along it, and {across} to the right"
         if along == across == _LEVEL_TEXT:
             ground = f"over {length:.0f} m around its point the ground {_LEVEL_TEXT}"
-        if max(abs(one) for one in slopes) > STEEPEST_STRIP:
+        if max(abs(slope) for slope in slopes) > STEEPEST_STRIP:
             ground += f" ({STEEPEST_STRIP:.0%} is the limit for a plan's landing)"
-    unknown = "no [landing] states its strip, so touch-down and roll-out are not judged"
-    yield f"item {last}: lands on {round(math.degrees(course)) % 360}°{wind}; {ground}; {unknown}"
+    strip_text = "no [landing] states its strip, so touch-down and roll-out are not judged"
+    yield f"item {last_item}: lands on {round(math.degrees(course)) % 360}°{wind}; {ground}; {strip_text}"

@@ -87,7 +87,7 @@ def nearest_landing(here: Place, landings: Sequence[LandingStart]) -> LandingSta
     >>> nearest_landing((0.0, 0.0, 50.0), [far, near]).item, nearest_landing((0.0, 0.0, 50.0), [])
     (12, None)
     """
-    return min(landings, key=lambda one: math.dist(here, one.mark), default=None)
+    return min(landings, key=lambda landing: math.dist(here, landing.mark), default=None)
 
 
 # Note on a return that the autopilot continues to a landing sequence, and that the route does not.
@@ -189,11 +189,12 @@ class ReturnAbility(NamedTuple):
     airspeed: float
 
 
-def choose_target(rules: ReturnRules, here: Place, home: ReturnPlace, rally: Sequence[ReturnPlace]) -> ReturnTarget:
-    """Return the destination of a return from ``here``: the nearest rally point, or home.
+def choose_target(rules: ReturnRules, start: Place, home: ReturnPlace, rally: Sequence[ReturnPlace]) -> ReturnTarget:
+    """Return the destination of a return: the nearest rally point, or home.
 
-    The distance limit applies to the nearest rally point only: beyond it the return goes home, at any distance.
-    here: east, north, up, m AMSL.
+    If the nearest rally point is beyond the distance limit, the return goes home, at any distance.
+
+    start: east, north, up at the start of the return, m AMSL.
 
     >>> home, near, far = (ReturnPlace(*at) for at in ((300.0, 0.0, 400.0), (1000.0, 0.0, 500.0), (0.0, 5000.0, 500.0)))
     >>> choose_target(ReturnRules(), (0.0, 0.0, 700.0), home, [far, near])[:3]
@@ -201,65 +202,76 @@ def choose_target(rules: ReturnRules, here: Place, home: ReturnPlace, rally: Seq
     >>> choose_target(ReturnRules(rally_limit=900.0), (0.0, 0.0, 700.0), home, [near])[:2]
     ((300.0, 0.0, 500.0), 'home')
     """
-    height = here[2] if math.isnan(rules.height) else home.up + rules.height
-    to_home = _distance(here, home)
+    height = start[2] if math.isnan(rules.height) else home.up + rules.height
+    home_distance = _distance(start, home)
     go_home = ReturnTarget(
-        (home.east, home.north, height), "home", "", to_home, _LEVEL_SLOPE_BASE_M * rules.holds_height
+        (home.east, home.north, height), "home", "", home_distance, _LEVEL_SLOPE_BASE_M * rules.holds_height
     )
     if not rally:
         return go_home
-    nearest = min(range(len(rally)), key=lambda k: _distance(here, rally[k]))
-    away = _distance(here, rally[nearest])
-    name = f"rally point {rally[nearest].number or nearest + 1}"
-    if 0.0 < rules.rally_limit < away:
+    index = min(range(len(rally)), key=lambda k: _distance(start, rally[k]))
+    distance = _distance(start, rally[index])
+    name = f"rally point {rally[index].number or index + 1}"
+    if 0.0 < rules.rally_limit < distance:
         reason = (
-            f"{name}, the nearest, is {_distance_text(away)} away, beyond RALLY_LIMIT_KM {rules.rally_limit / 1000.0:g}"
+            f"{name}, the nearest, is {_distance_text(distance)} away,"
+            f" beyond RALLY_LIMIT_KM {rules.rally_limit / 1000.0:g}"
         )
         return go_home._replace(reason=reason)
-    if rules.includes_home and to_home <= away:
-        why = "" if rules.holds_height else " (RALLY_INCL_HOME 1)"
-        return go_home._replace(reason=f"nearer than {name}, which is {_distance_text(away)} away{why}")
-    count = f"of {len(rally)} rally points" if len(rally) > 1 else "rally point"
-    point = rally[nearest]
-    base = point.base if rules.slope_to_stated_height else _LEVEL_SLOPE_BASE_M * rules.holds_height
+    if rules.includes_home and home_distance <= distance:
+        parameter_text = "" if rules.holds_height else " (RALLY_INCL_HOME 1)"
+        return go_home._replace(reason=f"nearer than {name}, which is {_distance_text(distance)} away{parameter_text}")
+    rally_text = f"of {len(rally)} rally points" if len(rally) > 1 else "rally point"
+    point = rally[index]
+    slope_base = point.base if rules.slope_to_stated_height else _LEVEL_SLOPE_BASE_M * rules.holds_height
     return ReturnTarget(
-        (point.east, point.north, point.up + rules.rally_height), name, f"the nearest {count}", away, base
+        (point.east, point.north, point.up + rules.rally_height),
+        name,
+        f"the nearest {rally_text}",
+        distance,
+        slope_base,
     )
 
 
-def described_return(target: ReturnTarget, rules: ReturnRules, up: float, onward: str = "") -> str:
+def described_return(target: ReturnTarget, rules: ReturnRules, start_altitude: float, continuation: str = "") -> str:
     """Describe a return in a note for people.
 
-    up: altitude at which it begins, m AMSL.
-    onward: what it continues to from its loiter, "" if it stays.
+    start_altitude: altitude at which it begins, m AMSL.
+    continuation: name of the sequence that it continues to from its loiter, "" if it stays.
 
     >>> described_return(ReturnTarget((0.0, 0.0, 435.0), "home", "", 3210.0), ReturnRules(), 1090.0)
     'NAV_RETURN_TO_LAUNCH: to home, 3.2 km away, sinking 655 m on a straight slope to 435 m AMSL; circles for 60 s; ...'
     """
-    rise = target.position[2] - up
+    rise = target.position[2] - start_altitude
     reason = f" ({target.reason})" if target.reason else ""
-    way = f"sinking {-rise:.0f} m on a straight slope to" if rise <= -1.0 else f"climbing {rise:.0f} m at once to"
+    altitude_text = (
+        f"sinking {-rise:.0f} m on a straight slope to" if rise <= -1.0 else f"climbing {rise:.0f} m at once to"
+    )
     if -rise >= 1.0 and abs(target.slope_base - rise) < rules.least_slope:
-        way = f"sinking {-rise:.0f} m at once to"
+        altitude_text = f"sinking {-rise:.0f} m at once to"
     if rules.holds_height:
-        way = f"climbing {rise:.0f} m first, to"
+        altitude_text = f"climbing {rise:.0f} m first, to"
         if rise < 0.0:
-            way = f"level, and sinking {-rise:.0f} m in circles there, to"
+            altitude_text = f"level, and sinking {-rise:.0f} m in circles there, to"
     if abs(rise) < 1.0:
-        way = "at"
-    first = ""
+        altitude_text = "at"
+    climb_text = ""
     if rules.climb_first > 0.0 and not (math.isinf(rules.climb_first) and rise < -1.0):
         bank = math.degrees(rules.first_bank)
         gain = rise if math.isinf(rules.climb_first) else rules.climb_first
-        first = f"; banks no more than {bank:.0f} degrees before it has climbed {gain:.0f} m"
+        climb_text = f"; banks no more than {bank:.0f} degrees before it has climbed {gain:.0f} m"
         if math.isinf(rules.climb_first) and rise <= 1.0:
-            first = f"; banks no more than {bank:.0f} degrees until it is above that height"
+            climb_text = f"; banks no more than {bank:.0f} degrees until it is above that height"
         if gain > max(0.0, rise):
-            first += ", even above that height"
-    ends = f"from its circle on to {onward}" if onward else f"circles for {UNLIMITED:.0f} s; the mission ends there"
+            climb_text += ", even above that height"
+    end_text = (
+        f"from its circle on to {continuation}"
+        if continuation
+        else f"circles for {UNLIMITED:.0f} s; the mission ends there"
+    )
     return (
-        f"NAV_RETURN_TO_LAUNCH: to {target.name}, {_distance_text(target.distance)} away{reason}, {way}"
-        f" {target.position[2]:.0f} m AMSL{first}; {ends}"
+        f"NAV_RETURN_TO_LAUNCH: to {target.name}, {_distance_text(target.distance)} away{reason}, {altitude_text}"
+        f" {target.position[2]:.0f} m AMSL{climb_text}; {end_text}"
     )
 
 
@@ -269,32 +281,32 @@ def lay_return(
     target: ReturnTarget,
     rules: ReturnRules,
     ability: ReturnAbility,
-    onward: Place | None = None,
+    next_place: Place | None = None,
 ) -> list[RoutePoint]:
     """Return the waypoints of a return's turn, its straight leg, and the loiter at its end.
 
-    before: the route up to the return, which begins at its last point, on the course of its last leg.
+    before: route points up to the return, which begins at the last point on the course of the last leg.
     stop: the itinerary stop of the return.
-    onward: where it continues to from its loiter as soon as it has its altitude there; None if it stays.
+    next_place: place that it continues to as soon as it has its altitude in the loiter; None if it stays.
 
     The turn takes the shorter direction. Altitudes of a descent lie on the straight slope from the start of the turn to
     the target, by the position along that line, no steeper than the aircraft can fly; a climb or a small descent begins
     at once. The remaining height difference is flown in the loiter, which then lasts
     `flight.mission.itinerary.UNLIMITED` s.  A climb before the turn is flown whatever the target's altitude is.
     """
-    here = before[-1].position
-    course = _course(before[-2].position, here) if len(before) > 1 else _course(here, target.position)
+    start = before[-1].position
+    course = _course(before[-2].position, start) if len(before) > 1 else _course(start, target.position)
     radius = math.copysign(max(abs(rules.radius), ability.circle), rules.radius)
     circle = Node(stop, *target.position, radius)
     dive = min(ability.dive, rules.sink / ability.airspeed)
-    plan = _ReturnBuilder(circle, target.slope_base, rules.least_slope, ability, dive, here, onward)
-    if _distance(here, target.position) <= abs(radius) + _MIN_TANGENT_M:
+    builder = _ReturnBuilder(circle, target.slope_base, rules.least_slope, ability, dive, start, next_place)
+    if _distance(start, target.position) <= abs(radius) + _MIN_TANGENT_M:
         # The return starts inside the loiter: fly straight on to its circle.
-        plan.circle_from(*_rim_ahead(here, course, circle))
-        return plan.points
-    course = plan.turn_gently(course, rules)
-    plan.turn(course)
-    return plan.points
+        builder.circle_from(*_rim_ahead(start, course, circle))
+        return builder.points
+    course = builder.turn_gently(course, rules)
+    builder.turn(course)
+    return builder.points
 
 
 class _ReturnBuilder:
@@ -304,100 +316,111 @@ class _ReturnBuilder:
         self,
         circle: Node,
         slope_base: float,
-        least_slope: float,
+        min_slope_height: float,
         ability: ReturnAbility,
-        dive: float,
-        here: Place,
-        onward: Place | None,
+        dive_slope: float,
+        start: Place,
+        next_place: Place | None,
     ) -> None:
         self.points: list[RoutePoint] = []
         self._stop, self._circle, self._slope_base = circle.stop, circle, slope_base
-        self._least_slope, self._ability, self._dive, self._onward = least_slope, ability, dive, onward
-        self._at = self._slope_from = here
+        self._min_slope_height, self._ability, self._dive_slope, self._next_place = (
+            min_slope_height,
+            ability,
+            dive_slope,
+            next_place,
+        )
+        self._position = self._slope_start = start
         # Altitude of the climb before the turn, m; it may lie above the target.
-        self._first_climb_to = -math.inf
+        self._first_climb_altitude = -math.inf
 
     @property
     def _is_step(self) -> bool:
-        return abs(self._slope_from[2] - self._circle.up + self._slope_base) < self._least_slope
+        return abs(self._slope_start[2] - self._circle.up + self._slope_base) < self._min_slope_height
 
     @property
     def _height_difference(self) -> float:
-        return self._circle.up - self._at[2]
+        return self._circle.up - self._position[2]
 
     def turn_gently(self, course: float, rules: ReturnRules) -> float:
-        """Fly the arc at the first bank limit while that limit applies, and return the course at its end."""
+        """Fly the arc at the bank limit of the first climb, and return the course at its end."""
         climb = max(0.0, self._height_difference) if math.isinf(rules.climb_first) else rules.climb_first
         if climb <= 0.0:
             return course
-        wide = self._ability.turn_radius(course, course + math.pi, self._at[2])
-        wide *= math.tan(self._ability.max_bank) / math.tan(max(1e-3, rules.first_bank))
-        arc = self._turn_to_tangent(course, wide)
+        radius = self._ability.turn_radius(course, course + math.pi, self._position[2])
+        radius *= math.tan(self._ability.max_bank) / math.tan(max(1e-3, rules.first_bank))
+        arc = self._turn_to_tangent(course, radius)
         if arc is None:
             return course
-        node, part, onward = arc
-        sweep = min(part, climb / self._ability.climb / wide)
-        self._first_climb_to = self._at[2] + climb
+        node, full_sweep, tangent = arc
+        sweep = min(full_sweep, climb / self._ability.climb / radius)
+        self._first_climb_altitude = self._position[2] + climb
         self._add_arc(node, course, sweep)
         end = course + math.copysign(sweep, node.turn)
         self._add_waypoint(*on_rim(node, end), 0.0)
-        if sweep == part and self._first_climb_to > self._circle.up:
-            self._climb_on(onward)
-        self._first_climb_to, self._slope_from = -math.inf, self._at
-        return onward if sweep == part else end
+        if sweep == full_sweep and self._first_climb_altitude > self._circle.up:
+            self._fly_climb_leg(tangent)
+        self._first_climb_altitude, self._slope_start = -math.inf, self._position
+        return tangent if sweep == full_sweep else end
 
-    def _climb_on(self, course: float) -> None:
-        """Fly straight on to the end of the first climb, or to the loiter if that is nearer."""
+    def _fly_climb_leg(self, course: float) -> None:
+        """Fly straight to the end of the first climb, or to the loiter if that is nearer."""
         east, north = on_rim(self._circle, course)
-        run = (self._first_climb_to - self._at[2]) / self._ability.climb
-        run = min(run, math.hypot(east - self._at[0], north - self._at[1]) - _MIN_TANGENT_M)
-        if run > _MIN_TANGENT_M:
-            self._add_waypoint(self._at[0] + run * math.sin(course), self._at[1] + run * math.cos(course), 0.0)
+        length = (self._first_climb_altitude - self._position[2]) / self._ability.climb
+        length = min(length, math.hypot(east - self._position[0], north - self._position[1]) - _MIN_TANGENT_M)
+        if length > _MIN_TANGENT_M:
+            self._add_waypoint(
+                self._position[0] + length * math.sin(course), self._position[1] + length * math.cos(course), 0.0
+            )
 
     def turn(self, course: float) -> None:
         """Fly the turn to the target, the straight leg, and the loiter there."""
-        bearing = _course(self._at, (self._circle.east, self._circle.north, 0.0))
-        arc = self._turn_to_tangent(course, self._ability.turn_radius(course, bearing, self._at[2]))
-        point = Node(self._stop, *self._at)
+        bearing = _course(self._position, (self._circle.east, self._circle.north, 0.0))
+        arc = self._turn_to_tangent(course, self._ability.turn_radius(course, bearing, self._position[2]))
+        point = Node(self._stop, *self._position)
         if arc is None:
             # No tangent leads from the turn to the loiter: the corner stays sharp.
-            onward = tangent_course(point, self._circle)
+            leg_course = tangent_course(point, self._circle)
         else:
-            node, part, onward = arc
-            if abs(node.turn) * math.tan(0.5 * min(part, CORNER)) > _MIN_TANGENT_M:
-                self._add_arc(node, course, part)
-                self._add_waypoint(*on_rim(node, onward), 0.0)
+            node, sweep, leg_course = arc
+            if abs(node.turn) * math.tan(0.5 * min(sweep, CORNER)) > _MIN_TANGENT_M:
+                self._add_arc(node, course, sweep)
+                self._add_waypoint(*on_rim(node, leg_course), 0.0)
             else:
-                onward = tangent_course(point, self._circle)
-        self._add_slope_break(onward)
-        self.circle_from(*on_rim(self._circle, onward), onward)
+                leg_course = tangent_course(point, self._circle)
+        self._add_slope_break(leg_course)
+        self.circle_from(*on_rim(self._circle, leg_course), leg_course)
 
-    def _add_slope_break(self, onward: float) -> None:
-        """Add a waypoint on the straight leg where a climb or step ends, or a held altitude begins to fall."""
-        join = on_rim(self._circle, onward)
-        run = math.hypot(join[0] - self._at[0], join[1] - self._at[1])
+    def _add_slope_break(self, leg_course: float) -> None:
+        """Add a waypoint on the straight leg where a climb or step ends, or where the descent begins."""
+        join_point = on_rim(self._circle, leg_course)
+        leg_length = math.hypot(join_point[0] - self._position[0], join_point[1] - self._position[1])
         if self._height_difference > 0.0:
-            needed = self._height_difference / self._ability.climb
+            break_distance = self._height_difference / self._ability.climb
         elif self._is_step:
-            needed = -self._height_difference / self._dive
+            break_distance = -self._height_difference / self._dive_slope
         else:
-            fall = self._slope_from[2] - self._circle.up
-            begins = self._slope_base / max(1e-6, fall + self._slope_base)
-            first, last = self._slope_fraction(*self._at[:2]), self._slope_fraction(*join)
-            needed = run * (begins - first) / max(1e-6, last - first)
-        if _MIN_TANGENT_M < needed < run - _MIN_TANGENT_M:
-            east, north = (a + needed / run * (b - a) for a, b in zip(self._at[:2], join, strict=True))
+            descent = self._slope_start[2] - self._circle.up
+            break_fraction = self._slope_base / max(1e-6, descent + self._slope_base)
+            begin_fraction, end_fraction = self._slope_fraction(*self._position[:2]), self._slope_fraction(*join_point)
+            break_distance = leg_length * (break_fraction - begin_fraction) / max(1e-6, end_fraction - begin_fraction)
+        if _MIN_TANGENT_M < break_distance < leg_length - _MIN_TANGENT_M:
+            east, north = (
+                a + break_distance / leg_length * (b - a) for a, b in zip(self._position[:2], join_point, strict=True)
+            )
             self._add_waypoint(east, north, 0.0)
 
     def circle_from(self, east: float, north: float, course: float) -> None:
         """Fly to a point on the circle, and around it until its altitude is reached and its time is over."""
-        if math.hypot(east - self._at[0], north - self._at[1]) > _MIN_TANGENT_M:
+        if math.hypot(east - self._position[0], north - self._position[1]) > _MIN_TANGENT_M:
             self._add_waypoint(east, north, 0.0)
         radius = abs(self._circle.turn)
-        missing = self._height_difference
-        spiral = abs(missing) / (self._ability.climb if missing > 0.0 else self._dive) / radius
-        if self._onward is not None:
-            self._continue_to(course, spiral if abs(missing) > _LANDING_JOIN_TOLERANCE_M else 0.0, self._onward)
+        altitude_change = self._height_difference
+        spiral = abs(altitude_change) / (self._ability.climb if altitude_change > 0.0 else self._dive_slope) / radius
+        if self._next_place is not None:
+            self._continue_to(
+                course, spiral if abs(altitude_change) > _LANDING_JOIN_TOLERANCE_M else 0.0, self._next_place
+            )
             return
         sweep = spiral + max(2.0 * math.pi, UNLIMITED * self._ability.airspeed / radius)
         self._add_circle(course, sweep)
@@ -406,7 +429,7 @@ class _ReturnBuilder:
         self._add_arc(self._circle, course, sweep, on_circle=True)
         self._add_waypoint(*on_rim(self._circle, course + math.copysign(sweep, self._circle.turn)), 0.0, on_circle=True)
 
-    def _continue_to(self, course: float, spiral: float, onward: Place) -> None:
+    def _continue_to(self, course: float, spiral: float, next_place: Place) -> None:
         """Fly around the circle until its altitude is reached, and turn towards a place.
 
         The turn takes the shorter direction.
@@ -414,35 +437,41 @@ class _ReturnBuilder:
         if spiral > 0.0:
             self._add_circle(course, spiral)
             course += math.copysign(spiral, self._circle.turn)
-        self._circle = Node(self._stop, onward[0], onward[1], self._at[2])
-        radius = self._ability.turn_radius(course, _course(self._at, onward), self._at[2])
+        self._circle = Node(self._stop, next_place[0], next_place[1], self._position[2])
+        radius = self._ability.turn_radius(course, _course(self._position, next_place), self._position[2])
         arc = self._turn_to_tangent(course, radius)
         if arc is not None and radius * math.tan(0.5 * min(arc[1], CORNER)) > _MIN_TANGENT_M:
-            node, part, end = arc
-            self._add_arc(node, course, part, on_circle=True)
-            self._add_waypoint(*on_rim(node, end), 0.0, on_circle=True)
+            node, sweep, exit_course = arc
+            self._add_arc(node, course, sweep, on_circle=True)
+            self._add_waypoint(*on_rim(node, exit_course), 0.0, on_circle=True)
 
     def _turn_to_tangent(self, course: float, radius: float) -> tuple[Node, float, float] | None:
         """Return the circle, angle and final course of the arc that leads to a tangent of the target's loiter.
 
         Choose the shorter direction; return None if no tangent leads on.
         """
-        off = float(wrap(_course(self._at, (self._circle.east, self._circle.north, 0.0)) - course))
-        side = math.copysign(1.0, off)
-        found = [
-            one
-            for one in (self._turn_on_side(course, side * radius), self._turn_on_side(course, -side * radius))
-            if one
+        course_error = float(wrap(_course(self._position, (self._circle.east, self._circle.north, 0.0)) - course))
+        side = math.copysign(1.0, course_error)
+        arcs = [
+            arc
+            for arc in (self._turn_on_side(course, side * radius), self._turn_on_side(course, -side * radius))
+            if arc
         ]
-        return next((one for one in found if one[1] < _MAX_TURN_ANGLE_RAD), None)
+        return next((arc for arc in arcs if arc[1] < _MAX_TURN_ANGLE_RAD), None)
 
-    def _turn_on_side(self, course: float, turn: float) -> tuple[Node, float, float] | None:
-        east, north, up = self._at
-        node = Node(self._stop, east + turn * math.cos(course), north - turn * math.sin(course), up, turn)
+    def _turn_on_side(self, course: float, signed_radius: float) -> tuple[Node, float, float] | None:
+        east, north, up = self._position
+        node = Node(
+            self._stop,
+            east + signed_radius * math.cos(course),
+            north - signed_radius * math.sin(course),
+            up,
+            signed_radius,
+        )
         if not is_joined(node, self._circle):
             return None
-        onward = tangent_course(node, self._circle)
-        return node, (math.copysign(1.0, turn) * (onward - course)) % (2.0 * math.pi), onward
+        tangent = tangent_course(node, self._circle)
+        return node, (math.copysign(1.0, signed_radius) * (tangent - course)) % (2.0 * math.pi), tangent
 
     def _add_arc(self, node: Node, course: float, sweep: float, *, on_circle: bool = False) -> None:
         for east, north in circle_corners(node, course, sweep):
@@ -450,39 +479,51 @@ class _ReturnBuilder:
 
     def _add_waypoint(self, east: float, north: float, arc: float, *, on_circle: bool = False) -> None:
         """Add a waypoint at the altitude that the return has at this position."""
-        run = math.hypot(east - self._at[0], north - self._at[1])
-        up, top = self._at[2], max(self._circle.up, self._first_climb_to)
-        if top >= up:
-            up = min(top, up + self._ability.climb * run)
+        distance = math.hypot(east - self._position[0], north - self._position[1])
+        altitude, climb_altitude = self._position[2], max(self._circle.up, self._first_climb_altitude)
+        if climb_altitude >= altitude:
+            altitude = min(climb_altitude, altitude + self._ability.climb * distance)
         else:
-            wanted = self._circle.up if on_circle else self._slope_altitude(east, north)
-            up = max(min(up, wanted), up - self._dive * run)
-        self._at = (east, north, up)
-        self.points.append(RoutePoint(self._stop, self._at, arc))
+            target_altitude = self._circle.up if on_circle else self._slope_altitude(east, north)
+            altitude = max(min(altitude, target_altitude), altitude - self._dive_slope * distance)
+        self._position = (east, north, altitude)
+        self.points.append(RoutePoint(self._stop, self._position, arc))
 
     def _slope_altitude(self, east: float, north: float) -> float:
         """Return the altitude of the slope to the target at a point, or the target's altitude for a step."""
-        start, end = self._slope_from[2], self._circle.up
+        start_altitude, end_altitude = self._slope_start[2], self._circle.up
         if self._is_step:
-            return end
-        left = 1.0 - min(1.0, max(0.0, self._slope_fraction(east, north)))
-        return min(start, end + left * (start - end + self._slope_base))
+            return end_altitude
+        remaining_fraction = 1.0 - min(1.0, max(0.0, self._slope_fraction(east, north)))
+        return min(
+            start_altitude, end_altitude + remaining_fraction * (start_altitude - end_altitude + self._slope_base)
+        )
 
     def _slope_fraction(self, east: float, north: float) -> float:
-        """Return the fraction of the sloping line that lies behind a point."""
-        from_e, from_n, _ = self._slope_from
-        along_e, along_n = self._circle.east - from_e, self._circle.north - from_n
-        return ((east - from_e) * along_e + (north - from_n) * along_n) / max(1e-6, along_e**2 + along_n**2)
+        """Return the fraction of the sloping line that a point has passed."""
+        start_east, start_north, _ = self._slope_start
+        slope_east, slope_north = self._circle.east - start_east, self._circle.north - start_north
+        return ((east - start_east) * slope_east + (north - start_north) * slope_north) / max(
+            1e-6, slope_east**2 + slope_north**2
+        )
 
 
-def _rim_ahead(here: Place, course: float, circle: Node) -> tuple[float, float, float]:
+def _rim_ahead(position: Place, course: float, circle: Node) -> tuple[float, float, float]:
     """Return the point where a straight path from inside a circle meets the circle, and its course on the circle."""
-    off_e, off_n = here[0] - circle.east, here[1] - circle.north
-    along = off_e * math.sin(course) + off_n * math.cos(course)
-    ahead = -along + math.sqrt(max(0.0, along * along + circle.turn * circle.turn - off_e * off_e - off_n * off_n))
-    east, north = here[0] + ahead * math.sin(course), here[1] + ahead * math.cos(course)
-    outwards = math.atan2(east - circle.east, north - circle.north)
-    return east, north, outwards + math.copysign(0.5 * math.pi, circle.turn)
+    offset_east, offset_north = position[0] - circle.east, position[1] - circle.north
+    distance_past_center = offset_east * math.sin(course) + offset_north * math.cos(course)
+    distance = -distance_past_center + math.sqrt(
+        max(
+            0.0,
+            distance_past_center * distance_past_center
+            + circle.turn * circle.turn
+            - offset_east * offset_east
+            - offset_north * offset_north,
+        )
+    )
+    east, north = position[0] + distance * math.sin(course), position[1] + distance * math.cos(course)
+    bearing = math.atan2(east - circle.east, north - circle.north)
+    return east, north, bearing + math.copysign(0.5 * math.pi, circle.turn)
 
 
 def _course(a: Place, b: Place) -> float:

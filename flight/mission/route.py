@@ -22,7 +22,7 @@ from flight.mission.loiter_circles import (
     RoutePoint,
     SpiralSlopes,
     Unjoined,
-    lay_circles,
+    lay_out_waypoints,
 )
 from flight.mission.placing import HIGHEST, LOWEST, SAME_PLACE, PlacedLanding, PlacedMission, place_stops
 from flight.mission.return_path import (
@@ -136,8 +136,10 @@ class Route:
         """Index of the waypoint at which a return joins the landing sequence, or one beyond the last."""
         if self.return_from < 0:
             return len(self.waypoints)
-        own = self.items[self.return_from + 1 :] == self.items[self.return_from + 1]
-        return self.return_from + 1 + int(np.argmin(own)) if not own.all() else len(self.waypoints)
+        is_return_item = self.items[self.return_from + 1 :] == self.items[self.return_from + 1]
+        return (
+            self.return_from + 1 + int(np.argmin(is_return_item)) if not is_return_item.all() else len(self.waypoints)
+        )
 
 
 def ends_at_plain_waypoint(route: Route, mission: Mission) -> bool:
@@ -147,8 +149,13 @@ def ends_at_plain_waypoint(route: Route, mission: Mission) -> bool:
     >>> ends_at_plain_waypoint(route, Mission(None, ()))
     False
     """
-    last = next((item for item in mission.items if item.seq == route.items[-1]), None)
-    return last is not None and last.command in PLACES and loiter_of(last) is None and route.return_to is None
+    final_item = next((item for item in mission.items if item.seq == route.items[-1]), None)
+    return (
+        final_item is not None
+        and final_item.command in PLACES
+        and loiter_of(final_item) is None
+        and route.return_to is None
+    )
 
 
 def part_of_route(route: Route, first: int, last: int) -> Route:
@@ -161,17 +168,17 @@ def part_of_route(route: Route, first: int, last: int) -> Route:
     """
     if (first, last) == (0, route.legs):
         return route
-    points = slice(first, last + 1)
+    waypoint_range = slice(first, last + 1)
     return replace(
         route,
-        waypoints=route.waypoints[points],
+        waypoints=route.waypoints[waypoint_range],
         airspeed=route.airspeed[first:last],
-        acceptance=route.acceptance[points],
-        fly_over=route.fly_over[points],
-        items=route.items[points],
-        arcs=route.arcs[points],
-        stops=route.stops[points],
-        **{name: getattr(route, name)[points] for name in ROUTE_COLUMNS_WITH_NAN},
+        acceptance=route.acceptance[waypoint_range],
+        fly_over=route.fly_over[waypoint_range],
+        items=route.items[waypoint_range],
+        arcs=route.arcs[waypoint_range],
+        stops=route.stops[waypoint_range],
+        **{name: getattr(route, name)[waypoint_range] for name in ROUTE_COLUMNS_WITH_NAN},
         endless=-1,
         takeoff_ground=route.takeoff_ground if first == 0 else math.nan,
         landing_ground=route.landing_ground if last == route.legs else math.nan,
@@ -244,9 +251,9 @@ def fly_over_waypoints(
     >>> [is_flown_over(0.0, lambda turn, amsl: distance) for distance in (10.0, 90.0)]
     [True, False]
     """
-    out = np.zeros(len(points), dtype=np.bool_)
+    is_flown_over = np.zeros(len(points), dtype=np.bool_)
     if limits is None:
-        return out
+        return is_flown_over
     courses, turns = leg_courses(points), np.abs(signed_turns(points))
     tables = {float(speed): limits.performance(float(speed)) for speed in set(airspeed.tolist())}
     for i in range(1, len(points) - 1):
@@ -257,12 +264,12 @@ def fly_over_waypoints(
         if turn == 0.0 or not math.isfinite(radius):
             continue
         if acceptance[i] > 0.0:
-            out[i] = fly_by_offset(turn, radius) > acceptance[i]
+            is_flown_over[i] = fly_by_offset(turn, radius) > acceptance[i]
         elif turn_distance is None:
-            out[i] = turn > SHARPEST_FLY_BY_RAD
+            is_flown_over[i] = turn > SHARPEST_FLY_BY_RAD
         else:
-            out[i] = fly_by_offset(turn, radius) > turn_distance(turn, float(points[i, 2]))
-    return out
+            is_flown_over[i] = fly_by_offset(turn, radius) > turn_distance(turn, float(points[i, 2]))
+    return is_flown_over
 
 
 # ----------------------------------------------------------------------
@@ -279,9 +286,9 @@ _MIN_COURSE_CHANGE_RAD = math.radians(0.5)
 def with_end_courses(route: Route, scenario: Scenario, limits: Limits) -> Route:
     """Start a route on the scenario's start course, and end it on its destination course.
 
-    A level lead-in leg before the first waypoint, or lead-out leg after the last, is as long as the turn's tangent and
-    `END_LEG_LENGTH`, so that the turn onto the first leg, or off the last, is flown and judged as any other. A route
-    that ends elsewhere, or whose scenario states no course, stays as it is.
+    A level lead-in leg before the first waypoint, or lead-out leg after the last, is as long as the turn's tangent plus
+    `END_LEG_LENGTH`. The turn onto the first leg, or off the last, is therefore flown and judged like any other. A
+    route that ends elsewhere, or whose scenario states no course, is unchanged.
 
     >>> from types import SimpleNamespace
     >>> from world.scenario import load_scenario
@@ -301,9 +308,9 @@ def with_end_courses(route: Route, scenario: Scenario, limits: Limits) -> Route:
         lead_in = _lead_point(points[0], scenario.start_course, float(courses[0]), limits, -1.0)
     if scenario.destination_course is not None and math.dist(points[-1], scenario.destination) < _SAME_END_M:
         lead_out = _lead_point(points[-1], scenario.destination_course, float(courses[-1]), limits, 1.0)
-    head = 0 if lead_in is None else 1
-    tail = 0 if lead_out is None else 1
-    if not head + tail:
+    lead_in_count = 0 if lead_in is None else 1
+    lead_out_count = 0 if lead_out is None else 1
+    if not lead_in_count + lead_out_count:
         return route
     started = route.started
     if lead_in is not None:
@@ -311,38 +318,45 @@ def with_end_courses(route: Route, scenario: Scenario, limits: Limits) -> Route:
         started += f"; on the scenario's start course, from a lead-in leg of {length:.0f} m"
     # Acceptance radii at the ends of the mission do not apply to turns that it does not have.
     acceptance = np.array(route.acceptance)
-    acceptance[:head], acceptance[len(acceptance) - tail :] = 0.0, 0.0
-    chain = [point for point in (lead_in, *points, lead_out) if point is not None]
+    acceptance[:lead_in_count], acceptance[len(acceptance) - lead_out_count :] = 0.0, 0.0
+    all_points = [point for point in (lead_in, *points, lead_out) if point is not None]
     padded: dict[str, Any] = {
-        name: np.pad(getattr(route, name), (head, tail), constant_values=math.nan) for name in ROUTE_COLUMNS_WITH_NAN
+        name: np.pad(getattr(route, name), (lead_in_count, lead_out_count), constant_values=math.nan)
+        for name in ROUTE_COLUMNS_WITH_NAN
     }
     return replace(
         route,
-        waypoints=np.array(chain),
-        airspeed=np.pad(route.airspeed, (head, tail), mode="edge"),
-        acceptance=np.pad(acceptance, (head, tail)),
-        fly_over=np.pad(route.fly_over, (head, tail), mode="edge"),
-        items=np.pad(route.items, (head, tail), constant_values=-1),
-        arcs=np.pad(route.arcs, (head, tail)),
+        waypoints=np.array(all_points),
+        airspeed=np.pad(route.airspeed, (lead_in_count, lead_out_count), mode="edge"),
+        acceptance=np.pad(acceptance, (lead_in_count, lead_out_count)),
+        fly_over=np.pad(route.fly_over, (lead_in_count, lead_out_count), mode="edge"),
+        items=np.pad(route.items, (lead_in_count, lead_out_count), constant_values=-1),
+        arcs=np.pad(route.arcs, (lead_in_count, lead_out_count)),
         **padded,
-        stops=np.concatenate([np.arange(head), route.stops + head, route.stops[-1:] + head + np.arange(1, tail + 1)]),
+        stops=np.concatenate(
+            [
+                np.arange(lead_in_count),
+                route.stops + lead_in_count,
+                route.stops[-1:] + lead_in_count + np.arange(1, lead_out_count + 1),
+            ]
+        ),
         started=started,
-        return_from=route.return_from + (head if route.return_from >= 0 else 0),
-        straight_to=route.straight_to + (head if route.straight_to >= 0 else 0),
+        return_from=route.return_from + (lead_in_count if route.return_from >= 0 else 0),
+        straight_to=route.straight_to + (lead_in_count if route.straight_to >= 0 else 0),
     )
 
 
-def _lead_point(point: np.ndarray, course: float, leg: float, limits: Limits, side: float) -> np.ndarray | None:
+def _lead_point(point: np.ndarray, course: float, leg_course: float, limits: Limits, side: float) -> np.ndarray | None:
     """Return the far end of the lead-in (side -1) or lead-out leg (side 1); None if no turn is needed.
 
     point: (3,) m, end of the route.
     course: the scenario's course there, rad.
-    leg: course of the route's first or last leg, rad.
+    leg_course: course of the route's first or last leg, rad.
     """
-    turn = abs(float(wrap(course - leg)))
+    turn = abs(float(wrap(course - leg_course)))
     if turn < _MIN_COURSE_CHANGE_RAD:
         return None
-    radius = limits.turn_radius(*((course, leg) if side < 0.0 else (leg, course)), float(point[2]))
+    radius = limits.turn_radius(*((course, leg_course) if side < 0.0 else (leg_course, course)), float(point[2]))
     # A reversal has no tangent; twice the radius shows it as a sharp corner.
     tangent_length = radius * min(math.tan(min(turn, math.radians(170.0)) / 2.0), 2.0)
     step = side * ((tangent_length if math.isfinite(tangent_length) else 0.0) + END_LEG_LENGTH)
@@ -380,8 +394,8 @@ def make_route(
     rules: rules by which the autopilot flies a route.
 
     Without TAKEOFF the route starts at the first position item; with one, over home at that item's altitude. Every leg
-    has a horizontal length of at least `flight.mission.placing.SAME_PLACE`. Raise MissionError, naming the item, for a
-    place that cannot be laid out, and for a mission of fewer than two positions.
+    has a horizontal length of at least `flight.mission.placing.SAME_PLACE`. Raises MissionError, naming the item, if a
+    place cannot be laid out, or if the mission has fewer than two positions.
 
     >>> from flight.mission.items import Command, Frame, MissionItem
     >>> items = [
@@ -406,7 +420,7 @@ def lay_route(
 ) -> Route:
     """Return the route through the places of a mission; arguments as for `make_route`.
 
-    Raise MissionError for fewer than two places, and for a loiter too wide or too long to lay out.
+    Raises MissionError for fewer than two places, or for a loiter too wide or too long to lay out.
 
     >>> from flight.mission.items import Command, Frame, MissionItem
     >>> items = [MissionItem(k, Command.NAV_WAYPOINT, Frame.GLOBAL, (0.0,) * 4, 36.5 + k, 8.0, 700.0) for k in (0, 1)]
@@ -416,33 +430,35 @@ def lay_route(
     """
     mission, notes = placed.mission, Notes()
     returns, loiters, reads_as_px4, turn_distance, acceptance_limit = rules
-    places = _with_gates(placed, notes) if reads_as_px4 else list(placed.stops)
-    kept = [_with_airspeed(place, default_airspeed, reads_as_px4) for place in places]
-    returning = kept.pop() if placed.itinerary.returns else None
-    straight = None if returning is None else _direct_landing(placed, kept, returns, notes)
-    if straight is not None:
-        kept += [_with_airspeed(place, default_airspeed, reads_as_px4) for place in straight.stops]
-    lay = partial(_lay_circles, mission.source, limits, loiters, notes)
-    points, unjoined = lay(kept)
-    _note_circles(placed.itinerary, kept, loiters, notes)
-    landing, back = straight, dict[str, Any]()
-    if returning is not None and straight is None:
-        back, landing = _lay_return(placed, returning.stop, points, returns, limits, notes)
+    all_places = _with_gates(placed, notes) if reads_as_px4 else list(placed.stops)
+    places_before_return = [_with_airspeed(place, default_airspeed, reads_as_px4) for place in all_places]
+    returning = places_before_return.pop() if placed.itinerary.returns else None
+    direct_landing = None if returning is None else _direct_landing(placed, places_before_return, returns, notes)
+    if direct_landing is not None:
+        places_before_return += [
+            _with_airspeed(place, default_airspeed, reads_as_px4) for place in direct_landing.stops
+        ]
+    lay = partial(_lay_out_waypoints, mission.source, limits, loiters, notes)
+    points, unjoined = lay(places_before_return)
+    _note_circles(placed.itinerary, places_before_return, loiters, notes)
+    landing, return_fields = direct_landing, dict[str, Any]()
+    if returning is not None and direct_landing is None:
+        return_fields, landing = _lay_return(placed, returning.stop, points, returns, limits, notes)
         if landing is not None:
             points += lay([_with_airspeed(place, default_airspeed, reads_as_px4) for place in landing.stops])[0]
-    _refuse_fewer_than_two(mission.source, len(points))
+    _check_place_count(mission.source, len(points))
     stops = [point.stop for point in points]
     waypoints = np.array([point.position for point in points])
     arcs = np.array([point.arc for point in points])
     airspeed = np.array([stop.airspeed for stop in stops[1:]])
     acceptance = np.minimum([stop.acceptance for stop in stops], acceptance_limit)
     _note_cruise_speed(mission, default_airspeed, stops[1], notes)
-    over = fly_over_waypoints(waypoints, airspeed, acceptance, limits, turn_distance)
+    misses_arc = fly_over_waypoints(waypoints, airspeed, acceptance, limits, turn_distance)
     return Route(
         waypoints=waypoints,
         airspeed=airspeed,
         acceptance=acceptance,
-        fly_over=(arcs == 0.0) & (fly_over | over),
+        fly_over=(arcs == 0.0) & (fly_over | misses_arc),
         items=np.array([stop.item for stop in stops], dtype=np.int64),
         started=_start_text(placed.itinerary, stops[0], placed.origin, waypoints),
         notes=_notes_of(placed.itinerary, landing, reads_as_px4) + placed.notes + notes.lines(),
@@ -455,28 +471,28 @@ def lay_route(
         **_columns_with_nan(stops, placed.home_up),
         unjoined=unjoined if loiters.at_middle else (),  # An autopilot that flies on tangents leaves these out.
         open_items=_open_items(placed.itinerary, landing, reads_as_px4),
-        **back,
+        **return_fields,
     )
 
 
 def _columns_with_nan(stops: list[ItineraryStop], home_up: float) -> dict[str, Any]:
     """Return the columns of `ROUTE_COLUMNS_WITH_NAN`; home_up is used where a stop states no altitude of home, m."""
     return {
-        "above_ground": np.array([_held_above_ground(stop) for stop in stops]),
+        "above_ground": np.array([_height_above_ground(stop) for stop in stops]),
         "min_ground_speed": np.array([stop.min_ground_speed for stop in stops]),
         "home_up": np.array([home_up if math.isnan(stop.home_up) else stop.home_up for stop in stops]),
     }
 
 
-def _held_above_ground(stop: ItineraryStop) -> float:
-    """Return the height above ground that is held along the leg to a stop, m; NaN where the leg is straight."""
+def _height_above_ground(stop: ItineraryStop) -> float:
+    """Return the height above ground held on the leg to a stop, m; NaN for a straight leg."""
     return stop.alt if stop.frame in OVER_TERRAIN and stop.command in PLACES else math.nan
 
 
-def _refuse_fewer_than_two(source: str, places: int) -> None:
-    """Raise MissionError for a route of fewer than two places."""
-    if places < 2:
-        message = f"{source}: {places} place to fly to: expected at least two different ones"
+def _check_place_count(source: str, place_count: int) -> None:
+    """Raise MissionError if a route has fewer than two places."""
+    if place_count < 2:
+        message = f"{source}: {place_count} place to fly to: expected at least two different ones"
         raise MissionError(message, file=source)
 
 
@@ -490,46 +506,46 @@ def _notes_of(itinerary: Itinerary, landing: PlacedLanding | None, reads_as_px4:
 
 
 def _open_items(itinerary: Itinerary, landing: PlacedLanding | None, reads_as_px4: bool) -> tuple[OpenItem, ...]:
-    """Return the items of an itinerary, and of its return's landing sequence, that leave the verdict open."""
-    own = itinerary.open_by_value if reads_as_px4 else itinerary.open_items
-    return own if landing is None else own + landing.open_items
+    """Return the items that leave the verdict open, in an itinerary and in its return's landing sequence."""
+    open_items = itinerary.open_by_value if reads_as_px4 else itinerary.open_items
+    return open_items if landing is None else open_items + landing.open_items
 
 
-def _lay_circles(
+def _lay_out_waypoints(
     source: str, limits: Limits | None, loiters: LoiterRules, notes: Notes, stops: list[PlacedStop]
 ) -> tuple[list[RoutePoint], tuple[Unjoined, ...]]:
-    return lay_circles(source, stops, notes, _make_own_radius(limits), _make_spiral_slopes(limits), loiters)
+    return lay_out_waypoints(source, stops, notes, _make_own_radius(limits), _make_spiral_slopes(limits), loiters)
 
 
 def _direct_landing(
-    placed: PlacedMission, kept: list[PlacedStop], rules: ReturnRules, notes: Notes
+    placed: PlacedMission, stops: list[PlacedStop], rules: ReturnRules, notes: Notes
 ) -> PlacedLanding | None:
     """Return the landing sequence to which a return flies directly, or None.
 
-    kept: the stops before the return.
+    stops: stops before the return.
     """
-    if rules.lands != "straight" or not kept:
+    if rules.lands != "straight" or not stops:
         return None
-    east, north, up = kept[-1].position.tolist()
+    east, north, up = stops[-1].position.tolist()
     landing = _nearest_landing(placed, (east, north, up), notes)
     if landing is None:
         return None
-    away, seq = math.dist((east, north), landing.start.place[:2]), placed.itinerary.stops[-1].item
-    text = f"at once to the landing sequence at item {landing.start.item}, {away / 1000.0:.1f} km away"
+    distance, seq = math.dist((east, north), landing.start.place[:2]), placed.itinerary.stops[-1].item
+    text = f"at once to the landing sequence at item {landing.start.item}, {distance / 1000.0:.1f} km away"
     notes.add(f"{Command.NAV_RETURN_TO_LAUNCH.name}: {text}{_landing_choice_text(placed)}", seq)
     return landing
 
 
-def _nearest_landing(placed: PlacedMission, here: tuple[float, float, float], notes: Notes) -> PlacedLanding | None:
+def _nearest_landing(placed: PlacedMission, position: tuple[float, float, float], notes: Notes) -> PlacedLanding | None:
     """Return the landing sequence that a return chooses at a position (m).
 
-    Return None, with a note, if the return is not flown there.
+    Return None, with a note, if the return does not continue to that sequence.
     """
-    start = nearest_landing(here, placed.landing_starts)
-    landing = next((one for one in placed.landings if one.start == start), None)
+    start = nearest_landing(position, placed.landing_starts)
+    landing = next((landing for landing in placed.landings if landing.start == start), None)
     if start is not None and landing is None:
-        why = "begins with the landing itself" if start.lands else "does not lead to a landing"
-        text = f"the landing sequence at item {start.item} {why}: {RETURN_NOT_FLOWN_ON}"
+        reason = "begins with the landing itself" if start.lands else "does not lead to a landing"
+        text = f"the landing sequence at item {start.item} {reason}: {RETURN_NOT_FLOWN_ON}"
         notes.add(text, placed.itinerary.stops[-1].item)
     return landing
 
@@ -539,18 +555,18 @@ def _landing_choice_text(placed: PlacedMission) -> str:
     return f" (the nearest of {count}, with height differences)" if count > 1 else ""
 
 
-def _note_circles(itinerary: Itinerary, kept: list[PlacedStop], loiters: LoiterRules, notes: Notes) -> None:
+def _note_circles(itinerary: Itinerary, places: list[PlacedStop], loiters: LoiterRules, notes: Notes) -> None:
     """Note the parts of the autopilot's loiters that are not flown.
 
-    kept: the stops, without a return.
+    places: places of the mission, without a return.
     """
-    last = kept[-1].stop
-    if loiters.unflown and (itinerary.returns or any(place.stop.loiter is not None for place in kept)):
+    final_stop = places[-1].stop
+    if loiters.unflown and (itinerary.returns or any(place.stop.loiter is not None for place in places)):
         notes.add(loiters.unflown)
-    if loiters.ends_in_circle and not itinerary.returns and itinerary.landing is None and last.loiter is None:
-        notes.add(loiters.end_note(), last.item)
-    if loiters.before_return and itinerary.returns and last.loiter is not None:
-        notes.add(loiters.before_return, last.item)
+    if loiters.ends_in_circle and not itinerary.returns and itinerary.landing is None and final_stop.loiter is None:
+        notes.add(loiters.end_note(), final_stop.item)
+    if loiters.before_return and itinerary.returns and final_stop.loiter is not None:
+        notes.add(loiters.before_return, final_stop.item)
 
 
 def _lay_return(
@@ -563,33 +579,33 @@ def _lay_return(
 ) -> tuple[dict[str, Any], PlacedLanding | None]:
     """Add a return's waypoints to the points; return the return's fields of `Route`.
 
-    Also return the landing sequence that the return continues to, or None if it stays in its loiter. Raise MissionError
-    for an altitude outside the flown range.
+    Also return the landing sequence that the return continues to, or None if it stays in its loiter. Raises
+    MissionError if its altitude is outside the flown range.
     """
-    source, here = placed.mission.source, points[-1].position
+    source, start = placed.mission.source, points[-1].position
     home, *rally = placed.return_places
-    target = choose_target(rules, here, home, rally)
-    up = target.position[2]
-    if not LOWEST <= up <= HIGHEST:
+    target = choose_target(rules, start, home, rally)
+    target_altitude = target.position[2]
+    if not LOWEST <= target_altitude <= HIGHEST:
         allowed = f"allowed {LOWEST:.0f}..{HIGHEST:.0f}"
-        where = f"item {stop.item}: return to {target.name}"
-        raise MissionError.at(source, where, up, allowed, shown=f"{up:.1f} m AMSL")
-    climb, dive = _make_spiral_slopes(limits)(stop.airspeed, max(here[2], up))
+        location = f"item {stop.item}: return to {target.name}"
+        raise MissionError.at(source, location, target_altitude, allowed, shown=f"{target_altitude:.1f} m AMSL")
+    climb_slope, dive_slope = _make_spiral_slopes(limits)(stop.airspeed, max(start[2], target_altitude))
     ability = ReturnAbility(
         turn_radius=lambda a, b, amsl: (
             DEFAULT_RADIUS if limits is None else limits.turn_radius(a, b, amsl, stop.airspeed)
         ),
-        circle=_make_own_radius(limits)(stop.airspeed, up),
-        climb=climb,
-        dive=dive,
+        circle=_make_own_radius(limits)(stop.airspeed, target_altitude),
+        climb=climb_slope,
+        dive=dive_slope,
         max_bank=math.radians(30.0) if limits is None else limits.max_bank,
         airspeed=stop.airspeed,
     )
     landing = _nearest_landing(placed, target.position, notes) if rules.lands == "circle" else None
-    onward = (
+    next_text = (
         "" if landing is None else f"the landing sequence at item {landing.start.item}{_landing_choice_text(placed)}"
     )
-    notes.add(described_return(target, rules, here[2], onward), stop.item)
+    notes.add(described_return(target, rules, start[2], next_text), stop.item)
     if rules.landing_counts and any(item.command in LANDINGS for item in placed.mission.items):
         notes.add(
             f"the mission's landing is also a place to return to, which is not flown: the return is to {target.name}",
@@ -597,11 +613,11 @@ def _lay_return(
         )
     if rules.instead:
         notes.add(rules.instead, stop.item)
-    first = len(points) - 1
-    place = None if landing is None else landing.start.place
-    points += lay_return(points, stop, target, rules, ability, place)
+    start_index = len(points) - 1
+    next_place = None if landing is None else landing.start.place
+    points += lay_return(points, stop, target, rules, ability, next_place)
     circle = ReturnCircle(*target.position, rules.radius or ability.circle, target.slope_base)
-    return {"return_from": first, "return_to": circle}, landing
+    return {"return_from": start_index, "return_to": circle}, landing
 
 
 def _with_gates(placed: PlacedMission, notes: Notes) -> list[PlacedStop]:
@@ -610,51 +626,61 @@ def _with_gates(placed: PlacedMission, notes: Notes) -> list[PlacedStop]:
     Each gate is placed where its plane cuts the leg, since an aircraft on its leg passes it there. The plane is
     perpendicular to the line from the gate to the next place.
     """
-    out = list(placed.stops[:1])
-    for place in placed.stops[1:]:
-        stop, before, passed = place.stop, out[-1], 0.0
-        for k, gate in enumerate(stop.gates):
-            after = stop.gates[k + 1].airspeed if k + 1 < len(stop.gates) else stop.airspeed_by_value
-            if gate.airspeed == after or (math.isnan(gate.airspeed) and math.isnan(after)):
+    placed_stops = list(placed.stops[:1])
+    for next_place in placed.stops[1:]:
+        stop, previous, last_fraction = next_place.stop, placed_stops[-1], 0.0
+        for index, gate in enumerate(stop.gates):
+            next_airspeed = stop.gates[index + 1].airspeed if index + 1 < len(stop.gates) else stop.airspeed_by_value
+            if gate.airspeed == next_airspeed or (math.isnan(gate.airspeed) and math.isnan(next_airspeed)):
                 continue
-            if not all(one.stop.loiter is None and one.stop.command in PLACES for one in (before, place)):
+            if not all(end.stop.loiter is None and end.stop.command in PLACES for end in (previous, next_place)):
                 text = "CONDITION_GATE not between waypoints: the speed after it holds from the leg's start"
                 notes.add(text, gate.item)
                 continue
-            share = _gate_fraction(before.position, place.position, to_map(placed.origin, gate.lat_deg, gate.lon_deg))
-            point = before.position + share * (place.position - before.position)
-            far = min(math.dist(point[:2], one.position[:2]) for one in (out[-1], place)) >= SAME_PLACE
-            if passed < share < 1.0 and far:
-                passed = share
+            fraction = _gate_fraction(
+                previous.position, next_place.position, to_map(placed.origin, gate.lat_deg, gate.lon_deg)
+            )
+            gate_position = previous.position + fraction * (next_place.position - previous.position)
+            is_apart = (
+                min(math.dist(gate_position[:2], end.position[:2]) for end in (placed_stops[-1], next_place))
+                >= SAME_PLACE
+            )
+            if last_fraction < fraction < 1.0 and is_apart:
+                last_fraction = fraction
                 at_gate = replace(
                     stop, item=gate.item, command=int(Command.CONDITION_GATE), airspeed_by_value=gate.airspeed, gates=()
                 )
-                out.append(PlacedStop(at_gate, point))
-        out.append(place)
-    return out
+                placed_stops.append(PlacedStop(at_gate, gate_position))
+        placed_stops.append(next_place)
+    return placed_stops
 
 
 def _gate_fraction(a: Floats, b: Floats, gate: tuple[Any, Any]) -> float:
-    """Return the fraction of the leg from a to b at which the plane of a gate (east, north, m) cuts it."""
-    out = b[:2] - np.array([float(gate[0]), float(gate[1])])
-    along = float((b[:2] - a[:2]) @ out)
+    """Return the fraction of the leg from a to b at which a gate's plane cuts it.
+
+    gate: east and north, m.
+    """
+    gate_to_end = b[:2] - np.array([float(gate[0]), float(gate[1])])
+    length_along_normal = float((b[:2] - a[:2]) @ gate_to_end)
     # Measured backwards from b, whose distance from the plane is its distance from the gate.
-    return 1.0 - float(out @ out) / along if along > 0.0 else 0.0
+    return 1.0 - float(gate_to_end @ gate_to_end) / length_along_normal if length_along_normal > 0.0 else 0.0
 
 
 def _with_airspeed(place: PlacedStop, default: float, by_value: bool) -> PlacedStop:
     """Return a place with the airspeed that the autopilot reads from the mission, or the default, m/s."""
-    stated = place.stop.airspeed_by_value if by_value else place.stop.airspeed
-    return PlacedStop(replace(place.stop, airspeed=default if math.isnan(stated) else stated), place.position)
+    stated_airspeed = place.stop.airspeed_by_value if by_value else place.stop.airspeed
+    return PlacedStop(
+        replace(place.stop, airspeed=default if math.isnan(stated_airspeed) else stated_airspeed), place.position
+    )
 
 
 # Relative difference beyond which a ground station's speed estimate is likely for another aircraft.
 FAR_SPEED = 0.2
 
 
-def _note_cruise_speed(mission: Mission, airspeed: float, first: ItineraryStop, notes: Notes) -> None:
+def _note_cruise_speed(mission: Mission, airspeed: float, first_stop: ItineraryStop, notes: Notes) -> None:
     """Note a cruiseSpeed other than the default airspeed (m/s), if the default is flown to the first stop."""
-    if mission.cruise_speed is not None and mission.cruise_speed != airspeed and first.airspeed == airspeed:
+    if mission.cruise_speed is not None and mission.cruise_speed != airspeed and first_stop.airspeed == airspeed:
         text = (
             f"cruiseSpeed {mission.cruise_speed:g} m/s is the ground station's estimate and no command:"
             f" started at {airspeed:g} m/s"
@@ -667,16 +693,16 @@ def _note_cruise_speed(mission: Mission, airspeed: float, first: ItineraryStop, 
 def _make_own_radius(limits: Limits | None) -> OwnRadius:
     """Return a function for the radius of a loiter whose item states none.
 
-    The radius is a tenth larger than that of the tightest turn in this wind, rounded up to 10 m.
+    That radius is 10 % larger than the tightest turn in this wind, rounded up to 10 m.
     """
 
     def radius(airspeed: float, up: float) -> float:
         if limits is None:
             return DEFAULT_RADIUS
-        tightest = max(limits.turn_radius(course, course + math.pi, up, airspeed) for course in (0.0, math.pi))
-        if not math.isfinite(tightest):
+        min_radius = max(limits.turn_radius(course, course + math.pi, up, airspeed) for course in (0.0, math.pi))
+        if not math.isfinite(min_radius):
             return DEFAULT_RADIUS
-        return max(DEFAULT_RADIUS, math.ceil(LOITER_RADIUS_MARGIN * tightest / 10.0) * 10.0)
+        return max(DEFAULT_RADIUS, math.ceil(LOITER_RADIUS_MARGIN * min_radius / 10.0) * 10.0)
 
     return radius
 
@@ -690,28 +716,28 @@ def _make_spiral_slopes(limits: Limits | None) -> SpiralSlopes:
     def slopes(airspeed: float, up: float) -> tuple[float, float]:
         if limits is None:
             return PLAIN_SLOPE, PLAIN_SLOPE
-        found = []
-        for k, stated in enumerate((limits.max_climb, limits.max_dive)):
-            limit = min(limits.slopes(course, up, airspeed)[k] for course in np.arange(8) * (math.pi / 4.0))
-            slope = min(limit, math.inf if stated is None else stated)
+        spiral_slopes = []
+        for index, stated_limit in enumerate((limits.max_climb, limits.max_dive)):
+            limit = min(limits.slopes(course, up, airspeed)[index] for course in np.arange(8) * (math.pi / 4.0))
+            slope = min(limit, math.inf if stated_limit is None else stated_limit)
             # An aircraft that cannot climb gets a plain spiral, and the slope rule reports it.
-            found.append(SPIRAL_SHARE * math.tan(slope) if 0.0 < slope < 1.5 else PLAIN_SLOPE)
-        return found[0], found[1]
+            spiral_slopes.append(SPIRAL_SHARE * math.tan(slope) if 0.0 < slope < 1.5 else PLAIN_SLOPE)
+        return spiral_slopes[0], spiral_slopes[1]
 
     return slopes
 
 
-def _start_text(itinerary: Itinerary, first: ItineraryStop, origin: GeoOrigin, waypoints: Floats) -> str:
+def _start_text(itinerary: Itinerary, first_stop: ItineraryStop, origin: GeoOrigin, waypoints: Floats) -> str:
     course = math.degrees(float(leg_courses(waypoints)[0])) % 360.0
-    lat, lon = first.lat_deg, first.lon_deg
-    if first.loiter is not None:
+    lat, lon = first_stop.lat_deg, first_stop.lon_deg
+    if first_stop.loiter is not None:
         lat, lon = (float(value) for value in to_geo(origin, waypoints[0, 0], waypoints[0, 1]))
-    where = f"{lat:.7f}, {lon:.7f}, {waypoints[0, 2]:.1f} m AMSL, on course {course:.0f} degrees"
+    start_place = f"{lat:.7f}, {lon:.7f}, {waypoints[0, 2]:.1f} m AMSL, on course {course:.0f} degrees"
     item = itinerary.takeoff
     name = "no TAKEOFF" if item is None else f"{command_name(item.command)} (item {item.seq})"
-    if first.loiter is not None:
-        return f"{name}: starts trimmed in the air on the circle of item {first.item}: {where}"
+    if first_stop.loiter is not None:
+        return f"{name}: starts trimmed in the air on the circle of item {first_stop.item}: {start_place}"
     if item is not None:
-        over = "home" if itinerary.has_home else "the first position, as there is no home,"
-        return f"{name}: starts trimmed in the air over {over} at that item's height: {where}"
-    return f"{name}: starts trimmed at the first position, item {first.item}: {where}"
+        place_name = "home" if itinerary.has_home else "the first position, as there is no home,"
+        return f"{name}: starts trimmed in the air over {place_name} at that item's height: {start_place}"
+    return f"{name}: starts trimmed at the first position, item {first_stop.item}: {start_place}"

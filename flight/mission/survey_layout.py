@@ -27,13 +27,13 @@ _LEAD_LENGTH_TOLERANCE_M = 1.0
 class SurveyLayout(NamedTuple):
     """Settings for flying a survey.
 
-    turn_around: distance from each line's end to where its turn begins, and from the turn's end to the next line's
+    turn_around: distance from each line's end to the start of its turn, and from the turn's end to the next line's
         start, m; 0 for none.
     every: interleave stride; 2 flies every second line first and then the others from the same side on, 3 every third.
     course: course of the lines, rad; None to keep it.
     backwards: True to begin with the line on the other side.
-    lead_in: straight distance before the first line, m, where that is more, since the first line is entered from any
-        direction.
+    lead_in: straight distance before the first line, m, if it exceeds ``turn_around``, since the first line is entered
+        from any direction.
     """
 
     turn_around: float
@@ -72,16 +72,16 @@ def turn_around_of(route: Route, survey: Survey) -> float:
 def _lead_lengths(route: Route, survey: Survey) -> list[float]:
     """Return the straight distance of each line beyond its photos, at each end of each turn-around, m."""
     points, pairs = route.waypoints[:, :2], zip(survey.lines[:-1], survey.lines[1:], strict=True)
-    ends = [pair for one, other in pairs for pair in ((one.last, one.ends), (other.begins, other.first))]
-    return [math.dist(points[one], points[other]) for one, other in ends]
+    ends = [pair for line, next_line in pairs for pair in ((line.last, line.ends), (next_line.begins, next_line.first))]
+    return [math.dist(points[start], points[end]) for start, end in ends]
 
 
 def kept_layout(mission: Mission, route: Route, survey: Survey) -> str:
-    """Return the reason why a survey's layout cannot be changed, in words, or "" if it can."""
+    """Return the reason why a survey's layout cannot be changed, or "" if it can."""
     if any(item.command in (Command.DO_JUMP, Command.DO_JUMP_TAG, Command.JUMP_TAG) for item in mission.items):
         return "the mission jumps"
-    at = {item.seq: k for k, item in enumerate(mission.items)}
-    if any(int(route.items[i]) not in at for line in survey.lines for i in range(line.first, line.last + 1)):
+    index_by_seq = {item.seq: index for index, item in enumerate(mission.items)}
+    if any(int(route.items[i]) not in index_by_seq for line in survey.lines for i in range(line.first, line.last + 1)):
         return "a line begins or ends where no item is"
     items = _survey_items(mission, route, survey)
     for first, end in items.lines:
@@ -107,25 +107,29 @@ def with_layout(
         return None
     items, lines = _survey_items(mission, route, survey), list[_Line]()
     for photo_line, (first, end) in zip(survey.lines, items.lines, strict=True):
-        corners, own = route.waypoints[photo_line.first : photo_line.last + 1, :2], mission.items[first:end]
-        steps = [item for item in own if is_navigation(item.command)]
+        corners, line_items = route.waypoints[photo_line.first : photo_line.last + 1, :2], mission.items[first:end]
+        steps = [item for item in line_items if is_navigation(item.command)]
         if _waypoint_of_item(mission, route)[steps[0].seq] != photo_line.first:
-            own = (_make_waypoint(steps[0], corners[0], origin), *own)
-        lines.append(_Line(corners, own))
+            line_items = (_make_waypoint(steps[0], corners[0], origin), *line_items)
+        lines.append(_Line(corners, line_items))
     if layout.course is not None:
-        turned = _lines_on_course(lines, survey, layout.course, origin)
-        if turned is None:
+        turned_lines = _lines_on_course(lines, survey, layout.course, origin)
+        if turned_lines is None:
             return None
-        lines = turned
-    longest = max(_lead_lengths(route, survey)) + _LEAD_LENGTH_TOLERANCE_M
+        lines = turned_lines
+    max_lead_length = max(_lead_lengths(route, survey)) + _LEAD_LENGTH_TOLERANCE_M
     (first, _), (_, end) = items.lines[0], items.lines[-1]
-    made = [*mission.items[: items.before]]
-    made += _without_leads(mission, route, mission.items[items.before : first], survey.lines[0].first, longest)
+    new_items = [*mission.items[: items.before]]
+    new_items += _without_leads(
+        mission, route, mission.items[items.before : first], survey.lines[0].first, max_lead_length
+    )
     for number, line in enumerate(_order_lines(lines, layout)):
-        made += _items_with_turn_arounds(line, layout.turn_around, layout.lead_in if number == 0 else 0.0, origin)
-    made += _without_leads(mission, route, mission.items[end : items.behind], survey.lines[-1].last, longest)
+        new_items += _items_with_turn_arounds(line, layout.turn_around, layout.lead_in if number == 0 else 0.0, origin)
+    new_items += _without_leads(
+        mission, route, mission.items[end : items.behind], survey.lines[-1].last, max_lead_length
+    )
     # Renumber all items: two items with one number would be ambiguous.
-    numbered = [replace(item, seq=k) for k, item in enumerate([*made, *mission.items[items.behind :]], 1)]
+    numbered = [replace(item, seq=seq) for seq, item in enumerate([*new_items, *mission.items[items.behind :]], 1)]
     return renumbered(replace(mission, items=tuple(numbered)))
 
 
@@ -134,56 +138,63 @@ def _survey_items(mission: Mission, route: Route, survey: Survey) -> _SurveyItem
 
     Each line includes the commands that switch something at its ends.
     """
-    at, count = {item.seq: k for k, item in enumerate(mission.items)}, len(mission.items)
+    index_by_seq, item_count = (
+        {item.seq: item_index for item_index, item in enumerate(mission.items)},
+        len(mission.items),
+    )
     seqs = [int(seq) for seq in route.items]
 
     def index(waypoint: int) -> int:
-        return at.get(seqs[waypoint], count) if 0 <= waypoint < len(seqs) else count
+        return index_by_seq.get(seqs[waypoint], item_count) if 0 <= waypoint < len(seqs) else item_count
 
     lines = []
     for line in survey.lines:
         # An item merged with the line's first waypoint stands at the same place, such as a take-off before a waypoint.
         first = max(
-            k for k in range(index(line.first), index(line.first + 1)) if is_navigation(mission.items[k].command)
+            item_index
+            for item_index in range(index(line.first), index(line.first + 1))
+            if is_navigation(mission.items[item_index].command)
         )
         if mission.items[first].command != Command.NAV_WAYPOINT:
             first += 1
-        end = index(line.last) + 1
-        while end < count and not is_navigation(mission.items[end].command):
-            end += 1
-        lines.append((first, end))
-    into, out = survey.lines[0], survey.lines[-1]
-    before = min(index(into.begins), lines[0][0])
-    return _SurveyItems(tuple(lines), before, max(lines[-1][1], index(out.ends + 1)))
+        end_index = index(line.last) + 1
+        while end_index < item_count and not is_navigation(mission.items[end_index].command):
+            end_index += 1
+        lines.append((first, end_index))
+    first_line, last_line = survey.lines[0], survey.lines[-1]
+    begin_index = min(index(first_line.begins), lines[0][0])
+    return _SurveyItems(tuple(lines), begin_index, max(lines[-1][1], index(last_line.ends + 1)))
 
 
 def _waypoint_of_item(mission: Mission, route: Route) -> dict[int, int]:
-    """Return the waypoint of each navigation item by its number, or the previous waypoint if the item has none."""
-    own, here, out = {int(seq): i for i, seq in enumerate(route.items)}, 0, dict[int, int]()
+    """Return the waypoint of each navigation item by the item's number.
+
+    An item without a waypoint has the previous waypoint.
+    """
+    waypoint_by_seq, waypoint, waypoints = {int(seq): i for i, seq in enumerate(route.items)}, 0, dict[int, int]()
     for item in mission.items:
         if is_navigation(item.command):
-            here = own.get(item.seq, here)
-            out[item.seq] = here
-    return out
+            waypoint = waypoint_by_seq.get(item.seq, waypoint)
+            waypoints[item.seq] = waypoint
+    return waypoints
 
 
 def _without_leads(
-    mission: Mission, route: Route, items: Sequence[MissionItem], end: int, longest: float
+    mission: Mission, route: Route, items: Sequence[MissionItem], end: int, max_lead_length: float
 ) -> list[MissionItem]:
-    """Return the items beyond an end of a survey without its lead waypoints.
+    """Return the items beyond an end of a survey without its lead waypoints, which the new layout replaces.
 
     end: the waypoint at that end.
 
-    The new layout replaces those leads. Waypoints further away than the turn-arounds are long belong to the transit to
-    the survey and stay.
+    Waypoints further away than the turn-arounds are long belong to the transit to the survey and stay.
     """
-    points, places = route.waypoints[:, :2], _waypoint_of_item(mission, route)
+    points, waypoint_of = route.waypoints[:, :2], _waypoint_of_item(mission, route)
 
-    def leads(item: MissionItem) -> bool:
-        near = item.seq in places and math.dist(points[places[item.seq]], points[end]) <= longest
-        return near and item.command == Command.NAV_WAYPOINT
+    def is_lead(item: MissionItem) -> bool:
+        is_near = item.seq in waypoint_of and math.dist(points[waypoint_of[item.seq]], points[end]) <= max_lead_length
+        return is_near and item.command == Command.NAV_WAYPOINT
 
-    return [item for item in items if not leads(item)]
+    return [item for item in items if not is_lead(item)]
 
 
 def _order_lines(lines: Sequence[_Line], layout: SurveyLayout) -> list[_Line]:
@@ -194,19 +205,19 @@ def _order_lines(lines: Sequence[_Line], layout: SurveyLayout) -> list[_Line]:
     if layout.every == 1 and layout.course is None and not layout.backwards:
         return list(lines)
     start, end = lines[0].corners[[0, -1]]
-    unit = (end - start) / max(float(np.hypot(*(end - start))), 1e-9)
-    right = np.array([unit[1], -unit[0]])
+    direction = (end - start) / max(float(np.hypot(*(end - start))), 1e-9)
+    right = np.array([direction[1], -direction[0]])
     offsets = [float((line.corners[[0, -1]].mean(axis=0) - start) @ right) for line in lines]
-    lateral = sorted(range(len(lines)), key=lambda k: offsets[k])
+    lateral = sorted(range(len(lines)), key=lambda index: offsets[index])
     if (offsets[0] > 0.5 * (min(offsets) + max(offsets))) is not layout.backwards:
         lateral.reverse()
-    out: list[_Line] = []
-    for begin in range(layout.every):
-        for k in lateral[begin :: layout.every]:
-            line, ahead = lines[k], len(out) % 2 == 0
-            along = float((line.corners[-1] - line.corners[0]) @ unit) > 0.0
-            out.append(line if along == ahead else _reverse_line(line))
-    return out
+    ordered: list[_Line] = []
+    for first in range(layout.every):
+        for index in lateral[first :: layout.every]:
+            line, is_forward = lines[index], len(ordered) % 2 == 0
+            runs_forward = float((line.corners[-1] - line.corners[0]) @ direction) > 0.0
+            ordered.append(line if runs_forward == is_forward else _reverse_line(line))
+    return ordered
 
 
 def _reverse_line(line: _Line) -> _Line:
@@ -215,61 +226,65 @@ def _reverse_line(line: _Line) -> _Line:
     Its waypoints swap places; the commands between them stay in place.
     """
     steps = [item for item in line.items if is_navigation(item.command)]
-    backwards = iter(reversed(steps))
+    reversed_steps = iter(reversed(steps))
     return _Line(
-        line.corners[::-1], tuple(next(backwards) if is_navigation(item.command) else item for item in line.items)
+        line.corners[::-1], tuple(next(reversed_steps) if is_navigation(item.command) else item for item in line.items)
     )
 
 
 def _items_with_turn_arounds(line: _Line, turn_around: float, lead_in: float, origin: GeoOrigin) -> list[MissionItem]:
     """Return a line's items with the waypoints of its turn-arounds and of a longer lead-in."""
     steps = [item for item in line.items if is_navigation(item.command)]
-    into, out = line.corners[0] - line.corners[1], line.corners[-1] - line.corners[-2]
-    into, out = (way / max(float(np.hypot(*way)), 1e-9) for way in (into, out))
+    entry_direction, exit_direction = line.corners[0] - line.corners[1], line.corners[-1] - line.corners[-2]
+    entry_direction, exit_direction = (
+        direction / max(float(np.hypot(*direction)), 1e-9) for direction in (entry_direction, exit_direction)
+    )
     leads = sorted({turn_around, max(turn_around, lead_in)} - {0.0}, reverse=True)
-    made = [_make_waypoint(steps[0], line.corners[0] + metres * into, origin) for metres in leads]
-    made += line.items
+    items = [_make_waypoint(steps[0], line.corners[0] + length * entry_direction, origin) for length in leads]
+    items += line.items
     return (
-        made if turn_around <= 0.0 else [*made, _make_waypoint(steps[-1], line.corners[-1] + turn_around * out, origin)]
+        items
+        if turn_around <= 0.0
+        else [*items, _make_waypoint(steps[-1], line.corners[-1] + turn_around * exit_direction, origin)]
     )
 
 
-def _make_waypoint(like: MissionItem, place: Floats, origin: GeoOrigin) -> MissionItem:
+def _make_waypoint(model_item: MissionItem, position: Floats, origin: GeoOrigin) -> MissionItem:
     """Return a plain waypoint at the altitude of another item."""
-    lat, lon = (on_grid(float(value)) for value in to_geo(origin, float(place[0]), float(place[1])))
-    nothing = (0.0, 0.0, 0.0, like.params[3] if math.isnan(like.params[3]) else 0.0)
-    return replace(like, command=int(Command.NAV_WAYPOINT), params=nothing, lat_deg=lat, lon_deg=lon)
+    lat, lon = (on_grid(float(value)) for value in to_geo(origin, float(position[0]), float(position[1])))
+    params = (0.0, 0.0, 0.0, model_item.params[3] if math.isnan(model_item.params[3]) else 0.0)
+    return replace(model_item, command=int(Command.NAV_WAYPOINT), params=params, lat_deg=lat, lon_deg=lon)
 
 
 def _lines_on_course(lines: Sequence[_Line], survey: Survey, course: float, origin: GeoOrigin) -> list[_Line] | None:
     """Return lines on another course over the hull of the present ones, or None if that is impossible."""
-    ends = [item for line in lines for item in line.items if is_navigation(item.command)]
-    if len({(item.frame, item.alt) for item in ends}) != 1 or any(_is_bent(line.corners) for line in lines):
+    waypoint_items = [item for line in lines for item in line.items if is_navigation(item.command)]
+    if len({(item.frame, item.alt) for item in waypoint_items}) != 1 or any(_is_bent(line.corners) for line in lines):
         return None
     hull = convex_hull(np.concatenate([line.corners for line in lines]))
     if hull is None:
         return None
-    unit = np.array([math.sin(course), math.cos(course)])
-    right = np.array([unit[1], -unit[0]])
-    lateral, along = hull @ right, hull @ unit
+    direction = np.array([math.sin(course), math.cos(course)])
+    right = np.array([direction[1], -direction[0]])
+    lateral, along = hull @ right, hull @ direction
     count = max(1, round((lateral.max() - lateral.min()) / survey.spacing))
     margin = 0.5 * (lateral.max() - lateral.min() - (count - 1) * survey.spacing)
-    pattern, out = lines[0], list[Floats]()
-    for k in range(count):
-        at = float(lateral.min()) + margin + k * survey.spacing
-        crossed = _line_within_outline(lateral, along, at)
-        if crossed is None or crossed[1] - crossed[0] < _MIN_LINE_LENGTH_M:
+    first_line, line_ends = lines[0], list[Floats]()
+    for number in range(count):
+        offset = float(lateral.min()) + margin + number * survey.spacing
+        crossings = _line_within_outline(lateral, along, offset)
+        if crossings is None or crossings[1] - crossings[0] < _MIN_LINE_LENGTH_M:
             continue
-        out.append(np.array([at * right + metres * unit for metres in crossed]))
-    if not out:
+        line_ends.append(np.array([offset * right + distance * direction for distance in crossings]))
+    if not line_ends:
         return None
     # The survey begins where it did before: at the nearest end of the nearest line.
-    start = pattern.corners[0]
-    if math.dist(out[-1].mean(axis=0), start) < math.dist(out[0].mean(axis=0), start):
-        out.reverse()
-    if math.dist(out[0][1], start) < math.dist(out[0][0], start):
-        out = [places[::-1] for places in out]
-    return [_Line(places, _move_items(pattern.items, places, origin)) for places in out]
+    start = first_line.corners[0]
+    if math.dist(line_ends[-1].mean(axis=0), start) < math.dist(line_ends[0].mean(axis=0), start):
+        line_ends.reverse()
+    if math.dist(line_ends[0][1], start) < math.dist(line_ends[0][0], start):
+        line_ends = [places[::-1] for places in line_ends]
+    return [_Line(places, _move_items(first_line.items, places, origin)) for places in line_ends]
 
 
 def convex_hull(points: Floats) -> Floats | None:
@@ -282,9 +297,9 @@ def convex_hull(points: Floats) -> Floats | None:
     """
     ordered = points[np.lexsort((points[:, 1], points[:, 0]))].tolist()
     hull: list[list[float]] = []
-    for way in (ordered, ordered[::-1]):
+    for half in (ordered, ordered[::-1]):
         chain: list[list[float]] = []
-        for x, y in way:
+        for x, y in half:
             while len(chain) > 1:
                 (x0, y0), (x1, y1) = chain[-2:]
                 if (x1 - x0) * (y - y0) - (y1 - y0) * (x - x0) > 0.0:
@@ -298,29 +313,37 @@ def convex_hull(points: Floats) -> Floats | None:
 def _is_bent(corners: Floats) -> bool:
     """Return True if a line deviates from the straight line between its ends by more than rounding."""
     start, step = corners[0], corners[-1] - corners[0]
-    off = (corners - start) @ np.array([step[1], -step[0]]) / max(float(np.hypot(*step)), 1e-9)
-    return bool(np.abs(off).max() > _BEND_TOLERANCE_M)
+    lateral_offsets = (corners - start) @ np.array([step[1], -step[0]]) / max(float(np.hypot(*step)), 1e-9)
+    return bool(np.abs(lateral_offsets).max() > _BEND_TOLERANCE_M)
 
 
-def _line_within_outline(lateral: Floats, along: Floats, at: float) -> tuple[float, float] | None:
+def _line_within_outline(lateral: Floats, along: Floats, offset: float) -> tuple[float, float] | None:
     """Return where a line enters and leaves a convex outline, m along the line, or None if they do not cross."""
-    found = []
-    for k in range(len(lateral)):
-        one, other = lateral[k - 1] - at, lateral[k] - at
-        if one * other <= 0.0 and one != other:
-            found.append(float(along[k - 1] + (along[k] - along[k - 1]) * one / (one - other)))
-    return (min(found), max(found)) if len(found) >= 2 else None
+    crossings = []
+    for index in range(len(lateral)):
+        start_distance, end_distance = lateral[index - 1] - offset, lateral[index] - offset
+        if start_distance * end_distance <= 0.0 and start_distance != end_distance:
+            crossings.append(
+                float(
+                    along[index - 1]
+                    + (along[index] - along[index - 1]) * start_distance / (start_distance - end_distance)
+                )
+            )
+    return (min(crossings), max(crossings)) if len(crossings) >= 2 else None
 
 
 def _move_items(items: Sequence[MissionItem], ends: Floats, origin: GeoOrigin) -> tuple[MissionItem, ...]:
-    """Return a line's items moved to another line: its first and last waypoint at the new ends, no others."""
-    steps = [k for k, item in enumerate(items) if is_navigation(item.command)]
-    out = []
-    for k, item in enumerate(items):
-        if k in (steps[0], steps[-1]):
-            lat, lon = (on_grid(float(value)) for value in to_geo(origin, *ends[0 if k == steps[0] else 1].tolist()))
+    """Return a line's items moved to another line: its first and last waypoint at the new ends, without any other."""
+    waypoint_indices = [index for index, item in enumerate(items) if is_navigation(item.command)]
+    moved = []
+    for index, item in enumerate(items):
+        if index in (waypoint_indices[0], waypoint_indices[-1]):
+            lat, lon = (
+                on_grid(float(value))
+                for value in to_geo(origin, *ends[0 if index == waypoint_indices[0] else 1].tolist())
+            )
             item = replace(item, lat_deg=lat, lon_deg=lon)
         elif is_navigation(item.command):
             continue
-        out.append(item)
-    return tuple(out)
+        moved.append(item)
+    return tuple(moved)

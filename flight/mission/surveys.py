@@ -120,15 +120,15 @@ class Survey:
 
     def turn_arounds(self) -> list[tuple[int, int]]:
         """Return the waypoints at which each turn-around begins and ends."""
-        return [(one.last, other.first) for one, other in zip(self.lines[:-1], self.lines[1:], strict=True)]
+        return [(line.last, following.first) for line, following in zip(self.lines[:-1], self.lines[1:], strict=True)]
 
     def ways_onto_lines(self) -> list[tuple[int, int]]:
         """Return the turn-arounds, the entry to the first line and the exit of the last line.
 
         Each is a pair of waypoints, between which the autopilot chooses the path.
         """
-        into, out = self.lines[0], self.lines[-1]
-        return [(into.begins, into.first), *self.turn_arounds(), (out.last, out.ends)]
+        first_line, last_line = self.lines[0], self.lines[-1]
+        return [(first_line.begins, first_line.first), *self.turn_arounds(), (last_line.last, last_line.ends)]
 
 
 class LineAxis:
@@ -138,28 +138,33 @@ class LineAxis:
         """Set up the axis of a line through corners (k, 2 or 3) m, k at least 2."""
         self.corners = corners
         step = np.diff(corners[:, :2], axis=0)
-        self._runs = np.hypot(*step.T)
-        self._units = step / np.maximum(self._runs, 1e-9)[:, None]
-        self.along = np.concatenate([[0.0], np.cumsum(self._runs)])
+        self._lengths = np.hypot(*step.T)
+        self._units = step / np.maximum(self._lengths, 1e-9)[:, None]
+        self.along = np.concatenate([[0.0], np.cumsum(self._lengths)])
         self.length = float(self.along[-1])
 
     def of(self, places: Floats) -> tuple[Floats, Floats, Floats]:
         """Project points (n, 2 or 3) on the line.
 
-        Return their distances along the line and to its right, m, and the line's course there, rad.
+        Return the points' distances along the line and to its right, m, and the line's course next to them, rad.
         """
-        nearest = np.full(len(places), np.inf)
-        out = np.zeros((3, len(places)))
-        for k, (unit, run) in enumerate(zip(self._units, self._runs, strict=True)):
-            along, across = _along_and_right(places[:, :2] - self.corners[k, :2], math.atan2(unit[0], unit[1]))
-            low = -math.inf if k == 0 else 0.0
-            high = math.inf if k == len(self._runs) - 1 else run
-            away = np.hypot(along - np.clip(along, low, high), across)
-            here = away < nearest
-            nearest[here] = away[here]
-            out[0, here], out[1, here] = self.along[k] + along[here], across[here]
-            out[2, here] = math.atan2(unit[0], unit[1])
-        return out[0], out[1], out[2]
+        min_distance = np.full(len(places), np.inf)
+        coordinates = np.zeros((3, len(places)))
+        for index, (direction, length) in enumerate(zip(self._units, self._lengths, strict=True)):
+            along, across = _along_and_right(
+                places[:, :2] - self.corners[index, :2], math.atan2(direction[0], direction[1])
+            )
+            min_along = -math.inf if index == 0 else 0.0
+            max_along = math.inf if index == len(self._lengths) - 1 else length
+            distance = np.hypot(along - np.clip(along, min_along, max_along), across)
+            is_nearer = distance < min_distance
+            min_distance[is_nearer] = distance[is_nearer]
+            coordinates[0, is_nearer], coordinates[1, is_nearer] = (
+                self.along[index] + along[is_nearer],
+                across[is_nearer],
+            )
+            coordinates[2, is_nearer] = math.atan2(direction[0], direction[1])
+        return coordinates[0], coordinates[1], coordinates[2]
 
     def at(self, along: Floats) -> Floats:
         """Return the points (n, 2 or 3) m on the line at given distances along it."""
@@ -174,25 +179,25 @@ def camera_spacing(mission: Mission, route: Route) -> Floats:
     switch the camera as soon as the waypoint is reached. If several items lead to a waypoint by jumps, the legs to it
     are assigned to the waypoint's own item.
     """
-    flown = set(route.items.tolist())
-    switched, on, here = dict[int, float](), 0.0, None
+    route_items = set(route.items.tolist())
+    spacing_after, spacing, place_seq = dict[int, float](), 0.0, None
     for item in mission.items:
         if is_navigation(item.command):
             # An item that is flown without a place of its own belongs to the place before it.
-            here = item.seq if item.seq in flown else here
+            place_seq = item.seq if item.seq in route_items else place_seq
         elif item.command == Command.DO_SET_CAM_TRIGG_DIST:
-            on = max(0.0, item.params[0]) if math.isfinite(item.params[0]) else 0.0
+            spacing = max(0.0, item.params[0]) if math.isfinite(item.params[0]) else 0.0
         elif item.command in (Command.IMAGE_START_CAPTURE, Command.VIDEO_START_CAPTURE):
-            on = math.nan
+            spacing = math.nan
         elif item.command in (Command.IMAGE_STOP_CAPTURE, Command.VIDEO_STOP_CAPTURE):
-            on = 0.0
-        if here is not None:
-            switched[here] = on
-    out, held = np.zeros(len(route.items)), 0.0
+            spacing = 0.0
+        if place_seq is not None:
+            spacing_after[place_seq] = spacing
+    spacings, current_spacing = np.zeros(len(route.items)), 0.0
     for i, seq in enumerate(route.items.tolist()):
-        held = switched.get(seq, held)
-        out[i] = held
-    return out
+        current_spacing = spacing_after.get(seq, current_spacing)
+        spacings[i] = current_spacing
+    return spacings
 
 
 def survey_plan(mission: Mission, survey: Survey) -> SurveyPlan | None:
@@ -201,23 +206,23 @@ def survey_plan(mission: Mission, survey: Survey) -> SurveyPlan | None:
     They are identified by the distance between photos. If no stored survey, or more than one, has that distance, the
     settings for any survey are returned.
     """
-    photo = survey.lines[0].photo
-    same = {
-        one
-        for one in mission.survey_plans
-        if one.photo is not None and abs(one.photo - photo) <= _PHOTO_SPACING_TOLERANCE_M
+    photo_spacing = survey.lines[0].photo
+    matching_plans = {
+        plan
+        for plan in mission.survey_plans
+        if plan.photo is not None and abs(plan.photo - photo_spacing) <= _PHOTO_SPACING_TOLERANCE_M
     }
-    if len(same) == 1:
-        return same.pop()
-    return next((one for one in mission.survey_plans if one.photo is None), None)
+    if len(matching_plans) == 1:
+        return matching_plans.pop()
+    return next((plan for plan in mission.survey_plans if plan.photo is None), None)
 
 
 def find_surveys(route: Route, camera: Floats, turn_arounds: Sequence[tuple[float, float]] = ()) -> tuple[Survey, ...]:
     """Find the surveys of a route, in flying order.
 
     camera: (w,) from `camera_spacing`.
-    turn_arounds: what a ground station states: pairs of the distance between photos, m, and how far lines extend beyond
-        their photos, m.
+    turn_arounds: pairs that a ground station states: the distance between photos, m, and the length of a line beyond
+        its photos, m.
 
     >>> lines = [[0, 0], [0, 900], [60, 900], [60, 0], [120, 0], [120, 900]]
     >>> points = np.array([[*place, 100.0] for place in lines], dtype=float)
@@ -227,19 +232,19 @@ def find_surveys(route: Route, camera: Floats, turn_arounds: Sequence[tuple[floa
     >>> [(line.first, line.last) for line in survey.lines], survey.offsets, survey.spacing
     ([(0, 1), (2, 3), (4, 5)], (0.0, 60.0, 120.0), 60.0)
     """
-    found, surveys, at = _straight_runs(route), list[Survey](), 0
+    run_bounds, surveys, run_index = _straight_runs(route), list[Survey](), 0
     if camera.any():
         # If items switch the camera, only a run with the camera on can be a line.
-        found = [(first, last) for first, last in found if (camera[first:last] != 0.0).any()]
-    runs = _Runs(route.waypoints, found)
-    while at < len(found):
-        chain = _find_chain(runs, at)
+        run_bounds = [(first, last) for first, last in run_bounds if (camera[first:last] != 0.0).any()]
+    runs = _Runs(route.waypoints, run_bounds)
+    while run_index < len(run_bounds):
+        chain = _find_chain(runs, run_index)
         survey = _make_survey(runs, chain, camera, turn_arounds)
         if survey is None:
-            at += 1
+            run_index += 1
             continue
         surveys.append(survey)
-        at = chain[-1][1] + 1
+        run_index = chain[-1][1] + 1
     return tuple(surveys)
 
 
@@ -250,16 +255,16 @@ def _straight_runs(route: Route) -> list[tuple[int, int]]:
     """
     courses, arcs, end = leg_courses(route.waypoints), route.arcs, len(route.waypoints) - 1
     last = route.return_from if route.return_from >= 0 else end
-    lands, takes_off = math.isfinite(route.landing_ground), math.isfinite(route.takeoff_ground)
+    has_landing, has_takeoff = math.isfinite(route.landing_ground), math.isfinite(route.takeoff_ground)
     runs, first = [], 0
-    for k in range(1, last + 1):
-        turned = abs(math.remainder(float(courses[min(k, end - 1)] - courses[first]), 2.0 * math.pi))
-        if k < last and turned <= _MAX_RUN_BEND_RAD and arcs[k] == 0.0:
+    for index in range(1, last + 1):
+        course_change = abs(math.remainder(float(courses[min(index, end - 1)] - courses[first]), 2.0 * math.pi))
+        if index < last and course_change <= _MAX_RUN_BEND_RAD and arcs[index] == 0.0:
             continue
-        on_ground = (takes_off and first == 0) or (lands and k == end)
-        if not on_ground and (arcs[first] == 0.0 or arcs[k] == 0.0):
-            runs.append((first, k))
-        first = k
+        is_ground_leg = (has_takeoff and first == 0) or (has_landing and index == end)
+        if not is_ground_leg and (arcs[first] == 0.0 or arcs[index] == 0.0):
+            runs.append((first, index))
+        first = index
     return runs
 
 
@@ -307,34 +312,38 @@ class _Runs:
         """Return True if a run begins where the previous run ends."""
         return self.runs[run - 1][1] == self.runs[run][0]
 
-    def spacing(self, one: int, other: int) -> float | None:
+    def spacing(self, run: int, other_run: int) -> float | None:
         """Return the distance between two runs, m, or None if they are not parallel neighbors."""
-        if (one, other) not in self._spacings:
-            self._spacings[one, other] = _apart(self.points, self.runs[one], self.runs[other])
-        return self._spacings[one, other]
+        if (run, other_run) not in self._spacings:
+            self._spacings[run, other_run] = _run_spacing(self.points, self.runs[run], self.runs[other_run])
+        return self._spacings[run, other_run]
 
-    def following(self, here: int) -> list[int]:
+    def following(self, run: int) -> list[int]:
         """Return the runs that can be the next line after a run, or its first part, in flying order."""
-        if here not in self._following:
-            self._following[here] = self._search_following(here)
-        return self._following[here]
+        if run not in self._following:
+            self._following[run] = self._search_following(run)
+        return self._following[run]
 
-    def _search_following(self, here: int) -> list[int]:
-        found, own = list[tuple[int, float, float]](), self.length((here, here))
-        for after in range(here + 1, min(len(self.runs), here + 2 + _MAX_TURN_AROUND_RUNS)):
-            between = self._distances[self.runs[after][0]] - self._distances[self.runs[here][1]]
-            length = self.length((after, after))
-            spacing = self.spacing(here, after)
-            if spacing is None or between > max(_MAX_TURN_AROUND_RATIO * max(own, length), _SHORT_TURN_AROUND_M):
+    def _search_following(self, run: int) -> list[int]:
+        candidates, own_length = list[tuple[int, float, float]](), self.length((run, run))
+        for next_run in range(run + 1, min(len(self.runs), run + 2 + _MAX_TURN_AROUND_RUNS)):
+            link_length = self._distances[self.runs[next_run][0]] - self._distances[self.runs[run][1]]
+            length = self.length((next_run, next_run))
+            spacing = self.spacing(run, next_run)
+            if spacing is None or link_length > max(
+                _MAX_TURN_AROUND_RATIO * max(own_length, length), _SHORT_TURN_AROUND_M
+            ):
                 continue
-            found.append((after, spacing, length))
+            candidates.append((next_run, spacing, length))
         # A leg of a turn-around may be parallel to lines too, but it is far from them, and short.
         return [
-            after
-            for after, spacing, length in found
+            next_run
+            for next_run, spacing, length in candidates
             if not any(
-                k > after and near < _NEARER_LINE_RATIO * spacing and length < _STUB_LENGTH_RATIO * long
-                for k, near, long in found
+                other_run > next_run
+                and other_spacing < _NEARER_LINE_RATIO * spacing
+                and length < _STUB_LENGTH_RATIO * other_length
+                for other_run, other_spacing, other_length in candidates
             )
         ]
 
@@ -344,12 +353,15 @@ def _find_chain(runs: _Runs, start: int) -> list[_Line]:
     chain = _follow_lines(runs, start)
     if len(chain) > 1:
         # The entry to the first line may be parallel to the second line.
-        others = (_follow_lines(runs, other) for other in range(start, chain[1][0]))
-        chain = max(others, key=lambda one: (len(one), sum(map(runs.length, one))))
+        chains = (_follow_lines(runs, other) for other in range(start, chain[1][0]))
+        chain = max(chains, key=lambda lines: (len(lines), sum(map(runs.length, lines))))
     while len(chain) > _MIN_LINES_WITH_PHOTOS:
         # The last line may be a turn-around of the next survey, whose lines are perpendicular.
-        (_, before), last = chain[-2:]
-        if not any(_is_turn_around(_follow_lines(runs, other), last, runs) for other in range(before + 1, last[0])):
+        (_, previous_run), last_line = chain[-2:]
+        if not any(
+            _is_turn_around(_follow_lines(runs, other), last_line, runs)
+            for other in range(previous_run + 1, last_line[0])
+        ):
             break
         chain.pop()
     return chain
@@ -357,62 +369,64 @@ def _find_chain(runs: _Runs, start: int) -> list[_Line]:
 
 def _is_turn_around(chain: Sequence[_Line], line: _Line, runs: _Runs) -> bool:
     """Return True if a line is only a turn-around between two longer lines of a survey."""
-    between = [pair for pair in pairwise(chain) if pair[0][1] < line[0] and line[1] < pair[1][0]]
-    own = runs.length(line)
+    enclosing_pairs = [pair for pair in pairwise(chain) if pair[0][1] < line[0] and line[1] < pair[1][0]]
+    length = runs.length(line)
     return len(chain) >= _MIN_LINES and any(
-        own < _TURN_AROUND_LENGTH_RATIO * min(map(runs.length, pair)) for pair in between
+        length < _TURN_AROUND_LENGTH_RATIO * min(map(runs.length, pair)) for pair in enclosing_pairs
     )
 
 
 def _follow_lines(runs: _Runs, start: int) -> list[_Line]:
-    """Return the lines that follow each other from a run on; the first line may begin before that run."""
+    """Return the lines of a chain that starts at a run; the first line may begin before that run."""
     chain = [(start, start)]
     while True:
-        first, here = chain[-1]
-        for after in runs.following(here):
-            bends = 0
-            while (len(chain) == 1 or here - bends > first) and _stay_parallel(runs, here, after, bends + 1):
-                bends += 1
+        first_run, last_run = chain[-1]
+        for next_run in runs.following(last_run):
+            bend_count = 0
+            while (len(chain) == 1 or last_run - bend_count > first_run) and _stay_parallel(
+                runs, last_run, next_run, bend_count + 1
+            ):
+                bend_count += 1
             if len(chain) == 1:
-                chain = [(here - bends, here)]
-            elif bends < here - first:
+                chain = [(last_run - bend_count, last_run)]
+            elif bend_count < last_run - first_run:
                 continue
-            chain.append((after, after + bends))
+            chain.append((next_run, next_run + bend_count))
             break
         else:
             return chain
 
 
-def _stay_parallel(runs: _Runs, here: int, after: int, bends: int) -> bool:
-    """Return True if two lines joined by a turn-around are still parallel ``bends`` runs away from it."""
-    one, other = here - bends, after + bends
+def _stay_parallel(runs: _Runs, run: int, next_run: int, bend_count: int) -> bool:
+    """Return True if two lines joined by a turn-around are still parallel ``bend_count`` runs away from it."""
+    run_before, run_after = run - bend_count, next_run + bend_count
     if (
-        one < 0
-        or other >= len(runs.runs)
-        or not (runs.starts_at_previous_end(one + 1) and runs.starts_at_previous_end(other))
+        run_before < 0
+        or run_after >= len(runs.runs)
+        or not (runs.starts_at_previous_end(run_before + 1) and runs.starts_at_previous_end(run_after))
     ):
         return False
-    wide, own = runs.spacing(here, after), runs.spacing(one, other)
-    lengths = [_run_geometry(runs.points, runs.runs[k])[2] for k in (one, other)]
+    spacing, bent_spacing = runs.spacing(run, next_run), runs.spacing(run_before, run_after)
+    lengths = [_run_geometry(runs.points, runs.runs[k])[2] for k in (run_before, run_after)]
     return (
-        wide is not None
-        and own is not None
-        and max(wide, own) <= _SPACING_RATIO_LIMIT * min(wide, own)
+        spacing is not None
+        and bent_spacing is not None
+        and max(spacing, bent_spacing) <= _SPACING_RATIO_LIMIT * min(spacing, bent_spacing)
         and max(lengths) <= _SPACING_RATIO_LIMIT * min(lengths)
     )
 
 
-def _apart(points: Floats, one: tuple[int, int], other: tuple[int, int]) -> float | None:
+def _run_spacing(points: Floats, own_run: tuple[int, int], other_run: tuple[int, int]) -> float | None:
     """Return the distance between two runs, m, or None if they are not parallel neighbors."""
-    start, course, length = _run_geometry(points, one)
-    along, across = _along_and_right(points[[other[0], other[1]], :2] - start, course)
-    run = float(np.hypot(*(points[other[1], :2] - points[other[0], :2])))
-    shorter, spacing = min(length, run), abs(float(across.mean()))
-    if shorter < _MIN_LINE_LENGTH_M or abs(along[1] - along[0]) < math.cos(_PARALLEL_TOLERANCE_RAD) * run:
+    start, course, length = _run_geometry(points, own_run)
+    along, across = _along_and_right(points[[other_run[0], other_run[1]], :2] - start, course)
+    other_length = float(np.hypot(*(points[other_run[1], :2] - points[other_run[0], :2])))
+    min_length, spacing = min(length, other_length), abs(float(across.mean()))
+    if min_length < _MIN_LINE_LENGTH_M or abs(along[1] - along[0]) < math.cos(_PARALLEL_TOLERANCE_RAD) * other_length:
         return None
-    shared = min(length, float(along.max())) - max(0.0, float(along.min()))
+    overlap = min(length, float(along.max())) - max(0.0, float(along.min()))
     if (
-        shared < _MIN_OVERLAP_FRACTION * shorter
+        overlap < _MIN_OVERLAP_FRACTION * min_length
         or spacing < _MIN_LINE_SPACING_M
         or abs(float(across[1] - across[0])) > _MAX_SPACING_CHANGE_RATIO * spacing
     ):
@@ -428,8 +442,8 @@ def _make_survey(
     runs: _Runs, chain: Sequence[_Line], camera: Floats, turn_arounds: Sequence[tuple[float, float]]
 ) -> Survey | None:
     """Build the survey of some lines; return None if too few of them have lateral positions of their own."""
-    points, (begins, ends) = runs.points, runs.ends(chain[0])
-    offsets = LineAxis(points[begins : ends + 1]).of(np.array([runs.midpoint(line) for line in chain]))[1]
+    points, (run_start, run_end) = runs.points, runs.ends(chain[0])
+    offsets = LineAxis(points[run_start : run_end + 1]).of(np.array([runs.midpoint(line) for line in chain]))[1]
     gaps = _line_gaps(np.sort(offsets))
     if len(gaps) + 1 < (_MIN_LINES_WITH_PHOTOS if camera.any() else _MIN_LINES):
         return None
@@ -437,32 +451,41 @@ def _make_survey(
     if len(gaps) + 1 < _MIN_LINES and not all(line.photo > 0.0 for line in lines):
         return None
     # A camera that is off between lines shows where they begin.
-    on = any((camera[line.first : line.last] != 0.0).any() for line in lines)
-    between = pairwise(lines)
-    if not on or all((camera[one.last : other.first] != 0.0).all() for one, other in between):
+    has_photos = any((camera[line.first : line.last] != 0.0).any() for line in lines)
+    line_pairs = pairwise(lines)
+    if not has_photos or all((camera[line.last : following.first] != 0.0).all() for line, following in line_pairs):
         lines = _without_leads(points, lines, turn_arounds)
-    course = _run_geometry(points, (begins, begins + 1))[1]
+    course = _run_geometry(points, (run_start, run_start + 1))[1]
     return Survey(lines, course, tuple((offsets - offsets[0]).tolist()), float(np.median(gaps)))
 
 
-def _line_gaps(places: Floats) -> list[float]:
+def _line_gaps(positions: Floats) -> list[float]:
     """Return the gaps (m) between lines at sorted positions (n,) m, ignoring lines flown twice."""
-    gaps = [float(gap) for gap in np.diff(places) if gap >= _MIN_LINE_SPACING_M]
+    gaps = [float(gap) for gap in np.diff(positions) if gap >= _MIN_LINE_SPACING_M]
     neighbors = [[gaps[k] for k in (i - 1, i + 1) if 0 <= k < len(gaps)] for i in range(len(gaps))]
     return [
-        gap for gap, near in zip(gaps, neighbors, strict=True) if not near or gap > _DUPLICATE_LINE_FRACTION * min(near)
+        gap
+        for gap, adjacent in zip(gaps, neighbors, strict=True)
+        if not adjacent or gap > _DUPLICATE_LINE_FRACTION * min(adjacent)
     ]
 
 
 def _camera_part(run: tuple[int, int], camera: Floats) -> PhotoLine:
-    """Return the part of a run on which the camera is on, or the whole run if it is never on."""
-    first, last = run
-    on = np.flatnonzero(camera[first:last] != 0.0)
-    if not on.size:
-        return PhotoLine(first, last, *run)
-    first, last = run[0] + int(on[0]), run[0] + int(on[-1]) + 1
-    was_off = first == 0 or camera[first - 1] == 0.0
-    return PhotoLine(first, last, *run, float(np.nan_to_num(camera[first])), was_off, bool(camera[last] == 0.0))
+    """Return the part of a run with the camera on, or the whole run if the camera is never on."""
+    first_waypoint, last_waypoint = run
+    photo_legs = np.flatnonzero(camera[first_waypoint:last_waypoint] != 0.0)
+    if not photo_legs.size:
+        return PhotoLine(first_waypoint, last_waypoint, *run)
+    first_waypoint, last_waypoint = run[0] + int(photo_legs[0]), run[0] + int(photo_legs[-1]) + 1
+    was_off = first_waypoint == 0 or camera[first_waypoint - 1] == 0.0
+    return PhotoLine(
+        first_waypoint,
+        last_waypoint,
+        *run,
+        float(np.nan_to_num(camera[first_waypoint])),
+        was_off,
+        bool(camera[last_waypoint] == 0.0),
+    )
 
 
 def _without_leads(
@@ -473,12 +496,12 @@ def _without_leads(
     Leads have the length that the ground station states. If it states none, end legs are leads if all lines have
     equally long ones, since a turn-around has one length.
     """
-    for photo, lead in turn_arounds:
-        if abs(photo - lines[0].photo) <= _PHOTO_SPACING_TOLERANCE_M and lead > 0.0:
-            shorter = tuple(_without_lead(points, line, lead) for line in lines)
+    for photo_spacing, lead in turn_arounds:
+        if abs(photo_spacing - lines[0].photo) <= _PHOTO_SPACING_TOLERANCE_M and lead > 0.0:
+            shortened = tuple(_without_lead(points, line, lead) for line in lines)
             # The mission may have been changed since the ground station wrote that length.
-            if shorter != lines:
-                return shorter
+            if shortened != lines:
+                return shortened
     lengths = leg_runs(points)
     if any(line.ends - line.begins < _MIN_LEGS_WITH_LEADS for line in lines):
         return lines
@@ -487,24 +510,24 @@ def _without_leads(
         line.last - line.first > 1 and np.ptp(lengths[line.first :][:2]) <= _LEAD_LENGTH_TOLERANCE_M for line in lines
     ):
         return lines
-    into, *_, out = lines
+    first_line, *_, last_line = lines
     leads = [lengths[line.first] for line in lines[1:]] + [lengths[line.last - 1] for line in lines[:-1]]
     if float(np.ptp(leads)) > _LEAD_LENGTH_TOLERANCE_M:
         return lines
     # The entry to the first line and the exit of the last may be longer than the other leads, so find a lead as long as
     # the others there; or use the camera, which goes on at the first line's photos and off after the last line's
     # photos.
-    alike = np.abs(lengths - np.median(leads)) <= _LEAD_LENGTH_TOLERANCE_M
-    begins = np.flatnonzero(alike[into.first : into.last - 1]) + into.first + 1
-    ends = np.flatnonzero(alike[out.first + 1 : out.last]) + out.first + 1
-    first = [into.first] if into.first > into.begins else begins.tolist()
-    last = [out.last] if out.last < out.ends else ends.tolist()
-    if not (first and last):
+    is_lead = np.abs(lengths - np.median(leads)) <= _LEAD_LENGTH_TOLERANCE_M
+    candidate_starts = np.flatnonzero(is_lead[first_line.first : first_line.last - 1]) + first_line.first + 1
+    candidate_ends = np.flatnonzero(is_lead[last_line.first + 1 : last_line.last]) + last_line.first + 1
+    first_waypoints = [first_line.first] if first_line.first > first_line.begins else candidate_starts.tolist()
+    last_waypoints = [last_line.last] if last_line.last < last_line.ends else candidate_ends.tolist()
+    if not (first_waypoints and last_waypoints):
         return lines
-    inner = [line._replace(first=line.first + 1, last=line.last - 1) for line in lines]
-    inner[0] = inner[0]._replace(first=first[0])
-    inner[-1] = inner[-1]._replace(last=last[-1])
-    return tuple(inner)
+    inner_lines = [line._replace(first=line.first + 1, last=line.last - 1) for line in lines]
+    inner_lines[0] = inner_lines[0]._replace(first=first_waypoints[0])
+    inner_lines[-1] = inner_lines[-1]._replace(last=last_waypoints[-1])
+    return tuple(inner_lines)
 
 
 def _without_lead(points: Floats, line: PhotoLine, lead: float) -> PhotoLine:
@@ -518,9 +541,9 @@ def _without_lead(points: Floats, line: PhotoLine, lead: float) -> PhotoLine:
     def points_at_lead_distance(end: int) -> list[int]:
         return [i for i in inner if abs(math.dist(points[i, :2], points[end, :2]) - lead) <= tolerance]
 
-    into, out = points_at_lead_distance(line.begins), points_at_lead_distance(line.ends)
-    first = into[0] if into and line.first == line.begins else line.first
-    last = out[-1] if out and line.last == line.ends else line.last
+    start_points, end_points = points_at_lead_distance(line.begins), points_at_lead_distance(line.ends)
+    first = start_points[0] if start_points and line.first == line.begins else line.first
+    last = end_points[-1] if end_points and line.last == line.ends else line.last
     return line._replace(first=first, last=last) if first < last else line
 
 
@@ -531,7 +554,7 @@ def _run_geometry(points: Floats, run: tuple[int, int]) -> tuple[Floats, float, 
     return start, math.atan2(step[0], step[1]), float(np.hypot(*step))
 
 
-def _along_and_right(off: Floats, course: float) -> tuple[Floats, Floats]:
+def _along_and_right(offsets: Floats, course: float) -> tuple[Floats, Floats]:
     """Return the distances along a course and to the right of it, m, of offsets (n, 2)."""
     east, north = math.sin(course), math.cos(course)
-    return off[:, 0] * east + off[:, 1] * north, off[:, 0] * north - off[:, 1] * east
+    return offsets[:, 0] * east + offsets[:, 1] * north, offsets[:, 0] * north - offsets[:, 1] * east

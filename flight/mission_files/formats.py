@@ -41,7 +41,7 @@ _UTF16_MARKS = (b"\xff\xfe", b"\xfe\xff")
 
 
 def mission_kind(path: Path) -> FileKind:
-    """Return the form that a file's suffix names. Raise MissionError for any other suffix.
+    """Return the form that a file's suffix names. Raises MissionError for any other suffix.
 
     >>> mission_kind(Path("survey.plan")), mission_kind(Path("survey.txt"))
     ('plan', 'waypoints')
@@ -62,7 +62,7 @@ def mission_kind(path: Path) -> FileKind:
 def read_mission(path: Path) -> Mission:
     r"""Read a mission file: WPL 110 text (.waypoints, .txt, .fence, .rally) or a `.plan`.
 
-    The suffix must be known; if text and suffix disagree, the text decides. Raise MissionError with one line: file,
+    The suffix must be known; if text and suffix disagree, the text decides. Raises MissionError with one line: file,
     line or field, value, allowed values.
 
     >>> import tempfile
@@ -98,7 +98,7 @@ def parse_mission(text: str, source: str) -> Mission:
 def read_fence(path: Path) -> tuple[MissionItem, ...]:
     r"""Read the fence of a file: of a mission in either form, or of a list of points from older tools.
 
-    Other contents of the file are ignored. Raise MissionError as `read_mission` does, and for a file without a fence.
+    Other contents of the file are ignored. Raises MissionError as `read_mission` does, and if the file has no fence.
 
     >>> import tempfile
     >>> with tempfile.TemporaryDirectory() as folder:

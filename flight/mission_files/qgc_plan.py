@@ -57,29 +57,31 @@ def expand_items(items: list[Any], source: str, warnings: list[str], plans: list
 
     plans: list to which the settings of its surveys are added.
 
-    Raise MissionError, naming the kind, for one that cannot be expanded. The contents of an item are checked later.
+    Raises MissionError, naming the kind, if an item cannot be expanded. The contents of an item are checked later.
     """
-    out: list[Any] = []
-    for k, item in enumerate(items):
+    simple_items: list[Any] = []
+    for index, item in enumerate(items):
         kind = item.get("type", "SimpleItem") if isinstance(item, dict) else "SimpleItem"
         if kind == "SimpleItem":
-            out.append(_to_present_form(item, f"{source}: mission.items.{k}", warnings))
+            simple_items.append(_to_present_form(item, f"{source}: mission.items.{index}", warnings))
             continue
-        place = f"mission.items.{k}"
+        place = f"mission.items.{index}"
         name = str(item.get("complexItemType", ""))[:40] if kind == "ComplexItem" else ""
         if name in _TRANSECT_KINDS:
-            made = _transect_items(item, source, place, name)
-            plans.append(_survey_plan(item["TransectStyleComplexItem"], made, f"{source}: {place}", warnings))
+            replacements = _transect_items(item, source, place, name)
+            plans.append(_survey_plan(item["TransectStyleComplexItem"], replacements, f"{source}: {place}", warnings))
         elif name == _LANDING_KIND:
-            made = _landing_items(item, source, place, _last_number(out) + 1)
+            replacements = _landing_items(item, source, place, _last_number(simple_items) + 1)
         else:
-            known = f"only SimpleItem, {', '.join(_TRANSECT_KINDS)} and {_LANDING_KIND} are read"
-            allowed = f"{known}; convert it to items in the ground station first"
+            read_kinds = f"only SimpleItem, {', '.join(_TRANSECT_KINDS)} and {_LANDING_KIND} are read"
+            allowed = f"{read_kinds}; convert it to items in the ground station first"
             shown = f"{json.dumps(kind)[:40]} {name!r}"
             raise MissionError.at(source, f"{place}.type", name or kind, allowed, shown=shown)
-        warnings.append(f"{source}: {place}: {name} replaced by the {len(made)} simple items that it stands for")
-        out += made
-    return out
+        warnings.append(
+            f"{source}: {place}: {name} replaced by the {len(replacements)} simple items that it stands for"
+        )
+        simple_items += replacements
+    return simple_items
 
 
 def _to_present_form(item: Any, place: str, warnings: list[str]) -> Any:
@@ -91,12 +93,17 @@ def _to_present_form(item: Any, place: str, warnings: list[str]) -> Any:
     """
     if not isinstance(item, dict) or not isinstance(params := item.get("params"), list):
         return item
-    place_of_old = item.get("coordinate")
-    if len(params) == 4 and isinstance(place_of_old, list) and len(place_of_old) == 3:
-        return {**item, "params": [*params, *place_of_old]}
+    old_coordinate = item.get("coordinate")
+    if len(params) == 4 and isinstance(old_coordinate, list) and len(old_coordinate) == 3:
+        return {**item, "params": [*params, *old_coordinate]}
     height = item.get("Altitude")
-    known = isinstance(height, int | float) and not isinstance(height, bool)
-    if len(params) == 7 and params[6] is None and item.get("AltitudeMode") == _ALTITUDE_ABOVE_TERRAIN_MODE and known:
+    has_height = isinstance(height, int | float) and not isinstance(height, bool)
+    if (
+        len(params) == 7
+        and params[6] is None
+        and item.get("AltitudeMode") == _ALTITUDE_ABOVE_TERRAIN_MODE
+        and has_height
+    ):
         warnings.append(
             f"{place}: its height is not calculated yet and is taken as {height:g} m above the terrain there"
         )
@@ -105,8 +112,8 @@ def _to_present_form(item: Any, place: str, warnings: list[str]) -> Any:
 
 
 def _transect_items(item: dict[str, Any], source: str, place: str, name: str) -> list[Any]:
-    held = item.get("TransectStyleComplexItem")
-    items = held.get("Items") if isinstance(held, dict) else None
+    settings = item.get("TransectStyleComplexItem")
+    items = settings.get("Items") if isinstance(settings, dict) else None
     if not isinstance(items, list) or not items:
         field, shown = f"{place}.TransectStyleComplexItem.Items", f"{name!r} without its items"
         allowed = "expected a list; save the plan again in the ground station"
@@ -115,7 +122,7 @@ def _transect_items(item: dict[str, Any], source: str, place: str, name: str) ->
 
 
 class _CameraCalc(BaseModel):
-    """QGC's camera of a survey (`CameraCalc.cc`), given by name, by lens and sensor, or by distances alone."""
+    """QGC's camera of a survey (`CameraCalc.cc`), given by name, by lens and sensor, or only by distances."""
 
     # QGC writes whole numbers as integers.
     model_config = ConfigDict(extra="ignore", allow_inf_nan=False, frozen=True)
@@ -131,20 +138,22 @@ class _CameraCalc(BaseModel):
 
     def camera(self) -> Camera:
         """Return the camera's footprint on level ground. QGC assumes square pixels, from the longer side."""
-        wide, high = self.SensorWidth / self.FocalLength, self.SensorHeight / self.FocalLength
+        width_ratio, height_ratio = self.SensorWidth / self.FocalLength, self.SensorHeight / self.FocalLength
         if self.ImageWidth is not None and self.ImageHeight is not None:
-            high = wide * self.ImageHeight / self.ImageWidth
-        across, along = (wide, high) if self.Landscape else (high, wide)
-        front, side = (None if one is None else one / 100.0 for one in (self.FrontalOverlap, self.SideOverlap))
+            height_ratio = width_ratio * self.ImageHeight / self.ImageWidth
+        across, along = (width_ratio, height_ratio) if self.Landscape else (height_ratio, width_ratio)
+        front, side = (
+            None if percent is None else percent / 100.0 for percent in (self.FrontalOverlap, self.SideOverlap)
+        )
         return Camera(across, along, front, side, self.MinTriggerInterval or 0.0)
 
 
-def _survey_plan(held: dict[str, Any], items: list[Any], place: str, warnings: list[str]) -> SurveyPlan:
+def _survey_plan(settings: dict[str, Any], items: list[Any], place: str, warnings: list[str]) -> SurveyPlan:
     """Return the settings that a survey stores in addition to its items: line extension and camera."""
-    beyond = held.get("TurnAroundDistance")
-    if isinstance(beyond, bool) or not isinstance(beyond, int | float) or not 0.0 <= beyond <= 1e5:
-        beyond = 0.0
-    calc, camera = held.get("CameraCalc"), None
+    turn_around = settings.get("TurnAroundDistance")
+    if isinstance(turn_around, bool) or not isinstance(turn_around, int | float) or not 0.0 <= turn_around <= 1e5:
+        turn_around = 0.0
+    calc, camera = settings.get("CameraCalc"), None
     # A camera that QGC calls manual has only distances.
     if isinstance(calc, dict) and calc.get("FocalLength") is not None:
         try:
@@ -154,19 +163,19 @@ def _survey_plan(held: dict[str, Any], items: list[Any], place: str, warnings: l
             field = ".".join(map(str, fault["loc"]))
             shown = "missing" if fault["type"] == "missing" else json.dumps(fault["input"])[:40]
             warnings.append(f"{place}: CameraCalc.{field}: {shown}: its camera is left out, and no overlap is judged")
-    return SurveyPlan(_trigger_distance(items), float(beyond), camera)
+    return SurveyPlan(_trigger_distance(items), float(turn_around), camera)
 
 
 def _trigger_distance(items: list[Any]) -> float:
     """Return the longest distance between photos that items state, m, or 0 if none does."""
-    found = [0.0]
+    distances = [0.0]
     for item in items:
         params = item.get("params") if isinstance(item, dict) else None
         if isinstance(params, list) and params and item.get("command") == Command.DO_SET_CAM_TRIGG_DIST:
             metres = params[0]
             if isinstance(metres, int | float) and not isinstance(metres, bool) and 0.0 < metres <= 1e6:
-                found.append(float(metres))
-    return max(found)
+                distances.append(float(metres))
+    return max(distances)
 
 
 def _last_number(items: list[Any]) -> int:
@@ -192,14 +201,16 @@ def _landing_items(item: dict[str, Any], source: str, place: str, number: int) -
     if isinstance(radius, bool) or not isinstance(radius, int | float) or not 0.0 <= radius <= 1e5:
         shown = json.dumps(radius)[:40]
         raise MissionError.at(source, f"{place}.loiterRadius", radius, "expected 0..100000 m", shown=shown)
-    turn = float(radius) if item.get("loiterClockwise", True) else -float(radius)
-    spiral = item.get("useLoiterToAlt", True)
-    into = (
-        (Command.NAV_LOITER_TO_ALT, [1.0, turn, 0.0, 1.0]) if spiral else (Command.NAV_WAYPOINT, [0.0, 0.0, 0.0, None])
+    signed_radius = float(radius) if item.get("loiterClockwise", True) else -float(radius)
+    is_spiral = item.get("useLoiterToAlt", True)
+    approach_command = (
+        (Command.NAV_LOITER_TO_ALT, [1.0, signed_radius, 0.0, 1.0])
+        if is_spiral
+        else (Command.NAV_WAYPOINT, [0.0, 0.0, 0.0, None])
     )
-    made: list[tuple[int, int, list[Any]]] = [
+    simple_items: list[tuple[int, int, list[Any]]] = [
         (Command.DO_LAND_START, Frame.MISSION, [0.0] * 7),
-        (into[0], frame, [*into[1], *approach]),
+        (approach_command[0], frame, [*approach_command[1], *approach]),
         (Command.NAV_LAND, frame, [0.0, 0.0, 0.0, None, *land]),
     ]
     return [
@@ -207,11 +218,11 @@ def _landing_items(item: dict[str, Any], source: str, place: str, number: int) -
             "type": "SimpleItem",
             "autoContinue": True,
             "command": int(command),
-            "doJumpId": number + k,
+            "doJumpId": number + index,
             "frame": int(item_frame),
             "params": params,
         }
-        for k, (command, item_frame, params) in enumerate(made)
+        for index, (command, item_frame, params) in enumerate(simple_items)
     ]
 
 
@@ -312,7 +323,7 @@ _UNNAMED_FIRMWARES = (0, 8)
 
 
 def _check_vehicle(kind: int | None, source: str) -> None:
-    """Raise MissionError for a plan that was made for a vehicle other than an airplane."""
+    """Raise MissionError if a plan is for a vehicle other than an airplane."""
     for kinds, name in _OTHER_VEHICLES:
         if kind in kinds:
             allowed = f"{name}: planfly flies fixed-wing aircraft (1)"
@@ -323,7 +334,7 @@ def _check_vehicle(kind: int | None, source: str) -> None:
 
 
 def _autopilot_of(firmware: int | None, source: str) -> str:
-    """Return the autopilot that a firmwareType names, "" for none. Raise MissionError for an unknown one."""
+    """Return the autopilot that a firmwareType names, "" for none. Raises MissionError if it is unknown."""
     if firmware is None or firmware in _UNNAMED_FIRMWARES:
         return ""
     if firmware not in _FIRMWARES:
@@ -336,7 +347,7 @@ def parse_plan_file(text: str, source: str) -> Mission:
     """Read the text of a `.plan` file; ``source`` names it in messages.
 
     Items are numbered as in QGroundControl, from 1 by their order; a jump leads to the item whose doJumpId it names.
-    null is NaN. Raise MissionError with file, field, value and allowed values.
+    null is NaN. Raises MissionError with file, field, value and allowed values.
     """
     try:
         data = json.loads(text.removeprefix("\ufeff"), parse_constant=_refuse_constant)
@@ -349,18 +360,20 @@ def parse_plan_file(text: str, source: str) -> Mission:
         raise MissionError(**first_fault(error, data).at(source)) from error
     _check_vehicle(file.mission.vehicleType, source)
     autopilot = _autopilot_of(file.mission.firmwareType, source)
-    items = [_read_item(item, k, source) for k, item in enumerate(file.mission.items)]
+    items = [_read_item(item, index, source) for index, item in enumerate(file.mission.items)]
     if not (items or file.geoFence.circles or file.geoFence.polygons or file.rallyPoints.points):
         raise MissionError(f"{source}: mission.items: no items", file=source, field="mission.items")
-    for k, (before, after) in enumerate(pairwise(items), 1):
-        if after.seq <= before.seq:
-            allowed = f"must be above the one before, {before.seq}"
-            raise MissionError.at(source, f"mission.items.{k}.doJumpId", after.seq, allowed)
-    counted = enumerate(items, 1)
-    lost = [(k, item) for k, item in counted if item.command in PLACES | LANDINGS and not item.has_position]
-    if lost:
-        number, name = lost[0][0], command_name(lost[0][1].command)
-        warnings.append(f"{source}: item {number}: {name} has no position ({len(lost)} such items in all)")
+    for index, (previous, following) in enumerate(pairwise(items), 1):
+        if following.seq <= previous.seq:
+            allowed = f"must be above the one before, {previous.seq}"
+            raise MissionError.at(source, f"mission.items.{index}.doJumpId", following.seq, allowed)
+    numbered_items = enumerate(items, 1)
+    unplaced = [
+        (index, item) for index, item in numbered_items if item.command in PLACES | LANDINGS and not item.has_position
+    ]
+    if unplaced:
+        number, name = unplaced[0][0], command_name(unplaced[0][1].command)
+        warnings.append(f"{source}: item {number}: {name} has no position ({len(unplaced)} such items in all)")
     home = _read_home(file.mission.plannedHomePosition, source)
     if home is None and file.mission.plannedHomePosition is not None:
         warnings.append(f"{source}: plannedHomePosition is not a position: left out; the mission has no home")
@@ -381,7 +394,7 @@ def parse_plan_file(text: str, source: str) -> Mission:
 
 
 def _check_kind(data: Any, source: str) -> tuple[list[str], list[SurveyPlan]]:
-    """Refuse data that is not a plan before its missing keys are named, and expand its items.
+    """Check that data is a plan, before its missing keys are named, and expand its items.
 
     Return warnings and survey settings.
     """
@@ -402,66 +415,66 @@ def _check_kind(data: Any, source: str) -> tuple[list[str], list[SurveyPlan]]:
     return warnings, plans
 
 
-def _read_item(item: _Item, k: int, source: str) -> MissionItem:
+def _read_item(item: _Item, index: int, source: str) -> MissionItem:
     p1, p2, p3, p4, lat, lon, alt = (math.nan if value is None else value + 0.0 for value in item.params)
     if is_located(item.command, item.frame) and position_problem(lat, lon) is None:
         lat, lon = on_grid(lat), on_grid(lon)
-    seq = k + 1 if item.doJumpId is None else item.doJumpId
-    read = MissionItem(seq, item.command, item.frame, (p1, p2, p3, p4), lat, lon, alt, item.autoContinue)
-    problem = item_problem(read)
+    seq = index + 1 if item.doJumpId is None else item.doJumpId
+    mission_item = MissionItem(seq, item.command, item.frame, (p1, p2, p3, p4), lat, lon, alt, item.autoContinue)
+    problem = item_problem(mission_item)
     if problem is not None:
-        raise MissionError(**problem.at(source, f"{source}: mission.items.{k} (item {seq})"))
-    return read
+        raise MissionError(**problem.at(source, f"{source}: mission.items.{index} (item {seq})"))
+    return mission_item
 
 
 def _read_home(values: list[float | None] | None, source: str) -> Home | None:
     if values is None or values[0] is None or values[1] is None:
         return None
     lat, lon, alt = values[0], values[1], values[2] or 0.0
-    read = MissionItem(0, Command.NAV_WAYPOINT, Frame.GLOBAL, (0.0, 0.0, 0.0, 0.0), lat, lon, alt + 0.0)
-    problem = item_problem(read)
+    home_item = MissionItem(0, Command.NAV_WAYPOINT, Frame.GLOBAL, (0.0, 0.0, 0.0, 0.0), lat, lon, alt + 0.0)
+    problem = item_problem(home_item)
     if problem is not None:
         raise MissionError(**problem.at(source, f"{source}: mission.plannedHomePosition"))
-    return Home(on_grid(lat), on_grid(lon), alt + 0.0) if read.has_position else None
+    return Home(on_grid(lat), on_grid(lon), alt + 0.0) if home_item.has_position else None
 
 
 def _read_fences(fence: _GeoFence, source: str) -> tuple[MissionItem, ...]:
-    found: list[MissionItem] = []
+    fences: list[MissionItem] = []
 
-    def add(command: Command, p1: float, point: list[float], where: str) -> None:
+    def add(command: Command, p1: float, point: list[float], place: str) -> None:
         item = MissionItem(
-            len(found), int(command), Frame.GLOBAL, (p1, 0.0, 0.0, 0.0), on_grid(point[0]), on_grid(point[1]), 0.0
+            len(fences), int(command), Frame.GLOBAL, (p1, 0.0, 0.0, 0.0), on_grid(point[0]), on_grid(point[1]), 0.0
         )
         problem = item_problem(item)
         if problem is not None:
-            raise MissionError(**problem.at(source, f"{source}: geoFence.{where}"))
-        found.append(item)
+            raise MissionError(**problem.at(source, f"{source}: geoFence.{place}"))
+        fences.append(item)
 
-    for k, shape in enumerate(fence.polygons):
+    for index, shape in enumerate(fence.polygons):
         command = (
             Command.NAV_FENCE_POLYGON_VERTEX_INCLUSION
             if shape.inclusion
             else Command.NAV_FENCE_POLYGON_VERTEX_EXCLUSION
         )
         for point in shape.polygon:
-            add(command, float(len(shape.polygon)), point, f"polygons.{k}")
-    for k, ring in enumerate(fence.circles):
+            add(command, float(len(shape.polygon)), point, f"polygons.{index}")
+    for index, ring in enumerate(fence.circles):
         command = Command.NAV_FENCE_CIRCLE_INCLUSION if ring.inclusion else Command.NAV_FENCE_CIRCLE_EXCLUSION
-        add(command, ring.circle.radius, ring.circle.center, f"circles.{k}")
-    return tuple(found)
+        add(command, ring.circle.radius, ring.circle.center, f"circles.{index}")
+    return tuple(fences)
 
 
 def _read_rally(rally: _Rally, source: str) -> tuple[MissionItem, ...]:
-    found = []
-    for k, (lat, lon, alt) in enumerate(rally.points):
+    points = []
+    for number, (lat, lon, alt) in enumerate(rally.points):
         item = MissionItem(
-            k, int(Command.NAV_RALLY_POINT), Frame.GLOBAL_RELATIVE_ALT, (0.0,) * 4, on_grid(lat), on_grid(lon), alt
+            number, int(Command.NAV_RALLY_POINT), Frame.GLOBAL_RELATIVE_ALT, (0.0,) * 4, on_grid(lat), on_grid(lon), alt
         )
         problem = item_problem(item)
         if problem is not None:
-            raise MissionError(**problem.at(source, f"{source}: rallyPoints.points.{k}"))
-        found.append(item)
-    return tuple(found)
+            raise MissionError(**problem.at(source, f"{source}: rallyPoints.points.{number}"))
+        points.append(item)
+    return tuple(points)
 
 
 def plan_file_text(mission: Mission) -> str:
@@ -481,7 +494,7 @@ def plan_file_text(mission: Mission) -> str:
         "groundStation": "planfly",
         "mission": {
             "cruiseSpeed": round(_cruise_speed(mission)),
-            "firmwareType": next((one for one, name in _FIRMWARES.items() if name == mission.autopilot), 0),
+            "firmwareType": next((number for number, name in _FIRMWARES.items() if name == mission.autopilot), 0),
             # 0: mixed.
             "globalPlanAltitudeMode": modes[0] if len(modes) == 1 else 0,
             "hoverSpeed": _HOVER_SPEED_MPS,

@@ -86,11 +86,11 @@ def parse_waypoints(text: str, source: str) -> Mission:
     Accepted: CRLF, spaces for TABs, '#' comments and empty lines, gaps in seq, no current item, more than seven
     decimals (rounded to the 1e-7 degrees that MISSION_ITEM_INT carries). Items are numbered by their lines, as in
     Mission Planner, QGroundControl and MAVProxy, and so are the targets of jumps: seq only shows whether the first line
-    is home. Raise MissionError with file, line, field, value and allowed values.
+    is home. Raises MissionError with file, line, field, value and allowed values.
     """
-    breaks = max(text.count("\n"), text.count("\r"))
-    if breaks > MAX_LINES:
-        raise MissionError(f"{source}: {breaks:,} lines: at most {MAX_LINES:,} are read", file=source)
+    line_break_count = max(text.count("\n"), text.count("\r"))
+    if line_break_count > MAX_LINES:
+        raise MissionError(f"{source}: {line_break_count:,} lines: at most {MAX_LINES:,} are read", file=source)
     lines = [
         (number, line.strip())
         for number, line in enumerate(re.split(r"\r\n|\n|\r", text.removeprefix("\ufeff")), 1)
@@ -165,9 +165,9 @@ def _value_error(where: TextLine, field: str, value: str | int, shown: str, allo
 
 
 def _parse_integer(where: TextLine, name: str, text: str) -> int:
-    low, high = _ALLOWED_RANGES[name]
-    if not _WHOLE_NUMBER.fullmatch(text) or not low <= int(text) <= high:
-        raise _value_error(where, name, text, _short_repr(text), f"expected a whole number {low}..{high}")
+    min_value, max_value = _ALLOWED_RANGES[name]
+    if not _WHOLE_NUMBER.fullmatch(text) or not min_value <= int(text) <= max_value:
+        raise _value_error(where, name, text, _short_repr(text), f"expected a whole number {min_value}..{max_value}")
     return int(text)
 
 
@@ -181,8 +181,8 @@ def _parse_number(where: TextLine, name: str, text: str) -> float:
 
 def _renumbered_rows(rows: list[_Row]) -> list[_Row]:
     """Return the rows with items numbered by their lines; without a home line the first is number 1."""
-    first = 0 if _begins_with_home(rows) or rows[0].item.command in _COMMANDS_WITH_OWN_FILES else 1
-    return [replace(row, item=replace(row.item, seq=seq)) for seq, row in enumerate(rows, first)]
+    first_number = 0 if _begins_with_home(rows) or rows[0].item.command in _COMMANDS_WITH_OWN_FILES else 1
+    return [replace(row, item=replace(row.item, seq=seq)) for seq, row in enumerate(rows, first_number)]
 
 
 def _begins_with_home(rows: list[_Row]) -> bool:
@@ -196,47 +196,57 @@ def _begins_with_home(rows: list[_Row]) -> bool:
 def _split_home(rows: list[_Row]) -> tuple[Home | None, list[_Row]]:
     if not _begins_with_home(rows):
         return None, rows
-    first = rows[0].item
-    if not first.has_position:
+    home_item = rows[0].item
+    if not home_item.has_position:
         return None, rows[1:]
-    return Home(first.lat_deg, first.lon_deg, first.alt), rows[1:]
+    return Home(home_item.lat_deg, home_item.lon_deg, home_item.alt), rows[1:]
 
 
 def _collect_warnings(rows: list[_Row], home: Home | None, body: list[_Row]) -> list[str]:
-    found: list[str] = []
+    warnings: list[str] = []
     if all(row.item.command in _COMMANDS_WITH_OWN_FILES for row in body):
         # A fence or rally file may have a home line, as Mission Planner writes it, or none, as MAVProxy does.
-        return found
+        return warnings
     if not any(row.current for row in rows):
-        found.append("no current item: flown from the first item")
+        warnings.append("no current item: flown from the first item")
     first = rows[0].item
     if len(body) == len(rows):
-        found.append(
+        warnings.append(
             f"{rows[0].where}: no home line (seq 0): the mission has no home and begins with this item, as in Mission"
             " Planner; QGroundControl and MAVProxy take it for home and leave it out"
         )
     elif first.command != Command.NAV_WAYPOINT:
-        found.append(
+        warnings.append(
             f"{rows[0].where}: {command_name(first.command)} in the line of home (seq 0): left out, as ground stations"
             " take that line for home and do not fly it"
         )
     if len(body) < len(rows):
         if home is None:
-            found.append(f"{rows[0].where}: home at 0, 0, which is not a position: left out; the mission has no home")
+            warnings.append(
+                f"{rows[0].where}: home at 0, 0, which is not a position: left out; the mission has no home"
+            )
         elif first.frame not in (Frame.GLOBAL, Frame.GLOBAL_INT):
-            found.append(f"{rows[0].where}: home in frame {first.frame}: its height is taken as above mean sea level")
-    counted = "items are numbered by their lines, as in ground stations, and jumps use these numbers"
-    steps = [(after, after.item.seq - before.item.seq) for before, after in pairwise(rows)]
-    gaps, falls = [row for row, by in steps if by > 1], [row for row, by in steps if by < 1]
+            warnings.append(
+                f"{rows[0].where}: home in frame {first.frame}: its height is taken as above mean sea level"
+            )
+    numbering_text = "items are numbered by their lines, as in ground stations, and jumps use these numbers"
+    seq_steps = [(following, following.item.seq - previous.item.seq) for previous, following in pairwise(rows)]
+    gaps, falling = [row for row, step in seq_steps if step > 1], [row for row, step in seq_steps if step < 1]
     if gaps:
-        found.append(f"{gaps[0].where}: a gap in seq before {gaps[0].item.seq} ({len(gaps)} in all): {counted}")
-    if falls:
-        found.append(f"{falls[0].where}: seq {falls[0].item.seq} does not rise ({len(falls)} in all): {counted}")
-    lost = [row for row in body if row.item.command in PLACES | LANDINGS and not row.item.has_position]
-    if lost:
-        name = command_name(lost[0].item.command)
-        found.append(f"{lost[0].where}: {name} at 0, 0, which is not a position ({len(lost)} such items in all)")
-    return found
+        warnings.append(
+            f"{gaps[0].where}: a gap in seq before {gaps[0].item.seq} ({len(gaps)} in all): {numbering_text}"
+        )
+    if falling:
+        warnings.append(
+            f"{falling[0].where}: seq {falling[0].item.seq} does not rise ({len(falling)} in all): {numbering_text}"
+        )
+    unplaced = [row for row in body if row.item.command in PLACES | LANDINGS and not row.item.has_position]
+    if unplaced:
+        name = command_name(unplaced[0].item.command)
+        warnings.append(
+            f"{unplaced[0].where}: {name} at 0, 0, which is not a position ({len(unplaced)} such items in all)"
+        )
+    return warnings
 
 
 def waypoints_text(mission: Mission) -> str:
@@ -265,9 +275,11 @@ def _file_without_home(items: tuple[MissionItem, ...]) -> str:
 
 
 def _file_text(home: Home | None, items: tuple[MissionItem, ...]) -> str:
-    at = home or Home(0.0, 0.0, 0.0)
-    first = MissionItem(0, Command.NAV_WAYPOINT, Frame.GLOBAL, (0.0, 0.0, 0.0, 0.0), at.lat_deg, at.lon_deg, at.alt)
-    lines = [HEADER, *(_item_line(item, current=item is first) for item in (first, *items))]
+    position = home or Home(0.0, 0.0, 0.0)
+    home_item = MissionItem(
+        0, Command.NAV_WAYPOINT, Frame.GLOBAL, (0.0, 0.0, 0.0, 0.0), position.lat_deg, position.lon_deg, position.alt
+    )
+    lines = [HEADER, *(_item_line(item, current=item is home_item) for item in (home_item, *items))]
     return "\n".join(lines) + "\n"
 
 
@@ -285,9 +297,9 @@ def _format_decimal(value: float, places: int) -> str:
     """
     if math.isnan(value):
         value = 0.0
-    whole, _, part = format(Decimal(repr(value + 0.0)), "f").partition(".")
-    part = part.rstrip("0").ljust(places, "0")
-    return f"{whole}.{part}" if part else whole
+    whole, _, decimals = format(Decimal(repr(value + 0.0)), "f").partition(".")
+    decimals = decimals.rstrip("0").ljust(places, "0")
+    return f"{whole}.{decimals}" if decimals else whole
 
 
 def _short_repr(text: str) -> str:
@@ -322,7 +334,7 @@ def parse_fence_points(text: str, source: str) -> tuple[MissionItem, ...]:
     r"""Return the polygon items of a fence file of the older tools; ``source`` names the file in messages.
 
     The return point is not part of the zone and is left out; a file without one, whose first point is its last, is
-    accepted. Raise MissionError with file, line, value and allowed values.
+    accepted. Raises MissionError with file, line, value and allowed values.
 
     >>> square = ["36.505 -84.195", "36.5 -84.2", "36.5 -84.19", "36.51 -84.19", "36.51 -84.2", "36.5 -84.2"]
     >>> [(item.command, item.params[0], item.lat_deg) for item in parse_fence_points("\n".join(square), "fence.txt")]
@@ -338,9 +350,9 @@ def parse_fence_points(text: str, source: str) -> tuple[MissionItem, ...]:
             " with the first corner repeated at the end",
             file=source,
         )
-    none = (float(len(ring) - 1), 0.0, 0.0, 0.0)
+    params = (float(len(ring) - 1), 0.0, 0.0, 0.0)
     command = int(Command.NAV_FENCE_POLYGON_VERTEX_INCLUSION)
-    return numbered([MissionItem(0, command, int(Frame.GLOBAL), none, lat, lon, 0.0) for lat, lon in ring[:-1]])
+    return numbered([MissionItem(0, command, int(Frame.GLOBAL), params, lat, lon, 0.0) for lat, lon in ring[:-1]])
 
 
 def _content_lines(text: str) -> list[tuple[int, str]]:

@@ -89,10 +89,10 @@ class Airborne(ABC):
         """Make the workspace for a route, and set the time limit of the flight."""
         self.setup, self.map = setup, local_map
         # An autopilot with its own turn law does not follow the arcs after waypoints that are flown over.
-        follows = setup.autopilot.follows_path and setup.autopilot.keeps_to_arcs
-        follows = follows or not setup.route.fly_over.any()
+        follows_arcs = setup.autopilot.follows_path and setup.autopilot.keeps_to_arcs
+        follows_arcs = follows_arcs or not setup.route.fly_over.any()
         self.path = (
-            setup.path if follows else fly_by_path(setup.route, setup.limits, setup.scenario.terrain, swing="none")
+            setup.path if follows_arcs else fly_by_path(setup.route, setup.limits, setup.scenario.terrain, swing="none")
         )
         waypoints = waypoint_records(setup.route, setup.mission, fly_over=setup.scenario.flight.fly_over)
         waypoints["ends"] &= setup.autopilot.loiter_rules.ends_in_circle
@@ -109,17 +109,19 @@ class Airborne(ABC):
         self._work.settings.middle = self.map.middle
         self._work.settings.battery = setup.battery
         length = self.path.length + _extra_loiter_length(setup, waypoints)
-        patience = PATIENCE * length / _min_ground_speed(setup, self._airspeeds) + PATIENCE_SECONDS
+        time_limit = PATIENCE * length / _min_ground_speed(setup, self._airspeeds) + PATIENCE_SECONDS
         # A loiter for a time lasts as long as its item states, whatever circle is laid out for it.
-        timed = waypoints[(waypoints["stays"] > 0.0) & (waypoints["stays"] < math.inf)]
-        patience += sum(dict(zip(timed["item"].tolist(), timed["stays"].tolist(), strict=True)).values())
+        timed_loiters = waypoints[(waypoints["stays"] > 0.0) & (waypoints["stays"] < math.inf)]
+        time_limit += sum(
+            dict(zip(timed_loiters["item"].tolist(), timed_loiters["stays"].tolist(), strict=True)).values()
+        )
         if setup.route.return_to is not None:
             # An autopilot that returns by its own control law may loiter longer than the path does.
-            wider = true_by_equivalent(setup.route.return_to.up) ** 2
-            patience += longest_circling(wider * setup.route.return_to.radius)
+            radius_factor = true_by_equivalent(setup.route.return_to.up) ** 2
+            time_limit += longest_circling(radius_factor * setup.route.return_to.radius)
         if waypoints["ends"][-1]:
-            patience += longest_circling(setup.autopilot.loiter_rules.radius)
-        self.max_ticks = int(patience / self.dt)
+            time_limit += longest_circling(setup.autopilot.loiter_rules.radius)
+        self.max_ticks = int(time_limit / self.dt)
 
     def _law(self, setup: FlightSetup) -> Autopilot:
         """Return the autopilot that keeps its record in the workspace."""
@@ -138,9 +140,9 @@ class Airborne(ABC):
     def _start_disturbances(self, setup: FlightSetup) -> None:
         """Set the wind, and start turbulence and navigation error."""
         wind, work = setup.scenario.wind, self._work
-        to = wind.to_course
+        wind_course = wind.to_course
         w20 = W20[wind.turbulence]
-        work.wind = (wind.speed, math.cos(to), math.sin(to), wind.gradient, wind.reference_amsl, w20)
+        work.wind = (wind.speed, math.cos(wind_course), math.sin(wind_course), wind.gradient, wind.reference_amsl, w20)
         self._windy = bool(wind.speed or wind.gradient or w20)
         self._random = stream(wind.seed if wind.seed is not None else setup.seed, TURBULENCE)
         start_gusts(self._random.standard_normal(5), work.gusts)
@@ -151,50 +153,50 @@ class Airborne(ABC):
             start_navigation(self._navigation_random.standard_normal(6), work.navigation)
 
     def _find_start(self, setup: FlightSetup) -> Start:
-        """Return the start of the route. Raise StartError for a place that is not above the terrain."""
+        """Return the start of the route. Raises StartError if it is not above the terrain."""
         airspeed = float(self._airspeeds[0])
         return find_start(setup, self.map, self._ground, self.fdm.aircraft, airspeed, self._start_offset)
 
     def _start_trimmed(self, source: str, start: Start) -> Trim:
-        """Start trimmed, in the start's wind. Raise StartError."""
+        """Start trimmed, in the start's wind. Raises StartError if that is not possible."""
         trimmed = start_trimmed(self.fdm, source, start)
         self._work.commands = tuple(trimmed.commands())
         self._work.air.wind_north, self._work.air.wind_east = start.wind[:2]
         return trimmed
 
     def block(self, count: int) -> tuple[Rows, str]:
-        """Fly up to ``count`` ticks, and return their rows and the reason why the flight ended ("" if it goes on)."""
-        parts: list[Rows] = []
+        """Fly up to ``count`` ticks, and return their rows and the reason why the flight ended, "" if it continues."""
+        row_blocks: list[Rows] = []
         ended = ""
         while count > 0 and not ended:
             rows, ended = self._fill_workspace(min(count, BLOCK_TICKS))
-            parts.append(rows)
+            row_blocks.append(rows)
             count -= BLOCK_TICKS
-        return (parts[0] if len(parts) == 1 else join_rows(parts)), ended
+        return (row_blocks[0] if len(row_blocks) == 1 else join_rows(row_blocks)), ended
 
     def _fill_workspace(self, count: int) -> tuple[Rows, str]:
         """Fly up to ``count`` ticks, at most one workspace of rows; return values as for `block`."""
-        space = self._workspace
-        space.turbulence[:count] = self._random.standard_normal((count, 3))
+        workspace = self._workspace
+        workspace.turbulence[:count] = self._random.standard_normal((count, 3))
         if self._navigation_random is not None:
-            space.navigation[:count] = self._navigation_random.standard_normal((count, 3))
-        left = self.max_ticks - int(space.ticks_flown[0])
-        space.rows_filled[0] = 0
-        status = self._fly(min(count, left))
-        rows = quantised(space.rows[: space.rows_filled[0]])
+            workspace.navigation[:count] = self._navigation_random.standard_normal((count, 3))
+        remaining_ticks = self.max_ticks - int(workspace.ticks_flown[0])
+        workspace.rows_filled[0] = 0
+        status = self._fly(min(count, remaining_ticks))
+        rows = quantised(workspace.rows[: workspace.rows_filled[0]])
         if status:
             return rows, ENDS[status]
-        if left <= count:
+        if remaining_ticks <= count:
             return rows, self._timeout_text()
         return rows, ""
 
     def _timeout_text(self) -> str:
         """Describe a flight that exceeded its time limit, either in a loiter at an item or elsewhere."""
-        route, ahead = self.setup.route, min(int(self.memory.leg) + 1, self.setup.route.legs)
-        seconds = f"not finished after {self.max_ticks * self.dt:.0f} s"
-        if route.arcs[ahead] > 0.0 and route.return_from < 0:
-            return f"circled: at the loiter of item {route.items[ahead]}, {seconds}"
-        return f"time limit: {seconds}"
+        route, next_waypoint = self.setup.route, min(int(self.memory.leg) + 1, self.setup.route.legs)
+        time_text = f"not finished after {self.max_ticks * self.dt:.0f} s"
+        if route.arcs[next_waypoint] > 0.0 and route.return_from < 0:
+            return f"circled: at the loiter of item {route.items[next_waypoint]}, {time_text}"
+        return f"time limit: {time_text}"
 
 
 def _extra_loiter_length(setup: FlightSetup, waypoints: Records) -> float:
@@ -208,19 +210,25 @@ def _extra_loiter_length(setup: FlightSetup, waypoints: Records) -> float:
     """
     if not setup.autopilot.loiter_rules.at_middle:
         return 0.0
-    longer = dict[int, float]()
+    extra_lengths = dict[int, float]()
     circles = waypoints[waypoints["circle"] != 0.0]
     # Waypoints of one loiter that agree in these fields are processed once.
-    alike = np.unique(circles[["item", "circle", "airspeed", "up"]], return_index=True)[1]
-    for waypoint in circles[alike]:
-        drawn, speed, up = abs(float(waypoint["circle"])), float(waypoint["airspeed"]), float(waypoint["up"])
-        held = max(setup.limits.turn_radius(course, course + math.pi, up, speed) for course in (0.0, math.pi))
+    first_indices = np.unique(circles[["item", "circle", "airspeed", "up"]], return_index=True)[1]
+    for waypoint in circles[first_indices]:
+        drawn_radius, speed, altitude = (
+            abs(float(waypoint["circle"])),
+            float(waypoint["airspeed"]),
+            float(waypoint["up"]),
+        )
+        flown_radius = max(
+            setup.limits.turn_radius(course, course + math.pi, altitude, speed) for course in (0.0, math.pi)
+        )
         # Autopilots keep an equivalent airspeed: the true airspeed is higher in thinner air.
-        held *= true_by_equivalent(up) ** 2
-        if drawn < held < math.inf and not waypoint["returns"]:
-            more = 2.0 * math.pi * (float(waypoint["turns"]) * (held - drawn) + held)
-            longer[int(waypoint["item"])] = max(more, longer.get(int(waypoint["item"]), 0.0))
-    return sum(longer.values())
+        flown_radius *= true_by_equivalent(altitude) ** 2
+        if drawn_radius < flown_radius < math.inf and not waypoint["returns"]:
+            extra_length = 2.0 * math.pi * (float(waypoint["turns"]) * (flown_radius - drawn_radius) + flown_radius)
+            extra_lengths[int(waypoint["item"])] = max(extra_length, extra_lengths.get(int(waypoint["item"]), 0.0))
+    return sum(extra_lengths.values())
 
 
 def _min_ground_speed(setup: FlightSetup, airspeeds: Floats) -> float:

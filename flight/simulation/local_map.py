@@ -37,29 +37,35 @@ class LocalMap:
     def around(setup: FlightSetup) -> "LocalMap":
         """Fit the area and the route with a margin of `MAP_BUFFER`.
 
-        The error is 0.1 mm and 1e-9 rad on areas up to 600 km wide. Raise FlightError if the map cannot be fitted, as
+        The error is 0.1 mm and 1e-9 rad on areas up to 600 km wide. Raises FlightError if the map cannot be fitted, as
         for an area around a pole.
         """
         origin: GeoOrigin = setup.scenario.origin
         points = np.concatenate([setup.route.waypoints[:, :2], setup.scenario.bounds.T])
-        low, high = points.min(axis=0) - MAP_BUFFER, points.max(axis=0) + MAP_BUFFER
-        outline = np.array([[e, n] for e in (low[0], 0.5 * (low[0] + high[0]), high[0]) for n in (low[1], high[1])])
+        min_corner, max_corner = points.min(axis=0) - MAP_BUFFER, points.max(axis=0) + MAP_BUFFER
+        outline = np.array(
+            [
+                [east, north]
+                for east in (min_corner[0], 0.5 * (min_corner[0] + max_corner[0]), max_corner[0])
+                for north in (min_corner[1], max_corner[1])
+            ]
+        )
         lat, lon = (np.radians(values) for values in to_geo(origin, outline[:, 0], outline[:, 1]))
         # Longitudes relative to the origin, so that an area may include the 180th meridian.
-        here = math.radians(origin.lon_deg)
-        lon = here + (lon - here + math.pi) % (2.0 * math.pi) - math.pi
+        origin_longitude = math.radians(origin.lon_deg)
+        lon = origin_longitude + (lon - origin_longitude + math.pi) % (2.0 * math.pi) - math.pi
         bounds = np.array([[lat.min(), lat.max()], [lon.min(), lon.max()]])
         if not (np.isfinite(bounds).all() and np.ptp(bounds[1]) < math.pi):
             raise FlightError(f"{setup.mission.source}: the area lies about a pole", file=setup.mission.source)
 
-        def position(phi: Floats, lam: Floats) -> tuple[Floats, Floats]:
-            return to_map(origin, np.degrees(phi), np.degrees(lam))
+        def position(latitude: Floats, longitude: Floats) -> tuple[Floats, Floats]:
+            return to_map(origin, np.degrees(latitude), np.degrees(longitude))
 
-        def angle(phi: Floats, lam: Floats) -> tuple[Floats, Floats]:
+        def angle(latitude: Floats, longitude: Floats) -> tuple[Floats, Floats]:
             step = 1e-5
-            east0, north0 = position(phi - step, lam)
-            east1, north1 = position(phi + step, lam)
-            return np.arctan2(east1 - east0, north1 - north0), np.zeros_like(phi)
+            east0, north0 = position(latitude - step, longitude)
+            east1, north1 = position(latitude + step, longitude)
+            return np.arctan2(east1 - east0, north1 - north0), np.zeros_like(latitude)
 
         middle = float((bounds[1, 0] + bounds[1, 1]) / 2)
         local = LocalMap(fit_polymap(position, bounds, 1e-4), fit_polymap(angle, bounds, 1e-9), middle)
@@ -91,7 +97,7 @@ class Ground:
         self.heights: Heights
         if terrain is None:
             self.heights, self.to_pixel = np.full((2, 2), np.nan, dtype=np.float32), _map_outside_raster()
-            # Locked like a terrain's array: a compiled function has one type for locked arrays and one for others.
+            # Lock it like a terrain's array: locked and other arrays are different types for a compiled function.
             self.heights.setflags(write=False)
         else:
             self.heights, self.to_pixel = terrain.heights, terrain.to_pixel

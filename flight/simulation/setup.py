@@ -1,4 +1,4 @@
-"""Hold the setup of a flight, which is every input, fixed before the flight starts."""
+"""Hold the setup of a flight: all its inputs, fixed before the flight starts."""
 
 import copy
 import math
@@ -124,7 +124,7 @@ class Gap:
 
 @dataclass(frozen=True, slots=True)
 class MissingItems:
-    """Items of a mission that its log lacks, or stores in a form that no autopilot could interpret.
+    """Items of a mission that its log lacks, or stores in an unusable form.
 
     numbers: numbers of those items, rising, as in the judged mission.
     total: number of the mission's items, including home if the autopilot counts it; 0 if the log does not say.
@@ -202,11 +202,11 @@ class FlightSetup:
     """Inputs of a flight, which are mission, aircraft, autopilot and world; the log stores all of them.
 
     scenario: the world, and the requirements for the flight.
-    mission: its items, as read or exported.
+    mission: the mission, as read or exported.
     route: the waypoints that result from the mission.
-    limits: of scenario and aircraft together, made where the aircraft is loaded.
+    limits: limits of scenario and aircraft together, made where the aircraft is loaded.
     aircraft: its name in the catalog, or its folder.
-    battery: energy carried, Wh.
+    battery: energy that the aircraft carries, Wh.
     seed: seed of the flight; the turbulence's stream comes from it unless the scenario's wind has its own.
     plan: None for a mission from outside.
     autopilot: the autopilot with its settings.
@@ -261,8 +261,8 @@ class FlightSetup:
     @property
     def min_ground_speeds(self) -> Floats:
         """Minimum ground speeds on the leg to each waypoint, (w,) m/s; 0 or less for none."""
-        stated = self.route.min_ground_speed
-        return np.where(np.isnan(stated), self.autopilot.min_ground_speed, stated)
+        stated_speeds = self.route.min_ground_speed
+        return np.where(np.isnan(stated_speeds), self.autopilot.min_ground_speed, stated_speeds)
 
     @property
     def max_bank(self) -> float:
@@ -272,16 +272,16 @@ class FlightSetup:
     @property
     def ground_ways(self) -> GroundWays:
         """Take-off and landing that are flown; empty for an autopilot that flies neither."""
-        asked = self.scenario.launch is not None or self.scenario.landing is not None
-        if self.source is not None or not asked:
+        has_ground_ends = self.scenario.launch is not None or self.scenario.landing is not None
+        if self.source is not None or not has_ground_ends:
             return GroundWays()
         if not self.autopilot.flies_ground:
             title = self.autopilot.title
             return GroundWays(notes=(f"take-off and landing are not flown, and not judged as flown, by {title}",))
         ways = find_ground_ways(self.scenario, self.mission, self.route, self.slowest_launched)
         if self.autopilot.flies_both_ends and ways and (ways.take_off is None or ways.approach is None):
-            lacks = "take-off" if ways.take_off is None else "landing"
-            text = f"without a {lacks} that is flown from the ground, the program is put into the air on a rail"
+            missing_end = "take-off" if ways.take_off is None else "landing"
+            text = f"without a {missing_end} that is flown from the ground, the program is put into the air on a rail"
             return GroundWays(notes=(*ways.notes, text))
         return ways
 
@@ -310,16 +310,16 @@ class FlightSetup:
 
     def in_scenario(self, scenario: Scenario) -> "FlightSetup":
         """Return the same flight in another scenario, with unchanged route, limits and path."""
-        moved = copy.copy(self)
-        object.__setattr__(moved, "scenario", scenario)
-        return moved
+        setup = copy.copy(self)
+        object.__setattr__(setup, "scenario", scenario)
+        return setup
 
     def turned_to_other_side(self) -> "FlightSetup":
         """Return a copy that turns the long way round at each course reversal."""
-        turned = copy.copy(self)
+        setup = copy.copy(self)
         path = fly_by_path(self.route, self.limits, self.scenario.terrain, swing="long")
-        object.__setattr__(turned, "path", path)
-        return turned
+        object.__setattr__(setup, "path", path)
+        return setup
 
 
 def make_limits(scenario: Scenario, envelope: Envelope, airspeed: float, max_bank: float) -> Limits:

@@ -27,7 +27,7 @@ from flight.simulation.track import Rows, Track, as_track, join_rows
 from world.errors import FlightError, StartError
 
 # ----------------------------------------------------------------------
-# The flight loop: read JSBSim, do a tick, set JSBSim, step it, with as little Python between as there can be.
+# The flight loop: read JSBSim, do a tick, set JSBSim and step it, with as little Python in between as possible.
 
 
 def make_loop(
@@ -35,7 +35,7 @@ def make_loop(
     setters: Sequence[Setter],
     tick: Callable[[], int],
     workspace: Workspace,
-    run: Callable[[], object],
+    step_model: Callable[[], object],
     steps: int,
 ) -> Callable[[int], int]:
     """Return a function that flies up to a number of ticks and returns 0, or a status if the flight ended.
@@ -43,9 +43,9 @@ def make_loop(
     getters: getters of the state, in the order of `flight.simulation.tick.READ_FIELDS`.
     setters: setters of the outputs, in the order of `flight.simulation.tick.OUTPUT`.
     tick: the control law's tick, on this workspace.
-    run: function that steps JSBSim; it is called ``steps`` times per tick.
+    step_model: function that steps JSBSim; it is called ``steps`` times per tick.
     """
-    # Each by its name: going through a list of them takes half as long again.
+    # Call each getter by name: a loop over the list takes 1.5 times as long.
     (
         latitude,
         longitude,
@@ -80,9 +80,9 @@ def make_loop(
         set_gust_down,
         set_ground,
     ) = setters
-    # struct writes so many floats in half the time of a slice assignment.
+    # struct writes these floats in half the time of a slice assignment.
     pack: Callable[..., None] = struct.Struct(f"{len(READ_FIELDS)}d").pack_into
-    readings, output, repeat = workspace.readings, workspace.output.tolist, (None,) * steps
+    readings, output, step_range = workspace.readings, workspace.output.tolist, (None,) * steps
 
     def fly(count: int) -> int:
         for _ in range(count):
@@ -123,20 +123,20 @@ def make_loop(
             set_gust_east(east_out)
             set_gust_down(down_out)
             set_ground(ground_out)
-            for _ in repeat:
-                run()
+            for _ in step_range:
+                step_model()
         return 0
 
     return fly
 
 
-# Of the usual guidance, s; `Flight.dt` is a flight's own.
+# Tick of the usual guidance, s; `Flight.dt` is the tick of one flight.
 TICK = 1.0 / 60.0
-# Rows that are handed on at a time, s of flight.
+# Duration of the rows that `simulate` yields at a time, s.
 BLOCK = 1.0
-# Bank that guidance may add to the planned turns' to correct an error, rad.
+# Bank that guidance may add to the bank of planned turns to correct an error, rad.
 BANK_RESERVE = math.radians(3.0)
-# So much longer a flight may take that takes off or lands, s.
+# Time added to the limit of a flight that takes off or lands, s.
 GROUND_PATIENCE = 120.0
 
 
@@ -158,7 +158,7 @@ class FlightBlock(NamedTuple):
     """Some rows of a flight, as `simulate` yields them.
 
     rows: `flight.simulation.track.TRACK_ROW` records, (t,).
-    ended: "completed", or the reason why the flight ended with these rows; "" while it goes on.
+    ended: "completed", or the reason why the flight ended with these rows; "" while it continues.
     distance: distance flown along the path by now, m.
     """
 
@@ -188,7 +188,7 @@ def simulate(flight: Airborne) -> Iterator[FlightBlock]:
 def fly_to_end(flight: Airborne) -> SimulatedFlight:
     """Fly until the flight ends.  The same setup gives the same track, bit for bit.
 
-    Raises FlightError for a program that does not fly to the end.
+    Raises FlightError if a program does not fly to the end.
 
     >>> import numpy as np
     >>> from aircraft.catalog import load_aircraft
@@ -215,14 +215,14 @@ def track_of(blocks: Sequence[FlightBlock]) -> Track:
     return as_track(join_rows([block.rows for block in blocks]))
 
 
-# What of `flight.guidance.inner_loops.GUIDANCE_MEMORY` belongs to the path that is flown, and not to the aircraft.
-_OF_THE_WAY = (
+# Fields of `flight.guidance.inner_loops.GUIDANCE_MEMORY` that describe the flown path and not the aircraft.
+_PATH_MEMORY_FIELDS = (
     *("piece", "leg", "distance", "cross_track", "height_error", "done", "returning", "circled", "turned", "bearing"),
     *("cross_track_sum", "path_bank", "path_bank_rate", "aside", "aside_rate", "arc_speed"),
     *("l1_leg", "l1_sum", "course_sum", "height_sum", "bend_acceleration"),
 )
-# What a flight keeps that leaves its route for another.
-_CARRIED = ("state", "true", "estimated", "commands", "air", "place", "wind", "gusts", "navigation", "memory")
+# Records that a flight keeps when it is diverted to another route.
+_DIVERSION_RECORDS = ("state", "true", "estimated", "commands", "air", "place", "wind", "gusts", "navigation", "memory")
 
 
 class Flight(Airborne):
@@ -239,9 +239,10 @@ class Flight(Airborne):
         """Start the flight from a trimmed state.
 
         variation: an aircraft that differs from its model, which guidance does not know.
-        local_map: the map of the setup if another flight of it has fitted one already.
+        local_map: local map of the setup, if another flight of it has fitted one already.
         start_offset: east, north and up from the route's first waypoint to the start of the flight, m.
-        Raises FlightError for an aircraft that cannot be loaded, and StartError for a flight that cannot start.
+
+        Raises FlightError if the aircraft cannot be loaded, and StartError if the flight cannot start.
         """
         gains = load_gains(aircraft)
         self._ways, gear = setup.ground_ways, None
@@ -270,32 +271,32 @@ class Flight(Airborne):
         setup: setup with the same aircraft, autopilot, wind and rates.
         local_map: local map of that setup.
         """
-        before, own = self._work, self._workspace.own
-        # In the air, whatever the other mission says.
+        previous, previous_memory = self._work, self._workspace.own
+        # The aircraft is in the air, whatever the new mission begins with.
         self._ways = GroundWays()
         self._lay_out(setup, self.fdm.aircraft, local_map)
-        for name in _CARRIED:
-            setattr(self._work, name, getattr(before, name))
-        for name in _OF_THE_WAY:
+        for name in _DIVERSION_RECORDS:
+            setattr(self._work, name, getattr(previous, name))
+        for name in _PATH_MEMORY_FIELDS:
             setattr(self.memory, name, 0)
         law = setup.autopilot.law
         law.begin(self.memory, self._workspace.own)
-        law.take_over(own, self._workspace.own, setup.route.waypoints[0])
+        law.take_over(previous_memory, self._workspace.own, setup.route.waypoints[0])
         self._loop = self._make_loop(law)
 
-    def _begin(self, setup: FlightSetup, model: Fdm, reference: float) -> None:
+    def _begin(self, setup: FlightSetup, model: Fdm, reference_airspeed: float) -> None:
         """Trim the aircraft at the route's start, and initialise the controls of guidance with the model.
 
-        reference: airspeed for which the gains apply, m/s.
+        reference_airspeed: airspeed for which the gains apply, m/s.
         """
         start = self._find_start(setup)
         if setup.autopilot.equivalent_airspeeds:
-            true = start.airspeed * setup.autopilot.airspeed_factor(start.amsl)
-            start = replace(start, slope=0.0, airspeed=min(self.fdm.aircraft.airspeed_max, true))
-        level = straight(model, reference, start.amsl)
+            true_airspeed = start.airspeed * setup.autopilot.airspeed_factor(start.amsl)
+            start = replace(start, slope=0.0, airspeed=min(self.fdm.aircraft.airspeed_max, true_airspeed))
+        level = straight(model, reference_airspeed, start.amsl)
         if level is None:
-            reason = f"no level flight at {reference:.1f} m/s and {start.amsl:.0f} m AMSL"
-            raise StartError(setup.aircraft, reason, field="airspeed", value=reference)
+            reason = f"no level flight at {reference_airspeed:.1f} m/s and {start.amsl:.0f} m AMSL"
+            raise StartError(setup.aircraft, reason, field="airspeed", value=reference_airspeed)
         self._start_fdm = partial(self._begin_motion, setup, start, level.elevator)
         self._start_fdm()
         memory = self.memory
@@ -308,10 +309,10 @@ class Flight(Airborne):
         """Start the aircraft trimmed, or release it with this elevator for a take-off."""
         self._start_trimmed(setup.mission.source, start)
         if self._ways.take_off is not None:
-            begin = find_release(setup, self.map, self._ground, self.fdm.aircraft, self._ways.take_off)
+            release_state = find_release(setup, self.map, self._ground, self.fdm.aircraft, self._ways.take_off)
             commands = (elevator, 0.0, 0.0, self._from_ground.released_throttle)
-            self._work.commands = release(self.fdm, begin, commands)
-            self._work.air.wind_north, self._work.air.wind_east = begin.wind[:2]
+            self._work.commands = release(self.fdm, release_state, commands)
+            self._work.air.wind_north, self._work.air.wind_east = release_state.wind[:2]
 
     def _law(self, setup: FlightSetup) -> Autopilot:
         return self._from_ground if self._ways else setup.autopilot
@@ -320,14 +321,14 @@ class Flight(Airborne):
         return self._loop(count)
 
     def _choose_engine(self, law: Autopilot) -> tuple[CompiledModel | None, str]:
-        """Return the compiled model if it may fly, or None for JSBSim, and which flies for which reason."""
+        """Return the compiled model if it may fly, or None for JSBSim; and the name of the engine with the reason."""
         if self.setup.engine == "jsbsim":
             return None, "JSBSim, as chosen"
         if law.loop is None:
             return None, f"JSBSim, since {law.title} has no compiled loop"
-        gusts, terrain = self._windy, bool(self._ground.known)
+        has_gusts, has_terrain = self._windy, bool(self._ground.known)
         try:
-            model = CompiledModel(self.fdm, READ_FIELDS, self._steps, gusts=gusts, terrain=terrain)
+            model = CompiledModel(self.fdm, READ_FIELDS, self._steps, gusts=has_gusts, terrain=has_terrain)
         except UnsupportedModel as unsupported:
             return None, f"JSBSim, since the compiled model does not cover {unsupported}"
         except (FlightError, ArithmeticError) as error:
@@ -347,9 +348,9 @@ class Flight(Airborne):
         if self._compiled is not None and law.loop is not None:
             model = self._compiled
             return partial(law.loop, space.block, self._ground.heights, *model.arrays)
-        # Not set: gusts in still air, and ground that is not known.
-        used = (True, True, True, True, self._windy, self._windy, self._windy, self._ground.known)
-        setters = [setter if use else _discard for setter, use in zip(access.setters, used, strict=True)]
+        # Do not set gusts in still air, or unknown ground.
+        is_used = (True, True, True, True, self._windy, self._windy, self._windy, self._ground.known)
+        setters = [setter if use else _discard for setter, use in zip(access.setters, is_used, strict=True)]
         return make_loop(
             [access.getters[field] for field in READ_FIELDS],
             setters,

@@ -49,48 +49,47 @@ def find_start(
     airspeed: airspeed of the first leg, m/s.
     offset: east, north and up from the first waypoint to the start, m.
 
-    Raise StartError for a place that is not above the terrain.
+    Raises StartError if the start is not above the terrain.
     """
     points = setup.route.waypoints
-    east, north, up = (float(value + off) for value, off in zip(points[0], offset, strict=True))
-    under = ground.height(east, north)
-    if not math.isnan(under) and up <= under:
-        reason = f"start at {up:.0f} m AMSL: not above the terrain, which is at {under:.0f} m"
+    east, north, up = (float(value + offset_part) for value, offset_part in zip(points[0], offset, strict=True))
+    ground_altitude = ground.height(east, north)
+    if not math.isnan(ground_altitude) and up <= ground_altitude:
+        reason = f"start at {up:.0f} m AMSL: not above the terrain, which is at {ground_altitude:.0f} m"
         raise StartError(setup.mission.source, reason, field="start", value=up)
     lat, lon = (float(value) for value in to_geo(setup.scenario.origin, east, north))
-    step = points[1] - points[0]
-    # Map course minus true course.
-    turn = local_map.convergence(lat, lon)
-    # A speed or a first slope that the aircraft cannot hold is for the verdict to report: the flight starts at the
-    # nearest speed that it can hold, and level.
+    first_leg = points[1] - points[0]
+    convergence = local_map.convergence(lat, lon)
+    # If the aircraft cannot hold the speed or the first slope, the flight starts at the nearest speed that it can hold,
+    # and level; the verdict reports it.
     east_wind, north_wind = setup.scenario.wind.at(up)
-    cos, sin = math.cos(turn), math.sin(turn)
+    cos, sin = math.cos(convergence), math.sin(convergence)
     return Start(
         lat_deg=lat,
         lon_deg=lon,
         amsl=up,
-        course=math.atan2(step[0], step[1]) - turn,
-        slope=math.atan2(step[2], math.hypot(step[0], step[1])),
+        course=math.atan2(first_leg[0], first_leg[1]) - convergence,
+        slope=math.atan2(first_leg[2], math.hypot(first_leg[0], first_leg[1])),
         airspeed=min(aircraft.airspeed_max, max(aircraft.airspeed_min, airspeed)),
         wind=(north_wind * cos + east_wind * sin, east_wind * cos - north_wind * sin, 0.0),
-        ground=min(0.0, up - 1000.0) if math.isnan(under) else under,
+        ground=min(0.0, up - 1000.0) if math.isnan(ground_altitude) else ground_altitude,
     )
 
 
 def start_trimmed(fdm: Fdm, source: str, start: Start) -> Trim:
     """Start trimmed on the slope of the start if the aircraft can hold that slope, otherwise level.
 
-    Raise StartError, which names the mission's file, ``source``.
+    Raises StartError, which names the mission's file, ``source``, if the aircraft can hold neither.
     """
-    begin = (start.lat_deg, start.lon_deg, start.amsl, start.course, start.airspeed)
+    start_values = (start.lat_deg, start.lon_deg, start.amsl, start.course, start.airspeed)
     try:
-        trimmed = fdm.start(*begin, start.slope, start.wind, start.ground)
+        trimmed = fdm.start(*start_values, start.slope, start.wind, start.ground)
     except FlightError:
         try:
-            trimmed = fdm.start(*begin, 0.0, start.wind, start.ground)
+            trimmed = fdm.start(*start_values, 0.0, start.wind, start.ground)
         except FlightError as error:
-            known = {"field": error.field, "value": error.value, "allowed": error.allowed}
-            raise StartError(source, str(error), **known) from error
+            error_fields = {"field": error.field, "value": error.value, "allowed": error.allowed}
+            raise StartError(source, str(error), **error_fields) from error
     # Mean wind is set as part of the gust.
     fdm.set_wind(0.0, 0.0, 0.0)
     fdm.set_gust(*start.wind)
@@ -130,27 +129,27 @@ def find_release(
     launch = take_off.launch
     place, velocity = take_off.release()
     if launch.method == "runway":
-        stands = [one.down for one in contacts_of(aircraft, "wheels") if one.stands]
-        place[2] += max(stands, default=0.0)
+        stand_heights = [contact.down for contact in contacts_of(aircraft, "wheels") if contact.stands]
+        place[2] += max(stand_heights, default=0.0)
     lat, lon = (float(value) for value in to_geo(setup.scenario.origin, place[0], place[1]))
-    turn = local_map.convergence(lat, lon)
+    convergence = local_map.convergence(lat, lon)
     east, north = setup.scenario.wind.at(float(place[2]))
-    under = ground.height(float(place[0]), float(place[1]))
+    ground_altitude = ground.height(float(place[0]), float(place[1]))
     return Release(
         place=(lat, lon, float(place[2])),
-        attitude=(0.0, launch.incline, take_off.course - turn),
-        velocity=(*_to_true_north(float(velocity[0]), float(velocity[1]), turn), -float(velocity[2])),
-        wind=(*_to_true_north(east, north, turn), 0.0),
-        ground=float(take_off.home[2]) if math.isnan(under) else under,
+        attitude=(0.0, launch.incline, take_off.course - convergence),
+        velocity=(*_to_true_north(float(velocity[0]), float(velocity[1]), convergence), -float(velocity[2])),
+        wind=(*_to_true_north(east, north, convergence), 0.0),
+        ground=float(take_off.home[2]) if math.isnan(ground_altitude) else ground_altitude,
     )
 
 
-def _to_true_north(east: float, north: float, turn: float) -> tuple[float, float]:
+def _to_true_north(east: float, north: float, convergence: float) -> tuple[float, float]:
     """Return the true north and east components of a map vector.
 
-    turn: map course of true north, rad.
+    convergence: map course of true north, rad.
     """
-    cos, sin = math.cos(turn), math.sin(turn)
+    cos, sin = math.cos(convergence), math.sin(convergence)
     return north * cos + east * sin, east * cos - north * sin
 
 

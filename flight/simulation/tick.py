@@ -269,9 +269,9 @@ def _read_sensors(work: Record, heights: Heights) -> bool:
     # Relative to the local map's center, so that a flight may cross the 180th meridian.
     state.longitude = settings.middle + wrap(state.longitude - settings.middle)
     # Map course of true north.
-    north, _ = polymap(work.north_map, state.latitude, state.longitude)
-    cos, sin = math.cos(north), math.sin(north)
-    state.yaw = wrap(state.yaw + north)
+    north_course, _ = polymap(work.north_map, state.latitude, state.longitude)
+    cos, sin = math.cos(north_course), math.sin(north_course)
+    state.yaw = wrap(state.yaw + north_course)
     true.east, true.north = polymap(work.position_map, state.latitude, state.longitude)
     true.up = state.amsl
     true.velocity_east = state.velocity_east * cos + state.velocity_north * sin
@@ -319,7 +319,7 @@ def fill_tick(work: Record) -> None:
 
 
 @inner
-def end_return(motion: Record, b: Record, memory: Record, dt: float) -> None:
+def end_return(motion: Record, waypoint: Record, memory: Record, dt: float) -> None:
     """Track the progress of a return to launch around its loiter, and end the flight after it.
 
     This is for an autopilot that returns by its own control law and need not follow the path. The flight ends at the
@@ -327,22 +327,24 @@ def end_return(motion: Record, b: Record, memory: Record, dt: float) -> None:
     `longest_circling` at the latest.
 
     motion: a record of `flight.guidance.navigation_error.MOTION`.
-    b: any waypoint of the return, a record of `flight.guidance.lateral_reference_laws.WAYPOINT`.
-    memory: of `flight.guidance.inner_loops.GUIDANCE_MEMORY`.
+    waypoint: any waypoint of the return, a record of `flight.guidance.lateral_reference_laws.WAYPOINT`.
+    memory: a record of `flight.guidance.inner_loops.GUIDANCE_MEMORY`.
     """
     memory.returning = True
-    off_e, off_n = motion.east - b.centre_east, motion.north - b.centre_north
-    factor = true_by_equivalent(motion.up)
-    radius = abs(b.circle) * factor * factor
-    there = math.hypot(off_e, off_n) < max(RTL_ARRIVAL_RADIUS_M, RTL_ARRIVAL_LOITER_RADII * radius)
-    bearing = math.atan2(off_e, off_n)
+    offset_east, offset_north = motion.east - waypoint.centre_east, motion.north - waypoint.centre_north
+    airspeed_factor = true_by_equivalent(motion.up)
+    radius = abs(waypoint.circle) * airspeed_factor * airspeed_factor
+    is_near = math.hypot(offset_east, offset_north) < max(RTL_ARRIVAL_RADIUS_M, RTL_ARRIVAL_LOITER_RADII * radius)
+    bearing = math.atan2(offset_east, offset_north)
     if memory.circled > 0.0:
         memory.turned += wrap(bearing - memory.bearing)
     memory.bearing = bearing
-    if memory.circled > 0.0 or (there and abs(motion.up - b.up) < RTL_ARRIVAL_ALTITUDE_TOLERANCE_M):
+    if memory.circled > 0.0 or (is_near and abs(motion.up - waypoint.up) < RTL_ARRIVAL_ALTITUDE_TOLERANCE_M):
         memory.circled += dt
-    around = abs(memory.turned) >= 2.0 * math.pi
-    memory.done = (memory.done and around and memory.circled > UNLIMITED) or memory.circled > longest_circling(radius)
+    is_full_circle = abs(memory.turned) >= 2.0 * math.pi
+    memory.done = (memory.done and is_full_circle and memory.circled > UNLIMITED) or memory.circled > longest_circling(
+        radius
+    )
 
 
 @inner
@@ -353,9 +355,9 @@ def end_around(motion: Record, memory: Record, dt: float) -> None:
     flies loops next to the waypoint, and the bearing may take one loop or three to go around.
 
     motion: a record of `flight.guidance.navigation_error.MOTION`.
-    memory: of `flight.guidance.inner_loops.GUIDANCE_MEMORY`.
+    memory: a record of `flight.guidance.inner_loops.GUIDANCE_MEMORY`.
     """
-    # However wide the loiter is flown, the mission's end is not missed.
+    # The mission's end is not missed, however wide the loiter is flown.
     memory.returning = True
     course = math.atan2(motion.velocity_east, motion.velocity_north)
     if memory.circled > 0.0:
@@ -383,7 +385,7 @@ def _to_si(state: Record, factors: Record) -> bool:
 
 
 @inner
-def _air_status(state: Record, memory: Record, clearance: float, slowest: float, empty: bool) -> int:
+def _air_status(state: Record, memory: Record, clearance: float, slowest: float, is_empty: bool) -> int:
     if clearance <= 0.0:
         return GROUND
     if abs(state.roll) > STEEPEST_BANK:
@@ -395,7 +397,7 @@ def _air_status(state: Record, memory: Record, clearance: float, slowest: float,
             abs(memory.cross_track) <= MISSED_ROUTE_DISTANCE_M and abs(memory.height_error) <= MISSED_ROUTE_DISTANCE_M
         )
         return COMPLETED if near else END_MISSED_ROUTE
-    return END_BATTERY_EMPTY if empty else 0
+    return END_BATTERY_EMPTY if is_empty else 0
 
 
 @inner
@@ -478,7 +480,7 @@ def _fill_row(
 def _fill_wind(row: Record, state: Record, cos: float, sin: float) -> None:
     """Set the row's wind in map axes.
 
-    cos, sin: of the map course of true north.
+    cos, sin: cosine and sine of the map course of true north.
     """
     wind = row.wind
     wind[0] = state.wind_east * cos + state.wind_north * sin

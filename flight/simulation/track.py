@@ -1,4 +1,4 @@
-"""Store the track of a flight, with one row per guidance tick."""
+"""Store the track of a flight, one row per guidance tick."""
 
 import csv
 import io
@@ -98,14 +98,14 @@ class Track:
 
     def __post_init__(self) -> None:
         """Convert each array to its type, and lock it."""
-        for item, kind in zip(fields(self), _FIELD_TYPES, strict=True):
-            given = getattr(self, item.name)
-            array = np.ascontiguousarray(given, dtype=kind)
+        for field, dtype in zip(fields(self), _FIELD_TYPES, strict=True):
+            values = getattr(self, field.name)
+            array = np.ascontiguousarray(values, dtype=dtype)
             if array.flags.writeable:
-                if np.may_share_memory(array, given):
+                if np.may_share_memory(array, values):
                     array = array.copy()
                 array.setflags(write=False)
-            object.__setattr__(self, item.name, array)
+            object.__setattr__(self, field.name, array)
 
     def __len__(self) -> int:
         """Return the number of rows."""
@@ -113,26 +113,26 @@ class Track:
 
     def rows(self, start: int, stop: int) -> "Track":
         """Return rows start..stop as a separate track."""
-        return Track(*(getattr(self, item.name)[start:stop] for item in fields(self)))
+        return Track(*(getattr(self, field.name)[start:stop] for field in fields(self)))
 
     def to_pandas(self) -> Any:
         """Return a `pandas.DataFrame`: one row per tick, columns with units in their names.
 
-        Raise `planfly.MissingExtraError`, which is an ImportError, without the extra ``planfly[tables]``.
+        Raises `planfly.MissingExtraError`, which is an ImportError, without the extra ``planfly[tables]``.
         """
         return track_frame(self)
 
     def to_csv(self, path: Path | str) -> None:
         """Write the track as comma-separated text, completely or not at all.
 
-        Numbers read back exactly. Raise OSError.
+        Numbers read back exactly. Raises OSError if the file cannot be written.
         """
         write_track_csv(self, Path(path))
 
     def to_parquet(self, path: Path | str) -> None:
         """Write the track as Parquet.
 
-        Raise MissingExtraError without the extra ``planfly[tables]``, and OSError.
+        Raises MissingExtraError without the extra ``planfly[tables]``, and OSError if the file cannot be written.
         """
         write_track_parquet(self, Path(path))
 
@@ -304,15 +304,15 @@ def track_columns(track: Track) -> dict[str, NDArray[Any]]:
     >>> len(columns), list(columns)[:4], columns["leg_index"].dtype
     (35, ['time_s', 'east_m', 'north_m', 'up_amsl_m'], dtype('int32'))
     """
-    found: dict[str, NDArray[Any]] = {}
+    columns: dict[str, NDArray[Any]] = {}
     for field, names in COLUMN_NAMES.items():
         values = getattr(track, field)
-        found |= dict(zip(names, (values,) if values.ndim == 1 else values.T, strict=True))
-    return found
+        columns |= dict(zip(names, (values,) if values.ndim == 1 else values.T, strict=True))
+    return columns
 
 
 def track_frame(track: Track) -> Any:
-    """Return the track as a `pandas.DataFrame`. Raise MissingExtraError without the extra ``tables``."""
+    """Return the track as a `pandas.DataFrame`. Raises MissingExtraError without the extra ``tables``."""
     need_extra("tables", "to_pandas() needs")
     import pandas as pd
 
@@ -322,22 +322,25 @@ def track_frame(track: Track) -> Any:
 def write_track_csv(track: Track, path: Path) -> None:
     """Write a track as comma-separated text: a row of names, and numbers that read back exactly.
 
-    Raise OSError.
+    Raises OSError if the file cannot be written.
     """
     columns = track_columns(track)
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(columns)
-    for first in range(0, len(track), _ROWS_PER_WRITE):
+    for first_row in range(0, len(track), _ROWS_PER_WRITE):
         # Convert each column by its own type: the fewest digits that reproduce a float32.
         writer.writerows(
-            zip(*(values[first : first + _ROWS_PER_WRITE].astype(str) for values in columns.values()), strict=True)
+            zip(
+                *(values[first_row : first_row + _ROWS_PER_WRITE].astype(str) for values in columns.values()),
+                strict=True,
+            )
         )
     write_whole(path, text.getvalue())
 
 
 def write_track_parquet(track: Track, path: Path) -> None:
-    """Write a track as Parquet. Raise MissingExtraError without the extra ``tables``, and OSError."""
+    """Write a track as Parquet. Raises MissingExtraError without the extra ``tables``, and OSError."""
     need_extra("tables", "to_parquet() needs")
     import pyarrow as pa
     from pyarrow import parquet
@@ -389,24 +392,24 @@ def control_limits(aircraft: str) -> list[tuple[str, float]]:
     throttle 1.00
     """
     try:
-        known = load_aircraft(aircraft)
+        known_aircraft = load_aircraft(aircraft)
     except FlightError:
         limits = (math.nan, math.nan, math.nan)
     else:
-        limits = (known.max_elevator, known.max_aileron, known.max_rudder)
+        limits = (known_aircraft.max_elevator, known_aircraft.max_aileron, known_aircraft.max_rudder)
     return list(zip(("elevator", "aileron", "rudder", "throttle"), (*limits, 1.0), strict=True))
 
 
-def held_at_limit(track: Track, k: int, low: float, high: float) -> NDArray[np.bool_]:
-    """Flag the rows at which the command of control k (a column of `Track.commands`) is saturated, (t,).
+def held_at_limit(track: Track, control: int, min_command: float, max_command: float) -> NDArray[np.bool_]:
+    """Flag the rows at which the command of a control (a column of `Track.commands`) is saturated, (t,).
 
-    low, high: limits of the control; no row is saturated if they are NaN.
+    min_command, max_command: limits of the control; no row is saturated if they are NaN.
 
     >>> rows = np.zeros(3, TRACK_ROW)
     >>> rows["commands"][:, THROTTLE] = 0.5, 1.0, 0.9
     >>> held_at_limit(as_track(rows), THROTTLE, 0.0, 1.0)
     array([False,  True, False])
     """
-    command = track.commands[:, k].astype(np.float64)
-    edge = _LIMIT_TOLERANCE_FRACTION * (high - low)
-    return np.asarray((command <= low + edge) | (command >= high - edge))
+    command = track.commands[:, control].astype(np.float64)
+    tolerance = _LIMIT_TOLERANCE_FRACTION * (max_command - min_command)
+    return np.asarray((command <= min_command + tolerance) | (command >= max_command - tolerance))

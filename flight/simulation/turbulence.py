@@ -68,9 +68,9 @@ def step_gusts(
 @inner
 def _step_transverse(first: float, second: float, noise: float, decay: float) -> tuple[float, float, float]:
     """Advance both lags by a step, and return them with the gust in standard deviations."""
-    before = first
-    first = decay * before + math.sqrt(1.0 - decay * decay) * noise
-    second = decay * second + (1.0 - decay) * 0.5 * (before + first)
+    previous = first
+    first = decay * previous + math.sqrt(1.0 - decay * decay) * noise
+    second = decay * second + (1.0 - decay) * 0.5 * (previous + first)
     root = math.sqrt(3.0)
     # var(sqrt(3) first + (1 - sqrt(3)) second) = 2.
     return first, second, (root * first + (1.0 - root) * second) / math.sqrt(2.0)

@@ -120,8 +120,8 @@ class ArduPlane(Autopilot):
         """Return ArduPlane with the log's parameters, for a log of any ArduPlane release."""
         if not program.startswith("ArduP"):
             return None
-        made, notes = ArduPilotParameters.of_log(parameters, source)
-        return cls(made), notes
+        law_parameters, notes = ArduPilotParameters.of_log(parameters, source)
+        return cls(law_parameters), notes
 
     @classmethod
     def missing_files(cls, aircraft: Aircraft) -> list[str]:
@@ -152,11 +152,11 @@ class ArduPlane(Autopilot):
 
     def described(self, aircraft: str) -> str:
         """Return a description of the law with the parameters that matter most in a flight."""
-        made = self.parameters
-        whose = f"the parameters of {made.source}" if made.source else "its default parameters"
+        parameters = self.parameters
+        source_text = f"the parameters of {parameters.source}" if parameters.source else "its default parameters"
         return (
-            f"the simulated ArduPlane {RELEASE} with {whose} (WP_RADIUS {made.wp_radius:g} m,"
-            f" NAVL1_PERIOD {made.navl1_period:g} s, TECS_HDEM_TCONST {made.tecs_height_demand_time:g} s)"
+            f"the simulated ArduPlane {RELEASE} with {source_text} (WP_RADIUS {parameters.wp_radius:g} m,"
+            f" NAVL1_PERIOD {parameters.navl1_period:g} s, TECS_HDEM_TCONST {parameters.tecs_height_demand_time:g} s)"
         )
 
     @property
@@ -174,24 +174,26 @@ class ArduPlane(Autopilot):
 
         The others are those of `flight.autopilots.arduplane.open_settings`.
         """
-        made = self.parameters
-        found = {name: value for name, value, _ in made.values}
-        left = [
-            f"{name} {found[name]:g} changes the flight and is not flown"
+        parameters = self.parameters
+        values = {name: value for name, value, _ in parameters.values}
+        texts = [
+            f"{name} {values[name]:g} changes the flight and is not flown"
             for name, neutral in _NEUTRAL.items()
-            if found[name] != neutral
+            if values[name] != neutral
         ]
-        left += [
+        texts += [
             f"{axis}_P 0 and {axis}_FF 0 leave the attitude uncontrolled, which is not flown"
             for axis in ("RLL_RATE", "PTCH_RATE")
-            if found[f"{axis}_P"] == found[f"{axis}_FF"] == 0.0
+            if values[f"{axis}_P"] == values[f"{axis}_FF"] == 0.0
         ]
-        fenced = made.changed(FENCE_ENABLE=1.0) if mission.enables_fence else made
-        if fenced.has_fence_of_its_own:
-            left.append(f"the circle and the altitudes of FENCE_TYPE {made.fence_type:g} are not judged")
-        if mission.returns and made.follows_terrain_home:
-            left.append(f"TERRAIN_FOLLOW {made.terrain_follow:g} has the return follow the terrain, which is not flown")
-        return left + describe_open_settings(made, mission, by_program=self.is_program)
+        fence_parameters = parameters.changed(FENCE_ENABLE=1.0) if mission.enables_fence else parameters
+        if fence_parameters.has_fence_of_its_own:
+            texts.append(f"the circle and the altitudes of FENCE_TYPE {parameters.fence_type:g} are not judged")
+        if mission.returns and parameters.follows_terrain_home:
+            texts.append(
+                f"TERRAIN_FOLLOW {parameters.terrain_follow:g} has the return follow the terrain, which is not flown"
+            )
+        return texts + describe_open_settings(parameters, mission, by_program=self.is_program)
 
     @property
     def follows_ground(self) -> bool:
@@ -243,12 +245,12 @@ class ArduPlane(Autopilot):
     @property
     def launch_trigger(self) -> tuple[float, str] | None:
         """TKOFF_THR_MINACC."""
-        least = self.parameters.takeoff_acceleration
-        return (least, "TKOFF_THR_MINACC") if least > 0.0 else None
+        min_acceleration = self.parameters.takeoff_acceleration
+        return (min_acceleration, "TKOFF_THR_MINACC") if min_acceleration > 0.0 else None
 
-    def go_around_height(self, asked: float, takeoff: float) -> float | None:
+    def go_around_height(self, stated_height: float, takeoff_height: float) -> float | None:
         """Return the landing item's first parameter, or the take-off's height, or 30 m."""
-        return go_around_height(asked, takeoff)
+        return go_around_height(stated_height, takeoff_height)
 
     @property
     def return_rules(self) -> ReturnRules:
@@ -260,19 +262,19 @@ class ArduPlane(Autopilot):
         >>> made.return_rules.lands
         'straight'
         """
-        made = self.parameters
+        parameters = self.parameters
         return ReturnRules(
-            height=math.nan if made.rtl_altitude < 0.0 else made.rtl_altitude,
-            radius=made.return_radius,
-            climb_first=math.inf if made.climbs_before_turn else made.rtl_climb_min,
-            first_bank=min(made.level_roll_limit, made.roll_limit),
-            sink=made.tecs_sink_max or math.inf,
-            least_slope=made.glide_slope_min,
-            rally_limit=made.rally_limit,
-            includes_home=made.rally_includes_home > 0.0,
+            height=math.nan if parameters.rtl_altitude < 0.0 else parameters.rtl_altitude,
+            radius=parameters.return_radius,
+            climb_first=math.inf if parameters.climbs_before_turn else parameters.rtl_climb_min,
+            first_bank=min(parameters.level_roll_limit, parameters.roll_limit),
+            sink=parameters.tecs_sink_max or math.inf,
+            least_slope=parameters.glide_slope_min,
+            rally_limit=parameters.rally_limit,
+            includes_home=parameters.rally_includes_home > 0.0,
             slope_to_stated_height=True,
-            lands=_LANDS.get(int(made.rtl_autoland), ""),
-            instead=_RETURN_PATH if int(made.rtl_autoland) == 4 else "",
+            lands=_LANDS.get(int(parameters.rtl_autoland), ""),
+            instead=_RETURN_PATH if int(parameters.rtl_autoland) == 4 else "",
         )
 
     @property
@@ -283,18 +285,18 @@ class ArduPlane(Autopilot):
         >>> rules.radius, round(rules.growth(1300.0), 3)
         (-80.0, 1.135)
         """
-        made = self.parameters
+        parameters = self.parameters
         return LoiterRules(
-            radius=made.loiter_radius,
+            radius=parameters.loiter_radius,
             radius_name="WP_LOITER_RAD",
             radius_of=radius_read,
             growth=_radius_growth,
             at_middle=True,
             lines_up=True,
-            climb=made.tecs_climb_max,
-            sink=made.tecs_sink_max or math.inf,
+            climb=parameters.tecs_climb_max,
+            sink=parameters.tecs_sink_max or math.inf,
             short=LOITER_ALTITUDE_TOLERANCE_M,
-            unflown=_bank_limit_note(made.navl1_lim_bank),
+            unflown=_bank_limit_note(parameters.navl1_lim_bank),
             before_return=_BEFORE_RETURN,
         )
 
@@ -375,22 +377,25 @@ class ArduPlaneFromGround(ArduPlane, GroundAutopilot):
     @property
     def released_throttle(self) -> float:
         """Throttle at the end of the rail."""
-        made = self.parameters
+        parameters = self.parameters
         # Without a slew limit the throttle opens at once (not 0 times infinity); it is closed if the motor starts
         # later.
-        since = max(0.0, -self.motor_start)
-        return min(made.takeoff_throttle or made.throttle_max, since * takeoff_slew(made) if since else 0.0)
+        running_time = max(0.0, -self.motor_start)
+        return min(
+            parameters.takeoff_throttle or parameters.throttle_max,
+            running_time * takeoff_slew(parameters) if running_time else 0.0,
+        )
 
     def begin(self, memory: Record, own: Record) -> None:
         """Write the parameters, the contacts, the take-off and the landing into the memory."""
         super().begin(memory, own)
         own.staged = own.parameters
         ground = own.ground
-        used = self.contacts[:CONTACTS]
-        ground.contacts = len(used)
-        for k, one in enumerate(used):
-            ground.contact[k] = one.forward, one.right, one.down
-            ground.stands[k] = one.stands
+        contacts = self.contacts[:CONTACTS]
+        ground.contacts = len(contacts)
+        for index, contact in enumerate(contacts):
+            ground.contact[index] = contact.forward, contact.right, contact.down
+            ground.stands[index] = contact.stands
         ground.turnover = _TURNOVER_SPEED_RATIO * self.aircraft.stall_speed
         ground.stage = IN_AIR
         if self.ways.take_off is not None:
@@ -399,15 +404,15 @@ class ArduPlaneFromGround(ArduPlane, GroundAutopilot):
             self._begin_landing(self.ways.approach, ground)
 
     def _begin_take_off(self, take_off: TakeOff, ground: Record) -> None:
-        made, launch = self.parameters, take_off.launch
+        parameters, launch = self.parameters, take_off.launch
         ground.stage, ground.rolls = TAKING_OFF, launch.method == "runway"
         ground.motor = self.motor_start
-        ground.slew, ground.full = takeoff_slew(made), made.takeoff_throttle or made.throttle_max
+        ground.slew, ground.full = takeoff_slew(parameters), parameters.takeoff_throttle or parameters.throttle_max
         ground.base, ground.top, ground.low = take_off.base, take_off.top, take_off.home[2]
         ground.pitch, ground.leg = self._climb_pitch(take_off), take_off.waypoint
         # Start when it moved at 5 m/s, at which its course over the ground is known.
-        pushed = take_off.acceleration
-        ground.fast = max(0.0, take_off.speed - _COURSE_SPEED_MPS) / pushed if pushed else 0.0
+        acceleration = take_off.acceleration
+        ground.fast = max(0.0, take_off.speed - _COURSE_SPEED_MPS) / acceleration if acceleration else 0.0
 
     def _climb_pitch(self, take_off: TakeOff) -> float:
         """Return the pitch of the climb, rad: the item's, or the highest if the motor runs before the push.
@@ -417,12 +422,14 @@ class ArduPlaneFromGround(ArduPlane, GroundAutopilot):
         """
         if self.motor_start > -math.inf or take_off.acceleration <= 0.0:
             return take_off.pitch
-        made = self.parameters
-        return max(take_off.pitch, min(made.pitch_limit_max, made.tecs_pitch_max or math.inf))
+        parameters = self.parameters
+        return max(take_off.pitch, min(parameters.pitch_limit_max, parameters.tecs_pitch_max or math.inf))
 
     def _begin_landing(self, approach: Approach, ground: Record) -> None:
-        up = float(approach.point[2])
-        glide = self.landing_glide(approach.begin - up, approach.run, approach.tail_wind, up)
+        landing_altitude = float(approach.point[2])
+        glide = self.landing_glide(
+            approach.begin - landing_altitude, approach.run, approach.tail_wind, landing_altitude
+        )
         ground.lands, ground.landing_leg = True, approach.leg
         ground.east, ground.north, ground.up = approach.point
         ground.begin, ground.slope = approach.begin, glide.slope
@@ -439,7 +446,7 @@ _TURNOVER_SPEED_RATIO = 0.75
 # Ground speed above which ArduPlane knows its course, m/s.
 _COURSE_SPEED_MPS = 5.0
 
-# Continuation of an RTL, by RTL_AUTOLAND; with 3 the landing sequence is for go-arounds alone.
+# Continuation of an RTL, by RTL_AUTOLAND; with 3 the landing sequence is only for go-arounds.
 _LANDS: dict[int, Literal["", "circle", "straight"]] = {1: "circle", 2: "straight"}
 _RETURN_PATH = (
     "RTL_AUTOLAND 4 returns along the mission's return path or landing sequence: not flown, it stays in its circle"
@@ -475,10 +482,10 @@ def radius_read(loiter: Loiter) -> float:
         return 0.0
     if not math.isfinite(loiter.radius):
         return abs(loiter.radius)
-    stated = float(math.floor(abs(loiter.radius)))
-    if not (loiter.endless or loiter.to_height) and stated > _MAX_BYTE_RADIUS_M:
-        stated = 10.0 * min(_MAX_BYTE_RADIUS_M, math.floor(stated / 10.0))
-    return stated if stated > _NO_RADIUS_M else 0.0
+    stated_radius = float(math.floor(abs(loiter.radius)))
+    if not (loiter.endless or loiter.to_height) and stated_radius > _MAX_BYTE_RADIUS_M:
+        stated_radius = 10.0 * min(_MAX_BYTE_RADIUS_M, math.floor(stated_radius / 10.0))
+    return stated_radius if stated_radius > _NO_RADIUS_M else 0.0
 
 
 def _radius_growth(up: float) -> float:

@@ -66,7 +66,7 @@ _FENCE_REACTION: dict[int, FailsafeAction] = {0: "on", 1: "return", 6: "guided",
 def failsafe_causes(
     parameters: ArduPilotParameters, *, has_fence: bool, has_landing: bool = False, ends_landed: bool = False
 ) -> tuple[Cause, ...]:
-    """Return the causes that can end an aircraft's mission in AUTO, in the order in which pilots usually ask.
+    """Return the causes that can end a mission in AUTO, in the order of interest to pilots.
 
     has_fence: True if the mission carries a fence.
     has_landing: True if it has a landing sequence; without one a landing is an RTL.
@@ -83,23 +83,23 @@ def failsafe_causes(
     battery low BATT_FS_LOW_ACT 1 return
     battery critical BATT_FS_CRT_ACT 0 on
     """
-    long = int(parameters.long_failsafe)
+    long_action = int(parameters.long_failsafe)
     causes = [Cause("the pilot's RTL", "return"), Cause("the mission's end", "landed" if ends_landed else "return")]
-    short = int(parameters.short_failsafe)
+    short_action = int(parameters.short_failsafe)
     # THR_FAILSAFE 2 notices the loss, and starts no failsafe.
-    notices = parameters.throttle_failsafe == 1.0
-    leaves_auto = _SHORT_FAILSAFE.get(short, "on") != "on" and notices
+    detects_loss = parameters.throttle_failsafe == 1.0
+    leaves_auto = _SHORT_FAILSAFE.get(short_action, "on") != "on" and detects_loss
     if leaves_auto:
-        causes.append(Cause("RC lost for 1.5 s", _SHORT_FAILSAFE[short], "FS_SHORT_ACTN", short))
-    if leaves_auto and long == 0:
+        causes.append(Cause("RC lost for 1.5 s", _SHORT_FAILSAFE[short_action], "FS_SHORT_ACTN", short_action))
+    if leaves_auto and long_action == 0:
         # It is no longer in AUTO, and from any other mode FS_LONG_ACTN 0 is an RTL.
-        causes.append(Cause("RC lost", "return", "FS_SHORT_ACTN", short))
-    elif notices:
-        causes.append(Cause("RC lost", _LONG_FAILSAFE.get(long, "on"), "FS_LONG_ACTN", long))
+        causes.append(Cause("RC lost", "return", "FS_SHORT_ACTN", short_action))
+    elif detects_loss:
+        causes.append(Cause("RC lost", _LONG_FAILSAFE.get(long_action, "on"), "FS_LONG_ACTN", long_action))
     else:
         causes.append(Cause("RC lost", "on", "THR_FAILSAFE", int(parameters.throttle_failsafe)))
     if parameters.station_failsafe > 0.0:
-        causes.append(Cause("station lost", _LONG_FAILSAFE.get(long, "on"), "FS_LONG_ACTN", long))
+        causes.append(Cause("station lost", _LONG_FAILSAFE.get(long_action, "on"), "FS_LONG_ACTN", long_action))
     else:
         causes.append(Cause("station lost", "on", "FS_GCS_ENABL", 0))
     causes += _battery_causes(parameters, has_landing=has_landing)
@@ -118,19 +118,19 @@ def _battery_causes(parameters: ArduPilotParameters, *, has_landing: bool) -> li
     Nothing triggers them without a monitor or without a threshold.  The default of BATT_MONITOR depends on the board,
     so a file that does not state it is taken to have a monitor.
     """
-    unstated = "BATT_MONITOR" in parameters.by_origin("default")
-    monitored = unstated or parameters.battery_monitor > 0.0
-    low = parameters.low_voltage > 0.0 or parameters.low_charge > 0.0
-    critical = parameters.critical_voltage > 0.0 or parameters.critical_charge > 0.0
-    found = []
-    for name, value, parameter, triggered in (
-        ("battery low", parameters.low_battery, "BATT_FS_LOW_ACT", low),
-        ("battery critical", parameters.critical_battery, "BATT_FS_CRT_ACT", critical),
+    is_unstated = "BATT_MONITOR" in parameters.by_origin("default")
+    is_monitored = is_unstated or parameters.battery_monitor > 0.0
+    has_low_threshold = parameters.low_voltage > 0.0 or parameters.low_charge > 0.0
+    has_critical_threshold = parameters.critical_voltage > 0.0 or parameters.critical_charge > 0.0
+    causes = []
+    for name, value, parameter, has_threshold in (
+        ("battery low", parameters.low_battery, "BATT_FS_LOW_ACT", has_low_threshold),
+        ("battery critical", parameters.critical_battery, "BATT_FS_CRT_ACT", has_critical_threshold),
     ):
-        does = _BATTERY_FAILSAFE.get(int(value), "on")
-        if does == "land" and not has_landing:
-            does = "return"
-        if does != "on" and not (monitored and triggered):
-            does = "never"
-        found.append(Cause(name, does, parameter, int(value)))
-    return found
+        action = _BATTERY_FAILSAFE.get(int(value), "on")
+        if action == "land" and not has_landing:
+            action = "return"
+        if action != "on" and not (is_monitored and has_threshold):
+            action = "never"
+        causes.append(Cause(name, action, parameter, int(value)))
+    return causes

@@ -32,15 +32,15 @@ def landing_airspeed(parameters: ArduPilotParameters, tail_wind: float) -> float
     >>> landing_airspeed(ArduPilotParameters.defaults().changed(TECS_LAND_ARSPD=14.0), 0.0)
     12.0
     """
-    cruise, stated = parameters.airspeed_cruise, parameters.landing_airspeed
-    base = stated if stated >= 0.0 else 0.5 * (cruise + parameters.airspeed_min)
-    return min(base + parameters.landing_head_wind * max(0.0, -tail_wind), cruise)
+    cruise, stated_airspeed = parameters.airspeed_cruise, parameters.landing_airspeed
+    calm_airspeed = stated_airspeed if stated_airspeed >= 0.0 else 0.5 * (cruise + parameters.airspeed_min)
+    return min(calm_airspeed + parameters.landing_head_wind * max(0.0, -tail_wind), cruise)
 
 
-def landing_glide(height: float, run: float, ground_speed: float, parameters: ArduPilotParameters) -> LandingGlide:
+def landing_glide(height: float, distance: float, ground_speed: float, parameters: ArduPilotParameters) -> LandingGlide:
     """Return the glide to a landing point from the waypoint before it.
 
-    height, run: height of the waypoint above the landing point, and its distance before it, m.
+    height, distance: height of the waypoint above the landing point, and its distance before it, m.
     ground_speed: m/s.
 
     At 20 m/s the sink rate from 54 m over 600 m is 1.8 m/s, and the flare's two seconds 3.6 m; the flare lasts
@@ -51,26 +51,26 @@ def landing_glide(height: float, run: float, ground_speed: float, parameters: Ar
     >>> [round(number, 3) for number in glide]
     [0.095, 3.6, 70.244]
 
-    A flare at TECS_LAND_SINK alone, 0.05 m/s, is computed with 0.1 m/s: 1 m, twice LAND_FLARE_ALT, takes 10 s.
+    A flare entirely at TECS_LAND_SINK, 0.05 m/s, is computed with 0.1 m/s: 1 m, twice LAND_FLARE_ALT, takes 10 s.
 
     >>> gentle = ArduPilotParameters.defaults().changed(TECS_LAND_SINK=0.05, LAND_FLARE_AIM=100.0, LAND_FLARE_ALT=0.5)
     >>> [round(landing_glide(54.0, 600.0, 20.0, gentle)[k], 3) for k in (1, 2)]
     [1.0, 200.0]
     """
     speed = max(_MIN_GROUND_SPEED_MPS, ground_speed)
-    sink = height * speed / run
-    flare_height = parameters.flare_time * sink or parameters.flare_height
+    sink_rate = height * speed / distance
+    flare_height = parameters.flare_time * sink_rate or parameters.flare_height
     if parameters.flare_height > 0.0:
         flare_height = min(flare_height, 2.0 * parameters.flare_height)
-    mean_sink = parameters.flare_weight * parameters.landing_sink + (1.0 - parameters.flare_weight) * sink
-    flare_distance = min(speed * flare_height / max(_MIN_SINK_MPS, mean_sink), _MAX_FLARE_FRACTION * run)
-    return LandingGlide((height - flare_height) / (run - flare_distance), flare_height, flare_distance)
+    mean_sink = parameters.flare_weight * parameters.landing_sink + (1.0 - parameters.flare_weight) * sink_rate
+    flare_distance = min(speed * flare_height / max(_MIN_SINK_MPS, mean_sink), _MAX_FLARE_FRACTION * distance)
+    return LandingGlide((height - flare_height) / (distance - flare_distance), flare_height, flare_distance)
 
 
-def go_around_height(asked: float, takeoff: float) -> float:
-    """Return the height of a go-around above home, m, which the landing item or the take-off states, or 30 m.
+def go_around_height(stated_height: float, takeoff_height: float) -> float:
+    """Return the height of a go-around above home, m, as the landing item or the take-off states it, or 30 m.
 
     >>> go_around_height(50.0, 80.0), go_around_height(0.0, 80.0), go_around_height(0.0, 0.0)
     (50.0, 80.0, 30.0)
     """
-    return next((height for height in (asked, takeoff) if height > 0.0), _GO_AROUND_ALTITUDE_M)
+    return next((height for height in (stated_height, takeoff_height) if height > 0.0), _GO_AROUND_ALTITUDE_M)

@@ -2,8 +2,8 @@
 
 With TKOFF_THR_MINACC it waits for an acceleration along the nose, and then for TKOFF_THR_DELAY; then within a tenth of
 a second the ground speed must be above TKOFF_THR_MINSPD, and the nose between -30 and 45 degrees, or it waits for an
-acceleration again (`Plane::auto_takeoff_check`, ArduPlane/takeoff.cpp, of ArduPlane 4.6).  Without MINACC it waits for
-the speed alone, and without either the motor runs as soon as the mission does.
+acceleration again (`Plane::auto_takeoff_check`, ArduPlane/takeoff.cpp, of ArduPlane 4.6).  Without MINACC it waits
+only for the speed, and without either the motor runs as soon as the mission does.
 """
 
 import math
@@ -38,27 +38,27 @@ def motor_start(acceleration: float, speed: float, incline: float, parameters: A
     >>> motor_start(0.0, 0.0, 0.0, ArduPilotParameters.defaults()), motor_start(0.0, 0.0, 0.0, made)
     (-inf, inf)
     """
-    least, delay = parameters.takeoff_acceleration, parameters.takeoff_delay
-    if least <= 0.0 and parameters.takeoff_ground_speed <= 0.0:
+    min_acceleration, delay = parameters.takeoff_acceleration, parameters.takeoff_delay
+    if min_acceleration <= 0.0 and parameters.takeoff_ground_speed <= 0.0:
         return -math.inf
     push_time = speed / acceleration if acceleration > 0.0 else 0.0
     push_start = math.nan
-    for k in range(round((push_time + _MOTOR_START_TIMEOUT_S) / _CHECK_INTERVAL_S)):
-        now = k * _CHECK_INTERVAL_S - push_time
+    for check in range(round((push_time + _MOTOR_START_TIMEOUT_S) / _CHECK_INTERVAL_S)):
+        time = check * _CHECK_INTERVAL_S - push_time
         # The horizontal part of the acceleration on the rail; after the rail the aircraft slows down.
-        measured = acceleration if now < 0.0 else 0.0
+        measured_acceleration = acceleration if time < 0.0 else 0.0
         if math.isnan(push_start):
-            if measured < least:
+            if measured_acceleration < min_acceleration:
                 continue
-            push_start = now
-        if now - push_start > delay + _SPEED_TIMEOUT_S or not _PITCH_RANGE_RAD[0] < incline < _PITCH_RANGE_RAD[1]:
+            push_start = time
+        if time - push_start > delay + _SPEED_TIMEOUT_S or not _PITCH_RANGE_RAD[0] < incline < _PITCH_RANGE_RAD[1]:
             push_start = math.nan
             continue
-        over_ground = speed * math.cos(incline) * min(1.0, 1.0 + now / push_time if push_time else 1.0)
-        if now - push_start >= delay - 1e-9 and (
-            over_ground > parameters.takeoff_ground_speed or parameters.takeoff_ground_speed <= 0.0
+        ground_speed = speed * math.cos(incline) * min(1.0, 1.0 + time / push_time if push_time else 1.0)
+        if time - push_start >= delay - 1e-9 and (
+            ground_speed > parameters.takeoff_ground_speed or parameters.takeoff_ground_speed <= 0.0
         ):
-            return now
+            return time
     return math.inf
 
 
@@ -74,13 +74,17 @@ def takeoff_slew(parameters: ArduPilotParameters) -> float:
     return parameters.takeoff_slew or parameters.throttle_slew or math.inf
 
 
-def run_up(starts: float, parameters: ArduPilotParameters) -> float:
+def run_up(start_time: float, parameters: ArduPilotParameters) -> float:
     """Return the time on the ground until full throttle, s; 0 if the motor starts in the launch or later.
 
-    starts: the result of `motor_start`.
+    start_time: result of `motor_start`, s.
 
     >>> from flight.autopilots.arduplane.parameters import ArduPilotParameters
     >>> round(run_up(-math.inf, ArduPilotParameters.defaults()), 2), run_up(-0.4, ArduPilotParameters.defaults())
     (1.2, 0.0)
     """
-    return parameters.takeoff_delay + 1.0 / takeoff_slew(parameters) if math.isinf(starts) and starts < 0.0 else 0.0
+    return (
+        parameters.takeoff_delay + 1.0 / takeoff_slew(parameters)
+        if math.isinf(start_time) and start_time < 0.0
+        else 0.0
+    )

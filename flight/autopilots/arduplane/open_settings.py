@@ -73,7 +73,7 @@ OPEN_SETTINGS = {
     "TECS_LAND_IGAIN": OpenSetting(_LANDING, by_program=True),
     "TECS_LAND_PDAMP": OpenSetting(_LANDING, by_program=True),
 }
-_DEFAULTS = {name: one.default for name, one in ArduPilotParameters.table.when_stated.items()}
+_DEFAULTS = {name: definition.default for name, definition in ArduPilotParameters.table.when_stated.items()}
 # Bits of USE_REV_THRUST for a mission without a landing.
 _REVERSE_IN_FLIGHT = 0b1_1101
 # Bit of USE_REV_THRUST for a return.
@@ -100,16 +100,16 @@ def describe_open_settings(parameters: ArduPilotParameters, mission: MissionPart
     >>> describe_open_settings(made, MissionParts(lands=True), by_program=False)[1]
     'LAND_PF_ARSPD 11 changes the landing and is not flown'
     """
-    flown = {Phase.FLIGHT: True, Phase.TAKE_OFF: mission.takes_off, Phase.LANDING: mission.lands}
+    is_flown = {Phase.FLIGHT: True, Phase.TAKE_OFF: mission.takes_off, Phase.LANDING: mission.lands}
     values = _DEFAULTS | {name: value for name, value, _ in parameters.values}
-    found = [
+    texts = [
         f"{name} {values[name]:g} changes the {setting.phase} and is not flown"
         for name, setting in OPEN_SETTINGS.items()
-        if flown[setting.phase]
+        if is_flown[setting.phase]
         and not setting.lowest <= values[name] <= setting.highest
         and not (by_program and setting.by_program)
     ]
-    return [*found, *_describe_others(parameters, values, mission, by_program=by_program)]
+    return [*texts, *_describe_others(parameters, values, mission, by_program=by_program)]
 
 
 def _describe_others(
@@ -118,11 +118,14 @@ def _describe_others(
     """Describe settings that depend on one another or on the mission."""
     # `Plane::set_servos_flaps` compares the demanded airspeed in whole m/s, which only a landing demands below the
     # minimum.
-    slowest = 0 if mission.lands else int(values["AIRSPEED_MIN"])
-    for k in (1, 2):
-        percent, below = values[f"FLAP_{k}_PERCNT"], values[f"FLAP_{k}_SPEED"]
-        if percent != 0.0 and below > 0.0 and slowest <= below:
-            yield f"FLAP_{k}_PERCNT {percent:g} below FLAP_{k}_SPEED {below:g} changes the flight and is not flown"
+    min_airspeed = 0 if mission.lands else int(values["AIRSPEED_MIN"])
+    for number in (1, 2):
+        percent, flap_speed = values[f"FLAP_{number}_PERCNT"], values[f"FLAP_{number}_SPEED"]
+        if percent != 0.0 and flap_speed > 0.0 and min_airspeed <= flap_speed:
+            yield (
+                f"FLAP_{number}_PERCNT {percent:g} below FLAP_{number}_SPEED {flap_speed:g}"
+                " changes the flight and is not flown"
+            )
     for name in ("ARSPD_WIND_MAX",) if by_program else ("AHRS_WIND_MAX", "ARSPD_WIND_MAX"):
         if 0.0 < values[name] < mission.wind:
             yield f"{name} {values[name]:g} in {mission.wind:.3g} m/s of wind changes the airspeed and is not flown"
@@ -137,7 +140,7 @@ def _describe_others(
         yield f"AIRSPEED_STALL {values['AIRSPEED_STALL']:g} changes the airspeed in turns and is not flown"
     reverse = _REVERSE_IN_FLIGHT | _REVERSE_IN_RETURN * mission.returns | _REVERSE_IN_LANDING * mission.lands
     if parameters.throttle_min < 0.0 and int(values["USE_REV_THRUST"]) & reverse:
-        use = f"THR_MIN {values['THR_MIN']:g} and USE_REV_THRUST {values['USE_REV_THRUST']:g}"
-        yield f"{use} reverse the thrust, which is not flown"
+        settings_text = f"THR_MIN {values['THR_MIN']:g} and USE_REV_THRUST {values['USE_REV_THRUST']:g}"
+        yield f"{settings_text} reverse the thrust, which is not flown"
     if mission.returns and mission.has_return_path and parameters.rtl_autoland == _BY_RETURN_PATH:
         yield "RTL_AUTOLAND 4 returns along the mission's return path, which is not flown"

@@ -389,14 +389,14 @@ class ArduPilotParameters(ParameterSet):
         >>> made.return_radius, made.changed(WP_LOITER_RAD=-1.0).return_radius
         (60.0, -60.0)
         """
-        size = next((abs(radius) for radius in (self.rtl_radius, self.wp_loiter_rad) if abs(radius) > 1.0), None)
-        return math.copysign(size or _DEFAULT_LOITER_RADIUS_M, self.rtl_radius or self.wp_loiter_rad)
+        abs_radius = next((abs(radius) for radius in (self.rtl_radius, self.wp_loiter_rad) if abs(radius) > 1.0), None)
+        return math.copysign(abs_radius or _DEFAULT_LOITER_RADIUS_M, self.rtl_radius or self.wp_loiter_rad)
 
     @property
     def loiter_radius(self) -> float:
         """Default loiter radius, m at sea level, negative to the left: WP_LOITER_RAD, or 60 m."""
-        size = abs(self.wp_loiter_rad)
-        return math.copysign(size if size > 1.0 else _DEFAULT_LOITER_RADIUS_M, self.wp_loiter_rad)
+        abs_radius = abs(self.wp_loiter_rad)
+        return math.copysign(abs_radius if abs_radius > 1.0 else _DEFAULT_LOITER_RADIUS_M, self.wp_loiter_rad)
 
     def record(self) -> Record:
         """Return the parameters for compiled code, as a record of `ARDUPILOT_PARAMETERS`."""
@@ -427,14 +427,14 @@ SIDE_CANDIDATES = (
 # Airspeeds of a mission that ArduPlane accepts.
 
 
-def takes_speed(airspeed: float, parameters: ArduPilotParameters) -> bool:
+def accepts_speed(airspeed: float, parameters: ArduPilotParameters) -> bool:
     """Return True if ArduPlane accepts a commanded airspeed (m/s, equivalent).
 
     It accepts AIRSPEED_MIN to AIRSPEED_MAX.  A command of another speed changes nothing: commanded to fly at 17 m/s
     with AIRSPEED_MIN at 18, ArduPlane 4.6 flew on at its 25 m/s.
 
     >>> from flight.autopilots.arduplane.parameters import ArduPilotParameters
-    >>> takes_speed(22.0, ArduPilotParameters.defaults()), takes_speed(22.1, ArduPilotParameters.defaults())
+    >>> accepts_speed(22.0, ArduPilotParameters.defaults()), accepts_speed(22.1, ArduPilotParameters.defaults())
     (True, False)
     """
     return parameters.airspeed_min <= airspeed <= parameters.airspeed_max
@@ -449,9 +449,9 @@ def speeds_flown(commanded: Floats, cruise: float, parameters: ArduPilotParamete
     >>> speeds_flown(np.array([8.0, 15.0, 30.0, 10.0]), 12.0, ArduPilotParameters.defaults()).tolist()
     [12.0, 15.0, 15.0, 10.0]
     """
-    flown = []
-    speed = cruise
-    for wanted in commanded.tolist():
-        speed = wanted if takes_speed(wanted, parameters) else speed
-        flown.append(speed)
-    return np.array(flown)
+    flown_speeds = []
+    current = cruise
+    for command in commanded.tolist():
+        current = command if accepts_speed(command, parameters) else current
+        flown_speeds.append(current)
+    return np.array(flown_speeds)

@@ -111,9 +111,9 @@ def _corner_tables(
     """Return tables (turns, speeds) of acceptance, excursion, and lengths of the legs before and after, m."""
     corners = np.zeros((TURNS.size, SPEED_SHARES.size), CORNER_TRACKING)
     record, speeds = parameters.record(), SPEED_SHARES * airspeed
-    _fill(record, airspeed, TURNS, speeds, fly_over, corners, waypoint_column(3))
-    share, more = WIND_SPREAD
-    corners["excursion"] *= (share + more * (TURNS / (0.5 * math.pi)) ** 2)[:, None]
+    _fill_corners(record, airspeed, TURNS, speeds, fly_over, corners, waypoint_column(3))
+    factor, right_angle_margin = WIND_SPREAD
+    corners["excursion"] *= (factor + right_angle_margin * (TURNS / (0.5 * math.pi)) ** 2)[:, None]
     # Rounded because plans must be the same on every machine, and sines differ between libraries.
     acceptance, excursion, before, after = (corners[name].round(2) for name in field_names(CORNER_TRACKING))
     for table in (acceptance, excursion, before, after):
@@ -122,7 +122,7 @@ def _corner_tables(
 
 
 @compiled
-def _fill(
+def _fill_corners(
     parameters: Record,
     airspeed: float,
     turns: Floats,
@@ -138,17 +138,19 @@ def _fill(
             if turns[i] == 0.0:
                 corner.acceptance = MIN_ACCEPTANCE
                 continue
-            low, high = MIN_ACCEPTANCE, MAX_ACCEPTANCE_M
-            best, nearest = low, math.inf
+            min_acceptance, max_acceptance = MIN_ACCEPTANCE, MAX_ACCEPTANCE_M
+            best, min_excursion = min_acceptance, math.inf
             for _ in range(1 if fly_over else _SEARCH_ROUNDS):
-                step = (high - low) / (_ACCEPTANCES_PER_ROUND - 1)
+                step = (max_acceptance - min_acceptance) / (_ACCEPTANCES_PER_ROUND - 1)
                 for k in range(1 if fly_over else _ACCEPTANCES_PER_ROUND):
-                    acceptance = math.floor(low + k * step)
-                    flown = _fly_corner(parameters, airspeed, turns[i], speeds[j], acceptance, fly_over, waypoints)
-                    if flown[0] < nearest:
-                        best, nearest = acceptance, flown[0]
-                        corner.excursion, corner.after = flown
-                low, high = max(MIN_ACCEPTANCE, best - step), min(MAX_ACCEPTANCE_M, best + step)
+                    acceptance = math.floor(min_acceptance + k * step)
+                    corner_flight = _fly_corner(
+                        parameters, airspeed, turns[i], speeds[j], acceptance, fly_over, waypoints
+                    )
+                    if corner_flight[0] < min_excursion:
+                        best, min_excursion = acceptance, corner_flight[0]
+                        corner.excursion, corner.after = corner_flight
+                min_acceptance, max_acceptance = max(MIN_ACCEPTANCE, best - step), min(MAX_ACCEPTANCE_M, best + step)
             corner.acceptance = best
             corner.before = 0.0 if fly_over else best
 
@@ -175,32 +177,34 @@ def _fly_corner(
     waypoints[2].east, waypoints[2].north = _LEG_LENGTH_M * east, _LEG_LENGTH_M * north
     own.from_north = -_LEG_LENGTH_M
     # The waypoint comes within the acceptance radius in the middle between two updates, which is the average case.
-    tick = speed * NAVIGATION_TICK
-    estimated.north = -acceptance - (math.floor(_RUN_IN_M / tick) + 0.5) * tick
+    tick_length = speed * NAVIGATION_TICK
+    estimated.north = -acceptance - (math.floor(_RUN_IN_M / tick_length) + 0.5) * tick_length
     lag = ROLL_LAG * parameters.roll_time
     decay = math.exp(-NAVIGATION_TICK / lag)
-    course, lateral_acceleration, clock, excursion, settled, along = 0.0, 0.0, 0.0, 0.0, 0.0, -1.0
-    while along < 0.75 * _LEG_LENGTH_M and clock < 120.0:
+    course, lateral_acceleration, time, excursion, settled_distance, along = 0.0, 0.0, 0.0, 0.0, 0.0, -1.0
+    while along < 0.75 * _LEG_LENGTH_M and time < 120.0:
         estimated.velocity_east, estimated.velocity_north = speed * math.sin(course), speed * math.cos(course)
         navigate_legs(estimated, waypoints, parameters, own, 1.0, NAVIGATION_TICK)
-        wanted = GRAVITY * math.tan(roll_demand(own.side_acceleration, 0.0, airspeed, parameters))
+        acceleration_demand = GRAVITY * math.tan(roll_demand(own.side_acceleration, 0.0, airspeed, parameters))
         # The exact solution of the lag, and the displacement on the mean course.
-        turned = (wanted * NAVIGATION_TICK + (lateral_acceleration - wanted) * lag * (1.0 - decay)) / speed
-        lateral_acceleration = wanted + (lateral_acceleration - wanted) * decay
-        estimated.east += tick * math.sin(course + 0.5 * turned)
-        estimated.north += tick * math.cos(course + 0.5 * turned)
-        course += turned
-        clock += NAVIGATION_TICK
+        course_change = (
+            acceleration_demand * NAVIGATION_TICK + (lateral_acceleration - acceleration_demand) * lag * (1.0 - decay)
+        ) / speed
+        lateral_acceleration = acceleration_demand + (lateral_acceleration - acceleration_demand) * decay
+        estimated.east += tick_length * math.sin(course + 0.5 * course_change)
+        estimated.north += tick_length * math.cos(course + 0.5 * course_change)
+        course += course_change
+        time += NAVIGATION_TICK
         along = estimated.east * east + estimated.north * north
         corner_distance = math.hypot(estimated.east, estimated.north)
-        first = abs(estimated.east) if estimated.north < 0.0 else corner_distance
-        second = abs(estimated.east * north - estimated.north * east) if along > 0.0 else corner_distance
-        excursion = max(excursion, min(first, second))
-        if own.leg == 1 and second > _SETTLED_CROSS_TRACK_M:
-            settled = max(0.0, along)
-        if own.leg == 1 and along > settled + _SETTLED_TIME_S * speed:
+        first_leg_distance = abs(estimated.east) if estimated.north < 0.0 else corner_distance
+        second_leg_distance = abs(estimated.east * north - estimated.north * east) if along > 0.0 else corner_distance
+        excursion = max(excursion, min(first_leg_distance, second_leg_distance))
+        if own.leg == 1 and second_leg_distance > _SETTLED_CROSS_TRACK_M:
+            settled_distance = max(0.0, along)
+        if own.leg == 1 and along > settled_distance + _SETTLED_TIME_S * speed:
             break
     # Compiled code frees an array after its last use, and a record that views it does not keep it alive.
     if motions.size + memories.size != 2:
         return math.nan, math.nan
-    return excursion, settled
+    return excursion, settled_distance

@@ -59,7 +59,7 @@ class ArduPlaneSitl(ProgramAutopilot, ArduPlane):
     def start(self, setup: FlightSetup, aircraft: Aircraft) -> ProgramFlight:
         """Start the program.
 
-        Raise FlightError if it does not start, and ParameterError for a bad file.
+        Raises FlightError if it does not start, and ParameterError if a file is invalid.
         """
         # Imported here: only this needs MAVLink.
         from flight.autopilots.arduplane_sitl.flight import AutopilotFlight

@@ -36,8 +36,9 @@ _SPOOL_TIME_S = 0.5
 class AutopilotFlight(SitlFlight):
     """One flight of ArduPlane itself; see `SitlFlight`.
 
-    autopilot: flies the setup in place of its own autopilot; has ArduPlane's parameters and the program's file.
-    own: the user's parameters, by ArduPlane's names; None takes the parameters of the scenario's file.
+    autopilot: autopilot that flies the setup instead of the setup's own; it has ArduPlane's parameters and the
+        program's file.
+    user_parameters: the user's parameters by ArduPlane's names; None takes those of the scenario's file.
     """
 
     def __init__(
@@ -45,7 +46,7 @@ class AutopilotFlight(SitlFlight):
         setup: FlightSetup,
         aircraft: Aircraft,
         autopilot: ProgramAutopilot,
-        own: Mapping[str, float] | None = None,
+        user_parameters: Mapping[str, float] | None = None,
     ) -> None:
         if not isinstance(autopilot.parameters, ArduPilotParameters):
             raise TypeError("ArduPlane's program needs ArduPlane's parameters")
@@ -53,20 +54,22 @@ class AutopilotFlight(SitlFlight):
         setup = replace(setup, autopilot=autopilot)
         digest = check_binary(binary, autopilot.title)
         servos = load_servo_map(aircraft)
-        given = autopilot_parameters(setup, aircraft, servos, person_parameters(setup) if own is None else own)
+        flight_parameters = autopilot_parameters(
+            setup, aircraft, servos, person_parameters(setup) if user_parameters is None else user_parameters
+        )
         super().__init__(setup, aircraft, binary)
-        with contextlib.ExitStack() as stack, self._name_program():
+        with contextlib.ExitStack() as stack, self._errors_name_program():
             port = stack.enter_context(contextlib.closing(PhysicsPort()))
             self._link = stack.enter_context(contextlib.closing(TcpLink()))
             heading = math.degrees(self._rail.yaw) % 360.0
-            launch = arduplane_launch(self._mission.home, heading, given.given, port.port, self._link.port)
+            launch = arduplane_launch(self._mission.home, heading, flight_parameters.given, port.port, self._link.port)
             self._process = stack.enter_context(AutopilotProcess(binary, launch))
             port.watch = self._process.watch
             self._lockstep = JsonLockstep(port, servos, self.fdm, self._workspace, self._mission.home, self._poll_link)
             self._preflight = Preflight(self._link, lambda: self._lockstep.time)
             self._apply_gnss_error()
-            self._hold_during(self._preflight.meet(given.given))
-            program = _program_of_messages(self._link, digest, given)
+            self._hold_during(self._preflight.meet(flight_parameters.given))
+            program = _program_of_messages(self._link, digest, flight_parameters)
             self.setup = replace(setup, autopilot=replace(autopilot, program=program))
             self._stack = stack.pop_all()
 
@@ -90,22 +93,22 @@ class AutopilotFlight(SitlFlight):
         law = None if take_off is None else self._from_ground
         if take_off is None or take_off.launch.method == "runway" or not isinstance(law, ArduPlaneFromGround):
             return
-        seconds = run_up(law.motor_start, law.parameters)
-        until = self._lockstep.time + (seconds + _SPOOL_TIME_S if seconds else 0.0)
-        while self._lockstep.time < until:
+        run_up_time = run_up(law.motor_start, law.parameters)
+        deadline = self._lockstep.time + (run_up_time + _SPOOL_TIME_S if run_up_time else 0.0)
+        while self._lockstep.time < deadline:
             yield
 
 
-def _program_of_messages(link: AutopilotLink, digest: str, given: AutopilotParameters) -> AutopilotProgram:
+def _program_of_messages(link: AutopilotLink, digest: str, parameters: AutopilotParameters) -> AutopilotProgram:
     """Return the program that flew, from its messages."""
     news = link.news
-    unknown = given.changed.keys() - news.parameters.keys()
+    unknown = parameters.changed.keys() - news.parameters.keys()
     return AutopilotProgram(
         version=version_text(news.texts, news.version),
         sha256=digest,
-        parameters={name: news.parameters[name] for name in sorted(given.given) if name in news.parameters},
-        changed={name: value for name, value in sorted(given.changed.items()) if name not in unknown},
-        unused=tuple(sorted({*given.unused, *unknown})),
+        parameters={name: news.parameters[name] for name in sorted(parameters.given) if name in news.parameters},
+        changed={name: value for name, value in sorted(parameters.changed.items()) if name not in unknown},
+        unused=tuple(sorted({*parameters.unused, *unknown})),
     )
 
 
@@ -113,20 +116,20 @@ def fly_autopilot(
     setup: FlightSetup,
     aircraft: Aircraft,
     autopilot: ProgramAutopilot,
-    own: Mapping[str, float] | None = None,
+    user_parameters: Mapping[str, float] | None = None,
     *,
     log: Path | None = None,
 ) -> tuple[SimulatedFlight, FlightSetup]:
     """Fly a setup with ArduPlane SITL, from its boot to its end.
 
-    setup, aircraft, autopilot, own: as in `AutopilotFlight`.
+    setup, aircraft, autopilot, user_parameters: see `AutopilotFlight`.
     log: file to which the autopilot's own log (.BIN) is moved.
 
     Return the flight, and the setup with the program that flew it.
     """
-    with AutopilotFlight(setup, aircraft, autopilot, own) as flight:
+    with AutopilotFlight(setup, aircraft, autopilot, user_parameters) as flight:
         flight.prepare()
-        flown = fly_to_end(flight)
+        simulated = fly_to_end(flight)
         if log is not None:
             flight.keep_log(log)
-        return flown, flight.setup
+        return simulated, flight.setup

@@ -1,7 +1,7 @@
 """Run one tick of an ArduPlane SITL flight from the ground to the ground, with its phases and its end.
 
 The phases, and the ends of a flight in each, are the ones of `flight.autopilots.arduplane.ground_law`.  The program
-reports only the mission's items: the rest is found from positions and altitudes.
+reports only the mission's items; everything else follows from positions and altitudes.
 """
 
 import math
@@ -78,7 +78,10 @@ def find_phase(true: Record, ground: Record, on_last_leg: bool) -> None:
         if on_last_leg:
             ground.stage = APPROACHING
     elif ground.stage < FLARING:
-        off_e, off_n = true.east - ground.east, true.north - ground.north
-        past = off_e * true.velocity_east + off_n * true.velocity_north > 0.0 and math.hypot(off_e, off_n) < 500.0
-        if past or true.up - ground.up <= max(_MIN_FLARE_HEIGHT_M, _MAX_FLARE_HEIGHT_RATIO * ground.flare_height):
+        offset_east, offset_north = true.east - ground.east, true.north - ground.north
+        is_past = (
+            offset_east * true.velocity_east + offset_north * true.velocity_north > 0.0
+            and math.hypot(offset_east, offset_north) < 500.0
+        )
+        if is_past or true.up - ground.up <= max(_MIN_FLARE_HEIGHT_M, _MAX_FLARE_HEIGHT_RATIO * ground.flare_height):
             ground.stage = FLARING

@@ -45,16 +45,16 @@ class ServoPacket(NamedTuple):
 def parse_servo_packet(data: bytes) -> ServoPacket:
     """Return the servo outputs in a datagram.
 
-    Raise FlightError for a datagram of another version of the interface.
+    Raises FlightError if the datagram is of another version of the interface.
 
     >>> packet = parse_servo_packet(struct.pack("<HHI16H", 18458, 120, 7, *range(1500, 1516)))
     >>> packet.frame, packet.pulses[:2], len(packet.pulses)
     (7, (1500, 1501), 16)
     """
     magic = int.from_bytes(data[:2], "little")
-    form = _PACKET_FORMATS.get(magic)
-    if form is None or len(data) != form.size:
-        allowed = " or ".join(f"{known} with {count} outputs" for known, count in MAGIC.items())
+    packet_format = _PACKET_FORMATS.get(magic)
+    if packet_format is None or len(data) != packet_format.size:
+        allowed = " or ".join(f"{number} with {count} outputs" for number, count in MAGIC.items())
         raise FlightError(
             f"speaks another version of the physics interface: a packet of {len(data)} bytes that begins with {magic};"
             f" allowed: {allowed}",
@@ -62,7 +62,7 @@ def parse_servo_packet(data: bytes) -> ServoPacket:
             value=magic,
             allowed=allowed,
         )
-    numbers = form.unpack(data)
+    numbers = packet_format.unpack(data)
     return ServoPacket(numbers[2], numbers[3:])
 
 
@@ -92,7 +92,7 @@ class PhysicsPort:
     """Socket to which an autopilot sends its servo outputs.
 
     port: its number.
-    watch: called while nothing arrives; raises FlightError if the program has ended.
+    watch: function that is called while nothing arrives; it raises FlightError if the program has ended.
 
     It sends nothing without a request.  A repeated request for a frame, which the program sends after a timeout, gets
     the same answer again, and the aircraft does not move.
@@ -103,11 +103,11 @@ class PhysicsPort:
         self._socket.bind((LOOPBACK, 0))
         self.port = int(self._socket.getsockname()[1])
         # The kernel's own timeout: one system call a frame.
-        look = struct.pack("@ll", int(_CHECK_INTERVAL_S), int(_CHECK_INTERVAL_S % 1.0 * 1e6))
-        self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVTIMEO, look)
+        check_interval = struct.pack("@ll", int(_CHECK_INTERVAL_S), int(_CHECK_INTERVAL_S % 1.0 * 1e6))
+        self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVTIMEO, check_interval)
         self.watch: Callable[[], None] = _do_nothing
         self._frame = -1
-        self._last = b""
+        self._last_answer = b""
         self._answered = 0.0
         # A sleeping laptop is not a silent program.
         self._clock = RunningClock()
@@ -120,7 +120,7 @@ class PhysicsPort:
     def receive(self) -> ServoPacket:
         """Return the next frame.
 
-        Raise FlightError for a program that ends, stops sending, restarts, or uses another version of the interface.
+        Raises FlightError if the program ends, stops sending, restarts, or uses another version of the interface.
         """
         waiting_since = 0.0
         while True:
@@ -135,7 +135,7 @@ class PhysicsPort:
                     raise FlightError(message, field="frame", value=packet.frame)
                 # A request that was sent while the answer was on its way has its answer.
                 if self._clock() - self._answered > _CROSSING_TIME_S:
-                    self._send(self._last)
+                    self._send(self._last_answer)
             now = self._clock()
             waiting_since = waiting_since or now
             self.watch()
@@ -151,7 +151,7 @@ class PhysicsPort:
 
     def answer(self, data: bytes) -> None:
         """Send the autopilot the motion of the aircraft after the last received frame."""
-        self._last = data
+        self._last_answer = data
         self._answered = self._clock()
         self._send(data)
 
@@ -182,7 +182,7 @@ def _do_nothing() -> None:
 
 
 class JsonLockstep(Lockstep):
-    """Exchange over a `PhysicsPort`, on which servo outputs request a frame and the motion answers it.
+    """Exchange over a `PhysicsPort`: servo outputs request a frame, and the motion answers it.
 
     servos: outputs of the controls.  The other parameters are those of `Lockstep`.
     """
@@ -194,9 +194,9 @@ class JsonLockstep(Lockstep):
         fdm: Fdm,
         workspace: Workspace,
         home: Home,
-        look: Callable[[], None],
+        poll: Callable[[], None],
     ) -> None:
-        super().__init__(fdm, workspace, home, look)
+        super().__init__(fdm, workspace, home, poll)
         self._port, self._servos = port, servos
 
     def _receive_commands(self) -> Commands:

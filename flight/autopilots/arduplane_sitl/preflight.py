@@ -26,14 +26,14 @@ class Preflight(Conversation):
     def meet(self, parameters: Iterable[str]) -> Talk:
         """Identify the autopilot, and read those of the given parameters that it has.
 
-        Raise FlightError if it is not ArduPlane.
+        Raises FlightError if it is not ArduPlane.
         """
         yield from self._identify("ArduPlane", _MESSAGE_INTERVALS_US, parameters)
 
     def prepare(self, mission: UploadedMission) -> Talk:
         """Wait until it has a position, upload the mission, and start it in AUTO.
 
-        Raise FlightError if it finds no position, or refuses.
+        Raises FlightError if it finds no position, or refuses.
         """
         news, ekf = self._news, mavlink.MAVLINK_MSG_ID_EKF_STATUS_REPORT
         yield from self._wait_for_position(ekf, _MESSAGE_INTERVALS_US[ekf], mavlink.ESTIMATOR_CONST_POS_MODE)
@@ -51,8 +51,8 @@ class Preflight(Conversation):
             lambda: self._send_command(Command.DO_SET_MODE, mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED, AUTO),
             "AUTO",
         )
-        under_way = Awaited("AUTO", REPLY_TIMEOUT_S, "is not in AUTO, armed")
-        yield from self._wait_until(lambda: news.mode == AUTO and news.armed, under_way)
+        auto_mode = Awaited("AUTO", REPLY_TIMEOUT_S, "is not in AUTO, armed")
+        yield from self._wait_until(lambda: news.mode == AUTO and news.armed, auto_mode)
 
 
 def _home_item(home: Home) -> MissionItem:
@@ -69,9 +69,9 @@ def version_text(texts: list[str], number: int | None) -> str:
     >>> version_text([], 0x040503FF)
     'ArduPlane 4.5.3'
     """
-    named = [text for text in texts if text.startswith("ArduPlane")]
-    if named:
-        return named[0]
+    names = [text for text in texts if text.startswith("ArduPlane")]
+    if names:
+        return names[0]
     if number is None:
         return "ArduPlane, version unknown"
     return f"ArduPlane {number >> 24 & 255}.{number >> 16 & 255}.{number >> 8 & 255}"

@@ -34,14 +34,14 @@ def arduplane_launch(
     def prepare(folder: Path) -> Launch:
         text = "".join(f"{name} {value:.9g}\n" for name, value in parameters.items())
         (folder / _DEFAULTS_FILE).write_text(text, encoding="ascii")
-        place = f"{home.lat_deg:.9f},{home.lon_deg:.9f},{home.alt:.3f},{heading:.2f}"
-        free = free_ports(3)
+        start_position = f"{home.lat_deg:.9f},{home.lon_deg:.9f},{home.alt:.3f},{heading:.2f}"
+        ports = free_ports(3)
         arguments = (
             *("--model", f"JSON:{LOOPBACK}"),
             *("--speedup", str(_SPEEDUP)),
-            *("--home", place),
-            *("--base-port", str(free[0]), "-I", "0"),
-            *("--sim-port-out", str(physics_port), "--sim-port-in", str(free[1]), "--rc-in-port", str(free[2])),
+            *("--home", start_position),
+            *("--base-port", str(ports[0]), "-I", "0"),
+            *("--sim-port-out", str(physics_port), "--sim-port-in", str(ports[1]), "--rc-in-port", str(ports[2])),
             *("--serial0", f"tcpclient:{LOOPBACK}:{link_port}"),
             *("--wipe", "--defaults", str(folder / _DEFAULTS_FILE)),
         )
@@ -105,25 +105,26 @@ class AutopilotParameters:
 
 
 def autopilot_parameters(
-    setup: FlightSetup, aircraft: Aircraft, servos: ServoMap, own: Mapping[str, float]
+    setup: FlightSetup, aircraft: Aircraft, servos: ServoMap, user_parameters: Mapping[str, float]
 ) -> AutopilotParameters:
     """Collect the parameters of a flight.
 
-    The mission's speed is the cruise speed, unless the user states one.  own: the user's parameters.
-    Raise ParameterError for a bad file.
+    The mission's speed is the cruise speed, unless the user states one.  Raises ParameterError if a file is invalid.
     """
     battery = _MEASURED if aircraft.battery_voltage else _UNMEASURED
     base = SIMULATION | battery | servos.parameters() | load_aircraft_parameters(aircraft)
     base["AIRSPEED_CRUISE"] = setup.airspeed
-    flying = {name: value for name, value in own.items() if name.startswith(FLYING)}
-    changed = {name: value for name, value in flying.items() if base.get(name) != value}
-    return AutopilotParameters(base | flying, changed, tuple(sorted(own.keys() - flying.keys())))
+    flight_values = {name: value for name, value in user_parameters.items() if name.startswith(FLYING)}
+    changed = {name: value for name, value in flight_values.items() if base.get(name) != value}
+    return AutopilotParameters(
+        base | flight_values, changed, tuple(sorted(user_parameters.keys() - flight_values.keys()))
+    )
 
 
 def load_aircraft_parameters(aircraft: Aircraft) -> dict[str, float]:
     """Return ArduPlane's parameters for an aircraft, from its folder.
 
-    Raise ParameterError, in one line, for a bad file.
+    Raises ParameterError, in one line, if the file is invalid.
     """
     return {name: entry.value for name, entry in read_parameter_file(aircraft.folder / AIRCRAFT_FILE).items()}
 
@@ -131,17 +132,17 @@ def load_aircraft_parameters(aircraft: Aircraft) -> dict[str, float]:
 def person_parameters(setup: FlightSetup) -> dict[str, float]:
     """Return the parameters of the scenario's file, by present names and in their units.
 
-    Raise ParameterError, in one line, for a file that cannot be read or states a value that is not allowed.
+    Raises ParameterError, in one line, if the file cannot be read or states a value that is not allowed.
     """
     file, parameters = setup.scenario.flight.params, setup.autopilot.parameters
-    made = {} if parameters is None else parameters.by_origin("file")
+    scenario_values = {} if parameters is None else parameters.by_origin("file")
     if file is None:
         # Settings of a scenario's RTL are taken as stated.
-        return made
-    old = {definition.old[0] for definition in DEFINITIONS.values() if definition.old is not None}
-    stated = {
+        return scenario_values
+    old_names = {definition.old[0] for definition in DEFINITIONS.values() if definition.old is not None}
+    file_values = {
         name: entry.value
         for name, entry in read_parameter_file(Path(file)).items()
-        if name not in old and len(name) <= LONGEST_NAME
+        if name not in old_names and len(name) <= LONGEST_NAME
     }
-    return stated | made
+    return file_values | scenario_values

@@ -3,8 +3,8 @@
 Three lateral laws: planfly's own, a second-order cross-track law with curvature feed-forward about the offset path that
 a rolling aircraft can follow, which answers gusts by bank, and by a skid where bank is at its limit; L1 along the legs,
 as ArduPlane flies it; and the vector field of Beard and McLain along the fly-by path, whose arcs are its fillets.
-They share bank limit, vertical channel and inner loops (`flight.guidance.inner_loops`), so that flights differ by the
-lateral law alone.  No law uses the wind, because all steer by the velocity over the ground.  The time step is an
+They share bank limit, vertical channel and inner loops (`flight.guidance.inner_loops`), so that flights differ only by
+the lateral law.  No law uses the wind, because all steer by the velocity over the ground.  The time step is an
 argument.
 """
 
@@ -159,71 +159,74 @@ def _path_bank_command(
     """Return the bank command from the curvature ahead and a second-order law on the cross-track error, rad."""
     speed = max(5.0, math.hypot(estimated.velocity_east, estimated.velocity_north))
     ground_course = math.atan2(estimated.velocity_east, estimated.velocity_north)
-    off_course = wrap(ground_course - course)
+    course_error = wrap(ground_course - course)
     # The lift's horizontal part is perpendicular to the heading, the demanded acceleration to the course.
     drift = wrap(ground_course - state.yaw)
     crab = max(0.5, math.cos(drift))
-    k, s = memory.piece, memory.distance
+    piece, distance = memory.piece, memory.distance
     # In a crosswind the turn changes the ground speed: this is its value when the bank takes effect.
     future_speed = speed + gains.turn_lead * GRAVITY * math.tan(memory.bank) * math.sin(drift)
-    start = s + speed * max(0.0, gains.turn_lead - 0.5 * gains.turn_smoothing)
-    turn = future_speed * future_speed * mean_curvature(pieces, k, start, start + speed * gains.turn_smoothing)
-    home = _correct_roll_offset(pieces[k].curvature, gains, memory, turn, speed, crab, dt)
-    push = _lateral_correction(state, estimated, gains, memory, speed, off_course, crab, dt)
+    start = distance + speed * max(0.0, gains.turn_lead - 0.5 * gains.turn_smoothing)
+    turn_acceleration = (
+        future_speed * future_speed * mean_curvature(pieces, piece, start, start + speed * gains.turn_smoothing)
+    )
+    offset_correction = _correct_roll_offset(pieces[piece].curvature, gains, memory, turn_acceleration, speed, crab, dt)
+    correction = _lateral_correction(state, estimated, gains, memory, speed, course_error, crab, dt)
     # Bank lags, so the correction leads.  A longer tick itself adds lag: with the whole lead the aircraft would
     # oscillate in roll (45 degrees of bank at 30 Hz in moderate turbulence; 38 with half of it).
-    change = (push - memory.push) / gains.push_smoothing
-    memory.push += change * min(dt, gains.push_smoothing)
-    push += home + gains.push_lead * min(1.0, (LEAD_TICK / dt) ** 2) * change
+    correction_rate = (correction - memory.push) / gains.push_smoothing
+    memory.push += correction_rate * min(dt, gains.push_smoothing)
+    correction += offset_correction + gains.push_lead * min(1.0, (LEAD_TICK / dt) ** 2) * correction_rate
     lift = GRAVITY + memory.bend_acceleration
-    wanted = math.atan((turn + push) / (lift * crab))
-    wanted = _limit_nose_angle(wanted, wrap(state.yaw - course), memory.max_bank)
-    bank: float = min(memory.max_bank, max(-memory.max_bank, wanted))
-    max_path_curvature = max_curvature(pieces, k, s, s + speed * gains.arc_slowing_time)
+    bank_demand = math.atan((turn_acceleration + correction) / (lift * crab))
+    bank_demand = _limit_nose_angle(bank_demand, wrap(state.yaw - course), memory.max_bank)
+    bank: float = min(memory.max_bank, max(-memory.max_bank, bank_demand))
+    max_path_curvature = max_curvature(pieces, piece, distance, distance + speed * gains.arc_slowing_time)
     memory.arc_speed = math.sqrt(ARC_SHARE * GRAVITY * math.tan(memory.max_bank) / max(1e-9, max_path_curvature))
     # A limited skid adds what the bank limit leaves: its side force points into the turn.
-    missing_force = lift * (math.tan(wanted) - math.tan(bank))
+    missing_force = lift * (math.tan(bank_demand) - math.tan(bank))
     slip = missing_force / max(1.0, gains.side_per_sideslip * _pressure_ratio(state, gains))
     memory.sideslip = -min(gains.sideslip_max, max(-gains.sideslip_max, slip))
-    if bank == wanted and abs(memory.cross_track) < 20.0:
+    if bank == bank_demand and abs(memory.cross_track) < 20.0:
         memory.cross_track_sum = min(40.0, max(-40.0, memory.cross_track_sum + memory.cross_track * dt))
     return bank
 
 
 @inner
-def _limit_nose_angle(wanted: float, nose: float, max_bank: float) -> float:
+def _limit_nose_angle(bank_demand: float, nose_angle: float, max_bank: float) -> float:
     """Return the demanded bank, reduced where it would turn the nose too far from the course, rad.
 
     At `_NOSE_LIMIT_RAD` the nose is almost perpendicular to the course.  Turning further would gain nothing against a
     crosswind and would take the aircraft all the way round.  The result is continuous in both angles except where the
     nose points straight back.  A bank that already turns the nose back towards the course fast enough is not changed.
 
-    nose: from the course to the nose, positive clockwise, within +-pi rad.  max_bank: rad.
+    nose_angle: angle from the course to the nose, positive clockwise, within +-pi rad.
+    max_bank: rad.
     """
-    away = math.copysign(1.0, nose)
-    limit = max(-max_bank, _BANK_PER_NOSE_ANGLE_RATIO * (_NOSE_LIMIT_RAD - abs(nose)))
-    return away * min(away * wanted, limit)
+    direction = math.copysign(1.0, nose_angle)
+    limit = max(-max_bank, _BANK_PER_NOSE_ANGLE_RATIO * (_NOSE_LIMIT_RAD - abs(nose_angle)))
+    return direction * min(direction * bank_demand, limit)
 
 
 @inner
 def _correct_roll_offset(
-    curvature: float, gains: Record, memory: Record, turn: float, speed: float, crab: float, dt: float
+    curvature: float, gains: Record, memory: Record, turn_acceleration: float, speed: float, crab: float, dt: float
 ) -> float:
     """Return the acceleration (m/s^2 to the right) that corrects the offset from rolling into arcs.
 
     No aircraft can change its bank in one step, so `aside` is the planned offset from the path where curvature jumps.
 
     curvature: curvature of the path here, 1/m.
-    turn: acceleration to the right that the path ahead needs, m/s^2.
+    turn_acceleration: acceleration to the right that the path ahead needs, m/s^2.
     """
     memory.path_bank, memory.path_bank_rate, _ = roll_model(
-        math.atan(turn / (GRAVITY * crab)), memory.path_bank, memory.path_bank_rate, gains, dt
+        math.atan(turn_acceleration / (GRAVITY * crab)), memory.path_bank, memory.path_bank_rate, gains, dt
     )
     frequency = gains.aside_frequency
-    home: float = -frequency * (2.0 * memory.aside_rate + frequency * memory.aside)
-    memory.aside_rate += (GRAVITY * math.tan(memory.path_bank) * crab - speed * speed * curvature + home) * dt
+    correction: float = -frequency * (2.0 * memory.aside_rate + frequency * memory.aside)
+    memory.aside_rate += (GRAVITY * math.tan(memory.path_bank) * crab - speed * speed * curvature + correction) * dt
     memory.aside += memory.aside_rate * dt
-    return home
+    return correction
 
 
 @inner
@@ -233,22 +236,24 @@ def _lateral_correction(
     gains: Record,
     memory: Record,
     speed: float,
-    off_course: float,
+    course_error: float,
     crab: float,
     dt: float,
 ) -> float:
     """Return the acceleration to the right that corrects cross-track error and disturbances, m/s^2."""
     frequency = gains.cross_track_frequency
     rate_gain = 2.0 * gains.cross_track_damping * frequency
-    limit = speed * math.sin(gains.intercept)
-    wanted_rate = min(limit, max(-limit, -(memory.cross_track - memory.aside) * frequency * frequency / rate_gain))
+    max_rate = speed * math.sin(gains.intercept)
+    rate_demand = min(
+        max_rate, max(-max_rate, -(memory.cross_track - memory.aside) * frequency * frequency / rate_gain)
+    )
     # Flying away from the course is treated as flying perpendicular to it: the sine would fall again.
-    away = abs(off_course) > 0.5 * math.pi
-    rate = math.copysign(speed, off_course) if away else speed * math.sin(off_course)
-    push: float = rate_gain * (wanted_rate - (rate - memory.aside_rate))
-    push -= gains.cross_track_integral * memory.cross_track_sum
-    push -= gains.side_gain * _unexplained_acceleration(state, estimated, gains, memory, speed, crab, dt)
-    return push
+    is_flying_away = abs(course_error) > 0.5 * math.pi
+    rate = math.copysign(speed, course_error) if is_flying_away else speed * math.sin(course_error)
+    correction: float = rate_gain * (rate_demand - (rate - memory.aside_rate))
+    correction -= gains.cross_track_integral * memory.cross_track_sum
+    correction -= gains.side_gain * _unexplained_acceleration(state, estimated, gains, memory, speed, crab, dt)
+    return correction
 
 
 @inner
@@ -263,13 +268,15 @@ def _unexplained_acceleration(
 ) -> float:
     """Return the smoothed lateral acceleration that neither lift nor ailerons explain, m/s^2 to the right."""
     if memory.last_velocity_east != 0.0 or memory.last_velocity_north != 0.0:
-        gained_east = estimated.velocity_east - memory.last_velocity_east
-        gained_north = estimated.velocity_north - memory.last_velocity_north
-        gained = gained_east * estimated.velocity_north - gained_north * estimated.velocity_east
-        lifted = (GRAVITY + (estimated.velocity_up - memory.last_velocity_up) / dt) * math.tan(state.roll)
-        pushed = gains.side_per_aileron * _pressure_ratio(state, gains) * state.aileron
-        side = gained / (speed * dt) - (lifted + pushed) * crab
-        memory.unexplained_acceleration += (side - memory.unexplained_acceleration) * min(1.0, dt / gains.side_lag)
+        change_east = estimated.velocity_east - memory.last_velocity_east
+        change_north = estimated.velocity_north - memory.last_velocity_north
+        lateral_change = change_east * estimated.velocity_north - change_north * estimated.velocity_east
+        lift_acceleration = (GRAVITY + (estimated.velocity_up - memory.last_velocity_up) / dt) * math.tan(state.roll)
+        aileron_acceleration = gains.side_per_aileron * _pressure_ratio(state, gains) * state.aileron
+        unexplained = lateral_change / (speed * dt) - (lift_acceleration + aileron_acceleration) * crab
+        memory.unexplained_acceleration += (unexplained - memory.unexplained_acceleration) * min(
+            1.0, dt / gains.side_lag
+        )
     memory.last_velocity_east = estimated.velocity_east
     memory.last_velocity_north = estimated.velocity_north
     memory.last_velocity_up = estimated.velocity_up
@@ -284,20 +291,20 @@ def _l1_bank_command(
     speed = max(0.1, math.hypot(estimated.velocity_east, estimated.velocity_north))
     damping = gains.l1_damping
     length = l1_length(speed, gains.l1_period, damping)
-    k = memory.l1_leg
-    a, b = waypoints[k], waypoints[k + 1]
+    leg = memory.l1_leg
+    a, b = waypoints[leg], waypoints[leg + 1]
     radius = b.acceptance if b.acceptance > 0.0 else WAYPOINT_RADIUS
-    if k + 2 < waypoints.shape[0] and l1_reached(estimated, a, b, length, radius):
-        k += 1
-        memory.l1_leg = k
-    a, b = waypoints[k], waypoints[k + 1]
+    if leg + 2 < waypoints.shape[0] and l1_reached(estimated, a, b, length, radius):
+        leg += 1
+        memory.l1_leg = leg
+    a, b = waypoints[leg], waypoints[leg + 1]
     angle, aim = l1_angles(estimated, a.east, a.north, b.east, b.north, length)
     memory.l1_sum = l1_integrate(aim, memory.l1_sum, gains.l1_integral, dt)
     if not math.isnan(aim):
         angle += aim + memory.l1_sum
     pitch = min(1.0, max(-1.0, state.pitch))
-    wanted = math.atan(l1_acceleration(angle, speed, length, damping) / (GRAVITY * math.cos(pitch)))
-    return min(memory.max_bank, max(-memory.max_bank, wanted))
+    bank_demand = math.atan(l1_acceleration(angle, speed, length, damping) / (GRAVITY * math.cos(pitch)))
+    return min(memory.max_bank, max(-memory.max_bank, bank_demand))
 
 
 @inner
@@ -306,14 +313,14 @@ def _field_bank_command(
 ) -> float:
     """Return the bank command from an orbit's own bank and a PI law on the field's course, rad."""
     speed = math.hypot(estimated.velocity_east, estimated.velocity_north)
-    wanted_course = field_course(
+    course_demand = field_course(
         course, memory.cross_track, curvature, gains.field_approach, gains.field_path, gains.field_orbit
     )
-    error = wrap(wanted_course - math.atan2(estimated.velocity_east, estimated.velocity_north))
-    orbit = math.atan(speed * speed * curvature / GRAVITY)
-    wanted = orbit + gains.field_course * error + gains.field_course_integral * memory.course_sum
-    bank: float = min(memory.max_bank, max(-memory.max_bank, wanted))
-    if bank == wanted:
+    error = wrap(course_demand - math.atan2(estimated.velocity_east, estimated.velocity_north))
+    orbit_bank = math.atan(speed * speed * curvature / GRAVITY)
+    bank_demand = orbit_bank + gains.field_course * error + gains.field_course_integral * memory.course_sum
+    bank: float = min(memory.max_bank, max(-memory.max_bank, bank_demand))
+    if bank == bank_demand:
         memory.course_sum = min(1.0, max(-1.0, memory.course_sum + error * dt))
     return bank
 
@@ -331,26 +338,26 @@ def steer_height(
 ) -> None:
     """Set elevator from the altitude profile through the load factor, and throttle from the airspeed."""
     airspeed = max(8.0, state.airspeed)
-    along = max(1.0, estimated.velocity_east * math.sin(course) + estimated.velocity_north * math.cos(course))
-    height, slope, _ = profile(nodes, memory.distance)
-    _, ahead_slope, bend = profile(nodes, memory.distance + along * gains.slope_lead)
-    error = estimated.up - height
-    memory.height_error = error
+    speed_along = max(1.0, estimated.velocity_east * math.sin(course) + estimated.velocity_north * math.cos(course))
+    path_height, slope, _ = profile(nodes, memory.distance)
+    _, slope_ahead, slope_rate = profile(nodes, memory.distance + speed_along * gains.slope_lead)
+    height_error = estimated.up - path_height
+    memory.height_error = height_error
     climb_rate = estimated.velocity_up
     frequency = gains.height_frequency
     rate_gain = 2.0 * gains.height_damping * frequency
-    wanted_rate = slope * along
-    correction = min(4.0, max(-4.0, -error * frequency * frequency / rate_gain))
-    memory.bend_acceleration = bend * along * along
-    push = memory.bend_acceleration + rate_gain * (wanted_rate + correction - climb_rate)
-    push -= gains.height_integral * memory.height_sum
-    ceiling = _max_upward_acceleration(state, estimated, gains, memory, commands, airspeed, rate_gain, dt)
-    held = push > ceiling
-    push = min(8.0, max(-6.0, min(push, ceiling)))
-    if not held and abs(error) < 5.0:
-        memory.height_sum = min(5.0, max(-5.0, memory.height_sum + error * dt))
-    steer_elevator(state, gains, memory, commands, climb_rate, push)
-    _set_throttle(estimated, gains, memory, commands, airspeed, ahead_slope, along, dt)
+    rate_demand = slope * speed_along
+    correction = min(4.0, max(-4.0, -height_error * frequency * frequency / rate_gain))
+    memory.bend_acceleration = slope_rate * speed_along * speed_along
+    acceleration_demand = memory.bend_acceleration + rate_gain * (rate_demand + correction - climb_rate)
+    acceleration_demand -= gains.height_integral * memory.height_sum
+    max_acceleration = _max_upward_acceleration(state, estimated, gains, memory, commands, airspeed, rate_gain, dt)
+    is_limited = acceleration_demand > max_acceleration
+    acceleration_demand = min(8.0, max(-6.0, min(acceleration_demand, max_acceleration)))
+    if not is_limited and abs(height_error) < 5.0:
+        memory.height_sum = min(5.0, max(-5.0, memory.height_sum + height_error * dt))
+    steer_elevator(state, gains, memory, commands, climb_rate, acceleration_demand)
+    _set_throttle(estimated, gains, memory, commands, airspeed, slope_ahead, speed_along, dt)
 
 
 @inner
@@ -382,14 +389,14 @@ def _max_upward_acceleration(
     memory.energy_rate += (energy_rate - memory.energy_rate) * dt / _ENERGY_LAG_S
     memory.airspeed += (airspeed - memory.airspeed) * dt / _AIRSPEED_LAG_S
     unused_climb = (1.0 - commands.throttle) / max(1e-3, gains.throttle_per_slope) * airspeed
-    stall = memory.stall_speed * density_factor(estimated.up)
+    stall_speed = memory.stall_speed * density_factor(estimated.up)
     load_factor = 1.0 / max(_MIN_BANK_COSINE, math.cos(state.roll))
     stall_multiple = max(SAFE_SPEED, SAFE_SPEED_BANKED * math.sqrt(load_factor))
-    safe = min(memory.speed_command, stall_multiple * stall)
-    slowest = max(safe, memory.speed_command - gains.slow_margin)
-    airspeed_excess = min(memory.airspeed - slowest, airspeed - safe)
-    climb = memory.energy_rate + unused_climb + airspeed_excess * airspeed / (GRAVITY * _SPEED_RECOVERY_TIME_S)
-    return rate_gain * (climb - climb_rate)
+    safe_airspeed = min(memory.speed_command, stall_multiple * stall_speed)
+    min_airspeed = max(safe_airspeed, memory.speed_command - gains.slow_margin)
+    airspeed_excess = min(memory.airspeed - min_airspeed, airspeed - safe_airspeed)
+    max_climb_rate = memory.energy_rate + unused_climb + airspeed_excess * airspeed / (GRAVITY * _SPEED_RECOVERY_TIME_S)
+    return rate_gain * (max_climb_rate - climb_rate)
 
 
 @inner
@@ -399,23 +406,23 @@ def _set_throttle(
     memory: Record,
     commands: Record,
     airspeed: float,
-    ahead_slope: float,
-    along: float,
+    slope_ahead: float,
+    speed_along: float,
     dt: float,
 ) -> None:
     """Set throttle for level flight, for the slope relative to the air, and for the airspeed error."""
-    slow = memory.speed_command - airspeed
+    airspeed_error = memory.speed_command - airspeed
     if memory.arc_speed > 0.0:
         # In an arc and before it the ground speed matters too, as far as the air allows.
-        over = math.hypot(estimated.velocity_east, estimated.velocity_north) - memory.arc_speed
-        slow = min(slow, max(-over, slow - gains.arc_slowing_max))
-    steady = memory.trim_throttle + gains.throttle_per_slope * ahead_slope * along / airspeed
-    wanted = steady + gains.speed_gain * slow + gains.speed_integral * memory.speed_sum
-    commands.throttle = min(1.0, max(0.0, wanted))
+        ground_speed_excess = math.hypot(estimated.velocity_east, estimated.velocity_north) - memory.arc_speed
+        airspeed_error = min(airspeed_error, max(-ground_speed_excess, airspeed_error - gains.arc_slowing_max))
+    feed_forward = memory.trim_throttle + gains.throttle_per_slope * slope_ahead * speed_along / airspeed
+    throttle_demand = feed_forward + gains.speed_gain * airspeed_error + gains.speed_integral * memory.speed_sum
+    commands.throttle = min(1.0, max(0.0, throttle_demand))
     # Below the throttle that gives thrust, which grows with airspeed, the integrator would wind up without effect.
-    idle = gains.throttle_idle * airspeed / gains.reference_airspeed
-    if (wanted < 1.0 or slow < 0.0) and (wanted > idle or slow > 0.0):
-        memory.speed_sum = min(60.0, max(-60.0, memory.speed_sum + slow * dt))
+    idle_throttle = gains.throttle_idle * airspeed / gains.reference_airspeed
+    if (throttle_demand < 1.0 or airspeed_error < 0.0) and (throttle_demand > idle_throttle or airspeed_error > 0.0):
+        memory.speed_sum = min(60.0, max(-60.0, memory.speed_sum + airspeed_error * dt))
 
 
 @inner
@@ -425,5 +432,5 @@ def steer_bank(state: Record, gains: Record, memory: Record, commands: Record, b
     The model answers the command as a critically damped oscillator within the limits of roll rate and acceleration, so
     it never overshoots; `follow_roll` makes the aircraft follow the model.
     """
-    bank, rate, turn = roll_model(bank, memory.bank, memory.bank_rate, gains, dt)
-    follow_roll(state, gains, memory, commands, bank, rate, turn, dt)
+    bank, roll_rate, roll_acceleration = roll_model(bank, memory.bank, memory.bank_rate, gains, dt)
+    follow_roll(state, gains, memory, commands, bank, roll_rate, roll_acceleration, dt)

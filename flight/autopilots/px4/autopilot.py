@@ -117,9 +117,9 @@ class Px4(Autopilot):
 
     def store(self) -> StoredAutopilot:
         """Return its parameters and its version for a log."""
-        made = self.parameters
-        stored = StoredParameters(made.values, made.unused, made.source)
-        return StoredAutopilot(parameters=stored, version=made.version)
+        parameters = self.parameters
+        stored = StoredParameters(parameters.values, parameters.unused, parameters.source)
+        return StoredAutopilot(parameters=stored, version=parameters.version)
 
     def of_release(self, version: Px4Version) -> Self:
         """Return the same autopilot with the control law of another PX4 release."""
@@ -155,11 +155,12 @@ class Px4(Autopilot):
 
     def described(self, aircraft: str) -> str:
         """Return a description of the law with the parameters that matter most in a flight."""
-        made = self.parameters
-        whose = f"the parameters of {made.source}" if made.source else "its default parameters"
+        parameters = self.parameters
+        source_text = f"the parameters of {parameters.source}" if parameters.source else "its default parameters"
         return (
-            f"the simulated PX4 {made.version} with {whose} (NAV_ACC_RAD {made['NAV_ACC_RAD']:g} m, FW_T_CLMB_R_SP"
-            f" {made['FW_T_CLMB_R_SP']:g} and FW_T_SINK_R_SP {made['FW_T_SINK_R_SP']:g} m/s)"
+            f"the simulated PX4 {parameters.version} with {source_text}"
+            f" (NAV_ACC_RAD {parameters['NAV_ACC_RAD']:g} m, FW_T_CLMB_R_SP {parameters['FW_T_CLMB_R_SP']:g}"
+            f" and FW_T_SINK_R_SP {parameters['FW_T_SINK_R_SP']:g} m/s)"
         )
 
     @property
@@ -174,37 +175,40 @@ class Px4(Autopilot):
 
     def settings_not_flown(self, mission: MissionParts) -> list[str]:
         """Return limits that end a mission, the settings of `_NEUTRAL` that are not neutral, and others."""
-        made, names = self.parameters, ["COM_FLT_TIME_MAX"]
-        if made["GF_ACTION"] > 0.0:
+        parameters, names = self.parameters, ["COM_FLT_TIME_MAX"]
+        if parameters["GF_ACTION"] > 0.0:
             names += ["GF_MAX_HOR_DIST", "GF_MAX_VER_DIST"]
-        if made["COM_WIND_MAX_ACT"] > _WARN_OF_WIND and made["COM_WIND_MAX"] < mission.wind:
+        if parameters["COM_WIND_MAX_ACT"] > _WARN_OF_WIND and parameters["COM_WIND_MAX"] < mission.wind:
             names += ["COM_WIND_MAX"]
-        ending = [f"{name} {made[name]:g} ends a mission and is not judged" for name in names if made[name] > 0.0]
-        changing = [
-            f"{name} {made[name]:g} changes the flight and is not flown"
-            for name, neutral in _NEUTRAL.items()
-            if not neutral.lowest <= made[name] <= neutral.highest and not (self.is_program and neutral.by_program)
+        ending_texts = [
+            f"{name} {parameters[name]:g} ends a mission and is not judged" for name in names if parameters[name] > 0.0
         ]
-        return [*ending, *changing, *([] if self.is_program else self._describe_others(mission))]
+        changing_texts = [
+            f"{name} {parameters[name]:g} changes the flight and is not flown"
+            for name, neutral in _NEUTRAL.items()
+            if not neutral.lowest <= parameters[name] <= neutral.highest
+            and not (self.is_program and neutral.by_program)
+        ]
+        return [*ending_texts, *changing_texts, *([] if self.is_program else self._describe_others(mission))]
 
     def _describe_others(self, mission: MissionParts) -> Iterator[str]:
         """Describe settings that change only some missions or releases."""
-        made = self.parameters
-        if made["NPFG_EN_MIN_GSP"] == 0.0 and self.version == "1.16":
+        parameters = self.parameters
+        if parameters["NPFG_EN_MIN_GSP"] == 0.0 and self.version == "1.16":
             yield "NPFG_EN_MIN_GSP 0 keeps no minimum ground speed, which is not flown"
-        if mission.moves_payload and made["MIS_COMMAND_TOUT"] > 0.0:
-            yield f"MIS_COMMAND_TOUT {made['MIS_COMMAND_TOUT']:g} waits for the payload, which is not flown"
-        if mission.loiters_to_land and made["FW_LND_EARLYCFG"] != 0.0:
+        if mission.moves_payload and parameters["MIS_COMMAND_TOUT"] > 0.0:
+            yield f"MIS_COMMAND_TOUT {parameters['MIS_COMMAND_TOUT']:g} waits for the payload, which is not flown"
+        if mission.loiters_to_land and parameters["FW_LND_EARLYCFG"] != 0.0:
             yield "FW_LND_EARLYCFG 1 changes the loiter before the landing and is not flown"
         if not mission.returns:
             return
-        if made["RTL_TYPE"] in _ALONG_THE_MISSION:
-            yield f"RTL_TYPE {made['RTL_TYPE']:g} returns along the mission, which is not flown"
-        if made["RTL_DESCEND_ALT"] != made["RTL_RETURN_ALT"]:
-            end = f"RTL_DESCEND_ALT {made['RTL_DESCEND_ALT']:g}"
-            yield f"{end} ends the return, which is flown to RTL_RETURN_ALT {made['RTL_RETURN_ALT']:g}"
-        if made["RTL_LAND_DELAY"] >= 0.0:
-            yield f"RTL_LAND_DELAY {made['RTL_LAND_DELAY']:g} lands after the return, which is not flown"
+        if parameters["RTL_TYPE"] in _ALONG_THE_MISSION:
+            yield f"RTL_TYPE {parameters['RTL_TYPE']:g} returns along the mission, which is not flown"
+        if parameters["RTL_DESCEND_ALT"] != parameters["RTL_RETURN_ALT"]:
+            end_text = f"RTL_DESCEND_ALT {parameters['RTL_DESCEND_ALT']:g}"
+            yield f"{end_text} ends the return, which is flown to RTL_RETURN_ALT {parameters['RTL_RETURN_ALT']:g}"
+        if parameters["RTL_LAND_DELAY"] >= 0.0:
+            yield f"RTL_LAND_DELAY {parameters['RTL_LAND_DELAY']:g} lands after the return, which is not flown"
 
     @property
     def reads_acceptance(self) -> bool:
@@ -216,16 +220,18 @@ class Px4(Autopilot):
 
         Up to 1.16 it grows with altitude.
         """
-        made = self.parameters
-        if not made.anticipates:
-            return made["NAV_ACC_RAD"]
-        period = made["NPFG_PERIOD"]
-        if made["NPFG_LB_PERIOD"] > 0.0:
-            least = math.pi * made["NPFG_ROLL_TC"] / made["NPFG_DAMPING"] * made["NPFG_PERIOD_SF"]
-            period = max(period, least)
-        speed = made["FW_AIRSPD_TRIM"] * float(true_by_equivalent(amsl))
-        early = made["NPFG_SW_DST_MLT"] * period * made["NPFG_DAMPING"] * speed
-        return max(made["NAV_ACC_RAD"], round(min(MAX_SWITCH_DISTANCE, early), 6))
+        parameters = self.parameters
+        if not parameters.anticipates:
+            return parameters["NAV_ACC_RAD"]
+        period = parameters["NPFG_PERIOD"]
+        if parameters["NPFG_LB_PERIOD"] > 0.0:
+            min_period = (
+                math.pi * parameters["NPFG_ROLL_TC"] / parameters["NPFG_DAMPING"] * parameters["NPFG_PERIOD_SF"]
+            )
+            period = max(period, min_period)
+        speed = parameters["FW_AIRSPD_TRIM"] * float(true_by_equivalent(amsl))
+        switch_distance = parameters["NPFG_SW_DST_MLT"] * period * parameters["NPFG_DAMPING"] * speed
+        return max(parameters["NAV_ACC_RAD"], round(min(MAX_SWITCH_DISTANCE, switch_distance), 6))
 
     def airspeed_factor(self, amsl: float) -> float:
         """Return the ratio of true to equivalent airspeed."""
@@ -244,18 +250,18 @@ class Px4(Autopilot):
         >>> rules.includes_home, rules.rally_height, rules.instead
         (False, 100.0, '')
         """
-        made = self.parameters
-        kind = int(made["RTL_TYPE"])
+        parameters = self.parameters
+        return_type = int(parameters["RTL_TYPE"])
         return ReturnRules(
-            height=made["RTL_RETURN_ALT"],
-            radius=made["RTL_LOITER_RAD"],
-            sink=made["FW_T_SINK_R_SP"],
+            height=parameters["RTL_RETURN_ALT"],
+            radius=parameters["RTL_LOITER_RAD"],
+            sink=parameters["FW_T_SINK_R_SP"],
             rally_limit=0.0,
-            includes_home=kind in (0, 3),
+            includes_home=return_type in (0, 3),
             holds_height=True,
-            rally_height=made["RTL_RETURN_ALT"],
-            landing_counts=kind == 1,
-            instead=_RTL_TYPES_NOT_FLOWN.get(kind, ""),
+            rally_height=parameters["RTL_RETURN_ALT"],
+            landing_counts=return_type == 1,
+            instead=_RTL_TYPES_NOT_FLOWN.get(return_type, ""),
         )
 
     @property
@@ -265,15 +271,15 @@ class Px4(Autopilot):
         >>> Px4(Px4Parameters.defaults()).loiter_rules.radius
         80.0
         """
-        made = self.parameters
+        parameters = self.parameters
         return LoiterRules(
-            radius=made["NAV_LOITER_RAD"],
+            radius=parameters["NAV_LOITER_RAD"],
             radius_name="NAV_LOITER_RAD",
             at_middle=True,
             holds_height=True,
-            climb=min(made["FW_T_CLMB_R_SP"], made["FW_T_CLMB_MAX"]),
-            sink=min(made["FW_T_SINK_R_SP"], made["FW_T_SINK_MAX"]),
-            short=made["NAV_FW_ALT_RAD"],
+            climb=min(parameters["FW_T_CLMB_R_SP"], parameters["FW_T_CLMB_MAX"]),
+            sink=min(parameters["FW_T_SINK_R_SP"], parameters["FW_T_SINK_MAX"]),
+            short=parameters["NAV_FW_ALT_RAD"],
             ends_in_circle=True,
         )
 
@@ -286,16 +292,16 @@ class Px4(Autopilot):
         >>> Px4(Px4Parameters.defaults()).mission_checks.requires
         2
         """
-        made = self.parameters
-        stated = made.is_whole_set or "MIS_TKO_LAND_REQ" in made.by_origin("file")
-        return MissionChecks(made["FW_LND_ANG"], int(made["MIS_TKO_LAND_REQ"]), stated)
+        parameters = self.parameters
+        is_stated = parameters.is_whole_set or "MIS_TKO_LAND_REQ" in parameters.by_origin("file")
+        return MissionChecks(parameters["FW_LND_ANG"], int(parameters["MIS_TKO_LAND_REQ"]), is_stated)
 
     @property
     def speed_limits(self) -> SpeedLimits | None:
         """FW_AIRSPD_MIN and FW_AIRSPD_MAX; a speed outside these limits is replaced by the nearest limit."""
-        made = self.parameters
-        low, high = made["FW_AIRSPD_MIN"], made["FW_AIRSPD_MAX"]
-        return SpeedLimits(low, high, "FW_AIRSPD_MIN", "FW_AIRSPD_MAX", nearest=True)
+        parameters = self.parameters
+        min_airspeed, max_airspeed = parameters["FW_AIRSPD_MIN"], parameters["FW_AIRSPD_MAX"]
+        return SpeedLimits(min_airspeed, max_airspeed, "FW_AIRSPD_MIN", "FW_AIRSPD_MAX", nearest=True)
 
     def speeds_flown(self, commanded: Floats, cruise: float) -> Floats:
         """Return the commanded speeds, clipped to its limits."""

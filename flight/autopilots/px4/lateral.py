@@ -3,7 +3,7 @@
 NPFG is by Furieri, Stastny, Marconi, Siegwart and Gilitschenski, "Gone with the wind: Nonlinear guidance for small
 fixed-wing aircraft in arbitrarily strong windfields" (ACC 2017), extended to any path in Stastny's "On Flying
 Backwards" (2019), in PX4's form (`src/lib/npfg/`): a course that closes in on the track and turns along it, the heading
-that flies this course in the wind, and a side acceleration proportional to the heading error.
+that flies this course in the wind, and a lateral acceleration proportional to the heading error.
 
 Tracks are flown over the ground: courses and headings are angles from the map's north, clockwise, and a signed error is
 positive to the right.
@@ -26,25 +26,25 @@ _MIN_GROUND_SPEED_MPS = 1.0
 
 
 @inner
-def feasibility(airspeed: float, across: float, along: float) -> float:
+def feasibility(airspeed: float, wind_across: float, wind_along: float) -> float:
     """Return the feasibility of a course, from 1 with enough airspeed to 0 where the wind prevails.
 
-    across, along: components of the wind across and along the course, m/s.
+    wind_across, wind_along: components of the wind across and along the course, m/s.
     """
-    headwind = abs(across) if along >= 0.0 else math.hypot(across, along)
-    share = min(1.0, max(0.0, (airspeed - headwind) / _AIRSPEED_BUFFER_MPS))
-    return math.sin(0.5 * math.pi * share) ** 2
+    headwind = abs(wind_across) if wind_along >= 0.0 else math.hypot(wind_across, wind_along)
+    fraction = min(1.0, max(0.0, (airspeed - headwind) / _AIRSPEED_BUFFER_MPS))
+    return math.sin(0.5 * math.pi * fraction) ** 2
 
 
 @inner
-def error_bound(ground_speed: float, time: float) -> float:
+def error_bound(ground_speed: float, time_constant: float) -> float:
     """Return the track error (m) beyond which guidance approaches the track at right angles.
 
-    time: NPFG's time constant, s.
+    time_constant: NPFG's time constant, s.
     """
     if ground_speed > _MIN_GROUND_SPEED_MPS:
-        return ground_speed * time
-    return 0.5 * time * (ground_speed * ground_speed + 1.0)
+        return ground_speed * time_constant
+    return 0.5 * time_constant * (ground_speed * ground_speed + 1.0)
 
 
 @inner
@@ -63,17 +63,17 @@ def switch_distance(ground_speed: float, parameters: Record) -> float:
 
     It is NPFG_SW_DST_MLT times the bound of the track error.
     """
-    time = straight_period(parameters) * parameters.npfg_damping
-    return min(MAX_SWITCH_DISTANCE, parameters.npfg_switch_share * error_bound(ground_speed, time))
+    time_constant = straight_period(parameters) * parameters.npfg_damping
+    return min(MAX_SWITCH_DISTANCE, parameters.npfg_switch_share * error_bound(ground_speed, time_constant))
 
 
 @inner
 def adapted_period(
-    airspeed: float, wind_speed: float, curvature: float, feasible: float, proximity: float, parameters: Record
+    airspeed: float, wind_speed: float, curvature: float, track_feasibility: float, proximity: float, parameters: Record
 ) -> float:
     """Return a period that is stable with the roll lag and short enough for a curve in wind, s.
 
-    feasible: feasibility of the track, 0..1.
+    track_feasibility: feasibility of the track, 0..1.
     proximity: proximity to the track, 0..1.
     """
     wind_factor = 2.0 * (1.0 - math.sqrt(1.0 - min(1.0, wind_speed / max(0.1, airspeed))))
@@ -82,13 +82,18 @@ def adapted_period(
     if turn_rate * wind_factor <= 0.0 or damping < 0.5:
         return straight_period(parameters)
     period: float = parameters.npfg_period
-    straight = math.pi * parameters.npfg_roll_time / damping
+    straight_period_min = math.pi * parameters.npfg_roll_time / damping
     if parameters.npfg_lower_bound > 0.0:
-        curved = 4.0 * math.pi * parameters.npfg_roll_time * damping * feasible + (1.0 - feasible) * straight
-        period_min = (curved * proximity + straight * (1.0 - proximity)) * parameters.npfg_period_safety
+        curved_period_min = (
+            4.0 * math.pi * parameters.npfg_roll_time * damping * track_feasibility
+            + (1.0 - track_feasibility) * straight_period_min
+        )
+        period_min = (
+            curved_period_min * proximity + straight_period_min * (1.0 - proximity)
+        ) * parameters.npfg_period_safety
         period = max(period, period_min)
         if parameters.npfg_upper_bound > 0.0:
-            period_max = 4.0 * math.pi * damping / (turn_rate * wind_factor * max(1e-3, feasible))
+            period_max = 4.0 * math.pi * damping / (turn_rate * wind_factor * max(1e-3, track_feasibility))
             period += (max(period_min, min(period, period_max)) - period) * proximity
     return period
 
@@ -101,29 +106,29 @@ def heading_for(
 
     If no heading flies the course, return the velocity whose ground track deviates least from it.
     """
-    across = wind_east * course_north - wind_north * course_east
-    along = wind_east * course_east + wind_north * course_north
-    wind = math.hypot(wind_east, wind_north)
-    if abs(across) < airspeed and (along > 0.0 or wind < airspeed):
-        over_ground = along + math.sqrt(airspeed * airspeed - across * across)
-        return over_ground * course_east - wind_east, over_ground * course_north - wind_north
-    rest = math.sqrt(max(0.0, wind * wind - airspeed * airspeed))
-    east, north = rest * course_east - wind_east, rest * course_north - wind_north
-    size = max(1e-6, math.hypot(east, north))
-    return airspeed * east / size, airspeed * north / size
+    wind_across = wind_east * course_north - wind_north * course_east
+    wind_along = wind_east * course_east + wind_north * course_north
+    wind_speed = math.hypot(wind_east, wind_north)
+    if abs(wind_across) < airspeed and (wind_along > 0.0 or wind_speed < airspeed):
+        ground_speed = wind_along + math.sqrt(airspeed * airspeed - wind_across * wind_across)
+        return ground_speed * course_east - wind_east, ground_speed * course_north - wind_north
+    remaining_speed = math.sqrt(max(0.0, wind_speed * wind_speed - airspeed * airspeed))
+    east, north = remaining_speed * course_east - wind_east, remaining_speed * course_north - wind_north
+    length = max(1e-6, math.hypot(east, north))
+    return airspeed * east / length, airspeed * north / length
 
 
 @inner
-def turn_share(air_east: float, air_north: float, want_east: float, want_north: float) -> float:
+def turn_share(air_east: float, air_north: float, demand_east: float, demand_north: float) -> float:
     """Return the sine of the angle from the air velocity to a demanded one, positive to the right.
 
     The result is 1 or -1 beyond 90 degrees.
     """
-    size = max(1e-6, math.hypot(air_east, air_north) * math.hypot(want_east, want_north))
-    turn = (air_north * want_east - air_east * want_north) / size
-    if air_north * want_north + air_east * want_east < 0.0:
-        return math.copysign(1.0, turn)
-    return turn
+    product = max(1e-6, math.hypot(air_east, air_north) * math.hypot(demand_east, demand_north))
+    sine = (air_north * demand_east - air_east * demand_north) / product
+    if air_north * demand_north + air_east * demand_east < 0.0:
+        return math.copysign(1.0, sine)
+    return sine
 
 
 @inner
@@ -140,7 +145,7 @@ def follow_track(
     parameters: Record,
     own: Record,
 ) -> None:
-    """Demand the side acceleration that leads onto a track, m/s^2 to the right, into ``own``.
+    """Demand the lateral acceleration that leads onto a track, m/s^2 to the right, into ``own``.
 
     estimated: a record of `flight.guidance.navigation_error.MOTION`.
     near: point of the track nearest to the aircraft, m.
@@ -153,15 +158,17 @@ def follow_track(
     airspeed = max(0.1, math.hypot(air_east, air_north))
     ground_speed = math.hypot(estimated.velocity_east, estimated.velocity_north)
     wind_speed = math.hypot(wind_east, wind_north)
-    away_east, away_north = estimated.east - near_east, estimated.north - near_north
-    error = along_north * away_east - along_east * away_north
+    offset_east, offset_north = estimated.east - near_east, estimated.north - near_north
+    error = along_north * offset_east - along_east * offset_north
     wind_across = wind_east * along_north - wind_north * along_east
     wind_along = wind_east * along_east + wind_north * along_north
-    on_track = feasibility(airspeed, wind_across, wind_along)
+    track_feasibility = feasibility(airspeed, wind_across, wind_along)
     damping = parameters.npfg_damping
     bound = error_bound(ground_speed, straight_period(parameters) * damping)
     look_ahead_angle = 0.5 * math.pi * (1.0 - min(1.0, abs(error) / bound)) ** 2
-    period = adapted_period(airspeed, wind_speed, curvature, on_track, math.sin(look_ahead_angle) ** 2, parameters)
+    period = adapted_period(
+        airspeed, wind_speed, curvature, track_feasibility, math.sin(look_ahead_angle) ** 2, parameters
+    )
     bound = error_bound(ground_speed, period * damping)
     look_ahead_angle = 0.5 * math.pi * (1.0 - min(1.0, abs(error) / bound)) ** 2
     proximity = math.sin(look_ahead_angle) ** 2
@@ -169,22 +176,26 @@ def follow_track(
     side = math.copysign(1.0, error)
     course_east = -math.cos(look_ahead_angle) * side * along_north + math.sin(look_ahead_angle) * along_east
     course_north = math.cos(look_ahead_angle) * side * along_east + math.sin(look_ahead_angle) * along_north
-    across = wind_east * course_north - wind_north * course_east
-    along = wind_east * course_east + wind_north * course_north
-    on_course = feasibility(airspeed, across, along)
-    least = math.hypot(parameters.ground_speed_min - along, across)
-    over_ground = along + math.sqrt(max(0.0, airspeed_demand * airspeed_demand - across * across))
-    own.airspeed_for_ground = least if over_ground < parameters.ground_speed_min else 0.0
+    course_wind_across = wind_east * course_north - wind_north * course_east
+    course_wind_along = wind_east * course_east + wind_north * course_north
+    course_feasibility = feasibility(airspeed, course_wind_across, course_wind_along)
+    min_airspeed = math.hypot(parameters.ground_speed_min - course_wind_along, course_wind_across)
+    ground_speed_on_course = course_wind_along + math.sqrt(
+        max(0.0, airspeed_demand * airspeed_demand - course_wind_across * course_wind_across)
+    )
+    own.airspeed_for_ground = min_airspeed if ground_speed_on_course < parameters.ground_speed_min else 0.0
     airspeed_setpoint = max(airspeed_demand, own.airspeed_for_ground)
-    want_east, want_north = heading_for(course_east, course_north, wind_east, wind_north, airspeed_setpoint)
-    turn = turn_share(air_east, air_north, want_east, want_north)
+    air_demand_east, air_demand_north = heading_for(course_east, course_north, wind_east, wind_north, airspeed_setpoint)
+    turn_sine = turn_share(air_east, air_north, air_demand_east, air_demand_north)
     gain = 4.0 * math.pi * damping / period if parameters.anticipates else _HEADING_GAIN_PER_S
     # Feed-forward for the curvature of the track.
-    tangent = max(0.0, estimated.velocity_east * along_east + estimated.velocity_north * along_north)
-    parallel = curvature / max(1.0 - curvature * error, max(1e-6, 0.5 * abs(curvature)))
+    speed_along_track = max(0.0, estimated.velocity_east * along_east + estimated.velocity_north * along_north)
+    parallel_curvature = curvature / max(1.0 - curvature * error, max(1e-6, 0.5 * abs(curvature)))
     ratio = 1.0 + wind_along / math.sqrt(max(1e-6, airspeed * airspeed - wind_across * wind_across))
-    curve = airspeed * ratio * parallel * tangent * on_course * on_track * proximity
-    own.side_acceleration = gain * airspeed * turn + curve
+    feed_forward = (
+        airspeed * ratio * parallel_curvature * speed_along_track * course_feasibility * track_feasibility * proximity
+    )
+    own.side_acceleration = gain * airspeed * turn_sine + feed_forward
 
 
 @inner
@@ -205,23 +216,23 @@ def follow_leg(
     """
     leg_east, leg_north = b_east - own.from_east, b_north - own.from_north
     length = math.hypot(leg_east, leg_north)
-    from_east, from_north = estimated.east - own.from_east, estimated.north - own.from_north
-    to_east, to_north = b_east - estimated.east, b_north - estimated.north
-    before = from_east * leg_east + from_north * leg_north < 0.0
+    from_start_east, from_start_north = estimated.east - own.from_east, estimated.north - own.from_north
+    to_end_east, to_end_north = b_east - estimated.east, b_north - estimated.north
+    is_before_start = from_start_east * leg_east + from_start_north * leg_north < 0.0
     speed = math.hypot(estimated.velocity_east, estimated.velocity_north)
-    aim_east, aim_north, straight = 0.0, 0.0, False
-    if length < 1e-3 or to_east * leg_east + to_north * leg_north < 0.0:
-        aim_east, aim_north, straight = to_east, to_north, True
-    elif before and math.hypot(from_east, from_north) > switch_distance(speed, parameters):
-        aim_east, aim_north, straight = -from_east, -from_north, True
-    if straight:
-        size = max(1e-3, math.hypot(aim_east, aim_north))
+    target_east, target_north, heads_to_point = 0.0, 0.0, False
+    if length < 1e-3 or to_end_east * leg_east + to_end_north * leg_north < 0.0:
+        target_east, target_north, heads_to_point = to_end_east, to_end_north, True
+    elif is_before_start and math.hypot(from_start_east, from_start_north) > switch_distance(speed, parameters):
+        target_east, target_north, heads_to_point = -from_start_east, -from_start_north, True
+    if heads_to_point:
+        distance = max(1e-3, math.hypot(target_east, target_north))
         follow_track(
             estimated,
             estimated.east,
             estimated.north,
-            aim_east / size,
-            aim_north / size,
+            target_east / distance,
+            target_north / distance,
             0.0,
             wind_east,
             wind_north,
@@ -231,7 +242,7 @@ def follow_leg(
         )
         return
     along_east, along_north = leg_east / length, leg_north / length
-    along = from_east * along_east + from_north * along_north
+    along = from_start_east * along_east + from_start_north * along_north
     follow_track(
         estimated,
         own.from_east + along * along_east,
@@ -250,8 +261,8 @@ def follow_leg(
 @inner
 def follow_circle(
     estimated: Record,
-    middle_east: float,
-    middle_north: float,
+    center_east: float,
+    center_north: float,
     radius: float,
     wind_east: float,
     wind_north: float,
@@ -263,21 +274,21 @@ def follow_circle(
 
     radius: m, positive to the right.  The other parameters are those of `follow_track`.
     """
-    out_east, out_north = estimated.east - middle_east, estimated.north - middle_north
-    distance = math.hypot(out_east, out_north)
+    radial_east, radial_north = estimated.east - center_east, estimated.north - center_north
+    distance = math.hypot(radial_east, radial_north)
     if distance < 0.1:
         speed = max(1e-3, math.hypot(estimated.velocity_east, estimated.velocity_north))
-        out_east, out_north = estimated.velocity_east / speed, estimated.velocity_north / speed
+        radial_east, radial_north = estimated.velocity_east / speed, estimated.velocity_north / speed
     else:
-        out_east, out_north = out_east / distance, out_north / distance
-    side, size = math.copysign(1.0, radius), max(1.0, abs(radius))
+        radial_east, radial_north = radial_east / distance, radial_north / distance
+    direction, abs_radius = math.copysign(1.0, radius), max(1.0, abs(radius))
     follow_track(
         estimated,
-        middle_east + size * out_east,
-        middle_north + size * out_north,
-        side * out_north,
-        -side * out_east,
-        side / size,
+        center_east + abs_radius * radial_east,
+        center_north + abs_radius * radial_north,
+        direction * radial_north,
+        -direction * radial_east,
+        direction / abs_radius,
         wind_east,
         wind_north,
         airspeed_demand,
@@ -287,7 +298,7 @@ def follow_circle(
 
 
 @inner
-def wanted_bank(side_acceleration: float, parameters: Record) -> float:
-    """Return the bank for a side acceleration (m/s^2), within FW_R_LIM, rad."""
-    wanted = math.atan(side_acceleration / GRAVITY)
-    return min(parameters.roll_limit, max(-parameters.roll_limit, wanted))
+def bank_demand(lateral_acceleration: float, parameters: Record) -> float:
+    """Return the bank demand for a lateral acceleration (m/s^2), within FW_R_LIM, rad."""
+    demand = math.atan(lateral_acceleration / GRAVITY)
+    return min(parameters.roll_limit, max(-parameters.roll_limit, demand))

@@ -9,7 +9,7 @@ import math
 import numpy as np
 
 from aircraft.envelope import GRAVITY
-from flight.autopilots.px4.lateral import wanted_bank
+from flight.autopilots.px4.lateral import bank_demand
 from flight.autopilots.px4.navigator import flown_to, is_last, navigate
 from flight.autopilots.px4.parameters import PX4_PARAMETERS
 from flight.autopilots.px4.tecs import update_tecs
@@ -154,48 +154,52 @@ def fly_as_px4(
 
     wind: velocity of the air, m/s.
     parameters: a record of `flight.autopilots.px4.parameters.PX4_PARAMETERS`.
-    own: of `flight.autopilots.px4.law.PX4_MEMORY`.
+    own: a record of `flight.autopilots.px4.law.PX4_MEMORY`.
     The other parameters are those of `flight.autopilots.planfly.law.guide`.
 
     The path is only the reference against which the track is measured; the law does not use it.
     """
     find_on_path(estimated, pieces, memory)
     memory.height_error = estimated.up - profile(nodes, memory.distance)[0]
-    factor = true_by_equivalent(estimated.up)
+    airspeed_factor = true_by_equivalent(estimated.up)
     if not own.begun:
-        _initialise_law(state, estimated, waypoints, memory, parameters, own, factor)
-    commanded = min(parameters.airspeed_max, max(parameters.airspeed_min, waypoints[own.leg].airspeed))
+        _initialise_law(state, estimated, waypoints, memory, parameters, own, airspeed_factor)
+    commanded_airspeed = min(parameters.airspeed_max, max(parameters.airspeed_min, waypoints[own.leg].airspeed))
     # Guidance gets the true airspeed; from 1.17 on it gets the equivalent airspeed and takes it for true.
-    airspeed_scale = factor if parameters.anticipates else 1.0
-    navigate(estimated, waypoints, wind_east, wind_north, commanded * airspeed_scale, parameters, own, dt)
+    airspeed_scale = airspeed_factor if parameters.anticipates else 1.0
+    navigate(estimated, waypoints, wind_east, wind_north, commanded_airspeed * airspeed_scale, parameters, own, dt)
     # Skip the rest of a loiter that PX4 left earlier than the path has it, and do not end the mission early.
     while pieces[memory.piece].leg < own.leg - 1 and memory.piece + 1 < pieces.shape[0]:
         memory.piece += 1
     leave_sharp_corners(pieces, memory, own.leg)
     memory.done = memory.done and is_last(waypoints, own)
-    wanted = max(commanded, own.airspeed_for_ground / airspeed_scale)
-    memory.speed_command = min(parameters.airspeed_max, wanted) * factor
+    airspeed_setpoint = max(commanded_airspeed, own.airspeed_for_ground / airspeed_scale)
+    memory.speed_command = min(parameters.airspeed_max, airspeed_setpoint) * airspeed_factor
     if own.returning:
         end_return(estimated, waypoints[own.leg + 1], memory, dt)
     elif flown_to(waypoints, own) + 1 >= waypoints.shape[0]:
         _end_mission(estimated, waypoints[waypoints.shape[0] - 1], memory, parameters, own, dt)
-    step = parameters.roll_slew * dt
-    bank = wanted_bank(own.side_acceleration, parameters)
-    own.roll_demand = min(own.roll_demand + step, max(own.roll_demand - step, bank)) if step > 0.0 else bank
-    update_tecs(state, estimated, parameters, own, wanted, factor, dt)
+    max_step = parameters.roll_slew * dt
+    demand = bank_demand(own.side_acceleration, parameters)
+    own.roll_demand = (
+        min(own.roll_demand + max_step, max(own.roll_demand - max_step, demand)) if max_step > 0.0 else demand
+    )
+    update_tecs(state, estimated, parameters, own, airspeed_setpoint, airspeed_factor, dt)
     _follow_attitude(state, estimated, gains, memory, parameters, own, commands, dt)
 
 
 @inner
-def _end_mission(estimated: Record, b: Record, memory: Record, parameters: Record, own: Record, dt: float) -> None:
-    """End the flight once it is past the last waypoint b and at its altitude, or after a timeout.
+def _end_mission(
+    estimated: Record, last_waypoint: Record, memory: Record, parameters: Record, own: Record, dt: float
+) -> None:
+    """End the flight once it is past the last waypoint and at its altitude, or after a timeout.
 
     At the mission's end PX4 loiters without end (`MissionBase::setEndOfMissionItems`): the flight joins that loiter
     and flies it once around.  A circle that begins before the waypoint, and is left at once because the altitude is
     reached, does not end the flight.
     """
-    here = own.waited > 0.0 or memory.done or own.circling or own.finished
-    if not here or b.circle != 0.0:
+    has_arrived = own.waited > 0.0 or memory.done or own.circling or own.finished
+    if not has_arrived or last_waypoint.circle != 0.0:
         return
     own.waited += dt
     if own.finished:
@@ -204,13 +208,23 @@ def _end_mission(estimated: Record, b: Record, memory: Record, parameters: Recor
     else:
         # An aircraft that loiters at the mission's end has not missed the route.
         memory.returning = True
-        ended = not b.ends and memory.done and abs(estimated.up - b.up) <= parameters.height_acceptance
+        ended = (
+            not last_waypoint.ends
+            and memory.done
+            and abs(estimated.up - last_waypoint.up) <= parameters.height_acceptance
+        )
     memory.done = ended or own.waited > LONGEST_WAIT
 
 
 @inner
 def _initialise_law(
-    state: Record, estimated: Record, waypoints: Records, memory: Record, parameters: Record, own: Record, factor: float
+    state: Record,
+    estimated: Record,
+    waypoints: Records,
+    memory: Record,
+    parameters: Record,
+    own: Record,
+    airspeed_factor: float,
 ) -> None:
     """Initialise the law in steady flight at the first waypoint."""
     own.begun = True
@@ -225,7 +239,7 @@ def _initialise_law(
     own.pitch_demand = state.alpha - parameters.pitch_trim
     own.balance_sum = own.pitch_demand * state.airspeed * GRAVITY
     own.throttle_demand = memory.trim_throttle
-    trim = min(parameters.throttle_max, max(parameters.throttle_min, parameters.throttle_trim * factor))
+    trim = min(parameters.throttle_max, max(parameters.throttle_min, parameters.throttle_trim * airspeed_factor))
     own.throttle_sum = memory.trim_throttle - trim
 
 
@@ -241,14 +255,14 @@ def _follow_attitude(
     dt: float,
 ) -> None:
     """Drive roll and pitch to their demands with the lags of PX4's controllers, and set throttle."""
-    before = memory.bank_rate
+    previous_rate = memory.bank_rate
     rate = (own.roll_demand - memory.bank) / (ROLL_LAG * parameters.roll_time)
     if parameters.roll_rate_max > 0.0:
         rate = min(parameters.roll_rate_max, max(-parameters.roll_rate_max, rate))
     rate = min(gains.roll_rate_max, max(-gains.roll_rate_max, rate))
-    limit = gains.roll_acceleration_max * dt
-    rate = before + min(limit, max(-limit, rate - before))
-    follow_roll(state, gains, memory, commands, memory.bank + rate * dt, rate, (rate - before) / dt, dt)
+    max_change = gains.roll_acceleration_max * dt
+    rate = previous_rate + min(max_change, max(-max_change, rate - previous_rate))
+    follow_roll(state, gains, memory, commands, memory.bank + rate * dt, rate, (rate - previous_rate) / dt, dt)
     pitch_rate = (own.pitch_demand + parameters.pitch_trim - state.pitch) / (PITCH_LAG * parameters.pitch_time)
     pitch_rate = min(_MAX_PITCH_RATE_RADPS, max(-_MAX_PITCH_RATE_RADPS, pitch_rate))
     steer_elevator(state, gains, memory, commands, estimated.velocity_up, state.airspeed * pitch_rate)

@@ -47,8 +47,8 @@ def reach_radius(ground_speed: float, parameters: Record) -> float:
 def past_waypoint(estimated: Record, b: Record, own: Record) -> bool:
     """Return True if the aircraft is past the plane across the leg at its end b; False for a leg without length."""
     leg_east, leg_north = b.east - own.from_east, b.north - own.from_north
-    ahead = (estimated.east - b.east) * leg_east + (estimated.north - b.north) * leg_north
-    return leg_east * leg_east + leg_north * leg_north > 1e-6 and ahead > 0.0
+    distance_past = (estimated.east - b.east) * leg_east + (estimated.north - b.north) * leg_north
+    return leg_east * leg_east + leg_north * leg_north > 1e-6 and distance_past > 0.0
 
 
 @inner
@@ -66,9 +66,11 @@ def navigate(
 
     estimated: a record of `flight.guidance.navigation_error.MOTION`.
     waypoints: (w,) of `flight.guidance.lateral_reference_laws.WAYPOINT`.
-    wind: velocity of the air, m/s.  airspeed_demand: m/s.
-    parameters: of `flight.autopilots.px4.parameters.PX4_PARAMETERS`.
-    own: of `flight.autopilots.px4.law.PX4_MEMORY`.  dt: s.
+    wind: velocity of the air, m/s.
+    airspeed_demand: m/s.
+    parameters: a record of `flight.autopilots.px4.parameters.PX4_PARAMETERS`.
+    own: a record of `flight.autopilots.px4.law.PX4_MEMORY`.
+    dt: s.
     """
     target = flown_to(waypoints, own)
     b = waypoints[target]
@@ -95,10 +97,10 @@ def flown_to(waypoints: Records, own: Record) -> int:
 
 @inner
 def _past_gate(estimated: Record, gate: Record, b: Record) -> bool:
-    """Return True past the plane through a gate that is perpendicular to the line from the gate to the waypoint b."""
-    onward_east, onward_north = b.east - gate.east, b.north - gate.north
-    ahead = (estimated.east - gate.east) * onward_east + (estimated.north - gate.north) * onward_north
-    return ahead >= 0.0
+    """Return True past the plane through a gate, perpendicular to the line from the gate to the waypoint b."""
+    normal_east, normal_north = b.east - gate.east, b.north - gate.north
+    distance_past = (estimated.east - gate.east) * normal_east + (estimated.north - gate.north) * normal_north
+    return distance_past >= 0.0
 
 
 @inner
@@ -119,23 +121,25 @@ def _follow_plain_leg(
     """
     b = waypoints[target]
     speed = math.hypot(estimated.velocity_east, estimated.velocity_north)
-    early, radius = switch_distance(speed, parameters), parameters.loiter_radius
+    turn_distance, loiter_radius = switch_distance(speed, parameters), parameters.loiter_radius
     distance = math.hypot(b.east - estimated.east, b.north - estimated.north)
     own.nearest = min(own.nearest, distance)
-    high_or_low = abs(estimated.up - b.up) > parameters.height_acceptance
+    is_off_altitude = abs(estimated.up - b.up) > parameters.height_acceptance
     # A circle is kept once begun, even if the aircraft is wide of it.
-    own.circling = own.finished or (high_or_low and (own.circling or distance < early))
+    own.circling = own.finished or (is_off_altitude and (own.circling or distance < turn_distance))
     if own.circling:
-        follow_circle(estimated, b.east, b.north, radius, wind_east, wind_north, airspeed_demand, parameters, own)
+        follow_circle(
+            estimated, b.east, b.north, loiter_radius, wind_east, wind_north, airspeed_demand, parameters, own
+        )
         own.height_asked = b.up
     else:
         follow_leg(estimated, b.east, b.north, wind_east, wind_north, airspeed_demand, parameters, own)
-        own.height_asked = leg_height(b.east, b.north, b.up, max(early, abs(radius)), own)
+        own.height_asked = leg_height(b.east, b.north, b.up, max(turn_distance, abs(loiter_radius)), own)
     is_end = target + 1 >= waypoints.shape[0]
     if is_end and not b.ends:
         return
     is_reached = distance <= reach_radius(speed, parameters) or past_waypoint(estimated, b, own)
-    own.reached_for = own.reached_for + dt if own.reached_for > 0.0 or (is_reached and not high_or_low) else 0.0
+    own.reached_for = own.reached_for + dt if own.reached_for > 0.0 or (is_reached and not is_off_altitude) else 0.0
     if own.reached_for <= SWITCH_DELAY:
         return
     if is_end:
@@ -166,26 +170,26 @@ def _fly_loiter(
     follow_circle(
         estimated, b.centre_east, b.centre_north, b.circle, wind_east, wind_north, airspeed_demand, parameters, own
     )
-    on_rim = distance <= abs(b.circle) + reach_radius(speed, parameters)
+    is_on_rim = distance <= abs(b.circle) + reach_radius(speed, parameters)
     if b.to_height and not own.at_rim:
         own.height_asked = own.begun_up
-        own.at_rim = on_rim and abs(estimated.up - own.begun_up) <= parameters.height_acceptance
+        own.at_rim = is_on_rim and abs(estimated.up - own.begun_up) <= parameters.height_acceptance
         return
     own.height_asked = b.up
-    at_height = abs(estimated.up - b.up) <= parameters.height_acceptance
-    own.reached_for = own.reached_for + dt if own.reached_for > 0.0 or (on_rim and at_height) else 0.0
-    after = own.leg + 2
+    is_at_altitude = abs(estimated.up - b.up) <= parameters.height_acceptance
+    own.reached_for = own.reached_for + dt if own.reached_for > 0.0 or (is_on_rim and is_at_altitude) else 0.0
+    exit_waypoint = own.leg + 2
     if math.isnan(b.stays):
         # A loiter by turns, which PX4 does not fly: it is left where the drawn route leaves it.
-        if after < waypoints.shape[0] and on_rim and past_corner(estimated, b):
+        if exit_waypoint < waypoints.shape[0] and is_on_rim and past_corner(estimated, b):
             begin_leg(estimated, waypoints, own.leg + 1, own)
         return
-    while after < waypoints.shape[0] and waypoints[after].stop == b.stop:
-        after += 1
-    if after >= waypoints.shape[0] or own.reached_for <= b.stays + SWITCH_DELAY:
+    while exit_waypoint < waypoints.shape[0] and waypoints[exit_waypoint].stop == b.stop:
+        exit_waypoint += 1
+    if exit_waypoint >= waypoints.shape[0] or own.reached_for <= b.stays + SWITCH_DELAY:
         return
-    if not b.leaves_on_course or _is_on_exit_course(estimated, waypoints[after], b):
-        begin_leg(estimated, waypoints, after - 1, own)
+    if not b.leaves_on_course or _is_on_exit_course(estimated, waypoints[exit_waypoint], b):
+        begin_leg(estimated, waypoints, exit_waypoint - 1, own)
 
 
 @inner
@@ -203,12 +207,14 @@ def _setpoint_position(b: Record) -> tuple[float, float]:
 
 
 @inner
-def _is_on_exit_course(estimated: Record, onward: Record, b: Record) -> bool:
+def _is_on_exit_course(estimated: Record, next_waypoint: Record, b: Record) -> bool:
     """Return True if the course leads to the setpoint after loiter b, or if no course can.
 
-    No course is required to a setpoint too close to the loiter's center.  onward: the waypoint after the loiter.
+    No course is required to a setpoint too close to the loiter's center.
+
+    next_waypoint: the waypoint after the loiter.
     """
-    east, north = _setpoint_position(onward)
+    east, north = _setpoint_position(next_waypoint)
     if math.hypot(east - b.centre_east, north - b.centre_north) <= _MIN_EXIT_DISTANCE_RATIO * abs(b.circle):
         return True
     bearing = math.atan2(east - estimated.east, north - estimated.north)
@@ -278,8 +284,8 @@ def begin_leg(estimated: Record, waypoints: Records, leg: int, own: Record) -> N
     if a.circle != 0.0 and a.leaves_on_tangent and not math.isnan(a.stays):
         east, north = _setpoint_position(b)
         bearing = math.atan2(east - a.centre_east, north - a.centre_north)
-        share = abs(a.circle) / max(1e-3, math.hypot(east - a.centre_east, north - a.centre_north))
-        exit_bearing = bearing - math.copysign(math.acos(min(1.0, share)), a.circle)
+        cosine = abs(a.circle) / max(1e-3, math.hypot(east - a.centre_east, north - a.centre_north))
+        exit_bearing = bearing - math.copysign(math.acos(min(1.0, cosine)), a.circle)
         own.from_east += abs(a.circle) * math.sin(exit_bearing)
         own.from_north += abs(a.circle) * math.cos(exit_bearing)
     if not (a.circle != 0.0 and a.stop == b.stop):
@@ -291,21 +297,21 @@ def begin_leg(estimated: Record, waypoints: Records, leg: int, own: Record) -> N
 @inner
 def past_corner(estimated: Record, b: Record) -> bool:
     """Return True if an aircraft on a loiter has passed the route's corner for this part of the loiter."""
-    corner = math.atan2(b.east - b.centre_east, b.north - b.centre_north)
-    here = math.atan2(estimated.east - b.centre_east, estimated.north - b.centre_north)
-    turned = wrap(here - corner) * math.copysign(1.0, b.circle)
-    return 0.0 <= turned < 0.5 * math.pi
+    corner_bearing = math.atan2(b.east - b.centre_east, b.north - b.centre_north)
+    bearing = math.atan2(estimated.east - b.centre_east, estimated.north - b.centre_north)
+    angle_past = wrap(bearing - corner_bearing) * math.copysign(1.0, b.circle)
+    return 0.0 <= angle_past < 0.5 * math.pi
 
 
 @inner
-def leg_height(end_east: float, end_north: float, end_up: float, early: float, own: Record) -> float:
-    """Return a leg's altitude setpoint at the aircraft, m, on a slope that ends ``early`` m before the leg's end.
+def leg_height(end_east: float, end_north: float, end_up: float, lead_distance: float, own: Record) -> float:
+    """Return a leg's altitude setpoint at the aircraft, m, on a slope that ends ``lead_distance`` m before the end.
 
     PX4 calls it a first-order hold.  The slope uses the smallest horizontal distance to the end that was reached on
-    this leg; a leg no longer than ``early`` is a step.
+    this leg; a leg no longer than ``lead_distance`` is a step.
     """
     length = math.hypot(end_east - own.from_east, end_north - own.from_north)
     nearest = min(own.nearest, length)
-    if length <= early or nearest <= early:
+    if length <= lead_distance or nearest <= lead_distance:
         return end_up
-    return own.from_up + (end_up - own.from_up) * (length - nearest) / (length - early)
+    return own.from_up + (end_up - own.from_up) * (length - nearest) / (length - lead_distance)

@@ -207,9 +207,9 @@ class Px4Parameters(ParameterSet):
         values = {}
         for name, entry in entries.items():
             if name in FROM_ARDUPILOT:
-                own, factor = FROM_ARDUPILOT[name]
-                definition = TABLE.by_name[own]
-                values[own] = min(definition.high, max(definition.low, entry.value * factor))
+                px4_name, factor = FROM_ARDUPILOT[name]
+                definition = TABLE.by_name[px4_name]
+                values[px4_name] = min(definition.high, max(definition.low, entry.value * factor))
         return values
 
     @classmethod
@@ -241,20 +241,24 @@ class Px4Parameters(ParameterSet):
         return record
 
 
-def speed_filter_gains(speed: float, rate: float, process: float) -> tuple[float, float, float, float]:
+def speed_filter_gains(
+    speed_sigma: float, rate_sigma: float, process_sigma: float
+) -> tuple[float, float, float, float]:
     """Return the gains of the airspeed filter, for speed and for rate, each by the errors of speed and of rate.
 
-    speed, rate: standard deviations of the measured airspeed (m/s) and of its measured rate (m/s^2).  process: standard
-    deviation of the noise that drives the rate, m/s^2.  They are the steady gains of a Kalman-Bucy filter on an
+    speed_sigma, rate_sigma: standard deviations of the measured airspeed (m/s) and of its measured rate (m/s^2).
+    process_sigma: standard deviation of the noise that drives the rate, m/s^2.
+
+    The gains are the steady gains of a Kalman-Bucy filter on an
     integrator chain (Kalman and Bucy 1961, J. Basic Eng. 83, 95-108), as PX4's parameters FW_T_SPD_* are described.
 
     >>> [round(gain, 2) for gain in speed_filter_gains(0.07, 0.2, 0.2)]
     [1.92, 0.26, 2.12, 0.67]
     """
-    chain, precision = np.array([[0.0, 1.0], [0.0, 0.0]]), np.diag([speed**-2.0, rate**-2.0])
+    chain, precision = np.array([[0.0, 1.0], [0.0, 0.0]]), np.diag([speed_sigma**-2.0, rate_sigma**-2.0])
     # Solve the Riccati equation by the stable eigenvectors of its Hamiltonian (Potter 1966, SIAM J. Appl. Math. 14,
     # 496-501).
-    hamiltonian = np.block([[chain.T, -precision], [-np.diag([0.0, process * process]), -chain]])
+    hamiltonian = np.block([[chain.T, -precision], [-np.diag([0.0, process_sigma * process_sigma]), -chain]])
     roots, vectors = np.linalg.eig(hamiltonian)
     stable = vectors[:, roots.real < 0.0]
     gains = np.real(stable[2:] @ np.linalg.inv(stable[:2])) @ precision

@@ -11,7 +11,7 @@ import numpy as np
 
 from aircraft.envelope import GRAVITY
 from aircraft.tracking import SPEED_SHARES, TURNS, TrackingError
-from flight.autopilots.px4.lateral import wanted_bank
+from flight.autopilots.px4.lateral import bank_demand
 from flight.autopilots.px4.law import PX4_MEMORY, ROLL_LAG
 from flight.autopilots.px4.navigator import navigate, reach_radius
 from flight.autopilots.px4.parameters import Px4Parameters
@@ -133,9 +133,9 @@ CORNER_TRACKING = record_dtype("acceptance", "excursion", "before", "after")
 def _corner_tables(parameters: Px4Parameters, airspeed: float) -> tuple[Floats, Floats, Floats, Floats]:
     """Return tables (turns, speeds) of acceptance, excursion, and lengths of the legs before and after, m."""
     corners = np.zeros((TURNS.size, SPEED_SHARES.size), CORNER_TRACKING)
-    _fill(parameters.record(), airspeed, TURNS, SPEED_SHARES * airspeed, corners, waypoint_column(3))
-    share, more = WIND_SPREAD
-    corners["excursion"] *= (share + more * (TURNS / (0.5 * math.pi)) ** 2)[:, None]
+    _fill_corners(parameters.record(), airspeed, TURNS, SPEED_SHARES * airspeed, corners, waypoint_column(3))
+    factor, right_angle_margin = WIND_SPREAD
+    corners["excursion"] *= (factor + right_angle_margin * (TURNS / (0.5 * math.pi)) ** 2)[:, None]
     # Rounded because plans must be the same on every machine, and sines differ between libraries.
     acceptance, excursion, before, after = (corners[name].round(2) for name in field_names(CORNER_TRACKING))
     for table in (acceptance, excursion, before, after):
@@ -144,7 +144,7 @@ def _corner_tables(parameters: Px4Parameters, airspeed: float) -> tuple[Floats, 
 
 
 @compiled
-def _fill(
+def _fill_corners(
     parameters: Record, airspeed: float, turns: Floats, speeds: Floats, corners: Records, waypoints: Records
 ) -> None:
     """Fill `CORNER_TRACKING` records (turns, speeds) by flights along three waypoints."""
@@ -175,28 +175,30 @@ def _fly_corner(
     estimated.north = -reach_radius(speed, parameters) - _RUN_IN_M
     lag = ROLL_LAG * parameters.roll_time
     decay = math.exp(-_TIME_STEP_S / lag)
-    course, lateral_acceleration, clock, excursion, settled, along = 0.0, 0.0, 0.0, 0.0, 0.0, -1.0
-    while along < 0.75 * _LEG_LENGTH_M and clock < 120.0:
+    course, lateral_acceleration, time, excursion, settled_distance, along = 0.0, 0.0, 0.0, 0.0, 0.0, -1.0
+    while along < 0.75 * _LEG_LENGTH_M and time < 120.0:
         estimated.velocity_east, estimated.velocity_north = speed * math.sin(course), speed * math.cos(course)
         navigate(estimated, waypoints, 0.0, 0.0, airspeed, parameters, own, _TIME_STEP_S)
-        wanted = GRAVITY * math.tan(wanted_bank(own.side_acceleration, parameters))
+        acceleration_demand = GRAVITY * math.tan(bank_demand(own.side_acceleration, parameters))
         # The exact solution of the lag, and the displacement on the mean course.
-        turned = (wanted * _TIME_STEP_S + (lateral_acceleration - wanted) * lag * (1.0 - decay)) / speed
-        lateral_acceleration = wanted + (lateral_acceleration - wanted) * decay
-        estimated.east += step_length * math.sin(course + 0.5 * turned)
-        estimated.north += step_length * math.cos(course + 0.5 * turned)
-        course += turned
-        clock += _TIME_STEP_S
+        course_change = (
+            acceleration_demand * _TIME_STEP_S + (lateral_acceleration - acceleration_demand) * lag * (1.0 - decay)
+        ) / speed
+        lateral_acceleration = acceleration_demand + (lateral_acceleration - acceleration_demand) * decay
+        estimated.east += step_length * math.sin(course + 0.5 * course_change)
+        estimated.north += step_length * math.cos(course + 0.5 * course_change)
+        course += course_change
+        time += _TIME_STEP_S
         along = estimated.east * east + estimated.north * north
         corner_distance = math.hypot(estimated.east, estimated.north)
-        first = abs(estimated.east) if estimated.north < 0.0 else corner_distance
-        second = abs(estimated.east * north - estimated.north * east) if along > 0.0 else corner_distance
-        excursion = max(excursion, min(first, second))
-        if own.leg == 1 and second > _SETTLED_CROSS_TRACK_M:
-            settled = max(0.0, along)
-        if own.leg == 1 and along > settled + _SETTLED_TIME_S * speed:
+        first_leg_distance = abs(estimated.east) if estimated.north < 0.0 else corner_distance
+        second_leg_distance = abs(estimated.east * north - estimated.north * east) if along > 0.0 else corner_distance
+        excursion = max(excursion, min(first_leg_distance, second_leg_distance))
+        if own.leg == 1 and second_leg_distance > _SETTLED_CROSS_TRACK_M:
+            settled_distance = max(0.0, along)
+        if own.leg == 1 and along > settled_distance + _SETTLED_TIME_S * speed:
             break
     # Compiled code frees an array after its last use, and a record that views it does not keep it alive.
     if motions.size + memories.size != 2:
         return math.nan, math.nan
-    return excursion, settled
+    return excursion, settled_distance

@@ -50,7 +50,7 @@ class Px4Sitl(ProgramAutopilot, Px4):
     def start(self, setup: FlightSetup, aircraft: Aircraft) -> ProgramFlight:
         """Start the program.
 
-        Raise FlightError if it does not start, and ParameterError for a bad file.
+        Raises FlightError if it does not start, and ParameterError if a file is invalid.
         """
         # Imported here: only this needs MAVLink.
         from flight.autopilots.px4_sitl.flight import Px4Flight

@@ -23,24 +23,24 @@ from flight.simulation.setup import FlightSetup
 from world.scenario_tables import NEWEST_PX4, Px4Version
 
 # Timeout to connect to the simulator, s by the clock.
-_CONNECTS = 30.0
+_CONNECT_TIMEOUT_S = 30.0
 # Timeout of its start-up script, s by the clock.
-_STARTS = 60.0
+_STARTUP_TIMEOUT_S = 60.0
 # A PX4 that has sent no answer for this time waits for a step, s by the clock.
 _STALL_TIME_S = 0.2
 # Fraction of the push along the rail after which mission mode is started.
 _MODE_START_FRACTION = 0.9
 # Time for PX4 to close its log, s of its own time.
 _LOG_CLOSING_TIME_S = 2.0
-# flight_sw_version of the first release that turns by NAV_ACC_RAD alone.
+# flight_sw_version of the first release that turns only by NAV_ACC_RAD.
 _FIRST_WITHOUT_ANTICIPATION = 0x01110000
 
 
 class Px4Flight(SitlFlight):
     """One flight of PX4 itself; see `SitlFlight`.
 
-    autopilot: flies the setup in place of its own autopilot; has PX4's parameters and the program's file, with the
-        start-up files next to it.
+    autopilot: autopilot that flies the setup instead of the setup's own; it has PX4's parameters and the program's
+        file, with the start-up files next to it.
 
     Its MAVLink port (UDP) is open on every interface of this machine, since PX4 has no setting for it.
     """
@@ -52,30 +52,32 @@ class Px4Flight(SitlFlight):
         setup = replace(setup, autopilot=autopilot)
         digest = check_binary(binary, autopilot.title)
         servos = load_servo_map(aircraft)
-        given = given_parameters(setup, aircraft, parameters)
+        parameters_given = given_parameters(setup, aircraft, parameters)
         super().__init__(setup, aircraft, binary)
-        self._setting_out: Iterator[None] = iter(())
-        with contextlib.ExitStack() as stack, self._name_program():
+        self._mode_start: Iterator[None] = iter(())
+        with contextlib.ExitStack() as stack, self._errors_name_program():
             port = stack.enter_context(contextlib.closing(SimulatorPort()))
             link = stack.enter_context(contextlib.closing(UdpLink()))
             self._link = link
-            launch = px4_launch(binary, given.given, port.port, link.theirs, link.port)
+            launch = px4_launch(binary, parameters_given.given, port.port, link.theirs, link.port)
             process = stack.enter_context(AutopilotProcess(binary, launch))
             self._process, port.watch = process, process.watch
             lockstep = HilLockstep(port, servos, self.fdm, self._workspace, self._mission.home, self._poll_link)
             self._lockstep = lockstep
             self._preflight = Px4Preflight(link, lambda: lockstep.time)
             self._apply_gnss_error()
-            port.connect(_CONNECTS)
-            lockstep.boot(self._rail, partial(_has_started, process), _STALL_TIME_S, _STARTS)
-            self._hold_during(self._preflight.meet(given.given))
+            port.connect(_CONNECT_TIMEOUT_S)
+            lockstep.boot(self._rail, partial(_has_started, process), _STALL_TIME_S, _STARTUP_TIMEOUT_S)
+            self._hold_during(self._preflight.meet(parameters_given.given))
             version: Px4Version = (
                 "1.16"
                 if (link.news.version or _FIRST_WITHOUT_ANTICIPATION) < _FIRST_WITHOUT_ANTICIPATION
                 else NEWEST_PX4
             )
-            flown = replace(autopilot.of_release(version), program=_program_of_messages(link, digest, given))
-            self.setup = replace(setup, autopilot=flown)
+            flown_autopilot = replace(
+                autopilot.of_release(version), program=_program_of_messages(link, digest, parameters_given)
+            )
+            self.setup = replace(setup, autopilot=flown_autopilot)
             self._stack = stack.pop_all()
 
     @property
@@ -101,27 +103,27 @@ class Px4Flight(SitlFlight):
         self._hold_during(self._preflight.prepare(self._mission))
         self._push(last=_MODE_START_FRACTION)
         # It answers while it flies on.
-        self._setting_out = self._preflight.set_out()
+        self._mode_start = self._preflight.set_out()
         self._push(first=_MODE_START_FRACTION)
 
     def _poll_link(self) -> None:
         super()._poll_link()
         self._preflight.accompany()
-        next(self._setting_out, None)
+        next(self._mode_start, None)
 
 
 def _has_started(process: AutopilotProcess) -> bool:
     return any(STARTED in line for line in process.lines())
 
 
-def _program_of_messages(link: AutopilotLink, digest: str, given: GivenParameters) -> AutopilotProgram:
+def _program_of_messages(link: AutopilotLink, digest: str, parameters: GivenParameters) -> AutopilotProgram:
     """Return the program that flew, from its messages."""
     news = link.news
-    unknown = given.changed.keys() - news.parameters.keys()
+    unknown = parameters.changed.keys() - news.parameters.keys()
     return AutopilotProgram(
         version=version_text(news.version),
         sha256=digest,
-        parameters={name: news.parameters[name] for name in sorted(given.given) if name in news.parameters},
-        changed={name: value for name, value in sorted(given.changed.items()) if name not in unknown},
-        unused=tuple(sorted({*given.unused, *unknown})),
+        parameters={name: news.parameters[name] for name in sorted(parameters.given) if name in news.parameters},
+        changed={name: value for name, value in sorted(parameters.changed.items()) if name not in unknown},
+        unused=tuple(sorted({*parameters.unused, *unknown})),
     )

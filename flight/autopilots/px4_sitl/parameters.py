@@ -89,33 +89,37 @@ class GivenParameters:
     unused: tuple[str, ...] = ()
 
 
-def given_parameters(setup: FlightSetup, aircraft: Aircraft, made: Px4Parameters) -> GivenParameters:
+def given_parameters(setup: FlightSetup, aircraft: Aircraft, law_parameters: Px4Parameters) -> GivenParameters:
     """Collect the parameters of a flight.
 
-    The mission's speed is the cruise speed, unless the user states one.  Raise ParameterError for a bad file.
+    The mission's speed is the cruise speed, unless the user states one.  Raises ParameterError if a file is invalid.
     """
     file = setup.scenario.flight.params
-    own = {} if file is None else {name: entry.value for name, entry in read_parameter_file(Path(file)).items()}
-    own |= made.by_origin("file")
-    base = SIMULATION | rate_gains(aircraft) | made.by_origin("aircraft")
+    user_values = {} if file is None else {name: entry.value for name, entry in read_parameter_file(Path(file)).items()}
+    user_values |= law_parameters.by_origin("file")
+    base = SIMULATION | rate_gains(aircraft) | law_parameters.by_origin("aircraft")
     base["FW_AIRSPD_TRIM"] = setup.airspeed
-    flying = {
+    flight_values = {
         name: value
-        for name, value in own.items()
+        for name, value in user_values.items()
         if name.startswith(FLYING) and name not in SIMULATION and len(name) <= LONGEST_NAME
     }
-    changed = {name: value for name, value in flying.items() if base.get(name) != value}
-    return GivenParameters(base | flying, changed, tuple(sorted(own.keys() - flying.keys())))
+    changed = {name: value for name, value in flight_values.items() if base.get(name) != value}
+    return GivenParameters(base | flight_values, changed, tuple(sorted(user_values.keys() - flight_values.keys())))
 
 
 def rate_gains(aircraft: Aircraft) -> dict[str, float]:
     """Return the gains of the rate controllers, from the aircraft's gains for ArduPlane.
 
-    Raise ParameterError for a bad file.
+    Raises ParameterError if the file is invalid.
 
     >>> from aircraft.catalog import load_aircraft
     >>> round(rate_gains(load_aircraft("aerosonde"))["FW_RR_FF"], 2)
     0.33
     """
-    stated = read_parameter_file(aircraft.folder / AIRCRAFT_FILE)
-    return {name: stated[old].value * _GAIN_FACTOR for old, name in _GAIN_NAMES.items() if old in stated}
+    entries = read_parameter_file(aircraft.folder / AIRCRAFT_FILE)
+    return {
+        name: entries[arduplane_name].value * _GAIN_FACTOR
+        for arduplane_name, name in _GAIN_NAMES.items()
+        if arduplane_name in entries
+    }

@@ -64,8 +64,8 @@ def earth_field(lat_deg: float, lon_deg: float) -> tuple[float, float, float]:
     """
     declination, inclination, strength = mavextra.get_mag_field_ef(lat_deg, lon_deg)
     declination, inclination = math.radians(declination), math.radians(inclination)
-    level = strength * math.cos(inclination)
-    return level * math.cos(declination), level * math.sin(declination), strength * math.sin(inclination)
+    horizontal = strength * math.cos(inclination)
+    return horizontal * math.cos(declination), horizontal * math.sin(declination), strength * math.sin(inclination)
 
 
 def atmosphere(amsl: float) -> tuple[float, float, float]:
@@ -139,9 +139,9 @@ class Sensors:
 
 def between(before: BodyMotion, after: BodyMotion) -> BodyMotion:
     """Return the motion halfway between two motions, whose courses must differ by less than half a turn."""
-    middle = [0.5 * (a + b) for a, b in zip(before, after, strict=True)]
-    made = BodyMotion(*middle)
-    return made._replace(yaw=before.yaw + 0.5 * math.remainder(after.yaw - before.yaw, 2.0 * math.pi))
+    values = [0.5 * (a + b) for a, b in zip(before, after, strict=True)]
+    middle_motion = BodyMotion(*values)
+    return middle_motion._replace(yaw=before.yaw + 0.5 * math.remainder(after.yaw - before.yaw, 2.0 * math.pi))
 
 
 # ----------------------------------------------------------------------
@@ -157,7 +157,7 @@ class SimulatorPort:
     """Socket to which PX4 connects.
 
     port: its number.
-    watch: called while nothing arrives; raises FlightError if the program has ended.
+    watch: function that is called while nothing arrives; it raises FlightError if the program has ended.
     """
 
     def __init__(self) -> None:
@@ -180,20 +180,22 @@ class SimulatorPort:
         if self._stream is not None:
             self._stream.close()
 
-    def connect(self, seconds: float) -> None:
+    def connect(self, timeout: float) -> None:
         """Wait until PX4 has connected.
 
-        Raise FlightError for a program that ends, or does not connect within a time, s.
+        timeout: s.
+
+        Raises FlightError if the program ends, or does not connect within that time.
         """
         self._listener.settimeout(_CHECK_INTERVAL_S)
-        began = self._clock()
+        start = self._clock()
         while self._stream is None:
             try:
                 self._stream, _ = self._listener.accept()
             except TimeoutError:
                 self.watch()
-                if self._clock() - began > seconds:
-                    message = f"did not connect to the simulator within {seconds:.0f} s"
+                if self._clock() - start > timeout:
+                    message = f"did not connect to the simulator within {timeout:.0f} s"
                     raise FlightError(message, field="simulator") from None
         self._stream.setblocking(True)
         self._stream.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
@@ -215,21 +217,21 @@ class SimulatorPort:
     def answer(self, patience: float) -> tuple[float, ...] | None:
         """Return HIL_ACTUATOR_CONTROLS.controls (16,), or None if it does not arrive within `patience` s by the clock.
 
-        Raise FlightError for a program that ends.
+        Raises FlightError if the program ends.
         """
         if not self._answers and not (self._receive_data(patience) and self._answers):
-            began = self._clock()
+            start = self._clock()
             while not self._answers:
                 if not self._receive_data(patience):
                     self.watch()
-                    if patience <= _CHECK_INTERVAL_S or self._clock() - began > patience:
+                    if patience <= _CHECK_INTERVAL_S or self._clock() - start > patience:
                         return None
         return self._answers.pop(0)
 
     def awaited_answer(self) -> tuple[float, ...]:
         """Wait for the answer of PX4 with running outputs, which answers every step, and return it.
 
-        Raise FlightError if there is no answer.
+        Raises FlightError if there is no answer.
         """
         answer = self.answer(SILENCE)
         if answer is None:
@@ -296,54 +298,57 @@ class HilLockstep(Lockstep):
         fdm: Fdm,
         workspace: Workspace,
         home: Home,
-        look: Callable[[], None],
+        poll: Callable[[], None],
     ) -> None:
-        super().__init__(fdm, workspace, home, look)
+        super().__init__(fdm, workspace, home, poll)
         self._port, self._servos = port, servos
         self._sensors = Sensors(home)
-        self._before: BodyMotion | None = None
-        self._answered = 0
+        self._last_motion: BodyMotion | None = None
+        self._answer_count = 0
         # The last answer, and True while a step has no answer yet.
-        self._last: tuple[float, ...] = (0.0,) * 4
-        self._flown: tuple[float, ...] = self._last
-        self._owes = False
+        self._last_answer: tuple[float, ...] = (0.0,) * 4
+        self._flown_outputs: tuple[float, ...] = self._last_answer
+        self._awaits_answer = False
 
     @property
     def _answers_every_step(self) -> bool:
         """True if PX4 answers every step."""
-        return self._answered >= _RUNNING_ANSWER_COUNT
+        return self._answer_count >= _RUNNING_ANSWER_COUNT
 
     def _next_outputs(self) -> tuple[float, ...]:
         """Return the answer to the last step; zeros before the first answer."""
-        if self._owes:
+        if self._awaits_answer:
             answer = (
                 self._port.awaited_answer() if self._answers_every_step else self._port.answer(_EARLY_ANSWER_TIMEOUT_S)
             )
-            self._answered = 0 if answer is None else self._answered + 1
-            self._last, self._owes = answer or self._last, False
-        return self._last
+            self._answer_count = 0 if answer is None else self._answer_count + 1
+            self._last_answer, self._awaits_answer = answer or self._last_answer, False
+        return self._last_answer
 
     def _send(self, data: bytes) -> None:
         """Trigger a step of PX4."""
         self._port.send(data)
-        self._owes = True
+        self._awaits_answer = True
 
-    def boot(self, rail: RailEnd, started: Callable[[], bool], patience: float, seconds: float) -> None:
+    def boot(self, rail: RailEnd, has_started: Callable[[], bool], patience: float, startup_timeout: float) -> None:
         """Start PX4 with its clock at rest, and trigger a step only when PX4 waits for one.
 
-        started: returns True once its start-up script has ended.  patience: s by the clock without an answer before a
-        step.  Raise FlightError if the script does not end within ``seconds`` by the clock.
+        has_started: function that returns True once its start-up script has ended.
+        patience: time without an answer before a step, s by the clock.
+        startup_timeout: timeout of the script, s by the clock.
+
+        Raises FlightError if the script does not end within that time.
         """
         clock = RunningClock()
-        began = clock()
-        while not started():
-            if clock() - began > seconds:
-                raise FlightError(f"did not start up within {seconds:.0f} s", field="start-up")
+        start = clock()
+        while not has_started():
+            if clock() - start > startup_timeout:
+                raise FlightError(f"did not start up within {startup_timeout:.0f} s", field="start-up")
             if self._port.answer(patience) is None:
                 self.hold(rail)
 
     def _receive_commands(self) -> Commands:
-        outputs, servos = self._flown, self._servos
+        outputs, servos = self._flown_outputs, self._servos
         return Commands(
             servos.elevator.at_share(outputs[ELEVATOR]),
             servos.aileron.at_share(outputs[AILERON]),
@@ -352,17 +357,17 @@ class HilLockstep(Lockstep):
         )
 
     def _send_motion(self, motion: tuple[float, ...], battery: tuple[float, float] | None) -> None:
-        after = BodyMotion(*motion)
-        before = self._before or after._replace(time=after.time - 1.0 / FRAME_HZ)
-        self._before = after
-        data = self._port.packed(self._sensors.measured(between(before, after)))
+        current = BodyMotion(*motion)
+        previous = self._last_motion or current._replace(time=current.time - 1.0 / FRAME_HZ)
+        self._last_motion = current
+        data = self._port.packed(self._sensors.measured(between(previous, current)))
         # PX4's second step of the previous frame, which it has computed while JSBSim made this frame.
         self._next_outputs()
         self._send(data)
         # Packed while PX4 computes that step.
-        now = [self._sensors.measured(after)]
+        messages = [self._sensors.measured(current)]
         if self._frame % _FIX_FRAMES == 0:
-            now.append(self._sensors.fix(after))
-        data = self._port.packed(*now)
-        self._flown = self._next_outputs()
+            messages.append(self._sensors.fix(current))
+        data = self._port.packed(*messages)
+        self._flown_outputs = self._next_outputs()
         self._send(data)

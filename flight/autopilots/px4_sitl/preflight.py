@@ -36,7 +36,7 @@ class Px4Preflight(Conversation):
     def meet(self, parameters: Iterable[str]) -> Talk:
         """Identify the autopilot, and read those of the given parameters that it has.
 
-        Raise FlightError if it is not PX4.
+        Raises FlightError if it is not PX4.
         """
         yield from self._identify("PX4", _MESSAGE_INTERVALS_US, parameters)
         if self._news.autopilot != mavlink.MAV_AUTOPILOT_PX4:
@@ -47,7 +47,7 @@ class Px4Preflight(Conversation):
     def prepare(self, mission: UploadedMission) -> Talk:
         """Wait until it has a position, upload the mission, and arm it in MANUAL.
 
-        In any other mode its TECS would wind up on the rail.  Raise FlightError if it finds no position, or refuses.
+        In any other mode its TECS would wind up on the rail.  Raises FlightError if it finds no position, or refuses.
         """
         estimator = mavlink.MAVLINK_MSG_ID_ESTIMATOR_STATUS
         yield from self._wait_for_position(estimator, _MESSAGE_INTERVALS_US[estimator])
@@ -63,13 +63,13 @@ class Px4Preflight(Conversation):
         )
 
     def set_out(self) -> Talk:
-        """Start its mission mode; raise FlightError if it refuses."""
+        """Start its mission mode. Raises FlightError if it refuses."""
         yield from self._send_until_accepted(Command.DO_SET_MODE, lambda: self._set_mode(_AUTO, _MISSION), "MISSION")
-        under_way = Awaited("MISSION", REPLY_TIMEOUT_S, "is not in its mission mode, armed")
-        yield from self._wait_until(lambda: self._news.mode == MISSION_MODE and self._news.armed, under_way)
+        mission_mode = Awaited("MISSION", REPLY_TIMEOUT_S, "is not in its mission mode, armed")
+        yield from self._wait_until(lambda: self._news.mode == MISSION_MODE and self._news.armed, mission_mode)
 
     def accompany(self) -> None:
-        """Send a heartbeat, to which it answers, and joystick inputs at rest with closed throttle."""
+        """Send a heartbeat, which it answers, and joystick inputs at rest with closed throttle."""
         self._send_heartbeat()
         self._link.send(mavlink.MAVLink_manual_control_message(SYSTEM, 0, 0, 0, 0, 0))
 
@@ -108,5 +108,5 @@ def version_text(number: int | None) -> str:
     """
     if number is None:
         return "PX4, version unknown"
-    kind = "" if number & 255 == 255 else _VERSION_TYPES.get(number & 192, "")
-    return f"PX4 {number >> 24 & 255}.{number >> 16 & 255}.{number >> 8 & 255}{kind}"
+    release_kind = "" if number & 255 == 255 else _VERSION_TYPES.get(number & 192, "")
+    return f"PX4 {number >> 24 & 255}.{number >> 16 & 255}.{number >> 8 & 255}{release_kind}"

@@ -25,8 +25,8 @@ _TEMPORARY_PREFIXES = ("px4_lock-", "px4-sock-")
 def startup_files(program: Path) -> Path | None:
     """Return the folder of a program's start-up files, or None if there is none."""
     folder = program.resolve().parent
-    places = (folder / STARTUP, folder.parent / STARTUP)
-    return next((place for place in places if (place / _STARTUP_SCRIPT).is_file()), None)
+    candidates = (folder / STARTUP, folder.parent / STARTUP)
+    return next((candidate for candidate in candidates if (candidate / _STARTUP_SCRIPT).is_file()), None)
 
 
 def px4_launch(
@@ -34,11 +34,11 @@ def px4_launch(
 ) -> Callable[[Path], Launch]:
     """Return a function that prepares a folder for PX4's program and returns its command line.
 
-    parameters: by name.
+    parameters: values by name.
     simulator_port: port on this machine of the physics (TCP).
     own_port, link_port: ports on which it receives MAVLink, and to which it sends it (UDP).
 
-    Raise FlightError for a program without its start-up files.
+    Raises FlightError if the program has no start-up files.
     """
     source = startup_files(binary)
     if source is None:
@@ -47,7 +47,10 @@ def px4_launch(
 
     def prepare(folder: Path) -> Launch:
         scripts = Path(shutil.copytree(source, folder / STARTUP)) / "init.d-posix"
-        lines = [". ${R}etc/init.d/rc.fw_defaults", *(f"param set {k} {v:.9g}" for k, v in parameters.items())]
+        lines = [
+            ". ${R}etc/init.d/rc.fw_defaults",
+            *(f"param set {parameter} {value:.9g}" for parameter, value in parameters.items()),
+        ]
         _write(scripts / "airframes" / f"{_AIRFRAME_ID}_planfly", *lines)
         _write(
             scripts / "px4-rc.simulator",

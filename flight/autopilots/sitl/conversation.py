@@ -1,7 +1,7 @@
 """Talk to a SITL autopilot before it flies, while the aircraft is held on its rail.
 
-A conversation is a generator.  Each time it is resumed, some more of the autopilot's time has passed, and the link has
-taken in what the autopilot has sent.
+A conversation is a generator.  Each time it is resumed, the autopilot's time has advanced, and the link has received
+the autopilot's new messages.
 """
 
 import time
@@ -54,8 +54,8 @@ class _Stopwatch:
 
     def longer_than(self, seconds: float) -> bool:
         """Return True if more than this time of the autopilot has passed, and enough time by the clock."""
-        began, by_clock = self._moments
-        return self._now() - began > seconds and self._clock() - by_clock > min(seconds, _MIN_REAL_TIME_S)
+        start, clock_start = self._moments
+        return self._now() - start > seconds and self._clock() - clock_start > min(seconds, _MIN_REAL_TIME_S)
 
 
 class Awaited(NamedTuple):
@@ -85,16 +85,17 @@ class Conversation:
         self._link, self._now, self._clock = link, now, clock
         self._news = link.news
 
-    def _identify(self, kind: str, wanted: dict[int, int], parameters: Iterable[str]) -> Talk:
+    def _identify(self, kind: str, message_intervals: dict[int, int], parameters: Iterable[str]) -> Talk:
         """Identify the autopilot, request messages, and read those of the given parameters that it has.
 
-        Raise FlightError if it is not a fixed wing.
-        kind: expected autopilot, in words.
-        wanted: requested intervals in microseconds by the number of the message.
+        kind: name of the expected autopilot.
+        message_intervals: requested intervals, microseconds, by the number of the message.
+
+        Raises FlightError if it is not a fixed wing.
         """
         news = self._news
-        heard = Awaited("heartbeat", HEARTBEAT_TIMEOUT_S, "said nothing over MAVLink")
-        yield from self._wait_until(lambda: news.vehicle is not None, heard, self._send_heartbeat)
+        awaited = Awaited("heartbeat", HEARTBEAT_TIMEOUT_S, "said nothing over MAVLink")
+        yield from self._wait_until(lambda: news.vehicle is not None, awaited, self._send_heartbeat)
         if news.vehicle != mavlink.MAV_TYPE_FIXED_WING:
             raise FlightError(
                 f"is no {kind}: its heartbeat says vehicle type {news.vehicle}; expected 1, a fixed wing",
@@ -102,36 +103,39 @@ class Conversation:
                 value=news.vehicle,
                 allowed="expected 1, a fixed wing",
             )
-        for message, interval in wanted.items():
+        for message, interval in message_intervals.items():
             self._send_command(mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, message, interval)
         self._send_command(mavlink.MAV_CMD_REQUEST_MESSAGE, mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION)
         self._send_command(mavlink.MAV_CMD_DO_SEND_BANNER)
         names = list(parameters)
-        for k in range(0, len(names), _PARAMETERS_PER_REQUEST):
-            yield from self._read_parameters(names[k : k + _PARAMETERS_PER_REQUEST])
+        for first in range(0, len(names), _PARAMETERS_PER_REQUEST):
+            yield from self._read_parameters(names[first : first + _PARAMETERS_PER_REQUEST])
 
-    def _wait_for_position(self, message: int, interval: int, lost: int = 0) -> Talk:
+    def _wait_for_position(self, message: int, interval: int, excluding_flags: int = 0) -> Talk:
         """Wait until its estimator has a position.
 
-        message: number of the message that reports it, every ``interval`` us.  lost: flags that exclude a position.
+        message: number of the message that reports it, every ``interval`` us.
+        excluding_flags: flags that exclude a position.
         """
         news = self._news
         yield from self._wait_until(
-            lambda: news.ekf & _REQUIRED_EKF_FLAGS == _REQUIRED_EKF_FLAGS and not news.ekf & lost,
+            lambda: news.ekf & _REQUIRED_EKF_FLAGS == _REQUIRED_EKF_FLAGS and not news.ekf & excluding_flags,
             Awaited("EKF", POSITION_TIMEOUT_S, "did not find its position (EKF)"),
             lambda: self._send_command(mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, message, interval),
         )
 
-    def _wait_until(self, done: Callable[[], bool], awaited: Awaited, again: Callable[[], None] | None = None) -> Talk:
-        """Wait until a condition holds, repeating a request each second; raise FlightError after a timeout."""
-        started, asked = self._start_stopwatch(), None
-        while not done():
-            if started.longer_than(awaited.seconds):
+    def _wait_until(
+        self, is_done: Callable[[], bool], awaited: Awaited, request: Callable[[], None] | None = None
+    ) -> Talk:
+        """Wait until a condition holds, repeating a request each second. Raises FlightError after a timeout."""
+        stopwatch, last_request = self._start_stopwatch(), None
+        while not is_done():
+            if stopwatch.longer_than(awaited.seconds):
                 message = f"{awaited.failed} within {awaited.seconds:.0f} s{self._last_status_text()}"
                 raise FlightError(message, field=awaited.field)
-            if again is not None and (asked is None or asked.longer_than(AGAIN)):
-                asked = self._start_stopwatch()
-                again()
+            if request is not None and (last_request is None or last_request.longer_than(AGAIN)):
+                last_request = self._start_stopwatch()
+                request()
             yield
 
     def _start_stopwatch(self) -> _Stopwatch:
@@ -171,42 +175,42 @@ class Conversation:
             )
         )
 
-    def _send_until_accepted(self, command: int, ask: Callable[[], None], what: str) -> Talk:
+    def _send_until_accepted(self, command: int, request: Callable[[], None], name: str) -> Talk:
         acknowledged = self._news.acknowledged
         acknowledged.pop(int(command), None)
         yield from self._wait_until(
             lambda: acknowledged.get(int(command)) == mavlink.MAV_RESULT_ACCEPTED,
-            Awaited(what, REPLY_TIMEOUT_S, f"refused {what} ({command_name(int(command))})"),
-            ask,
+            Awaited(name, REPLY_TIMEOUT_S, f"refused {name} ({command_name(int(command))})"),
+            request,
         )
 
     def _read_parameters(self, names: list[str]) -> Talk:
         """Read parameters; the autopilot does not answer for parameters that it does not have."""
         for name in names:
             self._link.send(mavlink.MAVLink_param_request_read_message(SYSTEM, COMPONENT, name.encode("ascii"), -1))
-        started, known = self._start_stopwatch(), self._news.parameters
-        while not (known.keys() >= set(names) or started.longer_than(AGAIN)):
+        stopwatch, parameters = self._start_stopwatch(), self._news.parameters
+        while not (parameters.keys() >= set(names) or stopwatch.longer_than(AGAIN)):
             yield
 
     def _upload(self, items: list[MissionItem], kind: MissionType) -> Talk:
         """Upload a list (MAVLink mission protocol), and retry while the autopilot has no space for it yet."""
-        started = self._start_stopwatch()
-        what = "mission" if kind == MissionType.MISSION else "rally points"
+        stopwatch = self._start_stopwatch()
+        list_name = "mission" if kind == MissionType.MISSION else "rally points"
         while True:
             yield from self._send_items(items, kind)
             result = self._news.mission_result
             if result == mavlink.MAV_MISSION_ACCEPTED:
                 return
-            if result != mavlink.MAV_MISSION_NO_SPACE or started.longer_than(UPLOAD_TIMEOUT_S):
-                asked = self._news.requested
-                item = (
+            if result != mavlink.MAV_MISSION_NO_SPACE or stopwatch.longer_than(UPLOAD_TIMEOUT_S):
+                requested_item = self._news.requested
+                item_text = (
                     ""
-                    if asked is None or asked >= len(items)
-                    else (f" at item {asked} ({command_name(items[asked].command)})")
+                    if requested_item is None or requested_item >= len(items)
+                    else (f" at item {requested_item} ({command_name(items[requested_item].command)})")
                 )
-                name = "no answer" if result is None else _MISSION_RESULTS.get(result, str(result))
-                message = f"refused the {what}{item}: {name}{self._last_status_text()}"
-                raise FlightError(message, field=what, value=name)
+                result_name = "no answer" if result is None else _MISSION_RESULTS.get(result, str(result))
+                message = f"refused the {list_name}{item_text}: {result_name}{self._last_status_text()}"
+                raise FlightError(message, field=list_name, value=result_name)
             yield from self._wait(AGAIN)
 
     def _send_items(self, items: list[MissionItem], kind: MissionType) -> Talk:
@@ -214,15 +218,15 @@ class Conversation:
         news, link = self._news, self._link
         news.requested = news.mission_result = None
         link.send(mavlink.MAVLink_mission_count_message(SYSTEM, COMPONENT, len(items), kind))
-        last, answered = None, self._start_stopwatch()
-        while news.mission_result is None and not answered.longer_than(REPLY_TIMEOUT_S):
-            if news.requested is not None and (news.requested != last or answered.longer_than(AGAIN)):
-                last, answered = news.requested, self._start_stopwatch()
-                if last < len(items):
-                    link.send(to_message(items[last], target_component=COMPONENT, seq=last))
+        last_item, stopwatch = None, self._start_stopwatch()
+        while news.mission_result is None and not stopwatch.longer_than(REPLY_TIMEOUT_S):
+            if news.requested is not None and (news.requested != last_item or stopwatch.longer_than(AGAIN)):
+                last_item, stopwatch = news.requested, self._start_stopwatch()
+                if last_item < len(items):
+                    link.send(to_message(items[last_item], target_component=COMPONENT, seq=last_item))
             yield
 
     def _wait(self, seconds: float) -> Talk:
-        began = self._now()
-        while self._now() - began < seconds:
+        start = self._now()
+        while self._now() - start < seconds:
             yield

@@ -1,4 +1,4 @@
-"""Exchange data with an autopilot in lockstep: its outputs move the controls, and its sensors get the result."""
+"""Exchange data with an autopilot in lockstep: its outputs move the controls, and its sensors get the motion."""
 
 import math
 import struct
@@ -26,10 +26,12 @@ _METRES_PER_RADIAN = math.degrees(METRES_A_DEGREE)
 class BodyMotion(NamedTuple):
     """Motion of the aircraft, as it is given to the autopilot's sensors.
 
-    time: s.  roll_rate..yaw_rate: rad/s about the body's axes.
+    time: s.
+    roll_rate..yaw_rate: rad/s about the body's axes.
     force_x..force_z: specific force along the body's axes, m/s^2; at rest 0, 0, -9.81.
     north, east, down: m from the place that ArduPilot calls home, on its sphere.
-    roll, pitch, yaw: rad, from true north.  velocity_*: m/s over the ground.
+    roll, pitch, yaw: rad, from true north.
+    velocity_*: m/s over the ground.
     airspeed: m/s, true.
     """
 
@@ -77,9 +79,9 @@ def place_on_sphere(north: float, east: float, from_lat: float, from_lon: float)
 # ----------------------------------------------------------------------
 # The rail on which an autopilot's flight starts: in the air, or the rail of a launch.
 #
-# The autopilot's estimator has to settle with the aircraft at rest, and an aircraft in the air is not at rest.  So it
-# stands on a level rail, at the attitude of its trimmed flight, until the autopilot is ready; then it is pushed along
-# the rail to the speed of that flight, and let go.  For a take-off the rail is the catapult or the throwing hand, with
+# The autopilot's estimator has to settle with the aircraft at rest.  The aircraft therefore stands on a level rail, at
+# the attitude of its trimmed flight, until the autopilot is ready; then it is pushed along the rail to the speed of
+# that flight, and released.  For a take-off the rail is the catapult or the throwing hand, with
 # its incline and acceleration; on a runway the aircraft stands where it begins.
 
 # Acceleration along the rail, m/s^2.
@@ -140,24 +142,28 @@ def rail_end(state: Record, wind: tuple[float, float, float]) -> RailEnd:
     )
 
 
-def motion_on_rail(end: RailEnd, time: float, pushed: float, origin: tuple[float, float, float]) -> BodyMotion:
-    """Return the motion ``pushed`` s after the start of the push, at ``time`` s of the exchange.
+def motion_on_rail(end: RailEnd, time: float, push_duration: float, origin: tuple[float, float, float]) -> BodyMotion:
+    """Return the motion ``push_duration`` s after the start of the push, at ``time`` s of the exchange.
 
-    The aircraft is at rest if ``pushed`` is 0 or less.
+    The aircraft is at rest if ``push_duration`` is 0 or less.
 
     origin: latitude and longitude (rad) and altitude (m) from which positions are measured.
     """
-    pushed = min(max(0.0, pushed), end.push_time)
-    level, rise = math.cos(end.incline), math.sin(end.incline)
-    along_north, along_east = level * math.cos(end.course), level * math.sin(end.course)
-    push = end.push if 0.0 < pushed < end.push_time else 0.0
-    speed = end.push * pushed
-    remaining = 0.5 * end.push * (end.push_time**2 - pushed**2)
-    lat = end.lat - remaining * along_north / _EARTH_RADIUS_M
-    lon = end.lon - remaining * along_east / (_EARTH_RADIUS_M * math.cos(end.lat))
+    push_duration = min(max(0.0, push_duration), end.push_time)
+    cos_incline, sin_incline = math.cos(end.incline), math.sin(end.incline)
+    direction_north, direction_east = cos_incline * math.cos(end.course), cos_incline * math.sin(end.course)
+    acceleration = end.push if 0.0 < push_duration < end.push_time else 0.0
+    speed = end.push * push_duration
+    remaining_distance = 0.5 * end.push * (end.push_time**2 - push_duration**2)
+    lat = end.lat - remaining_distance * direction_north / _EARTH_RADIUS_M
+    lon = end.lon - remaining_distance * direction_east / (_EARTH_RADIUS_M * math.cos(end.lat))
     north, east = offset_on_sphere(lat, lon, origin[0], origin[1])
-    velocity_north, velocity_east, velocity_down = speed * along_north, speed * along_east, -speed * rise
-    specific_force = (push * along_north, push * along_east, -push * rise - GRAVITY)
+    velocity_north, velocity_east, velocity_down = speed * direction_north, speed * direction_east, -speed * sin_incline
+    specific_force = (
+        acceleration * direction_north,
+        acceleration * direction_east,
+        -acceleration * sin_incline - GRAVITY,
+    )
     force = to_body((end.roll, end.pitch, end.yaw), specific_force)
     airspeed = math.hypot(velocity_north - end.wind_north, velocity_east - end.wind_east, velocity_down)
     return BodyMotion(
@@ -168,7 +174,7 @@ def motion_on_rail(end: RailEnd, time: float, pushed: float, origin: tuple[float
         *force,
         north,
         east,
-        origin[2] - end.amsl + remaining * rise,
+        origin[2] - end.amsl + remaining_distance * sin_incline,
         end.roll,
         end.pitch,
         end.yaw,
@@ -189,11 +195,11 @@ def to_body(attitude: tuple[float, float, float], vector: tuple[float, float, fl
     """
     (roll, pitch, yaw), (north, east, down) = attitude, vector
     cos, sin = math.cos(yaw), math.sin(yaw)
-    ahead, right = cos * north + sin * east, cos * east - sin * north
+    forward, right = cos * north + sin * east, cos * east - sin * north
     cos, sin = math.cos(pitch), math.sin(pitch)
-    x, below = cos * ahead - sin * down, sin * ahead + cos * down
+    body_x, level_down = cos * forward - sin * down, sin * forward + cos * down
     cos, sin = math.cos(roll), math.sin(roll)
-    return x, cos * right + sin * below, cos * below - sin * right
+    return body_x, cos * right + sin * level_down, cos * level_down - sin * right
 
 
 # ----------------------------------------------------------------------
@@ -213,15 +219,15 @@ class Lockstep(ABC):
     """One aircraft's exchange with an autopilot, frame by frame.
 
     home: origin of positions.
-    look: called every `LOOK_FRAMES` frames.
-    time: of the exchange, s.
-    error: of its GNSS receiver, m and m/s: north, east, up of the position, then of the velocity.
+    poll: function that is called every `LOOK_FRAMES` frames.
+    time: time of the exchange, s.
+    error: error of its GNSS receiver: north, east, up of the position, m, then of the velocity, m/s.
     """
 
-    def __init__(self, fdm: Fdm, workspace: Workspace, home: Home, look: Callable[[], None]) -> None:
+    def __init__(self, fdm: Fdm, workspace: Workspace, home: Home, poll: Callable[[], None]) -> None:
         self._fdm, self._workspace = fdm, workspace
         self._home = (math.radians(home.lat_deg), math.radians(home.lon_deg), home.alt)
-        self._look = look
+        self._poll = poll
         self._frame = 0
         self.error = _NO_ERROR
         access = fdm.loop_access()
@@ -240,14 +246,15 @@ class Lockstep(ABC):
     def _receive_commands(self) -> Commands:
         """Wait for the commands of the next frame.
 
-        Raise FlightError for a program that ends or stops answering.
+        Raises FlightError if the program ends or stops answering.
         """
 
     @abstractmethod
     def _send_motion(self, motion: tuple[float, ...], battery: tuple[float, float] | None) -> None:
         """Send the motion of the aircraft after that frame.
 
-        motion: the numbers of a `BodyMotion`.  battery: volts and amperes, None for an aircraft without a battery.
+        motion: numbers of a `BodyMotion`.
+        battery: volts and amperes; None for an aircraft without a battery.
         """
 
     def _battery(self) -> tuple[float, float] | None:
@@ -257,19 +264,19 @@ class Lockstep(ABC):
         current, factor = self._current
         return self._volts, current() * factor
 
-    def hold(self, rail: RailEnd, pushed: float = 0.0) -> None:
-        """Run one frame on the rail, ``pushed`` s after the push began."""
+    def hold(self, rail: RailEnd, push_duration: float = 0.0) -> None:
+        """Run one frame on the rail, ``push_duration`` s after the push began."""
         self._workspace.commands[:] = self._receive_commands()
-        motion = motion_on_rail(rail, self._next_time(), pushed, self._home)
-        north, east, up, v_north, v_east, v_up = self.error
+        motion = motion_on_rail(rail, self._next_time(), push_duration, self._home)
+        north, east, up, velocity_north, velocity_east, velocity_up = self.error
         self._send_motion(
             motion._replace(
                 north=motion.north + north,
                 east=motion.east + east,
                 down=motion.down - up,
-                velocity_north=motion.velocity_north + v_north,
-                velocity_east=motion.velocity_east + v_east,
-                velocity_down=motion.velocity_down - v_up,
+                velocity_north=motion.velocity_north + velocity_north,
+                velocity_east=motion.velocity_east + velocity_east,
+                velocity_down=motion.velocity_down - velocity_up,
             ),
             (self._volts, 0.0) if self._volts else None,
         )
@@ -277,17 +284,25 @@ class Lockstep(ABC):
     def step(self) -> None:
         """Run one frame of flight with the present controls: step JSBSim, and send the motion to the autopilot."""
         self._access.run()
-        lat, lon, amsl, vn, ve, vd, roll, pitch, yaw, p, q, r, airspeed = [
+        lat, lon, amsl, velocity_north, velocity_east, velocity_down, roll, pitch, yaw, p, q, r, airspeed = [
             get() * factor for get, factor in self._motion
         ]
         home_lat, home_lon, home_amsl = self._home
         north, east = offset_on_sphere(lat, lon, home_lat, home_lon)
-        dn, de, du, dvn, dve, dvu = self.error
+        error_north, error_east, error_up, error_velocity_north, error_velocity_east, error_velocity_up = self.error
         self._send_motion(
             (
                 *(self._next_time(), p, q, r, *self._fdm.specific_force()),
-                *(north + dn, east + de, home_amsl - amsl - du),
-                *(roll, pitch, yaw, vn + dvn, ve + dve, vd - dvu, airspeed),
+                *(north + error_north, east + error_east, home_amsl - amsl - error_up),
+                *(
+                    roll,
+                    pitch,
+                    yaw,
+                    velocity_north + error_velocity_north,
+                    velocity_east + error_velocity_east,
+                    velocity_down - error_velocity_up,
+                    airspeed,
+                ),
             ),
             self._battery(),
         )
@@ -296,35 +311,37 @@ class Lockstep(ABC):
         """Return a function that flies up to a number of ticks and returns the last status.
 
         It is used like the loop in `flight.simulation.simulate`.
-        tick: `flight.autopilots.sitl.flight.autopilot_tick` on the workspace.  steps: frames of a tick.
+
+        tick: `flight.autopilots.sitl.flight.autopilot_tick` on the workspace.
+        steps: frames of a tick.
         gusts, ground: True to set the tick's gusts and ground in JSBSim.
         """
-        space, fdm, take, step = self._workspace, self._fdm, self._receive_commands, self.step
-        read = [self._access.getters[field] for field in READ_FIELDS]
+        workspace, fdm, receive_commands, step = self._workspace, self._fdm, self._receive_commands, self.step
+        getters = [self._access.getters[field] for field in READ_FIELDS]
         pack: Callable[..., None] = struct.Struct(f"{len(READ_FIELDS)}d").pack_into
         pack_commands: Callable[..., None] = struct.Struct("4d").pack_into
-        readings, commands_array, output = space.readings, space.commands, space.output.tolist
+        readings, commands_array, output = workspace.readings, workspace.commands, workspace.output.tolist
         *_, set_north, set_east, set_down, set_ground = self._access.setters
 
         def fly(count: int) -> int:
             for _ in range(count):
                 # Read while the autopilot computes its answer, which does not depend on these values.
-                pack(readings, 0, *[getter() for getter in read])
-                commands = take()
+                pack(readings, 0, *[getter() for getter in getters])
+                commands = receive_commands()
                 pack_commands(commands_array, 0, *commands)
                 if status := tick():
                     return status
-                *_, north, east, down, under = output()
+                *_, north, east, down, terrain_altitude = output()
                 if gusts:
                     set_north(north)
                     set_east(east)
                     set_down(down)
                 if ground:
-                    set_ground(under)
+                    set_ground(terrain_altitude)
                 fdm.write(commands)
                 step()
                 for _ in range(steps - 1):
-                    fdm.write(take())
+                    fdm.write(receive_commands())
                     step()
             return 0
 
@@ -338,5 +355,5 @@ class Lockstep(ABC):
     def _next_time(self) -> float:
         self._frame += 1
         if self._frame % LOOK_FRAMES == 0:
-            self._look()
+            self._poll()
         return self._frame / FRAME_HZ

@@ -69,20 +69,20 @@ def autopilot_tick(block: Floats, heights: Heights) -> int:
     place_on_path(work.true, path.piece[: settings.pieces], path.node[: settings.nodes], memory)
     memory.speed_command = path.waypoint[memory.leg].airspeed
     last = path.waypoint[settings.waypoints - 1]
-    before = path.waypoint[settings.waypoints - 2]
+    previous = path.waypoint[settings.waypoints - 2]
     if last.returns and settings.on_last_leg:
         end_return(work.true, last, memory, work.timing.dt)
-    elif settings.on_last_leg and before.circle != 0.0 and before.stays == math.inf:
-        end_circling(work.true, before, memory, work.timing.dt)
+    elif settings.on_last_leg and previous.circle != 0.0 and previous.stays == math.inf:
+        end_circling(work.true, previous, memory, work.timing.dt)
     elif settings.on_last_leg and last.ends:
         end_around(work.true, memory, work.timing.dt)
     elif settings.on_last_leg:
-        across, beyond = beyond_end(work.true, path.waypoint[: settings.waypoints])
-        memory.done = beyond >= 0.0
+        cross_track, distance_past = beyond_end(work.true, path.waypoint[: settings.waypoints])
+        memory.done = distance_past >= 0.0
         # An aircraft that loiters at the mission's end, however wide, has not missed the route.
-        memory.returning = before.circle != 0.0 and before.stop == last.stop
+        memory.returning = previous.circle != 0.0 and previous.stop == last.stop
         if memory.done:
-            memory.cross_track = across
+            memory.cross_track = cross_track
     return end_tick(work)
 
 
@@ -90,48 +90,53 @@ def autopilot_tick(block: Floats, heights: Heights) -> int:
 def place_on_path(true: Record, pieces: Records, nodes: Records, memory: Record) -> None:  # pragma: no cover
     """Fill leg, distance, cross-track and altitude error of the memory from the nearest path piece.
 
-    The search starts at the last piece.  A piece against the direction of flight is not begun, because the way
-    back of an out-and-back leg lies on the way out.
+    The search starts at the last piece.  It skips pieces against the direction of flight, because both directions of an
+    out-and-back leg lie on one line.
+
     true: a record of `flight.guidance.navigation_error.MOTION`.
     """
-    k, nearest, distance, cross_track = memory.piece, math.inf, 0.0, 0.0
-    for i in range(memory.piece, min(memory.piece + _SEARCHED_PIECES, pieces.shape[0])):
-        piece = pieces[i]
-        along, cross, course = project(piece, true.east, true.north)
-        if i > memory.piece and true.velocity_east * math.sin(course) + true.velocity_north * math.cos(course) < 0.0:
+    nearest_piece, min_distance, distance, cross_track = memory.piece, math.inf, 0.0, 0.0
+    for candidate in range(memory.piece, min(memory.piece + _SEARCHED_PIECES, pieces.shape[0])):
+        piece = pieces[candidate]
+        along_piece, cross_track_there, course = project(piece, true.east, true.north)
+        if (
+            candidate > memory.piece
+            and true.velocity_east * math.sin(course) + true.velocity_north * math.cos(course) < 0.0
+        ):
             continue
-        outside = max(0.0, -along, along - piece.length)
-        if math.hypot(cross, outside) < nearest:
-            k, nearest = i, math.hypot(cross, outside)
-            distance, cross_track = piece.start + along, cross
-    memory.piece = k
+        overrun = max(0.0, -along_piece, along_piece - piece.length)
+        if math.hypot(cross_track_there, overrun) < min_distance:
+            nearest_piece, min_distance = candidate, math.hypot(cross_track_there, overrun)
+            distance, cross_track = piece.start + along_piece, cross_track_there
+    memory.piece = nearest_piece
     memory.distance = distance
     memory.cross_track = cross_track
-    memory.leg = pieces[k].leg + (1 if distance > pieces[k].leg_change else 0)
+    memory.leg = pieces[nearest_piece].leg + (1 if distance > pieces[nearest_piece].leg_change else 0)
     memory.height_error = true.up - profile(nodes, distance)[0]
 
 
 @inner
-def end_circling(true: Record, b: Record, memory: Record, dt: float) -> None:
+def end_circling(true: Record, corner: Record, memory: Record, dt: float) -> None:
     """Update the time on a loiter without end, and end the flight after `UNLIMITED`.
 
     The time runs from where the aircraft, near the circle, first flies around its center in its direction faster than
     towards it or away from it; from then on it runs however wide the circle is flown.
 
     true: a record of `flight.guidance.navigation_error.MOTION`.
-    b: a corner of the circle, of `flight.guidance.lateral_reference_laws.WAYPOINT`.
-    memory: of `flight.guidance.inner_loops.GUIDANCE_MEMORY`; its `circled` is the time in s.
+    corner: a corner of the circle, of `flight.guidance.lateral_reference_laws.WAYPOINT`.
+    memory: a record of `flight.guidance.inner_loops.GUIDANCE_MEMORY`; its `circled` is the time in s.
     """
-    out_e, out_n = true.east - b.centre_east, true.north - b.centre_north
-    distance = max(0.1, math.hypot(out_e, out_n))
-    outwards = (true.velocity_east * out_e + true.velocity_north * out_n) / distance
-    clockwise = (true.velocity_east * out_n - true.velocity_north * out_e) / distance
-    around = math.copysign(1.0, b.circle) * clockwise
+    offset_east, offset_north = true.east - corner.centre_east, true.north - corner.centre_north
+    distance = max(0.1, math.hypot(offset_east, offset_north))
+    radial_speed = (true.velocity_east * offset_east + true.velocity_north * offset_north) / distance
+    clockwise_speed = (true.velocity_east * offset_north - true.velocity_north * offset_east) / distance
+    tangential_speed = math.copysign(1.0, corner.circle) * clockwise_speed
     if memory.circled > 0.0 or (
-        distance < max(RTL_ARRIVAL_RADIUS_M, RTL_ARRIVAL_LOITER_RADII * abs(b.circle)) and around > abs(outwards)
+        distance < max(RTL_ARRIVAL_RADIUS_M, RTL_ARRIVAL_LOITER_RADII * abs(corner.circle))
+        and tangential_speed > abs(radial_speed)
     ):
         memory.circled += dt
-    # However wide it flies, it has not missed the mission's end.
+    # An aircraft that loiters at the mission's end, however wide, has not missed it.
     memory.returning = True
     memory.done = memory.circled > UNLIMITED
 
@@ -142,8 +147,8 @@ def beyond_end(true: Record, waypoints: Records) -> tuple[float, float]:
     a, b = waypoints[waypoints.shape[0] - 2], waypoints[waypoints.shape[0] - 1]
     length = math.hypot(b.east - a.east, b.north - a.north)
     east, north = (b.east - a.east) / length, (b.north - a.north) / length
-    de, dn = true.east - b.east, true.north - b.north
-    return de * north - dn * east, de * east + dn * north
+    offset_east, offset_north = true.east - b.east, true.north - b.north
+    return offset_east * north - offset_north * east, offset_east * east + offset_north * north
 
 
 # Minimum distance from the release to the first waypoint, m.
@@ -156,13 +161,24 @@ RUN_IN_SECONDS = 40.0
 _RUN_IN_TIMEOUT_S = 40.0
 
 
-def launch_rail(begin: Release, take_off: TakeOff) -> RailEnd:
+def launch_rail(release_state: Release, take_off: TakeOff) -> RailEnd:
     """Return the rail of a launch, or a rail of no length on a runway."""
-    north, east, _ = begin.velocity
-    roll, pitch, yaw = begin.attitude
-    lat, lon = (math.radians(value) for value in begin.place[:2])
+    north, east, _ = release_state.velocity
+    roll, pitch, yaw = release_state.attitude
+    lat, lon = (math.radians(value) for value in release_state.place[:2])
     return RailEnd(
-        *(lat, lon, begin.place[2], roll, pitch, yaw, yaw, math.hypot(north, east), begin.wind[0], begin.wind[1]),
+        *(
+            lat,
+            lon,
+            release_state.place[2],
+            roll,
+            pitch,
+            yaw,
+            yaw,
+            math.hypot(north, east),
+            release_state.wind[0],
+            release_state.wind[1],
+        ),
         incline=take_off.launch.incline,
         push=take_off.acceleration or PUSH,
     )
@@ -178,7 +194,7 @@ class SitlFlight(ProgramFlight):
     rail.  A flight from the ground begins at the end of the launch, or at rest on the runway, and the mission is
     uploaded unchanged.  Its GNSS position has the error of the setup's navigation.
 
-    Raise FlightError, in one line that names the program, for a program that does not start, does not understand the
+    Raises FlightError, in one line that names the program, if the program does not start, does not understand the
     exchange, finds no position, refuses the mission, or ends.
     """
 
@@ -194,7 +210,7 @@ class SitlFlight(ProgramFlight):
             self._from_ground = setup.autopilot.from_ground(self._ways, aircraft, contacts_of(aircraft, gear))
         super().__init__(setup, aircraft, load_gains(aircraft), gear=gear)
         self._release: Release | None = None
-        self._rail = self._make_rail(setup)
+        self._rail = self._trim_on_rail(setup)
         self._start_disturbances(setup)
         self._mission = uploaded_mission(setup)
         if self._ways:
@@ -240,15 +256,15 @@ class SitlFlight(ProgramFlight):
         return self._lockstep.time
 
     def prepare(self) -> None:
-        """Make the autopilot settle, accept the mission, and fly to the first waypoint; for a take-off, launch it.
+        """Let the autopilot settle and accept the mission, and fly the aircraft to the first waypoint.
 
-        Raise FlightError as the class does.
+        For a take-off, launch the aircraft instead. Raises FlightError, see the class.
         """
-        with self._name_program():
+        with self._errors_name_program():
             self._prepare_program()
-        with self._name_program(CrashError):
+        with self._errors_name_program(CrashError):
             if self._release is None:
-                self._run_in()
+                self._fly_to_first_waypoint()
             else:
                 self._begin_at_release(self._release)
 
@@ -264,16 +280,16 @@ class SitlFlight(ProgramFlight):
         return self._process.keep_log(target)
 
     @contextlib.contextmanager
-    def _name_program(self, kind: type[FlightError] = FlightError) -> Iterator[None]:
-        """Yield; raise any error of the program meanwhile as an error of this kind that names the program."""
+    def _errors_name_program(self, error_class: type[FlightError] = FlightError) -> Iterator[None]:
+        """Raise errors of the program in this context as errors of one kind that name the program."""
         try:
             yield
         except FlightError as error:
-            named = str(error).startswith(str(self._binary))
-            raise kind.from_error(error, "" if named else self._binary) from error
+            is_named = str(error).startswith(str(self._binary))
+            raise error_class.from_error(error, "" if is_named else self._binary) from error
 
-    def _make_rail(self, setup: FlightSetup) -> RailEnd:
-        """Trim the aircraft at its release before the first waypoint, straight and level and without ground.
+    def _trim_on_rail(self, setup: FlightSetup) -> RailEnd:
+        """Trim the aircraft at its release, straight and level before the first waypoint, and return its rail.
 
         For a take-off, return the rail of the launch.
         """
@@ -283,11 +299,13 @@ class SitlFlight(ProgramFlight):
             aircraft = self.fdm.aircraft
             self._release = find_release(setup, self.map, self._ground, aircraft, self._ways.take_off)
             return launch_rail(self._release, self._ways.take_off)
-        step = points[1, :2] - points[0, :2]
-        back = points[0, :2] - step / np.hypot(*step) * max(RUN_IN, RUN_IN_SECONDS * start.airspeed)
-        lat, lon = (float(value) for value in to_geo(setup.scenario.origin, *back))
-        begin = replace(start, lat_deg=lat, lon_deg=lon, slope=0.0, ground=min(0.0, start.amsl - 1000.0))
-        self._start_trimmed(setup.mission.source, begin)
+        first_leg = points[1, :2] - points[0, :2]
+        release_position = points[0, :2] - first_leg / np.hypot(*first_leg) * max(
+            RUN_IN, RUN_IN_SECONDS * start.airspeed
+        )
+        lat, lon = (float(value) for value in to_geo(setup.scenario.origin, *release_position))
+        release_start = replace(start, lat_deg=lat, lon_deg=lon, slope=0.0, ground=min(0.0, start.amsl - 1000.0))
+        self._start_trimmed(setup.mission.source, release_start)
         return rail_end(self.fdm.read(), start.wind)
 
     def _hold_during(self, talk: Talk) -> None:
@@ -301,7 +319,7 @@ class SitlFlight(ProgramFlight):
                 return
 
     def _poll_link(self) -> None:
-        """Read the autopilot's messages, of which the item being flown is the most important."""
+        """Read the autopilot's messages, and update whether its last leg is flown."""
         self._link.poll()
         self._workspace.on_last_leg[0] = self._is_ending
 
@@ -312,53 +330,55 @@ class SitlFlight(ProgramFlight):
         east, north, up = (scale * navigation.second).tolist()
         self._lockstep.error = (north, east, up, 0.0, 0.0, 0.0)
 
-    def _begin_at_release(self, begin: Release) -> None:
+    def _begin_at_release(self, release_state: Release) -> None:
         """Begin at the end of the rail or the throw, with the program's controls, or at rest on a runway."""
-        self._scale()
-        commands = tuple(float(one) for one in self._workspace.commands)
-        self._work.commands = release(self.fdm, begin, (commands[0], commands[1], commands[2], commands[3]))
-        self._work.air.wind_north, self._work.air.wind_east = begin.wind[:2]
+        self._set_unit_factors()
+        commands = tuple(float(command) for command in self._workspace.commands)
+        self._work.commands = release(self.fdm, release_state, (commands[0], commands[1], commands[2], commands[3]))
+        self._work.air.wind_north, self._work.air.wind_east = release_state.wind[:2]
         self._make_loop(self._ground_tick)
 
-    def _scale(self) -> None:
+    def _set_unit_factors(self) -> None:
         access = self.fdm.loop_access()
         self._work.state_factors = access.factors[0]
-        self._work.scale_above, self._work.scale_below = (tuple(one) for one in zip(*access.scales, strict=True))
+        self._work.scale_above, self._work.scale_below = (tuple(scales) for scales in zip(*access.scales, strict=True))
 
     def _make_loop(self, tick: Tick) -> None:
         """Continue the flight with a tick that is recorded, over the terrain."""
-        made = partial(tick, self._workspace.block, self._ground.heights)
-        own = partial(self._tick, made, bool(self._work.settings.navigation_sigma))
-        self._loop = self._lockstep.make_loop(own, self._steps, gusts=self._windy, ground=self._ground.known)
+        bound_tick = partial(tick, self._workspace.block, self._ground.heights)
+        tick_with_gnss_error = partial(self._tick, bound_tick, bool(self._work.settings.navigation_sigma))
+        self._loop = self._lockstep.make_loop(
+            tick_with_gnss_error, self._steps, gusts=self._windy, ground=self._ground.known
+        )
 
-    def _run_in(self) -> None:
-        """Fly to the first waypoint in the mean wind, without ground; an error meanwhile ends the run-in early."""
+    def _fly_to_first_waypoint(self) -> None:
+        """Fly to the first waypoint in the mean wind, without ground; an end of the flight ends the run-in early."""
         work, timing, steps = self._work, self._work.timing, self._steps
-        self._scale()
+        self._set_unit_factors()
         tick = partial(autopilot_tick, self._workspace.block, Ground(None).heights)
         loop = self._lockstep.make_loop(tick, steps, gusts=self._windy, ground=False)
-        kept = work.wind.w20, work.settings.navigation_sigma
+        saved_settings = work.wind.w20, work.settings.navigation_sigma
         work.wind.w20 = work.settings.navigation_sigma = 0.0
         for _ in range(round((2.0 * RUN_IN_SECONDS + _RUN_IN_TIMEOUT_S) / self.dt)):
             timing.row = 0
             if loop(1) or self.memory.distance >= 0.0:
                 break
-        work.wind.w20, work.settings.navigation_sigma = kept
+        work.wind.w20, work.settings.navigation_sigma = saved_settings
         timing.tick = timing.row = 0
         work.air.energy = 0.0
         self.memory.piece = 0
         self._make_loop(autopilot_tick)
 
-    def _tick(self, tick: "partial[int]", mistaken: bool) -> int:
+    def _tick(self, tick: "partial[int]", has_gnss_error: bool) -> int:
         """Run a tick, and set the GNSS error after it."""
         status = tick()
-        if mistaken:
-            east, north, up, v_east, v_north, v_up = self._workspace.navigation_error()
-            self._lockstep.error = (north, east, up, v_north, v_east, v_up)
+        if has_gnss_error:
+            east, north, up, velocity_east, velocity_north, velocity_up = self._workspace.navigation_error()
+            self._lockstep.error = (north, east, up, velocity_north, velocity_east, velocity_up)
         return status
 
     def _fly(self, count: int) -> int:
-        with self._name_program(CrashError):
+        with self._errors_name_program(CrashError):
             return self._loop(count)
 
     def _answer_frame(self) -> bool:

@@ -28,9 +28,9 @@ class AutopilotNews:
     mission_item: number of the item being flown.
     reached: number of the last item reached.
     texts: STATUSTEXT, in order.
-    parameters: by name, as it has them.
-    acknowledged: the result by command, MAV_RESULT.
-    requested: the mission item that it requested last.
+    parameters: its parameters by name.
+    acknowledged: MAV_RESULT by command.
+    requested: number of the mission item that it requested last.
     mission_result: MAV_MISSION_RESULT of the upload.
     version: AUTOPILOT_VERSION.flight_sw_version.
     """
@@ -64,7 +64,8 @@ _INTEGER_FORMATS = {
 class AutopilotLink(ABC):
     """A connection to the autopilot's program, on this machine.
 
-    port: of this end.  news: state from the received messages.
+    port: port of this end.
+    news: state from the received messages.
     """
 
     port: int
@@ -138,9 +139,9 @@ class AutopilotLink(ABC):
         self.news.reached = int(message.seq)
 
     def _on_parameter(self, message: Any) -> None:
-        value, form = float(message.param_value), _INTEGER_FORMATS.get(message.param_type)
-        if form is not None and self.news.autopilot == mavlink.MAV_AUTOPILOT_PX4:
-            (value,) = struct.unpack(form, struct.pack("<f", value))
+        value, integer_format = float(message.param_value), _INTEGER_FORMATS.get(message.param_type)
+        if integer_format is not None and self.news.autopilot == mavlink.MAV_AUTOPILOT_PX4:
+            (value,) = struct.unpack(integer_format, struct.pack("<f", value))
         self.news.parameters[str(message.param_id)] = float(value)
 
     def _on_command_ack(self, message: Any) -> None:
@@ -201,7 +202,7 @@ class TcpLink(AutopilotLink):
 class UdpLink(AutopilotLink):
     """A socket to which the program sends.
 
-    theirs: the port on which the program listens; free now.
+    theirs: port on which the program will listen.
     """
 
     def __init__(self) -> None:
@@ -232,12 +233,15 @@ class UdpLink(AutopilotLink):
 
 
 def free_ports(count: int) -> list[int]:
-    """Return ports that are free now, for sockets of the program that nothing connects to."""
+    """Return UDP ports that are free now.
+
+    The program opens sockets on them to which nothing connects.
+    """
     sockets = [socket.socket(socket.AF_INET, socket.SOCK_DGRAM) for _ in range(count)]
     try:
-        for opened in sockets:
-            opened.bind((LOOPBACK, 0))
-        return [int(opened.getsockname()[1]) for opened in sockets]
+        for udp_socket in sockets:
+            udp_socket.bind((LOOPBACK, 0))
+        return [int(udp_socket.getsockname()[1]) for udp_socket in sockets]
     finally:
-        for opened in sockets:
-            opened.close()
+        for udp_socket in sockets:
+            udp_socket.close()

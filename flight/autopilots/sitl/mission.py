@@ -56,26 +56,26 @@ def uploaded_mission(setup: FlightSetup) -> UploadedMission:
     if setup.ground_ways:
         return _unchanged_mission(setup, setup.ground_ways)
     route, origin = setup.route, setup.scenario.origin
-    kept: list[MissionItem] = []
-    lands = route.return_from >= 0 and route.return_until <= route.legs
+    items: list[MissionItem] = []
+    has_landing = route.return_from >= 0 and route.return_until <= route.legs
     for item in setup.mission.items:
-        rows = np.flatnonzero(route.items == item.seq)
+        waypoint_indices = np.flatnonzero(route.items == item.seq)
         if item.command == Command.NAV_RETURN_TO_LAUNCH:
-            kept += [item] if rows.size else []
-        elif rows.size:
-            kept.append(_place_item(item, route, rows, origin, kept))
-        elif item.command in _KEPT_COMMANDS or (lands and item.command == Command.DO_LAND_START):
-            kept.append(item)
-    if not any(item.has_position for item in kept):
-        kept = _route_items(route, origin)
-    elif route.items[-1] == -1 and kept[-1].command != Command.NAV_LOITER_UNLIM:
-        kept.append(_make_waypoint(kept[-1].seq + 1, route.waypoints[-1], 0.0, origin))
-    if (route.return_from >= 0 and not lands) or kept[-1].command == Command.NAV_LOITER_UNLIM:
-        return UploadedMission(_home_for_upload(setup), _renumber(kept), setup.mission.rally)
+            items += [item] if waypoint_indices.size else []
+        elif waypoint_indices.size:
+            items.append(_place_item(item, route, waypoint_indices, origin, items))
+        elif item.command in _KEPT_COMMANDS or (has_landing and item.command == Command.DO_LAND_START):
+            items.append(item)
+    if not any(item.has_position for item in items):
+        items = _route_items(route, origin)
+    elif route.items[-1] == -1 and items[-1].command != Command.NAV_LOITER_UNLIM:
+        items.append(_make_waypoint(items[-1].seq + 1, route.waypoints[-1], 0.0, origin))
+    if (route.return_from >= 0 and not has_landing) or items[-1].command == Command.NAV_LOITER_UNLIM:
+        return UploadedMission(_home_for_upload(setup), _renumber(items), setup.mission.rally)
     if setup.autopilot.loiter_rules.ends_in_circle and ends_at_plain_waypoint(route, setup.mission):
-        return UploadedMission(_home_for_upload(setup), _renumber(kept))
-    kept.append(_make_waypoint(kept[-1].seq + 1, _extra_point(route), 0.0, origin))
-    return UploadedMission(_home_for_upload(setup), _renumber(kept), setup.mission.rally if lands else ())
+        return UploadedMission(_home_for_upload(setup), _renumber(items))
+    items.append(_make_waypoint(items[-1].seq + 1, _extra_point(route), 0.0, origin))
+    return UploadedMission(_home_for_upload(setup), _renumber(items), setup.mission.rally if has_landing else ())
 
 
 def _unchanged_mission(setup: FlightSetup, ways: GroundWays) -> UploadedMission:
@@ -85,42 +85,42 @@ def _unchanged_mission(setup: FlightSetup, ways: GroundWays) -> UploadedMission:
         raise ValueError("a mission from the ground to the ground needs a home, a take-off and a landing")
     if math.isnan(home.alt):
         home = replace(home, alt=ways.take_off.base)
-    known = []
+    items = []
     for item in mission.items:
         p1, p2, p3, p4 = (0.0 if math.isnan(value) else value for value in item.params)
-        known.append(replace(item, params=(p1, p2, p3, p4)))
-    last = next(k for k, item in enumerate(known, 1) if item.seq == ways.approach.item)
-    return UploadedMission(home, _renumber(known), mission.rally, last)
+        items.append(replace(item, params=(p1, p2, p3, p4)))
+    last = next(number for number, item in enumerate(items, 1) if item.seq == ways.approach.item)
+    return UploadedMission(home, _renumber(items), mission.rally, last)
 
 
 def _place_item(
-    item: MissionItem, route: Route, rows: NDArray[np.intp], origin: GeoOrigin, before: list[MissionItem]
+    item: MissionItem, route: Route, waypoint_indices: NDArray[np.intp], origin: GeoOrigin, earlier: list[MissionItem]
 ) -> MissionItem:
     """Return the item of a place, which is a loiter about its own center, or a waypoint at the route's position."""
-    last = route.waypoints[rows[-1]]
+    position = route.waypoints[waypoint_indices[-1]]
     loiter = loiter_of(item)
     if loiter is None:
-        made = _make_waypoint(item.seq, last, float(route.acceptance[rows[-1]]), origin)
+        waypoint = _make_waypoint(item.seq, position, float(route.acceptance[waypoint_indices[-1]]), origin)
         if item.command != Command.NAV_WAYPOINT:
-            return made
+            return waypoint
         hold, _, pass_by, yaw = (0.0 if math.isnan(value) else value for value in item.params)
-        return replace(made, params=(hold, made.params[1], pass_by, yaw))
+        return replace(waypoint, params=(hold, waypoint.params[1], pass_by, yaw))
     lat, lon = item.lat_deg, item.lon_deg
     if not item.has_position:
-        centre = next(place for place in reversed(before) if place.has_position and is_navigation(place.command))
-        lat, lon = centre.lat_deg, centre.lon_deg
+        center_item = next(place for place in reversed(earlier) if place.has_position and is_navigation(place.command))
+        lat, lon = center_item.lat_deg, center_item.lon_deg
     p1, p2, p3, p4 = (0.0 if math.isnan(value) else value for value in item.params)
-    return MissionItem(item.seq, int(item.command), int(Frame.GLOBAL), (p1, p2, p3, p4), lat, lon, float(last[2]))
+    return MissionItem(item.seq, int(item.command), int(Frame.GLOBAL), (p1, p2, p3, p4), lat, lon, float(position[2]))
 
 
 def _route_items(route: Route, origin: GeoOrigin) -> list[MissionItem]:
     """Return the items of a route without a mission, which are its waypoints and its changes of speed."""
     items: list[MissionItem] = []
     speed = math.nan
-    for k, point in enumerate(route.waypoints):
-        items.append(_make_waypoint(len(items) + 1, point, float(route.acceptance[k]), origin))
-        if k < len(route.airspeed) and route.airspeed[k] != speed:
-            speed = float(route.airspeed[k])
+    for index, point in enumerate(route.waypoints):
+        items.append(_make_waypoint(len(items) + 1, point, float(route.acceptance[index]), origin))
+        if index < len(route.airspeed) and route.airspeed[index] != speed:
+            speed = float(route.airspeed[index])
             change = (0.0, speed, -1.0, 0.0)
             items.append(
                 MissionItem(len(items) + 1, int(Command.DO_CHANGE_SPEED), int(Frame.MISSION), change, 0.0, 0.0, 0.0)
@@ -136,17 +136,20 @@ def _make_waypoint(seq: int, point: Floats, acceptance: float, origin: GeoOrigin
 
 def _extra_point(route: Route) -> Floats:
     east, north, _ = route.waypoints[-1] - route.waypoints[-2]
-    step = STRAIGHT_ON / math.hypot(east, north)
-    return route.waypoints[-1] + np.array([step * east, step * north, 0.0])
+    scale = STRAIGHT_ON / math.hypot(east, north)
+    return route.waypoints[-1] + np.array([scale * east, scale * north, 0.0])
 
 
-def _renumber(kept: list[MissionItem]) -> tuple[MissionItem, ...]:
+def _renumber(items_in_order: list[MissionItem]) -> tuple[MissionItem, ...]:
     """Renumber items from 1, and let each jump lead to the first remaining item at or after its target."""
     items = []
-    for number, item in enumerate(kept, 1):
+    for number, item in enumerate(items_in_order, 1):
         params = item.params
         if item.command == Command.DO_JUMP:
-            target = next((k for k, other in enumerate(kept, 1) if other.seq >= params[0]), len(kept))
+            target = next(
+                (candidate for candidate, other in enumerate(items_in_order, 1) if other.seq >= params[0]),
+                len(items_in_order),
+            )
             params = (float(target), *params[1:])
         items.append(replace(item, seq=number, params=params))
     return tuple(items)
@@ -164,5 +167,5 @@ def _home_for_upload(setup: FlightSetup) -> Home:
         home = Home(on_grid(float(lat)), on_grid(float(lon)), math.nan)
     if setup.route.return_to is not None and not math.isnan(home.alt):
         return home
-    near = math.isnan(home.alt) or abs(home.alt - start[2]) < _MIN_HOME_DISTANCE_M
-    return replace(home, alt=float(start[2]) - _HOME_BELOW_START_M) if near else home
+    is_near = math.isnan(home.alt) or abs(home.alt - start[2]) < _MIN_HOME_DISTANCE_M
+    return replace(home, alt=float(start[2]) - _HOME_BELOW_START_M) if is_near else home

@@ -20,7 +20,7 @@ from world.files import temporary_folder
 from world.interruption import uninterrupted
 
 _OUTPUT_FILE = "output.txt"
-# Time to end by itself, so that its log is complete, before it is killed, s.
+# Time for the program to end by itself, so that its log is complete, before it is killed, s.
 _GRACE_S = 2.0
 _PANIC_MARK = "PANIC:"
 _PR_SET_PDEATHSIG = 1
@@ -29,7 +29,7 @@ _PR_SET_PDEATHSIG = 1
 def check_binary(binary: Path, kind: str) -> str:
     """Return the SHA-256, as hex, of an autopilot's program.
 
-    Raise FlightError, in one line, for a file that cannot be run.
+    Raises FlightError, in one line, if the file cannot be run.
 
     kind: name of the expected autopilot.
 
@@ -57,10 +57,10 @@ def check_binary(binary: Path, kind: str) -> str:
 class Launch:
     """Command line and environment of a program.
 
-    arguments: after its name.
-    environment: in addition to this process's environment.
-    logs: pattern of its own log below its folder.
-    leaves: files outside of that folder that it leaves behind.
+    arguments: arguments after its name.
+    environment: variables in addition to this process's environment.
+    logs: pattern of its own logs below its folder.
+    leaves: files that it leaves behind outside of that folder.
     """
 
     arguments: tuple[str, ...]
@@ -75,9 +75,9 @@ class AutopilotProcess:
     A guard does the same if planfly is killed.
 
     binary: its file, checked by `check_binary`.
-    prepare: puts what the program needs into its folder, and returns the command line.
+    prepare: function that prepares the program's folder, and returns the command line.
 
-    Raise FlightError if it cannot be started.
+    Raises FlightError if it cannot be started.
     """
 
     def __init__(self, binary: Path, prepare: Callable[[Path], Launch]) -> None:
@@ -98,7 +98,7 @@ class AutopilotProcess:
             raise
 
     def _spawn(self, guard: Guard) -> "subprocess.Popen[bytes]":
-        def begin() -> None:
+        def register_group() -> None:
             """Register the process group with the guard before the program runs.
 
             If it were registered later, it would remain if planfly were killed in between.
@@ -119,9 +119,9 @@ class AutopilotProcess:
                     stdout=output,
                     stderr=subprocess.STDOUT,
                     env=os.environ | self._launch.environment,
-                    # Its own session: Ctrl-C reaches planfly alone, which ends the program and its children in order.
+                    # Its own session: Ctrl-C reaches only planfly, which ends the program and its children in order.
                     start_new_session=True,
-                    preexec_fn=begin,
+                    preexec_fn=register_group,
                 )
             except OSError as error:
                 raise FlightError(
@@ -145,19 +145,21 @@ class AutopilotProcess:
         code = self._process.poll()
         if code is None:
             return
-        how = f"was ended by {signal.Signals(-code).name}" if code < 0 else f"ended with exit code {code}"
-        words = self.lines()
-        raise FlightError(how + (f": {words[-1]}" if words else ""), file=self.binary, field="exit code", value=code)
+        reason = f"was ended by {signal.Signals(-code).name}" if code < 0 else f"ended with exit code {code}"
+        output_lines = self.lines()
+        raise FlightError(
+            reason + (f": {output_lines[-1]}" if output_lines else ""), file=self.binary, field="exit code", value=code
+        )
 
-    def end(self, answer: Callable[[], bool]) -> None:
+    def end(self, answer_request: Callable[[], bool]) -> None:
         """Ask the program to end, so that it closes its log, and kill it if it does not end.
 
-        answer: answers one physics request of the program meanwhile; returns False if there was none.
+        answer_request: function that answers one physics request of the program; returns False if there is none.
         """
         if self._signal(signal.SIGTERM):
-            until = time.monotonic() + _GRACE_S
-            while self._is_alive() and time.monotonic() < until:
-                if not answer():
+            deadline = time.monotonic() + _GRACE_S
+            while self._is_alive() and time.monotonic() < deadline:
+                if not answer_request():
                     time.sleep(0.001)
         self._kill()
 

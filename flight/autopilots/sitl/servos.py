@@ -34,7 +34,7 @@ class ServoOutput:
 
     @property
     def rest(self) -> float:
-        """Pulse at the center of the throw, which is the knot whose value is nearest to zero."""
+        """Pulse at the center of the throw: the knot with the value nearest to zero."""
         return min(zip(self.pulses, self.values, strict=True), key=lambda knot: abs(knot[1]))[0]
 
     def value(self, pulse: float) -> float:
@@ -48,20 +48,20 @@ class ServoOutput:
         pulses, values = self.pulses, self.values
         if pulse <= pulses[0]:
             return values[0]
-        for k in range(1, len(pulses)):
-            if pulse < pulses[k]:
-                share = (pulse - pulses[k - 1]) / (pulses[k] - pulses[k - 1])
-                return values[k - 1] + share * (values[k] - values[k - 1])
+        for knot in range(1, len(pulses)):
+            if pulse < pulses[knot]:
+                fraction = (pulse - pulses[knot - 1]) / (pulses[knot] - pulses[knot - 1])
+                return values[knot - 1] + fraction * (values[knot] - values[knot - 1])
         return values[-1]
 
-    def at_share(self, share: float) -> float:
+    def at_share(self, fraction: float) -> float:
         """Return the control at a fraction of the throw, from -1 and 1 at the end pulses to 0 at the center.
 
         >>> ServoOutput(2, (1100.0, 1500.0, 1900.0), (0.5, 0.0, -0.5)).at_share(0.5)
         -0.25
         """
         rest = self.rest if len(self.pulses) > 2 else 0.5 * (self.pulses[0] + self.pulses[-1])
-        return self.value(rest + share * (self.pulses[-1] - rest if share > 0.0 else rest - self.pulses[0]))
+        return self.value(rest + fraction * (self.pulses[-1] - rest if fraction > 0.0 else rest - self.pulses[0]))
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,20 +85,20 @@ class ServoMap:
 
     def parameters(self) -> dict[str, float]:
         """Return ArduPilot's parameters for these outputs."""
-        found: dict[str, float] = {}
+        parameters: dict[str, float] = {}
         for name, function in FUNCTIONS.items():
             output: ServoOutput = getattr(self, name)
             prefix = f"SERVO{output.number}_"
-            found[f"{prefix}FUNCTION"] = float(function)
-            found[f"{prefix}MIN"], found[f"{prefix}MAX"] = output.pulses[0], output.pulses[-1]
-            found[f"{prefix}TRIM"] = output.rest
-        return found
+            parameters[f"{prefix}FUNCTION"] = float(function)
+            parameters[f"{prefix}MIN"], parameters[f"{prefix}MAX"] = output.pulses[0], output.pulses[-1]
+            parameters[f"{prefix}TRIM"] = output.rest
+        return parameters
 
 
 def load_servo_map(aircraft: Aircraft) -> ServoMap:
     """Read an aircraft's servos.
 
-    Raise FlightError, in one line, for a missing, unknown or bad entry.
+    Raises FlightError, in one line, if an entry is missing, unknown or invalid.
 
     >>> from aircraft.catalog import load_aircraft
     >>> servos = load_servo_map(load_aircraft("aerosonde"))
@@ -135,7 +135,7 @@ def _parse_output(name: str, entry: Any) -> ServoOutput:
     for label, numbers in (("pulse_us", pulses), (key, values)):
         if not (isinstance(numbers, list) and len(numbers) >= 2 and all(map(_is_number, numbers))):
             raise ValueError(f"{name}.{label} = {numbers!r}: expected two finite numbers or more")
-    if len(pulses) != len(values) or any(b <= a for a, b in pairwise(pulses)):
+    if len(pulses) != len(values) or any(later <= earlier for earlier, later in pairwise(pulses)):
         raise ValueError(f"{name}.pulse_us = {pulses!r}: expected increasing numbers, as many as in {key}")
     factor = math.radians(1.0) if unit else 1.0
     return ServoOutput(number, tuple(map(float, pulses)), tuple(factor * value for value in values))

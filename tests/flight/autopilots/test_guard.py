@@ -36,7 +36,7 @@ def test_where_its_owner_is_gone_it_ends_the_group_and_removes_the_folder(tmp_pa
     guard.keep_file(tmp_path / "never made")
     guard.keep_group(group.pid)
     # As the system does for an owner that was killed.
-    guard._words.close()
+    guard._pipe.close()
     assert group.wait(20.0) == -signal.SIGKILL
     guard._process.wait(20.0)
     assert not folder.exists()

@@ -84,13 +84,13 @@ def test_what_is_no_survey(places: list[Place]) -> None:
 
 def test_rounds_flown_many_times_are_looked_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
     """Each run is laid beside the 13 that follow it, once, though a survey might begin at each of 240 of them."""
-    asked, really = list[tuple[int, ...]](), survey_module._apart
+    asked, really = list[tuple[int, ...]](), survey_module._run_spacing
 
     def count(points: NDArray[np.float64], one: tuple[int, int], other: tuple[int, int]) -> float | None:
         asked.append((*one, *other))
         return really(points, one, other)
 
-    monkeypatch.setattr(survey_module, "_apart", count)
+    monkeypatch.setattr(survey_module, "_run_spacing", count)
     assert surveys([(0, 0), (0, 1500), (1500, 1500), (1500, 0)] * 60) == ()
     assert len(asked) == len(set(asked)) <= 240 * 13
 

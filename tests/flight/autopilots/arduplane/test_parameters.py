@@ -12,8 +12,8 @@ from flight.autopilots.arduplane.parameters import (
     ARDUPILOT_PARAMETERS,
     DEFINITIONS,
     ArduPilotParameters,
+    accepts_speed,
     speeds_flown,
-    takes_speed,
 )
 from flight.autopilots.autopilot import ParameterValue, StoredParameters
 from world.errors import ParameterError
@@ -146,7 +146,7 @@ PARAMETERS = ArduPilotParameters.defaults().changed(AIRSPEED_MIN=18.0, AIRSPEED_
 
 @pytest.mark.parametrize(("airspeed", "taken"), [(17.99, False), (18.0, True), (31.0, True), (31.01, False)])
 def test_speeds_within_the_limits_are_taken(airspeed: float, taken: bool) -> None:
-    assert takes_speed(airspeed, PARAMETERS) is taken
+    assert accepts_speed(airspeed, PARAMETERS) is taken
 
 
 def test_a_speed_that_is_not_taken_leaves_the_one_before() -> None:

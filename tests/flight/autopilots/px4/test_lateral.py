@@ -6,12 +6,12 @@ import pytest
 
 from flight.autopilots.px4.lateral import (
     adapted_period,
+    bank_demand,
     feasibility,
     follow_circle,
     follow_leg,
     heading_for,
     switch_distance,
-    wanted_bank,
 )
 from tests.flight.autopilots.px4.laws import flying, memory, parameters
 from world.scenario_tables import Px4Version
@@ -129,5 +129,5 @@ def test_in_wind_a_curve_shortens_the_period_and_a_straight_leg_does_not() -> No
 
 def test_the_bank_is_that_of_a_level_turn_within_the_limit() -> None:
     made = parameters(FW_R_LIM=30.0)
-    assert wanted_bank(9.80665 * math.tan(math.radians(20.0)), made) == pytest.approx(math.radians(20.0))
-    assert wanted_bank(-20.0, made) == pytest.approx(-math.radians(30.0))
+    assert bank_demand(9.80665 * math.tan(math.radians(20.0)), made) == pytest.approx(math.radians(20.0))
+    assert bank_demand(-20.0, made) == pytest.approx(-math.radians(30.0))

@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from flight.autopilots.px4.tecs import estimate_airspeed, lead_height, underspeed, update_tecs
+from flight.autopilots.px4.tecs import estimate_airspeed, underspeed, update_altitude_reference, update_tecs
 from tests.flight.autopilots.px4.laws import flying, memory, parameters, state
 from world.kernels import Record
 
@@ -16,7 +16,7 @@ def led(asked: float, seconds: float, **values: float) -> Record:
     own = memory(height_asked=asked)
     made = parameters(**values)
     for _ in range(round(seconds / DT)):
-        lead_height(made, own, DT)
+        update_altitude_reference(made, own, DT)
     return own
 
 
@@ -39,7 +39,7 @@ def test_the_reference_climbs_and_sinks_no_faster(asked: float, values: dict[str
 def test_the_reference_stops_at_the_height_without_going_past() -> None:
     own, made, highest = memory(height_asked=530.0), parameters(), 0.0
     for _ in range(300):
-        lead_height(made, own, DT)
+        update_altitude_reference(made, own, DT)
         highest = max(highest, own.height_reference)
     assert own.height_reference == pytest.approx(530.0, abs=0.01)
     assert highest < 530.1

@@ -140,9 +140,9 @@ def test_what_goes_wrong_with_px4_is_one_line_that_names_it(
     if fault == "silent":
         monkeypatch.setattr(physics, "SILENCE", 1.0)
     elif fault == "does-not-connect":
-        monkeypatch.setattr(px4_flight, "_CONNECTS", 1.0)
+        monkeypatch.setattr(px4_flight, "_CONNECT_TIMEOUT_S", 1.0)
     elif fault == "never-starts":
-        monkeypatch.setattr(px4_flight, "_STARTS", 1.0)
+        monkeypatch.setattr(px4_flight, "_STARTUP_TIMEOUT_S", 1.0)
     program = fake_px4(fault)
     with pytest.raises(FlightError) as failed:
         fly(make_setup(), program)
