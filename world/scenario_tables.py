@@ -200,7 +200,7 @@ def _check_paths(path: object) -> object:
     paths = path if isinstance(path, list) else [path]
     if path is None or (1 <= len(paths) <= MAX_TILES and all(isinstance(name, str) and name for name in paths)):
         return path
-    raise ValueError(f"expected a file's name, or a list of 1 to {MAX_TILES}")
+    raise ValueError(f"expected a file's name, or a list of 1 to {MAX_TILES} names")
 
 
 class TerrainTable(ScenarioTable):

@@ -134,7 +134,7 @@ def frame_register(name: str, element: int = 0) -> int:
     """Return the register of a field of the frame.
 
     >>> frame_register("dt"), frame_register("attitude", 3)
-    (0, 5)
+    (0, 6)
     """
     fields: Any = FRAME.fields
     return int(fields[name][1]) // 8 + element

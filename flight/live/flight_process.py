@@ -319,8 +319,7 @@ def _run_flight(
     """Fly in real time; return False if the process is to end."""
     try:
         # A diverted flight continues in the same instance of JSBSim.
-        live_setup = replace(prepared.setup, engine="jsbsim")
-        flight = Flight(live_setup, factory.aircraft, local_map=prepared.local_map)
+        flight = Flight(prepared.setup, factory.aircraft, local_map=prepared.local_map, engine="jsbsim")
         log = factory.open_log(prepared.setup, AUTO)
     except (PlanflyError, OSError) as error:
         send_event(connection, FlightEnded(f"not started: {error}"))

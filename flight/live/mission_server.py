@@ -190,7 +190,7 @@ def start_problem(mission: Mission, first: int, *, in_flight: bool = False) -> s
     >>> place = MissionItem(1, 16, 0, (0.0,) * 4, 46.0, 8.0, 75.0)
     >>> way = Mission(None, (place, replace(place, seq=2), replace(place, seq=3)))
     >>> start_problem(way, 2), start_problem(way, 3)
-    ('', 'from there on no leg is left to fly')
+    ('', 'no leg is left to fly from there')
     """
     if not mission.items or not 0 <= first <= mission.items[-1].seq:
         return "the mission has no such item"

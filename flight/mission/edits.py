@@ -49,7 +49,9 @@ def checked_place(mission: Mission, index: int) -> MissionItem:
         raise MissionError.at(mission.source, "item", index, f"expected 0..{len(mission.items) - 1}")
     item = mission.items[index]
     if not is_place(item):
-        raise MissionError.at(mission.source, f"item {item.seq}", item.command, "is not a place on the map")
+        raise MissionError.at(
+            mission.source, f"item {item.seq}", item.command, "expected a command with a place on the map"
+        )
     return item
 
 

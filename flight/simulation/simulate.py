@@ -20,7 +20,7 @@ from flight.guidance.path import FlyByPath
 from flight.mission.ground_ways import GroundWays
 from flight.simulation.airborne import Airborne
 from flight.simulation.local_map import LocalMap
-from flight.simulation.setup import FlightSetup
+from flight.simulation.setup import EngineChoice, FlightSetup
 from flight.simulation.start import Start, find_release, gear_of, release
 from flight.simulation.tick import READ_FIELDS, Workspace
 from flight.simulation.track import Rows, Track, as_track, join_rows
@@ -235,16 +235,19 @@ class Flight(Airborne):
         variation: Variation | None = None,
         local_map: LocalMap | None = None,
         start_offset: tuple[float, float, float] = (0.0, 0.0, 0.0),
+        engine: EngineChoice | None = None,
     ) -> None:
         """Start the flight from a trimmed state.
 
         variation: an aircraft that differs from its model, which guidance does not know.
         local_map: local map of the setup, if another flight of it has fitted one already.
         start_offset: east, north and up from the route's first waypoint to the start of the flight, m.
+        engine: flight model that flies; None for the setup's.
 
         Raises FlightError if the aircraft cannot be loaded, and StartError if the flight cannot start.
         """
         gains = load_gains(aircraft)
+        self._chosen_engine = engine or setup.engine
         self._ways, gear = setup.ground_ways, None
         if self._ways:
             gear = gear_of(self._ways)
@@ -322,7 +325,7 @@ class Flight(Airborne):
 
     def _choose_engine(self, law: Autopilot) -> tuple[CompiledModel | None, str]:
         """Return the compiled model if it may fly, or None for JSBSim; and the name of the engine with the reason."""
-        if self.setup.engine == "jsbsim":
+        if self._chosen_engine == "jsbsim":
             return None, "JSBSim, as chosen"
         if law.loop is None:
             return None, f"JSBSim, since {law.title} has no compiled loop"

@@ -35,7 +35,7 @@ from planfly.runtime.stages import report_replaced, stage
 from planfly.workflow import pipeline
 from planfly.workflow.airframe import airframe_of
 from planfly.workflow.crash_safe_log import FlightLimits, flight_kind, flight_text
-from planfly.workflow.open_flight import open_flight
+from planfly.workflow.open_flight import open_flight, with_engine
 from planfly.workflow.output_paths import FLY_LOG, LOG_FIGURES, check_output_file, file_target, prepare_folder
 from planfly.workflow.pipeline import JudgedFlight, PlanThenFly, autopilot_log, fly_and_judge
 from planfly.workflow.suggestion_trials import judge_mission
@@ -206,7 +206,7 @@ def fly(
     check_arguments(seed=options["seed"], log_hz=options["log_hz"], max_hours=limits.hours, max_log=limits.megabytes)
     check_arguments(engine=options["engine"])
     program = named_program(options["sitl"])
-    setup = replace(open_flight(mission, options, program), engine=options["engine"])
+    setup = with_engine(open_flight(mission, options, program), options["engine"])
     target = None if log is None else _prepare_log_file(log, setup, mission, program, overwrite)
     with stage(f"flying {flight_text(setup)}", flight_kind(setup)) as advance:
         flown = fly_and_judge(

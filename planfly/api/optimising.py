@@ -219,7 +219,7 @@ def optimise(
         first_points.shape != (population, lower_bounds.size) or not np.isfinite(first_points).all()
     ):
         raise ValueError(
-            f"initial: shape {first_points.shape}: expected finite numbers of ({population}, {lower_bounds.size})"
+            f"initial: shape {first_points.shape}: expected finite numbers of shape ({population}, {lower_bounds.size})"
         )
     return Optimiser(lower_bounds, upper_bounds, model, population, np.random.default_rng(seed), first_points)
 

@@ -24,7 +24,7 @@ from planfly.runtime.stages import report_replaced, stage
 from planfly.workflow.airframe import Airframe, choose_seed, load_airframe, tightened_airframe
 from planfly.workflow.crash_safe_log import FlightLimits, flight_kind, flight_text
 from planfly.workflow.make_plan import make_plan, planned_for
-from planfly.workflow.open_flight import make_setup, mission_of_plan
+from planfly.workflow.open_flight import make_setup, mission_of_plan, with_engine
 from planfly.workflow.output_paths import (
     RUN_FILES,
     RUN_FOLDER,
@@ -255,7 +255,7 @@ def _fly_round(task: _Task, plan: Plan, number: int) -> Round:
         verdict = judge_plan_only(plan, planned_for(task.scenario, airframe))
         write_whole(folder / "verdict.json", verdict_json(verdict))
         return Round(number, (), verdict, flown=False, folder=folder)
-    setup = replace(make_setup(task.scenario, airframe, mission, task.seed, plan=plan), engine=task.engine)
+    setup = with_engine(make_setup(task.scenario, airframe, mission, task.seed, plan=plan), task.engine)
     with stage(f"flying {flight_text(setup)}", flight_kind(setup)) as advance:
         flown = fly_and_judge(
             setup,

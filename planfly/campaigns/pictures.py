@@ -510,7 +510,7 @@ _LINE_SPACING_RATIO = 1.3
 def narrow_figure(figure: Figure) -> Figure:
     """Lay out a picture of this module `NARROW_WIDTH_IN` inches wide, with wrapped text and the legends below.
 
-    >>> float(narrowed(draw_failures([("slopes", "leg 2", 3)], 9)).get_figwidth())
+    >>> float(narrow_figure(draw_failures([("slopes", "leg 2", 3)], 9)).get_figwidth())
     5.0
     """
     old_width, old_height = figure.get_size_inches().tolist()

@@ -18,7 +18,7 @@ _MAX_LISTED = 8
 def stored_value(value: Any, kind: str) -> Any:
     """Return a value as SQLite reads it from a column; numpy numbers become Python numbers, and NaN becomes None.
 
-    >>> stored(3, "REAL NOT NULL"), stored(math.nan, "REAL"), stored(True, "INTEGER")
+    >>> stored_value(3, "REAL NOT NULL"), stored_value(math.nan, "REAL"), stored_value(True, "INTEGER")
     (3.0, None, 1)
     """
     if value is None or (isinstance(value, float) and math.isnan(value)):

@@ -42,7 +42,7 @@ def refusal_reason(head: bytes, port: int, allowed: Collection[str]) -> str:
     allowed: origins of pages; a program other than a browser states no origin, and is accepted.
 
     >>> page = b"GET / HTTP/1.1\r\nHost: 127.0.0.1:8765\r\nOrigin: https://example.com\r\n\r\n"
-    >>> refusal(page, 8765, VIEWERS), refusal(page, 8765, ["https://example.com"])
+    >>> refusal_reason(page, 8765, VIEWERS), refusal_reason(page, 8765, ["https://example.com"])
     ('a page of https://example.com', '')
     """
     try:

@@ -74,7 +74,7 @@ def report_replaced(*files: Path) -> None:
 def has_receiver() -> bool:
     """Return True if stages are shown.
 
-    >>> is_received()
+    >>> has_receiver()
     False
     """
     return _receiver.get() is not None

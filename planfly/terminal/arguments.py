@@ -177,7 +177,7 @@ def files(*suffixes: str) -> Completer:
 def complete_scenario(prefix: str, **_context: object) -> list[str]:
     """Return the names of embedded scenarios, and the scenario files, that start with `prefix`.
 
-    >>> scenario_words("jack")
+    >>> complete_scenario("jack")
     ['jacksboro', 'jacksboro-air', 'jacksboro-field']
     """
     names = sorted(file.stem for file in (_ROOT / "world" / "scenarios").glob("*.toml"))
@@ -187,7 +187,7 @@ def complete_scenario(prefix: str, **_context: object) -> list[str]:
 def complete_aircraft(prefix: str, **_context: object) -> list[str]:
     """Return the names of embedded aircraft, and the folders, that start with `prefix`.
 
-    >>> aircraft_words("aero")
+    >>> complete_aircraft("aero")
     ['aerosonde']
     """
     names = sorted(file.stem for file in (_ROOT / "aircraft").glob("*/*.toml") if file.stem == file.parent.name)

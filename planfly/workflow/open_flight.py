@@ -12,7 +12,7 @@ from flight.mission.placing import PlacedMission, place_stops
 from flight.mission.preflight_notes import field_notes
 from flight.mission.route import lay_route, with_end_courses
 from flight.mission_files.formats import read_mission
-from flight.simulation.setup import FDM_HZ, FlightSetup
+from flight.simulation.setup import FDM_HZ, EngineChoice, FlightSetup
 from planfly.flight_options import MissionOptions, apply_options, named_scenario
 from planfly.named_fences import read_named_fences
 from planfly.workflow.airframe import Airframe, choose_seed, load_airframe
@@ -24,6 +24,11 @@ from world.scenario import Scenario
 
 # Name of a plan without a file, in messages about its mission.
 PLAN_FILE = "plan.json"
+
+
+def with_engine(setup: FlightSetup, engine: EngineChoice) -> FlightSetup:
+    """Return a setup with a flight model; it is copied only if needed, because a copy computes its path again."""
+    return setup if setup.engine == engine else replace(setup, engine=engine)
 
 
 def open_flight(source: Plan | str | Path, options: MissionOptions, program: Path | None = None) -> FlightSetup:

@@ -188,10 +188,16 @@ VIRTUAL = {
     "another list": (b"<VRTDataset><SourceFilename>b.vrt</SourceFilename></VRTDataset>", "only local .tif"),
     "a file above": (
         b"<VRTDataset><SourceFilename relativeToVRT='1'>../a.tif</SourceFilename></VRTDataset>",
-        "below are",
+        "../a.tif: expected files in the folder of a.vrt or below",
     ),
-    "a file above, later": (b"<VRTDataset><SourceFilename>b/../../a.tif</SourceFilename></VRTDataset>", "below are"),
-    "a file elsewhere": (b"<VRTDataset><SourceFilename>/etc/a.tif</SourceFilename></VRTDataset>", "below are"),
+    "a file above, later": (
+        b"<VRTDataset><SourceFilename>b/../../a.tif</SourceFilename></VRTDataset>",
+        "expected files in the folder of a.vrt or below",
+    ),
+    "a file elsewhere": (
+        b"<VRTDataset><SourceFilename>/etc/a.tif</SourceFilename></VRTDataset>",
+        "expected files in the folder of a.vrt or below",
+    ),
     "a file that is not there": (b"<VRTDataset><SourceFilename>a.tif</SourceFilename></VRTDataset>", "no such file"),
 }
 
@@ -264,11 +270,11 @@ def test_of_listed_tiles_the_first_counts(tmp_path: Path) -> None:
     [
         ("[]", "four.toml: terrain.path: expected a file's name, or a list of 1 to 100"),
         ("5", "terrain.path: 5: expected a file's name, or a list of 1 to 100"),
-        ('["dem/00.tif", 5]', "expected a list of 1 to 100"),
+        ('["dem/00.tif", 5]', "expected a file's name, or a list of 1 to 100 names"),
         ('["dem/00.tif", ""]', "terrain.path"),
         ('["dem/00.tif", "none.tif"]', "none.tif: terrain path: no such file"),
         ('["dem/00.tif", "http://x/y.tif"]', "only local files are read"),
-        (str(["a.tif"] * 101), "expected a list of 1 to 100"),
+        (str(["a.tif"] * 101), "expected a file's name, or a list of 1 to 100 names"),
     ],
 )
 def test_a_list_that_is_none_is_one_line(path: str, said: str, tmp_path: Path) -> None:

@@ -34,7 +34,9 @@ class OpenSetting(NamedTuple):
     by_program: bool = False
 
 
-_FLIGHT, _TAKE_OFF, _LANDING = Phase.FLIGHT, Phase.TAKE_OFF, Phase.LANDING
+_FLIGHT = Phase.FLIGHT
+_TAKE_OFF = Phase.TAKE_OFF
+_LANDING = Phase.LANDING
 OPEN_SETTINGS = {
     # `Plane::stabilize_pitch_get_pitch_out` raises the pitch demand with the throttle.
     "KFF_THR2PTCH": OpenSetting(_FLIGHT, by_program=True),

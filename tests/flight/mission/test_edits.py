@@ -69,7 +69,10 @@ def test_two_places_are_kept() -> None:
         edits.deleted(mission(item(1), item(2)), 0)
 
 
-@pytest.mark.parametrize(("index", "words"), [(3, "no place"), (9, "expected 0..5"), (-1, "expected 0..5")])
+@pytest.mark.parametrize(
+    ("index", "words"),
+    [(3, "item 4: 177: expected a command with a place on the map"), (9, "expected 0..5"), (-1, "expected 0..5")],
+)
 def test_what_is_no_place_is_not_moved(index: int, words: str) -> None:
     with pytest.raises(MissionError, match=words):
         edits.moved(JUMPING, index, 46.0, 8.0)

@@ -140,7 +140,7 @@ def test_circles_too_wide_or_too_long_are_refused() -> None:
     assert "turns to loiter" in refusal(wp(0, 0), wp(0, 2000, command=18, p="1e9 0 100 0"))
     assert "turns to loiter" in refusal(wp(0, 0), wp(0, 2000, command=19, p="3e38 0 100 0"))
     many = [wp(0, 2000, command=18, p="900 0 100 0"), wp(0, 4000), wp(0, 2000, command=18, p="900 0 100 0")]
-    assert "more than 10,000 places" in refusal(wp(0, 0), *many)
+    assert "more than 10,000 waypoints" in refusal(wp(0, 0), *many)
     assert MAP_EXTENT > 30_000.0
 
 

@@ -53,10 +53,10 @@ def test_a_ring_without_a_return_point_is_taken_whole() -> None:
         (text_of([RETURN, *CORNERS]), "a.fence: 5 points: expected a return point and a closed ring"),
         (text_of([RETURN, *CORNERS[:2], CORNERS[0]]), "a.fence: 4 points"),
         (text_of([*CORNERS[:2], CORNERS[0]]), "a.fence: 3 points"),
-        ("36.5 -84.2\n36.5\n", "a.fence:2: '36.5': a latitude and a longitude"),
+        ("36.5 -84.2\n36.5\n", "a.fence:2: '36.5': expected a latitude and a longitude"),
         ("36.5 -84.2\n36.5 west\n", "a.fence:2: '36.5 west'"),
         ("36.5 -84.2\n96.5 -84.2\n", "a.fence:2: latitude"),
-        ("36.5 -84.2\nnan -84.2\n", "a.fence:2: 'nan -84.2': a latitude"),
+        ("36.5 -84.2\nnan -84.2\n", "a.fence:2: 'nan -84.2': expected a latitude"),
         (text_of([RETURN, *CORNERS * 64, CORNERS[0]]), "a.fence: 258 points: at most 255"),
     ],
 )

@@ -95,10 +95,10 @@ def test_numbers_stand_under_the_unit_that_they_have() -> None:
     ("change", "message"),
     [
         ({"airspeed_mps": [25.0] * 4}, r"route\.airspeed_mps: 4 values: expected 3"),
-        ({"acceptance_m": [0.0] * 3}, r"route\.acceptance_m: 3 values: 4"),
-        ({"fly_over": [False]}, r"route\.fly_over: 1 values: 4"),
-        ({"items": []}, r"route\.items: 0 values: 4"),
-        ({"arcs_m": [0.0]}, r"route\.arcs_m: 1 values: 4"),
+        ({"acceptance_m": [0.0] * 3}, r"route\.acceptance_m: 3 values: expected 4"),
+        ({"fly_over": [False]}, r"route\.fly_over: 1 values: expected 4"),
+        ({"items": []}, r"route\.items: 0 values: expected 4"),
+        ({"arcs_m": [0.0]}, r"route\.arcs_m: 1 values: expected 4"),
         ({"return_from_waypoint": 1}, r"route\.return_from_waypoint: 1: a waypoint before the last, with its target"),
         ({"return_from_waypoint": 3} | RETURN, r"route\.return_from_waypoint: 3: a waypoint before"),
         (RETURN, r"route\.return_from_waypoint: -1: a waypoint before"),
@@ -115,7 +115,7 @@ def test_a_route_whose_arrays_do_not_fit_is_refused(change: dict[str, Any], mess
         ({"amsl_m": [1500.0, 0.0]}, r"envelope\.amsl_m: not increasing"),
         ({"airspeed_mps": [18.0, 18.0, 20.0]}, r"envelope\.airspeed_mps: not increasing"),
         ({"climb_rad": [[0.1, 0.1]] * 2}, r"envelope\.climb_rad: shape \[2, 2\]: expected \[3, 2\]"),
-        ({"level_speed_min_mps": [16.0]}, r"envelope\.level_speed_min_mps: shape \[1\]: \[2\]"),
+        ({"level_speed_min_mps": [16.0]}, r"envelope\.level_speed_min_mps: shape \[1\]: expected \[2\]"),
         ({"power_idle_w": []}, r"envelope\.power_idle_w: shape"),
     ],
 )

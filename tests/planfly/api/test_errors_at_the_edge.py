@@ -61,11 +61,11 @@ CASES: dict[str, tuple[Callable[[], object], _Known]] = {
     "a scenario's terrain": (_no_terrain, _Known("a.toml", "terrain.path", "none.tif", "")),
     "an elevation file's edges": (
         lambda: _terrain(np.zeros((9, 9)), xmax=1000.0),
-        _Known("a.npz", "west, east, south, north edge", [8.0, 1000.0, 46.0, 46.5], "degrees of longitude"),
+        _Known("a.npz", "west, east, south, north edge", [8.0, 1000.0, 46.0, 46.5], "expected degrees of longitude"),
     ),
     "an elevation file's heights": (
         lambda: _terrain(np.zeros(9)),
-        _Known("a.npz", "elevation", (9,), "a 2-D array of numbers"),
+        _Known("a.npz", "elevation", (9,), "expected a 2-D array of numbers"),
     ),
     "a .waypoints": (
         lambda: planfly.check(_file("a.waypoints", _MISSION.replace("46.01", "91.5"))),
@@ -83,10 +83,10 @@ CASES: dict[str, tuple[Callable[[], object], _Known]] = {
     ),
     "a parameter file": (
         lambda: planfly.plan("tight", params=_file("a.parm", "WP_RADIUS\t90\nwp radius\t9\n")),
-        _Known("a.parm", "", "wp radius\t9", "a name and a value"),
+        _Known("a.parm", "", "wp radius\t9", "expected a name and a value"),
     ),
     "a log": (lambda: planfly.read_log(_file("a.mcap", "no log")), _Known("a.mcap", "", None, "")),
-    "an aircraft's name": (lambda: planfly.aircraft("boeing"), _Known("boeing", "", None, "known are aerosonde")),
+    "an aircraft's name": (lambda: planfly.aircraft("boeing"), _Known("boeing", "", None, "known names: aerosonde")),
     "an aircraft's folder": (lambda: planfly.aircraft(_own_aircraft()), _Known("mine.toml", "mass_kg", -1, "")),
     "a folder that a flight names": (
         lambda: planfly.plan("tight", aircraft=_own_aircraft()),
@@ -118,7 +118,7 @@ CASES: dict[str, tuple[Callable[[], object], _Known]] = {
     ),
     "a scheduler": (
         lambda: planfly.campaign(_file("a.waypoints", _MISSION), scheduler="udp://host"),
-        _Known("", "scheduler", "udp://host", "tcp://HOST:PORT"),
+        _Known("", "scheduler", "udp://host", "expected tcp://HOST:PORT"),
     ),
 }
 

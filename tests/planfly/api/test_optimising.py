@@ -177,7 +177,7 @@ def test_a_box_that_is_none_is_refused(arguments: tuple[list[float], list[float]
         ({"population": 2}, "even number from 4"),
         ({"population": 5}, "even number from 4"),
         ({"model": "ga"}, "allowed umda, emna, multistart, differential"),
-        ({"initial": [[0.5]]}, r"expected \(100, 1\)"),
+        ({"initial": [[0.5]]}, r"shape \(1, 1\): expected finite numbers of shape \(100, 1\)"),
         ({"initial": [[np.nan]] * 100}, "finite"),
     ],
 )

@@ -16,7 +16,8 @@ from tests.logs.blank_pictures import draw_nothing
 from tests.soak import SOAK
 from world.scenario import with_flight
 
-FLOWN = ["map", "profile", "scene", "turns", "envelope", "time", "exposure", "controls", "energy"]
+PLANNED = ["map", "profile", "scene", "turns", "envelope"]
+FLOWN = ["map", "profile", "scene", "turns", "time", "exposure", "controls", "energy", "envelope"]
 
 
 def test_figures_are_matplotlibs_by_name(
@@ -31,7 +32,7 @@ def test_figures_are_matplotlibs_by_name(
     assert (tmp_path / "map.pdf").read_bytes().startswith(b"%PDF")
     if not SOAK:
         monkeypatch.setattr("logs.views.figures.draw", lambda *_: Figure())
-    assert list(planfly.figures(path)) == FLOWN[:5]
+    assert list(planfly.figures(path)) == PLANNED
 
 
 def test_a_report_of_a_log_is_the_commands(
@@ -121,5 +122,5 @@ def test_bad_exports_write_nothing(path: planfly.Plan, tmp_path: Path) -> None:
 
 def test_a_flight_without_a_log_has_none_to_export(flown: planfly.FlownMission, tmp_path: Path) -> None:
     bare = planfly.FlownMission(flown.setup, flown.track, flown.verdict, flown.ended)
-    with pytest.raises(planfly.PlanflyError, match="without a log"):
+    with pytest.raises(planfly.PlanflyError, match="the flight has no log"):
         planfly.export(bare, tmp_path / "a.kml")

@@ -50,7 +50,7 @@ def test_an_aircraft_that_cannot_fly_is_refused(base: CampaignBase, mass: float,
     if good:
         check_level_flight_at_medians(made)
         return
-    with pytest.raises(SpreadError, match=r"mine.toml: mass 1.9, drag 2.85: .* no level flight at 25 m/s"):
+    with pytest.raises(SpreadError, match=r"mine.toml: mass 1.9, drag 2.85: .* cannot hold level flight at 25 m/s"):
         check_level_flight_at_medians(made)
 
 
@@ -194,8 +194,8 @@ def test_a_file_without_draws_flies_the_folders_or_leaves_slopes_open(sheet: Pat
     ("text", "told"),
     [
         ('[aircraft]\ndraws = "none.csv"', "none.csv: cannot be read"),
-        ("[aircraft]\ndraws = 3", "aircraft.draws: expected a file of draws"),
-        ("[aircraft]\n", "aircraft.draws: expected a file of draws"),
+        ("[aircraft]\ndraws = 3", "aircraft.draws: expected only a file of draws"),
+        ("[aircraft]\n", "aircraft.draws: expected only a file of draws"),
         (
             '[aircraft]\ndraws = "foam/draws.csv"\n[drag]\ndistribution = "norm"\nloc = 1\nscale = 0.1\nsource = "x"',
             "drag: cannot be combined with [aircraft] draws",

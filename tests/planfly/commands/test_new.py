@@ -121,7 +121,7 @@ def test_where_there_is_no_way_it_says_why_and_leaves_the_file(here: Path, capsy
         (["--from", "46", "--to", "46,8"], "argument --from: '46': expected LAT,LON"),
         (["--from", "46,8", "--to", "46,8"], "--to 46,8, 0 km away: expected 100 m to 300 km from --from"),
         (["--from", "46,8"], "the following arguments are required: --to"),
-        (["--from", "46,8", "--to", "46,8.1", "--height", "0"], "argument --height: '0': m above ground"),
+        (["--from", "46,8", "--to", "46,8.1", "--height", "0"], "argument --height: '0': expected m above ground"),
         (["--from", "46,8", "--to", "46,8.1", "--aircraft", "x9"], "x9"),
         (
             ["--from", "36.3,-84.2", "--to", "36.9,-84.2", "--terrain", "jacksboro"],
@@ -159,7 +159,7 @@ def test_ground_without_data_beside_the_way_makes_the_area_smaller(here: Path) -
 
 def test_names_and_places_that_are_none_are_told_in_python_too(here: Path) -> None:
     for given in (None, ("a", "b"), (46.0,), "46,8", (float("nan"), 8.0)):
-        with pytest.raises(planfly.PlanflyError, match=r"^start .*: latitude -89\.\.89 and longitude"):
+        with pytest.raises(planfly.PlanflyError, match=r"^start .*: expected latitude -89\.\.89 and longitude"):
             planfly.new_scenario("site", given, (46.0, 8.1))  # type: ignore[arg-type]
     for name in ("a\x7fb", "a\nb", "x" * 101, "caf\udce9"):
         with pytest.raises(planfly.PlanflyError, match="a folder with a name of 1 to 100 printable characters"):

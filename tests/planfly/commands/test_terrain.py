@@ -148,7 +148,7 @@ def test_nobody_there_is_one_line(here: Path, capsys: pytest.CaptureFixture[str]
         ({"status": 403}, "cannot be fetched: the server answers 403 Forbidden"),
         ({"length": 0}, "Content-Length: 0: expected 1 to 536,870,912 bytes"),
         ({"length": 10**9}, "Content-Length: 1,000,000,000: expected 1 to 536,870,912 bytes"),
-        ({"length": 10**20}, "Content-Length: 100,000,000,000,000,000,000: 1 to"),
+        ({"length": 10**20}, "Content-Length: 100,000,000,000,000,000,000: expected 1 to"),
         ({"garbage": True}, "the server's answer is not a readable GeoTIFF"),
         ({"moved": ("N46", "N47")}, "another place: expected the degree from 46 N 8 E on"),
         ({"odd": True}, "cannot be fetched: the server answers with 'bytes 1-"),
@@ -386,7 +386,7 @@ def test_around_a_mission_is_home_and_all_its_places(here: Path) -> None:
         (["--box", "46,8,47,9", "--out", "dem.png"], "dem.png: expected a name that ends with .tif"),
         (
             ["--box", "46,8,47,9", "--source", "ftp://x/y"],
-            "--source 'ftp://x/y': a folder, or the address of one by http",
+            "--source 'ftp://x/y': expected a folder, or the address of one by http",
         ),
         (["--box", "46,8,47,9", "--source", "http://127.0.0.1:9/\u00e4"], "or the address of one by http or https"),
         (["--box", "46,8,47,9", "--source", "http://[::1/"], "or the address of one by http or https"),

@@ -143,7 +143,7 @@ def test_what_a_form_does_not_hold_is_said() -> None:
     session = drawn_session(7, 14)
     session.edit(messages.Raise(kind="raise", rev=session.rev, by=10.0))
     assert any("threats" in line for line in session.save("waypoints").losses)
-    assert "a map only" in session.save("kml").losses[0]
+    assert "only a map" in session.save("kml").losses[0]
     with pytest.raises(MissionError, match="plain waypoints"):
         session.save("plan.json")
 

@@ -306,7 +306,7 @@ def test_what_is_not_there_names_what_is_expected(tmp_path: Path) -> None:
 
 def test_a_mission_that_lies_beside_the_name_is_named(short_mission: Path) -> None:
     (short_mission.parent / "m.waypoints.bak").write_text("", encoding="ascii")
-    with pytest.raises(MissionError, match=r"expected file: did you mean 'm\.waypoints'\?$"):
+    with pytest.raises(MissionError, match=r"\.waypoints or \.plan file: did you mean 'm\.waypoints'\?$"):
         open_flight(short_mission.with_name("n.waypoints"), {})
-    with pytest.raises(MissionError, match=r"expected file$"):
+    with pytest.raises(MissionError, match=r"\.waypoints or \.plan file$"):
         open_flight(short_mission.parent / "nowhere" / "m.waypoints", {})

@@ -83,7 +83,7 @@ def test_paper_scenario_names_the_papers_planner(make_limits: Callable[[Scenario
         assert (scenario.threats.detection_radius > scenario.threats.kill_radius).all()
     plan = plan_path(load_scenario("paper-15"), make_limits(load_scenario("paper-15")), seed=1)
     assert plan.algorithm == "umda"
-    assert not plan.violations.any()
+    assert not any(plan.violations)
 
 
 def test_no_feasible_path_is_a_plan_that_says_so(

@@ -105,9 +105,9 @@ def test_a_route_through_a_cell_costs_what_was_said_and_leads_from_end_to_end(da
 def test_beyond_the_bound_there_is_no_way(data: ProblemArrays) -> None:
     frame = rotated_frame(data.start, data.destination)
     whole = grid_costs(data, frame, GRID, math.inf)
-    bound = 1.2 * whole.left[0, 0, 2]
+    bound = 1.2 * whole.remaining[0, 0, 2]
     bounded = grid_costs(data, frame, GRID, bound)
-    total, kept = whole.reached + whole.left, bounded.reached + bounded.left
+    total, kept = whole.reached + whole.remaining, bounded.reached + bounded.remaining
     assert (kept[total <= bound] == total[total <= bound]).all()
     assert np.isinf(kept[total > bound + 1e-6]).all()
     assert np.isinf(kept).sum() > np.isinf(total).sum()

@@ -100,7 +100,9 @@ def test_what_is_no_geopackage(content: bytes | None, said: str, tmp_path: Path)
 )
 def test_a_geometry_that_is_none_is_named_by_its_row(geometry: bytes | None, tmp_path: Path) -> None:
     rows = [(1, blob(SQUARE), "lake", None, None, None), (2, geometry, "mast", None, None, None)]
-    with pytest.raises(ScenarioError, match=r"^z.gpkg: my zones row 2: geometry: a polygon"):
+    with pytest.raises(
+        ScenarioError, match=r"^z.gpkg: my zones row 2: geometry: expected a polygon, a multipolygon or a point$"
+    ):
         read_zone_file(package(tmp_path / "z.gpkg", rows), "z.gpkg")
 
 

@@ -156,12 +156,15 @@ def test_geometries_and_layers_of_ed_318(tmp_path: Path) -> None:
 FAULTS: dict[str, tuple[Any, str]] = {
     "no volume": (ed269(), "features[0]: geometry: expected a list of volumes"),
     "a number": (ed269(5), "features[0] (lake): horizontalProjection: expected a polygon or a circle"),
-    "no shape": (ed269(volume(None)), "features[0] (lake): horizontalProjection: a polygon or a circle"),
+    "no shape": (ed269(volume(None)), "features[0] (lake): horizontalProjection: expected a polygon or a circle"),
     "a line": (
         ed269(volume({"type": "Line"})),
         "features[0] (lake): horizontalProjection.type: allowed",
     ),
-    "no radius": (ed269(volume({"type": "Circle", "center": [8, 46]})), "features[0] (lake): circle: a centre"),
+    "no radius": (
+        ed269(volume({"type": "Circle", "center": [8, 46]})),
+        "features[0] (lake): circle: expected a centre",
+    ),
     "a unit": (ed269(volume(unit="FL")), "features[0] (lake): unit of its limits: allowed M, FT"),
     "a height": (ed269(volume(high="high")), "features[0] (lake): upper limit: expected a number"),
     "a datum": (
@@ -170,12 +173,24 @@ FAULTS: dict[str, tuple[Any, str]] = {
     ),
     "a corner": (
         ed269(volume({"type": "Polygon", "coordinates": [[[8.0]]]})),
-        "features[0] (lake): coordinates: list",
+        "features[0] (lake): coordinates: expected lists",
     ),
-    "no ring": (ed269(volume({"type": "Polygon", "coordinates": []})), "features[0] (lake): coordinates: at least one"),
-    "a day": (ed269(volume(), applicability=daily(["LUN"])), "features[0] (lake): applicability: dates and times"),
-    "a date": (ed269(volume(), applicability=[{"startDateTime": "May"}]), "features[0] (lake): applicability: dates"),
-    "a text": (ed269(volume(), applicability="always"), "features[0] (lake): applicability: a list of periods"),
+    "no ring": (
+        ed269(volume({"type": "Polygon", "coordinates": []})),
+        "features[0] (lake): coordinates: expected at least one",
+    ),
+    "a day": (
+        ed269(volume(), applicability=daily(["LUN"])),
+        "features[0] (lake): applicability: expected dates and times",
+    ),
+    "a date": (
+        ed269(volume(), applicability=[{"startDateTime": "May"}]),
+        "features[0] (lake): applicability: expected dates",
+    ),
+    "a text": (
+        ed269(volume(), applicability="always"),
+        "features[0] (lake): applicability: expected a list of periods",
+    ),
     "NaN": (ed269(volume({"type": "Polygon", "coordinates": [[[1e999, 46.0], *RING]]})), "not valid JSON"),
     "no geometry": (ed318(None), "features[0] (lake): geometry.type: allowed Polygon, MultiPolygon, Point"),
     "a point": (ed318({"type": "Point", "coordinates": [8, 46]}), "features[0] (lake): geometry.extent: a point is"),

@@ -57,7 +57,10 @@ def test_a_flight_level_bounds_an_exclusion_on_the_safe_side() -> None:
 FAULTS: dict[str, tuple[dict[str, Any], str]] = {
     "a key misspelt": ({"ceiling_m": 100.0}, "ceiling_m: unknown; known are kind, floor_amsl_m"),
     "another misspelt": ({"radius": 100.0}, "radius: unknown"),
-    "a limit that is a number": ({"upperLimit": 100.0}, "upperLimit: a table of value, unit and referenceDatum"),
+    "a limit that is a number": (
+        {"upperLimit": 100.0},
+        "upperLimit: expected a table of value, unit and referenceDatum",
+    ),
     "no value": ({"upperLimit": {"unit": 1, "referenceDatum": 1}}, "upperLimit.value: expected a number"),
     "a truth": ({"upperLimit": limit(True, 1, 1)}, "upperLimit.value: expected a number"),
     "a unit": ({"upperLimit": limit(5, 2, 1)}, "upperLimit.unit: allowed 0, M, 1, FT, 6, FL"),
@@ -136,11 +139,11 @@ GEOJSON_FAULTS: dict[str, tuple[Any, str]] = {
     "no geometry": ('{"type": "Feature", "geometry": null}', "geometry null: expected a Polygon"),
     "a geometry of no kind": ('{"type": ["Polygon"]}', 'geometry ["Polygon"]: expected a Polygon'),
     "a point alone": (json.dumps(feature("Point", [8.0, 46.0])), "feature (lake): radius_m: missing"),
-    "a ring too deep": (json.dumps(feature("Polygon", [[RING]])), "feature (lake): coordinates: lists of"),
-    "a ring too flat": (json.dumps(feature("Polygon", RING)), "coordinates: lists of [longitude, latitude]"),
-    "a corner of one": (json.dumps(feature("Polygon", [[[8.0]]])), "coordinates: lists of"),
-    "a corner of text": (json.dumps(feature("Polygon", [[["8", "46"]]])), "coordinates: lists of"),
-    "no coordinates": ('{"type": "Polygon"}', "coordinates: lists of"),
+    "a ring too deep": (json.dumps(feature("Polygon", [[RING]])), "feature (lake): coordinates: expected lists of"),
+    "a ring too flat": (json.dumps(feature("Polygon", RING)), "coordinates: expected lists of [longitude, latitude]"),
+    "a corner of one": (json.dumps(feature("Polygon", [[[8.0]]])), "coordinates: expected lists of"),
+    "a corner of text": (json.dumps(feature("Polygon", [[["8", "46"]]])), "coordinates: expected lists of"),
+    "no coordinates": ('{"type": "Polygon"}', "coordinates: expected lists of"),
     "a hole outside": (json.dumps(feature("Polygon", [RING, FAR])), "a hole lies outside its outline"),
     "a key misspelt": (json.dumps(feature("Polygon", [RING], ceiling_m=9)), "feature (lake): ceiling_m: unknown"),
     "another CRS": (

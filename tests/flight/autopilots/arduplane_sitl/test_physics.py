@@ -312,7 +312,10 @@ def test_full_pulses_are_the_aircrafts_full_throws(name: str) -> None:
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        (("[rudder]", "[flaps]"), "tables aileron, elevator, flaps, throttle: elevator, aileron, rudder, throttle are"),
+        (
+            ("[rudder]", "[flaps]"),
+            "tables aileron, elevator, flaps, throttle: expected elevator, aileron, rudder, throttle$",
+        ),
         (("output = 5", "output = 0"), "throttle.output = 0: allowed 1..32"),
         (("output = 5", "output = true"), "throttle.output = True: allowed 1..32"),
         (

@@ -319,7 +319,7 @@ def test_it_is_met_by_its_parameters_those_it_does_not_have_left_out(autopilot: 
 
 
 @pytest.mark.parametrize(
-    ("vehicle", "said"), [(2, "is no ArduPlane: .* type 2; 1, a fixed"), (None, "said nothing over MAV")]
+    ("vehicle", "said"), [(2, "is no ArduPlane: .* type 2; expected 1, a fixed"), (None, "said nothing over MAV")]
 )
 def test_who_is_no_plane_or_says_nothing_is_named(
     autopilot: Autopilot, clock: Clock, vehicle: int | None, said: str

@@ -14,7 +14,7 @@ from logs.verdict.measures.acceptance import (
     negligible_kink,
     position_error,
     reach,
-    step,
+    step_height,
 )
 from logs.verdict.measures.route_requirements import RouteRequirements, route_requirements
 from tests.synthetic import bank_radius, make_setup
@@ -97,7 +97,7 @@ def test_the_corners_of_a_circle_are_no_jog() -> None:
 @pytest.mark.parametrize(("rise", "height"), [(9.9, 9.9), (-9.9, 9.9), (10.1, None), (-10.1, None)])
 def test_a_step_is_as_high_as_its_leg(rise: float, height: float | None) -> None:
     requirements = demands_of([[0, 0, 300], [0, 1000, 300], [0, 1010, 300 + rise], [0, 2000, 300 + rise]])
-    assert step(requirements, 1) == (None if height is None else pytest.approx(height))
+    assert step_height(requirements, 1) == (None if height is None else pytest.approx(height))
 
 
 def test_all_that_is_too_steep_in_a_row_is_one_step() -> None:
@@ -105,10 +105,10 @@ def test_all_that_is_too_steep_in_a_row_is_one_step() -> None:
     for _ in range(3):
         points.append([0.0, points[-1][1] + 10.0, points[-1][2] + 3.0])
     requirements = demands_of([*points, [0.0, 3000.0, 309.0]])
-    assert [step(requirements, leg) for leg in (1, 2, 3)] == pytest.approx([9.0, 9.0, 9.0])
+    assert [step_height(requirements, leg) for leg in (1, 2, 3)] == pytest.approx([9.0, 9.0, 9.0])
     points.append([0.0, points[-1][1] + 10.0, points[-1][2] + 3.0])
     requirements = demands_of([*points, [0.0, 3000.0, 312.0]])
-    assert [step(requirements, leg) for leg in (1, 2, 3, 4)] == [None] * 4
+    assert [step_height(requirements, leg) for leg in (1, 2, 3, 4)] == [None] * 4
     assert math.degrees(requirements.slopes[1]) == pytest.approx(math.degrees(math.atan2(3, 10)))
 
 

@@ -220,8 +220,8 @@ def test_ranges_hold_every_place_in_order(tmp_path: Path) -> None:
 def test_an_engine_that_burns_fuel_has_a_note(tmp_path: Path) -> None:
     setup = hill_setup(tmp_path)
     fuelled = replace(setup, limits=replace(setup.limits, envelope=replace(setup.envelope, volts=0.0)))
-    assert any("closed throttle" in note for note in glide_notes(judged(fuelled, 40.0)))
-    assert not any("closed throttle" in note for note in glide_notes(judged(setup, 40.0)))
+    assert any("throttle closed" in note for note in glide_notes(judged(fuelled, 40.0)))
+    assert not any("throttle closed" in note for note in glide_notes(judged(setup, 40.0)))
 
 
 # ----------------------------------------------------------------------

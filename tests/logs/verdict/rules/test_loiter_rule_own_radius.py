@@ -126,7 +126,7 @@ def test_the_areas_edge_beside_it_leaves_geometry_open(north: float, open_: bool
 def test_a_wind_that_leaves_no_way_around_is_no_matter_of_the_radius() -> None:
     item = of(judge_geometry(loiter(TIME, OWN, wind={"speed_mps": 30.0, "from_deg": 270.0})), "loiter")
     assert item.ok is False
-    assert "the wind is too strong to fly this circle" in item.reason
+    assert "at 26 m/s the circle cannot be flown in this wind" in item.reason
 
 
 def test_a_circle_that_a_steep_roll_limit_holds_is_not_flown_wider() -> None:

@@ -129,7 +129,7 @@ def test_wind_that_leaves_no_way() -> None:
     setup = make_setup([[0, 0, 300], [0, 2000, 300], [2000, 2000, 300]], wind={"speed_mps": 30.0, "from_deg": 0.0})
     verdict = judge_geometry(setup)
     assert ("speed", leg(0)) in failing(verdict)
-    assert "no way" in of(verdict, "speed", leg(0)).reason
+    assert "the wind is too strong to hold the course of leg 0 at 25 m/s" in of(verdict, "speed", leg(0)).reason
 
 
 def test_a_commanded_speed_that_is_not_held_fails(setup: FlightSetup) -> None:

@@ -32,4 +32,4 @@ def test_no_two_answers_have_one_name() -> None:
 
 def test_fields_are_described() -> None:
     limit = answer_schema("check")["$defs"]["FindingDocument"]["properties"]["limit_source"]
-    assert limit["description"].startswith("Whose the limit is")
+    assert limit["description"].startswith("Source of the limit: scenario, aircraft")
