@@ -2,9 +2,7 @@
 
 ArduPlane also considers a waypoint reached, and turns to the next leg, once the aircraft has crossed the line across
 the leg at its end, however far to the side.  For ArduPlane's simulated law, crossing within the corridor is accepted.
-A simulated flight must also pass each waypoint near its altitude: an autopilot whose limits keep it from climbing or
-descending as the mission demands does not fly that mission.  An imported flight is judged horizontally, because its
-altitudes may have another datum.
+The rule ignores altitude, because other rules judge the harm that a wrong altitude can do.
 """
 
 import math
@@ -12,11 +10,11 @@ import math
 import numpy as np
 
 from logs.verdict.findings import Fact, Finding, Message, make_finding, message, reason_of
-from logs.verdict.measures.acceptance import Reach, position_error, reach
+from logs.verdict.measures.acceptance import Reach, reach
 from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.track_alignment import AlignedTrack, along_across, approaches
 from logs.verdict.rule import Rule
-from logs.verdict.tolerances import EQUAL_DISTANCE_TOLERANCE_M, ROUNDING_M, WAYPOINT_HEIGHT_ERROR_LIMIT_M
+from logs.verdict.tolerances import EQUAL_DISTANCE_TOLERANCE_M, ROUNDING_M
 from logs.verdict.wording import place_text, place_text_within
 from world.arrays import Floats
 
@@ -79,7 +77,6 @@ def _turn_text(requirements: RouteRequirements, i: int, condition: Reach) -> str
 def _flown_finding(requirements: RouteRequirements, aligned: AlignedTrack | None, i: int, apexes: Floats) -> Finding:
     condition, setup = reach(requirements, i), requirements.setup
     offset, max_distance = float(requirements.fly_by_offset[i]), condition.radius + condition.tolerance
-    max_height_error = WAYPOINT_HEIGHT_ERROR_LIMIT_M + position_error(setup)
     distance, reason = math.nan, "missed: nothing was flown"
     ok: bool | None = False
     facts: tuple[Fact, ...] = ()
@@ -109,11 +106,6 @@ def _flown_finding(requirements: RouteRequirements, aligned: AlignedTrack | None
                 reason = f"not reached: the flight ended on {place_text(last_leg)}"
         elif not ok:
             reason = f"missed: {reason}; {_acceptance_text(condition)}"
-        elif i > 0 and setup.source is None and abs(height_error) > max_height_error:
-            side = "above" if height_error > 0.0 else "below"
-            rest = f", and {max_height_error:.0f} m are allowed"
-            faults = [message(f"passed {abs(height_error):.0f} m {side} its altitude", rest)]
-            ok, reason = False, reason_of(faults)
     return make_finding(
         "waypoint",
         requirements.waypoint(i),
@@ -173,7 +165,6 @@ RULE = Rule(
         "ROUNDING_M",
         "EQUAL_DISTANCE_TOLERANCE_M",
         "WAYPOINT_PASS_MARGIN_M",
-        "WAYPOINT_HEIGHT_ERROR_LIMIT_M",
         "NAVIGATION_SIGMAS",
         "CORNER_CUT_TOLERANCE_M",
         "FINAL_WAYPOINT_TOLERANCE_M",

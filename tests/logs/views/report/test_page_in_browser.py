@@ -287,7 +287,7 @@ def test_narrow_page_fits_a_phone(browser: Browser) -> None:
 def test_paper_has_every_chart_in_its_width_and_a_copy_of_the_view(browser: Browser) -> None:
     """Also the charts that nobody scrolled to; A4 between margins of 14 mm is 182 mm or 688 px wide."""
     prefer(browser, "light", 1200)
-    until(browser, "window.Plotly")
+    until(browser, "document.querySelector('.chart').dataset.drawn")
     browser.call("Emulation.setEmulatedMedia", media="print")
     browser.value("window.dispatchEvent(new Event('beforeprint'))")
     until(browser, "[...document.querySelectorAll('.chart')].every(e => e.querySelector('.main-svg'))")
