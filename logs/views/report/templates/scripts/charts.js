@@ -6,7 +6,7 @@ function startCharts(charts, world) {
   const { theme, clock } = world, holders = [...document.querySelectorAll(".chart")].filter((holder) => charts[holder.dataset.chart]);
   if (!holders.length || !("DecompressionStream" in window)) return; // the pictures stay
   const drawn = new Map();
-  let library = null, loaded = null;
+  let library = null, loaded = null, printing = false;
   for (const holder of holders) {
     holder.closest("figure").classList.add("charted");
     // What follows stays where it is when the chart comes.
@@ -25,9 +25,10 @@ function startCharts(charts, world) {
   }
   async function draw(holder) {
     const width = Math.floor(holder.clientWidth);
-    if (!width || drawn.get(holder) === width) return;
+    if (printing || !width || drawn.get(holder) === width) return;
     drawn.set(holder, width);
-    await place(await load(), holder, width);
+    const plotly = await load();
+    if (!printing) await place(plotly, holder, width);
   }
   async function place(plotly, holder, width) {
     const chart = charts[holder.dataset.chart];
@@ -83,12 +84,14 @@ function startCharts(charts, world) {
   // Printing waits for nothing: the library is there before, and each chart is drawn at once in the width of the paper.
   window.addEventListener("load", () => window.setTimeout(load, 500));
   window.addEventListener("beforeprint", () => {
+    printing = true;
     for (const holder of holders) {
       if (loaded) place(loaded, holder, PRINT_WIDTH);
       else holder.closest("figure").classList.remove("charted");
     }
   });
   window.addEventListener("afterprint", () => {
+    printing = false;
     for (const holder of holders) holder.closest("figure").classList.add("charted");
     for (const holder of holders) drawn.set(holder, 0);
     again(true);
