@@ -25,11 +25,45 @@ CODE = sorted(
 )
 OURS = [file for file in CODE if file.relative_to(ROOT).parts[0] in PACKAGES]
 # Lines of a function.  Its statements are counted by ruff's PLR0915, and its branches by C901.
-LONGEST = 80
-# Functions that became longer when signatures and tables lost their `# fmt: skip`: to be split, and not to grow.
+LONGEST = 60
+# Functions that became longer when signatures and tables lost their `# fmt: skip`, or by clearer names without a
+# statement more: to be split, and not to grow.
 LONGER = {
+    "flight/autopilots/arduplane/go_around_point_mass.py:fly_go_arounds": 76,
+    "flight/autopilots/arduplane/rtl_point_mass.py:fly_returns": 77,
+    "flight/autopilots/arduplane/rtl_point_mass.py:fly_stages": 78,
+    "flight/autopilots/px4/lateral.py:follow_track": 64,
+    "flight/guidance/path.py:fly_by_path": 74,
+    "flight/mission/loiter_circles.py:_corners_around": 68,
+    "flight/mission/route.py:lay_route": 62,
+    "flight/mission/route.py:with_end_courses": 61,
     "flight/simulation/simulate.py:make_loop": 98,
+    "logs/verdict/returns/glide_reach.py:_look_ahead": 78,
+    "logs/verdict/rules/completion_rule.py:imported_completion": 66,
+    "logs/verdict/rules/ground_ways_rule.py:approach_findings": 77,
+    "logs/verdict/rules/ground_ways_rule.py:climbout_findings": 64,
+    "logs/verdict/rules/loiter_rule.py:_loiter_finding": 64,
+    "logs/verdict/rules/speed_rule.py:_speed_finding": 62,
     "logs/views/exports/log_files.py:_topics": 100,
+    "logs/views/profile.py:profile_chart": 65,
+    "planfly/api/drafting.py:new_scenario": 61,
+    "planfly/api/identifying.py:identify_aircraft": 66,
+    "planfly/api/optimising.py:optimise": 66,
+    "planfly/campaigns/pictures.py:draw_go_no_go": 72,
+    "planfly/campaigns/pictures.py:narrow_figure": 62,
+    "planfly/identification/records.py:flight_records": 65,
+    "planner/evaluation/graded_scores.py:score_missiles": 61,
+    "planner/evaluation/terrain_clearance.py:sample_terrain": 70,
+    "planner/evaluation/threat_index.py:kill_density": 73,
+    "planner/evaluation/travel_cost.py:model_leg": 61,
+    "planner/plan.py:parse_plan": 61,
+    "planner/search/plan_path.py:plan_path": 67,
+    "planner/search/replan.py:replan": 73,
+    "planner/seeding/airspace_grids.py:_relax_stage": 63,
+    "planner/seeding/pattern_search.py:_continue_search": 67,
+    "planner/seeding/shortening_model.py:_add_turns": 63,
+    "tests/instrumented_flights.py:px4_topics": 70,
+    "world/scenario.py:from_spec": 64,
 }
 KERNELS = set(DECORATORS)
 INNER = {"inner", "inlined"}
@@ -208,7 +242,7 @@ def test_package_inits_hold_a_docstring_only() -> None:
         assert "import" not in text.split('"""')[2]
 
 
-def test_no_function_is_longer_than_80_lines() -> None:
+def test_no_function_is_longer_than_60_lines() -> None:
     lengths = {
         f"{name_of(file)}:{function.name}": (function.end_lineno or 0) - function.lineno + 1
         for file in CODE

@@ -418,7 +418,8 @@ def unflown_by_px4(values: dict[str, float], *lines: str, version: Px4Version = 
 
 PAYLOAD = (wp(0, 0), wp(0, 900), "2 211 1 0 0 0 0 0 0", wp(900, 900))
 RETURN = (wp(0, 0), wp(0, 900), "2 20 0 0 0 0 0 0 0")
-LOITER, LAND = wp(1500, 0, 100, command=31, p="1 150 0 0"), wp(0, 0, 0, command=21)
+LOITER = wp(1500, 0, 100, command=31, p="1 150 0 0")
+LAND = wp(0, 0, 0, command=21)
 
 
 @pytest.mark.parametrize(
