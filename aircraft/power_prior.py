@@ -1,0 +1,66 @@
+"""Prior of drag and power of a small aircraft from its size alone, calibrated on real aircraft.
+
+Power in level flight is D V / efficiency + avionics. Least drag depends on layout and aspect ratio, the efficiency of
+the drive on mass. All deviations are log-normal. `examples/real/aircraft.csv` lists the powers of the 22 electric
+aircraft that the coefficients are fitted to; `benchmarks/real_power.py` is the fit, and predicts each aircraft from
+the others.
+"""
+
+from dataclasses import dataclass
+
+from aircraft.model_writer import Layout
+
+# Reynolds number on the mean chord of the reference least drag.
+DRAG_REYNOLDS = 3.2e5
+# Power of the Reynolds number in the least drag: turbulent skin friction of a flat plate (Schlichting).
+DRAG_POWER = -0.2
+# Aspect ratio of the reference least drag.
+DRAG_ASPECT = 8.0
+# Efficiency of a large drive: propeller 0.85, motor and speed controller 0.88. The Sky-Sailor's parts have 0.86 and
+# 0.80 (Noth, "Design of Solar Powered Airplanes for Continuous Flight", ETH 2008).
+LARGEST_EFFICIENCY = 0.75
+# Power of the mass in the ratio of losses to output. Losses of bearings, iron, speed controller and of blades at low
+# Reynolds numbers weigh more in a small drive; powers from -0.5 to -0.8 fit the table equally well.
+LOSS_POWER = -2.0 / 3.0
+# Standard deviation of the logarithm of the least drag.
+LEAST_DRAG_LOG_SD = 0.35
+# Standard deviation of the logarithm of drag due to lift; span efficiencies of 0.65 to 0.95 are published.
+INDUCED_DRAG_LOG_SD = 0.15
+# Standard deviation of the logarithm of the drive's efficiency.
+EFFICIENCY_LOG_SD = 0.29
+# Standard deviation of the logarithm of the avionics' power.
+AVIONICS_LOG_SD = 0.4
+
+
+@dataclass(frozen=True, slots=True)
+class PowerPrior:
+    """Medians of drag, efficiency and avionics power, by size.
+
+    tail_drag, wing_drag: least drag coefficient at `DRAG_REYNOLDS` and `DRAG_ASPECT`, with a tail and of a flying wing.
+    aspect_power: power of the aspect ratio in the least drag; fuselage and tail are smaller on a slender wing.
+    loss_mass: mass of an aircraft with half of `LARGEST_EFFICIENCY`, kg.
+    avionics: power of autopilot, radios and servos, W.
+    """
+
+    tail_drag: float
+    wing_drag: float
+    aspect_power: float
+    loss_mass: float
+    avionics: float
+
+    def least_drag(self, layout: Layout, aspect: float, reynolds: float) -> float:
+        """Return the least drag coefficient of a wing of this aspect ratio."""
+        reference = self.wing_drag if layout == "wing" else self.tail_drag
+        return reference * (aspect / DRAG_ASPECT) ** self.aspect_power * (reynolds / DRAG_REYNOLDS) ** DRAG_POWER
+
+    def drive_efficiency(self, mass: float) -> float:
+        """Return the ratio of D V to the drive's battery power, for an aircraft of this mass, kg.
+
+        >>> [round(POWER_PRIOR.drive_efficiency(mass), 2) for mass in (0.5, 2.0, 20.0)]
+        [0.26, 0.43, 0.65]
+        """
+        return LARGEST_EFFICIENCY / (1.0 + (mass / self.loss_mass) ** LOSS_POWER)
+
+
+# The fit of `benchmarks/real_power.py` to all aircraft of the table.
+POWER_PRIOR = PowerPrior(tail_drag=0.0315, wing_drag=0.0171, aspect_power=-0.42, loss_mass=1.32, avionics=3.2)
