@@ -57,6 +57,12 @@ EXTRAS = {
         ),
         Extra("px4-logs", "logs of PX4 need", "reading `.ulg` files", ("pyulog",)),
         Extra(
+            "data-logs",
+            "logs as columns need",
+            "flight logs as CSV, MAT, Parquet and HDF5 files",
+            ("h5py", "pandas", "pyarrow", "scipy"),
+        ),
+        Extra(
             "identification",
             "identifying an aircraft needs",
             "`planfly aircraft --identify LOG`",

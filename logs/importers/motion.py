@@ -46,6 +46,7 @@ class MotionLog:
     program_kind: kind of program that wrote the log.
     controls: (n, 4) pitch up, roll and yaw to the right as fractions of full travel, and throttle (0..1), of a log that
         has them instead of pulses.
+    angles: True for each of the first three controls that is a deflection, rad, instead of a fraction.
     elevons: true if the controls are made by elevons.
     hovering: periods on lifting motors (s) that the log itself names.
     home: latitude and longitude, degrees, and m AMSL: the last home of the vehicle (ORGN), or its first position on the
@@ -68,8 +69,9 @@ class MotionLog:
     modes: tuple[tuple[float, int], ...] = ()
     parameters: Mapping[str, float] = field(default_factory=dict)
     home: tuple[float, float, float] | None = None
-    program_kind: Literal["ardupilot", "px4"] = "ardupilot"
+    program_kind: Literal["ardupilot", "px4", "columns"] = "ardupilot"
     controls: Samples = field(default_factory=lambda: Samples(np.zeros(0), np.zeros((0, 4))))
+    angles: tuple[bool, bool, bool] = (False, False, False)
     elevons: bool = False
     hovering: tuple[tuple[float, float], ...] = ()
 

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from logs.importers.columns.file_names import DATA_SUFFIXES, is_table
 from logs.importers.dataflash_frames import Dataflash, MappedFile, Messages, index_dataflash
 from logs.importers.dataflash_log import logged_home, program_and_vehicle
 from logs.importers.motion import OUTPUTS, MotionLog, Samples, first_on_ground, rising
@@ -40,7 +41,12 @@ def read_motion(path: Path) -> MotionLog:
     """Read a log's motion.  Raises LogError, in one line, for a file that cannot be read or that is no such log."""
     try:
         if not path.is_file():
-            raise LogError(f"{path}: no such file; expected a log (.BIN or .ulg)", file=path)
+            raise LogError(f"{path}: no such file; expected a log (.BIN, .ulg or a table of columns)", file=path)
+        if is_table(path) or path.suffix.lower() in DATA_SUFFIXES:
+            need_extra("data-logs", f"{path}: reading {path.suffix.lower()} needs")
+            from logs.importers.columns.column_motion import read_column_motion
+
+            return read_column_motion(path)
         with path.open("rb") as file:
             head = file.read(7)
             file.seek(0)
@@ -53,7 +59,7 @@ def read_motion(path: Path) -> MotionLog:
 
         return read_px4_motion(path, digest)
     if head[:2] != b"\xa3\x95":
-        allowed = "expected an ArduPilot .BIN or a PX4 .ulg"
+        allowed = "expected an ArduPilot .BIN, a PX4 .ulg or a table of columns"
         raise LogError(
             f"{path}: not a log of inertial sensors and servo outputs: {allowed}", file=path, allowed=allowed
         )

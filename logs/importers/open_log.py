@@ -6,6 +6,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
+from logs.importers.columns.file_names import DATA_SUFFIXES, TABLE_SUFFIX, is_table
 from world.address_space import AddressSpaceError
 from world.errors import LogError
 from world.extras import need_extra
@@ -42,6 +43,13 @@ FORMATS = (
     LogFormat("MAVLink .tlog", (".tlog",), rb"\x00[\x03-\x0f].{6}[\xfd\xfe]", "telemetry_log.read_telemetry", "live"),
     LogFormat(".gpx", (".gpx",), rb"<gpx", "track_files.read_gpx"),
     LogFormat(".igc", (".igc",), rb"(\A|[\r\n])HFDTE", "track_files.read_igc"),
+    LogFormat(
+        "columns as .csv, .mat, .parquet or .h5",
+        (TABLE_SUFFIX, *DATA_SUFFIXES),
+        rb"\APAR1|\A\x89HDF|\AMATLAB [57]\.",
+        "columns.column_raw.read_columns",
+        "data-logs",
+    ),
     LogFormat(".kml or .kmz", (".kml", ".kmz"), rb"<kml|\APK\x03\x04", "track_files.read_kml"),
 )
 SUFFIXES = tuple(suffix for known in FORMATS for suffix in known.suffixes)
@@ -60,7 +68,12 @@ def is_imported_log(path: Path) -> bool:
     >>> is_imported_log(Path("00000042.BIN")), is_imported_log(Path("flight.mcap"))
     (True, False)
     """
-    return path.suffix.lower() in (*SUFFIXES, _TEXT_SUFFIX)
+    return _suffix(path) in (*SUFFIXES, _TEXT_SUFFIX)
+
+
+def _suffix(path: Path) -> str:
+    """Return the suffix of a file in lower case; that of a table of columns has two parts."""
+    return TABLE_SUFFIX if is_table(path) else path.suffix.lower()
 
 
 def open_log(path: Path) -> "RawLog":
@@ -84,8 +97,8 @@ def open_log(path: Path) -> "RawLog":
             raise LogError(f"{path}: empty; expected a log", file=path)
         log_type = log_format(path, head)
         if log_type.extra:
-            need_extra(log_type.extra, f"{path}: reading {log_type.suffixes[0]} needs")
-        module, function = log_type.reader.split(".")
+            need_extra(log_type.extra, f"{path}: reading {_suffix(path)} needs")
+        module, function = log_type.reader.rsplit(".", 1)
         read: Reader = getattr(import_module(f"logs.importers.{module}"), function)
         # Invalid numbers of a damaged log are left out later, and reported.
         with np.errstate(all="ignore"):
@@ -109,7 +122,7 @@ def log_format(path: Path, head: bytes) -> LogFormat:
     if re.search(_AS_TEXT, head, re.IGNORECASE):
         raise LogError(f"{path}: a dataflash log as text; planfly reads the .BIN from which it was made", file=path)
     by_content = [log_type for log_type in FORMATS if re.search(log_type.content, head, re.DOTALL | re.IGNORECASE)]
-    by_suffix = [log_type for log_type in FORMATS if path.suffix.lower() in log_type.suffixes]
+    by_suffix = [log_type for log_type in FORMATS if _suffix(path) in log_type.suffixes]
     if not by_content and not by_suffix:
         names = ", ".join(log_type.name for log_type in FORMATS)
         message = f"not a known log format (it starts with {head[:8]!r}); expected {names}"

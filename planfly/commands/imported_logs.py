@@ -36,7 +36,7 @@ def import_log_options(line: LineParser) -> None:
             "log",
             metavar=LOGS,
             help="a log of ArduPilot, of a ground station (.tlog; extra planfly[live]), of PX4 (.ulg; extra"
-            " planfly[px4-logs]), or a track",
+            " planfly[px4-logs]), a track, or a table of columns (extra planfly[data-logs])",
         ),
         files(*IMPORTED_LOGS),
     )

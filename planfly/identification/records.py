@@ -25,8 +25,8 @@ MIN_STRETCH = 30.0
 _MAX_SENSOR_GAP_S = 0.5
 # Maximum pause between rows of airspeed or wind, which are logged more slowly, s.
 _MAX_AIR_GAP_S = 1.0
-# Maximum pause between rows of PX4's wind, which is logged about once a second, s.
-_MAX_PX4_WIND_GAP_S = 2.5
+# Maximum pause between rows of the wind of PX4, which is logged about once a second, and of columns, s.
+_MAX_SLOW_WIND_GAP_S = 2.5
 # Time after take-off or release that is cut, s.
 _SETTLING_TIME_S = 15.0
 # Fraction of AIRSPEED_MIN above which the aircraft is flying.
@@ -83,7 +83,7 @@ def flight_records(
         else np.zeros((len(grid), log.outputs.values.shape[1]))
     )
     if len(log.controls.time):
-        controls = _fractions_to_controls(_hold_samples(log.controls, grid), aircraft)
+        controls = _fractions_to_controls(_hold_samples(log.controls, grid), aircraft, log.angles)
     else:
         controls = _pulses_to_controls(servos or log_outputs(log, aircraft), pulses)
     # A surface that is commanded beyond its stop stays at the stop.
@@ -145,14 +145,16 @@ def _pulses_to_controls(outputs: Mapping[str, ServoOutput], pulses: Floats) -> F
     return np.column_stack([controls.get(name, zeros) for name in ("elevator", "aileron", "rudder", "throttle")])
 
 
-def _fractions_to_controls(fractions: Floats, aircraft: Aircraft) -> Floats:
-    """Convert fractions of full travel to controls, rad and throttle, (n, 4).
+def _fractions_to_controls(fractions: Floats, aircraft: Aircraft, angles: tuple[bool, bool, bool]) -> Floats:
+    """Convert fractions of full travel, or angles, to controls, rad and throttle, (n, 4).
 
     Full travel is the maximum deflection of the base aircraft.
+    angles: True for each surface whose values are angles, rad.
     """
-    # Positive fractions are nose up and yaw to the right; the model's elevator and rudder have the opposite sign.
-    max_controls = np.array([-aircraft.max_elevator, aircraft.max_aileron, -aircraft.max_rudder, 1.0])
-    return np.asarray(fractions * max_controls)
+    # Positive is nose up and yaw to the right; the model's elevator and rudder have the opposite sign.
+    signs = np.array([-1.0, 1.0, -1.0])
+    travel = np.where(angles, 1.0, [aircraft.max_elevator, aircraft.max_aileron, aircraft.max_rudder])
+    return np.asarray(fractions * np.append(signs * travel, 1.0))
 
 
 # Message and quantity of each series, by autopilot.
@@ -175,6 +177,15 @@ _SERIES = {
         "height": "vehicle_global_position, the height",
         "airspeed": "airspeed_validated of a sensor in use, the airspeed",
         "wind": "wind, the wind",
+    },
+    "columns": {
+        "inertial": "acceleration_forward, _right, _down with roll_rate, pitch_rate, yaw_rate, the inertial sensors",
+        "outputs": "elevator, aileron and throttle, the commands",
+        "attitude": "roll, pitch and yaw, the attitude",
+        "velocity": "velocity_north and velocity_east, the velocity",
+        "height": "altitude, the height",
+        "airspeed": "airspeed",
+        "wind": "wind_north and wind_east, and too short a flight to estimate the wind",
     },
 }
 
@@ -208,11 +219,15 @@ def slowest_rows(log: MotionLog) -> float:
 
 def recording_setting(log: MotionLog) -> str:
     """Return the parameter, with its value, that records sensors and outputs at a high rate."""
+    if log.program_kind == "columns":
+        return "a logger with 50 rows a second"
     return f"SDLOG_PROFILE {_HIGH_RATE_PROFILE}" if log.program_kind == "px4" else f"LOG_BITMASK {_HIGH_RATE_BITMASK}"
 
 
 def _recording_hint(log: MotionLog) -> str:
-    """Describe the setting that records the missing series."""
+    """Describe the setting that records the missing series, or the entries of a table of columns."""
+    if log.program_kind == "columns":
+        return "expected in [columns] of its table"
     if log.program_kind == "px4":
         return f"{recording_setting(log)}, the default set at a high rate, records them (PX4 1.14 or later)"
     mask = log.parameters.get("LOG_BITMASK")
@@ -341,7 +356,7 @@ def _usable_rows(log: MotionLog, grid: Floats, equivalent_airspeed: Floats, puls
     min_airspeed = log.parameters.get("AIRSPEED_MIN", log.parameters.get("ARSPD_FBW_MIN", 9.0))
     is_flying = (equivalent_airspeed > _MIN_AIRSPEED_FRACTION * min_airspeed) & ~_vtol_rows(log, grid, pulses)
     sensors = [(samples, _MAX_SENSOR_GAP_S) for samples in (log.inertial, log.moved, log.attitude, log.velocity)]
-    wind_gap = _MAX_PX4_WIND_GAP_S if log.program_kind == "px4" else _MAX_AIR_GAP_S
+    wind_gap = _MAX_AIR_GAP_S if log.program_kind == "ardupilot" else _MAX_SLOW_WIND_GAP_S
     for samples, max_gap in (*sensors, (log.airspeed, _MAX_AIR_GAP_S), (log.wind, wind_gap)):
         steps = np.diff(samples.time)
         for k in np.flatnonzero(steps > max_gap):

@@ -194,6 +194,7 @@ MISSED = {
     "films": "replay out/flight.mcap --movie a.mp4",
     "tables": "export out/flight.mcap a.parquet",
     "px4-logs": "check a.ulg",
+    "data-logs": "check a.csv",
     "identification": "aircraft --identify a.BIN --mass 13 --span 2.9 --out mine",
 }
 
@@ -233,6 +234,7 @@ def test_the_base_installs_flies_and_misses_each_extra_on(version: str, wheel: P
     assert there["flyable"]
     assert {file.name for file in folder.iterdir()} == {"out"}
     (folder / "a.ulg").write_bytes(b"ULog\x01\x12\x35\x01" + bytes(8))
+    (folder / "a.csv").write_text("t,roll\n0,1\n")
     before = sorted(folder.rglob("*"))
     # A cluster's extra is missed where that of campaigns is there.
     assert set(MISSED) == set(EXTRAS) - {"cluster"}

@@ -64,6 +64,8 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     gpx(made / "flight.gpx")
     telemetry(made / "flight.tlog")
     (made / "flight.ulg").write_bytes(b"ULog\x01\x12\x35\x01" + bytes(8))
+    (made / "flight.csv").write_text("t,roll\n0,1\n")
+    (made / "flight.columns.toml").write_text("")
     (made / "arduplane").write_text("#!/bin/sh\n")
     (made / "arduplane").chmod(0o755)
     write_geotiff(made / "dem.tif", compress="lzw", predictor=3)
@@ -113,6 +115,8 @@ MISSED = {
     ),
     "export flight.mcap b.csv b.parquet": ("tables", ".parquet needs"),
     "check flight.ulg": ("px4-logs", "flight.ulg: reading .ulg needs"),
+    "check flight.csv": ("data-logs", "flight.csv: reading .csv needs"),
+    "import flight.columns.toml b.mcap": ("data-logs", "flight.columns.toml: reading .columns.toml needs"),
     "import flight.ulg b.mcap": ("px4-logs", "flight.ulg: reading .ulg needs"),
     "aircraft --identify flight.BIN --mass 13 --span 2.9 --out ./mine": (
         "identification",

@@ -25,7 +25,10 @@ def test_what_was_written_is_read(tmp_path: Path) -> None:
 def test_other_files_are_refused_in_one_line(tmp_path: Path) -> None:
     file = tmp_path / "a.gpx"
     file.write_text("<gpx/>", encoding="utf-8")
-    for path, said in ((file, "expected an ArduPilot .BIN or a PX4 .ulg"), (tmp_path / "no.BIN", "no such file")):
+    for path, said in (
+        (file, "expected an ArduPilot .BIN, a PX4 .ulg or"),
+        (tmp_path / "no.BIN", "no such file"),
+    ):
         with pytest.raises(LogError, match=said) as refused:
             read_motion(path)
         assert "\n" not in str(refused.value)

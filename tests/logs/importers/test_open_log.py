@@ -58,7 +58,7 @@ def test_a_log_whose_first_page_is_lost_is_read(tmp_path: Path) -> None:
 
 def test_every_reader_is_there() -> None:
     for known in FORMATS:
-        module, function = known.reader.split(".")
+        module, function = known.reader.rsplit(".", 1)
         assert callable(getattr(import_module(f"logs.importers.{module}"), function))
 
 

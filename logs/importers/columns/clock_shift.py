@@ -1,0 +1,58 @@
+"""Find the offset between two clocks from a pair of signals that move together."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from world.arrays import Floats
+
+# Interval of the samples that are correlated, s.
+_GRID_STEP_S = 0.2
+# Interval of the coarse search, s.
+_COARSE_STEP_S = 0.4
+# Interval of the fine search, s.
+_FINE_STEP_S = 0.02
+# Minimum duration of the common time of both signals, s.
+_MIN_OVERLAP_S = 20.0
+# Minimum fraction of the shorter signal that the common time must cover.
+_MIN_OVERLAP_FRACTION = 0.5
+
+
+class ClockShift(NamedTuple):
+    """Seconds to add to the clock of the first signal, and the correlation of both signals after it."""
+
+    shift: float
+    correlation: float
+
+
+def find_clock_shift(
+    time: Floats, values: Floats, other_time: Floats, other_values: Floats, within: float
+) -> ClockShift:
+    """Return the shift of the first signal, at most ``within`` seconds, that correlates it best with the other signal.
+
+    The signals are linearly interpolated.  The correlation is 0 if the signals have too little time in common or do
+    not move.
+
+    >>> time = np.arange(0.0, 100.0, 0.1)
+    >>> found = find_clock_shift(time, np.sin(time) + 0.1 * time, time + 3.0, np.sin(time) + 0.1 * time, 10.0)
+    >>> round(found.shift, 2), round(found.correlation, 3)
+    (3.0, 1.0)
+    """
+    min_overlap = max(_MIN_OVERLAP_S, _MIN_OVERLAP_FRACTION * min(float(np.ptp(time)), float(np.ptp(other_time))))
+    grid = np.arange(other_time[0], other_time[-1], _GRID_STEP_S)
+    other = np.interp(grid, other_time, other_values)
+    best = ClockShift(0.0, 0.0)
+    for step, reach in ((_COARSE_STEP_S, within), (_FINE_STEP_S, _COARSE_STEP_S)):
+        for shift in (best.shift + np.arange(-reach, reach + 0.5 * step, step)).tolist():
+            begin, end = np.searchsorted(grid, (time[0] + shift, time[-1] + shift)).tolist()
+            if (end - begin) * _GRID_STEP_S >= min_overlap:
+                own = np.interp(grid[begin:end] - shift, time, values)
+                correlation = _correlation(own, other[begin:end])
+                best = max(best, ClockShift(shift, correlation), key=lambda found: found.correlation)
+    return best
+
+
+def _correlation(values: Floats, other_values: Floats) -> float:
+    values, other_values = values - values.mean(), other_values - other_values.mean()
+    size = float(np.sqrt((values @ values) * (other_values @ other_values)))
+    return float(values @ other_values) / size if size > 0.0 else 0.0

@@ -1,0 +1,353 @@
+"""Read the series of a flight log by its table of columns, in SI units and radians on one clock."""
+
+import hashlib
+import math
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from logs.importers.columns.clock_shift import find_clock_shift
+from logs.importers.columns.column_table import (
+    MAIN_CLOCK,
+    ClockTable,
+    ColumnTable,
+    LogTable,
+    read_table,
+)
+from logs.importers.columns.data_files import Column, DataFile, read_data_file
+from logs.importers.columns.file_names import find_table, is_table
+from logs.importers.columns.quantities import QUANTITIES, UNIT_ZEROS, UNITS, better_unit, to_frame
+from world.arrays import Flags, Floats
+from world.errors import LogError
+from world.files import did_you_mean
+
+# Largest ratio of the stated and the measured rate of a clock, in either direction.
+_MAX_RATE_RATIO = 1.25
+# Share of the values that must lie in a quantity's plausible range.
+_PLAUSIBLE_SHARE = 0.98
+# Minimum correlation of the two signals that align a clock.
+_MIN_CORRELATION = 0.6
+# Times above this are seconds since 1970.
+_UTC_AFTER_S = 3e8
+
+
+@dataclass(frozen=True, slots=True)
+class Series:
+    """Values of one quantity.  time: (n,) s of the main clock.  values: (n,), NaN for rows without a value."""
+
+    time: Floats
+    values: Floats
+
+
+@dataclass(slots=True)
+class _Clock:
+    """Times of a clock, (n,) s, as written, and its file."""
+
+    data: DataFile
+    time: Floats
+    rate: float
+
+
+class ColumnLog:
+    """Flight log that is read by a table of columns.
+
+    path: the table, or a data file with a table next to it.
+    """
+
+    def __init__(self, path: Path) -> None:
+        table_path = path if is_table(path) else find_table(path)
+        self.path, self.table_path = path, table_path
+        self.table: LogTable = read_table(table_path)
+        self._files: dict[Path, DataFile] = {}
+        self._clocks: dict[str, _Clock] = {}
+        self._shifts: dict[str, float] = {}
+        self.utc_start = math.nan
+        self._check_names()
+
+    @property
+    def sha256(self) -> str:
+        """SHA-256 of the bytes of all data files, in the order of their paths, and of the table."""
+        digest = hashlib.sha256(self.table_path.read_bytes())
+        for path in sorted({self._file_of(clock) for clock in self.table.clocks.values()}):
+            digest.update(path.read_bytes())
+        return digest.hexdigest()
+
+    def has(self, *quantities: str) -> bool:
+        """Return True if the table names all these quantities."""
+        return all(quantity in self.table.columns for quantity in quantities)
+
+    def unit(self, quantity: str) -> str:
+        """Return the unit of the first entry of a quantity."""
+        return self.table.columns[quantity][0].unit
+
+    def frame(self, quantity: str) -> str:
+        """Return the frame of the first entry of a quantity, or the default frame."""
+        return self.table.columns[quantity][0].frame or QUANTITIES[quantity].frames[0]
+
+    def series(self, quantity: str) -> Series:
+        """Return a quantity in SI units and radians in its first frame; several entries are merged by their conditions.
+
+        Raises LogError for a missing column, text in place of numbers, and implausible values.
+        """
+        entries = self.table.columns[quantity]
+        parts = [self._entry_series(quantity, entry) for entry in entries]
+        if len(parts) == 1:
+            return parts[0]
+        time = parts[0].time
+        values = parts[0].values.copy()
+        for entry, part in zip(entries[1:], parts[1:], strict=True):
+            if len(part.time) != len(time):
+                raise self._error(f"columns.{quantity}.clock", entry.clock, "all entries of a quantity share one clock")
+            values = np.where(np.isfinite(values), values, part.values)
+        return Series(time, values)
+
+    def raw(self, quantity: str) -> tuple[Floats, Column]:
+        """Return times and unconverted values of a quantity, for texts and numbers of modes."""
+        entry = self.table.columns[quantity][0]
+        clock = self._clock(entry.clock)
+        return self._times(entry.clock), self._column(
+            clock, entry.column or "", f"columns.{quantity}.column", entry.clock
+        )
+
+    # ------------------------------------------------------------------
+    # Files and clocks.
+
+    def _error(self, field: str, value: Any, allowed: str) -> LogError:
+        return LogError.at(self.table_path, field, value, allowed)
+
+    def _file_of(self, clock: ClockTable) -> Path:
+        if clock.file is not None:
+            return self.table_path.parent / clock.file
+        if self.path != self.table_path:
+            return self.path
+        if self.table.file is None:
+            raise LogError(
+                f"{self.table_path}: file: missing; it names the data file", file=self.table_path, field="file"
+            )
+        return self.table_path.parent / self.table.file
+
+    def _data(self, clock: ClockTable) -> DataFile:
+        path = self._file_of(clock)
+        if path not in self._files:
+            self._files[path] = read_data_file(path)
+        return self._files[path]
+
+    def _clock(self, name: str) -> _Clock:
+        if name not in self._clocks:
+            self._clocks[name] = self._read_clock(name, self.table.clocks[name])
+        return self._clocks[name]
+
+    def _read_clock(self, name: str, clock: ClockTable) -> _Clock:
+        data, field = self._data(clock), f"clocks.{name}"
+        if clock.column is None:
+            lengths = [len(self._named(data, column)) for column in self._columns_of(name)]
+            rate = clock.rate or 1.0
+            return _Clock(data, np.arange(max(lengths, default=0)) / rate + clock.offset_s, rate)
+        values = self._named(data, clock.column, f"{field}.column")
+        if clock.unit == "iso" or values.dtype.kind == "M":
+            time = _seconds_of_dates(values, self._place(data, clock.column))
+        else:
+            time = _numbers(values, self._place(data, clock.column)) * UNITS["time"][clock.unit]
+        bad = np.flatnonzero(~np.isfinite(time))
+        if bad.size:
+            raise LogError.at(data.path, f"{clock.column}[{bad[0]}]", time[bad[0]], "expected a time in every row")
+        back = np.flatnonzero(np.diff(time) < 0.0)
+        if back.size:
+            k = int(back[0]) + 1
+            allowed = f"after {time[k - 1]:.6g} s: expected rising times"
+            raise LogError.at(data.path, f"{clock.column}[{k}]", f"{time[k]:.6g} s", allowed)
+        if len(time) < 2 or time[-1] <= time[0]:
+            raise LogError.at(data.path, clock.column, len(time), "expected at least two rows at different times")
+        rate = float(len(time) - 1) / float(time[-1] - time[0])
+        steps = np.diff(time)
+        usual = float(1.0 / np.median(steps[steps > 0.0]))
+        if clock.rate is not None and not 1.0 / _MAX_RATE_RATIO <= usual / clock.rate <= _MAX_RATE_RATIO:
+            allowed = f"the times in {clock.column} have {usual:.3g} rows a second: check the unit ({clock.unit})"
+            raise self._error(f"{field}.rate", f"{clock.rate:g} Hz", allowed)
+        return _Clock(data, time + clock.offset_s, rate)
+
+    @cached_property
+    def start(self) -> float:
+        """Time of the main clock that becomes zero: its first time if it counts from 1970, otherwise 0, s."""
+        first = float(self._clock(self._main).time[0])
+        if first > _UTC_AFTER_S:
+            self.utc_start = first
+            return first
+        return 0.0
+
+    @property
+    def _main(self) -> str:
+        return MAIN_CLOCK if MAIN_CLOCK in self.table.clocks else next(iter(self.table.clocks))
+
+    def _times(self, name: str) -> Floats:
+        """Return the times of a clock on the main clock."""
+        return self._own_times(name) + self._shift(name)
+
+    def _own_times(self, name: str) -> Floats:
+        """Return the times of a clock before its alignment; dates are counted from the start of the main clock."""
+        time = self._clock(name).time
+        return time - self.start if time[0] > _UTC_AFTER_S else time
+
+    def _shift(self, name: str) -> float:
+        align = self.table.clocks[name].align
+        if align is None:
+            return 0.0
+        if name not in self._shifts:
+            clock, field = self._clock(name), f"clocks.{name}.align"
+            own = _numbers(
+                self._column(clock, align.column, f"{field}.column", name), self._place(clock.data, align.column)
+            )
+            partner = self._partner(align.partner, field)
+            known = np.isfinite(own)
+            time = self._own_times(name)[known]
+            found = find_clock_shift(time, own[known], *partner, align.within_s)
+            if found.correlation < _MIN_CORRELATION:
+                message = f"{align.column} and {align.partner} correlate by {found.correlation:.2f} at most"
+                allowed = f"expected {_MIN_CORRELATION:g} at a shift within {align.within_s:g} s"
+                raise LogError(f"{self.table_path}: {field}: {message}; {allowed}", file=self.table_path, field=field)
+            self._shifts[name] = found.shift
+        return self._shifts[name]
+
+    def _partner(self, name: str, field: str) -> tuple[Floats, Floats]:
+        """Return the finite rows of a quantity, or of a column of the main clock."""
+        if name in self.table.columns:
+            series = self.series(name)
+        else:
+            clock = self._clock(self._main)
+            column = self._column(clock, name, f"{field}.with", self._main)
+            series = Series(self._times(self._main), _numbers(column, self._place(clock.data, name)))
+        known = np.isfinite(series.values)
+        return series.time[known], series.values[known]
+
+    # ------------------------------------------------------------------
+    # Columns.
+
+    def _columns_of(self, clock: str) -> list[str]:
+        return [
+            entry.column
+            for entries in self.table.columns.values()
+            for entry in entries
+            if entry.column is not None and entry.clock == clock
+        ]
+
+    def _check_names(self) -> None:
+        """Raise LogError for the first column that its file does not have."""
+        for quantity, entries in self.table.columns.items():
+            for entry in entries:
+                if entry.column is not None:
+                    data = self._data(self.table.clocks[entry.clock])
+                    self._named(data, entry.column, f"columns.{quantity}.column")
+
+    def _named(self, data: DataFile, name: str, field: str = "") -> Column:
+        if name not in data.columns:
+            hint = did_you_mean(name, data.columns) or f": it has {', '.join(list(data.columns)[:12])}"
+            raise self._error(field or "column", name, f"no such column in {data.path.name}{hint}")
+        return data.columns[name]
+
+    def _column(self, clock: _Clock, name: str, field: str, clock_name: str) -> Column:
+        values = self._named(clock.data, name, field)
+        if len(values) != len(clock.time):
+            allowed = f"{len(values)} rows, and the clock {clock_name} has {len(clock.time)}: expected as many"
+            raise self._error(field, name, allowed)
+        return values
+
+    def _place(self, data: DataFile, name: str) -> str:
+        return f"{data.path}: {name}"
+
+    def _entry_series(self, quantity: str, entry: ColumnTable) -> Series:
+        if entry.value is not None:
+            time = self._times(self._main)
+            return Series(time, np.full(len(time), self._convert(quantity, entry, np.array([entry.value]))[0]))
+        field = f"columns.{quantity}"
+        clock = self._clock(entry.clock)
+        column = self._column(clock, entry.column or "", f"{field}.column", entry.clock)
+        raw = _numbers(column, self._place(clock.data, entry.column or ""))
+        values = self._convert(quantity, entry, raw)
+        if entry.when is not None:
+            partner = self._column(clock, entry.when.column, f"{field}.when.column", entry.clock)
+            values = np.where(_equals(partner, entry.when.value), values, np.nan)
+        self._check_plausible(quantity, entry, values)
+        time = self._times(entry.clock)
+        if entry.rate is not None:
+            time, values = self._fresh_rows(quantity, entry, time, values)
+        if self.table.span_s is not None:
+            begin, end = self.table.span_s
+            inside = (time >= begin) & (time <= end)
+            time, values = time[inside], values[inside]
+        return Series(time, values)
+
+    def _convert(self, quantity: str, entry: ColumnTable, raw: Floats) -> Floats:
+        factor = UNITS[QUANTITIES[quantity].dimension][entry.unit]
+        frame_factor, frame_offset = to_frame(quantity, entry.frame)
+        stated = entry.sign * (entry.scale * raw + entry.offset)
+        return np.asarray(frame_factor * (factor * stated + UNIT_ZEROS.get(entry.unit, 0.0)) + frame_offset)
+
+    def _check_plausible(self, quantity: str, entry: ColumnTable, values: Floats) -> None:
+        """Raise LogError for values that no flight has, with the unit in which they would be plausible."""
+        known = values[np.isfinite(values)]
+        if not known.size:
+            raise self._error(f"columns.{quantity}", entry.column, "holds no numbers in the rows that are read")
+        limits = QUANTITIES[quantity]
+        if limits.dimension == "mode":
+            return
+        inside = (known >= limits.low) & (known <= limits.high)
+        if inside.mean() >= _PLAUSIBLE_SHARE:
+            return
+        factor = UNITS[limits.dimension][entry.unit]
+        worst = float(known[np.argmax(np.abs(known))])
+        zero = UNIT_ZEROS.get(entry.unit, 0.0)
+        unit = better_unit(quantity, entry.unit, float(np.quantile(np.abs(known - zero), 0.98)) / factor)
+        hint = f"; is it in {unit}?" if unit else ""
+        shown = f"{(worst - zero) / factor:.4g} {entry.unit}"
+        bounds = " to ".join(f"{(limit - zero) / factor:.4g}" for limit in (limits.low, limits.high))
+        raise self._error(f"columns.{quantity}", f"{entry.column} has {shown}", f"expected {bounds} {entry.unit}{hint}")
+
+    def _fresh_rows(self, quantity: str, entry: ColumnTable, time: Floats, values: Floats) -> tuple[Floats, Floats]:
+        """Return the rows with a new value of a column that is written more often than it is measured."""
+        changes: Flags = np.concatenate([[True], np.diff(values) != 0.0]) & np.isfinite(values)
+        rate, limit = changes.sum() / max(1e-9, float(np.ptp(time))), entry.rate or 0.0
+        if rate > _MAX_RATE_RATIO * limit:
+            raise self._error(f"columns.{quantity}.rate", f"{limit:g} Hz", f"it changes {rate:.3g} times a second")
+        return time[changes], values[changes]
+
+
+def _equals(values: Column, wanted: float | str) -> Flags:
+    if isinstance(wanted, str):
+        return np.asarray([text_of(value) == wanted for value in values], np.bool_)
+    return np.asarray(values == wanted, np.bool_)
+
+
+def text_of(value: Any) -> str:
+    """Return a value of a column of texts as a text."""
+    return value.decode("utf-8", "replace") if isinstance(value, bytes) else str(value)
+
+
+def _numbers(values: Column, place: str) -> Floats:
+    """Return a column as numbers; an empty text is NaN.  Raises LogError for any other text."""
+    if values.dtype.kind in "fiub":
+        return values.astype(np.float64)
+    out = np.full(len(values), np.nan)
+    for k, value in enumerate(values):
+        text = text_of(value).strip() if value is not None else ""
+        if text:
+            try:
+                out[k] = float(text)
+            except ValueError:
+                raise LogError(f"{place}[{k}]: {text[:40]!r}: expected a number", file=place.split(":")[0]) from None
+    return out
+
+
+def _seconds_of_dates(values: Column, place: str) -> Floats:
+    """Return times of day (ISO 8601) as seconds since 1970; a text without a time zone is UTC."""
+    import pandas as pd
+
+    texts = values if values.dtype.kind == "M" else [text_of(value) for value in values]
+    try:
+        stamps = pd.to_datetime(texts, utc=True, format=None if values.dtype.kind == "M" else "ISO8601")
+    except (ValueError, TypeError) as error:
+        reason = str(error).splitlines()[0]
+        raise LogError(f"{place}: {reason}: expected dates such as 2026-11-27T10:15:02.5", file=place) from None
+    return np.asarray(stamps.astype("datetime64[ns, UTC]").astype("int64"), np.float64) * 1e-9

@@ -1,0 +1,212 @@
+"""Motion of an aircraft from a table of columns, as `motion_log` reads it from ArduPilot's logs."""
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from logs.importers.columns.column_log import ColumnLog, Series
+from logs.importers.columns.quantities import FRACTION_UNITS
+from logs.importers.columns.wind_triangle import wind_of_triangle
+from logs.importers.motion import MotionLog, Samples, first_on_ground, rising
+from world.arrays import Floats
+from world.errors import LogError
+
+# Density of air at sea level, standard atmosphere, kg/m^3.
+_SEA_LEVEL_DENSITY = 1.225
+# Gas constant of dry air, J/(kg K).
+_GAS_CONSTANT = 287.05
+# Temperature of 0 degrees Celsius, K.
+_ZERO_CELSIUS_K = 273.15
+NONE = Samples(np.zeros(0), np.zeros((0, 1)))
+_SURFACES = ("elevator", "aileron", "rudder")
+
+
+def read_column_motion(path: Path) -> MotionLog:
+    """Read the motion of a log.  path: a table of columns, or a data file with a table next to it.
+
+    Raises LogError, in one line, for a file that cannot be read.
+    """
+    log = ColumnLog(path)
+    air, velocity = read_air(log), read_velocity(log)
+    controls, angles, elevons = _controls(log)
+    place = _group(log, "latitude", "longitude", "altitude")
+    if len(place.time):
+        place = Samples(place.time, place.values * np.array([math.degrees(1.0), math.degrees(1.0), 1.0]))
+    inertial = (
+        "acceleration_forward",
+        "acceleration_right",
+        "acceleration_down",
+        "roll_rate",
+        "pitch_rate",
+        "yaw_rate",
+    )
+    return MotionLog(
+        source=str(path),
+        sha256=log.sha256,
+        program=log.table.program,
+        vehicle="plane",
+        inertial=_group(log, *inertial),
+        outputs=NONE,
+        attitude=_attitude(log),
+        velocity=velocity,
+        wind=air.wind,
+        airspeed=air.airspeed,
+        ratio=air.ratio,
+        height=_group(log, "altitude"),
+        battery=_group(log, "voltage", "current"),
+        parameters=dict(log.table.parameters),
+        home=first_on_ground(place, velocity),
+        program_kind="columns",
+        controls=controls,
+        angles=angles,
+        elevons=elevons,
+    )
+
+
+def _group(log: ColumnLog, *quantities: str) -> Samples:
+    """Return several quantities as one series, (n, k); no rows if the table lacks one of them."""
+    if not log.has(*quantities):
+        return NONE
+    return join([log.series(quantity) for quantity in quantities])
+
+
+def join(parts: list[Series]) -> Samples:
+    """Return series as columns at the times of the series with most rows, interpolated, with finite rows only."""
+    longest = max(parts, key=lambda part: len(part.time))
+    columns = []
+    for part in parts:
+        if part.time.shape == longest.time.shape and np.array_equal(part.time, longest.time):
+            columns.append(part.values)
+            continue
+        known = np.isfinite(part.values)
+        if known.sum() < 2:
+            return NONE
+        columns.append(np.interp(longest.time, part.time[known], part.values[known], left=math.nan, right=math.nan))
+    return rising(longest.time, np.column_stack(columns))
+
+
+def _attitude(log: ColumnLog) -> Samples:
+    attitude = _group(log, "roll", "pitch", "yaw")
+    return Samples(attitude.time, np.unwrap(attitude.values, axis=0)) if len(attitude.time) else attitude
+
+
+def read_velocity(log: ColumnLog) -> Samples:
+    """Return the ground velocity, north, east, down, from components or from ground speed and course."""
+    if log.has("velocity_north", "velocity_east"):
+        parts = [log.series("velocity_north"), log.series("velocity_east")]
+    elif log.has("ground_speed", "ground_course"):
+        speed, course = log.series("ground_speed"), log.series("ground_course")
+        heading = _at(course, speed.time, turning=True)
+        parts = [Series(speed.time, speed.values * function(heading)) for function in (np.cos, np.sin)]
+    else:
+        return NONE
+    if log.has("velocity_down"):
+        return join([*parts, log.series("velocity_down")])
+    if not log.has("altitude"):
+        return NONE
+    altitude = join([log.series("altitude")])
+    return join([*parts, Series(altitude.time, -np.gradient(altitude.values[:, 0], altitude.time))])
+
+
+def _at(series: Series, time: Floats, *, turning: bool = False) -> Floats:
+    """Interpolate a series; turning: true for an angle that wraps."""
+    known = np.isfinite(series.values)
+    values = np.unwrap(series.values[known]) if turning else series.values[known]
+    return np.asarray(np.interp(time, series.time[known], values))
+
+
+@dataclass(frozen=True, slots=True)
+class AirData:
+    """Airspeed and wind of a log; no rows for what it lacks.
+
+    airspeed: (n, 1) indicated.  true_airspeed: (n, 1).
+    ratio: (n, 1) of true to indicated airspeed; no rows if the standard atmosphere gives it.
+    wind: (n, 2) north, east, in the direction of the air's motion.  wind_source: for people.
+    """
+
+    airspeed: Samples
+    true_airspeed: Samples
+    ratio: Samples
+    wind: Samples
+    wind_source: str
+
+
+def read_air(log: ColumnLog) -> AirData:
+    """Read airspeed and wind.
+
+    The ratio of true to indicated airspeed comes from static pressure and temperature if the table has both.  A log
+    without wind gets the wind of the triangle of ground velocity, heading and airspeed.
+    """
+    ratio = NONE
+    if log.has("static_pressure", "temperature"):
+        pressure = _group(log, "static_pressure", "temperature")
+        density = pressure.values[:, 0] / (_GAS_CONSTANT * (pressure.values[:, 1] + _ZERO_CELSIUS_K))
+        ratio = Samples(pressure.time, np.sqrt(_SEA_LEVEL_DENSITY / density)[:, np.newaxis])
+    airspeed = true = _group(log, "airspeed")
+    if len(airspeed.time):
+        factor = _ratio_at(ratio, _group(log, "altitude"), airspeed.time)[:, np.newaxis]
+        if log.frame("airspeed") == "true":
+            airspeed = Samples(airspeed.time, airspeed.values / factor)
+        else:
+            true = Samples(airspeed.time, airspeed.values * factor)
+    wind, source = _logged_wind(log), "wind of the table"
+    if not len(wind.time):
+        wind, source = wind_of_triangle(read_velocity(log), _attitude(log), true), "the triangle of velocities"
+    return AirData(airspeed, true, ratio, wind, source)
+
+
+def _logged_wind(log: ColumnLog) -> Samples:
+    if log.has("wind_north", "wind_east"):
+        return join([log.series("wind_north"), log.series("wind_east")])
+    if log.has("wind_speed", "wind_direction"):
+        speed, direction = log.series("wind_speed"), log.series("wind_direction")
+        origin = _at(direction, speed.time, turning=True)
+        return join([Series(speed.time, -speed.values * function(origin)) for function in (np.cos, np.sin)])
+    return NONE
+
+
+def _ratio_at(ratio: Samples, height: Samples, time: Floats) -> Floats:
+    """Return the ratio of true to indicated airspeed at some times, from the standard atmosphere if it is not given."""
+    if len(ratio.time):
+        return np.asarray(np.interp(time, ratio.time, ratio.values[:, 0]))
+    amsl = np.interp(time, height.time, height.values[:, 0]) if len(height.time) else np.zeros(len(time))
+    return np.asarray((1.0 - 2.25577e-5 * np.clip(amsl, -500.0, 9000.0)) ** -2.12794)
+
+
+def _controls(log: ColumnLog) -> tuple[Samples, tuple[bool, bool, bool], bool]:
+    """Return the controls as `MotionLog` has them, which of them are angles, and True if there are elevons.
+
+    Left and right halves of a surface become one surface: an elevator is their mean, an aileron half their difference.
+    """
+    halves = log.has("elevon_left", "elevon_right")
+    elevator = _surface(
+        log, "elevator", ("elevon_left", "elevon_right") if halves else ("elevator_left", "elevator_right")
+    )
+    aileron = _surface(log, "aileron", ("elevon_left", "elevon_right") if halves else ("aileron_left", "aileron_right"))
+    rudder = _surface(log, "rudder", ())
+    if elevator is None or aileron is None or not log.has("throttle"):
+        return NONE, (False, False, False), halves
+    (elevator_series, elevator_unit), (aileron_series, aileron_unit) = elevator, aileron
+    rudder_series, rudder_unit = rudder or (Series(elevator_series.time, 0.0 * elevator_series.values), "rad")
+    negated = Series(elevator_series.time, -elevator_series.values), Series(rudder_series.time, -rudder_series.values)
+    samples = join([negated[0], aileron_series, negated[1], log.series("throttle")])
+    angles = tuple(unit not in FRACTION_UNITS for unit in (elevator_unit, aileron_unit, rudder_unit))
+    return samples, (angles[0], angles[1], angles[2]), halves
+
+
+def _surface(log: ColumnLog, name: str, halves: tuple[str, ...]) -> tuple[Series, str] | None:
+    """Return a surface's deflections and unit, from one column or from its halves; None if the table lacks them."""
+    if log.has(name):
+        return log.series(name), log.unit(name)
+    if not halves or not log.has(*halves):
+        return None
+    units = {log.unit(half) in FRACTION_UNITS for half in halves}
+    if len(units) > 1:
+        raise LogError.at(
+            log.table_path, f"columns.{halves[1]}.unit", log.unit(halves[1]), f"expected the unit of {halves[0]}"
+        )
+    left, right = (log.series(half) for half in halves)
+    sign = -1.0 if name == "aileron" else 1.0
+    return Series(left.time, 0.5 * (left.values + sign * _at(right, left.time))), log.unit(halves[0])

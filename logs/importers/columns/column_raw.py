@@ -1,0 +1,105 @@
+"""Read a table of columns as an imported log, for `planfly import`."""
+
+import math
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+
+from flight.simulation.setup import VerticalDatum
+from logs.importers.columns.column_log import ColumnLog, text_of
+from logs.importers.columns.column_motion import join, read_air, read_velocity
+from logs.importers.raw_log import LogSeries, ModeChange, RawLog
+from world.arrays import Floats
+from world.errors import LogError
+
+FORMAT = "table of columns"
+_DATUMS: dict[str, VerticalDatum] = {"amsl": "amsl", "ellipsoid": "ellipsoid", "start": "unstated"}
+
+
+def read_columns(path: Path) -> RawLog:
+    """Read a log.  path: a table of columns, or a data file with a table next to it.
+
+    Raises LogError, in one line, for a file that cannot be read and for a table without latitude and longitude.
+    """
+    log = ColumnLog(path)
+    for quantity in ("latitude", "longitude"):
+        if not log.has(quantity):
+            raise LogError.at(log.table_path, f"columns.{quantity}", "missing", "a flight is judged by its positions")
+    position = _position(log)
+    return RawLog(
+        source=str(path),
+        format=FORMAT,
+        program=log.table.program,
+        vehicle="plane",
+        series={"position": position} | dict(_series(log)),
+        heights=(),
+        datum=_DATUMS[log.frame("altitude")] if log.has("altitude") else "unstated",
+        modes=tuple(_modes(log)),
+        parameters=dict(log.table.parameters),
+        clock="start",
+        utc_start=log.utc_start,
+    )
+
+
+def _position(log: ColumnLog) -> LogSeries:
+    latitude, longitude = log.series("latitude"), log.series("longitude")
+    parts = join([latitude, longitude])
+    up = np.full(len(parts.time), math.nan)
+    if log.has("altitude"):
+        altitude = join([log.series("altitude")])
+        up = np.interp(parts.time, altitude.time, altitude.values[:, 0])
+    values = np.column_stack([np.degrees(parts.values), up])
+    return LogSeries(_name(log, "latitude"), parts.time, values)
+
+
+def _series(log: ColumnLog) -> Iterator[tuple[str, LogSeries]]:
+    """Yield the series of `logs.importers.raw_log.COLUMNS` that the table has, except the positions."""
+    velocity = read_velocity(log)
+    if len(velocity.time):
+        yield "velocity", LogSeries("ground velocity", velocity.time, velocity.values[:, [1, 0, 2]] * [1.0, 1.0, -1.0])
+    if log.has("roll", "pitch", "yaw"):
+        attitude = join([log.series(name) for name in ("roll", "pitch", "yaw")])
+        yield "attitude", LogSeries("attitude", attitude.time, attitude.values)
+    air = read_air(log)
+    if len(air.true_airspeed.time):
+        yield "airspeed", LogSeries(_name(log, "airspeed"), air.true_airspeed.time, air.true_airspeed.values)
+    if len(air.wind.time):
+        yield "wind", LogSeries(air.wind_source, air.wind.time, air.wind.values[:, ::-1])
+    if log.has("current"):
+        yield "battery", _battery(log)
+    if log.has("throttle"):
+        throttle = join([log.series("throttle")])
+        yield "throttle", LogSeries(_name(log, "throttle"), throttle.time, throttle.values)
+
+
+def _name(log: ColumnLog, quantity: str) -> str:
+    return log.table.columns[quantity][0].column or quantity
+
+
+def _battery(log: ColumnLog) -> LogSeries:
+    """Return current and the energy taken from the battery, Wh; NaN without a voltage."""
+    if not log.has("voltage"):
+        current = join([log.series("current")])
+        return LogSeries(
+            "battery", current.time, np.column_stack([current.values, np.full(len(current.time), math.nan)])
+        )
+    battery = join([log.series("current"), log.series("voltage")])
+    power = battery.values.prod(axis=1)
+    steps = np.diff(battery.time, prepend=battery.time[:1])
+    energy: Floats = np.cumsum(power * steps) / 3600.0
+    return LogSeries("battery", battery.time, np.column_stack([battery.values[:, 0], energy]))
+
+
+def _modes(log: ColumnLog) -> Iterator[ModeChange]:
+    """Yield each change of `mode`, named by [modes]."""
+    if not log.has("mode"):
+        return
+    time, values = log.raw("mode")
+    names, automatic = log.table.modes.names, log.table.modes.automatic
+    previous = None
+    for start, value in zip(time.tolist(), values.tolist(), strict=True):
+        if value != previous:
+            key = f"{value:g}" if isinstance(value, float) else text_of(value)
+            yield ModeChange(start, names.get(key, key), value in automatic or key in automatic)
+            previous = value

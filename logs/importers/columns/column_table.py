@@ -1,0 +1,151 @@
+"""Read and check a table of columns (TOML): which column of which file holds each quantity of a flight."""
+
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, model_validator
+
+from logs.importers.columns.quantities import QUANTITIES, UNITS
+from world.errors import LogError
+from world.files import did_you_mean, read_small_file, toml_table
+from world.scenario_file import first_fault
+
+# Clock of columns that name no clock.
+MAIN_CLOCK = "main"
+_MAX_BYTES = 2**20
+
+
+class _Table(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, populate_by_name=True)
+
+
+class AlignTable(_Table):
+    """[clocks.NAME.align]: a pair of signals whose correlation gives the offset of the clock from the main clock.
+
+    column: a column on this clock.  with: the quantity that moves with it, on the main clock, or another column.
+    """
+
+    column: str
+    partner: Annotated[str, Field(alias="with")]
+    within_s: Annotated[float, Field(gt=0.0, le=3600.0)] = 120.0
+
+
+class ClockTable(_Table):
+    """[clocks.NAME]: column of times; without a column, the rows are counted at ``rate``, Hz."""
+
+    file: str | None = None
+    column: str | None = None
+    unit: str = "s"
+    rate: Annotated[float, Field(gt=0.0, le=10_000.0)] | None = None
+    offset_s: float = 0.0
+    align: AlignTable | None = None
+
+
+class ConditionTable(_Table):
+    """Condition ``when`` of a column: the rows in which another column of the same clock has a value."""
+
+    column: str
+    value: float | str
+
+
+class ColumnTable(_Table):
+    """Entry of [columns]: a column, or a constant value, with unit, sign, frame and rate.
+
+    The quantity is ``sign * (scale * column + offset)`` in ``unit`` and ``frame``.
+    """
+
+    column: str | None = None
+    value: float | None = None
+    clock: str = MAIN_CLOCK
+    unit: str = ""
+    scale: float = 1.0
+    offset: float = 0.0
+    sign: Literal[-1, 1] = 1
+    frame: str = ""
+    rate: Annotated[float, Field(gt=0.0, le=10_000.0)] | None = None
+    when: ConditionTable | None = None
+
+    @model_validator(mode="after")
+    def _check_source(self) -> "ColumnTable":
+        if (self.column is None) == (self.value is None):
+            raise ValueError("expected either `column`, the name of a column, or `value`, a constant")
+        return self
+
+
+class ModesTable(_Table):
+    """[modes]: names of the values of `mode`, and the values in which the vehicle follows its mission."""
+
+    names: dict[str, str] = {}
+    automatic: list[float | str] = []
+
+
+def _as_list(entry: Any) -> Any:
+    return entry if isinstance(entry, list) else [entry]
+
+
+Entries = Annotated[list[ColumnTable], BeforeValidator(_as_list), Field(min_length=1)]
+
+
+class LogTable(_Table):
+    """Table of columns of one flight log.
+
+    file: the data file, relative to the table; a data file that is opened by its own name takes its place.
+    program: name of the program that flew, for people.
+    span_s: first and last time on the main clock to read, s.
+    """
+
+    file: str | None = None
+    program: str = ""
+    span_s: tuple[float, float] | None = None
+    clocks: dict[str, ClockTable] = {}
+    columns: dict[str, Entries]
+    modes: ModesTable = ModesTable()
+    parameters: dict[str, float] = {}
+
+    @model_validator(mode="after")
+    def _check_entries(self) -> "LogTable":
+        for quantity, entries in self.columns.items():
+            if quantity not in QUANTITIES:
+                known = did_you_mean(quantity, QUANTITIES) or f": expected one of {', '.join(QUANTITIES)}"
+                raise ValueError(f"columns.{quantity}: unknown quantity{known}")
+            for entry in entries:
+                self._check_entry(quantity, entry)
+        for name, clock in self.clocks.items():
+            _check_choice(f"clocks.{name}.unit", clock.unit, UNITS["time"])
+            if clock.column is None and clock.rate is None:
+                raise ValueError(f"clocks.{name}: expected `column`, the column of times, or `rate`, rows per second")
+            if name == MAIN_CLOCK and clock.align is not None:
+                raise ValueError(f"clocks.{name}.align: the other clocks are aligned to this one")
+        if self.span_s is not None and not self.span_s[0] < self.span_s[1]:
+            raise ValueError(f"span_s: {list(self.span_s)}: expected a start before an end")
+        return self
+
+    def _check_entry(self, quantity: str, entry: ColumnTable) -> None:
+        field, known = f"columns.{quantity}", QUANTITIES[quantity]
+        if not (known.dimension == "mode" and not entry.unit):
+            _check_choice(f"{field}.unit", entry.unit, UNITS[known.dimension])
+        if entry.frame:
+            _check_choice(f"{field}.frame", entry.frame, known.frames)
+        if entry.value is None and entry.clock not in self.clocks:
+            _check_choice(f"{field}.clock", entry.clock, self.clocks)
+
+
+def _check_choice(field: str, value: str, allowed: Iterable[str]) -> None:
+    choices = tuple(allowed)
+    if value not in choices:
+        expected = f"expected {', '.join(choices)}" if choices else "none is allowed here"
+        raise ValueError(f"{field}: {value or 'missing'}: {expected}")
+
+
+def read_table(path: Path) -> LogTable:
+    """Read and check a table.  Raises LogError in one line: file, key, value and what is allowed."""
+    text = read_small_file(path, _MAX_BYTES, "table of columns", LogError)
+    try:
+        data = toml_table(text.decode("utf-8-sig"))
+    except ValueError as error:
+        raise LogError(f"{path}: not valid TOML: {str(error).splitlines()[0]}", file=path) from error
+    try:
+        return LogTable.model_validate(data)
+    except ValidationError as error:
+        raise LogError(**first_fault(error, data, LogTable).at(str(path))) from error

@@ -1,0 +1,212 @@
+"""Read all columns of a CSV, MAT, Parquet or HDF5 file as arrays by name."""
+
+import re
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from logs.importers.columns.file_names import DATA_SUFFIXES
+from world.errors import LogError
+
+Column = np.ndarray[Any, Any]
+# First bytes of a MAT file of version 7.3, which is an HDF5 file.
+_MAT_73 = b"MATLAB 7.3"
+# First bytes of an HDF5 file.
+_HDF5 = b"\x89HDF"
+# Characters that can separate the cells of a CSV file.
+_SEPARATORS = ",;\t"
+# A number as a CSV cell.
+_NUMBER = re.compile(r"\s*[-+]?(\d+[.,]?\d*|[.,]\d+)([eE][-+]?\d+)?\s*|\s*(nan|inf)?\s*", re.IGNORECASE)
+
+
+@dataclass(frozen=True, slots=True)
+class DataFile:
+    """Columns of a data file.
+
+    path: the file.
+    columns: arrays (n,) by name, in the order of the file; their lengths may differ.
+    units: units by name, for a CSV file that states them in a row below its header.
+    """
+
+    path: Path
+    columns: dict[str, Column]
+    units: dict[str, str] = field(default_factory=dict)
+
+
+def read_data_file(path: Path) -> DataFile:
+    """Read a data file.  Raises LogError, in one line, for a file that cannot be read or that holds no columns."""
+    suffix = path.suffix.lower()
+    readers: dict[str, Callable[[Path], DataFile]] = {
+        ".csv": _read_csv,
+        ".mat": _read_mat,
+        ".parquet": _read_parquet,
+        ".h5": _read_hdf5,
+        ".hdf5": _read_hdf5,
+    }
+    if suffix not in readers:
+        raise LogError.at(path, "suffix", suffix or "none", f"expected {', '.join(DATA_SUFFIXES)}")
+    try:
+        if not path.is_file():
+            raise LogError(f"{path}: no such file; expected {', '.join(DATA_SUFFIXES)}", file=path)
+        if not path.stat().st_size:
+            raise LogError(f"{path}: empty; expected columns of numbers", file=path)
+        data = readers[suffix](path)
+    except (LogError, MemoryError):
+        raise
+    # Of any kind: a damaged file makes these libraries raise errors of struct, zlib, arrow, and plain ones.
+    except Exception as error:
+        reason = (str(error).splitlines() or [""])[0] or type(error).__name__
+        raise LogError(f"{path}: cannot be read as a {suffix} file: {reason}", file=path) from error
+    if not any(len(values) for values in data.columns.values()):
+        raise LogError(f"{path}: holds no rows; expected columns of numbers", file=path)
+    return data
+
+
+# ----------------------------------------------------------------------
+# CSV.
+
+
+def _read_csv(path: Path) -> DataFile:
+    import pandas as pd
+
+    text = path.read_bytes().decode("utf-8-sig", errors="replace")
+    lines = text.splitlines()
+    first = next((k for k, line in enumerate(lines) if line.strip() and not _is_remark(line, lines[k + 1 : k + 2])), -1)
+    if first < 0:
+        raise LogError(f"{path}: holds no rows; expected columns of numbers", file=path)
+    header = lines[first].lstrip("#% ")
+    separator = max(_SEPARATORS, key=header.count)
+    names = [name.strip().strip('"') for name in header.split(separator)]
+    if all(_NUMBER.fullmatch(name) for name in names):
+        raise LogError(f"{path}: line {first + 1}: {header[:40]!r}: expected the names of the columns", file=path)
+    if len(set(names)) < len(names):
+        repeated = next(name for k, name in enumerate(names) if name in names[:k])
+        raise LogError.at(path, "columns", repr(repeated), "two columns have this name")
+    rows = [(k, line) for k, line in enumerate(lines[first + 1 :], first + 2) if line.strip()]
+    units: dict[str, str] = {}
+    if rows and not any(_NUMBER.fullmatch(cell) for cell in rows[0][1].split(separator) if cell.strip()):
+        cells = [cell.strip().strip('"[]()') for cell in rows.pop(0)[1].split(separator)]
+        units = dict(zip(names, cells, strict=False))
+    _check_widths(path, rows, separator, len(names))
+    decimal = "," if separator == ";" and any("," in line for _, line in rows[:10]) else "."
+    from io import StringIO
+
+    body = "\n".join(line for _, line in rows)
+    table = pd.read_csv(StringIO(body), sep=separator, header=None, names=names, decimal=decimal, low_memory=False)
+    return DataFile(path, {str(name): _without_text(table[name].to_numpy()) for name in table.columns}, units)
+
+
+def _is_remark(line: str, next_lines: list[str]) -> bool:
+    """Return True for a remark; the last line with a # before the rows can be the header."""
+    if not line.lstrip().startswith(("#", "%")):
+        return False
+    following = next_lines[0] if next_lines else ""
+    separator = max(_SEPARATORS, key=line.count)
+    return line.count(separator) == 0 or line.count(separator) != following.count(separator)
+
+
+def _check_widths(path: Path, rows: list[tuple[int, str]], separator: str, width: int) -> None:
+    """Raise LogError for rows with another number of cells than the header."""
+    for number, line in rows:
+        cells = line.count(separator) + 1
+        # A separator at the end of each row adds an empty cell; quoted cells may contain separators.
+        if cells != width and '"' not in line and not (cells == width + 1 and line.rstrip().endswith(separator)):
+            allowed = f"expected {width}, as in the header"
+            raise LogError(f"{path}: line {number}: {cells} cells: {allowed}", file=path, value=cells, allowed=allowed)
+
+
+def _without_text(values: Column) -> Column:
+    """Return numbers as float64, and other values as they are."""
+    return values.astype(np.float64) if values.dtype.kind in "fiub" else values
+
+
+# ----------------------------------------------------------------------
+# MAT, before version 7.3.
+
+
+def _read_mat(path: Path) -> DataFile:
+    with path.open("rb") as file:
+        head = file.read(128)
+    if head.startswith(_MAT_73) or head.startswith(_HDF5):
+        return _read_hdf5(path)
+    from scipy.io import loadmat
+
+    variables = loadmat(path, squeeze_me=True, struct_as_record=False)
+    columns: dict[str, Column] = {}
+    for name, value in variables.items():
+        if not name.startswith("__"):
+            labels = variables.get(f"{name}_label")
+            columns |= dict(_mat_columns(name, value, labels))
+    return DataFile(path, columns)
+
+
+def _mat_columns(name: str, value: Any, labels: Any = None) -> Iterator[tuple[str, Column]]:
+    """Yield the columns of a variable: of a struct, its fields; of a matrix, its columns, by their labels if known."""
+    if hasattr(value, "_fieldnames"):
+        for field_name in value._fieldnames:
+            yield from _mat_columns(f"{name}.{field_name}", getattr(value, field_name))
+        return
+    array = np.asarray(value)
+    if array.dtype.names is not None:
+        for field_name in array.dtype.names:
+            yield from _mat_columns(f"{name}.{field_name}", array[field_name])
+        return
+    titles = [str(label) for label in np.atleast_1d(labels)] if labels is not None else []
+    yield from _array_columns(name, array, titles)
+
+
+def _array_columns(name: str, array: Column, titles: list[str] | None = None) -> Iterator[tuple[str, Column]]:
+    """Yield an array of one dimension, or each column of a matrix, whose rows are along its longer axis."""
+    if array.ndim < 2:
+        values = np.atleast_1d(array)
+        yield name, values.astype(np.float64) if values.dtype.kind in "fiub" else values
+    elif array.ndim == 2:
+        has_titles = titles is not None and len(titles) in array.shape
+        rows = (
+            array
+            if (len(titles or ()) == array.shape[1] if has_titles else array.shape[0] >= array.shape[1])
+            else array.T
+        )
+        for k in range(rows.shape[1]):
+            title = f"{name}.{titles[k]}" if has_titles and titles else f"{name}[{k}]"
+            yield from _array_columns(title, np.ascontiguousarray(rows[:, k]))
+
+
+# ----------------------------------------------------------------------
+# Parquet and HDF5.
+
+
+def _read_parquet(path: Path) -> DataFile:
+    import pyarrow.parquet as pq
+
+    table = pq.read_table(path)
+    columns = {}
+    for name in table.column_names:
+        values = table[name].to_numpy()
+        columns[name] = _without_text(np.asarray(values))
+    return DataFile(path, columns)
+
+
+def _read_hdf5(path: Path) -> DataFile:
+    import h5py
+
+    columns: dict[str, Column] = {}
+
+    def visit(name: str, item: Any) -> None:
+        if not isinstance(item, h5py.Dataset) or name.startswith("#"):
+            return
+        title, values = name.replace("/", "."), np.asarray(item[()])
+        if item.attrs.get("MATLAB_class") == b"char":
+            values = np.array("".join(chr(code) for code in values.ravel()))
+        if values.dtype.names is not None:
+            for field_name in values.dtype.names:
+                columns.update(_array_columns(f"{title}.{field_name}", np.squeeze(values[field_name])))
+        else:
+            columns.update(_array_columns(title, np.squeeze(values)))
+
+    with h5py.File(path, "r") as file:
+        file.visititems(visit)
+    return DataFile(path, columns)

@@ -1,0 +1,31 @@
+"""Recognise data files and tables of columns by their names, and find the table of a data file."""
+
+from pathlib import Path
+
+from world.errors import LogError
+
+# Suffixes of data files.
+DATA_SUFFIXES = (".csv", ".mat", ".parquet", ".h5", ".hdf5")
+# Name of a table that applies to all data files of its folder.
+FOLDER_TABLE = "columns.toml"
+# End of the name of a table that applies to one data file.
+TABLE_SUFFIX = ".columns.toml"
+
+
+def is_table(path: Path) -> bool:
+    """Return True if a file is a table of columns, by its name.
+
+    >>> is_table(Path("flight.columns.toml")), is_table(Path("columns.toml")), is_table(Path("scenario.toml"))
+    (True, True, False)
+    """
+    return path.name == FOLDER_TABLE or path.name.endswith(TABLE_SUFFIX)
+
+
+def find_table(path: Path) -> Path:
+    """Return the table of columns of a data file: its own or that of its folder.  Raises LogError without one."""
+    choices = (path.with_name(f"{path.stem}{TABLE_SUFFIX}"), path.with_name(FOLDER_TABLE))
+    for choice in choices:
+        if choice.is_file():
+            return choice
+    advice = f"`planfly import {choices[0]} --columns-from {path}` writes one to check"
+    raise LogError(f"{path}: no table of columns ({choices[0].name} or {FOLDER_TABLE}): {advice}", file=path)
