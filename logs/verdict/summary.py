@@ -17,6 +17,7 @@ from logs.verdict.findings import (
 from logs.verdict.measures.mission_ends import missing_ends_text
 from logs.verdict.places import DecidingParameter, LevelAnswer
 from logs.verdict.rule_words import RULE_WORDS, RuleWords
+from logs.verdict.tolerances import NOTABLE_HEIGHT_ERROR_M
 from logs.verdict.wording import deciding_text, disagreement_text, place_text
 
 # Maximum number of failed findings that the first line names.
@@ -36,7 +37,8 @@ def headline(findings: Sequence[Finding], flyable: bool, source: str = "") -> st
     source_notes = [f"an aircraft from {source}"] if source else []
     if flyable:
         unjudged = [_unjudged_text(findings, rule) for rule in RULE_WORDS.values() if rule.unjudged]
-        return "; ".join(["flyable", *filter(None, unjudged), *_near_miss_notes(findings), *source_notes])
+        notes = [*filter(None, unjudged), *_near_miss_notes(findings), *_altitude_notes(findings)]
+        return "; ".join(["flyable", *notes, *source_notes])
     failed = _failed_by_urgency(findings)
     if not failed and (open_text := undecided_text(findings)):
         return "; ".join([f"not judged in full: {open_text}", *source_notes])
@@ -137,6 +139,22 @@ def _near_miss_notes(findings: Sequence[Finding]) -> list[str]:
         if facts.get("nearest", math.inf) < facts.get("navigation error", 0.0):
             notes.append(f"a missile missed by {facts['nearest']:.1f} m, less than the navigation error")
     return notes
+
+
+def _altitude_notes(findings: Sequence[Finding]) -> list[str]:
+    """Name the waypoint with the largest height error, if that error is notable, and count the others."""
+    errors = [
+        (fact.value, finding.place)
+        for finding in findings
+        for fact in finding.facts
+        if finding.rule == "waypoint" and finding.ok and fact.what == "height error"
+    ]
+    notable = [(error, place) for error, place in errors if abs(error) > NOTABLE_HEIGHT_ERROR_M]
+    if not notable:
+        return []
+    error, place = max(notable, key=lambda pair: abs(pair[0]))
+    others = f", and {len(notable) - 1} more by over {NOTABLE_HEIGHT_ERROR_M:.0f} m" if len(notable) > 1 else ""
+    return [f"{place_text(place)} passed {abs(error):.0f} m {'above' if error > 0.0 else 'below'} its altitude{others}"]
 
 
 def _headline_findings(failed: list[Finding]) -> list[Finding]:

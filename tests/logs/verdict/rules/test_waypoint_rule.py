@@ -145,6 +145,26 @@ def test_a_height_off_the_plan_is_told_and_no_miss(setup: FlightSetup, high: flo
     assert f"{abs(item.facts[0].value):.1f} m {'above' if high > 0.0 else 'below'}" in item.reason
 
 
+@pytest.mark.parametrize(
+    ("errors", "note"),
+    [
+        ((24.0, -24.0), ""),
+        ((26.0, 0.0), "; waypoint 1 (item 1) passed 26 m above its altitude"),
+        ((-30.0, -49.0), "; waypoint 2 (item 2) passed 49 m below its altitude, and 1 more by over 25 m"),
+    ],
+)
+def test_the_headline_names_a_waypoint_passed_far_from_its_altitude(errors: tuple[float, float], note: str) -> None:
+    setup = make_setup([[0, 0, 300], [0, 3000, 300], [0, 6000, 300], [0, 9000, 300]])
+
+    def offset(s: np.ndarray) -> np.ndarray:
+        return np.sum([bump(3000.0 * k, error, 800.0)(s) for k, error in enumerate(errors, 1)], axis=0)
+
+    headline = judge(setup, fly_path(setup, up=offset)).headline
+    assert "altitude" in headline or not note
+    assert headline.removeprefix("flyable").split("; an aircraft")[0].endswith(note)
+    assert ("altitude" in headline) is bool(note)
+
+
 @pytest.mark.parametrize(("aside", "ok", "margin"), [(15.0, True, 5.0), (30.0, False, -10.0)])
 def test_a_waypoints_margin_is_what_is_left_of_its_radius(aside: float, ok: bool, margin: float) -> None:
     setup = accepting(make_setup(STRAIGHT), 20.0)
