@@ -87,7 +87,7 @@ def _models_are_tried_here() -> Iterator[None]:
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     """Mark the tests of files that have more to do in a soak, leave out those that one before has passed, and sort."""
     for item in items:
-        if {"SOAK", "scaled", "some"} & vars(getattr(item, "module", object)).keys():
+        if {"SOAK", "only_in_soak", "scaled", "some"} & vars(getattr(item, "module", object)).keys():
             item.add_marker("soak")
     if passed := passed_files():
         config.hook.pytest_deselected(items=[item for item in items if _file(item.nodeid) in passed])

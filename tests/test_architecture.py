@@ -15,6 +15,7 @@ import pytest
 from planfly.cli import main
 from planfly.commands.registry import COMMANDS
 from tests.conftest import COMPILING
+from tests.soak import only_in_soak
 from tests.stopwatch import Stopwatch
 from world.kernel_cache import DECORATORS
 
@@ -201,6 +202,7 @@ def test_no_modules_import_one_another() -> None:
     assert cycles_of(imports_of_ours()) == []
 
 
+@only_in_soak
 def test_help_answers_in_half_a_second() -> None:
     spent = []
     for _ in range(3):

@@ -8,6 +8,7 @@ import time
 
 import pytest
 
+from tests.soak import only_in_soak
 from tests.stopwatch import Stopwatch
 
 # All on one core, whichever this process may use.
@@ -22,6 +23,7 @@ def seconds_of(code: str) -> float:
     return watch.seconds
 
 
+@only_in_soak
 @pytest.mark.parametrize("code", ["import time\ntime.sleep(0.3)", BUSY.format(0.3)])
 def test_what_a_process_takes_counts_beside_others(code: str) -> None:
     """Beside a busy process on its core, with which 0.3 s of it take 0.6 s by the clock or more."""

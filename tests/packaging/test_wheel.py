@@ -19,7 +19,7 @@ from packaging.specifiers import SpecifierSet
 from packaging.utils import canonicalize_name
 
 from tests.packaging.conftest import PACKAGES, ROOT
-from tests.soak import SOAK
+from tests.soak import SOAK, only_in_soak
 from world.extras import EXTRAS
 
 VERSIONS = ("3.11", "3.12", "3.13")
@@ -34,6 +34,7 @@ def metadata(wheel: Path) -> Message:
         return message_from_bytes(archive.read(name))
 
 
+@only_in_soak
 def test_a_package_index_shows_it(wheel: Path) -> None:
     done = subprocess.run(
         [sys.executable, "-m", "twine", "check", "--strict", wheel], capture_output=True, text=True, check=False

@@ -13,10 +13,15 @@ from functools import cache
 from pathlib import Path
 from typing import Any, TypeVar
 
+import pytest
+
 Case = TypeVar("Case")
 SOAK = os.environ.get("PLANFLY_SOAK") == "1"
 # Whether files are run as a whole, so that those that pass can be left out another time: `make soak` does.
 WHOLE = SOAK and os.environ.get("PLANFLY_SOAK_WHOLE") == "1"
+# Mark of a test that `make test` skips: it takes more than 4 s of a core or 15 s by the clock, and cheaper tests of
+# `make test` exercise the same code.
+only_in_soak = pytest.mark.skipif(not SOAK, reason="takes long; runs in make soak")
 ROOT = Path(__file__).parents[2]
 FIGURES = Path(os.environ.get("PLANFLY_SOAK_FIGURES", ROOT / "build" / "soak.json"))
 # Rows of the file that are not figures: the file of tests that noted each row, and the sources that a file passed with.

@@ -20,7 +20,7 @@ from flight.mission_files.formats import mission_text, read_mission
 from tests.clients import ROOT
 from tests.logs.made_flight import make_setup, make_track, record
 from tests.planfly.conftest import FIELD
-from tests.soak import SOAK, note, scaled
+from tests.soak import SOAK, note, only_in_soak, scaled
 from tests.soak.hostile_files import DAMAGE, JSON_VALUES, hostile
 
 # Exit codes of a command that has read what it was given, or refused it.
@@ -64,6 +64,7 @@ def make_valid(folder: Path) -> None:
     shutil.copy(ROOT / "aircraft" / "aerosonde" / "ardupilot.parm", folder / "m.parm")
 
 
+@only_in_soak
 @pytest.mark.parametrize("kind", KINDS)
 def test_hostile_files_are_judged_or_refused(kind: str, tmp_path: Path) -> None:
     make_valid(tmp_path)

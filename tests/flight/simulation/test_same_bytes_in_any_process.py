@@ -14,7 +14,7 @@ from flight.simulation.setup import FlightSetup
 from flight.simulation.simulate import Flight, fly_to_end
 from flight.simulation.track import COLUMNS
 from tests.setups import MakeSetup, standard
-from tests.soak import some
+from tests.soak import only_in_soak, some
 
 
 def fly(setup: FlightSetup) -> str:
@@ -23,6 +23,7 @@ def fly(setup: FlightSetup) -> str:
     return hashlib.sha256(b"".join(getattr(track, name).tobytes() for name in COLUMNS)).hexdigest()
 
 
+@only_in_soak
 @pytest.mark.parametrize("method", some(["spawn", "fork"], 2))
 def test_two_processes_at_once_give_the_same_bytes(make_setup: MakeSetup, method: str) -> None:
     setups = [make_setup(standard()[:3], wind=(7.0, 30.0), turbulence="moderate", seed=seed) for seed in (5, 6)]

@@ -10,7 +10,7 @@ from logs.recording.reader import read_log
 from planfly.workflow.airframe import load_airframe
 from planfly.workflow.make_plan import make_plan
 from planfly.workflow.open_flight import make_setup
-from tests.soak import SOAK
+from tests.soak import SOAK, only_in_soak
 from world.scenario import load_scenario
 
 # Of some 3 minutes each.
@@ -42,6 +42,7 @@ def hour(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, float]:
     return long_flight(tmp_path_factory.mktemp("hour"), LEGS)
 
 
+@only_in_soak
 def test_an_hour_takes_less_than_45_megabytes(hour: tuple[Path, float]) -> None:
     log, hours = hour
     assert hours > (1.0 if SOAK else 0.04)

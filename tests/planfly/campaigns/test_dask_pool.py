@@ -15,6 +15,7 @@ from planfly.campaigns.flight_row import FlightRow, lost_row
 from planfly.campaigns.tables import is_same_flight
 from planfly.campaigns.worker_pool import Workers, worker_pool
 from tests.planfly.campaigns.made_campaigns import made_flight
+from tests.soak import only_in_soak
 
 
 @pytest.mark.filterwarnings("default")
@@ -125,6 +126,7 @@ def test_names_come_again_but_for_one_that_is_flying(base: CampaignBase, monkeyp
     assert all(one != other for one, other in pairwise(client.names))
 
 
+@only_in_soak
 @pytest.mark.filterwarnings("default")
 def test_dask_flies_what_comes_under_a_name_that_was_flown(
     base: CampaignBase, scheduler: str, monkeypatch: pytest.MonkeyPatch

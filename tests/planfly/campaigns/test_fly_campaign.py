@@ -40,7 +40,7 @@ from tests.planfly.campaigns.made_campaigns import (
     table,
 )
 from tests.planfly.campaigns.made_searches import hire_here
-from tests.soak import SOAK, note, scaled
+from tests.soak import SOAK, note, only_in_soak, scaled
 
 pytestmark = pytest.mark.filterwarnings("default")
 
@@ -276,6 +276,7 @@ def cluster(tmp_path: Path) -> Iterator[tuple[str, "subprocess.Popen[bytes]"]]:
             process.wait()
 
 
+@only_in_soak
 def test_a_real_scheduler_with_a_worker_killed_gives_the_same_table(
     base: CampaignBase, tmp_path: Path, cluster: tuple[str, "subprocess.Popen[bytes]"]
 ) -> None:

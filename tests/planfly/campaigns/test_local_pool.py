@@ -20,7 +20,7 @@ from planfly.campaigns.local_pool import MAX_FAILED_STARTS, LocalPool
 from planfly.campaigns.tables import is_same_flight
 from tests.planfly.campaigns.kills import spawned_processes, start_client
 from tests.planfly.campaigns.made_campaigns import made_flight
-from tests.soak import some
+from tests.soak import only_in_soak, some
 from world.errors import MissionError
 
 
@@ -117,6 +117,7 @@ def fly_killed(base: CampaignBase, index: int, wind: GivenWind | None = None) ->
     return made_flight(base, index, wind)
 
 
+@only_in_soak
 def test_a_flight_that_kills_its_process_is_flown_twice_again_and_then_lost_and_no_other_is(
     base: CampaignBase, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -174,6 +175,7 @@ def hears_ctrl_c(process: int) -> bool:
     return not blocked >> (signal.SIGINT - 1) & 1
 
 
+@only_in_soak
 def test_flights_that_nobody_waits_for_end_with_their_processes_and_others_take_their_place(
     base: CampaignBase,
 ) -> None:
@@ -190,6 +192,7 @@ def test_flights_that_nobody_waits_for_end_with_their_processes_and_others_take_
 
 
 # Ctrl-C of a whole campaign, after which no process is left: tests/planfly/misuse/test_interruptions.py.
+@only_in_soak
 @pytest.mark.parametrize("number", some([signal.SIGKILL, signal.SIGINT], 2))
 def test_workers_end_with_the_process_that_leads_them(number: signal.Signals, tmp_path: Path) -> None:
     client = start_client("campaign", tmp_path, 100_000)

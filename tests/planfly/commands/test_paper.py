@@ -12,7 +12,7 @@ from logs.views.drawing import write_png
 from planfly.cli import main
 from planfly.planning.paper import file_names
 from planfly.workflow.output_paths import prepare_folder
-from tests.soak import SOAK
+from tests.soak import SOAK, only_in_soak
 
 ROWS = ["umda", "umda-strip", "umda-cartesian", "umda-polar", "umda-polar-45", "umda-bearing"]
 SEEDS = 2 if SOAK else 1
@@ -52,6 +52,7 @@ def test_every_file_is_there_and_the_table_agrees_with_the_runs(folder: Path) ->
     assert [float(row["length_ratio"]) for row in rows] == [run["length_ratio"] for run in data["runs"]]
 
 
+@only_in_soak
 def test_same_bytes_whatever_the_number_of_processes(
     folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -23,7 +23,7 @@ from planfly.cli import main
 from planfly.workflow.airframe import load_airframe
 from tests.planfly.conftest import FIELD, Served
 from tests.planfly.misuse.test_listeners import listening, table
-from tests.soak import SOAK, scaled, tally, widen
+from tests.soak import SOAK, only_in_soak, scaled, tally, widen
 from tests.stations import UdpStation, item
 from tests.stopwatch import Stopwatch
 
@@ -69,6 +69,7 @@ def real(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
         assert vehicle.stop() == 0
 
 
+@only_in_soak
 def test_a_served_flight_is_the_flight_of_fly_at_real_time(real: Served) -> None:
     """Rates within 5 %, under 15 % of a core, and the very flight that ``planfly fly`` gives."""
     vehicle = real
@@ -269,6 +270,7 @@ def attacks(key: bytes, heard: bytes) -> dict[str, list[bytes]]:
     }
 
 
+@only_in_soak
 def test_no_attack_on_a_signed_link_ends_a_flight_but_ctrl_c(serve: Callable[..., Served], tmp_path: Path) -> None:
     """Timestamps of the far future, wrong link ids, replay, rollback and a flood, all in flight.
 

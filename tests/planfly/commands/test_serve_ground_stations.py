@@ -23,7 +23,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink_messages
 from logs.recording.reader import read_log
 from tests.clients import need as client
 from tests.planfly.conftest import Served
-from tests.soak import SOAK
+from tests.soak import SOAK, only_in_soak
 
 pytestmark = pytest.mark.client
 
@@ -221,6 +221,7 @@ def mavproxy(tmp_path: Path) -> Iterator[Callable[[int], MavProxy]]:
         one.close()
 
 
+@only_in_soak
 def test_mavproxy_loads_arms_flies_elsewhere_and_saves(
     serve: Callable[..., Served], mavproxy: Callable[[int], MavProxy], tmp_path: Path
 ) -> None:

@@ -12,7 +12,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from logs.recording.reader import FlightLog, read_log
 from planfly.cli import main
 from tests.planfly.conftest import Served
-from tests.soak import some
+from tests.soak import only_in_soak, some
 from tests.stations import UdpStation, item
 
 LAT, LON = 460_000_000, 80_000_000
@@ -46,6 +46,7 @@ def set_mode(station: UdpStation, mode: int) -> None:
     in_mode(station, mode)
 
 
+@only_in_soak
 @pytest.mark.parametrize("law", some(["ardupilot", "px4", "planfly"], 3))
 def test_it_holds_goes_elsewhere_goes_on_and_returns(serve: Callable[..., Served], law: str) -> None:
     vehicle = serve("--scenario", "field.toml", "--speed", "20", "--autopilot", law)

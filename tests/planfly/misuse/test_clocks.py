@@ -23,7 +23,7 @@ from tests.flight.live.fake_vehicle import KEY
 from tests.logs.made_flight import make_setup, make_track, record
 from tests.planfly.conftest import FIELD, Served
 from tests.planfly.misuse.every_command import SHORT
-from tests.soak import SOAK
+from tests.soak import SOAK, only_in_soak
 from tests.stations import UdpStation, item
 from world import running_clock
 
@@ -42,6 +42,7 @@ time.time = lambda: real() - (3600.0 if os.path.exists({flag!r}) else 0.0)
 """
 
 
+@only_in_soak
 def test_a_served_flight_goes_on_through_a_sleep_and_a_clock_that_is_set_back(
     serve: Callable[..., Served], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -18,7 +18,7 @@ import pytest
 
 from logs.recording.reader import read_log
 from tests.planfly.misuse.every_command import EVERY, Done, Given, check_whole, give, make_inputs
-from tests.soak import SOAK, note
+from tests.soak import SOAK, note, only_in_soak
 from world.errors import LogError
 
 MB = 2**20
@@ -68,6 +68,7 @@ def limited(which: int, most: int) -> Callable[[], None]:
     return lambda: resource.setrlimit(which, (most, most))
 
 
+@only_in_soak
 @some("fly")
 def test_600_mb_of_address_space(name: str, inputs: Path, tmp_path: Path) -> None:
     """Most libraries together are larger; OpenBLAS, for one, would never return."""
@@ -80,6 +81,7 @@ def test_600_mb_of_address_space(name: str, inputs: Path, tmp_path: Path) -> Non
     whole(folder, inputs)
 
 
+@only_in_soak
 @some("campaign")
 def test_32_descriptors(name: str, inputs: Path, tmp_path: Path) -> None:
     given, folder = EVERY[name], tmp_path / "work"
@@ -132,6 +134,7 @@ READ_ONLY = 'mount --make-rprivate / && mount --bind . . && mount -o remount,ro,
 NOWHERE = {"HOME": "/nonexistent", "NUMBA_CACHE_DIR": "/proc/none", "XDG_CACHE_HOME": "/proc/none"}
 
 
+@only_in_soak
 @some("recover")
 def test_no_home_and_nothing_to_write(name: str, inputs: Path, tmp_path: Path) -> None:
     """A service account on a read-only install: each command runs; kernels are compiled for it alone."""

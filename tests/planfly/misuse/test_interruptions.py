@@ -22,7 +22,7 @@ from tests.autopilots import find_arduplane
 from tests.instances import make_instance, scenario_text
 from tests.planfly.conftest import FIELD
 from tests.planfly.misuse.every_command import check_whole
-from tests.soak import SOAK, at_most, note
+from tests.soak import SOAK, at_most, note, only_in_soak
 from tests.stopwatch import Stopwatch, processes_of
 
 pytestmark = pytest.mark.alone
@@ -188,6 +188,7 @@ def begun_work(case: Case, said: Path, work: Path) -> bool:
     )
 
 
+@only_in_soak
 @pytest.mark.parametrize("case", FEW, ids=lambda case: f"{case.argv[0]}-{case.number.name}")
 def test_a_command_ends_at_once_and_whole(case: Case, inputs: Path, tmp_path: Path) -> None:
     code, took, said = interrupted(case, inputs, tmp_path)

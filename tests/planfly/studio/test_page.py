@@ -21,7 +21,7 @@ from tests.browser import Browser
 from tests.logs.views.report.page_in_browser import grave_findings, prefer
 from tests.planfly.studio.drafts import drawn_session
 from tests.planfly.studio.served import Served, served
-from tests.soak import SOAK, at_most, scaled
+from tests.soak import SOAK, at_most, only_in_soak, scaled
 
 ROOT = Path(__file__).parents[3]
 TABS = ("verdict", "items", "plan", "settings", "files")
@@ -399,6 +399,7 @@ def test_a_dropped_file_is_opened(page: Browser) -> None:
     page.wait_for("document.getElementById('name').textContent === 'm.waypoints'")
 
 
+@only_in_soak
 def test_what_was_done_survives_a_reload_and_a_server_that_dies(page: Browser, studio: Studio) -> None:
     undo_all(page)
     with Served(studio.address).page() as program:
@@ -451,6 +452,7 @@ def test_a_phone_drags_by_touch(browser: Browser, studio: Studio) -> None:
     phone.go("about:blank")
 
 
+@only_in_soak
 def test_a_drag_is_coloured_in_time(page: Browser) -> None:
     from benchmarks.studio import DRAG, timed
 

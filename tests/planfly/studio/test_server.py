@@ -20,7 +20,7 @@ from planfly.studio import connections, messages
 from planfly.studio.jobs import LONG, Jobs
 from tests.planfly.studio.drafts import drawn_session
 from tests.planfly.studio.served import PageProgram, Served, served
-from tests.soak import SOAK, note, scaled
+from tests.soak import SOAK, note, only_in_soak, scaled
 
 FUZZED, EDITED = scaled(2000, 12), scaled(1000, 7)
 # Edits before memory is looked at; what more it may be, MB.
@@ -305,6 +305,7 @@ def test_no_message_ends_the_server(studio: Served) -> None:
     note("studio: fuzzed messages", messages=FUZZED, closed=closed, servers_ended=0)
 
 
+@only_in_soak
 def test_edits_take_little_memory(studio: Served, monkeypatch: pytest.MonkeyPatch) -> None:
     if not SOAK:
         monkeypatch.setattr("planfly.studio.jobs.Jobs.fly", lambda self, session: None)
@@ -327,6 +328,7 @@ def test_edits_take_little_memory(studio: Served, monkeypatch: pytest.MonkeyPatc
     assert taken[1] - taken[0] <= MOST_MEMORY
 
 
+@only_in_soak
 def test_a_long_work_is_stopped(studio: Served, monkeypatch: pytest.MonkeyPatch) -> None:
     if not SOAK:
         # Of a campaign nothing counts here but that it takes long.

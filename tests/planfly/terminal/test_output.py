@@ -15,6 +15,7 @@ import pytest
 from planfly.terminal import output
 from planfly.terminal.command_parser import coloured
 from planfly.terminal.output import progress
+from tests.soak import only_in_soak
 
 CODE = """
 import sys
@@ -45,6 +46,7 @@ def test_the_exit_code_survives_a_reader_that_leaves() -> None:
     assert errors == ""
 
 
+@only_in_soak
 def test_a_reader_that_stays_gets_every_line() -> None:
     done = subprocess.run([sys.executable, "-c", CODE], input="go on\n", capture_output=True, text=True, check=False)
     assert done.returncode == 4

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from planfly.terminal.signal_watch import end_process
-from tests.soak import at_most, some
+from tests.soak import at_most, only_in_soak, some
 from tests.stopwatch import Stopwatch
 from world.interruption import unfinished
 
@@ -143,6 +143,7 @@ def test_time_that_a_command_waits_for_a_processor_is_no_grace() -> None:
     assert (out, said) == ("saved\n", "")
 
 
+@only_in_soak
 def test_it_ends_in_time_where_no_pipe_can_be_told_not_to_block(tmp_path: Path) -> None:
     """As on Windows before Python 3.12."""
     text, least = BODIES["in C"]

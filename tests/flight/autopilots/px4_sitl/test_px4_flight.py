@@ -22,7 +22,7 @@ from tests.autopilots import shorten_run_in
 from tests.flight.autopilots.px4_sitl.conftest import MakeFake
 from tests.flight.autopilots.px4_sitl.fake_px4 import CIRCLE
 from tests.setups import setup_maker, waypoint_mission
-from tests.soak import SOAK, some
+from tests.soak import SOAK, only_in_soak, some
 from world.arrays import Floats
 from world.errors import CrashError, FlightError
 
@@ -94,6 +94,7 @@ def test_px4s_link_flies_the_mission_to_its_end(fake_px4: MakeFake, tmp_path: Pa
     assert left_behind() == []
 
 
+@only_in_soak
 @pytest.mark.usefixtures("short_run_in_but_for_a_soak")
 def test_the_flight_goes_once_around_where_px4_circles_about_its_last_waypoint(fake_px4: MakeFake) -> None:
     made = make_setup()
@@ -152,6 +153,7 @@ def test_what_goes_wrong_with_px4_is_one_line_that_names_it(
     assert left_behind() == []
 
 
+@only_in_soak
 @pytest.mark.usefixtures("short_run_in")
 def test_a_dive_into_the_ground_is_a_flight_that_ended_so(fake_px4: MakeFake) -> None:
     setup = setup_maker(AEROSONDE)(WAY * [1.0, 3.0, 1.0] - [0.0, 0.0, 300.0])
