@@ -19,6 +19,7 @@ export, foxglove_layout              files for ground stations, maps and other p
 replay, timeline, instruments, movie a flight again, from its log
 play_to_foxglove, play_to_stations   the same in other programs
 import_log, refly, recover           another program's log; its mission flown in JSBSim; a damaged log
+guess_columns                        a table of columns, by which CSV, MAT, Parquet and HDF5 files are logs
 returns                              will it come home, from everywhere on its way
 survey                               how much of each photo line of a survey can be used, and what would help
 campaign, campaign_flight, winds     how likely success is; the largest wind from each direction
@@ -76,7 +77,9 @@ if TYPE_CHECKING:
     from planfly.api.fronts import plan_front as plan_front
     from planfly.api.identifying import IdentifiedAircraft as IdentifiedAircraft
     from planfly.api.identifying import identify_aircraft as identify_aircraft
+    from planfly.api.imported import ColumnGuesses as ColumnGuesses
     from planfly.api.imported import Reflown as Reflown
+    from planfly.api.imported import guess_columns as guess_columns
     from planfly.api.imported import import_log as import_log
     from planfly.api.imported import recover as recover
     from planfly.api.imported import refly as refly
@@ -179,6 +182,8 @@ _HOMES = {
         "planfly.api.fronts": ("plan_front",),
         "planfly.api.imported": (
             "Reflown",
+            "ColumnGuesses",
+            "guess_columns",
             "import_log",
             "recover",
             "refly",

@@ -23,6 +23,7 @@ _ORDER = (
     *("compare", "export", "foxglove_layout", "timeline", "instruments", "movie", "play_to_foxglove"),
     *(
         "play_to_stations",
+        "guess_columns",
         "import_log",
         "refly",
         "recover",

@@ -31,14 +31,16 @@ FORMAT = "PX4 log"
 _HEADER = 16
 # Letters of all records (PX4, "ULog File Format").
 _LETTERS = b"BFIMPQARDLCSO"
+# Topics of the wind, the first with rows is read: of the state estimator, of the airspeed selector (PX4 1.12 and 1.13
+# log only this one), and of releases before 1.12.
+WIND_TOPICS = ("wind", "airspeed_wind", "wind_estimate")
 _TOPICS = [
     "vehicle_global_position",
     "vehicle_local_position",
     "vehicle_attitude",
     "airspeed_validated",
     "airspeed",
-    "wind",
-    "wind_estimate",
+    *WIND_TOPICS,
     "battery_status",
     "vehicle_status",
     "navigator_mission_item",
@@ -231,10 +233,8 @@ class Topics:
         yield "velocity", self._velocity()
         yield "attitude", self.attitude()
         yield "airspeed", self._airspeed()
-        wind = self.table("wind", ("windspeed_east", "windspeed_north"))
-        if wind is None:
-            wind = self.table("wind_estimate", ("windspeed_east", "windspeed_north"))
-        yield "wind", wind if wind is not None and np.any(wind.values) else None
+        winds = (self.table(topic, ("windspeed_east", "windspeed_north")) for topic in WIND_TOPICS)
+        yield "wind", next((wind for wind in winds if wind is not None and np.any(wind.values)), None)
         yield "battery", self._battery()
         yield "throttle", self.table("actuator_controls_0", ("control[3]",))
 

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from logs.importers.motion import MotionLog, Samples, first_on_ground, rising
-from logs.importers.px4_log import Topics, open_topics
+from logs.importers.px4_log import WIND_TOPICS, Topics, open_topics
 from world.arrays import Flags, Floats
 from world.errors import LogError
 
@@ -23,8 +23,7 @@ _TOPICS = [
     "vehicle_local_position",
     "vehicle_global_position",
     "airspeed_validated",
-    "wind",
-    "wind_estimate",
+    *WIND_TOPICS,
     "actuator_servos",
     "actuator_motors",
     "actuator_controls_0",
@@ -141,7 +140,7 @@ def _inertial(topics: Topics) -> Samples:
 
 def _wind(topics: Topics) -> Samples:
     """Return the wind vector, north and east, in the direction of the air's motion."""
-    for topic in ("wind", "wind_estimate"):
+    for topic in WIND_TOPICS:
         wind = _samples(topics, topic, ("windspeed_north", "windspeed_east"))
         if len(wind.time):
             return wind

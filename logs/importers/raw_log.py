@@ -99,6 +99,7 @@ class RawLog:
     utc_start: s since 1970 at time 0 of the log's clock; NaN if not known.
     clock_jumps: times at which the log's clock went back permanently, s.
     damage: parts that could not be read.
+    sha256: of the bytes of all files of a log that has several; "" for a log of one file.
     """
 
     source: str
@@ -116,6 +117,7 @@ class RawLog:
     utc_start: float = math.nan
     clock_jumps: tuple[float, ...] = ()
     damage: Damage = field(default_factory=Damage)
+    sha256: str = ""
 
 
 # ----------------------------------------------------------------------

@@ -1,10 +1,12 @@
 """Import and judge flight logs of other programs, fly their missions again, recover damaged logs."""
 
 import tempfile
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Unpack
 
+from logs.importers.columns.file_names import FOLDER_TABLE, TABLE_SUFFIX, is_table
 from logs.recording.reader import FlightLog, read_log
 from logs.recording.recorder import Recorder
 from logs.recording.recover import recover_log
@@ -25,6 +27,7 @@ from planfly.workflow.output_paths import (
     clean_folder,
 )
 from world.errors import LogError, ScenarioError
+from world.extras import needs_extra
 from world.files import write_whole
 
 # Number of rows recorded per call; it is limited because a recorder needs many times the memory of a row.
@@ -66,7 +69,8 @@ def import_log(
 ) -> ImportedFlight:
     """Read a flight from another program's log, judge it against its plan, and write it as a flight log.
 
-    log: log of ArduPilot (.BIN, .log), a ground station (.tlog) or PX4 (.ulg), or a track (.gpx, .igc, .kml, .kmz).
+    log: log of ArduPilot (.BIN, .log), a ground station (.tlog) or PX4 (.ulg), a track (.gpx, .igc, .kml, .kmz), a
+    table of columns (NAME.columns.toml), or a data file (.csv, .mat, .parquet, .h5) with a table next to it.
     target: the MCAP flight log to write; None writes no log.  overwrite: True replaces an existing log.
     plan: the planned mission or plan.json, which replaces the mission in the log.
     flight: number of the flight in the log, from 1; None for the flight with the longest time in AUTO.
@@ -81,6 +85,44 @@ def import_log(
     if target is not None:
         _write_log(Path(target), flight)
     return flight
+
+
+@dataclass(frozen=True, slots=True)
+class ColumnGuesses:
+    """Result of `planfly.guess_columns`.
+
+    table: the table that was written.
+    guesses: number of its lines that are guesses, to be checked.
+    missing: quantities that were not found, in lines.
+    """
+
+    table: Path
+    guesses: int
+    missing: tuple[str, ...]
+
+
+@needs_extra("data-logs")
+def guess_columns(
+    files: str | Path | Sequence[str | Path], table: str | Path, *, overwrite: bool = False
+) -> ColumnGuesses:
+    """Write a starting table of columns for data files, guessed from names and values, to be checked by a person.
+
+    files: CSV, MAT, Parquet or HDF5 files of one flight, the main one first.
+    table: the table to write, ``NAME.columns.toml`` or ``columns.toml``.  overwrite: True replaces an existing one.
+    Raises a `planfly.PlanflyError` for bad input; then nothing is written.
+    """
+    from logs.importers.columns.guesses import guess_table
+
+    target = Path(table)
+    if not is_table(target):
+        allowed = f"expected {FOLDER_TABLE} or a name that ends with {TABLE_SUFFIX}"
+        raise LogError(f"{target}: {allowed}", file=target, allowed=allowed)
+    check_output_file(target, overwrite)
+    text = guess_table([Path(file) for file in ([files] if isinstance(files, str | Path) else files)], target)
+    write_whole(target, text.encode())
+    lines = text.splitlines()
+    missing = tuple(line.removeprefix("# ") for line in lines if line.startswith("# Not found"))
+    return ColumnGuesses(target, sum("# guess" in line for line in lines), missing)
 
 
 def _write_log(target: Path, flight: ImportedFlight) -> None:

@@ -19,6 +19,7 @@ from planfly.terminal.options import (
 )
 from planfly.terminal.output import give_answer, give_junit
 from planfly.terminal.results import print_verdict, warn_of_loss
+from world.errors import PlanflyError
 
 if TYPE_CHECKING:
     from planfly import ImportedFlight, Reflown
@@ -30,6 +31,7 @@ def import_log_options(line: LineParser) -> None:
         "import",
         "convert an autopilot's log into a flight log, and judge the flight against its plan",
         "planfly import 00000042.BIN flight.mcap --terrain dem.tif --aircraft aerosonde",
+        "planfly import flight.columns.toml --columns-from flight.csv",
     )
     with_completer(
         parser.add_argument(
@@ -40,7 +42,18 @@ def import_log_options(line: LineParser) -> None:
         ),
         files(*IMPORTED_LOGS),
     )
-    parser.add_argument("target", metavar="FLIGHT.mcap", help="the flight log to write")
+    parser.add_argument("target", metavar="FLIGHT.mcap", nargs="?", help="the flight log to write")
+    with_completer(
+        parser.add_argument(
+            "--columns-from",
+            dest="files",
+            metavar="FILE",
+            nargs="+",
+            help="write a table of columns for these CSV, MAT, Parquet or HDF5 files to LOG, guessed from names and"
+            " values, for you to check; needs the extra planfly[data-logs]",
+        ),
+        files("csv", "mat", "parquet", "h5", "hdf5"),
+    )
     imported_log_options(parser)
     world_options(parser)
     aircraft_and_wind_options(parser)
@@ -49,6 +62,10 @@ def import_log_options(line: LineParser) -> None:
 
 def import_log(args: argparse.Namespace) -> int:
     """Import a log; return the exit code of the verdict, or 3 if part of the log could not be read."""
+    if args.files is not None:
+        return _guess_columns(args)
+    if args.target is None:
+        raise PlanflyError("import needs FLIGHT.mcap, the flight log to write", field="FLIGHT.mcap")
     flight = call(planfly.import_log, args)
     print_verdict(flight.verdict, flight.setup.route.notes)
     print(f"log       {Path(args.target)} ({len(flight.track)} rows)")
@@ -56,6 +73,22 @@ def import_log(args: argparse.Namespace) -> int:
     give_answer(args, lambda: _import_answer(Path(args.target), flight, code))
     give_junit(args, {args.log: flight.verdict})
     return code
+
+
+def _guess_columns(args: argparse.Namespace) -> int:
+    """Write a starting table of columns, and print how many of its lines are to be checked."""
+    for name, value in (("FLIGHT.mcap", args.target), ("--json", args.json), ("--junit", args.junit)):
+        if value is not None:
+            raise PlanflyError(f"--columns-from writes a table and no flight log: without {name}", field=name)
+    guesses = planfly.guess_columns(args.files, args.log, overwrite=args.overwrite)
+    print(f"table     {args.log}: {guesses.guesses} guesses to check")
+    for line in guesses.missing:
+        print(f"  {line}")
+    print(
+        f"next      check it, then `planfly import {args.log} FLIGHT.mcap`, or"
+        f" `planfly aircraft --identify {args.log} ...`"
+    )
+    return FLYABLE
 
 
 def _import_answer(target: Path, flight: "ImportedFlight", code: int) -> object:

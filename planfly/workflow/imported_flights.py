@@ -111,7 +111,7 @@ def import_flight(path: Path, options: LogOptions) -> ImportedFlight:
     source = ImportedLog(
         missing=None if plan is not None or flight.mission is None else flight.mission.missing,
         file=path.name,
-        sha256=_sha256(path),
+        sha256=flight.raw.sha256 or _sha256(path),
         format=flight.raw.format,
         program=flight.raw.program,
         utc_start=flight.raw.utc_start,

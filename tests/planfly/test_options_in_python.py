@@ -25,7 +25,7 @@ FUNCTIONS = {
     "compare": ("compare",),
     "replay": ("replay", "timeline", "instruments", "movie", "play_to_foxglove", "play_to_stations"),
     "recover": ("recover",),
-    "import": ("import_log",),
+    "import": ("import_log", "guess_columns"),
     "refly": ("refly",),
     "campaign": ("campaign", "campaign_flight"),
     "winds": ("winds",),

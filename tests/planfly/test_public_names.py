@@ -35,6 +35,7 @@ VERBS = {
     *("compare", "export", "foxglove_layout", "replay", "timeline", "instruments", "movie", "play_to_foxglove"),
     *(
         "play_to_stations",
+        "guess_columns",
         "import_log",
         "refly",
         "recover",
@@ -60,7 +61,7 @@ VERBS = {
 }
 RESULTS = {
     *("AircraftNumbers", "BestFound", "CampaignFlight", "CampaignResult", "Comparison", "ExportedFiles", "FlightLog"),
-    *("Front", "FrontPlan", "IdentifiedAircraft"),
+    *("ColumnGuesses", "Front", "FrontPlan", "IdentifiedAircraft"),
     *("FlownMission", "ImportedFlight", "Instruments", "Judged", "Optimiser", "PaperTables", "Plan", "PlanThenFly"),
     *(
         "Reflown",

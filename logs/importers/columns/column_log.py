@@ -112,6 +112,18 @@ class ColumnLog:
             clock, entry.column or "", f"columns.{quantity}.column", entry.clock
         )
 
+    def parameters(self) -> dict[str, float]:
+        """Return the autopilot's parameters by name."""
+        if self.table.parameter_columns is None:
+            return dict(self.table.parameters)
+        data = self._data(next(iter(self.table.clocks.values())))
+        names, values = (self._named(data, column, "parameter_columns") for column in self.table.parameter_columns)
+        if len(names) != len(values):
+            raise self._error("parameter_columns", f"{len(names)} names", f"{len(values)} values: expected as many")
+        numbers = _numbers(values, self._place(data, self.table.parameter_columns[1]))
+        stored = {text_of(name): value for name, value in zip(names, numbers.tolist(), strict=True)}
+        return {name: value for name, value in stored.items() if math.isfinite(value)} | self.table.parameters
+
     # ------------------------------------------------------------------
     # Files and clocks.
 
@@ -184,7 +196,16 @@ class ColumnLog:
 
     def _times(self, name: str) -> Floats:
         """Return the times of a clock on the main clock."""
+        self._check_overlap(name)
         return self._own_times(name) + self._shift(name)
+
+    def _check_overlap(self, name: str) -> None:
+        """Raise LogError for a clock without any time in common with the main clock, if nothing aligns it."""
+        own, main = self._own_times(name), self._own_times(self._main)
+        if self.table.clocks[name].align is None and (own[0] > main[-1] or own[-1] < main[0]):
+            spans = f"{own[0]:.6g} to {own[-1]:.6g} s, and {self._main} from {main[0]:.6g} to {main[-1]:.6g} s"
+            allowed = f"runs from {spans}: expected the same clock, `offset_s` or `align`"
+            raise self._error(f"clocks.{name}", self.table.clocks[name].column or "rows", allowed)
 
     def _own_times(self, name: str) -> Floats:
         """Return the times of a clock before its alignment; dates are counted from the start of the main clock."""
@@ -276,6 +297,9 @@ class ColumnLog:
         if self.table.span_s is not None:
             begin, end = self.table.span_s
             inside = (time >= begin) & (time <= end)
+            if not inside.any():
+                allowed = f"no rows of {quantity}, which has {time[0]:.6g} to {time[-1]:.6g} s"
+                raise self._error("span_s", f"{begin:g} to {end:g} s", allowed)
             time, values = time[inside], values[inside]
         return Series(time, values)
 

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from logs.importers.columns.column_checks import check_signs_and_units
 from logs.importers.columns.column_log import ColumnLog, Series
 from logs.importers.columns.quantities import FRACTION_UNITS
 from logs.importers.columns.wind_triangle import wind_of_triangle
@@ -29,6 +30,7 @@ def read_column_motion(path: Path) -> MotionLog:
     Raises LogError, in one line, for a file that cannot be read.
     """
     log = ColumnLog(path)
+    check_signs_and_units(log)
     air, velocity = read_air(log), read_velocity(log)
     controls, angles, elevons = _controls(log)
     place = _group(log, "latitude", "longitude", "altitude")
@@ -56,7 +58,7 @@ def read_column_motion(path: Path) -> MotionLog:
         ratio=air.ratio,
         height=_group(log, "altitude"),
         battery=_group(log, "voltage", "current"),
-        parameters=dict(log.table.parameters),
+        parameters=log.parameters(),
         home=first_on_ground(place, velocity),
         program_kind="columns",
         controls=controls,

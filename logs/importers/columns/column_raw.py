@@ -6,10 +6,12 @@ from pathlib import Path
 
 import numpy as np
 
+from flight.mission_files.formats import read_mission
 from flight.simulation.setup import VerticalDatum
+from logs.importers.columns.column_checks import check_signs_and_units
 from logs.importers.columns.column_log import ColumnLog, text_of
 from logs.importers.columns.column_motion import join, read_air, read_velocity
-from logs.importers.raw_log import LogSeries, ModeChange, RawLog
+from logs.importers.raw_log import LoggedMission, LogSeries, ModeChange, RawLog
 from world.arrays import Floats
 from world.errors import LogError
 
@@ -26,6 +28,7 @@ def read_columns(path: Path) -> RawLog:
     for quantity in ("latitude", "longitude"):
         if not log.has(quantity):
             raise LogError.at(log.table_path, f"columns.{quantity}", "missing", "a flight is judged by its positions")
+    check_signs_and_units(log)
     position = _position(log)
     return RawLog(
         source=str(path),
@@ -36,9 +39,11 @@ def read_columns(path: Path) -> RawLog:
         heights=(),
         datum=_DATUMS[log.frame("altitude")] if log.has("altitude") else "unstated",
         modes=tuple(_modes(log)),
-        parameters=dict(log.table.parameters),
+        missions=tuple(_missions(log)),
+        parameters=log.parameters(),
         clock="start",
         utc_start=log.utc_start,
+        sha256=log.sha256,
     )
 
 
@@ -50,7 +55,7 @@ def _position(log: ColumnLog) -> LogSeries:
         altitude = join([log.series("altitude")])
         up = np.interp(parts.time, altitude.time, altitude.values[:, 0])
     values = np.column_stack([np.degrees(parts.values), up])
-    return LogSeries(_name(log, "latitude"), parts.time, values)
+    return LogSeries(_name(log, "altitude" if log.has("altitude") else "latitude"), parts.time, values)
 
 
 def _series(log: ColumnLog) -> Iterator[tuple[str, LogSeries]]:
@@ -89,6 +94,12 @@ def _battery(log: ColumnLog) -> LogSeries:
     steps = np.diff(battery.time, prepend=battery.time[:1])
     energy: Floats = np.cumsum(power * steps) / 3600.0
     return LogSeries("battery", battery.time, np.column_stack([battery.values[:, 0], energy]))
+
+
+def _missions(log: ColumnLog) -> Iterator[LoggedMission]:
+    if log.table.mission is not None:
+        path = log.table_path.parent / log.table.mission
+        yield LoggedMission(0.0, read_mission(path), path.name)
 
 
 def _modes(log: ColumnLog) -> Iterator[ModeChange]:

@@ -91,12 +91,16 @@ class LogTable(_Table):
     """Table of columns of one flight log.
 
     file: the data file, relative to the table; a data file that is opened by its own name takes its place.
-    program: name of the program that flew, for people.
+    program: name of the program that flew: "ArduPlane V4.5.0".
+    mission: mission file that the vehicle followed, relative to the table.
+    parameter_columns: columns with names and values of the autopilot's parameters, in addition to [parameters].
     span_s: first and last time on the main clock to read, s.
     """
 
     file: str | None = None
     program: str = ""
+    mission: str | None = None
+    parameter_columns: tuple[str, str] | None = None
     span_s: tuple[float, float] | None = None
     clocks: dict[str, ClockTable] = {}
     columns: dict[str, Entries]

@@ -95,7 +95,9 @@ def _read_csv(path: Path) -> DataFile:
     from io import StringIO
 
     body = "\n".join(line for _, line in rows)
-    table = pd.read_csv(StringIO(body), sep=separator, header=None, names=names, decimal=decimal, low_memory=False)
+    # The names are given, so that a separator at the end of a row does not make its first cell an index.
+    options = {"header": None, "names": names, "index_col": False, "skipinitialspace": True, "low_memory": False}
+    table = pd.read_csv(StringIO(body), sep=separator, decimal=decimal, **options)
     return DataFile(path, {str(name): _without_text(table[name].to_numpy()) for name in table.columns}, units)
 
 
@@ -103,9 +105,9 @@ def _is_remark(line: str, next_lines: list[str]) -> bool:
     """Return True for a remark; the last line with a # before the rows can be the header."""
     if not line.lstrip().startswith(("#", "%")):
         return False
-    following = next_lines[0] if next_lines else ""
     separator = max(_SEPARATORS, key=line.count)
-    return line.count(separator) == 0 or line.count(separator) != following.count(separator)
+    widths = [text.rstrip(f" {separator}").count(separator) for text in (line, *next_lines)]
+    return widths[0] == 0 or widths[0] != widths[-1] or not next_lines
 
 
 def _check_widths(path: Path, rows: list[tuple[int, str]], separator: str, width: int) -> None:

@@ -12,7 +12,7 @@ UNITS: dict[str, dict[str, float]] = {
     "length": {"m": 1.0, "ft": 0.3048, "km": 1000.0, "cm": 0.01, "mm": 0.001},
     "deflection": {"rad": 1.0, "deg": math.pi / 180.0, "fraction": 1.0, "%": 0.01},
     "fraction": {"fraction": 1.0, "%": 0.01},
-    "voltage": {"V": 1.0, "mV": 0.001},
+    "voltage": {"V": 1.0, "cV": 0.01, "mV": 0.001},
     "current": {"A": 1.0, "cA": 0.01, "mA": 0.001},
     "pressure": {"Pa": 1.0, "hPa": 100.0, "mbar": 100.0, "kPa": 1000.0},
     "temperature": {"degC": 1.0, "K": 1.0},

@@ -10,6 +10,7 @@ import pytest
 from aircraft.identification.estimate import aligned_signals, fit_all
 from logs.importers.motion import MotionLog
 from logs.importers.motion_log import read_motion
+from logs.importers.open_log import open_log
 from planfly.identification.records import flight_records
 from tests.aircraft.identification.flown_truth import flown_truth
 from tests.instrumented_flights import PX4_PARAMETERS, px4_topics, short_motion, write_px4
@@ -232,6 +233,19 @@ def test_controls_of_releases_before_1_14_are_read(tmp_path: Path) -> None:
     shares = read_motion(write_px4(tmp_path / "a.ulg", topics, {})).controls.values
     # Roll, pitch, yaw and throttle there; pitch, roll, yaw, throttle here.
     assert shares[0] == pytest.approx([-0.2, 0.1, 0.3, 0.6])
+
+
+@pytest.mark.parametrize("topic", ["airspeed_wind", "wind_estimate"])
+def test_the_wind_of_releases_before_1_14_is_read(tmp_path: Path, topic: str) -> None:
+    topics = px4_topics(short_motion())
+    topics[topic] = topics.pop("wind")
+    path = write_px4(tmp_path / "a.ulg", topics, PX4_PARAMETERS)
+    wind = short_motion().wind
+    found = read_motion(path).wind
+    assert found.values == pytest.approx(wind.values[:: len(wind.values) // len(found.values)][: len(found.values)])
+    # North and east there, east and north in an imported log.
+    imported = open_log(path).series["wind"]
+    assert (imported.source, imported.values[0].tolist()) == (topic, found.values[0, ::-1].tolist())
 
 
 @pytest.mark.parametrize(

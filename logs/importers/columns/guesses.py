@@ -1,0 +1,347 @@
+"""Write a starting table of columns for data files, guessed from names and values, for a person to check."""
+
+import os
+import re
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from logs.importers.columns.column_table import MAIN_CLOCK
+from logs.importers.columns.data_files import Column, DataFile, read_data_file
+from logs.importers.columns.quantities import QUANTITIES, UNIT_ZEROS, UNITS
+from world.arrays import Floats
+from world.errors import LogError
+
+# Names of columns by quantity, in lower case without other characters than letters and digits; the first one wins.
+NAMES: dict[str, tuple[str, ...]] = {
+    "latitude": ("navlat", "lat", "latitude", "gpslat", "latitudedeg"),
+    "longitude": ("navlon", "lon", "lng", "long", "longitude", "gpslon", "gpslng"),
+    "altitude": ("navalt", "altitude", "altmsl", "altamsl", "alt", "height", "gpsalt", "h"),
+    "velocity_north": ("navvn", "vn", "velnorth", "velocitynorth", "vnorth", "veln", "vx"),
+    "velocity_east": ("navve", "ve", "veleast", "velocityeast", "veast", "vele", "vy"),
+    "velocity_down": ("navvd", "vd", "veldown", "velocitydown", "vdown", "veld", "vz"),
+    "ground_speed": ("groundspeed", "gs", "gspd", "sog", "spd"),
+    "ground_course": ("groundcourse", "course", "cog", "gcrs", "courseoverground"),
+    "roll": ("roll", "phi", "bank", "rollangle"),
+    "pitch": ("pitch", "theta", "pitchangle"),
+    "yaw": ("yaw", "psi", "heading", "hdg", "yawangle"),
+    "roll_rate": ("p", "rollrate", "gyrx", "gyrox", "rollspeed", "wx"),
+    "pitch_rate": ("q", "pitchrate", "gyry", "gyroy", "pitchspeed", "wy"),
+    "yaw_rate": ("r", "yawrate", "gyrz", "gyroz", "yawspeed", "wz"),
+    "acceleration_forward": ("ax", "accx", "accelx", "accelerationx", "xacc"),
+    "acceleration_right": ("ay", "accy", "accely", "accelerationy", "yacc"),
+    "acceleration_down": ("az", "accz", "accelz", "accelerationz", "zacc"),
+    "airspeed": ("ias", "airspeed", "arspd", "eas", "cas", "aspd", "tas", "trueairspeed", "va"),
+    "wind_north": ("windnorth", "windn", "vwn", "wn"),
+    "wind_east": ("windeast", "winde", "vwe", "we"),
+    "wind_speed": ("windspeed", "wspd"),
+    "wind_direction": ("winddirection", "winddir", "wdir"),
+    "static_pressure": ("staticpressure", "pstatic", "ps", "press", "pressure", "baropress"),
+    "temperature": ("temperature", "oat", "temp"),
+    "elevator": ("elevator", "elev", "ele", "de"),
+    "aileron": ("aileron", "ail", "da"),
+    "aileron_left": ("aileronleft", "leftaileron", "dal", "aill"),
+    "aileron_right": ("aileronright", "rightaileron", "dar", "ailr"),
+    "elevon_left": ("elevonleft", "leftelevon"),
+    "elevon_right": ("elevonright", "rightelevon"),
+    "rudder": ("rudder", "rud", "dr"),
+    "throttle": ("throttle", "dthr", "thr", "throut", "motorthrottle", "dt"),
+    "voltage": ("voltage", "volt", "volts", "vbat", "batteryvoltage", "motorvoltage"),
+    "current": ("current", "curr", "amp", "amps", "ibat", "batterycurrent", "motorcurrent"),
+    "mode": ("flightmode", "modenum", "mode"),
+}
+# Names of columns of times.
+_TIMES = (
+    "time",
+    "times",
+    "timestamp",
+    "timems",
+    "timeus",
+    "timeboot",
+    "elapsed",
+    "elapsedtime",
+    "t",
+    "motortime",
+    "seconds",
+)
+# Quantities that decide by themselves what can be done with a log, for the list of what was not found.
+_NEEDED = {
+    "import": ("latitude", "longitude", "altitude"),
+    "aircraft --identify": (
+        *("roll", "pitch", "yaw", "roll_rate", "pitch_rate", "yaw_rate"),
+        *("acceleration_forward", "acceleration_right", "acceleration_down"),
+        *(
+            "velocity_north",
+            "velocity_east",
+            "velocity_down",
+            "altitude",
+            "airspeed",
+            "elevator",
+            "aileron",
+            "throttle",
+        ),
+    ),
+}
+# Units by their spellings at the end of a column's name, or in a row below the header.
+_SPELLINGS = {
+    **{unit.lower(): unit for units in UNITS.values() for unit in units if unit not in ("", "iso", "fraction")},
+    **{"degs": "deg/s", "dps": "deg/s", "rads": "rad/s", "mps": "m/s", "kts": "kt", "knots": "kt", "kmh": "km/h"},
+    **{"mps2": "m/s2", "m/s^2": "m/s2", "c": "degC", "pct": "%", "percent": "%", "sec": "s"},
+}
+# Units to try for each dimension, the first in which the values are plausible is guessed.
+_TRIED = {
+    "angle": ("rad", "deg", "cdeg", "degE7"),
+    "angular rate": ("rad/s", "deg/s"),
+    "acceleration": ("m/s2", "g", "cm/s2"),
+    "speed": ("m/s", "cm/s"),
+    "length": ("m", "mm"),
+    "deflection": ("rad", "deg"),
+    "fraction": ("fraction", "%"),
+    "voltage": ("V", "cV", "mV"),
+    "current": ("A", "cA", "mA"),
+    "pressure": ("kPa", "hPa", "Pa"),
+    "temperature": ("degC", "K"),
+}
+# Range of usual intervals between rows, s.
+_STEPS_S = (0.001, 5.0)
+# Least median of some quantities in flight, which tells their units apart.
+_LEAST_MEDIANS = {"acceleration_down": 4.0, "voltage": 2.5}
+# Highest voltage that is guessed, V.
+_HIGHEST_VOLTAGE_V = 130.0
+_HEAD = (
+    "# Table of columns, guessed from names and values.  Check column, unit, sign and frame of each line with the mark",
+    "# `guess`, and remove the mark.  planfly refuses what contradicts itself, but cannot know the sign of a surface,",
+    "# or the datum of an altitude.",
+    "",
+)
+_UNIT_SUFFIX = re.compile(r"(?:\s*[\[(]\s*([^\])]*)\s*[\])]|_([a-zA-Z%]+[0-9]?))\s*$")
+
+
+@dataclass(frozen=True, slots=True)
+class _Clock:
+    """Column of times of a group of columns: the columns of one file with one prefix and one length.
+
+    unit: of its times.  span: first and last time, s.
+    """
+
+    file: str
+    prefix: str
+    column: str
+    unit: str
+    length: int
+    span: tuple[float, float]
+
+    @property
+    def group(self) -> tuple[str, str, int]:
+        """File, prefix and length of the columns on this clock."""
+        return self.file, self.prefix, self.length
+
+    def overlap(self, other: "_Clock") -> float:
+        """Return the time that this clock has in common with another clock, s."""
+        return min(self.span[1], other.span[1]) - max(self.span[0], other.span[0])
+
+
+@dataclass(frozen=True, slots=True)
+class _Guess:
+    quantity: str
+    column: str
+    clock: _Clock
+    unit: str
+    frame: str
+    reason: str
+
+
+def guess_table(paths: Sequence[Path], target: Path) -> str:
+    """Return the text of a table of columns for data files.
+
+    paths: the files, of which the first is the main one.  target: the table that will hold the text.
+    Raises LogError for a file that cannot be read, and if no column was recognised.
+    """
+    files = {_relative(path, target): read_data_file(path) for path in paths}
+    times = [clock for file, data in files.items() for clock in _times(data, file)]
+    clocks: list[_Clock] = []
+    for clock in sorted(times, key=lambda clock: -clock.length):
+        # Of two columns of times in a group, the one that covers the times of the longest group.
+        rivals = [
+            other
+            for other in times
+            if (other.file, other.prefix, other.length) == (clock.file, clock.prefix, clock.length)
+        ]
+        best = max(rivals, key=lambda rival: rival.overlap(clocks[0]) if clocks else 0.0)
+        if best not in clocks:
+            clocks.append(best)
+    guesses: list[_Guess] = []
+    rivals_of_guesses: list[_Guess] = []
+    for quantity in NAMES:
+        found = list(_candidates(quantity, clocks, files))
+        guesses += found[:1]
+        rivals_of_guesses += [guess for guess in found[1:] if guess.clock != found[0].clock]
+    if not guesses:
+        names = ", ".join(list(next(iter(files.values())).columns)[:12])
+        raise LogError(f"{paths[0]}: no column was recognised among {names}; write a table by hand", file=paths[0])
+    return _table_text(guesses, rivals_of_guesses, files)
+
+
+def _relative(path: Path, target: Path) -> str:
+    return Path(os.path.relpath(path, target.parent)).as_posix()
+
+
+def _plain(name: str) -> str:
+    return re.sub(r"[^a-z0-9]", "", name.lower())
+
+
+def _parts(data: DataFile, column: str) -> tuple[str, str, str]:
+    """Return the group of a column, its own name without a unit, and the unit that name or file state."""
+    prefix, _, own = column.rpartition(".")
+    unit = _SPELLINGS.get(data.units.get(column, "").strip().lower(), "")
+    match = _UNIT_SUFFIX.search(own)
+    spelling = (match[1] or match[2] or "").strip().lower() if match else ""
+    if match and spelling in _SPELLINGS and match.start() > 0:
+        return prefix, own[: match.start()], unit or _SPELLINGS[spelling]
+    return prefix, own, unit
+
+
+def _times(data: DataFile, file: str) -> Iterator[_Clock]:
+    """Yield each column of rising times."""
+    for column, values in data.columns.items():
+        prefix, own, unit = _parts(data, column)
+        if {_plain(own), _plain(column.rpartition(".")[2])} & set(_TIMES) and (unit := _time_unit(values, unit)):
+            factor = UNITS["time"][unit]
+            span = (0.0, 0.0) if unit == "iso" else (float(values[0]) * factor, float(values[-1]) * factor)
+            yield _Clock(file, prefix, column, unit, len(values), span)
+
+
+def _time_unit(values: Column, stated: str) -> str:
+    """Return the unit in which a column holds rising times, or "" if it holds none."""
+    if values.dtype.kind == "M":
+        return "iso"
+    if values.dtype.kind not in "fiu":
+        return "iso" if len(values) and re.match(r"\d{4}-\d\d-\d\d", str(values[0])) else ""
+    steps = np.diff(values.astype(np.float64))
+    if len(steps) < 2 or not np.isfinite(steps).all() or (steps < 0.0).any() or not (steps > 0.0).any():
+        return ""
+    usual = float(np.median(steps[steps > 0.0]))
+    units = [stated] if stated in UNITS["time"] else ["s", "ms", "us", "ns"]
+    return next((unit for unit in units if _STEPS_S[0] <= usual * UNITS["time"][unit] <= _STEPS_S[1]), "")
+
+
+def _candidates(quantity: str, clocks: Sequence[_Clock], files: dict[str, DataFile]) -> Iterator[_Guess]:
+    """Yield the columns that can hold a quantity, the best name first."""
+    for name in NAMES[quantity]:
+        for clock in clocks:
+            data = files[clock.file]
+            for column, values in data.columns.items():
+                prefix, own, unit = _parts(data, column)
+                is_here = prefix == clock.prefix and len(values) == clock.length
+                if not is_here or name not in (_plain(own), _plain(column.rpartition(".")[2])):
+                    continue
+                guess = _guess(quantity, column, clock, values, unit)
+                if guess is not None:
+                    yield guess
+
+
+def _guess(quantity: str, column: str, clock: _Clock, values: Column, stated: str) -> _Guess | None:
+    """Return the guess of unit and frame of a column; None if its values are not plausible in any unit."""
+    entry = QUANTITIES[quantity]
+    if quantity == "mode":
+        return _Guess(quantity, column, clock, "", "", "")
+    if values.dtype.kind not in "fiu":
+        return None
+    numbers = values.astype(np.float64)
+    known = numbers[np.isfinite(numbers)]
+    if not known.size or not np.ptp(known):
+        return None
+    unit = stated if stated in UNITS[entry.dimension] else _plausible_unit(quantity, known)
+    if not unit:
+        return None
+    reason = f": largest value {np.abs(known).max():.4g}" + ("" if unit != stated else f", named {stated}")
+    return _Guess(quantity, column, clock, unit, _frame(quantity, column, known), reason)
+
+
+def _plausible_unit(quantity: str, known: Floats) -> str:
+    entry = QUANTITIES[quantity]
+    for unit in _TRIED[entry.dimension]:
+        values = known * UNITS[entry.dimension][unit] + UNIT_ZEROS.get(unit, 0.0)
+        inside = float(((values >= entry.low) & (values <= entry.high)).mean())
+        median = float(np.median(np.abs(values)))
+        is_usual = median >= _LEAST_MEDIANS.get(quantity, 0.0)
+        is_usual &= quantity != "voltage" or median <= _HIGHEST_VOLTAGE_V
+        if inside >= 0.98 and is_usual:
+            return unit
+    return ""
+
+
+def _frame(quantity: str, column: str, known: Floats) -> str:
+    if quantity == "airspeed":
+        return "true" if "tas" in column.lower() or "true" in column.lower() else "indicated"
+    if quantity == "acceleration_down":
+        return "FLU" if float(np.median(known)) > 0.0 else "FRD"
+    frames = QUANTITIES[quantity].frames
+    return frames[0] if frames else ""
+
+
+def _clock_names(guesses: Sequence[_Guess]) -> dict[_Clock, str]:
+    """Return the names of the clocks that guesses use; the one with most guesses is the main clock."""
+    counts = Counter(guess.clock for guess in guesses)
+    names: dict[_Clock, str] = {}
+    for clock, _ in counts.most_common():
+        own = clock.prefix.rpartition(".")[2] or Path(clock.file).stem
+        name = re.sub(r"\W", "_", own) if names else MAIN_CLOCK
+        names[clock] = name if name not in names.values() else f"{name}_{len(names)}"
+    return names
+
+
+def _table_text(guesses: Sequence[_Guess], rivals: Sequence[_Guess], files: dict[str, DataFile]) -> str:
+    """Return the text of the table.  rivals: other columns for the same quantities, on other clocks."""
+    file, names = next(iter(files)), _clock_names(guesses)
+    lines = [*_HEAD, f'file = "{file}"', 'program = ""']
+    main = next(clock for clock, name in names.items() if name == MAIN_CLOCK)
+    for clock, name in names.items():
+        lines += ["", f"[clocks.{name}]  # guess: {clock.length} rows"]
+        lines += [f'file = "{clock.file}"'] if clock.file != file else []
+        lines += [f'column = "{clock.column}"', f'unit = "{clock.unit}"']
+        partner = next((guess for guess in rivals if guess.clock == clock), None)
+        # Groups of one file with names of their own (GPS, IMU) share one clock.
+        if clock != main and partner is not None and (clock.file != main.file or clock.prefix == main.prefix):
+            pair = f'column = "{partner.column}", with = "{partner.quantity}"'
+            lines.append(f"align = {{ {pair} }}  # guess: both move together")
+    lines += ["", "[columns]"]
+    for guess in guesses:
+        parts = [f'column = "{guess.column}"', *([f'unit = "{guess.unit}"'] if guess.unit else [])]
+        parts += [f'frame = "{guess.frame}"'] if guess.frame else []
+        parts += [f'clock = "{names[guess.clock]}"'] if guess.clock != main else []
+        lines.append(f"{guess.quantity} = {{ {', '.join(parts)} }}  # guess{guess.reason}")
+    return "\n".join([*lines, *_missing_lines(guesses), *_unused_lines(guesses, files)]) + "\n"
+
+
+def _missing_lines(guesses: Sequence[_Guess]) -> Iterator[str]:
+    """Yield the quantities that were not found, as remarks."""
+    found = {guess.quantity for guess in guesses}
+    halves = {"elevator": "elevon_left", "aileron": "aileron_left" if "aileron_left" in found else "elevon_left"}
+    yield ""
+    for purpose, quantities in _NEEDED.items():
+        missing = [name for name in quantities if name not in found and halves.get(name) not in found]
+        if missing:
+            yield f"# Not found, and needed by planfly {purpose}: {', '.join(missing)}"
+    others = [name for name in QUANTITIES if name not in found and not any(name in need for need in _NEEDED.values())]
+    if others:
+        yield f"# Not found, and optional: {', '.join(others)}"
+
+
+def _unused_lines(guesses: Sequence[_Guess], files: dict[str, DataFile]) -> Iterator[str]:
+    """Yield the columns that no guess uses, as remarks."""
+    used = {(guess.clock.file, guess.column) for guess in guesses} | {
+        (guess.clock.file, guess.clock.column) for guess in guesses
+    }
+    for file, data in files.items():
+        kinds = {(guess.clock.prefix, guess.clock.length) for guess in guesses if guess.clock.file == file}
+        names = [
+            name
+            for name, values in data.columns.items()
+            if (file, name) not in used and (name.rpartition(".")[0], len(values)) in kinds
+        ]
+        if names:
+            yield f"# Not used of {file}: {', '.join(names)}"
