@@ -69,7 +69,7 @@ class MotionLog:
     modes: tuple[tuple[float, int], ...] = ()
     parameters: Mapping[str, float] = field(default_factory=dict)
     home: tuple[float, float, float] | None = None
-    program_kind: Literal["ardupilot", "px4", "columns"] = "ardupilot"
+    program_kind: Literal["ardupilot", "px4", "telemetry", "columns"] = "ardupilot"
     controls: Samples = field(default_factory=lambda: Samples(np.zeros(0), np.zeros((0, 4))))
     angles: tuple[bool, bool, bool] = (False, False, False)
     elevons: bool = False

@@ -41,7 +41,7 @@ def read_motion(path: Path) -> MotionLog:
     """Read a log's motion.  Raises LogError, in one line, for a file that cannot be read or that is no such log."""
     try:
         if not path.is_file():
-            raise LogError(f"{path}: no such file; expected a log (.BIN, .ulg or a table of columns)", file=path)
+            raise LogError(f"{path}: no such file; expected a log (.BIN, .tlog, .ulg or a table of columns)", file=path)
         if is_table(path) or path.suffix.lower() in DATA_SUFFIXES:
             need_extra("data-logs", f"{path}: reading {path.suffix.lower()} needs")
             from logs.importers.columns.column_motion import read_column_motion
@@ -58,8 +58,13 @@ def read_motion(path: Path) -> MotionLog:
         from logs.importers.px4_motion import read_px4_motion
 
         return read_px4_motion(path, digest)
+    if path.suffix.lower() == ".tlog":
+        need_extra("live", f"{path}: reading .tlog needs")
+        from logs.importers.telemetry_motion import read_telemetry_motion
+
+        return read_telemetry_motion(path, digest)
     if head[:2] != b"\xa3\x95":
-        allowed = "expected an ArduPilot .BIN, a PX4 .ulg or a table of columns"
+        allowed = "expected an ArduPilot .BIN, a .tlog, a PX4 .ulg or a table of columns"
         raise LogError(
             f"{path}: not a log of inertial sensors and servo outputs: {allowed}", file=path, allowed=allowed
         )

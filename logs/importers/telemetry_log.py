@@ -142,6 +142,8 @@ class TelemetryReader:
 NUMBERS = {
     "GLOBAL_POSITION_INT": ("lat", "lon", "alt", "vx", "vy", "vz"),
     "ATTITUDE": ("roll", "pitch", "yaw"),
+    "RAW_IMU": ("time_usec", "xacc", "yacc", "zacc", "xgyro", "ygyro", "zgyro"),
+    "SERVO_OUTPUT_RAW": ("time_usec", "port", *(f"servo{k}_raw" for k in range(1, 15))),
     "VFR_HUD": ("airspeed", "groundspeed", "alt", "throttle"),
     "WIND": ("direction", "speed"),
     "WIND_COV": ("wind_x", "wind_y"),
@@ -262,6 +264,15 @@ _MISSION_TYPE = 0
 
 def read_telemetry(path: Path) -> RawLog:
     """Read a log.  Raises LogError for one without GLOBAL_POSITION_INT or GPS_RAW_INT."""
+    messages, damage = vehicle_messages(path)
+    return messages.log(damage)
+
+
+def vehicle_messages(path: Path) -> tuple["VehicleMessages", Damage]:
+    """Return the messages of the vehicle with the most messages, and the damage of the file.
+
+    Raises LogError for a log without a vehicle.
+    """
     file = MappedFile(path)
     reader = TelemetryReader(memoryview(file.data), _NUMBERS, file.let_go)  # type: ignore[arg-type]  # a buffer
     systems: dict[int, SystemMessages] = {}
@@ -278,14 +289,14 @@ def read_telemetry(path: Path) -> RawLog:
     if not vehicles:
         raise LogError(f"{path}: no HEARTBEAT of a vehicle: nothing says what flew", file=path)
     # Of several vehicles take the one with the most messages.
-    return _Messages(max(vehicles, key=len), items, str(path)).log(reader)
+    return VehicleMessages(max(vehicles, key=len), items, str(path)), reader.damage()
 
 
 def _is_vehicle(message: Any) -> bool:
     return message.type not in _NO_VEHICLES and message.autopilot not in _NOT_AUTOPILOTS
 
 
-class _Messages:
+class VehicleMessages:
     """Messages of one vehicle, by name, on its own clock."""
 
     def __init__(self, own: SystemMessages, items: list[tuple[float, Any]], source: str) -> None:
@@ -296,7 +307,8 @@ class _Messages:
         self._items = [(stamp - self._offset, message) for stamp, message in items]
         self._own = {name: [(float(self._times[k]), one) for k, one in own.named(name)] for name in _KEPT_MESSAGES}
 
-    def log(self, reader: TelemetryReader) -> RawLog:
+    def log(self, damage: Damage) -> RawLog:
+        """Return everything that a verdict needs.  Raises LogError for a log without positions."""
         series = {name: found for name, found in self._series() if found is not None}
         beats = [one for _, one in self._own.get("HEARTBEAT", []) if _is_vehicle(one)]
         if "position" not in series:
@@ -318,10 +330,11 @@ class _Messages:
             events=tuple((time, _text(one.text)) for time, one in self._own.get("STATUSTEXT", [])),
             utc_start=self._offset,
             clock_jumps=self.jumps,
-            damage=reader.damage(),
+            damage=damage,
         )
 
-    def _table(self, name: str, columns: Iterable[str]) -> LogSeries | None:
+    def table(self, name: str, columns: Iterable[str]) -> LogSeries | None:
+        """Return columns of a message as sent, on the vehicle's clock; None without such messages."""
         rows = self._found.table(name)
         if not len(rows):
             return None
@@ -329,7 +342,7 @@ class _Messages:
         return LogSeries(name, self._times[rows[:, 0].astype(np.int64)], rows[:, column_numbers])
 
     def _series(self) -> Iterable[tuple[str, LogSeries | None]]:
-        place = self._table("GLOBAL_POSITION_INT", ("lat", "lon", "alt", "vy", "vx", "vz"))
+        place = self.table("GLOBAL_POSITION_INT", ("lat", "lon", "alt", "vy", "vx", "vz"))
         if place is not None:
             is_known = (place.values[:, :2] != 0.0).any(axis=1)
             place = LogSeries(place.source, place.time[is_known], place.values[is_known]) if is_known.any() else None
@@ -341,9 +354,9 @@ class _Messages:
             yield "velocity", LogSeries(place.source, place.time, scaled[:, 3:])
         else:
             yield "position", self._gps_place()
-        yield "attitude", self._table("ATTITUDE", ("roll", "pitch", "yaw"))
+        yield "attitude", self.table("ATTITUDE", ("roll", "pitch", "yaw"))
         yield "wind", self._wind()
-        hud = self._table("VFR_HUD", ("airspeed", "alt", "throttle", "groundspeed"))
+        hud = self.table("VFR_HUD", ("airspeed", "alt", "throttle", "groundspeed"))
         if hud is not None:
             # Where there is no sensor some send the ground speed.
             sensed = np.any(hud.values[:, 0] > 0.0) and not np.array_equal(hud.values[:, 0], hud.values[:, 3])
@@ -355,7 +368,7 @@ class _Messages:
         yield "battery", self._battery()
 
     def _gps_place(self) -> LogSeries | None:
-        table = self._table("GPS_RAW_INT", ("lat", "lon", "alt", "fix_type"))
+        table = self.table("GPS_RAW_INT", ("lat", "lon", "alt", "fix_type"))
         if table is None:
             return None
         fixed = table.values[:, 3] >= 3
@@ -365,19 +378,19 @@ class _Messages:
         return LogSeries("GPS_RAW_INT", table.time[fixed], scaled)
 
     def _wind(self) -> LogSeries | None:
-        own = self._table("WIND", ("direction", "speed"))
+        own = self.table("WIND", ("direction", "speed"))
         if own is not None and np.any(own.values[:, 1]):
             # The direction is where the wind comes from.
             course, speed = np.radians(own.values[:, 0]), own.values[:, 1]
             return LogSeries("WIND", own.time, np.stack([-speed * np.sin(course), -speed * np.cos(course)], axis=1))
-        covered = self._table("WIND_COV", ("wind_y", "wind_x"))
+        covered = self.table("WIND_COV", ("wind_y", "wind_x"))
         return covered if covered is not None and np.any(covered.values) else None
 
     def _battery(self) -> LogSeries | None:
-        table = self._table("BATTERY_STATUS", ("current_battery", "energy_consumed"))
+        table = self.table("BATTERY_STATUS", ("current_battery", "energy_consumed"))
         if table is not None and (table.values >= 0.0).all() and np.any(table.values[:, 1]):
             return LogSeries(table.source, table.time, table.values * np.array([0.01, 1.0 / 36.0]))
-        table = self._table("SYS_STATUS", ("current_battery", "voltage_battery"))
+        table = self.table("SYS_STATUS", ("current_battery", "voltage_battery"))
         if table is None or (table.values[:, 0] < 0.0).any() or not np.any(table.values[:, 0]):
             return None
         current, volts = table.values[:, 0] * 0.01, table.values[:, 1] * 1e-3
@@ -390,7 +403,7 @@ class _Messages:
         gps = self._gps_place()
         if gps is not None and len(self._found.table("GLOBAL_POSITION_INT")):
             yield HeightSource("GPS_RAW_INT.alt", "amsl", LogSeries(gps.source, gps.time, gps.values[:, 2:]))
-        hud = self._table("VFR_HUD", ("alt",))
+        hud = self.table("VFR_HUD", ("alt",))
         if hud is not None:
             yield HeightSource("VFR_HUD.alt", "amsl", hud)
 
@@ -417,9 +430,8 @@ class _Messages:
             elif kind in ("MISSION_ITEM", "MISSION_ITEM_INT"):
                 rows.append(Item(time, total, _item(message, scaled=kind == "MISSION_ITEM_INT"), begins_mission))
                 begins_mission = False
-        px4 = any(heartbeat.autopilot == _PX4 for _, heartbeat in self._own["HEARTBEAT"])
         for logged in gather_items(rows):
-            readable = (_px4_mission if px4 else logged_mission)(logged, self._source, "mission items")
+            readable = (_px4_mission if self.is_px4 else logged_mission)(logged, self._source, "mission items")
             if readable is not None:
                 yield replace(readable, mission=self._with_home(readable.mission))
 
@@ -431,6 +443,17 @@ class _Messages:
         home = heard[-1]
         place = Home(home.latitude * 1e-7, home.longitude * 1e-7, home.altitude * 1e-3)
         return Mission(place, mission.items, warnings=mission.warnings, source=mission.source)
+
+    def mode_numbers(self) -> Iterator[tuple[float, int]]:
+        """Yield time and number of the mode of each heartbeat."""
+        for time, beat in self._own.get("HEARTBEAT", []):
+            if _is_vehicle(beat):
+                yield time, int(beat.custom_mode)
+
+    @property
+    def is_px4(self) -> bool:
+        """True if PX4 flew."""
+        return any(beat.autopilot == _PX4 for _, beat in self._own["HEARTBEAT"] if _is_vehicle(beat))
 
     def _parameters(self) -> dict[str, float]:
         values: dict[str, float] = {}

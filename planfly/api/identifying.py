@@ -203,7 +203,7 @@ def _records_and_outputs(log: MotionLog, prior: Aircraft) -> tuple[list[FlightRe
     """
     file = prior.folder / "ardupilot.toml"
     base_outputs = read_servos(file) if file.is_file() else {}
-    if log.program_kind != "ardupilot":
+    if log.program_kind in ("px4", "columns"):
         return flight_records(log, prior), dict(base_outputs)
     outputs = log_outputs(log, prior)
     if LEFT in outputs:
@@ -217,7 +217,7 @@ def _records_and_outputs(log: MotionLog, prior: Aircraft) -> tuple[list[FlightRe
 
 def _unmixed_outputs(log: MotionLog, prior: Aircraft) -> dict[str, int]:
     """Return the output number of each control that has its own servo output in the log."""
-    if log.program_kind != "ardupilot":
+    if log.program_kind in ("px4", "columns"):
         return {}
     return {name: output.output for name, output in log_outputs(log, prior).items()}
 

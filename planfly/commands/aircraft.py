@@ -66,9 +66,9 @@ def aircraft_options(line: LineParser) -> None:
             dest="logs",
             metavar="LOG",
             nargs="+",
-            help=".BIN of ArduPlane, .ulg of PX4 or a table of columns; needs the extra planfly[identification]",
+            help=".BIN or .tlog of ArduPlane, .ulg of PX4, or a table of columns; needs planfly[identification]",
         ),
-        files("bin", "BIN", "ulg", "toml", "csv", "mat", "parquet", "h5"),
+        files("bin", "BIN", "tlog", "ulg", "toml", "csv", "mat", "parquet", "h5"),
     )
     with_completer(
         logs.add_argument(
@@ -80,7 +80,7 @@ def aircraft_options(line: LineParser) -> None:
     )
     with_completer(
         logs.add_argument("--check", metavar="LOG", help="with --identify: another log, to replay with the model"),
-        files("bin", "BIN", "ulg", "toml", "csv", "mat", "parquet", "h5"),
+        files("bin", "BIN", "tlog", "ulg", "toml", "csv", "mat", "parquet", "h5"),
     )
     result_options(
         parser,

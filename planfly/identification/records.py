@@ -61,6 +61,11 @@ _FLAPS = {
 _LIFT_MOTORS = frozenset(range(33, 41))
 # ArduPlane's default LOG_BITMASK, which logs inertial sensors and servo outputs at a high rate.
 _HIGH_RATE_BITMASK = 65535
+# Settings that record more rows, for logs that no autopilot wrote.
+_RECORDING_SETTINGS = {
+    "columns": "a logger with 50 rows a second",
+    "telemetry": "SRn_RAW_SENS 25, SRn_RC_CHAN 25 and SRn_EXTRA1 25",
+}
 # PX4's SDLOG_PROFILE: the default set (1) and the high-rate set (16).
 _HIGH_RATE_PROFILE = 17
 
@@ -178,6 +183,15 @@ _SERIES = {
         "airspeed": "airspeed_validated of a sensor in use, the airspeed",
         "wind": "wind, the wind",
     },
+    "telemetry": {
+        "inertial": "RAW_IMU, the inertial sensors",
+        "outputs": "SERVO_OUTPUT_RAW, the servo outputs",
+        "attitude": "ATTITUDE, the attitude",
+        "velocity": "GLOBAL_POSITION_INT, the velocity",
+        "height": "GLOBAL_POSITION_INT, the height",
+        "airspeed": "VFR_HUD with the airspeed of a sensor, the airspeed",
+        "wind": "WIND, the wind",
+    },
     "columns": {
         "inertial": "acceleration_forward, _right, _down with roll_rate, pitch_rate, yaw_rate, the inertial sensors",
         "outputs": "elevator, aileron and throttle, the commands",
@@ -219,8 +233,8 @@ def slowest_rows(log: MotionLog) -> float:
 
 def recording_setting(log: MotionLog) -> str:
     """Return the parameter, with its value, that records sensors and outputs at a high rate."""
-    if log.program_kind == "columns":
-        return "a logger with 50 rows a second"
+    if log.program_kind in _RECORDING_SETTINGS:
+        return _RECORDING_SETTINGS[log.program_kind]
     return f"SDLOG_PROFILE {_HIGH_RATE_PROFILE}" if log.program_kind == "px4" else f"LOG_BITMASK {_HIGH_RATE_BITMASK}"
 
 
@@ -228,6 +242,8 @@ def _recording_hint(log: MotionLog) -> str:
     """Describe the setting that records the missing series, or the entries of a table of columns."""
     if log.program_kind == "columns":
         return "expected in [columns] of its table"
+    if log.program_kind == "telemetry":
+        return f"{recording_setting(log)} send them"
     if log.program_kind == "px4":
         return f"{recording_setting(log)}, the default set at a high rate, records them (PX4 1.14 or later)"
     mask = log.parameters.get("LOG_BITMASK")

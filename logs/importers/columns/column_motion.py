@@ -9,8 +9,8 @@ import numpy as np
 from logs.importers.columns.column_checks import check_signs_and_units
 from logs.importers.columns.column_log import ColumnLog, Series
 from logs.importers.columns.quantities import FRACTION_UNITS
-from logs.importers.columns.wind_triangle import wind_of_triangle
 from logs.importers.motion import MotionLog, Samples, first_on_ground, rising
+from logs.importers.wind_triangle import wind_of_triangle
 from world.arrays import Floats
 from world.errors import LogError
 

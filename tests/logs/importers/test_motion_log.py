@@ -26,7 +26,7 @@ def test_other_files_are_refused_in_one_line(tmp_path: Path) -> None:
     file = tmp_path / "a.gpx"
     file.write_text("<gpx/>", encoding="utf-8")
     for path, said in (
-        (file, "expected an ArduPilot .BIN, a PX4 .ulg or"),
+        (file, "expected an ArduPilot .BIN, a .tlog, a PX4 .ulg or"),
         (tmp_path / "no.BIN", "no such file"),
     ):
         with pytest.raises(LogError, match=said) as refused:

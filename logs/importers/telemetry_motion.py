@@ -1,0 +1,96 @@
+"""Motion of an aircraft from a telemetry log (`.tlog`), as `motion_log` reads it from ArduPilot's logs."""
+
+from pathlib import Path
+
+import numpy as np
+
+from logs.importers.motion import OUTPUTS, MotionLog, Samples, first_on_ground, rising
+from logs.importers.raw_log import LogSeries
+from logs.importers.telemetry_log import VehicleMessages, vehicle_messages
+from logs.importers.wind_triangle import wind_of_triangle
+from world.arrays import Floats
+from world.errors import LogError
+
+# RAW_IMU of ArduPilot is in thousandths of this, m/s^2, and of rad/s.
+_STANDARD_GRAVITY_MPS2 = 9.80665
+# Period after which a count of microseconds in 32 bits starts at 0 again, s.
+_WRAP_S = 2.0**32 * 1e-6
+# Largest difference between a message's own time and the time that its neighbours give it, s.
+_MAX_CLOCK_DIFFERENCE_S = 2.0
+NONE = Samples(np.zeros(0), np.zeros((0, 1)))
+
+
+def read_telemetry_motion(path: Path, digest: str) -> MotionLog:
+    """Read the motion of a log of ArduPlane; digest: SHA-256 of its bytes.
+
+    Raises LogError, in one line, for a log without a vehicle, and for PX4, whose outputs do not state what they move.
+    """
+    messages, damage = vehicle_messages(path)
+    if messages.is_px4:
+        advice = "a .ulg of the same flight does"
+        raise LogError(f"{path}: telemetry of PX4 does not state what its outputs move; {advice}", file=path)
+    raw = messages.log(damage)
+    velocity = _reordered(raw.series.get("velocity"), [1, 0, 2], [1.0, 1.0, -1.0])
+    attitude = _reordered(raw.series.get("attitude"), [0, 1, 2])
+    position = raw.series["position"]
+    true_airspeed = raw.series.get("airspeed")
+    wind = _reordered(raw.series.get("wind"), [1, 0])
+    if not len(wind.time):
+        wind = wind_of_triangle(velocity, attitude, _reordered(true_airspeed, [0]))
+    battery = messages.table("SYS_STATUS", ("voltage_battery", "current_battery"))
+    return MotionLog(
+        source=str(path),
+        sha256=digest,
+        program=raw.program,
+        vehicle=raw.vehicle,
+        inertial=_inertial(messages),
+        outputs=_outputs(messages),
+        attitude=attitude,
+        velocity=velocity,
+        wind=wind,
+        airspeed=NONE if true_airspeed is None else _reordered(messages.table("VFR_HUD", ("airspeed",)), [0]),
+        ratio=NONE,
+        height=_reordered(position, [2]),
+        battery=_reordered(battery, [0, 1], [1e-3, 0.01]) if "battery" in raw.series else NONE,
+        modes=tuple(messages.mode_numbers()),
+        parameters=raw.parameters,
+        home=first_on_ground(_reordered(position, [0, 1, 2]), velocity),
+        program_kind="telemetry",
+    )
+
+
+def _reordered(series: LogSeries | None, columns: list[int], factors: list[float] | None = None) -> Samples:
+    if series is None:
+        return NONE
+    return rising(series.time, series.values[:, columns] * np.array([1.0] if factors is None else factors))
+
+
+def _own_times(time: Floats, microseconds: Floats) -> Floats:
+    """Return the times at which messages were made instead of received, s.
+
+    time: (n,) s on the vehicle's clock, by their reception.  microseconds: (n,) since the vehicle was switched on; they
+    may start at 0 again after 32 bits.
+
+    >>> _own_times(np.array([4300.0, 4300.3]), np.array([5.1e6, 5.2e6])).round(3).tolist()
+    [4300.067, 4300.167]
+    """
+    own = microseconds * 1e-6
+    own = own + _WRAP_S * np.round((time - own) / _WRAP_S)
+    return np.asarray(np.where(np.abs(own - time) < _MAX_CLOCK_DIFFERENCE_S, own, time))
+
+
+def _inertial(messages: VehicleMessages) -> Samples:
+    table = messages.table("RAW_IMU", ("time_usec", "xacc", "yacc", "zacc", "xgyro", "ygyro", "zgyro"))
+    if table is None:
+        return NONE
+    units = np.repeat([_STANDARD_GRAVITY_MPS2 * 1e-3, 1e-3], 3)
+    return rising(_own_times(table.time, table.values[:, 0]), table.values[:, 1:] * units)
+
+
+def _outputs(messages: VehicleMessages) -> Samples:
+    names = tuple(f"servo{k}_raw" for k in range(1, OUTPUTS + 1))
+    table = messages.table("SERVO_OUTPUT_RAW", ("time_usec", "port", *names))
+    if table is None:
+        return Samples(np.zeros(0), np.zeros((0, OUTPUTS)))
+    first = table.values[:, 1] == 0.0
+    return rising(_own_times(table.time[first], table.values[first, 0]), table.values[first, 2:])
