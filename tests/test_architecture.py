@@ -32,7 +32,7 @@ LONGER = {
     "flight/autopilots/arduplane/go_around_point_mass.py:fly_go_arounds": 76,
     "flight/autopilots/arduplane/rtl_point_mass.py:fly_returns": 77,
     "flight/autopilots/arduplane/rtl_point_mass.py:fly_stages": 78,
-    "flight/autopilots/px4/lateral.py:follow_track": 64,
+    "flight/autopilots/px4/lateral.py:guide_to_path": 66,
     "flight/guidance/path.py:fly_by_path": 74,
     "flight/mission/loiter_circles.py:_corners_around": 68,
     "flight/mission/route.py:lay_route": 62,

@@ -78,7 +78,16 @@ _ALONG_THE_MISSION = (2.0, 4.0)
 _WARN_OF_WIND = 1.0
 
 # Fields of `flight.autopilots.px4.law.PX4_MEMORY` that belong to the current leg or mission, not to the aircraft.
-_LEG_FIELDS = ("leg", "reached_for", "at_rim", "circling", "returning", "climbed", "finished", "waited")
+_LEG_FIELDS = (
+    "leg",
+    "time_since_reached",
+    "rim_reached",
+    "is_loitering",
+    "is_in_rtl",
+    "rtl_climb_complete",
+    "mission_finished",
+    "time_at_mission_end",
+)
 
 
 @dataclass(frozen=True)
@@ -151,7 +160,7 @@ class Px4(Autopilot):
         for name in _LEG_FIELDS:
             setattr(own.memory, name, 0)
         own.memory.from_east, own.memory.from_north, own.memory.from_up = here
-        own.memory.nearest, own.memory.begun_up = math.inf, here[2]
+        own.memory.min_distance_to_end, own.memory.leg_start_altitude = math.inf, here[2]
 
     def described(self, aircraft: str) -> str:
         """Return a description of the law with the parameters that matter most in a flight."""
@@ -189,9 +198,9 @@ class Px4(Autopilot):
             if not neutral.lowest <= parameters[name] <= neutral.highest
             and not (self.is_program and neutral.by_program)
         ]
-        return [*ending_texts, *changing_texts, *([] if self.is_program else self._describe_others(mission))]
+        return [*ending_texts, *changing_texts, *([] if self.is_program else self._describe_mission_settings(mission))]
 
-    def _describe_others(self, mission: MissionParts) -> Iterator[str]:
+    def _describe_mission_settings(self, mission: MissionParts) -> Iterator[str]:
         """Describe settings that change only some missions or releases."""
         parameters = self.parameters
         if parameters["NPFG_EN_MIN_GSP"] == 0.0 and self.version == "1.16":
@@ -221,7 +230,7 @@ class Px4(Autopilot):
         Up to 1.16 it grows with altitude.
         """
         parameters = self.parameters
-        if not parameters.anticipates:
+        if not parameters.uses_switch_distance:
             return parameters["NAV_ACC_RAD"]
         period = parameters["NPFG_PERIOD"]
         if parameters["NPFG_LB_PERIOD"] > 0.0:
@@ -323,13 +332,13 @@ class Px4(Autopilot):
         """Return the deviations of its control law with these parameters; PX4 flies over no waypoint."""
         return tracking_error(self.parameters, airspeed, nav, turbulence=turbulence)
 
-    def altitude_miss_probability(self, climb: float, sink: float, turbulence: Turbulence) -> float:
+    def altitude_miss_probability(self, climb_reserve: float, sink_reserve: float, turbulence: Turbulence) -> float:
         """Return the probability of an altitude miss above NAV_FW_ALT_RAD, in moderate turbulence."""
-        return altitude_miss_probability(self.parameters["NAV_FW_ALT_RAD"], climb, sink, turbulence)
+        return altitude_miss_probability(self.parameters["NAV_FW_ALT_RAD"], climb_reserve, sink_reserve, turbulence)
 
-    def gust_rise(self, sink: float, turbulence: Turbulence) -> float:
+    def gust_rise(self, sink_reserve: float, turbulence: Turbulence) -> float:
         """Return the altitude gain in updrafts, in which it holds its airspeed with a limited sink rate."""
-        return height_in_updrafts(sink, turbulence)
+        return height_in_updrafts(sink_reserve, turbulence)
 
     def with_scenario_rtl_settings(
         self, rtl_altitude: float | None, rtl_autoland: int | None, *, lands: bool, lower: float = 0.0
