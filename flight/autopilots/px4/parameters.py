@@ -28,7 +28,7 @@ _VERSIONS: tuple[Px4Version, ...] = get_args(Px4Version)
 _RAD_PER_DEG = math.pi / 180.0
 
 
-# By the field of `PX4_PARAMETERS`; parameters that are not flown stand at the end.
+# Definitions by the field of `PX4_PARAMETERS`; parameters that are not simulated stand at the end.
 DEFINITIONS = {
     # Lateral guidance.
     "npfg_period": Definition("NPFG_PERIOD", 10.0, 0.5, 1000.0, documented=(1.0, 100.0)),
@@ -43,7 +43,7 @@ DEFINITIONS = {
     "roll_slew_rate": Definition("FW_PN_R_SLEW_MAX", 90.0, 0.0, 1000.0, _RAD_PER_DEG),
     "roll_time_constant": Definition("FW_R_TC", 0.4, 0.02, 10.0, documented=(0.2, 1.0)),
     "roll_rate_max": Definition("FW_R_RMAX", 70.0, 0.0, 720.0, _RAD_PER_DEG, documented=(0.0, 180.0)),
-    # Changes of waypoint.
+    # Switching of waypoints.
     "acceptance_radius": Definition("NAV_ACC_RAD", 10.0, 0.05, 10_000.0, documented=(0.05, 200.0)),
     "altitude_acceptance_radius": Definition("NAV_FW_ALT_RAD", 10.0, 0.05, 10_000.0, documented=(0.05, 200.0)),
     "loiter_radius": Definition("NAV_LOITER_RAD", 80.0, -10_000.0, 10_000.0),
@@ -79,14 +79,14 @@ DEFINITIONS = {
     "throttle_min": Definition("FW_THR_MIN", 0.0, 0.0, 1.0),
     "throttle_max": Definition("FW_THR_MAX", 1.0, 0.0, 1.0),
     "throttle_slew_rate": Definition("FW_THR_SLEW_MAX", 0.0, 0.0, 100.0, documented=(0.0, 1.0)),
-    # Return.
+    # RTL.
     "rtl_altitude": Definition("RTL_RETURN_ALT", 100.0, 0.0, 10_000.0),
     "rtl_loiter_radius": Definition("RTL_LOITER_RAD", 80.0, 1.0, 10_000.0),
     "rtl_type": Definition("RTL_TYPE", 1.0, 0.0, 5.0),
-    # Checks of a mission.
+    # Mission checks.
     "takeoff_landing_requirement": Definition("MIS_TKO_LAND_REQ", 2.0, 0.0, 5.0),
     "landing_angle": Definition("FW_LND_ANG", 5.0, 1.0, 45.0, _RAD_PER_DEG),
-    # Not flown.
+    # Not simulated.
     "uses_airspeed": Definition("FW_USE_AIRSPD", 1.0, 0.0, 1.0),
     "enables_min_ground_speed": Definition("NPFG_EN_MIN_GSP", 1.0, 0.0, 1.0),
     "landing_altitude_acceptance_radius": Definition("NAV_FW_ALTL_RAD", 5.0, 0.05, 200.0),
@@ -107,11 +107,11 @@ DEFINITIONS = {
     "fence_max_altitude": Definition("GF_MAX_VER_DIST", 0.0, 0.0, 1e6),
     "max_flight_time": Definition("COM_FLT_TIME_MAX", -1.0, -1.0, 1e6),
 }
-# Parameters that are read, but no flight shows the effect of a value other than PX4's default.
+# Parameters that are read but not simulated with a value other than PX4's default.
 NOT_FLOWN = tuple(definition.name for definition in list(DEFINITIONS.values())[-19:])
-# From this number of parameters on, a file is a complete set: a ground station saves a thousand and more.
+# Minimum number of parameters in a complete set: a ground station saves more than a thousand.
 _COMPLETE_SET_COUNT = 300
-# Parameters that should not fall from one to the next; PX4 warns of some and flies with them.
+# Parameters whose values should not decrease from one to the next; PX4 warns of some such values and flies with them.
 _ORDERS = (
     ("FW_THR_MIN", "FW_THR_TRIM", "FW_THR_MAX"),
     ("FW_AIRSPD_MIN", "FW_AIRSPD_TRIM", "FW_AIRSPD_MAX"),
@@ -126,7 +126,7 @@ _PAIRS = (("FW_THR_MIN", "FW_THR_MAX"), ("FW_AIRSPD_MIN", "FW_AIRSPD_MAX"))
 PX4_PARAMETERS = record_dtype(
     *DEFINITIONS,
     ("uses_switch_distance", np.bool_),  # True if the navigator uses guidance's own switch distance: up to 1.16
-    # Gains (1/s, 1/s, 1/s^2, 1/s) of the airspeed filter: of the speed and of its rate, by the error of each.
+    # Gains of the airspeed filter, see `speed_filter_gains`.
     "kalman_gain_00",
     "kalman_gain_01",
     "kalman_gain_10",
@@ -148,7 +148,7 @@ FROM_ARDUPILOT = {
     "TECS_SINK_MIN": ("FW_T_SINK_MIN", 1.0),
     "TECS_SINK_MAX": ("FW_T_SINK_MAX", 1.0),
 }
-# Parameters with which the verdict may be open (`flight.autopilots.px4.autopilot.Px4.settings_not_flown`).
+# Parameters that may leave a verdict undecided (`flight.autopilots.px4.autopilot.Px4.settings_not_flown`).
 _WHEN_STATED = {
     "ASPD_PRIMARY": 1.0,
     "COM_WIND_MAX": -1.0,
@@ -195,7 +195,7 @@ class Px4Parameters(ParameterSet):
     version: Px4Version = NEWEST_PX4
 
     def __post_init__(self) -> None:
-        """Refuse a version of PX4 that is not known."""
+        """Raise ParameterError if the version of PX4 is unknown."""
         if self.version not in _VERSIONS:
             allowed = f"expected {' or '.join(_VERSIONS)}"
             message = f"px4_version: {self.version!r}: {allowed}"
@@ -203,7 +203,7 @@ class Px4Parameters(ParameterSet):
 
     @classmethod
     def _of_aircraft(cls, entries: Mapping[str, Entry]) -> dict[str, float]:
-        """Return the values in the aircraft's file that PX4 has as well, limited to PX4's ranges."""
+        """Return the values of the aircraft's file that PX4 also has, limited to PX4's ranges."""
         values = {}
         for name, entry in entries.items():
             if name in FROM_ARDUPILOT:
@@ -214,7 +214,7 @@ class Px4Parameters(ParameterSet):
 
     @classmethod
     def _counts_as_set(cls, definition: Definition, value: float) -> bool:
-        """Return False for a parameter that is not flown and has its default, because stations save every parameter."""
+        """Return False for a parameter that is not simulated and has its default: stations save every parameter."""
         return definition.name not in NOT_FLOWN or value != definition.default
 
     @property
@@ -246,13 +246,15 @@ class Px4Parameters(ParameterSet):
 def speed_filter_gains(
     speed_sigma: float, rate_sigma: float, process_sigma: float
 ) -> tuple[float, float, float, float]:
-    """Return the gains of the airspeed filter, for speed and for rate, each by the errors of speed and of rate.
+    """Return the 2x2 steady-state Kalman gains of the airspeed filter, row by row (PX4: kKg00 to kKg11).
+
+    The rows are airspeed (1/s, 1) and its rate (1/s^2, 1/s); the columns are the errors of airspeed and of rate.
 
     speed_sigma, rate_sigma: standard deviations of the measured airspeed (m/s) and of its measured rate (m/s^2).
     process_sigma: standard deviation of the noise that drives the rate, m/s^2.
 
-    The gains are the steady gains of a Kalman-Bucy filter on an
-    integrator chain (Kalman and Bucy 1961, J. Basic Eng. 83, 95-108), as PX4's parameters FW_T_SPD_* are described.
+    The filter is a Kalman-Bucy filter on an integrator chain (Kalman and Bucy 1961, J. Basic Eng. 83, 95-108), as the
+    reference describes PX4's parameters FW_T_SPD_*.
 
     >>> [round(gain, 2) for gain in speed_filter_gains(0.07, 0.2, 0.2)]
     [1.92, 0.26, 2.12, 0.67]
@@ -261,9 +263,9 @@ def speed_filter_gains(
     # Solve the Riccati equation by the stable eigenvectors of its Hamiltonian (Potter 1966, SIAM J. Appl. Math. 14,
     # 496-501).
     hamiltonian = np.block([[dynamics.T, -precision], [-np.diag([0.0, process_sigma * process_sigma]), -dynamics]])
-    roots, vectors = np.linalg.eig(hamiltonian)
-    stable = vectors[:, roots.real < 0.0]
-    gains = np.real(stable[2:] @ np.linalg.inv(stable[:2])) @ precision
+    eigenvalues, eigenvectors = np.linalg.eig(hamiltonian)
+    stable_vectors = eigenvectors[:, eigenvalues.real < 0.0]
+    gains = np.real(stable_vectors[2:] @ np.linalg.inv(stable_vectors[:2])) @ precision
     return float(gains[0, 0]), float(gains[0, 1]), float(gains[1, 0]), float(gains[1, 1])
 
 
