@@ -35,7 +35,6 @@ LONGER = {
     "flight/autopilots/px4/lateral.py:guide_to_path": 66,
     "flight/guidance/path.py:fly_by_path": 74,
     "flight/mission/loiter_circles.py:_corners_around": 68,
-    "flight/mission/route.py:lay_route": 62,
     "flight/mission/route.py:with_end_courses": 61,
     "flight/simulation/simulate.py:make_loop": 98,
     "logs/verdict/returns/glide_reach.py:_look_ahead": 78,

@@ -10,7 +10,7 @@ from aircraft.catalog import load_aircraft
 from flight.guidance.gains import load_gains
 from flight.mission.items import Mission
 from flight.mission.return_path import ReturnCircle
-from flight.simulation.airborne import TIME_LIMIT_FACTOR, TIME_LIMIT_BASE_S, Airborne
+from flight.simulation.airborne import TIME_LIMIT_BASE_S, TIME_LIMIT_FACTOR, Airborne
 from tests.logs.verdict.rules.test_loiter_rule_own_radius import SPEED, loiter, radius_at
 from tests.mission_lines import setup_of, wp
 from tests.setups import setup_maker
