@@ -85,10 +85,10 @@ class TrackingError:
         return float(_interpolate(np.ascontiguousarray(self.excursion), self.airspeed, turn, ground_speed))
 
 
-def no_tracking() -> Record:
+def zero_tracking_error() -> Record:
     """Return the record of an autopilot that follows its path exactly.
 
-    >>> bool(no_tracking().has_error)
+    >>> bool(zero_tracking_error().has_error)
     False
     """
     record = np.zeros(1, TRACKING)

@@ -81,7 +81,7 @@ class Parameters:
         """
         return self.entries[self._numbers[name]].value
 
-    def put(self, name: str, value: float) -> None:
+    def set_value(self, name: str, value: float) -> None:
         """Change a value from within planfly.
 
         Raises KeyError for an unknown name.
@@ -123,7 +123,7 @@ class Parameters:
             return number, f"{entry.name} {entry.fixed}: {kept_text}"
         if not (math.isfinite(value) and entry.low <= value <= entry.high):
             return number, f"{entry.name} {value:g}: allowed {entry.low:g}..{entry.high:g}; {kept_text}"
-        self.put(entry.name, value)
+        self.set_value(entry.name, value)
         return number, ""
 
     def _set_law_parameter(self, entry: Parameter, value: float) -> str:
@@ -140,7 +140,7 @@ class Parameters:
             return f"{entry.name} {_FIXED_REASON}: {entry.value:g} kept"
         self.stated = stated_values
         for name, law_value in values.items():
-            self.put(name, law_value)
+            self.set_value(name, law_value)
         return ""
 
 
@@ -253,7 +253,7 @@ class Requests:
         handler = _HANDLERS.get(message.get_type())
         return handler(self, message, peer, now) if handler else []
 
-    def verdict_came(self) -> list[Response]:
+    def on_verdict(self) -> list[Response]:
         """Answer the arm commands that waited for the verdict."""
         waiting, self._waiting = self._waiting, []
         replies: list[Response] = []
