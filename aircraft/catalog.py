@@ -61,7 +61,7 @@ class Aircraft:
     wing_span: m.
     airspeed: cruise, m/s; this and the next three are true airspeeds.
     airspeed_min, airspeed_max: range that guidance may use, m/s.
-    stall_speed: slowest level trim at sea level, m/s.
+    stall_speed: minimum airspeed of a level trim at sea level, m/s.
     max_bank: bank limit of planned turns, rad.
     max_pitch: limit of the pitch command in either direction, rad.
     max_elevator, max_aileron, max_rudder: travel in either direction, rad.
@@ -153,7 +153,7 @@ def load_aircraft(name: str) -> Aircraft:
 
 
 def find_aircraft(name: str) -> Aircraft:
-    """Return the embedded aircraft with this name, or the one in this folder if the name contains a slash.
+    """Return the embedded aircraft of a name, or the aircraft of a folder if the name contains a slash.
 
     Raises FlightError as `load_aircraft` does.
 
@@ -164,7 +164,7 @@ def find_aircraft(name: str) -> Aircraft:
 
 
 def find_again(name: str, stated_name: str) -> Aircraft:
-    """Return the aircraft called `name` in a setup or log, whose scenario states the name or folder `stated_name`.
+    """Return the aircraft ``name`` of a setup or log whose scenario states the name or folder ``stated_name``.
 
     Raises FlightError as `load_aircraft` does.
 
@@ -207,7 +207,7 @@ def read_aircraft(folder: Path) -> Aircraft:
 
 
 def _toml_advice(folder: Path) -> str:
-    """Return what to do about a folder with a JSBSim model and without metadata; "" for another folder."""
+    """Return advice for a folder with a JSBSim model and without metadata; "" for another folder."""
     models = sorted(file.stem for file in folder.glob("*.xml"))
     if not models:
         return ""
@@ -218,7 +218,7 @@ def _toml_advice(folder: Path) -> str:
 
 
 def _numeric_fields(table: dict[str, Any]) -> dict[str, float]:
-    """Return the numeric fields of `Aircraft`; raise FlightError without the file's name."""
+    """Return the numeric fields of `Aircraft`. Raises FlightError without the file's name."""
     energy_keys = _FUEL_KEYS if set(_FUEL_KEYS) & table.keys() else _BATTERY_KEYS
     allowed = {*_FIELD_BY_KEY, *energy_keys}
     missing, unknown = sorted(allowed - table.keys()), sorted(table.keys() - allowed)
@@ -245,8 +245,8 @@ def _numeric_fields(table: dict[str, Any]) -> dict[str, float]:
 def model_hash(aircraft: Aircraft) -> str:
     """Return the SHA-256, as hex, of the names and contents of the model's XML and TOML files.
 
-    It changes with any change of the model and so identifies the model of a cached envelope or an old log. Other files
-    in the folder, such as guidance gains, are not included. Raises FlightError for a file that cannot be read.
+    The hash changes with any change of the model, and so identifies the model of a cached envelope or an old log. Other
+    files in the folder, such as guidance gains, are not included. Raises FlightError for a file that cannot be read.
 
     >>> len(model_hash(load_aircraft("aerosonde")))
     64
@@ -289,11 +289,11 @@ def make_own_folder(
 ) -> tuple[str, ...]:
     """Create a folder with the same aircraft under the folder's name, completely or not at all.
 
-    model: the files of a model that ships with JSBSim, by name, to be copied; without them the model stays there, and
-    the metadata name it.
+    model: files to copy of a model that JSBSim ships, by name; None to refer to the model in the metadata.
     overwrite: True replaces the folder of an aircraft.
-    Return the names of the created files, sorted.  Raise FlightError as `check_new_folder` does; OSError if the folder
-    cannot be written.
+
+    Return the names of the created files, sorted.  Raises FlightError as `check_new_folder` does, and OSError if the
+    folder cannot be written.
 
     >>> from tempfile import TemporaryDirectory
     >>> from aircraft.catalog import load_aircraft, read_aircraft
@@ -312,7 +312,7 @@ def make_own_folder(
 def write_own_folder(target: Path, files: Mapping[str, bytes]) -> None:
     """Write the files of an aircraft into a folder, completely or not at all.
 
-    In an existing folder the aircraft's files are replaced; files of other kinds stay.
+    In an existing folder the aircraft's files are replaced; files of other kinds are kept.
     """
     other_files = [file.name for file in target.iterdir() if file.suffix not in _SUFFIXES] if target.exists() else []
     new_names = {name.split("/")[0] for name in files}
@@ -322,8 +322,10 @@ def write_own_folder(target: Path, files: Mapping[str, bytes]) -> None:
 def check_new_folder(folder: Path, *, overwrite: bool = False) -> Path:
     """Return the absolute path of the folder of a new aircraft.
 
-    overwrite: True accepts the folder of an aircraft that exists.
-    Raises FlightError if it exists otherwise, its parent does not, or its name is not valid for a model.
+    overwrite: True accepts an existing folder of an aircraft.
+
+    Raises FlightError if the folder exists otherwise, if its parent does not exist, or if its name is not valid for a
+    model.
     """
     target = folder.absolute()
     if _NAME.fullmatch(target.name) is None or target.name in _RESERVED_NAMES:
@@ -342,7 +344,7 @@ def check_new_folder(folder: Path, *, overwrite: bool = False) -> Path:
 
 
 def _renamed_files(source: Aircraft, name: str, model: Mapping[str, bytes]) -> dict[str, bytes]:
-    """Return the contents of the new folder by path: the aircraft's files and the model's, with its own two renamed."""
+    """Return the files of the new folder by path: those of aircraft and model, renamed to the new name."""
     folders = [source.folder, *(folder for folder in source.model_folders if source.folder in folder.parents)]
     source_files = [file for folder in folders if folder.is_dir() for file in folder.iterdir()]
     files = {}

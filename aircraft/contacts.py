@@ -1,8 +1,7 @@
 """Ground contacts of an aircraft: belly skids or wheels, and points of the structure.
 
-Most models have no contacts, since a flight in the air needs none. Contacts are added to the model that is loaded for a
-flight with take-off or landing, so that a flight in the air still loads the same file. A model with contacts keeps its
-own.
+Most models have no contacts, because a flight in the air requires none. Contacts are added to the model only for a
+flight with take-off or landing, so that a flight in the air loads the unchanged file. A model with contacts keeps them.
 
 Positions and stiffness scale with span and mass, from an Aerosonde (11 kg, 2.9 m) that took off and landed in JSBSim
 under ArduPlane: a belly of 3000 N/m per skid, 0.18 m below the centre of gravity at rest, friction 0.5 and 0.4.
@@ -26,7 +25,7 @@ Gear = Literal["belly", "wheels"]
 _METRES_PER_UNIT = {"M": 1.0, "FT": 0.3048, "IN": 0.0254}
 # Kilograms in each unit of a model.
 _KILOGRAMS_PER_UNIT = {"KG": 1.0, "LBS": 0.45359237}
-# Smallest depth of the points that a model without wheels stands on, as a ratio to the deepest point.
+# Minimum depth of the points on which a model without wheels stands, as a ratio to the deepest point.
 _MIN_SKID_DEPTH_RATIO = 0.75
 
 # Positions relative to the centre of gravity, forward, right and down, in spans. Points to the right have a twin to the
@@ -52,8 +51,8 @@ class Contact:
 
     name: name in the model.
     forward, right, down: position relative to the centre of gravity, m.
-    stands: True if the aircraft stands and slides on it; other points must not touch the ground at speed.
-    wheel: True if it rolls.
+    stands: True if the aircraft stands and slides on the point; other points must not touch the ground at speed.
+    wheel: True for a wheel.
     """
 
     name: str
@@ -65,7 +64,7 @@ class Contact:
 
 
 def usual_contacts(aircraft: Aircraft, gear: Gear) -> tuple[Contact, ...]:
-    """Return the contacts of an aircraft whose model has none, scaled by its span.
+    """Return default contacts for a model without contacts, scaled by the span of the aircraft.
 
     >>> from aircraft.catalog import load_aircraft
     >>> made = usual_contacts(load_aircraft("aerosonde"), "belly")
@@ -84,9 +83,9 @@ def usual_contacts(aircraft: Aircraft, gear: Gear) -> tuple[Contact, ...]:
 
 
 def contacts_of(aircraft: Aircraft, gear: Gear) -> tuple[Contact, ...]:
-    """Return the contacts that an aircraft flies with: its model's contacts, or the usual contacts without any.
+    """Return the contacts of an aircraft: those of its model, or default contacts if the model has none.
 
-    Contacts that it stands on come first.
+    Contacts on which the aircraft stands come first.
 
     Raises ValueError for a model that is not XML.
 
@@ -99,7 +98,7 @@ def contacts_of(aircraft: Aircraft, gear: Gear) -> tuple[Contact, ...]:
 
 
 def with_contacts(model: bytes, aircraft: Aircraft, gear: Gear) -> bytes:
-    """Return a model's XML with the usual contacts, or unchanged if it has contacts of its own."""
+    """Return a model's XML with default contacts; a model with contacts is unchanged."""
     if _own_contacts(model):
         return model
     contacts = usual_contacts(aircraft, gear)
@@ -135,7 +134,7 @@ def _contact_xml(contact: Contact, aircraft: Aircraft, contacts: tuple[Contact, 
 def _own_contacts(model: bytes) -> tuple[Contact, ...]:
     """Return the contacts that a model states.
 
-    It stands on its wheels, or on its lowest points if it has none.
+    The aircraft stands on its wheels, or without wheels on its lowest points.
     """
     contacts = _read_contacts(model)
     if not any(contact.wheel for contact in contacts):
@@ -161,9 +160,9 @@ def _read_contacts(model: bytes) -> list[Contact]:
 
 
 def _center_of_gravity(model: bytes) -> Floats:
-    """Return the loaded aircraft's centre of gravity, (3,) m aft, right, up.
+    """Return the centre of gravity of the loaded aircraft, (3,) m aft, right, up of the reference point.
 
-    It is relative to the model's reference point, and includes the empty aircraft, its point masses and the initial
+    It includes the empty aircraft, its point masses and the initial
     contents of its tanks, as JSBSim sums them up.
     """
     root = ElementTree.fromstring(model)

@@ -10,8 +10,7 @@ from world.kernels import compiled
 
 # Standard gravity, m/s^2.
 GRAVITY = 9.80665
-# Number of standard deviations from an uncertain limit within which a slope is undecided: 95 % one-sided, of a normal
-# distribution.
+# Distance from an uncertain limit within which a slope is undecided, in standard deviations: 95 % one-sided.
 UNDECIDED = 1.645
 # Names of the tables of an `Envelope`.
 TABLES = ("airspeed", "amsl", "climb", "descent", "level_speed_min", "level_speed_max")
@@ -33,8 +32,8 @@ class Envelope:
     max_bank: the aircraft's own limit, rad.
     power_idle, power_level, power_full: (v, h) electric power, or heat of the fuel per second, at the steepest descent,
         in level flight and at the steepest climb, W; (0, 0) if unknown.
-    volts: battery voltage, 0 without one.
-    source: source of a model whose slopes are uncertain: "a data sheet"; "" if they are known for certain.
+    volts: battery voltage, V; 0 without a battery.
+    source: source of a model with uncertain slopes: "a data sheet"; "" if the slopes are certain.
     climb_sd, descent_sd: standard deviations of the steepest climb and descent, rad.
     fastest_sd: standard deviation of the fastest level flight, m/s.
     power_sd: relative standard deviation of power.
@@ -73,7 +72,7 @@ class Envelope:
         """Return the steepest climb and descent relative to the air, rad, by bilinear interpolation.
 
         Both are positive. They are NaN at an airspeed outside the table or below the slowest level flight; between that
-        speed and the slowest trim of the table the values of that trim are used. Altitudes outside the table use its
+        speed and the slowest trim of the table, the values of that trim apply. Altitudes outside the table use its
         nearest edge.
         """
         if not airspeed >= float(np.interp(amsl, self.amsl, self.level_speed_min)):
@@ -84,9 +83,9 @@ class Envelope:
         )
 
     def surely(self) -> "Envelope":
-        """Return the envelope that is certain: `UNDECIDED` standard deviations below the estimate.
+        """Return the certain part of the envelope: `UNDECIDED` standard deviations below the estimate.
 
-        Slopes are at least 0, and the fastest level flight is no slower than the slowest.
+        Slopes are at least 0, and the maximum level speed is at least the minimum level speed.
 
         >>> tables = {name: np.full((1, 1), 0.2) for name in ("climb", "descent")}
         >>> edges = dict.fromkeys(("airspeed", "amsl", "level_speed_min", "level_speed_max"), np.ones(1))
@@ -97,7 +96,7 @@ class Envelope:
         if not (self.climb_sd or self.descent_sd or self.fastest_sd):
             return self
         margins = {name: UNDECIDED * getattr(self, f"{name}_sd") for name in ("climb", "descent")}
-        # A loss of altitude stays as it is.
+        # A loss of altitude is unchanged.
         climb, descent = (
             np.where(table > 0.0, np.maximum(0.0, table - margins[name]), table)
             for name, table in (("climb", self.climb), ("descent", self.descent))
@@ -134,8 +133,8 @@ class Envelope:
 
         air_angle: angle relative to the air, rad, positive in a climb.
 
-        It follows the parabola through idle, level flight and full throttle, and is constant beyond idle and full
-        throttle. It is NaN if power is unknown or the airspeed is outside the table.
+        The power follows the parabola through idle, level flight and full throttle, and is constant beyond idle and
+        full throttle. It is NaN if power is unknown or the airspeed is outside the table.
         """
         if not self.power_level.size:
             return math.nan
@@ -154,7 +153,7 @@ class Envelope:
         )
 
     def level_speeds(self, amsl: float) -> tuple[float, float]:
-        """Return the slowest and fastest level flight at this altitude, m/s."""
+        """Return the minimum and maximum level-flight speed at an altitude (m), m/s."""
         return (
             float(np.interp(amsl, self.amsl, self.level_speed_min)),
             float(np.interp(amsl, self.amsl, self.level_speed_max)),
@@ -165,7 +164,7 @@ class Envelope:
 def ground_slope(air_angle: float, airspeed: float, tailwind: float, crosswind: float) -> float:
     """Return the path angle over the ground of a steady climb at ``air_angle`` to the air, rad.
 
-    It is NaN if the aircraft cannot make progress over the ground.
+    The result is NaN if the aircraft cannot make progress over the ground.
     """
     speed_over_ground = ground_speed(airspeed * math.cos(air_angle), tailwind, crosswind)
     return math.atan2(airspeed * math.sin(air_angle), speed_over_ground)
@@ -173,7 +172,7 @@ def ground_slope(air_angle: float, airspeed: float, tailwind: float, crosswind: 
 
 @compiled
 def ground_speed(airspeed: float, tailwind: float, crosswind: float) -> float:
-    """Return the ground speed along a course held against the wind, m/s; NaN if it cannot be held."""
+    """Return the ground speed along a course in wind, m/s; NaN if the course cannot be held."""
     speed2 = airspeed**2 - crosswind**2
     speed_over_ground = math.sqrt(speed2) + tailwind if speed2 > 0.0 else -1.0
     return speed_over_ground if speed_over_ground > 0.0 else math.nan

@@ -1,4 +1,4 @@
-"""Properties of a JSBSim model: those that take the four commands, and those that are read back."""
+"""Properties of a JSBSim model: the properties of the four commands, and those of the readings."""
 
 import math
 import re
@@ -18,9 +18,9 @@ _READINGS = (*_COMMANDS, "current", "power")
 
 @dataclass(frozen=True, slots=True)
 class CommandProperty:
-    """One command: a property, and its change per radian (or full throttle) above and below zero.
+    """Property of a command, and its change per radian (or full throttle) above and below zero.
 
-    There are two factors because a normalized stick often has unequal travel.
+    There are two factors because the normalized travel is often unequal.
     """
 
     name: str
@@ -30,9 +30,9 @@ class CommandProperty:
 
 @dataclass(frozen=True, slots=True)
 class Reading:
-    """One reading: a property and its factor to SI.
+    """Property of a reading, and its factor to SI.
 
-    An empty name reads as zero, for a quantity that does not exist.
+    An empty name reads as zero, for a quantity that the model lacks.
     """
 
     name: str
@@ -44,10 +44,9 @@ class Model:
     """Properties of a JSBSim model, and its kind.
 
     shipped: name of the model among JSBSim's models; "" for a model file in the aircraft's folder.
-    settles: True if the engine has a speed of its own, so that it runs from the start and must settle before
-        measurements.
+    settles: True if the engine speed is a state of the model, which must settle before measurements.
     commands: elevator, aileron, rudder, throttle.
-    readings: the same four, then battery current (A) and power (W).
+    readings: elevator, aileron, rudder and throttle, then battery current (A) and power (W).
     """
 
     shipped: str
@@ -117,9 +116,9 @@ def _checked_table(value: object, key: str, known_keys: tuple[str, ...]) -> dict
 
 
 def _shipped_model(table: dict[str, Any], aircraft: str) -> str:
-    """Return the name of JSBSim's own model.
+    """Return the name of a model that JSBSim ships, "" for none.
 
-    It names a folder and must not lead outside JSBSim's folder.
+    The name is that of a folder and must not lead outside JSBSim's folder.
     """
     value = table.get("shipped_by_jsbsim", False)
     if isinstance(value, bool):
@@ -138,7 +137,7 @@ def _read_flag(table: dict[str, Any], name: str) -> bool:
 
 
 def _read_entry(value: object, key: str, factor_count: int) -> tuple[Any, ...]:
-    """Return a property and its factors, all different from zero."""
+    """Return a property and its factors; no factor is zero."""
     is_valid = isinstance(value, list) and len(value) == 1 + factor_count and isinstance(value[0], str)
     # JSBSim aborts the process on a name with a space in it.
     if is_valid and isinstance(value, list):

@@ -2,8 +2,8 @@
 
 Equations and signs follow R. W. Beard and T. W. McLain, *Small Unmanned Aircraft*, chapters 3 and 4, as in
 ``aircraft/aerosonde/aerosonde.xml``: elevator trailing edge down, aileron rolling right and rudder yawing left are
-positive. A value that is not known for certain has a property ``ident/NAME`` in the model, a factor that is 1 unless it
-is set: so a draw of an uncertain aircraft is a set of properties.
+positive. An uncertain value has a property ``ident/NAME`` in the model, a factor with the default 1: a draw of an
+uncertain aircraft is thus a set of properties.
 """
 
 import math
@@ -16,7 +16,7 @@ from aircraft.xml_text import number, product, scaled, total
 # Control surfaces: a tail with elevator and rudder, a flying wing with elevons, a V-tail with ruddervators.
 Layout = Literal["tail", "wing", "vtail"]
 
-# Factors of the model that may be set, with the quantity that each multiplies.
+# Settable factors of the model, with the quantities that they multiply.
 FACTORS = {
     "zero-lift-drag": "least drag coefficient",
     "induced-drag": "drag due to lift",
@@ -30,7 +30,7 @@ FACTORS = {
     "roll-damping": "rolling moment per roll rate",
     "aileron-power": "rolling moment per aileron",
 }
-# Ratio of the stops of elevons and ruddervators to the larger stop of the two commands that they mix.
+# Ratio of the travel of elevons and ruddervators to the larger travel of the two commands that they mix.
 MIXED_TRAVEL = 1.3
 # kg m^2 in one slug ft^2.
 _KG_M2_PER_SLUG_FT2 = 1.3558179483314004
@@ -40,17 +40,18 @@ _KG_PER_POUND = 0.45359237
 
 @dataclass(frozen=True, slots=True)
 class AeroCoefficients:
-    """Aerodynamic coefficients with the textbook's names, per radian and per reduced rate.
+    """Aerodynamic coefficients of the textbook, per radian and per reduced rate.
 
     Reduced rates are p b/2V, q c/2V and r b/2V.
 
     lift_0, lift_alpha, lift_q, lift_elevator: lift.
     drag_min, drag_lift, lift_at_least_drag: CD = drag_min + drag_lift (CL - lift_at_least_drag)^2, where CL depends
         only on the angle of attack.
-    drag_elevator, drag_elevator_2: drag by the elevator's magnitude, and by its square.
-    drag_beta_2: drag by the square of the sideslip. pitch_0 .. yaw_rudder: moments. side_beta .. side_rudder: side
-        force.
-    stall_alpha, stall_sharpness: angle of attack at which the lift curve breaks (rad), and the textbook's M.
+    drag_elevator, drag_elevator_2: drag per magnitude of the elevator, and per square of the elevator.
+    drag_beta_2: drag per square of the sideslip.
+    pitch_0 .. yaw_rudder: moments.
+    side_beta .. side_rudder: side force.
+    stall_alpha, stall_sharpness: angle of attack of the stall (rad), and the textbook's M.
     """
 
     lift_0: float
@@ -90,13 +91,13 @@ class AeroCoefficients:
 class ModelNumbers:
     """All numbers of a model, in SI units and radians.
 
-    title: title for people.
-    source: source of the numbers, a sentence.
+    title: title of the model.
+    source: sentence on the source of the numbers.
     inertia: Jx, Jy, Jz, Jxz about the centre of gravity, kg m^2; Jxz is the integral of x z dm.
     throw: travel of elevator, aileron and rudder in either direction.
     rate: rate limit of the surfaces, rad/s.
     lag: lag of surfaces and of the motor, s.
-    lift_behind: distance of the wing's forces behind the centre of gravity, m.
+    lift_behind: distance from the centre of gravity back to the wing's forces, m.
     """
 
     title: str
@@ -119,9 +120,9 @@ class ModelNumbers:
 def model_xml(name: str, numbers: ModelNumbers) -> str:
     """Return the text of ``NAME.xml``.
 
-    It has no ``<input>`` and ``<output>`` channels, and the properties of `aircraft.jsbsim_model.DEFAULT_MODEL`.
+    The model has no ``<input>`` and ``<output>`` channels, and the properties of `aircraft.jsbsim_model.DEFAULT_MODEL`.
     """
-    jx, jy, jz, jxz = (value / _KG_M2_PER_SLUG_FT2 for value in numbers.inertia)
+    ixx, iyy, izz, ixz = (value / _KG_M2_PER_SLUG_FT2 for value in numbers.inertia)
     return f"""<?xml version="1.0"?>
 <!-- {_comment_text(numbers.title)}
      {_comment_text(numbers.source)}
@@ -144,10 +145,10 @@ def model_xml(name: str, numbers: ModelNumbers) -> str:
 
   <!-- Jxz is the integral of x z dm; slug ft2, because JSBSim's own conversion from kg m2 is off by 9e-5. -->
   <mass_balance negated_crossproduct_inertia="false">
-    <ixx unit="SLUG*FT2"> {number(jx)} </ixx>
-    <iyy unit="SLUG*FT2"> {number(jy)} </iyy>
-    <izz unit="SLUG*FT2"> {number(jz)} </izz>
-    <ixz unit="SLUG*FT2"> {number(jxz)} </ixz>
+    <ixx unit="SLUG*FT2"> {number(ixx)} </ixx>
+    <iyy unit="SLUG*FT2"> {number(iyy)} </iyy>
+    <izz unit="SLUG*FT2"> {number(izz)} </izz>
+    <ixz unit="SLUG*FT2"> {number(ixz)} </ixz>
     <emptywt unit="LBS"> {number(numbers.mass / _KG_PER_POUND)} </emptywt>
     <location name="CG" unit="M"> <x> 0 </x> <y> 0 </y> <z> 0 </z> </location>
     <pointmass name="payload">
@@ -174,7 +175,7 @@ def _comment_text(text: str) -> str:
 
 
 # ----------------------------------------------------------------------
-# Servos: each moves one control, or two of them are mixed.
+# Servos: each moves one control, or a mix of two controls.
 
 
 def _flight_control(numbers: ModelNumbers) -> str:
@@ -246,17 +247,17 @@ _TORQUE_XML = """    <!-- The reaction to the propeller's torque rolls the aircr
 
 
 def _external_reactions(numbers: ModelNumbers) -> str:
-    declared = "\n".join(f'    <property value="1"> ident/{name} </property>' for name in numbers.factors)
+    factor_properties = "\n".join(f'    <property value="1"> ident/{name} </property>' for name in numbers.factors)
     x, y, z = numbers.propulsion.direction
     # JSBSim's structural axes point aft, right and up; the body's forward, right and down.
-    forward, right, below = numbers.propulsion.place
-    # Without a rudder only sideslip could balance the torque and the ailerons against it, and trims have no sideslip.
+    forward, right, down = numbers.propulsion.place
+    # Without a rudder only sideslip could balance torque and ailerons, and trims have no sideslip.
     torque = "    <!-- No torque of the propeller: its elevons are rigged against it. -->"
     if numbers.layout != "wing":
         torque = _TORQUE_XML
     return f"""  <external_reactions>
     <!-- What is not known for certain: factors, 1 for the model as published or as guessed. -->
-{declared}
+{factor_properties}
     <property value="0"> motor/braking </property>
 
     <!-- SI throughout; slug/ft3 to kg/m3 and ft/s to m/s here, N to lbf and N m to lbf ft at the end. -->
@@ -269,7 +270,7 @@ def _external_reactions(numbers: ModelNumbers) -> str:
 {numbers.propulsion.functions(numbers.factors)}
     <force name="thrust" frame="BODY">
       <function> <product> <p> motor/thrust-n </p> <v> 0.2248089430997105 </v> </product> </function>
-      <location unit="M"> <x> {number(-forward)} </x> <y> {number(right)} </y> <z> {number(-below)} </z> </location>
+      <location unit="M"> <x> {number(-forward)} </x> <y> {number(right)} </y> <z> {number(-down)} </z> </location>
       <direction> <x> {number(x)} </x> <y> {number(y)} </y> <z> {number(z)} </z> </direction>
     </force>
 {torque}
@@ -331,76 +332,78 @@ def _axis(axis: str, name: str, content: str, frame: str = "") -> str:
 
 
 def _factor_property(name: str, factors: tuple[str, ...]) -> tuple[str, ...]:
-    """Return the property of a factor, if the model has it."""
+    """Return the property of a factor; () if the model lacks the factor."""
     return (f"ident/{name}",) if name in factors else ()
 
 
-def _force_terms(a: AeroCoefficients, factors: tuple[str, ...]) -> tuple[str, str, str]:
-    """Return drag, lift and side force, each as a coefficient."""
-    lift_difference = f"<difference> <p> aero/lift-linear </p> <v> {number(a.lift_at_least_drag)} </v> </difference>"
+def _force_terms(aero: AeroCoefficients, factors: tuple[str, ...]) -> tuple[str, str, str]:
+    """Return the coefficients of drag, lift and side force."""
+    lift_difference = f"<difference> <p> aero/lift-linear </p> <v> {number(aero.lift_at_least_drag)} </v> </difference>"
     induced = (f"<p> {name} </p>" for name in _factor_property("induced-drag", factors))
     drag = total(
-        scaled(a.drag_min, *_factor_property("zero-lift-drag", factors)),
-        product(f"<v> {number(a.drag_lift)} </v>", *induced, lift_difference, lift_difference),
-        product(f"<v> {number(a.drag_elevator)} </v>", f"<abs> <p> {_ELEVATOR} </p> </abs>"),
-        scaled(a.drag_elevator_2, _ELEVATOR, _ELEVATOR),
-        scaled(a.drag_beta_2, _BETA, _BETA),
+        scaled(aero.drag_min, *_factor_property("zero-lift-drag", factors)),
+        product(f"<v> {number(aero.drag_lift)} </v>", *induced, lift_difference, lift_difference),
+        product(f"<v> {number(aero.drag_elevator)} </v>", f"<abs> <p> {_ELEVATOR} </p> </abs>"),
+        scaled(aero.drag_elevator_2, _ELEVATOR, _ELEVATOR),
+        scaled(aero.drag_beta_2, _BETA, _BETA),
     )
     lift = total(
         "<p> aero/lift-alpha </p>",
-        scaled(a.lift_q, "aero/ci2vel", _RATE_Q),
-        scaled(a.lift_elevator, _ELEVATOR),
+        scaled(aero.lift_q, "aero/ci2vel", _RATE_Q),
+        scaled(aero.lift_elevator, _ELEVATOR),
     )
     side = total(
-        scaled(a.side_beta, _BETA),
-        scaled(a.side_p, "aero/bi2vel", _RATE_P),
-        scaled(a.side_r, "aero/bi2vel", _RATE_R),
-        scaled(a.side_aileron, _AILERON),
-        scaled(a.side_rudder, _RUDDER),
+        scaled(aero.side_beta, _BETA),
+        scaled(aero.side_p, "aero/bi2vel", _RATE_P),
+        scaled(aero.side_r, "aero/bi2vel", _RATE_R),
+        scaled(aero.side_aileron, _AILERON),
+        scaled(aero.side_rudder, _RUDDER),
     )
     return drag, lift, side
 
 
-def _moment_terms(a: AeroCoefficients, factors: tuple[str, ...]) -> tuple[str, str, str]:
-    """Return rolling, pitching and yawing moment, each as a coefficient."""
+def _moment_terms(aero: AeroCoefficients, factors: tuple[str, ...]) -> tuple[str, str, str]:
+    """Return the coefficients of rolling, pitching and yawing moment."""
     roll = total(
-        scaled(a.roll_beta, _BETA),
-        scaled(a.roll_p, "aero/bi2vel", _RATE_P, *_factor_property("roll-damping", factors)),
-        scaled(a.roll_r, "aero/bi2vel", _RATE_R),
-        scaled(a.roll_aileron, _CONTROL, _AILERON, *_factor_property("aileron-power", factors)),
-        scaled(a.roll_rudder, _CONTROL, _RUDDER),
+        scaled(aero.roll_beta, _BETA),
+        scaled(aero.roll_p, "aero/bi2vel", _RATE_P, *_factor_property("roll-damping", factors)),
+        scaled(aero.roll_r, "aero/bi2vel", _RATE_R),
+        scaled(aero.roll_aileron, _CONTROL, _AILERON, *_factor_property("aileron-power", factors)),
+        scaled(aero.roll_rudder, _CONTROL, _RUDDER),
     )
     pitch = total(
-        f"<v> {number(a.pitch_0)} </v>",
-        scaled(a.pitch_alpha, _ALPHA, *_factor_property("pitch-stiffness", factors)),
-        scaled(a.pitch_q, "aero/ci2vel", _RATE_Q, *_factor_property("pitch-damping", factors)),
-        scaled(a.pitch_elevator, _CONTROL, _ELEVATOR, *_factor_property("elevator-power", factors)),
+        f"<v> {number(aero.pitch_0)} </v>",
+        scaled(aero.pitch_alpha, _ALPHA, *_factor_property("pitch-stiffness", factors)),
+        scaled(aero.pitch_q, "aero/ci2vel", _RATE_Q, *_factor_property("pitch-damping", factors)),
+        scaled(aero.pitch_elevator, _CONTROL, _ELEVATOR, *_factor_property("elevator-power", factors)),
     )
     yaw = total(
-        scaled(a.yaw_beta, _BETA),
-        scaled(a.yaw_p, "aero/bi2vel", _RATE_P),
-        scaled(a.yaw_r, "aero/bi2vel", _RATE_R),
-        scaled(a.yaw_aileron, _CONTROL, _AILERON),
-        scaled(a.yaw_rudder, _CONTROL, _RUDDER),
+        scaled(aero.yaw_beta, _BETA),
+        scaled(aero.yaw_p, "aero/bi2vel", _RATE_P),
+        scaled(aero.yaw_r, "aero/bi2vel", _RATE_R),
+        scaled(aero.yaw_aileron, _CONTROL, _AILERON),
+        scaled(aero.yaw_rudder, _CONTROL, _RUDDER),
     )
     return roll, pitch, yaw
 
 
-def _lift_curve(a: AeroCoefficients, factors: tuple[str, ...]) -> str:
-    """Return the lift by angle of attack: a straight line, and a flat plate beyond the stall."""
-    line = total(f"<v> {number(a.lift_0)} </v>", scaled(a.lift_alpha, _ALPHA, *_factor_property("lift-slope", factors)))
+def _lift_curve(aero: AeroCoefficients, factors: tuple[str, ...]) -> str:
+    """Return the lift as a function of angle of attack: a straight line, and a flat plate beyond the stall."""
+    straight_line = total(
+        f"<v> {number(aero.lift_0)} </v>", scaled(aero.lift_alpha, _ALPHA, *_factor_property("lift-slope", factors))
+    )
     sine = f"<sin> <p> {_ALPHA} </p> </sin>"
-    plate = product("<v> 2 </v>", sine, f"<abs> {sine} </abs>", f"<cos> <p> {_ALPHA} </p> </cos>")
-    difference = f"<difference> {plate} <p> aero/lift-linear </p> </difference>"
+    flat_plate = product("<v> 2 </v>", sine, f"<abs> {sine} </abs>", f"<cos> <p> {_ALPHA} </p> </cos>")
+    difference = f"<difference> {flat_plate} <p> aero/lift-linear </p> </difference>"
     return f"""    <function name="aero/lift-linear">
-      {line}
+      {straight_line}
     </function>
     <!-- Share of separated flow: the book's blend of the straight line and of a flat plate. -->
     <function name="aero/separated">
       <table>
         <independentVar lookup="row"> {_ALPHA} </independentVar>
         <tableData>
-{_separation_table(a.stall_alpha, a.stall_sharpness)}
+{_separation_table(aero.stall_alpha, aero.stall_sharpness)}
         </tableData>
       </table>
     </function>
@@ -410,7 +413,7 @@ def _lift_curve(a: AeroCoefficients, factors: tuple[str, ...]) -> str:
 
 
 def _separation_table(stall_alpha: float, sharpness: float) -> str:
-    """Return rows of the separated fraction of the flow by angle of attack, rad (Beard and McLain, 4.10).
+    """Return rows of angle of attack (rad) and separated fraction of the flow (Beard and McLain, 4.10).
 
     The fraction is exactly 0 in attached flow.
     """
@@ -419,8 +422,11 @@ def _separation_table(stall_alpha: float, sharpness: float) -> str:
     points = sorted({-math.pi, *(-step for step in steps), *steps, math.pi})
     rows = []
     for alpha in points:
-        inner, outer = math.exp(-sharpness * (alpha - stall_alpha)), math.exp(sharpness * (alpha + stall_alpha))
-        fraction = (1.0 + inner + outer) / ((1.0 + inner) * (1.0 + outer))
+        upper_blend, lower_blend = (
+            math.exp(-sharpness * (alpha - stall_alpha)),
+            math.exp(sharpness * (alpha + stall_alpha)),
+        )
+        fraction = (1.0 + upper_blend + lower_blend) / ((1.0 + upper_blend) * (1.0 + lower_blend))
         fraction = 0.0 if abs(alpha) <= stall_alpha - width + 1e-9 else min(1.0, fraction)
         rows.append(f"          {alpha:.6f}  {fraction:.8f}")
     return "\n".join(rows)

@@ -1,7 +1,7 @@
-"""Limits of a path: the tighter of the scenario's numbers and the aircraft's envelope.
+"""Limits of a path: the tighter ones of the scenario's limits and the aircraft's envelope.
 
-Turn radii, turn lengths and slopes over the ground in wind. The compiled functions are the single definition of these
-limits for a planner's candidates, for certificates and for missions.
+These are turn radii, turn lengths and slopes over the ground in wind. The compiled functions are their only definition,
+for the planner's candidates, for certificates and for missions.
 """
 
 import math
@@ -59,18 +59,18 @@ class PerformanceTable(NamedTuple):
 class Limits:
     """Limits on turns, slopes and clearance.
 
-    max_turn, max_climb, max_dive: rad, or None where the scenario leaves them to the aircraft.
+    max_turn, max_climb, max_dive: limits of the scenario, rad; None if only the aircraft's limits apply.
     min_clearance: m above ground.
     envelope: performance of the aircraft in still air.
     airspeed: m/s.
-    max_bank: rad, the tighter of scenario and aircraft.
+    max_bank: rad, the smaller limit of scenario and aircraft.
     wind: wind over the whole area.
-    tracking: tracking error of the autopilot, None if it follows its path exactly.
-    reserve_height: height above ground that is kept for downdrafts in addition to the clearance, m.
-    reserve_threats: the same distance around missiles' spheres, in all directions, and above and below zones, m.
-    reserve_climb: rate of climb that legs leave unused for downdrafts, m/s.
-    reserve_above: distance below a maximum height above ground that is kept for updrafts, m.
-    reserve_sink: rate of sink that legs leave unused for updrafts, m/s.
+    tracking: tracking error of the autopilot; None if it follows its path exactly.
+    reserve_height: height above ground reserved for downdrafts in addition to the clearance, m.
+    reserve_threats: distance reserved around missiles' spheres, in all directions, and above and below zones, m.
+    reserve_climb: climb rate that legs leave unused for downdrafts, m/s.
+    reserve_above: distance below a maximum height above ground reserved for updrafts, m.
+    reserve_sink: sink rate that legs leave unused for updrafts, m/s.
     """
 
     max_turn: float | None
@@ -87,7 +87,7 @@ class Limits:
     reserve_climb: float = 0.0
     reserve_above: float = 0.0
     reserve_sink: float = 0.0
-    # Each is made once, because a route needs the same few speeds many times.
+    # Each table is made once, because a route uses the same few speeds many times.
     _tables: dict[float | None, PerformanceTable] = field(init=False, repr=False, compare=False, default_factory=dict)
 
     def slopes(self, course: float, amsl: float, airspeed: float | None = None) -> tuple[float, float]:
@@ -101,7 +101,7 @@ class Limits:
         return float(climb), float(dive)
 
     def surely(self) -> "Limits":
-        """Return the limits with the slopes that the aircraft can certainly fly, as far as they are known."""
+        """Return the limits with the slopes that the aircraft can certainly fly."""
         return replace(self, envelope=self.envelope.surely())
 
     def turn_radius(self, course_in: float, course_out: float, amsl: float, airspeed: float | None = None) -> float:
@@ -109,9 +109,9 @@ class Limits:
         return float(turn_radius_between(self.performance(airspeed), course_in, course_out, amsl))
 
     def rates(self, amsl: float) -> tuple[float, float]:
-        """Return the fastest steady climb and sink in still air at an altitude (m), m/s.
+        """Return the maximum steady climb and sink rates in still air at an altitude (m), m/s.
 
-        They are for the airspeed of the limits.
+        The rates are for the airspeed of the limits.
         """
         table = self.performance()
         speed = float(true_airspeed(table, amsl))
@@ -119,9 +119,9 @@ class Limits:
         return climb, sink
 
     def climb_rates(self, waypoints: Floats) -> Floats:
-        """Return the rate of climb (legs, 2) of each leg of a path (w, 3) at its start and at its end, m/s.
+        """Return the climb rate of each leg of a path (w, 3) at its start and at its end, (legs, 2) m/s.
 
-        The rate is negative in a descent, and NaN if the wind does not let the aircraft hold the leg.
+        The rate is negative in a descent, and NaN if the aircraft cannot hold the leg in the wind.
         """
         legs, table = zip(leg_courses(waypoints), leg_slopes(waypoints), strict=True), self.performance()
         return np.array(
@@ -137,8 +137,8 @@ class Limits:
     def performance(self, airspeed: float | None = None) -> PerformanceTable:
         """Return the performance at a true airspeed (m/s), for compiled functions.
 
-        airspeed: None for the airspeed of the limits. An autopilot with a tracking error uses it as an equivalent
-            airspeed: its true airspeed grows with altitude, where the aircraft climbs less.
+        airspeed: None for the airspeed of the limits, which an autopilot with a tracking error uses as an equivalent
+            airspeed: its true airspeed increases with altitude, where the aircraft climbs less.
 
         Climb and descent are NaN where `Envelope.air_angles` is NaN.
         """
@@ -179,10 +179,10 @@ def derate(
     unused_climb: float = 0.0,
     unused_sink: float = 0.0,
 ) -> PerformanceTable:
-    """Return the performance with fractions (0..1) of climb and descent, and with these rates (m/s) unused.
+    """Return the performance reduced to fractions (0..1) of climb and descent, and by unused rates, m/s.
 
-    Negative angles, a loss of altitude, are unchanged. If the aircraft has no more than the unused rate, level flight
-    remains.
+    A negative angle, a loss of altitude, is unchanged. An angle is at least 0 if the unused rate exceeds the aircraft's
+    rate.
 
     >>> nothing = np.zeros(2)
     >>> table = PerformanceTable(25.0, 0.58, 0.0, 0.0, 0.0, 0.0, 0.0, nothing, np.array([0.2, -0.1]), nothing)
@@ -206,7 +206,7 @@ def derate(
 
 
 def limit_rates(table: PerformanceTable, climb_rate: float, sink_rate: float) -> PerformanceTable:
-    """Return the performance limited to these climb and sink rates, m/s; inf for no limit.
+    """Return the performance limited to maximum climb and sink rates, m/s; inf for no limit.
 
     >>> table = PerformanceTable(25.0, 0.58, 0.0, 0.0, 0.0, 0.0, 0.0, *(np.full(2, 0.3) for _ in range(3)))
     >>> slower = limit_rates(table, 5.0, math.inf)
@@ -223,7 +223,7 @@ def limit_rates(table: PerformanceTable, climb_rate: float, sink_rate: float) ->
 
 
 def _read_only(values: Floats) -> Floats:
-    # Contiguous and read-only like every table: another layout would compile the kernels again.
+    # Contiguous and read-only like every table, because another layout would compile the kernels again.
     out = np.array(values, dtype=np.float64)
     out.setflags(write=False)
     return out
@@ -243,7 +243,7 @@ def true_airspeed(table: PerformanceTable, amsl: float) -> float:
 
 @compiled_inline
 def ground_speed_on(table: PerformanceTable, course: float, amsl: float) -> float:
-    """Return the ground speed on a course held against the mean wind, m/s; NaN if it cannot be held."""
+    """Return the ground speed on a course in the mean wind, m/s; NaN if the course cannot be held."""
     wind = wind_speed_at(table, amsl)
     angle = table.wind_to - course
     return ground_speed(true_airspeed(table, amsl), wind * math.cos(angle), wind * math.sin(angle))
@@ -277,7 +277,7 @@ def slopes_along(
     dive_slope = ground_slope(dive, speed, wind * tail_fraction, wind * cross_fraction)
     if math.isnan(climb_slope) or math.isnan(dive_slope):
         return 0.0, 0.0
-    # No leg may descend from an altitude at which thin air makes it faster than its fastest level flight.
+    # No leg may descend from an altitude at which the true airspeed exceeds that of the fastest level flight.
     if table.equivalent > 0.0 and climb < 0.0:
         dive_slope = 0.0
     return climb_slope, dive_slope
@@ -285,7 +285,7 @@ def slopes_along(
 
 @compiled_inline
 def aircraft_slopes(table: PerformanceTable, course: float, amsl: float) -> tuple[float, float]:
-    """Return the steepest climb and dive over the ground on this course, rad; (0, 0) without progress."""
+    """Return the steepest climb and dive over the ground on a course, rad; (0, 0) without progress."""
     angle = table.wind_to - course
     return slopes_along(table, math.cos(angle), math.sin(angle), amsl)
 
@@ -294,9 +294,10 @@ def aircraft_slopes(table: PerformanceTable, course: float, amsl: float) -> tupl
 def _turn_radius(
     table: PerformanceTable, ux: float, uy: float, vx: float, vy: float, amsl: float, side: float, wx: float, wy: float
 ) -> float:
-    """Return the arc radius between the unit courses u and v, m.
+    """Return the radius of the arc between the unit courses u and v, m.
 
-    w: `downwind`. side: sign of the turn, 0 for either direction.
+    w: unit vector of `downwind`.
+    side: sign of the turn, 0 for either direction.
     """
     wind, speed = wind_speed_at(table, amsl), true_airspeed(table, amsl)
     if wind == 0.0:
@@ -317,10 +318,10 @@ def _turn_radius(
 
 @compiled_inline
 def turn_radius_between(table: PerformanceTable, course_in: float, course_out: float, amsl: float) -> float:
-    """Return the arc radius at the bank limit between two courses; inf if one cannot be held.
+    """Return the radius of the arc at the bank limit between two courses, m; inf if a course cannot be held.
 
-    It is for the highest ground speed in the turn. In turbulence one standard deviation of the gusts is added: the
-    airspeed, and with it the bank that an arc over the ground requires, varies by that much.
+    The radius is for the highest ground speed in the turn. In turbulence one standard deviation of the gusts is added,
+    because the airspeed, and with it the bank for an arc over the ground, varies by that much.
     """
     turn = wrap(course_out - course_in)
     ux, uy, vx, vy = math.sin(course_in), math.cos(course_in), math.sin(course_out), math.cos(course_out)

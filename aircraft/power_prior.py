@@ -1,4 +1,4 @@
-"""Prior of drag and power of a small aircraft from its size alone, calibrated on real aircraft.
+"""Prior of drag and power of a small aircraft from its size, calibrated on real aircraft.
 
 Power in level flight is D V / efficiency + avionics. Least drag depends on layout and aspect ratio, the efficiency of
 the drive on mass. All deviations are log-normal. `examples/real/aircraft.csv` lists the powers of the 22 electric
@@ -10,19 +10,19 @@ from dataclasses import dataclass
 
 from aircraft.model_writer import Layout
 
-# Reynolds number on the mean chord of the reference least drag.
+# Reynolds number on the mean chord for the reference minimum drag.
 DRAG_REYNOLDS = 3.2e5
-# Power of the Reynolds number in the least drag: turbulent skin friction of a flat plate (Schlichting).
+# Exponent of the Reynolds number in the minimum drag: turbulent skin friction of a flat plate (Schlichting).
 DRAG_POWER = -0.2
-# Aspect ratio of the reference least drag.
+# Aspect ratio for the reference minimum drag.
 DRAG_ASPECT = 8.0
 # Efficiency of a large drive: propeller 0.85, motor and speed controller 0.88. The Sky-Sailor's parts have 0.86 and
 # 0.80 (Noth, "Design of Solar Powered Airplanes for Continuous Flight", ETH 2008).
 LARGEST_EFFICIENCY = 0.75
-# Power of the mass in the ratio of losses to output. Losses of bearings, iron, speed controller and of blades at low
+# Exponent of the mass in the ratio of losses to output. Losses of bearings, iron, speed controller and of blades at low
 # Reynolds numbers weigh more in a small drive; powers from -0.5 to -0.8 fit the table equally well.
 LOSS_POWER = -2.0 / 3.0
-# Standard deviation of the logarithm of the least drag.
+# Standard deviation of the logarithm of the minimum drag.
 LEAST_DRAG_LOG_SD = 0.35
 # Standard deviation of the logarithm of drag due to lift; span efficiencies of 0.65 to 0.95 are published.
 INDUCED_DRAG_LOG_SD = 0.15
@@ -36,8 +36,9 @@ AVIONICS_LOG_SD = 0.4
 class PowerPrior:
     """Medians of drag, efficiency and avionics power, by size.
 
-    tail_drag, wing_drag: least drag coefficient at `DRAG_REYNOLDS` and `DRAG_ASPECT`, with a tail and of a flying wing.
-    aspect_power: power of the aspect ratio in the least drag; fuselage and tail are smaller on a slender wing.
+    tail_drag, wing_drag: minimum drag coefficient at `DRAG_REYNOLDS` and `DRAG_ASPECT`, with a tail and for a flying
+        wing.
+    aspect_power: exponent of the aspect ratio in the minimum drag; fuselage and tail are smaller with a slender wing.
     loss_mass: mass of an aircraft with half of `LARGEST_EFFICIENCY`, kg.
     avionics: power of autopilot, radios and servos, W.
     """
@@ -49,12 +50,12 @@ class PowerPrior:
     avionics: float
 
     def least_drag(self, layout: Layout, aspect: float, reynolds: float) -> float:
-        """Return the least drag coefficient of a wing of this aspect ratio."""
+        """Return the minimum drag coefficient for an aspect ratio and a Reynolds number."""
         reference = self.wing_drag if layout == "wing" else self.tail_drag
         return reference * (aspect / DRAG_ASPECT) ** self.aspect_power * (reynolds / DRAG_REYNOLDS) ** DRAG_POWER
 
     def drive_efficiency(self, mass: float) -> float:
-        """Return the ratio of D V to the drive's battery power, for an aircraft of this mass, kg.
+        """Return the ratio of D V to the battery power of the drive, for a mass in kg.
 
         >>> [round(POWER_PRIOR.drive_efficiency(mass), 2) for mass in (0.5, 2.0, 20.0)]
         [0.26, 0.43, 0.65]

@@ -1,7 +1,7 @@
 """Tracking error of an autopilot: its deviation from its legs, for which plans reserve margins.
 
-The behavior of an autopilot at a corner, and the lag with which its altitude follows a slope, come from its own control
-law and parameters; an autopilot's module fills these tables from them. Compiled functions take them as one record.
+The turn of an autopilot at a corner, and the lag with which its altitude follows a slope, depend on its controllers and
+parameters; the module of each autopilot fills these tables. Compiled functions take the tables as one record.
 """
 
 import math
@@ -37,15 +37,15 @@ class TrackingError:
     """Deviation of an autopilot from its legs.
 
     airspeed: equivalent airspeed command, m/s; the true airspeed increases with altitude.
-    acceptance: (t, s) m, at turns `TURNS` and ground speeds `SPEED_SHARES` x airspeed: distance before a corner at
-        which turning to the next leg gives the smallest deviation.
-    excursion: (t, s) m, largest distance from the legs near the corner with that acceptance.
-    before, after: (t, s) m, lengths of the legs before and after the corner on which the deviation exceeds the
-        deviation on a straight leg.
+    acceptance: acceptance radius with the minimum deviation, (t, s) m, at turns `TURNS` and ground speeds
+        `SPEED_SHARES` x airspeed.
+    excursion: maximum distance from the legs near the corner with that radius, (t, s) m.
+    before, after: lengths of the legs before and after the corner on which the deviation exceeds the deviation on a
+        straight leg, (t, s) m.
     across, up: lateral and vertical deviation from a straight leg, m, including navigation error.
     lag: time by which the altitude lags behind a slope, s.
-    step: smallest altitude change of a leg that is not flown level at its final altitude, m.
-    climb_rate, sink_rate: fastest change of the altitude demand, m/s; inf for no limit.
+    step: minimum altitude change of a leg that is flown as a slope, m; a smaller change is flown at once.
+    climb_rate, sink_rate: maximum rates of the altitude demand, m/s; inf for no limit.
     own_climb_share, own_sink_share: fractions (0..1) of the aircraft's steepest climb and descent at which it stays
         near its altitude in gusts.
     """
@@ -66,7 +66,7 @@ class TrackingError:
     record: Record = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
-        """Create the record of the tables."""
+        """Copy the tables into the record."""
         record = np.zeros(1, TRACKING)
         record["has_error"] = True
         for name in ("excursion", "before", "after"):
@@ -77,18 +77,18 @@ class TrackingError:
         object.__setattr__(self, "record", record[0])
 
     def corner_acceptance(self, turn: float, ground_speed: float) -> float:
-        """Return the acceptance distance before a corner for a turn (rad) and a ground speed (m/s), m."""
+        """Return the acceptance radius at a corner for a turn (rad) and a ground speed (m/s), m."""
         return float(_interpolate(np.ascontiguousarray(self.acceptance), self.airspeed, turn, ground_speed))
 
     def corner_excursion(self, turn: float, ground_speed: float) -> float:
-        """Return the largest distance from the legs at a corner of this turn (rad) at a ground speed (m/s), m."""
+        """Return the maximum distance from the legs at a corner for a turn (rad) and a ground speed (m/s), m."""
         return float(_interpolate(np.ascontiguousarray(self.excursion), self.airspeed, turn, ground_speed))
 
 
-def no_tracking() -> Record:
-    """Return the record of an autopilot that follows its path exactly.
+def zero_tracking_error() -> Record:
+    """Return the tracking-error record of an autopilot that follows its path exactly.
 
-    >>> bool(no_tracking().has_error)
+    >>> bool(zero_tracking_error().has_error)
     False
     """
     record = np.zeros(1, TRACKING)
@@ -107,7 +107,7 @@ def air_density_factor(amsl: float) -> float:
 
 @compiled
 def density_factor(amsl: float) -> float:
-    """Return the same ratio as `air_density_factor`, for compiled functions."""
+    """Return the ratio of `air_density_factor` in compiled functions."""
     # Two terms of (1 - 2.2558e-5 h)^-2.128, accurate to 0.5 % up to 4,000 m; a library's power rounds differently on
     # different machines.
     return 1.0 + amsl * (4.8e-5 + 1.8e-9 * amsl)
@@ -115,22 +115,24 @@ def density_factor(amsl: float) -> float:
 
 @compiled
 def _interpolate(table: Floats, airspeed: float, turn: float, ground_speed: float) -> float:
-    """Interpolate bilinearly in a table (turns, speeds); use its nearest edge outside it."""
+    """Interpolate bilinearly in a table (turns, speeds); outside the table use its nearest edge."""
     turns, speeds = table.shape
     turn_position = min(max(turn / _TURN_STEP_RAD, 0.0), turns - 1.0)
     speed_position = min(max((ground_speed / airspeed - _FIRST_SPEED_RATIO) / _SPEED_RATIO_STEP, 0.0), speeds - 1.0)
-    i, j = min(int(turn_position), turns - 2), min(int(speed_position), speeds - 2)
-    v, u = turn_position - i, speed_position - j
-    lower_value = table[i, j] + u * (table[i, j + 1] - table[i, j])
-    upper_value = table[i + 1, j] + u * (table[i + 1, j + 1] - table[i + 1, j])
-    return lower_value + v * (upper_value - lower_value)
+    turn_index, speed_index = min(int(turn_position), turns - 2), min(int(speed_position), speeds - 2)
+    turn_fraction, speed_fraction = turn_position - turn_index, speed_position - speed_index
+    lower_value = table[turn_index, speed_index] + speed_fraction * (
+        table[turn_index, speed_index + 1] - table[turn_index, speed_index]
+    )
+    upper_value = table[turn_index + 1, speed_index] + speed_fraction * (
+        table[turn_index + 1, speed_index + 1] - table[turn_index + 1, speed_index]
+    )
+    return lower_value + turn_fraction * (upper_value - lower_value)
 
 
 @inlined
 def corner_deviation(tracking: Record, turn: float, ground_speed: float) -> tuple[float, float, float]:
-    """Return the largest distance from the legs at a corner, and the affected lengths around it, m.
-
-    The first affected length is on the leg before the corner, the second on the leg after it.
+    """Return the maximum distance from the legs at a corner, and the affected lengths before and after it, m.
 
     turn: rad, positive.
     ground_speed: m/s.
@@ -152,21 +154,21 @@ _SPEED_RATIO_STEP = float(SPEED_SHARES[1] - SPEED_SHARES[0])
 
 # --- Corridor ---
 
-# Half-width if a scenario states none, m: three times the overshoot of an autopilot at ordinary corners. ArduPlane in
+# Default half-width, m: three times the overshoot of an autopilot at ordinary corners. ArduPlane in
 # SITL overshot corners of up to 25 degrees in 5 m/s of wind by at most 10 m.
 MIN_CORRIDOR = 30.0
-# Half-width in acceptance radii. An autopilot that turns one radius before its waypoint cuts a right-angled corner by
-# up to 0.7 radii, and overshoots the next leg by as much if it turns late; the rest is for wind.
+# Minimum half-width in acceptance radii. An autopilot that turns one radius before its waypoint cuts a right-angled
+# corner by up to 0.7 radii, and overshoots the next leg by as much if it turns late; the remainder is for wind.
 CORRIDOR_RADII = 2.0
 
 
 def corridor_half_width(stated_half_width: float | None, acceptance_radius: float | None) -> float:
     """Return the half-width of the corridor around the legs of a path, m.
 
-    It is stated by the scenario, or follows from the autopilot's acceptance radius.
+    The scenario states it, or it follows from the autopilot's acceptance radius.
+
     stated_half_width: `[limits] corridor_m`, None if not stated.
-    acceptance_radius: radius at which the autopilot accepts a waypoint unless the mission states another, m; None for
-        guidance that flies corners as planned.
+    acceptance_radius: default acceptance radius of the autopilot, m; None for guidance that flies corners as planned.
 
     >>> corridor_half_width(None, None), corridor_half_width(None, 90.0), corridor_half_width(12.0, 90.0)
     (30.0, 180.0, 12.0)

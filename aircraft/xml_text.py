@@ -1,4 +1,4 @@
-"""Elements of JSBSim's XML for functions: numbers, products, sums."""
+"""Elements of JSBSim's XML functions: numbers, products and sums."""
 
 
 def number(value: float) -> str:
@@ -11,7 +11,7 @@ def number(value: float) -> str:
 
 
 def product(*parts: str) -> str:
-    """Return a product of these elements.
+    """Return the product of some elements.
 
     >>> product("<p> a </p>", "<v> 2 </v>")
     '<product> <p> a </p> <v> 2 </v> </product>'
@@ -20,7 +20,7 @@ def product(*parts: str) -> str:
 
 
 def scaled(value: float, *properties: str) -> str:
-    """Return a number times properties.
+    """Return the product of a number and properties.
 
     >>> scaled(2.0, "x", "y")
     '<product> <v> 2 </v> <p> x </p> <p> y </p> </product>'
@@ -29,7 +29,7 @@ def scaled(value: float, *properties: str) -> str:
 
 
 def total(*parts: str) -> str:
-    """Return a sum of these elements.
+    """Return the sum of some elements.
 
     >>> total("<v> 1 </v>", "<p> a </p>")
     '<sum> <v> 1 </v> <p> a </p> </sum>'

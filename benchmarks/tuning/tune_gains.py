@@ -23,13 +23,13 @@ from benchmarks.flight import Errors, errors_of, flown_with, straight_rms
 from benchmarks.tuning.tuning_missions import Case, cases
 from flight.dynamics.fdm import JSBSIM_VERSION
 from flight.guidance.gains import Gains, load_gains
-from flight.guidance.model_gains import ROUND_FIGURES, airframe_gains, at_airspeed
+from flight.guidance.model_gains import TYPICAL_GAINS, airframe_gains, at_airspeed
 from flight.simulation import simulate as simulation
 from flight.simulation.simulate import Flight, SimulatedFlight, fly_to_end
 from tests.setups import MakeSetup, setup_maker, standard
 
 # Start of every search: round figures, of the size that earlier searches of the Aerosonde found.
-START = ROUND_FIGURES
+START = TYPICAL_GAINS
 # Names of the gains that are searched.
 SEARCHED = tuple(START)
 # Numbers of the missions of the search, by aircraft.

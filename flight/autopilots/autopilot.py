@@ -34,14 +34,16 @@ from world.kernels import Record, Records
 from world.scenario_tables import FlightTable, Guidance, Navigation
 from world.wind import Turbulence
 
-# One tick of the compiled loop, on the block of a `flight.simulation.tick.Workspace`: a key of `ENDS`, 0 to fly on.
+# One tick of the compiled loop on the block of a `flight.simulation.tick.Workspace`; returns a key of `ENDS`, or 0 to
+# fly on.
 Tick = Callable[[Floats, Heights], int]
 
-# A number of ticks, each followed by the steps of a compiled model: block, heights, frames, numbers, code, contacts and
-# frictions of a `flight.dynamics.compiled_model.CompiledModel`, and the number; returns the last tick's status.
+# A number of ticks, each followed by the steps of a compiled model.  The arguments are block, heights, frames, numbers,
+# code, contacts and frictions of a `flight.dynamics.compiled_model.CompiledModel`, and the number of ticks; returns the
+# status of the last tick.
 Loop = Callable[[Floats, Heights, Records, Floats, Code, Records, Records, int], int]
 
-# Question that a flight answers: can the aircraft fly it at all, or can it fly it with an autopilot.
+# Question that a flight answers: can the aircraft itself fly the mission, or can the aircraft with its autopilot.
 Level = Literal["airframe", "autopilot"]
 
 # ----------------------------------------------------------------------
@@ -58,7 +60,7 @@ class ParameterValue(NamedTuple):
     origin: Origin
 
 
-# Sources of a value, in words.
+# Texts for the sources of a value.
 _SOURCE_NAMES: dict[Origin, str] = {"file": "the file", "aircraft": "the aircraft", "default": "the defaults"}
 
 
@@ -71,10 +73,10 @@ def find_misfits(values: Iterable[ParameterValue], orders: Iterable[tuple[str, .
     >>> find_misfits(made, [("THR_MIN", "TRIM_THROTTLE")])
     ('TRIM_THROTTLE 60 of the file is below THR_MIN 74 of the aircraft',)
     """
-    by_name = {value.name: value for value in values}
+    value_by_name = {value.name: value for value in values}
     misfits = []
     for order in orders:
-        for lower, higher in pairwise(by_name[name] for name in order if name in by_name):
+        for lower, higher in pairwise(value_by_name[name] for name in order if name in value_by_name):
             if lower.value <= higher.value or "file" not in (lower.origin, higher.origin):
                 continue
             file_value, relation, other_value = (
@@ -91,12 +93,12 @@ def find_misfits(values: Iterable[ParameterValue], orders: Iterable[tuple[str, .
 class Parameters(Protocol):
     """An autopilot's parameters by its own names and in its own units.
 
-    values: every parameter that its control law uses.
+    values: every parameter that the control law uses.
     unused: names in the file that the control law does not use.
     source: the user's file, "" if there is no file.
     not_flown: parameters that are read but have no effect on the simulated flight.
-    beyond: values of the file outside their documented ranges, with those ranges; they are flown nevertheless.
-    misfits: values of the file that contradict another parameter, in words; they are flown nevertheless.
+    beyond: values of the file outside their documented ranges, with those ranges; they are used nevertheless.
+    misfits: texts on values of the file that contradict another parameter; they are used nevertheless.
     """
 
     not_flown: ClassVar[tuple[str, ...]]
@@ -131,7 +133,8 @@ class Parameters(Protocol):
 class SpeedLimits(NamedTuple):
     """Airspeeds (m/s) that an autopilot accepts from a mission, and the parameters that set them.
 
-    nearest: True if it flies the nearest limit for a command outside the limits; otherwise it ignores such a command.
+    nearest: True if the autopilot flies the nearest limit for a command outside the limits, False if it ignores such a
+        command.
     """
 
     min: float
@@ -142,11 +145,11 @@ class SpeedLimits(NamedTuple):
 
 
 class MissionChecks(NamedTuple):
-    """Settings of PX4's feasibility checks, by default as for its fixed wings.
+    """Settings of PX4's feasibility checks; the defaults are those of its fixed wings.
 
     landing_angle: FW_LND_ANG, rad.
     requires: MIS_TKO_LAND_REQ: 0 nothing, 1 a takeoff, 2 a landing, 3 both, 4 and 5 both or neither.
-    stated: True if the user's file decides what it requires.
+    stated: True if the user's file decides ``requires``.
     """
 
     landing_angle: float = math.radians(5.0)
@@ -155,7 +158,7 @@ class MissionChecks(NamedTuple):
 
 
 class LandingGlide(NamedTuple):
-    """Glide to a landing point: straight to the start of the flare, and from there to the ground.
+    """Glide to a landing point: a straight line to the start of the flare, then the flare.
 
     slope: m of altitude per m of distance.
     flare_height: height of the start of the flare above the landing point, m; 0 if unknown.
@@ -171,10 +174,10 @@ class Candidate(NamedTuple):
     """A parameter that may cause a flight to fail.
 
     name: the autopilot's name for the parameter.
-    step: the increment in the autopilot's parameter reference, or a few increments.
-    far: the value furthest from the present value to try, within the range of the reference.
+    step: increment of the autopilot's parameter reference, or a few increments.
+    far: value to try that is furthest from the present value, within the range of the reference.
     unit: unit of step and value.
-    least: the minimum value that may be suggested; steps begin here if the present value is lower.
+    least: minimum value that may be suggested; the steps start there if the present value is lower.
     """
 
     name: str
@@ -185,15 +188,15 @@ class Candidate(NamedTuple):
 
 
 class MissionParts(NamedTuple):
-    """Parts of a mission that decide which of an autopilot's settings change its flight.
+    """Parts of a mission that decide which of an autopilot's settings change the flight.
 
-    returns: True if it returns to launch.
-    has_return_path: True if it marks a return path (DO_RETURN_PATH_START).
-    takes_off, lands: True if its take-off or its landing is flown from or to the ground.
-    loiters_to_land: True if the place before a landing is a loiter.
-    enables_fence: True if it switches the fence on (DO_FENCE_ENABLE).
-    moves_payload: True if it commands a gripper, a winch or a gimbal, after which PX4 may wait.
-    wind: highest mean wind speed on its route, m/s.
+    returns: True if the mission returns to launch.
+    has_return_path: True if the mission marks a return path (DO_RETURN_PATH_START).
+    takes_off, lands: True if the take-off or the landing is flown from or to the ground.
+    loiters_to_land: True if the last item before a landing is a loiter.
+    enables_fence: True if the mission switches the fence on (DO_FENCE_ENABLE).
+    moves_payload: True if the mission commands a gripper, a winch or a gimbal, after which PX4 may wait.
+    wind: highest mean wind speed on the route, m/s.
     """
 
     returns: bool = False
@@ -211,15 +214,15 @@ class AutopilotProgram(DocumentConfig):
     """SITL program of a flight."""
 
     version: str
-    """The version that the program states."""
+    """Version that the program reports."""
     sha256: str
-    """SHA-256 of its file."""
+    """SHA-256 of the program's file."""
     parameters: Mapping[str, float]
     """Values that replaced the program's own defaults, as the program stored them."""
     changed: Mapping[str, float]
     """Parameters for which the user's file states a different value from the aircraft's."""
     unused: tuple[str, ...] = ()
-    """Names in the person's file that the program does not know, or that belong to other hardware."""
+    """Names in the user's file that the program does not know, or that belong to other hardware."""
 
 
 class StoredParameters(NamedTuple):
@@ -233,8 +236,8 @@ class StoredParameters(NamedTuple):
 class StoredAutopilot(NamedTuple):
     """An autopilot's settings as a log stores them.
 
-    guidance: the control law of planfly's guidance, "path" for every other autopilot.
-    version: release of an autopilot whose releases have different control laws, "" for any other autopilot.
+    guidance: control law of planfly's guidance; "path" for every other autopilot.
+    version: release of an autopilot whose releases fly differently; "" for any other autopilot.
     """
 
     guidance: Guidance = "path"
@@ -249,25 +252,25 @@ class StoredAutopilot(NamedTuple):
 class Autopilot(ABC):
     """Autopilot of a flight, with its settings; subclasses are frozen dataclasses.
 
-    name: its name in `[flight] autopilot`.
-    title: its name in texts.
-    level: the question that its flight answers.  At "airframe" it stands only for the aircraft; at "autopilot" its
+    name: name in `[flight] autopilot`.
+    title: name in texts.
+    level: question that its flight answers.  "airframe": the autopilot stands only for the aircraft.  "autopilot": its
         verdict is compared with a reference flight by planfly's guidance.
     parameters: None for an autopilot without parameters.
-    program: program that flew it; None for a law and before the flight.
-    own: type of the record that its law has in addition to `flight.guidance.inner_loops.GUIDANCE_MEMORY`, or None.
-    cruise_parameter: parameter of its cruise airspeed; "" if it has no such parameter.
-    equivalent_airspeeds: True if commanded airspeeds are equivalent airspeeds, which are lower than true ones at
-        altitude; it then takes over in level flight.
-    acceptance_limit: maximum acceptance radius that it reads from an item, m.
-    refuses: True if it refuses missions that fail PX4's feasibility checks.
-    refuses_as_arduplane: True if it refuses missions with a command that ArduPlane refuses.
-    reads_as_px4: True if it reads only the value of a mission's change of speed, goes back to its own airspeed for any
-        value that is not positive, and reads gates.
-    flies_ground: True if it flies take-offs and landings, see `from_ground`.
-    flies_both_ends: True if it does so only in a mission that has both.
+    program: program that flew; None for a simulated autopilot and before the flight.
+    own: type of the autopilot's own record, in addition to `flight.guidance.inner_loops.GUIDANCE_MEMORY`, or None.
+    cruise_parameter: parameter of the cruise airspeed; "" without such a parameter.
+    equivalent_airspeeds: True if commanded airspeeds are equivalent airspeeds, which at altitude are lower than true
+        airspeeds; the autopilot then takes over in level flight.
+    acceptance_limit: maximum acceptance radius that the autopilot reads from an item, m.
+    refuses: True if the autopilot refuses missions that fail PX4's feasibility checks.
+    refuses_as_arduplane: True if the autopilot refuses missions with a command that ArduPlane refuses.
+    reads_as_px4: True if the autopilot reads only the value of a mission's change of speed, goes back to its own
+        airspeed for any value that is not positive, and reads gates.
+    flies_ground: True if the autopilot flies take-offs and landings, see `from_ground`.
+    flies_both_ends: True if the autopilot flies them only in a mission that has both.
     is_program: True for an external program, which reads its own parameters.
-    height_parameter: the altitude tolerance outside which it circles at a waypoint; "" if it flies on.
+    height_parameter: altitude tolerance outside which the autopilot circles at a waypoint; "" if it flies on.
     height_candidates, side_candidates: parameters that may cause an altitude or a track to fail.
     """
 
@@ -294,9 +297,12 @@ class Autopilot(ABC):
 
     @classmethod
     def load(cls, table: FlightTable, aircraft: Aircraft, scenario: str) -> Self:
-        """Return the autopilot of a scenario's [flight] table; `scenario` is the scenario's name in messages.
+        """Return the autopilot of a scenario's [flight] table.
 
-        Raises ScenarioError if it does not accept an entry, and ParameterError if the parameter file is invalid.
+        scenario: name of the scenario in messages.
+
+        Raises ScenarioError if the autopilot does not accept an entry, and ParameterError if the parameter file is
+        invalid.
         """
         if table.params is not None:
             allowed = f'not a key of autopilot = "{cls.name}", which has no parameters'
@@ -312,14 +318,14 @@ class Autopilot(ABC):
         return cls()
 
     def store(self) -> StoredAutopilot:
-        """Return its settings as a log stores them, for `restore`."""
+        """Return the settings of the autopilot as a log stores them, for `restore`."""
         return StoredAutopilot()
 
     @classmethod
     def of_flight_log(
         cls, program: str, parameters: Mapping[str, float], source: str
     ) -> tuple[Self, tuple[str, ...]] | None:
-        """Return the autopilot that wrote a log, and notes on its parameters, or None for another autopilot's log.
+        """Return the autopilot that wrote a log, and notes on its parameters; None for another autopilot's log.
 
         program: name of the flown program in the log.
         parameters: values by name.
@@ -331,12 +337,12 @@ class Autopilot(ABC):
 
     @classmethod
     def recognises(cls, program: Path) -> bool:
-        """Return True if the program that --sitl names flies this autopilot; False for a law."""
+        """Return True if the program of --sitl is this autopilot; False for a simulated autopilot."""
         return False
 
     @classmethod
     def missing_files(cls, aircraft: Aircraft) -> list[str]:
-        """Describe the files that this autopilot needs and an aircraft's folder lacks, in sentences.
+        """Return a sentence for each file that the autopilot requires and that an aircraft's folder lacks.
 
         Raises PlanflyError if a file is invalid.
         """
@@ -346,21 +352,21 @@ class Autopilot(ABC):
 
     @property
     def law(self) -> "Autopilot":
-        """The autopilot itself, or for a program the autopilot whose control law models it."""
+        """The autopilot itself; for a program, the simulated autopilot that models it."""
         return self
 
     @property
     @abstractmethod
     def tick(self) -> Tick:
-        """Compiled function for one tick of its law."""
+        """Compiled function for one tick of the autopilot's control law."""
 
     @property
     def loop(self) -> Loop | None:
-        """Compiled loop of its law with a compiled model, or None if only JSBSim flies it."""
+        """Compiled simulation loop of the control law and the aircraft model; None if only JSBSim flies it."""
         return None
 
     def begin(self, memory: Record, own: Record) -> None:
-        """Initialise the records of its control law before the first tick.
+        """Initialise the records of the control law before the first tick.
 
         memory: a `flight.guidance.inner_loops.GUIDANCE_MEMORY` record.
         own: a record of the type `own`, or None if that type is None.
@@ -368,17 +374,17 @@ class Autopilot(ABC):
         return
 
     def from_ground(self, ways: GroundWays, aircraft: Aircraft, contacts: Sequence[Contact]) -> "GroundAutopilot":
-        """Return the autopilot that also flies this take-off and landing; only for an autopilot that `flies_ground`.
+        """Return the autopilot that also flies a take-off and a landing; only for an autopilot that `flies_ground`.
 
         contacts: contact points of the aircraft.
         """
         raise ValueError(f"{self.title} flies neither take-off nor landing")
 
     def take_over(self, before: Record, own: Record, here: Floats) -> None:
-        """Begin another route at the aircraft's position, and keep the control law's state of the aircraft.
+        """Start another route at the aircraft's position, and keep the state of the control law.
 
-        before: record of the control law on the previous route.
-        own: record for this route, after `begin`.
+        before: record of the autopilot on the previous route.
+        own: record for the new route, after `begin`.
         here: (3,) start of the route, m.
         """
         return
@@ -386,40 +392,40 @@ class Autopilot(ABC):
     # Properties for planning, missions and verdicts.
 
     def described(self, aircraft: str) -> str:
-        """Describe the autopilot with the settings that matter most in the flight."""
+        """Return a description of the autopilot with the settings that matter most in a flight."""
         return self.title
 
     @property
     def version(self) -> str:
-        """Release of the program or law that flies; "" for planfly's own guidance."""
+        """Release of the program or of the simulated autopilot; "" for planfly's own guidance."""
         return ""
 
     @property
     def acceptance_radius(self) -> float | None:
-        """Distance from a waypoint at which it turns to the next leg if the mission states none, m.
+        """Default distance from a waypoint at which the autopilot turns to the next leg, m.
 
-        None for an autopilot that follows the fly-by path.  Any other flies from leg to leg, and has reached a waypoint
-        also if it passes the line across the leg there.
+        None for an autopilot that follows the fly-by path.  Any other autopilot flies from leg to leg, and has reached
+        a waypoint also if it passes the line across the leg there.
         """
         return None
 
     @property
     def reads_acceptance(self) -> bool:
-        """True if the radius of a mission's waypoint decides when it turns to the next leg."""
+        """True if the acceptance radius in a waypoint's item decides where the autopilot turns to the next leg."""
         return True
 
     @property
     def follows_path(self) -> bool:
-        """True if it follows the fly-by path, and does not turn by an acceptance radius."""
+        """True if the autopilot follows the fly-by path, and does not turn by an acceptance radius."""
         return self.acceptance_radius is None
 
     def settings_not_flown(self, mission: MissionParts) -> list[str]:
-        """Return the settings that change the flight path but are not flown, as sentences without a full stop."""
+        """Describe the settings that change the flight path but are not simulated, in sentences without full stop."""
         return []
 
     @property
     def follows_ground(self) -> bool:
-        """True if it follows the ground along a leg to a height above terrain."""
+        """True if the autopilot follows the ground along a leg to a height above terrain."""
         return True
 
     @property
@@ -428,9 +434,9 @@ class Autopilot(ABC):
         return True
 
     def turn_distance(self, turn: float, amsl: float) -> float:
-        """Return the maximum distance before a waypoint at which it turns to the next leg, m.
+        """Return the maximum distance before a waypoint at which the autopilot turns to the next leg, m.
 
-        It is 0 for an autopilot that follows the fly-by path.
+        The distance is 0 for an autopilot that follows the fly-by path.
 
         turn: turn at the waypoint, rad, positive; pi at the mission's end.
         amsl: altitude of the waypoint, m.
@@ -442,9 +448,10 @@ class Autopilot(ABC):
         return 1.0
 
     def landing_glide(self, height: float, run: float, tail_wind: float, amsl: float) -> LandingGlide:
-        """Return the glide from the waypoint before the landing point, straight to the point and without a flare.
+        """Return the glide from the last waypoint before the landing point: straight and without a flare.
 
-        height, run: height of that waypoint above the landing point, and its distance before it, m, both positive.
+        height: height of that waypoint above the landing point, m, positive.
+        run: horizontal distance of that waypoint before the landing point, m, positive.
         tail_wind: m/s, negative for a head wind.
         amsl: altitude of the landing point, m.
 
@@ -455,7 +462,7 @@ class Autopilot(ABC):
         return LandingGlide(height / run)
 
     def landing_airspeed(self, cruise: float, tail_wind: float, amsl: float) -> float:
-        """Return the true airspeed on the glide to a landing point, m/s: the cruise airspeed.
+        """Return the true airspeed on the glide to a landing point, m/s; by default the cruise airspeed.
 
         cruise: m/s.
         tail_wind: m/s, negative for a head wind.
@@ -466,58 +473,62 @@ class Autopilot(ABC):
     def with_scenario_rtl_settings(
         self, rtl_altitude: float | None, rtl_autoland: int | None, *, lands: bool, lower: float = 0.0
     ) -> "Autopilot":
-        """Return the autopilot with a scenario's RTL settings; unchanged if it has no such parameters.
+        """Return the autopilot with a scenario's RTL settings; an autopilot without such parameters is unchanged.
 
-        rtl_altitude: height above home, m.
-        rtl_autoland: ArduPlane's parameter; None for either leaves the setting unchanged.
+        rtl_altitude: height above home, m; None leaves the setting unchanged.
+        rtl_autoland: ArduPlane's parameter; None leaves the setting unchanged.
         lands: True if the scenario's missions end with a landing sequence.
         lower: depth of the landing field below home, m.
         """
         return self
 
     def go_around_height(self, stated_height: float, takeoff_height: float) -> float | None:
-        """Return the height above home to which it climbs to go around, m, or None if unknown.
+        """Return the height above home to which the autopilot climbs in a go-around, m, or None if unknown.
 
         stated_height: height that the landing item states, m; 0 if it states none.
-        takeoff_height: height of the mission's take-off above home, m; 0 without a take-off.
+        takeoff_height: height above home of the mission's take-off item, m; 0 without a take-off.
         """
         return None
 
     @property
     def launch_trigger(self) -> tuple[float, str] | None:
-        """Minimum launch acceleration that starts its motor, m/s^2, and its parameter; None if no minimum applies."""
+        """Minimum launch acceleration that starts the motor, m/s^2, and its parameter; None without a minimum."""
         return None
 
     @property
     def speed_limits(self) -> SpeedLimits | None:
-        """Airspeeds that it accepts from a mission; None for no limits."""
+        """Limits of the airspeeds that the autopilot accepts from a mission; None without limits."""
         return None
 
     @property
     def min_ground_speed(self) -> float:
-        """Minimum ground speed until the mission sets another one, m/s; 0 for none. It raises its airspeed for it."""
+        """Minimum ground speed until the mission sets another one, m/s; 0 for none.
+
+        The autopilot raises its airspeed to keep this ground speed.
+        """
         return 0.0
 
     def speeds_flown(self, commanded: Floats, cruise: float) -> Floats:
-        """Return the airspeed that it flies on each leg for the commanded airspeeds (l,), (l,) m/s.
+        """Return the airspeed that the autopilot flies on each leg, (l,) m/s.
 
-        cruise: its airspeed until it accepts the first command.
+        commanded: (l,) m/s.
+        cruise: airspeed until the autopilot accepts the first command, m/s.
         """
         return commanded
 
     @property
     def return_rules(self) -> ReturnRules:
-        """Rules of its RTL: target, altitude, turn and loiter."""
+        """Rules of an RTL: target, altitude, turn and loiter."""
         return USUAL_RULES
 
     @property
     def loiter_rules(self) -> LoiterRules:
-        """Rules of its loiters: default radius, entry and exit."""
+        """Rules of loiters: default radius, entry and exit."""
         return USUAL_LOITERS
 
     @property
     def route_rules(self) -> RouteRules:
-        """Rules by which it flies the route of a mission."""
+        """Rules by which the autopilot flies the route of a mission."""
         turn_distance = None if self.follows_path else self.turn_distance
         limit = self.acceptance_limit
         return RouteRules(self.return_rules, self.loiter_rules, self.reads_as_px4, turn_distance, limit)
@@ -529,7 +540,7 @@ class Autopilot(ABC):
 
     @property
     def stated_airspeed(self) -> tuple[float, str] | None:
-        """Cruise airspeed (m/s) in the user's parameter file, and the parameter; None if not stated."""
+        """Cruise airspeed in the user's parameter file, m/s, and its parameter; None if not stated."""
         file_values = {} if self.parameters is None else self.parameters.by_origin("file")
         return (
             (file_values[self.cruise_parameter], self.cruise_parameter)
@@ -539,49 +550,53 @@ class Autopilot(ABC):
 
     @property
     def stated_bank(self) -> float | None:
-        """Bank limit (rad) in the user's parameter file, or None if not stated."""
+        """Bank limit in the user's parameter file, rad, or None if not stated."""
         return None
 
     @property
     def bank_limit(self) -> float:
-        """Maximum bank that it demands, rad; inf if only the aircraft's limits apply."""
+        """Maximum bank that the autopilot demands, rad; inf if only the aircraft's limits apply."""
         return math.inf
 
     def tracking_error(
         self, airspeed: float, nav: Navigation, *, fly_over: bool = False, turbulence: Turbulence = "none"
     ) -> TrackingError | None:
-        """Return its deviations from the legs; None if it holds its path.  A plan reserves a margin for them.
+        """Return the deviations from the legs, for which a plan reserves margins; None for an exact autopilot.
 
         airspeed: commanded airspeed, m/s.
         nav: accuracy of navigation.
-        fly_over: True if it flies on to each waypoint before it turns.
+        fly_over: True if the autopilot flies over each waypoint before it turns.
         turbulence: turbulence of the wind.
         """
         return None
 
-    def altitude_miss_probability(self, climb: float, sink: float, turbulence: Turbulence) -> float:
-        """Return the probability (0..1) that gusts make it circle at a waypoint; 0 if it flies on.
+    def altitude_miss_probability(self, climb_reserve: float, sink_reserve: float, turbulence: Turbulence) -> float:
+        """Return the probability that gusts make the autopilot circle at a waypoint; 0 if it flies on.
 
-        climb, sink: climb and sink rates that the aircraft has in reserve against gusts, m/s.
+        climb_reserve, sink_reserve: unused climb and sink rates, m/s.
         """
         return 0.0
 
-    def gust_sink(self, climb: float, turbulence: Turbulence) -> float:
-        """Return the altitude loss (m) in a one-in-a-hundred downdraft; 0 if its tracking error includes the loss.
+    def gust_sink(self, climb_reserve: float, turbulence: Turbulence) -> float:
+        """Return the altitude loss in a downdraft with an exceedance probability of 1 %, m.
 
-        climb: climb rate that the aircraft has in reserve, m/s.
+        The result is 0 if the autopilot's tracking error includes this loss.
+
+        climb_reserve: unused climb rate, m/s.
         """
         return 0.0
 
-    def gust_rise(self, sink: float, turbulence: Turbulence) -> float:
-        """Return the altitude gain (m) in a one-in-a-hundred updraft; 0 if it holds its altitude.
+    def gust_rise(self, sink_reserve: float, turbulence: Turbulence) -> float:
+        """Return the altitude gain in an updraft with an exceedance probability of 1 %, m.
 
-        sink: sink rate that the aircraft has in reserve, m/s.
+        The result is 0 if the autopilot holds its altitude.
+
+        sink_reserve: unused sink rate, m/s.
         """
         return 0.0
 
     def with_parameters(self, **values: float) -> "Autopilot":
-        """Return a copy with the given parameters changed, by the autopilot's names and in its units."""
+        """Return a copy with other values for some parameters, by the autopilot's names and in its units."""
         raise ValueError(f"{self.title} has no parameters")
 
 
@@ -591,17 +606,17 @@ class GroundAutopilot(Autopilot):
     @property
     @abstractmethod
     def released_throttle(self) -> float:
-        """Throttle (0..1) at the end of the rail, at the throw, or at rest on the runway."""
+        """Throttle (0..1) at the end of the rail, at the hand launch, or at rest on the runway."""
 
 
 def describe_program(program: AutopilotProgram, aircraft: str, named: int = 8) -> str:
     """Return a description of a program; the verdict's data contains every parameter.
 
-    named: number of changed parameters to name.
+    named: maximum number of changed parameters in the description.
     """
     changed = [f"{name} {value:g}" for name, value in program.changed.items()]
-    rest_text = f", +{len(changed) - named} more" if len(changed) > named else ""
+    remainder = f", +{len(changed) - named} more" if len(changed) > named else ""
     return (
         f"{program.version} (sha256 {program.sha256[:8]}...), {len(program.parameters)} parameters set for"
-        f" {Path(aircraft).name}, changed: {', '.join(changed[:named]) or 'none'}{rest_text}"
+        f" {Path(aircraft).name}, changed: {', '.join(changed[:named]) or 'none'}{remainder}"
     )

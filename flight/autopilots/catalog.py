@@ -16,7 +16,7 @@ from world.errors import ScenarioError
 from world.files import did_you_mean
 from world.scenario import Scenario
 
-# Laws before the programs that they model; of several programs the first that recognises its own file is taken.
+# Simulated autopilots stand before the programs that they model.  The first program that recognises a file is used.
 AUTOPILOTS: tuple[type[Autopilot], ...] = (
     ArduPlane,
     PlanflyGuidance,
@@ -24,8 +24,8 @@ AUTOPILOTS: tuple[type[Autopilot], ...] = (
     Px4Sitl,
     ArduPlaneSitl,
 )
-# Laws by the name in a scenario.
-_LAWS = {kind.name: kind for kind in AUTOPILOTS if not issubclass(kind, ProgramAutopilot)}
+# Simulated autopilots by their names in a scenario.
+_SIMULATED = {kind.name: kind for kind in AUTOPILOTS if not issubclass(kind, ProgramAutopilot)}
 _PROGRAMS = tuple(kind for kind in AUTOPILOTS if issubclass(kind, ProgramAutopilot))
 
 
@@ -40,17 +40,19 @@ def load_autopilot(scenario: Scenario, aircraft: Aircraft) -> Autopilot:
     'ArduPlane'
     """
     name = scenario.flight.steering.autopilot
-    if name not in _LAWS:
-        known_names = " or ".join(f"'{known_names}'" for known_names in _LAWS)
-        allowed = f"expected {known_names}{did_you_mean(name, sorted(_LAWS))}"
+    if name not in _SIMULATED:
+        known_names = " or ".join(f"'{known_names}'" for known_names in _SIMULATED)
+        allowed = f"expected {known_names}{did_you_mean(name, sorted(_SIMULATED))}"
         raise ScenarioError.at(scenario.name, "flight.autopilot", name, allowed, shown=repr(name))
-    autopilot, returns = _LAWS[name].load(scenario.flight, aircraft, scenario.name), scenario.returns
-    rtl_settings = (None, None) if returns is None else (returns.rtl_altitude, returns.rtl_autoland)
-    with_returns = autopilot.with_scenario_rtl_settings(
+    autopilot, return_settings = _SIMULATED[name].load(scenario.flight, aircraft, scenario.name), scenario.returns
+    rtl_settings = (
+        (None, None) if return_settings is None else (return_settings.rtl_altitude, return_settings.rtl_autoland)
+    )
+    with_rtl_settings = autopilot.with_scenario_rtl_settings(
         *rtl_settings, lands=scenario.landing is not None, lower=_field_depth_below_home(scenario)
     )
-    _check_no_conflict(scenario, autopilot, with_returns)
-    return with_returns
+    _check_no_conflict(scenario, autopilot, with_rtl_settings)
+    return with_rtl_settings
 
 
 def _field_depth_below_home(scenario: Scenario) -> float:
@@ -62,14 +64,14 @@ def _field_depth_below_home(scenario: Scenario) -> float:
     return 0.0 if math.isnan(depth) else depth
 
 
-def _check_no_conflict(scenario: Scenario, autopilot: Autopilot, with_returns: Autopilot) -> None:
+def _check_no_conflict(scenario: Scenario, autopilot: Autopilot, with_rtl_settings: Autopilot) -> None:
     """Raise ScenarioError if a scenario and the user's parameter file state different values.
 
-    with_returns: the autopilot with the RTL settings of the scenario.
+    with_rtl_settings: the autopilot with the RTL settings of the scenario.
     """
-    if autopilot.parameters is None or with_returns.parameters is None:
+    if autopilot.parameters is None or with_rtl_settings.parameters is None:
         return
-    values = with_returns.parameters.by_origin("file")
+    values = with_rtl_settings.parameters.by_origin("file")
     for name, stated_value in autopilot.parameters.by_origin("file").items():
         if not math.isclose(values[name], stated_value, rel_tol=1e-6, abs_tol=1e-6):
             allowed = f"{autopilot.parameters.source} states {name} {stated_value:g}"
@@ -88,26 +90,29 @@ def program_autopilot(program: Path) -> type[ProgramAutopilot]:
 def autopilot_of_log(
     program: str, parameters: Mapping[str, float], source: str
 ) -> tuple[Autopilot, tuple[str, ...]] | None:
-    """Return the control law of the autopilot that wrote a flight log, and notes on its parameters.
+    """Return the autopilot that wrote a flight log, and notes on its parameters; None if planfly does not know it.
 
-    Return None for an autopilot that planfly does not know.  The notes name the parameters that could not be used.
-    program: its name in the log.  source: the log's file.
+    The notes name the parameters that could not be used.
+
+    program: name of the flown program in the log.
+    source: the log's file.
     """
-    return next(filter(None, (kind.of_flight_log(program, parameters, source) for kind in _LAWS.values())), None)
+    return next(filter(None, (kind.of_flight_log(program, parameters, source) for kind in _SIMULATED.values())), None)
 
 
 def restore_autopilot(name: str | None, stored: StoredAutopilot) -> Autopilot:
     """Return the autopilot that a log stores.
 
-    Raises ParameterError if a value is not allowed, and KeyError if the name is unknown.
     name: None if the stored settings imply it.
+
+    Raises ParameterError if a value is not allowed, and KeyError if the name is unknown.
     """
-    classes = _LAWS if stored.program is None else {kind.name: kind for kind in _PROGRAMS}
+    classes = _SIMULATED if stored.program is None else {kind.name: kind for kind in _PROGRAMS}
     return classes[name or _implied_name(stored)].restore(stored)
 
 
 def stored_name(autopilot: Autopilot) -> str | None:
-    """Return the name that a log has to state for an autopilot, or None if its settings imply the name.
+    """Return the name that a log must state for an autopilot, or None if its settings imply the name.
 
     >>> stored_name(PlanflyGuidance("l1")) is None
     True
@@ -116,5 +121,5 @@ def stored_name(autopilot: Autopilot) -> str | None:
 
 
 def _implied_name(stored: StoredAutopilot) -> str:
-    """Return the autopilot of a log that names none: ArduPlane if it has parameters or a program, else planfly."""
+    """Return the autopilot of a log without its name: ArduPlane if it has parameters or a program, else planfly."""
     return (PlanflyGuidance if stored.parameters is None and stored.program is None else ArduPlane).name

@@ -1,7 +1,7 @@
-"""Guard a flight's program, so that the program and its folder are removed if planfly is killed.
+"""Guard a flight's program: end the program and remove its folder if planfly is killed.
 
 The kernel kills a program whose parent is killed, but not that program's own children, such as the child of a wrapper
-script, and it removes no folder.  The guard is a small process that outlives planfly by the time that this takes.
+script, and it removes no folder.  The guard is a small process that outlives planfly until both are done.
 """
 
 import contextlib
@@ -46,20 +46,20 @@ for _ in range(100):
 
 
 class Guard:
-    """A guard process as a context manager; on exit nothing is left to remove.
+    """Guard process as a context manager; at a normal exit it removes nothing.
 
     >>> with Guard() as guard:
     ...     guard.keep_folder(Path("/nowhere/planfly-autopilot-1"))
     """
 
     def __init__(self) -> None:
-        read, write = os.pipe()
-        with os.fdopen(read, "rb") as end:
-            self._pipe = os.fdopen(write, "wb", buffering=0)
-            # It has a session of its own: a signal to planfly's process group does not end it.
+        read_end, write_end = os.pipe()
+        with os.fdopen(read_end, "rb") as stdin:
+            self._pipe = os.fdopen(write_end, "wb", buffering=0)
+            # The guard has its own session: a signal to planfly's process group does not end it.
             self._process = subprocess.Popen(
                 [sys.executable, "-I", "-S", "-c", _GUARD_SOURCE],
-                stdin=end,
+                stdin=stdin,
                 stdout=subprocess.DEVNULL,
                 stderr=subprocess.DEVNULL,
                 start_new_session=True,

@@ -2,7 +2,7 @@
 
 from world.wind import W20, Turbulence
 
-# Number of standard deviations of the gust that is exceeded with a probability of one in a hundred.
+# Gust with an exceedance probability of 1 %, in standard deviations.
 _GUST_SIGMAS = 2.33
 # Assumed duration of that gust, s.  In 303 flights of planfly's guidance in moderate turbulence (scenarios 4000 to 4599
 # and 12000 to 12299 of `benchmarks.plans_and_verdicts`, three streams each) one leg in a hundred sank by 34 m with 0.3
@@ -10,10 +10,10 @@ _GUST_SIGMAS = 2.33
 # with 1.3 to 1.6 m/s of spare sink rate (two streams, from 16000) three in a hundred rose by 18 m and one by 34 m; of
 # 54 legs with 2 to 2.5 m/s none rose by 19 m.
 _GUST_DURATION_S = 12.0
-# If the spare rate is below this many standard deviations, several gusts add up.
+# Spare rate below which several gusts add up, in standard deviations.
 LEAST_SIGMAS = 0.6
-# The aircraft then moves by one standard deviation for this time, s: of 64 legs of ArduPlane with 0.4 to 0.7 m/s of
-# spare rate one rose by 93 m.
+# Time for which the aircraft then moves with one standard deviation of the gust, s: of 64 legs of ArduPlane with 0.4 to
+# 0.7 m/s of spare rate one rose by 93 m.
 _LOW_RATE_DURATION_S = 60.0
 
 
@@ -26,24 +26,26 @@ def gust_deviation(turbulence: Turbulence) -> float:
     return 0.1 * W20[turbulence]
 
 
-def height_in_gusts(rate: float, turbulence: Turbulence) -> float:
-    """Return the height by which a one-in-a-hundred gust displaces an aircraft, m.
+def height_in_gusts(opposing_rate: float, turbulence: Turbulence) -> float:
+    """Return the vertical displacement of an aircraft in a gust with an exceedance probability of 1 %, m.
 
-    rate: climb or sink rate with which the aircraft opposes the gust, m/s.
+    opposing_rate: climb or sink rate with which the aircraft opposes the gust, m/s.
 
     >>> round(height_in_gusts(2.0, "moderate"), 1), height_in_gusts(4.0, "moderate"), height_in_gusts(0.0, "none")
     (19.1, 0.0, 0.0)
     """
-    return _GUST_DURATION_S * max(0.0, _GUST_SIGMAS * gust_deviation(turbulence) - rate)
+    return _GUST_DURATION_S * max(0.0, _GUST_SIGMAS * gust_deviation(turbulence) - opposing_rate)
 
 
-def height_in_updrafts(sink: float, turbulence: Turbulence) -> float:
-    """Return the altitude gain (m) in updrafts of an autopilot that holds airspeed, from its reserve sink rate (m/s).
+def height_in_updrafts(sink_reserve: float, turbulence: Turbulence) -> float:
+    """Return the altitude gain in updrafts of an autopilot that holds airspeed, m.
+
+    sink_reserve: unused sink rate, m/s.
 
     >>> round(height_in_updrafts(2.0, "moderate"), 1), round(height_in_updrafts(0.5, "moderate"), 1)
     (19.1, 92.4)
     """
     deviation = gust_deviation(turbulence)
-    if sink < LEAST_SIGMAS * deviation:
+    if sink_reserve < LEAST_SIGMAS * deviation:
         return _LOW_RATE_DURATION_S * deviation
-    return height_in_gusts(sink, turbulence)
+    return height_in_gusts(sink_reserve, turbulence)

@@ -19,9 +19,9 @@ class ProgramFlight(Airborne, AbstractContextManager["ProgramFlight"]):
 
     @abstractmethod
     def prepare(self) -> None:
-        """Make the program accept the mission and fly to the first waypoint.
+        """Upload the mission to the program, and let it fly to the first waypoint.
 
-        Raises FlightError if it fails.
+        Raises FlightError if the program refuses or fails.
         """
 
     @abstractmethod
@@ -31,7 +31,7 @@ class ProgramFlight(Airborne, AbstractContextManager["ProgramFlight"]):
 
 @dataclass(frozen=True)
 class ProgramAutopilot(Autopilot):
-    """Autopilot that is an external program; `law` is the autopilot that models it.
+    """Autopilot that is an external program; `law` is the simulated autopilot that models it.
 
     log_suffix: suffix of the log that the program itself writes.
     program: the program that flew; None before the flight.
@@ -43,7 +43,7 @@ class ProgramAutopilot(Autopilot):
     log_suffix: ClassVar[str]
     program: AutopilotProgram | None = None
     binary: Path | None = field(default=None, compare=False)
-    # A program is put into the air on a rail, even if its law takes off, unless its own class says otherwise.
+    # A program starts in the air, at the end of a rail, unless its own class says otherwise.
     flies_ground: ClassVar[bool] = False
 
     @property
@@ -54,18 +54,18 @@ class ProgramAutopilot(Autopilot):
     @classmethod
     @abstractmethod
     def flying(cls, law: Any, binary: Path) -> Self:
-        """Return the program's autopilot with the settings of its law.
+        """Return the program's autopilot with the settings of the simulated autopilot.
 
         binary: the program's file.
         """
 
     def described(self, aircraft: str) -> str:
-        """Describe the program and the parameters that the user changed, or before the flight its control law."""
+        """Describe the program and the parameters that the user changed; before the flight, the simulated autopilot."""
         return super().described(aircraft) if self.program is None else describe_program(self.program, aircraft)
 
     @property
     def version(self) -> str:
-        """Version that the program states, or before the flight the release of the law."""
+        """Version that the program reports; before the flight, the release of the simulated autopilot."""
         return super().version if self.program is None else self.program.version
 
     @property

@@ -137,18 +137,18 @@ def name_modes(a: Floats, airspeed: float) -> tuple[Mode, ...]:
     roots, vectors = np.linalg.eig(a)
     # Convert speeds to angles, so that the components of an eigenvector can be compared.
     sizes = np.abs(vectors) / np.array([airspeed] * 3 + [1.0] * 5)[:, None]
-    share = (sizes[_IS_LONGITUDINAL] ** 2).sum(axis=0) / (sizes**2).sum(axis=0)
-    along: list[complex] = []
-    aside: list[complex] = []
+    longitudinal_fraction = (sizes[_IS_LONGITUDINAL] ** 2).sum(axis=0) / (sizes**2).sum(axis=0)
+    longitudinal_roots: list[complex] = []
+    lateral_roots: list[complex] = []
     for k in np.argsort(-np.abs(roots), kind="stable"):
         # One of each pair.
         if roots[k].imag >= 0.0:
-            (along if share[k] > 0.5 else aside).append(complex(roots[k]))
-    modes = [Mode("short period" if k == 0 else "phugoid", root) for k, root in enumerate(along)]
-    pairs = [root for root in aside if root.imag > 0.0]
-    modes += [Mode("Dutch roll" if k == 0 else "roll-spiral", root) for k, root in enumerate(pairs)]
-    real = [root for root in aside if root.imag == 0.0]
-    modes += [Mode("roll" if k == 0 else "spiral", root) for k, root in enumerate(real)]
+            (longitudinal_roots if longitudinal_fraction[k] > 0.5 else lateral_roots).append(complex(roots[k]))
+    modes = [Mode("short period" if k == 0 else "phugoid", root) for k, root in enumerate(longitudinal_roots)]
+    oscillations = [root for root in lateral_roots if root.imag > 0.0]
+    modes += [Mode("Dutch roll" if k == 0 else "roll-spiral", root) for k, root in enumerate(oscillations)]
+    real_roots = [root for root in lateral_roots if root.imag == 0.0]
+    modes += [Mode("roll" if k == 0 else "spiral", root) for k, root in enumerate(real_roots)]
     return tuple(modes)
 
 
@@ -170,15 +170,18 @@ def step_responses(aircraft: Aircraft) -> tuple[StepResponse, ...]:
     rudder +0.052: roll by up to 0.49 rad
     """
     elevator, aileron, rudder = (
-        0.1 * most for most in (aircraft.max_elevator, aircraft.max_aileron, aircraft.max_rudder)
+        0.1 * max_deflection for max_deflection in (aircraft.max_elevator, aircraft.max_aileron, aircraft.max_rudder)
     )
     level = straight(Fdm(aircraft), aircraft.airspeed, TRIM_AMSL)
     throttle = 0.1 if level is None or level.throttle < 0.9 else -0.1
-    along, across = ("pitch", "alpha", "airspeed", "amsl"), ("roll", "roll_rate", "beta", "yaw")
+    longitudinal_quantities, lateral_quantities = (
+        ("pitch", "alpha", "airspeed", "amsl"),
+        ("roll", "roll_rate", "beta", "yaw"),
+    )
     responses = (
-        _step_response(aircraft, "elevator", -elevator, math.inf, 20.0, along),
-        _step_response(aircraft, "throttle", throttle, math.inf, 20.0, along),
-        _step_response(aircraft, "aileron", aileron, 1.0, 15.0, across),
+        _step_response(aircraft, "elevator", -elevator, math.inf, 20.0, longitudinal_quantities),
+        _step_response(aircraft, "throttle", throttle, math.inf, 20.0, longitudinal_quantities),
+        _step_response(aircraft, "aileron", aileron, 1.0, 15.0, lateral_quantities),
         _step_response(aircraft, "rudder", rudder, 1.0, 15.0, ("roll", "yaw_rate", "beta", "yaw")),
     )
     return tuple(response for response in responses if float(np.abs(response.change).max()) > _MIN_RESPONSE)

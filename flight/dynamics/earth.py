@@ -1,4 +1,4 @@
-"""Compute places on the ellipsoid of the earth as JSBSim does."""
+"""Compute positions on the ellipsoid of the earth as JSBSim does."""
 
 import math
 
@@ -20,12 +20,12 @@ _FOCUS = SEMI_MAJOR * ECCENTRICITY_2
 
 
 @inner
-def geodetic(place: Vector) -> tuple[float, float, float, float]:
-    """Return geodetic latitude and altitude (ft) of a place, and the sine and the cosine of that latitude.
+def geodetic(position: Vector) -> tuple[float, float, float, float]:
+    """Return geodetic latitude (rad), altitude (ft), and sine and cosine of the latitude of a position.
 
-    By one iteration of Fukushima's method (Journal of Geodesy 79, 2006).
+    One iteration of Fukushima's method (Journal of Geodesy 79, 2006).
     """
-    x, y, z = place
+    x, y, z = position
     equatorial = math.sqrt(x * x + y * y)
     s0 = abs(z)
     zc, c0 = AXES_RATIO * s0, AXES_RATIO * equatorial

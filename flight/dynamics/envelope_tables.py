@@ -32,8 +32,8 @@ def load_envelope(aircraft: Aircraft, *, motor_braking: bool = False) -> Envelop
     """Return the aircraft's envelope, from the cache if possible, otherwise computed and cached.
 
     The cached and the computed envelope are identical. A cache file that is unreadable, damaged or for another model,
-    JSBSim or schema is computed again; a cache folder without write permission is left alone. Raise FlightError for a
-    model that JSBSim cannot load.
+    JSBSim or schema is replaced, unless its folder is not writable. Raises FlightError for a model that JSBSim cannot
+    load.
 
     >>> from aircraft.catalog import load_aircraft
     >>> climb, descent = load_envelope(load_aircraft("aerosonde")).air_angles(25.0, 500.0)
@@ -46,14 +46,14 @@ def load_envelope(aircraft: Aircraft, *, motor_braking: bool = False) -> Envelop
     if tables is None:
         tables = compute_tables(aircraft, motor_braking)
         write_tables(file, key, tables)
-    known = read_uncertainty(aircraft.folder)
+    uncertainty = read_uncertainty(aircraft.folder)
     return Envelope(
-        source="" if known is None else known.source,
-        climb_sd=0.0 if known is None else known.climb,
-        descent_sd=0.0 if known is None else known.descent,
-        fastest_sd=0.0 if known is None else known.fastest,
-        power_sd=0.0 if known is None else known.power,
-        battery_guessed=known is not None and known.battery_guessed,
+        source="" if uncertainty is None else uncertainty.source,
+        climb_sd=0.0 if uncertainty is None else uncertainty.climb,
+        descent_sd=0.0 if uncertainty is None else uncertainty.descent,
+        fastest_sd=0.0 if uncertainty is None else uncertainty.fastest,
+        power_sd=0.0 if uncertainty is None else uncertainty.power,
+        battery_guessed=uncertainty is not None and uncertainty.battery_guessed,
         aircraft=aircraft.name,
         model_hash=model_hash(aircraft),
         motor_braking=motor_braking,
@@ -64,14 +64,14 @@ def load_envelope(aircraft: Aircraft, *, motor_braking: bool = False) -> Envelop
 
 
 def cache_file(aircraft: Aircraft, motor_braking: bool) -> Path:
-    """Return the cache file of this envelope."""
+    """Return the cache file of an aircraft's envelope."""
     kind = "braking" if motor_braking else "coasting"
     name = f"envelope-{aircraft.name}-{model_hash(aircraft)[:16]}-{kind}-v{_SCHEMA_VERSION}.json"
     return Path(user_cache_dir("planfly")) / name
 
 
 def compute_tables(aircraft: Aircraft, motor_braking: bool) -> dict[str, Floats]:
-    """Compute the tables of `aircraft.envelope.Envelope` by name, with a trim at each grid point.
+    """Return the tables of `aircraft.envelope.Envelope` by name, with a trim at each grid point.
 
     The trims are in still standard atmosphere, at 45 degrees latitude, on a course due north.
     """
@@ -80,41 +80,41 @@ def compute_tables(aircraft: Aircraft, motor_braking: bool) -> dict[str, Floats]
     climb = np.full((airspeeds.size, _GRID_AMSL_M.size), math.nan)
     descent = climb.copy()
     powers = {name: climb.copy() for name in POWERS}
-    slow, fast = np.full(_GRID_AMSL_M.size, math.nan), np.full(_GRID_AMSL_M.size, math.nan)
+    min_level_speed, max_level_speed = np.full(_GRID_AMSL_M.size, math.nan), np.full(_GRID_AMSL_M.size, math.nan)
     for j, amsl in enumerate(_GRID_AMSL_M.tolist()):
-        up: Trim | None = None
-        down: Trim | None = None
-        even: Trim | None = None
-        # From fast to slow: the slowest may have no trim, and each trim starts from its neighbor.
+        last_climb: Trim | None = None
+        last_descent: Trim | None = None
+        last_level: Trim | None = None
+        # From fast to slow, because the slowest airspeed may have no trim, and each trim starts from its neighbor.
         for i in reversed(range(airspeeds.size)):
             airspeed = float(airspeeds[i])
-            if found := full_throttle(fdm, airspeed, amsl, up):
-                up, climb[i, j] = found, found.climb
+            if found := full_throttle(fdm, airspeed, amsl, last_climb):
+                last_climb, climb[i, j] = found, found.climb
                 powers["power_full"][i, j] = _power(fdm, found)
-            if found := idle(fdm, airspeed, amsl, down):
-                down, descent[i, j] = found, -found.climb
+            if found := idle(fdm, airspeed, amsl, last_descent):
+                last_descent, descent[i, j] = found, -found.climb
                 powers["power_idle"][i, j] = _power(fdm, found)
-            if found := straight(fdm, airspeed, amsl, near=even):
-                even, powers["power_level"][i, j] = found, _power(fdm, found)
+            if found := straight(fdm, airspeed, amsl, near=last_level):
+                last_level, powers["power_level"][i, j] = found, _power(fdm, found)
         if found := fastest(fdm, amsl):
-            fast[j] = found.airspeed
+            max_level_speed[j] = found.airspeed
         if found := slowest(fdm, amsl):
-            slow[j] = found.airspeed
+            min_level_speed[j] = found.airspeed
     # A trim is accurate to about 1e-11; nine decimals are the same on every machine.
     return {
         "airspeed": airspeeds,
         "amsl": _GRID_AMSL_M,
         "climb": climb.round(9),
         "descent": descent.round(9),
-        "level_speed_min": slow.round(9),
-        "level_speed_max": fast.round(9),
+        "level_speed_min": min_level_speed.round(9),
+        "level_speed_max": max_level_speed.round(9),
         **{name: table.round(6) for name, table in powers.items()},
     }
 
 
-def _power(fdm: Fdm, at: Trim) -> float:
+def _power(fdm: Fdm, trim: Trim) -> float:
     """Return the power of a trim, W."""
-    fdm.balance(at.vector())
+    fdm.balance(trim.vector())
     return float(fdm.read().power)
 
 
@@ -146,7 +146,7 @@ def _read(file: Path, key: dict[str, Any], airspeeds: Floats) -> dict[str, Float
 
 
 # ----------------------------------------------------------------------
-# Tables of an aircraft in the user's cache folder, equal to the computed tables to the last bit.
+# Tables of an aircraft in the user's cache folder, bit for bit equal to the computed tables.
 
 
 def read_tables(file: Path, key: dict[str, Any], shapes: Mapping[str, tuple[int, ...]]) -> dict[str, Floats] | None:

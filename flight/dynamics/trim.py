@@ -1,6 +1,6 @@
 """Find steady straight flights, with controls and attitude without acceleration, and the linear dynamics about them.
 
-A trim has eight quantities, `QUANTITIES`. Two of them are held, and Newton's method finds the other six so that the
+A trim has eight quantities, `QUANTITIES`. Two of them are fixed, and Newton's method finds the other six such that the
 six body accelerations vanish. Speeds and angles are relative to the air mass.
 """
 
@@ -18,29 +18,29 @@ from world.errors import FlightError
 from world.least_squares import least_squares
 
 # ----------------------------------------------------------------------
-# Running engine in a JSBSim model: its speed is a state of its own, which must settle before a measurement.
+# Running engine in a JSBSim model: its speed is a state of the model, which must settle before a measurement.
 
-# First time step in which an engine's speed settles, s.
+# First time step while the engine speed settles, s.
 _SETTLE_STEP_S = 0.2
-# Number of such steps before the step follows the engine's own time constant.
+# Number of such steps before the step follows the engine's time constant.
 _FIRST_SETTLE_STEPS = 25
-# Largest number of steps.
+# Maximum number of steps.
 _MAX_SETTLE_STEPS = 300
 # Range of the following steps, s.
 _SETTLE_STEP_RANGE_S = (1e-4, 60.0)
-# Largest change of the step from one to the next, a factor.
+# Maximum ratio between successive steps.
 _MAX_STEP_CHANGE = 4.0
-# Change of the rates below which they are steady, ft/s^2 and rad/s^2.
+# Change below which the rates are steady, ft/s^2 and rad/s^2.
 _STEADY_RATE_CHANGE = 1e-10
-# Largest number of steps in which derivatives settle at constant engine speed.
+# Maximum number of steps while derivatives settle at constant engine speed.
 _MAX_RATE_STEPS = 6
 
 
 class Engine:
-    """A running engine whose speed can settle while the aircraft is held in its air flow.
+    """Engine whose speed can settle while the aircraft is held in the air flow.
 
     fdm: the JSBSim instance.
-    dt: time step of its flight, s.
+    dt: time step of the flight, s.
     getter, setter: access to its properties.
     """
 
@@ -49,7 +49,7 @@ class Engine:
         kinds = ("rate/rotational", "rate/translational", "position/rotational", "position/translational")
         names = [f"simulation/integrator/{kind}" for kind in kinds]
         self._integrators = [setter(name) for name in names]
-        self._usual = [getter(name)() for name in names]
+        self._saved_integrators = [getter(name)() for name in names]
         self._rates = [getter(name) for name in RATES[:6]]
         self._freeze = setter("propulsion/fuel_freeze")
         self._start = setter("propulsion/set-running")
@@ -71,65 +71,66 @@ class Engine:
         Without ``spin`` the engine keeps its speed, and only quantities that depend on their own derivative (the lift
         of a changing angle of attack) settle.
 
-        A light propeller follows within milliseconds, and would swing in longer steps; a heavy one takes a minute.  A
-        step of the engine's time constant leads to its steady speed at once, as in Newton's method.
+        A light propeller settles within milliseconds, and would oscillate in longer steps; a heavy one takes a minute.
+        A step of the engine's time constant leads directly to the steady speed, as in Newton's method.
         """
         steps = [_SETTLE_STEP_S, _SETTLE_STEP_S] if spin else [0.0, 0.0]
         self._exec.set_dt(steps[1])
-        before, change_before = [0.0] * 6, [0.0] * 6
+        previous_rates, previous_change = [0.0] * 6, [0.0] * 6
         for number in range(_MAX_SETTLE_STEPS if spin else _MAX_RATE_STEPS):
             self._exec.run()
-            now = [rate() for rate in self._rates]
-            # Without NumPy, which takes as long for six numbers as JSBSim for its step.
-            change = [a - b for a, b in zip(now, before, strict=True)]
-            if all(abs(one) < _STEADY_RATE_CHANGE for one in change):
+            rates = [rate() for rate in self._rates]
+            # Without NumPy, which takes as long for six numbers as JSBSim does for its step.
+            change = [a - b for a, b in zip(rates, previous_rates, strict=True)]
+            if all(abs(difference) < _STEADY_RATE_CHANGE for difference in change):
                 break
             if spin and number >= _FIRST_SETTLE_STEPS:
-                steps = [steps[1], settle_step(steps, change_before, change)]
+                steps = [steps[1], settle_step(steps, previous_change, change)]
                 self._exec.set_dt(steps[1])
-            before, change_before = now, change
+            previous_rates, previous_change = rates, change
         self._exec.set_dt(self._dt)
 
     def release(self) -> None:
-        """Release the motion again."""
-        for integrator, usual in zip(self._integrators, self._usual, strict=True):
-            integrator(usual)
+        """Release the aircraft's motion and the fuel flow."""
+        for integrator, saved_value in zip(self._integrators, self._saved_integrators, strict=True):
+            integrator(saved_value)
         self._freeze(0.0)
 
 
-def settle_step(steps: Sequence[float], before: Sequence[float], change: Sequence[float]) -> float:
-    """Return the time constant with which quantities settle, s, as the next step, in Euler's method.
+def settle_step(steps: Sequence[float], previous_change: Sequence[float], change: Sequence[float]) -> float:
+    """Return the next time step: the time constant of the quantities in Euler's method, s, within limits.
 
-    steps: the step before the last, and the last one, s.  before, change: the changes in them.
+    steps: the last two steps, s.
+    previous_change, change: changes of the quantities in these steps.
 
-    A change that falls to 0.9 in equal steps of 0.2 s has a time constant of 2 s, of which 4 times 0.2 s are taken; one
-    that swings, with -3 times the change before, has one of 0.05 s.
+    A change that falls to 0.9 in equal steps of 0.2 s has a time constant of 2 s, which is limited to 4 times 0.2 s; an
+    oscillation, with -3 times the previous change, has a time constant of 0.05 s.
 
     >>> settle_step((0.2, 0.2), (1.0,), (0.9,)), round(settle_step((0.2, 0.2), (1.0,), (-3.0,)), 9)
     (0.8, 0.05)
     """
-    largest = max(range(len(before)), key=lambda k: abs(before[k]))
+    fastest_index = max(range(len(previous_change)), key=lambda k: abs(previous_change[k]))
     step = steps[1]
-    if before[largest] == 0.0 or not math.isfinite(change[largest]):
+    if previous_change[fastest_index] == 0.0 or not math.isfinite(change[fastest_index]):
         return step
-    left = 1.0 - change[largest] / before[largest] * steps[0] / step
-    constant = steps[0] / left if left > 0.0 else math.inf
-    low, high = _SETTLE_STEP_RANGE_S
-    return min(max(constant, step / _MAX_STEP_CHANGE, low), step * _MAX_STEP_CHANGE, high)
+    settled_fraction = 1.0 - change[fastest_index] / previous_change[fastest_index] * steps[0] / step
+    time_constant = steps[0] / settled_fraction if settled_fraction > 0.0 else math.inf
+    min_step, max_step = _SETTLE_STEP_RANGE_S
+    return min(max(time_constant, step / _MAX_STEP_CHANGE, min_step), step * _MAX_STEP_CHANGE, max_step)
 
 
-# Elements of a trim vector (8,), in this order, SI and radians: climb is the flight-path angle to the air mass, bank is
-# a rotation about the velocity; sideslip is zero.
+# Elements of a trim vector (8,), in this order, SI and radians.  Climb is the flight-path angle to the air mass, and
+# bank a rotation about the velocity; sideslip is zero.
 TrimQuantity = Literal["airspeed", "climb", "alpha", "bank", "elevator", "aileron", "rudder", "throttle"]
 # The same names as a tuple.
 QUANTITIES: tuple[TrimQuantity, ...] = get_args(TrimQuantity)
-# Largest step of Newton's method for each quantity; also the scale of the finite differences.
+# Maximum step of Newton's method for each quantity; also the scale of the finite differences.
 _MAX_NEWTON_STEP = np.array([4.0, 0.1, 0.1, 0.05, 0.15, 0.05, 0.05, 0.2])
 # Finite difference as a ratio to `_MAX_NEWTON_STEP`.
 _DIFFERENCE_RATIO = 1e-5
-# Largest acceleration of a converged trim, m/s^2 and rad/s^2.
+# Maximum acceleration of a converged trim, m/s^2 and rad/s^2.
 _MAX_TRIM_ACCELERATION = 1e-8
-# Largest number of Newton steps.
+# Maximum number of Newton steps.
 _MAX_ITERATIONS = 40
 # Declare no trim after this many failed step halvings. Trims of the catalog's aircraft are found without one.
 _MAX_FAILED_HALVINGS = 3
@@ -170,7 +171,7 @@ class Trim:
         return Commands(self.elevator, self.aileron, self.rudder, self.throttle)
 
     def vector(self) -> Floats:
-        """Return its trim vector (8,), in the order of `QUANTITIES`."""
+        """Return the trim vector (8,), in the order of `QUANTITIES`."""
         return np.array([getattr(self, quantity) for quantity in QUANTITIES])
 
 
@@ -178,19 +179,19 @@ class Simulator(Protocol):
     """Interface of a flight-dynamics model for trims; `flight.dynamics.fdm.Fdm` implements it."""
 
     def move_to(self, amsl: float) -> None:
-        """Move the point of evaluation to this altitude."""
+        """Move the point of evaluation to an altitude, m."""
 
     def balance(self, values: Floats) -> Floats:
-        """Return the body accelerations (6,), m/s^2 and rad/s^2, of a flight with this trim vector (8,)."""
+        """Return the body accelerations (6,), m/s^2 and rad/s^2, of a trim vector (8,)."""
 
     def surface_limits(self) -> tuple[float, float, float]:
         """Return the elevator, aileron and rudder limits, rad, in either direction."""
 
     def first_guess(self) -> Floats:
-        """Return a trim vector (8,) to start from."""
+        """Return a trim vector (8,) as the initial guess."""
 
     def derivatives(self, states: Floats, commands: Floats) -> Floats:
-        """Return the rates (8,) of the states (u, v, w, p, q, r, roll, pitch) with these commands."""
+        """Return the rates (8,) of the states (u, v, w, p, q, r, roll, pitch) for commands."""
 
 
 def solve_trim(
@@ -199,9 +200,10 @@ def solve_trim(
     limits: tuple[float, float, float],
     start: Floats | None = None,
 ) -> Floats | None:
-    """Find the trim vector (8,) with two quantities held, or None if the iteration does not converge.
+    """Find the trim vector (8,) with two quantities fixed, or None if the iteration does not converge.
 
-    balance: maps a trim vector to its accelerations, (6,).
+    balance: function from a trim vector to its accelerations, (6,).
+    held: values of the fixed quantities.
     limits: elevator, aileron and rudder limits.
     start: first guess, (8,).
 
@@ -211,55 +213,57 @@ def solve_trim(
     values = (first_guess(25.0) if start is None else start).copy()
     for quantity, value in held.items():
         values[QUANTITIES.index(quantity)] = value
-    free = np.array([k for k, quantity in enumerate(QUANTITIES) if quantity not in held])
-    lowest, highest = _trim_bounds(limits)
+    free_indices = np.array([k for k, quantity in enumerate(QUANTITIES) if quantity not in held])
+    lower_bounds, upper_bounds = _trim_bounds(limits)
     residual = balance(values)
-    least, stalled_steps, failed_steps = math.inf, 0, 0
+    min_residual, stalled_steps, failed_steps = math.inf, 0, 0
     for _ in range(_MAX_ITERATIONS):
-        size = float(np.abs(residual).max())
-        if size < _MAX_TRIM_ACCELERATION or not np.isfinite(size):
+        residual_size = float(np.abs(residual).max())
+        if residual_size < _MAX_TRIM_ACCELERATION or not np.isfinite(residual_size):
             break
-        least, stalled_steps = (size, 0) if size < 0.5 * least else (least, stalled_steps + 1)
-        if size > 10.0 * _MAX_TRIM_ACCELERATION and (
+        min_residual, stalled_steps = (
+            (residual_size, 0) if residual_size < 0.5 * min_residual else (min_residual, stalled_steps + 1)
+        )
+        if residual_size > 10.0 * _MAX_TRIM_ACCELERATION and (
             failed_steps >= _MAX_FAILED_HALVINGS or stalled_steps >= _MAX_STALLED_STEPS
         ):
             break
         columns = []
-        for k in free:
+        for k in free_indices:
             moved = values.copy()
-            # Away from the stops: a surface beyond its stop does not move, and its column would be zero.
+            # Difference away from the stops: a surface beyond its stop does not move, and its column would be zero.
             difference = _DIFFERENCE_RATIO * _MAX_NEWTON_STEP[k] * (-1.0 if values[k] >= 0.0 else 1.0)
             moved[k] += difference
             columns.append((balance(moved) - residual) / difference)
         step = least_squares(np.stack(columns, axis=1), -residual)
-        step /= max(1.0, float(np.abs(step / _MAX_NEWTON_STEP[free]).max()))
+        step /= max(1.0, float(np.abs(step / _MAX_NEWTON_STEP[free_indices]).max()))
         for _ in range(6):
             trial = values.copy()
-            trial[free] += step
-            trial = np.clip(trial, lowest, highest)
-            changed = balance(trial)
-            if np.abs(changed).max() < size:
+            trial[free_indices] += step
+            trial = np.clip(trial, lower_bounds, upper_bounds)
+            trial_residual = balance(trial)
+            if np.abs(trial_residual).max() < residual_size:
                 break
             step = 0.5 * step
         else:
             failed_steps += 1
-        values, residual = trial, changed
+        values, residual = trial, trial_residual
     return values if np.abs(residual).max() < 10.0 * _MAX_TRIM_ACCELERATION else None
 
 
 def _trim_bounds(limits: tuple[float, float, float]) -> tuple[Floats, Floats]:
     elevator, aileron, rudder = limits
-    lowest = np.array([5.0, -1.2, -0.4, -0.5, -elevator, -aileron, -rudder, 0.0])
-    highest = np.array([80.0, 1.2, 0.4, 0.5, elevator, aileron, rudder, 1.0])
-    return lowest, highest
+    lower_bounds = np.array([5.0, -1.2, -0.4, -0.5, -elevator, -aileron, -rudder, 0.0])
+    upper_bounds = np.array([80.0, 1.2, 0.4, 0.5, elevator, aileron, rudder, 1.0])
+    return lower_bounds, upper_bounds
 
 
 def trim(
     simulator: Simulator, amsl: float, held: Mapping[TrimQuantity, float], near: Trim | None = None
 ) -> Trim | None:
-    """Return the steady flight at this altitude with two of its quantities held, or None if no trim is found.
+    """Return the steady flight at an altitude with two quantities fixed, or None if no trim is found.
 
-    near: a trim to start from.
+    near: trim from which the iteration starts.
     """
     simulator.move_to(amsl)
     start = near.vector() if near else simulator.first_guess()
@@ -268,7 +272,7 @@ def trim(
 
 
 def from_vector(values: Floats, amsl: float) -> Trim:
-    """Return the trim with this vector (8,), in the order of `QUANTITIES`."""
+    """Return the trim of a vector (8,), in the order of `QUANTITIES`."""
     airspeed, climb, alpha, bank, elevator, aileron, rudder, throttle = (float(value) for value in values)
     return Trim(airspeed, amsl, climb, alpha, bank, elevator, aileron, rudder, throttle)
 
@@ -276,7 +280,7 @@ def from_vector(values: Floats, amsl: float) -> Trim:
 def straight(
     simulator: Simulator, airspeed: float, amsl: float, climb: float = 0.0, near: Trim | None = None
 ) -> Trim | None:
-    """Return the steady flight at this airspeed (m/s), altitude (m) and climb angle (rad), or None.
+    """Return the steady flight at an airspeed (m/s), altitude (m) and climb angle (rad), or None.
 
     The climb angle is relative to the air mass.
 
@@ -287,22 +291,23 @@ def straight(
     >>> 0.3 < level.throttle < 0.9, straight(model, 90.0, 500.0) is None
     (True, True)
     """
-    found = trim(simulator, amsl, {"airspeed": airspeed, "climb": climb}, near)
-    if found is None and near is None:
-        # With little excess power the search fails from far away, and succeeds from the climb at the same airspeed.
-        steepest = full_throttle(simulator, airspeed, amsl)
-        if steepest is not None and steepest.climb >= climb:
-            found = trim(simulator, amsl, {"airspeed": airspeed, "climb": climb}, steepest)
-    return found
+    found_trim = trim(simulator, amsl, {"airspeed": airspeed, "climb": climb}, near)
+    if found_trim is None and near is None:
+        # With little excess power the search fails from a distant start, and succeeds from the climb at the same
+        # airspeed.
+        steepest_climb = full_throttle(simulator, airspeed, amsl)
+        if steepest_climb is not None and steepest_climb.climb >= climb:
+            found_trim = trim(simulator, amsl, {"airspeed": airspeed, "climb": climb}, steepest_climb)
+    return found_trim
 
 
 def full_throttle(simulator: Simulator, airspeed: float, amsl: float, near: Trim | None = None) -> Trim | None:
-    """Return the steepest steady climb at this airspeed (m/s) and altitude (m), or None."""
+    """Return the steepest steady climb at an airspeed (m/s) and altitude (m), or None."""
     return trim(simulator, amsl, {"airspeed": airspeed, "throttle": 1.0}, near)
 
 
 def idle(simulator: Simulator, airspeed: float, amsl: float, near: Trim | None = None) -> Trim | None:
-    """Return the steepest steady descent, with closed throttle, at this airspeed (m/s) and altitude (m), or None."""
+    """Return the steepest steady descent, with closed throttle, at an airspeed (m/s) and altitude (m), or None."""
     return trim(simulator, amsl, {"airspeed": airspeed, "throttle": 0.0}, near)
 
 

@@ -16,7 +16,7 @@ GAINS_FILE = "gains.toml"
 
 @dataclass(frozen=True, slots=True)
 class Gains:
-    """Gains of the guidance core, in SI units and radians.
+    """Gains of guidance and inner loops, in SI units and radians.
 
     Airframe and altitude:
 
@@ -32,11 +32,11 @@ class Gains:
 
     speed_gain, speed_integral: throttle per m/s.
     throttle_per_slope: throttle per rad of climb.
-    throttle_idle: throttle at which the motor begins to give thrust at the reference airspeed; lower limit of the
+    throttle_idle: throttle at which the motor starts to give thrust at the reference airspeed; lower limit of the
         integrator.
     slow_margin: airspeed error below the command at which altitude yields to airspeed.
-    arc_slowing_time, arc_slowing_max: time before an arc, and largest reduction, by which the airspeed yields to a
-        ground speed at which the arc can be flown.
+    arc_slowing_time, arc_slowing_max: time before an arc at which the airspeed is reduced to a ground speed at which
+        the arc can be flown, and maximum reduction.
 
     Cross-track:
 
@@ -45,10 +45,10 @@ class Gains:
     turn_lead, turn_smoothing: lead time of the path's curvature in the feedforward, and averaging time about that
         point.
     aside_frequency: frequency of the return to the path after the offset from rolling into an arc.
-    side_gain, side_lag: gain on the sideways acceleration that bank and ailerons do not explain, and its lag.
+    side_gain, side_lag: gain on the lateral acceleration that bank and ailerons do not explain, and its lag.
     push_lead, push_smoothing: lead time of a correction to compensate the bank's lag, from its rate of change, and the
         smoothing time of that rate.
-    side_per_sideslip, side_per_aileron: sideways acceleration, m/s^2 per rad.
+    side_per_sideslip, side_per_aileron: lateral acceleration, m/s^2 per rad.
     sideslip_max: skid at the bank limit.
 
     Roll and yaw:
@@ -62,10 +62,10 @@ class Gains:
     yaw_rate_gain: yaw damping.
     sideslip_gain: rudder per rad of sideslip.
 
-    Reference laws, whose gains have defaults, like other gains that an aircraft may omit:
+    Reference laws; their gains have defaults, like other gains that an aircraft may omit:
 
     l1_period, l1_damping, l1_integral: ArduPlane's NAVL1_PERIOD, NAVL1_DAMPING and NAVL1_XTRACK_I, and its defaults.
-    field_approach: course to the path far from it.
+    field_approach: angle of approach to the path when far from it.
     field_path, field_orbit: convergence of the vector field on a line and on an orbit.
     field_course, field_course_integral: bank per course error.
     """
@@ -131,7 +131,7 @@ class Gains:
 
 
 # Record of the fields of `Gains`, for compiled code.
-GAINS = record_dtype(*(item.name for item in fields(Gains)))
+GAINS = record_dtype(*(gain.name for gain in fields(Gains)))
 
 # Factor of an angle in degrees.
 _DEG_TO_RAD = math.radians(1.0)

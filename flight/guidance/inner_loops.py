@@ -1,4 +1,4 @@
-"""Implement the inner loops on roll, pitch and yaw rate, which all control laws share, and the memory of guidance."""
+"""Implement the inner loops of roll, pitch and yaw rate that all control laws share, and the memory of guidance."""
 
 import math
 
@@ -7,11 +7,11 @@ import numpy as np
 from aircraft.envelope import GRAVITY
 from world.kernels import Record, inner, record_dtype
 
-# State of the guidance from tick to tick, and one tick's values for the track.
+# Memory of the guidance from tick to tick, and values of one tick for the track.
 GUIDANCE_MEMORY = record_dtype(
     # Set before the first tick.
-    ("law", np.int64),  # control law of planfly's guidance: a value of `flight.autopilots.planfly.law.LAWS`
-    "max_bank",  # rad, of the command
+    ("lateral_law", np.int64),  # lateral law of planfly's guidance: a value of `flight.autopilots.planfly.law.LAWS`
+    "max_bank",  # rad, limit of the bank command
     "trim_elevator",  # rad, of level flight at the reference airspeed
     "trim_alpha",  # rad
     "trim_throttle",  # 0..1
@@ -21,37 +21,37 @@ GUIDANCE_MEMORY = record_dtype(
     ("leg", np.int64),
     "distance",  # m along the path
     "cross_track",  # m right of the path
-    "height_error",  # m above it
-    "speed_command",  # m/s
+    "height_error",  # m above the path
+    "speed_command",  # m/s, commanded airspeed
     ("done", np.bool_),  # past the end of the path
-    ("returning", np.bool_),  # on a return that the autopilot flies by itself: it cannot miss the path's end
-    "circled",  # s since it arrived at the loiter of that return, at its altitude
-    "turned",  # rad around it since then, positive to the right
-    "bearing",  # rad, bearing from its center, a tick ago
+    ("returning", np.bool_),  # on an RTL that the autopilot flies by itself and that cannot miss the path's end
+    "circled",  # s since the aircraft arrived at the loiter of that RTL, at the loiter's altitude
+    "turned",  # rad flown around the loiter since then, positive to the right
+    "bearing",  # rad, bearing from the loiter's center, a tick ago
     # Lateral: the cross-track law.
     "cross_track_sum",  # m s
     "last_velocity_east",  # m/s over the ground, a tick ago
     "last_velocity_north",
     "last_velocity_up",
     "unexplained_acceleration",  # m/s^2 to the right that bank and ailerons do not explain
-    "path_bank",  # rad and rad/s, model roll only for the path's curvature
+    "path_bank",  # rad and rad/s, model roll for the path's curvature alone
     "path_bank_rate",
-    "aside",  # m right of the path and m/s, offset caused by that roll
-    "aside_rate",
-    "push",  # m/s^2 to the right that corrects errors, smoothed
+    "roll_offset",  # m right of the path and m/s, offset caused by that roll
+    "roll_offset_rate",
+    "smoothed_correction",  # m/s^2 to the right, smoothed correction of errors
     "sideslip",  # rad, sideslip setpoint
-    "arc_speed",  # m/s over the ground, for the sharpest arc close ahead; 0 for no limit
+    "max_arc_speed",  # m/s, maximum ground speed for the sharpest arc close ahead; 0 for no limit
     # Lateral: the reference laws.
     ("l1_leg", np.int64),  # the leg that L1 is on
-    "l1_sum",  # rad
-    "course_sum",  # rad s, of the vector field
+    "l1_integrator",  # rad
+    "course_integrator",  # rad s, of the vector field
     # Vertical.
-    "height_sum",  # m s
-    "speed_sum",  # m
-    "energy_rate",  # m/s, filtered rate of total energy height
+    "altitude_integrator",  # m s
+    "speed_integrator",  # m
+    "energy_height_rate",  # m/s, filtered rate of total energy height
     "last_airspeed",  # m/s, negative before the first tick
-    "airspeed",  # m/s, without gusts
-    "bend_acceleration",  # m/s^2 upwards, from the path's slope change ahead
+    "filtered_airspeed",  # m/s, without gusts
+    "slope_acceleration",  # m/s^2 upwards, required by the path's change of slope
     # Roll.
     "bank",  # rad, of the model roll
     "bank_rate",  # rad/s, of the model roll
@@ -64,7 +64,7 @@ GUIDANCE_MEMORY = record_dtype(
 def steer_elevator(
     state: Record, gains: Record, memory: Record, commands: Record, climb_rate: float, acceleration: float
 ) -> None:
-    """Set the elevator for an upward acceleration, through load factor and angle of attack.
+    """Set the elevator for an upward acceleration, from the load factor and the angle of attack.
 
     climb_rate: m/s.
     acceleration: m/s^2, positive upwards.
@@ -91,10 +91,10 @@ def steer_elevator(
 
 
 @inner
-def roll_model(
+def step_roll_model(
     bank_demand: float, bank: float, roll_rate: float, gains: Record, dt: float
 ) -> tuple[float, float, float]:
-    """Advance the model roll by one tick, and return its bank (rad), roll rate and roll acceleration.
+    """Advance the model roll by one tick, and return bank (rad), roll rate and roll acceleration.
 
     The model is a critically damped oscillator with limits of roll rate and roll acceleration.
     """
@@ -118,14 +118,14 @@ def follow_roll(
     roll_acceleration: float,
     dt: float,
 ) -> None:
-    """Set aileron and rudder so that the aircraft follows a given roll.
+    """Set aileron and rudder so that the aircraft follows a roll.
 
     bank: rad.
     roll_rate: rad/s.
     roll_acceleration: rad/s^2.
 
-    The ailerons get the deflection for this roll, the feedback of the remaining error, and the compensation of gusts
-    and propeller torque, estimated from the roll that the ailerons do not explain.
+    The aileron command is the deflection for this roll, plus feedback of the remaining error, plus compensation of
+    gusts and propeller torque, which are estimated from the roll that the ailerons do not explain.
     """
     airspeed = max(8.0, state.airspeed)
     inverse_speed_ratio = gains.reference_airspeed / airspeed

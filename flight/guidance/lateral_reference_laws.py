@@ -1,4 +1,4 @@
-"""Implement the lateral control laws of other autopilots, L1 and the vector field, as formulas.
+"""Implement the lateral control laws L1 and vector field as formulas.
 
 L1 is the law of Park, Deyst and How ("A New Nonlinear Guidance Logic for Trajectory Tracking", AIAA 2004-4900) in
 ArduPlane's form: period and damping as parameters, a capture angle of 45 degrees, an integrator, and leg switching at a
@@ -12,42 +12,42 @@ import numpy as np
 from world.geometry import wrap
 from world.kernels import Record, Records, inner, record_dtype
 
-# A waypoint, and the leg that begins there.
+# A waypoint, and the leg that starts there.
 WAYPOINT = record_dtype(
     "east",  # m
     "north",
     "turn",  # rad, positive in either direction
     ("fly_over", np.bool_),
     "acceptance",  # m; 0 if the mission states none
-    "pass_by",  # m that ArduPlane flies on beyond it along the leg
+    "pass_by",  # m that ArduPlane flies past the waypoint along the leg
     "airspeed",  # m/s, of the leg
-    "min_ground_speed",  # m/s, on the leg to it; 0 or less for none
+    "min_ground_speed",  # m/s, on the leg to the waypoint; 0 or less for none
     "up",  # m AMSL
-    "circle",  # m, radius of the loiter that it is a corner of, positive to the right; 0 for none
-    "centre_east",  # m, of that circle
+    "circle",  # m, radius of the loiter of which it is a corner, positive to the right; 0 for none
+    "centre_east",  # m, of that loiter
     "centre_north",
-    ("item", np.int64),  # seq of the mission item that it belongs to, -1 for none
-    "stays",  # s, duration of a loiter once it is reached: inf without end, NaN for one with a number of turns
+    ("item", np.int64),  # seq of its mission item, -1 for none
+    "stays",  # s, duration of a loiter once reached: inf without end, NaN for a loiter by turns
     "turns",  # number of turns of a loiter, 0 for any other
     ("to_height", np.bool_),  # True if the loiter climbs or descends to an altitude
-    ("leaves_on_course", np.bool_),  # True if its item states an exit on the course to the next waypoint
-    ("leaves_on_tangent", np.bool_),  # True if the line to the next waypoint begins on its circle, not at its center
-    ("returns", np.bool_),  # True if the leg to it stands for a return; circle, center and up are then the target's
-    ("stop", np.int64),  # stop of the route that it belongs to: a jump back leads to another stop of the same item
-    ("gate", np.bool_),  # True for a CONDITION_GATE, which is passed and not flown to
-    ("ends", np.bool_),  # True if the mission ends there without a landing or a return
-    ("straight", np.bool_),  # True if the leg to it leads from wherever the aircraft is, along no line
+    ("leaves_on_course", np.bool_),  # True if the item states an exit on the course to the next waypoint
+    ("leaves_on_tangent", np.bool_),  # True if the line to the next waypoint starts on the circle, not at its center
+    ("returns", np.bool_),  # True if the leg to it is an RTL; circle, center and up are then those of the RTL loiter
+    ("stop", np.int64),  # its stop of the route: a jump back leads to another stop of the same item
+    ("gate", np.bool_),  # True for a CONDITION_GATE, which is no target
+    ("ends", np.bool_),  # True if the mission ends there without a landing or an RTL
+    ("straight", np.bool_),  # True if the leg to it starts at the aircraft and follows no line
     "slope_base",  # m, see `flight.mission.return_path.ReturnCircle`
     ("over_ground", np.bool_),  # True if the leg to it follows the ground
     "above_ground",  # m, height above ground at the end of such a leg
-    "home_up",  # m AMSL, home while the leg to it is flown; NaN if unknown
+    "home_up",  # m AMSL, altitude of home during the leg to it; NaN if unknown
 )
 
 
 def waypoint_column(count: int) -> Records:
     """Return `WAYPOINT` records (count,), all 0, with the memory stride of a flight's path.
 
-    Numba treats contiguous records as another type, and would compile every control law a second time for it.
+    Numba treats contiguous records as another type, and would compile every control law a second time for them.
 
     >>> waypoint_column(3).shape, waypoint_column(3).flags.c_contiguous
     ((3,), False)
@@ -55,15 +55,15 @@ def waypoint_column(count: int) -> Records:
     return np.zeros(2 * count, WAYPOINT)[::2]
 
 
-# ArduPlane's WP_RADIUS where a mission states no acceptance, m.
+# ArduPlane's WP_RADIUS, for a mission without an acceptance radius, m.
 WAYPOINT_RADIUS = 90.0
-# Largest angle from its line at which L1 integrates, rad.
+# Maximum angle to the line at which L1 integrates, rad.
 _INTEGRATION_LIMIT_RAD = math.radians(5.0)
-# Largest magnitude of the L1 integrator, rad.
+# Maximum magnitude of the L1 integrator, rad.
 _MAX_INTEGRATOR_RAD = 0.1
-# Steepest intercept of L1: sine of 45 degrees.
+# Sine of the steepest intercept angle of L1, 45 degrees.
 _CAPTURE_SINE = math.sqrt(0.5)
-# Time after passing a waypoint at which L1 heads back to it, s.
+# Time after passing a waypoint at which L1 turns back to it, s.
 _PASSED_TIME_S = 3.0
 
 
@@ -75,14 +75,15 @@ def l1_length(speed: float, period: float, damping: float) -> float:
 
 @inner
 def l1_angles(
-    estimated: Record, a_east: float, a_north: float, b_east: float, b_north: float, length: float
+    estimated: Record, a_east: float, a_north: float, b_east: float, b_north: float, l1_distance: float
 ) -> tuple[float, float]:
-    """Return the angle from ground velocity to leg or waypoint, and the angle from that to the aim point, rad.
+    """Return the angle from the ground velocity to the leg or waypoint, and from the leg to the aim point, rad.
 
     estimated: a record of `flight.guidance.navigation_error.MOTION`.
     a_east, a_north, b_east, b_north: the leg's ends, m.
 
-    The second angle is NaN while the aircraft heads straight for a waypoint. Both are positive if it has to turn left.
+    The second angle is NaN while L1 aims straight at a waypoint. Both angles are positive if the aircraft must turn
+    left.
     """
     leg_east, leg_north = b_east - a_east, b_north - a_north
     leg_length = max(1e-6, math.hypot(leg_east, leg_north))
@@ -92,11 +93,11 @@ def l1_angles(
     cross_track = from_a_east * leg_north - from_a_north * leg_east
     distance = math.hypot(from_a_east, from_a_north)
     course = math.atan2(estimated.velocity_east, estimated.velocity_north)
-    if distance > length and distance_along < -_CAPTURE_SINE * max(1.0, distance):
+    if distance > l1_distance and distance_along < -_CAPTURE_SINE * max(1.0, distance):
         return wrap(course - math.atan2(-from_a_east, -from_a_north)), math.nan
     if distance_along > leg_length + _PASSED_TIME_S * math.hypot(estimated.velocity_east, estimated.velocity_north):
         return wrap(course - math.atan2(b_east - estimated.east, b_north - estimated.north)), math.nan
-    aim_angle = math.asin(min(_CAPTURE_SINE, max(-_CAPTURE_SINE, cross_track / max(0.1, length))))
+    aim_angle = math.asin(min(_CAPTURE_SINE, max(-_CAPTURE_SINE, cross_track / max(0.1, l1_distance))))
     return wrap(course - math.atan2(leg_east, leg_north)), aim_angle
 
 
@@ -109,28 +110,28 @@ def l1_integrate(aim_angle: float, integrator: float, gain: float, dt: float) ->
 
 
 @inner
-def l1_acceleration(angle: float, speed: float, length: float, damping: float) -> float:
-    """Return the acceleration to the right, m/s^2.
+def l1_acceleration(angle: float, speed: float, l1_distance: float, damping: float) -> float:
+    """Return the acceleration to the right that L1 demands, m/s^2.
 
-    angle: angle of the velocity to the right of the aim, rad.
+    angle: angle from the aim direction to the velocity, rad, positive to the right.
     """
     angle = min(0.5 * math.pi, max(-0.5 * math.pi, angle))
-    return -4.0 * damping * damping * speed * speed / length * math.sin(angle)
+    return -4.0 * damping * damping * speed * speed / l1_distance * math.sin(angle)
 
 
 @inner
-def l1_reached(estimated: Record, a: Record, b: Record, length: float, radius: float) -> bool:
-    """Return True if L1 switches to the next leg, within the turn distance of b or past the line across the leg at b.
+def has_l1_reached(estimated: Record, a: Record, b: Record, l1_distance: float, radius: float) -> bool:
+    """Return True if the aircraft is within the turn distance of waypoint b, or past the line across the leg there.
 
     estimated: a record of `flight.guidance.navigation_error.MOTION`.
     a, b: the leg's ends, of `WAYPOINT`.
-    radius: turn distance for a right angle, m; smaller turns start later.
+    radius: turn distance for a turn of 90 degrees, m; smaller turns start later.
     """
     leg_east, leg_north = b.east - a.east, b.north - a.north
     to_b_east, to_b_north = b.east - estimated.east, b.north - estimated.north
     if to_b_east * leg_east + to_b_north * leg_north <= 0.0:
         return True
-    turn_distance = min(radius, length) * min(1.0, b.turn / (0.5 * math.pi))
+    turn_distance = min(radius, l1_distance) * min(1.0, b.turn / (0.5 * math.pi))
     return not b.fly_over and math.hypot(to_b_east, to_b_north) <= turn_distance
 
 
@@ -138,7 +139,7 @@ def l1_reached(estimated: Record, a: Record, b: Record, length: float, radius: f
 def field_course(
     course: float, cross_track: float, curvature: float, approach: float, path_gain: float, orbit_gain: float
 ) -> float:
-    """Return the course that the vector field commands next to a path, rad.
+    """Return the course that the vector field commands at a distance from a path, rad.
 
     course: course of the path here, rad.
     cross_track: distance to the right of the path, m.

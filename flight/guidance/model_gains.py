@@ -1,7 +1,7 @@
-"""Compute an aircraft's gains in a second from its linear model, and from typical values where the model has none.
+"""Compute an aircraft's gains from its linear model and from typical values, within a second.
 
-The airframe's own gains come from a linear model in level flight at cruise (500 m); the roll and pitch loops are placed
-by control power, as fast as servos and airspeed allow.
+The gains of the airframe come from a linear model in level flight at cruise (500 m); the poles of the roll and pitch
+loops are placed according to control power, as fast as servos and airspeed allow.
 """
 
 import math
@@ -20,8 +20,8 @@ from world.least_squares import least_squares
 # Altitude of the linear model, m.
 AMSL = 500.0
 # Typical gains at an airspeed of 25 m/s, of the size that searches found for the Aerosonde
-# (`benchmarks.tuning.tune_gains`): a slower aircraft reacts sooner, a faster one later.
-ROUND_FIGURES = {
+# (`benchmarks.tuning.tune_gains`): a slower aircraft reacts sooner, a faster aircraft later.
+TYPICAL_GAINS = {
     "cross_track_frequency": 1.0,
     "cross_track_damping": 0.8,
     "cross_track_integral": 0.05,
@@ -49,7 +49,7 @@ ROUND_FIGURES = {
     "speed_integral": 0.01,
     "throttle_per_slope": 2.0,
 }
-# Power of the airspeed ratio that a gain scales with, by the end of its name.
+# Power of the airspeed ratio in the scale of a gain, by the suffix of its name.
 _AIRSPEED_POWERS = {
     "frequency": -1,
     "lead": 1,
@@ -62,9 +62,9 @@ _AIRSPEED_POWERS = {
 _SERVO_PHASE_RAD = 0.4
 # Damping ratio of the roll and pitch loops.
 _DAMPING_RATIO = 0.8
-# Throttle step in the search for the onset of motor current.
+# Throttle step in the search for the start of motor current.
 _THROTTLE_STEP = 0.02
-# Limits that do not follow from the model.
+# Limits that do not depend on the model.
 _FIXED_GAINS = {
     "intercept": math.radians(35.0),
     "roll_rate_max": math.radians(80.0),
@@ -75,13 +75,13 @@ _FIXED_GAINS = {
 
 
 def at_airspeed(airspeed: float) -> dict[str, float]:
-    """Return `ROUND_FIGURES` scaled to an airspeed, m/s.
+    """Return `TYPICAL_GAINS` scaled to an airspeed, m/s.
 
     The gains of control surfaces stay unchanged, because they are scaled with airspeed elsewhere.
     """
     ratio = airspeed / 25.0
     gains: dict[str, float] = {}
-    for name, value in ROUND_FIGURES.items():
+    for name, value in TYPICAL_GAINS.items():
         power = next((power for suffix, power in _AIRSPEED_POWERS.items() if name.endswith(suffix)), 0)
         gains[name] = value * ratio**power
     return gains
@@ -125,10 +125,9 @@ def _gains_of_matrices(aircraft: Aircraft, a: Floats, b: Floats) -> dict[str, fl
 
 
 def idle_throttle(aircraft: Aircraft, fdm: Fdm, level: Trim) -> float:
-    """Return the throttle (0..1) below which an electric motor has no thrust in this level flight.
+    """Return the throttle (0..1) below which an electric motor has no current, and thus no thrust, in level flight.
 
-    Below this throttle no motor current flows. The resolution is 0.02. Return 0 for an aircraft without an electric
-    motor.
+    The resolution is 0.02. The result is 0 for an aircraft without an electric motor.
     """
     fdm.move_to(level.amsl)
     for throttle in np.arange(0.0, level.throttle, _THROTTLE_STEP).tolist():
@@ -139,7 +138,7 @@ def idle_throttle(aircraft: Aircraft, fdm: Fdm, level: Trim) -> float:
 
 
 def gains_of_model(aircraft: Aircraft, fdm: Fdm | None = None) -> Gains:
-    """Return all gains of an aircraft by the rule of this module.
+    """Return all gains of an aircraft from its model.
 
     fdm: simulation of the aircraft with its engine at rest; None creates one.
 
@@ -160,19 +159,19 @@ def gains_of_model(aircraft: Aircraft, fdm: Fdm | None = None) -> Gains:
     # Roll: two poles as fast as the servo allows.
     max_frequency = _SERVO_PHASE_RAD / aircraft.surface_lag
     frequency = min(max_frequency, gains["roll_frequency"])
-    power, damping = b[p, aileron], -a[p, p]
+    control_power, roll_damping = b[p, aileron], -a[p, p]
     gains["roll_frequency"] = frequency
-    gains["roll_gain"] = frequency**2 / power
-    gains["roll_rate_gain"] = max(0.2 * frequency, 2.0 * _DAMPING_RATIO * frequency - damping) / power
-    gains["roll_rate_max"] = min(gains["roll_rate_max"], 0.6 * aircraft.max_aileron * power / damping)
-    gains["roll_acceleration_max"] = min(gains["roll_acceleration_max"], 0.5 * aircraft.max_aileron * power)
-    # Pitch: damping of the short period, as far as the servo lag leaves it damping.
+    gains["roll_gain"] = frequency**2 / control_power
+    gains["roll_rate_gain"] = max(0.2 * frequency, 2.0 * _DAMPING_RATIO * frequency - roll_damping) / control_power
+    gains["roll_rate_max"] = min(gains["roll_rate_max"], 0.6 * aircraft.max_aileron * control_power / roll_damping)
+    gains["roll_acceleration_max"] = min(gains["roll_acceleration_max"], 0.5 * aircraft.max_aileron * control_power)
+    # Pitch: damping of the short period, up to the damping that the servo lag allows.
     stiffness = max(1.0, -a[q, 2] * aircraft.airspeed)
     missing_damping = 2.0 * _DAMPING_RATIO * math.sqrt(stiffness) + a[q, q] + a[2, 2]
     gains["pitch_rate_gain"] = min(max(0.0, missing_damping), max_frequency) / -b[q, elevator]
-    steering = -b[r, rudder]
-    if steering > 1e-6:
-        gains["yaw_rate_gain"] = 1.5 * gains["cross_track_frequency"] / steering
+    yaw_control_power = -b[r, rudder]
+    if yaw_control_power > 1e-6:
+        gains["yaw_rate_gain"] = 1.5 * gains["cross_track_frequency"] / yaw_control_power
         gains["sideslip_gain"] = 0.5
         gains["sideslip_max"] = math.radians(3.0)
     else:
@@ -182,7 +181,7 @@ def gains_of_model(aircraft: Aircraft, fdm: Fdm | None = None) -> Gains:
     return Gains(**gains)
 
 
-# Unit suffixes of the keys in a file, by gain; gains without one are plain numbers.
+# Unit suffixes of the keys in a file, by gain; gains without a suffix have no unit.
 _UNIT_SUFFIXES = {
     "reference_airspeed": "_mps",
     "cross_track_frequency": "_rad_s",

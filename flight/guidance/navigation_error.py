@@ -1,4 +1,4 @@
-"""Compute the estimated state for guidance as true position and velocity plus a time-correlated error.
+"""Compute the estimated state for guidance: true position and velocity plus a time-correlated error.
 
 Each axis has a second-order Gauss-Markov error, typical of an estimator that blends satellite and inertial navigation.
 The error varies smoothly, and the velocity error is its rate. The autocorrelation is (1 + t / T) exp(-t / T).
@@ -23,7 +23,7 @@ NAVIGATION_LAGS = record_dtype(("first", np.float64, (3,)), ("second", np.float6
 
 
 def start_navigation(noise: Floats, lags: Record) -> None:
-    """Draw the stationary state of the lags, a record of `NAVIGATION_LAGS`, from (6,) unit normals."""
+    """Set the lags, a record of `NAVIGATION_LAGS`, to a stationary state from (6,) unit normals."""
     lags.first = noise[:3]
     # See `flight.simulation.turbulence.start_gusts`.
     lags.second = 0.5 * noise[:3] + 0.5 * noise[3:]

@@ -1,7 +1,7 @@
-"""Compute the fly-by path of a fixed wing, with legs joined by fly-by arcs and slopes joined by parabolas.
+"""Compute the fly-by path of a fixed-wing aircraft: legs joined by fly-by arcs, and slopes joined by parabolas.
 
 A fly-by arc has the bank-limited radius for the highest ground speed in the turn, and the corners of a loiter have the
-loiter's radius. If the legs are too short for their turns, arcs are drawn tighter than the bank limit so that the path
+loiter's radius. If the legs are too short for their turns, the arcs are tighter than the bank limit so that the path
 stays continuous; the flight will then leave the path, and the verdict says so. The path goes through a fly-over
 waypoint, whose corner stays sharp, like the corner of a U-turn.
 """
@@ -39,20 +39,20 @@ PIECE = record_dtype(
     "course",  # rad, at its start
     "curvature",  # 1/m, positive to the right
     ("leg", np.int64),  # leg at its start
-    "leg_change",  # m along the path where the next leg begins; infinite if it does not begin on this piece
+    "leg_change",  # m along the path, start of the next leg; infinite if the next leg does not start on this piece
 )
 # A corner of the altitude profile and the parabola that blends it.
 NODE = record_dtype(
     "distance",  # m along the path
     "height",  # m
-    "slope",  # tangent, after the corner
-    "half_length",  # m, of its parabola
+    "slope",  # tangent of the slope after the corner
+    "half_length",  # m, of the parabola
 )
 
 
 @inner
 def project(piece: Record, east: float, north: float) -> tuple[float, float, float]:
-    """Return the distance along a piece (m), the cross-track error (m) and the path's course there (rad).
+    """Project a position onto a piece: distance along it (m), cross-track error (m) and course there (rad).
 
     The cross-track error is positive to the right.
     """
@@ -103,62 +103,62 @@ def find_on_path(estimated: Record, pieces: Records, memory: Record) -> float:
 
 @inner
 def leave_sharp_corners(pieces: Records, memory: Record, leg: int) -> None:
-    """Advance the memory past sharp corners to the leg that an autopilot has turned to.
+    """Advance the memory past sharp corners to the leg to which an autopilot has turned.
 
-    The autopilot may turn back before it passes the end of the leg before. Other arguments as for `find_on_path`.
+    The autopilot may turn before it passes the end of the previous leg. Other arguments as for `find_on_path`.
     """
     while memory.piece + 1 < pieces.shape[0] and pieces[memory.piece].leg < leg:
-        piece, following = pieces[memory.piece], pieces[memory.piece + 1]
-        is_corner = piece.curvature == 0.0 and following.curvature == 0.0
-        if not is_corner or math.cos(following.course - piece.course) >= 0.0:
+        piece, next_piece = pieces[memory.piece], pieces[memory.piece + 1]
+        is_corner = piece.curvature == 0.0 and next_piece.curvature == 0.0
+        if not is_corner or math.cos(next_piece.course - piece.course) >= 0.0:
             return
         memory.piece += 1
 
 
 @inner
-def mean_curvature(pieces: Records, k: int, start: float, end: float) -> float:
-    """Return the mean curvature of the path between two distances, both at or after piece ``k``, 1/m."""
-    turn = 0.0
-    for i in range(k, pieces.shape[0]):
+def mean_curvature(pieces: Records, first_piece: int, start: float, end: float) -> float:
+    """Return the mean curvature of the path between two distances, both at or after piece ``first_piece``, 1/m."""
+    turn_angle = 0.0
+    for i in range(first_piece, pieces.shape[0]):
         piece = pieces[i]
         overlap_start = max(start, piece.start)
         overlap_end = min(end, piece.start + piece.length)
         if overlap_end > overlap_start:
-            turn += piece.curvature * (overlap_end - overlap_start)
+            turn_angle += piece.curvature * (overlap_end - overlap_start)
         if piece.start > end:
             break
-    return turn / (end - start)
+    return turn_angle / (end - start)
 
 
 @inner
-def max_curvature(pieces: Records, k: int, start: float, end: float) -> float:
-    """Return the largest curvature of the path between two distances, 1/m, positive.
+def max_curvature(pieces: Records, first_piece: int, start: float, end: float) -> float:
+    """Return the maximum curvature of the path between two distances, 1/m, positive.
 
-    Both distances are at or after piece ``k``.
+    Both distances are at or after piece ``first_piece``.
     """
-    largest = 0.0
-    for i in range(k, pieces.shape[0]):
+    max_piece_curvature = 0.0
+    for i in range(first_piece, pieces.shape[0]):
         piece = pieces[i]
         if piece.start > end:
             break
         if piece.start + piece.length > start:
-            largest = max(largest, abs(piece.curvature))
-    return largest
+            max_piece_curvature = max(max_piece_curvature, abs(piece.curvature))
+    return max_piece_curvature
 
 
 @compiled
-def profile(nodes: Records, s: float) -> tuple[float, float, float]:
-    """Return altitude (m), slope (tangent) and slope change per meter of the altitude profile at ``s``."""
+def profile(nodes: Records, distance: float) -> tuple[float, float, float]:
+    """Return altitude (m), slope (tangent) and slope change per meter of the altitude profile at ``distance``."""
     index = 0
-    while index + 1 < nodes.shape[0] and nodes[index + 1].distance <= s:
+    while index + 1 < nodes.shape[0] and nodes[index + 1].distance <= distance:
         index += 1
     for i in range(index, min(index + 2, nodes.shape[0])):
         node = nodes[i]
         half_length = node.half_length
-        if half_length > 0.0 and abs(s - node.distance) < half_length:
+        if half_length > 0.0 and abs(distance - node.distance) < half_length:
             previous_slope = nodes[max(i - 1, 0)].slope
             slope_rate = (node.slope - previous_slope) / (2.0 * half_length)
-            blend_distance = s - node.distance + half_length
+            blend_distance = distance - node.distance + half_length
             return (
                 node.height
                 + previous_slope * (blend_distance - half_length)
@@ -167,16 +167,16 @@ def profile(nodes: Records, s: float) -> tuple[float, float, float]:
                 slope_rate,
             )
     node = nodes[index]
-    return node.height + node.slope * (s - node.distance), node.slope, 0.0
+    return node.height + node.slope * (distance - node.distance), node.slope, 0.0
 
 
-# Largest turn per chord of an arc, rad.
+# Maximum turn per chord of an arc, rad.
 CHORD = math.radians(5.0)
 
 
 @dataclass(frozen=True, slots=True)
 class FlyByPath:
-    """A fly-by path by the distance along it.
+    """A fly-by path as a function of the distance along it.
 
     pieces: (p,) of `PIECE`, straight pieces and arcs.
     nodes: (k,) of `NODE`, the corners of the altitude profile.
@@ -193,9 +193,9 @@ class FlyByPath:
         self.nodes.setflags(write=False)
 
 
-# Sides of the turn after a waypoint that is flown over.
+# Turns after a fly-over waypoint.
 Swing = Literal["none", "short", "long"]
-# Turns within this angle of 180 degrees may go to either side, rad: a navigation error of 5 m over ArduPlane's L1
+# Tolerance within which a turn of 180 degrees may go to either side, rad: a navigation error of 5 m over ArduPlane's L1
 # distance of 60 m at 25 m/s.
 REVERSAL_SIDE_TOLERANCE_RAD = math.radians(5.0)
 
@@ -206,12 +206,12 @@ GROUND_STEP_M = 100.0
 def fly_by_path(route: Route, limits: Limits, terrain: Terrain | None = None, swing: Swing = "short") -> FlyByPath:
     """Join the legs of a route to a fly-by path.
 
-    The route has at least one leg, and only its first leg may have no length. An arc passes each waypoint; after one
-    that is flown over, arcs lead back to the next leg.
+    The route has at least one leg, and only its first leg may have no length. An arc passes each waypoint; after a
+    fly-over waypoint, arcs lead back to the next leg.
 
-    terrain: ground that legs at a height above ground follow; None flies them straight.
-    swing: "none" leaves such corners sharp, as the reference of an autopilot with its own turn law; "long" turns at
-        `reversals` to the side of the longer turn.
+    terrain: ground that legs at a height above ground follow; with None these legs are straight.
+    swing: "none" keeps the corners at fly-over waypoints sharp, for an autopilot with its own turns; "long" takes the
+        longer turn at `reversals`.
 
     A right angle, flown with 0.5 rad of bank at 25 m/s in calm air, is an arc of 117 m:
 
@@ -232,7 +232,7 @@ def fly_by_path(route: Route, limits: Limits, terrain: Terrain | None = None, sw
     return_lengths *= swing != "none"
     pieces: list[tuple[float, ...]] = []
     nodes: list[tuple[float, float]] = [(0.0, float(points[0, 2]))]
-    # A loiter that the flight begins on may end where it begins.
+    # A loiter at the start of the flight may end where it starts.
     slopes = np.divide(np.diff(points[:, 2]), runs, out=np.zeros_like(runs), where=runs > 0.0)
     distance, piece_start = 0.0, points[0, :2].copy()
     for leg in range(route.legs):
@@ -282,7 +282,7 @@ def fly_by_path(route: Route, limits: Limits, terrain: Terrain | None = None, sw
 def reversals(route: Route) -> NDArray[np.int64]:
     """Return the indices of fly-over waypoints at which the course reverses.
 
-    A turn to either side is possible there.
+    The turn there may go to either side.
 
     >>> way = np.array([[0.0, 0.0, 90.0], [0.0, 900.0, 90.0], [60.0, 0.0, 90.0], [900.0, 0.0, 90.0]])
     >>> over = np.array([False, True, True, False])
@@ -303,13 +303,13 @@ def _turn_angles(route: Route, swing: Swing) -> Floats:
 
 
 def _ground_following_corners(
-    route: Route, terrain: Terrain, leg: int, begin: Floats, course: float, start_distance: float, length: float
+    route: Route, terrain: Terrain, leg: int, segment_start: Floats, course: float, start_distance: float, length: float
 ) -> list[tuple[float, float]]:
     """Return corners (distance along the path, altitude; m) of the altitude profile of a leg above ground.
 
     The height above ground changes linearly from its value at the leg's start to the stated value at its end.
 
-    begin: (2,) m, start of the leg's straight part.
+    segment_start: (2,) m, start of the leg's straight part.
     start_distance: distance of that start along the path, m.
     length: length of the straight part, m.
     """
@@ -318,24 +318,32 @@ def _ground_following_corners(
     if not math.isfinite(start_height):
         start_height = end_height
     corners = []
-    for along in np.arange(0.5 * GROUND_STEP_M, length - 0.5 * GROUND_STEP_M, GROUND_STEP_M).tolist():
-        east, north = begin[0] + along * math.sin(course), begin[1] + along * math.cos(course)
+    for distance_along in np.arange(0.5 * GROUND_STEP_M, length - 0.5 * GROUND_STEP_M, GROUND_STEP_M).tolist():
+        east, north = (
+            segment_start[0] + distance_along * math.sin(course),
+            segment_start[1] + distance_along * math.cos(course),
+        )
         fraction = math.hypot(east - leg_start[0], north - leg_start[1]) / math.dist(
             leg_start[:2], route.waypoints[leg + 1, :2]
         )
-        ground = float(terrain.height(east, north))
-        if math.isfinite(ground):
-            corners.append((start_distance + along, ground + start_height + fraction * (end_height - start_height)))
+        ground_altitude = float(terrain.height(east, north))
+        if math.isfinite(ground_altitude):
+            corners.append(
+                (
+                    start_distance + distance_along,
+                    ground_altitude + start_height + fraction * (end_height - start_height),
+                )
+            )
     return corners
 
 
 def _arcs_at_waypoints(
     route: Route, limits: Limits, courses: Floats, runs: Floats, turns: Floats
 ) -> tuple[Floats, Floats, Floats]:
-    """Return the arcs at each waypoint, (w,) m each.
+    """Return tangent lengths, radii and return lengths of the arcs at each waypoint, (w,) m each.
 
-    The results are the tangent lengths of fly-by arcs, shortened if a leg is too short for them; their radii; and, for
-    waypoints that are flown over, the length of the next leg until the path is back on it, 0 if that leg is too short.
+    The tangent lengths of fly-by arcs are shortened if a leg is too short for them. The return length of a fly-over
+    waypoint is the part of the next leg until the path is back on that leg; it is 0 if the leg is too short.
     """
     count = len(route.waypoints)
     tangents, radii, return_lengths = np.zeros(count), np.zeros(count), np.zeros(count)
@@ -354,7 +362,7 @@ def _arcs_at_waypoints(
     is_sharp = np.concatenate([[False], np.abs(turns) > SHARPEST_FLY_BY_RAD, [False]])
     is_short = tangents[:-1] + tangents[1:] > runs
     tangents[is_sharp & (np.append(is_short, False) | np.append(False, is_short))] = 0.0
-    # A leg that cannot be flown in this wind has no radius; draw the longest arc that fits.
+    # In this wind a turn may have no radius; use the longest arc that fits.
     tangents[1:-1] = np.minimum(tangents[1:-1], np.minimum(runs[:-1], runs[1:]))
     full_tangents = tangents.copy()
     for leg in range(len(runs)):
@@ -365,7 +373,7 @@ def _arcs_at_waypoints(
             tangents[leg + 1] = min(tangents[leg + 1], full_tangents[leg + 1] * fraction)
     arc_indices = np.flatnonzero(tangents)
     radii[arc_indices] = tangents[arc_indices] / np.tan(np.abs(turns[arc_indices - 1]) / 2)
-    # A leg that is too short for its return arcs keeps a sharp corner.
+    # A leg that is too short for its return arcs has a sharp corner.
     return_lengths[:-1][return_lengths[:-1] + tangents[1:] > runs] = 0.0
     return tangents, radii, return_lengths
 
@@ -402,19 +410,19 @@ def _fly_over_arcs(
 def _altitude_profile(corners: list[tuple[float, float]], limits: Limits, route: Route) -> Records:
     """Return the corners of the altitude profile with the parabolas that blend them."""
     distances, altitudes = np.array(corners).T
-    is_kept = np.concatenate([[True], np.diff(distances) > 1e-3])
-    # Of two corners at the same distance keep the later one, which is on the next leg.
-    distances, altitudes = distances[is_kept], altitudes[is_kept]
+    is_distinct = np.concatenate([[True], np.diff(distances) > 1e-3])
+    # Of two corners at the same distance keep the second one, which is on the next leg.
+    distances, altitudes = distances[is_distinct], altitudes[is_distinct]
     slopes = np.diff(altitudes) / np.diff(distances)
     next_slopes = np.concatenate([slopes, slopes[-1:]])
     slope_changes = np.concatenate([[0.0], np.diff(slopes), [0.0]])
     speed = float(route.airspeed.max()) + limits.wind.strongest(route.waypoints[:, 2])
     half_lengths = np.abs(slope_changes) * speed**2 / (2.0 * BLEND_ACCELERATION)
     gaps = np.diff(distances)
-    available = 0.5 * np.minimum(np.concatenate([[np.inf], gaps]), np.concatenate([gaps, [np.inf]]))
+    max_half_lengths = 0.5 * np.minimum(np.concatenate([[np.inf], gaps]), np.concatenate([gaps, [np.inf]]))
     nodes: Records = np.empty(distances.size, NODE)
     nodes["distance"], nodes["height"], nodes["slope"] = distances, altitudes, next_slopes
-    nodes["half_length"] = np.minimum(half_lengths, available)
+    nodes["half_length"] = np.minimum(half_lengths, max_half_lengths)
     return nodes
 
 
@@ -423,13 +431,13 @@ def waypoint_records(route: Route, mission: Mission | None = None, *, fly_over: 
 
     The last waypoint has the airspeed of the leg before it.
 
-    mission: mission of the route, which states how its loiters end; None ends them all after their turns.
-    fly_over: True if the scenario requires that waypoints without an acceptance radius are flown over.
+    mission: mission of the route, which states how its loiters end; with None all loiters end after their turns.
+    fly_over: True if the scenario requires fly-over at waypoints without an acceptance radius.
     """
     waypoints: Records = np.zeros(len(route.waypoints), WAYPOINT)
     waypoints["east"], waypoints["north"] = route.waypoints[:, 0], route.waypoints[:, 1]
     waypoints["turn"][1:-1] = np.abs(signed_turns(route.waypoints))
-    # A stated acceptance radius switches legs, whatever the scenario states.
+    # An acceptance radius stated by the item has priority over the scenario.
     waypoints["fly_over"] = fly_over & (route.acceptance == 0.0) & (route.arcs == 0.0)
     waypoints["acceptance"] = route.acceptance
     items = {} if mission is None else {item.seq: item for item in mission.items}
@@ -461,9 +469,9 @@ def waypoint_records(route: Route, mission: Mission | None = None, *, fly_over: 
 
 
 def _turn_before_return(route: Route, index: int, items: dict[int, MissionItem]) -> float:
-    """Return the turn at the waypoint before a return that ArduPlane computes, rad; a right angle if it is unknown.
+    """Return the turn that ArduPlane computes at the waypoint before an RTL, rad; a right angle if it is unknown.
 
-    The return's item has no place, which is read as 0 N, 0 E (`AP_Mission::get_next_ground_course_cd`,
+    The RTL item has no position, which ArduPlane reads as 0 N, 0 E (`AP_Mission::get_next_ground_course_cd`,
     `Location::get_bearing_to`).
     """
     item = items.get(int(route.items[index]))
@@ -474,7 +482,7 @@ def _turn_before_return(route: Route, index: int, items: dict[int, MissionItem])
 
 
 def _set_circles(corners: Records, route: Route) -> None:
-    """Set radius and center of the loiter that each of a route's corners belongs to."""
+    """Set radius and center of the loiter of each corner of a route."""
     turns, courses = signed_turns(route.waypoints), leg_courses(route.waypoints)
     corners["circle"] = np.where(np.abs(turns) < 1e-6, 0.0, np.copysign(route.arcs[1:-1], turns))
     # The center lies at a right angle to the course halfway through the turn.
@@ -512,17 +520,21 @@ def _piece_index(path: FlyByPath, distances: Floats) -> NDArray[np.intp]:
 def _points_at(path: FlyByPath, distances: Floats) -> Floats:
     """Return the points (n, 3) of the path at distances (n,) along it, m."""
     pieces = path.pieces[_piece_index(path, distances)]
-    course, curvature, along = pieces["course"], pieces["curvature"], distances - pieces["start"]
+    course, curvature, distances_along = pieces["course"], pieces["curvature"], distances - pieces["start"]
     is_straight = curvature == 0.0
-    nonzero_curvature, course_at = np.where(is_straight, 1.0, curvature), course + curvature * along
-    east = np.where(is_straight, along * np.sin(course), (np.cos(course) - np.cos(course_at)) / nonzero_curvature)
-    north = np.where(is_straight, along * np.cos(course), (np.sin(course_at) - np.sin(course)) / nonzero_curvature)
+    nonzero_curvature, course_at = np.where(is_straight, 1.0, curvature), course + curvature * distances_along
+    east = np.where(
+        is_straight, distances_along * np.sin(course), (np.cos(course) - np.cos(course_at)) / nonzero_curvature
+    )
+    north = np.where(
+        is_straight, distances_along * np.cos(course), (np.sin(course_at) - np.sin(course)) / nonzero_curvature
+    )
     up = [profile(path.nodes, float(s))[0] for s in distances]
     return np.column_stack([pieces["east"] + east, pieces["north"] + north, up])
 
 
 def path_polyline(path: FlyByPath) -> tuple[Floats, NDArray[np.int64]]:
-    """Return the path as a chain of points (n, 3), and the leg of each of its n - 1 segments.
+    """Return the path as a polyline of points (n, 3), and the leg of each of its n - 1 segments.
 
     Chords of arcs turn by at most `CHORD`; on a 160 m radius they deviate from the arc by 0.15 m.
 

@@ -19,13 +19,13 @@ from flight.live.telemetry import (
     RTL,
 )
 
-# Values of param2 of MAV_CMD_COMPONENT_ARM_DISARM that force it: MAVLink's number, and MAVProxy's number for arming.
+# Values of param2 of MAV_CMD_COMPONENT_ARM_DISARM for a forced command: MAVLink's, and MAVProxy's for arming.
 _FORCE_VALUES = (21196, 2989)
 # Result of an accepted command.
 ACCEPTED = mavlink.MAV_RESULT_ACCEPTED
 # Result of a denied command.
 DENIED = mavlink.MAV_RESULT_DENIED
-# Result of a command that is to be repeated.
+# Result of a command that must be repeated.
 IN_PROGRESS = mavlink.MAV_RESULT_IN_PROGRESS
 # Result of an unknown command.
 UNSUPPORTED = mavlink.MAV_RESULT_UNSUPPORTED
@@ -44,19 +44,19 @@ class ArmingState:
     """The vehicle's state for its commands.
 
     mode: ArduPlane's number.
-    judging: True while a verdict on the mission is awaited.
-    judged: the last verdict; None without a mission.
+    is_judging: True while a verdict on the mission is awaited.
+    last_verdict: last verdict on the mission; None without a mission.
     force: PFLY_FORCE.
-    end_requested: True if the flight is to be ended.
-    place: target of the current flight's diversion in its new mode; None for no diversion.
+    end_requested: True if the flight must end.
+    place: loiter center of a requested diversion in its new mode; None without a request.
     mission_state: MISSION_STATE of MISSION_CURRENT.
     """
 
     mode: int = MANUAL
     armed: bool = False
     flying: bool = False
-    judging: bool = False
-    judged: MissionJudged | None = None
+    is_judging: bool = False
+    last_verdict: MissionJudged | None = None
     force: bool = False
     end_requested: bool = False
     place: Place | None = None
@@ -65,17 +65,23 @@ class ArmingState:
     @property
     def armable(self) -> bool:
         """True if arming would be accepted now."""
-        return not self.judging and not self._arming_refusal(False)
+        return not self.is_judging and not self._arming_refusal(False)
 
     @property
     def starts(self) -> bool:
-        """True if the flight is to be started: armed, in AUTO, and judged."""
-        return self.armed and self.mode == AUTO and not self.flying and not self.judging and self.judged is not None
+        """True if the flight must start: armed, in AUTO, and judged."""
+        return (
+            self.armed
+            and self.mode == AUTO
+            and not self.flying
+            and not self.is_judging
+            and self.last_verdict is not None
+        )
 
     def arm(self, should_arm: bool, param2: float) -> CommandResult:
         """Arm or disarm (MAV_CMD_COMPONENT_ARM_DISARM).
 
-        IN_PROGRESS: repeat the command after the verdict.
+        The result is IN_PROGRESS if the command must be repeated after the verdict.
         """
         is_forced = param2 in _FORCE_VALUES
         if not should_arm:
@@ -88,7 +94,7 @@ class ArmingState:
             return CommandResult(ACCEPTED)
         if self.armed:
             return CommandResult(ACCEPTED)
-        if self.judging:
+        if self.is_judging:
             return CommandResult(IN_PROGRESS)
         reason = self._arming_refusal(is_forced)
         if reason:
@@ -96,10 +102,12 @@ class ArmingState:
         self.armed = True
         if self.mode == AUTO:
             return CommandResult(ACCEPTED)
-        return CommandResult(ACCEPTED, "armed: AUTO starts the mission" if self.judged else "armed: no mission yet")
+        return CommandResult(
+            ACCEPTED, "armed: AUTO starts the mission" if self.last_verdict else "armed: no mission yet"
+        )
 
     def set_mode(self, mode: int) -> CommandResult:
-        """Change to one of ArduPlane's modes."""
+        """Change the mode to one of ArduPlane's modes."""
         if mode not in MODE_NAMES:
             plane_mode = mavlink.enums["PLANE_MODE"].get(mode)
             name = plane_mode.name.removeprefix("PLANE_MODE_") if plane_mode else f"mode {mode}"
@@ -108,7 +116,7 @@ class ArmingState:
             return self._divert(mode)
         if mode in (RTL, GUIDED):
             return CommandResult(DENIED, f"{MODE_NAMES[mode]} denied: not in flight")
-        if mode == AUTO and self.judged is None and not self.judging:
+        if mode == AUTO and self.last_verdict is None and not self.is_judging:
             return CommandResult(DENIED, "AUTO denied: no mission")
         self.mode = mode
         return CommandResult(ACCEPTED, "AUTO: arming starts the mission" if mode == AUTO and not self.armed else "")
@@ -126,7 +134,7 @@ class ArmingState:
         return CommandResult(ACCEPTED) if should_continue else CommandResult(DENIED, "pause denied: not in flight")
 
     def go_to(self, place: Place) -> CommandResult:
-        """Fly to a place and loiter there, in GUIDED."""
+        """Fly to a position and loiter there, in GUIDED."""
         if not self.flying:
             return CommandResult(DENIED, "go-to denied: not in flight")
         self.mode, self.place = GUIDED, place
@@ -137,28 +145,28 @@ class ArmingState:
         """Continue the mission from the item that was set in flight."""
         self.place = Place()
 
-    def diverted(self, mode: int) -> None:
-        """Store that the flight is in this mode now."""
+    def set_flight_mode(self, mode: int) -> None:
+        """Set the mode and the mission state of a diverted flight."""
         self.mode = mode
         self.mission_state = ACTIVE if mode == AUTO else PAUSED
 
     def _divert(self, mode: int) -> CommandResult:
-        """Continue the flight in another mode; nothing changes if it is the current mode."""
+        """Continue the flight in another mode; the current mode changes nothing."""
         if mode == MANUAL:
             return CommandResult(DENIED, "MANUAL denied: nobody has the sticks; a forced disarm ends the flight")
         if mode != self.mode:
-            self.diverted(mode)
+            self.set_flight_mode(mode)
             self.place = Place()
         return CommandResult(ACCEPTED)
 
-    def mission_uploaded(self) -> None:
-        """Store that a mission was uploaded and is being judged."""
-        self.judging, self.mission_state = True, NOT_STARTED
+    def on_mission_uploaded(self) -> None:
+        """Wait for the verdict on an uploaded mission."""
+        self.is_judging, self.mission_state = True, NOT_STARTED
 
-    def mission_judged(self, judged: MissionJudged) -> str:
-        """Store a verdict, and return the reason why the vehicle was disarmed, or "" if it was not disarmed."""
-        self.judging = False
-        self.judged = judged
+    def on_mission_judged(self, verdict: MissionJudged) -> str:
+        """Store a verdict, disarm if it does not allow flight, and return the reason for that, or ""."""
+        self.is_judging = False
+        self.last_verdict = verdict
         self.mission_state = NOT_STARTED
         reason = self._arming_refusal(False)
         if self.armed and reason:
@@ -166,28 +174,28 @@ class ArmingState:
             return f"disarmed: {reason}"
         return ""
 
-    def mission_cleared(self) -> None:
-        """Store that the mission was cleared."""
-        self.judging, self.judged, self.mission_state = False, None, NO_MISSION
+    def on_mission_cleared(self) -> None:
+        """Discard the mission's verdict, and leave AUTO."""
+        self.is_judging, self.last_verdict, self.mission_state = False, None, NO_MISSION
         if self.mode == AUTO:
             self.mode = MANUAL
 
-    def flight_started(self) -> None:
-        """Store that the flight has started."""
+    def on_flight_started(self) -> None:
+        """Set the state of a started flight."""
         self.flying, self.mission_state = True, ACTIVE
 
-    def flight_ended(self, completed: bool) -> None:
-        """Store that the flight is over; the vehicle is then disarmed and ready to fly again."""
+    def on_flight_ended(self, is_completed: bool) -> None:
+        """Disarm the vehicle after its flight, ready to fly again."""
         self.flying = self.armed = self.end_requested = False
-        self.mission_state = COMPLETE if completed and self.mode == AUTO else NOT_STARTED
+        self.mission_state = COMPLETE if is_completed and self.mode == AUTO else NOT_STARTED
         self.mode, self.place = MANUAL, None
 
     def _arming_refusal(self, is_forced: bool) -> str:
-        if self.judged is None:
+        if self.last_verdict is None:
             return ""
-        if not self.judged.possible:
+        if not self.last_verdict.possible:
             return "the mission cannot be flown"
-        if not (self.judged.flyable or self.force or is_forced):
+        if not (self.last_verdict.flyable or self.force or is_forced):
             return "the mission is judged not flyable; set PFLY_FORCE 1 to fly it all the same"
         return ""
 

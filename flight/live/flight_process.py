@@ -45,21 +45,21 @@ from world.errors import PlanflyError
 SNAPSHOT_RATE = 60.0
 # Interval at which the log is passed to the operating system, s.
 FLUSH_PERIOD = 0.2
-# Beyond this delay behind the clock the flight runs late instead of in one leap, s.
+# Maximum delay behind the clock that the flight makes up, s; beyond it the flight runs late.
 _MAX_DELAY_S = 0.5
 # First byte of a packed snapshot.
 _PACKED_MARK = b"S"
 # First byte of a pickled event.
 _PICKLED_MARK = b"E"
-# End of a flight that a station stopped.
+# End reason of a flight that a station stopped.
 STOPPED = "stopped by the ground station"
-# End of a flight at the shutdown of the vehicle.
+# End reason of a flight at the shutdown of the vehicle.
 SHUT_DOWN = "stopped: the vehicle was shut down"
-# End of a route that a diversion left; the new mode follows.
+# End reason of a route that a diversion left; the new mode follows.
 DIVERTED_TEXT = "left at a ground station's request for "
-# End of one log of a loiter that continues.
+# End reason of one log of a loiter that continues.
 STILL_LOITERING_TEXT = "log ends here; the aircraft keeps circling"
-# Loiters without end are logged in pieces, and end after this number.
+# Maximum number of logs of a loiter without end.
 _MAX_LOITER_LOGS = 16
 
 
@@ -67,7 +67,8 @@ _MAX_LOITER_LOGS = 16
 class JudgeMission:
     """Request: judge a mission in the vehicle's scenario.
 
-    number: repeated in the event.  parameters: of the law, by name, as set by stations.
+    number: number that the event repeats.
+    parameters: parameters of the simulated autopilot by name, as set by stations.
     """
 
     mission: Mission
@@ -99,9 +100,9 @@ class Place:
 
 @dataclass(frozen=True, slots=True)
 class DivertFlight:
-    """Request: leave the current route for another, from the aircraft's position.
+    """Request: leave the current route for another one, from the aircraft's position.
 
-    mode: ArduPlane's number: AUTO flies the mission's items, RTL returns, LOITER and GUIDED loiter at the place.
+    mode: ArduPlane's number: AUTO flies the mission's items, RTL returns, LOITER and GUIDED loiter at ``place``.
     mission: home, rally points and fence; in AUTO with the remaining items.
     """
 
@@ -112,7 +113,7 @@ class DivertFlight:
 
 @dataclass(frozen=True, slots=True)
 class EndFlight:
-    """Request: end the flight; with ``quit`` the process too."""
+    """Request: end the flight, and with ``quit`` also the process."""
 
     quit: bool = False
 
@@ -129,10 +130,10 @@ class MissionJudged:
     number: number of the request.
     possible: True if the mission can be started at all.
     flyable: False if a finding of its geometry failed.
-    texts: texts about it for stations.
-    home: the mission's home, or the ground at its start; None if it is not possible.
-    items: seq of the item at each waypoint, -1 for no item.
-    start: the aircraft where the flight starts; None if it is not possible.
+    texts: texts on the mission for stations.
+    home: home of the mission, or the ground at its start; None if not possible.
+    items: seq of the item at each waypoint, -1 without an item.
+    start: aircraft at the start of the flight; None if not possible.
     """
 
     number: int
@@ -146,10 +147,10 @@ class MissionJudged:
 
 @dataclass(frozen=True, slots=True)
 class FlightDiverted:
-    """Event: the aircraft is on another route, or flies on because it cannot be diverted.
+    """Event: the aircraft is on another route, or stays on its route because it cannot be diverted.
 
-    mode: mode of the flight now.
-    problem: reason why it cannot be diverted, "" if it is diverted.
+    mode: present mode of the flight.
+    problem: reason why the flight cannot be diverted, or "".
     items: seq of the item at each waypoint, -1 for no item.
     """
 
@@ -162,7 +163,7 @@ class FlightDiverted:
 class FlightEnded:
     """Event: the flight is over.
 
-    ended: "completed" or the reason.
+    ended: "completed", or the reason for the end.
     """
 
     ended: str
@@ -172,7 +173,7 @@ class FlightEnded:
 class FlightJudged:
     """Event: the flight has been judged and its log closed.
 
-    texts: texts about it for stations.
+    texts: texts on the flight for stations.
     """
 
     flyable: bool
@@ -192,7 +193,7 @@ class LogSink(Protocol):
     def finish(self, ended: str, should_abort: Callable[[], bool]) -> FlightJudged:
         """Judge the flight and close the log.
 
-        should_abort: returns True if the process is to end; called during long work.
+        should_abort: function that returns True if the process must end; called during long work.
         """
 
     def abandon(self) -> None:
@@ -201,7 +202,7 @@ class LogSink(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class PreparedFlight:
-    """A mission that can be started, and the map fitted around it."""
+    """Setup of a mission that can be started, and the local map of its flight."""
 
     setup: FlightSetup
     local_map: LocalMap
@@ -217,7 +218,7 @@ class FlightFactory(Protocol):
     speed: float
 
     def prepare(self, request: JudgeMission) -> tuple[PreparedFlight | None, MissionJudged]:
-        """Judge a mission; return None for the flight if it cannot be flown."""
+        """Judge a mission; the prepared flight is None if the mission cannot be flown."""
 
     def divert(self, request: DivertFlight, here: Floats) -> PreparedFlight:
         """Return the requested route from a position (3,) on the map.
@@ -233,7 +234,7 @@ class FlightFactory(Protocol):
 
 
 def serve_flights(connection: Connection, factory: FlightFactory) -> None:
-    """Serve requests until the other end closes or asks the process to end.
+    """Serve requests until the other end closes, or requests the end of the process.
 
     connection: this end of a `multiprocessing.Pipe`; requests are pickled into the other end, and `read_event` reads
     its output.
@@ -288,13 +289,13 @@ class _RequestQueue:
         self._queued: deque[object] = deque()
 
     def next(self) -> object:
-        """Return the next request, waiting for it.
+        """Wait for the next request, and return it.
 
         Raises EOFError if the link is gone.
         """
         return self._queued.popleft() if self._queued else self._connection.recv()
 
-    def waiting(self) -> object:
+    def poll(self) -> object:
         """Return the next request without blocking, or None; return EndFlight(quit=True) if the link is gone."""
         if not self._queued and not self._connection.poll():
             return None
@@ -303,8 +304,8 @@ class _RequestQueue:
         except EOFError:
             return EndFlight(quit=True)
 
-    def ending(self) -> bool:
-        """Return True if a request or a closed link asks the process to end; no request is removed."""
+    def is_ending(self) -> bool:
+        """Return True if the process must end, because of a request or a closed link; keep all requests."""
         try:
             while self._connection.poll():
                 self._queued.append(self._connection.recv())
@@ -316,7 +317,7 @@ class _RequestQueue:
 def _run_flight(
     connection: Connection, requests: _RequestQueue, prepared: PreparedFlight, factory: FlightFactory
 ) -> bool:
-    """Fly in real time; return False if the process is to end."""
+    """Fly in real time; return False if the process must end."""
     try:
         # A diverted flight continues in the same instance of JSBSim.
         flight = Flight(prepared.setup, factory.aircraft, local_map=prepared.local_map, engine="jsbsim")
@@ -327,20 +328,20 @@ def _run_flight(
         return True
     logged_flight = _LoggedFlight(connection, requests, factory, flight, log)
     try:
-        ended, should_continue = logged_flight.run_in_real_time()
+        end_reason, should_continue = logged_flight.run_in_real_time()
         if should_continue:
-            send_event(connection, FlightEnded(ended))
-        judged = logged_flight.finish(ended, requests.ending if should_continue else lambda: True)
+            send_event(connection, FlightEnded(end_reason))
+        events = logged_flight.finish(end_reason, requests.is_ending if should_continue else lambda: True)
     except OSError as error:
         logged_flight.abandon()
-        # A pipe that broke ends the process; a full disk ends the flight.
+        # A broken pipe ends the process; a full disk ends only the flight.
         if isinstance(error, BrokenPipeError | ConnectionResetError):
             raise
         send_event(connection, FlightEnded(f"log: {error.strerror}"))
         text = f"flight ended: its log cannot be written: {error.strerror}"
-        judged = [FlightJudged(False, (StatusText(text, CRITICAL),))]
+        events = [FlightJudged(False, (StatusText(text, CRITICAL),))]
         should_continue = True
-    for event in judged:
+    for event in events:
         send_event(connection, event)
     return should_continue
 
@@ -356,47 +357,47 @@ class _LoggedFlight:
         self._snapshots = SnapshotMaker(flight.setup, flight.map)
         # The last log is written; the others are judged after the flight, with their ends in `_ends`.
         self._logs, self._ends = [log], list[str]()
-        self._pending: list[Rows] = []
+        self._unwritten_rows: list[Rows] = []
         # The current loiter, or None, and the number of its logs.
         self._loiter: DivertFlight | None = None
         self._loiter_logs = 0
 
     def run_in_real_time(self) -> tuple[str, bool]:
-        """Step the flight by the clock; return the reason why it ended, and True if the process continues."""
+        """Step the flight by the clock; return its end reason, and True if the process continues."""
         clock, speed = time.monotonic, self._factory.speed
         time_origin = start_time = clock()
-        ticks, last_flush, beat_count = 0, time_origin, 0
-        ended, should_continue = "", True
-        while not ended:
+        ticks, last_flush, snapshot_count = 0, time_origin, 0
+        end_reason, should_continue = "", True
+        while not end_reason:
             now = clock()
-            due = int((now - time_origin) * speed / TICK) - ticks
-            max_due = max(1, int(_MAX_DELAY_S * speed / TICK))
-            if due > max_due:
-                time_origin += (due - max_due) * TICK / speed
-                due = max_due
-            if due > 0:
-                rows, ended = self._flight.block(due)
-                ticks += due
+            due_ticks = int((now - time_origin) * speed / TICK) - ticks
+            max_due_ticks = max(1, int(_MAX_DELAY_S * speed / TICK))
+            if due_ticks > max_due_ticks:
+                time_origin += (due_ticks - max_due_ticks) * TICK / speed
+                due_ticks = max_due_ticks
+            if due_ticks > 0:
+                rows, end_reason = self._flight.block(due_ticks)
+                ticks += due_ticks
                 if len(rows):
-                    self._pending.append(rows)
+                    self._unwritten_rows.append(rows)
                     self._connection.send_bytes(_PACKED_MARK + self._snapshots.snapshot(rows[-1]).pack())
-            if ended == "completed" and self._loiter is not None and self._loiter_logs < _MAX_LOITER_LOGS:
+            if end_reason == "completed" and self._loiter is not None and self._loiter_logs < _MAX_LOITER_LOGS:
                 self._loiter_logs += 1
-                ended = "" if self._begin_route(self._loiter, STILL_LOITERING_TEXT) else ended
-            request = self._requests.waiting()
+                end_reason = "" if self._begin_route(self._loiter, STILL_LOITERING_TEXT) else end_reason
+            request = self._requests.poll()
             if isinstance(request, EndFlight):
-                ended = ended or (SHUT_DOWN if request.quit else STOPPED)
+                end_reason = end_reason or (SHUT_DOWN if request.quit else STOPPED)
                 should_continue = not request.quit
-            elif isinstance(request, DivertFlight) and not ended:
+            elif isinstance(request, DivertFlight) and not end_reason:
                 self._divert(request)
-            if self._pending and (ended or now - last_flush >= FLUSH_PERIOD):
+            if self._unwritten_rows and (end_reason or now - last_flush >= FLUSH_PERIOD):
                 self._write()
                 last_flush = now
-            if not ended:
-                beat_count += 1
-                time.sleep(max(0.0, start_time + beat_count / SNAPSHOT_RATE - clock()))
-                beat_count = max(beat_count, int((clock() - start_time) * SNAPSHOT_RATE))
-        return ended, should_continue
+            if not end_reason:
+                snapshot_count += 1
+                time.sleep(max(0.0, start_time + snapshot_count / SNAPSHOT_RATE - clock()))
+                snapshot_count = max(snapshot_count, int((clock() - start_time) * SNAPSHOT_RATE))
+        return end_reason, should_continue
 
     def finish(self, ended: str, should_abort: Callable[[], bool]) -> list[FlightJudged]:
         """Judge each route, and close its log.
@@ -407,13 +408,13 @@ class _LoggedFlight:
         return [log.finish(end_reason, should_abort) for log, end_reason in zip(self._logs, endings, strict=True)]
 
     def abandon(self) -> None:
-        """Close the logs as they are."""
+        """Close the logs in their present state."""
         for log in self._logs:
             log.abandon()
 
     def _write(self) -> None:
-        self._logs[-1].write(as_track(join_rows(self._pending)))
-        self._pending.clear()
+        self._logs[-1].write(as_track(join_rows(self._unwritten_rows)))
+        self._unwritten_rows.clear()
 
     def _divert(self, request: DivertFlight) -> None:
         if not self._begin_route(request, DIVERTED_TEXT + MODE_NAMES[request.mode]):
@@ -427,7 +428,7 @@ class _LoggedFlight:
         send_event(self._connection, FlightDiverted(request.mode, "", tuple(int(item) for item in route.items)))
 
     def _begin_route(self, request: DivertFlight, end_reason: str) -> bool:
-        """Begin a route at the aircraft's position, with its own log; return False if there is no such route.
+        """Start a route at the aircraft's position, with its own log; return False if there is no such route.
 
         end_reason: text on the end of the current route.
         """
@@ -437,7 +438,7 @@ class _LoggedFlight:
             send_event(self._connection, FlightDiverted(self._mode, str(error)))
             return False
         log = self._factory.open_log(prepared.setup, request.mode)
-        if self._pending:
+        if self._unwritten_rows:
             self._write()
         self._flight.divert(prepared.setup, prepared.local_map)
         self._snapshots = SnapshotMaker(prepared.setup, prepared.local_map)

@@ -35,19 +35,19 @@ from world.running_clock import RunningClock
 MAGIC_V1 = 0xFE
 # First byte of a MAVLink 2 frame.
 MAGIC_V2 = 0xFD
-SIGNED = 0x01
-SIGNATURE = 13
+SIGNED_FLAG = 0x01
+SIGNATURE_BYTES = 13
 _CRC_FORMAT = struct.Struct("<H")
-# Largest datagram that is read, bytes.
-LARGEST = 4096
+# Maximum number of bytes read from a datagram.
+MAX_DATAGRAM_BYTES = 4096
 MAX_FRAMES = 64
 
 
 @dataclass(frozen=True, slots=True)
 class MavlinkFrame:
-    """One frame with a good checksum.
+    """One frame with a valid checksum.
 
-    raw: the whole frame.
+    raw: bytes of the whole frame.
     signed: True if a signature is attached, valid or not.
     """
 
@@ -75,7 +75,7 @@ class Decoder:
 def split_frames(data: bytes) -> list[MavlinkFrame]:
     """Return the complete frames in a datagram, in order; damaged frames are skipped."""
     frames: list[MavlinkFrame] = []
-    data = data[:LARGEST]
+    data = data[:MAX_DATAGRAM_BYTES]
     offset = 0
     while offset < len(data) and len(frames) < MAX_FRAMES:
         frame = _parse_frame_at(data, offset) if data[offset] in (MAGIC_V1, MAGIC_V2) else None
@@ -94,11 +94,11 @@ def _parse_frame_at(data: bytes, offset: int) -> MavlinkFrame | None:
     if len(data) - offset < header_size + 2:
         return None
     flags = data[offset + 2] if is_v2 else 0
-    # Any other flag changes the frame in a way that is not known here, and the standard says to drop it.
-    if flags & ~SIGNED:
+    # Any other flag changes the frame in an unknown way, and the standard says to drop such a frame.
+    if flags & ~SIGNED_FLAG:
         return None
     end = offset + header_size + data[offset + 1] + 2
-    frame_end = end + (SIGNATURE if flags else 0)
+    frame_end = end + (SIGNATURE_BYTES if flags else 0)
     if frame_end > len(data):
         return None
     if is_v2:
@@ -117,16 +117,16 @@ def _parse_frame_at(data: bytes, offset: int) -> MavlinkFrame | None:
 
 
 # ----------------------------------------------------------------------
-# MAVLink 2 message signing: a signature is verified before anything in its packet is trusted or stored.
+# MAVLink 2 message signing: verify a signature before anything in its packet is trusted or stored.
 #
-# (mavlink.io, "Message Signing".)  pymavlink stores a packet's timestamp before it checks the signature: one forged
+# (mavlink.io, "Message Signing".)  pymavlink stores a packet's timestamp before it checks the signature: a forged
 # packet from the future then locks the real station out.
 
 # Unix time of 2015-01-01, from which timestamps are measured, s.
 EPOCH = 1_420_070_400.0
 # Timestamp units per second: 10 us each.
 _UNITS_PER_S = 100_000
-# Largest timestamp: six bytes.
+# Maximum timestamp: six bytes.
 _MAX_TIMESTAMP = 2**48 - 1
 # Maximum lag of a new stream's timestamp: a minute.
 _MAX_LAG_UNITS = 60 * _UNITS_PER_S
@@ -134,7 +134,7 @@ _MAX_LAG_UNITS = 60 * _UNITS_PER_S
 _MAX_LEAD_UNITS = 86_400 * _UNITS_PER_S
 # Number of streams that are stored.
 _MAX_STREAMS = 64
-# Largest key, bytes.
+# Maximum length of a key, bytes.
 _MAX_KEY_BYTES = 1024
 
 
@@ -189,12 +189,12 @@ class Refused(Enum):
 
 @dataclass(slots=True)
 class Signing:
-    """Signs outgoing frames and checks incoming ones.
+    """Signer of outgoing frames and checker of incoming frames.
 
     key: 32 bytes.
     link: link id of this end.
-    newest: largest timestamp sent or trusted.
-    clock: largest timestamp of this machine's clock; it does not fall if the clock is set back.
+    newest: maximum timestamp sent or trusted.
+    clock: maximum timestamp of this machine's clock; it does not decrease if the clock is set back.
     """
 
     key: bytes
@@ -203,8 +203,8 @@ class Signing:
     clock: int = 0
     _streams: dict[tuple[int, int, int], int] = field(default_factory=dict)
 
-    def refuses(self, frame: MavlinkFrame, wall: float) -> Refused | None:
-        """Return the reason to distrust a frame, or None if it is signed with the key and newer than its stream.
+    def find_refusal(self, frame: MavlinkFrame, wall: float) -> Refused | None:
+        """Return the reason to distrust a frame, or None if the frame is signed with the key and newer than its stream.
 
         A stream is a system, its component and its link id.  A frame with a bad signature changes nothing.
 
@@ -215,7 +215,7 @@ class Signing:
         body, signature = frame.raw[:-6], frame.raw[-6:]
         if not hmac.compare_digest(hashlib.sha256(self.key + body).digest()[:6], signature):
             return Refused.FORGED
-        link = frame.raw[-SIGNATURE]
+        link = frame.raw[-SIGNATURE_BYTES]
         timestamp = int.from_bytes(frame.raw[-12:-6], "little")
         stream = (frame.system, frame.component, link)
         last_timestamp = self._streams.get(stream)
@@ -247,7 +247,7 @@ class Signing:
         self.newest = min(max(self.newest + 1, _signing_timestamp(wall)), _MAX_TIMESTAMP)
         number = packed[7] | packed[8] << 8 | packed[9] << 16
         body = bytearray(packed[:-2])
-        body[2] |= SIGNED
+        body[2] |= SIGNED_FLAG
         crc = x25crc(bytes(body[1:]))
         crc.accumulate(bytes([mavlink.mavlink_map[number].crc_extra]))
         signed = bytes(body) + struct.pack("<H", crc.crc) + bytes([self.link]) + self.newest.to_bytes(6, "little")
@@ -264,13 +264,13 @@ Address = tuple[str, int]
 SYSTEM = 1
 # MAVLink component id of the vehicle.
 COMPONENT = mavlink.MAV_COMP_ID_AUTOPILOT1
-# Largest number of stations.
+# Maximum number of stations.
 MAX_PEERS = 16
-# A station that has sent no heartbeat for this time is removed, s.
+# Time without a heartbeat after which a station is removed, s.
 SILENCE = 15.0
-# Number of unknown senders that the log names.
+# Maximum number of unknown senders that notices name.
 _MAX_NAMED_STRANGERS = 16
-# Number of datagrams that are handled before telemetry is due again.
+# Maximum number of datagrams handled before telemetry is sent again.
 _MAX_DATAGRAMS_PER_POLL = 200
 
 
@@ -334,10 +334,10 @@ class Access:
 
 
 def check_access(access: Access) -> None:
-    """Check that access to the vehicle from other machines is protected.
+    """Raise FlightError if access to the vehicle from other machines is not protected.
 
     Beyond loopback, an address to listen at needs a key or a list of allowed addresses, and an address to send to needs
-    a key or must be on that list.  Raises FlightError, which names the argument to give, if it is not protected.
+    a key or must be on that list.  The error names the argument to give.
 
     >>> check_access(Access(("127.0.0.1", 14551), (("127.0.0.1", 14550),)))
     >>> check_access(Access(("0.0.0.0", 14551), ()))
@@ -367,11 +367,11 @@ def is_loopback(host: str) -> bool:
 
 
 class Link:
-    """The socket and its peers.
+    """UDP socket with its peers.
 
-    clock: function for the silence of peers and the times of messages, also for users of the link; it never goes back,
-        and stops while the process is stopped.
-    wall: function for the time since 1970, s, for signatures.
+    clock: function that returns the time for the silence of peers and the times of messages, s, also for users of the
+        link; it never goes back, and stops while the process is stopped.
+    wall: function that returns the time since 1970, s, for signatures.
     """
 
     def __init__(
@@ -389,10 +389,10 @@ class Link:
         self._signing = Signing(access.key) if access.key is not None else None
         self._decoder = Decoder()
         # Addresses already named in a notice: unknown senders, and senders whose clock is ahead.
-        self._strangers: set[str] = set()
-        self._ahead: set[str] = set()
+        self._named_strangers: set[str] = set()
+        self._named_ahead: set[str] = set()
         self._notices: list[str] = []
-        self._hello = {address: mavlink.MAVLink(None, SYSTEM, COMPONENT) for address in access.to}
+        self._expected_stations = {address: mavlink.MAVLink(None, SYSTEM, COMPONENT) for address in access.to}
         family = socket.AF_INET6 if ":" in access.bind[0] else socket.AF_INET
         self._socket = socket.socket(family, socket.SOCK_DGRAM)
         try:
@@ -418,20 +418,20 @@ class Link:
         return str(host), int(port)
 
     def receive(self) -> list[tuple[Any, Peer]]:
-        """Return the received messages of stations, each with its sender; everything else is dropped."""
+        """Return the received messages of stations, each with its sender; drop everything else."""
         messages: list[tuple[Any, Peer]] = []
         for _ in range(_MAX_DATAGRAMS_PER_POLL):
             try:
-                data, source = self._socket.recvfrom(LARGEST)
+                data, source = self._socket.recvfrom(MAX_DATAGRAM_BYTES)
             except BlockingIOError:
                 break
             except OSError:
                 # A station's port is closed: its ICMP answer comes up here.
                 continue
-            messages += self.take(data, (str(source[0]), int(source[1])))
+            messages += self.decode_datagram(data, (str(source[0]), int(source[1])))
         return messages
 
-    def take(self, data: bytes, source: Address) -> list[tuple[Any, Peer]]:
+    def decode_datagram(self, data: bytes, source: Address) -> list[tuple[Any, Peer]]:
         """Return the messages of one datagram, and register its sender as a peer if it contains a HEARTBEAT."""
         if self.access.allowed and not is_loopback(source[0]) and source[0] not in self.access.allowed:
             self.dropped.address += 1
@@ -441,7 +441,7 @@ class Link:
             if frame.system == SYSTEM or frame.system == 0:
                 self.dropped.others += 1
                 continue
-            if self._signing is not None and (reason := self._signing.refuses(frame, self._wall())):
+            if self._signing is not None and (reason := self._signing.find_refusal(frame, self._wall())):
                 self._count_dropped(reason)
                 if reason is Refused.FUTURE:
                     self._notice_clock_ahead(source[0])
@@ -469,24 +469,28 @@ class Link:
         )
 
     def _notice_stranger(self, message: Any, host: str) -> None:
-        """Add a notice, once for each address, with the reason why the address gets no answer."""
-        if host in self._strangers or len(self._strangers) >= _MAX_NAMED_STRANGERS or not self._is_for_vehicle(message):
+        """Add a notice, once for each address, on the reason why the address gets no answer."""
+        if (
+            host in self._named_strangers
+            or len(self._named_strangers) >= _MAX_NAMED_STRANGERS
+            or not self._is_for_vehicle(message)
+        ):
             return
-        self._strangers.add(host)
+        self._named_strangers.add(host)
         full_text = "" if len(self.peers) < MAX_PEERS else f", and {MAX_PEERS} stations are served already"
         self._notices.append(f"{host} sends {message.get_type()} and no HEARTBEAT{full_text}: it is not answered")
 
     def _notice_clock_ahead(self, host: str) -> None:
         """Add a notice, once for each address with the key, that one of the two clocks is wrong."""
-        if host in self._ahead or len(self._ahead) >= _MAX_NAMED_STRANGERS:
+        if host in self._named_ahead or len(self._named_ahead) >= _MAX_NAMED_STRANGERS:
             return
-        self._ahead.add(host)
+        self._named_ahead.add(host)
         self._notices.append(
             f"{host} signs with timestamps more than a day ahead of this machine's clock: such frames are dropped"
         )
 
     def notices(self) -> list[str]:
-        """Return the notices since the last call about senders without an answer."""
+        """Return the notices since the last call on senders without an answer."""
         notices, self._notices = self._notices, []
         return notices
 
@@ -515,7 +519,7 @@ class Link:
         return peer
 
     def _frame_sequence(self, address: Address) -> Any:
-        return self._hello.get(address) or mavlink.MAVLink(None, SYSTEM, COMPONENT)
+        return self._expected_stations.get(address) or mavlink.MAVLink(None, SYSTEM, COMPONENT)
 
     @staticmethod
     def _is_for_vehicle(message: Any) -> bool:
@@ -530,12 +534,12 @@ class Link:
             del self.peers[key]
 
     def send(self, message: Any, peer: Peer) -> None:
-        """Send a message to a peer; it is lost if the network does not accept it, as on any radio."""
+        """Send a message to a peer; the message is lost if the network does not accept it, as on any radio."""
         self._transmit(message.pack(peer.mav), peer.mav, peer.address)
 
     def send_heartbeat(self, message: Any) -> None:
         """Send a HEARTBEAT to the expected addresses of stations, and to every peer."""
-        for address, mav in self._hello.items():
+        for address, mav in self._expected_stations.items():
             if address not in self.peers:
                 self._transmit(message.pack(mav), mav, address)
         for peer in self.peers.values():

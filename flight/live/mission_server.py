@@ -31,7 +31,7 @@ from flight.mission.items import (
 from world.errors import MissionError
 
 # ----------------------------------------------------------------------
-# Mission items as messages: MISSION_ITEM_INT made and parsed, MISSION_ITEM parsed (MAVLink mission protocol).
+# Mission items as messages: make and parse MISSION_ITEM_INT, parse MISSION_ITEM (MAVLink mission protocol).
 #
 # Only the INT form is made: the float MISSION_ITEM moves a waypoint by up to 0.5 m.  pymavlink is imported when a
 # message is made, so that reading files does not wait for it.
@@ -93,7 +93,7 @@ def to_message(
 def from_message(message: Any, source: str) -> MissionItem:
     """Return the item of a MISSION_ITEM_INT or MISSION_ITEM message.
 
-    ``source`` names the sender in error messages.
+    source: name of the sender in messages.
 
     INT32_MAX in an integer x or y is NaN (MAVLink's "unset").  A float's latitude and longitude are rounded to the
     nearest 1e-7 degrees.  Raises MissionError with one line that names item, field, value, and allowed values.
@@ -121,13 +121,13 @@ def from_message(message: Any, source: str) -> MissionItem:
 
 
 # ----------------------------------------------------------------------
-# Missions as numbered by stations, and as flown: home, seq and jumps converted between both.
+# Missions as numbered by stations and as flown: conversion of home, seq and jumps.
 
 
-def uploaded(lists: dict[MissionType, tuple[MissionItem, ...]], own_home: Home) -> tuple[Mission, int]:
-    """Return the mission of the lists, and the offset between its items' seq and the stations' numbers.
+def uploaded_mission(lists: dict[MissionType, tuple[MissionItem, ...]], own_home: Home) -> tuple[Mission, int]:
+    """Return the mission of uploaded lists, and the offset between its items' seq and the stations' numbers.
 
-    Item 0 is home, as in ArduPilot, if it is a waypoint above mean sea level, or one with no parameter set: MAVSDK's
+    Item 0 is home, as in ArduPilot, if it is a waypoint above mean sea level, or one without parameters: MAVSDK's
     `mission` plugin sends no home, and its waypoints are relative and have a radius.
     own_home: the vehicle's home, for a mission without home.
     """
@@ -156,11 +156,11 @@ def _is_home(item: MissionItem) -> bool:
     return item.frame in AMSL or not any(item.params)
 
 
-def listed(mission: Mission) -> tuple[tuple[MissionItem, ...], ...]:
+def mission_lists(mission: Mission) -> tuple[tuple[MissionItem, ...], ...]:
     """Return the lists of a mission for stations, with home first, seq without gaps, and jumps renumbered.
 
     >>> place = MissionItem(4, 16, 0, (0.0,) * 4, 46.0, 8.0, 75.0)
-    >>> items, fences, rally = listed(Mission(Home(46.0, 8.0, 0.0), (place, replace(place, seq=7))))
+    >>> items, fences, rally = mission_lists(Mission(Home(46.0, 8.0, 0.0), (place, replace(place, seq=7))))
     >>> [item.seq for item in items], fences, rally
     ([0, 1, 2], (), ())
     """
@@ -183,7 +183,7 @@ def listed(mission: Mission) -> tuple[tuple[MissionItem, ...], ...]:
 
 
 def start_problem(mission: Mission, first: int, *, in_flight: bool = False) -> str:
-    """Return the reason why a mission cannot be flown from the item with seq ``first``, or "" if it can.
+    """Return the reason why a mission cannot be flown from the item with seq ``first``, or "".
 
     in_flight: True if the leg from the aircraft to the item will be its first leg.
 
@@ -199,15 +199,15 @@ def start_problem(mission: Mission, first: int, *, in_flight: bool = False) -> s
     return "" if first <= mission.items[0].seq or len(places) >= min_place_count else "no leg is left to fly from there"
 
 
-def flown_from(mission: Mission, first: int) -> Mission:
-    """Return the mission from the item with seq ``first``, preceded by the last speed change before it.
+def mission_from_item(mission: Mission, first: int) -> Mission:
+    """Return the mission from the item with seq ``first``, after the last speed change before that item.
 
     Items keep their numbers.
 
     >>> place = MissionItem(1, 16, 0, (0.0,) * 4, 46.0, 8.0, 75.0)
     >>> speed = MissionItem(2, 178, 2, (0.0, 22.0, -1.0, 0.0), 0.0, 0.0, 0.0)
     >>> way = Mission(None, (place, speed, replace(place, seq=3), replace(place, seq=4)))
-    >>> [item.seq for item in flown_from(way, 4).items], flown_from(way, 1) == way
+    >>> [item.seq for item in mission_from_item(way, 4).items], mission_from_item(way, 1) == way
     ([2, 4], True)
     """
     earlier = [item for item in mission.items if item.seq < first]
@@ -230,19 +230,19 @@ SLOWEST_RETRY = 0.4
 CONFIRMATIONS = 4
 # Interval of these requests, s.
 CONFIRM = 0.4
-# A last item that arrives twice within this time is a duplicate and gets no second ACK, which would end the next
-# upload, s.
+# Time within which a last item that arrives again is a duplicate and gets no second ACK, s: that ACK would end the next
+# upload.
 ACK_AGAIN = 0.3
-# After this number of unanswered requests for a first item, requests without MISSION_REQUEST_INT are sent.
+# Number of unanswered requests for a first item before MISSION_REQUEST replaces MISSION_REQUEST_INT.
 _INT_REQUEST_ATTEMPTS = 4
-# Silence after which another station may take over, s.
+# Silence of a station after which another one may upload, s.
 LOCK = 1.0
-# Silence after which the upload is given up, s.
+# Silence after which an upload is abandoned, s.
 UPLOAD_TIMEOUT = 8.0
 
-# `current` of an item that is a place to fly to now.
+# `current` of an item with a position to fly to now.
 _GO_TO_PLACE = 2
-# `current` of an item that is an altitude to fly at now.
+# `current` of an item with an altitude to fly at now.
 _GO_TO_ALTITUDE = 3
 _GUIDED = (_GO_TO_PLACE, _GO_TO_ALTITUDE)
 _FLOAT_WARNING = (
@@ -278,23 +278,23 @@ class MissionReply:
 class _Upload:
     """An upload in progress.
 
-    heard: time of the last message, s of the caller's clock.
-    first_asked, asked: times of the first and last request for the current item, s of the caller's clock.
+    last_message_time: s of the caller's clock.
+    last_request_time, first_request_time: times of the last and first request for the current item, s of that clock.
     wait: time until the next request, s.
-    repeated: True if any request was repeated.
-    asked_in_vain: number of requests for the first item before it arrived.
-    floats: True if items arrive as MISSION_ITEM.
+    was_repeated: True if any request was repeated.
+    unanswered_count: number of requests for the first item before it arrived.
+    has_floats: True if items arrive as MISSION_ITEM.
     """
 
     station: Station
     count: int
-    heard: float
-    asked: float
-    first_asked: float
+    last_message_time: float
+    last_request_time: float
+    first_request_time: float
     wait: float = RETRY
-    repeated: bool = False
-    asked_in_vain: int = 0
-    floats: bool = False
+    was_repeated: bool = False
+    unanswered_count: int = 0
+    has_floats: bool = False
     items: list[MissionItem] = field(default_factory=list)
 
 
@@ -302,18 +302,20 @@ class _Upload:
 class _Finished:
     """An upload that was accepted.
 
-    asked, acknowledged: times of the last request for its last item, and of its last ACK, s.
-    left: number of remaining requests for that item.
+    last_request_time: time of the last request for the upload's last item, s.
+    last_ack_time: time of the last ACK, s.
+    remaining_count: number of remaining requests for that item.
     """
 
     station: Station
     count: int
-    asked: float
-    acknowledged: float
-    left: int
+    last_request_time: float
+    last_ack_time: float
+    remaining_count: int
 
 
-def _refuse_go_to(_receive_item: MissionItem) -> str:
+def _deny_go_to(_item: MissionItem) -> str:
+    """Deny a go-to, as a vehicle that is not in flight."""
     return "go-to denied: not in flight"
 
 
@@ -323,23 +325,23 @@ class MissionServer:
 
     lists: the vehicle's items, seq from 0 on; item 0 of a mission may be home.
     changed: lists that an upload replaced since the caller last cleared this set.
-    locked: reason why the mission may not change now, "" if it may.
-    go_to: function that flies to an item's place, at its altitude, and loiters there; latitude and longitude are NaN
+    locked: reason why the mission must not change now, or "".
+    go_to: function that flies to an item's position and altitude, and loiters there; latitude and longitude are NaN
         for the aircraft's position.  It returns the reason for a refusal, or "".
     """
 
     lists: dict[MissionType, tuple[MissionItem, ...]] = field(default_factory=lambda: dict.fromkeys(MissionType, ()))
     changed: set[MissionType] = field(default_factory=set)
     locked: str = ""
-    go_to: Callable[[MissionItem], str] = _refuse_go_to
+    go_to: Callable[[MissionItem], str] = _deny_go_to
     _uploads: dict[MissionType, _Upload] = field(default_factory=dict)
     # Station of the last finished upload of each list: its final ACK is repeated if its last item arrives again.
     _finished: dict[MissionType, _Finished] = field(default_factory=dict)
 
     def handle(self, message: Any, station: Station, now: float) -> list[MissionReply]:
-        """Answer a message of the protocol; other messages get no answer.
+        """Return the replies to a message of the protocol; other messages get no reply.
 
-        ``now``: s, any clock that never goes back.
+        now: time of any clock that never goes back, s.
         """
         if message.get_type() in _HANDLERS and message.get_type() not in _ITEMS:
             self._stop_confirmations(station)
@@ -358,25 +360,25 @@ class MissionServer:
         """Repeat requests for missing items, or for the last item, and abandon uploads of silent stations."""
         replies = []
         for kind, upload in list(self._uploads.items()):
-            if now - upload.heard > UPLOAD_TIMEOUT:
+            if now - upload.last_message_time > UPLOAD_TIMEOUT:
                 del self._uploads[kind]
                 text = (
                     f"{_NAMES[kind]} upload given up after item {len(upload.items)} of {upload.count}; nothing changed"
                 )
                 replies.append(self._ack(upload.station, mavlink.MAV_MISSION_OPERATION_CANCELLED, kind, text))
-            elif now - upload.asked >= upload.wait:
+            elif now - upload.last_request_time >= upload.wait:
                 upload.wait = min(2.0 * upload.wait, SLOWEST_RETRY)
-                upload.repeated = True
-                upload.asked_in_vain += not upload.items
+                upload.was_repeated = True
+                upload.unanswered_count += not upload.items
                 replies.append(self._request(upload, kind, now))
         for kind, finished in self._finished.items():
-            if finished.left > 0 and now - finished.asked >= CONFIRM:
-                finished.left -= 1
-                finished.asked = now
+            if finished.remaining_count > 0 and now - finished.last_request_time >= CONFIRM:
+                finished.remaining_count -= 1
+                finished.last_request_time = now
                 replies.append(_request(finished.station, finished.count - 1, kind))
         return replies
 
-    def _begin_upload(self, message: Any, station: Station, kind: MissionType, now: float) -> list[MissionReply]:
+    def _start_upload(self, message: Any, station: Station, kind: MissionType, now: float) -> list[MissionReply]:
         count = int(message.count)
         refusal = self._upload_refusal(station, kind, now)
         if refusal:
@@ -393,7 +395,7 @@ class MissionServer:
         self._finished.pop(kind, None)
         return [self._request(upload, kind, now)]
 
-    def _handle_go_to(self, message: Any, station: Station, kind: MissionType) -> MissionReply:
+    def _answer_go_to(self, message: Any, station: Station, kind: MissionType) -> MissionReply:
         try:
             item = from_message(message, "go-to")
         except MissionError as error:
@@ -407,16 +409,16 @@ class MissionServer:
     def _receive_item(self, message: Any, station: Station, kind: MissionType, now: float) -> list[MissionReply]:
         upload = self._uploads.get(kind)
         if message.current in _GUIDED and (upload is None or upload.station != station):
-            return [self._handle_go_to(message, station, kind)]
+            return [self._answer_go_to(message, station, kind)]
         if upload is None or upload.station != station:
             finished = self._finished.get(kind)
             is_last_item = finished is not None and (finished.station, finished.count) == (station, message.seq + 1)
-            if finished is not None and is_last_item and now - finished.acknowledged >= ACK_AGAIN:
+            if finished is not None and is_last_item and now - finished.last_ack_time >= ACK_AGAIN:
                 # The station repeats its last item, because the ACK was lost.
-                finished.acknowledged = now
+                finished.last_ack_time = now
                 return [self._ack(station, mavlink.MAV_MISSION_ACCEPTED, kind)]
             return []
-        upload.heard = now
+        upload.last_message_time = now
         if message.seq != len(upload.items):
             # A duplicate, or an item out of order; the missing one is requested again in time.
             return []
@@ -428,15 +430,15 @@ class MissionServer:
         if placement_problem:
             return [self._reject_upload(upload, kind, mavlink.MAV_MISSION_UNSUPPORTED, placement_problem)]
         upload.items.append(item)
-        upload.floats = message.get_type() == "MISSION_ITEM"
-        upload.wait = min(max(RETRY, 1.5 * (now - upload.first_asked)), SLOWEST_RETRY)
-        upload.first_asked = now
+        upload.has_floats = message.get_type() == "MISSION_ITEM"
+        upload.wait = min(max(RETRY, 1.5 * (now - upload.first_request_time)), SLOWEST_RETRY)
+        upload.first_request_time = now
         if len(upload.items) < upload.count:
             return [self._request(upload, kind, now)]
         del self._uploads[kind]
         self.lists[kind] = tuple(upload.items)
         self.changed.add(kind)
-        self._finished[kind] = _Finished(station, upload.count, now, now, CONFIRMATIONS if upload.repeated else 0)
+        self._finished[kind] = _Finished(station, upload.count, now, now, CONFIRMATIONS if upload.was_repeated else 0)
         is_float = message.get_type() == "MISSION_ITEM"
         return [self._ack(station, mavlink.MAV_MISSION_ACCEPTED, kind, _FLOAT_WARNING if is_float else "")]
 
@@ -484,24 +486,24 @@ class MissionServer:
         upload = self._uploads.get(kind)
         if upload is None or upload.station != station or message.type == mavlink.MAV_MISSION_ACCEPTED:
             return []
-        if message.type == mavlink.MAV_MISSION_UNSUPPORTED and upload.asked_in_vain >= _INT_REQUEST_ATTEMPTS:
-            # It accepts only MISSION_REQUEST_INT, and did not get those.
-            upload.asked_in_vain = 0
+        if message.type == mavlink.MAV_MISSION_UNSUPPORTED and upload.unanswered_count >= _INT_REQUEST_ATTEMPTS:
+            # The station accepts only MISSION_REQUEST_INT, and did not get those requests.
+            upload.unanswered_count = 0
             return [self._request(upload, kind, now)]
         del self._uploads[kind]
         return []
 
     def _stop_confirmations(self, station: Station) -> None:
-        """Stop requests to a station for its finished uploads, because it sends other messages now."""
+        """Stop requests to a station for its finished uploads, because it now sends other messages."""
         for finished in self._finished.values():
             if finished.station == station:
-                finished.left = 0
+                finished.remaining_count = 0
 
     def _upload_refusal(self, station: Station, kind: MissionType, now: float) -> str:
         if self.locked and kind == MissionType.MISSION:
             return self.locked
         for upload in self._uploads.values():
-            if upload.station != station and now - upload.heard <= LOCK:
+            if upload.station != station and now - upload.last_message_time <= LOCK:
                 return f"another station (system {upload.station.system}) is uploading"
         return ""
 
@@ -510,8 +512,8 @@ class MissionServer:
         self._uploads = {kind: upload for kind, upload in self._uploads.items() if upload.station == station}
 
     def _request(self, upload: _Upload, kind: MissionType, now: float) -> MissionReply:
-        upload.asked = now
-        if upload.asked_in_vain >= _INT_REQUEST_ATTEMPTS or upload.floats:
+        upload.last_request_time = now
+        if upload.unanswered_count >= _INT_REQUEST_ATTEMPTS or upload.has_floats:
             return _request(upload.station, len(upload.items), kind, mavlink.MAVLink_mission_request_message)
         return _request(upload.station, len(upload.items), kind)
 
@@ -531,7 +533,7 @@ def _request(
 
 
 def _placement_problem(item: MissionItem, kind: MissionType) -> str:
-    """Return the reason why an item does not belong in a list, or "" if it does."""
+    """Return the reason why an item does not belong in a list, or ""."""
     is_allowed = (
         item.command in _ALLOWED_COMMANDS[kind]
         if kind in _ALLOWED_COMMANDS
@@ -552,7 +554,7 @@ def _refusal_result(message: Any) -> int:
 
 _ITEMS = ("MISSION_ITEM_INT", "MISSION_ITEM")
 _HANDLERS = {
-    "MISSION_COUNT": MissionServer._begin_upload,
+    "MISSION_COUNT": MissionServer._start_upload,
     "MISSION_ITEM_INT": MissionServer._receive_item,
     "MISSION_ITEM": MissionServer._receive_item,
     "MISSION_REQUEST_LIST": MissionServer._send_count,

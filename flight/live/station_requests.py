@@ -29,7 +29,7 @@ from world.errors import PlanflyError
 # The vehicle's parameters: readable by ground stations, and partly settable.
 
 FORCE = "PFLY_FORCE"
-# Number of parameters sent per second to a station that asked for all.
+# Number of parameters sent per second to a station that requested all.
 PARAMETERS_PER_SECOND = 200.0
 _FIXED_REASON = "is fixed by the aircraft or the scenario"
 
@@ -39,9 +39,9 @@ class Parameter:
     """One parameter; values are sent as float32.
 
     low, high: range that a station may set; high is None for a fixed parameter.
-    fixed: reason why it is fixed.
-    flies: True for a parameter of the control law, which may be set only on the ground; the mission is then judged
-        again.
+    fixed: reason why the parameter is fixed.
+    flies: True for a parameter of the simulated autopilot, which may be set only on the ground; the mission is then
+        judged again.
     """
 
     name: str
@@ -60,9 +60,9 @@ def _no_flown_parameters(_stated: Mapping[str, float]) -> Mapping[str, float]:
 class Parameters:
     """Parameters by number and by name, with the autopilot's name if it has the same parameter.
 
-    flown: function that returns the law's parameters by name, for the values that stations have stated.  It raises
-        PlanflyError if a value is not allowed.
-    stated: values of the law's parameters that stations have set.
+    flown: function that returns the simulated autopilot's parameters by name, for the values that stations have set.
+        It raises PlanflyError if a value is not allowed.
+    stated: values of the simulated autopilot's parameters that stations have set.
     """
 
     entries: list[Parameter]
@@ -81,8 +81,8 @@ class Parameters:
         """
         return self.entries[self._numbers[name]].value
 
-    def put(self, name: str, value: float) -> None:
-        """Change a value from within planfly.
+    def set_value(self, name: str, value: float) -> None:
+        """Set a value from within planfly.
 
         Raises KeyError for an unknown name.
         """
@@ -97,9 +97,9 @@ class Parameters:
         )
 
     def find(self, name: bytes, number: int) -> int | None:
-        """Return the number of the parameter that a PARAM_REQUEST_READ or PARAM_SET names, or None if it is unknown.
+        """Return the number of a parameter in PARAM_REQUEST_READ or PARAM_SET, or None if unknown.
 
-        number: -1 to find it by name.
+        number: -1 to find the parameter by name.
         """
         if number >= 0:
             return number if number < len(self.entries) else None
@@ -108,26 +108,29 @@ class Parameters:
     def set(self, name: bytes, value: float, *, in_flight: bool = False) -> tuple[int | None, str]:
         """Set a parameter for a station.
 
-        Return its number (None if it is unknown), and the reason why it was refused ("" if it was set).
+        Return its number, None if unknown, and the reason for a refusal, "" if it was set.
         """
         number = self._numbers.get(_decode_name(name))
         if number is None:
             return None, f"{_decode_name(name)}: no such parameter"
         entry = self.entries[number]
-        kept_text = f"{entry.value:g} kept"
+        unchanged_text = f"{entry.value:g} kept"
         if entry.flies:
             if in_flight:
-                return number, f"{entry.name} {value:g} refused in flight, which is logged with one set; {kept_text}"
+                return (
+                    number,
+                    f"{entry.name} {value:g} refused in flight, which is logged with one set; {unchanged_text}",
+                )
             return number, self._set_law_parameter(entry, value)
         if entry.high is None:
-            return number, f"{entry.name} {entry.fixed}: {kept_text}"
+            return number, f"{entry.name} {entry.fixed}: {unchanged_text}"
         if not (math.isfinite(value) and entry.low <= value <= entry.high):
-            return number, f"{entry.name} {value:g}: allowed {entry.low:g}..{entry.high:g}; {kept_text}"
-        self.put(entry.name, value)
+            return number, f"{entry.name} {value:g}: allowed {entry.low:g}..{entry.high:g}; {unchanged_text}"
+        self.set_value(entry.name, value)
         return number, ""
 
     def _set_law_parameter(self, entry: Parameter, value: float) -> str:
-        """Change a parameter of the control law; return the reason why it was refused, or "" if it was changed."""
+        """Set a parameter of the simulated autopilot, and return the reason for a refusal, or ""."""
         if not math.isfinite(value):
             return f"{entry.name} {value:g}: expected a finite number; {entry.value:g} kept"
         # 0.7 is sent as 0.699999988: the typed number is the shortest one with the same float32.
@@ -140,7 +143,7 @@ class Parameters:
             return f"{entry.name} {_FIXED_REASON}: {entry.value:g} kept"
         self.stated = stated_values
         for name, law_value in values.items():
-            self.put(name, law_value)
+            self.set_value(name, law_value)
         return ""
 
 
@@ -155,14 +158,14 @@ def vehicle_parameters(
     flown: Callable[[Mapping[str, float]], Mapping[str, float]] = _no_flown_parameters,
     not_flown: Iterable[str] = (),
 ) -> Parameters:
-    """Return the parameters of a vehicle and of its control law, by the autopilot's names, in alphabetical order.
+    """Return the parameters of a vehicle and of its simulated autopilot, in alphabetical order.
 
     airspeed, slowest, fastest: m/s.
     max_bank_deg: degrees.
     system: the vehicle's MAVLink system id.
     speed: speed of the flight relative to real time.
     flown: function as in `Parameters`; its names replace the vehicle's own.
-    not_flown: parameters of the control law that are not flown; they cannot be set.
+    not_flown: parameters that are read but not simulated; they cannot be set.
 
     >>> parameters = vehicle_parameters(
     ...     airspeed=25.0, slowest=18.0, fastest=31.0, max_bank_deg=30.0, system=1, speed=1.0,
@@ -210,7 +213,7 @@ _MIN_PERIOD_S = 0.02
 # Maximum interval between two messages of a kind, s.
 _MAX_PERIOD_S = 3600.0
 # Number of arm commands that may wait for a verdict.
-_MAX_WAITING = 16
+_MAX_WAITING_COMMANDS = 16
 
 
 class PeerMessage(NamedTuple):
@@ -226,7 +229,10 @@ Response = PeerMessage | StatusText
 
 @dataclass(frozen=True, slots=True)
 class _WaitingArmCommand:
-    """An arm command that waits for the verdict; param1, param2: of MAV_CMD_COMPONENT_ARM_DISARM."""
+    """An arm command that waits for the verdict.
+
+    param1, param2: of MAV_CMD_COMPONENT_ARM_DISARM.
+    """
 
     peer: Peer
     system: int
@@ -237,27 +243,27 @@ class _WaitingArmCommand:
 
 @dataclass(slots=True)
 class Requests:
-    """Answers requests with messages for the requesting station, and with texts for all stations.
+    """Answer requests with messages for the requesting station, and with texts for all stations.
 
-    start_at: function that sets the start of the next flight to an item, by the station's number.
+    start_at: function that sets the item at which the next flight starts, by the station's number.
     """
 
     arming: ArmingState
     parameters: Parameters
     status: Status
     start_at: Callable[[int], CommandResult]
-    _waiting: list[_WaitingArmCommand] = field(default_factory=list)
+    _waiting_commands: list[_WaitingArmCommand] = field(default_factory=list)
 
     def handle(self, message: Any, peer: Peer, now: float) -> list[Response]:
-        """Answer a message; a message that is not one of these requests gets no answer."""
+        """Return the responses to a message; a message without a handler has none."""
         handler = _HANDLERS.get(message.get_type())
         return handler(self, message, peer, now) if handler else []
 
-    def verdict_came(self) -> list[Response]:
-        """Answer the arm commands that waited for the verdict."""
-        waiting, self._waiting = self._waiting, []
+    def on_verdict(self) -> list[Response]:
+        """Return the responses to the arm commands that waited for the verdict."""
+        waiting_commands, self._waiting_commands = self._waiting_commands, []
         replies: list[Response] = []
-        for command in waiting:
+        for command in waiting_commands:
             reply = self.arming.arm(command.param1 == 1.0, command.param2)
             replies += self._acknowledge(command.peer, command.system, command.component, _ARM_COMMAND, reply)
         return replies
@@ -268,8 +274,10 @@ class Requests:
         if number == _ARM_COMMAND:
             reply = self.arming.arm(message.param1 == 1.0, message.param2)
             if reply.result == IN_PROGRESS:
-                if len(self._waiting) < _MAX_WAITING:
-                    self._waiting.append(_WaitingArmCommand(peer, system, component, message.param1, message.param2))
+                if len(self._waiting_commands) < _MAX_WAITING_COMMANDS:
+                    self._waiting_commands.append(
+                        _WaitingArmCommand(peer, system, component, message.param1, message.param2)
+                    )
                 else:
                     reply = CommandResult(mavlink.MAV_RESULT_TEMPORARILY_REJECTED)
             return self._acknowledge(peer, system, component, number, reply)
@@ -292,7 +300,7 @@ class Requests:
         if number in _MODE_COMMANDS:
             return self.arming.set_mode(_MODE_COMMANDS[number])
         if number == mavlink.MAV_CMD_DO_REPOSITION:
-            place = _parse_place(message)
+            place = _parse_loiter_center(message)
             return CommandResult(DENIED, _NO_PLACE) if place is None else self.arming.go_to(place)
         if number == mavlink.MAV_CMD_DO_SET_MISSION_CURRENT:
             return self.start_at(_to_integer(message.param1))
@@ -349,12 +357,13 @@ class Requests:
         reply = self.start_at(int(message.seq))
         if reply.result == ACCEPTED:
             return [PeerMessage(peer, telemetry_message("MISSION_CURRENT", self.status))]
-        # The message has no refusal, and MAVSDK repeats it without end, at each MISSION_CURRENT of another item; it
-        # gives up if it gets none during its timeout.  One sent before the refusal still causes the repetition.
+        # The message has no refusal, and MAVSDK repeats it without end, at each MISSION_CURRENT of another item; MAVSDK
+        # gives up if no MISSION_CURRENT arrives during its timeout.  One sent before the refusal still causes a
+        # repetition.
         peer.due["MISSION_CURRENT"] = now + _MISSION_CURRENT_PAUSE_S
         return [StatusText(reply.text, WARNING)]
 
-    def _go_to(self, _message: Any, _peer: Peer, _now: float) -> list[Response]:
+    def _refuse_guided_item(self, _message: Any, _peer: Peer, _now: float) -> list[Response]:
         return [StatusText(_NO_GUIDED, WARNING)]
 
     def _list_parameters(self, _message: Any, peer: Peer, _now: float) -> list[Response]:
@@ -397,8 +406,8 @@ class Requests:
         return replies
 
 
-def _parse_place(message: Any) -> Place | None:
-    """Return the place in MAV_CMD_DO_REPOSITION, or None if it is invalid."""
+def _parse_loiter_center(message: Any) -> Place | None:
+    """Return the loiter center in MAV_CMD_DO_REPOSITION, or None if it is invalid."""
     if message.get_type() == "COMMAND_INT":
         lat, lon = (math.nan if value == _UNSET_COORDINATE else value / 1e7 for value in (message.x, message.y))
         alt, frame = float(message.z), int(message.frame)
@@ -450,8 +459,8 @@ _HANDLERS: dict[str, Callable[[Requests, Any, Peer, float], list[Response]]] = {
     "COMMAND_INT": Requests._on_command,
     "SET_MODE": Requests._set_mode,
     "MISSION_SET_CURRENT": Requests._on_mission_set_current,
-    "SET_POSITION_TARGET_GLOBAL_INT": Requests._go_to,
-    "SET_POSITION_TARGET_LOCAL_NED": Requests._go_to,
+    "SET_POSITION_TARGET_GLOBAL_INT": Requests._refuse_guided_item,
+    "SET_POSITION_TARGET_LOCAL_NED": Requests._refuse_guided_item,
     "REQUEST_DATA_STREAM": Requests._set_streams,
     "PARAM_REQUEST_LIST": Requests._list_parameters,
     "PARAM_REQUEST_READ": Requests._read_parameter,

@@ -75,7 +75,7 @@ class Snapshot:
 
     @property
     def finite(self) -> bool:
-        """True if all values are finite, so that it can be sent to a station; a flight may end with other values."""
+        """True if all values are finite and may be sent to stations; a flight may end with other values."""
         return all(math.isfinite(value) for value in astuple(replace(self, height=0.0)))
 
 
@@ -85,9 +85,9 @@ _SNAPSHOT_FORMAT = struct.Struct(f"<{len(fields(Snapshot))}d")
 class SnapshotMaker:
     """Maker of snapshots from the rows of one flight.
 
-    Positions become latitude and longitude, and vectors and courses on the map become true ones.
+    Positions are converted to latitude and longitude, and map vectors and courses to true ones.
 
-    local_map: around the setup's flight.
+    local_map: local map of the flight.
     """
 
     def __init__(self, setup: FlightSetup, local_map: LocalMap) -> None:
@@ -95,7 +95,7 @@ class SnapshotMaker:
         self._map = local_map
 
     def before_start(self, setup: FlightSetup) -> Snapshot:
-        """Return the snapshot of an aircraft that waits at the route's start, on the course of its first leg."""
+        """Return the snapshot of an aircraft at the start of the route, on the course of its first leg."""
         points = setup.route.waypoints
         first_leg = points[1] - points[0]
         terrain = setup.scenario.terrain
@@ -174,7 +174,7 @@ _MAX_TEXT_BYTES = 400
 
 
 class StatusText(NamedTuple):
-    """A line for every station; severity: MAV_SEVERITY."""
+    """A line of text for every station, with its MAV_SEVERITY."""
 
     text: str
     severity: int = INFO
@@ -245,10 +245,10 @@ _CAPABILITIES = (
     | mavlink.MAV_PROTOCOL_CAPABILITY_MISSION_FENCE
     | mavlink.MAV_PROTOCOL_CAPABILITY_MISSION_RALLY
 )
-# ArduPlane version for ground stations: the vehicle follows its conventions (modes, home as item 0).
+# ArduPlane version for ground stations: the vehicle follows ArduPlane's conventions (modes, home as item 0).
 _VERSION = (4 << 24) | (5 << 16) | (0 << 8) | 255
 
-# Intervals between two messages of a kind, s, unless a station sets another; HEARTBEAT cannot be changed.
+# Default intervals between two messages of a kind, s; a station may set others, except for HEARTBEAT.
 PERIODS: dict[str, float] = {
     "ATTITUDE": 1 / 30,
     "GLOBAL_POSITION_INT": 0.1,
@@ -276,14 +276,14 @@ STREAMS: dict[int, tuple[str, ...]] = {
 class Status:
     """State of the vehicle for `telemetry_message`.
 
-    snapshot: the aircraft.
-    home: origin of heights above home.
+    snapshot: state of the aircraft.
+    home: reference of heights above home.
     boot, wall: s since the vehicle started, and since 1970.
     mode: ArduPlane's number.
     ready: True if arming would be accepted, or has been.
-    battery: Wh when full.
-    load: fraction of time that the event loop is busy.
-    current: the mission item that is flown to.
+    battery: energy of the full battery, Wh.
+    load: busy fraction of the event loop's time.
+    current: number of the current mission item.
     total: number of mission items without home.
     mission_state: MISSION_STATE of MISSION_CURRENT.
     """
@@ -347,34 +347,36 @@ def _boot_ms(status: Status) -> int:
 
 
 def _attitude_message(status: Status) -> Any:
-    now = status.snapshot
-    return mavlink.MAVLink_attitude_message(_boot_ms(status), now.roll, now.pitch, now.yaw, now.p, now.q, now.r)
+    snapshot = status.snapshot
+    return mavlink.MAVLink_attitude_message(
+        _boot_ms(status), snapshot.roll, snapshot.pitch, snapshot.yaw, snapshot.p, snapshot.q, snapshot.r
+    )
 
 
 def _position_message(status: Status) -> Any:
-    now = status.snapshot
+    snapshot = status.snapshot
     return mavlink.MAVLink_global_position_int_message(
         _boot_ms(status),
-        round(now.lat_deg * 1e7),
-        round(now.lon_deg * 1e7),
-        round(now.amsl * 1e3),
-        round((now.amsl - status.home.alt) * 1e3),
-        _to_int16(now.v_north * 100),
-        _to_int16(now.v_east * 100),
-        _to_int16(now.v_down * 100),
-        round(_to_degrees(now.yaw) * 100) % 36000,
+        round(snapshot.lat_deg * 1e7),
+        round(snapshot.lon_deg * 1e7),
+        round(snapshot.amsl * 1e3),
+        round((snapshot.amsl - status.home.alt) * 1e3),
+        _to_int16(snapshot.v_north * 100),
+        _to_int16(snapshot.v_east * 100),
+        _to_int16(snapshot.v_down * 100),
+        round(_to_degrees(snapshot.yaw) * 100) % 36000,
     )
 
 
 def _hud_message(status: Status) -> Any:
-    now = status.snapshot
+    snapshot = status.snapshot
     return mavlink.MAVLink_vfr_hud_message(
-        now.airspeed,
-        math.hypot(now.v_north, now.v_east),
-        int(_to_degrees(now.yaw)),
-        max(0, min(100, round(now.throttle * 100))),
-        now.amsl,
-        -now.v_down,
+        snapshot.airspeed,
+        math.hypot(snapshot.v_north, snapshot.v_east),
+        int(_to_degrees(snapshot.yaw)),
+        max(0, min(100, round(snapshot.throttle * 100))),
+        snapshot.amsl,
+        -snapshot.v_down,
     )
 
 
@@ -404,33 +406,41 @@ def _sys_status_message(status: Status) -> Any:
 
 
 def _gps_message(status: Status) -> Any:
-    now = status.snapshot
+    snapshot = status.snapshot
     return mavlink.MAVLink_gps_raw_int_message(
         int(status.boot * 1e6),
         mavlink.GPS_FIX_TYPE_RTK_FIXED,
-        round(now.lat_deg * 1e7),
-        round(now.lon_deg * 1e7),
-        round(now.amsl * 1e3),
+        round(snapshot.lat_deg * 1e7),
+        round(snapshot.lon_deg * 1e7),
+        round(snapshot.amsl * 1e3),
         50,
         80,
-        min(65534, round(math.hypot(now.v_north, now.v_east) * 100)),
-        round(_to_degrees(math.atan2(now.v_east, now.v_north)) * 100) % 36000,
+        min(65534, round(math.hypot(snapshot.v_north, snapshot.v_east) * 100)),
+        round(_to_degrees(math.atan2(snapshot.v_east, snapshot.v_north)) * 100) % 36000,
         16,
     )
 
 
 def _wind_message(status: Status) -> Any:
-    now = status.snapshot
+    snapshot = status.snapshot
     # Direction from which the wind blows.
-    source = math.degrees(math.atan2(-now.wind_east, -now.wind_north))
-    return mavlink.MAVLink_wind_message(source, math.hypot(now.wind_east, now.wind_north), 0.0)
+    source = math.degrees(math.atan2(-snapshot.wind_east, -snapshot.wind_north))
+    return mavlink.MAVLink_wind_message(source, math.hypot(snapshot.wind_east, snapshot.wind_north), 0.0)
 
 
 def _wind_cov_message(status: Status) -> Any:
-    now = status.snapshot
+    snapshot = status.snapshot
     unknown = math.nan
     return mavlink.MAVLink_wind_cov_message(
-        int(status.boot * 1e6), now.wind_north, now.wind_east, 0.0, unknown, unknown, now.amsl, unknown, unknown
+        int(status.boot * 1e6),
+        snapshot.wind_north,
+        snapshot.wind_east,
+        0.0,
+        unknown,
+        unknown,
+        snapshot.amsl,
+        unknown,
+        unknown,
     )
 
 

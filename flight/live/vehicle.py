@@ -27,7 +27,15 @@ from flight.live.flight_process import (
     read_event,
 )
 from flight.live.link import Link, Peer
-from flight.live.mission_server import MissionServer, MissionType, Station, flown_from, listed, start_problem, uploaded
+from flight.live.mission_server import (
+    MissionServer,
+    MissionType,
+    Station,
+    mission_from_item,
+    mission_lists,
+    start_problem,
+    uploaded_mission,
+)
 from flight.live.station_requests import PARAMETERS_PER_SECOND, Parameters, Requests, Response
 from flight.live.telemetry import (
     ACTIVE,
@@ -48,9 +56,9 @@ from flight.live.telemetry import (
 from flight.mission.items import Home, Mission, MissionItem
 
 # ----------------------------------------------------------------------
-# Messages that a live vehicle sends unasked: heartbeats, telemetry, texts, parameter streams.
+# Messages that a live vehicle sends without a request: heartbeats, telemetry, texts, parameter streams.
 
-# Beyond this delay a message is skipped instead of sent late, s.
+# Maximum delay of a message, s; a later one is skipped.
 _MAX_DELAY_S = 0.5
 # Interval of heartbeats, and of checks of a message that a station has switched off, s.
 _HEARTBEAT_PERIOD_S = 1.0
@@ -63,7 +71,7 @@ class Downlink:
     """Sender of messages to every station that has sent a heartbeat.
 
     show: function that also gets each text.
-    pause: longest sleep of the caller, s.
+    pause: maximum sleep of the caller, s.
     """
 
     def __init__(self, link: Link, status: Status, parameters: Parameters, show: ShowText, pause: float) -> None:
@@ -90,13 +98,15 @@ class Downlink:
             self._link.send(message, peer)
 
     def heartbeat_now(self) -> None:
-        """Send the next heartbeat at once, because its contents have changed."""
+        """Send the next heartbeat immediately, because its contents have changed."""
         self._next_heartbeat = self._link.clock()
 
     def wait(self, now: float, patience: float) -> float:
         """Return the time until the next message is due, s, at most ``patience``."""
-        due = min((time for peer in self._link.peers.values() for time in peer.due.values()), default=now + patience)
-        return max(0.0, min(patience, due - now, self._next_heartbeat - now))
+        due_time = min(
+            (time for peer in self._link.peers.values() for time in peer.due.values()), default=now + patience
+        )
+        return max(0.0, min(patience, due_time - now, self._next_heartbeat - now))
 
     def tick(self, now: float) -> None:
         """Send all messages that are due."""
@@ -113,15 +123,15 @@ class Downlink:
             self._stream_parameters(peer)
 
     def _send_telemetry(self, peer: Peer, now: float) -> None:
-        for name, due in peer.due.items():
-            if now < due:
+        for name, due_time in peer.due.items():
+            if now < due_time:
                 continue
             period = peer.periods[name]
             if period is None:
                 peer.due[name] = now + _HEARTBEAT_PERIOD_S
                 continue
             self._link.send(telemetry_message(name, self._status), peer)
-            peer.due[name] = due + period if now - due < _MAX_DELAY_S else now + period
+            peer.due[name] = due_time + period if now - due_time < _MAX_DELAY_S else now + period
 
     def _stream_parameters(self, peer: Peer) -> None:
         if peer.parameter is None:
@@ -139,14 +149,14 @@ class Downlink:
 
 
 class MissionProgress:
-    """Reports the current item, and the items that were reached, to stations.
+    """Report the current item and the reached items to stations.
 
     shift: offset from an item's seq to the station's number.
     first: the station's number of the item at which the next flight starts; 0 for the whole mission.
     """
 
     def __init__(self, server: MissionServer, arming: ArmingState, status: Status, downlink: Downlink) -> None:
-        """Start with a mission that is flown as a whole, from its first item."""
+        """Start with a whole mission, from its first item."""
         self._server = server
         self._arming = arming
         self._status = status
@@ -157,30 +167,30 @@ class MissionProgress:
         self.shift = 0
         self.first = 0
 
-    def started(self) -> None:
-        """Start the progress of a flight that begins."""
+    def start_flight(self) -> None:
+        """Reset the progress for a new flight."""
         self._leg, self._route_items = -1, None
 
-    def diverted(self, items: tuple[int, ...]) -> None:
-        """Start the progress on another route.
+    def start_route(self, items: tuple[int, ...]) -> None:
+        """Reset the progress for another route.
 
         items: seq of the mission's item at each waypoint; empty for a route outside the mission.
         """
         self._leg, self._route_items = -1, items
 
-    def at_start(self) -> None:
-        """Set the current item of a mission that is not being flown to the mission's start."""
-        self._status.current = self.first or (self._station_number(0) if self._arming.judged is not None else 0)
+    def reset_current_item(self) -> None:
+        """Set the current item to the start of a mission that is not being flown."""
+        self._status.current = self.first or (self._station_number(0) if self._arming.last_verdict is not None else 0)
 
     def refresh(self) -> None:
         """Update the mission fields of the status."""
         items = self._server.lists[MissionType.MISSION]
         self._status.total = max(0, len(items) - 1) if items else 0
         if self._arming.mission_state not in (ACTIVE, PAUSED, COMPLETE):
-            self.at_start()
+            self.reset_current_item()
 
-    def on_leg(self, leg: int) -> None:
-        """Send the waypoints that were reached since the last snapshot."""
+    def report_leg(self, leg: int) -> None:
+        """Report the waypoints that were reached since the last snapshot."""
         if leg == self._leg or leg < 0 or not self._waypoint_items():
             return
         for waypoint in range(max(0, self._leg + 1), leg + 1):
@@ -189,7 +199,7 @@ class MissionProgress:
         self._status.current = self._station_number(leg + 1)
         self.send_current()
 
-    def completed(self) -> None:
+    def report_completion(self) -> None:
         """Report the last waypoint as reached."""
         self._report_reached(len(self._waypoint_items()) - 1)
 
@@ -204,25 +214,25 @@ class MissionProgress:
             self._downlink.send_to_all(mavlink.MAVLink_mission_item_reached_message(self._station_number(waypoint)))
 
     def _waypoint_items(self) -> tuple[int, ...]:
-        """Return the seq of the item at each waypoint of the flown mission, -1 for no item."""
+        """Return the seq of the item at each waypoint of the flown mission, -1 without an item."""
         if self._route_items is not None:
             return self._route_items
-        return () if self._arming.judged is None else self._arming.judged.items
+        return () if self._arming.last_verdict is None else self._arming.last_verdict.items
 
     def _station_number(self, waypoint: int) -> int:
         """Return the station's number of the item at a waypoint, or of the next waypoint with an item."""
         items = self._waypoint_items()
-        following = [item for item in items[waypoint:] if item >= 0] or [item for item in items if item >= 0][-1:]
-        return following[0] + self.shift if following else 0
+        next_items = [item for item in items[waypoint:] if item >= 0] or [item for item in items if item >= 0][-1:]
+        return next_items[0] + self.shift if next_items else 0
 
 
-# Longest wait for the network or the flight, s.
+# Maximum wait for the network or the flight, s.
 _MAX_WAIT_S = 0.02
 # Time for the flight process to close its log when the vehicle is shut down, s.
 CLOSING = 0.8
 # Number of crashes in a row after which the vehicle gives up.
 _MAX_CRASHES = 3
-# Within this time the same text is sent once, s.
+# Time within which the same text is sent only once, s.
 _REPEATED_TEXT_TIME_S = 3.0
 
 
@@ -234,7 +244,7 @@ class Standby(NamedTuple):
 
 
 class Vehicle:
-    """A vehicle that stands ready, accepts missions, and flies them on a station's command."""
+    """A vehicle on the ground that accepts missions, and flies them on a station's command."""
 
     def __init__(
         self,
@@ -247,11 +257,11 @@ class Vehicle:
     ) -> None:
         """Start the flight process.
 
-        link: the stations.
-        spawn: function that starts a flight process, and returns the link's end of its pipe.
+        link: link to the stations.
+        spawn: function that starts a flight process, and returns this end of its pipe.
         parameters: parameters that stations may read, and partly set.
-        standby: the aircraft before it has a mission.
-        battery: Wh when full.
+        standby: aircraft before it has a mission.
+        battery: energy of the full battery, Wh.
         show: function that shows a text at the terminal.
         """
         self.link = link
@@ -282,7 +292,7 @@ class Vehicle:
 
     def load(self, mission: Mission) -> None:
         """Load a mission from a file, as if a station had uploaded it."""
-        for kind, items in zip(MissionType, listed(mission), strict=True):
+        for kind, items in zip(MissionType, mission_lists(mission), strict=True):
             self.server.lists[kind] = items
         self.server.changed.add(MissionType.MISSION)
 
@@ -346,7 +356,7 @@ class Vehicle:
                 self.link.send(response.message, response.peer)
                 continue
             now = self._clock()
-            # A text is sent once if the station soon repeats its request.
+            # Send a text only once if the station soon repeats its request.
             if self._last_text != response.text or now - self._last_text_time > _REPEATED_TEXT_TIME_S:
                 self.downlink.send_text(*response)
             self._last_text, self._last_text_time = response.text, now
@@ -370,60 +380,60 @@ class Vehicle:
             self._divert(self.arming.place)
             self.arming.place = None
         if self.arming.starts:
-            self.arming.flight_started()
-            self._progress.started()
+            self.arming.on_flight_started()
+            self._progress.start_flight()
             self.downlink.send_text("mission started")
             self._send_request(StartFlight())
         self._refresh()
 
     def _judge_changes(self) -> None:
         """Request a verdict on a changed mission, which includes a changed fence and changed rally points."""
-        # One request at a time: stations that upload faster than missions are judged must not fill the pipe.
+        # One request at a time, so that stations that upload faster than missions are judged do not fill the pipe.
         if not self.server.changed or self.arming.flying or self._awaits_verdict:
             return
-        changed = set(self.server.changed)
+        changed_lists = set(self.server.changed)
         self.server.changed.clear()
         totals = {"MIS_TOTAL": MissionType.MISSION, "FENCE_TOTAL": MissionType.FENCE, "RALLY_TOTAL": MissionType.RALLY}
         for name, kind in totals.items():
-            self._parameters.put(name, float(len(self.server.lists[kind])))
+            self._parameters.set_value(name, float(len(self.server.lists[kind])))
         self._mission_number += 1
         if not self.server.lists[MissionType.MISSION]:
-            self.arming.mission_cleared()
+            self.arming.on_mission_cleared()
             self.status.snapshot, self.status.home = self._standby
-            self._send_responses(self.requests.verdict_came())
+            self._send_responses(self.requests.on_verdict())
             self._refresh()
             return
         if self.server.lists[MissionType.MISSION] is not self._start_item_upload:
             self._progress.first = 0
-        mission, self._progress.shift = uploaded(self.server.lists, self._standby.home)
-        mission = flown_from(mission, self._progress.first - self._progress.shift)
+        mission, self._progress.shift = uploaded_mission(self.server.lists, self._standby.home)
+        mission = mission_from_item(mission, self._progress.first - self._progress.shift)
         # A changed fence or changed rally points need not repeat the texts about the mission.
-        self._is_brief = MissionType.MISSION not in changed and (self._is_brief or not self.arming.judging)
-        self.arming.mission_uploaded()
+        self._is_brief = MissionType.MISSION not in changed_lists and (self._is_brief or not self.arming.is_judging)
+        self.arming.on_mission_uploaded()
         self._awaits_verdict = True
         self._law_parameters = tuple(self._parameters.stated.items())
         self._send_request(JudgeMission(mission, self._mission_number, self._law_parameters))
         self._refresh()
 
     def _divert(self, place: Place) -> None:
-        """Divert the aircraft to the mission's current item, to home, or to a loiter at a place."""
-        mission, shift = uploaded(self.server.lists, self._standby.home)
+        """Divert the aircraft to the mission's current item, to home, or to a loiter."""
+        mission, shift = uploaded_mission(self.server.lists, self._standby.home)
         mission = replace(mission, home=self.status.home)
         if self.arming.mode == AUTO:
-            mission = flown_from(mission, self.status.current - shift)
+            mission = mission_from_item(mission, self.status.current - shift)
         self._send_request(DivertFlight(self.arming.mode, mission, place))
 
     def _go_to(self, item: MissionItem) -> str:
-        """Fly to an item's place; return the reason why this is refused, or "" if it is accepted."""
+        """Fly to an item's position; return the reason for a refusal, or ""."""
         return self.arming.go_to(Place(item.lat_deg, item.lon_deg, item.alt, item.frame)).text
 
     def _handle_diversion(self, event: FlightDiverted) -> None:
         if event.problem:
             requested_mode, self.arming.mode = self.arming.mode, event.mode
-            self.arming.diverted(event.mode)
+            self.arming.set_flight_mode(event.mode)
             self.downlink.send_text(f"{MODE_NAMES[requested_mode]} refused: {event.problem}", WARNING)
         else:
-            self._progress.diverted(event.items if event.mode == AUTO else ())
+            self._progress.start_route(event.items if event.mode == AUTO else ())
             self.downlink.send_text(f"flying in {MODE_NAMES[event.mode]}")
         self._refresh()
 
@@ -432,9 +442,9 @@ class Vehicle:
 
         seq: the station's number of the item.
 
-        A new start is judged as it will be flown.
+        A mission with a new start is judged from there.
         """
-        mission, shift = uploaded(self.server.lists, self._standby.home)
+        mission, shift = uploaded_mission(self.server.lists, self._standby.home)
         problem = start_problem(mission, seq - shift, in_flight=self.arming.flying)
         if self.arming.flying and not problem:
             self.status.current = seq
@@ -481,7 +491,7 @@ class Vehicle:
         if isinstance(event, Snapshot):
             if event.finite:
                 self.status.snapshot = event
-                self._progress.on_leg(int(event.leg))
+                self._progress.report_leg(int(event.leg))
         elif isinstance(event, MissionJudged):
             self._handle_verdict(event)
         elif isinstance(event, FlightDiverted):
@@ -495,43 +505,43 @@ class Vehicle:
         else:
             self._send_texts(event.texts)
 
-    def _handle_verdict(self, judged: MissionJudged) -> None:
-        if judged.number != self._mission_number:
+    def _handle_verdict(self, verdict: MissionJudged) -> None:
+        if verdict.number != self._mission_number:
             return
         self._awaits_verdict = False
         if self.server.changed:
             # The verdict is about a mission that was replaced.
             self._judge_changes()
             return
-        previous = self.arming.judged
-        if not self._is_brief or previous is None or previous.texts != judged.texts:
-            self._send_texts(judged.texts)
-        disarm_reason = self.arming.mission_judged(judged)
+        previous = self.arming.last_verdict
+        if not self._is_brief or previous is None or previous.texts != verdict.texts:
+            self._send_texts(verdict.texts)
+        disarm_reason = self.arming.on_mission_judged(verdict)
         if disarm_reason:
             self.downlink.send_text(disarm_reason, WARNING)
-        if judged.start is not None and judged.home is not None:
-            self.status.snapshot, self.status.home = judged.start, judged.home
-        self._progress.at_start()
-        self._send_responses(self.requests.verdict_came())
+        if verdict.start is not None and verdict.home is not None:
+            self.status.snapshot, self.status.home = verdict.start, verdict.home
+        self._progress.reset_current_item()
+        self._send_responses(self.requests.on_verdict())
         self._apply_state()
 
-    def _handle_flight_end(self, ended: str) -> None:
-        completed = ended == "completed"
-        if completed and self.arming.mode == AUTO:
-            self._progress.completed()
-        self.arming.flight_ended(completed)
+    def _handle_flight_end(self, end_reason: str) -> None:
+        is_completed = end_reason == "completed"
+        if is_completed and self.arming.mode == AUTO:
+            self._progress.report_completion()
+        self.arming.on_flight_ended(is_completed)
         self._refresh()
-        self.downlink.send_text(f"flight {ended}; disarmed", INFO if completed else CRITICAL)
+        self.downlink.send_text(f"flight {end_reason}; disarmed", INFO if is_completed else CRITICAL)
         self._progress.send_current()
         if self._progress.first:
-            # The next flight is the whole mission again.
+            # The next flight flies the whole mission again.
             self._progress.first = 0
             self.server.changed.add(MissionType.MISSION)
 
     def _refresh(self) -> None:
         arming, status = self.arming, self.status
         if (status.mode, status.armed, status.flying) != (arming.mode, arming.armed, arming.flying):
-            # A change is sent at once.
+            # Send a change immediately.
             self.downlink.heartbeat_now()
         status.mode, status.armed, status.flying = arming.mode, arming.armed, arming.flying
         status.ready, status.mission_state = arming.armable or arming.armed, arming.mission_state

@@ -1,6 +1,6 @@
 """Move, raise, insert and delete items of a mission, and change speeds; each function returns a new mission.
 
-An item keeps its frame and everything that was not edited, so that an unedited mission equals the opened mission.
+An item keeps its frame and all values that were not edited, so that an unedited mission equals the opened one.
 Items are identified by their index in the list; item numbers and jump targets are adapted to insertions.
 """
 
@@ -22,14 +22,14 @@ from flight.mission.items import (
 )
 from world.errors import MissionError
 
-# Maximum number of edited items, so that a drag is judged while the hand moves, and the page draws all items.
+# Maximum number of items, so that a drag is judged while the pointer moves, and the page draws all items.
 MAX_EDITED = 2_000
-# Commands that belong to the next place instead of the previous one.
+# Commands that belong to the next waypoint instead of the previous one.
 _COMMANDS_OF_NEXT_PLACE = (Command.DO_LAND_START, Command.DO_RETURN_PATH_START, Command.JUMP_TAG)
 
 
 def is_place(item: MissionItem) -> bool:
-    """Return True if an item is a place on the map that can be moved."""
+    """Return True if an item has a position on the map and can be moved."""
     return item.command in PLACES | TAKEOFFS | LANDINGS and item.has_position
 
 
@@ -44,7 +44,7 @@ def places(mission: Mission) -> tuple[int, ...]:
 
 
 def checked_place(mission: Mission, index: int) -> MissionItem:
-    """Return the place to edit.  Raises MissionError if there is no such item or it is not a place."""
+    """Return the item to edit.  Raises MissionError if there is no such item, or if it cannot be moved."""
     if not 0 <= index < len(mission.items):
         raise MissionError.at(mission.source, "item", index, f"expected 0..{len(mission.items) - 1}")
     item = mission.items[index]
@@ -67,7 +67,9 @@ def moved(mission: Mission, index: int, lat_deg: float, lon_deg: float) -> Missi
 
 
 def raised(mission: Mission, indices: Iterable[int], by: float) -> Mission:
-    """Return the mission with items raised, each in its frame; an item without altitude is not changed.  by: m.
+    """Return the mission with items raised by a height in m, each in its frame.
+
+    An item without altitude is unchanged.
 
     >>> way = tuple(MissionItem(k, 16, 3, (0.0,) * 4, 46.0, 8.0, 75.0) for k in (1, 2))
     >>> [item.alt for item in raised(Mission(None, way), [1], 12.5).items]
@@ -92,7 +94,7 @@ def at_height(mission: Mission, index: int, amsl: float, now: float) -> Mission:
 
 
 def next_index(mission: Mission, after: int) -> int:
-    """Return the index for a waypoint inserted behind a place, after all actions at that place.
+    """Return the index for a waypoint inserted after an item, behind all actions at that item.
 
     >>> way = [MissionItem(k, c, 3, (0.0,) * 4, 46.0, 8.0, 75.0) for k, c in ((1, 16), (2, 206), (3, 16))]
     >>> next_index(Mission(None, tuple(way)), 0)
@@ -107,9 +109,10 @@ def next_index(mission: Mission, after: int) -> int:
 
 
 def inserted(mission: Mission, after: int, lat_deg: float, lon_deg: float, height: float | None = None) -> Mission:
-    """Return the mission with a waypoint inserted behind a place, at `next_index`, in the frame of that place.
+    """Return the mission with a waypoint inserted after an item, at `next_index`, in the frame of that item.
 
-    height: altitude in that frame, m; None for the altitude of the place.
+    height: altitude in that frame, m; None for the altitude of the item.
+
     Raises MissionError if the mission already has the maximum number of items.
 
     >>> way = tuple(MissionItem(k, 16, 3, (0.0,) * 4, 46.0, 8.0, 75.0) for k in (1, 2))
@@ -135,9 +138,9 @@ def inserted(mission: Mission, after: int, lat_deg: float, lon_deg: float, heigh
 
 
 def deleted(mission: Mission, index: int) -> Mission:
-    """Return the mission without a place; a jump to this place then goes to the next item.
+    """Return the mission without an item; a jump to it then goes to the next item.
 
-    Raises MissionError if fewer than two places would remain.
+    Raises MissionError if fewer than two waypoints would remain.
     """
     checked_place(mission, index)
     if len(places(mission)) <= 2:
@@ -149,9 +152,9 @@ def deleted(mission: Mission, index: int) -> Mission:
 
 
 def at_speed(mission: Mission, index: int, airspeed: float, after: float) -> Mission:
-    """Return the mission with another airspeed on the leg to a place; behind the place the airspeed `after` applies.
+    """Return the mission with another airspeed on the leg to an item, and the airspeed ``after`` behind that item.
 
-    If a change of speed is directly before the place, it is edited, and no item is added.
+    A change of speed directly before the item is edited instead of adding an item.
 
     airspeed, after: m/s.
     """
@@ -166,8 +169,8 @@ def at_speed(mission: Mission, index: int, airspeed: float, after: float) -> Mis
             _with_inserted_item(mission, index, _speed_item(mission.items[index].seq, airspeed)),
             index + 1,
         )
-    following = mission.items[place_index + 1 :]
-    if not any(is_place(item) for item in following) or following[0].command == Command.DO_CHANGE_SPEED:
+    later_items = mission.items[place_index + 1 :]
+    if not any(is_place(item) for item in later_items) or later_items[0].command == Command.DO_CHANGE_SPEED:
         return mission
     return _with_inserted_item(mission, place_index + 1, _speed_item(mission.items[place_index].seq + 1, after))
 
@@ -197,7 +200,7 @@ def _check_item(mission: Mission, item: MissionItem) -> None:
 
 
 def _renumber(item: MissionItem, after_seq: int, shift: int) -> MissionItem:
-    """Return the item with its number and its jump target increased by `shift` if they are above `after_seq`."""
+    """Return the item with its number and its jump target increased by ``shift`` if they are above ``after_seq``."""
     params = item.params
     if item.command == Command.DO_JUMP and params[0] > after_seq:
         params = (params[0] + shift, *params[1:])

@@ -29,51 +29,53 @@ _POLYGON_COMMANDS = {
 }
 
 
-def fence_item(origin: GeoOrigin, command: Command, p1: float, position: Sequence[float] | Floats) -> MissionItem:
+def fence_item(origin: GeoOrigin, command: Command, param1: float, position: Sequence[float] | Floats) -> MissionItem:
     """Return a fence item at a position (east, north, m).
 
-    p1: number of corners of its polygon, or radius of its circle, m.
+    param1: number of corners of the polygon, or radius of the circle, m.
 
     >>> item = fence_item(GeoOrigin(36.5, -84.2), Command.NAV_FENCE_CIRCLE_EXCLUSION, 200.0, (0.0, 0.0))
     >>> item.params[0], round(item.lat_deg, 6)
     (200.0, 36.5)
     """
     lat, lon = to_geo(origin, float(position[0]), float(position[1]))
-    params = (round(p1, 3), 0.0, 0.0, 0.0)
+    params = (round(param1, 3), 0.0, 0.0, 0.0)
     return MissionItem(0, int(command), int(Frame.GLOBAL), params, on_grid(float(lat)), on_grid(float(lon)), 0.0)
 
 
 def zone_fences(zones: Sequence[Zone], origin: GeoOrigin) -> tuple[list[MissionItem], list[str]]:
-    """Return the fence items of zones, and notes for people on what a fence cannot represent.
+    """Return the fence items of zones, and notes on what a fence cannot represent.
 
     A cylinder becomes a circle, and an outline a polygon. A hole of an inclusion becomes an exclusion. A hole of an
-    exclusion is closed, and an inclusion of several parts is left out, since a position must be inside every inclusion.
-    No fence has a floor or a ceiling.
+    exclusion is closed, and an inclusion of several parts is omitted, because a position must be inside every
+    inclusion. No fence has a floor or a ceiling.
 
     >>> zone = Zone("mast", "exclusion", Cylinder(0.0, 500.0, 200.0))
     >>> items, notes = zone_fences([zone], GeoOrigin(36.5, -84.2))
     >>> [(item.command, item.params[0]) for item in items], notes
     ([(5004, 200.0)], [])
     """
-    items, closed, left_out = [], [], []
+    items, closed_names, omitted_names = [], [], []
     for zone in zones:
         rings = () if isinstance(zone.shape, Cylinder) else zone.shape.rings
         holes = [ring for ring in rings if is_hole(ring)]
         if zone.kind == "inclusion" and len(rings) - len(holes) > 1:
-            left_out.append(zone.name)
+            omitted_names.append(zone.name)
             continue
         if zone.kind == "exclusion" and holes:
-            closed.append(zone.name)
+            closed_names.append(zone.name)
         items += list(_zone_items(zone, origin))
-    bands = [zone.name for zone in zones if zone.floor is not None or zone.ceiling is not None]
+    banded_names = [zone.name for zone in zones if zone.floor is not None or zone.ceiling is not None]
     notes = []
-    if bands:
-        notes.append(f"a fence has no floor and no ceiling: {_joined_names(bands)} in the fence at every height")
-    if closed:
-        notes.append(f"an excluded area of a fence has no holes: {_joined_names(closed)} in the fence without them")
-    if left_out:
+    if banded_names:
+        notes.append(f"a fence has no floor and no ceiling: {_joined_names(banded_names)} in the fence at every height")
+    if closed_names:
         notes.append(
-            f"a flight must be inside every inclusion of a fence: {_joined_names(left_out)} left out for having"
+            f"an excluded area of a fence has no holes: {_joined_names(closed_names)} in the fence without them"
+        )
+    if omitted_names:
+        notes.append(
+            f"a flight must be inside every inclusion of a fence: {_joined_names(omitted_names)} left out for having"
             " several parts"
         )
     return items, notes
@@ -96,9 +98,9 @@ def _ring_items(ring: Ring, command: Command, origin: GeoOrigin) -> Iterator[Mis
 
 
 def _joined_names(names: list[str]) -> str:
-    """Return up to three names, the number of the others, and the verb."""
-    rest_text = f" and {len(names) - 3} more" if len(names) > 3 else ""
-    return ", ".join(names[:3]) + rest_text + (" is" if len(names) == 1 else " are")
+    """Return up to three names, the number of the others, and the verb "is" or "are"."""
+    remainder = f" and {len(names) - 3} more" if len(names) > 3 else ""
+    return ", ".join(names[:3]) + remainder + (" is" if len(names) == 1 else " are")
 
 
 # ----------------------------------------------------------------------
@@ -110,7 +112,7 @@ POLYGONS = (Command.NAV_FENCE_POLYGON_VERTEX_INCLUSION, Command.NAV_FENCE_POLYGO
 # Commands of inclusions.
 INCLUSIONS = (Command.NAV_FENCE_POLYGON_VERTEX_INCLUSION, Command.NAV_FENCE_CIRCLE_INCLUSION)
 
-# Largest number of omitted shapes that a note lists by name.
+# Maximum number of omitted shapes that a note names.
 _MAX_NAMES = 12
 
 
@@ -138,7 +140,7 @@ def fence_shapes(fences: tuple[MissionItem, ...], source: str = "fence") -> list
 def fence_problem(
     fences: tuple[MissionItem, ...], origin: GeoOrigin, east: float, north: float
 ) -> tuple[str, int] | None:
-    """Return the first fence that a position violates, as text and its first item's number, or None.
+    """Return the first fence that a position violates, as text and number of its first item, or None.
 
     fences: items 5001..5004, a polygon's corners together.
     east, north: m on the map about ``origin``.
@@ -173,16 +175,16 @@ PassTest = Callable[[tuple[MissionItem, ...]], bool]
 
 
 def with_fences(mission: Mission, scenario: Scenario, passes: PassTest) -> tuple[Mission, tuple[str, ...]]:
-    """Return a mission with a scenario's area, threats and zones as fence, and notes for people.
+    """Return a mission with a scenario's area, threats and zones as fence, and notes for the user.
 
     The area becomes an inclusion polygon of four corners, and each missile's kill radius an exclusion circle without
-    altitude limits. Radars are left out: detection is not forbidden. Zones are converted by `zone_fences`. The
-    mission's own fence is kept. An exclusion that the mission passes above or below, according to ``passes``, is left
-    out: an autopilot with such a fence refuses the mission or aborts it.
+    altitude limits. Radars are omitted: detection is not forbidden. Zones are converted by `zone_fences`. The
+    mission's own fence is kept. An exclusion that the mission passes above or below, according to ``passes``, is
+    omitted: an autopilot with such a fence refuses the mission or aborts it.
 
     Rally points are the first and last position of the mission, at the mission's height above home; a mission with
     rally points, and one from or to the ground, keeps its own. The notes list what a fence cannot represent, and what
-    was left out.
+    is omitted.
 
     >>> from world.scenario import load_scenario
     >>> fenced, notes = with_fences(Mission(None, ()), load_scenario("tight"), lambda shape: False)
@@ -204,10 +206,10 @@ def with_fences(mission: Mission, scenario: Scenario, passes: PassTest) -> tuple
         count = "1 missile sphere" if len(missile_zones) == 1 else f"{len(missile_zones)} missile spheres"
         change_text = "became an exclusion circle" if len(missile_zones) == 1 else "became exclusion circles"
         notes.append(f"{count} {change_text}: a fence has no height, so that each is a cylinder")
-    left_out = [*crossed_missiles, *passed_zones]
-    if left_out:
-        names = ", ".join(left_out[:_MAX_NAMES]) + (
-            f" and {len(left_out) - _MAX_NAMES} more" if len(left_out) > _MAX_NAMES else ""
+    omitted_names = [*crossed_missiles, *passed_zones]
+    if omitted_names:
+        names = ", ".join(omitted_names[:_MAX_NAMES]) + (
+            f" and {len(omitted_names) - _MAX_NAMES} more" if len(omitted_names) > _MAX_NAMES else ""
         )
         notes.append(
             f"left out of the fence, as the mission passes above or below: {names}; a fence has no height, and an"
@@ -218,7 +220,7 @@ def with_fences(mission: Mission, scenario: Scenario, passes: PassTest) -> tuple
         limit_text = f"{scenario.limits.max_height_m:g} m above ground"
         notes.append(f"a fence does not follow the ground: the greatest height of {limit_text} is not in it")
     all_fences = numbered([*fences, *mission.fences])
-    # A mission that begins or ends on the ground keeps its rally points: its last position is where it lands.
+    # A mission that starts or ends on the ground keeps its rally points: its last position is the landing point.
     keeps_rally = bool(mission.rally) or scenario.launch is not None or scenario.landing is not None
     rally = mission.rally if keeps_rally else numbered(_ends_as_rally_points(mission))
     return replace(mission, fences=all_fences, rally=rally), tuple(notes)
@@ -270,7 +272,7 @@ def _home_offset(item: MissionItem, home: Home) -> float:
 
 
 def numbered(items: Sequence[MissionItem]) -> tuple[MissionItem, ...]:
-    """Return fence items or rally points numbered from 0, as a vehicle numbers them in its lists.
+    """Return fence items or rally points with numbers from 0, as in the lists of a vehicle.
 
     >>> item = MissionItem(7, Command.NAV_RALLY_POINT, Frame.GLOBAL, (0.0,) * 4, 36.5, -84.2, 0.0)
     >>> [one.seq for one in numbered([item, item])]
@@ -284,8 +286,8 @@ def _in_polygon(corners_east: Floats, corners_north: Floats, east: float, north:
     start_east, start_north = corners_east, corners_north
     end_east, end_north = np.roll(start_east, -1), np.roll(start_north, -1)
     is_crossed = (start_north > north) != (end_north > north)
-    rise = np.where(is_crossed, end_north - start_north, 1.0)
-    crossing_east = start_east + (north - start_north) / rise * (end_east - start_east)
+    north_extent = np.where(is_crossed, end_north - start_north, 1.0)
+    crossing_east = start_east + (north - start_north) / north_extent * (end_east - start_east)
     return bool((is_crossed & (crossing_east > east)).sum() % 2)
 
 
@@ -294,7 +296,7 @@ def _in_polygon(corners_east: Floats, corners_north: Floats, east: float, north:
 
 
 def fence_zones(fences: tuple[MissionItem, ...], origin: GeoOrigin, source: str = "fence") -> tuple[Zone, ...]:
-    """Return the zones of fence items 5001..5004, without floor and ceiling, which MAVLink's fences lack.
+    """Return the zones of fence items 5001..5004, which have no floor and no ceiling.
 
     source: name of the mission in messages.
 

@@ -21,30 +21,31 @@ ACCEPTANCE_TOLERANCE = 10.0
 # Minimum pitch of a take-off, degrees: the first parameter of NAV_TAKEOFF. With 10 ArduPlane's Aerosonde climbed at 5
 # m/s and 26 m/s from a catapult of 20 m/s; with 15 at 6 m/s and 24 m/s.
 LAUNCH_PITCH = 12.0
-# Sharpest turn whose arc gets that margin, rad.
+# Sharpest turn whose arc has that margin, rad.
 _MAX_OFFSET_TURN_RAD = math.radians(150.0)
-# Sharpest turn that has an arc at all, rad.
+# Sharpest turn with an arc, rad.
 _MAX_ARC_TURN_RAD = math.radians(179.0)
 
 
 def plan_mission(
     plan: Plan, airspeed: float, max_bank: float, source: str = "plan", tracking: TrackingError | None = None
 ) -> Mission:
-    """Return the mission of a plan, from its first waypoint to its last, with its ground ends if any.
+    """Return the mission of a plan, with the plan's departure and approach, if any.
 
     airspeed: m/s.
     max_bank: rad.
 
-    Home is the scenario's home, or the ground below the start. A plan with a departure and an approach begins with
-    NAV_TAKEOFF at home and ends with DO_LAND_START, two places to line up at and NAV_LAND, whose first parameter is the
-    go-around height above home. The scenario's rally points are included.
+    Home is the scenario's home, or the ground below the start. A plan with a departure and an approach starts with
+    NAV_TAKEOFF at home and ends with DO_LAND_START, two waypoints of the final approach and NAV_LAND, whose first
+    parameter is the go-around height above home. The scenario's rally points are included.
 
-    Positions are put on the 1e-7 degree grid of MISSION_ITEM_INT and altitudes on whole millimeters, so that every form
-    of the mission carries the same numbers; that moves a waypoint by less than 8 mm on the map.
+    Positions are rounded to the 1e-7 degree grid of MISSION_ITEM_INT and altitudes to whole millimeters, so that every
+    form of the mission has the same numbers; this moves a waypoint by less than 8 mm on the map.
 
     The acceptance radius is the fly-by offset R(1/cos(theta/2) - 1), the distance at which a turn at this speed and
     bank passes its waypoint with the scenario's wind from behind, plus `ACCEPTANCE_TOLERANCE`, rounded up to a whole
-    meter, so that no arc of the flight misses it. PX4 has its own radius on fixed wings. If the tracking error of an
+    meter, so that no arc of the flight misses the waypoint. PX4 has its own radius for fixed-wing aircraft. If the
+    tracking error of an
     autopilot is known, the radius is the one with the smallest error: ArduPlane turns to the next leg at that distance
     before a waypoint.
 
@@ -59,27 +60,27 @@ def plan_mission(
     >>> [(item.command, item.params[1]) for item in mission.items]  # speed, then acceptance radii
     [(178, 25.0), (16, 10.0), (16, 20.0), (16, 10.0)]
     """
-    ground_ways = plan.ways or GroundWays()
-    points = _mission_places(plan, ground_ways)
+    procedures = plan.ways or GroundWays()
+    points = _mission_positions(plan, procedures)
     radii = acceptance_radii(plan.scenario, points, airspeed, max_bank, tracking)
     home = _home_position(plan)
     builder = _ItemBuilder(plan.scenario.origin)
-    if ground_ways.climb is not None:
+    if procedures.climb is not None:
         builder.add(
             Command.NAV_TAKEOFF,
             (LAUNCH_PITCH, 0.0, 0.0, 0.0),
-            np.append(ground_ways.climb.home[:2], ground_ways.climb.up),
+            np.append(procedures.climb.home[:2], procedures.climb.up),
         )
     builder.add(Command.DO_CHANGE_SPEED, (0.0, _round_to_thousandths(airspeed), -1.0, 0.0))
-    first_waypoint = 0 if ground_ways.climb is None else 1
-    end_waypoint = len(points) if ground_ways.descent is None else len(points) - 3
+    first_waypoint = 0 if procedures.climb is None else 1
+    end_waypoint = len(points) if procedures.descent is None else len(points) - 3
     for index in range(first_waypoint, end_waypoint):
         builder.add(Command.NAV_WAYPOINT, (0.0, float(radii[index]), 0.0, 0.0), points[index])
-    if ground_ways.descent is not None:
+    if procedures.descent is not None:
         builder.add(Command.DO_LAND_START, (0.0,) * 4)
         for index in (end_waypoint, end_waypoint + 1):
             builder.add(Command.NAV_WAYPOINT, (0.0, float(radii[index]), 0.0, 0.0), points[index])
-        builder.add(Command.NAV_LAND, (ground_ways.descent.go_around, 0.0, 0.0, 0.0), ground_ways.descent.point)
+        builder.add(Command.NAV_LAND, (procedures.descent.go_around, 0.0, 0.0, 0.0), procedures.descent.point)
     returns = plan.scenario.returns
     rally = () if returns is None else tuple(_rally_items(plan.scenario.origin, returns.rally, home))
     return Mission(
@@ -94,34 +95,34 @@ class _ItemBuilder:
         self.items: list[MissionItem] = []
         self._origin = origin
 
-    def add(self, command: Command, params: tuple[float, float, float, float], place: Floats | None = None) -> None:
+    def add(self, command: Command, params: tuple[float, float, float, float], position: Floats | None = None) -> None:
         """Add an item.
 
-        place: (3,) m, None for a command without a position.
+        position: (3,) m; None for a command without a position.
         """
         frame, lat, lon, up = Frame.MISSION, 0.0, 0.0, 0.0
-        if place is not None:
-            frame, up = Frame.GLOBAL, _round_to_thousandths(float(place[2]))
-            lat, lon = (on_grid(float(value)) for value in to_geo(self._origin, place[0], place[1]))
+        if position is not None:
+            frame, up = Frame.GLOBAL, _round_to_thousandths(float(position[2]))
+            lat, lon = (on_grid(float(value)) for value in to_geo(self._origin, position[0], position[1]))
         self.items.append(MissionItem(len(self.items) + 1, int(command), int(frame), params, lat, lon, up))
 
 
-def _mission_places(plan: Plan, ways: GroundWays) -> Floats:
-    """Return all positions flown to, from above home to the landing point, (w, 3) m.
+def _mission_positions(plan: Plan, procedures: GroundWays) -> Floats:
+    """Return the positions of all navigation items, from above home to the landing point, (w, 3) m.
 
-    The landing point has the line-up's altitude.
+    The landing point has the altitude of the end of the final approach.
     """
     parts = [plan.waypoints]
-    if (climb := ways.climb) is not None:
+    if (climb := procedures.climb) is not None:
         parts = [np.append(climb.home[:2], climb.up)[None], climb.waypoints, *parts]
-    if (descent := ways.descent) is not None:
+    if (descent := procedures.descent) is not None:
         above_landing = np.append(descent.point[:2], descent.line_up[-1, 2])
         parts = [*parts, descent.waypoints, descent.line_up, above_landing[None]]
     return np.concatenate(parts)
 
 
 def _home_position(plan: Plan) -> Home:
-    """Return the scenario's home, or the ground below the start, or the start if the ground is unknown."""
+    """Return the scenario's home, or the ground below the start; the start itself if the ground is unknown."""
     scenario, start = plan.scenario, plan.waypoints[0]
     position = scenario.home if scenario.home is not None else start
     lat, lon = to_geo(scenario.origin, position[:1], position[1:2])
@@ -141,7 +142,7 @@ def _rally_items(origin: GeoOrigin, points: Floats, home: Home) -> Iterator[Miss
 def acceptance_radii(
     scenario: Scenario, points: Floats, airspeed: float, max_bank: float, tracking: TrackingError | None
 ) -> Floats:
-    """Return the acceptance radius at each place of a planned mission, (w,) whole m; see `plan_mission`.
+    """Return the acceptance radius at each position of a planned mission, (w,) whole m; see `plan_mission`.
 
     points: (w, 3) m, in flying order.
     """
@@ -153,7 +154,7 @@ def acceptance_radii(
     radii[1:-1] += _fly_by_offsets(
         np.minimum(turns, _MAX_OFFSET_TURN_RAD), (airspeed + wind) ** 2 / lateral_acceleration
     )
-    # Arcs are drawn with a margin for a gust. The limit on the turn keeps the offset finite: a U-turn has no arc.
+    # Arcs have a margin for a gust. The limit on the turn keeps the offset finite: a U-turn has no arc.
     gust = 0.1 * W20[scenario.wind.turbulence]
     arc_offsets = _fly_by_offsets(
         np.minimum(turns, _MAX_ARC_TURN_RAD), (airspeed + wind + gust) ** 2 / lateral_acceleration
@@ -163,7 +164,7 @@ def acceptance_radii(
 
 
 def _fly_by_offsets(turns: Floats, radius: float) -> Floats:
-    """Return the distances at which arcs of the given radius (m) pass the corners of the given turns (rad), m."""
+    """Return the distances (m) at which arcs of a radius (m) pass the corners of turns (rad)."""
     return np.asarray(radius * (1.0 / np.cos(turns / 2.0) - 1.0))
 
 
@@ -188,14 +189,18 @@ def corner_speeds(scenario: Scenario, points: Floats, airspeed: float) -> list[f
         speed = airspeed * air_density_factor(altitude)
         turn_courses = courses[i - 1] + wrap(courses[i] - courses[i - 1]) * np.linspace(0.0, 1.0, 5)
         ground_speeds = [
-            ground_speed(speed, east * math.sin(c) + north * math.cos(c), east * math.cos(c) - north * math.sin(c))
-            for c in turn_courses.tolist()
+            ground_speed(
+                speed,
+                east * math.sin(course) + north * math.cos(course),
+                east * math.cos(course) - north * math.sin(course),
+            )
+            for course in turn_courses.tolist()
         ]
         # The ground speed is NaN on a course that cannot be held.
-        speeds.append(max((v for v in ground_speeds if v > 0.0), default=speed))
+        speeds.append(max((value for value in ground_speeds if value > 0.0), default=speed))
     return speeds
 
 
 def _round_to_thousandths(value: float) -> float:
-    """Return a number rounded to whole thousandths."""
+    """Round a number to thousandths."""
     return round(value * 1e3) / 1e3

@@ -1,7 +1,7 @@
-"""Find the take-off and the landing of a mission that are simulated, and where each begins and ends.
+"""Find the take-off and the landing of a mission that are simulated, with their starts and ends.
 
-A take-off is flown if the scenario states how the aircraft is launched and the mission begins with a take-off item; a
-landing is flown if the scenario has a strip and the mission ends with a landing item. All other flights begin and end
+A take-off is flown if the scenario states how the aircraft is launched and the mission starts with a take-off item; a
+landing is flown if the scenario has a strip and the mission ends with a landing item. All other flights start and end
 in the air.
 """
 
@@ -18,9 +18,9 @@ from world.airfield import LandingStrip, Launch
 from world.arrays import Floats
 from world.scenario import Scenario
 
-# Climb pitch of a take-off item that states none, rad: ArduPlane's own where the first parameter is 0.
-USUAL_PITCH = math.radians(4.0)
-# Height above ground at which a catapult's rail begins, m.
+# Climb pitch of a take-off item without a pitch, rad: ArduPlane's pitch for a first parameter of 0.
+DEFAULT_CLIMB_PITCH = math.radians(4.0)
+# Height above ground of the start of a catapult's rail, m.
 _RAIL_HEIGHT_M = 1.0
 # Height above ground at which a hand launch releases the aircraft, m.
 _HAND_RELEASE_HEIGHT_M = 1.8
@@ -28,16 +28,16 @@ _HAND_RELEASE_HEIGHT_M = 1.8
 
 @dataclass(frozen=True, slots=True)
 class TakeOff:
-    """A take-off that is flown.
+    """A take-off that is simulated.
 
     launch: the scenario's launch.
     item: number of the mission item.
     home: (3,) m, on the ground.
     course: launch course, rad on the map.
-    top: altitude at which it ends, m AMSL.
-    base: altitude of home, m AMSL, to which the autopilot's heights are relative.
+    top: altitude at the end of the take-off, m AMSL.
+    base: altitude of home, m AMSL, the reference of the autopilot's heights.
     pitch: minimum climb pitch, rad.
-    waypoint: index of the route's waypoint from which the mission continues.
+    waypoint: index of the route's waypoint at which the mission continues.
     speed: ground speed at the end of the launch, m/s.
     acceleration: acceleration along the launch, m/s^2; 0 for a runway.
     """
@@ -68,7 +68,7 @@ class TakeOff:
         return position, self.speed * np.array([*(cos_incline * direction), sin_incline])
 
     def described(self) -> str:
-        """Describe the start of the flight in words."""
+        """Return a description of the start of the flight."""
         method_text = {"catapult": "from a catapult", "hand": "by hand", "runway": "on a runway"}[self.launch.method]
         course = math.degrees(self.course) % 360.0
         return (
@@ -79,16 +79,16 @@ class TakeOff:
 
 @dataclass(frozen=True, slots=True)
 class Approach:
-    """A landing that is flown.
+    """A landing that is simulated.
 
     strip: the scenario's landing strip.
     item: number of the mission item.
     leg: index of the route's last leg, which leads to the landing point.
-    point: (3,) m, the landing point at the altitude that the mission states.
+    point: landing point at the altitude that the mission states, (3,) m.
     course: landing course, rad.
     run: length of the leg, m.
     begin: altitude at the start of the leg, m AMSL.
-    tail_wind: tail wind on that course at the landing point, m/s.
+    tail_wind: tail wind at the landing point on the landing course, m/s.
     base: altitude of home, m AMSL; the landing point's altitude if the mission has no home.
     """
 
@@ -109,8 +109,8 @@ class Approach:
     def on_strip(self, position: Floats) -> tuple[Floats, Floats]:
         """Return the distances of positions (n, 3) from the strip's center along it and to its right, (n,) m each.
 
-        The strip lies where the scenario has it, on its stated course, or on the landing's course if none is stated. A
-        landing against the stated course uses the same strip.
+        The strip has its stated course, or the landing's course if none is stated. A landing against the stated course
+        uses the same strip.
         """
         axis = self.course if self.strip.course is None else self.strip.course
         if math.cos(self.course - axis) < 0.0:
@@ -118,16 +118,16 @@ class Approach:
         return _along_and_right(position, np.array([self.strip.east, self.strip.north]), axis)
 
 
-def _along_and_right(position: Floats, begin: Floats, course: float) -> tuple[Floats, Floats]:
+def _along_and_right(position: Floats, start: Floats, course: float) -> tuple[Floats, Floats]:
     """Return the distances of positions (n, 3) from a point along a course (rad) and to the right of it, m."""
-    east, north = position[..., 0] - begin[0], position[..., 1] - begin[1]
+    east, north = position[..., 0] - start[0], position[..., 1] - start[1]
     sin, cos = math.sin(course), math.cos(course)
     return east * sin + north * cos, east * cos - north * sin
 
 
 @dataclass(frozen=True, slots=True)
 class GroundWays:
-    """Take-off and landing of a flight; None for one that is not flown.
+    """Take-off and landing of a flight; None for one that is not simulated.
 
     notes: reasons why a launch or a strip of the scenario is not flown, in sentences.
     """
@@ -137,7 +137,7 @@ class GroundWays:
     notes: tuple[str, ...] = ()
 
     def __bool__(self) -> bool:
-        """Return True if a take-off or a landing is flown."""
+        """Return True if a take-off or a landing is simulated."""
         return self.take_off is not None or self.approach is not None
 
 
@@ -160,7 +160,7 @@ def find_ground_ways(scenario: Scenario, mission: Mission, route: Route, slowest
 
 
 def _find_take_off(scenario: Scenario, mission: Mission, route: Route, slowest: float) -> tuple[TakeOff | None, str]:
-    """Return the take-off, or the reason why none is flown."""
+    """Return the take-off, or the reason why it is not simulated."""
     launch, base = scenario.launch, home_place(mission, scenario.origin, scenario.terrain)
     items = {item.seq: item for item in mission.items if item.command == Command.NAV_TAKEOFF}
     route_items = route.items.tolist()
@@ -175,7 +175,7 @@ def _find_take_off(scenario: Scenario, mission: Mission, route: Route, slowest: 
     ground = scenario.terrain.height(*home_position) if scenario.terrain is not None else base.up
     if math.isnan(ground):
         return None, "[launch]: the ground at home is not known: the flight begins in the air"
-    # ArduPlane does not fly to a take-off item's own position: the next item is the first place.
+    # ArduPlane does not fly to the position of a take-off item: the next item is the first one.
     first_leg = route.waypoints[index + 1, :2] - home_position
     course = launch.course if launch.course is not None else math.atan2(first_leg[0], first_leg[1])
     home = np.array([*home_position, float(ground)])
@@ -187,11 +187,11 @@ def _find_take_off(scenario: Scenario, mission: Mission, route: Route, slowest: 
 def climb_pitch(item: MissionItem) -> float:
     """Return the minimum climb pitch that a take-off item states, rad."""
     pitch = item.params[0]
-    return math.radians(pitch) if pitch > 0.0 else USUAL_PITCH
+    return math.radians(pitch) if pitch > 0.0 else DEFAULT_CLIMB_PITCH
 
 
 def _find_approach(scenario: Scenario, mission: Mission, route: Route) -> tuple[Approach | None, str]:
-    """Return the landing, or the reason why none is flown."""
+    """Return the landing, or the reason why it is not simulated."""
     strip, last_leg = scenario.landing, route.legs
     items = {item.seq: item for item in mission.items if item.command == Command.NAV_LAND}
     if strip is None or not items or int(route.items[last_leg]) not in items or last_leg < 2:
@@ -216,14 +216,14 @@ def _find_approach(scenario: Scenario, mission: Mission, route: Route) -> tuple[
 def airborne_route(route: Route, ways: GroundWays, first_leg_start: Floats | None) -> Route:
     """Return the airborne part of a route, to which the usual rules apply.
 
-    first_leg_start: (3,) m, point at which the take-off ended and the first leg begins; None for the route's start.
+    first_leg_start: point where the take-off ends and the first leg starts, (3,) m; None for the start of the route.
 
-    The leg to the landing point is left out; numbers of legs and waypoints stay.
+    The leg to the landing point is omitted; the numbers of legs and waypoints do not change.
     """
     points = np.array(route.waypoints)
     if ways.take_off is not None and first_leg_start is not None:
         points[: ways.take_off.waypoint + 1] = first_leg_start
-        # Waypoints before it are not flown: place each slightly before the next, so that every leg has a length.
+        # Earlier waypoints are not flown: place each slightly before the next, so that every leg has a length.
         for index in range(ways.take_off.waypoint - 1, -1, -1):
             next_leg = points[index + 1, :2] - points[index + 2, :2]
             points[index, :2] += next_leg / max(1e-6, float(np.hypot(*next_leg)))
@@ -236,9 +236,9 @@ def airborne_route(route: Route, ways: GroundWays, first_leg_start: Floats | Non
 
 
 def shown_waypoints(route: Route, ways: GroundWays) -> Floats:
-    """Return a route's waypoints (w, 3) m for pictures and tables, with flown ends on the ground.
+    """Return a route's waypoints for pictures and tables, (w, 3) m, with flown ends on the ground.
 
-    The route itself begins at the altitude where a take-off ends, and its leg to a landing point is level.
+    The route itself starts at the altitude at which a take-off ends, and its leg to a landing point is level.
     """
     points = np.array(route.waypoints)
     if ways.take_off is not None:
@@ -249,7 +249,7 @@ def shown_waypoints(route: Route, ways: GroundWays) -> Floats:
 
 
 def flown_notes(route: Route, ways: GroundWays) -> tuple[str, ...]:
-    """Return a route's notes without the note on a landing that is flown."""
+    """Return a route's notes, without the note on the landing if that is simulated."""
     if ways.approach is None:
         return route.notes
     return tuple(note for note in route.notes if LANDING_NOTE not in note)

@@ -27,7 +27,7 @@ _MAX_HOME_DISTANCE_M = 100_000.0
 
 @dataclass(frozen=True, slots=True)
 class ImpliedScenario:
-    """The scenario built around a mission, and the mission's places in it."""
+    """Scenario built around a mission, and the placed mission."""
 
     scenario: Scenario
     placed: PlacedMission
@@ -84,7 +84,7 @@ def implied_scenario(
 
 
 def mission_origin(mission: Mission, stops: tuple[ItineraryStop, ...]) -> GeoOrigin:
-    """Return the map origin of a mission without a scenario: home, or the first position flown to.
+    """Return the map origin of a mission without a scenario: home, or the first position of the mission.
 
     stops: stops of the mission's itinerary.
 
@@ -107,7 +107,7 @@ def mission_origin(mission: Mission, stops: tuple[ItineraryStop, ...]) -> GeoOri
 
 
 def _area_and_flown_box(mission: Mission, itinerary: Itinerary, origin: GeoOrigin) -> tuple[Floats, Floats]:
-    """Return the area, and the smallest box of the positions flown to; both (2, 2) [[e0, e1], [n0, n1]] m."""
+    """Return the area, and the bounding box of the mission's positions; both (2, 2) [[e0, e1], [n0, n1]] m."""
     stops = itinerary.stops
     points = on_map(mission.source, stops, origin)
     flown_box = np.stack([points.min(axis=0), points.max(axis=0)], axis=1)

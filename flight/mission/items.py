@@ -26,7 +26,7 @@ class Notes:
     _items: dict[str, list[int]] = field(default_factory=dict)
 
     def add(self, text: str, seq: int | None = None) -> None:
-        """Add a note on an item or on the whole mission; a repeated note is kept once."""
+        """Add a note on an item or on the whole mission; ignore a repeated note."""
         items = self._items.setdefault(text, [])
         if seq is not None and seq not in items[-1:]:
             items.append(seq)
@@ -127,7 +127,7 @@ OVER_TERRAIN = frozenset({Frame.GLOBAL_TERRAIN_ALT, Frame.GLOBAL_TERRAIN_ALT_INT
 
 
 def is_located(command: int, frame: int) -> bool:
-    """Return True if the fifth to seventh parameters of such an item are latitude, longitude and altitude."""
+    """Return True if an item of a command and frame has latitude, longitude and altitude."""
     return frame != Frame.MISSION and (
         command <= _LAST_NAV_COMMAND or command in FENCES or command in _LOCATED_COMMANDS
     )
@@ -206,7 +206,7 @@ class MissionItem:
 
     @property
     def has_position(self) -> bool:
-        """True if its latitude and longitude are a position; 0, 0 and NaN are not."""
+        """True if the item has a position; latitude and longitude of 0, 0 or NaN are none."""
         if not (math.isfinite(self.lat_deg) and math.isfinite(self.lon_deg)):
             return False
         return is_located(self.command, self.frame) and (self.x, self.y) != (0, 0)
@@ -223,7 +223,7 @@ class Home:
 
 @dataclass(frozen=True, slots=True)
 class Camera:
-    """A camera that looks straight down, and the photo overlap that is required.
+    """A camera that looks straight down, and the required photo overlap.
 
     across, along: footprint of a photo across and along the track, m per m above ground.
     front, side: required overlap with the next photo and with the photos of the next line, as a fraction of the

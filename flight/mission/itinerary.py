@@ -1,10 +1,11 @@
 """List a mission's stops in flying order, with jumps unrolled and a speed for each leg.
 
-ArduPlane and PX4 reach the same places in the same order, but run the commands between them at different times. PX4
-runs each where it stands (`MissionBase::advance_mission`). ArduPlane runs the first before the next place, and the
-others one after another while it flies there, from the first on and through jumps by the state of their counters at
-that time (`AP_Mission::advance_current_nav_cmd`, `advance_current_do_cmd`): commands after a jump that has just been
-taken for the last time are run a round early (ArduPilot #30376).
+ArduPlane and PX4 reach the same stops in the same order, but run the commands between them at different times. PX4
+runs each command at its position in the list (`MissionBase::advance_mission`). ArduPlane runs the first command before
+the leg to the next stop, and the others one after another on that leg, following jumps according to the state of their
+counters at that time
+ (`AP_Mission::advance_current_nav_cmd`, `advance_current_do_cmd`): commands after a jump that has just been
+taken for the last time run one loop early (ArduPilot #30376).
 """
 
 import math
@@ -31,17 +32,17 @@ from flight.mission.items import (
 )
 from world.errors import MissionError
 
-# Largest number of places that a mission may unroll to.
+# Maximum number of stops of an unrolled mission.
 MAX_STOPS = 10_000
-# Largest number of items that may be stepped through while unrolling it.
+# Maximum number of items passed while a mission is unrolled.
 _MAX_STEPS = 200_000
 
-# Time for which a loiter without end is flown, s; the mission ends there.
+# Simulated duration of a loiter without end, s; the mission ends there.
 UNLIMITED = 60.0
 
 # Note on items after a mission's end.
 NEVER_REACHED = "never reached"
-# Note on a landing item whose landing is not flown.
+# Note on a landing item whose landing is not simulated.
 LANDING_NOTE = "not flown to the ground; the flight ends above it at the last height"
 
 
@@ -49,15 +50,14 @@ LANDING_NOTE = "not flown to the ground; the flight ends above it at the last he
 class Loiter:
     """A loiter to fly.
 
-    radius: m, positive to the right, 0 for the aircraft's own.
-    turns, seconds: duration, 0 if it does not apply; neither is shortened, and the circle is left afterwards on the
-        first tangent to the next position.
+    radius: m, positive to the right; 0 for the autopilot's default radius.
+    turns, seconds: minimum duration, 0 if it does not apply; the aircraft then leaves the circle on the first tangent
+        to the next position.
     timed: True if the item states a time, even 0.
-    to_height: True if it lasts until the item's altitude is reached.
-    endless: True if the item states a loiter without end, of which ``seconds`` are flown.
-    on_course: True if the item states an exit on the course to the next place, as PX4 reads it; ArduPlane always does
-        so.
-    on_tangent: True if the item states a line to the next place that begins on the circle (PX4) or at the exit
+    to_height: True if the loiter lasts until the item's altitude is reached.
+    endless: True if the item states a loiter without end, of which ``seconds`` are simulated.
+    on_course: True if the item states an exit on the course to the next stop, for PX4; ArduPlane always leaves so.
+    on_tangent: True if the item states that the line to the next stop starts on the circle (PX4) or at the exit
         (ArduPlane).
     """
 
@@ -71,36 +71,36 @@ class Loiter:
     on_tangent: bool = False
 
     def sweep(self, airspeed: float, radius: float) -> float:
-        """Return the minimum angle to fly around the circle, rad.
+        """Return the minimum angle of the loiter around its circle, rad.
 
-        In wind a circle over the ground takes longer than its air distance.
+        In wind a circle over the ground takes longer than its length divided by the airspeed.
         """
         return max(2.0 * math.pi * self.turns, self.seconds * airspeed / radius)
 
 
 def loiter_of(item: MissionItem) -> Loiter | None:
     """Return the loiter that an item states, or None for any other command."""
-    p1, p2, p3, p4 = (0.0 if math.isnan(value) else value for value in item.params)
+    param1, param2, param3, param4 = (0.0 if math.isnan(value) else value for value in item.params)
     if item.command == Command.NAV_LOITER_UNLIM:
-        return Loiter(p3, seconds=UNLIMITED, endless=True)
+        return Loiter(param3, seconds=UNLIMITED, endless=True)
     if item.command == Command.NAV_LOITER_TURNS:
-        return Loiter(p3, turns=p1, on_tangent=p4 > 0.0)
+        return Loiter(param3, turns=param1, on_tangent=param4 > 0.0)
     if item.command == Command.NAV_LOITER_TIME:
-        return Loiter(p3, seconds=p1, timed=True, on_course=p2 > 0.0, on_tangent=p4 > 0.0)
+        return Loiter(param3, seconds=param1, timed=True, on_course=param2 > 0.0, on_tangent=param4 > 0.0)
     if item.command == Command.NAV_LOITER_TO_ALT:
         # Its radius is the second parameter.
-        return Loiter(p2, to_height=True, on_course=p1 > 0.0, on_tangent=p4 > 0.0)
+        return Loiter(param2, to_height=True, on_course=param1 > 0.0, on_tangent=param4 > 0.0)
     return None
 
 
-# Longest distance that ArduPlane flies on beyond a waypoint, m: it is stored as whole metres in a byte.
+# Maximum distance that ArduPlane flies past a waypoint, m: the distance is stored as whole metres in a byte.
 _MAX_PASS_BY_M = 255
 
 
 def pass_by_distance(item: MissionItem) -> float:
-    """Return the distance that ArduPlane flies on beyond a waypoint, m; 0 for any other item.
+    """Return the distance that ArduPlane flies past a waypoint before it turns, m; 0 for any other item.
 
-    It is the third parameter of NAV_WAYPOINT in whole metres (`AP_Mission::mavlink_int_to_mission_cmd`).
+    The distance is the third parameter of NAV_WAYPOINT in whole metres (`AP_Mission::mavlink_int_to_mission_cmd`).
 
     >>> place = (0, 36.5, 8.0, 700.0)
     >>> made = [MissionItem(1, 16, place[0], (0.0, 0.0, p3, 0.0), *place[1:]) for p3 in (150.9, 300.0, math.nan, -50.0)]
@@ -116,10 +116,10 @@ def pass_by_distance(item: MissionItem) -> float:
 
 
 class OpenItem(NamedTuple):
-    """An item that changes the flight path, and that is not simulated as the autopilot flies it.
+    """An item that changes the flight path in a way that is not simulated.
 
     item: seq of the mission item.
-    text: its command, and the part that is not flown.
+    text: command of the item, and the part that is not simulated.
     """
 
     item: int
@@ -127,10 +127,10 @@ class OpenItem(NamedTuple):
 
 
 class Gate(NamedTuple):
-    """A CONDITION_GATE on the leg to a stop; later commands take effect when the aircraft passes the gate.
+    """A CONDITION_GATE on the leg to a stop: later commands take effect when the aircraft passes the gate.
 
     item: seq of the mission item.
-    airspeed: airspeed until it is passed, m/s; NaN for the aircraft's own.
+    airspeed: airspeed until the gate is passed, m/s; NaN for the autopilot's default.
     """
 
     item: int
@@ -143,17 +143,17 @@ class Gate(NamedTuple):
 class ItineraryStop:
     """A position to fly to.
 
-    item: seq of the mission item, -1 without one.
+    item: seq of the mission item, -1 for a stop without an item.
     command: MAV_CMD of the item.
     alt: m in the item's frame, NaN to keep the last altitude.
     frame: MAV_FRAME of the item.
-    airspeed: airspeed on the leg that ends here, m/s; NaN for the aircraft's own.
-    acceptance: acceptance radius, m, 0 if none is stated.
-    loiter: the loiter about it, or None.
-    airspeed_by_value: airspeed as PX4 reads the items.
-    gates: gates on the leg to it, in order.
+    airspeed: airspeed on the leg to the stop, m/s; NaN for the autopilot's default.
+    acceptance: acceptance radius, m; 0 if not stated.
+    loiter: loiter about the stop, or None.
+    px4_airspeed: airspeed on that leg as PX4 reads the items, m/s.
+    gates: gates on the leg to the stop, in order.
     min_ground_speed: ground speed for which ArduPlane raises its airspeed on that leg, m/s; 0 or less for none, NaN for
-        the autopilot's own.
+        the autopilot's default.
     home_up: altitude of home on that leg, m AMSL; NaN if the mission's home does not state it.
     """
 
@@ -166,7 +166,7 @@ class ItineraryStop:
     airspeed: float
     acceptance: float = 0.0
     loiter: Loiter | None = None
-    airspeed_by_value: float = math.nan
+    px4_airspeed: float = math.nan
     gates: tuple[Gate, ...] = ()
     min_ground_speed: float = math.nan
     home_up: float = math.nan
@@ -177,14 +177,14 @@ class Itinerary:
     """Stops of a mission in flying order, at least one.
 
     home: the mission's home, or the first position item with altitude NaN.
-    has_home: True if it is the mission's own.
-    takeoff: the item that the flight starts with, or None.
-    notes: items that are not flown as written, with their numbers.
+    has_home: True if the mission states its home.
+    takeoff: take-off item at the start of the flight, or None.
+    notes: items that are not flown as written, with their numbers, for ArduPlane.
     endless: seq of a jump without end, -1 for none.
-    landing: the landing place, or None; the flight ends above it.
-    notes_by_value: notes for an autopilot that reads items as PX4 does: only the value of a speed change, and gates.
-    open_items, open_by_value: items that leave the verdict open, as ArduPlane and as PX4 reads them.
-    last_home: home at the mission's end, which a return flies to; it differs from ``home`` after a DO_SET_HOME.
+    landing: landing point, or None; the flight ends above it.
+    px4_notes: the same notes for PX4, which reads only the value of a speed change, and gates.
+    open_items, px4_open_items: items that leave the verdict undecided for ArduPlane and for PX4.
+    last_home: home at the mission's end, the target of an RTL; it differs from ``home`` after a DO_SET_HOME.
     """
 
     stops: tuple[ItineraryStop, ...]
@@ -194,16 +194,16 @@ class Itinerary:
     notes: tuple[str, ...]
     endless: int = -1
     landing: ItineraryStop | None = None
-    notes_by_value: tuple[str, ...] = ()
+    px4_notes: tuple[str, ...] = ()
     open_items: tuple[OpenItem, ...] = ()
-    open_by_value: tuple[OpenItem, ...] = ()
+    px4_open_items: tuple[OpenItem, ...] = ()
     last_home: Home | None = None
 
     @property
     def returns(self) -> bool:
-        """True if it ends with a return to launch.
+        """True if the mission ends with a return to launch.
 
-        The last stop is then home, at the altitude of the stop before.
+        The last stop is then home, at the altitude of the previous stop.
         """
         return self.stops[-1].command == Command.NAV_RETURN_TO_LAUNCH
 
@@ -212,11 +212,11 @@ def make_itinerary(mission: Mission) -> Itinerary:
     """Unroll a mission as an autopilot would.
 
     Raises MissionError if no item has a position, if a jump leads to a missing item, or if the mission unrolls to more
-    than `MAX_STOPS` places.
+    than `MAX_STOPS` stops.
     """
     builder, steps = _ItineraryBuilder(mission), _Steps(mission)
     for step in steps:
-        builder.take(step)
+        builder.process_step(step)
         if len(builder.stops) > MAX_STOPS:
             seq = step.to.seq if step.to is not None else mission.items[-1].seq
             raise MissionError(
@@ -230,9 +230,7 @@ def make_itinerary(mission: Mission) -> Itinerary:
         name = command_name(mission.items[steps.index[steps.endless]].command)
         builder.notes.add(f"{name} has no end: it is flown once, and the flight ends there", steps.endless)
     for gate in builder.gates:
-        builder.notes.by_value.add(
-            "CONDITION_GATE: nothing to fly to comes after it, so it is passed at once", gate.item
-        )
+        builder.notes.px4.add("CONDITION_GATE: nothing to fly to comes after it, so it is passed at once", gate.item)
     for item in mission.items:
         if item.seq not in steps.reached and not (builder.ended and item.command in JUMPS):
             builder.notes.add(NEVER_REACHED, item.seq)
@@ -243,23 +241,23 @@ def make_itinerary(mission: Mission) -> Itinerary:
         home=builder.first_home,
         has_home=builder.has_home,
         takeoff=builder.takeoff,
-        notes=builder.notes.usual.lines(),
+        notes=builder.notes.arduplane.lines(),
         endless=steps.endless,
         landing=builder.landing,
-        notes_by_value=builder.notes.by_value.lines(),
-        open_items=tuple(builder.open),
-        open_by_value=tuple(builder.open_by_value),
+        px4_notes=builder.notes.px4.lines(),
+        open_items=tuple(builder.open_items),
+        px4_open_items=tuple(builder.px4_open_items),
         last_home=builder.home,
     )
 
 
 class _Step(NamedTuple):
-    """The next navigation item, and the commands that precede it.
+    """The next navigation item, and the commands before it.
 
-    between: the commands before it, following jumps, as PX4 runs them.
-    early: the command that ArduPlane runs before the item, or None.
-    late: the commands that ArduPlane runs on the leg to the item.
-    to: the navigation item, None at the mission's end.
+    between: commands before the item, following jumps, as PX4 runs them.
+    early: command that ArduPlane runs before the leg to the item, or None.
+    late: commands that ArduPlane runs on the leg to the item.
+    to: the navigation item; None at the mission's end.
     """
 
     between: tuple[MissionItem, ...]
@@ -274,7 +272,7 @@ class _Steps:
     Jump counters are never reset, as in ArduPlane 4.6 and PX4.
 
     reached: numbers of the items reached, including jumps.
-    endless: seq of the jump without end that ended it, -1 for none; such a jump is taken once.
+    endless: seq of the jump without end at which the iteration ended, -1 for none; such a jump is taken once.
     """
 
     def __init__(self, mission: Mission) -> None:
@@ -283,26 +281,26 @@ class _Steps:
         self.tags: dict[int, int] = {}
         for k, item in enumerate(mission.items):
             if item.command == Command.JUMP_TAG:
-                # The first tag of a number applies, wherever the jump stands (`AP_Mission::get_index_of_jump_tag`).
+                # The first tag with a number applies, wherever the jump is (`AP_Mission::get_index_of_jump_tag`).
                 self.tags.setdefault(int(item.params[0]), k)
-        self.taken: dict[int, int] = {}
+        self.jump_counts: dict[int, int] = {}
         self.reached: set[int] = set()
-        self.endless, self._walked = -1, 0
+        self.endless, self._step_count = -1, 0
 
     def __iter__(self) -> Iterator[_Step]:
         """Iterate over the navigation items, counting jumps."""
         index: int | None = 0
         while index is not None:
-            skipped: list[int] = []
+            passed_indices: list[int] = []
             index = self._next_item(index, counting=True)
             while index is not None and not is_navigation(self.items[index].command):
-                skipped.append(index)
+                passed_indices.append(index)
                 index = self._next_item(index + 1, counting=True)
-            late_commands = self._late_commands(skipped[0]) if skipped and index is not None else []
+            late_commands = self._late_commands(passed_indices[0]) if passed_indices and index is not None else []
             self.reached |= {self.items[command].seq for command in late_commands}
             yield _Step(
-                tuple(self.items[command] for command in skipped),
-                self.items[skipped[0]] if skipped else None,
+                tuple(self.items[command] for command in passed_indices),
+                self.items[passed_indices[0]] if passed_indices else None,
                 tuple(self.items[command] for command in late_commands),
                 None if index is None else self.items[index],
             )
@@ -311,7 +309,7 @@ class _Steps:
     def _late_commands(self, early: int) -> list[int]:
         """Return the indices of the commands that ArduPlane runs on the leg to an item.
 
-        early: index of the command that it has already run before that leg.
+        early: index of the command that ArduPlane has already run before that leg.
         """
         commands: list[int] = []
         index = self._next_item(early + 1, counting=False)
@@ -333,12 +331,12 @@ class _Steps:
             if not counting and index == first_jump:
                 return None
             first_jump = index if first_jump < 0 else first_jump
-            if counting and repeats < 0 and index in self.taken:
+            if counting and repeats < 0 and index in self.jump_counts:
                 self.endless = item.seq
                 return None
-            if repeats < 0 or self.taken.get(index, 0) < repeats:
+            if repeats < 0 or self.jump_counts.get(index, 0) < repeats:
                 if counting:
-                    self.taken[index] = self.taken.get(index, 0) + 1
+                    self.jump_counts[index] = self.jump_counts.get(index, 0) + 1
                 index = target
             else:
                 index += 1
@@ -346,8 +344,8 @@ class _Steps:
 
     def _count_item(self, item: MissionItem) -> None:
         self.reached.add(item.seq)
-        self._walked += 1
-        if self._walked > _MAX_STEPS:
+        self._step_count += 1
+        if self._step_count > _MAX_STEPS:
             raise MissionError(
                 f"{self.mission.source}: item {item.seq}: jumps lead through more than {_MAX_STEPS:,} items",
                 file=self.mission.source,
@@ -365,29 +363,29 @@ class _Steps:
         return index_by_number[number]
 
 
-class _NotesOfBothReadings:
-    """Notes for both readings of a speed change, by ArduPlane and by PX4."""
+class _AutopilotNotes:
+    """Notes for ArduPlane and for PX4, which read some items differently."""
 
     def __init__(self) -> None:
-        self.usual, self.by_value = Notes(), Notes()
+        self.arduplane, self.px4 = Notes(), Notes()
 
     def add(self, text: str, seq: int | None = None) -> None:
-        """Add a note for both readings."""
-        self.usual.add(text, seq)
-        self.by_value.add(text, seq)
+        """Add a note for both autopilots."""
+        self.arduplane.add(text, seq)
+        self.px4.add(text, seq)
 
 
 class _ItineraryBuilder:
-    """Build an itinerary step by step; hold its stops, speed, home and notes meanwhile."""
+    """Builder of an itinerary, with its stops, speed, home and notes so far."""
 
     def __init__(self, mission: Mission) -> None:
         self.source = mission.source
         self.last_seq = mission.items[-1].seq if mission.items else -1
-        self.airspeed = self.airspeed_by_value = self.min_ground_speed = math.nan
-        self.notes = _NotesOfBothReadings()
-        # Dictionaries without duplicates that keep their order.
-        self.open: dict[OpenItem, None] = {}
-        self.open_by_value: dict[OpenItem, None] = {}
+        self.airspeed = self.px4_airspeed = self.min_ground_speed = math.nan
+        self.notes = _AutopilotNotes()
+        # Dictionaries as ordered sets.
+        self.open_items: dict[OpenItem, None] = {}
+        self.px4_open_items: dict[OpenItem, None] = {}
         self.stops: list[ItineraryStop] = []
         self.takeoff: MissionItem | None = None
         self.gates: list[Gate] = []
@@ -396,61 +394,65 @@ class _ItineraryBuilder:
         self.has_home = mission.home is not None
         self.first_home = self.home = mission.home or _first_position(mission)
 
-    def take(self, step: _Step) -> None:
+    def process_step(self, step: _Step) -> None:
         """Process the commands before a navigation item, and the item."""
         for item in step.between:
             self._run_as_px4(item)
-        run_commands = () if step.early is None else (step.early, *step.late)
-        for index, item in enumerate(run_commands):
-            # A home that is set on a leg does not move the altitude of the item that is already flown to.
+        arduplane_commands = () if step.early is None else (step.early, *step.late)
+        for index, item in enumerate(arduplane_commands):
+            # A home that is set on a leg does not change the altitude of the item at its end.
             if index == 0 or item.command != Command.DO_SET_HOME:
-                self._run_as_arduplane(item, run_commands[index + 1 :])
+                self._run_as_arduplane(item, arduplane_commands[index + 1 :])
         for item in step.late:
             if item not in step.between:
-                self.notes.usual.add(f"{command_name(item.command)}: run one loop early, as ArduPlane does", item.seq)
+                self.notes.arduplane.add(
+                    f"{command_name(item.command)}: run one loop early, as ArduPlane does", item.seq
+                )
         if step.to is not None:
             self._fly_item(step.to)
         else:
             for item in step.between[1:]:
                 text = f"{command_name(item.command)}: not run, as nothing to fly to comes after it"
-                self.notes.usual.add(text, item.seq)
-        for item in run_commands[1:]:
+                self.notes.arduplane.add(text, item.seq)
+        for item in arduplane_commands[1:]:
             if item.command == Command.DO_SET_HOME:
                 self._set_home(item)
 
-    def leave_open(self, text: str, seq: int, *, usual: bool = True, by_value: bool = True) -> None:
-        """Note an item that changes the path and is not flown, in either or both autopilots' readings."""
+    def add_open_item(self, text: str, seq: int, *, arduplane: bool = True, px4: bool = True) -> None:
+        """Note an item that changes the path and is not simulated, for one or both autopilots."""
         for applies, notes, open_items in (
-            (usual, self.notes.usual, self.open),
-            (by_value, self.notes.by_value, self.open_by_value),
+            (arduplane, self.notes.arduplane, self.open_items),
+            (px4, self.notes.px4, self.px4_open_items),
         ):
             if applies:
                 notes.add(text, seq)
                 open_items[OpenItem(seq, text)] = None
 
-    def _run_as_arduplane(self, item: MissionItem, following: Sequence[MissionItem]) -> None:
+    def _run_as_arduplane(self, item: MissionItem, later_commands: Sequence[MissionItem]) -> None:
         """Run a command as ArduPlane does.
 
-        following: commands that are run after it on the leg to the same item.
+        later_commands: commands that are run after it on the leg to the same item.
         """
         if item.command == Command.DO_CHANGE_SPEED:
             self._change_speed_as_arduplane(item)
         elif item.command == Command.DO_SET_HOME:
             self._set_home(item)
         elif item.command == Command.CONDITION_GATE:
-            self.leave_open(f"{command_name(item.command)}: not flown", item.seq, by_value=False)
+            self.add_open_item(f"{command_name(item.command)}: not flown", item.seq, px4=False)
         elif item.command in (Command.CONDITION_DELAY, Command.CONDITION_DISTANCE):
             delayed = [
-                command for command in following if command.command in (Command.DO_CHANGE_SPEED, Command.DO_SET_HOME)
+                command
+                for command in later_commands
+                if command.command in (Command.DO_CHANGE_SPEED, Command.DO_SET_HOME)
             ]
             text = f"{command_name(item.command)}: not flown"
             if delayed:
                 delay_text = f"; {command_name(delayed[0].command)} (item {delayed[0].seq}) is flown without the delay"
-                self.leave_open(text + delay_text, item.seq, by_value=False)
+                self.add_open_item(text + delay_text, item.seq, px4=False)
             else:
-                self.notes.usual.add(text, item.seq)
+                self.notes.arduplane.add(text, item.seq)
         else:
-            self._note_not_flown(item, by_value=False)
+            self._note_not_flown(item, as_px4=False)
 
     def _run_as_px4(self, item: MissionItem) -> None:
         """Run a command as PX4 does."""
@@ -461,15 +463,15 @@ class _ItineraryBuilder:
         elif item.command == Command.CONDITION_GATE:
             self._add_gate(item)
         else:
-            self._note_not_flown(item, by_value=True)
+            self._note_not_flown(item, as_px4=True)
 
-    def _note_not_flown(self, item: MissionItem, *, by_value: bool) -> None:
-        """Note the treatment of a command that is not flown."""
+    def _note_not_flown(self, item: MissionItem, *, as_px4: bool) -> None:
+        """Note a command that is not simulated."""
         name, support = command_name(item.command), support_of(item.command)
-        treatment = support.px4 if by_value else support.arduplane
-        notes = self.notes.by_value if by_value else self.notes.usual
+        treatment = support.px4 if as_px4 else support.arduplane
+        notes = self.notes.px4 if as_px4 else self.notes.arduplane
         if treatment == Treatment.OPEN:
-            self.leave_open(f"{name}: not flown; {support.reason}", item.seq, usual=not by_value, by_value=by_value)
+            self.add_open_item(f"{name}: not flown; {support.reason}", item.seq, arduplane=not as_px4, px4=as_px4)
         elif item.command in MARKS:
             notes.add(f"{name}: a mark, nothing to fly", item.seq)
         elif support.reason == CAMERA:
@@ -478,12 +480,14 @@ class _ItineraryBuilder:
             notes.add(f"{name}: not flown", item.seq)
 
     def _note_wait(self, item: MissionItem) -> None:
-        """Note an item after which PX4 waits (`MissionBase::on_active`); ArduPlane does not read that flag."""
-        self.notes.usual.add("autocontinue is 0: the flight continues, as ArduPlane does", item.seq)
+        """Note an item after which PX4 waits (`MissionBase::on_active`); ArduPlane does not read its flag."""
+        self.notes.arduplane.add("autocontinue is 0: the flight continues, as ArduPlane does", item.seq)
         if item.seq == self.last_seq:
-            self.notes.by_value.add("autocontinue is 0 at the mission's end: nothing comes after it", item.seq)
+            self.notes.px4.add("autocontinue is 0 at the mission's end: nothing comes after it", item.seq)
         else:
-            self.leave_open("autocontinue is 0: the flight continues, where PX4 would wait", item.seq, usual=False)
+            self.add_open_item(
+                "autocontinue is 0: the flight continues, where PX4 would wait", item.seq, arduplane=False
+            )
 
     def _fly_item(self, item: MissionItem) -> None:
         """Process a navigation item."""
@@ -498,8 +502,8 @@ class _ItineraryBuilder:
         elif item.command in LANDINGS:
             self._add_landing(item)
         else:
-            self._note_not_flown(item, by_value=False)
-            self._note_not_flown(item, by_value=True)
+            self._note_not_flown(item, as_px4=False)
+            self._note_not_flown(item, as_px4=True)
 
     def _make_stop(self, item: MissionItem, acceptance: float = 0.0) -> ItineraryStop:
         lat, lon, loiter, alt, frame = item.lat_deg, item.lon_deg, loiter_of(item), item.alt, item.frame
@@ -508,42 +512,42 @@ class _ItineraryBuilder:
             alt, frame = self.home.alt + alt, int(Frame.GLOBAL)
         return ItineraryStop(
             *(item.seq, item.command, lat, lon, alt, frame),
-            *(self.airspeed, acceptance, loiter, self.airspeed_by_value, gates),
+            *(self.airspeed, acceptance, loiter, self.px4_airspeed, gates),
             min_ground_speed=self.min_ground_speed,
             home_up=self.home.alt,
         )
 
     def _add_gate(self, item: MissionItem) -> None:
-        """Add a gate to the next leg; PX4 passes a gate without a position, or before the start, at once."""
+        """Add a gate to the next leg; PX4 passes a gate without a position, or before the start, immediately."""
         if item.has_position and self.stops:
-            self.gates.append(Gate(item.seq, item.lat_deg, item.lon_deg, self.airspeed_by_value))
+            self.gates.append(Gate(item.seq, item.lat_deg, item.lon_deg, self.px4_airspeed))
         else:
-            self.notes.by_value.add(f"{command_name(item.command)}: passed at once", item.seq)
+            self.notes.px4.add(f"{command_name(item.command)}: passed at once", item.seq)
 
     def _add_take_off(self, item: MissionItem) -> None:
         name = command_name(item.command)
         is_vertical = item.command == Command.NAV_VTOL_TAKEOFF
         if self.stops:
             if item.has_position and not is_vertical:
-                self.leave_open(f"{name} in the air: flown through as a waypoint", item.seq)
+                self.add_open_item(f"{name} in the air: flown through as a waypoint", item.seq)
                 self.stops.append(self._make_stop(item))
             else:
-                self.leave_open(f"{name} in the air: not flown", item.seq)
+                self.add_open_item(f"{name} in the air: not flown", item.seq)
             return
         if math.isnan(item.alt):
             message = f"{self.source}: item {item.seq}: {name} has no altitude: expected a number"
             raise MissionError(message, file=self.source, field="altitude", allowed="expected a number")
         self.takeoff = item
         if is_vertical:
-            self.leave_open(f"{name}: not flown straight up", item.seq)
+            self.add_open_item(f"{name}: not flown straight up", item.seq)
         home = self.first_home
         over_home = replace(self._make_stop(item), lat_deg=home.lat_deg, lon_deg=home.lon_deg)
-        has_own_place = item.has_position and (item.lat_deg, item.lon_deg) != (home.lat_deg, home.lon_deg)
-        if has_own_place and is_vertical:
-            # ArduPlane climbs where it stands and continues at that altitude (QuadPlane::takeoff_controller and
+        has_own_position = item.has_position and (item.lat_deg, item.lon_deg) != (home.lat_deg, home.lon_deg)
+        if has_own_position and is_vertical:
+            # ArduPlane climbs vertically and continues at that altitude (QuadPlane::takeoff_controller and
             # verify_vtol_takeoff); its fixed wings skip the item.
             self.notes.add(f"{name}: its place is not flown to, as in ArduPlane; PX4 would", item.seq)
-        if has_own_place and not is_vertical:
+        if has_own_position and not is_vertical:
             self.stops += [replace(over_home, item=-1), self._make_stop(item)]
         else:
             self.stops.append(over_home)
@@ -552,35 +556,38 @@ class _ItineraryBuilder:
         name = command_name(item.command)
         if not item.has_position and loiter_of(item) is not None and self.stops:
             text = f"{name} without a position: flown about the place before"
-            self.notes.usual.add(text, item.seq)
-            # PX4 reads 0, 0 as a place.
-            self.leave_open(text, item.seq, usual=False)
+            self.notes.arduplane.add(text, item.seq)
+            # PX4 reads 0, 0 as a position.
+            self.add_open_item(text, item.seq, arduplane=False)
             alt = math.nan if item.frame == Frame.MISSION else item.alt
             item = replace(item, lat_deg=self.stops[-1].lat_deg, lon_deg=self.stops[-1].lon_deg, alt=alt)
         elif not item.has_position:
-            self.leave_open(
+            self.add_open_item(
                 f"{name} without a position, which means the place where the aircraft is: not flown", item.seq
             )
             return
         if item.command == Command.NAV_WAYPOINT:
             if item.params[0] > 0.0:
-                # No fixed wing holds: ArduPlane stores no time, PX4 (`MissionBlock::get_time_inside`) reads none.
+                # Fixed-wing aircraft do not hold: ArduPlane stores no time, PX4 (`MissionBlock::get_time_inside`) reads
+                # none.
                 self.notes.add("NAV_WAYPOINT with a time to hold: flown through", item.seq)
             if pass_by := pass_by_distance(item):
-                self.notes.usual.add(f"{name} with {pass_by:.0f} m to fly on beyond it, as ArduPlane does", item.seq)
+                self.notes.arduplane.add(
+                    f"{name} with {pass_by:.0f} m to fly on beyond it, as ArduPlane does", item.seq
+                )
             elif item.params[2] <= -1.0:
                 # Converting a negative number to an unsigned one gives 0 on ARM and 255 on a PC; PX4 does not read it.
                 text = (
                     f"{name} with {item.params[2]:g} m to fly on beyond it: flown as 0, where ArduPlane may fly 255 m"
                 )
-                self.leave_open(text, item.seq, by_value=False)
+                self.add_open_item(text, item.seq, px4=False)
         elif item.command == Command.NAV_SPLINE_WAYPOINT:
-            self.leave_open(f"{name}: flown as a straight waypoint", item.seq)
+            self.add_open_item(f"{name}: flown as a straight waypoint", item.seq)
         elif item.command == Command.NAV_LOITER_UNLIM:
             self.notes.add(f"{name}: flown for {UNLIMITED:.0f} s; the mission ends there", item.seq)
             self.ended = True
         elif loiter_of(item) is None:
-            self.leave_open(f"{name}: flown through as a waypoint", item.seq)
+            self.add_open_item(f"{name}: flown through as a waypoint", item.seq)
         if math.isnan(item.alt):
             self.notes.add(f"{name} without an altitude: keeps the last height", item.seq)
         radius = item.params[1] if item.command in (Command.NAV_WAYPOINT, Command.NAV_SPLINE_WAYPOINT) else 0.0
@@ -588,20 +595,20 @@ class _ItineraryBuilder:
 
     def _add_return(self, item: MissionItem) -> None:
         if not self.has_home and self.home is self.first_home:
-            self.leave_open("NAV_RETURN_TO_LAUNCH without a home: not flown", item.seq)
+            self.add_open_item("NAV_RETURN_TO_LAUNCH without a home: not flown", item.seq)
         elif not self.stops:
-            self.leave_open("NAV_RETURN_TO_LAUNCH before the start: not flown", item.seq)
+            self.add_open_item("NAV_RETURN_TO_LAUNCH before the start: not flown", item.seq)
         else:
-            # The autopilot chooses destination and altitude: `flight.mission.return_path`. No speed that was set
-            # applies there.
+            # The autopilot chooses destination and altitude: `flight.mission.return_path`. Earlier speed changes do not
+            # apply to the RTL.
             home = replace(item, lat_deg=self.home.lat_deg, lon_deg=self.home.lon_deg, alt=math.nan)
-            self.stops.append(replace(self._make_stop(home), airspeed=math.nan, airspeed_by_value=math.nan))
+            self.stops.append(replace(self._make_stop(home), airspeed=math.nan, px4_airspeed=math.nan))
             self.ended = True
 
     def _add_landing(self, item: MissionItem) -> None:
         name = command_name(item.command)
         if not self.stops:
-            self.leave_open(f"{name} before the start: not flown", item.seq)
+            self.add_open_item(f"{name} before the start: not flown", item.seq)
             return
         self.ended = True
         if item.has_position:
@@ -609,42 +616,42 @@ class _ItineraryBuilder:
             self.landing = self._make_stop(item)
             self.stops.append(replace(self.landing, alt=math.nan))
         else:
-            self.leave_open(f"{name} without a position: not flown; the flight ends at the place before", item.seq)
+            self.add_open_item(f"{name} without a position: not flown; the flight ends at the place before", item.seq)
         if item.command == Command.NAV_VTOL_LAND:
-            self.leave_open(f"{name}: not flown straight down", item.seq)
+            self.add_open_item(f"{name}: not flown straight down", item.seq)
 
     def _set_home(self, item: MissionItem) -> None:
-        """Set the home of all later altitudes and returns, as ArduPlane does (`Plane::do_set_home`)."""
+        """Set the home of all later altitudes and RTLs, as ArduPlane does (`Plane::do_set_home`)."""
         name = command_name(item.command)
         if item.params[0] == 1.0:
             if self.stops:
-                self.leave_open(f"{name} to where the aircraft is: not flown", item.seq, by_value=False)
+                self.add_open_item(f"{name} to where the aircraft is: not flown", item.seq, px4=False)
             else:
-                self.notes.usual.add(f"{name} before the start: home is where the aircraft stands", item.seq)
+                self.notes.arduplane.add(f"{name} before the start: home is where the aircraft stands", item.seq)
             return
         if not item.has_position:
-            self.notes.usual.add(f"{name} without a position: ignored, as ArduPlane does", item.seq)
+            self.notes.arduplane.add(f"{name} without a position: ignored, as ArduPlane does", item.seq)
             return
         altitude = item.alt + self.home.alt if item.frame in OVER_HOME else item.alt if item.frame in AMSL else math.nan
         if math.isnan(altitude):
-            self.leave_open(f"{name} to an altitude that is not known: not flown", item.seq, by_value=False)
+            self.add_open_item(f"{name} to an altitude that is not known: not flown", item.seq, px4=False)
             return
         self.home = Home(item.lat_deg, item.lon_deg, altitude)
 
     def _change_speed_as_arduplane(self, item: MissionItem) -> None:
         """Read a speed change as ArduPlane does (`Plane::do_change_speed`)."""
-        kind, speed, throttle = item.params[:3]
-        notes = self.notes.usual
-        sets_speed = kind == 1.0 or (kind == 0.0 and (speed > 0.0 or speed == -2.0))
+        speed_type, speed, throttle = item.params[:3]
+        notes = self.notes.arduplane
+        sets_speed = speed_type == 1.0 or (speed_type == 0.0 and (speed > 0.0 or speed == -2.0))
         if throttle > 0.0 and not sets_speed:
-            # If no speed is set, TRIM_THROTTLE is changed.
-            self.leave_open("DO_CHANGE_SPEED's throttle: not flown", item.seq, by_value=False)
+            # Without a speed the item changes TRIM_THROTTLE.
+            self.add_open_item("DO_CHANGE_SPEED's throttle: not flown", item.seq, px4=False)
         elif throttle > 0.0:
             notes.add("DO_CHANGE_SPEED's throttle: ignored", item.seq)
-        if kind not in (0.0, 1.0):
-            notes.add(f"DO_CHANGE_SPEED of type {kind:g}, neither airspeed nor ground speed: ignored", item.seq)
-        elif kind == 1.0:
-            # The airspeed stays.
+        if speed_type not in (0.0, 1.0):
+            notes.add(f"DO_CHANGE_SPEED of type {speed_type:g}, neither airspeed nor ground speed: ignored", item.seq)
+        elif speed_type == 1.0:
+            # The airspeed is unchanged.
             self.min_ground_speed = 0.0 if math.isnan(speed) else speed
             notes.add(
                 f"DO_CHANGE_SPEED of ground speed: sets MIN_GROUNDSPEED to {self.min_ground_speed:g} m/s", item.seq
@@ -658,14 +665,16 @@ class _ItineraryBuilder:
 
     def _change_speed_as_px4(self, item: MissionItem) -> None:
         """Read a speed change as PX4 does (`navigator_main.cpp`, VEHICLE_CMD_DO_CHANGE_SPEED)."""
-        kind, speed, throttle = item.params[:3]
-        notes = self.notes.by_value
+        speed_type, speed, throttle = item.params[:3]
+        notes = self.notes.px4
         if speed > 0.0:
-            self.airspeed_by_value = speed
-            if kind != 0.0:
-                notes.add(f"DO_CHANGE_SPEED of type {kind:g}: flown as airspeed, as its type is not read", item.seq)
+            self.px4_airspeed = speed
+            if speed_type != 0.0:
+                notes.add(
+                    f"DO_CHANGE_SPEED of type {speed_type:g}: flown as airspeed, as its type is not read", item.seq
+                )
             return
-        self.airspeed_by_value = math.nan
+        self.px4_airspeed = math.nan
         notes.add(f"DO_CHANGE_SPEED to {speed:g} m/s: back to the autopilot's own airspeed", item.seq)
         if throttle > 0.0:
             notes.add("DO_CHANGE_SPEED's throttle: not flown", item.seq)

@@ -1,8 +1,8 @@
 """Lay out loiters on the map, from joining the circle to leaving it.
 
-A loiter is laid out as the corners of a polygon around its circle, each with an arc of the circle's radius. The arcs
+A loiter consists of the corners of a polygon around its circle, each with an arc of the circle's radius. The arcs
 touch, so that the path is the circle, while turns, legs, altitudes and clearances are judged as everywhere else. The
-circle is joined and left on tangents.
+path joins and leaves the circle on tangents.
 """
 
 import math
@@ -16,39 +16,41 @@ from flight.mission.itinerary import MAX_STOPS, ItineraryStop, Loiter
 from world.arrays import Floats
 from world.errors import MissionError
 
-# Largest course change at a corner of the polygon, rad: the corners then lie 8 % of the radius outside the circle.
+# Maximum course change at a corner of the polygon, rad: the corners are then 8 % of the radius outside the circle.
 CORNER = math.pi / 4.0
-# Smallest loiter radius that is flown, m: below it a corner's legs vanish, and no aircraft here turns as tightly.
+# Minimum loiter radius, m: at a smaller radius the legs of a corner vanish, and no aircraft here turns as tightly.
 TIGHTEST = 10.0
-# Largest loiter radius that is flown, m.
+# Maximum loiter radius, m.
 WIDEST = 20_000.0
-# Smallest distance of a stop from a circle for a tangent between them, m.
+# Minimum distance of a stop from a circle for a tangent between them, m.
 _MIN_TANGENT_CLEARANCE_M = 2.0
-# Largest distance between two positions that are the same place, m.
+# Maximum distance between two positions that count as one, m.
 _SAME_PLACE_M = 1.0
-# Largest difference between two altitudes that are flown as one, m.
+# Maximum difference between two altitudes that count as one, m.
 _SAME_ALTITUDE_M = 10.0
-# Slope (tangent) of a spiral without a known aircraft.
+# Slope (tangent) of a spiral if the aircraft is unknown.
 PLAIN_SLOPE = 0.05
 
 # Angle before the tangent at which an autopilot that exits on heading leaves its loiter, rad.
 LINED_UP = math.radians(10.0)
-# Angle it has turned by then, from its path to the center to the tangent at which the drawn loiter begins, rad.
+# Angle by which it has then turned, from its path to the center to the tangent at the start of the loiter in the route,
+# rad.
 _TURN_TO_TANGENT_RAD = 0.5 * math.pi
 
-# Steepest climb and descent (tangents) in a spiral at an airspeed (m/s) and an altitude (m AMSL).
+# Function that returns the steepest climb and descent (tangents) in a spiral at an airspeed (m/s) and an altitude (m
+# AMSL).
 SpiralSlopes = Callable[[float, float], tuple[float, float]]
-# Radius (m) of a loiter that states none, at an airspeed (m/s) and an altitude (m AMSL).
+# Function that returns the default loiter radius (m) at an airspeed (m/s) and an altitude (m AMSL).
 OwnRadius = Callable[[float, float], float]
 
 
 def as_stated(loiter: Loiter) -> float:
-    """Return the radius that a loiter's item states, m, 0 for none."""
+    """Return the radius that a loiter's item states, m; 0 for none."""
     return abs(loiter.radius)
 
 
 def as_at_sea(up: float) -> float:
-    """Return the ratio of a loiter's radius at an altitude (m AMSL) to its radius at sea level: here 1."""
+    """Return 1, as the ratio of a loiter's radius at an altitude (m AMSL) to its radius at sea level."""
     return 1.0
 
 
@@ -56,20 +58,20 @@ def as_at_sea(up: float) -> float:
 class LoiterRules:
     """Rules by which an autopilot flies loiters.
 
-    radius: radius of a loiter that states none, m, negative to the left; 0 for the aircraft's own radius.
-    radius_name: name of the parameter that sets it, "" for none.
-    radius_of: radius that the autopilot reads from a loiter's item, m, 0 for none.
-    growth: ratio of the flown radius at an altitude (m AMSL) to the stated radius.
-    at_middle: True if it steers to the loiter's center until it reaches the circle, and leaves as soon as the loiter is
-        over for the line that begins at the center; otherwise it joins and leaves the circle on tangents.
-    lines_up: True if, steering to the center, it counts turns from where it turns away from the center, and continues
-        after the loiter is over until it heads for the next waypoint within `LINED_UP`.
-    holds_height: True if it holds its altitude on the leg to a loiter that climbs or descends to an altitude.
+    radius: default radius, m, negative to the left; 0 for a radius that depends on the aircraft.
+    radius_name: name of the parameter of that radius; "" for none.
+    radius_of: function that returns the radius that the autopilot reads from a loiter's item, m; 0 for none.
+    growth: function that returns the ratio of the flown radius at an altitude (m AMSL) to the stated radius.
+    at_middle: True if the autopilot steers to the loiter's center until it reaches the circle, and at the end of the
+        loiter leaves at once for the line from the center; otherwise it joins and leaves the circle on tangents.
+    lines_up: True if the autopilot, after steering to the center, counts turns from its turn away from the center, and
+        after the end of the loiter continues until it heads for the next waypoint within `LINED_UP`.
+    holds_height: True if the autopilot holds its altitude on the leg to a loiter to an altitude.
     climb, sink: maximum climb and descent rate in a loiter, m/s.
     short: altitude tolerance, m.
-    ends_in_circle: True if it loiters without end about a mission's last waypoint.
-    unflown: note for people on the parts of its loiters that are not flown, "" for none.
-    before_return: note for people on how it leaves a loiter before a return to launch, if that is not flown.
+    ends_in_circle: True if the autopilot loiters without end about a mission's last waypoint.
+    unflown: note on parts of loiters that are not simulated; "" for none.
+    before_return: note on the exit from a loiter before an RTL, if that is not simulated.
 
     >>> LoiterRules().radius, LoiterRules().at_middle
     (0.0, False)
@@ -90,7 +92,7 @@ class LoiterRules:
     before_return: str = ""
 
     def end_note(self) -> str:
-        """Return a note for people on the loiter that follows the mission's end.
+        """Return a note on the loiter after the mission's end.
 
         >>> LoiterRules(80.0, "NAV_LOITER_RAD", ends_in_circle=True).end_note()
         'after the last waypoint the aircraft circles it without end, with NAV_LOITER_RAD, 80 m: flown once'
@@ -100,7 +102,7 @@ class LoiterRules:
         return f"after the last waypoint the aircraft circles it without end, {circle}: flown once"
 
 
-# Rules of an autopilot without its own.
+# Rules of an autopilot without loiter rules.
 USUAL_LOITERS = LoiterRules()
 
 
@@ -118,7 +120,7 @@ class PlacedStop(NamedTuple):
 class RoutePoint:
     """One waypoint of a route.
 
-    stop: stop of the itinerary that it belongs to.
+    stop: its stop of the itinerary.
     position: east, north, up, m.
     arc: radius of the turn there, m, 0 for the radius at the bank limit.
     """
@@ -129,11 +131,11 @@ class RoutePoint:
 
 
 class Unjoined(NamedTuple):
-    """A stop that is not laid out at its stated position, because no tangent joins it to a circle.
+    """A stop that is not at its stated position in the route, because no tangent joins it to a circle.
 
-    item, circle: seq of its item, and seq of the circle's item.
-    is_circle: True if it is a circle, which is laid out on the other circle; otherwise it lies inside that circle and
-        is left out.
+    item, circle: seq of the stop's item, and seq of the circle's item.
+    is_circle: True for a loiter, which moves to the other circle; False for a point inside that circle, which is
+        omitted.
     """
 
     item: int
@@ -143,7 +145,7 @@ class Unjoined(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Node:
-    """A stop as a point, or as a circle about it; east, north, up in m.
+    """A stop as a point, or as a circle about that point; east, north, up in m.
 
     turn: radius of the circle, m, positive to the right, 0 for a point.
     """
@@ -169,14 +171,14 @@ def lay_out_waypoints(
 ) -> tuple[list[RoutePoint], tuple[Unjoined, ...]]:
     """Lay out the waypoints of a route along straight legs and around loiter circles.
 
-    Return the waypoints, and the stops that could not be laid out as stated.
+    Return the waypoints, and the stops that are not at their stated positions.
 
     source: name of the mission in errors.
     own_radius: the aircraft's own loiter radius at an airspeed and altitude.
     slopes: steepest climb and descent of the aircraft in a spiral.
     rules: loiter rules of the autopilot.
 
-    Stops inside a circle before or after them are left out, with a note, since no straight leg joins them. Raises
+    Stops inside the previous or next circle are omitted, with a note, because no straight leg joins them. Raises
     MissionError if a loiter is too wide or too long to lay out.
     """
     unjoined: list[Unjoined] = []
@@ -219,7 +221,7 @@ def _make_nodes(
 
     Append the stops that no tangent joins to ``unjoined``.
 
-    If the take-off lies inside the first circle, the flight begins on that circle, without any part of the take-off.
+    If the take-off is inside the first circle, the flight starts on that circle, without the take-off.
     """
     nodes: list[Node] = []
     for stop, (east, north, up) in stops:
@@ -231,21 +233,21 @@ def _make_nodes(
                 and nodes[-1].turn == 0.0
                 and nodes[-1].distance_to(node) < abs(node.turn) + _MIN_TANGENT_CLEARANCE_M
             ):
-                inside = nodes.pop()
-                _note_left_out(inside.stop, node.stop, notes)
-                # An autopilot that steers to the center passes a place there, and a take-off there needs no leg.
+                inner_node = nodes.pop()
+                _note_omitted_stop(inner_node.stop, node.stop, notes)
+                # An autopilot that steers to the center passes a stop there, and a take-off there needs no leg.
                 is_passed_anyway = (
-                    inside.distance_to(node) < _SAME_PLACE_M and abs(inside.up - node.up) <= _SAME_ALTITUDE_M
+                    inner_node.distance_to(node) < _SAME_PLACE_M and abs(inner_node.up - node.up) <= _SAME_ALTITUDE_M
                 )
-                if inside.stop.item >= 0 and inside.stop.command not in TAKEOFFS and not is_passed_anyway:
-                    unjoined.append(Unjoined(inside.stop.item, stop.item, is_circle=False))
+                if inner_node.stop.item >= 0 and inner_node.stop.command not in TAKEOFFS and not is_passed_anyway:
+                    unjoined.append(Unjoined(inner_node.stop.item, stop.item, is_circle=False))
         previous = nodes[-1] if nodes else None
         if previous is not None and previous.turn != 0.0 and not is_joined(previous, node):
             if node.turn == 0.0:
-                _note_left_out(stop, previous.stop, notes)
+                _note_omitted_stop(stop, previous.stop, notes)
                 unjoined.append(Unjoined(stop.item, previous.stop.item, is_circle=False))
                 continue
-            # Two loiters with the same stated radius and place may differ by the growth at their altitudes.
+            # Two loiters with the same stated radius and center may differ by the growth at their altitudes.
             previous_stated_radius, stated_radius = (
                 abs(previous.turn) / rules.growth(previous.up),
                 abs(node.turn) / rules.growth(node.up),
@@ -265,7 +267,7 @@ def _make_nodes(
     return nodes
 
 
-def _note_left_out(stop: ItineraryStop, circle: ItineraryStop, notes: Notes) -> None:
+def _note_omitted_stop(stop: ItineraryStop, circle: ItineraryStop, notes: Notes) -> None:
     text = f"lies inside the circle of item {circle.item}, which is joined on a tangent: not flown to"
     notes.add(text if stop.item >= 0 else f"home {text}", stop.item if stop.item >= 0 else None)
 
@@ -352,12 +354,12 @@ def _corners_around(
     slopes: SpiralSlopes,
     rules: LoiterRules,
 ) -> list[RoutePoint]:
-    """Return the corners around a circle that the path joins on one course and leaves on another.
+    """Return the corners around a circle, from its entry course to its exit course.
 
     entry_course, exit_course: courses at the tangents, rad; ``exit_course`` is None at the mission's end.
-    previous_altitude: altitude at the start of the leg before, m AMSL.
+    previous_altitude: altitude at the start of the leg to the circle, m AMSL.
     leg_length: length of that leg, m.
-    min_radius: the aircraft's own radius, m, to which a smaller circle is widened in flight; 0 if unknown.
+    min_radius: minimum radius of the aircraft, m, to which it widens a smaller circle; 0 if unknown.
 
     For an autopilot that leaves as soon as the loiter's time is over, the circle ends at the last tangent before that.
     """

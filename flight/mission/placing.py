@@ -37,24 +37,24 @@ from world.geometry import leg_courses
 from world.scenario_tables import MAP_EXTENT
 from world.terrain import Terrain
 
-# Distance below which two positions are the same place, m.
+# Distance below which two positions are the same, m.
 SAME_PLACE = 1.0
 # Horizontal length of a vertical leg, m: one meter of height on it is a slope of 89.4 degrees.
 VERTICAL_STEP = 0.01
-# Lowest altitude that a flight may have, m AMSL.
+# Minimum altitude of a flight, m AMSL.
 LOWEST = -500.0
-# Highest altitude that a flight may have, m AMSL.
+# Maximum altitude of a flight, m AMSL.
 HIGHEST = 9000.0
-# Difference between home's altitude and the ground there above which a note is added, m.
+# Maximum difference between home's altitude and the ground there without a note, m.
 _HOME_ALTITUDE_TOLERANCE_M = 30.0
 
 
 class PlacedLanding(NamedTuple):
-    """A landing sequence of a mission that a return to launch may continue to.
+    """A landing sequence of a mission to which an RTL may continue.
 
-    start: its start.
-    stops: its stops in flying order, the landing last.
-    ground: altitude of the landing place, m, NaN if unknown.
+    start: start of the sequence.
+    stops: stops in flying order, the landing last.
+    ground: altitude of the landing point, m; NaN if unknown.
     notes: parts that are not flown as written.
     open_items: items that leave the verdict open.
     """
@@ -68,16 +68,16 @@ class PlacedLanding(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class PlacedMission:
-    """Places of a mission on the map about ``origin``, with altitudes AMSL.
+    """Stops of a mission on the map about ``origin``, with altitudes AMSL.
 
     stops: stops in flying order; a stop at the position of the previous stop is merged with it.
-    notes: notes from placing them, after the itinerary's notes.
-    takeoff_ground: altitude of the ground at home, m, NaN if unknown or if nothing takes off.
-    landing_ground: altitude of the landing place, m, NaN if unknown or if nothing lands.
-    return_places: home, at the altitude that heights above home are relative to, and then the rally points; empty if
-        the mission does not end with a return.
-    landings: landing sequences that such a return may continue to, and that are flown.
-    landing_starts: starts of all landing sequences, including those that no return continues to.
+    notes: notes on the placing, after the itinerary's notes.
+    takeoff_ground: altitude of the ground at home, m; NaN if unknown or without a take-off.
+    landing_ground: altitude of the landing point, m; NaN if unknown or without a landing.
+    return_places: home, at the reference altitude of heights above home, and then the rally points; empty if the
+        mission does not end with an RTL.
+    landings: landing sequences to which an RTL may continue, and that are simulated.
+    landing_starts: starts of all landing sequences, including those to which no RTL continues.
     home_up: altitude of the mission's home, m AMSL: stated, or the ground there; NaN if unknown.
     """
 
@@ -105,12 +105,12 @@ def place_stops(
     """Place the stops of a mission's itinerary on the map about ``origin``.
 
     terrain: None if unknown; heights above terrain are then an error.
-    itinerary: the mission's itinerary if it has been made already.
-    vertical_legs: True to turn a position straight above or below the one before it into a leg of `VERTICAL_STEP` m,
+    itinerary: the mission's itinerary; None to make it.
+    vertical_legs: True to turn a position straight above or below the previous one into a leg of `VERTICAL_STEP` m,
         which then fails the verdict's slope rule; otherwise such a position is an error.
 
-    Successive stops of the result are at least `SAME_PLACE` apart across the ground, or `VERTICAL_STEP` if vertical.
-    Raises MissionError, naming the item, if a stop cannot be placed.
+    Successive stops of the result are at least `SAME_PLACE` apart horizontally, or `VERTICAL_STEP` on a vertical leg.
+    Raises MissionError, which names the item, if a stop cannot be placed.
 
     >>> from flight.mission.items import Command, Frame, MissionItem
     >>> items = [MissionItem(k, Command.NAV_WAYPOINT, Frame.GLOBAL, (0.0,) * 4, 36.5, 8.0, 700.0) for k in (1, 2)]
@@ -127,7 +127,7 @@ def place_stops(
     landing_ground = heights.touchdown(itinerary)
     return_mission, return_heights, home = mission, heights, itinerary.last_home or itinerary.home
     if home is not itinerary.home:
-        # A return and its landing sequence use the home that a DO_SET_HOME set.
+        # An RTL and its landing sequence use the home of the last DO_SET_HOME.
         return_mission, return_heights = (
             replace(mission, home=home),
             _Heights(mission.source, home, origin, terrain, notes),
@@ -153,7 +153,7 @@ def place_stops(
 def return_places(mission: Mission, origin: GeoOrigin, terrain: Terrain | None) -> tuple[ReturnPlace, ...]:
     """Return home and the rally points of a mission on the map, home first; empty without a home.
 
-    Raises MissionError, naming the rally point, if it is beyond the largest map.
+    Raises MissionError, which names the rally point, if it is beyond the maximum extent of the map.
 
     >>> from flight.mission.items import Command, Frame, MissionItem
     >>> items = (MissionItem(1, Command.NAV_WAYPOINT, Frame.GLOBAL, (0.0,) * 4, 36.5, 8.0, 700.0),)
@@ -200,19 +200,19 @@ def _landing_starts(mission: Mission, origin: GeoOrigin, heights: "_Heights") ->
     A DO_LAND_START with nothing to fly to after it is left out.
     """
     for index, mark in enumerate(mission.items):
-        first_item = next((item for item in mission.items[index + 1 :] if _is_flown_to(item)), None)
+        first_item = next((item for item in mission.items[index + 1 :] if _is_navigation_target(item)), None)
         if mark.command != Command.DO_LAND_START or first_item is None:
             continue
-        start = _place_start(first_item, origin, heights)
-        next_places = _places_to_landing(mission.items[index + 1 :], origin, heights)[1:]
-        mark_position = _position_of(mark, origin, heights) if mark.has_position else start.place
+        start = _landing_stop(first_item, origin, heights)
+        next_places = _stops_to_landing(mission.items[index + 1 :], origin, heights)[1:]
+        mark_position = _item_position(mark, origin, heights) if mark.has_position else start.place
         yield index, start._replace(mark=mark_position, onward=next_places)
 
 
 def _place_landings(
     mission: Mission, origin: GeoOrigin, heights: "_Heights", numbered_starts: Sequence[tuple[int, LandingStart]]
 ) -> tuple[PlacedLanding, ...]:
-    """Return a mission's landing sequences, without those that begin with the landing or cannot be placed."""
+    """Return a mission's landing sequences, without those that start with the landing or cannot be placed."""
     landings = []
     for index, start in numbered_starts:
         if start.lands:
@@ -232,11 +232,11 @@ def _place_landings(
 def landing_sequence(
     mission: Mission, origin: GeoOrigin, terrain: Terrain | None, first: int
 ) -> tuple[LandingStart, ...]:
-    """Return the places of a landing sequence from an item up to the landing, which is not included.
+    """Return the stops of a landing sequence from an item up to the landing, which is not included.
 
     first: number of that item.
 
-    A mission without a home has no such places.
+    The result is empty for a mission without a home.
 
     >>> from flight.mission.items import Command, Frame, MissionItem
     >>> over, none = int(Frame.GLOBAL_RELATIVE_ALT), (0.0,) * 4
@@ -249,34 +249,32 @@ def landing_sequence(
     if mission.home is None:
         return ()
     heights = _Heights(mission.source, mission.home, origin, terrain, Notes())
-    return _places_to_landing([item for item in mission.items if item.seq >= first], origin, heights)
+    return _stops_to_landing([item for item in mission.items if item.seq >= first], origin, heights)
 
 
-def _places_to_landing(
-    items: Sequence[MissionItem], origin: GeoOrigin, heights: "_Heights"
-) -> tuple[LandingStart, ...]:
-    """Return the places of items up to the first landing."""
+def _stops_to_landing(items: Sequence[MissionItem], origin: GeoOrigin, heights: "_Heights") -> tuple[LandingStart, ...]:
+    """Return the stops of items up to the first landing."""
     places = []
     for item in items:
         if item.command in LANDINGS:
             break
-        if _is_flown_to(item):
-            places.append(_place_start(item, origin, heights))
+        if _is_navigation_target(item):
+            places.append(_landing_stop(item, origin, heights))
     return tuple(places)
 
 
-def _is_flown_to(item: MissionItem) -> bool:
+def _is_navigation_target(item: MissionItem) -> bool:
     return item.command in PLACES | LANDINGS and item.has_position
 
 
-def _position_of(item: MissionItem, origin: GeoOrigin, heights: "_Heights") -> tuple[float, float, float]:
+def _item_position(item: MissionItem, origin: GeoOrigin, heights: "_Heights") -> tuple[float, float, float]:
     stop = ItineraryStop(item.seq, item.command, item.lat_deg, item.lon_deg, item.alt, item.frame, math.nan)
     east, north = on_map(heights.source, (stop,), origin)[0].tolist()
     return east, north, heights.amsl(stop, east, north, heights.home_amsl())
 
 
-def _place_start(item: MissionItem, origin: GeoOrigin, heights: "_Heights") -> LandingStart:
-    place, loiter = _position_of(item, origin, heights), loiter_of(item)
+def _landing_stop(item: MissionItem, origin: GeoOrigin, heights: "_Heights") -> LandingStart:
+    place, loiter = _item_position(item, origin, heights), loiter_of(item)
     radius = (loiter or Loiter(0.0)).radius
     return LandingStart(
         *(item.seq, place, place, loiter is not None, radius),
@@ -287,7 +285,7 @@ def _place_start(item: MissionItem, origin: GeoOrigin, heights: "_Heights") -> L
 
 
 def landing_places(mission: Mission, origin: GeoOrigin) -> tuple[tuple[int, float, float], ...]:
-    """Return the item number, east and north (m) of each landing that states a position.
+    """Return the item number, east and north (m) of each landing item with a position.
 
     >>> from flight.mission.items import Command, Frame, MissionItem
     >>> land = MissionItem(2, Command.NAV_LAND, Frame.GLOBAL_RELATIVE_ALT, (0.0,) * 4, 36.5, 8.0, 10.0)
@@ -321,7 +319,7 @@ def rally_stops(mission: Mission) -> tuple[ItineraryStop, ...]:
 def _place_returns(mission: Mission, home: Home, origin: GeoOrigin, heights: "_Heights") -> tuple[ReturnPlace, ...]:
     """Return home and the rally points on the map.
 
-    Raises MissionError, naming the rally point, if it is beyond the largest map.
+    Raises MissionError, which names the rally point, if it is beyond the maximum extent of the map.
     """
     east, north = to_map(origin, home.lat_deg, home.lon_deg)
     launch = ReturnPlace(float(east), float(north), heights.home_amsl())
@@ -330,7 +328,7 @@ def _place_returns(mission: Mission, home: Home, origin: GeoOrigin, heights: "_H
     numbers = [number for number, item in enumerate(mission.rally, 1) if item.has_position]
     points = on_map(mission.source, stops, origin).tolist()
     for number, stop, (point_east, point_north) in zip(numbers, stops, points, strict=True):
-        # Ground stations always write a rally point's height; one without it gets home's altitude.
+        # Ground stations always write a rally point's height; a point without height gets home's altitude.
         up = heights.amsl(stop, point_east, point_north, launch.up)
         base = launch.up if stop.frame in OVER_HOME else 0.0
         places.append(ReturnPlace(point_east, point_north, up, base, number))
@@ -340,13 +338,13 @@ def _place_returns(mission: Mission, home: Home, origin: GeoOrigin, heights: "_H
 def _place_stops(
     source: str, itinerary: Itinerary, origin: GeoOrigin, heights: "_Heights", vertical_legs: bool
 ) -> list[PlacedStop]:
-    """Return the stops on the map, merging a stop with the one before at the same position."""
+    """Return the stops on the map; successive stops at the same position are merged."""
     notes = heights.notes
     map_positions = on_map(source, itinerary.stops, origin)
     placed_stops: list[PlacedStop] = []
     for stop, (east, north) in zip(itinerary.stops, map_positions, strict=True):
         previous_altitude = float(placed_stops[-1].position[2]) if placed_stops else math.nan
-        new = PlacedStop(
+        placed_stop = PlacedStop(
             stop, np.array([east, north, heights.amsl(stop, float(east), float(north), previous_altitude)])
         )
         is_loiter_or_return = stop.loiter is not None or bool(placed_stops and placed_stops[-1].stop.loiter is not None)
@@ -354,21 +352,23 @@ def _place_stops(
         if (
             placed_stops
             and not is_loiter_or_return
-            and math.dist(placed_stops[-1].position[:2], new.position[:2]) < SAME_PLACE
+            and math.dist(placed_stops[-1].position[:2], placed_stop.position[:2]) < SAME_PLACE
         ):
-            if vertical_legs and _is_vertical(placed_stops[-1], new):
-                placed_stops.append(PlacedStop(stop, _offset_vertical_leg(placed_stops, new.position)))
+            if vertical_legs and _is_vertical(placed_stops[-1], placed_stop):
+                placed_stops.append(PlacedStop(stop, _offset_vertical_leg(placed_stops, placed_stop.position)))
                 continue
-            placed_stops[-1] = PlacedStop(_merge_stops(source, placed_stops[-1], new, notes), placed_stops[-1].position)
+            placed_stops[-1] = PlacedStop(
+                _merge_stops(source, placed_stops[-1], placed_stop, notes), placed_stops[-1].position
+            )
         else:
-            placed_stops.append(new)
+            placed_stops.append(placed_stop)
     return placed_stops
 
 
 def on_map(source: str, stops: tuple[ItineraryStop, ...], origin: GeoOrigin) -> Floats:
     """Return east and north of each stop, (n, 2) m.
 
-    Raises MissionError, naming the item, if a stop is beyond the largest map.
+    Raises MissionError, which names the item, if a stop is beyond the maximum extent of the map.
     """
     east, north = to_map(origin, [stop.lat_deg for stop in stops], [stop.lon_deg for stop in stops])
     points = np.stack([east, north], axis=1)
@@ -400,7 +400,7 @@ class _Heights:
     def amsl(self, stop: ItineraryStop, east: float, north: float, previous_altitude: float) -> float:
         """Return the altitude of a stop, m AMSL.
 
-        previous_altitude: altitude of the stop before, m AMSL, NaN at the first.
+        previous_altitude: altitude of the previous stop, m AMSL; NaN for the first stop.
         """
         if math.isnan(stop.alt):
             if math.isnan(previous_altitude):
@@ -428,15 +428,16 @@ class _Heights:
         return ground
 
     def home_amsl(self) -> float:
-        """Return the altitude that heights above home are relative to, m AMSL."""
+        """Return the reference altitude of heights above home, m AMSL."""
         if self._home_amsl is None:
             self._home_amsl = self._find_home_amsl(self.home)
         return self._home_amsl
 
     def touchdown(self, itinerary: Itinerary) -> float:
-        """Return the altitude of the landing place, or NaN if it is unknown.
+        """Return the altitude of the landing point, m AMSL; NaN if unknown.
 
-        A height above home is known only with terrain, with home's altitude, or if the stop before is above home too.
+        A height above home is known only with terrain, with home's altitude, or if the previous stop also has a height
+        above home.
         """
         stop = itinerary.landing
         if stop is None or math.isnan(stop.alt):
@@ -449,7 +450,7 @@ class _Heights:
         return self.amsl(stop, float(east), float(north), math.nan) if is_known else math.nan
 
     def ground_at_home(self) -> float:
-        """Return the altitude of the ground at home, NaN if unknown."""
+        """Return the altitude of the ground at home, m AMSL; NaN if unknown."""
         home = self.home
         if self.terrain is not None:
             east, north = to_map(self.origin, home.lat_deg, home.lon_deg)
@@ -458,7 +459,7 @@ class _Heights:
         return math.nan
 
     def known_home(self) -> float:
-        """Return the altitude of home, or of the ground there if home states none, m AMSL; NaN if unknown."""
+        """Return the altitude of home, or of the ground there if home has none, m AMSL; NaN if unknown."""
         return self.ground_at_home() if math.isnan(self.home.alt) else self.home.alt
 
     def _find_home_amsl(self, home: Home) -> float:
@@ -481,12 +482,12 @@ class _Heights:
 
 
 def _is_vertical(previous: PlacedStop, new: PlacedStop) -> bool:
-    """Return True if a stop is straight above or below the one before, and is not a take-off."""
+    """Return True if a stop is straight above or below the previous stop, and is not a take-off."""
     return abs(float(new.position[2] - previous.position[2])) >= SAME_PLACE and new.stop.command not in TAKEOFFS
 
 
 def _offset_vertical_leg(stops: list[PlacedStop], point: Floats) -> Floats:
-    """Return the last position, moved by `VERTICAL_STEP` m along its course and to the altitude of `point`.
+    """Return the last position, moved by `VERTICAL_STEP` m along its course and to the altitude of ``point``.
 
     Without a course the last position is moved to the east.
     """
@@ -498,7 +499,7 @@ def _offset_vertical_leg(stops: list[PlacedStop], point: Floats) -> Floats:
 
 
 def _merge_stops(source: str, previous: PlacedStop, new: PlacedStop, notes: Notes) -> ItineraryStop:
-    """Merge a stop with the one before it at the same place; return the merged stop."""
+    """Merge a stop with the previous stop at the same position, and return the merged stop."""
     before, new_stop = previous.stop, new.stop
     climb = float(new.position[2] - previous.position[2])
     if abs(climb) >= SAME_PLACE:

@@ -1,8 +1,8 @@
 """Preflight notes on a mission's take-off, landing, home, rally points and return.
 
-The verdict judges collisions. These notes cover what a pilot would find out on the field: tail wind, a home in another
-place, a rally point below ground or out of range, a return below the hills around home, a landing sequence that
-prevents arming, and the ground under a landing without a stated strip.
+The verdict judges collisions. These notes cover what a pilot would find out on the field: tail wind, a wrong home, a
+rally point below ground or out of range, an RTL below the hills around home, a landing sequence that prevents arming,
+and the ground under a landing without a stated strip.
 """
 
 import math
@@ -21,11 +21,11 @@ from world.frames import to_map
 from world.geometry import leg_courses
 from world.scenario import Scenario
 
-# Wind component below which no wind is noted, m/s.
+# Minimum wind component in a note, m/s.
 CALM = 0.05
-# Distance from the scenario's home beyond which a mission's home is another one, m.
+# Maximum distance of a mission's home from the scenario's home without a note, m.
 HOME_APART = 50.0
-# Smallest radius about home that a return needs, m: with WP_LOITER_RAD 60, loiters of up to 260 m were flown.
+# Minimum radius about home for an RTL, m: with WP_LOITER_RAD 60, loiters of up to 260 m were flown.
 MIN_CIRCLE = 260.0
 # Number of rings about home on which the ground is checked.
 _RING_COUNT = 13
@@ -36,24 +36,23 @@ _DIRECTION_COUNT = 72
 def field_notes(
     mission: Mission, route: Route, scenario: Scenario, rules: ReturnRules, parameters: Mapping[str, float]
 ) -> tuple[str, ...]:
-    """Return notes on a mission's launch, landing, home, rally points and return.
+    """Return notes on a mission's launch, landing, home, rally points and RTL.
 
-    rules: return rules of the autopilot.
-    parameters: the autopilot's parameters by name, as far as they are stated.
+    rules: RTL rules of the autopilot.
+    parameters: stated parameters of the autopilot by name.
     """
     rally_problems: tuple[str, ...] = ()
     try:
-        places = return_places(mission, scenario.origin, scenario.terrain)
+        return_targets = return_places(mission, scenario.origin, scenario.terrain)
     except MissionError as error:
-        # Rally points left over from another field: only a return would fly to them, and such a return is refused
-        # itself.
-        places, rally_problems = (), (str(error),)
+        # Rally points of another field: only an RTL would fly to them, and such an RTL is refused itself.
+        return_targets, rally_problems = (), (str(error),)
     return (
         *rally_problems,
         *_note_tail_winds(route, scenario),
         *_note_distant_home(mission, scenario),
-        *_note_rally_points(places[1:], route, scenario, rules),
-        *_note_low_return(places[:1], scenario, rules),
+        *_note_rally_points(return_targets[1:], route, scenario, rules),
+        *_note_low_return(return_targets[:1], scenario, rules),
         *_note_forbidden_landing_sequence(mission, parameters),
         *_note_landing_ground(mission, route, scenario),
     )
@@ -92,7 +91,7 @@ def _note_distant_home(mission: Mission, scenario: Scenario) -> Iterator[str]:
 def _note_rally_points(
     points: tuple[ReturnPlace, ...], route: Route, scenario: Scenario, rules: ReturnRules
 ) -> Iterator[str]:
-    """Note rally points below ground, and those beyond the distance limit of every return from the route."""
+    """Note rally points below ground, and rally points beyond the distance limit of any RTL from the route."""
     for point in points:
         name = f"rally point {point.number}"
         ground = math.nan if scenario.terrain is None else float(scenario.terrain.height(point.east, point.north))
@@ -111,7 +110,7 @@ def _note_rally_points(
 
 
 def _distance_from_path(waypoints: Floats, point: tuple[float, float]) -> float:
-    """Return the smallest horizontal distance of a point from a path (w, 3), m."""
+    """Return the minimum horizontal distance of a point from a path (w, 3), m."""
     leg_starts, leg_vectors = waypoints[:-1, :2], np.diff(waypoints[:, :2], axis=0)
     squared_lengths = np.maximum(1e-12, (leg_vectors**2).sum(axis=1))
     fractions = np.clip(((np.array(point) - leg_starts) * leg_vectors).sum(axis=1) / squared_lengths, 0.0, 1.0)
@@ -119,7 +118,7 @@ def _distance_from_path(waypoints: Floats, point: tuple[float, float]) -> float:
 
 
 def _note_low_return(home: tuple[ReturnPlace, ...], scenario: Scenario, rules: ReturnRules) -> Iterator[str]:
-    """Note a return to home whose altitude is below the ground under its loiter."""
+    """Note an RTL to home whose altitude is below the ground under its loiter."""
     if not home or scenario.terrain is None or math.isnan(rules.height):
         return
     radius = max(MIN_CIRCLE, abs(rules.radius))
@@ -148,7 +147,7 @@ _LEVEL_TEXT = "is level"
 
 
 def _slope_text(slope: float) -> str:
-    """Describe the slope of the ground (m per m) in words."""
+    """Return a description of a slope of the ground (m per m)."""
     shown = f"{abs(slope):.1%}"
     return _LEVEL_TEXT if shown == "0.0%" else f"{'rises' if slope > 0.0 else 'falls'} by {shown}"
 
@@ -156,7 +155,7 @@ def _slope_text(slope: float) -> str:
 def landing_slopes(mission: Mission, route: Route, scenario: Scenario) -> tuple[float, float] | None:
     """Return the slopes of the ground along and across a landing without a stated strip, m per m.
 
-    Return NaN if the ground is not known, and None if there is no such landing.
+    The slopes are NaN if the ground is unknown; the result is None without such a landing.
     """
     last_item = int(route.items[-1])
     has_landing = any(item.seq == last_item and item.command == Command.NAV_LAND for item in mission.items)
@@ -169,7 +168,7 @@ def landing_slopes(mission: Mission, route: Route, scenario: Scenario) -> tuple[
 
 
 def _note_landing_ground(mission: Mission, route: Route, scenario: Scenario) -> Iterator[str]:
-    """Note the known ground at a landing without a stated strip."""
+    """Note the ground at a landing without a stated strip."""
     last_item = int(route.items[-1])
     slopes = landing_slopes(mission, route, scenario)
     if slopes is None:

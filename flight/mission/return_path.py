@@ -1,8 +1,8 @@
-"""Return to launch on the map: choose its destination, and lay out the path for the route.
+"""Choose the destination of an RTL (return to launch), and lay out its path for the route.
 
-An autopilot returns by its own control law, which no mission spells out: it turns at once, flies straight to the
-nearest rally point or home, descends on a straight slope or climbs as fast as it can, and loiters there. `ReturnRules`
-states that law in numbers. The path uses the same pieces as any other: an arc, a straight leg, a loiter.
+An autopilot flies an RTL by its own rules, which no mission states: it turns at once, flies straight to the nearest
+rally point or home, descends on a straight slope or climbs as fast as it can, and loiters there. `ReturnRules` holds
+these rules as numbers. The path consists of the usual pieces: an arc, a straight leg, a loiter.
 
 The rules follow ArduPlane 4.6 (`ModeRTL` in ArduPlane/mode_rtl.cpp, `Plane::do_RTL` in commands_logic.cpp,
 `AP_Rally::calc_best_rally_or_home_location` in libraries/AP_Rally/AP_Rally.cpp, `Plane::setup_glide_slope` in
@@ -26,8 +26,8 @@ class ReturnPlace(NamedTuple):
     """Home or a rally point on the map.
 
     east, north, up: m, up AMSL; home's altitude is the ground altitude there.
-    base: altitude that the stated altitude is relative to, m AMSL: home's altitude, or 0 for one stated AMSL.
-    number: number of a rally point in its file, from 1; 0 if it has none.
+    base: reference of the stated altitude, m AMSL: home's altitude, or 0 for an altitude AMSL.
+    number: number of a rally point in its file, from 1; 0 without a number.
     """
 
     east: float
@@ -38,7 +38,7 @@ class ReturnPlace(NamedTuple):
 
 
 class ReturnCircle(NamedTuple):
-    """Loiter at the end of a return, as the autopilot reads it.
+    """Loiter at the end of an RTL, as the autopilot reads it.
 
     east, north, up: center, m, up AMSL.
     radius: m at sea level, negative for a left-hand loiter.
@@ -54,16 +54,17 @@ class ReturnCircle(NamedTuple):
 
 
 class LandingStart(NamedTuple):
-    """Start of a mission's landing sequence: the first item to fly to after a DO_LAND_START.
+    """Start of a mission's landing sequence: the first navigation item after a DO_LAND_START.
 
     item: number of that mission item.
-    place: its east, north, up, m AMSL.
-    mark: east, north, up that the distance to the sequence is measured to: the place that DO_LAND_START states, if any.
+    place: east, north, up of the item, m AMSL.
+    mark: east, north, up from which the distance to the sequence is measured: the position of DO_LAND_START, if it
+        states one.
     circles: True if the item is a loiter.
-    radius: loiter radius, m, negative to the left, 0 if none is stated.
+    radius: loiter radius, m, negative to the left; 0 if not stated.
     lands: True if the item is the landing itself.
-    onward: the places after it up to the landing; their own ``onward`` is empty.
-    pass_by: distance that ArduPlane flies on beyond the place, m.
+    onward: the next items up to the landing; their own ``onward`` is empty.
+    pass_by: distance that ArduPlane flies past the item, m.
     home_up: altitude of home, m AMSL, NaN if unknown.
     """
 
@@ -78,51 +79,52 @@ class LandingStart(NamedTuple):
     home_up: float = math.nan
 
 
-def nearest_landing(here: Place, landings: Sequence[LandingStart]) -> LandingStart | None:
-    """Return the landing sequence that ArduPlane chooses at a position (east, north, up), the nearest in 3D.
+def nearest_landing(position: Place, landings: Sequence[LandingStart]) -> LandingStart | None:
+    """Return the landing sequence that ArduPlane chooses at a position (east, north, up): the nearest in 3D.
 
-    It follows `AP_Mission::get_landing_sequence_start` (libraries/AP_Mission/AP_Mission.cpp). Return None without any.
+    Follows `AP_Mission::get_landing_sequence_start` (libraries/AP_Mission/AP_Mission.cpp). The result is None without
+    sequences.
 
     >>> far, near = (LandingStart(k, (x, 0.0, 50.0), (x, 0.0, 50.0)) for k, x in ((8, 900.0), (12, -500.0)))
     >>> nearest_landing((0.0, 0.0, 50.0), [far, near]).item, nearest_landing((0.0, 0.0, 50.0), [])
     (12, None)
     """
-    return min(landings, key=lambda landing: math.dist(here, landing.mark), default=None)
+    return min(landings, key=lambda landing: math.dist(position, landing.mark), default=None)
 
 
-# Note on a return that the autopilot continues to a landing sequence, and that the route does not.
+# Note on an RTL that continues to a landing sequence in flight, but not in the route.
 RETURN_NOT_FLOWN_ON = "the return does not continue to it"
-# A turn with a tangent shorter than this is omitted, m.
+# Minimum tangent length of a turn, m; a smaller turn is omitted.
 _MIN_TANGENT_M = 1.0
 # Altitude tolerance for leaving the loiter to join the landing sequence, m.
 _LANDING_JOIN_TOLERANCE_M = 10.0
-# A turn by more than this angle to one side is flown as a smaller turn to the other side, rad.
+# Maximum turn to one side, rad; a larger turn becomes a smaller turn to the other side.
 _MAX_TURN_ANGLE_RAD = 1.5 * math.pi
 
 
 @dataclass(frozen=True, slots=True)
 class ReturnRules:
-    """Rules by which an autopilot returns to launch.
+    """Rules by which an autopilot flies an RTL.
 
-    height: height above home at the end of the return, m; NaN to keep the altitude at which it turns back.
-    radius: loiter radius there, m, negative to the left; 0 for the aircraft's own radius.
-    climb_first: height gain before it turns with its full bank limit, m, even above its target; inf for the whole
-        missing height, 0 for none.
+    height: height above home at the end of the RTL, m; NaN to keep the altitude of its start.
+    radius: loiter radius at the end, m, negative to the left; 0 for the default radius of the aircraft.
+    climb_first: altitude gain before a turn with the full bank limit, m, even above the target; inf for the whole
+        altitude difference, 0 for none.
     first_bank: bank limit during that climb, rad.
     sink: maximum descent rate, m/s.
-    least_slope: height difference below which a descent is flown as a step, at once, m.
-    rally_limit: maximum distance to the nearest rally point that is flown to, m; 0 for no limit.
-    includes_home: True if home is chosen where it is nearer than every rally point.
-    slope_to_stated_height: True if the slope down to a rally point is drawn as if its height above home were an
-        altitude AMSL, and flown no higher than its start. ArduPlane 4.6-dev does that: it holds its altitude first, and
+    least_slope: altitude difference below which a descent is a step instead of a slope, m.
+    rally_limit: maximum distance to the nearest rally point, m, beyond which the RTL goes home; 0 for no limit.
+    includes_home: True if home is chosen when it is nearer than any rally point.
+    slope_to_stated_height: True if the slope down to a rally point treats its height above home as an altitude AMSL,
+        and is never higher than its start. ArduPlane 4.6-dev does that: it holds its altitude first, and
         descends later than on a straight slope to the point.
-    rally_height: height above a rally point's own altitude at the end of the return, m.
-    landing_counts: True if a mission's landing is a place to return to, which is noted and not flown.
-    instead: note for people on which of the autopilot's rules are flown differently; "" for none.
-    lands: "circle" if it continues to a landing sequence by a loiter at home or a rally point, "straight" if it does so
-        at once, "" if it stays in its loiter.
-    holds_height: True if it holds its altitude until it is over its target and descends in circles there, and climbs,
-        if necessary, in circles at its start, as PX4 does.
+    rally_height: height above a rally point's own altitude at the end of the RTL, m.
+    landing_counts: True if the RTL may go to a mission's landing, which is noted and not simulated.
+    instead: note on rules of the autopilot that are simulated differently; "" for none.
+    lands: "circle" if the RTL continues to a landing sequence from a loiter at home or a rally point, "straight" if it
+        flies there directly, "" if it stays in its loiter.
+    holds_height: True if the RTL holds its altitude until it is over its target and descends in circles there, and
+        climbs, if necessary, in circles at its start, as PX4 does.
 
     >>> ReturnRules().height, ReturnRules().rally_limit
     (100.0, 5000.0)
@@ -144,22 +146,22 @@ class ReturnRules:
     lands: Literal["", "circle", "straight"] = ""
 
 
-# Slope base that puts the target of a slope far below, m: a slope flown no higher than its start is then level.
+# Slope base that puts the target of a slope far below the ground, m, so that the slope is level.
 _LEVEL_SLOPE_BASE_M = 1e6
-# Rules of an autopilot without its own: planfly's guidance returns as ArduPlane does with its default parameters.
+# Rules for an autopilot without RTL rules: planfly's guidance flies an RTL like ArduPlane with its default parameters.
 USUAL_RULES = ReturnRules()
 
 
 class ReturnTarget(NamedTuple):
-    """Destination of a return.
+    """Destination of an RTL.
 
     position: east, north, up of the loiter's center, m.
     name: "home" or "rally point 2", numbered from 1 in the order of the file.
-    reason: reason for this choice, a clause for people; "" if there is no choice.
+    reason: clause with the reason for this choice; "" without a choice.
     distance: horizontal distance, m.
     slope_base: see `ReturnCircle`.
-    landing: landing sequence that it continues to, or None.
-    straight: True if it goes there at once, and ``position`` is the start of the sequence.
+    landing: landing sequence to which the RTL continues, or None.
+    straight: True if the RTL flies there directly, and ``position`` is the start of the sequence.
     """
 
     position: Place
@@ -172,11 +174,11 @@ class ReturnTarget(NamedTuple):
 
 
 class ReturnAbility(NamedTuple):
-    """Abilities of the aircraft that the return path depends on.
+    """Abilities of the aircraft for the path of an RTL.
 
     turn_radius: radius of an arc at the bank limit between two courses (rad) at an altitude (m AMSL), m.
-    circle: smallest loiter radius, m.
-    climb, dive: tangents of slopes that it can hold in any direction and in turns.
+    circle: minimum loiter radius, m.
+    climb, dive: tangents of slopes that the aircraft can hold in any direction and in turns.
     max_bank: rad.
     airspeed: m/s.
     """
@@ -190,11 +192,11 @@ class ReturnAbility(NamedTuple):
 
 
 def choose_target(rules: ReturnRules, start: Place, home: ReturnPlace, rally: Sequence[ReturnPlace]) -> ReturnTarget:
-    """Return the destination of a return: the nearest rally point, or home.
+    """Choose the destination of an RTL: the nearest rally point, or home.
 
-    If the nearest rally point is beyond the distance limit, the return goes home, at any distance.
+    If the nearest rally point is beyond the distance limit, the RTL goes home, at any distance.
 
-    start: east, north, up at the start of the return, m AMSL.
+    start: east, north, up at the start of the RTL, m AMSL.
 
     >>> home, near, far = (ReturnPlace(*at) for at in ((300.0, 0.0, 400.0), (1000.0, 0.0, 500.0), (0.0, 5000.0, 500.0)))
     >>> choose_target(ReturnRules(), (0.0, 0.0, 700.0), home, [far, near])[:3]
@@ -202,13 +204,17 @@ def choose_target(rules: ReturnRules, start: Place, home: ReturnPlace, rally: Se
     >>> choose_target(ReturnRules(rally_limit=900.0), (0.0, 0.0, 700.0), home, [near])[:2]
     ((300.0, 0.0, 500.0), 'home')
     """
-    height = start[2] if math.isnan(rules.height) else home.up + rules.height
+    home_target_altitude = start[2] if math.isnan(rules.height) else home.up + rules.height
     home_distance = _distance(start, home)
-    go_home = ReturnTarget(
-        (home.east, home.north, height), "home", "", home_distance, _LEVEL_SLOPE_BASE_M * rules.holds_height
+    home_target = ReturnTarget(
+        (home.east, home.north, home_target_altitude),
+        "home",
+        "",
+        home_distance,
+        _LEVEL_SLOPE_BASE_M * rules.holds_height,
     )
     if not rally:
-        return go_home
+        return home_target
     index = min(range(len(rally)), key=lambda k: _distance(start, rally[k]))
     distance = _distance(start, rally[index])
     name = f"rally point {rally[index].number or index + 1}"
@@ -217,10 +223,12 @@ def choose_target(rules: ReturnRules, start: Place, home: ReturnPlace, rally: Se
             f"{name}, the nearest, is {_distance_text(distance)} away,"
             f" beyond RALLY_LIMIT_KM {rules.rally_limit / 1000.0:g}"
         )
-        return go_home._replace(reason=reason)
+        return home_target._replace(reason=reason)
     if rules.includes_home and home_distance <= distance:
         parameter_text = "" if rules.holds_height else " (RALLY_INCL_HOME 1)"
-        return go_home._replace(reason=f"nearer than {name}, which is {_distance_text(distance)} away{parameter_text}")
+        return home_target._replace(
+            reason=f"nearer than {name}, which is {_distance_text(distance)} away{parameter_text}"
+        )
     rally_text = f"of {len(rally)} rally points" if len(rally) > 1 else "rally point"
     point = rally[index]
     slope_base = point.base if rules.slope_to_stated_height else _LEVEL_SLOPE_BASE_M * rules.holds_height
@@ -234,35 +242,37 @@ def choose_target(rules: ReturnRules, start: Place, home: ReturnPlace, rally: Se
 
 
 def described_return(target: ReturnTarget, rules: ReturnRules, start_altitude: float, continuation: str = "") -> str:
-    """Describe a return in a note for people.
+    """Return a note that describes an RTL.
 
-    start_altitude: altitude at which it begins, m AMSL.
-    continuation: name of the sequence that it continues to from its loiter, "" if it stays.
+    start_altitude: altitude of its start, m AMSL.
+    continuation: name of the sequence after the loiter; "" if the RTL stays in the loiter.
 
     >>> described_return(ReturnTarget((0.0, 0.0, 435.0), "home", "", 3210.0), ReturnRules(), 1090.0)
     'NAV_RETURN_TO_LAUNCH: to home, 3.2 km away, sinking 655 m on a straight slope to 435 m AMSL; circles for 60 s; ...'
     """
-    rise = target.position[2] - start_altitude
+    altitude_gain = target.position[2] - start_altitude
     reason = f" ({target.reason})" if target.reason else ""
     altitude_text = (
-        f"sinking {-rise:.0f} m on a straight slope to" if rise <= -1.0 else f"climbing {rise:.0f} m at once to"
+        f"sinking {-altitude_gain:.0f} m on a straight slope to"
+        if altitude_gain <= -1.0
+        else f"climbing {altitude_gain:.0f} m at once to"
     )
-    if -rise >= 1.0 and abs(target.slope_base - rise) < rules.least_slope:
-        altitude_text = f"sinking {-rise:.0f} m at once to"
+    if -altitude_gain >= 1.0 and abs(target.slope_base - altitude_gain) < rules.least_slope:
+        altitude_text = f"sinking {-altitude_gain:.0f} m at once to"
     if rules.holds_height:
-        altitude_text = f"climbing {rise:.0f} m first, to"
-        if rise < 0.0:
-            altitude_text = f"level, and sinking {-rise:.0f} m in circles there, to"
-    if abs(rise) < 1.0:
+        altitude_text = f"climbing {altitude_gain:.0f} m first, to"
+        if altitude_gain < 0.0:
+            altitude_text = f"level, and sinking {-altitude_gain:.0f} m in circles there, to"
+    if abs(altitude_gain) < 1.0:
         altitude_text = "at"
     climb_text = ""
-    if rules.climb_first > 0.0 and not (math.isinf(rules.climb_first) and rise < -1.0):
+    if rules.climb_first > 0.0 and not (math.isinf(rules.climb_first) and altitude_gain < -1.0):
         bank = math.degrees(rules.first_bank)
-        gain = rise if math.isinf(rules.climb_first) else rules.climb_first
-        climb_text = f"; banks no more than {bank:.0f} degrees before it has climbed {gain:.0f} m"
-        if math.isinf(rules.climb_first) and rise <= 1.0:
+        first_gain = altitude_gain if math.isinf(rules.climb_first) else rules.climb_first
+        climb_text = f"; banks no more than {bank:.0f} degrees before it has climbed {first_gain:.0f} m"
+        if math.isinf(rules.climb_first) and altitude_gain <= 1.0:
             climb_text = f"; banks no more than {bank:.0f} degrees until it is above that height"
-        if gain > max(0.0, rise):
+        if first_gain > max(0.0, altitude_gain):
             climb_text += ", even above that height"
     end_text = (
         f"from its circle on to {continuation}"
@@ -276,41 +286,44 @@ def described_return(target: ReturnTarget, rules: ReturnRules, start_altitude: f
 
 
 def lay_return(
-    before: Sequence[RoutePoint],
+    previous_points: Sequence[RoutePoint],
     stop: ItineraryStop,
     target: ReturnTarget,
     rules: ReturnRules,
     ability: ReturnAbility,
-    next_place: Place | None = None,
+    next_position: Place | None = None,
 ) -> list[RoutePoint]:
-    """Return the waypoints of a return's turn, its straight leg, and the loiter at its end.
+    """Return the waypoints of an RTL: its turn, its straight leg, and the loiter at its end.
 
-    before: route points up to the return, which begins at the last point on the course of the last leg.
-    stop: the itinerary stop of the return.
-    next_place: place that it continues to as soon as it has its altitude in the loiter; None if it stays.
+    previous_points: route points up to the RTL, which starts at the last point on the course of the last leg.
+    stop: itinerary stop of the RTL.
+    next_position: position to which the RTL continues once the loiter has reached its altitude; None if it stays.
 
     The turn takes the shorter direction. Altitudes of a descent lie on the straight slope from the start of the turn to
     the target, by the position along that line, no steeper than the aircraft can fly; a climb or a small descent begins
-    at once. The remaining height difference is flown in the loiter, which then lasts
-    `flight.mission.itinerary.UNLIMITED` s.  A climb before the turn is flown whatever the target's altitude is.
+    at once. The aircraft covers the remaining altitude difference in the loiter,
+    which then lasts `flight.mission.itinerary.UNLIMITED` s.  A climb before the turn does not depend on the altitude of
+    the target.
     """
-    start = before[-1].position
-    course = _course(before[-2].position, start) if len(before) > 1 else _course(start, target.position)
+    start = previous_points[-1].position
+    course = (
+        _course(previous_points[-2].position, start) if len(previous_points) > 1 else _course(start, target.position)
+    )
     radius = math.copysign(max(abs(rules.radius), ability.circle), rules.radius)
     circle = Node(stop, *target.position, radius)
     dive = min(ability.dive, rules.sink / ability.airspeed)
-    builder = _ReturnBuilder(circle, target.slope_base, rules.least_slope, ability, dive, start, next_place)
+    builder = _ReturnBuilder(circle, target.slope_base, rules.least_slope, ability, dive, start, next_position)
     if _distance(start, target.position) <= abs(radius) + _MIN_TANGENT_M:
         # The return starts inside the loiter: fly straight on to its circle.
-        builder.circle_from(*_rim_ahead(start, course, circle))
+        builder.add_loiter(*_rim_point_ahead(start, course, circle))
         return builder.points
-    course = builder.turn_gently(course, rules)
-    builder.turn(course)
+    course = builder.add_gentle_turn(course, rules)
+    builder.add_turn(course)
     return builder.points
 
 
 class _ReturnBuilder:
-    """Builder of the waypoints of a return."""
+    """Builder of the waypoints of an RTL."""
 
     def __init__(
         self,
@@ -320,15 +333,15 @@ class _ReturnBuilder:
         ability: ReturnAbility,
         dive_slope: float,
         start: Place,
-        next_place: Place | None,
+        next_position: Place | None,
     ) -> None:
         self.points: list[RoutePoint] = []
         self._stop, self._circle, self._slope_base = circle.stop, circle, slope_base
-        self._min_slope_height, self._ability, self._dive_slope, self._next_place = (
+        self._min_slope_height, self._ability, self._dive_slope, self._next_position = (
             min_slope_height,
             ability,
             dive_slope,
-            next_place,
+            next_position,
         )
         self._position = self._slope_start = start
         # Altitude of the climb before the turn, m; it may lie above the target.
@@ -342,29 +355,29 @@ class _ReturnBuilder:
     def _height_difference(self) -> float:
         return self._circle.up - self._position[2]
 
-    def turn_gently(self, course: float, rules: ReturnRules) -> float:
-        """Fly the arc at the bank limit of the first climb, and return the course at its end."""
-        climb = max(0.0, self._height_difference) if math.isinf(rules.climb_first) else rules.climb_first
-        if climb <= 0.0:
+    def add_gentle_turn(self, course: float, rules: ReturnRules) -> float:
+        """Add the arc at the bank limit of the first climb, and return the course at its end."""
+        first_climb = max(0.0, self._height_difference) if math.isinf(rules.climb_first) else rules.climb_first
+        if first_climb <= 0.0:
             return course
         radius = self._ability.turn_radius(course, course + math.pi, self._position[2])
         radius *= math.tan(self._ability.max_bank) / math.tan(max(1e-3, rules.first_bank))
-        arc = self._turn_to_tangent(course, radius)
-        if arc is None:
+        arc_to_tangent = self._turn_to_tangent(course, radius)
+        if arc_to_tangent is None:
             return course
-        node, full_sweep, tangent = arc
-        sweep = min(full_sweep, climb / self._ability.climb / radius)
-        self._first_climb_altitude = self._position[2] + climb
+        node, full_sweep, tangent = arc_to_tangent
+        sweep = min(full_sweep, first_climb / self._ability.climb / radius)
+        self._first_climb_altitude = self._position[2] + first_climb
         self._add_arc(node, course, sweep)
-        end = course + math.copysign(sweep, node.turn)
-        self._add_waypoint(*on_rim(node, end), 0.0)
+        end_course = course + math.copysign(sweep, node.turn)
+        self._add_waypoint(*on_rim(node, end_course), 0.0)
         if sweep == full_sweep and self._first_climb_altitude > self._circle.up:
-            self._fly_climb_leg(tangent)
+            self._add_climb_leg(tangent)
         self._first_climb_altitude, self._slope_start = -math.inf, self._position
-        return tangent if sweep == full_sweep else end
+        return tangent if sweep == full_sweep else end_course
 
-    def _fly_climb_leg(self, course: float) -> None:
-        """Fly straight to the end of the first climb, or to the loiter if that is nearer."""
+    def _add_climb_leg(self, course: float) -> None:
+        """Add the straight leg to the end of the first climb, or to the loiter if that is nearer."""
         east, north = on_rim(self._circle, course)
         length = (self._first_climb_altitude - self._position[2]) / self._ability.climb
         length = min(length, math.hypot(east - self._position[0], north - self._position[1]) - _MIN_TANGENT_M)
@@ -373,13 +386,13 @@ class _ReturnBuilder:
                 self._position[0] + length * math.sin(course), self._position[1] + length * math.cos(course), 0.0
             )
 
-    def turn(self, course: float) -> None:
-        """Fly the turn to the target, the straight leg, and the loiter there."""
+    def add_turn(self, course: float) -> None:
+        """Add the turn to the target, the straight leg, and the loiter there."""
         bearing = _course(self._position, (self._circle.east, self._circle.north, 0.0))
         arc = self._turn_to_tangent(course, self._ability.turn_radius(course, bearing, self._position[2]))
         point = Node(self._stop, *self._position)
         if arc is None:
-            # No tangent leads from the turn to the loiter: the corner stays sharp.
+            # No tangent leads from the turn to the loiter: use a sharp corner.
             leg_course = tangent_course(point, self._circle)
         else:
             node, sweep, leg_course = arc
@@ -389,10 +402,10 @@ class _ReturnBuilder:
             else:
                 leg_course = tangent_course(point, self._circle)
         self._add_slope_break(leg_course)
-        self.circle_from(*on_rim(self._circle, leg_course), leg_course)
+        self.add_loiter(*on_rim(self._circle, leg_course), leg_course)
 
     def _add_slope_break(self, leg_course: float) -> None:
-        """Add a waypoint on the straight leg where a climb or step ends, or where the descent begins."""
+        """Add a waypoint on the straight leg where a climb or step ends, or where the descent starts."""
         join_point = on_rim(self._circle, leg_course)
         leg_length = math.hypot(join_point[0] - self._position[0], join_point[1] - self._position[1])
         if self._height_difference > 0.0:
@@ -402,43 +415,46 @@ class _ReturnBuilder:
         else:
             descent = self._slope_start[2] - self._circle.up
             break_fraction = self._slope_base / max(1e-6, descent + self._slope_base)
-            begin_fraction, end_fraction = self._slope_fraction(*self._position[:2]), self._slope_fraction(*join_point)
-            break_distance = leg_length * (break_fraction - begin_fraction) / max(1e-6, end_fraction - begin_fraction)
+            start_fraction, end_fraction = self._slope_fraction(*self._position[:2]), self._slope_fraction(*join_point)
+            break_distance = leg_length * (break_fraction - start_fraction) / max(1e-6, end_fraction - start_fraction)
         if _MIN_TANGENT_M < break_distance < leg_length - _MIN_TANGENT_M:
             east, north = (
-                a + break_distance / leg_length * (b - a) for a, b in zip(self._position[:2], join_point, strict=True)
+                start + break_distance / leg_length * (end - start)
+                for start, end in zip(self._position[:2], join_point, strict=True)
             )
             self._add_waypoint(east, north, 0.0)
 
-    def circle_from(self, east: float, north: float, course: float) -> None:
-        """Fly to a point on the circle, and around it until its altitude is reached and its time is over."""
+    def add_loiter(self, east: float, north: float, course: float) -> None:
+        """Add the leg to a point on the circle, and the loiter until its altitude is reached and its time is over."""
         if math.hypot(east - self._position[0], north - self._position[1]) > _MIN_TANGENT_M:
             self._add_waypoint(east, north, 0.0)
         radius = abs(self._circle.turn)
         altitude_change = self._height_difference
-        spiral = abs(altitude_change) / (self._ability.climb if altitude_change > 0.0 else self._dive_slope) / radius
-        if self._next_place is not None:
-            self._continue_to(
-                course, spiral if abs(altitude_change) > _LANDING_JOIN_TOLERANCE_M else 0.0, self._next_place
+        spiral_angle = (
+            abs(altitude_change) / (self._ability.climb if altitude_change > 0.0 else self._dive_slope) / radius
+        )
+        if self._next_position is not None:
+            self._add_exit(
+                course, spiral_angle if abs(altitude_change) > _LANDING_JOIN_TOLERANCE_M else 0.0, self._next_position
             )
             return
-        sweep = spiral + max(2.0 * math.pi, UNLIMITED * self._ability.airspeed / radius)
+        sweep = spiral_angle + max(2.0 * math.pi, UNLIMITED * self._ability.airspeed / radius)
         self._add_circle(course, sweep)
 
     def _add_circle(self, course: float, sweep: float) -> None:
         self._add_arc(self._circle, course, sweep, on_circle=True)
         self._add_waypoint(*on_rim(self._circle, course + math.copysign(sweep, self._circle.turn)), 0.0, on_circle=True)
 
-    def _continue_to(self, course: float, spiral: float, next_place: Place) -> None:
-        """Fly around the circle until its altitude is reached, and turn towards a place.
+    def _add_exit(self, course: float, spiral_angle: float, next_position: Place) -> None:
+        """Add the loiter until its altitude is reached, and the turn towards the next position.
 
         The turn takes the shorter direction.
         """
-        if spiral > 0.0:
-            self._add_circle(course, spiral)
-            course += math.copysign(spiral, self._circle.turn)
-        self._circle = Node(self._stop, next_place[0], next_place[1], self._position[2])
-        radius = self._ability.turn_radius(course, _course(self._position, next_place), self._position[2])
+        if spiral_angle > 0.0:
+            self._add_circle(course, spiral_angle)
+            course += math.copysign(spiral_angle, self._circle.turn)
+        self._circle = Node(self._stop, next_position[0], next_position[1], self._position[2])
+        radius = self._ability.turn_radius(course, _course(self._position, next_position), self._position[2])
         arc = self._turn_to_tangent(course, radius)
         if arc is not None and radius * math.tan(0.5 * min(arc[1], CORNER)) > _MIN_TANGENT_M:
             node, sweep, exit_course = arc
@@ -446,9 +462,9 @@ class _ReturnBuilder:
             self._add_waypoint(*on_rim(node, exit_course), 0.0, on_circle=True)
 
     def _turn_to_tangent(self, course: float, radius: float) -> tuple[Node, float, float] | None:
-        """Return the circle, angle and final course of the arc that leads to a tangent of the target's loiter.
+        """Return the circle, angle and final course of the arc to a tangent of the target's loiter.
 
-        Choose the shorter direction; return None if no tangent leads on.
+        Choose the shorter direction; return None if there is no such tangent.
         """
         course_error = float(wrap(_course(self._position, (self._circle.east, self._circle.north, 0.0)) - course))
         side = math.copysign(1.0, course_error)
@@ -478,7 +494,7 @@ class _ReturnBuilder:
             self._add_waypoint(east, north, abs(node.turn), on_circle=on_circle)
 
     def _add_waypoint(self, east: float, north: float, arc: float, *, on_circle: bool = False) -> None:
-        """Add a waypoint at the altitude that the return has at this position."""
+        """Add a waypoint at the altitude of the RTL at this position."""
         distance = math.hypot(east - self._position[0], north - self._position[1])
         altitude, climb_altitude = self._position[2], max(self._circle.up, self._first_climb_altitude)
         if climb_altitude >= altitude:
@@ -490,7 +506,7 @@ class _ReturnBuilder:
         self.points.append(RoutePoint(self._stop, self._position, arc))
 
     def _slope_altitude(self, east: float, north: float) -> float:
-        """Return the altitude of the slope to the target at a point, or the target's altitude for a step."""
+        """Return the altitude of the slope to the target at a point; for a step, the target's altitude."""
         start_altitude, end_altitude = self._slope_start[2], self._circle.up
         if self._is_step:
             return end_altitude
@@ -500,7 +516,7 @@ class _ReturnBuilder:
         )
 
     def _slope_fraction(self, east: float, north: float) -> float:
-        """Return the fraction of the sloping line that a point has passed."""
+        """Return the fraction of the slope's length up to a point."""
         start_east, start_north, _ = self._slope_start
         slope_east, slope_north = self._circle.east - start_east, self._circle.north - start_north
         return ((east - start_east) * slope_east + (north - start_north) * slope_north) / max(
@@ -508,8 +524,8 @@ class _ReturnBuilder:
         )
 
 
-def _rim_ahead(position: Place, course: float, circle: Node) -> tuple[float, float, float]:
-    """Return the point where a straight path from inside a circle meets the circle, and its course on the circle."""
+def _rim_point_ahead(position: Place, course: float, circle: Node) -> tuple[float, float, float]:
+    """Return the point where a straight path from inside a circle meets it, and the course along the circle there."""
     offset_east, offset_north = position[0] - circle.east, position[1] - circle.north
     distance_past_center = offset_east * math.sin(course) + offset_north * math.cos(course)
     distance = -distance_past_center + math.sqrt(

@@ -1,4 +1,4 @@
-"""Lay out a mission's route as the aircraft flies it, with waypoints, airspeeds and unrolled jumps."""
+"""Lay out the route of a mission as the aircraft flies it, with waypoints, airspeeds and unrolled jumps."""
 
 import math
 from collections.abc import Callable
@@ -43,7 +43,7 @@ from world.geometry import fly_by_offset, leg_courses, signed_turns, wrap
 from world.scenario import Scenario
 from world.terrain import Terrain
 
-# Columns of a route that are NaN where nothing is stated.
+# Columns of a route with NaN where the mission states nothing.
 ROUTE_COLUMNS_WITH_NAN = ("above_ground", "min_ground_speed", "home_up")
 
 
@@ -54,28 +54,28 @@ class Route:
     waypoints: (w, 3) east, north, up, m.
     airspeed: (w - 1,) m/s on each leg.
     acceptance: (w,) m, 0 where the mission states none (advisory: the verdict has its own rule).
-    fly_over: (w,) bool, True if the path goes through the waypoint and turns behind it, False if it passes by on an
-        arc.
-    items: (w,) seq of the mission item, -1 for a point without one.
-    started: a sentence for people: where and how the flight starts.
+    fly_over: (w,) bool, True if the path goes through the waypoint and turns behind it, False if it turns on an arc
+        that passes the waypoint.
+    items: (w,) seq of the mission item, -1 for a point without an item.
+    started: sentence on where and how the flight starts.
     notes: parts that cannot be flown as written, with item numbers.
-    arcs: (w,) turn radius, m, 0 for the radius at the bank limit; a loiter is the corners of a polygon around its
-        circle, all of one item, each with the circle's radius.
-    endless: seq of a jump that repeats the last round without end, -1 for none.
-    takeoff_ground, landing_ground: altitude of the ground at take-off and at the landing place, m, above which the
-        flight begins and ends; NaN if there is none or it is unknown.
-    return_from: index of the waypoint at which a return to launch begins, -1 for none; the waypoints from there to
-        `return_until` stand for the path that the autopilot chooses itself.
-    return_to: loiter that the return ends in, or leaves for a landing sequence; None for no return.
-    straight_to: index of the waypoint at which a return joins a landing sequence, -1 for none; the autopilot heads
-        there from where it is, along no line.
-    stops: (w,) number of the stop that the waypoint belongs to, never decreasing: a jump back leads to another stop of
-        the same item. If it is not given, successive waypoints of one item are one stop.
-    unjoined: stops that the autopilot flies to, and that the waypoints lack, since no tangent joins them to a circle.
-    open_items: items that change the flight path, and that are not flown as the autopilot would.
-    above_ground: (w,) height above ground that is held along the leg to the waypoint, m; NaN for a straight leg.
+    arcs: (w,) turn radius, m, 0 for the radius at the bank limit; a loiter consists of the corners of a polygon around
+        its circle, all of one item, each with the circle's radius.
+    endless: seq of a jump that repeats the last loop without end, -1 for none.
+    takeoff_ground, landing_ground: altitude of the ground at take-off and at the landing point, m, above which the
+        flight starts and ends; NaN without such a point or if unknown.
+    return_from: index of the waypoint at which an RTL starts, -1 for none; the waypoints from there to `return_until`
+        stand for the path that the autopilot chooses itself.
+    return_to: loiter in which the RTL ends, or which it leaves for a landing sequence; None without an RTL.
+    straight_to: index of the waypoint at which an RTL joins a landing sequence, -1 for none; the autopilot flies there
+        from its position, along no line.
+    stops: (w,) number of the waypoint's stop, never decreasing: a jump back leads to another stop of the same item. By
+        default, successive waypoints of one item are one stop.
+    unjoined: stops of the autopilot that the waypoints lack, because no tangent joins them to a circle.
+    open_items: items that change the flight path in a way that is not simulated.
+    above_ground: (w,) height above ground held along the leg to the waypoint, m; NaN for a straight leg.
     min_ground_speed: (w,) ground speed for which ArduPlane raises its airspeed on the leg to the waypoint, m/s; 0 or
-        less for none, NaN for the autopilot's own.
+        less for none, NaN for the autopilot's default.
     home_up: (w,) altitude of home on the leg to the waypoint, m AMSL; NaN if unknown.
     """
 
@@ -125,15 +125,15 @@ class Route:
 
     @property
     def leg_numbers(self) -> NDArray[np.int64]:
-        """Number of each leg as people count them, (w - 1,).
+        """Number of each leg in messages, (w - 1,).
 
-        All legs around a loiter have the number of the leg to it.
+        All legs around a loiter have the number of the leg to the loiter.
         """
         return np.maximum(self.stops[1:] - 1, 0)
 
     @property
     def return_until(self) -> int:
-        """Index of the waypoint at which a return joins the landing sequence, or one beyond the last."""
+        """Index of the waypoint at which an RTL joins the landing sequence; the number of waypoints otherwise."""
         if self.return_from < 0:
             return len(self.waypoints)
         is_return_item = self.items[self.return_from + 1 :] == self.items[self.return_from + 1]
@@ -143,7 +143,7 @@ class Route:
 
 
 def ends_at_plain_waypoint(route: Route, mission: Mission) -> bool:
-    """Return True if a route ends at a plain waypoint: not with a loiter, a landing or a return.
+    """Return True if a route ends at a plain waypoint, without a loiter, a landing or an RTL.
 
     >>> route = Route(np.eye(3)[:2], np.ones(1), np.zeros(2), np.zeros(2, dtype=bool), np.array([1, 2]), "")
     >>> ends_at_plain_waypoint(route, Mission(None, ()))
@@ -159,7 +159,7 @@ def ends_at_plain_waypoint(route: Route, mission: Mission) -> bool:
 
 
 def part_of_route(route: Route, first: int, last: int) -> Route:
-    """Return the part of a route from one of its waypoints to another, both included.
+    """Return the part of a route from waypoint ``first`` to waypoint ``last``, both included.
 
     >>> way = np.array([[0.0, 1000.0 * k, 300.0] for k in range(4)])
     >>> whole = Route(way, np.full(3, 25.0), np.zeros(4), np.zeros(4, bool), np.arange(4), "")
@@ -189,18 +189,18 @@ def part_of_route(route: Route, first: int, last: int) -> Route:
 
 
 # ----------------------------------------------------------------------
-# Waypoints that a path flies over, because the fly-by arc would pass too far away.
+# Fly-over waypoints, which a fly-by arc would miss by too much.
 
 
 class RouteRules(NamedTuple):
     """Rules by which an autopilot flies the route of a mission.
 
-    returns: rules of its returns to launch.
-    loiters: rules of its loiters.
-    reads_as_px4: True if it reads only the value of a speed change, and reads gates, as PX4 does.
-    turn_distance: distance before a waypoint at which it turns to the next leg, m, by the turn (rad, positive) and the
-        waypoint's altitude (m AMSL); None for guidance that follows the fly-by path.
-    acceptance_limit: maximum acceptance radius that it accepts from an item, m.
+    returns: rules of RTLs.
+    loiters: rules of loiters.
+    reads_as_px4: True if the autopilot reads only the value of a speed change, and reads gates, as PX4 does.
+    turn_distance: function that returns the distance before a waypoint at which the autopilot turns to the next leg, m,
+        for a turn (rad, positive) and the waypoint's altitude (m AMSL); None for guidance on the fly-by path.
+    acceptance_limit: maximum acceptance radius that the autopilot accepts from an item, m.
     """
 
     returns: ReturnRules = USUAL_RULES
@@ -210,10 +210,10 @@ class RouteRules(NamedTuple):
     acceptance_limit: float = math.inf
 
 
-# Rules of guidance that follows the fly-by path.
+# Rules of guidance on the fly-by path.
 USUAL_ROUTE_RULES = RouteRules()
-# Guidance that follows the path flies over a waypoint with a sharper turn than this, rad: at 150 degrees the fly-by arc
-# begins 3.7 radii before the waypoint and passes 2.9 radii from it, and at 180 degrees it never comes near.
+# Sharpest turn that guidance on the fly-by path does not fly over, rad: at 150 degrees the fly-by arc starts 3.7 radii
+# before the waypoint and passes 2.9 radii from it, and at 180 degrees it never comes near.
 SHARPEST_FLY_BY_RAD = math.radians(150.0)
 
 
@@ -224,18 +224,18 @@ def fly_over_waypoints(
     limits: Limits | None,
     turn_distance: Callable[[float, float], float] | None = None,
 ) -> NDArray[np.bool_]:
-    """Flag the waypoints that are flown over, because the fly-by arc at the bank limit misses them, (w,).
+    """Return True for each waypoint that the fly-by arc at the bank limit misses, and that is flown over, (w,).
 
     points: (w, 3) m.
     airspeed: (w - 1,) m/s.
     acceptance: (w,) m, 0 where the mission states none.
-    limits: limits of the aircraft; None if unknown, and then there are no arcs.
+    limits: limits of the aircraft; None if unknown, for a result of False.
     turn_distance: see `RouteRules`.
 
     An arc that turns by ``turn`` passes its waypoint at R(1/cos(turn/2) - 1). At 25 m/s and 30 degrees of bank R is 110
     m, and the arc passes a corner of 90 degrees at 46 m, one of 120 degrees at 110 m, and one of 174 degrees at 2 km.
-    It misses the waypoint if that distance exceeds the acceptance radius that the mission states, or, if it states
-    none, the autopilot's own turn distance; the autopilot then flies on to that distance before it turns.
+    It misses the waypoint if that distance exceeds the acceptance radius of the mission, or, without one, the
+    autopilot's turn distance; the autopilot then flies on to that distance before it turns.
 
     >>> from types import SimpleNamespace
     >>> from aircraft.path_limits import PerformanceTable
@@ -260,7 +260,7 @@ def fly_over_waypoints(
         turn = float(turns[i - 1])
         table = tables[float(max(airspeed[i - 1], airspeed[i]))]
         radius = float(turn_radius_between(table, courses[i - 1], courses[i], points[i, 2]))
-        # A leg that cannot be flown in this wind has no arc.
+        # A turn that cannot be flown in this wind has no arc.
         if turn == 0.0 or not math.isfinite(radius):
             continue
         if acceptance[i] > 0.0:
@@ -275,16 +275,16 @@ def fly_over_waypoints(
 # ----------------------------------------------------------------------
 # Straight lead-in and lead-out legs that give a route the start and end courses of its scenario.
 
-# Length of these legs beyond the turn's tangent, m: the aircraft is level and on course again by then.
+# Length of these legs beyond the turn's tangent, m, on which the aircraft becomes level and steady on course.
 END_LEG_LENGTH = 100.0
-# Distance within which an end of the route is the scenario's end, m.
+# Tolerance within which an end of the route is at the scenario's start or destination, m.
 _SAME_END_M = 1.0
 # Course difference below which no turn is needed, rad.
 _MIN_COURSE_CHANGE_RAD = math.radians(0.5)
 
 
 def with_end_courses(route: Route, scenario: Scenario, limits: Limits) -> Route:
-    """Start a route on the scenario's start course, and end it on its destination course.
+    """Return a route that starts on the scenario's start course and ends on its destination course.
 
     A level lead-in leg before the first waypoint, or lead-out leg after the last, is as long as the turn's tangent plus
     `END_LEG_LENGTH`. The turn onto the first leg, or off the last, is therefore flown and judged like any other. A
@@ -320,7 +320,7 @@ def with_end_courses(route: Route, scenario: Scenario, limits: Limits) -> Route:
     acceptance = np.array(route.acceptance)
     acceptance[:lead_in_count], acceptance[len(acceptance) - lead_out_count :] = 0.0, 0.0
     all_points = [point for point in (lead_in, *points, lead_out) if point is not None]
-    padded: dict[str, Any] = {
+    padded_columns: dict[str, Any] = {
         name: np.pad(getattr(route, name), (lead_in_count, lead_out_count), constant_values=math.nan)
         for name in ROUTE_COLUMNS_WITH_NAN
     }
@@ -332,7 +332,7 @@ def with_end_courses(route: Route, scenario: Scenario, limits: Limits) -> Route:
         fly_over=np.pad(route.fly_over, (lead_in_count, lead_out_count), mode="edge"),
         items=np.pad(route.items, (lead_in_count, lead_out_count), constant_values=-1),
         arcs=np.pad(route.arcs, (lead_in_count, lead_out_count)),
-        **padded,
+        **padded_columns,
         stops=np.concatenate(
             [
                 np.arange(lead_in_count),
@@ -347,7 +347,7 @@ def with_end_courses(route: Route, scenario: Scenario, limits: Limits) -> Route:
 
 
 def _lead_point(point: np.ndarray, course: float, leg_course: float, limits: Limits, side: float) -> np.ndarray | None:
-    """Return the far end of the lead-in (side -1) or lead-out leg (side 1); None if no turn is needed.
+    """Return the outer end of the lead-in (side -1) or lead-out leg (side 1), or None if no turn is needed.
 
     point: (3,) m, end of the route.
     course: the scenario's course there, rad.
@@ -364,11 +364,11 @@ def _lead_point(point: np.ndarray, course: float, leg_course: float, limits: Lim
 
 
 # ----------------------------------------------------------------------
-# From a mission's places to the route that is flown, with loiters and spirals that its aircraft can fly.
+# From the stops of a mission to its route, with loiters and spirals that the aircraft can fly.
 
-# Radius of a loiter that states none, if the aircraft can turn more tightly by the margin below, m: PX4's default.
+# Default loiter radius, if the aircraft can turn more tightly by the margin below, m: PX4's default.
 DEFAULT_RADIUS = 80.0
-# Ratio of such a loiter's radius to the tightest turn.
+# Minimum ratio of the default loiter radius to the radius of the tightest turn.
 LOITER_RADIUS_MARGIN = 1.1
 # Fraction of the aircraft's slope limits in straight flight at which a spiral climbs and descends.
 SPIRAL_SHARE = 0.6
@@ -389,13 +389,13 @@ def make_route(
     default_airspeed: airspeed until the mission sets one, m/s (the cruiseSpeed of a `.plan` file, a ground station's
         estimate, sets none).
     fly_over: True to fly over all waypoints; otherwise only over the waypoints of `fly_over_waypoints`.
-    limits: limits of the aircraft for those arcs, for the radius of a loiter that states none (80 m if None), and for
-        the slope of a spiral (5 % if None).
+    limits: limits of the aircraft for those arcs, for the default loiter radius (80 m if None), and for the slope of a
+        spiral (5 % if None).
     rules: rules by which the autopilot flies a route.
 
-    Without TAKEOFF the route starts at the first position item; with one, over home at that item's altitude. Every leg
-    has a horizontal length of at least `flight.mission.placing.SAME_PLACE`. Raises MissionError, naming the item, if a
-    place cannot be laid out, or if the mission has fewer than two positions.
+    Without a take-off item the route starts at the first position item; with a take-off item, over home at the altitude
+    of that item. Every leg has a horizontal length of at least `flight.mission.placing.SAME_PLACE`. Raises
+    MissionError, which names the item, if a stop cannot be placed, or if the mission has fewer than two positions.
 
     >>> from flight.mission.items import Command, Frame, MissionItem
     >>> items = [
@@ -418,9 +418,9 @@ def lay_route(
     limits: Limits | None = None,
     rules: RouteRules = USUAL_ROUTE_RULES,
 ) -> Route:
-    """Return the route through the places of a mission; arguments as for `make_route`.
+    """Return the route through the placed stops of a mission; arguments as for `make_route`.
 
-    Raises MissionError for fewer than two places, or for a loiter too wide or too long to lay out.
+    Raises MissionError for fewer than two stops, or for a loiter too wide or too long to lay out.
 
     >>> from flight.mission.items import Command, Frame, MissionItem
     >>> items = [MissionItem(k, Command.NAV_WAYPOINT, Frame.GLOBAL, (0.0,) * 4, 36.5 + k, 8.0, 700.0) for k in (0, 1)]
@@ -430,22 +430,20 @@ def lay_route(
     """
     mission, notes = placed.mission, Notes()
     returns, loiters, reads_as_px4, turn_distance, acceptance_limit = rules
-    all_places = _with_gates(placed, notes) if reads_as_px4 else list(placed.stops)
-    places_before_return = [_with_airspeed(place, default_airspeed, reads_as_px4) for place in all_places]
-    returning = places_before_return.pop() if placed.itinerary.returns else None
-    direct_landing = None if returning is None else _direct_landing(placed, places_before_return, returns, notes)
+    all_stops = _insert_gates(placed, notes) if reads_as_px4 else list(placed.stops)
+    placed_stops = [_with_airspeed(stop, default_airspeed, reads_as_px4) for stop in all_stops]
+    return_stop = placed_stops.pop() if placed.itinerary.returns else None
+    direct_landing = None if return_stop is None else _find_direct_landing(placed, placed_stops, returns, notes)
     if direct_landing is not None:
-        places_before_return += [
-            _with_airspeed(place, default_airspeed, reads_as_px4) for place in direct_landing.stops
-        ]
-    lay = partial(_lay_out_waypoints, mission.source, limits, loiters, notes)
-    points, unjoined = lay(places_before_return)
-    _note_circles(placed.itinerary, places_before_return, loiters, notes)
+        placed_stops += [_with_airspeed(stop, default_airspeed, reads_as_px4) for stop in direct_landing.stops]
+    lay_out = partial(_lay_out_waypoints, mission.source, limits, loiters, notes)
+    points, unjoined = lay_out(placed_stops)
+    _note_circles(placed.itinerary, placed_stops, loiters, notes)
     landing, return_fields = direct_landing, dict[str, Any]()
-    if returning is not None and direct_landing is None:
-        return_fields, landing = _lay_return(placed, returning.stop, points, returns, limits, notes)
+    if return_stop is not None and direct_landing is None:
+        return_fields, landing = _append_return(placed, return_stop.stop, points, returns, limits, notes)
         if landing is not None:
-            points += lay([_with_airspeed(place, default_airspeed, reads_as_px4) for place in landing.stops])[0]
+            points += lay_out([_with_airspeed(stop, default_airspeed, reads_as_px4) for stop in landing.stops])[0]
     _check_place_count(mission.source, len(points))
     stops = [point.stop for point in points]
     waypoints = np.array([point.position for point in points])
@@ -461,7 +459,7 @@ def lay_route(
         fly_over=(arcs == 0.0) & (fly_over | misses_arc),
         items=np.array([stop.item for stop in stops], dtype=np.int64),
         started=_start_text(placed.itinerary, stops[0], placed.origin, waypoints),
-        notes=_notes_of(placed.itinerary, landing, reads_as_px4) + placed.notes + notes.lines(),
+        notes=_route_notes(placed.itinerary, landing, reads_as_px4) + placed.notes + notes.lines(),
         arcs=arcs,
         stops=np.cumsum([False, *(a is not b for a, b in pairwise(stops))]),
         straight_to=-1 if landing is None else [stop.item for stop in stops].index(landing.stops[0].stop.item),
@@ -469,14 +467,17 @@ def lay_route(
         takeoff_ground=placed.takeoff_ground,
         landing_ground=placed.landing_ground if landing is None else landing.ground,
         **_columns_with_nan(stops, placed.home_up),
-        unjoined=unjoined if loiters.at_middle else (),  # An autopilot that flies on tangents leaves these out.
+        unjoined=unjoined if loiters.at_middle else (),  # An autopilot that flies on tangents omits these.
         open_items=_open_items(placed.itinerary, landing, reads_as_px4),
         **return_fields,
     )
 
 
 def _columns_with_nan(stops: list[ItineraryStop], home_up: float) -> dict[str, Any]:
-    """Return the columns of `ROUTE_COLUMNS_WITH_NAN`; home_up is used where a stop states no altitude of home, m."""
+    """Return the columns of `ROUTE_COLUMNS_WITH_NAN`.
+
+    home_up: altitude of home for a stop that states none, m AMSL.
+    """
     return {
         "above_ground": np.array([_height_above_ground(stop) for stop in stops]),
         "min_ground_speed": np.array([stop.min_ground_speed for stop in stops]),
@@ -489,25 +490,25 @@ def _height_above_ground(stop: ItineraryStop) -> float:
     return stop.alt if stop.frame in OVER_TERRAIN and stop.command in PLACES else math.nan
 
 
-def _check_place_count(source: str, place_count: int) -> None:
-    """Raise MissionError if a route has fewer than two places."""
-    if place_count < 2:
-        message = f"{source}: {place_count} place to fly to: expected at least two different ones"
+def _check_place_count(source: str, point_count: int) -> None:
+    """Raise MissionError if a route has fewer than two points."""
+    if point_count < 2:
+        message = f"{source}: {point_count} place to fly to: expected at least two different ones"
         raise MissionError(message, file=source)
 
 
-def _notes_of(itinerary: Itinerary, landing: PlacedLanding | None, reads_as_px4: bool) -> tuple[str, ...]:
-    """Return the notes of an itinerary and of the landing sequence that its return continues to.
+def _route_notes(itinerary: Itinerary, landing: PlacedLanding | None, reads_as_px4: bool) -> tuple[str, ...]:
+    """Return the notes of an itinerary and of the landing sequence after its RTL.
 
-    A note that items are never reached is left out if the landing sequence reaches them.
+    A note that items are never reached is omitted if the landing sequence reaches them.
     """
-    notes = itinerary.notes_by_value if reads_as_px4 else itinerary.notes
+    notes = itinerary.px4_notes if reads_as_px4 else itinerary.notes
     return notes if landing is None else (*(note for note in notes if NEVER_REACHED not in note), *landing.notes)
 
 
 def _open_items(itinerary: Itinerary, landing: PlacedLanding | None, reads_as_px4: bool) -> tuple[OpenItem, ...]:
-    """Return the items that leave the verdict open, in an itinerary and in its return's landing sequence."""
-    open_items = itinerary.open_by_value if reads_as_px4 else itinerary.open_items
+    """Return the items that leave the verdict undecided, in an itinerary and in the landing sequence after its RTL."""
+    open_items = itinerary.px4_open_items if reads_as_px4 else itinerary.open_items
     return open_items if landing is None else open_items + landing.open_items
 
 
@@ -517,17 +518,17 @@ def _lay_out_waypoints(
     return lay_out_waypoints(source, stops, notes, _make_own_radius(limits), _make_spiral_slopes(limits), loiters)
 
 
-def _direct_landing(
+def _find_direct_landing(
     placed: PlacedMission, stops: list[PlacedStop], rules: ReturnRules, notes: Notes
 ) -> PlacedLanding | None:
-    """Return the landing sequence to which a return flies directly, or None.
+    """Return the landing sequence to which an RTL flies directly, or None.
 
-    stops: stops before the return.
+    stops: stops before the RTL.
     """
     if rules.lands != "straight" or not stops:
         return None
     east, north, up = stops[-1].position.tolist()
-    landing = _nearest_landing(placed, (east, north, up), notes)
+    landing = _find_landing(placed, (east, north, up), notes)
     if landing is None:
         return None
     distance, seq = math.dist((east, north), landing.start.place[:2]), placed.itinerary.stops[-1].item
@@ -536,10 +537,10 @@ def _direct_landing(
     return landing
 
 
-def _nearest_landing(placed: PlacedMission, position: tuple[float, float, float], notes: Notes) -> PlacedLanding | None:
-    """Return the landing sequence that a return chooses at a position (m).
+def _find_landing(placed: PlacedMission, position: tuple[float, float, float], notes: Notes) -> PlacedLanding | None:
+    """Return the landing sequence that an RTL chooses at a position (m).
 
-    Return None, with a note, if the return does not continue to that sequence.
+    Return None and add a note if the simulated RTL does not continue to that sequence.
     """
     start = nearest_landing(position, placed.landing_starts)
     landing = next((landing for landing in placed.landings if landing.start == start), None)
@@ -555,13 +556,15 @@ def _landing_choice_text(placed: PlacedMission) -> str:
     return f" (the nearest of {count}, with height differences)" if count > 1 else ""
 
 
-def _note_circles(itinerary: Itinerary, places: list[PlacedStop], loiters: LoiterRules, notes: Notes) -> None:
-    """Note the parts of the autopilot's loiters that are not flown.
+def _note_circles(itinerary: Itinerary, placed_stops: list[PlacedStop], loiters: LoiterRules, notes: Notes) -> None:
+    """Note the parts of the autopilot's loiters that are not simulated.
 
-    places: places of the mission, without a return.
+    placed_stops: stops of the mission, without an RTL.
     """
-    final_stop = places[-1].stop
-    if loiters.unflown and (itinerary.returns or any(place.stop.loiter is not None for place in places)):
+    final_stop = placed_stops[-1].stop
+    if loiters.unflown and (
+        itinerary.returns or any(placed_stop.stop.loiter is not None for placed_stop in placed_stops)
+    ):
         notes.add(loiters.unflown)
     if loiters.ends_in_circle and not itinerary.returns and itinerary.landing is None and final_stop.loiter is None:
         notes.add(loiters.end_note(), final_stop.item)
@@ -569,7 +572,7 @@ def _note_circles(itinerary: Itinerary, places: list[PlacedStop], loiters: Loite
         notes.add(loiters.before_return, final_stop.item)
 
 
-def _lay_return(
+def _append_return(
     placed: PlacedMission,
     stop: ItineraryStop,
     points: list[RoutePoint],
@@ -577,10 +580,10 @@ def _lay_return(
     limits: Limits | None,
     notes: Notes,
 ) -> tuple[dict[str, Any], PlacedLanding | None]:
-    """Add a return's waypoints to the points; return the return's fields of `Route`.
+    """Append the waypoints of an RTL to the points, and return its fields of `Route` and its landing sequence.
 
-    Also return the landing sequence that the return continues to, or None if it stays in its loiter. Raises
-    MissionError if its altitude is outside the flown range.
+    The landing sequence is None if the RTL stays in its loiter. Raises MissionError if the RTL's altitude is outside
+    the allowed range.
     """
     source, start = placed.mission.source, points[-1].position
     home, *rally = placed.return_places
@@ -601,7 +604,7 @@ def _lay_return(
         max_bank=math.radians(30.0) if limits is None else limits.max_bank,
         airspeed=stop.airspeed,
     )
-    landing = _nearest_landing(placed, target.position, notes) if rules.lands == "circle" else None
+    landing = _find_landing(placed, target.position, notes) if rules.lands == "circle" else None
     next_text = (
         "" if landing is None else f"the landing sequence at item {landing.start.item}{_landing_choice_text(placed)}"
     )
@@ -620,43 +623,45 @@ def _lay_return(
     return {"return_from": start_index, "return_to": circle}, landing
 
 
-def _with_gates(placed: PlacedMission, notes: Notes) -> list[PlacedStop]:
-    """Return a mission's places, and the gates between them where PX4 changes the airspeed.
+def _insert_gates(placed: PlacedMission, notes: Notes) -> list[PlacedStop]:
+    """Return the stops of a mission, and the gates between them at which PX4 changes the airspeed.
 
-    Each gate is placed where its plane cuts the leg, since an aircraft on its leg passes it there. The plane is
-    perpendicular to the line from the gate to the next place.
+    Each gate is placed where its plane cuts the leg, because an aircraft on the leg passes the gate there. The plane is
+    perpendicular to the line from the gate to the next stop.
     """
     placed_stops = list(placed.stops[:1])
-    for next_place in placed.stops[1:]:
-        stop, previous, last_fraction = next_place.stop, placed_stops[-1], 0.0
+    for next_stop in placed.stops[1:]:
+        stop, previous, last_fraction = next_stop.stop, placed_stops[-1], 0.0
         for index, gate in enumerate(stop.gates):
-            next_airspeed = stop.gates[index + 1].airspeed if index + 1 < len(stop.gates) else stop.airspeed_by_value
+            next_airspeed = stop.gates[index + 1].airspeed if index + 1 < len(stop.gates) else stop.px4_airspeed
             if gate.airspeed == next_airspeed or (math.isnan(gate.airspeed) and math.isnan(next_airspeed)):
                 continue
-            if not all(end.stop.loiter is None and end.stop.command in PLACES for end in (previous, next_place)):
+            if not all(
+                leg_end.stop.loiter is None and leg_end.stop.command in PLACES for leg_end in (previous, next_stop)
+            ):
                 text = "CONDITION_GATE not between waypoints: the speed after it holds from the leg's start"
                 notes.add(text, gate.item)
                 continue
             fraction = _gate_fraction(
-                previous.position, next_place.position, to_map(placed.origin, gate.lat_deg, gate.lon_deg)
+                previous.position, next_stop.position, to_map(placed.origin, gate.lat_deg, gate.lon_deg)
             )
-            gate_position = previous.position + fraction * (next_place.position - previous.position)
+            gate_position = previous.position + fraction * (next_stop.position - previous.position)
             is_apart = (
-                min(math.dist(gate_position[:2], end.position[:2]) for end in (placed_stops[-1], next_place))
+                min(math.dist(gate_position[:2], leg_end.position[:2]) for leg_end in (placed_stops[-1], next_stop))
                 >= SAME_PLACE
             )
             if last_fraction < fraction < 1.0 and is_apart:
                 last_fraction = fraction
-                at_gate = replace(
-                    stop, item=gate.item, command=int(Command.CONDITION_GATE), airspeed_by_value=gate.airspeed, gates=()
+                gate_stop = replace(
+                    stop, item=gate.item, command=int(Command.CONDITION_GATE), px4_airspeed=gate.airspeed, gates=()
                 )
-                placed_stops.append(PlacedStop(at_gate, gate_position))
-        placed_stops.append(next_place)
+                placed_stops.append(PlacedStop(gate_stop, gate_position))
+        placed_stops.append(next_stop)
     return placed_stops
 
 
 def _gate_fraction(a: Floats, b: Floats, gate: tuple[Any, Any]) -> float:
-    """Return the fraction of the leg from a to b at which a gate's plane cuts it.
+    """Return the fraction of the leg from a to b at which the plane of a gate cuts the leg.
 
     gate: east and north, m.
     """
@@ -666,20 +671,21 @@ def _gate_fraction(a: Floats, b: Floats, gate: tuple[Any, Any]) -> float:
     return 1.0 - float(gate_to_end @ gate_to_end) / length_along_normal if length_along_normal > 0.0 else 0.0
 
 
-def _with_airspeed(place: PlacedStop, default: float, by_value: bool) -> PlacedStop:
-    """Return a place with the airspeed that the autopilot reads from the mission, or the default, m/s."""
-    stated_airspeed = place.stop.airspeed_by_value if by_value else place.stop.airspeed
+def _with_airspeed(placed_stop: PlacedStop, default_airspeed: float, as_px4: bool) -> PlacedStop:
+    """Return a placed stop with the airspeed that the autopilot reads from the mission, or the default, m/s."""
+    stated_airspeed = placed_stop.stop.px4_airspeed if as_px4 else placed_stop.stop.airspeed
     return PlacedStop(
-        replace(place.stop, airspeed=default if math.isnan(stated_airspeed) else stated_airspeed), place.position
+        replace(placed_stop.stop, airspeed=default_airspeed if math.isnan(stated_airspeed) else stated_airspeed),
+        placed_stop.position,
     )
 
 
-# Relative difference beyond which a ground station's speed estimate is likely for another aircraft.
+# Relative difference beyond which a ground station's speed estimate is probably for another aircraft.
 FAR_SPEED = 0.2
 
 
 def _note_cruise_speed(mission: Mission, airspeed: float, first_stop: ItineraryStop, notes: Notes) -> None:
-    """Note a cruiseSpeed other than the default airspeed (m/s), if the default is flown to the first stop."""
+    """Note a cruiseSpeed other than the airspeed (m/s), if that is the airspeed to the first stop."""
     if mission.cruise_speed is not None and mission.cruise_speed != airspeed and first_stop.airspeed == airspeed:
         text = (
             f"cruiseSpeed {mission.cruise_speed:g} m/s is the ground station's estimate and no command:"
@@ -691,9 +697,9 @@ def _note_cruise_speed(mission: Mission, airspeed: float, first_stop: ItineraryS
 
 
 def _make_own_radius(limits: Limits | None) -> OwnRadius:
-    """Return a function for the radius of a loiter whose item states none.
+    """Return a function for the default loiter radius.
 
-    That radius is 10 % larger than the tightest turn in this wind, rounded up to 10 m.
+    That radius is 10 % larger than the tightest turn in the wind, rounded up to a multiple of 10 m.
     """
 
     def radius(airspeed: float, up: float) -> float:

@@ -1,6 +1,6 @@
 """Change the layout of a survey: longer turn-arounds, interleaved lines, or lines on another course.
 
-Items that do not belong to the survey stay as they are, and each line keeps its items, including camera commands.
+Items outside the survey are unchanged, and each line keeps its items, including camera commands.
 """
 
 import math
@@ -16,11 +16,11 @@ from flight.mission.surveys import Survey
 from world.arrays import Floats
 from world.frames import GeoOrigin, to_geo
 
-# Smallest length of a survey line on another course, m.
+# Minimum length of a survey line on another course, m.
 _MIN_LINE_LENGTH_M = 50.0
-# Largest distance of a line that is not bent from the straight line between its ends, m.
+# Maximum distance of a straight line's corners from the straight line between its ends, m.
 _BEND_TOLERANCE_M = 5.0
-# Tolerance for a lead as long as the turn-arounds, m.
+# Tolerance for the length of leads, m.
 _LEAD_LENGTH_TOLERANCE_M = 1.0
 
 
@@ -29,11 +29,11 @@ class SurveyLayout(NamedTuple):
 
     turn_around: distance from each line's end to the start of its turn, and from the turn's end to the next line's
         start, m; 0 for none.
-    every: interleave stride; 2 flies every second line first and then the others from the same side on, 3 every third.
+    every: interleave stride; 2 flies every second line first and then the others, from the same side; 3 every third.
     course: course of the lines, rad; None to keep it.
-    backwards: True to begin with the line on the other side.
-    lead_in: straight distance before the first line, m, if it exceeds ``turn_around``, since the first line is entered
-        from any direction.
+    backwards: True to start with the line on the other side.
+    lead_in: straight distance before the first line, m, if it exceeds ``turn_around``, because the entry to the first
+        line may come from any direction.
     """
 
     turn_around: float
@@ -53,10 +53,10 @@ class _Line(NamedTuple):
 class _SurveyItems(NamedTuple):
     """Indices of a survey's items in the mission's list of items.
 
-    lines: index of each line's first item, and of the item after its last one; for a line that starts without a
-        waypoint of its own, the first is the item after the one that stands there instead.
-    behind: the first item that is flown after the survey's last run.
-    before: the first item after those that are flown before the survey's first run.
+    lines: index of each line's first item, and of the item after its last one; if another item stands at the start of
+        the line, the first item is the one after it.
+    behind: index of the first item after the survey's last run.
+    before: index of the first item of the survey's first run.
     """
 
     lines: tuple[tuple[int, int], ...]
@@ -65,7 +65,7 @@ class _SurveyItems(NamedTuple):
 
 
 def turn_around_of(route: Route, survey: Survey) -> float:
-    """Return the shortest straight extension of a survey's lines beyond their photos at a turn-around, m."""
+    """Return the minimum straight extension of a survey's lines beyond their photos at a turn-around, m."""
     return min(_lead_lengths(route, survey))
 
 
@@ -77,7 +77,7 @@ def _lead_lengths(route: Route, survey: Survey) -> list[float]:
 
 
 def kept_layout(mission: Mission, route: Route, survey: Survey) -> str:
-    """Return the reason why a survey's layout cannot be changed, or "" if it can."""
+    """Return the reason why a survey's layout cannot be changed, or "" if it can be changed."""
     if any(item.command in (Command.DO_JUMP, Command.DO_JUMP_TAG, Command.JUMP_TAG) for item in mission.items):
         return "the mission jumps"
     index_by_seq = {item.seq: index for index, item in enumerate(mission.items)}
@@ -149,7 +149,7 @@ def _survey_items(mission: Mission, route: Route, survey: Survey) -> _SurveyItem
 
     lines = []
     for line in survey.lines:
-        # An item merged with the line's first waypoint stands at the same place, such as a take-off before a waypoint.
+        # An item merged with the line's first waypoint has the same position, such as a take-off before a waypoint.
         first = max(
             item_index
             for item_index in range(index(line.first), index(line.first + 1))
@@ -167,9 +167,9 @@ def _survey_items(mission: Mission, route: Route, survey: Survey) -> _SurveyItem
 
 
 def _waypoint_of_item(mission: Mission, route: Route) -> dict[int, int]:
-    """Return the waypoint of each navigation item by the item's number.
+    """Return the waypoint of each navigation item, by number of the item.
 
-    An item without a waypoint has the previous waypoint.
+    An item without a waypoint gets the previous waypoint.
     """
     waypoint_by_seq, waypoint, waypoints = {int(seq): i for i, seq in enumerate(route.items)}, 0, dict[int, int]()
     for item in mission.items:
@@ -182,11 +182,11 @@ def _waypoint_of_item(mission: Mission, route: Route) -> dict[int, int]:
 def _without_leads(
     mission: Mission, route: Route, items: Sequence[MissionItem], end: int, max_lead_length: float
 ) -> list[MissionItem]:
-    """Return the items beyond an end of a survey without its lead waypoints, which the new layout replaces.
+    """Return the items beyond an end of a survey, without its lead waypoints, which the new layout replaces.
 
-    end: the waypoint at that end.
+    end: waypoint at that end.
 
-    Waypoints further away than the turn-arounds are long belong to the transit to the survey and stay.
+    Waypoints beyond the length of the turn-arounds belong to the transit to the survey and are kept.
     """
     points, waypoint_of = route.waypoints[:, :2], _waypoint_of_item(mission, route)
 
@@ -200,7 +200,7 @@ def _without_leads(
 def _order_lines(lines: Sequence[_Line], layout: SurveyLayout) -> list[_Line]:
     """Return the lines in flying order, in alternating directions; the first line keeps its direction.
 
-    The lines of a survey that keeps its order stay as they are.
+    The lines are unchanged if the layout keeps their order.
     """
     if layout.every == 1 and layout.course is None and not layout.backwards:
         return list(lines)
@@ -223,7 +223,7 @@ def _order_lines(lines: Sequence[_Line], layout: SurveyLayout) -> list[_Line]:
 def _reverse_line(line: _Line) -> _Line:
     """Return a line in the opposite direction.
 
-    Its waypoints swap places; the commands between them stay in place.
+    Its waypoints are reversed; the commands between them keep their positions in the list.
     """
     steps = [item for item in line.items if is_navigation(item.command)]
     reversed_steps = iter(reversed(steps))
@@ -257,7 +257,7 @@ def _make_waypoint(model_item: MissionItem, position: Floats, origin: GeoOrigin)
 
 
 def _lines_on_course(lines: Sequence[_Line], survey: Survey, course: float, origin: GeoOrigin) -> list[_Line] | None:
-    """Return lines on another course over the hull of the present ones, or None if that is impossible."""
+    """Return lines on another course over the hull of the present lines, or None if that is impossible."""
     waypoint_items = [item for line in lines for item in line.items if is_navigation(item.command)]
     if len({(item.frame, item.alt) for item in waypoint_items}) != 1 or any(_is_bent(line.corners) for line in lines):
         return None
@@ -278,13 +278,13 @@ def _lines_on_course(lines: Sequence[_Line], survey: Survey, course: float, orig
         line_ends.append(np.array([offset * right + distance * direction for distance in crossings]))
     if not line_ends:
         return None
-    # The survey begins where it did before: at the nearest end of the nearest line.
+    # The survey starts near its previous start: at the nearest end of the nearest line.
     start = first_line.corners[0]
     if math.dist(line_ends[-1].mean(axis=0), start) < math.dist(line_ends[0].mean(axis=0), start):
         line_ends.reverse()
     if math.dist(line_ends[0][1], start) < math.dist(line_ends[0][0], start):
-        line_ends = [places[::-1] for places in line_ends]
-    return [_Line(places, _move_items(first_line.items, places, origin)) for places in line_ends]
+        line_ends = [ends[::-1] for ends in line_ends]
+    return [_Line(ends, _move_items(first_line.items, ends, origin)) for ends in line_ends]
 
 
 def convex_hull(points: Floats) -> Floats | None:

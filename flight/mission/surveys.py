@@ -2,8 +2,8 @@
 
 No mission item marks a survey: QGroundControl's survey and Mission Planner's grid are waypoints, with items that switch
 the camera between them. Surveys are therefore found by their geometry, whichever program wrote them: three or more
-parallel runs at equal spacing that follow each other with short links. A run is straight, or bends as its neighbors do,
-as the runs of QGroundControl's corridor scan.
+parallel runs at equal spacing with short links between them. A run is straight, or bends like its neighbors, as in
+QGroundControl's corridor scan.
 """
 
 import math
@@ -19,42 +19,42 @@ from flight.mission.route import Route
 from world.arrays import Floats
 from world.geometry import leg_courses, leg_runs
 
-# Largest course difference between a leg and the first leg of its straight run, rad.
+# Maximum course difference between a leg and the first leg of its straight run, rad.
 _MAX_RUN_BEND_RAD = math.radians(3.0)
-# Runs are parallel if their courses agree within this angle in either direction, rad.
+# Maximum course difference of parallel runs, in either direction, rad.
 _PARALLEL_TOLERANCE_RAD = math.radians(10.0)
-# Largest change of the spacing along two parallel runs, as a ratio to the spacing: it excludes the link between two
+# Maximum change of the spacing along two parallel runs, as a ratio to the spacing: it excludes the link between two
 # lines and the spokes of a hub, which touch.
 _MAX_SPACING_CHANGE_RATIO = 0.5
-# Smallest distance between neighboring lines, m.
+# Minimum distance between neighboring lines, m.
 _MIN_LINE_SPACING_M = 1.0
-# Smallest overlap of neighboring lines, as a fraction of the shorter line.
+# Minimum overlap of neighboring lines, as a fraction of the shorter line.
 _MIN_OVERLAP_FRACTION = 0.5
-# Smallest length of a line, m.
+# Minimum length of a line, m.
 _MIN_LINE_LENGTH_M = 10.0
-# Largest number of straight runs in a turn-around.
+# Maximum number of straight runs in a turn-around.
 _MAX_TURN_AROUND_RUNS = 12
-# Largest length of a turn-around, as a ratio to the longer of its two lines.
+# Maximum length of a turn-around, as a ratio to the longer of its two lines.
 _MAX_TURN_AROUND_RATIO = 2.0
-# A turn-around up to this length is accepted in any case, m: lines at the tip of a field are short.
+# Length up to which any turn-around is accepted, m: lines at the tip of a field are short.
 _SHORT_TURN_AROUND_M = 250.0
-# A parallel run is not a line if both conditions hold: a later run is nearer than this ratio of its distance,
+# A parallel run is no line if a later run is nearer than this ratio of its distance,
 _NEARER_LINE_RATIO = 0.5
-# and it is shorter than this ratio of that later run.
+# and if it is shorter than this ratio of that later run.
 _STUB_LENGTH_RATIO = 0.2
-# A line between two lines of another survey, shorter than this ratio of both, is a turn-around of that survey.
+# Ratio of lengths below which a line between two lines of another survey is a turn-around of that survey.
 _TURN_AROUND_LENGTH_RATIO = 0.5
-# Largest ratio between the spacings, and between the lengths, of successive run pairs of lines that bend.
+# Maximum ratio between the spacings, and between the lengths, of successive run pairs of lines that bend.
 _SPACING_RATIO_LIMIT = 2.0
-# Smallest number of legs in a straight run that has a lead at either end.
+# Minimum number of legs in a straight run with a lead at each end.
 _MIN_LEGS_WITH_LEADS = 3
 # Tolerance for equal leads, m.
 _LEAD_LENGTH_TOLERANCE_M = 1.0
-# Smallest number of lines with different lateral positions in a survey: there and back is not a survey.
+# Minimum number of lines with different lateral positions in a survey: a flight there and back is no survey.
 _MIN_LINES = 3
 # The same number for lines with the camera on.
 _MIN_LINES_WITH_PHOTOS = 2
-# A gap smaller than this fraction of both its neighbors is no gap, but one line flown twice.
+# Fraction of both neighboring gaps below which a gap is none, but one line flown twice.
 _DUPLICATE_LINE_FRACTION = 0.2
 # Tolerance for equal distances between photos, m: ground stations write this distance in single precision.
 _PHOTO_SPACING_TOLERANCE_M = 0.01
@@ -63,10 +63,10 @@ _PHOTO_SPACING_TOLERANCE_M = 0.01
 class PhotoLine(NamedTuple):
     """A line along which photos are taken.
 
-    first, last: index of its first and last waypoint; its own legs are first to last - 1.
-    begins, ends: index of the first and last waypoint of the run it is part of, which may extend beyond the line.
+    first, last: index of the first and last waypoint; the legs of the line are first to last - 1.
+    begins, ends: index of the first and last waypoint of the line's run, which may extend beyond the line.
     photo: distance between photos, m; 0 if no item states it.
-    switched_on, switched_off: True if its first waypoint switches the camera on, and its last one switches it off.
+    switched_on, switched_off: True if the first waypoint switches the camera on, and if the last one switches it off.
     """
 
     first: int
@@ -95,7 +95,7 @@ class Survey:
 
     @property
     def first(self) -> int:
-        """Index of the waypoint at which the survey begins."""
+        """Index of the waypoint at which the survey starts."""
         return self.lines[0].first
 
     @property
@@ -104,7 +104,7 @@ class Survey:
         return self.lines[-1].last
 
     def line(self, number: int) -> PhotoLine:
-        """Return the line with this number in flying order."""
+        """Return a line by its number in flying order."""
         return self.lines[number]
 
     def has_leg(self, leg: int) -> bool:
@@ -115,24 +115,24 @@ class Survey:
         return self.lines[0].begins - 1 <= leg <= self.lines[-1].ends
 
     def takes_photos(self) -> bool:
-        """Return True if items of the mission switch the camera on its lines."""
+        """Return True if items of the mission switch the camera on the survey's lines."""
         return any(line.switched_on or line.switched_off or line.photo > 0.0 for line in self.lines)
 
     def turn_arounds(self) -> list[tuple[int, int]]:
-        """Return the waypoints at which each turn-around begins and ends."""
+        """Return the first and last waypoint of each turn-around."""
         return [(line.last, following.first) for line, following in zip(self.lines[:-1], self.lines[1:], strict=True)]
 
     def ways_onto_lines(self) -> list[tuple[int, int]]:
         """Return the turn-arounds, the entry to the first line and the exit of the last line.
 
-        Each is a pair of waypoints, between which the autopilot chooses the path.
+        Each is a pair of waypoints between which the autopilot chooses the path.
         """
         first_line, last_line = self.lines[0], self.lines[-1]
         return [(first_line.begins, first_line.first), *self.turn_arounds(), (last_line.last, last_line.ends)]
 
 
 class LineAxis:
-    """Along-track and cross-track coordinates of a line, which is extended straight beyond both ends."""
+    """Along-track and cross-track coordinates of a line that is extended straight beyond both ends."""
 
     def __init__(self, corners: Floats) -> None:
         """Set up the axis of a line through corners (k, 2 or 3) m, k at least 2."""
@@ -143,16 +143,16 @@ class LineAxis:
         self.along = np.concatenate([[0.0], np.cumsum(self._lengths)])
         self.length = float(self.along[-1])
 
-    def of(self, places: Floats) -> tuple[Floats, Floats, Floats]:
+    def of(self, points: Floats) -> tuple[Floats, Floats, Floats]:
         """Project points (n, 2 or 3) on the line.
 
         Return the points' distances along the line and to its right, m, and the line's course next to them, rad.
         """
-        min_distance = np.full(len(places), np.inf)
-        coordinates = np.zeros((3, len(places)))
+        min_distance = np.full(len(points), np.inf)
+        coordinates = np.zeros((3, len(points)))
         for index, (direction, length) in enumerate(zip(self._units, self._lengths, strict=True)):
             along, across = _along_and_right(
-                places[:, :2] - self.corners[index, :2], math.atan2(direction[0], direction[1])
+                points[:, :2] - self.corners[index, :2], math.atan2(direction[0], direction[1])
             )
             min_along = -math.inf if index == 0 else 0.0
             max_along = math.inf if index == len(self._lengths) - 1 else length
@@ -167,7 +167,7 @@ class LineAxis:
         return coordinates[0], coordinates[1], coordinates[2]
 
     def at(self, along: Floats) -> Floats:
-        """Return the points (n, 2 or 3) m on the line at given distances along it."""
+        """Return the points (n, 2 or 3) m on the line at distances along it, m."""
         columns = [np.interp(along, self.along, self.corners[:, axis]) for axis in range(self.corners.shape[1])]
         return np.stack(columns, axis=1)
 
@@ -175,24 +175,24 @@ class LineAxis:
 def camera_spacing(mission: Mission, route: Route) -> Floats:
     """Return the distance between photos on the leg that begins at each waypoint, (w,) m.
 
-    It is 0 with the camera off, and NaN if the camera is on without a stated distance. Items after a waypoint's item
-    switch the camera as soon as the waypoint is reached. If several items lead to a waypoint by jumps, the legs to it
-    are assigned to the waypoint's own item.
+    The distance is 0 with the camera off, and NaN if the camera is on without a stated distance. Items after a
+    waypoint's item switch the camera as soon as the waypoint is reached. If several items lead to a waypoint by jumps,
+    the legs to it are assigned to the waypoint's own item.
     """
     route_items = set(route.items.tolist())
-    spacing_after, spacing, place_seq = dict[int, float](), 0.0, None
+    spacing_after, spacing, waypoint_seq = dict[int, float](), 0.0, None
     for item in mission.items:
         if is_navigation(item.command):
-            # An item that is flown without a place of its own belongs to the place before it.
-            place_seq = item.seq if item.seq in route_items else place_seq
+            # An item without a waypoint of its own belongs to the previous waypoint.
+            waypoint_seq = item.seq if item.seq in route_items else waypoint_seq
         elif item.command == Command.DO_SET_CAM_TRIGG_DIST:
             spacing = max(0.0, item.params[0]) if math.isfinite(item.params[0]) else 0.0
         elif item.command in (Command.IMAGE_START_CAPTURE, Command.VIDEO_START_CAPTURE):
             spacing = math.nan
         elif item.command in (Command.IMAGE_STOP_CAPTURE, Command.VIDEO_STOP_CAPTURE):
             spacing = 0.0
-        if place_seq is not None:
-            spacing_after[place_seq] = spacing
+        if waypoint_seq is not None:
+            spacing_after[waypoint_seq] = spacing
     spacings, current_spacing = np.zeros(len(route.items)), 0.0
     for i, seq in enumerate(route.items.tolist()):
         current_spacing = spacing_after.get(seq, current_spacing)
@@ -201,7 +201,7 @@ def camera_spacing(mission: Mission, route: Route) -> Floats:
 
 
 def survey_plan(mission: Mission, survey: Survey) -> SurveyPlan | None:
-    """Return the survey settings that the mission's author stored for a survey, or None if there are none.
+    """Return the survey settings that the mission's author stored for a survey, or None.
 
     They are identified by the distance between photos. If no stored survey, or more than one, has that distance, the
     settings for any survey are returned.
@@ -221,8 +221,7 @@ def find_surveys(route: Route, camera: Floats, turn_arounds: Sequence[tuple[floa
     """Find the surveys of a route, in flying order.
 
     camera: (w,) from `camera_spacing`.
-    turn_arounds: pairs that a ground station states: the distance between photos, m, and the length of a line beyond
-        its photos, m.
+    turn_arounds: pairs of a ground station: distance between photos, m, and length of a line beyond its photos, m.
 
     >>> lines = [[0, 0], [0, 900], [60, 900], [60, 0], [120, 0], [120, 900]]
     >>> points = np.array([[*place, 100.0] for place in lines], dtype=float)
@@ -279,7 +278,7 @@ _Line = tuple[int, int]
 class _Runs:
     """Straight runs of a route in flying order, addressed by index.
 
-    Results for pairs of runs are cached: each pair is looked up again from every possible start of a survey, and a
+    Results for pairs of runs are cached, because each pair is looked up from every possible start of a survey, and a
     mission whose items are flown a hundred times has as many starts.
     """
 
@@ -319,7 +318,7 @@ class _Runs:
         return self._spacings[run, other_run]
 
     def following(self, run: int) -> list[int]:
-        """Return the runs that can be the next line after a run, or its first part, in flying order."""
+        """Return the runs that can be the next line after a run, or the first part of that line, in flying order."""
         if run not in self._following:
             self._following[run] = self._search_following(run)
         return self._following[run]
@@ -349,7 +348,7 @@ class _Runs:
 
 
 def _find_chain(runs: _Runs, start: int) -> list[_Line]:
-    """Return the lines of a survey that begins with a run, or slightly before or after it."""
+    """Return the lines of a survey that starts at a run, or slightly before or after it."""
     chain = _follow_lines(runs, start)
     if len(chain) > 1:
         # The entry to the first line may be parallel to the second line.
@@ -377,7 +376,7 @@ def _is_turn_around(chain: Sequence[_Line], line: _Line, runs: _Runs) -> bool:
 
 
 def _follow_lines(runs: _Runs, start: int) -> list[_Line]:
-    """Return the lines of a chain that starts at a run; the first line may begin before that run."""
+    """Return the lines of a chain that starts at a run; the first line may start before that run."""
     chain = [(start, start)]
     while True:
         first_run, last_run = chain[-1]
@@ -398,7 +397,7 @@ def _follow_lines(runs: _Runs, start: int) -> list[_Line]:
 
 
 def _stay_parallel(runs: _Runs, run: int, next_run: int, bend_count: int) -> bool:
-    """Return True if two lines joined by a turn-around are still parallel ``bend_count`` runs away from it."""
+    """Return True if two lines are still parallel ``bend_count`` runs before and after their turn-around."""
     run_before, run_after = run - bend_count, next_run + bend_count
     if (
         run_before < 0
@@ -441,7 +440,7 @@ def _run_spacing(points: Floats, own_run: tuple[int, int], other_run: tuple[int,
 def _make_survey(
     runs: _Runs, chain: Sequence[_Line], camera: Floats, turn_arounds: Sequence[tuple[float, float]]
 ) -> Survey | None:
-    """Build the survey of some lines; return None if too few of them have lateral positions of their own."""
+    """Build a survey from lines, or return None if they have too few different lateral positions."""
     points, (run_start, run_end) = runs.points, runs.ends(chain[0])
     offsets = LineAxis(points[run_start : run_end + 1]).of(np.array([runs.midpoint(line) for line in chain]))[1]
     gaps = _line_gaps(np.sort(offsets))
@@ -450,7 +449,7 @@ def _make_survey(
     lines = tuple(_camera_part(runs.ends(line), camera) for line in chain)
     if len(gaps) + 1 < _MIN_LINES and not all(line.photo > 0.0 for line in lines):
         return None
-    # A camera that is off between lines shows where they begin.
+    # A camera that is off between lines shows where they start.
     has_photos = any((camera[line.first : line.last] != 0.0).any() for line in lines)
     line_pairs = pairwise(lines)
     if not has_photos or all((camera[line.last : following.first] != 0.0).all() for line, following in line_pairs):
@@ -493,8 +492,8 @@ def _without_leads(
 ) -> tuple[PhotoLine, ...]:
     """Return the lines without their lead-in and lead-out legs, where the camera does not separate them.
 
-    Leads have the length that the ground station states. If it states none, end legs are leads if all lines have
-    equally long ones, since a turn-around has one length.
+    Leads have the length that the ground station states. If it states none, end legs are leads if they are equally long
+    on all lines, because all turn-arounds of a survey have one length.
     """
     for photo_spacing, lead in turn_arounds:
         if abs(photo_spacing - lines[0].photo) <= _PHOTO_SPACING_TOLERANCE_M and lead > 0.0:

@@ -37,7 +37,7 @@ from world.files import TextLine
 
 # First line of the file.
 HEADER = "QGC WPL 110"
-# Largest number of lines in a file, comments and empty lines included: ten per item.
+# Maximum number of lines in a file, comments and empty lines included: ten per item.
 MAX_LINES = 10 * MAX_ITEMS
 
 # Columns of a line.
@@ -73,7 +73,7 @@ _ALLOWED_RANGES = {
 
 @dataclass(frozen=True, slots=True)
 class _Row:
-    """One line of the file, as numbers."""
+    """Numbers of one line of the file."""
 
     where: TextLine
     current: bool
@@ -180,7 +180,7 @@ def _parse_number(where: TextLine, name: str, text: str) -> float:
 
 
 def _renumbered_rows(rows: list[_Row]) -> list[_Row]:
-    """Return the rows with items numbered by their lines; without a home line the first is number 1."""
+    """Return the rows with items numbered by their lines; without a home line the first item is number 1."""
     first_number = 0 if _begins_with_home(rows) or rows[0].item.command in _COMMANDS_WITH_OWN_FILES else 1
     return [replace(row, item=replace(row.item, seq=seq)) for seq, row in enumerate(rows, first_number)]
 

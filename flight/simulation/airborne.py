@@ -1,7 +1,7 @@
 """Simulate an aircraft for any autopilot, with its start, ground, wind and time limit.
 
-`flight.simulation.simulate.Flight` steers it by an autopilot's control law, a `flight.autopilots.program.ProgramFlight`
-by a program of its own.
+In a `flight.simulation.simulate.Flight` a simulated autopilot controls the aircraft, in a
+`flight.autopilots.program.ProgramFlight` an external program.
 """
 
 import math
@@ -32,17 +32,17 @@ from world.kernels import Records
 from world.random_streams import NAVIGATION, TURBULENCE, stream
 from world.wind import W20
 
-# Time limit of a flight, as a multiple of its length at its lowest ground speed.
-PATIENCE = 1.5
+# Time limit of a flight, as a multiple of the time for its length at its lowest ground speed.
+TIME_LIMIT_FACTOR = 1.5
 # Time added to that limit, s.
-PATIENCE_SECONDS = 60.0
+TIME_LIMIT_BASE_S = 60.0
 
 
 class Airborne(ABC):
     """One flight in progress, advanced by `block`.
 
     dt: duration of a tick, s.
-    setup: the flight's setup, with the program that flies it once that is known.
+    setup: setup of the flight, with the program that flies once that is known.
     path: reference path.
     map: local map from JSBSim's positions, around area and route.
     memory: memory of the guidance, a record of `flight.guidance.inner_loops.GUIDANCE_MEMORY`.
@@ -65,9 +65,9 @@ class Airborne(ABC):
     ) -> None:
         """Load the aircraft, and start the flight.
 
-        local_map: local map of the setup, if another flight of it has fitted one already.
+        local_map: local map of the setup, if another flight has already fitted one.
         start_offset: east, north and up from the route's first waypoint to the start of the flight, m.
-        gear: gear for ground contact; None for a flight without any.
+        gear: gear for ground contact; None for a flight without ground contact.
         """
         self._start_offset = start_offset
         self._ground = Ground(setup.scenario.terrain)
@@ -88,7 +88,7 @@ class Airborne(ABC):
     def _lay_out(self, setup: FlightSetup, aircraft: Aircraft, local_map: LocalMap) -> None:
         """Make the workspace for a route, and set the time limit of the flight."""
         self.setup, self.map = setup, local_map
-        # An autopilot with its own turn law does not follow the arcs after waypoints that are flown over.
+        # An autopilot with its own turns does not follow the arcs after fly-over waypoints.
         follows_arcs = setup.autopilot.follows_path and setup.autopilot.keeps_to_arcs
         follows_arcs = follows_arcs or not setup.route.fly_over.any()
         self.path = (
@@ -109,14 +109,14 @@ class Airborne(ABC):
         self._work.settings.middle = self.map.middle
         self._work.settings.battery = setup.battery
         length = self.path.length + _extra_loiter_length(setup, waypoints)
-        time_limit = PATIENCE * length / _min_ground_speed(setup, self._airspeeds) + PATIENCE_SECONDS
-        # A loiter for a time lasts as long as its item states, whatever circle is laid out for it.
+        time_limit = TIME_LIMIT_FACTOR * length / _min_ground_speed(setup, self._airspeeds) + TIME_LIMIT_BASE_S
+        # A loiter for a time lasts as long as its item states, whatever circle the path has for it.
         timed_loiters = waypoints[(waypoints["stays"] > 0.0) & (waypoints["stays"] < math.inf)]
         time_limit += sum(
             dict(zip(timed_loiters["item"].tolist(), timed_loiters["stays"].tolist(), strict=True)).values()
         )
         if setup.route.return_to is not None:
-            # An autopilot that returns by its own control law may loiter longer than the path does.
+            # An autopilot that flies an RTL by its own control law may loiter longer than the path does.
             radius_factor = true_by_equivalent(setup.route.return_to.up) ** 2
             time_limit += longest_circling(radius_factor * setup.route.return_to.radius)
         if waypoints["ends"][-1]:
@@ -153,26 +153,26 @@ class Airborne(ABC):
             start_navigation(self._navigation_random.standard_normal(6), work.navigation)
 
     def _find_start(self, setup: FlightSetup) -> Start:
-        """Return the start of the route. Raises StartError if it is not above the terrain."""
+        """Return the start of the route. Raises StartError if the start is not above the terrain."""
         airspeed = float(self._airspeeds[0])
         return find_start(setup, self.map, self._ground, self.fdm.aircraft, airspeed, self._start_offset)
 
     def _start_trimmed(self, source: str, start: Start) -> Trim:
-        """Start trimmed, in the start's wind. Raises StartError if that is not possible."""
+        """Start the aircraft trimmed, in the wind of the start. Raises StartError if that is not possible."""
         trimmed = start_trimmed(self.fdm, source, start)
         self._work.commands = tuple(trimmed.commands())
         self._work.air.wind_north, self._work.air.wind_east = start.wind[:2]
         return trimmed
 
     def block(self, count: int) -> tuple[Rows, str]:
-        """Fly up to ``count`` ticks, and return their rows and the reason why the flight ended, "" if it continues."""
+        """Fly up to ``count`` ticks, and return their rows and the reason for the flight's end, "" if it continues."""
         row_blocks: list[Rows] = []
-        ended = ""
-        while count > 0 and not ended:
-            rows, ended = self._fill_workspace(min(count, BLOCK_TICKS))
+        end_reason = ""
+        while count > 0 and not end_reason:
+            rows, end_reason = self._fill_workspace(min(count, BLOCK_TICKS))
             row_blocks.append(rows)
             count -= BLOCK_TICKS
-        return (row_blocks[0] if len(row_blocks) == 1 else join_rows(row_blocks)), ended
+        return (row_blocks[0] if len(row_blocks) == 1 else join_rows(row_blocks)), end_reason
 
     def _fill_workspace(self, count: int) -> tuple[Rows, str]:
         """Fly up to ``count`` ticks, at most one workspace of rows; return values as for `block`."""
@@ -191,7 +191,7 @@ class Airborne(ABC):
         return rows, ""
 
     def _timeout_text(self) -> str:
-        """Describe a flight that exceeded its time limit, either in a loiter at an item or elsewhere."""
+        """Return the end reason of a flight that exceeded its time limit, in a loiter at an item or elsewhere."""
         route, next_waypoint = self.setup.route, min(int(self.memory.leg) + 1, self.setup.route.legs)
         time_text = f"not finished after {self.max_ticks * self.dt:.0f} s"
         if route.arcs[next_waypoint] > 0.0 and route.return_from < 0:
@@ -200,11 +200,11 @@ class Airborne(ABC):
 
 
 def _extra_loiter_length(setup: FlightSetup, waypoints: Records) -> float:
-    """Return the extra length (m) of loiters too tight for the bank limit, beyond their laid-out length.
+    """Return the extra length of loiters that are too tight for the bank limit, beyond their length in the path, m.
 
     An autopilot that steers to a loiter's center flies around the center at the radius that the bank limit requires,
-    and once more until the next waypoint lies ahead. Loiters that cannot be flown in this wind add nothing: no time
-    limit is long enough.
+    and once more until the next waypoint lies ahead. A loiter that cannot be flown in the wind adds nothing, because
+    no time limit is long enough.
 
     waypoints: waypoints of the route, (w,) of `flight.guidance.lateral_reference_laws.WAYPOINT`.
     """
@@ -212,10 +212,10 @@ def _extra_loiter_length(setup: FlightSetup, waypoints: Records) -> float:
         return 0.0
     extra_lengths = dict[int, float]()
     circles = waypoints[waypoints["circle"] != 0.0]
-    # Waypoints of one loiter that agree in these fields are processed once.
+    # Process waypoints of one loiter that agree in these fields only once.
     first_indices = np.unique(circles[["item", "circle", "airspeed", "up"]], return_index=True)[1]
     for waypoint in circles[first_indices]:
-        drawn_radius, speed, altitude = (
+        path_radius, speed, altitude = (
             abs(float(waypoint["circle"])),
             float(waypoint["airspeed"]),
             float(waypoint["up"]),
@@ -223,10 +223,10 @@ def _extra_loiter_length(setup: FlightSetup, waypoints: Records) -> float:
         flown_radius = max(
             setup.limits.turn_radius(course, course + math.pi, altitude, speed) for course in (0.0, math.pi)
         )
-        # Autopilots keep an equivalent airspeed: the true airspeed is higher in thinner air.
+        # Autopilots hold an equivalent airspeed: the true airspeed is higher in thinner air.
         flown_radius *= true_by_equivalent(altitude) ** 2
-        if drawn_radius < flown_radius < math.inf and not waypoint["returns"]:
-            extra_length = 2.0 * math.pi * (float(waypoint["turns"]) * (flown_radius - drawn_radius) + flown_radius)
+        if path_radius < flown_radius < math.inf and not waypoint["returns"]:
+            extra_length = 2.0 * math.pi * (float(waypoint["turns"]) * (flown_radius - path_radius) + flown_radius)
             extra_lengths[int(waypoint["item"])] = max(extra_length, extra_lengths.get(int(waypoint["item"]), 0.0))
     return sum(extra_lengths.values())
 

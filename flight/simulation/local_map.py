@@ -16,8 +16,8 @@ from world.terrain import Terrain
 
 # Margin of the local map around the area and the route, m.
 MAP_BUFFER = 5000.0
-# Largest errors of the local map that a flight accepts, m and rad.
-WORST = (0.01, 1e-6)
+# Maximum errors of the local map, m and rad.
+MAX_MAP_ERRORS = (0.01, 1e-6)
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,7 +26,7 @@ class LocalMap:
 
     position: (latitude, longitude) to (east, north).
     angle: (latitude, longitude) to the map course of true north (rad), and 0.
-    middle: longitude of its center, rad; longitudes are taken within half a turn of it.
+    middle: longitude of the map's center, rad; longitudes are normalised to within pi of it.
     """
 
     position: PolyMap
@@ -35,7 +35,7 @@ class LocalMap:
 
     @staticmethod
     def around(setup: FlightSetup) -> "LocalMap":
-        """Fit the area and the route with a margin of `MAP_BUFFER`.
+        """Fit a local map around the area and the route, with a margin of `MAP_BUFFER`.
 
         The error is 0.1 mm and 1e-9 rad on areas up to 600 km wide. Raises FlightError if the map cannot be fitted, as
         for an area around a pole.
@@ -69,10 +69,10 @@ class LocalMap:
 
         middle = float((bounds[1, 0] + bounds[1, 1]) / 2)
         local = LocalMap(fit_polymap(position, bounds, 1e-4), fit_polymap(angle, bounds, 1e-9), middle)
-        if not (local.position.residual <= WORST[0] and local.angle.residual <= WORST[1]):
+        if not (local.position.residual <= MAX_MAP_ERRORS[0] and local.angle.residual <= MAX_MAP_ERRORS[1]):
             raise FlightError(
                 f"{setup.mission.source}: the area is too large to fly in: its map is out by"
-                f" {local.position.residual:.2g} m; {WORST[0]:g} m is allowed",
+                f" {local.position.residual:.2g} m; {MAX_MAP_ERRORS[0]:g} m is allowed",
                 file=setup.mission.source,
             )
         return local
@@ -84,7 +84,7 @@ class LocalMap:
 
 
 class Ground:
-    """Terrain for the compiled tick; unknown ground is a raster without data.
+    """Terrain for the compiled tick; without terrain, a raster without data.
 
     known: True if there is terrain.
     heights: (rows, cols) m.
@@ -97,7 +97,7 @@ class Ground:
         self.heights: Heights
         if terrain is None:
             self.heights, self.to_pixel = np.full((2, 2), np.nan, dtype=np.float32), _map_outside_raster()
-            # Lock it like a terrain's array: locked and other arrays are different types for a compiled function.
+            # Lock it like a terrain's array, because locked arrays are a different type for compiled code.
             self.heights.setflags(write=False)
         else:
             self.heights, self.to_pixel = terrain.heights, terrain.to_pixel
@@ -108,9 +108,9 @@ class Ground:
 
 
 def _map_outside_raster() -> PolyMap:
-    """Return a map that takes every position to a pixel outside every raster."""
+    """Return a map from every position to a pixel outside any raster."""
 
-    def nowhere(x: Floats, y: Floats) -> tuple[Floats, Floats]:
+    def outside_pixel(x: Floats, y: Floats) -> tuple[Floats, Floats]:
         return np.full_like(x, -9.0), np.full_like(y, -9.0)
 
-    return fit_polymap(nowhere, [[-1.0, 1.0], [-1.0, 1.0]], 1e-6)
+    return fit_polymap(outside_pixel, [[-1.0, 1.0], [-1.0, 1.0]], 1e-6)

@@ -29,10 +29,10 @@ from world.scenario_tables import Navigation
 # 1013.25 hPa level. "unstated": the log does not say.
 VerticalDatum = Literal["amsl", "ellipsoid", "pressure", "unstated"]
 
-# Data that rules need in addition to time and position.
+# Kinds of data that rules require in addition to time and position.
 Quantity = Literal["attitude", "airspeed", "wind", "battery", "throttle", "heights", "velocity"]
 
-# Reason why a stretch ended: a mode change, the end of the log, or the landing.
+# End reason of a stretch: a mode change, the end of the log, or the landing.
 StretchEnd = Literal["mode", "log", "landed"]
 
 
@@ -42,8 +42,8 @@ class MissionStretch:
 
     start, end: s on the log's clock.
     mode: the vehicle's name for the mode, "" for a log without modes.
-    ended: reason why it ended.
-    next_mode: the next mode, "" if there was none.
+    ended: reason for the end.
+    next_mode: next mode; "" without a next mode.
     """
 
     start: float
@@ -55,7 +55,7 @@ class MissionStretch:
 
 @dataclass(frozen=True, slots=True)
 class HeightOffset:
-    """Offset of another altitude in the log from the altitude used, m, at the start of the judged flight."""
+    """Offset of another altitude in the log from the one in use, m, at the start of the judged flight."""
 
     name: str
     offset: float
@@ -92,7 +92,7 @@ class Damage:
 
     @property
     def lossy(self) -> bool:
-        """True if anything but the file's end is lost."""
+        """True if more than the file's end is lost."""
         return self.places > 0 or self.unreadable > 0
 
 
@@ -126,10 +126,10 @@ class Gap:
 class MissingItems:
     """Items of a mission that its log lacks, or stores in an unusable form.
 
-    numbers: numbers of those items, rising, as in the judged mission.
+    numbers: numbers of the missing items, increasing, as in the judged mission.
     total: number of the mission's items, including home if the autopilot counts it; 0 if the log does not say.
-    first, last: numbers of the first and last judged item; all between them are judged too.
-    end: the highest known number.
+    first, last: numbers of the first and last judged item; all items between them are judged.
+    end: highest known number of an item.
     """
 
     numbers: tuple[int, ...]
@@ -150,22 +150,22 @@ class ImportedLog:
 
     file: name of the file.
     sha256: SHA-256 of its bytes.
-    format: format name for people.
-    program: program that flew, "" if the log does not say.
+    format: title of the file format.
+    program: program that flew; "" if the log does not say.
     utc_start: s since 1970 at time 0; NaN if unknown.
     holds: kinds of data that the log contains in addition to times and positions.
-    stretches: the judged stretches; the rest is only shown.
-    heights: the altitude that is used.
+    stretches: the judged stretches; other parts are only shown.
+    heights: source of the altitude in use.
     wind: source of the wind: "XKF2", "" for none.
     mission: source of the mission: "CMD of the log, at 22.4 s", or a file.
-    missing: items of that mission that the log lacks; None if it is judged in full.
+    missing: items of that mission that the log lacks; None if the whole mission is judged.
     plan_heights: True if the mission states altitudes.
-    aircraft_known: True if the aircraft was named; otherwise no limits of an aircraft are applied.
-    begins_in_flight: True if the log begins after the flight did.
+    aircraft_known: True if the aircraft was named; otherwise no aircraft limits apply.
+    begins_in_flight: True if the log starts during the flight.
     gaps: pauses between rows, over all imported data.
     faults: faults of its rows.
     damage: unreadable parts of the file.
-    notes: further facts that a person should know, in sentences.
+    notes: further facts for the user, in sentences.
 
     >>> ImportedLog("a.BIN", "", "ArduPilot dataflash log", "ArduPlane V4.6.0", holds=("attitude",)).holds
     ('attitude',)
@@ -204,11 +204,11 @@ class FlightSetup:
     scenario: the world, and the requirements for the flight.
     mission: the mission, as read or exported.
     route: the waypoints that result from the mission.
-    limits: limits of scenario and aircraft together, made where the aircraft is loaded.
-    aircraft: its name in the catalog, or its folder.
+    limits: limits of scenario and aircraft together.
+    aircraft: name in the catalog, or folder.
     battery: energy that the aircraft carries, Wh.
-    seed: seed of the flight; the turbulence's stream comes from it unless the scenario's wind has its own.
-    plan: None for a mission from outside.
+    seed: seed of the flight, and of the turbulence unless the scenario's wind has its own seed.
+    plan: plan of the mission; None for a mission from elsewhere.
     autopilot: the autopilot with its settings.
     nav: accuracy of the navigation, a key of `flight.guidance.navigation_error.ERRORS`.
     guidance_hz: guidance ticks per second, and track rows per second.
@@ -240,7 +240,7 @@ class FlightSetup:
 
     @property
     def name(self) -> str:
-        """Stem for names of files: the scenario of a plan, the file of a mission."""
+        """Stem for file names: name of a plan's scenario, or of a mission's file."""
         return self.scenario.name if self.plan is not None else Path(self.mission.source).stem
 
     @property
@@ -250,12 +250,12 @@ class FlightSetup:
 
     @property
     def corridor(self) -> float:
-        """Half width of the corridor about the legs that the flight must stay in, m."""
+        """Half width of the corridor along the legs in which the flight must stay, m."""
         return corridor_half_width(self.scenario.limits.corridor_m, self.autopilot.acceptance_radius)
 
     @property
     def airspeed(self) -> float:
-        """Airspeed until the mission sets another, m/s."""
+        """Airspeed until the mission sets another one, m/s."""
         return self.limits.airspeed
 
     @property
@@ -271,7 +271,7 @@ class FlightSetup:
 
     @property
     def ground_ways(self) -> GroundWays:
-        """Take-off and landing that are flown; empty for an autopilot that flies neither."""
+        """Take-off and landing of the flight; empty for an autopilot that flies neither."""
         has_ground_ends = self.scenario.launch is not None or self.scenario.landing is not None
         if self.source is not None or not has_ground_ends:
             return GroundWays()
@@ -287,17 +287,17 @@ class FlightSetup:
 
     @property
     def slowest_launched(self) -> float:
-        """Minimum level-flight speed at the route's start, m/s, which is the launch speed if none is stated."""
+        """Minimum level-flight speed at the start of the route, m/s: the default launch speed."""
         return self.envelope.level_speeds(float(self.route.waypoints[0, 2]))[0]
 
     @property
     def shown_waypoints(self) -> Floats:
-        """The route's waypoints (w, 3) m for pictures and tables, with flown ends on the ground."""
+        """Waypoints of the route for pictures and tables, (w, 3) m, with the ends on the ground that are flown."""
         return shown_waypoints(self.route, self.ground_ways)
 
     @property
     def started(self) -> str:
-        """Description of the flight's start, and reason why a launch or a landing of its scenario is not flown."""
+        """Description of the flight's start, with the reasons why the scenario's launch or landing is not flown."""
         ways, started = self.ground_ways, self.route.started
         if ways.take_off is not None:
             started = ways.take_off.described()
@@ -309,13 +309,13 @@ class FlightSetup:
         return flown_notes(self.route, self.ground_ways)
 
     def in_scenario(self, scenario: Scenario) -> "FlightSetup":
-        """Return the same flight in another scenario, with unchanged route, limits and path."""
+        """Return a copy of the setup in another scenario, with the same route, limits and path."""
         setup = copy.copy(self)
         object.__setattr__(setup, "scenario", scenario)
         return setup
 
     def turned_to_other_side(self) -> "FlightSetup":
-        """Return a copy that turns the long way round at each course reversal."""
+        """Return a copy of the setup with the longer turn at each course reversal."""
         setup = copy.copy(self)
         path = fly_by_path(self.route, self.limits, self.scenario.terrain, swing="long")
         object.__setattr__(setup, "path", path)
@@ -323,10 +323,10 @@ class FlightSetup:
 
 
 def make_limits(scenario: Scenario, envelope: Envelope, airspeed: float, max_bank: float) -> Limits:
-    """Return the limits of a path: the scenario's limits, or the aircraft's limits if it states none.
+    """Return the limits of a path: the limits of the scenario, or those of the aircraft if it states none.
 
     airspeed: m/s.
-    max_bank: rad; the smaller of it and the envelope's limit applies.
+    max_bank: rad; the limit of the envelope applies if it is smaller.
 
     >>> from aircraft.catalog import load_aircraft
     >>> from flight.dynamics.envelope_tables import load_envelope
@@ -336,15 +336,15 @@ def make_limits(scenario: Scenario, envelope: Envelope, airspeed: float, max_ban
     (60.0, 0.5, False)
     """
 
-    def number(value: float | str) -> float | None:
+    def limit_in_rad(value: float | str) -> float | None:
         return None if isinstance(value, str) else math.radians(value)
 
-    table = scenario.limits
+    scenario_limits = scenario.limits
     return Limits(
-        max_turn=number(table.max_turn_deg),
-        max_climb=number(table.max_climb_deg),
-        max_dive=number(table.max_dive_deg),
-        min_clearance=table.min_clearance_m,
+        max_turn=limit_in_rad(scenario_limits.max_turn_deg),
+        max_climb=limit_in_rad(scenario_limits.max_climb_deg),
+        max_dive=limit_in_rad(scenario_limits.max_dive_deg),
+        min_clearance=scenario_limits.min_clearance_m,
         envelope=envelope,
         airspeed=airspeed,
         max_bank=min(max_bank, envelope.max_bank),

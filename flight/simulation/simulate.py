@@ -1,4 +1,4 @@
-"""Fly JSBSim under guidance along a route and over its terrain until the flight's end or failure."""
+"""Fly JSBSim with a simulated autopilot along a route and over its terrain, until the flight ends."""
 
 import math
 import struct
@@ -27,7 +27,7 @@ from flight.simulation.track import Rows, Track, as_track, join_rows
 from world.errors import FlightError, StartError
 
 # ----------------------------------------------------------------------
-# The flight loop: read JSBSim, do a tick, set JSBSim and step it, with as little Python in between as possible.
+# The flight loop: read JSBSim, do a tick, set JSBSim and step it, with as little Python as possible.
 
 
 def make_loop(
@@ -38,7 +38,7 @@ def make_loop(
     step_model: Callable[[], object],
     steps: int,
 ) -> Callable[[int], int]:
-    """Return a function that flies up to a number of ticks and returns 0, or a status if the flight ended.
+    """Return a function that flies up to a number of ticks, and returns 0 or the status of the flight's end.
 
     getters: getters of the state, in the order of `flight.simulation.tick.READ_FIELDS`.
     setters: setters of the outputs, in the order of `flight.simulation.tick.OUTPUT`.
@@ -132,9 +132,9 @@ def make_loop(
 
 # Tick of the usual guidance, s; `Flight.dt` is the tick of one flight.
 TICK = 1.0 / 60.0
-# Duration of the rows that `simulate` yields at a time, s.
+# Duration of the rows of a block from `simulate`, s.
 BLOCK = 1.0
-# Bank that guidance may add to the bank of planned turns to correct an error, rad.
+# Bank that guidance may add to the bank of planned turns in order to correct an error, rad.
 BANK_RESERVE = math.radians(3.0)
 # Time added to the limit of a flight that takes off or lands, s.
 GROUND_PATIENCE = 120.0
@@ -142,11 +142,11 @@ GROUND_PATIENCE = 120.0
 
 @dataclass(frozen=True, slots=True)
 class SimulatedFlight:
-    """A flight that is over.
+    """A flight that has ended.
 
-    track: the flown track.
+    track: flown track.
     ended: "completed", or the reason why the flight ended earlier.
-    path: the path to follow.
+    path: reference path.
     """
 
     track: Track
@@ -159,7 +159,7 @@ class FlightBlock(NamedTuple):
 
     rows: `flight.simulation.track.TRACK_ROW` records, (t,).
     ended: "completed", or the reason why the flight ended with these rows; "" while it continues.
-    distance: distance flown along the path by now, m.
+    distance: distance along the path so far, m.
     """
 
     rows: Rows
@@ -218,15 +218,15 @@ def track_of(blocks: Sequence[FlightBlock]) -> Track:
 # Fields of `flight.guidance.inner_loops.GUIDANCE_MEMORY` that describe the flown path and not the aircraft.
 _PATH_MEMORY_FIELDS = (
     *("piece", "leg", "distance", "cross_track", "height_error", "done", "returning", "circled", "turned", "bearing"),
-    *("cross_track_sum", "path_bank", "path_bank_rate", "aside", "aside_rate", "arc_speed"),
-    *("l1_leg", "l1_sum", "course_sum", "height_sum", "bend_acceleration"),
+    *("cross_track_sum", "path_bank", "path_bank_rate", "roll_offset", "roll_offset_rate", "max_arc_speed"),
+    *("l1_leg", "l1_integrator", "course_integrator", "altitude_integrator", "slope_acceleration"),
 )
 # Records that a flight keeps when it is diverted to another route.
 _DIVERSION_RECORDS = ("state", "true", "estimated", "commands", "air", "place", "wind", "gusts", "navigation", "memory")
 
 
 class Flight(Airborne):
-    """A flight by an autopilot's control law, flown as fast as possible by `simulate`, or live in real time."""
+    """A flight by a simulated autopilot: as fast as possible by `simulate`, or live in real time."""
 
     def __init__(
         self,
@@ -239,10 +239,10 @@ class Flight(Airborne):
     ) -> None:
         """Start the flight from a trimmed state.
 
-        variation: an aircraft that differs from its model, which guidance does not know.
-        local_map: local map of the setup, if another flight of it has fitted one already.
+        variation: differences of the aircraft from its model, which guidance does not know.
+        local_map: local map of the setup, if another flight has already fitted one.
         start_offset: east, north and up from the route's first waypoint to the start of the flight, m.
-        engine: flight model that flies; None for the setup's.
+        engine: flight model that flies; None for the choice of the setup.
 
         Raises FlightError if the aircraft cannot be loaded, and StartError if the flight cannot start.
         """
@@ -256,39 +256,40 @@ class Flight(Airborne):
         super().__init__(setup, aircraft, gains, variation, local_map, start_offset, gear)
         if self._ways:
             self.max_ticks += int(GROUND_PATIENCE / self.dt)
-        # Guidance knows the model, not how the aircraft differs from it.
+        # Guidance knows the model, but not the differences of the aircraft from it.
         model = Fdm(aircraft, rate_hz=setup.fdm_hz, motor_braking=setup.scenario.flight.motor_braking)
-        self._begin(setup, model, gains.reference_airspeed)
+        self._trim_at_start(setup, model, gains.reference_airspeed)
         self.memory.max_bank = setup.limits.max_bank + BANK_RESERVE
-        law = self._law(setup).law
-        law.begin(self.memory, self._workspace.own)
+        autopilot = self._law(setup).law
+        autopilot.begin(self.memory, self._workspace.own)
         self._start_disturbances(setup)
-        self._compiled, self.engine = self._choose_engine(law)
-        self._loop = self._make_loop(law)
+        self._compiled, self.engine = self._choose_engine(autopilot)
+        self._loop = self._make_loop(autopilot)
 
     def divert(self, setup: FlightSetup, local_map: LocalMap) -> None:
-        """Leave the route for another setup's route, which begins at the aircraft's position; its time begins at 0.
+        """Leave the route for the route of another setup, which starts at the aircraft's position at time 0.
 
-        The aircraft, its wind and the estimates of guidance stay; the state of guidance on the old route is discarded.
+        The aircraft, its wind and the estimates of guidance are kept; the state of guidance on the old route is
+        discarded.
 
         setup: setup with the same aircraft, autopilot, wind and rates.
         local_map: local map of that setup.
         """
         previous, previous_memory = self._work, self._workspace.own
-        # The aircraft is in the air, whatever the new mission begins with.
+        # The aircraft is in the air, even if the new mission starts with a take-off.
         self._ways = GroundWays()
         self._lay_out(setup, self.fdm.aircraft, local_map)
         for name in _DIVERSION_RECORDS:
             setattr(self._work, name, getattr(previous, name))
         for name in _PATH_MEMORY_FIELDS:
             setattr(self.memory, name, 0)
-        law = setup.autopilot.law
-        law.begin(self.memory, self._workspace.own)
-        law.take_over(previous_memory, self._workspace.own, setup.route.waypoints[0])
-        self._loop = self._make_loop(law)
+        autopilot = setup.autopilot.law
+        autopilot.begin(self.memory, self._workspace.own)
+        autopilot.take_over(previous_memory, self._workspace.own, setup.route.waypoints[0])
+        self._loop = self._make_loop(autopilot)
 
-    def _begin(self, setup: FlightSetup, model: Fdm, reference_airspeed: float) -> None:
-        """Trim the aircraft at the route's start, and initialise the controls of guidance with the model.
+    def _trim_at_start(self, setup: FlightSetup, model: Fdm, reference_airspeed: float) -> None:
+        """Trim the aircraft at the start of the route, and store the trim of the model in the guidance memory.
 
         reference_airspeed: airspeed for which the gains apply, m/s.
         """
@@ -300,7 +301,7 @@ class Flight(Airborne):
         if level is None:
             reason = f"no level flight at {reference_airspeed:.1f} m/s and {start.amsl:.0f} m AMSL"
             raise StartError(setup.aircraft, reason, field="airspeed", value=reference_airspeed)
-        self._start_fdm = partial(self._begin_motion, setup, start, level.elevator)
+        self._start_fdm = partial(self._start_motion, setup, start, level.elevator)
         self._start_fdm()
         memory = self.memory
         memory.trim_elevator, memory.trim_alpha = level.elevator, level.alpha
@@ -308,8 +309,8 @@ class Flight(Airborne):
         memory.last_airspeed = -1.0
         memory.stall_speed = self.fdm.aircraft.stall_speed
 
-    def _begin_motion(self, setup: FlightSetup, start: Start, elevator: float) -> None:
-        """Start the aircraft trimmed, or release it with this elevator for a take-off."""
+    def _start_motion(self, setup: FlightSetup, start: Start, elevator: float) -> None:
+        """Start the aircraft trimmed in the air, or release it on the launcher with an elevator command."""
         self._start_trimmed(setup.mission.source, start)
         if self._ways.take_off is not None:
             release_state = find_release(setup, self.map, self._ground, self.fdm.aircraft, self._ways.take_off)
@@ -323,12 +324,12 @@ class Flight(Airborne):
     def _fly(self, count: int) -> int:
         return self._loop(count)
 
-    def _choose_engine(self, law: Autopilot) -> tuple[CompiledModel | None, str]:
-        """Return the compiled model if it may fly, or None for JSBSim; and the name of the engine with the reason."""
+    def _choose_engine(self, autopilot: Autopilot) -> tuple[CompiledModel | None, str]:
+        """Return the compiled model, or None for JSBSim, and the name of the engine with the reason."""
         if self._chosen_engine == "jsbsim":
             return None, "JSBSim, as chosen"
-        if law.loop is None:
-            return None, f"JSBSim, since {law.title} has no compiled loop"
+        if autopilot.loop is None:
+            return None, f"JSBSim, since {autopilot.title} has no compiled loop"
         has_gusts, has_terrain = self._windy, bool(self._ground.known)
         try:
             model = CompiledModel(self.fdm, READ_FIELDS, self._steps, gusts=has_gusts, terrain=has_terrain)
@@ -343,21 +344,21 @@ class Flight(Airborne):
             return None, f"JSBSim, since the compiled model differs from it in {differences[0]}"
         return model, f"compiled model, equal to JSBSim {JSBSIM_VERSION} in every bit of {PROOF_STEPS} steps"
 
-    def _make_loop(self, law: Autopilot) -> Callable[[int], int]:
-        """Return a function that flies a number of ticks into the workspace's rows and returns the last status."""
+    def _make_loop(self, autopilot: Autopilot) -> Callable[[int], int]:
+        """Return a function that flies a number of ticks, fills the workspace's rows, and returns the last status."""
         work, space, access = self._work, self._workspace, self.fdm.loop_access()
         work.state_factors = access.factors[0]
         work.scale_above, work.scale_below = (tuple(scales) for scales in zip(*access.scales, strict=True))
-        if self._compiled is not None and law.loop is not None:
+        if self._compiled is not None and autopilot.loop is not None:
             model = self._compiled
-            return partial(law.loop, space.block, self._ground.heights, *model.arrays)
+            return partial(autopilot.loop, space.block, self._ground.heights, *model.arrays)
         # Do not set gusts in still air, or unknown ground.
         is_used = (True, True, True, True, self._windy, self._windy, self._windy, self._ground.known)
         setters = [setter if use else _discard for setter, use in zip(access.setters, is_used, strict=True)]
         return make_loop(
             [access.getters[field] for field in READ_FIELDS],
             setters,
-            partial(law.tick, space.block, self._ground.heights),
+            partial(autopilot.tick, space.block, self._ground.heights),
             space,
             access.run,
             self._steps,
@@ -365,4 +366,4 @@ class Flight(Airborne):
 
 
 def _discard(_value: float) -> None:
-    """Ignore the value of an output that is not used."""
+    """Discard the value of an output that is not used."""

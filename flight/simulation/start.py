@@ -1,4 +1,4 @@
-"""Start a flight, either trimmed in the air on its route or released from a rail, a hand or a runway."""
+"""Start a flight: trimmed in the air on its route, or released from a rail, a hand or a runway."""
 
 import math
 from dataclasses import dataclass
@@ -23,7 +23,7 @@ class Start:
     course: true course of the first leg, rad.
     slope: slope of the first leg, rad.
     airspeed: m/s, true.
-    wind: (3,) m/s, north, east, down, direction of air motion.
+    wind: (3,) m/s, velocity of the air, north, east, down.
     """
 
     lat_deg: float
@@ -60,8 +60,8 @@ def find_start(
     lat, lon = (float(value) for value in to_geo(setup.scenario.origin, east, north))
     first_leg = points[1] - points[0]
     convergence = local_map.convergence(lat, lon)
-    # If the aircraft cannot hold the speed or the first slope, the flight starts at the nearest speed that it can hold,
-    # and level; the verdict reports it.
+    # If the aircraft cannot hold the airspeed or the first slope, the flight starts level at the nearest airspeed that
+    # the aircraft can hold; the verdict reports it.
     east_wind, north_wind = setup.scenario.wind.at(up)
     cos, sin = math.cos(convergence), math.sin(convergence)
     return Start(
@@ -77,9 +77,11 @@ def find_start(
 
 
 def start_trimmed(fdm: Fdm, source: str, start: Start) -> Trim:
-    """Start trimmed on the slope of the start if the aircraft can hold that slope, otherwise level.
+    """Start the aircraft trimmed on the slope of the start, or level if it cannot hold that slope.
 
-    Raises StartError, which names the mission's file, ``source``, if the aircraft can hold neither.
+    source: file of the mission, for messages.
+
+    Raises StartError if the aircraft can hold neither.
     """
     start_values = (start.lat_deg, start.lon_deg, start.amsl, start.course, start.airspeed)
     try:
@@ -104,13 +106,13 @@ def start_trimmed(fdm: Fdm, source: str, start: Start) -> Trim:
 class Release:
     """State of the aircraft at its release.
 
-    place: lat_deg, lon_deg, m AMSL.
+    position: latitude and longitude, deg, and altitude, m AMSL.
     attitude: roll, pitch, yaw (true), rad.
-    velocity, wind: (3,) m/s, north, east, down, over the ground and of the air.
+    velocity, wind: velocities of the aircraft over the ground and of the air, (3,) m/s, north, east, down.
     ground: m AMSL.
     """
 
-    place: tuple[float, float, float]
+    position: tuple[float, float, float]
     attitude: tuple[float, float, float]
     velocity: tuple[float, float, float]
     wind: tuple[float, float, float]
@@ -118,7 +120,7 @@ class Release:
 
 
 def gear_of(ways: GroundWays) -> Gear:
-    """Return the gear for an aircraft whose model has no contacts, with wheels if it takes off from a runway."""
+    """Return the gear for a model without contacts: wheels for a take-off from a runway, otherwise a belly."""
     return "wheels" if ways.take_off is not None and ways.take_off.launch.method == "runway" else "belly"
 
 
@@ -127,16 +129,16 @@ def find_release(
 ) -> Release:
     """Return the state of the aircraft at the start of a take-off."""
     launch = take_off.launch
-    place, velocity = take_off.release()
+    position, velocity = take_off.release()
     if launch.method == "runway":
         stand_heights = [contact.down for contact in contacts_of(aircraft, "wheels") if contact.stands]
-        place[2] += max(stand_heights, default=0.0)
-    lat, lon = (float(value) for value in to_geo(setup.scenario.origin, place[0], place[1]))
+        position[2] += max(stand_heights, default=0.0)
+    lat, lon = (float(value) for value in to_geo(setup.scenario.origin, position[0], position[1]))
     convergence = local_map.convergence(lat, lon)
-    east, north = setup.scenario.wind.at(float(place[2]))
-    ground_altitude = ground.height(float(place[0]), float(place[1]))
+    east, north = setup.scenario.wind.at(float(position[2]))
+    ground_altitude = ground.height(float(position[0]), float(position[1]))
     return Release(
-        place=(lat, lon, float(place[2])),
+        position=(lat, lon, float(position[2])),
         attitude=(0.0, launch.incline, take_off.course - convergence),
         velocity=(*_to_true_north(float(velocity[0]), float(velocity[1]), convergence), -float(velocity[2])),
         wind=(*_to_true_north(east, north, convergence), 0.0),
@@ -153,17 +155,19 @@ def _to_true_north(east: float, north: float, convergence: float) -> tuple[float
     return north * cos + east * sin, east * cos - north * sin
 
 
-def release(fdm: Fdm, start: Release, commands: tuple[float, float, float, float]) -> tuple[float, float, float, float]:
-    """Release the aircraft with these commands, and return them."""
+def release(
+    fdm: Fdm, release_state: Release, commands: tuple[float, float, float, float]
+) -> tuple[float, float, float, float]:
+    """Release the aircraft with some commands, and return these commands."""
     fdm.release(
-        start.place,
-        start.attitude,
-        start.velocity,
-        wind=start.wind,
-        terrain_amsl=start.ground,
+        release_state.position,
+        release_state.attitude,
+        release_state.velocity,
+        wind=release_state.wind,
+        terrain_amsl=release_state.ground,
         commands=commands,
     )
     # Mean wind is set as part of the gust.
     fdm.set_wind(0.0, 0.0, 0.0)
-    fdm.set_gust(*start.wind)
+    fdm.set_gust(*release_state.wind)
     return commands

@@ -31,14 +31,14 @@ from world.terrain import pixel_height
 from world.wind import mean_wind_speed
 
 # ----------------------------------------------------------------------
-# Data of the compiled tick: one record, and one table of the path.
+# Data of the compiled tick: one record, and one table with the path.
 #
-# Each array that is passed to compiled code costs as much as a hundred additions.
+# Each array passed to compiled code costs as much as a hundred additions.
 
 
-# Fields of the state that are read from JSBSim each tick; time and wind are known without reading them.
+# Fields of the state that are read from JSBSim each tick; time and wind are already known.
 READ_FIELDS = field_names(STATE)[: field_names(STATE).index("time")]
-# Largest number of ticks that are flown in one call.
+# Maximum number of ticks per call of compiled code.
 BLOCK_TICKS = 60
 # Mean wind and gust, true north, east and down; ground altitude below; battery energy.
 AIR = record_dtype(
@@ -55,7 +55,7 @@ PLACE = record_dtype(
     "north_cos",  # of the map course of true north
     "north_sin",
     "ground",  # m AMSL, NaN where it is unknown
-    "clearance",  # m above it
+    "clearance",  # m above that ground
 )
 # Mean wind and turbulence of the scenario.
 MEAN_WIND = record_dtype(
@@ -74,15 +74,15 @@ TIMING = record_dtype(
 )
 # Constants of the flight.
 SETTINGS = record_dtype(
-    "slowest",  # m/s, loss of control below this airspeed
-    "battery",  # Wh; a flight that has used this energy ends
+    "slowest",  # m/s, airspeed below which control is lost
+    "battery",  # Wh; the flight ends once it has used this energy
     "navigation_sigma",  # m
     "navigation_time",  # s
     "middle",  # rad, longitude of the local map's center
     ("pieces", np.int64),  # number of path table rows that hold a piece
     ("nodes", np.int64),
     ("waypoints", np.int64),
-    ("on_last_leg", np.bool_),  # for a flight that another program steers, as it reports
+    ("on_last_leg", np.bool_),  # for a flight by an external program, as the program reports
 )
 # The i-th piece, node and waypoint of a path in one row.
 PATH_ROW = record_dtype(("piece", PIECE), ("node", NODE), ("waypoint", WAYPOINT))
@@ -90,7 +90,7 @@ PATH_ROW = record_dtype(("piece", PIECE), ("node", NODE), ("waypoint", WAYPOINT)
 OUTPUT = record_dtype(*field_names(COMMANDS), "gust_north", "gust_east", "gust_down", "ground")
 # Unit normal random numbers of a tick.
 NOISE = record_dtype(("turbulence", np.float64, (3,)), ("navigation", np.float64, (3,)))
-# All data of a tick but the path.
+# All data of a tick except the path.
 WORKSPACE = record_dtype(
     ("state", STATE),
     ("state_factors", STATE),  # factors from JSBSim's units to SI
@@ -128,7 +128,7 @@ class Workspace:
     block: (n,) numbers of the workspace, of the control law's own record, and of the path.
     array: (1,) of `WORKSPACE`, for compiled code.
     record: its one record, for Python.
-    own: the control law's own record, or None.
+    own: the autopilot's own record, or None.
     path: rows of `PATH_ROW`, as many as the largest of the numbers of pieces, nodes and waypoints.
     readings: (n,) the state's `READ_FIELDS`.
     output: (n,) the fields of `OUTPUT`.
@@ -160,7 +160,7 @@ class Workspace:
         self._true, self._estimated = (
             self._field_numbers(name, len(field_names(MOTION))) for name in ("true", "estimated")
         )
-        # Created once: numpy needs microseconds for each access to a record's field from Python.
+        # Created once, because numpy takes microseconds for each access to a record's field from Python.
         self.ticks_flown: NDArray[np.int64] = self.array["timing"]["tick"]
         self.rows_filled: NDArray[np.int64] = self.array["timing"]["row"]
         self.on_last_leg: NDArray[np.bool_] = self.array["settings"]["on_last_leg"]
@@ -180,7 +180,7 @@ class Workspace:
 
 # Bank beyond which control is lost, rad.
 STEEPEST_BANK = math.radians(75.0)
-# Return values of a tick: how the flight has ended.
+# Return values of a tick that ends the flight.
 # The end of the route was reached.
 COMPLETED = 1
 # The state is not a number.
@@ -193,16 +193,16 @@ END_OVERBANK = 4
 STALLED = 5
 # The end of the route was passed at more than `MISSED_ROUTE_DISTANCE_M` from it.
 END_MISSED_ROUTE = 6
-# Battery or tank are empty.
+# The battery or the tank is empty.
 END_BATTERY_EMPTY = 7
 # The motor never started.
 NO_MOTOR = 8
 # The aircraft touched the ground with something other than belly or wheels.
 END_TIPPED_OVER = 9
-# Distance from the end of the route beyond which a flight that passes it has missed it, m.
+# Distance from the end of the route beyond which a flight that passes the end has missed it, m.
 MISSED_ROUTE_DISTANCE_M = 100.0
-# Distance from the center at which a return to launch has arrived at its loiter, m. A loiter of 60 m cannot be flown at
-# 26 m/s and 30 degrees of bank: ArduPlane flies up to 260 m from its center.
+# Distance from the center at which an RTL has arrived at its loiter, m. A loiter of 60 m cannot be flown at 26 m/s and
+# 30 degrees of bank: ArduPlane flies up to 260 m from its center.
 RTL_ARRIVAL_RADIUS_M = 300.0
 # The same distance as a multiple of the loiter radius; the larger one applies.
 RTL_ARRIVAL_LOITER_RADII = 1.3
@@ -210,7 +210,7 @@ RTL_ARRIVAL_LOITER_RADII = 1.3
 RTL_ARRIVAL_ALTITUDE_TOLERANCE_M = 20.0
 # Abort the RTL loiter after this multiple of its nominal duration, which is at least one full circle.
 LOITER_TIMEOUT_FACTOR = 5.0
-# Lowest ground speed assumed for that circle, m/s.
+# Ground speed assumed for that circle, m/s.
 _CIRCLING_SPEED_MPS = 10.0
 # A mission that ends in a loiter about its last waypoint ends when the course has turned by this angle, rad: a quarter
 # turn onto the loiter, and one full circle.
@@ -320,14 +320,14 @@ def fill_tick(work: Record) -> None:
 
 @inner
 def end_return(motion: Record, waypoint: Record, memory: Record, dt: float) -> None:
-    """Track the progress of a return to launch around its loiter, and end the flight after it.
+    """Track the progress of an RTL around its loiter, and end the flight after it.
 
-    This is for an autopilot that returns by its own control law and need not follow the path. The flight ends at the
-    path's end once the aircraft has arrived at the loiter and flown a full circle at its altitude, and after
+    This is for an autopilot that flies an RTL by its own control law and need not follow the path. The flight ends at
+    the path's end once the aircraft has arrived at the loiter and flown a full circle at its altitude, and after
     `longest_circling` at the latest.
 
     motion: a record of `flight.guidance.navigation_error.MOTION`.
-    waypoint: any waypoint of the return, a record of `flight.guidance.lateral_reference_laws.WAYPOINT`.
+    waypoint: any waypoint of the RTL, a record of `flight.guidance.lateral_reference_laws.WAYPOINT`.
     memory: a record of `flight.guidance.inner_loops.GUIDANCE_MEMORY`.
     """
     memory.returning = True
@@ -351,13 +351,13 @@ def end_return(motion: Record, waypoint: Record, memory: Record, dt: float) -> N
 def end_around(motion: Record, memory: Record, dt: float) -> None:
     """Track the course change since the last waypoint was reached, and end the flight at `AROUND_END`.
 
-    The course is used, not the bearing from the waypoint: if the loiter is narrower than the aircraft can turn, it
-    flies loops next to the waypoint, and the bearing may take one loop or three to go around.
+    The course is used instead of the bearing from the waypoint: if the loiter is too tight for the aircraft, it flies
+    loops next to the waypoint, and the bearing may take one loop or three to go around.
 
     motion: a record of `flight.guidance.navigation_error.MOTION`.
     memory: a record of `flight.guidance.inner_loops.GUIDANCE_MEMORY`.
     """
-    # The mission's end is not missed, however wide the loiter is flown.
+    # The mission's end is not missed, however wide the aircraft flies the loiter.
     memory.returning = True
     course = math.atan2(motion.velocity_east, motion.velocity_north)
     if memory.circled > 0.0:
@@ -369,7 +369,10 @@ def end_around(motion: Record, memory: Record, dt: float) -> None:
 
 @compiled
 def longest_circling(radius: float) -> float:
-    """Return the timeout of a return in a loiter of the given radius (m), s."""
+    """Return the timeout of an RTL in its loiter, s.
+
+    radius: m.
+    """
     return LOITER_TIMEOUT_FACTOR * max(UNLIMITED, 2.0 * math.pi * abs(radius) / _CIRCLING_SPEED_MPS)
 
 
@@ -385,23 +388,25 @@ def _to_si(state: Record, factors: Record) -> bool:
 
 
 @inner
-def _air_status(state: Record, memory: Record, clearance: float, slowest: float, is_empty: bool) -> int:
-    if clearance <= 0.0:
+def _air_status(
+    state: Record, memory: Record, height_above_ground: float, min_airspeed: float, is_battery_empty: bool
+) -> int:
+    if height_above_ground <= 0.0:
         return GROUND
     if abs(state.roll) > STEEPEST_BANK:
         return END_OVERBANK
-    if state.airspeed < slowest:
+    if state.airspeed < min_airspeed:
         return STALLED
     if memory.done:
-        near = memory.returning or (
+        is_near = memory.returning or (
             abs(memory.cross_track) <= MISSED_ROUTE_DISTANCE_M and abs(memory.height_error) <= MISSED_ROUTE_DISTANCE_M
         )
-        return COMPLETED if near else END_MISSED_ROUTE
-    return END_BATTERY_EMPTY if is_empty else 0
+        return COMPLETED if is_near else END_MISSED_ROUTE
+    return END_BATTERY_EMPTY if is_battery_empty else 0
 
 
 @inner
-def _set_output(output: Record, commands: Record, air: Record, above: Record, below: Record) -> None:
+def _set_output(output: Record, commands: Record, air: Record, scale_above: Record, scale_below: Record) -> None:
     """Set the outputs in JSBSim's units."""
     output.elevator, output.aileron = commands.elevator, commands.aileron
     output.rudder, output.throttle = commands.rudder, commands.throttle
@@ -409,7 +414,7 @@ def _set_output(output: Record, commands: Record, air: Record, above: Record, be
     output.gust_north, output.gust_east = air.wind_north + air.gust_north, air.wind_east + air.gust_east
     output.gust_down, output.ground = air.gust_down, air.ground
     for name in literal_unroll(_OUTPUT_FIELDS):
-        output[name] *= above[name] if output[name] > 0.0 else below[name]
+        output[name] *= scale_above[name] if output[name] > 0.0 else scale_below[name]
 
 
 @inner
@@ -418,23 +423,26 @@ def _update_wind(
     wind: Record,
     gusts: Record,
     noise: Floats,
-    clearance: float,
+    height_above_ground: float,
     up: float,
-    turn_cos: float,
-    turn_sin: float,
+    convergence_cos: float,
+    convergence_sin: float,
     air: Record,
     dt: float,
 ) -> None:
-    """Set ``air`` to the mean wind and the next gust at this altitude, true north, east and down."""
+    """Set the mean wind and the next gust at the aircraft in ``air``, true north, east and down.
+
+    convergence_cos, convergence_sin: of the map course of true north.
+    """
     speed = mean_wind_speed(wind.speed, wind.gradient, wind.reference_amsl, up)
     # The wind's map course minus the map course of true north.
-    cos = wind.cos * turn_cos + wind.sin * turn_sin
-    sin = wind.sin * turn_cos - wind.cos * turn_sin
+    cos = wind.cos * convergence_cos + wind.sin * convergence_sin
+    sin = wind.sin * convergence_cos - wind.cos * convergence_sin
     air.wind_north, air.wind_east = speed * cos, speed * sin
     if wind.w20 > 0.0:
-        # Over unknown ground use the scales that apply above 300 m.
-        height = clearance if not math.isnan(clearance) else 1000.0
-        along, across, down = step_gusts(gusts, noise, wind.w20, height, state.airspeed, dt)
+        # Over unknown ground use the turbulence scales for more than 300 m.
+        gust_height = height_above_ground if not math.isnan(height_above_ground) else 1000.0
+        along, across, down = step_gusts(gusts, noise, wind.w20, gust_height, state.airspeed, dt)
         air.gust_north = along * cos - across * sin
         air.gust_east = along * sin + across * cos
         air.gust_down = down
@@ -460,12 +468,16 @@ def _fill_row(
     attitude[0], attitude[1], attitude[2] = state.roll, state.pitch, state.yaw
     rates[0], rates[1], rates[2] = state.roll_rate, state.pitch_rate, state.yaw_rate
     row.airspeed = state.airspeed
-    flow, controls, commanded = row.flow, row.controls, row.commands
+    flow, controls, commands_row = row.flow, row.controls, row.commands
     flow[0], flow[1] = state.alpha, state.beta
     controls[ELEVATOR], controls[AILERON], controls[RUDDER] = state.elevator, state.aileron, state.rudder
     controls[THROTTLE] = state.throttle
-    commanded[ELEVATOR], commanded[AILERON], commanded[RUDDER] = commands.elevator, commands.aileron, commands.rudder
-    commanded[THROTTLE] = commands.throttle
+    commands_row[ELEVATOR], commands_row[AILERON], commands_row[RUDDER] = (
+        commands.elevator,
+        commands.aileron,
+        commands.rudder,
+    )
+    commands_row[THROTTLE] = commands.throttle
     row.load_factor = state.load_factor
     row.current = state.current
     row.energy = energy

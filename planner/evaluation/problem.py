@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from aircraft.path_limits import Limits, PerformanceTable, derate, limit_rates
-from aircraft.tracking import no_tracking
+from aircraft.tracking import zero_tracking_error
 from planner.airspace.zone_limits import PlannerAirspace, ZoneMargins, make_airspace
 from planner.evaluation.encoding import Space
 from planner.evaluation.threat_index import MissileIndex, ThreatCells, make_missile_index, make_threat_cells
@@ -343,7 +343,7 @@ def _certified_arrays(scenario: Scenario, limits: Limits, terrain: Terrain) -> P
     """Return the arrays with the margins of the certificate."""
     threats = threat_records(scenario.threats)
     radius = np.maximum(scenario.threats.kill_radius, scenario.threats.detection_radius)
-    tracking = no_tracking() if limits.tracking is None else limits.tracking.record
+    tracking = zero_tracking_error() if limits.tracking is None else limits.tracking.record
     vertical, end_fraction = CERTIFIED_BUFFER + float(tracking.up), CERTIFIED_END_SHARE
     buffer, vertical_zone_margin = vertical + limits.reserve_height, vertical + limits.reserve_threats
     aircraft = _reduced_performance(scenario, limits)

@@ -12,7 +12,7 @@ from aircraft.tracking import (
     air_density_factor,
     corner_deviation,
     corridor_half_width,
-    no_tracking,
+    zero_tracking_error,
 )
 
 
@@ -41,7 +41,7 @@ def test_outside_the_tables_their_edges_count() -> None:
 
 
 def test_an_exact_autopilot_has_nothing_to_leave_room_for() -> None:
-    record = no_tracking()
+    record = zero_tracking_error()
     assert not record.has_error
     assert error_of().record.has_error
     with pytest.raises(ValueError, match="read-only"):

@@ -21,9 +21,9 @@ _LAW_NAMES = {
 
 @dataclass(frozen=True)
 class PlanflyGuidance(Autopilot):
-    """Planfly's guidance, which stands for what the aircraft itself can fly.
+    """Planfly's guidance, whose flight shows what the aircraft itself can do.
 
-    guidance: its lateral law, as in `[flight] guidance`.
+    guidance: lateral law, as in `[flight] guidance`.
     """
 
     name: ClassVar = "planfly"
@@ -33,21 +33,21 @@ class PlanflyGuidance(Autopilot):
 
     @classmethod
     def load(cls, table: FlightTable, aircraft: Aircraft, scenario: str) -> Self:
-        """Return the law that the table names; a table with parameters names another autopilot."""
+        """Return the guidance of a [flight] table; a table with parameters names another autopilot."""
         return cls(table.steering.guidance)
 
     @classmethod
     def restore(cls, stored: StoredAutopilot) -> Self:
-        """Return the law that a log stores."""
+        """Return the guidance that a log stores."""
         return cls(stored.guidance)
 
     def store(self) -> StoredAutopilot:
-        """Return its law for a log."""
+        """Return the lateral law for a log."""
         return StoredAutopilot(self.guidance)
 
     @classmethod
     def missing_files(cls, aircraft: Aircraft) -> list[str]:
-        """Return the gains file if it is missing; its gains tune the inner loops, which every lateral law uses."""
+        """Return a sentence if the gains file is missing; its gains tune the inner loops of every lateral law."""
         if (aircraft.folder / GAINS_FILE).exists():
             load_gains(aircraft)
             return []
@@ -55,27 +55,27 @@ class PlanflyGuidance(Autopilot):
 
     @property
     def tick(self) -> Tick:
-        """Compiled function for one tick, of all three laws."""
+        """Compiled function for one tick, for all three lateral laws."""
         return planfly_tick
 
     @property
     def loop(self) -> Loop:
-        """Compiled loop of the law with a compiled model."""
+        """Compiled simulation loop of the guidance and the aircraft model."""
         return planfly_loop
 
     def begin(self, memory: Record, own: Record) -> None:
-        """Select the lateral law."""
-        memory.law = LAWS[self.guidance]
+        """Set the lateral law in the guidance memory."""
+        memory.lateral_law = LAWS[self.guidance]
 
-    def gust_sink(self, climb: float, turbulence: Turbulence) -> float:
-        """Return the altitude loss in a one-in-a-hundred downdraft.
+    def gust_sink(self, climb_reserve: float, turbulence: Turbulence) -> float:
+        """Return the altitude loss in a downdraft with an exceedance probability of 1 %, m.
 
-        Updrafts do not lift the aircraft, because it dives and flies faster.
+        Updrafts do not lift the aircraft, because the guidance dives and flies faster.
         """
-        return height_in_gusts(climb, turbulence)
+        return height_in_gusts(climb_reserve, turbulence)
 
     def described(self, aircraft: str) -> str:
-        """Return the lateral law in words."""
+        """Return a description of the lateral law."""
         return _LAW_NAMES[self.guidance]
 
     @property

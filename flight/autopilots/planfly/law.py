@@ -1,11 +1,11 @@
 """Compute planfly's guidance in compiled code, from the state to the four commands, on records with named fields.
 
-Three lateral laws: planfly's own, a second-order cross-track law with curvature feed-forward about the offset path that
-a rolling aircraft can follow, which answers gusts by bank, and by a skid where bank is at its limit; L1 along the legs,
-as ArduPlane flies it; and the vector field of Beard and McLain along the fly-by path, whose arcs are its fillets.
-They share bank limit, vertical channel and inner loops (`flight.guidance.inner_loops`), so that flights differ only by
-the lateral law.  No law uses the wind, because all steer by the velocity over the ground.  The time step is an
-argument.
+There are three lateral laws.  Planfly's own is a second-order cross-track law with curvature feed-forward about the
+offset path that a rolling aircraft can follow; it counters gusts by bank, and by a skid at the bank limit.  L1 flies
+along the legs, as in ArduPlane.  The vector field of Beard and McLain flies along the fly-by path, whose arcs are its
+fillets.  The laws share bank limit, vertical channel and inner loops (`flight.guidance.inner_loops`), so that flights
+differ only by the lateral law.  No law uses the wind, because all use the velocity over the ground.  The time step is
+an argument.
 """
 
 import math
@@ -13,15 +13,15 @@ import math
 from aircraft.envelope import GRAVITY
 from aircraft.tracking import density_factor
 from flight.dynamics.instructions import Code
-from flight.guidance.inner_loops import follow_roll, roll_model, steer_elevator
+from flight.guidance.inner_loops import follow_roll, steer_elevator, step_roll_model
 from flight.guidance.lateral_reference_laws import (
     WAYPOINT_RADIUS,
     field_course,
+    has_l1_reached,
     l1_acceleration,
     l1_angles,
     l1_integrate,
     l1_length,
-    l1_reached,
 )
 from flight.guidance.path import find_on_path, max_curvature, mean_curvature, profile
 from flight.simulation.compiled_loop import advance_model, read_state
@@ -31,11 +31,11 @@ from world.geometry import wrap
 from world.kernels import Record, Records, compiled, inner
 from world.scenario_tables import Guidance
 
-# Value of `memory.law` for planfly's own law.
+# Value of `memory.lateral_law` for planfly's own law.
 CROSS_TRACK = 0
-# Value of `memory.law` for L1.
+# Value of `memory.lateral_law` for L1.
 L1 = 1
-# Value of `memory.law` for the vector field.
+# Value of `memory.lateral_law` for the vector field.
 VECTOR_FIELD = 2
 # Lateral laws by their names in a scenario's `[flight] guidance`.
 LAWS: dict[Guidance, int] = {"path": CROSS_TRACK, "l1": L1, "vector-field": VECTOR_FIELD}
@@ -43,10 +43,10 @@ LAWS: dict[Guidance, int] = {"path": CROSS_TRACK, "l1": L1, "vector-field": VECT
 _ENERGY_LAG_S = 1.0
 # Time constant of the airspeed without its gusts, s.
 _AIRSPEED_LAG_S = 2.0
-# Multiple of the stall speed with level wings below which speed has priority over altitude at once.
+# Multiple of the stall speed with level wings below which speed has priority over altitude immediately.
 SAFE_SPEED = 1.2
-# The same multiple of the stall speed at the present bank; it gives the higher airspeed above 33 degrees of bank.  The
-# wing can then give 1.44 or 1.21 times the lift that it needs: a margin for gusts.  With 1.2 in turns as well, an
+# The same multiple of the stall speed at the present bank; it gives the higher airspeed from 33 degrees of bank on.
+# The wing can then give 1.44 or 1.21 times the lift that it needs: a margin for gusts.  With 1.2 in turns as well, an
 # Aerosonde with 30 % more drag strayed 0.56 m instead of 0.16 m in one of 20 winds of moderate turbulence.
 SAFE_SPEED_BANKED = 1.1
 # Lower limit of the bank's cosine in the load factor, as in `steer_elevator`, which demands no more lift.
@@ -55,14 +55,13 @@ _MIN_BANK_COSINE = 0.4
 _SPEED_RECOVERY_TIME_S = 3.0
 # Angle between the nose and the course at which the guidance no longer banks to turn the nose further away, rad.
 _NOSE_LIMIT_RAD = math.radians(80.0)
-# Bank allowed for each rad that the nose is short of that angle, rad/rad; beyond it, opposite bank for each rad of
-# excess.  With a bank of at most 40 degrees all of it is allowed until 70 degrees, and all of it is demanded back from
-# 90.  The nose settles there with a time constant of V / (4 g), 0.4 s for the Zagi at 15 m/s, which rolls within 0.25
-# s.
+# Bank allowed per rad between the nose and that angle, rad/rad; beyond that angle, opposite bank per rad of excess.
+# With a bank limit of 40 degrees, full bank is allowed up to 70 degrees, and full opposite bank is demanded from 90.
+# The nose settles there with a time constant of V / (4 g), 0.4 s for the Zagi at 15 m/s, which rolls within 0.25 s.
 _BANK_PER_NOSE_ANGLE_RATIO = 4.0
-# Fraction of the lateral acceleration at maximum bank that an arc may use before the aircraft slows down for it.
+# Fraction of the lateral acceleration at maximum bank that an arc may require before the aircraft slows down for it.
 ARC_SHARE = 0.95
-# Longest tick for which the whole lead of a correction is used, s.
+# Longest tick for which the full lead of a correction is used, s.
 LEAD_TICK = 1.0 / 60.0
 
 
@@ -124,7 +123,7 @@ def guide(
     commands: Record,
     dt: float,
 ) -> None:
-    """Fill the commands for one tick of ``dt`` seconds, and update the memory.
+    """Compute the commands for one tick of ``dt`` seconds, and update the memory.
 
     state: a `flight.dynamics.state.STATE` record.
     estimated: a `flight.guidance.navigation_error.MOTION` record.
@@ -136,18 +135,18 @@ def guide(
     """
     course = find_on_path(estimated, pieces, memory)
     memory.speed_command = waypoints[memory.leg].airspeed
-    if memory.law == L1:
+    if memory.lateral_law == L1:
         bank = _l1_bank_command(state, estimated, waypoints, gains, memory, dt)
-    elif memory.law == VECTOR_FIELD:
+    elif memory.lateral_law == VECTOR_FIELD:
         bank = _field_bank_command(estimated, pieces[memory.piece].curvature, gains, memory, course, dt)
     else:
-        bank = _path_bank_command(state, estimated, pieces, gains, memory, course, dt)
+        bank = _cross_track_bank_command(state, estimated, pieces, gains, memory, course, dt)
     steer_height(state, estimated, nodes, gains, memory, commands, course, dt)
     steer_bank(state, gains, memory, commands, bank, dt)
 
 
 @inner
-def _path_bank_command(
+def _cross_track_bank_command(
     state: Record,
     estimated: Record,
     pieces: Records,
@@ -164,7 +163,7 @@ def _path_bank_command(
     drift = wrap(ground_course - state.yaw)
     crab = max(0.5, math.cos(drift))
     piece, distance = memory.piece, memory.distance
-    # In a crosswind the turn changes the ground speed: this is its value when the bank takes effect.
+    # In a crosswind the turn changes the ground speed: predict its value for when the bank takes effect.
     future_speed = speed + gains.turn_lead * GRAVITY * math.tan(memory.bank) * math.sin(drift)
     start = distance + speed * max(0.0, gains.turn_lead - 0.5 * gains.turn_smoothing)
     turn_acceleration = (
@@ -172,21 +171,21 @@ def _path_bank_command(
     )
     offset_correction = _correct_roll_offset(pieces[piece].curvature, gains, memory, turn_acceleration, speed, crab, dt)
     correction = _lateral_correction(state, estimated, gains, memory, speed, course_error, crab, dt)
-    # Bank lags, so the correction leads.  A longer tick itself adds lag: with the whole lead the aircraft would
+    # The bank lags, so the correction leads.  A longer tick itself adds lag: with the full lead the aircraft would
     # oscillate in roll (45 degrees of bank at 30 Hz in moderate turbulence; 38 with half of it).
-    correction_rate = (correction - memory.push) / gains.push_smoothing
-    memory.push += correction_rate * min(dt, gains.push_smoothing)
+    correction_rate = (correction - memory.smoothed_correction) / gains.push_smoothing
+    memory.smoothed_correction += correction_rate * min(dt, gains.push_smoothing)
     correction += offset_correction + gains.push_lead * min(1.0, (LEAD_TICK / dt) ** 2) * correction_rate
-    lift = GRAVITY + memory.bend_acceleration
-    bank_demand = math.atan((turn_acceleration + correction) / (lift * crab))
+    lift_acceleration = GRAVITY + memory.slope_acceleration
+    bank_demand = math.atan((turn_acceleration + correction) / (lift_acceleration * crab))
     bank_demand = _limit_nose_angle(bank_demand, wrap(state.yaw - course), memory.max_bank)
     bank: float = min(memory.max_bank, max(-memory.max_bank, bank_demand))
     max_path_curvature = max_curvature(pieces, piece, distance, distance + speed * gains.arc_slowing_time)
-    memory.arc_speed = math.sqrt(ARC_SHARE * GRAVITY * math.tan(memory.max_bank) / max(1e-9, max_path_curvature))
-    # A limited skid adds what the bank limit leaves: its side force points into the turn.
-    missing_force = lift * (math.tan(bank_demand) - math.tan(bank))
-    slip = missing_force / max(1.0, gains.side_per_sideslip * _pressure_ratio(state, gains))
-    memory.sideslip = -min(gains.sideslip_max, max(-gains.sideslip_max, slip))
+    memory.max_arc_speed = math.sqrt(ARC_SHARE * GRAVITY * math.tan(memory.max_bank) / max(1e-9, max_path_curvature))
+    # A limited skid adds the force that the bank limit withholds: its side force points into the turn.
+    missing_acceleration = lift_acceleration * (math.tan(bank_demand) - math.tan(bank))
+    sideslip = missing_acceleration / max(1.0, gains.side_per_sideslip * _pressure_ratio(state, gains))
+    memory.sideslip = -min(gains.sideslip_max, max(-gains.sideslip_max, sideslip))
     if bank == bank_demand and abs(memory.cross_track) < 20.0:
         memory.cross_track_sum = min(40.0, max(-40.0, memory.cross_track_sum + memory.cross_track * dt))
     return bank
@@ -194,18 +193,18 @@ def _path_bank_command(
 
 @inner
 def _limit_nose_angle(bank_demand: float, nose_angle: float, max_bank: float) -> float:
-    """Return the demanded bank, reduced where it would turn the nose too far from the course, rad.
+    """Return the bank demand, reduced if it would turn the nose too far from the course, rad.
 
     At `_NOSE_LIMIT_RAD` the nose is almost perpendicular to the course.  Turning further would gain nothing against a
-    crosswind and would take the aircraft all the way round.  The result is continuous in both angles except where the
-    nose points straight back.  A bank that already turns the nose back towards the course fast enough is not changed.
+    crosswind, and the aircraft would turn all the way round.  The result is continuous in both angles unless the nose
+    points straight back.  A bank that already turns the nose back towards the course fast enough is not changed.
 
     nose_angle: angle from the course to the nose, positive clockwise, within +-pi rad.
     max_bank: rad.
     """
-    direction = math.copysign(1.0, nose_angle)
+    side = math.copysign(1.0, nose_angle)
     limit = max(-max_bank, _BANK_PER_NOSE_ANGLE_RATIO * (_NOSE_LIMIT_RAD - abs(nose_angle)))
-    return direction * min(direction * bank_demand, limit)
+    return side * min(side * bank_demand, limit)
 
 
 @inner
@@ -214,18 +213,21 @@ def _correct_roll_offset(
 ) -> float:
     """Return the acceleration (m/s^2 to the right) that corrects the offset from rolling into arcs.
 
-    No aircraft can change its bank in one step, so `aside` is the planned offset from the path where curvature jumps.
+    No aircraft can change its bank in one step, so ``memory.roll_offset`` is the planned offset from the path where the
+    curvature jumps.
 
     curvature: curvature of the path here, 1/m.
-    turn_acceleration: acceleration to the right that the path ahead needs, m/s^2.
+    turn_acceleration: acceleration to the right for the path ahead, m/s^2.
     """
-    memory.path_bank, memory.path_bank_rate, _ = roll_model(
+    memory.path_bank, memory.path_bank_rate, _ = step_roll_model(
         math.atan(turn_acceleration / (GRAVITY * crab)), memory.path_bank, memory.path_bank_rate, gains, dt
     )
     frequency = gains.aside_frequency
-    correction: float = -frequency * (2.0 * memory.aside_rate + frequency * memory.aside)
-    memory.aside_rate += (GRAVITY * math.tan(memory.path_bank) * crab - speed * speed * curvature + correction) * dt
-    memory.aside += memory.aside_rate * dt
+    correction: float = -frequency * (2.0 * memory.roll_offset_rate + frequency * memory.roll_offset)
+    memory.roll_offset_rate += (
+        GRAVITY * math.tan(memory.path_bank) * crab - speed * speed * curvature + correction
+    ) * dt
+    memory.roll_offset += memory.roll_offset_rate * dt
     return correction
 
 
@@ -243,14 +245,15 @@ def _lateral_correction(
     """Return the acceleration to the right that corrects cross-track error and disturbances, m/s^2."""
     frequency = gains.cross_track_frequency
     rate_gain = 2.0 * gains.cross_track_damping * frequency
-    max_rate = speed * math.sin(gains.intercept)
-    rate_demand = min(
-        max_rate, max(-max_rate, -(memory.cross_track - memory.aside) * frequency * frequency / rate_gain)
+    max_cross_track_rate = speed * math.sin(gains.intercept)
+    cross_track_rate_demand = min(
+        max_cross_track_rate,
+        max(-max_cross_track_rate, -(memory.cross_track - memory.roll_offset) * frequency * frequency / rate_gain),
     )
-    # Flying away from the course is treated as flying perpendicular to it: the sine would fall again.
+    # Flying away from the course is treated as flying perpendicular to it, because the sine would decrease again.
     is_flying_away = abs(course_error) > 0.5 * math.pi
-    rate = math.copysign(speed, course_error) if is_flying_away else speed * math.sin(course_error)
-    correction: float = rate_gain * (rate_demand - (rate - memory.aside_rate))
+    cross_track_rate = math.copysign(speed, course_error) if is_flying_away else speed * math.sin(course_error)
+    correction: float = rate_gain * (cross_track_rate_demand - (cross_track_rate - memory.roll_offset_rate))
     correction -= gains.cross_track_integral * memory.cross_track_sum
     correction -= gains.side_gain * _unexplained_acceleration(state, estimated, gains, memory, speed, crab, dt)
     return correction
@@ -273,8 +276,8 @@ def _unexplained_acceleration(
         lateral_change = change_east * estimated.velocity_north - change_north * estimated.velocity_east
         lift_acceleration = (GRAVITY + (estimated.velocity_up - memory.last_velocity_up) / dt) * math.tan(state.roll)
         aileron_acceleration = gains.side_per_aileron * _pressure_ratio(state, gains) * state.aileron
-        unexplained = lateral_change / (speed * dt) - (lift_acceleration + aileron_acceleration) * crab
-        memory.unexplained_acceleration += (unexplained - memory.unexplained_acceleration) * min(
+        new_estimate = lateral_change / (speed * dt) - (lift_acceleration + aileron_acceleration) * crab
+        memory.unexplained_acceleration += (new_estimate - memory.unexplained_acceleration) * min(
             1.0, dt / gains.side_lag
         )
     memory.last_velocity_east = estimated.velocity_east
@@ -287,23 +290,23 @@ def _unexplained_acceleration(
 def _l1_bank_command(
     state: Record, estimated: Record, waypoints: Records, gains: Record, memory: Record, dt: float
 ) -> float:
-    """Return the bank command of L1 on the current leg, and switch to the next leg as L1 does, rad."""
+    """Return the bank command of L1, rad, and switch to the next leg if L1 has reached the waypoint."""
     speed = max(0.1, math.hypot(estimated.velocity_east, estimated.velocity_north))
     damping = gains.l1_damping
-    length = l1_length(speed, gains.l1_period, damping)
+    l1_distance = l1_length(speed, gains.l1_period, damping)
     leg = memory.l1_leg
-    a, b = waypoints[leg], waypoints[leg + 1]
-    radius = b.acceptance if b.acceptance > 0.0 else WAYPOINT_RADIUS
-    if leg + 2 < waypoints.shape[0] and l1_reached(estimated, a, b, length, radius):
+    start, end = waypoints[leg], waypoints[leg + 1]
+    turn_distance = end.acceptance if end.acceptance > 0.0 else WAYPOINT_RADIUS
+    if leg + 2 < waypoints.shape[0] and has_l1_reached(estimated, start, end, l1_distance, turn_distance):
         leg += 1
         memory.l1_leg = leg
-    a, b = waypoints[leg], waypoints[leg + 1]
-    angle, aim = l1_angles(estimated, a.east, a.north, b.east, b.north, length)
-    memory.l1_sum = l1_integrate(aim, memory.l1_sum, gains.l1_integral, dt)
-    if not math.isnan(aim):
-        angle += aim + memory.l1_sum
+    start, end = waypoints[leg], waypoints[leg + 1]
+    velocity_angle, aim_angle = l1_angles(estimated, start.east, start.north, end.east, end.north, l1_distance)
+    memory.l1_integrator = l1_integrate(aim_angle, memory.l1_integrator, gains.l1_integral, dt)
+    if not math.isnan(aim_angle):
+        velocity_angle += aim_angle + memory.l1_integrator
     pitch = min(1.0, max(-1.0, state.pitch))
-    bank_demand = math.atan(l1_acceleration(angle, speed, length, damping) / (GRAVITY * math.cos(pitch)))
+    bank_demand = math.atan(l1_acceleration(velocity_angle, speed, l1_distance, damping) / (GRAVITY * math.cos(pitch)))
     return min(memory.max_bank, max(-memory.max_bank, bank_demand))
 
 
@@ -311,17 +314,19 @@ def _l1_bank_command(
 def _field_bank_command(
     estimated: Record, curvature: float, gains: Record, memory: Record, course: float, dt: float
 ) -> float:
-    """Return the bank command from an orbit's own bank and a PI law on the field's course, rad."""
+    """Return the bank command from the bank of the orbit and a PI law on the course of the vector field, rad."""
     speed = math.hypot(estimated.velocity_east, estimated.velocity_north)
     course_demand = field_course(
         course, memory.cross_track, curvature, gains.field_approach, gains.field_path, gains.field_orbit
     )
-    error = wrap(course_demand - math.atan2(estimated.velocity_east, estimated.velocity_north))
+    course_error = wrap(course_demand - math.atan2(estimated.velocity_east, estimated.velocity_north))
     orbit_bank = math.atan(speed * speed * curvature / GRAVITY)
-    bank_demand = orbit_bank + gains.field_course * error + gains.field_course_integral * memory.course_sum
+    bank_demand = (
+        orbit_bank + gains.field_course * course_error + gains.field_course_integral * memory.course_integrator
+    )
     bank: float = min(memory.max_bank, max(-memory.max_bank, bank_demand))
     if bank == bank_demand:
-        memory.course_sum = min(1.0, max(-1.0, memory.course_sum + error * dt))
+        memory.course_integrator = min(1.0, max(-1.0, memory.course_integrator + course_error * dt))
     return bank
 
 
@@ -336,26 +341,28 @@ def steer_height(
     course: float,
     dt: float,
 ) -> None:
-    """Set elevator from the altitude profile through the load factor, and throttle from the airspeed."""
+    """Set the elevator to follow the altitude profile, and the throttle to hold the airspeed."""
     airspeed = max(8.0, state.airspeed)
     speed_along = max(1.0, estimated.velocity_east * math.sin(course) + estimated.velocity_north * math.cos(course))
-    path_height, slope, _ = profile(nodes, memory.distance)
+    path_altitude, slope, _ = profile(nodes, memory.distance)
     _, slope_ahead, slope_rate = profile(nodes, memory.distance + speed_along * gains.slope_lead)
-    height_error = estimated.up - path_height
+    height_error = estimated.up - path_altitude
     memory.height_error = height_error
     climb_rate = estimated.velocity_up
     frequency = gains.height_frequency
     rate_gain = 2.0 * gains.height_damping * frequency
-    rate_demand = slope * speed_along
-    correction = min(4.0, max(-4.0, -height_error * frequency * frequency / rate_gain))
-    memory.bend_acceleration = slope_rate * speed_along * speed_along
-    acceleration_demand = memory.bend_acceleration + rate_gain * (rate_demand + correction - climb_rate)
-    acceleration_demand -= gains.height_integral * memory.height_sum
+    climb_rate_demand = slope * speed_along
+    climb_rate_correction = min(4.0, max(-4.0, -height_error * frequency * frequency / rate_gain))
+    memory.slope_acceleration = slope_rate * speed_along * speed_along
+    acceleration_demand = memory.slope_acceleration + rate_gain * (
+        climb_rate_demand + climb_rate_correction - climb_rate
+    )
+    acceleration_demand -= gains.height_integral * memory.altitude_integrator
     max_acceleration = _max_upward_acceleration(state, estimated, gains, memory, commands, airspeed, rate_gain, dt)
     is_limited = acceleration_demand > max_acceleration
     acceleration_demand = min(8.0, max(-6.0, min(acceleration_demand, max_acceleration)))
     if not is_limited and abs(height_error) < 5.0:
-        memory.height_sum = min(5.0, max(-5.0, memory.height_sum + height_error * dt))
+        memory.altitude_integrator = min(5.0, max(-5.0, memory.altitude_integrator + height_error * dt))
     steer_elevator(state, gains, memory, commands, climb_rate, acceleration_demand)
     _set_throttle(estimated, gains, memory, commands, airspeed, slope_ahead, speed_along, dt)
 
@@ -382,20 +389,22 @@ def _max_upward_acceleration(
     climb_rate = estimated.velocity_up
     if memory.last_airspeed < 0.0:
         memory.last_airspeed = airspeed
-        memory.airspeed = airspeed
-        memory.energy_rate = climb_rate
+        memory.filtered_airspeed = airspeed
+        memory.energy_height_rate = climb_rate
     energy_rate = climb_rate + airspeed * (airspeed - memory.last_airspeed) / (dt * GRAVITY)
     memory.last_airspeed = airspeed
-    memory.energy_rate += (energy_rate - memory.energy_rate) * dt / _ENERGY_LAG_S
-    memory.airspeed += (airspeed - memory.airspeed) * dt / _AIRSPEED_LAG_S
+    memory.energy_height_rate += (energy_rate - memory.energy_height_rate) * dt / _ENERGY_LAG_S
+    memory.filtered_airspeed += (airspeed - memory.filtered_airspeed) * dt / _AIRSPEED_LAG_S
     unused_climb = (1.0 - commands.throttle) / max(1e-3, gains.throttle_per_slope) * airspeed
     stall_speed = memory.stall_speed * density_factor(estimated.up)
     load_factor = 1.0 / max(_MIN_BANK_COSINE, math.cos(state.roll))
     stall_multiple = max(SAFE_SPEED, SAFE_SPEED_BANKED * math.sqrt(load_factor))
     safe_airspeed = min(memory.speed_command, stall_multiple * stall_speed)
     min_airspeed = max(safe_airspeed, memory.speed_command - gains.slow_margin)
-    airspeed_excess = min(memory.airspeed - min_airspeed, airspeed - safe_airspeed)
-    max_climb_rate = memory.energy_rate + unused_climb + airspeed_excess * airspeed / (GRAVITY * _SPEED_RECOVERY_TIME_S)
+    airspeed_excess = min(memory.filtered_airspeed - min_airspeed, airspeed - safe_airspeed)
+    max_climb_rate = (
+        memory.energy_height_rate + unused_climb + airspeed_excess * airspeed / (GRAVITY * _SPEED_RECOVERY_TIME_S)
+    )
     return rate_gain * (max_climb_rate - climb_rate)
 
 
@@ -410,27 +419,27 @@ def _set_throttle(
     speed_along: float,
     dt: float,
 ) -> None:
-    """Set throttle for level flight, for the slope relative to the air, and for the airspeed error."""
+    """Set the throttle from level flight, the slope relative to the air, and the airspeed error."""
     airspeed_error = memory.speed_command - airspeed
-    if memory.arc_speed > 0.0:
-        # In an arc and before it the ground speed matters too, as far as the air allows.
-        ground_speed_excess = math.hypot(estimated.velocity_east, estimated.velocity_north) - memory.arc_speed
+    if memory.max_arc_speed > 0.0:
+        # In and before an arc also limit the ground speed, as far as the airspeed allows.
+        ground_speed_excess = math.hypot(estimated.velocity_east, estimated.velocity_north) - memory.max_arc_speed
         airspeed_error = min(airspeed_error, max(-ground_speed_excess, airspeed_error - gains.arc_slowing_max))
     feed_forward = memory.trim_throttle + gains.throttle_per_slope * slope_ahead * speed_along / airspeed
-    throttle_demand = feed_forward + gains.speed_gain * airspeed_error + gains.speed_integral * memory.speed_sum
+    throttle_demand = feed_forward + gains.speed_gain * airspeed_error + gains.speed_integral * memory.speed_integrator
     commands.throttle = min(1.0, max(0.0, throttle_demand))
-    # Below the throttle that gives thrust, which grows with airspeed, the integrator would wind up without effect.
+    # Below the throttle that gives thrust, which increases with airspeed, the integrator would wind up without effect.
     idle_throttle = gains.throttle_idle * airspeed / gains.reference_airspeed
     if (throttle_demand < 1.0 or airspeed_error < 0.0) and (throttle_demand > idle_throttle or airspeed_error > 0.0):
-        memory.speed_sum = min(60.0, max(-60.0, memory.speed_sum + airspeed_error * dt))
+        memory.speed_integrator = min(60.0, max(-60.0, memory.speed_integrator + airspeed_error * dt))
 
 
 @inner
 def steer_bank(state: Record, gains: Record, memory: Record, commands: Record, bank: float, dt: float) -> None:
-    """Set aileron from a bank command through a roll model, and rudder for coordination and damping.
+    """Set the aileron from a bank command through a roll model, and the rudder for coordination and damping.
 
     The model answers the command as a critically damped oscillator within the limits of roll rate and acceleration, so
     it never overshoots; `follow_roll` makes the aircraft follow the model.
     """
-    bank, roll_rate, roll_acceleration = roll_model(bank, memory.bank, memory.bank_rate, gains, dt)
+    bank, roll_rate, roll_acceleration = step_roll_model(bank, memory.bank, memory.bank_rate, gains, dt)
     follow_roll(state, gains, memory, commands, bank, roll_rate, roll_acceleration, dt)

@@ -1,4 +1,4 @@
-"""PX4's control law for fixed wing as an autopilot, with its parameters."""
+"""Define the simulated PX4 for fixed wing as an autopilot, with its parameters."""
 
 import math
 from collections.abc import Iterator
@@ -34,9 +34,9 @@ from world.wind import Turbulence
 
 
 class _NeutralRange(NamedTuple):
-    """Values of a parameter with which PX4 flies as simulated.
+    """Range of a parameter in which PX4 flies as simulated.
 
-    by_program: True if PX4's own program flies the other values, with planfly's physics.
+    by_program: True if PX4's own program, with planfly's physics, also flies values outside the range.
     """
 
     lowest: float
@@ -62,7 +62,7 @@ _NEUTRAL = {
     # Descents that a distance sensor ends (`updateAltToAvoidTerrainCollisionAndRepublishTriplet`).
     "NAV_MIN_GND_DIST": _NeutralRange(-math.inf, 0.0, by_program=False),
 }
-# By RTL_TYPE: the part of it that is not flown.
+# Part of an RTL that is not flown, by RTL_TYPE.
 _RTL_TYPES_NOT_FLOWN = {
     2: "RTL_TYPE 2, a return along the mission to its landing or back, is flown as 1, to the nearest rally "
     "point or home",
@@ -72,18 +72,27 @@ _RTL_TYPES_NOT_FLOWN = {
     "point or home",
 }
 
-# RTL_TYPE of a return along the mission.
+# Values of RTL_TYPE for an RTL along the mission.
 _ALONG_THE_MISSION = (2.0, 4.0)
-# COM_WIND_MAX_ACT of a mere warning.
+# COM_WIND_MAX_ACT that only warns.
 _WARN_OF_WIND = 1.0
 
 # Fields of `flight.autopilots.px4.law.PX4_MEMORY` that belong to the current leg or mission, not to the aircraft.
-_LEG_FIELDS = ("leg", "reached_for", "at_rim", "circling", "returning", "climbed", "finished", "waited")
+_LEG_FIELDS = (
+    "leg",
+    "time_since_reached",
+    "rim_reached",
+    "is_loitering",
+    "is_in_rtl",
+    "rtl_climb_complete",
+    "mission_finished",
+    "time_at_mission_end",
+)
 
 
 @dataclass(frozen=True)
 class Px4(Autopilot):
-    """PX4's control law for fixed wing: NPFG along the legs, TECS for altitude and airspeed.
+    """Simulated PX4 for fixed wing: NPFG along the legs, TECS for altitude and airspeed.
 
     >>> made = Px4(Px4Parameters.defaults("1.16"))
     >>> made.acceptance_radius, Px4(Px4Parameters.defaults("1.17")).acceptance_radius
@@ -116,13 +125,13 @@ class Px4(Autopilot):
         return cls(Px4Parameters.restore(stored.parameters, version))
 
     def store(self) -> StoredAutopilot:
-        """Return its parameters and its version for a log."""
+        """Return the parameters and the version of PX4 for a log."""
         parameters = self.parameters
         stored = StoredParameters(parameters.values, parameters.unused, parameters.source)
         return StoredAutopilot(parameters=stored, version=parameters.version)
 
     def of_release(self, version: Px4Version) -> Self:
-        """Return the same autopilot with the control law of another PX4 release."""
+        """Return the same autopilot with the controllers of another PX4 release."""
         return replace(self, parameters=replace(self.parameters, version=version))
 
     @classmethod
@@ -133,28 +142,28 @@ class Px4(Autopilot):
 
     @property
     def tick(self) -> Tick:
-        """Compiled function for one tick of the law."""
+        """Compiled function for one tick of PX4's controllers."""
         return px4_tick
 
     @property
     def loop(self) -> Loop:
-        """Compiled loop of the law with a compiled model."""
+        """Compiled simulation loop of PX4's controllers and the aircraft model."""
         return px4_loop
 
     def begin(self, memory: Record, own: Record) -> None:
-        """Write the parameters into the memory."""
+        """Copy the parameters into the controllers' record."""
         own.parameters = self.parameters.record()
 
     def take_over(self, before: Record, own: Record, here: Floats) -> None:
-        """Begin a new leg here, as after a change of mode, and keep the state of TECS and airspeed filter."""
+        """Start a new leg at ``here``, as after a change of mode, and keep the state of TECS and airspeed filter."""
         own.memory = before.memory
         for name in _LEG_FIELDS:
             setattr(own.memory, name, 0)
         own.memory.from_east, own.memory.from_north, own.memory.from_up = here
-        own.memory.nearest, own.memory.begun_up = math.inf, here[2]
+        own.memory.min_distance_to_end, own.memory.leg_start_altitude = math.inf, here[2]
 
     def described(self, aircraft: str) -> str:
-        """Return a description of the law with the parameters that matter most in a flight."""
+        """Return a description of the simulated PX4 with the parameters that matter most in a flight."""
         parameters = self.parameters
         source_text = f"the parameters of {parameters.source}" if parameters.source else "its default parameters"
         return (
@@ -165,23 +174,25 @@ class Px4(Autopilot):
 
     @property
     def version(self) -> str:
-        """PX4 release of the law."""
+        """Simulated PX4 release."""
         return self.parameters.version
 
     @property
     def acceptance_radius(self) -> float | None:
-        """NAV_ACC_RAD, or up to 1.16 guidance's own switch distance at sea level if that is more."""
+        """NAV_ACC_RAD; up to 1.16 at least guidance's own switch distance at sea level."""
         return self.turn_distance(math.pi, 0.0)
 
     def settings_not_flown(self, mission: MissionParts) -> list[str]:
-        """Return limits that end a mission, the settings of `_NEUTRAL` that are not neutral, and others."""
-        parameters, names = self.parameters, ["COM_FLT_TIME_MAX"]
+        """Describe settings that end a mission or change its flight and are not simulated."""
+        parameters, ending_names = self.parameters, ["COM_FLT_TIME_MAX"]
         if parameters["GF_ACTION"] > 0.0:
-            names += ["GF_MAX_HOR_DIST", "GF_MAX_VER_DIST"]
+            ending_names += ["GF_MAX_HOR_DIST", "GF_MAX_VER_DIST"]
         if parameters["COM_WIND_MAX_ACT"] > _WARN_OF_WIND and parameters["COM_WIND_MAX"] < mission.wind:
-            names += ["COM_WIND_MAX"]
+            ending_names += ["COM_WIND_MAX"]
         ending_texts = [
-            f"{name} {parameters[name]:g} ends a mission and is not judged" for name in names if parameters[name] > 0.0
+            f"{name} {parameters[name]:g} ends a mission and is not judged"
+            for name in ending_names
+            if parameters[name] > 0.0
         ]
         changing_texts = [
             f"{name} {parameters[name]:g} changes the flight and is not flown"
@@ -189,9 +200,9 @@ class Px4(Autopilot):
             if not neutral.lowest <= parameters[name] <= neutral.highest
             and not (self.is_program and neutral.by_program)
         ]
-        return [*ending_texts, *changing_texts, *([] if self.is_program else self._describe_others(mission))]
+        return [*ending_texts, *changing_texts, *([] if self.is_program else self._describe_mission_settings(mission))]
 
-    def _describe_others(self, mission: MissionParts) -> Iterator[str]:
+    def _describe_mission_settings(self, mission: MissionParts) -> Iterator[str]:
         """Describe settings that change only some missions or releases."""
         parameters = self.parameters
         if parameters["NPFG_EN_MIN_GSP"] == 0.0 and self.version == "1.16":
@@ -216,12 +227,12 @@ class Px4(Autopilot):
         return False
 
     def turn_distance(self, turn: float, amsl: float) -> float:
-        """Return the distance before a waypoint at which it turns in still air, for any turn, m.
+        """Return the distance before a waypoint at which PX4 turns in still air, for any turn, m.
 
-        Up to 1.16 it grows with altitude.
+        Up to 1.16 the distance grows with altitude.
         """
         parameters = self.parameters
-        if not parameters.anticipates:
+        if not parameters.uses_switch_distance:
             return parameters["NAV_ACC_RAD"]
         period = parameters["NPFG_PERIOD"]
         if parameters["NPFG_LB_PERIOD"] > 0.0:
@@ -239,12 +250,12 @@ class Px4(Autopilot):
 
     @property
     def return_rules(self) -> ReturnRules:
-        """Rules of an RTL from RTL_RETURN_ALT, RTL_LOITER_RAD and RTL_TYPE, at any distance.
+        """Rules of an RTL at any distance, from RTL_RETURN_ALT, RTL_LOITER_RAD and RTL_TYPE.
 
         RTL_RETURN_ALT applies above a rally point as above home.  Follows PX4's
-        `src/modules/navigator/rtl.cpp`.  RTL_TYPE 0 is the nearest of home and the rally points; 1 (the default of
-        fixed wings) and 5 are the nearest rally point, or home if there is no rally point.  The other types, and 1,
-        also use a mission's landing, which is not flown to.
+        `src/modules/navigator/rtl.cpp`.  RTL_TYPE 0 returns to the nearest of home and the rally points; 1 (the default
+        of fixed wings) and 5 return to the nearest rally point, or to home without a rally point.  The other types, and
+        1, also use a mission's landing, which is not simulated.
 
         >>> rules = Px4(Px4Parameters.defaults()).return_rules
         >>> rules.includes_home, rules.rally_height, rules.instead
@@ -287,7 +298,7 @@ class Px4(Autopilot):
     def mission_checks(self) -> MissionChecks:
         """Mission checks from FW_LND_ANG and MIS_TKO_LAND_REQ.
 
-        A file with all parameters is taken to state MIS_TKO_LAND_REQ.
+        A file with all parameters is assumed to state MIS_TKO_LAND_REQ.
 
         >>> Px4(Px4Parameters.defaults()).mission_checks.requires
         2
@@ -304,7 +315,7 @@ class Px4(Autopilot):
         return SpeedLimits(min_airspeed, max_airspeed, "FW_AIRSPD_MIN", "FW_AIRSPD_MAX", nearest=True)
 
     def speeds_flown(self, commanded: Floats, cruise: float) -> Floats:
-        """Return the commanded speeds, clipped to its limits."""
+        """Return the commanded airspeeds, clipped to FW_AIRSPD_MIN and FW_AIRSPD_MAX."""
         return np.clip(commanded, self.parameters["FW_AIRSPD_MIN"], self.parameters["FW_AIRSPD_MAX"])
 
     @property
@@ -320,16 +331,16 @@ class Px4(Autopilot):
     def tracking_error(
         self, airspeed: float, nav: Navigation, *, fly_over: bool = False, turbulence: Turbulence = "none"
     ) -> TrackingError | None:
-        """Return the deviations of its control law with these parameters; PX4 flies over no waypoint."""
+        """Return PX4's deviations with these parameters; PX4 flies over no waypoint."""
         return tracking_error(self.parameters, airspeed, nav, turbulence=turbulence)
 
-    def altitude_miss_probability(self, climb: float, sink: float, turbulence: Turbulence) -> float:
-        """Return the probability of an altitude miss above NAV_FW_ALT_RAD, in moderate turbulence."""
-        return altitude_miss_probability(self.parameters["NAV_FW_ALT_RAD"], climb, sink, turbulence)
+    def altitude_miss_probability(self, climb_reserve: float, sink_reserve: float, turbulence: Turbulence) -> float:
+        """Return the probability that the altitude error exceeds NAV_FW_ALT_RAD at a waypoint."""
+        return altitude_miss_probability(self.parameters["NAV_FW_ALT_RAD"], climb_reserve, sink_reserve, turbulence)
 
-    def gust_rise(self, sink: float, turbulence: Turbulence) -> float:
-        """Return the altitude gain in updrafts, in which it holds its airspeed with a limited sink rate."""
-        return height_in_updrafts(sink, turbulence)
+    def gust_rise(self, sink_reserve: float, turbulence: Turbulence) -> float:
+        """Return the altitude gained in updrafts while PX4 holds airspeed and cannot sink fast enough, m."""
+        return height_in_updrafts(sink_reserve, turbulence)
 
     def with_scenario_rtl_settings(
         self, rtl_altitude: float | None, rtl_autoland: int | None, *, lands: bool, lower: float = 0.0

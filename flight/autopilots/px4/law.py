@@ -1,7 +1,7 @@
-"""Implement PX4's control law as compiled code, with its memory and a tick of navigation, guidance, TECS and attitude.
+"""Simulate PX4's fixed-wing controllers in compiled code: navigation, guidance, TECS and attitude, and their memory.
 
 Attitude control uses planfly's inner loops (`flight.guidance.inner_loops`) with the lags of PX4's controllers, whose
-gains are tuned to the aircraft and do not belong to the law.
+gains are tuned to the aircraft and are no part of this model.
 """
 
 import math
@@ -9,8 +9,8 @@ import math
 import numpy as np
 
 from aircraft.envelope import GRAVITY
-from flight.autopilots.px4.lateral import bank_demand
-from flight.autopilots.px4.navigator import flown_to, is_last, navigate
+from flight.autopilots.px4.lateral import roll_setpoint
+from flight.autopilots.px4.navigator import find_target, is_last_target, navigate
 from flight.autopilots.px4.parameters import PX4_PARAMETERS
 from flight.autopilots.px4.tecs import update_tecs
 from flight.dynamics.instructions import Code
@@ -31,51 +31,51 @@ from flight.simulation.tick import (
 from world.arrays import Floats, Heights
 from world.kernels import Record, Records, compiled, inner, record_dtype
 
-# Memory of PX4's control law from tick to tick.
+# Memory of PX4's controllers from tick to tick.
 PX4_MEMORY = record_dtype(
-    ("begun", np.bool_),  # True once a tick was flown
+    ("is_initialised", np.bool_),  # True once a tick was flown
     # Navigation.
     ("leg", np.int64),  # current leg, from waypoint `leg` to `leg + 1`
     "from_east",  # m, start of the leg's line
     "from_north",
-    "from_up",  # m, start of its altitude slope
-    "nearest",  # m, smallest distance to the leg's end on this leg
-    "reached_for",  # s since its end was reached
-    "begun_up",  # m, altitude of the aircraft at the start of the leg
-    ("at_rim", np.bool_),  # True once the rim of a loiter to an altitude was reached
-    ("circling", np.bool_),  # True while a circle is followed
-    ("returning", np.bool_),  # True during an RTL; from_east, from_north and from_up are then where the RTL began
-    ("climbed", np.bool_),  # True once the return altitude is reached
-    ("finished", np.bool_),  # True once the mission's last waypoint was reached
-    "waited",  # s at the mission's end
+    "from_up",  # m, start of the leg's altitude slope
+    "min_distance_to_end",  # m, minimum distance to the leg's end on this leg (`_min_current_sp_distance_xy`)
+    "time_since_reached",  # s since the leg's end was reached
+    "leg_start_altitude",  # m, altitude of the aircraft at the start of the leg
+    ("rim_reached", np.bool_),  # True once the rim of a loiter to an altitude was reached
+    ("is_loitering", np.bool_),  # True while the aircraft follows a circle
+    ("is_in_rtl", np.bool_),  # True during an RTL; from_east, from_north and from_up are then where the RTL began
+    ("rtl_climb_complete", np.bool_),  # True once the return altitude is reached
+    ("mission_finished", np.bool_),  # True once the mission's last waypoint was reached
+    "time_at_mission_end",  # s since the mission's end was reached
     # Lateral.
-    "side_acceleration",  # m/s^2 to the right, the demand
-    "airspeed_for_ground",  # m/s, needed for the minimum ground speed; 0 if not needed
-    "roll_demand",  # rad
+    "lateral_acceleration",  # m/s^2 to the right, setpoint
+    "min_airspeed",  # m/s, required for the minimum ground speed; 0 if not required
+    "roll_setpoint",  # rad
     # Altitude and speed.
-    "height_asked",  # m, altitude setpoint of the leg
-    "height_reference",  # m, altitude reference that follows the setpoint
-    "height_rate",  # m/s, of the reference
-    "airspeed",  # m/s, smoothed
-    "airspeed_rate",  # m/s^2
-    "airspeed_demand",  # m/s, after the rate limit
-    "energy_rate",  # m^2/s^3, STE rate, smoothed
-    "balance_sum",  # m^2/s^3, SEB rate integrator
-    "throttle_sum",  # 0..1, STE rate integrator
-    "pitch_demand",  # rad, without the trim
-    "throttle_demand",  # 0..1
+    "altitude_setpoint",  # m, on the leg
+    "altitude_reference",  # m, follows the setpoint (`TECSAltitudeReferenceModel`)
+    "altitude_rate_reference",  # m/s
+    "tas",  # m/s, filtered true airspeed (`TECSAirspeedFilter`)
+    "tas_rate",  # m/s^2
+    "tas_setpoint",  # m/s, after the rate limit
+    "ste_rate",  # m^2/s^3, filtered
+    "pitch_integrator",  # m^2/s^3, integrator of the SEB rate error
+    "throttle_integrator",  # 0..1, integrator of the STE rate error
+    "pitch_setpoint",  # rad above the trim pitch
+    "throttle_setpoint",  # 0..1
 )
 # PX4's part of a `flight.simulation.tick.Workspace`.
 PX4 = record_dtype(("memory", PX4_MEMORY), ("parameters", PX4_PARAMETERS))
 PX4_NUMBERS = PX4.itemsize // 8
 
-# Lag of the bank behind its demand, as a ratio to FW_R_TC.  From the overshoots of PX4's flights of the Aerosonde,
+# Lag of the roll behind its setpoint, as a ratio to FW_R_TC.  From the overshoots of PX4's flights of the Aerosonde,
 # whose aileron feed-forward (FW_RR_FF) gives more than a roll rate needs.
 ROLL_LAG = 0.65
-# Lag of the pitch behind its demand, as a ratio to FW_P_TC.
+# Lag of the pitch behind its setpoint, as a ratio to FW_P_TC.
 PITCH_LAG = 1.0
-# Timeout at a mission's end, s: for reaching the last altitude, or for one lap around the last waypoint.
-LONGEST_WAIT = 300.0
+# Timeout at a mission's end, s: to reach the last altitude, or to fly once around the last waypoint.
+MISSION_END_TIMEOUT_S = 300.0
 
 
 @compiled
@@ -86,16 +86,16 @@ def px4_tick(block: Floats, heights: Heights) -> int:
     """
     path_begins = WORKSPACE_NUMBERS + PX4_NUMBERS
     work = block[:WORKSPACE_NUMBERS].view(WORKSPACE)[0]
-    own = block[WORKSPACE_NUMBERS:path_begins].view(PX4)[0]
+    px4 = block[WORKSPACE_NUMBERS:path_begins].view(PX4)[0]
     path: Record = block[path_begins:].view(PATH_ROW)
     settings = work.settings
     if not begin_tick(work, heights):
         return NOT_A_NUMBER
-    # PX4's wind estimate is slow: it contains no gusts.
+    # PX4's wind estimate is slow and contains no gusts.
     air, place = work.air, work.place
     wind_east = air.wind_east * place.north_cos + air.wind_north * place.north_sin
     wind_north = air.wind_north * place.north_cos - air.wind_east * place.north_sin
-    fly_as_px4(
+    control_as_px4(
         work.state,
         work.estimated,
         path.piece[: settings.pieces],
@@ -105,8 +105,8 @@ def px4_tick(block: Floats, heights: Heights) -> int:
         wind_north,
         work.gains,
         work.memory,
-        own.parameters,
-        own.memory,
+        px4.parameters,
+        px4.memory,
         work.commands,
         work.timing.dt,
     )
@@ -135,7 +135,7 @@ def px4_loop(
 
 
 @inner
-def fly_as_px4(
+def control_as_px4(
     state: Record,
     estimated: Record,
     pieces: Records,
@@ -144,129 +144,143 @@ def fly_as_px4(
     wind_east: float,
     wind_north: float,
     gains: Record,
-    memory: Record,
+    guidance: Record,
     parameters: Record,
-    own: Record,
+    memory: Record,
     commands: Record,
     dt: float,
 ) -> None:
-    """Fill the commands for one tick of ``dt`` seconds, and update the memories.
+    """Compute the commands for one tick of ``dt`` seconds, and update both memories.
 
-    wind: velocity of the air, m/s.
+    wind_east, wind_north: velocity of the air, m/s.
+    guidance: a record of `flight.guidance.inner_loops.GUIDANCE_MEMORY`.
     parameters: a record of `flight.autopilots.px4.parameters.PX4_PARAMETERS`.
-    own: a record of `flight.autopilots.px4.law.PX4_MEMORY`.
+    memory: a record of `flight.autopilots.px4.law.PX4_MEMORY`.
     The other parameters are those of `flight.autopilots.planfly.law.guide`.
 
-    The path is only the reference against which the track is measured; the law does not use it.
+    The path is only the reference against which the track is measured; PX4 does not use it.
     """
-    find_on_path(estimated, pieces, memory)
-    memory.height_error = estimated.up - profile(nodes, memory.distance)[0]
-    airspeed_factor = true_by_equivalent(estimated.up)
-    if not own.begun:
-        _initialise_law(state, estimated, waypoints, memory, parameters, own, airspeed_factor)
-    commanded_airspeed = min(parameters.airspeed_max, max(parameters.airspeed_min, waypoints[own.leg].airspeed))
-    # Guidance gets the true airspeed; from 1.17 on it gets the equivalent airspeed and takes it for true.
-    airspeed_scale = airspeed_factor if parameters.anticipates else 1.0
-    navigate(estimated, waypoints, wind_east, wind_north, commanded_airspeed * airspeed_scale, parameters, own, dt)
-    # Skip the rest of a loiter that PX4 left earlier than the path has it, and do not end the mission early.
-    while pieces[memory.piece].leg < own.leg - 1 and memory.piece + 1 < pieces.shape[0]:
-        memory.piece += 1
-    leave_sharp_corners(pieces, memory, own.leg)
-    memory.done = memory.done and is_last(waypoints, own)
-    airspeed_setpoint = max(commanded_airspeed, own.airspeed_for_ground / airspeed_scale)
-    memory.speed_command = min(parameters.airspeed_max, airspeed_setpoint) * airspeed_factor
-    if own.returning:
-        end_return(estimated, waypoints[own.leg + 1], memory, dt)
-    elif flown_to(waypoints, own) + 1 >= waypoints.shape[0]:
-        _end_mission(estimated, waypoints[waypoints.shape[0] - 1], memory, parameters, own, dt)
-    max_step = parameters.roll_slew * dt
-    demand = bank_demand(own.side_acceleration, parameters)
-    own.roll_demand = (
-        min(own.roll_demand + max_step, max(own.roll_demand - max_step, demand)) if max_step > 0.0 else demand
+    find_on_path(estimated, pieces, guidance)
+    guidance.height_error = estimated.up - profile(nodes, guidance.distance)[0]
+    eas_to_tas = true_by_equivalent(estimated.up)
+    if not memory.is_initialised:
+        _initialise_memory(state, estimated, waypoints, guidance, parameters, memory, eas_to_tas)
+    commanded_airspeed = min(parameters.airspeed_max, max(parameters.airspeed_min, waypoints[memory.leg].airspeed))
+    # Guidance gets the true airspeed; from 1.17 on it gets the equivalent airspeed, which it treats as true airspeed.
+    airspeed_scale = eas_to_tas if parameters.uses_switch_distance else 1.0
+    navigate(estimated, waypoints, wind_east, wind_north, commanded_airspeed * airspeed_scale, parameters, memory, dt)
+    # Skip the rest of a loiter that PX4 left earlier than the path does, and do not end the mission early.
+    while pieces[guidance.piece].leg < memory.leg - 1 and guidance.piece + 1 < pieces.shape[0]:
+        guidance.piece += 1
+    leave_sharp_corners(pieces, guidance, memory.leg)
+    guidance.done = guidance.done and is_last_target(waypoints, memory)
+    airspeed_setpoint = max(commanded_airspeed, memory.min_airspeed / airspeed_scale)
+    guidance.speed_command = min(parameters.airspeed_max, airspeed_setpoint) * eas_to_tas
+    if memory.is_in_rtl:
+        end_return(estimated, waypoints[memory.leg + 1], guidance, dt)
+    elif find_target(waypoints, memory) + 1 >= waypoints.shape[0]:
+        _end_mission(estimated, waypoints[waypoints.shape[0] - 1], guidance, parameters, memory, dt)
+    max_roll_step = parameters.roll_slew_rate * dt
+    limited_roll = roll_setpoint(memory.lateral_acceleration, parameters)
+    memory.roll_setpoint = (
+        min(memory.roll_setpoint + max_roll_step, max(memory.roll_setpoint - max_roll_step, limited_roll))
+        if max_roll_step > 0.0
+        else limited_roll
     )
-    update_tecs(state, estimated, parameters, own, airspeed_setpoint, airspeed_factor, dt)
-    _follow_attitude(state, estimated, gains, memory, parameters, own, commands, dt)
+    update_tecs(state, estimated, parameters, memory, airspeed_setpoint, eas_to_tas, dt)
+    _control_attitude(state, estimated, gains, guidance, parameters, memory, commands, dt)
 
 
 @inner
 def _end_mission(
-    estimated: Record, last_waypoint: Record, memory: Record, parameters: Record, own: Record, dt: float
+    estimated: Record, last_waypoint: Record, guidance: Record, parameters: Record, memory: Record, dt: float
 ) -> None:
-    """End the flight once it is past the last waypoint and at its altitude, or after a timeout.
+    """End the flight once the aircraft is past the last waypoint and at its altitude, or after a timeout.
 
     At the mission's end PX4 loiters without end (`MissionBase::setEndOfMissionItems`): the flight joins that loiter
-    and flies it once around.  A circle that begins before the waypoint, and is left at once because the altitude is
-    reached, does not end the flight.
+    once around.  A circle that begins before the waypoint, and that the aircraft leaves at once because its altitude is
+    right, does not end the flight.
     """
-    has_arrived = own.waited > 0.0 or memory.done or own.circling or own.finished
+    has_arrived = memory.time_at_mission_end > 0.0 or guidance.done or memory.is_loitering or memory.mission_finished
     if not has_arrived or last_waypoint.circle != 0.0:
         return
-    own.waited += dt
-    if own.finished:
-        end_around(estimated, memory, dt)
-        ended = memory.done
+    memory.time_at_mission_end += dt
+    if memory.mission_finished:
+        end_around(estimated, guidance, dt)
+        is_over = guidance.done
     else:
         # An aircraft that loiters at the mission's end has not missed the route.
-        memory.returning = True
-        ended = (
+        guidance.returning = True
+        is_over = (
             not last_waypoint.ends
-            and memory.done
-            and abs(estimated.up - last_waypoint.up) <= parameters.height_acceptance
+            and guidance.done
+            and abs(estimated.up - last_waypoint.up) <= parameters.altitude_acceptance_radius
         )
-    memory.done = ended or own.waited > LONGEST_WAIT
+    guidance.done = is_over or memory.time_at_mission_end > MISSION_END_TIMEOUT_S
 
 
 @inner
-def _initialise_law(
+def _initialise_memory(
     state: Record,
     estimated: Record,
     waypoints: Records,
-    memory: Record,
+    guidance: Record,
     parameters: Record,
-    own: Record,
-    airspeed_factor: float,
+    memory: Record,
+    eas_to_tas: float,
 ) -> None:
-    """Initialise the law in steady flight at the first waypoint."""
-    own.begun = True
-    own.from_east, own.from_north, own.from_up = waypoints[0].east, waypoints[0].north, waypoints[0].up
-    own.nearest = math.inf
-    own.begun_up = estimated.up
-    own.height_asked = estimated.up
-    own.height_reference = estimated.up
-    own.airspeed = state.airspeed
-    own.airspeed_demand = state.airspeed
-    # Start with the trim of level flight here, as if the aircraft had flown before.
-    own.pitch_demand = state.alpha - parameters.pitch_trim
-    own.balance_sum = own.pitch_demand * state.airspeed * GRAVITY
-    own.throttle_demand = memory.trim_throttle
-    trim = min(parameters.throttle_max, max(parameters.throttle_min, parameters.throttle_trim * airspeed_factor))
-    own.throttle_sum = memory.trim_throttle - trim
+    """Initialise the memory for steady flight at the first waypoint."""
+    memory.is_initialised = True
+    memory.from_east, memory.from_north, memory.from_up = waypoints[0].east, waypoints[0].north, waypoints[0].up
+    memory.min_distance_to_end = math.inf
+    memory.leg_start_altitude = estimated.up
+    memory.altitude_setpoint = estimated.up
+    memory.altitude_reference = estimated.up
+    memory.tas = state.airspeed
+    memory.tas_setpoint = state.airspeed
+    # Start with the trim of level flight here, as if the aircraft had been flying.
+    memory.pitch_setpoint = state.alpha - parameters.pitch_trim
+    memory.pitch_integrator = memory.pitch_setpoint * state.airspeed * GRAVITY
+    memory.throttle_setpoint = guidance.trim_throttle
+    throttle_trim = min(parameters.throttle_max, max(parameters.throttle_min, parameters.throttle_trim * eas_to_tas))
+    memory.throttle_integrator = guidance.trim_throttle - throttle_trim
 
 
 @inner
-def _follow_attitude(
+def _control_attitude(
     state: Record,
     estimated: Record,
     gains: Record,
-    memory: Record,
+    guidance: Record,
     parameters: Record,
-    own: Record,
+    memory: Record,
     commands: Record,
     dt: float,
 ) -> None:
-    """Drive roll and pitch to their demands with the lags of PX4's controllers, and set throttle."""
-    previous_rate = memory.bank_rate
-    rate = (own.roll_demand - memory.bank) / (ROLL_LAG * parameters.roll_time)
+    """Drive roll and pitch to their setpoints with the lags of PX4's controllers, and set the throttle."""
+    previous_roll_rate = guidance.bank_rate
+    roll_rate = (memory.roll_setpoint - guidance.bank) / (ROLL_LAG * parameters.roll_time_constant)
     if parameters.roll_rate_max > 0.0:
-        rate = min(parameters.roll_rate_max, max(-parameters.roll_rate_max, rate))
-    rate = min(gains.roll_rate_max, max(-gains.roll_rate_max, rate))
+        roll_rate = min(parameters.roll_rate_max, max(-parameters.roll_rate_max, roll_rate))
+    roll_rate = min(gains.roll_rate_max, max(-gains.roll_rate_max, roll_rate))
     max_change = gains.roll_acceleration_max * dt
-    rate = previous_rate + min(max_change, max(-max_change, rate - previous_rate))
-    follow_roll(state, gains, memory, commands, memory.bank + rate * dt, rate, (rate - previous_rate) / dt, dt)
-    pitch_rate = (own.pitch_demand + parameters.pitch_trim - state.pitch) / (PITCH_LAG * parameters.pitch_time)
+    roll_rate = previous_roll_rate + min(max_change, max(-max_change, roll_rate - previous_roll_rate))
+    follow_roll(
+        state,
+        gains,
+        guidance,
+        commands,
+        guidance.bank + roll_rate * dt,
+        roll_rate,
+        (roll_rate - previous_roll_rate) / dt,
+        dt,
+    )
+    pitch_rate = (memory.pitch_setpoint + parameters.pitch_trim - state.pitch) / (
+        PITCH_LAG * parameters.pitch_time_constant
+    )
     pitch_rate = min(_MAX_PITCH_RATE_RADPS, max(-_MAX_PITCH_RATE_RADPS, pitch_rate))
-    steer_elevator(state, gains, memory, commands, estimated.velocity_up, state.airspeed * pitch_rate)
-    commands.throttle = own.throttle_demand
+    steer_elevator(state, gains, guidance, commands, estimated.velocity_up, state.airspeed * pitch_rate)
+    commands.throttle = memory.throttle_setpoint
 
 
 # Limit of the pitch rate, rad/s: the default of FW_P_RMAX_POS and FW_P_RMAX_NEG.

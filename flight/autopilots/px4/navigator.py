@@ -19,35 +19,39 @@ circles about it with NAV_LOITER_RAD.
 
 import math
 
-from flight.autopilots.px4.lateral import follow_circle, follow_leg, switch_distance
+from flight.autopilots.px4.lateral import follow_leg, follow_loiter, switch_distance
 from world.geometry import wrap
 from world.kernels import Record, Records, inner
 
 # Delay from reaching a waypoint to the turn, s: the navigator's loop, its message to the position controller and the
 # controller's turn.  At 33 waypoints of the stored flights it was 0.13 s on average, 0.02 to 0.26.  PX4 1.17 and 1.18,
-# which turn by the same rule, differ from each other by up to 5.9 m at the same waypoints; a law without that delay is
-# never closer than 3 m.
+# which turn by the same rule, differ from each other by up to 5.9 m at the same waypoints; a simulation without that
+# delay is never closer than 3 m.
 SWITCH_DELAY = 0.13
-# Course tolerance for leaving a loiter on the course to what follows, rad (MIS_YAW_ERR).
+# Course tolerance for the exit from a loiter to the next item, rad (MIS_YAW_ERR).
 COURSE_ACCEPTANCE = math.radians(12.0)
-# A place closer to the center than this, in radii, cannot be headed for from the loiter: no course is awaited.
+# Minimum distance of the next waypoint from the loiter's center for which an exit course is awaited, in radii: from
+# the loiter no course leads to a nearer one.
 _MIN_EXIT_DISTANCE_RATIO = 1.05
 
 
 @inner
-def reach_radius(ground_speed: float, parameters: Record) -> float:
-    """Return the distance to a waypoint within which it is reached, m."""
-    radius: float = parameters.acceptance
-    if parameters.anticipates:
+def acceptance_radius_at(ground_speed: float, parameters: Record) -> float:
+    """Return the acceptance radius of a waypoint at a ground speed (m/s), m (`get_acceptance_radius`)."""
+    radius: float = parameters.acceptance_radius
+    if parameters.uses_switch_distance:
         radius = max(radius, switch_distance(ground_speed, parameters))
     return radius
 
 
 @inner
-def past_waypoint(estimated: Record, b: Record, own: Record) -> bool:
-    """Return True if the aircraft is past the plane across the leg at its end b; False for a leg without length."""
-    leg_east, leg_north = b.east - own.from_east, b.north - own.from_north
-    distance_past = (estimated.east - b.east) * leg_east + (estimated.north - b.north) * leg_north
+def is_past_waypoint(estimated: Record, target: Record, memory: Record) -> bool:
+    """Return True if the aircraft is past the vertical plane across the leg at its end.
+
+    The result is False for a leg without length.
+    """
+    leg_east, leg_north = target.east - memory.from_east, target.north - memory.from_north
+    distance_past = (estimated.east - target.east) * leg_east + (estimated.north - target.north) * leg_north
     return leg_east * leg_east + leg_north * leg_north > 1e-6 and distance_past > 0.0
 
 
@@ -57,261 +61,306 @@ def navigate(
     waypoints: Records,
     wind_east: float,
     wind_north: float,
-    airspeed_demand: float,
+    target_airspeed: float,
     parameters: Record,
-    own: Record,
+    memory: Record,
     dt: float,
 ) -> None:
-    """Follow the current leg, demand its altitude, and change to the next leg when it is time.
+    """Follow the current leg, set the altitude setpoint, and switch to the next leg when the target is reached.
 
     estimated: a record of `flight.guidance.navigation_error.MOTION`.
     waypoints: (w,) of `flight.guidance.lateral_reference_laws.WAYPOINT`.
-    wind: velocity of the air, m/s.
-    airspeed_demand: m/s.
+    wind_east, wind_north: velocity of the air, m/s.
+    target_airspeed: m/s.
     parameters: a record of `flight.autopilots.px4.parameters.PX4_PARAMETERS`.
-    own: a record of `flight.autopilots.px4.law.PX4_MEMORY`.
+    memory: a record of `flight.autopilots.px4.law.PX4_MEMORY`.
     dt: s.
     """
-    target = flown_to(waypoints, own)
-    b = waypoints[target]
-    if target > own.leg + 1 and _past_gate(estimated, waypoints[own.leg + 1], b):
-        own.leg += 1
-    if b.returns:
+    target_index = find_target(waypoints, memory)
+    target = waypoints[target_index]
+    if target_index > memory.leg + 1 and _is_past_gate(estimated, waypoints[memory.leg + 1], target):
+        memory.leg += 1
+    if target.returns:
         # An RTL is one leg, which lasts until the flight ends.
-        _navigate_rtl(estimated, b, wind_east, wind_north, airspeed_demand, parameters, own)
+        _navigate_rtl(estimated, target, wind_east, wind_north, target_airspeed, parameters, memory)
         return
-    if b.circle != 0.0:
-        _fly_loiter(estimated, waypoints, b, wind_east, wind_north, airspeed_demand, parameters, own, dt)
+    if target.circle != 0.0:
+        _navigate_loiter(estimated, waypoints, target, wind_east, wind_north, target_airspeed, parameters, memory, dt)
     else:
-        _follow_plain_leg(estimated, waypoints, target, wind_east, wind_north, airspeed_demand, parameters, own, dt)
+        _navigate_waypoint(
+            estimated, waypoints, target_index, wind_east, wind_north, target_airspeed, parameters, memory, dt
+        )
 
 
 @inner
-def flown_to(waypoints: Records, own: Record) -> int:
-    """Return the index of the waypoint that is flown to; gates are passed on the leg to it."""
-    target: int = own.leg + 1
-    while waypoints[target].gate:
-        target += 1
-    return target
+def find_target(waypoints: Records, memory: Record) -> int:
+    """Return the index of the target waypoint: the next one that is not a gate."""
+    target_index: int = memory.leg + 1
+    while waypoints[target_index].gate:
+        target_index += 1
+    return target_index
 
 
 @inner
-def _past_gate(estimated: Record, gate: Record, b: Record) -> bool:
-    """Return True past the plane through a gate, perpendicular to the line from the gate to the waypoint b."""
-    normal_east, normal_north = b.east - gate.east, b.north - gate.north
+def _is_past_gate(estimated: Record, gate: Record, target: Record) -> bool:
+    """Return True past the vertical plane through a gate, perpendicular to the line from the gate to the target."""
+    normal_east, normal_north = target.east - gate.east, target.north - gate.north
     distance_past = (estimated.east - gate.east) * normal_east + (estimated.north - gate.north) * normal_north
     return distance_past >= 0.0
 
 
 @inner
-def _follow_plain_leg(
+def _navigate_waypoint(
     estimated: Record,
     waypoints: Records,
-    target: int,
+    target_index: int,
     wind_east: float,
     wind_north: float,
-    airspeed_demand: float,
+    target_airspeed: float,
     parameters: Record,
-    own: Record,
+    memory: Record,
     dt: float,
 ) -> None:
-    """Follow the leg to a waypoint, and circle at it while the aircraft is too high or too low.
+    """Follow the leg to a waypoint, and circle at the waypoint while the aircraft is too high or too low.
 
-    At the last waypoint of a mission the aircraft circles once it is reached.
+    Once the last waypoint of a mission is reached, the aircraft circles about it.
     """
-    b = waypoints[target]
-    speed = math.hypot(estimated.velocity_east, estimated.velocity_north)
-    turn_distance, loiter_radius = switch_distance(speed, parameters), parameters.loiter_radius
-    distance = math.hypot(b.east - estimated.east, b.north - estimated.north)
-    own.nearest = min(own.nearest, distance)
-    is_off_altitude = abs(estimated.up - b.up) > parameters.height_acceptance
-    # A circle is kept once begun, even if the aircraft is wide of it.
-    own.circling = own.finished or (is_off_altitude and (own.circling or distance < turn_distance))
-    if own.circling:
-        follow_circle(
-            estimated, b.east, b.north, loiter_radius, wind_east, wind_north, airspeed_demand, parameters, own
+    target = waypoints[target_index]
+    ground_speed = math.hypot(estimated.velocity_east, estimated.velocity_north)
+    turn_distance, loiter_radius = switch_distance(ground_speed, parameters), parameters.loiter_radius
+    distance = math.hypot(target.east - estimated.east, target.north - estimated.north)
+    memory.min_distance_to_end = min(memory.min_distance_to_end, distance)
+    is_off_altitude = abs(estimated.up - target.up) > parameters.altitude_acceptance_radius
+    # A circle continues once begun, even if the aircraft is far outside it.
+    memory.is_loitering = memory.mission_finished or (
+        is_off_altitude and (memory.is_loitering or distance < turn_distance)
+    )
+    if memory.is_loitering:
+        follow_loiter(
+            estimated,
+            target.east,
+            target.north,
+            loiter_radius,
+            wind_east,
+            wind_north,
+            target_airspeed,
+            parameters,
+            memory,
         )
-        own.height_asked = b.up
+        memory.altitude_setpoint = target.up
     else:
-        follow_leg(estimated, b.east, b.north, wind_east, wind_north, airspeed_demand, parameters, own)
-        own.height_asked = leg_height(b.east, b.north, b.up, max(turn_distance, abs(loiter_radius)), own)
-    is_end = target + 1 >= waypoints.shape[0]
-    if is_end and not b.ends:
+        follow_leg(estimated, target.east, target.north, wind_east, wind_north, target_airspeed, parameters, memory)
+        memory.altitude_setpoint = foh_altitude(
+            target.east, target.north, target.up, max(turn_distance, abs(loiter_radius)), memory
+        )
+    is_end = target_index + 1 >= waypoints.shape[0]
+    if is_end and not target.ends:
         return
-    is_reached = distance <= reach_radius(speed, parameters) or past_waypoint(estimated, b, own)
-    own.reached_for = own.reached_for + dt if own.reached_for > 0.0 or (is_reached and not is_off_altitude) else 0.0
-    if own.reached_for <= SWITCH_DELAY:
+    is_reached = distance <= acceptance_radius_at(ground_speed, parameters) or is_past_waypoint(
+        estimated, target, memory
+    )
+    memory.time_since_reached = (
+        memory.time_since_reached + dt
+        if memory.time_since_reached > 0.0 or (is_reached and not is_off_altitude)
+        else 0.0
+    )
+    if memory.time_since_reached <= SWITCH_DELAY:
         return
     if is_end:
-        own.finished = True
+        memory.mission_finished = True
     else:
-        begin_leg(estimated, waypoints, target, own)
+        begin_leg(estimated, waypoints, target_index, memory)
 
 
 @inner
-def _fly_loiter(
+def _navigate_loiter(
     estimated: Record,
     waypoints: Records,
-    b: Record,
+    loiter: Record,
     wind_east: float,
     wind_north: float,
-    airspeed_demand: float,
+    target_airspeed: float,
     parameters: Record,
-    own: Record,
+    memory: Record,
     dt: float,
 ) -> None:
-    """Fly to a loiter and around it until it is over.
+    """Fly to a loiter and around it until its end condition holds.
 
-    b: the corner of the route that stands for the loiter.
+    loiter: the corner of the route that stands for the loiter.
     """
-    speed = math.hypot(estimated.velocity_east, estimated.velocity_north)
-    distance = math.hypot(b.centre_east - estimated.east, b.centre_north - estimated.north)
-    own.circling = True
-    follow_circle(
-        estimated, b.centre_east, b.centre_north, b.circle, wind_east, wind_north, airspeed_demand, parameters, own
+    ground_speed = math.hypot(estimated.velocity_east, estimated.velocity_north)
+    distance = math.hypot(loiter.centre_east - estimated.east, loiter.centre_north - estimated.north)
+    memory.is_loitering = True
+    follow_loiter(
+        estimated,
+        loiter.centre_east,
+        loiter.centre_north,
+        loiter.circle,
+        wind_east,
+        wind_north,
+        target_airspeed,
+        parameters,
+        memory,
     )
-    is_on_rim = distance <= abs(b.circle) + reach_radius(speed, parameters)
-    if b.to_height and not own.at_rim:
-        own.height_asked = own.begun_up
-        own.at_rim = is_on_rim and abs(estimated.up - own.begun_up) <= parameters.height_acceptance
+    is_on_rim = distance <= abs(loiter.circle) + acceptance_radius_at(ground_speed, parameters)
+    if loiter.to_height and not memory.rim_reached:
+        memory.altitude_setpoint = memory.leg_start_altitude
+        memory.rim_reached = (
+            is_on_rim and abs(estimated.up - memory.leg_start_altitude) <= parameters.altitude_acceptance_radius
+        )
         return
-    own.height_asked = b.up
-    is_at_altitude = abs(estimated.up - b.up) <= parameters.height_acceptance
-    own.reached_for = own.reached_for + dt if own.reached_for > 0.0 or (is_on_rim and is_at_altitude) else 0.0
-    exit_waypoint = own.leg + 2
-    if math.isnan(b.stays):
+    memory.altitude_setpoint = loiter.up
+    is_at_altitude = abs(estimated.up - loiter.up) <= parameters.altitude_acceptance_radius
+    memory.time_since_reached = (
+        memory.time_since_reached + dt if memory.time_since_reached > 0.0 or (is_on_rim and is_at_altitude) else 0.0
+    )
+    exit_index = memory.leg + 2
+    if math.isnan(loiter.stays):
         # A loiter by turns, which PX4 does not fly: it is left where the drawn route leaves it.
-        if exit_waypoint < waypoints.shape[0] and is_on_rim and past_corner(estimated, b):
-            begin_leg(estimated, waypoints, own.leg + 1, own)
+        if exit_index < waypoints.shape[0] and is_on_rim and is_past_corner(estimated, loiter):
+            begin_leg(estimated, waypoints, memory.leg + 1, memory)
         return
-    while exit_waypoint < waypoints.shape[0] and waypoints[exit_waypoint].stop == b.stop:
-        exit_waypoint += 1
-    if exit_waypoint >= waypoints.shape[0] or own.reached_for <= b.stays + SWITCH_DELAY:
+    while exit_index < waypoints.shape[0] and waypoints[exit_index].stop == loiter.stop:
+        exit_index += 1
+    if exit_index >= waypoints.shape[0] or memory.time_since_reached <= loiter.stays + SWITCH_DELAY:
         return
-    if not b.leaves_on_course or _is_on_exit_course(estimated, waypoints[exit_waypoint], b):
-        begin_leg(estimated, waypoints, exit_waypoint - 1, own)
+    if not loiter.leaves_on_course or _is_on_exit_course(estimated, waypoints[exit_index], loiter):
+        begin_leg(estimated, waypoints, exit_index - 1, memory)
 
 
 @inner
-def is_last(waypoints: Records, own: Record) -> bool:
-    """Return True if nothing but corners of the same loiter follows the current target."""
-    target = flown_to(waypoints, own)
-    b = waypoints[target]
-    return target + 1 >= waypoints.shape[0] or (b.circle != 0.0 and waypoints[-1].stop == b.stop)
+def is_last_target(waypoints: Records, memory: Record) -> bool:
+    """Return True if only corners of the same loiter follow the target."""
+    target_index = find_target(waypoints, memory)
+    target = waypoints[target_index]
+    return target_index + 1 >= waypoints.shape[0] or (target.circle != 0.0 and waypoints[-1].stop == target.stop)
 
 
 @inner
-def _setpoint_position(b: Record) -> tuple[float, float]:
+def _setpoint_position(waypoint: Record) -> tuple[float, float]:
     """Return east and north (m) of a waypoint's setpoint, which for a loiter is its center."""
-    return (b.centre_east, b.centre_north) if b.circle != 0.0 else (b.east, b.north)
+    return (waypoint.centre_east, waypoint.centre_north) if waypoint.circle != 0.0 else (waypoint.east, waypoint.north)
 
 
 @inner
-def _is_on_exit_course(estimated: Record, next_waypoint: Record, b: Record) -> bool:
-    """Return True if the course leads to the setpoint after loiter b, or if no course can.
+def _is_on_exit_course(estimated: Record, next_waypoint: Record, loiter: Record) -> bool:
+    """Return True if the ground course points to the setpoint after a loiter, within `COURSE_ACCEPTANCE`.
 
-    No course is required to a setpoint too close to the loiter's center.
+    Also True for a setpoint so close to the loiter's center that the course can never point to it.
 
     next_waypoint: the waypoint after the loiter.
     """
-    east, north = _setpoint_position(next_waypoint)
-    if math.hypot(east - b.centre_east, north - b.centre_north) <= _MIN_EXIT_DISTANCE_RATIO * abs(b.circle):
+    next_east, next_north = _setpoint_position(next_waypoint)
+    if math.hypot(next_east - loiter.centre_east, next_north - loiter.centre_north) <= _MIN_EXIT_DISTANCE_RATIO * abs(
+        loiter.circle
+    ):
         return True
-    bearing = math.atan2(east - estimated.east, north - estimated.north)
+    bearing = math.atan2(next_east - estimated.east, next_north - estimated.north)
     return abs(wrap(bearing - math.atan2(estimated.velocity_east, estimated.velocity_north))) < COURSE_ACCEPTANCE
 
 
 @inner
 def _navigate_rtl(
     estimated: Record,
-    b: Record,
+    rtl: Record,
     wind_east: float,
     wind_north: float,
-    airspeed_demand: float,
+    target_airspeed: float,
     parameters: Record,
-    own: Record,
+    memory: Record,
 ) -> None:
-    """Fly an RTL: climb in a circle if necessary, go straight to the target at that altitude, and descend there.
+    """Fly an RTL: circle up to the return altitude if necessary, fly straight to the target, and descend there.
 
     Follows PX4's `src/modules/navigator/rtl_direct.cpp`; the aircraft never descends before it is over its target.
     """
-    if not own.returning:
-        own.returning, own.circling = True, False
-        own.from_east, own.from_north, own.from_up = estimated.east, estimated.north, estimated.up
-    return_altitude = max(own.from_up, b.up)
-    if not own.climbed:
-        own.climbed = estimated.up >= return_altitude - parameters.height_acceptance
-        if own.climbed:
-            own.from_east, own.from_north = estimated.east, estimated.north
-    if not own.climbed:
-        own.height_asked = return_altitude
-        follow_circle(
+    if not memory.is_in_rtl:
+        memory.is_in_rtl, memory.is_loitering = True, False
+        memory.from_east, memory.from_north, memory.from_up = estimated.east, estimated.north, estimated.up
+    return_altitude = max(memory.from_up, rtl.up)
+    if not memory.rtl_climb_complete:
+        memory.rtl_climb_complete = estimated.up >= return_altitude - parameters.altitude_acceptance_radius
+        if memory.rtl_climb_complete:
+            memory.from_east, memory.from_north = estimated.east, estimated.north
+    if not memory.rtl_climb_complete:
+        memory.altitude_setpoint = return_altitude
+        follow_loiter(
             estimated,
-            own.from_east,
-            own.from_north,
+            memory.from_east,
+            memory.from_north,
             parameters.loiter_radius,
             wind_east,
             wind_north,
-            airspeed_demand,
+            target_airspeed,
             parameters,
-            own,
+            memory,
         )
         return
     speed = math.hypot(estimated.velocity_east, estimated.velocity_north)
-    distance = math.hypot(b.centre_east - estimated.east, b.centre_north - estimated.north)
-    own.circling = own.circling or distance < abs(b.circle) + switch_distance(speed, parameters)
-    own.height_asked = b.up if own.circling else return_altitude
-    if own.circling:
-        follow_circle(
-            estimated, b.centre_east, b.centre_north, b.circle, wind_east, wind_north, airspeed_demand, parameters, own
+    distance = math.hypot(rtl.centre_east - estimated.east, rtl.centre_north - estimated.north)
+    memory.is_loitering = memory.is_loitering or distance < abs(rtl.circle) + switch_distance(speed, parameters)
+    memory.altitude_setpoint = rtl.up if memory.is_loitering else return_altitude
+    if memory.is_loitering:
+        follow_loiter(
+            estimated,
+            rtl.centre_east,
+            rtl.centre_north,
+            rtl.circle,
+            wind_east,
+            wind_north,
+            target_airspeed,
+            parameters,
+            memory,
         )
     else:
-        follow_leg(estimated, b.centre_east, b.centre_north, wind_east, wind_north, airspeed_demand, parameters, own)
+        follow_leg(
+            estimated, rtl.centre_east, rtl.centre_north, wind_east, wind_north, target_airspeed, parameters, memory
+        )
 
 
 @inner
-def begin_leg(estimated: Record, waypoints: Records, leg: int, own: Record) -> None:
-    """Begin a leg, whose line joins both waypoints; after a loiter, the line starts at the loiter's center.
+def begin_leg(estimated: Record, waypoints: Records, leg: int, memory: Record) -> None:
+    """Make ``leg`` the current leg, along the line between its two waypoints.
 
-    After a loiter by turns, which PX4 does not fly, it starts where the loiter is left.
+    After a loiter the line starts at the loiter's center.  After a loiter by turns, which PX4 does not fly, the line
+    starts where the aircraft leaves the loiter.
     """
-    a, b = waypoints[leg], waypoints[leg + 1]
-    own.leg = leg
-    own.from_east, own.from_north = _setpoint_position(a)
-    own.from_up = a.up
-    if a.circle != 0.0 and math.isnan(a.stays):
-        own.from_east, own.from_north = estimated.east, estimated.north
-    if a.circle != 0.0 and a.leaves_on_tangent and not math.isnan(a.stays):
-        east, north = _setpoint_position(b)
-        bearing = math.atan2(east - a.centre_east, north - a.centre_north)
-        cosine = abs(a.circle) / max(1e-3, math.hypot(east - a.centre_east, north - a.centre_north))
-        exit_bearing = bearing - math.copysign(math.acos(min(1.0, cosine)), a.circle)
-        own.from_east += abs(a.circle) * math.sin(exit_bearing)
-        own.from_north += abs(a.circle) * math.cos(exit_bearing)
-    if not (a.circle != 0.0 and a.stop == b.stop):
-        own.circling, own.at_rim, own.begun_up = False, False, estimated.up
-        own.reached_for = 0.0
-    own.nearest = math.inf
+    start, end = waypoints[leg], waypoints[leg + 1]
+    memory.leg = leg
+    memory.from_east, memory.from_north = _setpoint_position(start)
+    memory.from_up = start.up
+    if start.circle != 0.0 and math.isnan(start.stays):
+        memory.from_east, memory.from_north = estimated.east, estimated.north
+    if start.circle != 0.0 and start.leaves_on_tangent and not math.isnan(start.stays):
+        end_east, end_north = _setpoint_position(end)
+        bearing = math.atan2(end_east - start.centre_east, end_north - start.centre_north)
+        cosine = abs(start.circle) / max(1e-3, math.hypot(end_east - start.centre_east, end_north - start.centre_north))
+        exit_bearing = bearing - math.copysign(math.acos(min(1.0, cosine)), start.circle)
+        memory.from_east += abs(start.circle) * math.sin(exit_bearing)
+        memory.from_north += abs(start.circle) * math.cos(exit_bearing)
+    if not (start.circle != 0.0 and start.stop == end.stop):
+        memory.is_loitering, memory.rim_reached, memory.leg_start_altitude = False, False, estimated.up
+        memory.time_since_reached = 0.0
+    memory.min_distance_to_end = math.inf
 
 
 @inner
-def past_corner(estimated: Record, b: Record) -> bool:
+def is_past_corner(estimated: Record, corner: Record) -> bool:
     """Return True if an aircraft on a loiter has passed the route's corner for this part of the loiter."""
-    corner_bearing = math.atan2(b.east - b.centre_east, b.north - b.centre_north)
-    bearing = math.atan2(estimated.east - b.centre_east, estimated.north - b.centre_north)
-    angle_past = wrap(bearing - corner_bearing) * math.copysign(1.0, b.circle)
+    corner_bearing = math.atan2(corner.east - corner.centre_east, corner.north - corner.centre_north)
+    bearing = math.atan2(estimated.east - corner.centre_east, estimated.north - corner.centre_north)
+    angle_past = wrap(bearing - corner_bearing) * math.copysign(1.0, corner.circle)
     return 0.0 <= angle_past < 0.5 * math.pi
 
 
 @inner
-def leg_height(end_east: float, end_north: float, end_up: float, lead_distance: float, own: Record) -> float:
-    """Return a leg's altitude setpoint at the aircraft, m, on a slope that ends ``lead_distance`` m before the end.
+def foh_altitude(end_east: float, end_north: float, end_up: float, lead_distance: float, memory: Record) -> float:
+    """Return the altitude setpoint on the slope of a leg, m: PX4's first-order hold.
 
-    PX4 calls it a first-order hold.  The slope uses the smallest horizontal distance to the end that was reached on
-    this leg; a leg no longer than ``lead_distance`` is a step.
+    The slope ends ``lead_distance`` m before the end of the leg, and uses the minimum horizontal distance to the end
+    on this leg.  On a leg no longer than ``lead_distance`` the setpoint is the altitude of its end.
     """
-    length = math.hypot(end_east - own.from_east, end_north - own.from_north)
-    nearest = min(own.nearest, length)
-    if length <= lead_distance or nearest <= lead_distance:
+    leg_length = math.hypot(end_east - memory.from_east, end_north - memory.from_north)
+    min_distance = min(memory.min_distance_to_end, leg_length)
+    if leg_length <= lead_distance or min_distance <= lead_distance:
         return end_up
-    return own.from_up + (end_up - own.from_up) * (length - nearest) / (length - lead_distance)
+    return memory.from_up + (end_up - memory.from_up) * (leg_length - min_distance) / (leg_length - lead_distance)

@@ -28,90 +28,90 @@ _VERSIONS: tuple[Px4Version, ...] = get_args(Px4Version)
 _RAD_PER_DEG = math.pi / 180.0
 
 
-# By the field of `PX4_PARAMETERS`; parameters that are not flown stand at the end.
+# Definitions by the field of `PX4_PARAMETERS`; parameters that are not simulated stand at the end.
 DEFINITIONS = {
     # Lateral guidance.
     "npfg_period": Definition("NPFG_PERIOD", 10.0, 0.5, 1000.0, documented=(1.0, 100.0)),
     "npfg_damping": Definition("NPFG_DAMPING", 0.7, 0.05, 5.0, documented=(0.1, 1.0)),
-    "npfg_lower_bound": Definition("NPFG_LB_PERIOD", 1.0, 0.0, 1.0),
-    "npfg_upper_bound": Definition("NPFG_UB_PERIOD", 1.0, 0.0, 1.0),
-    "npfg_roll_time": Definition("NPFG_ROLL_TC", 0.5, 0.0, 20.0, documented=(0.0, 2.0)),
-    "npfg_switch_share": Definition("NPFG_SW_DST_MLT", 0.32, 0.0, 10.0, documented=(0.1, 1.0)),
-    "npfg_period_safety": Definition("NPFG_PERIOD_SF", 1.5, 1.0, 10.0),
-    "ground_speed_min": Definition("FW_GND_SPD_MIN", 5.0, 0.0, 40.0),
+    "npfg_enables_period_lower_bound": Definition("NPFG_LB_PERIOD", 1.0, 0.0, 1.0),
+    "npfg_enables_period_upper_bound": Definition("NPFG_UB_PERIOD", 1.0, 0.0, 1.0),
+    "npfg_roll_time_constant": Definition("NPFG_ROLL_TC", 0.5, 0.0, 20.0, documented=(0.0, 2.0)),
+    "npfg_switch_distance_multiplier": Definition("NPFG_SW_DST_MLT", 0.32, 0.0, 10.0, documented=(0.1, 1.0)),
+    "npfg_period_safety_factor": Definition("NPFG_PERIOD_SF", 1.5, 1.0, 10.0),
+    "min_ground_speed": Definition("FW_GND_SPD_MIN", 5.0, 0.0, 40.0),
     "roll_limit": Definition("FW_R_LIM", 50.0, 5.0, 85.0, _RAD_PER_DEG, documented=(35.0, 75.0)),
-    "roll_slew": Definition("FW_PN_R_SLEW_MAX", 90.0, 0.0, 1000.0, _RAD_PER_DEG),
-    "roll_time": Definition("FW_R_TC", 0.4, 0.02, 10.0, documented=(0.2, 1.0)),
+    "roll_slew_rate": Definition("FW_PN_R_SLEW_MAX", 90.0, 0.0, 1000.0, _RAD_PER_DEG),
+    "roll_time_constant": Definition("FW_R_TC", 0.4, 0.02, 10.0, documented=(0.2, 1.0)),
     "roll_rate_max": Definition("FW_R_RMAX", 70.0, 0.0, 720.0, _RAD_PER_DEG, documented=(0.0, 180.0)),
-    # Changes of waypoint.
-    "acceptance": Definition("NAV_ACC_RAD", 10.0, 0.05, 10_000.0, documented=(0.05, 200.0)),
-    "height_acceptance": Definition("NAV_FW_ALT_RAD", 10.0, 0.05, 10_000.0, documented=(0.05, 200.0)),
+    # Switching of waypoints.
+    "acceptance_radius": Definition("NAV_ACC_RAD", 10.0, 0.05, 10_000.0, documented=(0.05, 200.0)),
+    "altitude_acceptance_radius": Definition("NAV_FW_ALT_RAD", 10.0, 0.05, 10_000.0, documented=(0.05, 200.0)),
     "loiter_radius": Definition("NAV_LOITER_RAD", 80.0, -10_000.0, 10_000.0),
     # Altitude and speed.
-    "climb_reference": Definition("FW_T_CLMB_R_SP", 3.0, 0.1, 1000.0, documented=(0.5, 15.0)),
-    "sink_reference": Definition("FW_T_SINK_R_SP", 2.0, 0.1, 1000.0, documented=(0.5, 15.0)),
-    "climb_max": Definition("FW_T_CLMB_MAX", 5.0, 0.1, 100.0, documented=(1.0, 15.0)),
-    "sink_min": Definition("FW_T_SINK_MIN", 2.0, 0.1, 100.0, documented=(1.0, 15.0)),
-    "sink_max": Definition("FW_T_SINK_MAX", 5.0, 0.1, 100.0, documented=(1.0, 15.0)),
-    "height_time": Definition("FW_T_ALT_TC", 5.0, 0.1, 1000.0, documented=(2.0, 50.0)),
-    "height_rate_share": Definition("FW_T_HRATE_FF", 0.3, 0.0, 1.0),
-    "speed_time": Definition("FW_T_TAS_TC", 5.0, 0.1, 1000.0, documented=(2.0, 50.0)),
-    "pitch_integral": Definition("FW_T_I_GAIN_PIT", 0.1, 0.0, 20.0, documented=(0.0, 2.0)),
-    "pitch_damping": Definition("FW_T_PTCH_DAMP", 0.1, 0.0, 20.0, documented=(0.0, 2.0)),
-    "balance_share": Definition("FW_T_SEB_R_FF", 1.0, 0.0, 3.0, documented=(0.5, 1.5)),
-    "throttle_damping": Definition("FW_T_THR_DAMPING", 0.05, 0.0, 10.0, documented=(0.0, 1.0)),
-    "throttle_integral": Definition("FW_T_THR_INTEG", 0.02, 0.0, 10.0, documented=(0.0, 1.0)),
-    "roll_to_throttle": Definition("FW_T_RLL2THR", 15.0, 0.0, 200.0, documented=(0.0, 20.0)),
-    "speed_weight": Definition("FW_T_SPDWEIGHT", 1.0, 0.0, 2.0),
-    "energy_rate_time": Definition("FW_T_STE_R_TC", 0.4, 0.0, 20.0, documented=(0.0, 2.0)),
-    "vertical_acceleration": Definition("FW_T_VERT_ACC", 7.0, 0.1, 100.0, documented=(1.0, 10.0)),
-    "speed_deviation": Definition("FW_T_SPD_STD", 0.07, 0.01, 10.0),
-    "speed_rate_deviation": Definition("FW_T_SPD_DEV_STD", 0.2, 0.01, 10.0),
-    "speed_process_deviation": Definition("FW_T_SPD_PRC_STD", 0.2, 0.01, 10.0),
+    "target_climb_rate": Definition("FW_T_CLMB_R_SP", 3.0, 0.1, 1000.0, documented=(0.5, 15.0)),
+    "target_sink_rate": Definition("FW_T_SINK_R_SP", 2.0, 0.1, 1000.0, documented=(0.5, 15.0)),
+    "max_climb_rate": Definition("FW_T_CLMB_MAX", 5.0, 0.1, 100.0, documented=(1.0, 15.0)),
+    "min_sink_rate": Definition("FW_T_SINK_MIN", 2.0, 0.1, 100.0, documented=(1.0, 15.0)),
+    "max_sink_rate": Definition("FW_T_SINK_MAX", 5.0, 0.1, 100.0, documented=(1.0, 15.0)),
+    "altitude_time_constant": Definition("FW_T_ALT_TC", 5.0, 0.1, 1000.0, documented=(2.0, 50.0)),
+    "altitude_rate_feedforward": Definition("FW_T_HRATE_FF", 0.3, 0.0, 1.0),
+    "airspeed_time_constant": Definition("FW_T_TAS_TC", 5.0, 0.1, 1000.0, documented=(2.0, 50.0)),
+    "integrator_gain_pitch": Definition("FW_T_I_GAIN_PIT", 0.1, 0.0, 20.0, documented=(0.0, 2.0)),
+    "pitch_damping_gain": Definition("FW_T_PTCH_DAMP", 0.1, 0.0, 20.0, documented=(0.0, 2.0)),
+    "seb_rate_feedforward": Definition("FW_T_SEB_R_FF", 1.0, 0.0, 3.0, documented=(0.5, 1.5)),
+    "throttle_damping_gain": Definition("FW_T_THR_DAMPING", 0.05, 0.0, 10.0, documented=(0.0, 1.0)),
+    "integrator_gain_throttle": Definition("FW_T_THR_INTEG", 0.02, 0.0, 10.0, documented=(0.0, 1.0)),
+    "load_factor_correction": Definition("FW_T_RLL2THR", 15.0, 0.0, 200.0, documented=(0.0, 20.0)),
+    "pitch_speed_weight": Definition("FW_T_SPDWEIGHT", 1.0, 0.0, 2.0),
+    "ste_rate_time_constant": Definition("FW_T_STE_R_TC", 0.4, 0.0, 20.0, documented=(0.0, 2.0)),
+    "vertical_acceleration_limit": Definition("FW_T_VERT_ACC", 7.0, 0.1, 100.0, documented=(1.0, 10.0)),
+    "airspeed_std_dev": Definition("FW_T_SPD_STD", 0.07, 0.01, 10.0),
+    "airspeed_rate_std_dev": Definition("FW_T_SPD_DEV_STD", 0.2, 0.01, 10.0),
+    "airspeed_rate_noise_std_dev": Definition("FW_T_SPD_PRC_STD", 0.2, 0.01, 10.0),
     "airspeed_min": Definition("FW_AIRSPD_MIN", 10.0, 0.5, 500.0),
     "airspeed_trim": Definition("FW_AIRSPD_TRIM", 15.0, 0.5, 500.0),
     "airspeed_max": Definition("FW_AIRSPD_MAX", 20.0, 0.5, 500.0),
     "pitch_limit_min": Definition("FW_P_LIM_MIN", -30.0, -80.0, 0.0, _RAD_PER_DEG, documented=(-60.0, 0.0)),
     "pitch_limit_max": Definition("FW_P_LIM_MAX", 30.0, 0.0, 80.0, _RAD_PER_DEG, documented=(0.0, 60.0)),
     "pitch_trim": Definition("FW_PSP_OFF", 0.0, -90.0, 90.0, _RAD_PER_DEG),
-    "pitch_time": Definition("FW_P_TC", 0.4, 0.02, 10.0, documented=(0.2, 1.0)),
+    "pitch_time_constant": Definition("FW_P_TC", 0.4, 0.02, 10.0, documented=(0.2, 1.0)),
     "throttle_trim": Definition("FW_THR_TRIM", 0.6, 0.0, 1.0),
     "throttle_min": Definition("FW_THR_MIN", 0.0, 0.0, 1.0),
     "throttle_max": Definition("FW_THR_MAX", 1.0, 0.0, 1.0),
-    "throttle_slew": Definition("FW_THR_SLEW_MAX", 0.0, 0.0, 100.0, documented=(0.0, 1.0)),
-    # Return.
-    "return_height": Definition("RTL_RETURN_ALT", 100.0, 0.0, 10_000.0),
-    "return_radius": Definition("RTL_LOITER_RAD", 80.0, 1.0, 10_000.0),
-    "return_type": Definition("RTL_TYPE", 1.0, 0.0, 5.0),
-    # Checks of a mission.
-    "mission_requires": Definition("MIS_TKO_LAND_REQ", 2.0, 0.0, 5.0),
+    "throttle_slew_rate": Definition("FW_THR_SLEW_MAX", 0.0, 0.0, 100.0, documented=(0.0, 1.0)),
+    # RTL.
+    "rtl_altitude": Definition("RTL_RETURN_ALT", 100.0, 0.0, 10_000.0),
+    "rtl_loiter_radius": Definition("RTL_LOITER_RAD", 80.0, 1.0, 10_000.0),
+    "rtl_type": Definition("RTL_TYPE", 1.0, 0.0, 5.0),
+    # Mission checks.
+    "takeoff_landing_requirement": Definition("MIS_TKO_LAND_REQ", 2.0, 0.0, 5.0),
     "landing_angle": Definition("FW_LND_ANG", 5.0, 1.0, 45.0, _RAD_PER_DEG),
-    # Not flown.
+    # Not simulated.
     "uses_airspeed": Definition("FW_USE_AIRSPD", 1.0, 0.0, 1.0),
-    "keeps_ground_speed": Definition("NPFG_EN_MIN_GSP", 1.0, 0.0, 1.0),
-    "landing_height_acceptance": Definition("NAV_FW_ALTL_RAD", 5.0, 0.05, 200.0),
+    "enables_min_ground_speed": Definition("NPFG_EN_MIN_GSP", 1.0, 0.0, 1.0),
+    "landing_altitude_acceptance_radius": Definition("NAV_FW_ALTL_RAD", 5.0, 0.05, 200.0),
     "track_keeping": Definition("NPFG_TRACK_KEEP", 1.0, 0.0, 1.0),
     "excess_wind": Definition("NPFG_WIND_REG", 1.0, 0.0, 1.0),
     "track_keeping_speed": Definition("NPFG_GSP_MAX_TK", 5.0, 0.0, 50.0),
-    "fast_descend": Definition("FW_T_F_ALT_ERR", -1.0, -1.0, 10_000.0),
-    "throttle_slow": Definition("FW_THR_ASPD_MIN", 0.0, 0.0, 1.0),
-    "throttle_fast": Definition("FW_THR_ASPD_MAX", 0.0, 0.0, 1.0),
-    "wind_to_airspeed": Definition("FW_WIND_ARSP_SC", 0.0, 0.0, 10.0),
+    "fast_descend_altitude_error": Definition("FW_T_F_ALT_ERR", -1.0, -1.0, 10_000.0),
+    "throttle_trim_min_airspeed": Definition("FW_THR_ASPD_MIN", 0.0, 0.0, 1.0),
+    "throttle_trim_max_airspeed": Definition("FW_THR_ASPD_MAX", 0.0, 0.0, 1.0),
+    "wind_airspeed_scale": Definition("FW_WIND_ARSP_SC", 0.0, 0.0, 10.0),
     "weight_base": Definition("WEIGHT_BASE", -1.0, -1.0, 10_000.0),
     "weight_gross": Definition("WEIGHT_GROSS", -1.0, -1.0, 10_000.0),
     "service_ceiling": Definition("FW_SERVICE_CEIL", -1.0, -1.0, 20_000.0),
-    "return_descent": Definition("RTL_DESCEND_ALT", 100.0, 0.0, 10_000.0),
-    "return_landing": Definition("RTL_LAND_DELAY", -1.0, -1.0, 10_000.0),
+    "rtl_descend_altitude": Definition("RTL_DESCEND_ALT", 100.0, 0.0, 10_000.0),
+    "rtl_land_delay": Definition("RTL_LAND_DELAY", -1.0, -1.0, 10_000.0),
     "fence_action": Definition("GF_ACTION", 2.0, 0.0, 5.0),
-    "fence_distance": Definition("GF_MAX_HOR_DIST", 0.0, 0.0, 1e6),
-    "fence_height": Definition("GF_MAX_VER_DIST", 0.0, 0.0, 1e6),
-    "longest_flight": Definition("COM_FLT_TIME_MAX", -1.0, -1.0, 1e6),
+    "fence_max_distance": Definition("GF_MAX_HOR_DIST", 0.0, 0.0, 1e6),
+    "fence_max_altitude": Definition("GF_MAX_VER_DIST", 0.0, 0.0, 1e6),
+    "max_flight_time": Definition("COM_FLT_TIME_MAX", -1.0, -1.0, 1e6),
 }
-# Parameters that are read, but no flight shows the effect of a value other than PX4's default.
+# Parameters that are read but not simulated with a value other than PX4's default.
 NOT_FLOWN = tuple(definition.name for definition in list(DEFINITIONS.values())[-19:])
-# From this number of parameters on, a file is a complete set: a ground station saves a thousand and more.
+# Minimum number of parameters in a complete set: a ground station saves more than a thousand.
 _COMPLETE_SET_COUNT = 300
-# Parameters that should not fall from one to the next; PX4 warns of some and flies with them.
+# Parameters whose values should not decrease from one to the next; PX4 warns of some such values and flies with them.
 _ORDERS = (
     ("FW_THR_MIN", "FW_THR_TRIM", "FW_THR_MAX"),
     ("FW_AIRSPD_MIN", "FW_AIRSPD_TRIM", "FW_AIRSPD_MAX"),
@@ -125,12 +125,12 @@ _PAIRS = (("FW_THR_MIN", "FW_THR_MAX"), ("FW_AIRSPD_MIN", "FW_AIRSPD_MAX"))
 
 PX4_PARAMETERS = record_dtype(
     *DEFINITIONS,
-    ("anticipates", np.bool_),  # True if the navigator uses guidance's own switch distance: up to 1.16
-    # Gains (1/s, 1/s, 1/s^2, 1/s) of the airspeed filter: of the speed and of its rate, by the error of each.
-    "speed_by_speed",
-    "speed_by_rate",
-    "rate_by_speed",
-    "rate_by_rate",
+    ("uses_switch_distance", np.bool_),  # True if the navigator uses guidance's own switch distance: up to 1.16
+    # Gains of the airspeed filter, see `speed_filter_gains`.
+    "kalman_gain_00",
+    "kalman_gain_01",
+    "kalman_gain_10",
+    "kalman_gain_11",
 )
 # ArduPlane's parameters of an aircraft that PX4 has under another name, with the factor to PX4's unit.
 FROM_ARDUPILOT = {
@@ -148,7 +148,7 @@ FROM_ARDUPILOT = {
     "TECS_SINK_MIN": ("FW_T_SINK_MIN", 1.0),
     "TECS_SINK_MAX": ("FW_T_SINK_MAX", 1.0),
 }
-# Parameters with which the verdict may be open (`flight.autopilots.px4.autopilot.Px4.settings_not_flown`).
+# Parameters that may leave a verdict undecided (`flight.autopilots.px4.autopilot.Px4.settings_not_flown`).
 _WHEN_STATED = {
     "ASPD_PRIMARY": 1.0,
     "COM_WIND_MAX": -1.0,
@@ -175,7 +175,7 @@ class Px4Parameters(ParameterSet):
     version: release of PX4.
 
     >>> default = Px4Parameters.defaults()
-    >>> round(default["FW_R_LIM"], 3), default["NAV_ACC_RAD"], Px4Parameters.defaults("1.16").anticipates
+    >>> round(default["FW_R_LIM"], 3), default["NAV_ACC_RAD"], Px4Parameters.defaults("1.16").uses_switch_distance
     (0.873, 10.0, True)
     >>> default.changed(NAV_ACC_RAD=56.0)["NAV_ACC_RAD"]
     56.0
@@ -195,7 +195,7 @@ class Px4Parameters(ParameterSet):
     version: Px4Version = NEWEST_PX4
 
     def __post_init__(self) -> None:
-        """Refuse a version of PX4 that is not known."""
+        """Raise ParameterError if the version of PX4 is unknown."""
         if self.version not in _VERSIONS:
             allowed = f"expected {' or '.join(_VERSIONS)}"
             message = f"px4_version: {self.version!r}: {allowed}"
@@ -203,7 +203,7 @@ class Px4Parameters(ParameterSet):
 
     @classmethod
     def _of_aircraft(cls, entries: Mapping[str, Entry]) -> dict[str, float]:
-        """Return the values in the aircraft's file that PX4 has as well, limited to PX4's ranges."""
+        """Return the values of the aircraft's file that PX4 also has, limited to PX4's ranges."""
         values = {}
         for name, entry in entries.items():
             if name in FROM_ARDUPILOT:
@@ -214,7 +214,7 @@ class Px4Parameters(ParameterSet):
 
     @classmethod
     def _counts_as_set(cls, definition: Definition, value: float) -> bool:
-        """Return False for a parameter that is not flown and has its default, because stations save every parameter."""
+        """Return False for a parameter that is not simulated and has its default: stations save every parameter."""
         return definition.name not in NOT_FLOWN or value != definition.default
 
     @property
@@ -223,7 +223,7 @@ class Px4Parameters(ParameterSet):
         return len(self.unused) + len(self.by_origin("file")) >= _COMPLETE_SET_COUNT
 
     @property
-    def anticipates(self) -> bool:
+    def uses_switch_distance(self) -> bool:
         """True if the navigator uses guidance's own switch distance.
 
         Up to 1.16 the position controller published it; 1.17 split the controller into modules that do not publish it.
@@ -235,33 +235,37 @@ class Px4Parameters(ParameterSet):
         record: Record = np.zeros(1, PX4_PARAMETERS)[0]
         for (field, definition), parameter in zip(DEFINITIONS.items(), self.values, strict=False):
             setattr(record, field, parameter.value * definition.to_si)
-        record.anticipates = self.anticipates
-        gains = speed_filter_gains(record.speed_deviation, record.speed_rate_deviation, record.speed_process_deviation)
-        record.speed_by_speed, record.speed_by_rate, record.rate_by_speed, record.rate_by_rate = gains
+        record.uses_switch_distance = self.uses_switch_distance
+        gains = speed_filter_gains(
+            record.airspeed_std_dev, record.airspeed_rate_std_dev, record.airspeed_rate_noise_std_dev
+        )
+        record.kalman_gain_00, record.kalman_gain_01, record.kalman_gain_10, record.kalman_gain_11 = gains
         return record
 
 
 def speed_filter_gains(
     speed_sigma: float, rate_sigma: float, process_sigma: float
 ) -> tuple[float, float, float, float]:
-    """Return the gains of the airspeed filter, for speed and for rate, each by the errors of speed and of rate.
+    """Return the 2x2 steady-state Kalman gains of the airspeed filter, row by row (PX4: kKg00 to kKg11).
+
+    The rows are airspeed (1/s, 1) and its rate (1/s^2, 1/s); the columns are the errors of airspeed and of rate.
 
     speed_sigma, rate_sigma: standard deviations of the measured airspeed (m/s) and of its measured rate (m/s^2).
     process_sigma: standard deviation of the noise that drives the rate, m/s^2.
 
-    The gains are the steady gains of a Kalman-Bucy filter on an
-    integrator chain (Kalman and Bucy 1961, J. Basic Eng. 83, 95-108), as PX4's parameters FW_T_SPD_* are described.
+    The filter is a Kalman-Bucy filter on an integrator chain (Kalman and Bucy 1961, J. Basic Eng. 83, 95-108), as the
+    reference describes PX4's parameters FW_T_SPD_*.
 
     >>> [round(gain, 2) for gain in speed_filter_gains(0.07, 0.2, 0.2)]
     [1.92, 0.26, 2.12, 0.67]
     """
-    chain, precision = np.array([[0.0, 1.0], [0.0, 0.0]]), np.diag([speed_sigma**-2.0, rate_sigma**-2.0])
+    dynamics, precision = np.array([[0.0, 1.0], [0.0, 0.0]]), np.diag([speed_sigma**-2.0, rate_sigma**-2.0])
     # Solve the Riccati equation by the stable eigenvectors of its Hamiltonian (Potter 1966, SIAM J. Appl. Math. 14,
     # 496-501).
-    hamiltonian = np.block([[chain.T, -precision], [-np.diag([0.0, process_sigma * process_sigma]), -chain]])
-    roots, vectors = np.linalg.eig(hamiltonian)
-    stable = vectors[:, roots.real < 0.0]
-    gains = np.real(stable[2:] @ np.linalg.inv(stable[:2])) @ precision
+    hamiltonian = np.block([[dynamics.T, -precision], [-np.diag([0.0, process_sigma * process_sigma]), -dynamics]])
+    eigenvalues, eigenvectors = np.linalg.eig(hamiltonian)
+    stable_vectors = eigenvectors[:, eigenvalues.real < 0.0]
+    gains = np.real(stable_vectors[2:] @ np.linalg.inv(stable_vectors[:2])) @ precision
     return float(gains[0, 0]), float(gains[0, 1]), float(gains[1, 0]), float(gains[1, 1])
 
 

@@ -11,42 +11,46 @@ from world.kernels import Record, inner
 
 # Fraction of the maximum energy rates that a change of speed may use.
 _SPEED_RATE_FRACTION = 0.5
-# Limit of the rate of the airspeed demand, m/s^2.
+# Maximum rate of the airspeed setpoint, m/s^2.
 _AIRSPEED_SLEW_MPS2 = 1.0
-# Underspeed begins this fraction of FW_AIRSPD_TRIM below FW_AIRSPD_MIN, and is complete as far again below that.
+# Distance below FW_AIRSPD_MIN at which underspeed begins, as a fraction of FW_AIRSPD_TRIM.  The underspeed ratio
+# rises from 0 to 1 over the same distance below that.
 _UNDERSPEED_FRACTION = 0.15
 
 
 @inner
-def update_altitude_reference(parameters: Record, own: Record, dt: float) -> None:
-    """Move the altitude reference towards the setpoint, within its limits (`TECSAltitudeReferenceModel`).
+def update_altitude_reference(parameters: Record, memory: Record, dt: float) -> None:
+    """Move the altitude reference towards the setpoint (`TECSAltitudeReferenceModel`).
 
-    It climbs by at most FW_T_CLMB_R_SP, sinks by at most FW_T_SINK_R_SP, and decelerates in time with FW_T_VERT_ACC.
+    The reference climbs by at most FW_T_CLMB_R_SP, sinks by at most FW_T_SINK_R_SP, and decelerates in time with
+    FW_T_VERT_ACC.
     """
-    altitude_error = own.height_asked - own.height_reference
-    rate = min(math.sqrt(2.0 * parameters.vertical_acceleration * abs(altitude_error)), abs(altitude_error) / dt)
-    climb = min(parameters.climb_reference, parameters.climb_max)
-    sink = min(parameters.sink_reference, parameters.sink_max)
-    rate_demand = min(climb, max(-sink, math.copysign(rate, altitude_error)))
-    max_change = parameters.vertical_acceleration * dt
-    own.height_rate = min(own.height_rate + max_change, max(own.height_rate - max_change, rate_demand))
-    own.height_reference += own.height_rate * dt
+    altitude_error = memory.altitude_setpoint - memory.altitude_reference
+    rate_towards_setpoint = min(
+        math.sqrt(2.0 * parameters.vertical_acceleration_limit * abs(altitude_error)), abs(altitude_error) / dt
+    )
+    max_climb_rate = min(parameters.target_climb_rate, parameters.max_climb_rate)
+    max_sink_rate = min(parameters.target_sink_rate, parameters.max_sink_rate)
+    rate_setpoint = min(max_climb_rate, max(-max_sink_rate, math.copysign(rate_towards_setpoint, altitude_error)))
+    max_change = parameters.vertical_acceleration_limit * dt
+    memory.altitude_rate_reference = min(
+        memory.altitude_rate_reference + max_change, max(memory.altitude_rate_reference - max_change, rate_setpoint)
+    )
+    memory.altitude_reference += memory.altitude_rate_reference * dt
 
 
 @inner
-def estimate_airspeed(measured_airspeed: float, parameters: Record, own: Record, dt: float) -> None:
-    """Update the airspeed filter with a measured airspeed (m/s) (`TECSAirspeedFilter`).
+def update_airspeed_filter(measured_tas: float, parameters: Record, memory: Record, dt: float) -> None:
+    """Update the airspeed filter with a measured true airspeed, m/s (`TECSAirspeedFilter`).
 
-    The measured rate is taken as 0, as in PX4.
+    The measured rate is 0, as in PX4.
     """
-    airspeed_error, airspeed_rate_error = measured_airspeed - own.airspeed, -own.airspeed_rate
-    own.airspeed += (
-        own.airspeed_rate + parameters.speed_by_speed * airspeed_error + parameters.speed_by_rate * airspeed_rate_error
+    tas_error, tas_rate_error = measured_tas - memory.tas, -memory.tas_rate
+    memory.tas += (
+        memory.tas_rate + parameters.kalman_gain_00 * tas_error + parameters.kalman_gain_01 * tas_rate_error
     ) * dt
-    own.airspeed = max(1.0, own.airspeed)
-    own.airspeed_rate += (
-        parameters.rate_by_speed * airspeed_error + parameters.rate_by_rate * airspeed_rate_error
-    ) * dt
+    memory.tas = max(1.0, memory.tas)
+    memory.tas_rate += (parameters.kalman_gain_10 * tas_error + parameters.kalman_gain_11 * tas_rate_error) * dt
 
 
 @inner
@@ -54,117 +58,139 @@ def update_tecs(
     state: Record,
     estimated: Record,
     parameters: Record,
-    own: Record,
+    memory: Record,
     airspeed_setpoint: float,
-    airspeed_factor: float,
+    eas_to_tas: float,
     dt: float,
 ) -> None:
-    """Update the throttle and pitch demands for the altitude setpoint and an airspeed, into ``own``.
+    """Update the throttle and pitch setpoints of ``memory`` for its altitude setpoint and an airspeed.
 
-    state: a record of `flight.dynamics.state.STATE`.  estimated: of `flight.guidance.navigation_error.MOTION`.
-    airspeed_setpoint: equivalent airspeed, m/s.  airspeed_factor: ratio of true to equivalent airspeed.
+    state: a record of `flight.dynamics.state.STATE`.  estimated: a record of
+    `flight.guidance.navigation_error.MOTION`.
+    airspeed_setpoint: equivalent airspeed, m/s.  eas_to_tas: ratio of true to equivalent airspeed.
     """
-    update_altitude_reference(parameters, own, dt)
-    estimate_airspeed(state.airspeed, parameters, own, dt)
-    speed = own.airspeed
+    update_altitude_reference(parameters, memory, dt)
+    update_airspeed_filter(state.airspeed, parameters, memory, dt)
+    tas = memory.tas
     # In a bank the minimum airspeed grows as the root of the load factor.
-    min_airspeed = parameters.airspeed_min / math.sqrt(max(0.1, math.cos(own.roll_demand)))
-    true_setpoint = min(parameters.airspeed_max, max(min_airspeed, airspeed_setpoint)) * airspeed_factor
+    min_airspeed = parameters.airspeed_min / math.sqrt(max(0.1, math.cos(memory.roll_setpoint)))
+    limited_tas_setpoint = min(parameters.airspeed_max, max(min_airspeed, airspeed_setpoint)) * eas_to_tas
     step = _AIRSPEED_SLEW_MPS2 * dt
-    own.airspeed_demand = min(own.airspeed_demand + step, max(own.airspeed_demand - step, true_setpoint))
-    max_rate, min_rate = GRAVITY * parameters.climb_max, -GRAVITY * parameters.sink_min
-    climb_rate = (own.height_reference - estimated.up) / parameters.height_time
-    climb_rate += parameters.height_rate_share * own.height_rate
-    climb_rate = min(parameters.climb_max, max(-parameters.sink_max, climb_rate))
-    acceleration = (own.airspeed_demand - speed) / parameters.speed_time
-    rate_fraction = _SPEED_RATE_FRACTION / speed
-    acceleration = min(rate_fraction * max_rate, max(rate_fraction * min_rate, acceleration))
-    underspeed_ratio = underspeed(speed / airspeed_factor, parameters)
-    _set_pitch(estimated, parameters, own, climb_rate, acceleration, underspeed_ratio, dt)
-    _set_throttle(state, estimated, parameters, own, climb_rate, acceleration, underspeed_ratio, airspeed_factor, dt)
+    memory.tas_setpoint = min(memory.tas_setpoint + step, max(memory.tas_setpoint - step, limited_tas_setpoint))
+    ste_rate_max, ste_rate_min = GRAVITY * parameters.max_climb_rate, -GRAVITY * parameters.min_sink_rate
+    altitude_rate_setpoint = (memory.altitude_reference - estimated.up) / parameters.altitude_time_constant
+    altitude_rate_setpoint += parameters.altitude_rate_feedforward * memory.altitude_rate_reference
+    altitude_rate_setpoint = min(parameters.max_climb_rate, max(-parameters.max_sink_rate, altitude_rate_setpoint))
+    tas_rate_setpoint = (memory.tas_setpoint - tas) / parameters.airspeed_time_constant
+    tas_rate_per_ste_rate = _SPEED_RATE_FRACTION / tas
+    tas_rate_setpoint = min(
+        tas_rate_per_ste_rate * ste_rate_max, max(tas_rate_per_ste_rate * ste_rate_min, tas_rate_setpoint)
+    )
+    underspeed_ratio = detect_underspeed(tas / eas_to_tas, parameters)
+    _update_pitch_setpoint(
+        estimated, parameters, memory, altitude_rate_setpoint, tas_rate_setpoint, underspeed_ratio, dt
+    )
+    _update_throttle_setpoint(
+        state,
+        estimated,
+        parameters,
+        memory,
+        altitude_rate_setpoint,
+        tas_rate_setpoint,
+        underspeed_ratio,
+        eas_to_tas,
+        dt,
+    )
 
 
 @inner
-def underspeed(airspeed: float, parameters: Record) -> float:
-    """Return the underspeed ratio (0..1), which is the priority of speed over altitude (`_detectUnderspeed`).
+def detect_underspeed(equivalent_airspeed: float, parameters: Record) -> float:
+    """Return the underspeed ratio (0..1), the priority of speed over altitude (`_detectUnderspeed`).
 
-    airspeed: equivalent, m/s.
+    equivalent_airspeed: m/s.
     """
-    ramp = _UNDERSPEED_FRACTION * parameters.airspeed_trim
-    start = max(0.0, parameters.airspeed_min - ramp)
-    full = max(0.0, start - ramp)
-    return 1.0 - min(1.0, max(0.0, (airspeed - full) / max(1e-3, start - full)))
+    ramp_width = _UNDERSPEED_FRACTION * parameters.airspeed_trim
+    start_airspeed = max(0.0, parameters.airspeed_min - ramp_width)
+    full_airspeed = max(0.0, start_airspeed - ramp_width)
+    return 1.0 - min(1.0, max(0.0, (equivalent_airspeed - full_airspeed) / max(1e-3, start_airspeed - full_airspeed)))
 
 
 @inner
-def _set_pitch(
+def _update_pitch_setpoint(
     estimated: Record,
     parameters: Record,
-    own: Record,
-    climb_rate: float,
-    acceleration: float,
+    memory: Record,
+    altitude_rate_setpoint: float,
+    tas_rate_setpoint: float,
     underspeed_ratio: float,
     dt: float,
 ) -> None:
-    """Set the pitch demand from the SEB rate of a climb rate (m/s) and an acceleration (m/s^2)."""
-    speed = own.airspeed
-    weight = parameters.speed_weight * (1.0 - underspeed_ratio) + 2.0 * underspeed_ratio
+    """Set the pitch setpoint from the SEB rate of an altitude rate (m/s) and an acceleration (m/s^2)."""
+    tas = memory.tas
+    speed_weight = parameters.pitch_speed_weight * (1.0 - underspeed_ratio) + 2.0 * underspeed_ratio
     # Clip both weights at 1: a weight above 1 then lowers the other instead of raising the loop gain.
-    ske_weight, spe_weight = min(1.0, max(0.0, weight)), min(1.0, max(0.0, 2.0 - weight))
-    rate_demand = GRAVITY * climb_rate * spe_weight - speed * acceleration * ske_weight
-    rate_error = rate_demand - (GRAVITY * estimated.velocity_up * spe_weight - speed * own.airspeed_rate * ske_weight)
-    rate_per_pitch = speed * GRAVITY
+    ske_weighting, spe_weighting = min(1.0, max(0.0, speed_weight)), min(1.0, max(0.0, 2.0 - speed_weight))
+    seb_rate_setpoint = GRAVITY * altitude_rate_setpoint * spe_weighting - tas * tas_rate_setpoint * ske_weighting
+    seb_rate_error = seb_rate_setpoint - (
+        GRAVITY * estimated.velocity_up * spe_weighting - tas * memory.tas_rate * ske_weighting
+    )
+    seb_rate_per_pitch = tas * GRAVITY
     pitch_max, pitch_min = (
         parameters.pitch_limit_max - parameters.pitch_trim,
         parameters.pitch_limit_min - parameters.pitch_trim,
     )
-    increment = rate_error * parameters.pitch_integral * dt
+    increment = seb_rate_error * parameters.integrator_gain_pitch * dt
     pitch = (
-        rate_error * parameters.pitch_damping + parameters.balance_share * rate_demand + own.balance_sum
-    ) / rate_per_pitch
+        seb_rate_error * parameters.pitch_damping_gain
+        + parameters.seb_rate_feedforward * seb_rate_setpoint
+        + memory.pitch_integrator
+    ) / seb_rate_per_pitch
     # In saturation the integrator may only move away from the limit.
     if not ((pitch >= pitch_max and increment > 0.0) or (pitch <= pitch_min and increment < 0.0)):
-        own.balance_sum += increment
-        pitch += increment / rate_per_pitch
+        memory.pitch_integrator += increment
+        pitch += increment / seb_rate_per_pitch
     pitch = min(pitch_max, max(pitch_min, pitch))
-    max_step = parameters.vertical_acceleration / speed * dt
-    own.pitch_demand = min(own.pitch_demand + max_step, max(own.pitch_demand - max_step, pitch))
+    max_step = parameters.vertical_acceleration_limit / tas * dt
+    memory.pitch_setpoint = min(memory.pitch_setpoint + max_step, max(memory.pitch_setpoint - max_step, pitch))
 
 
 @inner
-def _set_throttle(
+def _update_throttle_setpoint(
     state: Record,
     estimated: Record,
     parameters: Record,
-    own: Record,
-    climb_rate: float,
-    acceleration: float,
+    memory: Record,
+    altitude_rate_setpoint: float,
+    tas_rate_setpoint: float,
     underspeed_ratio: float,
-    airspeed_factor: float,
+    eas_to_tas: float,
     dt: float,
 ) -> None:
-    """Set the throttle demand from the STE rate of a climb rate (m/s) and an acceleration (m/s^2)."""
-    max_rate, min_rate = GRAVITY * parameters.climb_max, -GRAVITY * parameters.sink_min
-    roll_drag = parameters.roll_to_throttle * (1.0 / max(0.1, math.cos(state.roll)) - 1.0)
-    rate_demand = min(max_rate, max(min_rate, GRAVITY * climb_rate + own.airspeed * acceleration + roll_drag))
-    ste_rate = GRAVITY * estimated.velocity_up + own.airspeed * own.airspeed_rate
-    own.energy_rate += (ste_rate - own.energy_rate) * dt / (dt + parameters.energy_rate_time)
-    rate_error, span = rate_demand - own.energy_rate, max_rate - min_rate
+    """Set the throttle setpoint from the STE rate of an altitude rate (m/s) and an acceleration (m/s^2)."""
+    ste_rate_max, ste_rate_min = GRAVITY * parameters.max_climb_rate, -GRAVITY * parameters.min_sink_rate
+    load_factor_correction = parameters.load_factor_correction * (1.0 / max(0.1, math.cos(state.roll)) - 1.0)
+    ste_rate_setpoint = min(
+        ste_rate_max,
+        max(ste_rate_min, GRAVITY * altitude_rate_setpoint + memory.tas * tas_rate_setpoint + load_factor_correction),
+    )
+    ste_rate = GRAVITY * estimated.velocity_up + memory.tas * memory.tas_rate
+    memory.ste_rate += (ste_rate - memory.ste_rate) * dt / (dt + parameters.ste_rate_time_constant)
+    ste_rate_error, ste_rate_span = ste_rate_setpoint - memory.ste_rate, ste_rate_max - ste_rate_min
     # In thin air level flight needs more throttle.
-    trim = min(parameters.throttle_max, max(parameters.throttle_min, parameters.throttle_trim * airspeed_factor))
-    if rate_demand >= 0.0:
-        throttle = trim + rate_demand * (parameters.throttle_max - trim) / max_rate
+    throttle_trim = min(parameters.throttle_max, max(parameters.throttle_min, parameters.throttle_trim * eas_to_tas))
+    if ste_rate_setpoint >= 0.0:
+        throttle = throttle_trim + ste_rate_setpoint * (parameters.throttle_max - throttle_trim) / ste_rate_max
     else:
-        throttle = trim + rate_demand * (trim - parameters.throttle_min) / -min_rate
-    throttle += rate_error * parameters.throttle_damping / span + own.throttle_sum
-    increment = rate_error * parameters.throttle_integral / span * dt
-    is_full, is_idle = throttle >= parameters.throttle_max, throttle <= parameters.throttle_min
-    if not ((is_full and increment > 0.0) or (is_idle and increment < 0.0)):
-        own.throttle_sum += increment
+        throttle = throttle_trim + ste_rate_setpoint * (throttle_trim - parameters.throttle_min) / -ste_rate_min
+    throttle += ste_rate_error * parameters.throttle_damping_gain / ste_rate_span + memory.throttle_integrator
+    increment = ste_rate_error * parameters.integrator_gain_throttle / ste_rate_span * dt
+    is_at_max, is_at_min = throttle >= parameters.throttle_max, throttle <= parameters.throttle_min
+    if not ((is_at_max and increment > 0.0) or (is_at_min and increment < 0.0)):
+        memory.throttle_integrator += increment
         throttle += increment
     throttle += underspeed_ratio * (parameters.throttle_max - throttle)
     throttle = min(parameters.throttle_max, max(parameters.throttle_min, throttle))
-    if parameters.throttle_slew > 0.0:
-        step = parameters.throttle_slew * (parameters.throttle_max - parameters.throttle_min) * dt
-        throttle = min(own.throttle_demand + step, max(own.throttle_demand - step, throttle))
-    own.throttle_demand = throttle
+    if parameters.throttle_slew_rate > 0.0:
+        max_step = parameters.throttle_slew_rate * (parameters.throttle_max - parameters.throttle_min) * dt
+        throttle = min(memory.throttle_setpoint + max_step, max(memory.throttle_setpoint - max_step, throttle))
+    memory.throttle_setpoint = throttle

@@ -1,7 +1,7 @@
-"""Compute PX4's deviation from the legs of a plan by flying corners with its own guidance in the plane.
+"""Compute PX4's deviation from the legs of a plan by simulating horizontal turns with its own guidance.
 
-Each corner is flown in still air, at a constant ground speed, by `flight.autopilots.px4.navigator` and the lag of the
-bank.  For wind, the excursion in still air at the highest ground speed on the leg is taken, increased by `WIND_SPREAD`.
+Each turn is simulated in still air, at a constant ground speed, with `flight.autopilots.px4.navigator` and the lag of
+the roll.  For wind, the excursion in still air at the highest ground speed on the leg is increased by `WIND_SPREAD`.
 """
 
 import math
@@ -11,9 +11,9 @@ import numpy as np
 
 from aircraft.envelope import GRAVITY
 from aircraft.tracking import SPEED_SHARES, TURNS, TrackingError
-from flight.autopilots.px4.lateral import bank_demand
+from flight.autopilots.px4.lateral import roll_setpoint
 from flight.autopilots.px4.law import PX4_MEMORY, ROLL_LAG
-from flight.autopilots.px4.navigator import navigate, reach_radius
+from flight.autopilots.px4.navigator import acceptance_radius_at, navigate
 from flight.autopilots.px4.parameters import Px4Parameters
 from flight.guidance.lateral_reference_laws import waypoint_column
 from flight.guidance.navigation_error import ERRORS, MOTION
@@ -22,40 +22,40 @@ from world.kernels import Record, Records, compiled, field_names, inner, record_
 from world.scenario_tables import Navigation
 from world.wind import W20, Turbulence
 
-# A corner is over where the aircraft stays this close to the next leg, m ...
+# A turn is complete once the aircraft stays this close to the next leg, m ...
 _SETTLED_CROSS_TRACK_M = 2.0
 # ... for this time, s.
 _SETTLED_TIME_S = 8.0
-# Length of the legs on both sides of a corner, m; the flights end there at the latest.
+# Length of the legs before and after a turn, m; the simulations end there at the latest.
 _LEG_LENGTH_M = 4000.0
-# Distance before the earliest turn at which the flights begin, m.
+# Distance before the earliest turn at which the simulations begin, m.
 _RUN_IN_M = 200.0
-# Time step of these flights, s.
+# Time step of the simulations, s.
 _TIME_STEP_S = 0.05
-# Margin for wind, as a factor on the excursion in still air, and what is added to it at a right angle.  It is what wind
-# made of ArduPlane's corners (`flight.autopilots.arduplane.tracking_error`), whose guidance does not use the wind as
+# Margin for wind: factor on the excursion in still air, and addition to that factor for a turn of 90 degrees.  Measured
+# on ArduPlane's turns in wind (`flight.autopilots.arduplane.tracking_error`), whose guidance does not use the wind as
 # PX4's does.
 WIND_SPREAD = 1.1, 0.5
-# Number of standard deviations of navigation for which room is left.
+# Margin for navigation errors, in standard deviations.
 _NAVIGATION_SIGMAS = 3.0
-# Deviation across straight legs in light turbulence, without navigation, m.
+# Cross-track deviation on straight legs in light turbulence, without navigation errors, m.
 _CROSS_TRACK_M = 2.0
-# Deviation from the lagged altitude in light turbulence, without navigation, m.
+# Deviation from the lagged altitude in light turbulence, without navigation errors, m.
 _ALTITUDE_ERROR_M = 3.0
-# Fraction of FW_T_CLMB_R_SP and FW_T_SINK_R_SP that a plan uses, by turbulence.  Slopes are flown steeper than they are
-# drawn, as they end a loiter radius early, and the altitude that is missing at a waypoint costs circles.
+# Fraction of FW_T_CLMB_R_SP and FW_T_SINK_R_SP that a plan uses, by turbulence.  PX4 flies slopes steeper than planned,
+# because they end a loiter radius early, and it circles if the altitude is not reached at a waypoint.
 _RATE_FRACTIONS = {"none": 0.8, "light": 0.7, "moderate": 0.6}
-# The same fraction of the aircraft's own climb and sink rates: a gust that lasts as long as a leg leaves less, and PX4
-# circles if it reaches a waypoint more than NAV_FW_ALT_RAD off its altitude.  In light turbulence the Zagi's slopes
+# The same fraction of the aircraft's own climb and sink rates: a gust that lasts as long as a leg reduces them, and PX4
+# circles if it reaches a waypoint more than NAV_FW_ALT_RAD from its altitude.  In light turbulence the Zagi's slopes
 # over 4 km at 0.9 of its rates ended in circles in 2 (up) and 6 (down) of 6 streams, at 0.6 (0.7 less the margin of
-# plans) in none and 1.  In still air it flew 0.98 of them within 6 m: no margin is left there.
+# plans) in none and 1.  In still air it flew 0.98 of them within 6 m: no margin is needed there.
 _OWN_RATE_FRACTIONS = _RATE_FRACTIONS | {"none": 1.0}
 
-# Standard deviation of the altitude in moderate turbulence if the aircraft has rate to spare, m: 3.7 computed from
-# PX4's law and Dryden's gusts at 15 to 27 m/s; 3.7 (Aerosonde) and 4.2 (Ultra Stick) in 84 flights.
+# Standard deviation of the altitude in moderate turbulence with sufficient climb and sink rates, m: 3.7 computed from
+# PX4's TECS and Dryden's gusts at 15 to 27 m/s; 3.7 (Aerosonde) and 4.2 (Ultra Stick) in 84 flights.
 _ALTITUDE_SIGMA_MODERATE_M = 4.0
-# Assumed duration of a gust that exceeds the aircraft's spare rate, s: with it 74 of 1,860 waypoints in 186 flights of
-# four aircraft are expected to be passed more than 10 m off their altitudes, and 58 were.
+# Assumed duration of a gust that exceeds the aircraft's reserve of climb or sink rate, s: with it 74 of 1,860
+# waypoints in 186 flights of four aircraft are expected to be passed more than 10 m from their altitudes, and 58 were.
 _GUST_DURATION_S = 6.0
 
 
@@ -66,7 +66,7 @@ def tracking_error(
     *,
     turbulence: Turbulence = "none",
 ) -> TrackingError:
-    """Return the margins that a plan needs for PX4's deviations at an equivalent airspeed (m/s).
+    """Return PX4's deviations at an equivalent airspeed (m/s), for which a plan needs margins.
 
     nav: accuracy of navigation.
     turbulence: turbulence of the wind.
@@ -78,7 +78,7 @@ def tracking_error(
     """
     acceptance, excursion, before, after = _corner_tables(parameters, airspeed)
     navigation_error = _NAVIGATION_SIGMAS * ERRORS[nav][0]
-    made = parameters
+    values = parameters
     return TrackingError(
         airspeed=airspeed,
         acceptance=acceptance,
@@ -87,21 +87,23 @@ def tracking_error(
         after=after,
         across=math.hypot(_CROSS_TRACK_M, navigation_error),
         up=math.hypot(_ALTITUDE_ERROR_M, navigation_error),
-        lag=(1.0 - made["FW_T_HRATE_FF"]) * made["FW_T_ALT_TC"],
+        lag=(1.0 - values["FW_T_HRATE_FF"]) * values["FW_T_ALT_TC"],
         step=0.0,
-        climb_rate=_RATE_FRACTIONS[turbulence] * min(made["FW_T_CLMB_R_SP"], made["FW_T_CLMB_MAX"]),
-        sink_rate=_RATE_FRACTIONS[turbulence] * min(made["FW_T_SINK_R_SP"], made["FW_T_SINK_MAX"]),
+        climb_rate=_RATE_FRACTIONS[turbulence] * min(values["FW_T_CLMB_R_SP"], values["FW_T_CLMB_MAX"]),
+        sink_rate=_RATE_FRACTIONS[turbulence] * min(values["FW_T_SINK_R_SP"], values["FW_T_SINK_MAX"]),
         own_climb_share=_OWN_RATE_FRACTIONS[turbulence],
         own_sink_share=_OWN_RATE_FRACTIONS[turbulence],
     )
 
 
-def altitude_miss_probability(acceptance: float, climb: float, sink: float, turbulence: Turbulence) -> float:
-    """Return the probability that gusts carry the aircraft beyond the altitude tolerance at a waypoint.
+def altitude_miss_probability(
+    acceptance: float, climb_reserve: float, sink_reserve: float, turbulence: Turbulence
+) -> float:
+    """Return the probability that gusts carry the aircraft beyond NAV_FW_ALT_RAD at a waypoint.
 
     acceptance: NAV_FW_ALT_RAD, m.
-    climb, sink: rates that the aircraft has in reserve, m/s; an up- or downdraft that exceeds them carries the aircraft
-        off until the draft ends.
+    climb_reserve, sink_reserve: unused climb and sink rates, m/s; an up- or downdraft that exceeds them carries the
+        aircraft away until the draft ends.
 
     The probability is computed for moderate turbulence only; for any other turbulence it is 0.
 
@@ -112,30 +114,30 @@ def altitude_miss_probability(acceptance: float, climb: float, sink: float, turb
     """
     if turbulence != "moderate":
         return 0.0
-    gust, extra_rate = 0.1 * W20[turbulence], acceptance / _GUST_DURATION_S
+    gust_sigma, drift_rate = 0.1 * W20[turbulence], acceptance / _GUST_DURATION_S
     return (
         2.0 * _exceedance_probability(acceptance / _ALTITUDE_SIGMA_MODERATE_M)
-        + _exceedance_probability((climb + extra_rate) / gust)
-        + _exceedance_probability((sink + extra_rate) / gust)
+        + _exceedance_probability((climb_reserve + drift_rate) / gust_sigma)
+        + _exceedance_probability((sink_reserve + drift_rate) / gust_sigma)
     )
 
 
 def _exceedance_probability(deviations: float) -> float:
-    """Return the probability that a normal variable exceeds this many standard deviations, on one side."""
+    """Return the probability that a normal variable exceeds a number of standard deviations, on one side."""
     return 0.5 * math.erfc(deviations / math.sqrt(2.0))
 
 
-# Tracking of a corner, m: turn distance, greatest distance from the legs, affected length of each leg.
+# Tracking of a turn, m: acceptance radius, maximum distance from the legs, affected lengths before and after.
 CORNER_TRACKING = record_dtype("acceptance", "excursion", "before", "after")
 
 
 @lru_cache(maxsize=8)
 def _corner_tables(parameters: Px4Parameters, airspeed: float) -> tuple[Floats, Floats, Floats, Floats]:
-    """Return tables (turns, speeds) of acceptance, excursion, and lengths of the legs before and after, m."""
+    """Return tables (turns, speeds) of acceptance radius, excursion, and lengths before and after the corner, m."""
     corners = np.zeros((TURNS.size, SPEED_SHARES.size), CORNER_TRACKING)
-    _fill_corners(parameters.record(), airspeed, TURNS, SPEED_SHARES * airspeed, corners, waypoint_column(3))
-    factor, right_angle_margin = WIND_SPREAD
-    corners["excursion"] *= (factor + right_angle_margin * (TURNS / (0.5 * math.pi)) ** 2)[:, None]
+    _measure_corners(parameters.record(), airspeed, TURNS, SPEED_SHARES * airspeed, corners, waypoint_column(3))
+    excursion_factor, right_angle_margin = WIND_SPREAD
+    corners["excursion"] *= (excursion_factor + right_angle_margin * (TURNS / (0.5 * math.pi)) ** 2)[:, None]
     # Rounded because plans must be the same on every machine, and sines differ between libraries.
     acceptance, excursion, before, after = (corners[name].round(2) for name in field_names(CORNER_TRACKING))
     for table in (acceptance, excursion, before, after):
@@ -144,42 +146,52 @@ def _corner_tables(parameters: Px4Parameters, airspeed: float) -> tuple[Floats, 
 
 
 @compiled
-def _fill_corners(
-    parameters: Record, airspeed: float, turns: Floats, speeds: Floats, corners: Records, waypoints: Records
+def _measure_corners(
+    parameters: Record,
+    airspeed: float,
+    turn_angles: Floats,
+    ground_speeds: Floats,
+    corners: Records,
+    waypoints: Records,
 ) -> None:
-    """Fill `CORNER_TRACKING` records (turns, speeds) by flights along three waypoints."""
-    for i in range(turns.size):
-        for j in range(speeds.size):
+    """Simulate a turn for each turn angle and ground speed, and store its tracking in `CORNER_TRACKING` records."""
+    for i in range(turn_angles.size):
+        for j in range(ground_speeds.size):
             corner = corners[i, j]
-            corner.acceptance = reach_radius(speeds[j], parameters)
-            if turns[i] > 0.0:
+            corner.acceptance = acceptance_radius_at(ground_speeds[j], parameters)
+            if turn_angles[i] > 0.0:
                 corner.before = corner.acceptance
-                corner.excursion, corner.after = _fly_corner(parameters, airspeed, turns[i], speeds[j], waypoints)
+                corner.excursion, corner.after = _fly_corner(
+                    parameters, airspeed, turn_angles[i], ground_speeds[j], waypoints
+                )
 
 
 @inner
 def _fly_corner(
     parameters: Record, airspeed: float, turn: float, speed: float, waypoints: Records
 ) -> tuple[float, float]:
-    """Return the maximum distance from the two legs, and the length of the second leg until the flight settles, m.
+    """Return the maximum distance from the two legs, and the distance along the second leg until the flight settles, m.
 
-    The first leg leads north to the origin.  turn: rad, to the right.  speed: over the ground, m/s.
+    The first leg leads north to the origin.
+
+    turn: rad, to the right.
+    speed: ground speed, m/s.
     """
     motions, memories = np.zeros(1, MOTION), np.zeros(1, PX4_MEMORY)
-    estimated, own = motions[0], memories[0]
+    estimated, memory = motions[0], memories[0]
     east, north = math.sin(turn), math.cos(turn)
     waypoints[0].north = -_LEG_LENGTH_M
     waypoints[2].east, waypoints[2].north = _LEG_LENGTH_M * east, _LEG_LENGTH_M * north
-    own.from_north, own.nearest = -_LEG_LENGTH_M, math.inf
+    memory.from_north, memory.min_distance_to_end = -_LEG_LENGTH_M, math.inf
     step_length = speed * _TIME_STEP_S
-    estimated.north = -reach_radius(speed, parameters) - _RUN_IN_M
-    lag = ROLL_LAG * parameters.roll_time
+    estimated.north = -acceptance_radius_at(speed, parameters) - _RUN_IN_M
+    lag = ROLL_LAG * parameters.roll_time_constant
     decay = math.exp(-_TIME_STEP_S / lag)
-    course, lateral_acceleration, time, excursion, settled_distance, along = 0.0, 0.0, 0.0, 0.0, 0.0, -1.0
-    while along < 0.75 * _LEG_LENGTH_M and time < 120.0:
+    course, lateral_acceleration, time, excursion, settled_distance, distance_along = 0.0, 0.0, 0.0, 0.0, 0.0, -1.0
+    while distance_along < 0.75 * _LEG_LENGTH_M and time < 120.0:
         estimated.velocity_east, estimated.velocity_north = speed * math.sin(course), speed * math.cos(course)
-        navigate(estimated, waypoints, 0.0, 0.0, airspeed, parameters, own, _TIME_STEP_S)
-        acceleration_demand = GRAVITY * math.tan(bank_demand(own.side_acceleration, parameters))
+        navigate(estimated, waypoints, 0.0, 0.0, airspeed, parameters, memory, _TIME_STEP_S)
+        acceleration_demand = GRAVITY * math.tan(roll_setpoint(memory.lateral_acceleration, parameters))
         # The exact solution of the lag, and the displacement on the mean course.
         course_change = (
             acceleration_demand * _TIME_STEP_S + (lateral_acceleration - acceleration_demand) * lag * (1.0 - decay)
@@ -189,14 +201,16 @@ def _fly_corner(
         estimated.north += step_length * math.cos(course + 0.5 * course_change)
         course += course_change
         time += _TIME_STEP_S
-        along = estimated.east * east + estimated.north * north
+        distance_along = estimated.east * east + estimated.north * north
         corner_distance = math.hypot(estimated.east, estimated.north)
         first_leg_distance = abs(estimated.east) if estimated.north < 0.0 else corner_distance
-        second_leg_distance = abs(estimated.east * north - estimated.north * east) if along > 0.0 else corner_distance
+        second_leg_distance = (
+            abs(estimated.east * north - estimated.north * east) if distance_along > 0.0 else corner_distance
+        )
         excursion = max(excursion, min(first_leg_distance, second_leg_distance))
-        if own.leg == 1 and second_leg_distance > _SETTLED_CROSS_TRACK_M:
-            settled_distance = max(0.0, along)
-        if own.leg == 1 and along > settled_distance + _SETTLED_TIME_S * speed:
+        if memory.leg == 1 and second_leg_distance > _SETTLED_CROSS_TRACK_M:
+            settled_distance = max(0.0, distance_along)
+        if memory.leg == 1 and distance_along > settled_distance + _SETTLED_TIME_S * speed:
             break
     # Compiled code frees an array after its last use, and a record that views it does not keep it alive.
     if motions.size + memories.size != 2:

@@ -14,7 +14,7 @@ from flight.simulation.setup import FlightSetup
 
 @dataclass(frozen=True)
 class Px4Sitl(ProgramAutopilot, Px4):
-    """PX4 itself.  Before the flight, its control law stands in for the program."""
+    """PX4 itself.  Before the flight, the simulated PX4 stands in for the program."""
 
     log_suffix: ClassVar = ".ulg"
 
@@ -25,32 +25,32 @@ class Px4Sitl(ProgramAutopilot, Px4):
 
     @classmethod
     def recognises(cls, program: Path) -> bool:
-        """Return True if its name, or start-up files next to it, show that a program is PX4."""
+        """Return True if a program is PX4 according to its name, or to start-up files next to it."""
         return program.name.lower().startswith("px4") or startup_files(program) is not None
 
     @classmethod
     def flying(cls, law: Px4, binary: Path) -> Self:
-        """Return the program's autopilot in place of its control law."""
+        """Return the program's autopilot with the parameters of the simulated PX4."""
         return cls(law.parameters, binary=binary)
 
     @classmethod
     def missing_files(cls, aircraft: Aircraft) -> list[str]:
-        """Return an empty list, because it needs only the servo map, which ArduPlane's program reports if missing."""
+        """Return an empty list: PX4 requires only the servo map, which ArduPlane's program reports if missing."""
         return []
 
     @property
     def law(self) -> Px4:
-        """PX4's law with the same parameters."""
+        """Simulated PX4 with the same parameters."""
         return Px4(self.parameters)
 
     def store(self) -> StoredAutopilot:
-        """Return the settings of its law, and the program."""
+        """Return the settings of the simulated PX4, and the program."""
         return super().store()._replace(program=self.program)
 
     def start(self, setup: FlightSetup, aircraft: Aircraft) -> ProgramFlight:
         """Start the program.
 
-        Raises FlightError if it does not start, and ParameterError if a file is invalid.
+        Raises FlightError if the program does not start, and ParameterError if a file is invalid.
         """
         # Imported here: only this needs MAVLink.
         from flight.autopilots.px4_sitl.flight import Px4Flight

@@ -24,13 +24,13 @@ from world.scenario_tables import NEWEST_PX4, Px4Version
 
 # Timeout to connect to the simulator, s by the clock.
 _CONNECT_TIMEOUT_S = 30.0
-# Timeout of its start-up script, s by the clock.
+# Timeout of PX4's start-up script, s by the clock.
 _STARTUP_TIMEOUT_S = 60.0
-# A PX4 that has sent no answer for this time waits for a step, s by the clock.
+# Time without an answer after which PX4 is waiting for a step, s by the clock.
 _STALL_TIME_S = 0.2
-# Fraction of the push along the rail after which mission mode is started.
+# Fraction of the launch along the rail after which mission mode is started.
 _MODE_START_FRACTION = 0.9
-# Time for PX4 to close its log, s of its own time.
+# Time for PX4 to close its log, s of simulated time.
 _LOG_CLOSING_TIME_S = 2.0
 # flight_sw_version of the first release that turns only by NAV_ACC_RAD.
 _FIRST_WITHOUT_ANTICIPATION = 0x01110000
@@ -82,14 +82,14 @@ class Px4Flight(SitlFlight):
 
     @property
     def last_item(self) -> int:
-        """Number of the last item; items are numbered from 0."""
+        """Number of the mission's last item, counted from 0."""
         return len(self._mission.items) - 1
 
     @property
     def _is_ending(self) -> bool:
-        """True once it has reached its last waypoint, if it circles there; otherwise as in the base class."""
-        circles = self._workspace.path["waypoint"]["ends"][self.setup.route.legs]
-        return self._link.news.reached >= self.last_item if circles else super()._is_ending
+        """True once PX4 has reached a last waypoint at which it circles; otherwise as in the base class."""
+        ends_in_circle = self._workspace.path["waypoint"]["ends"][self.setup.route.legs]
+        return self._link.news.reached >= self.last_item if ends_in_circle else super()._is_ending
 
     def keep_log(self, target: Path) -> bool:
         """Make PX4 close its log (.ulg), end it, and move the log to a file; return True if there was a log."""
@@ -102,7 +102,7 @@ class Px4Flight(SitlFlight):
     def _prepare_program(self) -> None:
         self._hold_during(self._preflight.prepare(self._mission))
         self._push(last=_MODE_START_FRACTION)
-        # It answers while it flies on.
+        # PX4 answers while it flies on.
         self._mode_start = self._preflight.set_out()
         self._push(first=_MODE_START_FRACTION)
 
@@ -117,7 +117,7 @@ def _has_started(process: AutopilotProcess) -> bool:
 
 
 def _program_of_messages(link: AutopilotLink, digest: str, parameters: GivenParameters) -> AutopilotProgram:
-    """Return the program that flew, from its messages."""
+    """Return the program that flew, from the messages on its link."""
     news = link.news
     unknown = parameters.changed.keys() - news.parameters.keys()
     return AutopilotProgram(

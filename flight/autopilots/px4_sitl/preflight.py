@@ -31,12 +31,12 @@ _VERSION_TYPES = {0: " (development)", 64: " (alpha)", 128: " (beta)", 192: " (r
 
 
 class Px4Preflight(Conversation):
-    """The conversation with one PX4."""
+    """Conversation with one PX4."""
 
     def meet(self, parameters: Iterable[str]) -> Talk:
-        """Identify the autopilot, and read those of the given parameters that it has.
+        """Identify the autopilot, and read the named parameters that it has.
 
-        Raises FlightError if it is not PX4.
+        Raises FlightError if the autopilot is not PX4.
         """
         yield from self._identify("PX4", _MESSAGE_INTERVALS_US, parameters)
         if self._news.autopilot != mavlink.MAV_AUTOPILOT_PX4:
@@ -45,9 +45,9 @@ class Px4Preflight(Conversation):
             raise FlightError(message, field="autopilot", value=autopilot, allowed=allowed)
 
     def prepare(self, mission: UploadedMission) -> Talk:
-        """Wait until it has a position, upload the mission, and arm it in MANUAL.
+        """Wait until PX4 has a position, upload the mission, and arm PX4 in MANUAL.
 
-        In any other mode its TECS would wind up on the rail.  Raises FlightError if it finds no position, or refuses.
+        In any other mode its TECS would wind up on the rail.  Raises FlightError if PX4 finds no position, or refuses.
         """
         estimator = mavlink.MAVLINK_MSG_ID_ESTIMATOR_STATUS
         yield from self._wait_for_position(estimator, _MESSAGE_INTERVALS_US[estimator])
@@ -63,18 +63,18 @@ class Px4Preflight(Conversation):
         )
 
     def set_out(self) -> Talk:
-        """Start its mission mode. Raises FlightError if it refuses."""
+        """Start mission mode. Raises FlightError if PX4 refuses."""
         yield from self._send_until_accepted(Command.DO_SET_MODE, lambda: self._set_mode(_AUTO, _MISSION), "MISSION")
         mission_mode = Awaited("MISSION", REPLY_TIMEOUT_S, "is not in its mission mode, armed")
         yield from self._wait_until(lambda: self._news.mode == MISSION_MODE and self._news.armed, mission_mode)
 
     def accompany(self) -> None:
-        """Send a heartbeat, which it answers, and joystick inputs at rest with closed throttle."""
+        """Send a heartbeat, which PX4 answers, and neutral joystick inputs with closed throttle."""
         self._send_heartbeat()
         self._link.send(mavlink.MAVLink_manual_control_message(SYSTEM, 0, 0, 0, 0, 0))
 
     def disarm(self) -> None:
-        """Disarm it, which closes its log."""
+        """Disarm PX4, which closes its log."""
         self._send_command(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 0, _FORCE_DISARMING)
 
     def _set_mode(self, main: int, sub: int) -> None:
@@ -82,9 +82,9 @@ class Px4Preflight(Conversation):
 
 
 def counted_from_0(items: Iterable[MissionItem]) -> list[MissionItem]:
-    """Renumber a mission's items from 0, as in PX4, which stores home separately.
+    """Return a mission's items numbered from 0, as in PX4, which stores home separately.
 
-    ArduPlane numbers them from 1.
+    ArduPlane numbers items from 1.
 
     >>> jump = MissionItem(3, Command.DO_JUMP, 2, (1.0, 2.0, 0.0, 0.0), 0.0, 0.0, 0.0)
     >>> counted_from_0([jump])[0].seq, counted_from_0([jump])[0].params[:2]

@@ -14,11 +14,11 @@ STARTUP = "etc"
 _STARTUP_SCRIPT = Path("init.d-posix", "rcS")
 # Number of planfly's airframe, among PX4's own.
 _AIRFRAME_ID = 22000
-# Last line of its start-up script.
+# Last line of PX4's start-up script.
 STARTED = "Startup script returned successfully"
-# Folder in which it creates temporary files, whatever the system's setting.
+# Folder of PX4's temporary files, whatever the system's setting.
 _TEMPORARY_FOLDER = Path("/tmp")
-# Prefixes of these files, before the number of its instance.
+# Prefixes of these files, before the number of the instance.
 _TEMPORARY_PREFIXES = ("px4_lock-", "px4-sock-")
 
 
@@ -36,7 +36,7 @@ def px4_launch(
 
     parameters: values by name.
     simulator_port: port on this machine of the physics (TCP).
-    own_port, link_port: ports on which it receives MAVLink, and to which it sends it (UDP).
+    own_port, link_port: ports on which PX4 receives MAVLink, and to which it sends MAVLink (UDP).
 
     Raises FlightError if the program has no start-up files.
     """

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from flight.live.mission_server import listed, to_message
+from flight.live.mission_server import mission_lists, to_message
 from flight.live.telemetry import (
     ACTIVE,
     AUTO,
@@ -70,7 +70,7 @@ def _frames(log: FlightLog) -> Iterator[tuple[float, tuple[int, int], Any]]:
 
 
 def _upload(log: FlightLog) -> Iterator[Any]:
-    items, _, _ = listed(log.setup.mission)
+    items, _, _ = mission_lists(log.setup.mission)
     yield mavlink.MAVLink_heartbeat_message(mavlink.MAV_TYPE_GCS, mavlink.MAV_AUTOPILOT_INVALID, 0, 0, 4, 3)
     yield mavlink.MAVLink_mission_count_message(1, 1, len(items), 0)
     for item in items:

@@ -12,7 +12,7 @@ from aircraft.envelope import GRAVITY
 from flight.autopilots.planfly.law import CROSS_TRACK, L1, LAWS, VECTOR_FIELD, steer_bank, steer_height
 from flight.dynamics.state import COMMANDS, STATE
 from flight.guidance.gains import Gains, load_gains
-from flight.guidance.inner_loops import GUIDANCE_MEMORY, roll_model
+from flight.guidance.inner_loops import GUIDANCE_MEMORY, step_roll_model
 from flight.guidance.navigation_error import MOTION
 from flight.guidance.path import NODE
 from world.kernels import Record, field_names
@@ -27,14 +27,14 @@ def test_every_law_of_a_scenario_has_its_number() -> None:
 
 def test_a_fresh_memory_steers_by_the_default_law_from_the_paths_beginning() -> None:
     memory: Record = np.zeros(1, GUIDANCE_MEMORY)[0]
-    assert memory.law == LAWS[FlightTable().steering.guidance]
+    assert memory.lateral_law == LAWS[FlightTable().steering.guidance]
     assert (memory.piece, memory.leg, memory.distance, bool(memory.done)) == (0, 0, 0.0, False)
 
 
 def test_counts_are_whole_and_an_end_is_a_truth() -> None:
     kinds = {name: GUIDANCE_MEMORY[name] for name in field_names(GUIDANCE_MEMORY)}
     whole = {name for name, kind in kinds.items() if kind == np.int64}
-    assert whole == {"law", "piece", "leg", "l1_leg"}
+    assert whole == {"lateral_law", "piece", "leg", "l1_leg"}
     assert {name for name, kind in kinds.items() if kind == np.bool_} == {"done", "returning"}
     assert all(kind == np.float64 for name, kind in kinds.items() if name not in whole | {"done", "returning"})
 
@@ -187,7 +187,7 @@ def test_near_the_stall_a_gust_counts_at_once() -> None:
     def elevator(stall: float) -> float:
         channel = Channel()
         channel.memory.stall_speed = stall
-        channel.memory.airspeed = channel.memory.last_airspeed = GAINS.reference_airspeed
+        channel.memory.filtered_airspeed = channel.memory.last_airspeed = GAINS.reference_airspeed
         channel.commands.throttle = 1.0
         # As fast a tick ago: nothing is gained or lost.
         channel.memory.last_airspeed = 20.0
@@ -221,7 +221,7 @@ def test_the_model_roll_arrives_within_its_limits_and_does_not_overshoot(wanted:
     gains, bank, rate = GAINS.record(), 0.0, 0.0
     rates, banks, changes = [], [], []
     for _ in range(600):
-        bank, rate, change = roll_model(wanted, bank, rate, gains, DT)
+        bank, rate, change = step_roll_model(wanted, bank, rate, gains, DT)
         banks.append(bank)
         rates.append(abs(rate))
         changes.append(abs(change))

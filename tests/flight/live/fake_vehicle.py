@@ -54,7 +54,7 @@ class FakeVehicle:
         self.feed([packed(message, system) for message in messages], port)
 
     def feed(self, datagrams: list[bytes], port: int = 5) -> None:
-        found = [one for data in datagrams for one in self.link.take(data, ("127.0.0.1", port))]
+        found = [one for data in datagrams for one in self.link.decode_datagram(data, ("127.0.0.1", port))]
         self.link.receive = lambda: found  # the one place where bytes come in
         for message, peer in found:
             self.vehicle._handle_message(message, peer, self.vehicle._clock())

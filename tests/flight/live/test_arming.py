@@ -23,8 +23,8 @@ FORCED = 21196.0
 def judged(*, possible: bool = True, flyable: bool = True) -> ArmingState:
     """A vehicle whose mission has this verdict."""
     state = ArmingState()
-    state.mission_uploaded()
-    state.mission_judged(MissionJudged(1, possible, flyable, ()))
+    state.on_mission_uploaded()
+    state.on_mission_judged(MissionJudged(1, possible, flyable, ()))
     return state
 
 
@@ -34,9 +34,9 @@ def test_armed_in_auto_with_a_verdict_starts() -> None:
     assert not state.starts
     assert state.set_mode(AUTO).result == ACCEPTED
     assert state.starts
-    state.flight_started()
+    state.on_flight_started()
     assert (state.starts, state.flying, state.mission_state) == (False, True, ACTIVE)
-    state.flight_ended(True)
+    state.on_flight_ended(True)
     assert (state.armed, state.mode, state.mission_state) == (False, MANUAL, COMPLETE)
 
 
@@ -47,7 +47,7 @@ def test_only_a_mission_is_said_to_start() -> None:
 
 def test_an_arm_command_waits_for_the_verdict() -> None:
     state = ArmingState()
-    state.mission_uploaded()
+    state.on_mission_uploaded()
     assert state.arm(True, 0.0).result == IN_PROGRESS
     assert not state.armable
 
@@ -69,8 +69,8 @@ def test_only_what_is_flyable_is_armed_unless_forced(possible: bool, flyable: bo
 def test_a_verdict_against_an_armed_vehicle_disarms_it() -> None:
     state = judged()
     state.arm(True, 0.0)
-    state.mission_uploaded()
-    text = state.mission_judged(MissionJudged(2, True, False, ()))
+    state.on_mission_uploaded()
+    text = state.on_mission_judged(MissionJudged(2, True, False, ()))
     assert text.startswith("disarmed: ")
     assert not state.armed
 
@@ -80,7 +80,7 @@ def flying() -> ArmingState:
     state = judged()
     state.arm(True, 0.0)
     state.set_mode(AUTO)
-    state.flight_started()
+    state.on_flight_started()
     return state
 
 
@@ -113,7 +113,7 @@ def test_a_pause_circles_and_a_go_to_needs_a_flight() -> None:
     assert (state.go_to(there).result, state.mode, state.place) == (ACCEPTED, GUIDED, there)
     assert judged().go_to(there).result == judged().pause(False).result == DENIED
     # What ends beside the mission completes nothing of it.
-    state.flight_ended(True)
+    state.on_flight_ended(True)
     assert (state.mode, state.place, state.mission_state) == (MANUAL, None, NOT_STARTED)
 
 
@@ -124,5 +124,5 @@ def test_auto_needs_a_mission_and_goes_with_it() -> None:
     state = judged()
     assert state.mission_state == NOT_STARTED
     state.set_mode(AUTO)
-    state.mission_cleared()
+    state.on_mission_cleared()
     assert (state.mode, state.mission_state) == (MANUAL, NO_MISSION)

@@ -9,7 +9,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from flight.live.link import (
     EPOCH,
-    LARGEST,
+    MAX_DATAGRAM_BYTES,
     MAX_PEERS,
     SILENCE,
     Access,
@@ -42,7 +42,7 @@ def test_frames_of_both_versions_are_read() -> None:
     old = HEARTBEAT.pack(mav, force_mavlink1=True)
     assert old[0] == 0xFE
     assert [one.number for one in split_frames(old + packed(HEARTBEAT))] == [0, 0]
-    assert split_frames(bytes([0xFD]) * LARGEST) == []
+    assert split_frames(bytes([0xFD]) * MAX_DATAGRAM_BYTES) == []
 
 
 # ----------------------------------------------------------------------
@@ -60,9 +60,9 @@ def test_pymavlink_accepts_our_signatures_and_we_its() -> None:
     assert message.get_type() == "HEARTBEAT"
     assert message.get_signed()
     (frame,) = split_frames(HEARTBEAT.pack(theirs))
-    assert ours.refuses(frame, WALL) is None
-    assert ours.refuses(frame, WALL), "a replayed frame"
-    assert ours.refuses(split_frames(packed(HEARTBEAT))[0], WALL), "an unsigned frame"
+    assert ours.find_refusal(frame, WALL) is None
+    assert ours.find_refusal(frame, WALL), "a replayed frame"
+    assert ours.find_refusal(split_frames(packed(HEARTBEAT))[0], WALL), "an unsigned frame"
 
 
 def test_a_vehicle_started_anew_after_its_clock_was_set_back_is_heard() -> None:
@@ -75,12 +75,12 @@ def test_a_vehicle_started_anew_after_its_clock_was_set_back_is_heard() -> None:
     with pytest.raises(mavlink.MAVError, match="signature"):
         theirs.decode(bytearray(anew.sign(packed(HEARTBEAT, 1), back)))
     (heard,) = split_frames(HEARTBEAT.pack(theirs))
-    assert anew.refuses(heard, back) is None
+    assert anew.find_refusal(heard, back) is None
     assert theirs.decode(bytearray(anew.sign(packed(HEARTBEAT, 1), back))).get_signed()
     # What is forged moves nothing.
     (forged,) = split_frames(Signing(bytes(32)).sign(packed(HEARTBEAT), WALL + 1e8))
     before = anew.newest
-    assert anew.refuses(forged, back) is Refused.FORGED
+    assert anew.find_refusal(forged, back) is Refused.FORGED
     assert anew.newest == before
 
 
@@ -90,21 +90,21 @@ def test_a_forged_timestamp_locks_nobody_out() -> None:
     for link_id in range(256):
         thief.link = link_id
         (forged,) = split_frames(thief.sign(packed(HEARTBEAT), future))
-        assert vehicle.refuses(forged, WALL)
+        assert vehicle.find_refusal(forged, WALL)
     (good,) = split_frames(station.sign(packed(HEARTBEAT), WALL))
     flipped = bytearray(good.raw)
     flipped[-7] ^= 0x40  # a later time under a signature that was good
-    assert vehicle.refuses(split_frames(bytes(flipped))[0], WALL)
-    assert vehicle.refuses(good, WALL) is None
+    assert vehicle.find_refusal(split_frames(bytes(flipped))[0], WALL)
+    assert vehicle.find_refusal(good, WALL) is None
     (old,) = split_frames(Signing(KEY, 9).sign(packed(HEARTBEAT), WALL - 120.0))
-    assert vehicle.refuses(old, WALL), "a recording from two minutes ago, on a new link"
+    assert vehicle.find_refusal(old, WALL), "a recording from two minutes ago, on a new link"
 
 
 def test_each_frame_that_is_not_believed_says_why() -> None:
     vehicle, station = Signing(KEY), Signing(KEY, 4)
 
     def refused(raw: bytes, wall: float = WALL) -> Refused | None:
-        return vehicle.refuses(split_frames(raw)[0], wall)
+        return vehicle.find_refusal(split_frames(raw)[0], wall)
 
     first, second = (station.sign(packed(HEARTBEAT), WALL) for _ in range(2))
     assert refused(packed(HEARTBEAT)) is Refused.UNSIGNED
@@ -141,7 +141,7 @@ def test_a_timestamp_more_than_a_day_ahead_is_refused_and_leaves_no_trace() -> N
     vehicle = Signing(KEY)
 
     def refused(stamp: int, link_id: int = 1) -> Refused | None:
-        return vehicle.refuses(split_frames(signed_at(stamp, link_id))[0], WALL)
+        return vehicle.find_refusal(split_frames(signed_at(stamp, link_id))[0], WALL)
 
     assert refused(NOW) is None
     for ahead in (2**48 - 1, 2**48 - 2, NOW + DAY + 1):
@@ -158,8 +158,8 @@ def test_a_timestamp_more_than_a_day_ahead_is_refused_and_leaves_no_trace() -> N
 
 def test_a_clock_set_back_by_years_keeps_the_streams_that_it_had() -> None:
     vehicle = Signing(KEY)
-    assert vehicle.refuses(split_frames(signed_at(NOW))[0], WALL) is None
-    assert vehicle.refuses(split_frames(signed_at(NOW + 1))[0], 0.0) is None
+    assert vehicle.find_refusal(split_frames(signed_at(NOW))[0], WALL) is None
+    assert vehicle.find_refusal(split_frames(signed_at(NOW + 1))[0], 0.0) is None
 
 
 def test_our_timestamps_never_overflow_their_six_bytes() -> None:
@@ -222,15 +222,15 @@ def test_nobody_beyond_this_machine_is_believed_before_a_heartbeat() -> None:
     link = Link(FAR, Clock(), lambda: WALL)
     try:
         ask = packed(mavlink.MAVLink_param_request_list_message(1, 1))
-        assert link.take(ask, ("192.0.2.1", 5)) == []
+        assert link.decode_datagram(ask, ("192.0.2.1", 5)) == []
         assert link.peers == {}
         assert link.notices() == ["192.0.2.1 sends PARAM_REQUEST_LIST and no HEARTBEAT: it is not answered"]
-        assert link.take(ask, ("192.0.2.1", 6)) == []
+        assert link.decode_datagram(ask, ("192.0.2.1", 6)) == []
         assert link.notices() == [], "said once"
-        assert len(link.take(packed(HEARTBEAT) + ask, ("192.0.2.1", 5))) == 2
-        assert link.take(ask, ("192.0.2.1", 6)) == []
+        assert len(link.decode_datagram(packed(HEARTBEAT) + ask, ("192.0.2.1", 5))) == 2
+        assert link.decode_datagram(ask, ("192.0.2.1", 6)) == []
         other = packed(mavlink.MAVLink_param_request_list_message(7, 1))
-        assert link.take(other, ("192.0.2.1", 5)) == []
+        assert link.decode_datagram(other, ("192.0.2.1", 5)) == []
     finally:
         link.close()
 
@@ -239,21 +239,23 @@ def test_who_asks_the_vehicle_on_this_machine_needs_no_heartbeat(link: Link) -> 
     """Whatever is addressed to it makes a station known, and keeps it so; what is for all or for others does not."""
     for_all = packed(mavlink.MAVLink_param_request_list_message(0, 0))
     for_others = packed(mavlink.MAVLink_param_request_list_message(7, 1))
-    assert link.take(for_all, ("127.0.0.1", 5)) + link.take(for_others, ("127.0.0.1", 5)) == []
+    assert link.decode_datagram(for_all, ("127.0.0.1", 5)) + link.decode_datagram(for_others, ("127.0.0.1", 5)) == []
     assert link.peers == {}
     ask = packed(mavlink.MAVLink_mission_request_list_message(1, 1))
     for _ in range(3):
-        assert [message.get_type() for message, _ in link.take(ask, ("127.0.0.1", 6))] == ["MISSION_REQUEST_LIST"]
+        assert [message.get_type() for message, _ in link.decode_datagram(ask, ("127.0.0.1", 6))] == [
+            "MISSION_REQUEST_LIST"
+        ]
         link.clock.now += 0.6 * SILENCE
     assert list(link.peers) == [("127.0.0.1", 6)]
 
 
 def test_the_table_of_stations_is_bounded_and_forgets(link: Link) -> None:
     for port in range(1000):
-        link.take(packed(HEARTBEAT), ("127.0.0.1", port))
+        link.decode_datagram(packed(HEARTBEAT), ("127.0.0.1", port))
     assert len(link.peers) == MAX_PEERS
     link.clock.now += SILENCE + 1.0
-    link.take(packed(HEARTBEAT), ("127.0.0.1", 5000))
+    link.decode_datagram(packed(HEARTBEAT), ("127.0.0.1", 5000))
     assert list(link.peers) == [("127.0.0.1", 5000)]
 
 
@@ -395,10 +397,10 @@ def _lengths(kind: type) -> list[int]:
 
 def test_strangers_and_others_are_counted(link: Link) -> None:
     ask = mavlink.MAVLink_param_request_list_message(0, 0)
-    link.take(packed(ask), ("127.0.0.1", 5))
-    link.take(packed(HEARTBEAT, system=1), ("127.0.0.1", 5))
-    link.take(packed(HEARTBEAT), ("127.0.0.1", 5))
-    link.take(packed(mavlink.MAVLink_param_request_list_message(7, 1)), ("127.0.0.1", 5))
+    link.decode_datagram(packed(ask), ("127.0.0.1", 5))
+    link.decode_datagram(packed(HEARTBEAT, system=1), ("127.0.0.1", 5))
+    link.decode_datagram(packed(HEARTBEAT), ("127.0.0.1", 5))
+    link.decode_datagram(packed(mavlink.MAVLink_param_request_list_message(7, 1)), ("127.0.0.1", 5))
     assert (link.dropped.stranger, link.dropped.others, link.dropped.unsigned) == (1, 2, 0)
 
 

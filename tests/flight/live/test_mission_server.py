@@ -16,9 +16,9 @@ from flight.live.mission_server import (
     Station,
     from_message,
     item_type,
-    listed,
+    mission_lists,
     to_message,
-    uploaded,
+    uploaded_mission,
 )
 from flight.mission.items import Command, Frame, Home, Mission, MissionItem
 from tests.flight.mission_files.worldwide_mission import some_mission
@@ -78,7 +78,7 @@ def lists_of(*items: MissionItem) -> dict[MissionType, tuple[MissionItem, ...]]:
 
 def test_jumps_keep_their_targets_in_numbers_without_gaps() -> None:
     jump = MissionItem(9, 177, 2, (7.0, 2.0, 0.0, 0.0), 0.0, 0.0, 0.0)
-    items, fences, rally = listed(Mission(HOME, (waypoint(3, 46.1), waypoint(7, 46.2), jump)))
+    items, fences, rally = mission_lists(Mission(HOME, (waypoint(3, 46.1), waypoint(7, 46.2), jump)))
     assert [item.seq for item in items] == [0, 1, 2, 3]
     assert (items[0].lat_deg, items[0].alt) == (46.0, 400.0)
     assert items[3].params[:2] == (2.0, 2.0)
@@ -87,13 +87,13 @@ def test_jumps_keep_their_targets_in_numbers_without_gaps() -> None:
 
 def test_a_listed_mission_comes_back() -> None:
     mission = Mission(HOME, (waypoint(1, 46.1), waypoint(2, 46.2)))
-    back, shift = uploaded(lists_of(*listed(mission)[0]), OWN)
+    back, shift = uploaded_mission(lists_of(*mission_lists(mission)[0]), OWN)
     assert (back, shift) == (mission, 0)
 
 
 def test_a_station_that_sends_no_home_gets_its_own_numbers() -> None:
     """MAVSDK's mission plugin: the first item is relative and has a radius."""
-    back, shift = uploaded(lists_of(waypoint(0, 46.1, radius=1.0), waypoint(1, 46.2, radius=1.0)), OWN)
+    back, shift = uploaded_mission(lists_of(waypoint(0, 46.1, radius=1.0), waypoint(1, 46.2, radius=1.0)), OWN)
     assert back.home == OWN
     assert [item.seq + shift for item in back.items] == [0, 1]
 

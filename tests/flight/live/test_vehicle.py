@@ -30,9 +30,9 @@ def reached(fake: FakeVehicle) -> list[tuple[str, int]]:
     fake.link.send = lambda message, peer: out.append(message)
     fake.vehicle.arming.mission_state = ACTIVE
     progress = fake.vehicle._progress
-    progress.started()
+    progress.start_flight()
     for leg in (0, 0, 1):
-        progress.on_leg(leg)
+        progress.report_leg(leg)
     return [(m.get_type(), m.seq) for m in out if m.get_type() in ("MISSION_CURRENT", "MISSION_ITEM_REACHED")]
 
 
@@ -317,7 +317,7 @@ def test_any_datagram_is_survived(fake: FakeVehicle) -> None:
     assert resident() - before <= 10 * 2**20
     assert judged > 0, "the fuzz is to reach the missions"
     # Whatever it left behind: the flight is over, and both stations silent for a while.
-    fake.vehicle.arming.flight_ended(False)
+    fake.vehicle.arming.on_flight_ended(False)
     fake.link.peers.clear()
     fake.vehicle.server.tick(fake.vehicle._clock() + 100.0)
     fake.orders.clear()

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from flight.mission.ground_ways import USUAL_PITCH, airborne_route
+from flight.mission.ground_ways import DEFAULT_CLIMB_PITCH, airborne_route
 from flight.mission.items import Command, Frame, Mission, MissionItem
 from flight.simulation.setup import FlightSetup
 from logs.verdict.judge_geometry import judge_geometry
@@ -43,7 +43,7 @@ def test_without_a_course_it_is_launched_along_the_first_leg_and_without_a_pitch
     take_off = circuit(replace(RAIL, course=None), None, pitch=0.0).ground_ways.take_off
     assert take_off is not None
     assert take_off.course == pytest.approx(math.radians(90.0), abs=1e-3)
-    assert take_off.pitch == USUAL_PITCH
+    assert take_off.pitch == DEFAULT_CLIMB_PITCH
     assert (take_off.top, take_off.base) == pytest.approx((60.0, 0.0))
 
 

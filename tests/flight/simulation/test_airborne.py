@@ -10,7 +10,7 @@ from aircraft.catalog import load_aircraft
 from flight.guidance.gains import load_gains
 from flight.mission.items import Mission
 from flight.mission.return_path import ReturnCircle
-from flight.simulation.airborne import PATIENCE, PATIENCE_SECONDS, Airborne
+from flight.simulation.airborne import TIME_LIMIT_BASE_S, TIME_LIMIT_FACTOR, Airborne
 from tests.logs.verdict.rules.test_loiter_rule_own_radius import SPEED, loiter, radius_at
 from tests.mission_lines import setup_of, wp
 from tests.setups import setup_maker
@@ -54,7 +54,7 @@ def test_a_start_in_the_ground_is_refused() -> None:
 
 def test_a_flight_may_take_its_length_at_its_slowest_ground_speed_and_more() -> None:
     flight = airborne([[0.0, 0.0, 500.0], [0.0, 3000.0, 500.0]], wind=(5.0, 0.0))
-    seconds = PATIENCE * 3000.0 / 20.0 + PATIENCE_SECONDS
+    seconds = TIME_LIMIT_FACTOR * 3000.0 / 20.0 + TIME_LIMIT_BASE_S
     assert flight.max_ticks == pytest.approx(seconds / flight.dt, abs=60)
 
 
@@ -82,7 +82,7 @@ def test_turns_too_tight_for_the_bank_may_take_as_long_as_it_makes_them() -> Non
     steep = replace(setup, limits=replace(setup.limits, max_bank=math.radians(60.0)))
     wide, plain = (Gliding(one, AEROSONDE, gains) for one in (setup, steep))
     held, drawn = radius_at(30.0), 60.0 * (SPEED / 25.0) ** 2
-    longer = PATIENCE * 2.0 * math.pi * (40.0 * (held - drawn) + held) / 25.0
+    longer = TIME_LIMIT_FACTOR * 2.0 * math.pi * (40.0 * (held - drawn) + held) / 25.0
     assert (wide.max_ticks - plain.max_ticks) * plain.dt == pytest.approx(longer, rel=0.003)
     tangents = replace(setup, autopilot=MAKE([[0.0, 0.0, 500.0], [0.0, 3000.0, 500.0]]).autopilot)
     assert Gliding(tangents, AEROSONDE, gains).max_ticks == pytest.approx(plain.max_ticks, rel=0.01)

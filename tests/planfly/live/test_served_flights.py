@@ -106,8 +106,8 @@ def test_an_upload_that_crosses_its_own_fence_is_warned_of_and_not_armed(
     warnings = [text.text for text in judged.texts if text.severity == WARNING]
     assert any(text.startswith("fence at fence item 0 (exclusion): 200.0 m inside at ") for text in warnings) != armed
     arming = ArmingState()
-    arming.mission_uploaded()
-    arming.mission_judged(judged)
+    arming.on_mission_uploaded()
+    arming.on_mission_judged(judged)
     assert (arming.arm(True, 0.0).result == ACCEPTED) == armed
 
 

@@ -5,7 +5,7 @@ from typing import Literal
 import numpy as np
 import pytest
 
-from aircraft.tracking import no_tracking
+from aircraft.tracking import zero_tracking_error
 from benchmarks.task import make_task
 from planner.evaluation.leg_constraints import precompute_limits
 from planner.evaluation.problem import ProblemArrays, make_problem
@@ -100,7 +100,7 @@ def zigzag(data: ProblemArrays, share: float, waypoints: int = 9) -> np.ndarray:
 def test_the_gradient_is_that_of_the_augmented_length(name: str, corners: str) -> None:
     data = make_task(name).problem.search
     if corners == "arcs":
-        data = data._replace(tracking=no_tracking())
+        data = data._replace(tracking=zero_tracking_error())
     assert data.legs_hold_turns == (name == "jacksboro-air")
     path, limits = zigzag(data, 1.0 if name == "hard-60" else 0.3), precompute_limits(data)
     if corners:

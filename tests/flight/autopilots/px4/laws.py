@@ -61,15 +61,15 @@ def parameters(version: Px4Version = "1.16", /, **values: float) -> Record:
 def memory(**values: Any) -> Record:
     """At the beginning of the first leg, in level flight at 500 m and 25 m/s."""
     usual: dict[str, Any] = {
-        "begun": True,
+        "is_initialised": True,
         "from_up": 500.0,
-        "begun_up": 500.0,
-        "nearest": math.inf,
-        "height_asked": 500.0,
-        "height_reference": 500.0,
-        "airspeed": 25.0,
-        "airspeed_demand": 25.0,
-        "throttle_demand": 0.6,
+        "leg_start_altitude": 500.0,
+        "min_distance_to_end": math.inf,
+        "altitude_setpoint": 500.0,
+        "altitude_reference": 500.0,
+        "tas": 25.0,
+        "tas_setpoint": 25.0,
+        "throttle_setpoint": 0.6,
     }
     return record(PX4_MEMORY, **(usual | values))
 

@@ -6,11 +6,11 @@ import pytest
 
 from flight.autopilots.px4.lateral import (
     adapted_period,
-    bank_demand,
     feasibility,
-    follow_circle,
     follow_leg,
-    heading_for,
+    follow_loiter,
+    reference_air_velocity,
+    roll_setpoint,
     switch_distance,
 )
 from tests.flight.autopilots.px4.laws import flying, memory, parameters
@@ -24,7 +24,7 @@ def beside(east: float, course: float = 0.0, version: Px4Version = "1.16", **val
     """Side acceleration at an offset east of a leg north, far from its ends."""
     own = memory()
     follow_leg(flying(east, 1000.0, course=course), 0.0, 5000.0, 0.0, 0.0, 25.0, parameters(version, **values), own)
-    return float(own.side_acceleration)
+    return float(own.lateral_acceleration)
 
 
 @pytest.mark.parametrize("east", [0.0, 40.0, 100.0, 174.0, 176.0, 900.0, -40.0, -900.0])
@@ -67,7 +67,7 @@ def test_before_the_leg_it_flies_to_its_begin_and_past_it_back_to_its_end() -> N
     def side(east: float, north: float, course: float) -> float:
         own = memory()
         follow_leg(flying(east, north, course=course), 0.0, 1000.0, 0.0, 0.0, 25.0, parameters(), own)
-        return float(own.side_acceleration)
+        return float(own.lateral_acceleration)
 
     # 60 m before the begin (more than 56 m away) and 60 m right of the line: the begin bears 45 degrees left of north.
     assert side(60.0, -60.0, -math.radians(45.0)) == pytest.approx(0.0, abs=1e-9)
@@ -81,21 +81,21 @@ def test_on_a_circle_it_demands_what_the_circle_takes(radius: float) -> None:
     own = memory()
     # North of the middle, eastwards around it to the right.
     course = math.copysign(0.5 * math.pi, radius)
-    follow_circle(flying(0.0, 200.0, course=course), 0.0, 0.0, radius, 0.0, 0.0, 25.0, parameters(), own)
-    assert own.side_acceleration == pytest.approx(math.copysign(25.0 * 25.0 / 200.0, radius))
+    follow_loiter(flying(0.0, 200.0, course=course), 0.0, 0.0, radius, 0.0, 0.0, 25.0, parameters(), own)
+    assert own.lateral_acceleration == pytest.approx(math.copysign(25.0 * 25.0 / 200.0, radius))
 
 
 def test_far_from_a_circle_it_flies_at_its_middle() -> None:
     own = memory()
-    follow_circle(flying(0.0, -900.0), 0.0, 0.0, 80.0, 0.0, 0.0, 25.0, parameters(), own)
-    assert own.side_acceleration == pytest.approx(0.0, abs=1e-9)
+    follow_loiter(flying(0.0, -900.0), 0.0, 0.0, 80.0, 0.0, 0.0, 25.0, parameters(), own)
+    assert own.lateral_acceleration == pytest.approx(0.0, abs=1e-9)
 
 
 def test_the_heading_holds_the_course_in_wind() -> None:
     # 7 m/s from the west on a course north at 25 m/s: sqrt(25^2 - 7^2) = 24 m/s of the air velocity is northwards.
-    assert heading_for(0.0, 1.0, 7.0, 0.0, 25.0) == pytest.approx((-7.0, 24.0))
+    assert reference_air_velocity(0.0, 1.0, 7.0, 0.0, 25.0) == pytest.approx((-7.0, 24.0))
     # 30 m/s from ahead cannot be flown against: straight into it.
-    east, north = heading_for(0.0, 1.0, 0.0, -30.0, 25.0)
+    east, north = reference_air_velocity(0.0, 1.0, 0.0, -30.0, 25.0)
     assert (east, north) == pytest.approx((0.0, 25.0))
 
 
@@ -111,9 +111,9 @@ def test_a_slow_ground_speed_raises_the_airspeed() -> None:
     own = memory()
     # Against 22 m/s at 25 m/s of airspeed: 3 m/s over the ground, where 5 are wanted.
     follow_leg(flying(speed=3.0), 0.0, 5000.0, 0.0, -22.0, 25.0, parameters(), own)
-    assert own.airspeed_for_ground == pytest.approx(27.0)
+    assert own.min_airspeed == pytest.approx(27.0)
     follow_leg(flying(speed=6.0), 0.0, 5000.0, 0.0, -19.0, 25.0, parameters(), own)
-    assert own.airspeed_for_ground == 0.0
+    assert own.min_airspeed == 0.0
 
 
 def test_in_wind_a_curve_shortens_the_period_and_a_straight_leg_does_not() -> None:
@@ -129,5 +129,5 @@ def test_in_wind_a_curve_shortens_the_period_and_a_straight_leg_does_not() -> No
 
 def test_the_bank_is_that_of_a_level_turn_within_the_limit() -> None:
     made = parameters(FW_R_LIM=30.0)
-    assert bank_demand(9.80665 * math.tan(math.radians(20.0)), made) == pytest.approx(math.radians(20.0))
-    assert bank_demand(-20.0, made) == pytest.approx(-math.radians(30.0))
+    assert roll_setpoint(9.80665 * math.tan(math.radians(20.0)), made) == pytest.approx(math.radians(20.0))
+    assert roll_setpoint(-20.0, made) == pytest.approx(-math.radians(30.0))

@@ -10,14 +10,26 @@ from world.kernels import Record, field_names
 
 def test_a_fresh_memory_is_on_the_first_leg_and_has_flown_nothing() -> None:
     fresh: Record = np.zeros(1, PX4_MEMORY)[0]
-    assert (fresh.leg, bool(fresh.begun), bool(fresh.circling), bool(fresh.returning)) == (0, False, False, False)
+    assert (fresh.leg, bool(fresh.is_initialised), bool(fresh.is_loitering), bool(fresh.is_in_rtl)) == (
+        0,
+        False,
+        False,
+        False,
+    )
 
 
 def test_a_leg_is_counted_in_whole_numbers_and_all_else_are_numbers() -> None:
     kinds = {name: PX4_MEMORY[name] for name in field_names(PX4_MEMORY)}
     assert {name for name, kind in kinds.items() if kind == np.int64} == {"leg"}
     truths = {name for name, kind in kinds.items() if kind == np.bool_}
-    assert truths == {"begun", "at_rim", "circling", "returning", "climbed", "finished"}
+    assert truths == {
+        "is_initialised",
+        "rim_reached",
+        "is_loitering",
+        "is_in_rtl",
+        "rtl_climb_complete",
+        "mission_finished",
+    }
 
 
 # Waypoints at which PX4 began to circle, until it was within 10 m of the height: after slopes of 12.9 %, which 3 m/s up

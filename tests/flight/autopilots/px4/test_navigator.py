@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from flight.autopilots.px4.navigator import SWITCH_DELAY, leg_height, navigate, past_corner, reach_radius
+from flight.autopilots.px4.navigator import SWITCH_DELAY, acceptance_radius_at, foh_altitude, is_past_corner, navigate
 from tests.flight.autopilots.px4.laws import flying, memory, parameters, waypoints
 from world.kernels import Record
 from world.scenario_tables import Px4Version
@@ -37,7 +37,7 @@ def after(
     ],
 )
 def test_a_waypoint_is_reached_within_its_radius(version: Px4Version, values: dict[str, float], radius: float) -> None:
-    assert reach_radius(25.0, parameters(version, **values)) == pytest.approx(radius)
+    assert acceptance_radius_at(25.0, parameters(version, **values)) == pytest.approx(radius)
     assert after(flying(0.0, 1000.0 - radius - 0.1), version=version, **values).leg == 0
     assert after(flying(0.0, 1000.0 - radius + 0.1), version=version, **values).leg == 1
 
@@ -71,18 +71,18 @@ def test_only_near_its_height_is_it_reached(up: float, leg: int) -> None:
 
 def test_near_it_and_too_high_it_circles_and_further_away_it_does_not() -> None:
     near = after(flying(0.0, 945.0, 520.0))
-    assert (near.leg, bool(near.circling), near.height_asked) == (0, True, 500.0)
-    assert not after(flying(0.0, 943.0, 520.0)).circling
-    assert not after(flying(0.0, 945.0, 509.0)).circling
+    assert (near.leg, bool(near.is_loitering), near.altitude_setpoint) == (0, True, 500.0)
+    assert not after(flying(0.0, 943.0, 520.0)).is_loitering
+    assert not after(flying(0.0, 945.0, 509.0)).is_loitering
     # South of its middle, a circle to the right goes west, and one to the left east.
-    assert after(flying(0.0, 990.0, 520.0), NAV_LOITER_RAD=80.0).side_acceleration < -5.0
-    assert after(flying(0.0, 990.0, 520.0), NAV_LOITER_RAD=-80.0).side_acceleration > 5.0
+    assert after(flying(0.0, 990.0, 520.0), NAV_LOITER_RAD=80.0).lateral_acceleration < -5.0
+    assert after(flying(0.0, 990.0, 520.0), NAV_LOITER_RAD=-80.0).lateral_acceleration > 5.0
 
 
 def test_the_next_legs_line_goes_through_both_waypoints() -> None:
     own = after(flying(5.0, 960.0))
-    assert (own.from_east, own.from_north, own.from_up, own.reached_for) == (0.0, 1000.0, 500.0, 0.0)
-    assert own.nearest == math.inf
+    assert (own.from_east, own.from_north, own.from_up, own.time_since_reached) == (0.0, 1000.0, 500.0, 0.0)
+    assert own.min_distance_to_end == math.inf
 
 
 def test_the_last_waypoint_is_not_left() -> None:
@@ -94,32 +94,32 @@ def test_the_last_waypoint_is_not_left() -> None:
     [(1000.0, 500.0), (1200.0, 500.0), (540.0, 550.0), (80.0, 600.0), (0.0, 600.0)],
 )
 def test_a_legs_slope_is_done_a_loiters_radius_before_its_end(nearest: float, expected: float) -> None:
-    assert leg_height(0.0, 1000.0, 600.0, 80.0, memory(nearest=nearest)) == pytest.approx(expected)
+    assert foh_altitude(0.0, 1000.0, 600.0, 80.0, memory(min_distance_to_end=nearest)) == pytest.approx(expected)
 
 
 def test_a_leg_shorter_than_that_is_a_step() -> None:
-    assert leg_height(0.0, 80.0, 600.0, 80.0, memory(nearest=79.0)) == 600.0
-    assert leg_height(0.0, 80.2, 600.0, 80.0, memory(nearest=80.1)) == pytest.approx(550.0)
+    assert foh_altitude(0.0, 80.0, 600.0, 80.0, memory(min_distance_to_end=79.0)) == 600.0
+    assert foh_altitude(0.0, 80.2, 600.0, 80.0, memory(min_distance_to_end=80.1)) == pytest.approx(550.0)
 
 
 def test_the_slope_never_goes_back() -> None:
     own, route, made = memory(), waypoints((0.0, 0.0, 500.0), (0.0, 1000.0, 600.0), LEGS[2]), parameters()
     navigate(flying(0.0, 460.0, 540.0), route, 0.0, 0.0, 25.0, made, own, DT)
-    assert own.height_asked == pytest.approx(550.0)
+    assert own.altitude_setpoint == pytest.approx(550.0)
     navigate(flying(0.0, 300.0, 540.0), route, 0.0, 0.0, 25.0, made, own, DT)
-    assert own.height_asked == pytest.approx(550.0)
+    assert own.altitude_setpoint == pytest.approx(550.0)
 
 
 def test_a_circle_at_the_gate_is_not_left_for_being_wider_than_the_switch_distance() -> None:
     own = after(flying(0.0, 945.0, 520.0), NAV_LOITER_RAD=150.0)
-    assert own.circling
+    assert own.is_loitering
     # 150 m off, which is more than 56 m; further away none is begun.
-    assert after(flying(0.0, 850.0, 520.0), own, NAV_LOITER_RAD=150.0).circling
-    assert not after(flying(0.0, 850.0, 520.0), NAV_LOITER_RAD=150.0).circling
-    assert not after(flying(0.0, 850.0, 505.0), own, NAV_LOITER_RAD=150.0).circling
+    assert after(flying(0.0, 850.0, 520.0), own, NAV_LOITER_RAD=150.0).is_loitering
+    assert not after(flying(0.0, 850.0, 520.0), NAV_LOITER_RAD=150.0).is_loitering
+    assert not after(flying(0.0, 850.0, 505.0), own, NAV_LOITER_RAD=150.0).is_loitering
     # Nor is it kept for the next waypoint.
     next_one = after(flying(0.0, 960.0, 505.0), after(flying(0.0, 945.0, 520.0)))
-    assert (next_one.leg, bool(next_one.circling)) == (1, False)
+    assert (next_one.leg, bool(next_one.is_loitering)) == (1, False)
 
 
 CIRCLE = {"circle": 100.0, "centre_east": 0.0, "centre_north": 1000.0, "stop": 1}
@@ -145,44 +145,44 @@ def test_a_loiter_of_turns_is_flown_until_its_corner_is_passed() -> None:
     route["circle"][1], route["centre_east"][1], route["centre_north"][1] = 100.0, 0.0, 1000.0
     own, made = memory(), parameters()
     # The corner is east of the middle; a circle to the right comes to it from the north.
-    assert not past_corner(flying(70.0, 1070.0), route[1])
+    assert not is_past_corner(flying(70.0, 1070.0), route[1])
     navigate(flying(70.0, 1070.0), route, 0.0, 0.0, 25.0, made, own, DT)
     assert own.leg == 0
     navigate(flying(70.0, 930.0), route, 0.0, 0.0, 25.0, made, own, DT)
-    assert (own.leg, bool(own.circling), own.from_east) == (1, False, 70.0)
+    assert (own.leg, bool(own.is_loitering), own.from_east) == (1, False, 70.0)
 
 
 def test_a_loiter_is_flown_to_at_its_own_height_straight_at_its_middle() -> None:
     own = memory()
     fly_on(flying(300.0, 0.0), to_a_loiter(stays=60.0), own, DT)
-    assert own.height_asked == 600.0
+    assert own.altitude_setpoint == 600.0
     # The middle lies to the left of a course north from 300 m east of the leg.
-    assert own.side_acceleration < -1.0
+    assert own.lateral_acceleration < -1.0
     own = memory()
     fly_on(flying(300.0, 0.0, course=math.atan2(-300.0, 1000.0)), to_a_loiter(stays=60.0), own, DT)
-    assert own.side_acceleration == pytest.approx(0.0, abs=1e-6)
+    assert own.lateral_acceleration == pytest.approx(0.0, abs=1e-6)
 
 
 def test_a_loiter_to_a_height_holds_that_of_its_legs_begin_until_its_rim() -> None:
     own, route = memory(), to_a_loiter(to_height=True, stays=0.0)
     fly_on(flying(0.0, 889.0), route, own, 1.0)
-    assert own.height_asked == 500.0
+    assert own.altitude_setpoint == 500.0
     # Within 10 m of a circle of 100 m, but not at the height that it holds.
     fly_on(flying(0.0, 891.0, 511.0), route, own, 1.0)
-    assert own.height_asked == 500.0
+    assert own.altitude_setpoint == 500.0
     fly_on(flying(0.0, 891.0, 509.0), route, own, 2.5 * DT)
-    assert own.height_asked == 600.0
+    assert own.altitude_setpoint == 600.0
     fly_on(flying(0.0, 891.0, 589.0), route, own, 1.0)
     assert own.leg == 0
     fly_on(flying(0.0, 891.0, 591.0), route, own, 1.0)
-    assert (own.leg, bool(own.circling), own.at_rim, own.begun_up) == (2, False, False, 591.0)
+    assert (own.leg, bool(own.is_loitering), own.rim_reached, own.leg_start_altitude) == (2, False, False, 591.0)
 
 
 def test_a_loiter_once_reached_counts_its_time_wherever_the_aircraft_is() -> None:
     own, route = memory(), to_a_loiter(stays=60.0)
     fly_on(flying(0.0, 891.0, 589.0), route, own, 100.0)
     fly_on(flying(0.0, 885.0, 600.0), route, own, 100.0)
-    assert (own.leg, own.reached_for) == (0, 0.0)
+    assert (own.leg, own.time_since_reached) == (0, 0.0)
     fly_on(flying(0.0, 891.0, 600.0), route, own, 1.0)
     # What banks to 30 degrees flies a circle of 119 m: it never comes to the rim again.
     fly_on(flying(0.0, 881.0, 620.0), route, own, 58.5)
@@ -229,25 +229,30 @@ def test_a_return_climbs_on_the_spot_flies_straight_and_comes_down_at_its_target
         navigate(flying(0.0, north, up), route, 0.0, 0.0, 25.0, made, own, DT)
 
     seen(100.0, 500.0)
-    assert (bool(own.returning), bool(own.climbed), own.from_north, own.height_asked) == (True, False, 100.0, 600.0)
+    assert (bool(own.is_in_rtl), bool(own.rtl_climb_complete), own.from_north, own.altitude_setpoint) == (
+        True,
+        False,
+        100.0,
+        600.0,
+    )
     seen(150.0, 591.0)
-    assert (bool(own.climbed), own.from_north) == (True, 150.0)
+    assert (bool(own.rtl_climb_complete), own.from_north) == (True, 150.0)
     seen(4000.0, 700.0)
-    assert (own.height_asked, own.side_acceleration) == (600.0, pytest.approx(0.0, abs=1e-9))
+    assert (own.altitude_setpoint, own.lateral_acceleration) == (600.0, pytest.approx(0.0, abs=1e-9))
     own = memory()
     seen(100.0, 800.0)
-    assert own.climbed
+    assert own.rtl_climb_complete
     seen(4000.0, 800.0)
-    assert own.height_asked == 800.0
+    assert own.altitude_setpoint == 800.0
     seen(4900.0, 800.0)
-    assert own.height_asked == 600.0
+    assert own.altitude_setpoint == 600.0
 
 
 @pytest.mark.parametrize(("loiters", "returns"), [(150.0, 60.0), (60.0, 150.0)])
 def test_a_return_climbs_with_the_radius_of_loiters(loiters: float, returns: float) -> None:
     route = waypoints((0.0, 0.0, 500.0), (0.0, 5000.0, 600.0), returns=True, circle=returns, centre_north=5000.0)
     made = parameters("1.17", NAV_LOITER_RAD=loiters, RTL_LOITER_RAD=returns)
-    own = memory(returning=True, from_up=500.0)
+    own = memory(is_in_rtl=True, from_up=500.0)
     # Around the place where it began, to the right: on the circle's east it flies south, with V^2 / r to the west.
     navigate(flying(loiters, 0.0, 500.0, course=math.pi), route, 0.0, 0.0, 25.0, made, own, DT)
-    assert own.side_acceleration == pytest.approx(25.0**2 / loiters, rel=1e-6)
+    assert own.lateral_acceleration == pytest.approx(25.0**2 / loiters, rel=1e-6)

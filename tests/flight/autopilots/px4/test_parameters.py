@@ -33,8 +33,8 @@ def test_every_field_is_in_the_record_in_si() -> None:
     record = Px4Parameters.of_text("FW_R_LIM 45\nFW_THR_TRIM 0.5\nFW_PSP_OFF -3\n", "a.params", "1.16").record()
     assert (record.roll_limit, record.throttle_trim) == pytest.approx((math.radians(45.0), 0.5))
     assert record.pitch_trim == pytest.approx(-math.radians(3.0))
-    assert record.anticipates
-    assert not Px4Parameters.defaults("1.17").record().anticipates
+    assert record.uses_switch_distance
+    assert not Px4Parameters.defaults("1.17").record().uses_switch_distance
 
 
 def test_every_default_is_allowed() -> None:
