@@ -121,13 +121,13 @@ def test_flights_are_few_and_shared(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_by_geometry_every_suggestion_that_is_offered_mends() -> None:
     """And one that leads beyond the ceiling is not offered."""
-    desk = SESSION.desk
-    judged = desk.judge(raised(SESSION.mission, places(SESSION.mission), -90.0))
+    context = SESSION.context
+    judged = context.judge(raised(SESSION.mission, places(SESSION.mission), -90.0))
     [first, *_] = [item for item in judged.verdict.failed if item.rule == "clearance"]
     wrong = replace(first, suggestions=(higher(first.place.index or 0, 9000.0), *first.suggestions))
     findings = tuple(wrong if item is first else item for item in judged.verdict.findings)
     offered = with_tried_suggestions(replace(judged, verdict=replace(judged.verdict, findings=findings)))
     after = {(item.rule, item.place): item.suggestions for item in offered.failed}
     assert after[first.rule, first.place] == first.suggestions[:1]
-    for one in SuggestionTrials(desk, judged).passing():
-        assert fails_no_more(judged.verdict, desk.judge(one.setup.mission).verdict, one.finding)
+    for one in SuggestionTrials(context, judged).passing():
+        assert fails_no_more(judged.verdict, context.judge(one.setup.mission).verdict, one.finding)
