@@ -37,7 +37,7 @@ from planfly.studio.view_model import Json
 from world.errors import MissionError, PlanflyError
 from world.files import read_small_file, utf8_text
 
-Result = TypeVar("Given")
+Given = TypeVar("Given")
 
 # Maximum number of pages.
 MAX_PAGES = 4
@@ -137,7 +137,7 @@ class Server:
         self._judge_thread.shutdown(wait=False, cancel_futures=True)
         self._draw_thread.shutdown(wait=False, cancel_futures=True)
 
-    async def _run_judging(self, function: Callable[[], Result]) -> Result:
+    async def _run_judging(self, function: Callable[[], Given]) -> Given:
         return await asyncio.get_running_loop().run_in_executor(self._judge_thread, function)
 
     def _pack_work(self, work: Work | None) -> bytes:
