@@ -48,7 +48,7 @@ class WrittenReport:
 
 
 class _ReportContent(NamedTuple):
-    """Content of pictures and pages, and the package versions of the flight, None for the installed versions."""
+    """Content of pictures and pages.  versions: package versions of the flight; None for the installed versions."""
 
     setup: FlightSetup
     verdict: Verdict

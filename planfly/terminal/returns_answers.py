@@ -10,7 +10,7 @@ from logs.verdict.returns.glides_text import glide_range_text, glides_headline
 from logs.verdict.returns.judge_glides import MARGIN
 from logs.verdict.returns.judge_returns import ReturnFlown, ReturnRange
 from logs.verdict.returns.returns_text import headline, range_text
-from planfly.api.returning import ReturnsFound, Suggested
+from planfly.api.returning import RemedyTrial, ReturnsFound
 from planfly.terminal.verdict_answers import STRICT
 from world.frames import to_geo
 
@@ -209,7 +209,7 @@ class ReturnsAnswer:
     notes: list[str]
 
 
-def suggestion_entry(result: ReturnsFound, suggestion: Suggested) -> ReturnSuggestion:
+def suggestion_entry(result: ReturnsFound, suggestion: RemedyTrial) -> ReturnSuggestion:
     """Return a suggested remedy, with the numbers of safe and unsafe returns after it, for the JSON answer."""
     rally = None
     if suggestion.remedy.rally is not None:
