@@ -23,7 +23,7 @@ from planfly.runtime.first_start import with_warm_up
 from planfly.runtime.stages import report_replaced, stage
 from planfly.workflow.airframe import Airframe, choose_seed, load_airframe, tightened_airframe
 from planfly.workflow.crash_safe_log import FlightLimits, flight_kind, flight_text
-from planfly.workflow.make_plan import make_plan, planned_for
+from planfly.workflow.make_plan import make_plan, planning_conditions
 from planfly.workflow.open_flight import make_setup, mission_of_plan, with_engine
 from planfly.workflow.output_paths import (
     RUN_FILES,
@@ -32,9 +32,9 @@ from planfly.workflow.output_paths import (
     expand_path_pattern,
     prepare_folder,
 )
-from planfly.workflow.pipeline import autopilot_log, fly_and_judge
+from planfly.workflow.pipeline import fly_and_judge, program_log_path
 from planfly.workflow.reference_flights import FlyReference
-from planfly.workflow.tighten_plan import refine as refine_rounds
+from planfly.workflow.tighten_plan import refine_rounds
 from planner.plan import Plan, plan_json
 from world.files import hold, write_whole
 from world.scenario import Scenario
@@ -96,7 +96,7 @@ class RunResult:
 
 
 @dataclass(frozen=True, slots=True)
-class _Task:
+class _RunTask:
     """Common settings of all rounds.
 
     scenario: the scenario in which each round is judged.
@@ -167,7 +167,7 @@ def run(
     changed_options = {name: value for name, value in {"refine": refine, **options}.items() if value != defaults[name]}
     repeat_command = command_line(scenario_name, chosen_seed, changed_options)
     reference: FlyReference = "always" if options["levels"] else "failed"
-    task = _Task(
+    task = _RunTask(
         world,
         airframe,
         chosen_seed,
@@ -200,7 +200,7 @@ def command_line(scenario: str, seed: int, options: Mapping[str, Any]) -> str:
 
 
 def _fly_rounds(
-    task: _Task, refine: int, locks: contextlib.ExitStack, on_round: Callable[[Round], None] | None
+    task: _RunTask, refine: int, locks: contextlib.ExitStack, on_round: Callable[[Round], None] | None
 ) -> RunResult:
     """Plan and fly in rounds until a round is flyable or no round remains.
 
@@ -219,7 +219,7 @@ def _fly_rounds(
             folder.mkdir(parents=True, exist_ok=True)
             locks.enter_context(hold(folder))
             if task.program is not None:
-                report_replaced(folder / "flight.mcap", autopilot_log(folder / "flight.mcap", task.program))
+                report_replaced(folder / "flight.mcap", program_log_path(folder / "flight.mcap", task.program))
             prepare_folder(folder)
         flown_rounds.append(_fly_round(task, plan, len(flown_rounds)))
         if on_round is not None:
@@ -240,7 +240,7 @@ def _fly_rounds(
     return RunResult(scenario.name, task.seed, folder, rounds, round_entries[-1]["next"])
 
 
-def _fly_round(task: _Task, plan: Plan, number: int) -> Round:
+def _fly_round(task: _RunTask, plan: Plan, number: int) -> Round:
     """Write a plan and its mission, fly the plan if it is feasible, and write the report."""
     # Imported here: only the report needs matplotlib.
     from logs.views.report.page import write_report
@@ -255,7 +255,7 @@ def _fly_round(task: _Task, plan: Plan, number: int) -> Round:
     if plan.ways is not None and airframe.autopilot.parameters is not None:
         write_whole(folder / "mission.parm", judging_parameters_text("mission.waypoints", airframe.autopilot)[0])
     if not plan.feasible:
-        verdict = judge_plan_only(plan, planned_for(task.scenario, airframe))
+        verdict = judge_plan_only(plan, planning_conditions(task.scenario, airframe))
         write_whole(folder / "verdict.json", verdict_json(verdict))
         return Round(number, (), verdict, flown=False, folder=folder)
     setup = with_engine(make_setup(task.scenario, airframe, mission, task.seed, plan=plan), task.engine)

@@ -357,14 +357,14 @@ def _plan_with_ground_phases(context: EditContext, mission: Mission) -> Plan | N
     Departure and approach were certified with the turns at their ends, so the adjacent legs must be unchanged.  Raises
     MissionError if these legs were changed.
     """
-    opened_plan = context.opened.plan
+    opened_plan = context.opened_setup.plan
     if (
         opened_plan is None
         or opened_plan.ways is None
         or (opened_plan.ways.climb, opened_plan.ways.descent) == (None, None)
     ):
         return None
-    climb, descent, points = opened_plan.ways.climb, opened_plan.ways.descent, context.points(mission)
+    climb, descent, points = opened_plan.ways.climb, opened_plan.ways.descent, context.item_positions(mission)
     departure_count = 0 if climb is None else 1 + len(climb.waypoints)
     approach_count = 0 if descent is None else len(descent.waypoints) + len(descent.line_up) + 1
     waypoints = points[departure_count : len(points) - approach_count]

@@ -55,19 +55,19 @@ class EditContext(MissionContext):
         The new context has no plan, because the certificate of a plan applies only to the scenario it was made for.
         """
         airframe = parameters.airframe(scenario)
-        setup = make_setup(scenario, airframe, self.opened.mission, self.seed)
-        return replace(self, scenario=scenario, airframe=airframe, opened=setup, parameters=parameters)
+        setup = make_setup(scenario, airframe, self.opened_setup.mission, self.seed)
+        return replace(self, scenario=scenario, airframe=airframe, opened_setup=setup, parameters=parameters)
 
     def with_plan(self, plan: Plan, mission: Mission) -> "EditContext":
         """Return the context of a new plan; its certificate applies until the mission is changed."""
         setup = make_setup(self.scenario, self.airframe, mission, self.seed, plan=plan)
-        return replace(self, opened=setup, planned=True)
+        return replace(self, opened_setup=setup, planned=True)
 
     def around_mission(self, mission: Mission) -> "EditContext":
         """Return this context, or one with a new scenario if the mission has left the scenario made around it."""
         if not self.scenario.external:
             return self
-        points = self.points(mission)[:, :2]
+        points = self.item_positions(mission)[:, :2]
         (west, east), (south, north) = self.scenario.bounds.tolist()
         min_corner, max_corner = points.min(axis=0), points.max(axis=0)
         if (
@@ -91,7 +91,7 @@ class EditContext(MissionContext):
         """Return the route of a mission, without the notes for the user."""
         frame, fly_over = self.airframe, self.scenario.flight.fly_over
         rules = frame.autopilot.route_rules
-        route = lay_route(self.placed(mission), frame.airspeed, fly_over, frame.limits, rules)
+        route = lay_route(self.place_mission(mission), frame.airspeed, fly_over, frame.limits, rules)
         return with_end_courses(route, self.scenario, frame.limits)
 
     def part_setup(self, mission: Mission, route: Route) -> FlightSetup:

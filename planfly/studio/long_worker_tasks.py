@@ -64,7 +64,7 @@ def campaign(payload: tuple[EditContext, Mission], advance: Advance) -> dict[str
             context.scenario,
             context.airframe,
             mission,
-            context.placed(mission),
+            context.place_mission(mission),
             setup.plan,
             default_dispersions(),
             context.seed,

@@ -254,13 +254,13 @@ class Session:
         mission = self.mission
         edits.checked_place(mission, index)
         if east is not None and north is not None:
-            mission = edits.moved(mission, index, *self.context.geographic(east, north))
+            mission = edits.moved(mission, index, *self.context.to_geographic(east, north))
         if altitude is not None:
-            current_altitude = float(self.context.points(mission)[edits.places(mission).index(index), 2])
+            current_altitude = float(self.context.item_positions(mission)[edits.places(mission).index(index), 2])
             mission = edits.at_height(
                 mission, index, altitude, current_altitude if np.isfinite(current_altitude) else altitude
             )
-        return mission if mission is self.mission else self.context.retuned(mission, index)
+        return mission if mission is self.mission else self.context.with_updated_radii(mission, index)
 
     def _insert_waypoint(self, message: Insert) -> tuple[Mission, str]:
         """Return the mission with a waypoint inserted, and the text of the edit.
@@ -276,9 +276,9 @@ class Session:
             altitude = 0.5 * (previous_item.alt + next_item.alt) if has_same_frame else None
             altitude = altitude if altitude is not None and np.isfinite(altitude) else None
         new_mission = edits.inserted(
-            mission, message.after, *self.context.geographic(message.east, message.north), altitude
+            mission, message.after, *self.context.to_geographic(message.east, message.north), altitude
         )
-        return self.context.retuned(
+        return self.context.with_updated_radii(
             new_mission, edits.next_index(mission, message.after)
         ), f"insert an item after {previous_item.seq}"
 
@@ -288,7 +288,7 @@ class Session:
             mission = edits.deleted(mission, index)
             place_indices = edits.places(mission)
             nearest_index = min(place_indices, key=lambda place_index: abs(place_index - index))
-            mission = self.context.retuned(mission, nearest_index)
+            mission = self.context.with_updated_radii(mission, nearest_index)
         return mission, f"delete {len(set(indices))} item{'s' if len(set(indices)) != 1 else ''}"
 
     def _apply_suggestion(self, message: Apply) -> tuple[Mission, str]:
@@ -331,17 +331,21 @@ class Session:
         ):
             previous_index, inserted_index = inserted_index, edits.next_index(mission, inserted_index)
             mission = edits.inserted(mission, previous_index, waypoint_lat, waypoint_lon)
-            current_altitude = float(self.context.points(mission)[edits.places(mission).index(inserted_index), 2])
+            current_altitude = float(
+                self.context.item_positions(mission)[edits.places(mission).index(inserted_index), 2]
+            )
             mission = edits.at_height(mission, inserted_index, altitude, current_altitude)
         place_indices = edits.places(mission)
         for index in place_indices[place_indices.index(first) : place_indices.index(inserted_index) + 2]:
-            mission = self.context.retuned(mission, index)
+            mission = self.context.with_updated_radii(mission, index)
         return mission
 
     def item_position(self, index: int) -> tuple[float, float, float]:
         """Return east, north and altitude AMSL of an item, m.  Raises MissionError if the item has no position."""
         edits.checked_place(self.mission, index)
-        east, north, altitude = self.context.points(self.mission)[edits.places(self.mission).index(index)].tolist()
+        east, north, altitude = self.context.item_positions(self.mission)[
+            edits.places(self.mission).index(index)
+        ].tolist()
         return east, north, altitude
 
     # ------------------------------------------------------------------

@@ -62,7 +62,7 @@ def round_to_json(values: Any, digits: int = 1) -> Any:
 def world_json(context: EditContext, setup: FlightSetup) -> Json:
     """Return page data of the world of a mission, with its area, threats, zones, ends and limits."""
     scenario, mission = context.scenario, setup.mission
-    extent = scenario.bounds if scenario.external else map_extent(scenario, context.points(mission), [])
+    extent = scenario.bounds if scenario.external else map_extent(scenario, context.item_positions(mission), [])
     return {
         "name": scenario.name,
         "origin": [scenario.origin.lat_deg, scenario.origin.lon_deg],
@@ -166,7 +166,7 @@ def _window_json(mission: Mission, route: Route, window: Window) -> Json:
 
 def items_json(context: EditContext, mission: Mission) -> list[Json]:
     """Return page data of the items that can be moved, with their positions on the map and in the mission."""
-    points, flown_seqs = context.points(mission), context.flown(mission)
+    points, flown_seqs = context.item_positions(mission), context.reached_items(mission)
     entries = []
     for k, (east, north, altitude) in zip(places(mission), points.tolist(), strict=True):
         item = mission.items[k]

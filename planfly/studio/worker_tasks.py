@@ -82,7 +82,7 @@ def try_suggestions(payload: tuple[EditContext, bytes], advance: Advance) -> dic
         advance(0.0, MAX_TRIAL_FLIGHTS, "trying suggestions")
         return False
 
-    passed_trials = SuggestionTrials(context, judged_mission, report).passing()
+    passed_trials = SuggestionTrials(context, judged_mission, report).find_passing()
     findings = with_passing_suggestions(judged_mission.verdict.findings, tried_suggestions(passed_trials))
     missions = {
         (number, which): trial.setup.mission

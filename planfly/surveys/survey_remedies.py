@@ -18,7 +18,7 @@ from logs.verdict.trials import least_change
 from logs.verdict.verdict import Verdict
 from planfly.workflow.airframe import Airframe, load_airframe
 from planfly.workflow.open_flight import make_setup
-from planfly.workflow.reference_flights import deciding_parameter
+from planfly.workflow.reference_flights import find_passing_parameter
 from planfly.workflow.trial_flight import Trial
 from world.errors import PlanflyError
 from world.scenario import with_flight
@@ -316,7 +316,7 @@ class _Trials:
                 passed_flights.append(flown)
             return self._passes(flown)
 
-        deciding = deciding_parameter(self._airframe.autopilot, self._verdict.findings, passes)
+        deciding = find_passing_parameter(self._airframe.autopilot, self._verdict.findings, passes)
         if deciding is None:
             return None
         return SurveyRemedy(

@@ -48,7 +48,7 @@ def same(found: list[Any], wanted: list[Any]) -> bool:
 def changed(session: Session, k: int, how: str, rng: np.random.Generator) -> tuple[Mission, int]:
     """The mission with a place moved, raised, inserted or deleted, and the place about which it has changed."""
     east, north, _ = session.item_position(k)
-    lat, lon = session.context.geographic(*(np.array([east, north]) + rng.normal(0.0, 150.0, 2)).tolist())
+    lat, lon = session.context.to_geographic(*(np.array([east, north]) + rng.normal(0.0, 150.0, 2)).tolist())
     match how:
         case "up":
             return edits.raised(session.mission, [k], float(rng.normal(0.0, 60.0))), k
@@ -118,7 +118,7 @@ def test_windows_violate_the_zones_that_the_whole_does() -> None:
     context = replace(session.context, scenario=replace(session.context.scenario, zones=tuple(zones)))
     for k in edits.places(session.mission)[::8]:
         x, y = places[min(range(ZONES), key=lambda one: math.dist(places[one], session.item_position(k)[:2]))]
-        mission = edits.moved(session.mission, k, *context.geographic(x, y))
+        mission = edits.moved(session.mission, k, *context.to_geographic(x, y))
         _, windows = judge_windows(context, mission, k)
         whole = route_requirements(context.setup(mission))
         legs, again = fenced(whole, place_findings(whole), 0)
@@ -175,7 +175,7 @@ def test_a_move_is_seen_where_it_matters() -> None:
     session = drawn_session(11, 60)
     k = edits.places(session.mission)[40]
     east, north, _ = session.item_position(k)
-    mission = edits.moved(session.mission, k, *session.context.geographic(east + 400.0, north))
+    mission = edits.moved(session.mission, k, *session.context.to_geographic(east + 400.0, north))
     found = judge_windows(session.context, mission, k)
     assert found[1][0].last - found[1][0].first < found[0].legs
     before = by_place(session.judged.verdict.findings)

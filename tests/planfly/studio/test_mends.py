@@ -133,7 +133,7 @@ def test_an_edited_plan_keeps_its_ways_to_the_ground_while_the_legs_next_to_them
     first = next(
         n
         for n, k in enumerate(places)
-        if np.allclose(session.context.points(session.mission)[n], base.waypoints[0], atol=0.02)
+        if np.allclose(session.context.item_positions(session.mission)[n], base.waypoints[0], atol=0.02)
     )
     middle = places[first + len(base.waypoints) // 2]
     session.edit(messages.Raise(kind="raise", rev=session.rev, by=-2.0, ks=[middle]))
@@ -148,7 +148,7 @@ def test_an_edited_plan_keeps_its_ways_to_the_ground_while_the_legs_next_to_them
     kinds = [item.command for item in reopened.mission.items]
     assert kinds == [item.command for item in session.mission.items]
     assert kinds[-1] == Command.NAV_LAND
-    here, there = (one.context.points(one.mission) for one in (session, reopened))
+    here, there = (one.context.item_positions(one.mission) for one in (session, reopened))
     assert np.abs(here - there).max() < 0.02
     # The turn at the first waypoint is the climb-out's, too.
     session.edit(messages.Raise(kind="raise", rev=session.rev, by=1.0, ks=[places[first + 1]]))
