@@ -141,7 +141,13 @@ def _search_and_write(
     airframe, should_stop = load_airframe(world), stop_condition(options["seconds"], options["stop"])
     with stage(f"planning {world.name}", "planning") as advance:
         plan = make_plan(
-            world, airframe, seed, options["algorithm"], advance, stop=should_stop, flown=flown_plan_and_leg
+            world,
+            airframe,
+            seed,
+            options["algorithm"],
+            advance,
+            stop=should_stop,
+            flown_plan_and_leg=flown_plan_and_leg,
         )
     if target is not None:
         target.parent.mkdir(parents=True, exist_ok=True)

@@ -32,9 +32,9 @@ from planfly.workflow.output_paths import (
     expand_path_pattern,
     prepare_folder,
 )
-from planfly.workflow.pipeline import fly_and_judge, program_log_path
+from planfly.workflow.pipeline import autopilot_log, fly_and_judge
 from planfly.workflow.reference_flights import FlyReference
-from planfly.workflow.tighten_plan import refine_rounds
+from planfly.workflow.tighten_plan import refine as refine_rounds
 from planner.plan import Plan, plan_json
 from world.files import hold, write_whole
 from world.scenario import Scenario
@@ -219,7 +219,7 @@ def _fly_rounds(
             folder.mkdir(parents=True, exist_ok=True)
             locks.enter_context(hold(folder))
             if task.program is not None:
-                report_replaced(folder / "flight.mcap", program_log_path(folder / "flight.mcap", task.program))
+                report_replaced(folder / "flight.mcap", autopilot_log(folder / "flight.mcap", task.program))
             prepare_folder(folder)
         flown_rounds.append(_fly_round(task, plan, len(flown_rounds)))
         if on_round is not None:

@@ -192,10 +192,10 @@ def _fly_with_program(task: _FlightOptions, setup: FlightSetup, program: Program
     return judged_flight
 
 
-def program_log_path(log: Path, program: Path) -> Path:
+def autopilot_log(log: Path, program: Path) -> Path:
     """Return the path of the autopilot program's own log, next to the flight log of planfly.
 
-    >>> program_log_path(Path("runs/flight.mcap"), Path("arduplane")).name
+    >>> autopilot_log(Path("runs/flight.mcap"), Path("arduplane")).name
     'flight.BIN'
     """
     return log.with_suffix(program_autopilot(program).log_suffix)

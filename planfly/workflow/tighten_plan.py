@@ -206,7 +206,7 @@ Rounds = list[dict[str, Any]]
 FlyRound = Callable[[Scenario], tuple[Verdict, bool]]
 
 
-def refine_rounds(
+def refine(
     scenario: Scenario, max_rounds: int, fly_round: FlyRound, keep_results: Callable[[int], None]
 ) -> tuple[Verdict, Rounds]:
     """Plan and fly in rounds, each with limits tightened after the previous round, until a round is flyable.

@@ -16,7 +16,7 @@ from planfly.cli import main
 from planfly.workflow.airframe import load_airframe
 from planfly.workflow.make_plan import make_plan
 from planfly.workflow.open_flight import make_setup
-from planfly.workflow.tighten_plan import NEXT_ROUND_REMARK, refine_rounds, tighten_limits
+from planfly.workflow.tighten_plan import NEXT_ROUND_REMARK, refine, tighten_limits
 from tests.planfly.conftest import FIELD
 from tests.synthetic import fly_path
 from world.scenario import Scenario, from_spec
@@ -117,7 +117,7 @@ def test_an_autopilot_that_strays_into_a_zones_edge_is_given_more_room() -> None
         fence = tuple(item for item in verdict.findings if item.rule == "fence")
         return replace(verdict, findings=fence, flyable=all(item.ok for item in fence)), True
 
-    _, rounds = refine_rounds(scenario, 3, one_round, lambda _: None)
+    _, rounds = refine(scenario, 3, one_round, lambda _: None)
     assert [entry["flyable"] for entry in rounds] == [False, True]
     assert kept[0] < 0.0 < kept[1]
     assert rounds[0]["next"] == NEXT_ROUND_REMARK
