@@ -123,7 +123,7 @@ def report(
             svg=svg,
             versions=content.versions or package_versions(),
             command=command,
-            returns=return_summary(content.setup, content.track).drawn(),
+            returns=return_summary(content.setup, content.track).data_for_pictures(),
         )
     return WrittenReport(folder / "report.html", tuple(files), content.verdict)
 

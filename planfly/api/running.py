@@ -283,7 +283,7 @@ def _fly_round(task: _RunTask, plan: Plan, number: int) -> Round:
             versions=package_versions(),
             command=task.command,
             events=flight.events,
-            returns=summary.drawn(),
+            returns=summary.data_for_pictures(),
         )
     notes = (*setup.scenario.notes, *setup.notes)
     has_log = len(flight.track) > 0

@@ -27,14 +27,14 @@ from planfly.runtime.stages import stage
 from planfly.surveys.survey_remedies import NearMiss, SurveyRemedy, survey_remedies
 from planfly.surveys.survey_text import (
     has_required_overlap,
+    is_line_usable,
     line_text,
     lines_headline,
     near_miss_text,
-    needed_text,
     overlap_lines,
     remedy_text,
     survey_text,
-    usable,
+    usable_segments_text,
 )
 from planfly.workflow.airframe import airframe_of
 from planfly.workflow.crash_safe_log import flight_text
@@ -74,7 +74,7 @@ class SurveyFound:
     @property
     def usable(self) -> bool:
         """True if enough of every line is usable and the photos overlap as required."""
-        return all(usable(line) for lines in self.lines for line in lines) and all(
+        return all(is_line_usable(line) for lines in self.lines for line in lines) and all(
             map(has_required_overlap, self.overlaps)
         )
 
@@ -104,7 +104,7 @@ class SurveyFound:
             "no single turn-around, order, course, parameter or airspeed was found that would help, nor longer"
             " turn-arounds with another parameter or a slower flight"
         ]
-        texts += [needed_text(*pair) for pair in zip(self.surveys, self.lines, strict=True)]
+        texts += [usable_segments_text(*pair) for pair in zip(self.surveys, self.lines, strict=True)]
         if self.kept:
             texts.append(f"no other layout was tried: {self.kept}")
         if self.nearest is not None:

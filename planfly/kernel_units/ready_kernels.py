@@ -116,7 +116,7 @@ def _fly_mission() -> None:
 def _judge_glides() -> None:
     scenario, airframe = _make_world()
     setup = make_setup(scenario, airframe, parse_mission(MISSION, "field.waypoints"), 1)
-    return_summary(setup, None).drawn()
+    return_summary(setup, None).data_for_pictures()
 
 
 # Function of each unit by name.
