@@ -21,9 +21,9 @@ from planfly.campaigns.flight_row import FlightRow
 from planfly.campaigns.fly_campaign import fly_campaign, open_store, resumed_goal
 from planfly.campaigns.report import OutputDirectory, campaign_folder, finish_campaign, fly_row_again, write_winds
 from planfly.campaigns.statistics.decision import Goal
-from planfly.campaigns.summary import summarise
-from planfly.campaigns.tables import DATABASE, WINDS_DATABASE, read_table
-from planfly.campaigns.worker_pool import Workers, checked_address
+from planfly.campaigns.summary import summarise_campaign
+from planfly.campaigns.tables import CAMPAIGN_DATABASE, WINDS_DATABASE, read_table
+from planfly.campaigns.worker_pool import Workers, check_scheduler_address
 from planfly.flight_options import (
     CampaignOptions,
     MissionOptions,
@@ -62,13 +62,13 @@ def _open_base(
     is_planned = isinstance(campaign_target, Plan) or is_mission_file(campaign_target)
 
     def open_with_plan(plan_file: Path | None) -> CampaignBase:
-        make_base = partial(open_campaign, campaign_target, dispersions, flight_options, planned=plan_file)
+        make_base = partial(open_campaign, campaign_target, dispersions, flight_options, plan_file=plan_file)
         if is_planned or (plan_file is not None and plan_file.is_file()):
             return make_base()
         with stage("planning") as advance:
             return make_base(advance=advance)
 
-    return folder.open(open_with_plan)
+    return folder.open_base_and_clear(open_with_plan)
 
 
 def _command_line_target(target: Plan | str | Path, folder: Path) -> str:
@@ -88,7 +88,7 @@ def _make_workers(count: int | None, scheduler: str | None, seed: int | None) ->
     """
     check_arguments(workers=count, seed=seed)
     if scheduler is not None:
-        checked_address(scheduler)
+        check_scheduler_address(scheduler)
         need_extra("cluster", "--scheduler needs")
     return Workers(count, scheduler)
 
@@ -152,7 +152,7 @@ def campaign(
     workers_used = _make_workers(workers, scheduler, options["seed"])
     requested = (options["flights"], options["prove"], options["at_least"], options["confidence"])
     goal, spread = make_goal(*requested), options["spread"]
-    with campaign_folder(out, DATABASE, resume=resume, overwrite=overwrite) as directory:
+    with campaign_folder(out, CAMPAIGN_DATABASE, resume=resume, overwrite=overwrite) as directory:
         if resume:
             goal = continued_goal(directory.folder, *requested)
         base = _open_base(target, options, _read_spread(spread), directory)
@@ -166,11 +166,11 @@ def _fly_and_summarise(
     base: CampaignBase, goal: Goal, workers: Workers, directory: OutputDirectory, command_line: str, *, keep: bool
 ) -> CampaignResult:
     """Fly the remaining flights of a campaign, and summarise the campaign.  keep: True keeps its folder and files."""
-    table_path = directory.folder / DATABASE
+    table_path = directory.folder / CAMPAIGN_DATABASE
     with open_store(base, goal, directory.folder, resume=directory.resume) as store:
         with stage("flying", "flying a campaign") as advance:
             estimate = fly_campaign(base, goal, workers, store, advance)
-        short_summary = None if keep else summarise(base, goal, estimate, store)
+        short_summary = None if keep else summarise_campaign(base, goal, estimate, store)
     # The open store locks its table.
     if short_summary is not None:
         return CampaignResult(short_summary, read_table(table_path))
@@ -197,7 +197,7 @@ def campaign_flight(
     check_arguments(index=index, seed=options["seed"])
     folder = Path(out)
     goal = continued_goal(folder, options["flights"], options["prove"], options["at_least"], options["confidence"])
-    directory = OutputDirectory(folder, DATABASE, resume=True, overwrite=False)
+    directory = OutputDirectory(folder, CAMPAIGN_DATABASE, resume=True, overwrite=False)
     base = _open_base(target, options, _read_spread(options["spread"]), directory)
     row = _flight_row(base, goal, folder, index)
     log = folder / "flights" / f"flight-{index:06d}.mcap"
