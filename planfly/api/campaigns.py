@@ -28,8 +28,8 @@ from planfly.flight_options import (
     CampaignOptions,
     MissionOptions,
     WindsOptions,
-    mission_options,
-    named_fences,
+    fence_file_names,
+    select_mission_options,
     takes_options,
 )
 from planfly.kernel_units.unit_kernels import PLANNING_AND_FLYING
@@ -58,7 +58,10 @@ def _open_base(
 
     A scenario is planned if the folder has no plan for it.  Raises PlanflyError; then the folder is not changed.
     """
-    campaign_target, flight_options = target if isinstance(target, Plan) else str(target), mission_options(options)
+    campaign_target, flight_options = (
+        target if isinstance(target, Plan) else str(target),
+        select_mission_options(options),
+    )
     is_planned = isinstance(campaign_target, Plan) or is_mission_file(campaign_target)
 
     def open_with_plan(plan_file: Path | None) -> CampaignBase:
@@ -78,7 +81,10 @@ def _command_line_target(target: Plan | str | Path, folder: Path) -> str:
 
 def _command_line_options(base: CampaignBase, options: MissionOptions, spread: str | Path | None) -> dict[str, object]:
     """Return the options of the command line that repeats a campaign, keyed by name."""
-    return {"seed": base.seed, "spread": spread} | {**mission_options(options), "fence": named_fences(options)}
+    return {"seed": base.seed, "spread": spread} | {
+        **select_mission_options(options),
+        "fence": fence_file_names(options),
+    }
 
 
 def _make_workers(count: int | None, scheduler: str | None, seed: int | None) -> Workers:

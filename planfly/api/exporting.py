@@ -28,7 +28,7 @@ from planfly.api.flying import FlownMission
 from planfly.flight_logs import is_log, loss_text
 from planfly.flight_options import FencePaths, MissionOptions
 from planfly.named_fences import read_named_fences
-from planfly.plan_fence import fence_of_plan
+from planfly.plan_fence import add_plan_fence
 from planfly.rtl.return_summary import return_summary
 from planfly.runtime.first_start import with_warm_up
 from planfly.runtime.stages import stage
@@ -211,7 +211,7 @@ def _read_mission(path: Path, options: MissionOptions, *, needs_world: bool, nee
         raise MissionError(f"{path}: no such file; expected a plan.json, mission file or log", file=path)
     is_plan, fences = path.suffix.lower() == ".json", read_named_fences(options["fence"])
     if not (needs_world or is_plan or fences.zones or options["at"] is not None):
-        mission = fences.on_mission(read_mission(path))
+        mission = fences.add_to_mission(read_mission(path))
         return _SourceContent(replace(mission, autopilot=mission.autopilot or DEFAULT_AUTOPILOT), path.stem)
     # Fence items have no times, so only the zones that are active during the flight are exported.
     setup = open_flight(path, options)
@@ -220,7 +220,7 @@ def _read_mission(path: Path, options: MissionOptions, *, needs_world: bool, nee
     source = _with_returns(source, setup, None) if needs_returns else source
     if not is_plan:
         return _with_zones(source, setup.scenario)
-    mission, notes = fence_of_plan(setup)
+    mission, notes = add_plan_fence(setup)
     missing_ends = missing_ends_text(mission, setup.autopilot.mission_checks) if setup.autopilot.refuses else ""
     return replace(source, mission=mission, notes=(*notes, *([missing_ends] if missing_ends else [])))
 

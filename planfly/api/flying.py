@@ -22,9 +22,9 @@ from planfly.flight_options import (
     FlyOptions,
     LogOptions,
     MissionOptions,
-    mission_options,
-    named_scenario,
-    options_of_log,
+    load_scenario_with_options,
+    select_log_options,
+    select_mission_options,
     takes_options,
 )
 from planfly.kernel_units.unit_kernels import FLYING, PLANNING_AND_FLYING
@@ -155,7 +155,7 @@ def plan_then_fly(
     check_arguments(seed=seed)
     if log is not None:
         check_output_file(Path(log), overwrite=True)
-    world = named_scenario(scenario, options)
+    world = load_scenario_with_options(scenario, options)
     return pipeline.plan_then_fly(world, seed=seed, log=None if log is None else Path(log))
 
 
@@ -322,13 +322,13 @@ def judge(
         imported = read_imported(what, **options)
         return Judged(imported.setup, imported.verdict, lossy=imported.lossy, track=imported.track, is_log=True)
     source = _source_name(what)
-    check_keywords_not_given(source, options_of_log(options), "only with an imported log, not with this file")
+    check_keywords_not_given(source, select_log_options(options), "only with an imported log, not with this file")
     if isinstance(what, FlightLog | FlownMission) or (isinstance(what, str | Path) and is_log(Path(what))):
         check_judging_options(source, options)
         check_keywords_not_given(source, {"geometry": geometry or None}, "a flight is judged as it was flown")
         what = read_log(Path(what)) if isinstance(what, str | Path) else what
         return _judge_flight(what, options["terrain"], read_named_fences(options["fence"]))
-    flight_options = mission_options(options)
+    flight_options = select_mission_options(options)
     if not geometry:
         flight = fly(what, **flight_options)
         return Judged(flight.setup, flight.verdict, track=flight.track if len(flight.track) else None)
@@ -394,7 +394,9 @@ def _judge_flight(flight: FlightLog | FlownMission, terrain: str | Path | None, 
     if terrain is not None:
         setup = setup.in_scenario(over_terrain(setup.scenario, str(terrain)))
     if fences.items or fences.zones:
-        setup = replace(setup.in_scenario(fences.on_scenario(setup.scenario)), mission=fences.on_mission(setup.mission))
+        setup = replace(
+            setup.in_scenario(fences.add_to_scenario(setup.scenario)), mission=fences.add_to_mission(setup.mission)
+        )
     if isinstance(flight, FlightLog):
         verdict = judge_log(replace(flight, setup=setup))
         return Judged(setup, verdict, loss_text(flight), not flight.complete, flight.track, is_log=True)

@@ -10,7 +10,7 @@ from typing import Any, Unpack
 
 from planfly.api.planning import stop_condition
 from planfly.arguments import RANGES, check_arguments
-from planfly.flight_options import FlightOptions, named_scenario, takes_options
+from planfly.flight_options import FlightOptions, load_scenario_with_options, takes_options
 from planfly.kernel_units.unit_kernels import FRONT_PLANNING
 from planfly.planning.pareto_plans import make_pareto_plans
 from planfly.runtime.first_start import with_warm_up
@@ -70,7 +70,7 @@ def plan_front(
     (True, True)
     """
     check_arguments(front=count, seed=seed, seconds=seconds)
-    world = named_scenario(scenario, options)
+    world = load_scenario_with_options(scenario, options)
     chosen_seed = choose_seed(world, seed)
     airframe = load_airframe(world)
     folder = None

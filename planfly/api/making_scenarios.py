@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from planfly.flight_options import named_scenario
+from planfly.flight_options import load_scenario_with_options
 from world.errors import ArgumentError
 from world.scenario import DETECTION_SCALE_RATIO, KILL_SCALE_RATIO, Scenario, from_spec, with_threats
 
@@ -44,7 +44,7 @@ def make_scenario(
     >>> scenario.threats.kill_scale.tolist(), scenario.wind.speed
     ([15.0, 15.0], 4.0)
     """
-    base_scenario = named_scenario(base, {})
+    base_scenario = load_scenario_with_options(base, {})
     spec = base_scenario.to_json()
     for name, values in tables.items():
         is_merged = isinstance(values, Mapping) and isinstance(spec.get(name), dict) and name not in _POSITIONS

@@ -9,7 +9,7 @@ from typing import Unpack
 from flight.autopilots.catalog import load_autopilot
 from logs.verdict.conditions import Conditions, conditions_of
 from planfly.arguments import check_arguments
-from planfly.flight_options import PlanOptions, named_scenario, takes_options
+from planfly.flight_options import PlanOptions, load_scenario_with_options, takes_options
 from planfly.kernel_units.unit_kernels import PLANNING
 from planfly.runtime.first_start import with_warm_up
 from planfly.runtime.stages import stage
@@ -64,7 +64,7 @@ def plan(
     (22, 3)
     """
     check_arguments(seed=options["seed"], budget=options["budget"], seconds=options["seconds"])
-    world = _with_budget(named_scenario(scenario, options), options["budget"])
+    world = _with_budget(load_scenario_with_options(scenario, options), options["budget"])
     return _search_and_write(world, scenario, None, options, out, overwrite)
 
 
@@ -96,7 +96,7 @@ def replan(
     (3, True)
     """
     check_arguments(seed=options["seed"], budget=options["budget"], seconds=options["seconds"], at_leg=at_leg)
-    world = _with_budget(named_scenario(scenario, options), options["budget"])
+    world = _with_budget(load_scenario_with_options(scenario, options), options["budget"])
     old_plan = old if isinstance(old, Plan) else read_plan(Path(old))
     check_same_mission(world, old_plan)
     return _search_and_write(

@@ -31,7 +31,7 @@ from logs.views.exports.map_files import glide_shapes, kml_text, map_zones, plan
 from planfly.api.flying import FlownMission, check_keywords_not_given, named_program
 from planfly.arguments import check_arguments
 from planfly.flight_logs import is_log
-from planfly.flight_options import LogOptions, mission_options, options_of_log, takes_options
+from planfly.flight_options import LogOptions, select_log_options, select_mission_options, takes_options
 from planfly.kernel_units.unit_kernels import FLYING, GLIDING
 from planfly.rtl.jsbsim_returns import fly_return
 from planfly.rtl.return_summary import return_starts
@@ -207,9 +207,9 @@ def returns(
     if path is not None and is_imported_log(path):
         check_keywords_not_given(str(path), {"seed": options["seed"], "nav": options["nav"]}, _RETURNS_AS_FLOWN_TEXT)
         return _judge_imported_flight(_read_imported_flight(path, options), request)
-    check_keywords_not_given(str(path or "mission"), options_of_log(options), "only with an imported log")
+    check_keywords_not_given(str(path or "mission"), select_log_options(options), "only with an imported log")
     what = read_log(path) if path is not None and is_log(path) else what
-    flight_options = mission_options(options)
+    flight_options = select_mission_options(options)
     if isinstance(what, FlightLog | FlownMission):
         fixed_options: dict[str, Any] = {**flight_options, "terrain": None, "fence": options["fence"] or None}
         check_keywords_not_given(str(path or "flight"), fixed_options, _RETURNS_AS_FLOWN_TEXT)

@@ -16,7 +16,7 @@ from logs.verdict.verdict import Verdict, verdict_json
 from planfly.api.exporting import judging_parameters_text
 from planfly.api.flying import named_program
 from planfly.arguments import check_arguments
-from planfly.flight_options import RunOptions, named_scenario, option_defaults, takes_options
+from planfly.flight_options import RunOptions, load_scenario_with_options, option_defaults, takes_options
 from planfly.kernel_units.unit_kernels import GLIDING, PLANNING_AND_FLYING
 from planfly.rtl.return_summary import return_summary
 from planfly.runtime.first_start import with_warm_up
@@ -158,7 +158,7 @@ def run(
     )
     check_arguments(engine=options["engine"])
     program = named_program(options["sitl"])
-    world = named_scenario(scenario, options, program)
+    world = load_scenario_with_options(scenario, options, program)
     chosen_seed, airframe = choose_seed(world, seed), load_airframe(world)
     folder = expand_path_pattern(out, world.name, chosen_seed)
     check_output_folder(folder, overwrite or out == RUN_FOLDER)

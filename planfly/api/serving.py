@@ -53,13 +53,13 @@ def serve(
     Raises a `planfly.PlanflyError` for bad input.
     """
     # Imported here: only this function needs MAVLink.
-    from planfly.live.served_flights import ServeOptions, open_served
+    from planfly.live.served_flights import ServeOptions, load_served_scenario
     from planfly.live.served_vehicle import serve_vehicle
 
     access = link_access(to, bind, allow, sign_key)
     check_arguments(served_speed=speed)
     serve_options = ServeOptions("" if mission is None else str(mission), speed, Path(log), options)
-    flights = open_served(serve_options)
+    flights = load_served_scenario(serve_options)
     if serve_options.logs.exists() and not serve_options.logs.is_dir():
         raise PlanflyError.of_argument("log", log, "is a file; expected a folder")
     serve_vehicle(access, serve_options, flights, stop, on_message)

@@ -18,7 +18,7 @@ from logs.verdict.measures.track_alignment import align_track
 from logs.verdict.verdict import Verdict
 from logs.views.surveys import survey_chart
 from planfly.api.flying import FlownMission, check_keywords_not_given
-from planfly.arguments import CAMERA, check_arguments, is_camera
+from planfly.arguments import CAMERA_FORMAT, check_arguments, is_camera
 from planfly.flight_logs import is_log
 from planfly.flight_options import MissionOptions, takes_options
 from planfly.kernel_units.unit_kernels import FLYING
@@ -174,7 +174,7 @@ def _parse_camera(numbers: tuple[float, ...] | None) -> Camera | None:
         camera_numbers = ()
     if isinstance(numbers, str | bytes) or not is_camera(camera_numbers):
         raise ArgumentError.of_argument(
-            "camera", numbers, f"expected {CAMERA}, such as (23.5, 15.6, 16)", shown=repr(numbers)
+            "camera", numbers, f"expected {CAMERA_FORMAT}, such as (23.5, 15.6, 16)", shown=repr(numbers)
         )
     width, height, focal_length, *overlaps = camera_numbers
     front_overlap, side_overlap = (percent / 100.0 for percent in overlaps) if overlaps else (None, None)

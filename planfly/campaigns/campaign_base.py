@@ -20,7 +20,7 @@ from flight.mission_files.formats import mission_text
 from flight.simulation.setup import FlightSetup, make_limits
 from logs.verdict.conditions import Conditions, setup_conditions
 from planfly.campaigns.dispersions import DEFAULT_DISPERSIONS_NAME, QUANTITIES_OF_DRAWS, Dispersions, Draw, SpreadError
-from planfly.flight_options import MissionOptions, named_scenario
+from planfly.flight_options import MissionOptions, load_scenario_with_options
 from planfly.named_fences import NamedFences, read_named_fences
 from planfly.workflow.airframe import (
     Airframe,
@@ -120,7 +120,7 @@ def open_campaign(
         base = _make_base_from_setup(setup, dispersions, Path(setup.mission.source).name)
     else:
         fences, seed = read_named_fences(options.get("fence") or ()), options.get("seed")
-        scenario = fences.on_scenario(named_scenario(target, options))
+        scenario = fences.add_to_scenario(load_scenario_with_options(target, options))
         has_plan_file = plan_file is not None and plan_file.is_file()
         plan = read_plan(plan_file) if has_plan_file and plan_file is not None else _make_plan(scenario, seed, advance)
         if has_plan_file and plan.scenario.to_json() != scenario.to_json():
@@ -146,7 +146,7 @@ def _make_plan(scenario: Scenario, seed: int | None, advance: Advance | None) ->
 def _make_base_from_plan(plan: Plan, fences: NamedFences, dispersions: Dispersions, seed: int) -> CampaignBase:
     scenario = plan.scenario
     airframe = load_airframe(scenario)
-    mission = fences.on_mission(mission_of_plan(plan, airframe))
+    mission = fences.add_to_mission(mission_of_plan(plan, airframe))
     placed = place_stops(mission, scenario.origin, scenario.terrain)
     dispersions = _with_aircraft_draws(dispersions, airframe.aircraft)
     return CampaignBase(scenario, airframe, mission, placed, plan, dispersions, seed, scenario.name)

@@ -83,7 +83,7 @@ STATION_COUNT = 150
 
 
 def clearance_profile(route: Route, track: Track) -> Singles:
-    """Return the minimum height above ground on each equal piece of the route, m, (STATIONS,); NaN if not flown.
+    """Return the minimum height above ground on each equal piece of the route, m, (STATION_COUNT,); NaN if not flown.
 
     Each track point is assigned to the nearest point of the leg that was flown at that time.
     """

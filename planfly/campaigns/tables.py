@@ -34,7 +34,7 @@ from planfly.campaigns.flight_row import (
 )
 from planfly.campaigns.statistics.decision import Tally
 from planfly.campaigns.table_repair import LOCKED_CODES, checksum, copy_undamaged_rows, examine_table, stored_value
-from planfly.runtime.stages import say
+from planfly.runtime.stages import report_line
 from world.errors import PlanflyError
 
 # ----------------------------------------------------------------------
@@ -242,7 +242,7 @@ class LockedTable:
             Path(f"{self.path}{ending}").unlink(missing_ok=True)
         self._connection = sqlite3.connect(self.path, timeout=1.0, isolation_level=None)
         self._lock()
-        say(f"{self.path}: {examination.text()}")
+        report_line(f"{self.path}: {examination.text()}")
 
     def _last_number(self) -> int:
         """Return the largest flight number that can be read from either end of the table, or -1 without flights."""

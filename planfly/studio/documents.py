@@ -19,7 +19,7 @@ from logs.recording.setup_attachments import PLAN_FILE, SCENARIO_FILE
 from logs.views.exports.map_files import kml_text, map_zones, plan_line
 from planfly.api.imported import read_imported
 from planfly.flight_logs import MCAP_MAGIC, is_log
-from planfly.flight_options import LogOptions, MissionOptions, apply_options, named_scenario
+from planfly.flight_options import LogOptions, MissionOptions, apply_options, load_scenario_with_options
 from planfly.studio.edit_context import EditContext
 from planfly.workflow.airframe import Airframe, choose_seed, load_airframe
 from planfly.workflow.imported_flights import ImportedFlight
@@ -76,7 +76,7 @@ class Document:
 def open_document(target: str, options: MissionOptions) -> Document:
     """Open a scenario, a plan, a mission or a log, by name or path.  Raises PlanflyError."""
     if target in embedded_names() or target.lower().endswith(".toml"):
-        return _scenario_document(named_scenario(target, options), options.get("seed"))
+        return _scenario_document(load_scenario_with_options(target, options), options.get("seed"))
     path = Path(target)
     setup = _open_file(path, options)
     kind = next((kind for kind, suffix in KINDS.items() if suffix == path.suffix.lower()), "")

@@ -82,7 +82,7 @@ class EditContext(MissionContext):
             update={"wind": self.scenario.spec.wind, "limits": self.scenario.spec.limits}
         )
         new_scenario = replace(new_scenario, spec=spec, wind=self.scenario.wind, limits=self.scenario.limits)
-        return replace(self, scenario=self.fences.on_scenario(new_scenario))
+        return replace(self, scenario=self.fences.add_to_scenario(new_scenario))
 
     # ------------------------------------------------------------------
     # Verdicts while a mission is dragged.

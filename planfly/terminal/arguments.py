@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from logs.importers.open_log import SUFFIXES
-from planfly.arguments import CAMERA, CHOICES, RANGES, is_camera, is_place, is_wind
+from planfly.arguments import CAMERA_FORMAT, CHOICES, RANGES, is_camera, is_place, is_wind
 
 # ----------------------------------------------------------------------
 # Convert command line texts to values within the ranges of the API's keywords.
@@ -61,7 +61,7 @@ def camera(text: str) -> tuple[float, ...]:
     except ValueError:
         numbers = ()
     if not is_camera(numbers) or sensor.lower().count("x") != 1:
-        raise argparse.ArgumentTypeError(f"{text!r}: expected WxH,FOCAL or WxH,FOCAL,FRONT,SIDE: {CAMERA}")
+        raise argparse.ArgumentTypeError(f"{text!r}: expected WxH,FOCAL or WxH,FOCAL,FRONT,SIDE: {CAMERA_FORMAT}")
     return numbers
 
 

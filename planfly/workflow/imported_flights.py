@@ -85,13 +85,13 @@ def import_flight(path: Path, options: LogOptions) -> ImportedFlight:
     plan, fences = options.get("plan"), read_named_fences(options.get("fence") or ())
     flight = make_flight(open_log(path), options.get("flight"))
     mission, mission_origin, planned_in = _planned_mission(path, flight, options)
-    mission = fences.on_mission(mission)
+    mission = fences.add_to_mission(mission)
     has_plan_heights = plan is not None or flight.mission is None or flight.mission.with_heights
     if not has_plan_heights:
         mission = with_flown_heights(mission, flight.lat, flight.lon, flight.up)
     _check_plan_autopilot(path, mission, flight.raw.program)
     scenario, placed = _choose_scenario_and_place_mission(mission, options, planned_in)
-    scenario, wind_source = _with_wind_of_log(fences.on_scenario(apply_options(scenario, options)), flight, options)
+    scenario, wind_source = _with_wind_of_log(fences.add_to_scenario(apply_options(scenario, options)), flight, options)
     aircraft_options = (options.get("aircraft"), options.get("scenario"), planned_in)
     aircraft_known = any(option is not None for option in aircraft_options)
     logged_autopilot = autopilot_of_log(flight.raw.program, flight.raw.parameters, flight.raw.source)

@@ -13,7 +13,7 @@ from flight.mission.preflight_notes import field_notes
 from flight.mission.route import lay_route, with_end_courses
 from flight.mission_files.formats import read_mission
 from flight.simulation.setup import FDM_HZ, EngineChoice, FlightSetup
-from planfly.flight_options import MissionOptions, apply_options, named_scenario
+from planfly.flight_options import MissionOptions, apply_options, load_scenario_with_options
 from planfly.named_fences import read_named_fences
 from planfly.workflow.airframe import Airframe, choose_seed, load_airframe
 from planfly.workflow.file_autopilots import with_file_autopilot
@@ -53,14 +53,14 @@ def open_flight(source: Plan | str | Path, options: MissionOptions, program: Pat
         options.get("scenario"),
         _terrain_option(options),
     )
-    mission = fences.on_mission(check_fixed_wing(read_mission(check_mission_exists(Path(source)))))
+    mission = fences.add_to_mission(check_fixed_wing(read_mission(check_mission_exists(Path(source)))))
     if named_world is not None:
-        scenario = named_scenario(named_world, options, program)
+        scenario = load_scenario_with_options(named_world, options, program)
         placed = place_stops(mission, scenario.origin, scenario.terrain, vertical_legs=True)
     else:
         implied_world = implied_scenario(mission, terrain, vertical_legs=True)
         scenario, placed = apply_options(implied_world.scenario, options, program), implied_world.placed
-    scenario = with_file_autopilot(fences.on_scenario(scenario), mission)
+    scenario = with_file_autopilot(fences.add_to_scenario(scenario), mission)
     seed = choose_seed(scenario, options.get("seed"))
     return make_setup(scenario, load_airframe(scenario), mission, seed, placed=placed)
 
@@ -76,14 +76,17 @@ def _open_plan(source: Plan | str | Path, options: MissionOptions, program: Path
         plan, file = read_plan(check_mission_exists(Path(source)), terrain=terrain), str(source)
     else:
         plan, file = source if terrain is None else parse_plan(plan_json(source), PLAN_FILE, terrain=terrain), PLAN_FILE
-    scenario = fences.on_scenario(apply_options(plan.scenario, options, program))
+    scenario = fences.add_to_scenario(apply_options(plan.scenario, options, program))
     airframe, seed = load_airframe(scenario), options.get("seed")
-    mission, chosen_seed = fences.on_mission(mission_of_plan(plan, airframe, file)), plan.seed if seed is None else seed
+    mission, chosen_seed = (
+        fences.add_to_mission(mission_of_plan(plan, airframe, file)),
+        plan.seed if seed is None else seed,
+    )
     if named_world is None:
         return make_setup(scenario, airframe, mission, chosen_seed, plan=plan)
     # The plan's waypoints are in the map coordinates of its own scenario.  Therefore its mission items are flown in
     # another scenario.
-    scenario = fences.on_scenario(named_scenario(named_world, options, program))
+    scenario = fences.add_to_scenario(load_scenario_with_options(named_world, options, program))
     return make_setup(scenario, load_airframe(scenario), mission, chosen_seed)
 
 

@@ -94,7 +94,7 @@ def test_a_cluster_forgets_a_campaign_however_it_ends(
             # As dask does where one of the workers has just died.
             raise OSError("Stream is closed")
 
-    monkeypatch.setattr(dask_pool, "connect", lambda _: Client())
+    monkeypatch.setattr(dask_pool, "connect_client", lambda _: Client())
     with pytest.raises(type(error)), worker_pool(Workers(1, "tcp://127.0.0.1:8786"), base, made_flight):
         raise error
     assert told == [told[0], told[0], "closed"]
