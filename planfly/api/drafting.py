@@ -56,19 +56,19 @@ def new_scenario(
     name = Path(whole_path(target)).name if ".." in target.parts else target.absolute().name
     file = _scenario_file(target, name, overwrite=overwrite)
     autopilot_name, _, version = (autopilot or DEFAULT_AUTOPILOT).partition("-")
-    terrain_path = None if terrain is None else _absolute_path(terrain, is_name=terrain in EMBEDDED)
-    aircraft_path = _absolute_path(aircraft, is_name=isinstance(aircraft, str) and not names_folder(aircraft))
-    airspeed = find_aircraft(aircraft_path).airspeed
+    raster_path = None if terrain is None else _absolute_path(terrain, is_name=terrain in EMBEDDED)
+    model_path = _absolute_path(aircraft, is_name=isinstance(aircraft, str) and not names_folder(aircraft))
+    airspeed = find_aircraft(model_path).airspeed
     with stage(f"laying out {name}", "laying out"):
-        raster = None if terrain_path is None else open_raster(terrain_path)
+        raster = None if raster_path is None else open_raster(raster_path)
         draft = make_draft(
             name,
             endpoints[0],
             endpoints[1],
             height,
             raster=raster,
-            terrain=terrain_path,
-            aircraft=aircraft_path,
+            terrain=raster_path,
+            aircraft=model_path,
             airspeed=airspeed,
             autopilot=autopilot_name,
             px4_version=version or None,
@@ -76,9 +76,7 @@ def new_scenario(
         # Parse the text as it will be read from the file, so that a fault is found before anything is written.
         from_spec(parse_scenario(draft_text(draft), str(file)), str(file))
     relative_draft = replace(
-        draft,
-        terrain=terrain_path and _relative_path(target, terrain_path),
-        aircraft=_relative_path(target, aircraft_path),
+        draft, terrain=raster_path and _relative_path(target, raster_path), aircraft=_relative_path(target, model_path)
     )
     target.mkdir(exist_ok=True)
     write_whole(file, draft_text(relative_draft))

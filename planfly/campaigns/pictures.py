@@ -27,7 +27,7 @@ INTERVAL_COLOUR = theme.colour("commanded")
 INK_COLOUR = theme.colour("ink")
 QUIET_COLOUR = theme.colour("quiet")
 GRID_COLOUR = theme.colour("grid")
-PAPER_COLOUR = theme.colour("paper")
+PAPER = theme.colour("paper")
 
 
 # ----------------------------------------------------------------------
@@ -401,17 +401,14 @@ def draw_go_no_go(
         axes.set_theta_zero_location("N")  # type: ignore[attr-defined]  # of polar axes
         axes.set_theta_direction(-1)  # type: ignore[attr-defined]  # of polar axes
         angle = np.radians([direction.from_deg for direction in directions] + [directions[0].from_deg + 360.0])
-        closed_directions = [*directions, directions[0]]
+        circle = [*directions, directions[0]]
         fine_angles = np.linspace(angle[0], angle[-1], 720)
 
         def interpolate(values: Sequence[float]) -> np.ndarray:
             return np.interp(fine_angles, angle, values)
 
-        lower, upper = (
-            interpolate([direction.low for direction in closed_directions]),
-            interpolate([direction.high for direction in closed_directions]),
-        )
-        boundary = interpolate([direction.boundary for direction in closed_directions])
+        lower, upper = interpolate([point.low for point in circle]), interpolate([point.high for point in circle])
+        boundary = interpolate([point.boundary for point in circle])
         axes.fill_between(fine_angles, 0.0, lower, color=PLANNED, alpha=0.45, linewidth=0.0)
         axes.fill_between(fine_angles, boundary, max_speed, color=FAIL, alpha=0.13, linewidth=0.0)
         axes.fill_between(fine_angles, lower, upper, color=INTERVAL_COLOUR, alpha=0.45, linewidth=0.0)
@@ -441,9 +438,7 @@ def draw_go_no_go(
                     alpha=0.75,
                 )
         if wind is not None:
-            axes.plot(
-                np.radians(wind[1]), wind[0], marker="*", color=INK_COLOUR, markersize=13, markeredgecolor=PAPER_COLOUR
-            )
+            axes.plot(np.radians(wind[1]), wind[0], marker="*", color=INK_COLOUR, markersize=13, markeredgecolor=PAPER)
         axes.set_ylim(0.0, max_speed)
         axes.set_xticks(np.radians(np.arange(0, 360, 45)), ["N", "NE", "E", "SE", "S", "SW", "W", "NW"])
         axes.set_rlabel_position(11.0)  # type: ignore[attr-defined]  # of polar axes

@@ -78,7 +78,7 @@ class Jobs:
                 self._plan_request(messages.Plan(kind="plan"), session),
                 session.rev,
             )
-            self._worker(FLIGHT_WORKER).start_first_work()
+            self._worker(FLIGHT_WORKER).start()
         else:
             self.fly(session)
 

@@ -14,7 +14,7 @@ from flight.autopilots.catalog import load_autopilot
 from flight.dynamics.envelope_tables import load_envelope
 from flight.simulation.setup import FlightSetup, make_limits
 from planner.plan import Plan
-from planner.search.lay_ground_ways import FinalLaw, with_ground_ways
+from planner.search.lay_ground_ways import FinalModel, with_ground_ways
 from world.errors import FlightError, ScenarioError
 from world.scenario import Scenario
 
@@ -61,7 +61,7 @@ def with_departure_and_approach(plan: Plan, airframe: Airframe, flown_plan: Plan
     True
     """
     autopilot, cruise = airframe.autopilot, airframe.airspeed
-    final_law = FinalLaw(
+    final_law = FinalModel(
         airspeed=lambda tailwind, amsl: autopilot.landing_airspeed(cruise, tailwind, amsl),
         slope=lambda height, distance, tailwind, amsl: autopilot.landing_glide(height, distance, tailwind, amsl).slope,
     )

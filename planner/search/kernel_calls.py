@@ -11,7 +11,7 @@ from planner.evaluation.front_scores import front_values
 from planner.evaluation.graded_scores import graded_scores
 from planner.evaluation.paper_scores import paper_scores
 from planner.evaluation.problem import Problem, make_problem
-from planner.evaluation.travel_cost import energy_cost
+from planner.evaluation.travel_cost import make_energy_cost
 from planner.optimisers.hypervolume import covering_order
 from planner.search.search_state import best_first, score_table
 from planner.seeding.grids import GridRoute, grid_route, make_grid
@@ -105,7 +105,7 @@ def _score_samples(task: _Task) -> None:
 
 def _choose(task: _Task) -> None:
     data = task.problem.search
-    front_values(data, energy_cost(task.problem.limits.envelope, data.aircraft), task.path[None])
+    front_values(data, make_energy_cost(task.problem.limits.envelope, data.aircraft), task.path[None])
     covering_order(np.eye(SAMPLE_COUNT), np.full(SAMPLE_COUNT, 2.0), SAMPLE_COUNT)
 
 
