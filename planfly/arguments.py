@@ -10,7 +10,8 @@ from world.errors import ArgumentError
 class Range(NamedTuple):
     """Range of allowed values of a number.
 
-    low, high: minimum and maximum, which are allowed unless `above` excludes low or `below` excludes high.
+    low, high: minimum and maximum.
+    above: True if the value must be above ``low``.  below: True if it must be below ``high``.
     expected: text of the error.
     integer: True if only whole numbers are allowed.
     """
@@ -34,8 +35,8 @@ class Range(NamedTuple):
             return False
         if isinstance(value, bool) or (self.integer and number != value):
             return False
-        inside = self.low <= number <= self.high
-        return inside and not (self.above and number == self.low) and not (self.below and number == self.high)
+        is_inside = self.low <= number <= self.high
+        return is_inside and not (self.above and number == self.low) and not (self.below and number == self.high)
 
 
 # Range of times, s.
@@ -47,7 +48,8 @@ _COUNT_RANGE = Range(1, 1000, "expected a whole number from 1 to 1,000", integer
 # Range of probabilities to prove.
 _PROBABILITY_RANGE = Range(0.5, 1.0, "expected at least 0.5 and below 1", below=True)
 
-# Ranges by keyword.  Values that a scenario file also limits (wind, turbulence, airspeed, laws) are checked there.
+# Range for each keyword.  Values that a scenario file also limits (wind, turbulence, airspeed, guidance) are checked
+# there.
 RANGES: Mapping[str, Range] = {
     "seed": Range(0, 2**63 - 1, "expected a whole number from 0 to 2^63 - 1", integer=True),
     "refine": Range(0, 20, "expected a whole number from 0 to 20", integer=True),
@@ -80,7 +82,7 @@ RANGES: Mapping[str, Range] = {
     "margin": Range(0.0, 100.0, "expected km from 0 to 100"),
     "height": Range(1.0, 5000.0, "expected m above ground from 1 to 5,000"),
 }
-# Allowed words by keyword.
+# Allowed words for each keyword.
 CHOICES: Mapping[str, tuple[Any, ...]] = {
     "turbulence": ("none", "light", "moderate"),
     "guidance": ("path", "l1", "vector-field"),
@@ -96,7 +98,7 @@ CHOICES: Mapping[str, tuple[Any, ...]] = {
 def check_arguments(**given: Any) -> None:
     """Raise ArgumentError for the first number or word that is outside its range.
 
-    given: values by their name in `RANGES` or `CHOICES`; None if a value was not given.
+    given: values, keyed by their name in `RANGES` or `CHOICES`; None if a value was not given.
 
     >>> check_arguments(seed=3, log_hz=60, max_hours=None)
     >>> check_arguments(directions=3)
@@ -115,17 +117,19 @@ def check_arguments(**given: Any) -> None:
             continue
         else:
             allowed = RANGES[name].expected
-        raise ArgumentError.of_argument(_SHARED_KEYWORDS.get(name, name), value, allowed)
+        raise ArgumentError.of_argument(_KEYWORDS_IN_MESSAGES.get(name, name), value, allowed)
 
 
-# Keywords of entries in `RANGES` for calls in which the same keyword has another range.
-_SHARED_KEYWORDS = {"served_speed": "speed", "front": "count"}
+# Keywords in messages, for entries of `RANGES` whose keyword has another range in other calls.
+_KEYWORDS_IN_MESSAGES = {"served_speed": "speed", "front": "count"}
 
 
 # Largest sensor size across and along the track, and longest focal length, mm.
 _MAX_CAMERA_SIZES_MM = (1000.0, 1000.0, 10_000.0)
 # Description of the numbers of a camera, in messages.
-CAMERA = "the sensor's size across and along the track and the focal length, mm, maybe overlaps along and across, %"
+CAMERA_FORMAT = (
+    "the sensor's size across and along the track and the focal length, mm, maybe overlaps along and across, %"
+)
 
 
 def is_wind(speed: float, from_deg: float) -> bool:

@@ -11,9 +11,15 @@ from collections.abc import Sequence
 from planfly.commands.registry import build_parser, find_command
 from planfly.runtime.process_setup import prepare_process, with_large_stack
 from planfly.terminal.arguments import COMPLETION_VARIABLE, complete_for_shell
-from planfly.terminal.command_parser import coloured, error_text
+from planfly.terminal.command_parser import colour_text, error_text
 from planfly.terminal.exit_codes import BAD_INPUT, FAULT, INTERRUPTED
-from planfly.terminal.output import give_junit_error, open_standard_streams, printable, redirected_output, safe_streams
+from planfly.terminal.output import (
+    open_standard_streams,
+    printable,
+    redirect_output,
+    safe_streams,
+    write_junit_error_if_requested,
+)
 from planfly.terminal.signal_watch import end_on_signals, end_process
 from world.errors import CrashError, PlanflyError
 from world.interruption import Interrupted
@@ -25,7 +31,8 @@ _MACHINE_ERRORS = (errno.EMFILE, errno.ENFILE, errno.ENOMEM, errno.EIO)
 def main(argv: Sequence[str] | None = None) -> int:
     """Run one command, and return its exit code.
 
-    argv: arguments without the program's name; None takes those of the process, which SIGINT and SIGTERM then end.
+    argv: arguments without the program's name; None for those of the process.  With None, SIGINT and
+    SIGTERM end the process.
     """
     if argv is not None:
         return _run_and_report(argv)
@@ -40,7 +47,7 @@ def main(argv: Sequence[str] | None = None) -> int:
             if not received_signals:
                 raise
             # An interrupted compiler may fail with any error.
-            code = _fail(128 + received_signals[0], "interrupted")
+            code = _report_error(128 + received_signals[0], "interrupted")
     if received_signals:
         # End the process directly, because the shutdown of an interpreter with compiled code takes a second.
         end_process(code)
@@ -52,29 +59,31 @@ def _run_and_report(argv: Sequence[str] | None) -> int:
         with safe_streams():
             return _run_command(argv)
     except OSError as error:
-        return _fail(FAULT, f"{error.filename or 'file'}: {error.strerror or error}")
+        return _report_error(FAULT, f"{error.filename or 'file'}: {error.strerror or error}")
     except MemoryError as error:
         text = str(error)
-        return _fail(FAULT, f"too little memory: {text}" if text and "bad_alloc" not in text else "too little memory")
+        return _report_error(
+            FAULT, f"too little memory: {text}" if text and "bad_alloc" not in text else "too little memory"
+        )
     except Interrupted as interrupted:
-        return _fail(128 + interrupted.number, "interrupted")
+        return _report_error(128 + interrupted.number, "interrupted")
     except KeyboardInterrupt:
-        return _fail(INTERRUPTED, "interrupted")
+        return _report_error(INTERRUPTED, "interrupted")
 
 
 def _run_command(argv: Sequence[str] | None) -> int:
     parser = build_parser()
     args = parser.parse_args(argv)
     try:
-        with redirected_output(args):
+        with redirect_output(args):
             try:
                 return find_command(args.command)(args)
             except PlanflyError as error:
-                give_junit_error(args, error_text(error, parser.commands[args.command]))
+                write_junit_error_if_requested(args, error_text(error, parser.commands[args.command]))
                 raise
     except PlanflyError as error:
         code = FAULT if isinstance(error, CrashError) or _is_machine_error(error.__cause__) else BAD_INPUT
-        return _fail(code, error_text(error, parser.commands[args.command]))
+        return _report_error(code, error_text(error, parser.commands[args.command]))
 
 
 def _is_machine_error(cause: BaseException | None) -> bool:
@@ -82,8 +91,8 @@ def _is_machine_error(cause: BaseException | None) -> bool:
     return isinstance(cause, OSError) and cause.errno in _MACHINE_ERRORS
 
 
-def _fail(code: int, message: object) -> int:
-    print(coloured(f"planfly: {printable(str(message))}", "bad", sys.stderr), file=sys.stderr)
+def _report_error(code: int, message: object) -> int:
+    print(colour_text(f"planfly: {printable(str(message))}", "bad", sys.stderr), file=sys.stderr)
     return code
 
 

@@ -37,9 +37,9 @@ class FlightOptions(TypedDict, total=False):
     wind: speed, m/s, and the direction from which the wind blows, degrees.
     turbulence: "none", "light" or "moderate".
     at: time of the flight, "START" or "START/END", in ISO 8601 with offsets from UTC; zones that are inactive at this
-    time are left out.  None keeps all zones.
+    time are ignored.  None keeps all zones.
     aircraft: a name, or a folder.  airspeed: m/s.  params: a file of the autopilot's parameters.
-    guidance: planfly's own law ("path", "l1", "vector-field") instead of the law of ArduPlane.
+    guidance: planfly's own guidance ("path", "l1", "vector-field") instead of the simulated ArduPlane.
     autopilot: the simulated autopilot: "ardupilot", "px4" (the newest release that planfly knows), "px4-1.16",
     "px4-1.17" or "planfly".
     nav: "perfect", "rtk" or "gnss".
@@ -61,7 +61,7 @@ class MissionOptions(FlightOptions, total=False):
     """Options of the flight of a mission file or a plan, and of its world.
 
     scenario: a name or a TOML file; None for the plan's own scenario, or one made around the mission.
-    fence: files of fences and zones in addition to the mission's own.
+    fence: files of fences and zones in addition to those of the mission.
     seed: seed of the turbulence; None takes the seed of the plan or of the scenario, or 1.
     """
 
@@ -88,7 +88,7 @@ class PlanOptions(FlightOptions, total=False):
 
 
 class LogOptions(MissionOptions, total=False):
-    """Facts that a log of another program does not state.
+    """Options for the log of another program, for information that it may lack.
 
     plan: the planned mission; None for the mission in the log.
     flight: number of the flight in the log, from 1.
@@ -111,8 +111,8 @@ class SimulationOptions(TypedDict, total=False):
     engine: "auto" flies the compiled flight model if it equals JSBSim in every bit, "jsbsim" flies JSBSim.
     log_hz: rows per second in the log.
     max_hours: simulated hours after which the flight is stopped.  max_log: size of the log at which it is stopped, MB.
-    levels: True also flies a mission that passes with planfly's guidance, as is done for one that fails, and compares
-    the two flights.
+    levels: True also flies a mission that passes with planfly's guidance, and compares the two flights; a mission that
+    fails is always flown again.
     """
 
     sitl: str | Path | None
@@ -124,7 +124,7 @@ class SimulationOptions(TypedDict, total=False):
 
 
 class CampaignOptions(MissionOptions, total=False):
-    """Options of the flights of a campaign, and of its end.
+    """Options of the flights of a campaign, and of its goal.
 
     spread: a TOML file of the quantities that vary; None takes planfly's default.
     flights: number of flights.
@@ -141,7 +141,7 @@ class CampaignOptions(MissionOptions, total=False):
 
 
 class WindsOptions(MissionOptions, total=False):
-    """Options of the flights of a search for the strongest winds, and of the search's end.
+    """Options of the flights of a search for the strongest winds, and of the search itself.
 
     spread: a TOML file of the quantities that vary.  flights: maximum number of flights for all directions together.
     confidence: confidence level of each interval.  workers: number of processes on this machine; None for one per core.
@@ -171,7 +171,7 @@ _Given = TypeVar("_Given")
 
 
 def takes_options(function: Callable[_Taken, _Given]) -> Callable[_Taken, _Given]:
-    """Return a function with its ``Unpack[...]`` options in its signature, which fills in defaults and refuses others.
+    """Return a function with its ``Unpack[...]`` options in its signature, with their defaults.
 
     >>> from typing import Unpack
     >>> @takes_options
@@ -214,19 +214,19 @@ def option_defaults(options: type) -> dict[str, object]:
     return {name: getattr(hint, "__metadata__", (None,))[0] for name, hint in hints.items()}
 
 
-def options_of_log(options: LogOptions) -> dict[str, object]:
+def select_log_options(options: LogOptions) -> dict[str, object]:
     """Return the options that apply to the log of another program."""
     return {name: value for name, value in options.items() if name in LOG_OPTIONS}
 
 
-def mission_options(options: MissionOptions) -> MissionOptions:
-    """Return the options that belong to the mission, without the options of a log or a campaign."""
+def select_mission_options(options: MissionOptions) -> MissionOptions:
+    """Return the options of the mission, without the options of a log or a campaign."""
     return cast(
         MissionOptions, {name: value for name, value in options.items() if name in MissionOptions.__annotations__}
     )
 
 
-def named_fences(options: MissionOptions) -> list[str]:
+def fence_file_names(options: MissionOptions) -> list[str]:
     """Return the names of the fence files."""
     fence = options.get("fence") or ()
     return [str(file) for file in ([fence] if isinstance(fence, str | Path) else fence)]
@@ -236,22 +236,24 @@ def named_fences(options: MissionOptions) -> list[str]:
 # Scenarios changed by options.
 
 
-def named_scenario(scenario: Scenario | str | Path, options: FlightOptions, program: Path | None = None) -> Scenario:
-    """Return a scenario with options applied; a name or a TOML file is loaded first.
+def load_scenario_with_options(
+    scenario: Scenario | str | Path, options: FlightOptions, program: Path | None = None
+) -> Scenario:
+    """Return a scenario, given as an object, a name or a TOML file, with options applied.
 
     program: the autopilot's program that flies.  Raises ScenarioError, TerrainError or ParameterError.
     """
     terrain = options.get("terrain")
-    ground = None if terrain is None else str(terrain)
+    terrain_path = None if terrain is None else str(terrain)
     if not isinstance(scenario, Scenario):
-        scenario = load_scenario(str(scenario), ground)
-    elif ground is not None:
-        scenario = over_terrain(scenario, ground)
+        scenario = load_scenario(str(scenario), terrain_path)
+    elif terrain_path is not None:
+        scenario = over_terrain(scenario, terrain_path)
     return apply_options(scenario, options, program)
 
 
 def apply_options(scenario: Scenario, options: FlightOptions, program: Path | None = None) -> Scenario:
-    """Return a scenario with the weather and the flight options applied, over the same terrain.
+    """Apply options of the weather and the flight to a scenario; the terrain is not changed.
 
     program: the autopilot's program that flies.
     If no autopilot is named, the file of parameters decides the autopilot.
@@ -263,20 +265,20 @@ def apply_options(scenario: Scenario, options: FlightOptions, program: Path | No
     (8.0, 28.0)
     """
     wind = options.get("wind")
-    speed, from_deg = (None, None) if wind is None else _two_numbers(wind)
+    speed, from_deg = (None, None) if wind is None else _parse_wind(wind)
     if from_deg is not None and not is_wind(0.0, from_deg):
         raise ArgumentError.of_argument(
             "wind", wind, "expected the direction that the wind blows from, degrees from north, -360..360"
         )
     from_course = None if from_deg is None else math.radians(from_deg)
-    changed = with_flight(at_time(scenario, options.get("at")), **flight_entries(options, program))
-    return with_wind(with_file_autopilot(changed), speed, from_course, options.get("turbulence"))
+    new_scenario = with_flight(at_time(scenario, options.get("at")), **flight_entries(options, program))
+    return with_wind(with_file_autopilot(new_scenario), speed, from_course, options.get("turbulence"))
 
 
 def flight_entries(options: FlightOptions, program: Path | None = None) -> dict[str, str | float | None]:
     """Return the [flight] entries of a scenario for options; None for entries that are not given.
 
-    Raises ArgumentError for an unknown law, and for a law in addition to a program.
+    Raises ArgumentError for an unknown autopilot, and for an autopilot in addition to a program.
 
     >>> entries = flight_entries({"autopilot": "px4-1.16"})
     >>> entries["autopilot"], entries["px4_version"]
@@ -287,12 +289,12 @@ def flight_entries(options: FlightOptions, program: Path | None = None) -> dict[
     if program is not None and autopilot is not None:
         allowed = "not with sitl: a real autopilot flies by its own control laws"
         raise ArgumentError.of_argument("autopilot", autopilot, allowed)
-    law, _, version = (autopilot or "").partition("-")
+    autopilot_name, _, version = (autopilot or "").partition("-")
     return {
         # A `Path` is a folder; its absolute path marks it as a folder instead of a name.
         "aircraft": str(aircraft.resolve()) if isinstance(aircraft, Path) else aircraft,
         "airspeed_mps": options.get("airspeed"),
-        "autopilot": law or None if program is None else program_autopilot(program).name,
+        "autopilot": autopilot_name or None if program is None else program_autopilot(program).name,
         "px4_version": version or None,
         "guidance": options.get("guidance"),
         "nav": options.get("nav"),
@@ -301,8 +303,8 @@ def flight_entries(options: FlightOptions, program: Path | None = None) -> dict[
     }
 
 
-def _two_numbers(wind: Wind) -> Wind:
-    """Return a wind as two numbers.  Raises ArgumentError for anything else."""
+def _parse_wind(wind: Wind) -> Wind:
+    """Parse a wind as two numbers.  Raises ArgumentError for other values."""
     try:
         speed, from_deg = wind
         if isinstance(wind, str | bytes):

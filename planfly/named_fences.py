@@ -1,4 +1,4 @@
-"""Read files of fences and zones, and add them to a mission's own fence and a scenario's own zones."""
+"""Read files of fences and zones, and add them to the fence of a mission and the zones of a scenario."""
 
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -16,15 +16,15 @@ from world.scenario import Scenario, with_zones
 class NamedFences:
     """Content of the named files of fences and zones.
 
-    items: fence items, which are added to the mission's own.
-    zones: zones by their file, which are added to the scenario's own.
+    items: fence items.
+    zones: zones of each file, with the file's name.
     """
 
     items: tuple[MissionItem, ...] = ()
     zones: tuple[tuple[str, FileZones], ...] = ()
 
-    def on_mission(self, mission: Mission) -> Mission:
-        """Return a mission with the fence items in addition to its own."""
+    def add_to_mission(self, mission: Mission) -> Mission:
+        """Return a mission with the fence items added."""
         if not self.items:
             return mission
         warnings = mission.warnings
@@ -32,15 +32,15 @@ class NamedFences:
             warnings = (*warnings, f"its own fence of {len(mission.fences)} items applies in addition to the one named")
         return replace(mission, fences=numbered([*mission.fences, *self.items]), warnings=warnings)
 
-    def on_scenario(self, scenario: Scenario) -> Scenario:
-        """Return a scenario with the zones in addition to its own.  Raises the ScenarioError of `with_zones`."""
+    def add_to_scenario(self, scenario: Scenario) -> Scenario:
+        """Return a scenario with the zones added.  Raises the ScenarioError of `with_zones`."""
         for source, file_zones in self.zones:
             scenario = with_zones(scenario, file_zones.zones, source, file_zones.notes)
         return scenario
 
 
 def read_named_fences(files: FencePaths) -> NamedFences:
-    """Read one or more files of fences and zones, by the suffix of each.
+    """Read one or more files of fences and zones; the suffix of each tells its format.
 
     Raises MissionError or ScenarioError for a file that cannot be read, for a file without a fence, and for invalid
     shapes.
@@ -48,7 +48,7 @@ def read_named_fences(files: FencePaths) -> NamedFences:
     >>> read_named_fences([])
     NamedFences(items=(), zones=())
     """
-    items: list[MissionItem] = []
+    all_items: list[MissionItem] = []
     zones = []
     for file in [files] if isinstance(files, str | Path) else files:
         path = Path(file)
@@ -58,5 +58,5 @@ def read_named_fences(files: FencePaths) -> NamedFences:
         fence_items = read_fence(path)
         # Check the shapes here, because the file they are from is known only here.
         fence_zones(fence_items, GeoOrigin(fence_items[0].lat_deg, fence_items[0].lon_deg), str(file))
-        items += fence_items
-    return NamedFences(tuple(items), tuple(zones))
+        all_items += fence_items
+    return NamedFences(tuple(all_items), tuple(zones))

@@ -10,27 +10,27 @@ PACKAGES = ("aircraft", "flight", "logs", "planner", "world")
 _BAD_USAGE_CODE = 2
 
 
-class Hidden(NamedTuple):
-    """Package of planfly that another module hides.  found: file of that module.  own: file of the package."""
+class HiddenPackage(NamedTuple):
+    """Package of planfly that another module hides.  found: file of the other module.  own: file of the package."""
 
     found: str
     own: str
 
 
-def hidden_package(home: Path) -> Hidden | None:
+def find_hidden_package(home: Path) -> HiddenPackage | None:
     """Return the first package of planfly that a module of the same name hides, or None.  Imports nothing.
 
     home: the folder of planfly and its packages.
 
-    >>> hidden_package(Path(__file__).parents[1]) is None
+    >>> find_hidden_package(Path(__file__).parents[1]) is None
     True
-    >>> hidden_package(Path("/elsewhere")).own
+    >>> find_hidden_package(Path("/elsewhere")).own
     '/elsewhere/aircraft/__init__.py'
     """
     for name in PACKAGES:
-        found_file, own_file = _module_file(name), home / name / "__init__.py"
-        if found_file is not None and found_file != str(own_file) and not _is_same_file(found_file, own_file):
-            return Hidden(found_file, str(own_file))
+        file, package_file = _module_file(name), home / name / "__init__.py"
+        if file is not None and file != str(package_file) and not _is_same_file(file, package_file):
+            return HiddenPackage(file, str(package_file))
     return None
 
 
@@ -41,9 +41,9 @@ def _module_file(name: str) -> str | None:
     return None if spec is None else spec.origin
 
 
-def _is_same_file(found_file: str, own_file: Path) -> bool:
+def _is_same_file(file: str, package_file: Path) -> bool:
     try:
-        return own_file.samefile(found_file)
+        return package_file.samefile(file)
     except OSError:
         return False
 
@@ -55,7 +55,7 @@ def check_hidden_packages() -> None:
 
     >>> check_hidden_packages()
     """
-    hidden = hidden_package(Path(__file__).parents[1])
+    hidden = find_hidden_package(Path(__file__).parents[1])
     if hidden is None:
         return
     message = (

@@ -6,13 +6,13 @@ from flight.simulation.setup import FlightSetup
 from logs.verdict.rules.fence_rule import zone_test
 
 
-def fence_of_plan(setup: FlightSetup) -> tuple[Mission, tuple[str, ...]]:
+def add_plan_fence(setup: FlightSetup) -> tuple[Mission, tuple[str, ...]]:
     """Return a plan's mission with the scenario as its fence, and notes on the contents that a fence cannot store.
 
-    Shapes that the planned path violates by the verdict's rule `fence` are left out, and named in the notes.
+    Shapes that the planned path violates according to the rule `fence` are omitted, and named in the notes.
 
     >>> from logs.recording.example_log import example_log
-    >>> mission, notes = fence_of_plan(example_log().setup)
+    >>> mission, notes = add_plan_fence(example_log().setup)
     >>> [item.command for item in mission.fences]  # the area; the example has no missiles
     [5001, 5001, 5001, 5001]
     """

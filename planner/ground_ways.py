@@ -14,7 +14,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from world.arrays import Floats
 
 _Metres = Annotated[float, Field(ge=-500_000.0, le=500_000.0)]
-_Place = Annotated[list[_Metres], Field(min_length=3, max_length=3)]
+_Position = Annotated[list[_Metres], Field(min_length=3, max_length=3)]
 _Course = Annotated[float, Field(ge=-10.0, le=10.0)]
 _Length = Annotated[float, Field(gt=0.0, le=100_000.0)]
 
@@ -25,9 +25,9 @@ class ClimbOut:
 
     home: (3,) m, on the ground.
     course: launch course, rad clockwise from north.
-    up: altitude that the take-off climbs to, m AMSL.
+    up: altitude at the end of the take-off, m AMSL.
     waypoints: (n, 3) m, between home and the plan's first waypoint.
-    gradient: smallest climb gradient that the departure is laid out for, m per m.
+    gradient: minimum climb gradient with which the departure can be flown, m per m.
     """
 
     home: Floats
@@ -43,14 +43,14 @@ class ClimbOut:
 
 @dataclass(frozen=True, slots=True)
 class Descent:
-    """Approach: waypoints from the plan's last one to the line-up, and along the line-up to the landing point.
+    """Approach: waypoints from the plan's last waypoint to the line-up, and the line-up to the landing point.
 
     waypoints: (n, 3) m, before the line-up.
     line_up: (2, 3) m, two points at one altitude on the landing course; the glide begins at the second.
     point: (3,) m, the landing point on the ground.
     course: landing course, rad clockwise from north.
     slope: slope of the straight line from the end of the line-up to the landing point, m per m.
-    go_around: height over home that a go-around from there climbs to, m.
+    go_around: height above home at the end of the climb of a go-around, m.
     """
 
     waypoints: Floats
@@ -85,28 +85,28 @@ def _lock_arrays(ground_way: ClimbOut | Descent, *names: str) -> None:
 # File format.
 
 
-class _Table(BaseModel):
+class _FileTable(BaseModel):
     model_config = ConfigDict(extra="forbid", allow_inf_nan=False, frozen=True)
 
 
-class _ClimbFile(_Table):
-    home_east_north_amsl_m: _Place
+class _ClimbFile(_FileTable):
+    home_east_north_amsl_m: _Position
     course_rad: _Course
     takeoff_amsl_m: _Metres
-    waypoints_east_north_amsl_m: Annotated[list[_Place], Field(min_length=1, max_length=1000)]
+    waypoints_east_north_amsl_m: Annotated[list[_Position], Field(min_length=1, max_length=1000)]
     gradient: Annotated[float, Field(gt=0.0, le=10.0)]
 
 
-class _DescentFile(_Table):
-    waypoints_east_north_amsl_m: Annotated[list[_Place], Field(max_length=1000)]
-    line_up_east_north_amsl_m: Annotated[list[_Place], Field(min_length=2, max_length=2)]
-    point_east_north_amsl_m: _Place
+class _DescentFile(_FileTable):
+    waypoints_east_north_amsl_m: Annotated[list[_Position], Field(max_length=1000)]
+    line_up_east_north_amsl_m: Annotated[list[_Position], Field(min_length=2, max_length=2)]
+    point_east_north_amsl_m: _Position
     course_rad: _Course
     slope: Annotated[float, Field(gt=0.0, le=10.0)]
     go_around_m: _Length
 
 
-class GroundWaysFile(_Table):
+class GroundWaysFile(_FileTable):
     """Departure and approach of a plan as JSON: keys with units, None if missing."""
 
     climb: _ClimbFile | None = None

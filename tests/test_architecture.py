@@ -55,7 +55,7 @@ LONGER = {
     "planner/evaluation/graded_scores.py:score_missiles": 61,
     "planner/evaluation/terrain_clearance.py:sample_terrain": 70,
     "planner/evaluation/threat_index.py:kill_density": 73,
-    "planner/evaluation/travel_cost.py:model_leg": 61,
+    "planner/evaluation/travel_cost.py:model_leg": 62,
     "planner/plan.py:parse_plan": 61,
     "planner/search/plan_path.py:plan_path": 67,
     "planner/search/replan.py:replan": 73,

@@ -17,7 +17,7 @@ from benchmarks.campaigns.client_memory import client_memory
 from benchmarks.campaigns.compare_step_rates import compare_all
 from benchmarks.campaigns.winds_reference import winds_row
 from flight.simulation.simulate import Flight, fly_to_end
-from planfly.campaigns.campaign_base import CampaignBase, open_campaign, vary
+from planfly.campaigns.campaign_base import CampaignBase, open_campaign, vary_flight
 from planfly.campaigns.dispersions import default_dispersions, draw_flight
 from planfly.campaigns.flight_requests import FlightRequest
 from planfly.campaigns.flight_row import fly_one
@@ -72,7 +72,7 @@ def over_simulate(base: CampaignBase, flights: int = 20) -> float:
         started = time.process_time()
         fly_one(base, index)
         between = time.process_time()
-        varied = vary(base, draw_flight(base.dispersions, base.seed, index))
+        varied = vary_flight(base, draw_flight(base.dispersions, base.seed, index))
         setup_done = time.process_time()
         how = varied.off_nominal
         fly_to_end(Flight(varied.setup, varied.airframe.aircraft, how.variation, start_offset=how.start_offset))

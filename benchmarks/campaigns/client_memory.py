@@ -14,7 +14,7 @@ import numpy as np
 
 from planfly.campaigns.campaign_base import CampaignBase, GivenWind, open_campaign
 from planfly.campaigns.dispersions import default_dispersions
-from planfly.campaigns.flight_row import STATIONS, FlightRow
+from planfly.campaigns.flight_row import STATION_COUNT, FlightRow
 from planfly.campaigns.fly_campaign import fly_campaign, open_store
 from planfly.campaigns.report import finish_campaign
 from planfly.campaigns.statistics.decision import Goal
@@ -29,7 +29,7 @@ def large_flight(base: CampaignBase, index: int, wind: GivenWind | None = None) 
     """A made flight with a shape of a real one's size; of no duration, so that none is flown again for its log."""
     row = made_flight(base, index, wind)
     random = np.random.default_rng(index)
-    clearance = random.uniform(50.0, 300.0, STATIONS).astype(np.float32)
+    clearance = random.uniform(50.0, 300.0, STATION_COUNT).astype(np.float32)
     crossings = random.normal(0.0, 3.0, (_WAYPOINTS, 2)).astype(np.float32)
     return replace(row, duration=0.0, clearance=clearance.tobytes(), crossings=crossings.tobytes())
 

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import qmc
 
-from planfly.campaigns.campaign_base import CampaignBase, GivenWind, vary
+from planfly.campaigns.campaign_base import CampaignBase, GivenWind, vary_flight
 from planfly.campaigns.dispersions import QUANTITIES, Dispersions, Draw
 from planfly.campaigns.flight_row import FlightRow
 from planfly.workflow.pipeline import fly_and_judge
@@ -38,6 +38,6 @@ def sobol_draw(dispersions: Dispersions, seed: int, index: int) -> Draw:
 def fly_sobol(base: CampaignBase, index: int, wind: GivenWind | None = None) -> FlightRow:
     """Fly one of them by its index; wind: mean wind in the scenario's place."""
     draw = sobol_draw(base.dispersions, base.seed, index)
-    varied = vary(base, draw, wind)
+    varied = vary_flight(base, draw, wind)
     flown = fly_and_judge(varied.setup, varied.airframe, None, off_nominal=varied.off_nominal, reference="never")
     return FlightRow(draw, "flyable" if flown.verdict.flyable else "not flyable", flown.ended)

@@ -27,7 +27,7 @@ from planfly.workflow.airframe import load_airframe
 from planfly.workflow.make_plan import make_plan
 from planfly.workflow.open_flight import make_setup
 from planfly.workflow.pipeline import fly_and_judge
-from planner.evaluation.travel_cost import energy_cost, path_cost, time_cost
+from planner.evaluation.travel_cost import make_energy_cost, make_time_cost, path_cost
 from tests.autopilot_plans import plan_scenario
 from world.arrays import Floats
 from world.scenario import Scenario, from_spec
@@ -99,9 +99,9 @@ def fly(scenario: Scenario, seed: int, *, planned: bool) -> Flown:
 
 def _by_legs(limits: Limits, table: PerformanceTable, path: Floats) -> tuple[float, float]:
     """Return the time (s) and energy (Wh) of a path (w, 3) by its legs."""
-    energy = energy_cost(limits.envelope, table)
+    energy = make_energy_cost(limits.envelope, table)
     joules = np.nan if energy is None else path_cost(energy, table, path) / energy.energy
-    return path_cost(time_cost(table), table, path) / float(table.airspeed), joules / 3600.0
+    return path_cost(make_time_cost(table), table, path) / float(table.airspeed), joules / 3600.0
 
 
 def measure(name: str, first: int, count: int, *, planned: bool) -> list[dict[str, Any]]:

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from benchmarks.task import exact_airframe
-from planfly.planning.paper import PROBLEMS, STRIP_ACROSS, problem_name
+from planfly.planning.paper import PROBLEMS, STRIP_HALF_WIDTHS_M, problem_name
 from planner.evaluation.encoding import Encoding, Space, bearing, cartesian, polar, polar_45, rotated
 from planner.evaluation.paper_scores import paper_scores
 from planner.evaluation.problem import make_problem
@@ -107,7 +107,7 @@ def searched(choice: Choice, threats: int, seed: int) -> tuple[bool, float]:
     """Return True if the reported path of a search is safe at the paper's points, and its length ratio."""
     scenario = load_scenario(problem_name(threats))
     problem, table = make_problem(scenario, exact_airframe(scenario).limits), scenario.planner
-    space = replace(problem.space, across=STRIP_ACROSS[threats]) if choice.strip else problem.space
+    space = replace(problem.space, across=STRIP_HALF_WIDTHS_M[threats]) if choice.strip else problem.space
     encoding = choice.encode(space, table.waypoints)
 
     def score(vectors: Floats) -> Floats:

@@ -3,7 +3,7 @@
 import json
 from typing import Any
 
-from planfly.commands.registry import answer_objects, answering_commands, schema_text
+from planfly.commands.registry import answer_objects, commands_with_json, schema_text
 
 
 def schema_tables(command: str) -> str:
@@ -43,7 +43,7 @@ def _type(one: dict[str, Any]) -> str:
 def answer_table() -> str:
     """Return one row per command: the name of its schema, and its top-level fields."""
     rows = []
-    for command in answering_commands():
+    for command in commands_with_json():
         schema = json.loads(schema_text(command))
         for one in answer_objects(schema):
             fields = one.get("properties", {})

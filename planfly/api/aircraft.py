@@ -29,13 +29,13 @@ class AircraftNumbers:
 
     aircraft: metadata of the aircraft.
     model_sha256: SHA-256 of the JSBSim model.
-    envelope: climb and descent limits by airspeed and altitude.
-    trims: trimmed level flight by airspeed.
-    modes: modes of motion by airspeed, m/s.
+    envelope: climb and descent limits for each airspeed and altitude.
+    trims: trimmed level flight at each airspeed.
+    modes: modes of motion, keyed by airspeed, m/s.
     cruise: modes of motion at cruise speed.
     steps: responses to steps of the controls.
-    lacking: files that a flight needs and the aircraft's folder lacks, a line each.
-    files: pictures written.
+    lacking: one line for each file that a flight needs and the aircraft's folder lacks.
+    files: pictures that were written.
     """
 
     aircraft: Aircraft
@@ -56,7 +56,7 @@ def aircraft(name: str | Path) -> Aircraft: ...
 def aircraft(name: str | Path | None = None) -> Aircraft | dict[str, Aircraft]:
     """Return an aircraft by name or folder, with its masses, speeds and limits in SI units and radians.
 
-    name: name or folder; None returns all embedded aircraft by name.
+    name: name or folder; None returns all embedded aircraft, keyed by name.
     Raises a `planfly.PlanflyError` for an unknown name, and for a folder without an aircraft.
 
     >>> import planfly
@@ -66,7 +66,7 @@ def aircraft(name: str | Path | None = None) -> Aircraft | dict[str, Aircraft]:
     ['aerosonde', 'c172x', 'ultrastick25e', 'x8', 'zagi']
     """
     if name is None:
-        return {embedded: load_aircraft(embedded) for embedded in aircraft_names()}
+        return {embedded_name: load_aircraft(embedded_name) for embedded_name in aircraft_names()}
     return find_aircraft(str(name.resolve()) if isinstance(name, Path) else name)
 
 
@@ -128,7 +128,7 @@ def new_aircraft(
     """
     sheet_values = {name: value for name, value in options.items() if value is not None}
     if not sheet_values:
-        source_aircraft = _open_aircraft("aerosonde" if source is None else source)
+        source_aircraft = _load_aircraft("aerosonde" if source is None else source)
         model = shipped_model(source_aircraft) if source_aircraft.model.shipped else None
         make_own_folder(Path(folder), source_aircraft, model, overwrite=overwrite)
         return find_aircraft(str(Path(folder).absolute()))
@@ -166,32 +166,32 @@ def describe_aircraft(
     >>> numbers.envelope.level_speeds(0.0)
     (15.9..., 32.4...)
     """
-    described = _open_aircraft(name)
-    model_sha256 = model_hash(described)
-    # Invalid settings files are refused here.
-    lacking = tuple(missing for kind in AUTOPILOTS for missing in kind.missing_files(described))
-    folder = None if out is None else expand_path_pattern(out, described.name, 0)
+    aircraft_entry = _load_aircraft(name)
+    model_sha256 = model_hash(aircraft_entry)
+    # This also refuses invalid settings files.
+    missing_files = tuple(missing_file for kind in AUTOPILOTS for missing_file in kind.missing_files(aircraft_entry))
+    folder = None if out is None else expand_path_pattern(out, aircraft_entry.name, 0)
     if folder is not None:
         check_output_folder(folder, overwrite)
     # Compute all results before writing any file.
-    with stage(f"trimming {described.name}", "trimming"):
-        envelope = load_envelope(described, motor_braking=motor_braking)
-        check_level_flight(described, envelope)
-        trims = trim_table(described)
-        modes = {row.trim.airspeed: modes_at(described, row.trim.airspeed) for row in trims}
-        cruise, steps = modes_at(described, described.airspeed), step_responses(described)
+    with stage(f"trimming {aircraft_entry.name}", "trimming"):
+        envelope = load_envelope(aircraft_entry, motor_braking=motor_braking)
+        check_level_flight(aircraft_entry, envelope)
+        trims = trim_table(aircraft_entry)
+        modes = {row.trim.airspeed: modes_at(aircraft_entry, row.trim.airspeed) for row in trims}
+        cruise, steps = modes_at(aircraft_entry, aircraft_entry.airspeed), step_responses(aircraft_entry)
     files: tuple[Path, ...] = ()
     if folder is not None:
-        pictures = _draw_pictures(described, envelope, trims, modes, steps)
+        pictures = _draw_pictures(aircraft_entry, envelope, trims, modes, steps)
         prepare_folder(folder, tuple(pictures))
         for file, data in pictures.items():
             write_whole(folder / file, data)
         files = tuple(folder / file for file in pictures)
-    return AircraftNumbers(described, model_sha256, envelope, trims, modes, cruise, steps, lacking, files)
+    return AircraftNumbers(aircraft_entry, model_sha256, envelope, trims, modes, cruise, steps, missing_files, files)
 
 
-def _open_aircraft(name: str | Path) -> Aircraft:
-    """Return the aircraft with a name or in a folder.  Raises PlanflyError if there is none."""
+def _load_aircraft(name: str | Path) -> Aircraft:
+    """Load the aircraft with a name or in a folder.  Raises PlanflyError if there is none."""
     text = str(name.absolute()) if isinstance(name, Path) else name
     if not names_folder(text):
         return find_aircraft(text)

@@ -1,4 +1,4 @@
-"""Find the probability that a mission flies, and the strongest wind from each direction, by many flights."""
+"""Find the probability that a mission is flyable, and the strongest wind from each direction, by many flights."""
 
 from dataclasses import dataclass
 from functools import partial
@@ -21,15 +21,15 @@ from planfly.campaigns.flight_row import FlightRow
 from planfly.campaigns.fly_campaign import fly_campaign, open_store, resumed_goal
 from planfly.campaigns.report import OutputDirectory, campaign_folder, finish_campaign, fly_row_again, write_winds
 from planfly.campaigns.statistics.decision import Goal
-from planfly.campaigns.summary import summarise
-from planfly.campaigns.tables import DATABASE, WINDS_DATABASE, read_table
-from planfly.campaigns.worker_pool import Workers, checked_address
+from planfly.campaigns.summary import summarise_campaign
+from planfly.campaigns.tables import CAMPAIGN_DATABASE, WINDS_DATABASE, read_table
+from planfly.campaigns.worker_pool import Workers, check_scheduler_address
 from planfly.flight_options import (
     CampaignOptions,
     MissionOptions,
     WindsOptions,
-    mission_options,
-    named_fences,
+    fence_file_names,
+    select_mission_options,
     takes_options,
 )
 from planfly.kernel_units.unit_kernels import PLANNING_AND_FLYING
@@ -42,7 +42,7 @@ from world.extras import need_extra, needs_extra
 
 @dataclass(frozen=True, slots=True)
 class CampaignFlight:
-    """Result of `planfly.campaign_flight`, a flight of a campaign flown again with the result in the table.
+    """Result of `planfly.campaign_flight`: a flight of a campaign that was flown again, with the same result.
 
     row: outcome, reason for the end, and failed rules.  log: the file of its flight log.
     """
@@ -58,37 +58,43 @@ def _open_base(
 
     A scenario is planned if the folder has no plan for it.  Raises PlanflyError; then the folder is not changed.
     """
-    campaign_target, flight_options = target if isinstance(target, Plan) else str(target), mission_options(options)
+    campaign_target, flight_options = (
+        target if isinstance(target, Plan) else str(target),
+        select_mission_options(options),
+    )
     is_planned = isinstance(campaign_target, Plan) or is_mission_file(campaign_target)
 
-    def open_planned(planned: Path | None) -> CampaignBase:
-        make_base = partial(open_campaign, campaign_target, dispersions, flight_options, planned=planned)
-        if is_planned or (planned is not None and planned.is_file()):
+    def open_with_plan(plan_file: Path | None) -> CampaignBase:
+        make_base = partial(open_campaign, campaign_target, dispersions, flight_options, plan_file=plan_file)
+        if is_planned or (plan_file is not None and plan_file.is_file()):
             return make_base()
         with stage("planning") as advance:
             return make_base(advance=advance)
 
-    return folder.open(open_planned)
+    return folder.open_base_and_clear(open_with_plan)
 
 
 def _command_line_target(target: Plan | str | Path, folder: Path) -> str:
-    """Return the target as the command line that repeats a campaign names it; a `Plan` is in the campaign's folder."""
+    """Return the target for the command line that repeats a campaign; for a `Plan`, its file in `folder`."""
     return str(folder / "plan.json") if isinstance(target, Plan) else str(target)
 
 
 def _command_line_options(base: CampaignBase, options: MissionOptions, spread: str | Path | None) -> dict[str, object]:
-    """Return the options of the command line that repeats a campaign, by name."""
-    return {"seed": base.seed, "spread": spread} | {**mission_options(options), "fence": named_fences(options)}
+    """Return the options of the command line that repeats a campaign, keyed by name."""
+    return {"seed": base.seed, "spread": spread} | {
+        **select_mission_options(options),
+        "fence": fence_file_names(options),
+    }
 
 
 def _make_workers(count: int | None, scheduler: str | None, seed: int | None) -> Workers:
     """Check the number of workers, the scheduler and the seed, and return the workers.
 
-    Raises PlanflyError before anything is planned, for instance for a scheduler address that is not allowed.
+    Raises PlanflyError for invalid arguments, before anything is planned.
     """
     check_arguments(workers=count, seed=seed)
     if scheduler is not None:
-        checked_address(scheduler)
+        check_scheduler_address(scheduler)
         need_extra("cluster", "--scheduler needs")
     return Workers(count, scheduler)
 
@@ -98,13 +104,13 @@ def _read_spread(file: str | Path | None) -> Dispersions:
 
 
 # ----------------------------------------------------------------------
-# Find the probability that a mission flies.
+# Find the probability that a mission is flyable.
 
 
 def continued_goal(
     folder: Path, flights: int | None, prove: float | None, at_least: float | None, confidence: float | None
 ) -> Goal:
-    """Return the goal of a resumed campaign, which is the requested goal, or the earlier goal if none is requested.
+    """Return the goal of a resumed campaign: the requested goal, or the earlier goal if none is requested.
 
     Raises PlanflyError for numbers outside their ranges, and for a folder without a campaign.
     """
@@ -127,7 +133,7 @@ def campaign(
     overwrite: bool = False,
     **options: Unpack[CampaignOptions],
 ) -> CampaignResult:
-    """Fly a mission many times as `planfly.fly` does, with variations of wind, aircraft, terrain and start.
+    """Fly a mission many times, like `planfly.fly`, with variations of wind, aircraft, terrain and start.
 
     target: an embedded scenario's name, a scenario's TOML file, a `Plan`, or a plan.json, .waypoints or .plan file.
     spread: a TOML file of the quantities that vary; None takes planfly's default.
@@ -136,7 +142,7 @@ def campaign(
     prove: a probability; flights are flown until they show whether the mission reaches it.
     at_least: a probability to judge after all flights.  Only one of the two may be given.
     confidence: confidence level of each bound; None takes 0.95, or the earlier value of a resumed campaign.
-    seed: seed of plan and draws.  The other options are those of `planfly.fly`.
+    seed: seed of plan and draws.  For the other options, see `planfly.fly`.
     workers: number of processes on this machine; None for one per core.
     scheduler: address of a running dask scheduler, whose workers then fly.
     out: folder of the campaign's files; None keeps no files.
@@ -152,7 +158,7 @@ def campaign(
     workers_used = _make_workers(workers, scheduler, options["seed"])
     requested = (options["flights"], options["prove"], options["at_least"], options["confidence"])
     goal, spread = make_goal(*requested), options["spread"]
-    with campaign_folder(out, DATABASE, resume=resume, overwrite=overwrite) as directory:
+    with campaign_folder(out, CAMPAIGN_DATABASE, resume=resume, overwrite=overwrite) as directory:
         if resume:
             goal = continued_goal(directory.folder, *requested)
         base = _open_base(target, options, _read_spread(spread), directory)
@@ -165,18 +171,18 @@ def campaign(
 def _fly_and_summarise(
     base: CampaignBase, goal: Goal, workers: Workers, directory: OutputDirectory, command_line: str, *, keep: bool
 ) -> CampaignResult:
-    """Fly a campaign or its remaining flights, and summarise them.  keep: True keeps its folder and files."""
-    table = directory.folder / DATABASE
+    """Fly the remaining flights of a campaign, and summarise the campaign.  keep: True keeps its folder and files."""
+    table_path = directory.folder / CAMPAIGN_DATABASE
     with open_store(base, goal, directory.folder, resume=directory.resume) as store:
         with stage("flying", "flying a campaign") as advance:
             estimate = fly_campaign(base, goal, workers, store, advance)
-        short_summary = None if keep else summarise(base, goal, estimate, store)
+        short_summary = None if keep else summarise_campaign(base, goal, estimate, store)
     # The open store locks its table.
     if short_summary is not None:
-        return CampaignResult(short_summary, read_table(table))
+        return CampaignResult(short_summary, read_table(table_path))
     with stage("reporting") as advance:
         summary = finish_campaign(base, goal, estimate, directory.folder, command_line, advance)
-    return CampaignResult(summary, read_table(table), table)
+    return CampaignResult(summary, read_table(table_path), table_path)
 
 
 @needs_extra("campaigns")
@@ -190,14 +196,14 @@ def campaign_flight(
 ) -> CampaignFlight:
     """Fly one flight of a campaign again, into a log in the campaign's folder.
 
-    target: the campaign's target; all other keywords must also be those of the campaign.
+    target: the campaign's target; all other keywords must also have the same values as for the campaign.
     index: number of the flight, from 0.  out: the campaign's folder.
     Raises a `planfly.PlanflyError` for bad input, and if the result of the flight differs from the table.
     """
     check_arguments(index=index, seed=options["seed"])
     folder = Path(out)
     goal = continued_goal(folder, options["flights"], options["prove"], options["at_least"], options["confidence"])
-    directory = OutputDirectory(folder, DATABASE, resume=True, overwrite=False)
+    directory = OutputDirectory(folder, CAMPAIGN_DATABASE, resume=True, overwrite=False)
     base = _open_base(target, options, _read_spread(options["spread"]), directory)
     row = _flight_row(base, goal, folder, index)
     log = folder / "flights" / f"flight-{index:06d}.mcap"
@@ -215,7 +221,7 @@ def _flight_row(base: CampaignBase, goal: Goal, folder: Path, index: int) -> Fli
 
 
 # ----------------------------------------------------------------------
-# Find the strongest wind from each direction in which a mission flies.
+# Find the strongest wind from each direction in which a mission is flyable.
 
 
 @needs_extra("campaigns")
@@ -232,7 +238,7 @@ def winds(
     overwrite: bool = False,
     **options: Unpack[WindsOptions],
 ) -> WindsFound:
-    """Find the strongest wind from each direction in which a mission flies with a given probability.
+    """For each wind direction, find the strongest wind in which a mission is flyable with a given probability.
 
     target: an embedded scenario's name, a scenario's TOML file, a `Plan`, or a plan.json, .waypoints or .plan file.
     prove: the probability.
@@ -241,7 +247,7 @@ def winds(
     flights: maximum number of flights for all directions together; None takes 5,000, or the earlier number of a resumed
     search.
     confidence: confidence level of each interval.
-    spread, seed, workers, scheduler: see `planfly.campaign`.  The other options are those of `planfly.fly`.
+    spread, seed, workers, scheduler: see `planfly.campaign`.  For the other options, see `planfly.fly`.
     out: a folder for ``winds.html``, ``winds.png``, ``winds.json`` and the flights; None keeps no files.
     resume: True continues the search in the folder.  overwrite: True replaces the search.
     A script must call this function under ``if __name__ == "__main__":``, because workers import the script.
@@ -260,10 +266,10 @@ def winds(
         goal = WindsGoal(prove, confidence, directions, most, flight_limit(flights, folder, resume=resume))
         base = _open_base(target, options, _read_spread(spread).without(SEARCHED_QUANTITIES), directory)
         with open_winds_store(base, goal, folder, resume=resume) as store, stage("flying", "winds") as advance:
-            found = find_winds(base, goal, workers_used, store, advance)
+            winds_found = find_winds(base, goal, workers_used, store, advance)
         if out is not None:
             command_line = winds_line(
                 _command_line_target(target, folder), goal, _command_line_options(base, options, spread)
             )
-            write_winds(folder, base, found, command_line)
-    return found
+            write_winds(folder, base, winds_found, command_line)
+    return winds_found

@@ -34,8 +34,8 @@ def terrain(
     """Write the terrain of an area as a GeoTIFF, which the other functions of planfly read as terrain.
 
     out: the file.  overwrite: True replaces an existing file.
-    around: a mission file whose places the area contains.  Alternatively box: south, west, north and east edge of the
-    area, degrees.
+    around: a mission file; the area contains all its positions.  Alternatively box: south, west, north and east edge of
+    the area, degrees.
     margin: width of the terrain added on every side, km.
     source: a folder of tiles or an elevation file; or the address (http or https) of a server with GLO-30 tiles of the
     Copernicus DEM, laid out as in the AWS registry of open data.  This registry is the default.  Downloaded parts are
@@ -57,7 +57,7 @@ def terrain(
     if target.suffix.lower() not in (".tif", ".tiff"):
         raise PlanflyError(f"{target}: expected a name that ends with .tif", file=target)
     check_output_file(target, overwrite, Path(around) if around is not None else None)
-    area = _widen(_parse_box(box) if box is not None else _mission_box(Path(str(around))), margin)
+    area = _add_margin_to_box(_parse_box(box) if box is not None else _mission_box(Path(str(around))), margin)
     source_name = str(source)
     with stage("fetching terrain" if "://" in source_name else "cutting terrain") as advance:
         if "://" not in source_name:
@@ -91,16 +91,16 @@ def _parse_box(edges: Sequence[float]) -> Box:
 def _mission_box(file: Path) -> Box:
     """Return the smallest box around all items, home, fences and rally points of a mission.  Raises PlanflyError."""
     mission = read_mission(file)
-    places = [
+    positions = [
         (item.lat_deg, item.lon_deg) for item in (*mission.items, *mission.fences, *mission.rally) if item.has_position
     ]
     if mission.home is not None:
-        places.append((mission.home.lat_deg, mission.home.lon_deg))
-    if not places:
+        positions.append((mission.home.lat_deg, mission.home.lon_deg))
+    if not positions:
         raise PlanflyError(f"{file}: contains no coordinates", file=file)
-    first_lon = places[0][1]
-    lats = [lat for lat, _ in places]
-    lons = [first_lon + (lon - first_lon + 180.0) % 360.0 - 180.0 for _, lon in places]
+    first_lon = positions[0][1]
+    lats = [lat for lat, _ in positions]
+    lons = [first_lon + (lon - first_lon + 180.0) % 360.0 - 180.0 for _, lon in positions]
     if max(abs(lat) for lat in lats) > _MAX_LATITUDE_DEG or max(lons) - min(lons) > 30.0:
         raise PlanflyError(
             f"{file}: its places lie too far apart, or beyond {_MAX_LATITUDE_DEG:g} degrees of latitude", file=file
@@ -108,8 +108,8 @@ def _mission_box(file: Path) -> Box:
     return Box(min(lats), min(lons), max(lats), max(lons))
 
 
-def _widen(box: Box, margin: float) -> Box:
-    """Return the box widened by a margin on every side.  margin: km."""
+def _add_margin_to_box(box: Box, margin: float) -> Box:
+    """Add a margin to every side of a box.  margin: km."""
     lat_margin = margin / _DEGREE_KM
     lon_margin = lat_margin / math.cos(math.radians(min(_MAX_LATITUDE_DEG, max(abs(box.south), abs(box.north)))))
     return Box(box.south - lat_margin, box.west - lon_margin, box.north + lat_margin, box.east + lon_margin)

@@ -31,7 +31,7 @@ def new_scenario(
     autopilot: str | None = None,
     overwrite: bool = False,
 ) -> Path:
-    """Write a commented scenario from one place to another, which can be planned and flown without changes.
+    """Write a commented scenario between two positions, which can be planned and flown without changes.
 
     folder: the folder for FOLDER/NAME.toml, where NAME is the name of the folder; it is made if it is missing.
     start, destination: latitude and longitude, degrees.
@@ -56,19 +56,19 @@ def new_scenario(
     name = Path(whole_path(target)).name if ".." in target.parts else target.absolute().name
     file = _scenario_file(target, name, overwrite=overwrite)
     autopilot_name, _, version = (autopilot or DEFAULT_AUTOPILOT).partition("-")
-    ground = None if terrain is None else _absolute_path(terrain, is_name=terrain in EMBEDDED)
-    model = _absolute_path(aircraft, is_name=isinstance(aircraft, str) and not names_folder(aircraft))
-    airspeed = find_aircraft(model).airspeed
+    raster_path = None if terrain is None else _absolute_path(terrain, is_name=terrain in EMBEDDED)
+    model_path = _absolute_path(aircraft, is_name=isinstance(aircraft, str) and not names_folder(aircraft))
+    airspeed = find_aircraft(model_path).airspeed
     with stage(f"laying out {name}", "laying out"):
-        raster = None if ground is None else open_raster(ground)
+        raster = None if raster_path is None else open_raster(raster_path)
         draft = make_draft(
             name,
             endpoints[0],
             endpoints[1],
             height,
             raster=raster,
-            terrain=ground,
-            aircraft=model,
+            terrain=raster_path,
+            aircraft=model_path,
             airspeed=airspeed,
             autopilot=autopilot_name,
             px4_version=version or None,
@@ -76,7 +76,7 @@ def new_scenario(
         # Parse the text as it will be read from the file, so that a fault is found before anything is written.
         from_spec(parse_scenario(draft_text(draft), str(file)), str(file))
     relative_draft = replace(
-        draft, terrain=ground and _relative_path(target, ground), aircraft=_relative_path(target, model)
+        draft, terrain=raster_path and _relative_path(target, raster_path), aircraft=_relative_path(target, model_path)
     )
     target.mkdir(exist_ok=True)
     write_whole(file, draft_text(relative_draft))
@@ -84,7 +84,7 @@ def new_scenario(
 
 
 def _scenario_file(folder: Path, name: str, *, overwrite: bool) -> Path:
-    """Return the file to write.  Raises PlanflyError for an invalid folder, and without `overwrite` for an old file."""
+    """Return the file to write.  Raises PlanflyError for an invalid folder, or an existing file without `overwrite`."""
     if not name.isprintable() or not 1 <= len(name) <= 100:
         allowed = "expected a folder with a name of 1 to 100 printable characters"
         raise PlanflyError.of_argument("folder", folder, allowed, shown=ascii(str(folder)))
@@ -99,7 +99,7 @@ def _scenario_file(folder: Path, name: str, *, overwrite: bool) -> Path:
 
 
 def _parse_place(keyword: str, coordinates: Sequence[float]) -> Place:
-    """Return a place by its latitude and longitude.  Raises ArgumentError for an invalid place."""
+    """Parse latitude and longitude of a position.  Raises ArgumentError for invalid coordinates."""
     try:
         lat, lon = (float(value) for value in coordinates)
     except (TypeError, ValueError):

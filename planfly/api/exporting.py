@@ -28,7 +28,7 @@ from planfly.api.flying import FlownMission
 from planfly.flight_logs import is_log, loss_text
 from planfly.flight_options import FencePaths, MissionOptions
 from planfly.named_fences import read_named_fences
-from planfly.plan_fence import fence_of_plan
+from planfly.plan_fence import add_plan_fence
 from planfly.rtl.return_summary import return_summary
 from planfly.runtime.first_start import with_warm_up
 from planfly.runtime.stages import stage
@@ -42,15 +42,15 @@ from world.scenario import Scenario
 from world.scenario_tables import DEFAULT_AUTOPILOT
 
 # Function that returns the text of a map, by suffix.
-MAPS = {".kml": kml_text, ".gpx": gpx_text}
-# Suffixes of files with the autopilot parameters that returns, rally points, take-off and landing are judged with.
-PARAMETERS = (".parm",)
+MAP_WRITERS = {".kml": kml_text, ".gpx": gpx_text}
+# Suffixes of files with the autopilot parameters for judging returns, rally points, take-off and landing.
+PARAMETER_SUFFIXES = (".parm",)
 # Prefixes of the names of these parameters.
 _JUDGED_PREFIXES = ("RTL_", "RALLY_", "LAND_", "TECS_LAND_", "TKOFF_", "FW_LND_", "FW_TKO_", "NAV_DLL_ACT")
-# Suffixes of formats that only a flight log can be exported to.
-LOGS = (".csv", ".parquet", ".tlog", ".ulg")
-# Names of contents in messages, by suffix.
-_CONTENTS = {"fence": "fence items", "rally": "rally points"}
+# Suffixes of formats for flight logs only.
+LOG_SUFFIXES = (".csv", ".parquet", ".tlog", ".ulg")
+# Names of contents in messages, keyed by the kind of the file.
+_CONTENT_NAMES = {"fence": "fence items", "rally": "rally points"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,8 +59,8 @@ class ExportedFiles:
 
     files: paths in the order of the request.
     contents: description of the content of each file.
-    notes: one line for each part of the source that the files do not contain, or that PX4 would reject in a plan for
-    PX4.
+    notes: one line for each part of the source that the files do not contain, and for each part of a plan for PX4 that
+    PX4 would reject.
     loss: description of the part of a flight log that could not be read, also in `notes`; "" if nothing is missing.
     """
 
@@ -71,12 +71,12 @@ class ExportedFiles:
 
 
 @dataclass(frozen=True, slots=True)
-class _Source:
+class _SourceContent:
     """Content of an input.
 
     mission: items of the mission, and the threats of a plan as fences.
     name: title of a map.
-    lines: lines on a map, by their meaning; empty if no target is a map.
+    lines: lines on a map, keyed by their meaning; empty if no target is a map.
     zones: zones on a map; empty if no target is a map.
     returns, footprint: coloured lines and shapes on a KML map.
     notes: parts of the plan that the mission does not contain.
@@ -106,9 +106,9 @@ def export(
     """Write a plan, a mission or a flight in the formats that the suffixes of the files name.
 
     source: a plan, a flight with a log, or the path of a plan.json, mission file or log.
-    files: .waypoints, .plan, .fence, .rally, .kml, .gpx, and .parm with the parameters that take-off, landing and
-    returns are judged with; for a flight also .csv, .parquet, .tlog (MAVLink), .ulg (PX4).
-    fence: files of fences or zones in addition to the source's own.
+    files: .waypoints, .plan, .fence, .rally, .kml, .gpx, and .parm with the parameters for judging take-off, landing
+    and returns; for a flight also .csv, .parquet, .tlog (MAVLink), .ulg (PX4).
+    fence: files of fences or zones in addition to those of the source.
     at: time of the flight, see `planfly.plan`; the files omit zones that are inactive at that time.
     overwrite: True replaces existing files.
     Raises a `planfly.PlanflyError` for bad input; then nothing is written.
@@ -122,25 +122,25 @@ def export(
     if not files:
         raise PlanflyError("export: expected at least one file", field="files")
     targets = tuple(Path(file) for file in files)
-    with contextlib.ExitStack() as place:
-        path = _source_path(source, place)
+    with contextlib.ExitStack() as temporary_folders:
+        path = _source_path(source, temporary_folders)
         for target in targets:
-            if target.suffix.lower() not in (*MAPS, *PARAMETERS, *LOGS):
+            if target.suffix.lower() not in (*MAP_WRITERS, *PARAMETER_SUFFIXES, *LOG_SUFFIXES):
                 _check_suffix(target)
             check_output_file(target, overwrite, path)
-        parts = _read_source(path, targets, {"fence": fence, "at": at})
-        contents = [_target_content(parts, target) for target in targets]
+        source_content = _read_source(path, targets, {"fence": fence, "at": at})
+        contents = [_target_content(source_content, target) for target in targets]
     for target, (data, _) in zip(targets, contents, strict=True):
         write_whole(target, data)
-    loss = "" if parts.log is None else loss_text(parts.log)
-    notes = (*parts.mission.warnings, *parts.notes, *([loss] if loss else []))
+    loss = "" if source_content.log is None else loss_text(source_content.log)
+    notes = (*source_content.mission.warnings, *source_content.notes, *([loss] if loss else []))
     return ExportedFiles(targets, notes, tuple(description for _, description in contents), loss)
 
 
-def _source_path(source: FlightLog | FlownMission | Plan | str | Path, place: contextlib.ExitStack) -> Path:
-    """Return the path of a source, or write the source to a file that exists while `place` is open."""
+def _source_path(source: FlightLog | FlownMission | Plan | str | Path, temporary_folders: contextlib.ExitStack) -> Path:
+    """Return the path of a source; a plan is written to a file that exists while `temporary_folders` is open."""
     if isinstance(source, Plan):
-        file = place.enter_context(temporary_folder("planfly-export-")) / "plan.json"
+        file = temporary_folders.enter_context(temporary_folder("planfly-export-")) / "plan.json"
         write_whole(file, plan_json(source))
         return file
     if isinstance(source, FlightLog):
@@ -156,12 +156,12 @@ def _check_suffix(target: Path) -> None:
     try:
         mission_kind(target)
     except MissionError:
-        allowed = f"allowed {', '.join([*KINDS, *MAPS, *PARAMETERS, *LOGS])}"
+        allowed = f"allowed {', '.join([*KINDS, *MAP_WRITERS, *PARAMETER_SUFFIXES, *LOG_SUFFIXES])}"
         message = f"{target}: suffix {target.suffix!r}: {allowed}"
         raise MissionError(message, file=target, field="suffix", value=target.suffix, allowed=allowed) from None
 
 
-def _read_source(path: Path, targets: tuple[Path, ...], options: MissionOptions) -> _Source:
+def _read_source(path: Path, targets: tuple[Path, ...], options: MissionOptions) -> _SourceContent:
     """Return the parts of a source that the targets need."""
     if path.is_file() and is_log(path):
         if (at := options["at"]) is not None:
@@ -173,10 +173,10 @@ def _read_source(path: Path, targets: tuple[Path, ...], options: MissionOptions)
         return _read_log(path, needs_returns=_needs_kml(targets))
     for target in targets:
         suffix = target.suffix
-        if suffix.lower() in LOGS:
+        if suffix.lower() in LOG_SUFFIXES:
             message = f"{target}: {suffix} is written only from a flight log (.mcap), which {path} is not"
             raise MissionError(message, file=target, field="suffix", value=suffix)
-    needs_world = any(target.suffix.lower() in (*MAPS, *PARAMETERS) for target in targets)
+    needs_world = any(target.suffix.lower() in (*MAP_WRITERS, *PARAMETER_SUFFIXES) for target in targets)
     return _read_mission(path, options, needs_world=needs_world, needs_returns=_needs_kml(targets))
 
 
@@ -184,82 +184,84 @@ def _needs_kml(targets: tuple[Path, ...]) -> bool:
     return any(target.suffix.lower() == ".kml" for target in targets)
 
 
-def _with_returns(source: _Source, setup: FlightSetup, track: Track | None) -> _Source:
-    """Return the source with returns and glides from a few places of the flight or path, if they can be judged."""
+def _with_returns(source: _SourceContent, setup: FlightSetup, track: Track | None) -> _SourceContent:
+    """Add returns and glides from a few points of the flight or path, if they can be judged."""
     with stage("flying returns for the map"):
-        drawn = return_summary(setup, track).drawn()
-    if drawn is None:
+        returns = return_summary(setup, track).data_for_pictures()
+    if returns is None:
         return source
-    return replace(source, returns=return_lines(setup, drawn), footprint=glide_shapes(setup, drawn))
+    return replace(source, returns=return_lines(setup, returns), footprint=glide_shapes(setup, returns))
 
 
-def _read_log(path: Path, *, needs_returns: bool) -> _Source:
+def _read_log(path: Path, *, needs_returns: bool) -> _SourceContent:
     log = read_log(path)
     lines = {"plan": plan_line(log.setup)}
     if len(log.track):
         lines["flown"] = track_line(log.setup, log.track)
     setup = log.setup
-    source = _Source(setup.mission, setup.scenario.name, lines, map_zones(setup), log=log, autopilot=setup.autopilot)
+    source = _SourceContent(
+        setup.mission, setup.scenario.name, lines, map_zones(setup), log=log, autopilot=setup.autopilot
+    )
     return _with_returns(source, log.setup, log.track) if needs_returns else source
 
 
-def _read_mission(path: Path, options: MissionOptions, *, needs_world: bool, needs_returns: bool) -> _Source:
-    """Read a plan or a mission file; place the mission in its scenario if a target, a plan or a fence needs this."""
+def _read_mission(path: Path, options: MissionOptions, *, needs_world: bool, needs_returns: bool) -> _SourceContent:
+    """Read a plan or a mission file; load its scenario if a target, a plan or a fence needs it."""
     if not path.is_file():
         raise MissionError(f"{path}: no such file; expected a plan.json, mission file or log", file=path)
     is_plan, fences = path.suffix.lower() == ".json", read_named_fences(options["fence"])
     if not (needs_world or is_plan or fences.zones or options["at"] is not None):
-        mission = fences.on_mission(read_mission(path))
-        return _Source(replace(mission, autopilot=mission.autopilot or DEFAULT_AUTOPILOT), path.stem)
-    # Mission items have no times, so select the zones that are active during the flight.
+        mission = fences.add_to_mission(read_mission(path))
+        return _SourceContent(replace(mission, autopilot=mission.autopilot or DEFAULT_AUTOPILOT), path.stem)
+    # Fence items have no times, so only the zones that are active during the flight are exported.
     setup = open_flight(path, options)
     lines, zones = {"plan": plan_line(setup)}, map_zones(setup)
-    source = _Source(setup.mission, setup.scenario.name, lines, zones, autopilot=setup.autopilot)
+    source = _SourceContent(setup.mission, setup.scenario.name, lines, zones, autopilot=setup.autopilot)
     source = _with_returns(source, setup, None) if needs_returns else source
     if not is_plan:
         return _with_zones(source, setup.scenario)
-    mission, notes = fence_of_plan(setup)
+    mission, notes = add_plan_fence(setup)
     missing_ends = missing_ends_text(mission, setup.autopilot.mission_checks) if setup.autopilot.refuses else ""
     return replace(source, mission=mission, notes=(*notes, *([missing_ends] if missing_ends else [])))
 
 
-def _with_zones(source: _Source, scenario: Scenario) -> _Source:
-    """Return the source with the zones of the scenario as fence items, in addition to the mission's own fences."""
-    items, notes = zone_fences(scenario.zones, scenario.origin)
-    mission = replace(source.mission, fences=numbered([*source.mission.fences, *items]))
+def _with_zones(source: _SourceContent, scenario: Scenario) -> _SourceContent:
+    """Add the zones of the scenario to the fences of the mission."""
+    fence_items, notes = zone_fences(scenario.zones, scenario.origin)
+    mission = replace(source.mission, fences=numbered([*source.mission.fences, *fence_items]))
     return replace(source, mission=mission, notes=tuple(notes))
 
 
-def _target_content(source: _Source, target: Path) -> tuple[str | bytes, str]:
+def _target_content(source: _SourceContent, target: Path) -> tuple[str | bytes, str]:
     """Return the content of a target file, and a description of this content."""
     suffix, mission = target.suffix.lower(), source.mission
     if source.autopilot is not None:
         mission = replace(mission, autopilot=source.autopilot.name)
-    if suffix in LOGS and source.log is not None:
+    if suffix in LOG_SUFFIXES and source.log is not None:
         return _flight_content(source.log, suffix)
-    if suffix in MAPS:
+    if suffix in MAP_WRITERS:
         descriptions = [*source.lines, *([f"{len(source.zones)} zones"] if source.zones else [])]
         lines, zones = list(source.lines.values()), source.zones
         if suffix == ".kml" and source.returns:
             lines, zones = lines + source.returns, zones + source.footprint
             descriptions.append("returns")
-        return MAPS[suffix](source.name, lines, zones), " and ".join(descriptions)
-    if suffix in PARAMETERS and source.autopilot is not None:
-        return judged_parameters(mission.source, source.autopilot)
+        return MAP_WRITERS[suffix](source.name, lines, zones), " and ".join(descriptions)
+    if suffix in PARAMETER_SUFFIXES and source.autopilot is not None:
+        return judging_parameters_text(mission.source, source.autopilot)
     kind = mission_kind(target)
-    if kind in _CONTENTS:
+    if kind in _CONTENT_NAMES:
         count = len(mission.fences if kind == "fence" else mission.rally)
         if not count:
-            raise MissionError(f"{mission.source}: no {_CONTENTS[kind]} to write to {target}", file=mission.source)
-        return mission_text(mission, kind), f"{count} {_CONTENTS[kind]}"
+            raise MissionError(f"{mission.source}: no {_CONTENT_NAMES[kind]} to write to {target}", file=mission.source)
+        return mission_text(mission, kind), f"{count} {_CONTENT_NAMES[kind]}"
     extra = ""
     if kind == "plan" and (mission.fences or mission.rally):
         extra = f", {len(mission.fences)} fence items, {len(mission.rally)} rally points"
     return mission_text(mission, kind), f"{len(mission.items)} items{extra}"
 
 
-def judged_parameters(mission: str, autopilot: Autopilot) -> tuple[str, str]:
-    """Return the text of a file of take-off, landing and return parameters, and a description of this file.
+def judging_parameters_text(mission: str, autopilot: Autopilot) -> tuple[str, str]:
+    """Return the text of a parameter file for take-off, landing and returns, and a description of its content.
 
     mission: name of the mission in messages.  Raises MissionError for an autopilot without such parameters.
     """
@@ -273,10 +275,7 @@ def judged_parameters(mission: str, autopilot: Autopilot) -> tuple[str, str]:
 
 
 def _flight_content(log: FlightLog, suffix: str) -> tuple[str | bytes, str]:
-    """Return the rows of a flight in the format of another program, and a description of the content.
-
-    Only the libraries that the format needs are imported.
-    """
+    """Return the rows of a flight in the format of another program, and a description of the content."""
     description = f"{len(log.track):,} rows, {log.end_time:.0f} s"
     if suffix == ".tlog":
         need_extra("live", ".tlog needs")

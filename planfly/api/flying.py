@@ -22,9 +22,9 @@ from planfly.flight_options import (
     FlyOptions,
     LogOptions,
     MissionOptions,
-    mission_options,
-    named_scenario,
-    options_of_log,
+    load_scenario_with_options,
+    select_log_options,
+    select_mission_options,
     takes_options,
 )
 from planfly.kernel_units.unit_kernels import FLYING, PLANNING_AND_FLYING
@@ -52,14 +52,14 @@ from world.scenario import Scenario, over_terrain
 class FlownMission:
     """Result of `planfly.fly`.
 
-    setup: everything that determined the flight.
+    setup: all inputs of the flight.
     track: rows of the flight; empty if the flight could not start.
     verdict: verdict on the mission, with a finding for every rule and place.
     ended: "completed", or the reason for an early end.
     events: entries of the log in addition to the rows.
     log: the file of the flight log; None if no log was requested or nothing was flown.
     autopilot_log: the autopilot program's own log, next to the flight log, if such a program flew.
-    returns: returns from a few places of the flight, as recorded in the log; None without a log.
+    returns: returns from a few points of the flight, as recorded in the log; None without a log.
     engine: flight model that flew, and the reason; "" if nothing was flown.
     """
 
@@ -90,7 +90,7 @@ class FlownMission:
 
     @property
     def returns_line(self) -> str:
-        """One line on returns from a few places of the flight; "" for a mission without a home."""
+        """One line on returns from a few points of the flight; "" for a mission without a home."""
         return returns_line(self.setup, self.track) if self.returns is None else self.returns.line
 
     def __repr__(self) -> str:
@@ -105,7 +105,7 @@ class FlownMission:
 class Judged:
     """Result of `planfly.judge`.
 
-    setup: everything that determines the flight.
+    setup: all inputs of the flight.
     verdict: verdict on the mission, with a finding for every rule and place.
     loss: description of the part of a flight log that could not be read, in one line; "" if nothing is missing.
     lossy: True if part of a log could not be read.
@@ -122,7 +122,7 @@ class Judged:
 
     @property
     def returns_line(self) -> str:
-        """One line on returns from a few places of the flight or the planned path; "" without a home."""
+        """One line on returns from a few points of the flight or the planned path; "" without a home."""
         return returns_line(self.setup, self.track)
 
 
@@ -155,7 +155,7 @@ def plan_then_fly(
     check_arguments(seed=seed)
     if log is not None:
         check_output_file(Path(log), overwrite=True)
-    world = named_scenario(scenario, options)
+    world = load_scenario_with_options(scenario, options)
     return pipeline.plan_then_fly(world, seed=seed, log=None if log is None else Path(log))
 
 
@@ -177,10 +177,10 @@ def fly(
     The world of the flight (None keeps the value of the plan or the scenario):
     scenario: a name or a TOML file; None for the plan's own scenario, or one made around the mission.
     terrain: an elevation file that replaces the terrain of the scenario.
-    fence: files of fences and zones in addition to the mission's own.
+    fence: files of fences and zones in addition to those of the mission.
     seed: seed of the turbulence; None takes the seed of the plan or of the scenario, or 1.
     wind: speed, m/s, and the direction it blows from, degrees.  turbulence: "none", "light" or "moderate".
-    at: time of the flight, "START" or "START/END", in ISO 8601 with offsets from UTC; it leaves out inactive zones.
+    at: time of the flight, "START" or "START/END", in ISO 8601 with offsets from UTC; zones inactive then are ignored.
 
     The aircraft and its control:
     aircraft: a name, or a folder.  airspeed: m/s.  params: a file of the autopilot's parameters.
@@ -209,7 +209,7 @@ def fly(
     setup = with_engine(open_flight(mission, options, program), options["engine"])
     target = None if log is None else _prepare_log_file(log, setup, mission, program, overwrite)
     with stage(f"flying {flight_text(setup)}", flight_kind(setup)) as advance:
-        flown = fly_and_judge(
+        flight = fly_and_judge(
             setup,
             airframe_of(setup),
             target,
@@ -220,23 +220,23 @@ def fly(
             reference="always" if options["levels"] else "failed",
             returns=target is not None,
         )
-    return _flown_mission(flown, target, program)
+    return _flown_mission(flight, target, program)
 
 
-def _flown_mission(flown: JudgedFlight, log: Path | None, program: Path | None) -> FlownMission:
+def _flown_mission(flight: JudgedFlight, log: Path | None, program: Path | None) -> FlownMission:
     """Return the result of a flight; a flight that did not start has no log and no flight model."""
-    log = log if len(flown.track) else None
+    log = log if len(flight.track) else None
     program_log = None if log is None or program is None else autopilot_log(log, program)
     return FlownMission(
-        flown.setup,
-        flown.track,
-        flown.verdict,
-        flown.ended,
-        flown.events,
+        flight.setup,
+        flight.track,
+        flight.verdict,
+        flight.ended,
+        flight.events,
         log,
         program_log,
-        flown.returns,
-        flown.engine if len(flown.track) else "",
+        flight.returns,
+        flight.engine if len(flight.track) else "",
     )
 
 
@@ -249,7 +249,7 @@ def fly_by_each(
 
     autopilots: names that `autopilot` of `planfly.fly` accepts.
     options: see `planfly.fly`; `autopilot`, `params` and `guidance` are not allowed.
-    Returns the flights by the names of the autopilots.  Raises a `planfly.PlanflyError` for bad input.
+    Returns the flights, keyed by the name of the autopilot.  Raises a `planfly.PlanflyError` for bad input.
 
     >>> import planfly
     >>> flown = planfly.fly_by_each(planfly.plan("paper-07", seed=1), ["planfly", "px4"])
@@ -263,20 +263,22 @@ def fly_by_each(
     per_autopilot_options = {
         name: value for name, value in options.items() if name in ("params", "guidance", "autopilot")
     }
-    refuse_keywords(_source_name(mission), per_autopilot_options, "belongs to one autopilot, and several are named")
-    flown = {}
+    check_keywords_not_given(
+        _source_name(mission), per_autopilot_options, "belongs to one autopilot, and several are named"
+    )
+    flights = {}
     for name in names:
         options["autopilot"] = name
-        flown[name] = fly(mission, **options)
-    return flown
+        flights[name] = fly(mission, **options)
+    return flights
 
 
 def _prepare_log_file(
     log: str | Path, setup: FlightSetup, mission: Plan | str | Path, program: Path | None, overwrite: bool
 ) -> Path:
-    """Return the log file to write, after removing an existing log and the autopilot program's log.
+    """Remove an existing log and the autopilot program's log, and return the log file to write.
 
-    Raises PlanflyError for a file that cannot be written, and without `overwrite` for one that exists.
+    Raises PlanflyError for a file that cannot be written, and for an existing file without `overwrite`.
     """
     source = None if isinstance(mission, Plan) else Path(mission)
     target = file_target(log, setup.name, setup.seed, overwrite=overwrite, source=source)
@@ -320,16 +322,16 @@ def judge(
         imported = read_imported(what, **options)
         return Judged(imported.setup, imported.verdict, lossy=imported.lossy, track=imported.track, is_log=True)
     source = _source_name(what)
-    refuse_keywords(source, options_of_log(options), "only with an imported log, not with this file")
+    check_keywords_not_given(source, select_log_options(options), "only with an imported log, not with this file")
     if isinstance(what, FlightLog | FlownMission) or (isinstance(what, str | Path) and is_log(Path(what))):
         check_judging_options(source, options)
-        refuse_keywords(source, {"geometry": geometry or None}, "a flight is judged as it was flown")
+        check_keywords_not_given(source, {"geometry": geometry or None}, "a flight is judged as it was flown")
         what = read_log(Path(what)) if isinstance(what, str | Path) else what
         return _judge_flight(what, options["terrain"], read_named_fences(options["fence"]))
-    flight_options = mission_options(options)
+    flight_options = select_mission_options(options)
     if not geometry:
-        flown = fly(what, **flight_options)
-        return Judged(flown.setup, flown.verdict, track=flown.track if len(flown.track) else None)
+        flight = fly(what, **flight_options)
+        return Judged(flight.setup, flight.verdict, track=flight.track if len(flight.track) else None)
     setup = open_flight(what, flight_options)
     return Judged(setup, judge_mission(setup))
 
@@ -340,7 +342,7 @@ def check(
 ) -> Verdict:
     """Judge a flight by its log, or a plan or a mission by flying it.
 
-    Takes the arguments of `planfly.judge`, which returns the flight in addition to the verdict.
+    For the arguments, see `planfly.judge`, which returns the flight in addition to the verdict.
 
     Raises a `planfly.PlanflyError` for bad input.
 
@@ -361,10 +363,10 @@ def _source_name(what: FlightLog | FlownMission | Plan | str | Path) -> str:
     return what.scenario.name if isinstance(what, Plan) else str(what)
 
 
-def refuse_keywords(source: str, keywords: Mapping[str, Any], reason: str) -> None:
-    """Raise ScenarioError for the first keyword with a value, because none applies to the judged source.
+def check_keywords_not_given(source: str, keywords: Mapping[str, Any], reason: str) -> None:
+    """Raise ScenarioError for the first keyword that was given, because no keyword applies to the judged source.
 
-    keywords: keywords and their values; None is a keyword that was not given.
+    keywords: value of each keyword; None if it was not given.
     reason: text of the message.
     """
     for name, value in keywords.items():
@@ -373,18 +375,18 @@ def refuse_keywords(source: str, keywords: Mapping[str, Any], reason: str) -> No
 
 
 # Reason why a log cannot be judged in another world, in messages.
-_JUDGED_AS_FLOWN_TEXT = "a log is judged with the aircraft, the speeds, the wind and the autopilot it was flown with"
+_FIXED_OPTIONS_TEXT = "a log is judged with the aircraft, the speeds, the wind and the autopilot it was flown with"
 # Reason why a log cannot be judged in another scenario, in messages.
-_JUDGED_IN_SCENARIO_TEXT = "a log is judged in the scenario it carries; only `terrain` replaces its ground"
+_FIXED_SCENARIO_TEXT = "a log is judged in the scenario it carries; only `terrain` replaces its ground"
 
 
 def check_judging_options(source: str, options: MissionOptions) -> None:
     """Raise ScenarioError for an option that would change the flight recorded in a log."""
     allowed_options = (*LOG_OPTIONS, "terrain", "fence", "scenario")
-    refuse_keywords(
-        source, {name: value for name, value in options.items() if name not in allowed_options}, _JUDGED_AS_FLOWN_TEXT
+    check_keywords_not_given(
+        source, {name: value for name, value in options.items() if name not in allowed_options}, _FIXED_OPTIONS_TEXT
     )
-    refuse_keywords(source, {"scenario": options["scenario"]}, _JUDGED_IN_SCENARIO_TEXT)
+    check_keywords_not_given(source, {"scenario": options["scenario"]}, _FIXED_SCENARIO_TEXT)
 
 
 def _judge_flight(flight: FlightLog | FlownMission, terrain: str | Path | None, fences: NamedFences) -> Judged:
@@ -392,7 +394,9 @@ def _judge_flight(flight: FlightLog | FlownMission, terrain: str | Path | None, 
     if terrain is not None:
         setup = setup.in_scenario(over_terrain(setup.scenario, str(terrain)))
     if fences.items or fences.zones:
-        setup = replace(setup.in_scenario(fences.on_scenario(setup.scenario)), mission=fences.on_mission(setup.mission))
+        setup = replace(
+            setup.in_scenario(fences.add_to_scenario(setup.scenario)), mission=fences.add_to_mission(setup.mission)
+        )
     if isinstance(flight, FlightLog):
         verdict = judge_log(replace(flight, setup=setup))
         return Judged(setup, verdict, loss_text(flight), not flight.complete, flight.track, is_log=True)

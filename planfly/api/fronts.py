@@ -10,7 +10,7 @@ from typing import Any, Unpack
 
 from planfly.api.planning import stop_condition
 from planfly.arguments import RANGES, check_arguments
-from planfly.flight_options import FlightOptions, named_scenario, takes_options
+from planfly.flight_options import FlightOptions, load_scenario_with_options, takes_options
 from planfly.kernel_units.unit_kernels import FRONT_PLANNING
 from planfly.planning.pareto_plans import make_pareto_plans
 from planfly.runtime.first_start import with_warm_up
@@ -52,17 +52,17 @@ def plan_front(
     stop: Callable[[], bool] | None = None,
     **options: Unpack[FlightOptions],
 ) -> Front:
-    """Plan a Pareto front, which is a set of plans in which no plan is better than another in every criterion.
+    """Plan a Pareto front: a set of plans of which none is better than another in every criterion.
 
     The criteria are length, exposure to radars, minimum height above ground, and energy.  Time replaces energy if the
-    scenario's ``[planner] objective`` is "time" or the power of the aircraft is not known.  Each plan has its own
+    scenario's ``[planner] objective`` is "time" or the power of the aircraft is unknown.  Each plan has its own
     certificate and is safe.  Each plan gains more than 0.1 % in length or energy, 1 % in exposure or 1 m in height over
     the plans selected before it.  There may be fewer plans than requested; the front is empty if no safe plan is found.
 
     count: maximum number of plans, 2 to 100.
     out: a folder for plan-1.json, plan-2.json, ..., the shortest first, their table as front.csv and front.json, and
     two pictures.  In its name, {name} and {seed} stand for the scenario's name and the seed.
-    The other keywords are those of `planfly.plan`.
+    For the other keywords, see `planfly.plan`.
 
     >>> import planfly
     >>> front = planfly.plan_front("tight", 3, seed=1)
@@ -70,7 +70,7 @@ def plan_front(
     (True, True)
     """
     check_arguments(front=count, seed=seed, seconds=seconds)
-    world = named_scenario(scenario, options)
+    world = load_scenario_with_options(scenario, options)
     chosen_seed = choose_seed(world, seed)
     airframe = load_airframe(world)
     folder = None
@@ -89,9 +89,9 @@ def _write_front(front: Front, world: Scenario, folder: Path) -> None:
         write_whole(folder / f"plan-{number}.json", plan_json(front_plan.plan))
     rows = table_rows(front)
     text = io.StringIO()
-    table = csv.writer(text, lineterminator="\n")
-    table.writerow(COLUMNS)
-    table.writerows([["" if value is None else value for value in row.values()] for row in rows])
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(COLUMNS)
+    writer.writerows([["" if value is None else value for value in row.values()] for row in rows])
     write_whole(folder / "front.csv", text.getvalue())
     data = {
         "schema": TABLE_SCHEMA,
@@ -131,7 +131,7 @@ def _table_row(number: int, front_plan: FrontPlan) -> dict[str, Any]:
         front_plan.time,
     )
     digits = (1, 3, 2, 3, 2)
-    rounded = [
-        round(value, places) if math.isfinite(value) else None for value, places in zip(values, digits, strict=True)
+    rounded_values = [
+        round(value, decimals) if math.isfinite(value) else None for value, decimals in zip(values, digits, strict=True)
     ]
-    return dict(zip(COLUMNS, (number, *rounded), strict=True))
+    return dict(zip(COLUMNS, (number, *rounded_values), strict=True))

@@ -52,7 +52,7 @@ class Reflown:
 def read_imported(log: str | Path, **options: Unpack[LogOptions]) -> ImportedFlight:
     """Read and judge a flight from the log of another program, with the options of `import_log`.
 
-    Raises ScenarioError for an option that does not apply to a flight that was already flown.
+    Raises ScenarioError for an option that does not apply to a flight from a log.
     """
     for name in ("params", "guidance", "autopilot", "airspeed", "nav", "seed"):
         if (value := dict(options)[name]) is not None:
@@ -157,7 +157,7 @@ def refly(
     log: a flight log that `planfly.import_log` wrote.
     out: a folder for pictures and for logs of the simulated flights; None writes no files.
     aircraft: name or folder of the aircraft to fly; None for the aircraft of the log.
-    turbulence: turbulence to fly in instead of the log's; None keeps that.
+    turbulence: turbulence of the simulated flight; None for the turbulence of the log.
     overwrite: True replaces results in the folder.
     Raises a `planfly.PlanflyError` for bad input; then nothing is written.
     """
@@ -231,11 +231,11 @@ def recover(log: str | Path, out: str | Path | None = None, *, overwrite: bool =
     """
     target = recovered_path(log) if out is None else Path(out)
     check_output_file(target, overwrite)
-    recovered = recover_log(Path(log))
-    if recovered is None:
+    recovered_log = recover_log(Path(log))
+    if recovered_log is None:
         return None
-    write_whole(target, recovered.data)
-    return recovered.log
+    write_whole(target, recovered_log.data)
+    return recovered_log.log
 
 
 def recovered_path(log: str | Path) -> Path:

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from planfly.flight_options import named_scenario
+from planfly.flight_options import load_scenario_with_options
 from world.errors import ArgumentError
 from world.scenario import DETECTION_SCALE_RATIO, KILL_SCALE_RATIO, Scenario, from_spec, with_threats
 
@@ -27,10 +27,10 @@ def make_scenario(
     threats: Mapping[str, ArrayLike] | Sequence[Mapping[str, Any]] | ArrayLike | None = None,
     **tables: Any,
 ) -> Scenario:
-    """Return a scenario with other threats and other values, for `planfly.plan`, `planfly.fly` and all others.
+    """Return a scenario with other threats and other values, for `planfly.plan`, `planfly.fly` and other functions.
 
     base: an embedded name, a TOML file's path, or a `Scenario`.
-    threats: the threats that replace those of the base; None keeps them.  A pandas data frame or a mapping of columns,
+    threats: threats that replace the base's threats; None keeps these.  A pandas data frame or a mapping of columns,
     named as the keys of [[threats]]; a list of mappings with these keys; or an array (n, 4) of east, north, kill radius
     and detection radius, m.  A radius that is 0 or missing means no such zone; a scale that is missing is a quarter of
     the kill radius and a third of the detection radius.
@@ -44,21 +44,21 @@ def make_scenario(
     >>> scenario.threats.kill_scale.tolist(), scenario.wind.speed
     ([15.0, 15.0], 4.0)
     """
-    known = named_scenario(base, {})
-    spec = known.to_json()
+    base_scenario = load_scenario_with_options(base, {})
+    spec = base_scenario.to_json()
     for name, values in tables.items():
-        merged = isinstance(values, Mapping) and isinstance(spec.get(name), dict) and name not in _POSITIONS
-        spec[name] = spec[name] | dict(values) if merged else values
+        is_merged = isinstance(values, Mapping) and isinstance(spec.get(name), dict) and name not in _POSITIONS
+        spec[name] = spec[name] | dict(values) if is_merged else values
     rows = None if threats is None else _threat_rows(threats)
     if rows is not None:
         spec["threats"] = [] if isinstance(rows, np.ndarray) else rows
-    ground = known.terrain if _TERRAIN_TABLES.isdisjoint(tables) else None
-    made = from_spec(spec, "make_scenario", ground=ground, external=known.external)
-    return with_threats(made, rows.tolist(), "threats") if isinstance(rows, np.ndarray) else made
+    terrain = base_scenario.terrain if _TERRAIN_TABLES.isdisjoint(tables) else None
+    new_scenario = from_spec(spec, "make_scenario", ground=terrain, external=base_scenario.external)
+    return with_threats(new_scenario, rows.tolist(), "threats") if isinstance(rows, np.ndarray) else new_scenario
 
 
 def _threat_rows(threats: Any) -> list[dict[str, Any]] | np.ndarray:
-    """Return threats as tables of a scenario file, or as an array (n, 4).  Raises ArgumentError for anything else."""
+    """Convert threats to tables of a scenario file, or to an array (n, 4).  Raises ArgumentError for other values."""
     try:
         if isinstance(threats, Mapping):
             columns = {name: np.asarray(values).tolist() for name, values in threats.items()}
@@ -69,25 +69,27 @@ def _threat_rows(threats: Any) -> list[dict[str, Any]] | np.ndarray:
             rows = [dict(row) for row in threats]
         else:
             array = np.asarray(threats, dtype=np.float64)
-            return array.reshape(-1, 4) if array.size == 0 or array.shape[1:] == (4,) else _refuse(threats)
+            return (
+                array.reshape(-1, 4) if array.size == 0 or array.shape[1:] == (4,) else _raise_invalid_threats(threats)
+            )
         return [_threat_table(row) for row in rows]
     except ArgumentError:
         raise
     except (TypeError, ValueError):
-        return _refuse(threats)
+        return _raise_invalid_threats(threats)
 
 
-def _refuse(threats: Any) -> Any:
+def _raise_invalid_threats(threats: Any) -> Any:
     raise ArgumentError.of_argument("threats", type(threats).__name__, _THREATS_EXPECTED)
 
 
 def _threat_table(row: Mapping[str, Any]) -> dict[str, Any]:
-    """Return one threat without missing values and zones of radius 0, and with its scales."""
-    table = {key: value for key, value in row.items() if value is not None and value == value}
+    """Return the table of a threat: without missing values and zones of radius 0, and with default scales."""
+    values = {key: value for key, value in row.items() if value is not None and value == value}
     for kind, ratio in (("kill", KILL_SCALE_RATIO), ("detection", DETECTION_SCALE_RATIO)):
         radius, scale = f"{kind}_radius_m", f"{kind}_scale_m"
-        if table.get(radius) == 0.0:
-            table = {key: value for key, value in table.items() if key not in (radius, scale)}
-        elif radius in table:
-            table.setdefault(scale, ratio * table[radius])
-    return table
+        if values.get(radius) == 0.0:
+            values = {key: value for key, value in values.items() if key not in (radius, scale)}
+        elif radius in values:
+            values.setdefault(scale, ratio * values[radius])
+    return values

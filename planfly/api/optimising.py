@@ -77,21 +77,19 @@ class Optimiser:
         return np.array(self._search.ask())
 
     def tell(self, values: ArrayLike, violations: ArrayLike | None = None) -> None:
-        """Take the values of the points from `ask`, and draw the next points from the better half.
+        """Receive the values of the points from `ask`, and draw the next points from the better half.
 
         values: values to minimise, (n,), or (n, m) for m objectives, which are compared by Pareto dominance.
         violations: amount by which each constraint is violated, (n,) or (n, v), 0 or less if the constraint is met; a
         smaller violation takes precedence over values.
         NaN is treated as the worst value.
-        Raises ValueError if the number of rows differs from the number of points that `ask` returned, or the number of
-        columns from that of the previous call.
+        Raises ValueError if the number of rows differs from the number of points that `ask` returned, or if the number
+        of columns differs from the previous call.
         """
         points = self._search.ask()
-        objective_values = _checked_columns("values", values, len(points))
+        objective_values = _parse_columns("values", values, len(points))
         violation_values = (
-            np.empty((len(points), 0))
-            if violations is None
-            else _checked_columns("violations", violations, len(points))
+            np.empty((len(points), 0)) if violations is None else _parse_columns("violations", violations, len(points))
         )
         if not objective_values.shape[1]:
             raise ValueError("values: no columns; expected one for each objective")
@@ -165,7 +163,7 @@ def optimise(
     seed: int | np.random.Generator = 1,
     initial: ArrayLike | None = None,
 ) -> Optimiser:
-    """Return an ask/tell optimiser with one of the planner's algorithms, for any black-box function within bounds.
+    """Return an ask/tell optimiser that uses one of the planner's algorithms, for any function within bounds.
 
     lower, upper: bounds of the box, (d,).
     model: "umda", the paper's univariate Gaussians; "emna", one Gaussian with full covariance; "multistart", Gaussians
@@ -225,14 +223,14 @@ def optimise(
 
 
 def _levels(violations: int, objectives: int) -> tuple[Level, ...]:
-    """Return the levels of priority, in which constraints with the goal 0 precede objectives without goals."""
+    """Return the priority levels: first the constraints with the goal 0, then the objectives without goals."""
     values = Level(tuple(range(violations, violations + objectives)), (NO_GOAL,) * objectives)
     return (Level(tuple(range(violations)), (0.0,) * violations), values) if violations else (values,)
 
 
-def _checked_columns(name: str, numbers: ArrayLike, row_count: int) -> Floats:
-    table = np.array(numbers, dtype=np.float64)
-    table = table[:, np.newaxis] if table.ndim == 1 else table
-    if table.ndim != 2 or len(table) != row_count:
+def _parse_columns(name: str, numbers: ArrayLike, row_count: int) -> Floats:
+    columns = np.array(numbers, dtype=np.float64)
+    columns = columns[:, np.newaxis] if columns.ndim == 1 else columns
+    if columns.ndim != 2 or len(columns) != row_count:
         raise ValueError(f"{name}: shape {np.shape(numbers)}: expected {row_count} rows, one for each requested point")
-    return np.where(np.isnan(table), np.inf, table)
+    return np.where(np.isnan(columns), np.inf, columns)

@@ -9,7 +9,7 @@ from typing import Unpack
 from flight.autopilots.catalog import load_autopilot
 from logs.verdict.conditions import Conditions, conditions_of
 from planfly.arguments import check_arguments
-from planfly.flight_options import PlanOptions, named_scenario, takes_options
+from planfly.flight_options import PlanOptions, load_scenario_with_options, takes_options
 from planfly.kernel_units.unit_kernels import PLANNING
 from planfly.runtime.first_start import with_warm_up
 from planfly.runtime.stages import stage
@@ -64,7 +64,7 @@ def plan(
     (22, 3)
     """
     check_arguments(seed=options["seed"], budget=options["budget"], seconds=options["seconds"])
-    world = _with_budget(named_scenario(scenario, options), options["budget"])
+    world = _with_budget(load_scenario_with_options(scenario, options), options["budget"])
     return _search_and_write(world, scenario, None, options, out, overwrite)
 
 
@@ -82,11 +82,11 @@ def replan(
 ) -> Plan:
     """Plan again in flight, keeping the flown legs and routing the rest around new threats.
 
-    scenario: see `planfly.plan`; threats that only the old plan knew are kept.
+    scenario: see `planfly.plan`; threats that only the old plan has are kept.
     old: the plan that is being flown, or its file.
     at_leg: the leg that is about to be flown, from 0.
     threats: east, north, kill radius and detection radius of each new threat, m; a radius of 0 means no such zone.
-    The other keywords are those of `planfly.plan`.
+    For the other keywords, see `planfly.plan`.
     Raises a `planfly.PlanflyError` for bad input, and for a plan of another mission.
 
     >>> import planfly
@@ -96,7 +96,7 @@ def replan(
     (3, True)
     """
     check_arguments(seed=options["seed"], budget=options["budget"], seconds=options["seconds"], at_leg=at_leg)
-    world = _with_budget(named_scenario(scenario, options), options["budget"])
+    world = _with_budget(load_scenario_with_options(scenario, options), options["budget"])
     old_plan = old if isinstance(old, Plan) else read_plan(Path(old))
     check_same_mission(world, old_plan)
     return _search_and_write(
@@ -108,23 +108,23 @@ def _with_budget(scenario: Scenario, budget: int | None) -> Scenario:
     return scenario if budget is None else with_planner(scenario, "budget", budget=budget)
 
 
-def _with_new_threats(scenario: Scenario, old: Plan, threats: Sequence[Threat]) -> Scenario:
-    """Return a scenario with the old plan's other threats and with new threats.
+def _with_new_threats(scenario: Scenario, old_plan: Plan, threats: Sequence[Threat]) -> Scenario:
+    """Add new threats, and the threats that only the old plan has, to a scenario.
 
-    Raises ScenarioError for a new threat outside the known terrain.
+    Raises ScenarioError for a new threat outside the terrain data.
     """
     for east, north, _, _ in threats:
         if scenario.terrain is not None and math.isnan(scenario.terrain.height(east, north)):
-            place = f"east {east:g} m, north {north:g} m: outside the terrain that is known"
-            raise ScenarioError.of_argument("threats", (east, north), place, shown="")
-    old_threats = [table for table in old.scenario.spec.threats if table not in scenario.spec.threats]
+            reason = f"east {east:g} m, north {north:g} m: outside the terrain that is known"
+            raise ScenarioError.of_argument("threats", (east, north), reason, shown="")
+    old_threats = [threat for threat in old_plan.scenario.spec.threats if threat not in scenario.spec.threats]
     return with_threats(scenario, threats, "threats", old_threats)
 
 
 def _search_and_write(
     world: Scenario,
     source: Scenario | str | Path,
-    flown: tuple[Plan, int] | None,
+    flown_plan_and_leg: tuple[Plan, int] | None,
     options: PlanOptions,
     out: str | Path | None,
     overwrite: bool,
@@ -132,7 +132,7 @@ def _search_and_write(
     """Search for a plan, write it if a file is named, and return it.
 
     source: the scenario as the caller named it; its file must not be overwritten.
-    flown: the plan being flown and the leg to plan from; None for a new plan.
+    flown_plan_and_leg: the plan being flown and the leg to plan from; None for a new plan.
     """
     seed, target = choose_seed(world, options["seed"]), None
     if out is not None:
@@ -140,7 +140,15 @@ def _search_and_write(
         target = file_target(out, world.name, seed, overwrite=overwrite, source=source_file)
     airframe, should_stop = load_airframe(world), stop_condition(options["seconds"], options["stop"])
     with stage(f"planning {world.name}", "planning") as advance:
-        plan = make_plan(world, airframe, seed, options["algorithm"], advance, stop=should_stop, flown=flown)
+        plan = make_plan(
+            world,
+            airframe,
+            seed,
+            options["algorithm"],
+            advance,
+            stop=should_stop,
+            flown_plan_and_leg=flown_plan_and_leg,
+        )
     if target is not None:
         target.parent.mkdir(parents=True, exist_ok=True)
         write_whole(target, plan_json(plan))
@@ -148,7 +156,7 @@ def _search_and_write(
 
 
 def stop_condition(seconds: float | None, stop: Callable[[], bool] | None) -> StopCondition:
-    """Return a check to make between generations, which returns "interrupted", "budget" after `seconds`, or ""."""
+    """Return a stop condition, which returns "interrupted" after `stop`, "budget" after `seconds`, or otherwise ""."""
     deadline = None if seconds is None else time.monotonic() + seconds
 
     def should_stop() -> str:

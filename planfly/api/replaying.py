@@ -17,7 +17,7 @@ from world.errors import LogError
 from world.extras import needs_extra
 from world.running_clock import RunningClock
 
-# Numbers that the user may mean as the port of a ground station.
+# Numbers that may be meant as the port of a ground station.
 _PORTS = range(1024, 65536)
 # Origin of web pages with a scheme, a lower-case host name, as browsers write it, and a port.
 _ORIGIN = re.compile(r"[a-z][a-z0-9+.-]*://[a-z0-9._\[\]:-]+")
@@ -27,12 +27,12 @@ _FRAME_RATE_HZ = 10.0
 _STATION_TIMEOUT_S = 10.0
 
 
-def _open_log(log: FlightLog | str | Path) -> FlightLog:
+def _read_log_if_path(log: FlightLog | str | Path) -> FlightLog:
     return log if isinstance(log, FlightLog) else read_log(log)
 
 
-def replayed_part(log: FlightLog, start: float | None, end: float | None) -> tuple[float, float]:
-    """Return start and end of the replayed part in flight time, s.  Raises LogError if the part is empty."""
+def replay_interval(log: FlightLog, start: float | None, end: float | None) -> tuple[float, float]:
+    """Return start and end of a replay in flight time, s.  Raises LogError for an empty interval."""
     check_arguments(start=start, end=end)
     start_time = start if start is not None else float(log.track.time[0])
     end_time = log.end_time if end is None else min(end, log.end_time)
@@ -63,23 +63,23 @@ def timeline(
     >>> planfly.timeline(example_log(), start=20.0)[0].text
     'turn left 14.0° at waypoint 1 (item 2), peak bank 0.0°'
     """
-    flight_log = _open_log(log)
+    flight_log = _read_log_if_path(log)
     start_time, end_time = (
-        (-math.inf, math.inf) if start is None and end is None else replayed_part(flight_log, start, end)
+        (-math.inf, math.inf) if start is None and end is None else replay_interval(flight_log, start, end)
     )
     return tuple(entry for entry in list_timeline(flight_log) if start_time <= entry.time <= end_time)
 
 
 @with_warm_up()
 def instruments(log: FlightLog | str | Path) -> Instruments:
-    """Return the instruments of a recorded flight; `Instruments.frame` returns their text lines at a given time.
+    """Return the instruments of a recorded flight, whose readings `Instruments.frame` formats as text lines.
 
     >>> import planfly
     >>> from logs.recording.example_log import example_log
     >>> len(planfly.instruments(example_log()).frame(12.0)) > 10
     True
     """
-    return make_instruments(_open_log(log))
+    return make_instruments(_read_log_if_path(log))
 
 
 def replay(
@@ -104,8 +104,8 @@ def replay(
     20.1
     """
     check_arguments(speed=speed)
-    flight_log = _open_log(log)
-    start_time, end_time = replayed_part(flight_log, start, end)
+    flight_log = _read_log_if_path(log)
+    start_time, end_time = replay_interval(flight_log, start, end)
     return _play_frames(instruments(flight_log), start_time, end_time, speed or 1.0, width)
 
 
@@ -143,8 +143,8 @@ def movie(
     from planfly.replays.movie import write_movie
 
     check_arguments(speed=speed)
-    flight_log = _open_log(log)
-    start_time, end_time = replayed_part(flight_log, start, end)
+    flight_log = _read_log_if_path(log)
+    start_time, end_time = replay_interval(flight_log, start, end)
     return tuple(write_movie(flight_log, Path(out), start_time, end_time, speed=speed, overwrite=overwrite))
 
 
@@ -187,9 +187,9 @@ def play_to_foxglove(
 
     check_arguments(speed=speed, port=port, wait=wait)
     origins = allow_origin.split(",") if isinstance(allow_origin, str) else allow_origin
-    allowed_origins = [_checked_origin(origin.strip()) for origin in origins if origin.strip()]
-    flight_log = _open_log(log)
-    start_time, end_time = replayed_part(flight_log, start, end)
+    allowed_origins = [_check_origin(origin.strip()) for origin in origins if origin.strip()]
+    flight_log = _read_log_if_path(log)
+    start_time, end_time = replay_interval(flight_log, start, end)
     foxglove_server.play_to_foxglove(
         flight_log,
         start_time,
@@ -203,7 +203,7 @@ def play_to_foxglove(
     )
 
 
-def _checked_origin(text: str) -> str:
+def _check_origin(text: str) -> str:
     """Return the origin if browsers would write it like this.  Raises LogError for an invalid origin."""
     if not _ORIGIN.fullmatch(text):
         allowed = "expected the origin of a web page, such as https://example.com or http://localhost:8080"
@@ -241,7 +241,7 @@ def play_to_stations(
     check_arguments(speed=speed, wait=wait)
     access = link_access(to, bind, allow, sign_key)
     stations.play_to_stations(
-        _open_log(log),
+        _read_log_if_path(log),
         access,
         speed=speed or 1.0,
         wait=_STATION_TIMEOUT_S if wait is None else wait,

@@ -48,7 +48,7 @@ class WrittenReport:
 
 
 class _ReportContent(NamedTuple):
-    """Content of pictures and pages, and the package versions of the flight, None for the installed versions."""
+    """Content of pictures and pages.  versions: package versions of the flight; None for the installed versions."""
 
     setup: FlightSetup
     verdict: Verdict
@@ -123,7 +123,7 @@ def report(
             svg=svg,
             versions=content.versions or package_versions(),
             command=command,
-            returns=return_summary(content.setup, content.track).drawn(),
+            returns=return_summary(content.setup, content.track).data_for_pictures(),
         )
     return WrittenReport(folder / "report.html", tuple(files), content.verdict)
 

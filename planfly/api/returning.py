@@ -1,4 +1,4 @@
-"""Judge returns to launch from every place on a mission, plan or flight, with and without engine."""
+"""Judge returns to launch from points all along a mission, plan or flight, with and without engine."""
 
 import shutil
 from dataclasses import dataclass, replace
@@ -28,10 +28,10 @@ from logs.verdict.returns.returns_text import (
 )
 from logs.verdict.returns.suggest_returns import Remedy, helps, suggest_parameters, suggest_rally
 from logs.views.exports.map_files import glide_shapes, kml_text, map_zones, plan_line, return_lines, track_line
-from planfly.api.flying import FlownMission, named_program, refuse_keywords
+from planfly.api.flying import FlownMission, check_keywords_not_given, named_program
 from planfly.arguments import check_arguments
 from planfly.flight_logs import is_log
-from planfly.flight_options import LogOptions, mission_options, options_of_log, takes_options
+from planfly.flight_options import LogOptions, select_log_options, select_mission_options, takes_options
 from planfly.kernel_units.unit_kernels import FLYING, GLIDING
 from planfly.rtl.jsbsim_returns import fly_return
 from planfly.rtl.return_summary import return_starts
@@ -52,8 +52,8 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, slots=True)
-class Suggested:
-    """A remedy, and the returns flown with it by the simulated ArduPlane; the least certain returns also in JSBSim."""
+class RemedyTrial:
+    """A remedy and the returns with it, flown by the simulated ArduPlane; the least certain returns also in JSBSim."""
 
     remedy: Remedy
     returns: Returns
@@ -74,7 +74,7 @@ class ReturnsFound:
     setup: FlightSetup
     returns: Returns
     glides: Glides = NOT_ASKED
-    suggested: tuple[Suggested, ...] = ()
+    suggested: tuple[RemedyTrial, ...] = ()
     files: tuple[Path, ...] = ()
     by_program: ProgramReturns | None = None
 
@@ -85,7 +85,7 @@ class ReturnsFound:
 
     @property
     def undecided(self) -> bool:
-        """True if no return is known to be unsafe, and some are undecided."""
+        """True if some returns are undecided, and no return is unsafe."""
         return self.returns.undecided
 
     @property
@@ -95,7 +95,7 @@ class ReturnsFound:
 
     @property
     def cause_lines(self) -> tuple[str, ...]:
-        """Lines on the triggers of a return, the settings that trigger no return, and the end of a return."""
+        """Lines on the triggers of a return, the settings that trigger none, and the end of a return."""
         return (*causes_text(self.returns.causes), *landing_text(self.returns))
 
     @property
@@ -114,7 +114,7 @@ class ReturnsFound:
 
     @property
     def no_return_line(self) -> str:
-        """Description of the point after which the battery is too low for the return."""
+        """Line on the point of no return, after which the battery is too low for the return."""
         return no_return_text(self.returns)
 
     @property
@@ -124,15 +124,13 @@ class ReturnsFound:
 
     @property
     def glide_lines(self) -> tuple[str, ...]:
-        """One line for each range of seconds with the same best glide destination, by time."""
+        """One line for each range of seconds with the same best glide destination, in order of time."""
         return tuple(glide_range_text(glide_range, self.glides) for glide_range in self.glides.ranges)
 
     @property
     def suggestion_lines(self) -> tuple[str, ...]:
         """One line for each remedy, with the outcome of the returns flown with it."""
-        return tuple(
-            remedy_text(suggested.remedy, suggested.returns, self.setup.scenario) for suggested in self.suggested
-        )
+        return tuple(remedy_text(trial.remedy, trial.returns, self.setup.scenario) for trial in self.suggested)
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -184,7 +182,7 @@ def returns(
     overwrite: bool = True,
     **options: Unpack[LogOptions],
 ) -> ReturnsFound:
-    """Fly and judge returns to launch from every place on a flight, and find places in gliding range.
+    """Fly and judge returns to launch from points all along a flight, and find places in gliding range.
 
     what: a `Plan`, or the path of a plan.json, .waypoints or .plan, which is flown first; or a flight, which is a
     result of `planfly.fly`, a flight log or its path, or an autopilot's log.
@@ -207,14 +205,14 @@ def returns(
     path = Path(what) if isinstance(what, str | Path) else None
     request = _check_request(every, suggest, out, sitl, points, overwrite=overwrite)
     if path is not None and is_imported_log(path):
-        refuse_keywords(str(path), {"seed": options["seed"], "nav": options["nav"]}, _RETURNS_AS_FLOWN_TEXT)
+        check_keywords_not_given(str(path), {"seed": options["seed"], "nav": options["nav"]}, _RETURNS_AS_FLOWN_TEXT)
         return _judge_imported_flight(_read_imported_flight(path, options), request)
-    refuse_keywords(str(path or "mission"), options_of_log(options), "only with an imported log")
+    check_keywords_not_given(str(path or "mission"), select_log_options(options), "only with an imported log")
     what = read_log(path) if path is not None and is_log(path) else what
-    flight_options = mission_options(options)
+    flight_options = select_mission_options(options)
     if isinstance(what, FlightLog | FlownMission):
         fixed_options: dict[str, Any] = {**flight_options, "terrain": None, "fence": options["fence"] or None}
-        refuse_keywords(str(path or "flight"), fixed_options, _RETURNS_AS_FLOWN_TEXT)
+        check_keywords_not_given(str(path or "flight"), fixed_options, _RETURNS_AS_FLOWN_TEXT)
         return _judge_flight(
             _with_terrain(what.setup, options["terrain"]), what.track, request, what.ended or INTERRUPTED
         )
@@ -229,12 +227,12 @@ def _read_imported_flight(path: Path, options: LogOptions) -> "ImportedFlight":
 
 
 def _with_terrain(setup: FlightSetup, terrain: str | Path | None) -> FlightSetup:
-    """Return the setup over the named terrain, or unchanged if no terrain is named."""
+    """Replace the terrain of a setup, or return the setup unchanged if no terrain is named."""
     return setup if terrain is None else setup.in_scenario(over_terrain(setup.scenario, str(terrain)))
 
 
 class _ReturnsRequest(NamedTuple):
-    """Request for returns, with their interval, remedies, a program that also flies them, and a folder for pictures."""
+    """Options of `returns` for the returns themselves and their files."""
 
     every: float
     suggest: bool
@@ -247,7 +245,7 @@ class _ReturnsRequest(NamedTuple):
 def _check_request(
     every: float, suggest: bool, out: str | Path | None, sitl: str | Path | None, points: int, *, overwrite: bool
 ) -> _ReturnsRequest:
-    """Check a request for returns, and return it.
+    """Check the options for the returns, and convert them.
 
     Raises PlanflyError for a folder that is a file or is not empty, and for a program that is not ArduPlane.
     """
@@ -267,11 +265,11 @@ def _judge_mission(setup: FlightSetup, request: _ReturnsRequest) -> ReturnsFound
     """Fly a mission, and judge the returns of its flight."""
     return_world(setup)  # Raises errors before the flight.
     with stage("flying the mission"):
-        flown = fly_and_judge(setup, airframe_of(setup), None, reference="never")
-    return _judge_flight(flown.setup, flown.track, request, flown.ended)
+        flight = fly_and_judge(setup, airframe_of(setup), None, reference="never")
+    return _judge_flight(flight.setup, flight.track, request, flight.ended)
 
 
-def _judge_flight(setup: FlightSetup, track: Track, request: _ReturnsRequest, ended: str) -> ReturnsFound:
+def _judge_flight(setup: FlightSetup, track: Track, request: _ReturnsRequest, end_reason: str) -> ReturnsFound:
     world = return_world(setup)
     starts = return_starts(setup, track, request.every)
     with stage(f"flying {len(starts)} returns", "flying returns"):
@@ -283,14 +281,14 @@ def _judge_flight(setup: FlightSetup, track: Track, request: _ReturnsRequest, en
             program_returns = fly_by_program(world, starts, judged_returns, request.program, request.points, logs)
             judged_returns = program_returns.with_worse_results(judged_returns)
         with stage("gliding from there without the engine"):
-            found = ReturnsFound(setup, judged_returns, judge_glides(world, starts), by_program=program_returns)
-        if request.suggest and not found.safe and found.returns.each:
-            found = replace(found, suggested=_suggest_remedies(world, starts, found, request.every))
-        if request.folder is None or not found.returns.each:
-            return found
+            result = ReturnsFound(setup, judged_returns, judge_glides(world, starts), by_program=program_returns)
+        if request.suggest and not result.safe and result.returns.each:
+            result = replace(result, suggested=_suggest_remedies(world, starts, result, request.every))
+        if request.folder is None or not result.returns.each:
+            return result
         with stage("drawing", "drawing returns"):
-            drawn = drawn_returns(world, starts, judged_returns, found.glides)
-            files = _draw_files(setup, track, drawn)
+            drawn_returns_data = drawn_returns(world, starts, judged_returns, result.glides)
+            files = _draw_files(setup, track, drawn_returns_data)
         folder = clean_folder(request.folder, RETURN_FILES, overwrite=request.overwrite)
         for name, data in files.items():
             write_whole(folder / name, data)
@@ -301,35 +299,37 @@ def _judge_flight(setup: FlightSetup, track: Track, request: _ReturnsRequest, en
     if len(track):
         with Recorder(folder / "returns.mcap", setup) as recorder:
             recorder.write(track)
-            recorder.finish(ended, returns=drawn)
+            recorder.finish(end_reason, returns=drawn_returns_data)
         names.append("returns.mcap")
-    return replace(found, files=tuple(folder / name for name in names))
+    return replace(result, files=tuple(folder / name for name in names))
 
 
 def _suggest_remedies(
-    world: ReturnWorld, starts: ReturnStarts, found: ReturnsFound, every: float
-) -> tuple[Suggested, ...]:
-    """Return the suggested remedies that improve the returns."""
+    world: ReturnWorld, starts: ReturnStarts, result: ReturnsFound, every: float
+) -> tuple[RemedyTrial, ...]:
+    """Fly the returns again with each remedy, and return the remedies that help."""
     # Remedies do not help a return that sinks to the ground in a take-off or a landing.
-    judged_times = [judged.time for judged in found.returns.each]
+    judged_times = [judged_return.time for judged_return in result.returns.each]
     airborne_starts = starts.at(np.flatnonzero(np.isin(starts.time, judged_times)))
     with stage("looking for what would make them safe"):
         remedies = suggest_parameters(world, airborne_starts)
         rally = suggest_rally(world, airborne_starts)
     remedies += [] if rally is None else [rally]
     with stage(f"flying the returns of {len(remedies)} suggestions", "flying suggested returns"):
-        tested = [Suggested(remedy, judge_returns(remedy.on(world), starts, every, fly_return)) for remedy in remedies]
-    return tuple(suggested for suggested in tested if helps(found.returns, suggested.returns))
+        trials = [
+            RemedyTrial(remedy, judge_returns(remedy.on(world), starts, every, fly_return)) for remedy in remedies
+        ]
+    return tuple(trial for trial in trials if helps(result.returns, trial.returns))
 
 
-def _draw_files(setup: FlightSetup, track: Track, drawn: DrawnReturns) -> dict[str, bytes]:
-    """Draw the pictures of returns, and the map with their lines and shapes, by file name."""
+def _draw_files(setup: FlightSetup, track: Track, returns: DrawnReturns) -> dict[str, bytes]:
+    """Return the pictures of returns, and the map with their lines and shapes, keyed by file name."""
     # Imported here: only pictures need matplotlib.
     from logs.views.figures import draw_pictures, return_views
 
     tracks = [track_line(setup, track)] if len(track) else []
-    lines = [plan_line(setup), *tracks, *return_lines(setup, drawn)]
-    zones = [*map_zones(setup), *glide_shapes(setup, drawn)]
+    lines = [plan_line(setup), *tracks, *return_lines(setup, returns)]
+    zones = [*map_zones(setup), *glide_shapes(setup, returns)]
     text = kml_text(f"{setup.scenario.name} returns", lines, zones)
-    pictures = draw_pictures(return_views(setup, drawn, track if tracks else None))
+    pictures = draw_pictures(return_views(setup, returns, track if tracks else None))
     return {**pictures, "returns.kml": text.encode("utf-8")}

@@ -13,17 +13,17 @@ from flight.simulation.setup import EngineChoice
 from logs.recording.setup_attachments import package_versions
 from logs.verdict.judge_flight import judge_plan_only
 from logs.verdict.verdict import Verdict, verdict_json
-from planfly.api.exporting import judged_parameters
+from planfly.api.exporting import judging_parameters_text
 from planfly.api.flying import named_program
 from planfly.arguments import check_arguments
-from planfly.flight_options import RunOptions, named_scenario, option_defaults, takes_options
+from planfly.flight_options import RunOptions, load_scenario_with_options, option_defaults, takes_options
 from planfly.kernel_units.unit_kernels import GLIDING, PLANNING_AND_FLYING
 from planfly.rtl.return_summary import return_summary
 from planfly.runtime.first_start import with_warm_up
 from planfly.runtime.stages import report_replaced, stage
 from planfly.workflow.airframe import Airframe, choose_seed, load_airframe, tightened_airframe
 from planfly.workflow.crash_safe_log import FlightLimits, flight_kind, flight_text
-from planfly.workflow.make_plan import make_plan, planned_for
+from planfly.workflow.make_plan import make_plan, planning_conditions
 from planfly.workflow.open_flight import make_setup, mission_of_plan, with_engine
 from planfly.workflow.output_paths import (
     RUN_FILES,
@@ -45,13 +45,13 @@ class Round:
     """One round of a run.
 
     number: number of the round, from 0.
-    changes: limits that were tightened for its planning, a line each.
+    changes: one line for each limit that was tightened for its planning.
     verdict: verdict on its flight, or on its plan if nothing was flown.
     flown: True if it was flown.
     folder: the folder of its files.
     notes: notes on the scenario's zones and the mission's route.
     has_log: True if a flight log was written.
-    returns_line: returns from a few places of the flight, in one line; "" if nothing was flown.
+    returns_line: returns from a few points of the flight, in one line; "" if nothing was flown.
     engine: flight model that flew, and the reason; "" if nothing was flown.
     """
 
@@ -90,23 +90,23 @@ class RunResult:
 
     @property
     def files(self) -> tuple[Path, ...]:
-        """Files in the folder, without those in its subfolders."""
-        found = (self.folder / name for name in (*RUN_FILES, "rounds.json"))
-        return tuple(file for file in found if file.exists())
+        """Files in the folder, without the files in its subfolders."""
+        candidates = (self.folder / name for name in (*RUN_FILES, "rounds.json"))
+        return tuple(file for file in candidates if file.exists())
 
 
 @dataclass(frozen=True, slots=True)
-class _Task:
-    """Settings that every round has in common.
+class _RunTask:
+    """Common settings of all rounds.
 
-    scenario: the scenario that each round is judged in.
+    scenario: the scenario in which each round is judged.
     airframe: the aircraft of the scenario.
     command: the command line that repeats the run, for the report.
     folder: the folder for the results.
     program: program of an autopilot; None for planfly's own simulation.
     reference: cases in which reference flights are flown.
     limits: limits of the flight time and of the size of the log.
-    every: the log keeps one row out of this many.
+    every: interval of the log's rows; 1 records every row.
     engine: flight model that flies.
     """
 
@@ -143,7 +143,7 @@ def run(
     out: the folder, in whose name {name} and {seed} stand for the scenario's name and the seed.
     overwrite: True replaces results in the folder; in the default folder they are always replaced.
     on_round: called with each round when it has ended.
-    The other keywords are those of `planfly.fly`.
+    For the other keywords, see `planfly.fly`.
     Raises a `planfly.PlanflyError` for bad input, before anything is written.
 
     >>> import planfly, tempfile
@@ -158,7 +158,7 @@ def run(
     )
     check_arguments(engine=options["engine"])
     program = named_program(options["sitl"])
-    world = named_scenario(scenario, options, program)
+    world = load_scenario_with_options(scenario, options, program)
     chosen_seed, airframe = choose_seed(world, seed), load_airframe(world)
     folder = expand_path_pattern(out, world.name, chosen_seed)
     check_output_folder(folder, overwrite or out == RUN_FOLDER)
@@ -167,7 +167,7 @@ def run(
     changed_options = {name: value for name, value in {"refine": refine, **options}.items() if value != defaults[name]}
     repeat_command = command_line(scenario_name, chosen_seed, changed_options)
     reference: FlyReference = "always" if options["levels"] else "failed"
-    task = _Task(
+    task = _RunTask(
         world,
         airframe,
         chosen_seed,
@@ -184,7 +184,7 @@ def run(
 
 
 def command_line(scenario: str, seed: int, options: Mapping[str, Any]) -> str:
-    """Return the command line of ``planfly run`` with the given options, which are named by keyword.
+    """Return the command line of ``planfly run`` with the given options, keyed by keyword.
 
     >>> command_line("tight", 3, {"wind": (8.0, 270.0), "autopilot": "px4", "params": "my file.parm"})
     "planfly run tight --seed 3 --wind 8,270 --autopilot px4 --params 'my file.parm'"
@@ -200,14 +200,14 @@ def command_line(scenario: str, seed: int, options: Mapping[str, Any]) -> str:
 
 
 def _fly_rounds(
-    task: _Task, refine: int, locks: contextlib.ExitStack, on_round: Callable[[Round], None] | None
+    task: _RunTask, refine: int, locks: contextlib.ExitStack, on_round: Callable[[Round], None] | None
 ) -> RunResult:
-    """Plan and fly until a round flies or no round remains.
+    """Plan and fly in rounds until a round is flyable or no round remains.
 
-    locks: stack that takes the lock of the folder, after the first plan.
+    locks: exit stack that holds the lock of the folder from the first plan on.
     """
     scenario, airframe, folder = task.scenario, task.airframe, task.folder
-    rounds_flown: list[Round] = []
+    flown_rounds: list[Round] = []
 
     def fly_round(planning_scenario: Scenario) -> tuple[Verdict, bool]:
         planning_airframe = (
@@ -215,29 +215,32 @@ def _fly_rounds(
         )
         with stage(f"planning {scenario.name}", "planning") as advance:
             plan = make_plan(planning_scenario, planning_airframe, task.seed, advance=advance)
-        if not rounds_flown:
+        if not flown_rounds:
             folder.mkdir(parents=True, exist_ok=True)
             locks.enter_context(hold(folder))
             if task.program is not None:
                 report_replaced(folder / "flight.mcap", autopilot_log(folder / "flight.mcap", task.program))
             prepare_folder(folder)
-        rounds_flown.append(_fly_round(task, plan, len(rounds_flown)))
+        flown_rounds.append(_fly_round(task, plan, len(flown_rounds)))
         if on_round is not None:
-            on_round(rounds_flown[-1])
-        return rounds_flown[-1].verdict, rounds_flown[-1].flown
+            on_round(flown_rounds[-1])
+        return flown_rounds[-1].verdict, flown_rounds[-1].flown
 
-    _, entries = refine_rounds(scenario, refine, fly_round, lambda number: _keep_round(folder, number))
+    _, round_entries = refine_rounds(scenario, refine, fly_round, lambda number: _move_round_results(folder, number))
     if refine:
-        write_whole(folder / "rounds.json", json.dumps(entries, indent=1) + "\n")
-    *earlier, last = (
-        replace(finished, changes=tuple(entry["changes"]))
-        for finished, entry in zip(rounds_flown, entries, strict=True)
+        write_whole(folder / "rounds.json", json.dumps(round_entries, indent=1) + "\n")
+    *earlier_rounds, last_round = (
+        replace(flown_round, changes=tuple(round_entry["changes"]))
+        for flown_round, round_entry in zip(flown_rounds, round_entries, strict=True)
     )
-    rounds = (*(replace(finished, folder=folder / f"round-{finished.number}") for finished in earlier), last)
-    return RunResult(scenario.name, task.seed, folder, rounds, entries[-1]["next"])
+    rounds = (
+        *(replace(flown_round, folder=folder / f"round-{flown_round.number}") for flown_round in earlier_rounds),
+        last_round,
+    )
+    return RunResult(scenario.name, task.seed, folder, rounds, round_entries[-1]["next"])
 
 
-def _fly_round(task: _Task, plan: Plan, number: int) -> Round:
+def _fly_round(task: _RunTask, plan: Plan, number: int) -> Round:
     """Write a plan and its mission, fly the plan if it is feasible, and write the report."""
     # Imported here: only the report needs matplotlib.
     from logs.views.report.page import write_report
@@ -250,14 +253,14 @@ def _fly_round(task: _Task, plan: Plan, number: int) -> Round:
     for target in (folder / "mission.waypoints", folder / "mission.plan", *rally):
         write_whole(target, mission_text(mission, mission_kind(target)))
     if plan.ways is not None and airframe.autopilot.parameters is not None:
-        write_whole(folder / "mission.parm", judged_parameters("mission.waypoints", airframe.autopilot)[0])
+        write_whole(folder / "mission.parm", judging_parameters_text("mission.waypoints", airframe.autopilot)[0])
     if not plan.feasible:
-        verdict = judge_plan_only(plan, planned_for(task.scenario, airframe))
+        verdict = judge_plan_only(plan, planning_conditions(task.scenario, airframe))
         write_whole(folder / "verdict.json", verdict_json(verdict))
         return Round(number, (), verdict, flown=False, folder=folder)
     setup = with_engine(make_setup(task.scenario, airframe, mission, task.seed, plan=plan), task.engine)
     with stage(f"flying {flight_text(setup)}", flight_kind(setup)) as advance:
-        flown = fly_and_judge(
+        flight = fly_and_judge(
             setup,
             airframe,
             folder / "flight.mcap",
@@ -268,36 +271,36 @@ def _fly_round(task: _Task, plan: Plan, number: int) -> Round:
             returns=True,
             limits=task.limits,
         )
-    write_whole(folder / "verdict.json", verdict_json(flown.verdict))
-    summary = flown.returns or return_summary(flown.setup, flown.track)
+    write_whole(folder / "verdict.json", verdict_json(flight.verdict))
+    summary = flight.returns or return_summary(flight.setup, flight.track)
     with stage("drawing", "drawing a report"):
         write_report(
             folder,
-            flown.setup,
-            flown.track,
-            flown.verdict,
-            ended=flown.ended,
+            flight.setup,
+            flight.track,
+            flight.verdict,
+            ended=flight.ended,
             versions=package_versions(),
             command=task.command,
-            events=flown.events,
-            returns=summary.drawn(),
+            events=flight.events,
+            returns=summary.data_for_pictures(),
         )
     notes = (*setup.scenario.notes, *setup.notes)
-    has_log = len(flown.track) > 0
+    has_log = len(flight.track) > 0
     return Round(
         number,
         (),
-        flown.verdict,
+        flight.verdict,
         flown=True,
         folder=folder,
         notes=notes,
         has_log=has_log,
         returns_line=summary.line,
-        engine=flown.engine if has_log else "",
+        engine=flight.engine if has_log else "",
     )
 
 
-def _keep_round(folder: Path, number: int) -> None:
+def _move_round_results(folder: Path, number: int) -> None:
     """Move the results of a round to its own subfolder before the next round."""
     round_folder = folder / f"round-{number}"
     round_folder.mkdir(exist_ok=True)

@@ -45,7 +45,7 @@ def serve(
     mission: the file of the first mission; None waits for an upload into the scenario that the options name.
     options: options of `planfly.fly`.
     to: addresses of ground stations, IP:PORT, one or several.  bind: address of the vehicle.
-    allow: IP addresses beyond this machine that may talk to it.  sign_key: a file with a MAVLink signing key.
+    allow: IP addresses of other machines that may connect.  sign_key: a file with a MAVLink signing key.
     speed: multiple of real time, 0.1 to 100.  log: the folder of the flight logs.
     stop: polled continuously.  on_message: called with one line for each event.
 
@@ -53,16 +53,16 @@ def serve(
     Raises a `planfly.PlanflyError` for bad input.
     """
     # Imported here: only this function needs MAVLink.
-    from planfly.live.served_flights import ServeOptions, open_served
+    from planfly.live.served_flights import ServeOptions, load_served_scenario
     from planfly.live.served_vehicle import serve_vehicle
 
     access = link_access(to, bind, allow, sign_key)
     check_arguments(served_speed=speed)
     serve_options = ServeOptions("" if mission is None else str(mission), speed, Path(log), options)
-    served = open_served(serve_options)
+    flights = load_served_scenario(serve_options)
     if serve_options.logs.exists() and not serve_options.logs.is_dir():
         raise PlanflyError.of_argument("log", log, "is a file; expected a folder")
-    serve_vehicle(access, serve_options, served, stop, on_message)
+    serve_vehicle(access, serve_options, flights, stop, on_message)
 
 
 # ----------------------------------------------------------------------
@@ -72,12 +72,12 @@ def serve(
 def link_access(
     to: str | Sequence[str], bind: str, allow: str | Sequence[str] | None = (), sign_key: str | Path | None = None
 ) -> "Access":
-    """Return the addresses and the signing key of a link.
+    """Parse the addresses and the signing key of a link.
 
     to: IP:PORT of each station.
     bind: IP:PORT of the vehicle.
     allow: IP addresses of stations on other machines.
-    Several addresses are a sequence, or separated by commas.  Raises FlightError or PlanflyError for invalid ones.
+    Several addresses are a sequence, or separated by commas.  Raises FlightError or PlanflyError for invalid addresses.
 
     >>> link_access("127.0.0.1:14550", "127.0.0.1:0").to
     (('127.0.0.1', 14550),)

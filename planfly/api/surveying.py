@@ -17,8 +17,8 @@ from logs.verdict.measures.route_requirements import RouteRequirements, route_re
 from logs.verdict.measures.track_alignment import align_track
 from logs.verdict.verdict import Verdict
 from logs.views.surveys import survey_chart
-from planfly.api.flying import FlownMission, refuse_keywords
-from planfly.arguments import CAMERA, check_arguments, is_camera
+from planfly.api.flying import FlownMission, check_keywords_not_given
+from planfly.arguments import CAMERA_FORMAT, check_arguments, is_camera
 from planfly.flight_logs import is_log
 from planfly.flight_options import MissionOptions, takes_options
 from planfly.kernel_units.unit_kernels import FLYING
@@ -27,14 +27,14 @@ from planfly.runtime.stages import stage
 from planfly.surveys.survey_remedies import NearMiss, SurveyRemedy, survey_remedies
 from planfly.surveys.survey_text import (
     has_required_overlap,
+    is_line_usable,
     line_text,
     lines_headline,
     near_miss_text,
-    needed_text,
     overlap_lines,
     remedy_text,
     survey_text,
-    usable,
+    usable_segments_text,
 )
 from planfly.workflow.airframe import airframe_of
 from planfly.workflow.crash_safe_log import flight_text
@@ -54,9 +54,9 @@ class SurveyFound:
     surveys: surveys of the mission, in the order flown.
     lines: measures of each line of each survey; None for a line that was not flown.
     overlaps: overlap of the photos of each survey; None if it cannot be measured, for instance without a camera.
-    remedies: remedies that help, each tested by a flight; empty if none were requested or nothing is lost.
+    remedies: remedies that help, each tested by a flight; empty if none were requested or no line is lost.
     nearest: the trial that came closest to success, if remedies were requested and none helps.
-    kept: reason why no other layout was tried, for messages.
+    kept: reason why the layout was kept and no other layout was tried, for messages.
     files: files written; empty if no folder was named.
     """
 
@@ -74,7 +74,7 @@ class SurveyFound:
     @property
     def usable(self) -> bool:
         """True if enough of every line is usable and the photos overlap as required."""
-        return all(usable(line) for lines in self.lines for line in lines) and all(
+        return all(is_line_usable(line) for lines in self.lines for line in lines) and all(
             map(has_required_overlap, self.overlaps)
         )
 
@@ -99,12 +99,12 @@ class SurveyFound:
 
     @property
     def no_remedy_lines(self) -> tuple[str, ...]:
-        """Lines that state that no remedy was found, the closest trial, and why no other layout was tried."""
+        """Lines for a survey without a remedy, with the closest trial, and the reason to keep the layout."""
         texts = [
             "no single turn-around, order, course, parameter or airspeed was found that would help, nor longer"
             " turn-arounds with another parameter or a slower flight"
         ]
-        texts += [needed_text(*pair) for pair in zip(self.surveys, self.lines, strict=True)]
+        texts += [usable_segments_text(*pair) for pair in zip(self.surveys, self.lines, strict=True)]
         if self.kept:
             texts.append(f"no other layout was tried: {self.kept}")
         if self.nearest is not None:
@@ -149,18 +149,18 @@ def survey(
     if out is not None:
         check_output_folder(Path(out), overwrite)
     if isinstance(what, str | Path) and is_log(Path(what)):
-        refuse_keywords(str(what), fixed_options, _LINES_AS_FLOWN_TEXT)
+        check_keywords_not_given(str(what), fixed_options, _LINES_AS_FLOWN_TEXT)
         what = read_log(Path(what))
     if isinstance(what, FlightLog | FlownMission):
-        refuse_keywords("flight", fixed_options, _LINES_AS_FLOWN_TEXT)
+        check_keywords_not_given("flight", fixed_options, _LINES_AS_FLOWN_TEXT)
         source = what.setup.source
         if source is not None and "attitude" not in source.holds:
             raise LogError(f"{source.file}: no attitude, so the bank of photos is not known", file=source.file)
-        setup = _with_camera(what.setup.in_scenario(_judging_parallel_lines(what.setup.scenario)), own_camera)
+        setup = _with_camera(what.setup.in_scenario(_with_parallel_lines_as_survey(what.setup.scenario)), own_camera)
         return _write_results(_judge_flown_survey(setup, what.track, what.ended or ""), out, overwrite)
 
     planned_setup = open_flight(what, options)
-    setup = _with_camera(planned_setup.in_scenario(_judging_parallel_lines(planned_setup.scenario)), own_camera)
+    setup = _with_camera(planned_setup.in_scenario(_with_parallel_lines_as_survey(planned_setup.scenario)), own_camera)
     return _write_results(_fly_survey(setup, suggest), out, overwrite)
 
 
@@ -174,50 +174,51 @@ def _parse_camera(numbers: tuple[float, ...] | None) -> Camera | None:
         camera_numbers = ()
     if isinstance(numbers, str | bytes) or not is_camera(camera_numbers):
         raise ArgumentError.of_argument(
-            "camera", numbers, f"expected {CAMERA}, such as (23.5, 15.6, 16)", shown=repr(numbers)
+            "camera", numbers, f"expected {CAMERA_FORMAT}, such as (23.5, 15.6, 16)", shown=repr(numbers)
         )
-    width, height, focal, *overlaps = camera_numbers
+    width, height, focal_length, *overlaps = camera_numbers
     front_overlap, side_overlap = (percent / 100.0 for percent in overlaps) if overlaps else (None, None)
-    return Camera(width / focal, height / focal, front_overlap, side_overlap)
+    return Camera(width / focal_length, height / focal_length, front_overlap, side_overlap)
 
 
 def _with_camera(setup: FlightSetup, camera: Camera | None) -> FlightSetup:
-    """Return a setup with a camera for its surveys.
-
-    Overlaps that are not given with the camera are taken from the mission.
-    """
+    """Return a setup with a camera for its surveys; missing overlaps are taken from the mission."""
     if camera is None:
         return setup
     plans = []
     for plan in setup.mission.survey_plans:
         plan_camera = plan.camera or camera
-        front, side = (camera.front, camera.side) if camera.front is not None else (plan_camera.front, plan_camera.side)
-        plans.append(replace(plan, camera=replace(camera, front=front, side=side, interval=plan_camera.interval)))
+        front_overlap, side_overlap = (
+            (camera.front, camera.side) if camera.front is not None else (plan_camera.front, plan_camera.side)
+        )
+        plans.append(
+            replace(plan, camera=replace(camera, front=front_overlap, side=side_overlap, interval=plan_camera.interval))
+        )
     return replace(setup, mission=replace(setup.mission, survey_plans=(*plans, SurveyPlan(None, 0.0, camera))))
 
 
 def _fly_survey(setup: FlightSetup, suggest: bool) -> SurveyFound:
     """Fly a mission, measure its photo lines, and look for remedies if they are requested."""
-    _require_survey(setup)
+    _check_has_survey(setup)
     airframe = airframe_of(setup)
     with stage(f"flying {flight_text(setup)}", "flying a survey") as advance:
-        flown = fly_and_judge(setup, airframe, None, advance, reference="never")
-    found = _measure_survey(flown.requirements, flown.track, flown.verdict)
-    if not suggest or found.usable:
-        return found
+        flight = fly_and_judge(setup, airframe, None, advance, reference="never")
+    result = _measure_survey(flight.requirements, flight.track, flight.verdict)
+    if not suggest or result.usable:
+        return result
     with stage("looking for what would help") as advance:
         step_counter = count(1)
         trials = survey_remedies(
-            flown.setup, airframe, flown.verdict, lambda text: advance(next(step_counter), 0.0, text)
+            flight.setup, airframe, flight.verdict, lambda text: advance(next(step_counter), 0.0, text)
         )
-    return replace(found, remedies=trials.remedies, nearest=trials.nearest, kept=trials.kept)
+    return replace(result, remedies=trials.remedies, nearest=trials.nearest, kept=trials.kept)
 
 
-def _write_results(found: SurveyFound, out: str | Path | None, overwrite: bool) -> SurveyFound:
-    """Write the picture of the lines and the remedied missions if a folder is named; return the result with files."""
+def _write_results(result: SurveyFound, out: str | Path | None, overwrite: bool) -> SurveyFound:
+    """Write the picture of the lines and the missions of the remedies if a folder is named; return the result."""
     if out is None:
-        return found
-    folder, chart = clean_folder(out, SURVEY_FILES, overwrite=overwrite), survey_chart(found.setup, found.track)
+        return result
+    folder, chart = clean_folder(out, SURVEY_FILES, overwrite=overwrite), survey_chart(result.setup, result.track)
     folder.mkdir(parents=True, exist_ok=True)
     files = []
     if chart is not None:
@@ -226,28 +227,28 @@ def _write_results(found: SurveyFound, out: str | Path | None, overwrite: bool) 
 
         write_whole(folder / "survey.png", png_bytes(draw_chart(chart)))
         files.append(folder / "survey.png")
-    for remedy in found.remedies:
-        if remedy.mission is not found.setup.mission:
+    for remedy in result.remedies:
+        if remedy.mission is not result.setup.mission:
             path = folder / f"{remedy.kind}.waypoints"
             write_whole(path, mission_text(remedy.mission, "waypoints"))
             files.append(path)
         if remedy.kind == "parameter":
             # Include the parameters of the user's own file, because they were flown, too.
-            parameters = found.setup.autopilot.with_parameters(**{remedy.name: remedy.value}).parameters
+            parameters = result.setup.autopilot.with_parameters(**{remedy.name: remedy.value}).parameters
             file_values = {} if parameters is None else parameters.by_origin("file")
             path = folder / "parameter.param"
             write_whole(path, "".join(f"{name},{value!r}\n" for name, value in file_values.items()))
             files.append(path)
-    return replace(found, files=tuple(files))
+    return replace(result, files=tuple(files))
 
 
-def _judging_parallel_lines(scenario: Scenario) -> Scenario:
-    """Return the scenario changed so that all parallel lines are judged as survey lines."""
+def _with_parallel_lines_as_survey(scenario: Scenario) -> Scenario:
+    """Return a scenario in which all parallel lines are judged as survey lines."""
     limits = scenario.limits.model_copy(update={"surveys": "lines"})
     return replace(scenario, limits=limits, spec=scenario.spec.model_copy(update={"limits": limits}))
 
 
-def _require_survey(setup: FlightSetup) -> None:
+def _check_has_survey(setup: FlightSetup) -> None:
     """Raise MissionError for a mission without a survey."""
     if not surveys_of(setup):
         source = setup.mission.source
@@ -257,11 +258,11 @@ def _require_survey(setup: FlightSetup) -> None:
         )
 
 
-def _judge_flown_survey(setup: FlightSetup, track: Track, ended: str) -> SurveyFound:
+def _judge_flown_survey(setup: FlightSetup, track: Track, end_reason: str) -> SurveyFound:
     """Judge and measure a flight that has already been flown."""
-    _require_survey(setup)
+    _check_has_survey(setup)
     requirements = route_requirements(setup)
-    return _measure_survey(requirements, track, judge_flight(setup, track, ended, requirements=requirements))
+    return _measure_survey(requirements, track, judge_flight(setup, track, end_reason, requirements=requirements))
 
 
 def _measure_survey(requirements: RouteRequirements, track: Track, verdict: Verdict) -> SurveyFound:

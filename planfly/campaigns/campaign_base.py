@@ -19,8 +19,8 @@ from flight.mission.placing import PlacedMission, place_stops
 from flight.mission_files.formats import mission_text
 from flight.simulation.setup import FlightSetup, make_limits
 from logs.verdict.conditions import Conditions, setup_conditions
-from planfly.campaigns.dispersions import DEFAULT, QUANTITIES_OF_DRAWS, Dispersions, Draw, SpreadError
-from planfly.flight_options import MissionOptions, named_scenario
+from planfly.campaigns.dispersions import DEFAULT_DISPERSIONS_NAME, QUANTITIES_OF_DRAWS, Dispersions, Draw, SpreadError
+from planfly.flight_options import MissionOptions, load_scenario_with_options
 from planfly.named_fences import NamedFences, read_named_fences
 from planfly.workflow.airframe import (
     Airframe,
@@ -69,11 +69,11 @@ class CampaignBase:
         return make_setup(self.scenario, self.airframe, self.mission, self.seed, plan=self.plan, placed=self.placed)
 
     def conditions(self) -> Conditions:
-        """Return the nominal conditions of the flights, which are aircraft, weather, world and autopilot."""
+        """Return the nominal conditions of the flights: aircraft, weather, world and autopilot."""
         return setup_conditions(self.nominal_setup())
 
     def world_hash(self) -> str:
-        """Return the hash of scenario, mission, model, dispersions and seed, all inputs of a flight except the code."""
+        """Return the hash of all inputs of a flight except the code: scenario, mission, model, dispersions and seed."""
         model = self.airframe.aircraft
         terrain = self.scenario.terrain
         parts = (
@@ -103,31 +103,31 @@ def open_campaign(
     dispersions: Dispersions,
     options: MissionOptions,
     *,
-    planned: Path | None = None,
+    plan_file: Path | None = None,
     advance: Advance | None = None,
 ) -> CampaignBase:
-    """Open the base of a campaign for a plan or mission file, or for a scenario, in which a path is then planned.
+    """Open the base of a campaign for a plan, a mission file, or a scenario, for which a path is planned.
 
     target: an embedded scenario's name, a scenario's TOML file, a plan, or a plan.json, .waypoints or .plan.
     options: options of the flights; the plan avoids their zones, and their seed is used for the plan and the draws.
-    planned: file of a scenario's plan, which is read if it exists, and written otherwise.
-    Raises a PlanflyError for bad input, for a plan that is not feasible, and for dispersions whose medians give an
-    aircraft that cannot fly.
+    plan_file: file of a scenario's plan, which is read if it exists, and written otherwise.
+    Raises a PlanflyError for bad input, for a plan that is not feasible, and for dispersions with medians at which the
+    aircraft cannot fly.
     """
     if isinstance(target, Plan) or is_mission_file(target):
         setup = open_flight(target, options)
         # Use the name without the folder, because the folder does not affect the flight.
-        base = _base_of_setup(setup, dispersions, Path(setup.mission.source).name)
+        base = _make_base_from_setup(setup, dispersions, Path(setup.mission.source).name)
     else:
         fences, seed = read_named_fences(options.get("fence") or ()), options.get("seed")
-        scenario = fences.on_scenario(named_scenario(target, options))
-        has_plan_file = planned is not None and planned.is_file()
-        plan = read_plan(planned) if has_plan_file and planned is not None else _make_plan(scenario, seed, advance)
+        scenario = fences.add_to_scenario(load_scenario_with_options(target, options))
+        has_plan_file = plan_file is not None and plan_file.is_file()
+        plan = read_plan(plan_file) if has_plan_file and plan_file is not None else _make_plan(scenario, seed, advance)
         if has_plan_file and plan.scenario.to_json() != scenario.to_json():
-            raise MissionError(f"{planned}: is the plan of another scenario than {target}", file=str(planned))
-        if planned is not None and not has_plan_file:
-            write_whole(planned, plan_json(plan))
-        base = _base_of_plan(plan, fences, dispersions, choose_seed(scenario, seed))
+            raise MissionError(f"{plan_file}: is the plan of another scenario than {target}", file=str(plan_file))
+        if plan_file is not None and not has_plan_file:
+            write_whole(plan_file, plan_json(plan))
+        base = _make_base_from_plan(plan, fences, dispersions, choose_seed(scenario, seed))
     check_level_flight_at_medians(base)
     # Refuse a mission without a valid route now, not in a worker.
     base.nominal_setup()
@@ -143,20 +143,20 @@ def _make_plan(scenario: Scenario, seed: int | None, advance: Advance | None) ->
     return plan
 
 
-def _base_of_plan(plan: Plan, fences: NamedFences, dispersions: Dispersions, seed: int) -> CampaignBase:
+def _make_base_from_plan(plan: Plan, fences: NamedFences, dispersions: Dispersions, seed: int) -> CampaignBase:
     scenario = plan.scenario
     airframe = load_airframe(scenario)
-    mission = fences.on_mission(mission_of_plan(plan, airframe))
+    mission = fences.add_to_mission(mission_of_plan(plan, airframe))
     placed = place_stops(mission, scenario.origin, scenario.terrain)
-    dispersions = _with_own_draws(dispersions, airframe.aircraft)
+    dispersions = _with_aircraft_draws(dispersions, airframe.aircraft)
     return CampaignBase(scenario, airframe, mission, placed, plan, dispersions, seed, scenario.name)
 
 
-def _base_of_setup(setup: FlightSetup, dispersions: Dispersions, source: str) -> CampaignBase:
+def _make_base_from_setup(setup: FlightSetup, dispersions: Dispersions, source: str) -> CampaignBase:
     mission = replace(setup.mission, source=source)
     scenario, airframe = setup.scenario, airframe_of(setup)
     placed = place_stops(mission, scenario.origin, scenario.terrain, vertical_legs=setup.plan is None)
-    dispersions = _with_own_draws(dispersions, airframe.aircraft)
+    dispersions = _with_aircraft_draws(dispersions, airframe.aircraft)
     return CampaignBase(scenario, airframe, mission, placed, setup.plan, dispersions, setup.seed, setup.name)
 
 
@@ -198,13 +198,13 @@ def _check_draws(base: CampaignBase) -> None:
         raise SpreadError(f"{draws.source}: {allowed}", file=draws.source, field=error.field) from error
 
 
-def _with_own_draws(dispersions: Dispersions, aircraft: Aircraft) -> Dispersions:
+def _with_aircraft_draws(dispersions: Dispersions, aircraft: Aircraft) -> Dispersions:
     """Return the dispersions with the draws stored next to the aircraft's model, if there are any.
 
     A dispersions file that names other draws, or has its own dispersions of drag or control power, is used unchanged.
     """
     file = aircraft.folder / DRAWS_FILE
-    has_own_dispersions = dispersions.name != DEFAULT and any(
+    has_own_dispersions = dispersions.name != DEFAULT_DISPERSIONS_NAME and any(
         varying.quantity.name in QUANTITIES_OF_DRAWS for varying in dispersions.varying
     )
     if has_own_dispersions or dispersions.draws is not None or not file.is_file():
@@ -213,18 +213,18 @@ def _with_own_draws(dispersions: Dispersions, aircraft: Aircraft) -> Dispersions
 
 
 # ----------------------------------------------------------------------
-# Vary a flight by its draw, and note the differences that the guidance does not know.
+# Vary a flight by its draw, and record the differences that are unknown to the guidance.
 
 # Levels of turbulence in increasing order.
-LEVELS: tuple[Literal["none", "light", "moderate"], ...] = ("none", "light", "moderate")
+TURBULENCE_LEVELS: tuple[Literal["none", "light", "moderate"], ...] = ("none", "light", "moderate")
 # Maximum wind speed of a varied flight, m/s.
-MAX_WIND = 40.0
+MAX_WIND_MPS = 40.0
 # Maximum wind gradient of a varied flight, 1/s.
-MAX_GRADIENT = 0.05
+MAX_WIND_GRADIENT = 0.05
 
 
 class GivenWind(NamedTuple):
-    """Mean wind that replaces the scenario's wind, by its speed, m/s, and the direction it blows from, degrees."""
+    """Mean wind that replaces the scenario's wind: speed, m/s, and the direction from which it blows, degrees."""
 
     speed: float
     from_deg: float
@@ -232,14 +232,14 @@ class GivenWind(NamedTuple):
 
 @dataclass(frozen=True)
 class VariedFlight:
-    """Setup with the wind and terrain of a draw, and the rest of the draw."""
+    """Setup with the wind and terrain of a draw, and the draw's other differences."""
 
     setup: FlightSetup
     airframe: Airframe
     off_nominal: OffNominal
 
 
-def vary(base: CampaignBase, draw: Draw, wind: GivenWind | None = None) -> VariedFlight:
+def vary_flight(base: CampaignBase, draw: Draw, wind: GivenWind | None = None) -> VariedFlight:
     """Return the flight of a draw.
 
     Scenario and limits are adapted to the flight's wind, as in `planfly fly --wind`.  The autopilot does not know the
@@ -268,14 +268,14 @@ def _with_drawn_wind(scenario: Scenario, values: dict[str, float], mean_wind: Gi
     """Return the scenario with the wind of a draw; gusts use the flight's seed, not the scenario's seed."""
     old_wind = scenario.wind
     nominal = mean_wind or GivenWind(old_wind.speed, math.degrees(old_wind.from_course))
-    speed = min(MAX_WIND, max(0.0, nominal.speed + values["wind_speed"]))
+    speed = min(MAX_WIND_MPS, max(0.0, nominal.speed + values["wind_speed"]))
     from_deg = (nominal.from_deg + values["wind_from"]) % 360.0
-    gradient = min(MAX_GRADIENT, max(-MAX_GRADIENT, old_wind.gradient + values["wind_gradient"]))
-    level = LEVELS.index(old_wind.turbulence) + round(values["turbulence"])
-    turbulence = LEVELS[min(len(LEVELS) - 1, max(0, level))]
-    table = WindTable(speed_mps=speed, from_deg=from_deg, gradient=gradient, turbulence=turbulence)
+    gradient = min(MAX_WIND_GRADIENT, max(-MAX_WIND_GRADIENT, old_wind.gradient + values["wind_gradient"]))
+    level = TURBULENCE_LEVELS.index(old_wind.turbulence) + round(values["turbulence"])
+    turbulence = TURBULENCE_LEVELS[min(len(TURBULENCE_LEVELS) - 1, max(0, level))]
+    wind_table = WindTable(speed_mps=speed, from_deg=from_deg, gradient=gradient, turbulence=turbulence)
     wind = Wind(speed, math.radians(from_deg), gradient, turbulence, None, old_wind.reference_amsl)
-    return replace(scenario, spec=scenario.spec.model_copy(update={"wind": table}), wind=wind)
+    return replace(scenario, spec=scenario.spec.model_copy(update={"wind": wind_table}), wind=wind)
 
 
 def _raise_terrain(terrain: Terrain, height: float) -> Terrain:

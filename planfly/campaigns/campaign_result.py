@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from planfly.arguments import check_arguments
-from planfly.campaigns.find_winds import USUAL_WIND_FLIGHTS, WindsGoal
-from planfly.campaigns.statistics.decision import USUAL_CONFIDENCE, Answer, Goal, Interval
+from planfly.campaigns.find_winds import DEFAULT_WIND_FLIGHTS, WindsGoal
+from planfly.campaigns.statistics.decision import DEFAULT_CONFIDENCE, Answer, Goal, Interval
 from planfly.campaigns.summary import CampaignSummary, campaign_lines
-from planfly.campaigns.tables import read_shapes
+from planfly.campaigns.tables import read_path_arrays
 from world.errors import ArgumentError
 from world.html_table import html_table
 
@@ -25,7 +25,7 @@ _DEFAULTS = {"confidence": 0.95, "directions": 16, "most": 20.0}
 
 
 def campaign_line(target: str, goal: Goal, options: Mapping[str, object]) -> str:
-    """Return the ``planfly campaign`` command for a goal and options by name, without options that are None or empty.
+    """Return the ``planfly campaign`` command for a goal and options, without options that are None or empty.
 
     >>> campaign_line("my plan.json", Goal(0.99, True, 5000), {"seed": 3, "wind": (8.0, 270.0), "fence": ["a", "b"]})
     "planfly campaign 'my plan.json' --prove 0.99 --flights 5000 --seed 3 --wind 8,270 --fence a --fence b"
@@ -42,7 +42,7 @@ def winds_line(target: str, goal: WindsGoal, options: Mapping[str, object]) -> s
     >>> winds_line("jacksboro-air", WindsGoal(0.9, 0.95, 8, 20.0, 5000), {"seed": 1})
     'planfly winds jacksboro-air --prove 0.9 --directions 8 --seed 1'
     """
-    flights = None if goal.flights == USUAL_WIND_FLIGHTS else goal.flights
+    flights = None if goal.flights == DEFAULT_WIND_FLIGHTS else goal.flights
     goal_options = {"prove": goal.target, "directions": goal.directions, "most": goal.most, "flights": flights}
     return _command_line("winds", target, {**goal_options, "confidence": goal.confidence, **options})
 
@@ -52,19 +52,19 @@ def _command_line(command: str, target: str, options: Mapping[str, object]) -> s
     for name, value in options.items():
         if value is None or value == _DEFAULTS.get(name):
             continue
-        for item in value if isinstance(value, list) else [value]:
-            parts += [f"--{name.replace('_', '-')}", shlex.quote(_option_text(item))]
+        for option_value in value if isinstance(value, list) else [value]:
+            parts += [f"--{name.replace('_', '-')}", shlex.quote(_option_text(option_value))]
     return " ".join(parts)
 
 
 def _option_text(value: object) -> str:
     if isinstance(value, tuple):
-        return ",".join(_option_text(item) for item in value)
+        return ",".join(_option_text(number) for number in value)
     return f"{value:g}" if isinstance(value, float) and float(f"{value:g}") == value else str(value)
 
 
 # Default number of flights of a campaign with a fixed number.
-USUAL_FLIGHTS = 300
+DEFAULT_FLIGHTS = 300
 # Default maximum number of flights of a campaign that stops by itself.
 MAX_FLIGHTS = 5000
 
@@ -98,17 +98,17 @@ class CampaignResult:
 
     @property
     def answer(self) -> Answer:
-        """Answer to the goal, which is that the target is reached, missed, or undecided."""
+        """Answer to the goal: the target is reached, missed, or undecided."""
         return self.summary.estimate.answer
 
     @property
     def by_rule(self) -> dict[str, int]:
-        """Number of flights that failed each rule, for rules that at least one flight failed."""
+        """Number of flights that failed each rule, without rules that no flight failed."""
         return {failures.rule: failures.flights for failures in self.summary.by_rule}
 
     @property
     def flights(self) -> Any:
-        """Table of flights as a pandas DataFrame if pandas is installed, otherwise as arrays by name."""
+        """Table of flights as a pandas DataFrame, or as arrays keyed by name if pandas is not installed."""
         try:
             import pandas as pd
         except ImportError:
@@ -116,15 +116,15 @@ class CampaignResult:
         return pd.DataFrame(dict(self.columns))
 
     def shapes(self) -> dict[str, NDArray[np.float32]]:
-        """Return the path data of each flight, read from the campaign's folder; one row per flight, NaN if unknown.
+        """Read the path data of each flight from the campaign's folder; one row per flight, NaN if unknown.
 
         "clearance": minimum height above ground on each of 150 equal pieces of the route, (n, 150), m.
         "crossings": distance right of and above each stop of the route at closest approach, (n, s, 2), m.
-        Raises ValueError for a campaign without a kept folder.
+        Raises ValueError for a campaign without a folder.
         """
         if self.table is None:
             raise ValueError("shapes: the campaign kept no folder; give it one by out")
-        return read_shapes(self.table)
+        return read_path_arrays(self.table)
 
     def __repr__(self) -> str:
         tally, (low, high) = self.summary.estimate.tally, self.interval
@@ -146,7 +146,7 @@ def make_goal(flights: int | None, prove: float | None, at_least: float | None, 
     if prove is not None and at_least is not None:
         raise ArgumentError("`prove` and `at_least`: give one of them", field="prove", value=prove)
     check_arguments(prove=prove, at_least=at_least, confidence=confidence, flights=flights)
-    flight_count = flights or (USUAL_FLIGHTS if prove is None else MAX_FLIGHTS)
+    flight_count = flights or (DEFAULT_FLIGHTS if prove is None else MAX_FLIGHTS)
     return Goal(
-        prove if prove is not None else at_least, prove is not None, flight_count, confidence or USUAL_CONFIDENCE
+        prove if prove is not None else at_least, prove is not None, flight_count, confidence or DEFAULT_CONFIDENCE
     )

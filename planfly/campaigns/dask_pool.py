@@ -17,15 +17,15 @@ from distributed import CancelledError, KilledWorker, WorkerPlugin, get_worker
 
 from planfly.campaigns.campaign_base import CampaignBase
 from planfly.campaigns.flight_requests import (
-    LOST,
-    MAX_FAILURES,
+    LOST_REASON,
+    MAX_WORKER_DEATHS,
     CampaignCopy,
     FinishedFlight,
     FlightRequest,
     FlyOne,
     fingerprint,
 )
-from planfly.campaigns.flight_row import FlightRow, fly_one, lost_row
+from planfly.campaigns.flight_row import FlightRow, fly_one, make_lost_row
 from world.errors import PlanflyError
 from world.interruption import Interrupted
 
@@ -35,7 +35,7 @@ _CONNECT_SECONDS = 20
 _TASK_NAME_COUNT = 4096
 
 
-def connect(address: str) -> Any:
+def connect_client(address: str) -> Any:
     """Return a `distributed.Client` of a scheduler, with the security settings of dask's configuration.
 
     Raises OSError and ValueError if no scheduler answers.
@@ -113,10 +113,10 @@ class DaskPool:
                 row = self._result_row(future, request)
                 if row is None:
                     abandoned_counts[request] += 1
-                if row is None and abandoned_counts[request] < MAX_FAILURES:
+                if row is None and abandoned_counts[request] < MAX_WORKER_DEATHS:
                     send(request)
                 else:
-                    yield FinishedFlight(request, row or lost_row(self._base, request.index, LOST))
+                    yield FinishedFlight(request, row or make_lost_row(self._base, request.index, LOST_REASON))
                     send_requests()
                 # Release it after the next task was sent, because dask makes a new record for a kind without tasks.
                 future.release()

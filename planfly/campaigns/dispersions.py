@@ -37,7 +37,7 @@ class Quantity(NamedTuple):
     name: name of the quantity's table in a dispersions file, and of its column in the table of flights.
     combine: "added" if it is added to the value of the scenario, or "factor" if it multiplies that value.
     unit: unit of an added value; "" for a factor.
-    low, high: minimum and maximum value that may be drawn; values beyond them are not realistic.
+    low, high: minimum and maximum value that may be drawn; values outside this range are unrealistic.
     integer: True for a number of steps, with a discrete distribution.
     title: name shown to the user.
     """
@@ -56,7 +56,7 @@ class Quantity(NamedTuple):
         return 1.0 if self.combine == "factor" else 0.0
 
 
-# All numbers of a flight are drawn in this order, even if they do not vary, so that a quantity does not affect others.
+# All numbers of a flight are drawn in this order, even if they do not vary, so that no quantity affects another.
 QUANTITIES = (
     Quantity("wind_speed", "added", "m/s", -40.0, 40.0, "wind speed"),
     Quantity("wind_from", "added", "deg", -180.0, 180.0, "wind direction"),
@@ -72,9 +72,9 @@ QUANTITIES = (
     Quantity("start_up", "added", "m", -100.0, 100.0, "start, height"),
 )
 # Quantities by name.
-BY_NAME = {quantity.name: quantity for quantity in QUANTITIES}
+QUANTITY_BY_NAME = {quantity.name: quantity for quantity in QUANTITIES}
 # Names of the quantities, in the order of the draws.
-NAMES = tuple(BY_NAME)
+NAMES = tuple(QUANTITY_BY_NAME)
 
 
 # Quantities that draws of the whole aircraft replace.
@@ -84,9 +84,9 @@ _DRAWS_TABLE = "aircraft"
 # Minimum fraction of a distribution within the range of its quantity; the rest of the distribution is never drawn.
 MIN_FRACTION_INSIDE = 0.99
 # Maximum size of a dispersions file, bytes.
-MAX_BYTES = 100_000
+MAX_DISPERSIONS_BYTES = 100_000
 # Name of the default dispersions in messages and reports.
-DEFAULT = "planfly's default dispersions"
+DEFAULT_DISPERSIONS_NAME = "planfly's default dispersions"
 
 
 class SpreadError(PlanflyError):
@@ -115,7 +115,7 @@ class Varying:
 
     @cached_property
     def _range_limits(self) -> tuple[float, float]:
-        """Return the values of the distribution function just below the quantity's range and at its upper end."""
+        """Return the values of the distribution function just below and at the upper end of the quantity's range."""
         min_value = self.quantity.low - (0.5 if self.quantity.integer else 0.0)
         return float(self._distribution.cdf(min_value)), float(self._distribution.cdf(self.quantity.high))
 
@@ -126,16 +126,16 @@ class Varying:
         return upper_probability - lower_probability
 
     def value(self, fraction: float) -> float:
-        """Return the inverse distribution function at a fraction, 0 to 1, of the distribution within the range.
+        """Return the value below which a fraction, 0 to 1, of the distribution within the range lies.
 
-        >>> mass = Varying(BY_NAME["mass"], "uniform", (("loc", 0.9), ("scale", 0.2)), "by hand")
+        >>> mass = Varying(QUANTITY_BY_NAME["mass"], "uniform", (("loc", 0.9), ("scale", 0.2)), "by hand")
         >>> round(mass.value(0.25), 6)
         0.95
         """
         return float(self.values(np.array([fraction]))[0])
 
     def values(self, fractions: Floats) -> Floats:
-        """Return the values at many fractions of the distribution, (n,), as `value` does.  fractions: (n,)."""
+        """Return the value for each of several fractions, like `value`.  fractions: (n,)."""
         lower_probability, upper_probability = self._range_limits
         values = self._distribution.ppf(lower_probability + fractions * (upper_probability - lower_probability))
         return np.clip(values, self.quantity.low, self.quantity.high)
@@ -194,13 +194,14 @@ def default_dispersions() -> Dispersions:
     ['wind_speed', 'wind_from', 'wind_gradient']
     """
     text = (resources.files("planfly.campaigns") / "default_dispersions.toml").read_text(encoding="utf-8")
-    return parse_dispersions(text, DEFAULT)
+    return parse_dispersions(text, DEFAULT_DISPERSIONS_NAME)
 
 
 def read_dispersions(path: Path) -> Dispersions:
     """Read a dispersions file.  Raises SpreadError for a file that cannot be read or used."""
     return parse_dispersions(
-        utf8_text(read_small_file(path, MAX_BYTES, "dispersions", SpreadError), path, SpreadError), str(path)
+        utf8_text(read_small_file(path, MAX_DISPERSIONS_BYTES, "dispersions", SpreadError), path, SpreadError),
+        str(path),
     )
 
 
@@ -220,45 +221,55 @@ def parse_dispersions(text: str, name: str) -> Dispersions:
     except ValueError as error:
         raise SpreadError(f"{name}: {' '.join(str(error).split())}", file=name) from None
     aircraft = tables.pop(_DRAWS_TABLE, None)
-    unknown = [key for key in tables if key not in BY_NAME]
-    if unknown:
+    unknown_names = [key for key in tables if key not in QUANTITY_BY_NAME]
+    if unknown_names:
         allowed = f"unknown; it is one of {', '.join((*NAMES, _DRAWS_TABLE))}"
-        raise SpreadError.at(name, unknown[0], tables[unknown[0]], allowed, shown="")
-    varying = tuple(_parse_quantity(BY_NAME[key], tables[key], name) for key in NAMES if key in tables)
+        raise SpreadError.at(name, unknown_names[0], tables[unknown_names[0]], allowed, shown="")
+    varying = tuple(_parse_quantity(QUANTITY_BY_NAME[key], tables[key], name) for key in NAMES if key in tables)
     if not varying and aircraft is None:
         raise SpreadError(f"{name}: nothing varies; give at least one of {', '.join(NAMES)}", file=name)
     if aircraft is None:
         return Dispersions(varying, name)
-    for varied in varying:
-        if varied.quantity.name in QUANTITIES_OF_DRAWS:
+    for quantity_dispersion in varying:
+        if quantity_dispersion.quantity.name in QUANTITIES_OF_DRAWS:
             raise SpreadError.at(
-                name, varied.quantity.name, None, f"cannot be combined with [{_DRAWS_TABLE}] draws", shown=""
+                name,
+                quantity_dispersion.quantity.name,
+                None,
+                f"cannot be combined with [{_DRAWS_TABLE}] draws",
+                shown="",
             )
     return Dispersions(varying, name, _read_named_draws(aircraft, name))
 
 
-def _read_named_draws(table: Any, name: str) -> Draws:
+def _read_named_draws(aircraft_table: Any, name: str) -> Draws:
     """Return the aircraft's draws from the file that a dispersions file names, relative to the dispersions file."""
-    file_name = table.get("draws") if isinstance(table, dict) else None
-    if not isinstance(file_name, str) or not file_name or (isinstance(table, dict) and len(table) > 1):
+    file_name = aircraft_table.get("draws") if isinstance(aircraft_table, dict) else None
+    if (
+        not isinstance(file_name, str)
+        or not file_name
+        or (isinstance(aircraft_table, dict) and len(aircraft_table) > 1)
+    ):
         allowed = 'expected only a file of draws, such as draws = "mine/draws.csv"'
-        raise SpreadError.at(name, f"{_DRAWS_TABLE}.draws", table, allowed, shown="")
+        raise SpreadError.at(name, f"{_DRAWS_TABLE}.draws", aircraft_table, allowed, shown="")
     return read_draws(Path(name).parent / Path(file_name).expanduser(), SpreadError)
 
 
-def _parse_quantity(quantity: Quantity, table: Any, name: str) -> Varying:
-    if not isinstance(table, dict):
+def _parse_quantity(quantity: Quantity, quantity_table: Any, name: str) -> Varying:
+    if not isinstance(quantity_table, dict):
         allowed = "expected a table, with distribution, its parameters, and source"
-        raise SpreadError.at(name, quantity.name, table, allowed, shown="")
-    entries = dict(table)
-    distribution, source = entries.pop("distribution", None), entries.pop("source", None)
+        raise SpreadError.at(name, quantity.name, quantity_table, allowed, shown="")
+    parameters = dict(quantity_table)
+    distribution, source = parameters.pop("distribution", None), parameters.pop("source", None)
     _check_distribution(quantity, distribution, name)
     if not isinstance(source, str) or not source.strip():
         allowed = "missing; state the source of the numbers"
         raise SpreadError.at(name, f"{quantity.name}.source", source, allowed, shown="")
-    _check_parameters(str(distribution), entries, name, quantity.name)
-    varying = Varying(quantity, str(distribution), tuple((key, float(value)) for key, value in entries.items()), source)
-    fraction = _checked_fraction_inside(varying, name)
+    _check_parameters(str(distribution), parameters, name, quantity.name)
+    varying = Varying(
+        quantity, str(distribution), tuple((key, float(value)) for key, value in parameters.items()), source
+    )
+    fraction = _compute_fraction_inside(varying, name)
     if not fraction >= MIN_FRACTION_INSIDE:
         allowed = (
             f"{100.0 * fraction:.1f} % of it lies within {quantity.low:g}..{quantity.high:g}"
@@ -304,7 +315,7 @@ def _check_parameters(distribution: str, entries: dict[str, Any], name: str, qua
         raise SpreadError.at(name, f"{quantity}.{missing[0]}", None, reason_missing, shown="")
 
 
-def _checked_fraction_inside(varying: Varying, name: str) -> float:
+def _compute_fraction_inside(varying: Varying, name: str) -> float:
     fraction = varying.fraction_inside
     if math.isnan(fraction):
         allowed = f"parameters that {varying.distribution} cannot have"
@@ -317,7 +328,7 @@ def _call_text(varying: Varying) -> str:
 
 
 # Number of quantiles used to compute the mean and standard deviation of a distribution.
-_QUANTILES = 4096
+_QUANTILE_COUNT = 4096
 
 
 @dataclass(frozen=True, slots=True)
@@ -325,7 +336,7 @@ class Draw:
     """Draw of flight `index` of a campaign.
 
     seed: seed of the turbulence and the navigation error within the flight.
-    values: values of all quantities by name; quantities that do not vary have their nominal value.
+    values: values of all quantities, keyed by name; quantities that do not vary have their nominal value.
     """
 
     index: int
@@ -388,7 +399,7 @@ def standard_population(dispersions: Dispersions, count: int) -> Floats:
 
 
 def _draw_fractions(seed: int, index: int) -> tuple[Floats, int]:
-    """Draw a fraction of the distribution of each of `QUANTITIES`, 0 to 1, and the seed used within the flight."""
+    """Draw the fraction of each quantity's distribution, 0 to 1, and the seed used within the flight."""
     random = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(index,)))
     return random.random(len(QUANTITIES)), int(random.integers(2**63))
 
@@ -398,10 +409,10 @@ def _standardise(dispersions: Dispersions, fractions: Floats) -> Floats:
 
     The deviations are in standard deviations.
     """
-    quantiles = (np.arange(_QUANTILES) + 0.5) / _QUANTILES
+    quantiles = (np.arange(_QUANTILE_COUNT) + 0.5) / _QUANTILE_COUNT
     columns = []
-    for k, varying in enumerate(dispersions.varying):
+    for column, varying in enumerate(dispersions.varying):
         values = varying.values(quantiles)
         if (deviation := float(values.std())) > 0.0:
-            columns.append((varying.values(fractions[:, k]) - values.mean()) / deviation)
+            columns.append((varying.values(fractions[:, column]) - values.mean()) / deviation)
     return np.column_stack(columns) if columns else np.zeros((len(fractions), 0))

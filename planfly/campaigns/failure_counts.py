@@ -55,6 +55,6 @@ def failure_lines(by_rule: Iterable[RuleFailures]) -> list[str]:
     """Return a line for each failed rule, with the number of flights and the places where most of them failed."""
     lines = []
     for failures in by_rule:
-        where = ", ".join(f"{place_text(place)} in {count}" for place, count in failures.places[:3])
-        lines.append(f"  failed  {RULE_WORDS[failures.rule].title} in {failures.flights}: {where}")
+        places_text = ", ".join(f"{place_text(place)} in {count}" for place, count in failures.places[:3])
+        lines.append(f"  failed  {RULE_WORDS[failures.rule].title} in {failures.flights}: {places_text}")
     return lines

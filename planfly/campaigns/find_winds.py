@@ -1,4 +1,4 @@
-"""Find the strongest wind from each direction in which a mission flies, by rounds of the most informative flights."""
+"""Find the strongest wind from each direction in which a mission is flyable, by rounds of informative flights."""
 
 import math
 from collections.abc import Callable, Hashable
@@ -32,18 +32,18 @@ from planfly.campaigns.tables import (
 from planfly.campaigns.worker_pool import FlightRate, WorkerPool, Workers, worker_pool
 
 # Target for half the width of a boundary's interval, m/s.
-ACCURACY = 0.25
-# Minimum number of flights of a direction.  If all of them are flyable, at most one in fifty fails (95 %).  With fewer
-# flights the fit gives intervals that are too narrow.
-FEWEST = 150
+BOUNDARY_ACCURACY_MPS = 0.25
+# Minimum number of flights in each direction.  If all of them are flyable, at most one in fifty fails (95 %).  With
+# fewer flights the intervals of the fit are too narrow.
+MIN_FLIGHTS_PER_DIRECTION = 150
 # Number of points that represent the distribution of all drawn quantities.
-_POPULATION = 4096
+_POPULATION_SIZE = 4096
 # Approximate number of flights of a round; workers wait for the end of each round.
 _FLIGHTS_PER_ROUND = 48
 # Minimum number of flights of one direction in a round.
 _MIN_FLIGHTS_EACH = 3
 # Maximum number of flights of one direction in a round.
-_MAX_EACH = 6
+_MAX_FLIGHTS_EACH = 6
 # Growth of the number of flights between two checks of an open direction, because the posterior is slow to compute.
 _CHECK_GROWTH_RATIO = 1.04
 # Dispersed quantities that the wind of the search replaces.
@@ -64,30 +64,30 @@ class WindsGoal:
 
 
 # Default number of flights of a search.
-USUAL_WIND_FLIGHTS = 5000
+DEFAULT_WIND_FLIGHTS = 5000
 
 
 def flight_limit(requested: int | None, folder: Path, *, resume: bool) -> int:
-    """Return the requested maximum number of flights; without a request, the folder's stored number, or the default.
+    """Return the maximum number of flights: the requested number, or the number stored in the folder, or the default.
 
     Raises StoreError for a file that planfly did not write, or that another process has locked.
     """
     settings = read_stored_settings(folder / WINDS_DATABASE) if resume else {}
-    return int(settings.get("flights", USUAL_WIND_FLIGHTS)) if requested is None else requested
+    return int(settings.get("flights", DEFAULT_WIND_FLIGHTS)) if requested is None else requested
 
 
-# Boundary below which a mission does not fly with the target probability even in calm air, m/s; it is printed as 0.0.
+# Boundary below which a mission is not flyable with the target probability even in calm air, m/s; printed as 0.0.
 CALM_MPS = 0.05
 
 
 @dataclass(frozen=True)
 class CalmFailures:
-    """Failures in the weakest wind flown, in directions in which the mission fails even in calm air.
+    """Failures in the weakest wind flown, for directions in which the mission fails even in calm air.
 
     speed: speed of this wind, m/s.
     flights: number of flights in this wind.
-    failed: number of these flights that failed.
-    by_rule: rules and places that these flights failed; empty if none failed or none could be flown.
+    failed: number of failed flights among them.
+    by_rule: failures by rule and place; empty if no flight failed or could be flown.
     """
 
     speed: float
@@ -103,7 +103,7 @@ class WindsFound:
     flights: direction, wind speed, m/s, and True if flyable, of each flight.
     lost: indices, from 0, of the flights that could not be flown; they are treated as not flyable.
     conditions: conditions of the flights, without the wind, which depends on the direction.
-    calm: failures in calm air, if the mission does not fly in it with the target probability; None otherwise.
+    calm: failures in calm air if the mission is not flyable in calm air with the target probability; None otherwise.
     """
 
     goal: WindsGoal
@@ -144,27 +144,27 @@ def find_winds(
     advance: Advance | None = None,
     fly: FlyOne = fly_one,
 ) -> WindsFound:
-    """Fly rounds of flights until each boundary is known well enough or all flights are used.
+    """Fly rounds of flights until each boundary is known accurately enough, or all flights are used.
 
-    Flights in the table are not flown again.  The winds of a round depend only on the earlier rounds, so that the
-    result is the same for any number of workers and of interruptions.  Flights completed before an error or Ctrl-C stay
-    in the table.
+    Flights in the table are not flown again.  The winds of a round depend only on the earlier rounds, so the result is
+    the same for any number of workers and interruptions.  Flights completed before an error or Ctrl-C stay in the
+    table.
 
     base: campaign base, whose dispersions must not contain `SEARCHED_QUANTITIES`.
     """
-    search, stored = _Search(goal, base), _StoredFlights(store)
-    progress = _Pace(search, len(stored.flown), advance)
+    search, stored_flights = _Search(goal, base), _StoredFlights(store)
+    progress = _Pace(search, len(stored_flights.flown), advance)
     with ExitStack() as stack:
         pool: WorkerPool | None = None
         while requests := search.next_round():
-            if missing_requests := stored.missing(requests):
+            if missing_requests := stored_flights.missing(requests):
                 if pool is None:
                     # Report before the workers start, because the start takes seconds.
-                    progress.begin(len(stored.flown))
+                    progress.report_start(len(stored_flights.flown))
                 pool = pool or stack.enter_context(worker_pool(workers, base, fly))
-                _fly_round(pool, search, missing_requests, stored, progress)
+                _fly_round(pool, search, missing_requests, stored_flights, progress)
             for request in requests:
-                search.add_result(request, stored.flown[request.number])
+                search.add_result(request, stored_flights.flown[request.number])
     progress.report(len(search.flown), is_last=True)
     return search.result()
 
@@ -175,23 +175,24 @@ class _Search:
     def __init__(self, goal: WindsGoal, base: CampaignBase) -> None:
         self.goal, self._base = goal, base
         drawn_numbers = DrawnNumbers(
-            standard_population(base.dispersions, _POPULATION), partial(standard_draws, base.dispersions, base.seed)
+            standard_population(base.dispersions, _POPULATION_SIZE),
+            partial(standard_draws, base.dispersions, base.seed),
         )
         self.directions = [
             Direction(goal.most, goal.target, drawn_numbers, goal.confidence) for _ in range(goal.directions)
         ]
         self.open = list(range(goal.directions))
         # Number of flights of each direction at which it is checked next.
-        self._next_check = [FEWEST] * goal.directions
+        self._next_check = [MIN_FLIGHTS_PER_DIRECTION] * goal.directions
         self.flown: list[tuple[int, float, bool]] = []
         self.lost: list[int] = []
         # Failed rules and places of each flight.
         self._failed: list[tuple[tuple[str, Place], ...]] = []
 
     def next_round(self) -> list[RequestedFlight]:
-        """Return the flights to fly next; empty if all boundaries are known or all flights are used."""
+        """Return the requests of the next round; empty if all boundaries are known or all flights are used."""
         self.open = [number for number in self.open if self._is_open(number)]
-        flights_each = max(_MIN_FLIGHTS_EACH, min(_MAX_EACH, _FLIGHTS_PER_ROUND // max(1, len(self.open))))
+        flights_each = max(_MIN_FLIGHTS_EACH, min(_MAX_FLIGHTS_EACH, _FLIGHTS_PER_ROUND // max(1, len(self.open))))
         requests: list[RequestedFlight] = []
         for number in self.open:
             for speed, draw in next_flights(self.directions[number], flights_each):
@@ -204,27 +205,27 @@ class _Search:
         if count < self._next_check[index]:
             return True
         self._next_check[index] = math.ceil(_CHECK_GROWTH_RATIO * count)
-        return needs_more_flights(direction.boundary(), count, ACCURACY, FEWEST)
+        return needs_more_flights(direction.boundary(), count, BOUNDARY_ACCURACY_MPS, MIN_FLIGHTS_PER_DIRECTION)
 
-    def add_result(self, request: RequestedFlight, flown: FlownFlight) -> None:
+    def add_result(self, request: RequestedFlight, flight: FlownFlight) -> None:
         """Add the result of a flight; flights must be added in the order in which they were requested."""
-        flyable = flown.outcome == "flyable"
-        failures: set[Hashable] = {_failure_key(rule, place) for rule, place in flown.failed} or {flown.outcome}
-        failed = frozenset() if flyable else frozenset(failures)
+        flyable = flight.outcome == "flyable"
+        failure_keys: set[Hashable] = {_failure_key(rule, place) for rule, place in flight.failed} or {flight.outcome}
+        failed_keys = frozenset() if flyable else frozenset(failure_keys)
         margins: dict[Hashable, float] | None = {
-            _failure_key(rule, place): fraction for rule, place, fraction in flown.narrow
+            _failure_key(rule, place): fraction for rule, place, fraction in flight.narrow
         }
-        if flown.outcome == "lost" or any(rule == "completion" for rule, _ in flown.failed):
+        if flight.outcome == "lost" or any(rule == "completion" for rule, _ in flight.failed):
             # The rules that the flight would have passed if it had continued are unknown.
             margins = None
-        self.directions[request.direction].add(request.speed, request.draw, failed, margins)
+        self.directions[request.direction].add(request.speed, request.draw, failed_keys, margins)
         self.flown.append((request.direction, request.speed, flyable))
-        self._failed.append(flown.failed)
-        if flown.outcome == "lost":
+        self._failed.append(flight.failed)
+        if flight.outcome == "lost":
             self.lost.append(request.number)
 
     def request(self, requested_flight: RequestedFlight) -> FlightRequest:
-        """Return the flight as a request to a worker."""
+        """Make the request to a worker for a flight."""
         return FlightRequest(
             requested_flight.draw,
             GivenWind(requested_flight.speed, 360.0 * requested_flight.direction / self.goal.directions),
@@ -232,7 +233,7 @@ class _Search:
 
     def min_remaining_flights(self) -> int:
         """Return the number of flights until all open directions have the minimum number of flights."""
-        remaining = sum(max(0, FEWEST - len(self.directions[number].speeds)) for number in self.open)
+        remaining = sum(max(0, MIN_FLIGHTS_PER_DIRECTION - len(self.directions[number].speeds)) for number in self.open)
         return min(remaining, self.goal.flights - len(self.flown))
 
     def result(self) -> WindsFound:
@@ -243,35 +244,35 @@ class _Search:
         return WindsFound(self.goal, boundaries, tuple(self.flown), tuple(self.lost), conditions, calm)
 
     def _calm_failures(self, boundaries: tuple[WindBoundary, ...]) -> CalmFailures | None:
-        """Return the failures in the weakest wind flown, for directions whose boundary is calm air, or None."""
+        """Return the failures in the weakest wind flown, for directions whose boundary is calm air; otherwise None."""
         calm_directions = {number for number, boundary in enumerate(boundaries) if boundary.estimate < CALM_MPS}
         numbered_flights = [
             (number, flight) for number, flight in enumerate(self.flown) if flight[0] in calm_directions
         ]
         if not numbered_flights:
             return None
-        weakest = min(speed for _, (_, speed, _) in numbered_flights)
-        numbers = [number for number, (_, speed, _) in numbered_flights if speed == weakest]
-        failed = [self._failed[number] for number in numbers if not self.flown[number][2]]
-        return CalmFailures(weakest, len(numbers), len(failed), count_failures(failed))
+        min_speed = min(speed for _, (_, speed, _) in numbered_flights)
+        numbers = [number for number, (_, speed, _) in numbered_flights if speed == min_speed]
+        failed_findings = [self._failed[number] for number in numbers if not self.flown[number][2]]
+        return CalmFailures(min_speed, len(numbers), len(failed_findings), count_failures(failed_findings))
 
 
 def _failure_key(rule: str, place: Place) -> Hashable:
-    """Return the key of a failure, which is its rule and place."""
+    """Return the key of a failure: its rule and place."""
     return rule, place.kind, place.index
 
 
 class _StoredFlights:
-    """Flights in the table, and their outcomes by number."""
+    """Flights in the table, with their requests and outcomes keyed by number."""
 
     def __init__(self, store: WindsStore) -> None:
-        stored = store.known()
+        stored_flights = store.stored_flights()
         self._store = store
-        self._requests = {number: request for number, (request, _) in stored.items()}
-        self.flown = {number: flown for number, (_, flown) in stored.items()}
+        self._requests = {number: request for number, (request, _) in stored_flights.items()}
+        self.flown = {number: flight for number, (_, flight) in stored_flights.items()}
 
     def missing(self, requests: list[RequestedFlight]) -> list[RequestedFlight]:
-        """Return the requested flights that the table lacks.  Raises StoreError if a number has another request."""
+        """Return the requests that are not in the table.  Raises StoreError if a number has another request there."""
         for request in requests:
             if self._requests.get(request.number, request) != request:
                 path = self._store.path
@@ -288,14 +289,14 @@ def _fly_round(
     pool: WorkerPool,
     search: _Search,
     missing_requests: list[RequestedFlight],
-    stored: _StoredFlights,
+    stored_flights: _StoredFlights,
     progress: "_Pace",
 ) -> None:
-    remaining = iter(missing_requests)
+    remaining_requests = iter(missing_requests)
     requests: dict[FlightRequest, RequestedFlight] = {}
 
     def next_flight_request() -> FlightRequest | None:
-        requested_flight = next(remaining, None)
+        requested_flight = next(remaining_requests, None)
         if requested_flight is None:
             return None
         request = search.request(requested_flight)
@@ -303,8 +304,8 @@ def _fly_round(
         return request
 
     for request, row in pool.fly(next_flight_request):
-        stored.add(requests[request], row)
-        progress.report(len(stored.flown))
+        stored_flights.add(requests[request], row)
+        progress.report(len(stored_flights.flown))
 
 
 class _Pace:
@@ -313,8 +314,8 @@ class _Pace:
     def __init__(self, search: _Search, stored_count: int, advance: Advance | None) -> None:
         self._search, self._advance, self._rate = search, advance, FlightRate(stored_count)
 
-    def begin(self, flight_count: int) -> None:
-        """Report the minimum amount of work before the first flight."""
+    def report_start(self, flight_count: int) -> None:
+        """Report the minimum number of flights before the first flight."""
         if self._advance is not None:
             total = max(len(self._search.flown) + self._search.min_remaining_flights(), flight_count + 1)
             remark = f"{flight_count} of {total} flights at least"
@@ -323,7 +324,7 @@ class _Pace:
     def report(self, flight_count: int, is_last: bool = False) -> None:
         """Report the settled directions, the flights, the flights per minute, and the remaining time if it is known.
 
-        The number of flights beyond `FEWEST` is not known in advance; then no remaining time is given.
+        No remaining time is given beyond `MIN_FLIGHTS_PER_DIRECTION`, because the number of flights is then unknown.
         is_last: True reports even if no report is due.
         """
         if self._advance is None or not (self._rate.is_due() or is_last):

@@ -20,14 +20,14 @@ from world.errors import PlanflyError
 FlyOne = Callable[[CampaignBase, int, GivenWind | None], FlightRow]
 
 # Reason for the end of a flight that could not be flown.
-LOST = "lost: its workers died"
+LOST_REASON = "lost: its workers died"
 # Number of workers that may die on one flight before the flight is lost; the first deaths may have another cause.
-MAX_FAILURES = 3
+MAX_WORKER_DEATHS = 3
 
 
 @dataclass(frozen=True, slots=True)
 class FlightRequest:
-    """Flight to fly, by its index and the mean wind that replaces the scenario's wind, or None to keep that wind."""
+    """Requested flight.  wind: mean wind that replaces the scenario's wind, or None."""
 
     index: int
     wind: GivenWind | None = None
@@ -66,7 +66,7 @@ def code_hash() -> str:
 
 
 def fingerprint(aircraft: str) -> dict[str, str]:
-    """Return the versions and hashes that determine a flight of an aircraft on this machine, by name.
+    """Return the versions and hashes, keyed by name, that determine a flight of an aircraft on this machine.
 
     >>> sorted(fingerprint("aerosonde"))
     ['jsbsim', 'model', 'numba', 'numpy', 'planfly', 'python', 'scipy', 'sources']
@@ -85,7 +85,7 @@ def fingerprint(aircraft: str) -> dict[str, str]:
 
 
 def check_fingerprint(own_fingerprint: dict[str, str], worker_fingerprint: dict[str, str], worker: str) -> None:
-    """Raise WorkerError, which names the worker and the first difference, unless the fingerprints are equal.
+    """Raise WorkerError if the fingerprints differ, with the worker and the first difference.
 
     >>> check_fingerprint({"planfly": "0.1.0"}, {"planfly": "0.0.9"}, "tls://10.0.0.7:4000")
     Traceback (most recent call last):
@@ -113,11 +113,11 @@ class CampaignCopy:
 
     def fly(self, request: FlightRequest, worker: str) -> FlightRow:
         """Fly a flight on this worker.  Raises WorkerError if this worker would fly it differently."""
-        base, fly = self.unpacked(worker)
+        base, fly = self.unpack(worker)
         return replace(fly(base, request.index, request.wind), worker=worker)
 
-    def unpacked(self, worker: str) -> tuple[CampaignBase, FlyOne]:
-        """Return the campaign and the function that flies it.  Raises WorkerError as `fly` does."""
+    def unpack(self, worker: str) -> tuple[CampaignBase, FlyOne]:
+        """Return the campaign and the function that flies it.  Raises WorkerError if this worker's software differs."""
         if self._unpacked is None:
             check_fingerprint(self._own_fingerprint, fingerprint(self._aircraft), worker)
             base, fly = pickle.loads(self._packed)

@@ -21,43 +21,43 @@ from logs.verdict.measures.path_sweeps import path_spheres
 from logs.verdict.places import Place
 from logs.verdict.rule_words import RULE_WORDS
 from logs.verdict.verdict import Verdict
-from planfly.campaigns.campaign_base import CampaignBase, GivenWind, vary
+from planfly.campaigns.campaign_base import CampaignBase, GivenWind, vary_flight
 from planfly.campaigns.dispersions import Draw, draw_flight
 from planfly.workflow.pipeline import fly_and_judge
 from world.arrays import Singles
 from world.scenario import Scenario
 
 # ----------------------------------------------------------------------
-# Find the narrow passes of a flight, because they say more about the risk than the fact that no rule failed.
+# Find the marginal passes of a flight: rules that a flight nearly failed, which show the risk better than a pass alone.
 #
-# A pass is narrow if the distance to the failure of the rule, tolerance included, is less than the scale of the
-# rule's margin.  For a missile, it is narrow if the flight stayed less than `SPHERE_SCALE` outside its sphere.
+# A pass is marginal if the distance to the failure of the rule, including the tolerance, is less than the scale of the
+# rule's margin.  For a missile, it is marginal if the flight came closer than `SPHERE_SCALE_M` to its sphere.
 
 # Scale of the distance outside a missile's sphere, m.
-SPHERE_SCALE = 10.0
+SPHERE_SCALE_M = 10.0
 
-# Rule, place, and margin as a share of the rule's scale, 0 to 1.
-NarrowPass = tuple[str, Place, float]
+# Rule, place, and margin as a fraction of the rule's scale, 0 to 1.
+MarginalPass = tuple[str, Place, float]
 
 
-def narrow_passes(findings: Iterable[Finding], scenario: Scenario, track: Track) -> tuple[NarrowPass, ...]:
-    """Return the rule, place and margin of each narrow pass, in the verdict's order, followed by those at missiles.
+def find_marginal_passes(findings: Iterable[Finding], scenario: Scenario, track: Track) -> tuple[MarginalPass, ...]:
+    """Return rule, place and margin of each marginal pass, in the verdict's order, followed by the passes at missiles.
 
     The margin is 0 if a rule accepts a value beyond its limit for another reason.
     """
     fractions: dict[tuple[str, Place], float] = {}
-    failed = {(finding.rule, finding.place) for finding in findings if finding.ok is False}
+    failed_keys = {(finding.rule, finding.place) for finding in findings if finding.ok is False}
     for finding in findings:
         key = finding.rule, finding.place
         scale = RULE_WORDS[finding.rule].scale
-        if key in failed or not finding.ok or finding.margin is None or scale is None:
+        if key in failed_keys or not finding.ok or finding.margin is None or scale is None:
             continue
         fraction = max(0.0, finding.margin + (finding.tolerance or 0.0)) / scale
         if fraction < 1.0:
             fractions[key] = min(fraction, fractions.get(key, fraction))
     for place, distance in _distances_outside_spheres(scenario, track):
-        if ("threat", place) not in failed and distance < SPHERE_SCALE:
-            fractions["threat", place] = max(0.0, distance) / SPHERE_SCALE
+        if ("threat", place) not in failed_keys and distance < SPHERE_SCALE_M:
+            fractions["threat", place] = max(0.0, distance) / SPHERE_SCALE_M
     return tuple((rule, place, fraction) for (rule, place), fraction in fractions.items())
 
 
@@ -75,17 +75,17 @@ def _distances_outside_spheres(scenario: Scenario, track: Track) -> list[tuple[P
 
 
 # ----------------------------------------------------------------------
-# Data of a flight for the pictures, which are its clearance along the path and its crossing of each waypoint.
+# Data of a flight for the pictures: clearance along the path, and offset at each waypoint.
 
 
 # Number of equal pieces of the route's length; the minimum clearance on each piece is stored.
-STATIONS = 150
+STATION_COUNT = 150
 
 
 def clearance_profile(route: Route, track: Track) -> Singles:
-    """Return the minimum height above ground on each equal piece of the route, m, (STATIONS,); NaN if not flown.
+    """Return the minimum height above ground on each equal piece of the route, m, (STATION_COUNT,); NaN if not flown.
 
-    Each track point is assigned to the nearest place on the leg that was flown at that time.
+    Each track point is assigned to the nearest point of the leg that was flown at that time.
     """
     starts, ends = route.waypoints[:-1, :2], route.waypoints[1:, :2]
     lengths = np.hypot(*(ends - starts).T)
@@ -94,8 +94,8 @@ def clearance_profile(route: Route, track: Track) -> Singles:
     directions = (ends - starts)[leg] / np.maximum(lengths[leg], 1e-9)[:, None]
     distances_along_leg = np.einsum("ij,ij->i", track.position[:, :2] - starts[leg], directions)
     distance = leg_starts[leg] + np.clip(distances_along_leg, 0.0, lengths[leg])
-    piece = np.minimum((distance / leg_starts[-1] * STATIONS).astype(int), STATIONS - 1)
-    min_clearance = np.full(STATIONS, np.inf, dtype=np.float32)
+    piece = np.minimum((distance / leg_starts[-1] * STATION_COUNT).astype(int), STATION_COUNT - 1)
+    min_clearance = np.full(STATION_COUNT, np.inf, dtype=np.float32)
     np.fmin.at(min_clearance, piece, track.clearance)
     return np.where(np.isfinite(min_clearance), min_clearance, np.float32(np.nan)).astype(np.float32)
 
@@ -103,7 +103,7 @@ def clearance_profile(route: Route, track: Track) -> Singles:
 def waypoint_crossings(route: Route, track: Track) -> Singles:
     """Return the distance right of and above each of s stops at closest approach, m, (s, 2); NaN if not reached.
 
-    A stop is a waypoint, or the corner at which a loiter or a return starts; later corners are left out, because their
+    A stop is a waypoint, or the corner at which a loiter or a return starts; later corners are omitted, because their
     number differs between flights.  Right is relative to the mean of the incoming and outgoing courses.
     """
     points = route.waypoints
@@ -111,17 +111,20 @@ def waypoint_crossings(route: Route, track: Track) -> Singles:
     steps = np.diff(points[:, :2], axis=0)
     courses = np.unwrap(np.arctan2(steps[:, 0], steps[:, 1]))
     mean_courses = np.concatenate([courses[:1], 0.5 * (courses[:-1] + courses[1:]), courses[-1:]])
-    first = np.unique(route.stops, return_index=True)[1]
-    for k in first.tolist():
-        point = points[k]
-        near_rows = np.flatnonzero((track.leg == k) | (track.leg == k - 1))
-        was_passed = len(track) and (track.leg.max() >= k or k == len(points) - 1)
+    first_waypoints = np.unique(route.stops, return_index=True)[1]
+    for waypoint in first_waypoints.tolist():
+        point = points[waypoint]
+        near_rows = np.flatnonzero((track.leg == waypoint) | (track.leg == waypoint - 1))
+        was_passed = len(track) and (track.leg.max() >= waypoint or waypoint == len(points) - 1)
         if not near_rows.size or not was_passed:
             continue
         offsets = track.position[near_rows] - point
-        nearest = offsets[np.argmin(offsets[:, 0] ** 2 + offsets[:, 1] ** 2)]
-        crossings[k] = nearest[0] * np.cos(mean_courses[k]) - nearest[1] * np.sin(mean_courses[k]), nearest[2]
-    return crossings[first]
+        nearest_offset = offsets[np.argmin(offsets[:, 0] ** 2 + offsets[:, 1] ** 2)]
+        crossings[waypoint] = (
+            nearest_offset[0] * np.cos(mean_courses[waypoint]) - nearest_offset[1] * np.sin(mean_courses[waypoint]),
+            nearest_offset[2],
+        )
+    return crossings[first_waypoints]
 
 
 # ----------------------------------------------------------------------
@@ -132,8 +135,8 @@ Outcome = Literal["flyable", "not flyable", "lost"]
 
 
 @dataclass(frozen=True, slots=True)
-class LeastMargin:
-    """Value, unit and place of a rule's minimum margin in a flight; the value is None if no margin has a number."""
+class MinimumMargin:
+    """Value, unit and place of a rule's minimum margin in a flight; the value is None if no margin is a number."""
 
     value: float | None
     unit: str
@@ -147,7 +150,7 @@ class Column:
     kind: type and constraint in SQLite.
     write, read: functions that convert the value of the field to the value of the column, and back.
     entry: shape of each entry of an array stored as bytes (a BLOB, float32); () for numbers.
-    same: True if the same flight has the same value on every machine, independent of its computing time.
+    same: True if the value is the same for the same flight on every machine.
     """
 
     kind: str
@@ -157,14 +160,14 @@ class Column:
     entry: tuple[int, ...] = ()
 
 
-def _failed_text(failed: Iterable[tuple[str, Place]]) -> str:
+def _failed_findings_text(failed: Iterable[tuple[str, Place]]) -> str:
     return json.dumps([{"rule": rule, **asdict(place)} for rule, place in failed])
 
 
-def parse_failed(text: str) -> tuple[tuple[str, Place], ...]:
+def parse_failed_findings(text: str) -> tuple[tuple[str, Place], ...]:
     """Parse the rule and place of each failed finding from the text in the column.
 
-    >>> parse_failed('[{"rule": "slope", "kind": "leg", "index": 3}]')[0][1].index
+    >>> parse_failed_findings('[{"rule": "slope", "kind": "leg", "index": 3}]')[0][1].index
     3
     """
     entries = json.loads(text)
@@ -178,7 +181,7 @@ _REAL = Column("REAL NOT NULL")
 # Column of an array stored as bytes.
 _BLOB = Column("BLOB NOT NULL")
 # Column of the failed findings, as JSON.
-_FAILED = Column("TEXT NOT NULL", _failed_text, parse_failed)
+_FAILED = Column("TEXT NOT NULL", _failed_findings_text, parse_failed_findings)
 
 
 @dataclass(frozen=True, slots=True)
@@ -190,7 +193,7 @@ class FlightRow:
 
     ended: "completed", or the reason why the flight ended early.
     failed: rule and place of each failed finding, in the verdict's order.
-    margins: minimum margin by rule, for judged rules whose margin has a scale.
+    margins: minimum margin of each judged rule whose margin has a scale.
     energy_left: remaining energy, Wh; None if nothing was flown.
     duration: duration of the flight, s.
     made_of: hash of all inputs of the flight; "" outside a table.
@@ -198,14 +201,14 @@ class FlightRow:
     flown.
     seconds: computing time, s.
     worker: name of the worker that flew the flight.
-    narrow: narrow passes with their margins; the table of a campaign does not store them.
+    narrow: marginal passes with their margins; the table of a campaign does not store them.
     """
 
     draw: Draw
     outcome: Annotated[Outcome, _TEXT]
     ended: Annotated[str, _TEXT]
     failed: Annotated[tuple[tuple[str, Place], ...], _FAILED] = ()
-    margins: tuple[tuple[str, LeastMargin], ...] = ()
+    margins: tuple[tuple[str, MinimumMargin], ...] = ()
     energy_left: Annotated[float | None, Column("REAL")] = None
     duration: Annotated[float, _REAL] = 0.0
     made_of: Annotated[str, _TEXT] = field(default="", compare=False)
@@ -213,88 +216,90 @@ class FlightRow:
     crossings: Annotated[bytes, Column("BLOB NOT NULL", entry=(2,))] = b""
     seconds: Annotated[float, Column("REAL NOT NULL", same=False)] = 0.0
     worker: Annotated[str, Column("TEXT NOT NULL", same=False)] = ""
-    narrow: tuple[NarrowPass, ...] = ()
+    narrow: tuple[MarginalPass, ...] = ()
 
     @property
     def closeness(self) -> float:
-        """Minimum of all scaled margins, by which the closest calls are sorted; inf if no margin is known."""
-        fractions = (fraction for rule, margin in self.margins if (fraction := scaled_margin(rule, margin)) is not None)
+        """Minimum of all scaled margins, which sorts the closest calls; inf if no margin is known."""
+        fractions = (fraction for rule, margin in self.margins if (fraction := scale_margin(rule, margin)) is not None)
         return min((fraction for fraction in fractions if math.isfinite(fraction)), default=math.inf)
 
 
-def scaled_margin(rule: str, margin: LeastMargin) -> float | None:
+def scale_margin(rule: str, margin: MinimumMargin) -> float | None:
     """Return a margin divided by the scale of its rule, or None if the margin or the scale has no number."""
     scale = RULE_WORDS[rule].scale
     return None if margin.value is None or scale is None else margin.value / scale
 
 
 def _column_fields() -> dict[str, Column]:
-    """Return the columns of `FlightRow` by field name, in order."""
+    """Return the columns of `FlightRow` in order, keyed by field name."""
     hints = get_type_hints(FlightRow, include_extras=True)
     hint_args = {name: get_args(hint) for name, hint in hints.items()}
     return {name: args[-1] for name, args in hint_args.items() if args and isinstance(args[-1], Column)}
 
 
 # Fields of `FlightRow` that are columns, by name.
-FIELDS = _column_fields()
+COLUMN_FIELDS = _column_fields()
 
 
 def fly_one(base: CampaignBase, index: int, wind: GivenWind | None = None, log: Path | None = None) -> FlightRow:
-    """Fly a flight of a campaign, which its index determines, and return its row.
+    """Fly the flight of a campaign with an index, and return its row.
 
     wind: mean wind that replaces the scenario's wind, or None.
     log: file for the recording, or None for no recording.
     """
     start_time = time.perf_counter()
     draw = draw_flight(base.dispersions, base.seed, index)
-    varied = vary(base, draw, wind)
-    flown = fly_and_judge(varied.setup, varied.airframe, log, off_nominal=varied.off_nominal, reference="never")
-    track, route = flown.track, varied.setup.route
+    varied_flight = vary_flight(base, draw, wind)
+    flight = fly_and_judge(
+        varied_flight.setup, varied_flight.airframe, log, off_nominal=varied_flight.off_nominal, reference="never"
+    )
+    track, route = flight.track, varied_flight.setup.route
     has_rows = len(track) > 0
     return FlightRow(
         draw=draw,
-        outcome="flyable" if flown.verdict.flies else "not flyable",
-        ended=flown.ended,
-        failed=failed_findings(flown.verdict),
-        margins=least_margins(flown.verdict.findings),
-        energy_left=varied.setup.battery - float(track.energy[-1]) if has_rows else None,
+        outcome="flyable" if flight.verdict.flies else "not flyable",
+        ended=flight.ended,
+        failed=list_failed_findings(flight.verdict),
+        margins=find_minimum_margins(flight.verdict.findings),
+        energy_left=varied_flight.setup.battery - float(track.energy[-1]) if has_rows else None,
         duration=float(track.time[-1]) if has_rows else 0.0,
         clearance=clearance_profile(route, track).tobytes() if has_rows else b"",
         crossings=waypoint_crossings(route, track).tobytes() if has_rows else b"",
-        narrow=narrow_passes(flown.verdict.findings, varied.setup.scenario, track),
+        narrow=find_marginal_passes(flight.verdict.findings, varied_flight.setup.scenario, track),
         seconds=time.perf_counter() - start_time,
     )
 
 
-def failed_findings(verdict: Verdict) -> tuple[tuple[str, Place], ...]:
-    """Return the rule and place of each failed finding; for an incomplete flight without one, those of completion."""
-    failed = tuple((finding.rule, finding.place) for finding in verdict.findings if finding.ok is False)
-    if failed or verdict.flies:
-        return failed
+def list_failed_findings(verdict: Verdict) -> tuple[tuple[str, Place], ...]:
+    """Return rule and place of each failed finding; of the rule completion for other incomplete flights."""
+    failed_findings = tuple((finding.rule, finding.place) for finding in verdict.findings if finding.ok is False)
+    if failed_findings or verdict.flies:
+        return failed_findings
     return (("completion", Place("flight")),)
 
 
-def least_margins(findings: tuple[Finding, ...]) -> tuple[tuple[str, LeastMargin], ...]:
+def find_minimum_margins(findings: tuple[Finding, ...]) -> tuple[tuple[str, MinimumMargin], ...]:
     """Return the minimum margin of each judged rule, in the order of the verdict.
 
     >>> from logs.verdict.findings import make_finding
     >>> wide, close = (make_finding("slope", Place("leg", 1), ok=True, reason="", margin=m) for m in (9.0, 4.0))
-    >>> least_margins((wide, close))[0][1].value
+    >>> find_minimum_margins((wide, close))[0][1].value
     4.0
     """
-    by_rule: dict[str, list[Finding]] = {}
+    findings_by_rule: dict[str, list[Finding]] = {}
     for finding in findings:
         if finding.ok is not None and RULE_WORDS[finding.rule].scale is not None:
-            by_rule.setdefault(finding.rule, []).append(finding)
-    closest = [closest_to_limit(findings_of_rule) for findings_of_rule in by_rule.values()]
+            findings_by_rule.setdefault(finding.rule, []).append(finding)
+    closest_findings = [closest_to_limit(findings_of_rule) for findings_of_rule in findings_by_rule.values()]
     # A rule that fails for a reason other than its value has no margin.
     return tuple(
-        (finding.rule, LeastMargin(finding.margin, finding.unit, finding.place))
-        for finding in closest
+        (finding.rule, MinimumMargin(finding.margin, finding.unit, finding.place))
+        for finding in closest_findings
         if finding and finding.margin is not None
     )
 
 
-def lost_row(base: CampaignBase, index: int, reason: str) -> FlightRow:
+def make_lost_row(base: CampaignBase, index: int, reason: str) -> FlightRow:
     """Return the row of a flight that could not be flown."""
     return FlightRow(draw_flight(base.dispersions, base.seed, index), "lost", reason)

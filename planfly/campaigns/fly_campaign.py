@@ -8,7 +8,7 @@ from planfly.campaigns.campaign_base import CampaignBase
 from planfly.campaigns.flight_requests import FlightRequest, FlyOne, code_hash
 from planfly.campaigns.flight_row import FlightRow, fly_one
 from planfly.campaigns.statistics.decision import Estimate, Estimator, Goal, Tally
-from planfly.campaigns.tables import DATABASE, Store, StoreError, read_stored_settings
+from planfly.campaigns.tables import CAMPAIGN_DATABASE, Store, StoreError, read_stored_settings
 from planfly.campaigns.worker_pool import FlightRate, WorkerPool, Workers, worker_pool
 
 Advance = Callable[[float, float, str], None]
@@ -18,32 +18,33 @@ Advance = Callable[[float, float, str], None]
 class _FlightTally:
     """Known flights of a campaign, and the tally of the flights before the first missing index.
 
-    beyond: outcomes of the known flights after the first missing index.
+    later_outcomes: outcomes of the known flights after the first missing index.
+    next_index: index of the next flight to request.
     """
 
     estimator: Estimator
     goal: Goal
     tally: Tally = field(default_factory=lambda: Tally(0, 0))
-    beyond: dict[int, str] = field(default_factory=dict)
-    sent: int = 0
-    decided: bool = False
+    later_outcomes: dict[int, str] = field(default_factory=dict)
+    next_index: int = 0
+    is_decided: bool = False
 
     def add(self, index: int, outcome: str) -> None:
         """Add a flight, and decide as soon as the flights before the first missing index allow a decision."""
-        self.beyond[index] = outcome
-        while not self.decided and (next_outcome := self.beyond.pop(self.tally.flown, None)) is not None:
+        self.later_outcomes[index] = outcome
+        while not self.is_decided and (next_outcome := self.later_outcomes.pop(self.tally.flown, None)) is not None:
             self.tally = _with_outcome(self.tally, next_outcome)
-            self.decided = self.goal.stops and self.estimator.decides(self.tally)
+            self.is_decided = self.goal.stops and self.estimator.decides(self.tally)
 
     def next_request(self) -> FlightRequest | None:
         """Return the next flight to send, or None if no flight remains."""
-        self.sent = max(self.sent, self.tally.flown)
-        while self.sent in self.beyond:
-            self.sent += 1
-        if self.decided or self.sent >= self.goal.flights:
+        self.next_index = max(self.next_index, self.tally.flown)
+        while self.next_index in self.later_outcomes:
+            self.next_index += 1
+        if self.is_decided or self.next_index >= self.goal.flights:
             return None
-        self.sent += 1
-        return FlightRequest(self.sent - 1)
+        self.next_index += 1
+        return FlightRequest(self.next_index - 1)
 
 
 def _with_outcome(tally: Tally, outcome: str) -> Tally:
@@ -52,12 +53,12 @@ def _with_outcome(tally: Tally, outcome: str) -> Tally:
 
 
 def resumed_goal(requested: Goal | None, folder: Path, confidence: float | None = None) -> Goal:
-    """Return the goal of a resumed campaign, which is the requested goal, or without a request the stored goal.
+    """Return the goal of a resumed campaign: the requested goal, or the stored goal if none is requested.
 
     confidence: confidence of the goal; None keeps the stored confidence.
     Raises StoreError for a folder without a campaign.
     """
-    path = folder / DATABASE
+    path = folder / CAMPAIGN_DATABASE
     settings = read_stored_settings(path)
     if not settings:
         raise StoreError(f"{path}: no campaign there to continue", file=path)
@@ -73,7 +74,7 @@ def open_store(base: CampaignBase, goal: Goal, folder: Path, *, resume: bool) ->
     Raises StoreError, also if the table has more flights than the goal.
     """
     settings = {"name": base.name, "seed": base.seed, "spread": base.dispersions.to_json(), **asdict(goal)}
-    path = folder / DATABASE
+    path = folder / CAMPAIGN_DATABASE
     return Store(path, f"{base.world_hash()}-{code_hash()}", settings, resume=resume)
 
 
@@ -87,28 +88,29 @@ def fly_campaign(
 ) -> Estimate:
     """Fly the flights missing from the table until the goal has its number of flights or its answer.
 
-    Flights are counted in index order, so that answer and table do not depend on the speed of the workers; flights
-    after the deciding one are deleted.  Flights completed before an error or Ctrl-C stay in the table.
+    Flights are counted in the order of their indices, so that answer and table do not depend on the speed of the
+    workers; flights after the deciding flight are deleted.  Flights completed before an error or Ctrl-C stay in the
+    table.
     """
     estimator = Estimator(goal)
     flight_tally = _FlightTally(estimator, goal)
     for index, outcome in store.outcomes().items():
         if index < goal.flights:
             flight_tally.add(index, outcome)
-    if not flight_tally.decided and flight_tally.tally.flown < goal.flights:
+    if not flight_tally.is_decided and flight_tally.tally.flown < goal.flights:
         progress = _Pace(goal, estimator, flight_tally.tally, advance)
         with worker_pool(workers, base, fly) as pool:
             _fly_remaining(pool, flight_tally, store, progress)
-    store.drop_from(flight_tally.tally.flown)
+    store.delete_flights_from(flight_tally.tally.flown)
     return estimator.estimate(store.tally())
 
 
 def _fly_remaining(pool: WorkerPool, flight_tally: _FlightTally, store: Store, progress: "_Pace") -> None:
-    progress.start(flight_tally.tally)
+    progress.start_timing(flight_tally.tally)
     for _, row in pool.fly(flight_tally.next_request):
         _store_flight(row, flight_tally, store)
         progress.report(flight_tally.tally)
-        if flight_tally.decided:
+        if flight_tally.is_decided:
             break
     progress.report(flight_tally.tally, is_last=True)
 
@@ -123,20 +125,20 @@ class _Pace:
 
     def __init__(self, goal: Goal, estimator: Estimator, stored: Tally, advance: Advance | None) -> None:
         self._goal, self._estimator, self._advance = goal, estimator, advance
-        self.start(stored)
+        self.start_timing(stored)
         if advance is not None:
             # Report before the workers start, because the start takes seconds.
             total = self._total(stored)
             remark = f"{stored.flown} of {total} flights" + (" at least" if goal.stops else "")
             advance(float(stored.flown), float(total), remark)
 
-    def start(self, stored: Tally) -> None:
-        """Start timing, because the workers are ready."""
+    def start_timing(self, stored: Tally) -> None:
+        """Start to measure the rate of flights, because the workers are ready."""
         self._rate = FlightRate(stored.flown)
 
     def _total(self, tally: Tally) -> int:
         """Return the minimum possible total number of flights."""
-        return max(self._estimator.fewest, tally.flown) if self._goal.stops else self._goal.flights
+        return max(self._estimator.min_flights, tally.flown) if self._goal.stops else self._goal.flights
 
     def report(self, tally: Tally, is_last: bool = False) -> None:
         """Report the flights, P with its bounds, flights per minute and remaining time.

@@ -11,15 +11,15 @@ from typing import TYPE_CHECKING
 
 from planfly.campaigns.campaign_base import CampaignBase
 from planfly.campaigns.flight_requests import (
-    LOST,
-    MAX_FAILURES,
+    LOST_REASON,
+    MAX_WORKER_DEATHS,
     CampaignCopy,
     FinishedFlight,
     FlightRequest,
     FlyOne,
     fingerprint,
 )
-from planfly.campaigns.flight_row import FlightRow, fly_one, lost_row
+from planfly.campaigns.flight_row import FlightRow, fly_one, make_lost_row
 from world.errors import PlanflyError
 from world.interruption import children_ignore_sigint, end_children, end_with_parent, uninterrupted
 
@@ -133,10 +133,10 @@ class LocalPool:
                     if row is None:
                         deaths[request] += worker.has_started
                         _end_workers([worker])
-                        if deaths[request] < MAX_FAILURES:
+                        if deaths[request] < MAX_WORKER_DEATHS:
                             retries.append(request)
                             continue
-                        row = lost_row(self._base, request.index, LOST)
+                        row = make_lost_row(self._base, request.index, LOST_REASON)
                     yield FinishedFlight(request, row)
         finally:
             _end_workers(worker for worker, _ in flying.values())

@@ -22,11 +22,11 @@ from world.arrays import Floats
 PLANNED = theme.colour("planned")
 BLUE = theme.colour("second")
 FAIL = theme.colour("fail")
-LIMIT = theme.colour("limit")
-INTERVAL = theme.colour("commanded")
-INK = theme.colour("ink")
-QUIET = theme.colour("quiet")
-GRID = theme.colour("grid")
+LIMIT_COLOUR = theme.colour("limit")
+INTERVAL_COLOUR = theme.colour("commanded")
+INK_COLOUR = theme.colour("ink")
+QUIET_COLOUR = theme.colour("quiet")
+GRID_COLOUR = theme.colour("grid")
 PAPER = theme.colour("paper")
 
 
@@ -38,25 +38,27 @@ MAX_BARS = 14
 
 
 def draw_failures(counts: Sequence[tuple[str, str, int]], flights: int) -> Figure:
-    """Draw bars of the number of failed flights by rule and place, the most frequent first.
+    """Draw a bar chart of the failed flights for each rule and place, the most frequent first.
 
     counts: title of the rule, description of the place, and number of flights.
     flights: total number of flights.
     """
     with clean_style():
-        shown_counts = sorted(counts, key=lambda count: -count[2])[:MAX_BARS]
-        height = 1.4 + 0.32 * max(1, len(shown_counts))
+        bars = sorted(counts, key=lambda count: -count[2])[:MAX_BARS]
+        height = 1.4 + 0.32 * max(1, len(bars))
         figure = new_figure(height)
         axes = figure.add_axes((0.27, 0.6 / height, 0.69, 1.0 - 1.1 / height))
         axes.set_title("Failures by rule and place")
-        for side in ("top", "right"):
-            axes.spines[side].set_visible(False)
-        if not shown_counts:
+        for spine in ("top", "right"):
+            axes.spines[spine].set_visible(False)
+        if not bars:
             axes.set_axis_off()
-            axes.text(0.0, 0.5, f"No flight of {flights} failed.", transform=axes.transAxes, fontsize=11, color=QUIET)
+            axes.text(
+                0.0, 0.5, f"No flight of {flights} failed.", transform=axes.transAxes, fontsize=11, color=QUIET_COLOUR
+            )
             return figure
-        rows = list(range(len(shown_counts)))
-        numbers = [count[2] for count in shown_counts]
+        rows = list(range(len(bars)))
+        numbers = [count[2] for count in bars]
         axes.barh(rows, numbers, height=0.62, color=FAIL)
         for row, number in zip(rows, numbers, strict=True):
             axes.annotate(
@@ -66,9 +68,9 @@ def draw_failures(counts: Sequence[tuple[str, str, int]], flights: int) -> Figur
                 textcoords="offset points",
                 va="center",
                 fontsize=8,
-                color=INK,
+                color=INK_COLOUR,
             )
-        axes.set_yticks(rows, [shorten(f"{rule}, {place}", 38) for rule, place, _ in shown_counts])
+        axes.set_yticks(rows, [shorten(f"{rule}, {place}", 38) for rule, place, _ in bars])
         axes.invert_yaxis()
         axes.set_xlim(0.0, 1.2 * max(numbers))
         axes.set_xlabel(f"flights, of {flights}")
@@ -105,10 +107,10 @@ class Bar:
     slope: float
 
 
-def speed_bins(speed: Floats, flyable: NDArray[np.bool_], confidence: float = 0.95) -> list[SpeedBin]:
-    """Group flights by wind speed; ranges without a flight are left out.  speed: wind speed, m/s, (n,).
+def group_by_speed(speed: Floats, flyable: NDArray[np.bool_], confidence: float = 0.95) -> list[SpeedBin]:
+    """Group flights by wind speed; ranges without a flight are omitted.  speed: wind speed, m/s, (n,).
 
-    >>> [one.flights for one in speed_bins(np.array([0.2, 0.7, 2.5]), np.array([True, False, True]))]
+    >>> [one.flights for one in group_by_speed(np.array([0.2, 0.7, 2.5]), np.array([True, False, True]))]
     [2, 1]
     """
     if not speed.size:
@@ -155,10 +157,10 @@ def draw_probability(bins: Sequence[SpeedBin], target: float | None) -> Figure:
                 textcoords="offset points",
                 ha="center",
                 fontsize=7,
-                color=QUIET,
+                color=QUIET_COLOUR,
             )
         if target is not None:
-            axes.axhline(target, color=LIMIT, linewidth=1.2, linestyle="--")
+            axes.axhline(target, color=LIMIT_COLOUR, linewidth=1.2, linestyle="--")
             axes.annotate(
                 f"target {target:g}",
                 (1.0, target),
@@ -166,7 +168,7 @@ def draw_probability(bins: Sequence[SpeedBin], target: float | None) -> Figure:
                 xytext=(-4, -11),
                 textcoords="offset points",
                 ha="right",
-                color=INK,
+                color=INK_COLOUR,
                 fontsize=8,
             )
         axes.set_ylim(-0.02, 1.05)
@@ -199,7 +201,7 @@ def draw_tornado(bars: Sequence[Bar], rule_title: str) -> Figure:
                 ha="left" if length >= 0.0 else "right",
                 fontsize=8,
             )
-        axes.axvline(0.0, color=INK, linewidth=0.8)
+        axes.axvline(0.0, color=INK_COLOUR, linewidth=0.8)
         axes.set_yticks(list(rows), [bar.title for bar in bars])
         axes.invert_yaxis()
         half_range = max([0.2, *(1.25 * bar.index for bar in bars)])
@@ -207,39 +209,39 @@ def draw_tornado(bars: Sequence[Bar], rule_title: str) -> Figure:
         axes.set_xlabel("share of the margin's variance   (left: more of it leaves less margin; right: more)")
         axes.set_title(f"What decides: first-order sensitivity of the margin of {rule_title}")
         axes.set_xticks([])
-        for side in ("top", "right", "left"):
-            axes.spines[side].set_visible(False)
+        for spine in ("top", "right", "left"):
+            axes.spines[spine].set_visible(False)
         axes.tick_params(left=False)
     return figure
 
 
 def _style_axes(axes: object) -> None:
     if isinstance(axes, Axes):
-        axes.grid(visible=True, color=GRID, linewidth=0.6)
+        axes.grid(visible=True, color=GRID_COLOUR, linewidth=0.6)
         axes.set_axisbelow(True)
-        for side in ("top", "right"):
-            axes.spines[side].set_visible(False)
+        for spine in ("top", "right"):
+            axes.spines[spine].set_visible(False)
 
 
 # ----------------------------------------------------------------------
 # Draw the tracks of the flights, as height above ground along the path and as crossings of each waypoint.
 
 # Lower quantile, upper quantile and opacity of each band of flights, the widest first.
-_BANDS = ((0.0, 1.0, 0.18), (0.05, 0.95, 0.30), (0.25, 0.75, 0.45))
+_QUANTILE_BANDS = ((0.0, 1.0, 0.18), (0.05, 0.95, 0.30), (0.25, 0.75, 0.45))
 # Chi-square of two degrees of freedom at 95 %, which gives the squared half axes of the ellipse in standard deviations.
 _CHI2 = -2.0 * math.log(0.05)
 # Number of panels in a row.
-_COLUMNS = 5
+_PANELS_PER_ROW = 5
 
 
 def draw_clearance_fan(
-    clearance: Floats, failed: NDArray[np.bool_], ground: Floats, length: float, min_clearance: float
+    clearance: Floats, has_failed: NDArray[np.bool_], terrain_altitudes: Floats, length: float, min_clearance: float
 ) -> Figure:
     """Draw the height above ground along the path for all flights, above the profile of the ground.
 
     clearance: minimum clearance of each flight on each of s equal pieces of the path, m, (n, s); NaN if not reached.
-    failed: True for a flight that is not flyable, (n,); at most 30 of them are drawn.
-    ground: terrain altitude, m AMSL, (s,).
+    has_failed: True for a flight that is not flyable, (n,); at most 30 of them are drawn.
+    terrain_altitudes: terrain altitude, m AMSL, (s,).
     length: length of the path, m.
     min_clearance: required clearance, m.
     """
@@ -250,7 +252,7 @@ def draw_clearance_fan(
         stations = clearance.shape[1]
         distance_km = (np.arange(stations) + 0.5) / stations * length / 1000.0
         has_data = np.isfinite(clearance).any(axis=0)
-        for lower_quantile, upper_quantile, alpha in _BANDS:
+        for lower_quantile, upper_quantile, alpha in _QUANTILE_BANDS:
             band = np.full((2, stations), np.nan)
             band[:, has_data] = np.nanquantile(clearance[:, has_data], (lower_quantile, upper_quantile), axis=0)
             label = (
@@ -262,12 +264,12 @@ def draw_clearance_fan(
         median = np.full(stations, np.nan)
         median[has_data] = np.nanmedian(clearance[:, has_data], axis=0)
         upper_axes.plot(distance_km, median, color=BLUE, linewidth=1.4, label="median")
-        for k, row in enumerate(clearance[failed][:30]):
+        for number, row in enumerate(clearance[has_failed][:30]):
             upper_axes.plot(
-                distance_km, row, color=FAIL, linewidth=0.7, alpha=0.8, label="not flyable" if k == 0 else None
+                distance_km, row, color=FAIL, linewidth=0.7, alpha=0.8, label="not flyable" if number == 0 else None
             )
         upper_axes.axhline(
-            min_clearance, color=LIMIT, linewidth=1.4, linestyle="--", label=f"required, {min_clearance:g} m"
+            min_clearance, color=LIMIT_COLOUR, linewidth=1.4, linestyle="--", label=f"required, {min_clearance:g} m"
         )
         upper_axes.set_ylim(bottom=0.0)
         upper_axes.set_ylabel("above ground (m)")
@@ -275,27 +277,29 @@ def draw_clearance_fan(
         upper_axes.set_title("Clearance along the path, over all flights", pad=20.0)
         upper_axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=6, columnspacing=1.0, borderaxespad=0.2)
         upper_axes.tick_params(labelbottom=False)
-        lower_axes.fill_between(distance_km, ground, np.nanmin(ground) - 10.0, color=theme.GROUND[1], linewidth=0.0)
-        lower_axes.plot(distance_km, ground, color=QUIET, linewidth=0.8)
+        lower_axes.fill_between(
+            distance_km, terrain_altitudes, np.nanmin(terrain_altitudes) - 10.0, color=theme.GROUND[1], linewidth=0.0
+        )
+        lower_axes.plot(distance_km, terrain_altitudes, color=QUIET_COLOUR, linewidth=0.8)
         lower_axes.set_xlim(0.0, length / 1000.0)
         lower_axes.set_ylabel("ground (m AMSL)")
         lower_axes.set_xlabel("along the path (km)")
         for axes in (upper_axes, lower_axes):
-            axes.grid(visible=True, color=GRID, linewidth=0.5)
+            axes.grid(visible=True, color=GRID_COLOUR, linewidth=0.5)
             axes.set_axisbelow(True)
-            for side in ("top", "right"):
-                axes.spines[side].set_visible(False)
+            for spine in ("top", "right"):
+                axes.spines[spine].set_visible(False)
     return figure
 
 
-def draw_crossings(crossings: Floats, failed: NDArray[np.bool_]) -> Figure:
+def draw_crossings(crossings: Floats, has_failed: NDArray[np.bool_]) -> Figure:
     """Draw the crossings of each waypoint in a panel, seen along the path, with their 95 % ellipse.
 
     crossings: distance right of and above each waypoint, m, (n, w, 2); NaN if not reached.
-    failed: True for a flight that is not flyable, (n,).
+    has_failed: True for a flight that is not flyable, (n,).
     """
     count = crossings.shape[1]
-    columns = min(_COLUMNS, count)
+    columns = min(_PANELS_PER_ROW, count)
     row_count = -(-count // columns)
     with clean_style():
         figure = new_figure(0.7 + 2.0 * row_count)
@@ -304,30 +308,32 @@ def draw_crossings(crossings: Floats, failed: NDArray[np.bool_]) -> Figure:
         figure.subplots_adjust(
             left=0.07, right=0.98, bottom=0.4 / height, top=1.0 - 0.65 / height, wspace=0.22, hspace=0.35
         )
-        for k, axes in enumerate(panels.ravel()):
-            if k >= count:
+        for waypoint, axes in enumerate(panels.ravel()):
+            if waypoint >= count:
                 axes.set_axis_off()
                 continue
-            points = crossings[:, k]
+            points = crossings[:, waypoint]
             is_reached = np.isfinite(points).all(axis=1)
-            axes.axhline(0.0, color=GRID, linewidth=0.6)
-            axes.axvline(0.0, color=GRID, linewidth=0.6)
+            axes.axhline(0.0, color=GRID_COLOUR, linewidth=0.6)
+            axes.axvline(0.0, color=GRID_COLOUR, linewidth=0.6)
             # Thousands of points, drawn as pixels, in a colour that is visible on light and on dark paper.
-            axes.plot(*points[is_reached & ~failed].T, ".", color=PLANNED, markersize=2.6, alpha=0.8, rasterized=True)
-            axes.plot(*points[is_reached & failed].T, "x", color=FAIL, markersize=3.5)
+            axes.plot(
+                *points[is_reached & ~has_failed].T, ".", color=PLANNED, markersize=2.6, alpha=0.8, rasterized=True
+            )
+            axes.plot(*points[is_reached & has_failed].T, "x", color=FAIL, markersize=3.5)
             half_size = _panel_half_size(points)
             if is_reached.sum() > 2:
                 ellipse = covariance_ellipse(points[is_reached])
                 # Its extents are in metres until it is added to axes.
                 half_size = max(half_size, 1.05 * float(np.abs(ellipse.get_extents().get_points()).max()))
                 axes.add_patch(ellipse)
-            axes.set_title(f"waypoint {k}", fontsize=8.5, pad=3.0)
+            axes.set_title(f"waypoint {waypoint}", fontsize=8.5, pad=3.0)
             axes.set_xlim(-half_size, half_size)
             axes.set_ylim(-half_size, half_size)
             axes.tick_params(labelsize=7)
         title = "Crossings of the waypoints, m right of and above each, with the ellipse of 95 %"
-        figure.text(0.07, 1.0 - 0.3 / height, title, fontsize=11, color=INK)
-        figure.text(0.98, 1.0 - 0.3 / height, "dots flyable, crosses not", fontsize=8, color=QUIET, ha="right")
+        figure.text(0.07, 1.0 - 0.3 / height, title, fontsize=11, color=INK_COLOUR)
+        figure.text(0.98, 1.0 - 0.3 / height, "dots flyable, crosses not", fontsize=8, color=QUIET_COLOUR, ha="right")
     return figure
 
 
@@ -343,8 +349,10 @@ def covariance_ellipse(points: Floats) -> Ellipse:
     values, vectors = np.linalg.eigh(covariance)
     major_axis, minor_axis = (2.0 * math.sqrt(_CHI2 * max(0.0, float(value))) for value in values[::-1])
     angle = math.degrees(math.atan2(vectors[1, 1], vectors[0, 1]))
-    east, up = (float(value) for value in points.mean(axis=0))
-    return Ellipse((east, up), major_axis, minor_axis, angle=angle, fill=False, edgecolor=INK, linewidth=0.9)
+    right, height = (float(value) for value in points.mean(axis=0))
+    return Ellipse(
+        (right, height), major_axis, minor_axis, angle=angle, fill=False, edgecolor=INK_COLOUR, linewidth=0.9
+    )
 
 
 def _panel_half_size(crossings: Floats) -> float:
@@ -357,7 +365,7 @@ def _panel_half_size(crossings: Floats) -> float:
 
 
 @dataclass(frozen=True)
-class Spoke:
+class ChartDirection:
     """Direction of the chart.
 
     from_deg: direction from which the wind blows, degrees.
@@ -376,52 +384,52 @@ class Spoke:
 
 
 def draw_go_no_go(
-    spokes: Sequence[Spoke],
+    directions: Sequence[ChartDirection],
     max_speed: float,
     target: float,
     confidence: float,
     name: str,
     wind: tuple[float, float] | None,
 ) -> Figure:
-    """Draw a polar chart with north up, spokes in the directions of the wind, and speed outwards to ``max_speed`` m/s.
+    """Draw a polar chart of wind direction, north up, and wind speed, up to ``max_speed`` m/s at the edge.
 
-    wind: the scenario's wind, which is drawn as a star, by its speed, m/s, and direction, degrees.
+    wind: speed, m/s, and direction, degrees, of the scenario's wind, which is drawn as a star; or None.
     """
     with clean_style():
         figure = new_figure(7.6)
         axes = figure.add_axes((0.06, 0.07, 0.64, 0.80), projection="polar")
         axes.set_theta_zero_location("N")  # type: ignore[attr-defined]  # of polar axes
         axes.set_theta_direction(-1)  # type: ignore[attr-defined]  # of polar axes
-        angle = np.radians([spoke.from_deg for spoke in spokes] + [spokes[0].from_deg + 360.0])
-        ring = [*spokes, spokes[0]]
+        angle = np.radians([direction.from_deg for direction in directions] + [directions[0].from_deg + 360.0])
+        circle = [*directions, directions[0]]
         fine_angles = np.linspace(angle[0], angle[-1], 720)
 
-        def outline(values: Sequence[float]) -> np.ndarray:
+        def interpolate(values: Sequence[float]) -> np.ndarray:
             return np.interp(fine_angles, angle, values)
 
-        lower, upper = outline([spoke.low for spoke in ring]), outline([spoke.high for spoke in ring])
-        boundary = outline([spoke.boundary for spoke in ring])
+        lower, upper = interpolate([point.low for point in circle]), interpolate([point.high for point in circle])
+        boundary = interpolate([point.boundary for point in circle])
         axes.fill_between(fine_angles, 0.0, lower, color=PLANNED, alpha=0.45, linewidth=0.0)
         axes.fill_between(fine_angles, boundary, max_speed, color=FAIL, alpha=0.13, linewidth=0.0)
-        axes.fill_between(fine_angles, lower, upper, color=INTERVAL, alpha=0.45, linewidth=0.0)
+        axes.fill_between(fine_angles, lower, upper, color=INTERVAL_COLOUR, alpha=0.45, linewidth=0.0)
         # The largest wind of the search is not a limit of the mission.
-        axes.plot(fine_angles, np.where(boundary < max_speed - 1e-6, boundary, np.nan), color=INK, linewidth=1.8)
-        for spoke in spokes:
-            if spoke.reaches:
-                marker = (3, 0, -spoke.from_deg)
+        axes.plot(fine_angles, np.where(boundary < max_speed - 1e-6, boundary, np.nan), color=INK_COLOUR, linewidth=1.8)
+        for direction in directions:
+            if direction.reaches:
+                marker = (3, 0, -direction.from_deg)
                 axes.plot(
-                    np.radians(spoke.from_deg),
+                    np.radians(direction.from_deg),
                     max_speed,
                     marker=marker,
-                    color=QUIET,
+                    color=QUIET_COLOUR,
                     markersize=7,
                     linewidth=0.0,
                     clip_on=False,
                 )
-            for speed, flights, flyable in spoke.flights:
+            for speed, flights, flyable in direction.flights:
                 all_flyable = flights == flyable
                 axes.plot(
-                    np.radians(spoke.from_deg),
+                    np.radians(direction.from_deg),
                     speed,
                     marker="o" if all_flyable else "x",
                     color=BLUE if all_flyable else FAIL,
@@ -430,21 +438,21 @@ def draw_go_no_go(
                     alpha=0.75,
                 )
         if wind is not None:
-            axes.plot(np.radians(wind[1]), wind[0], marker="*", color=INK, markersize=13, markeredgecolor=PAPER)
+            axes.plot(np.radians(wind[1]), wind[0], marker="*", color=INK_COLOUR, markersize=13, markeredgecolor=PAPER)
         axes.set_ylim(0.0, max_speed)
         axes.set_xticks(np.radians(np.arange(0, 360, 45)), ["N", "NE", "E", "SE", "S", "SW", "W", "NW"])
         axes.set_rlabel_position(11.0)  # type: ignore[attr-defined]  # of polar axes
         axes.tick_params(axis="y", labelsize=8)
-        axes.grid(color=GRID, linewidth=0.6)
-        figure.text(0.03, 0.955, f"{name}: in which wind it flies", fontsize=14, color=INK)
+        axes.grid(color=GRID_COLOUR, linewidth=0.6)
+        figure.text(0.03, 0.955, f"{name}: in which wind it flies", fontsize=14, color=INK_COLOUR)
         figure.text(
             0.03,
             0.922,
             f"wind from each direction, m/s; flies with a probability of {target:g} or more",
             fontsize=9,
-            color=QUIET,
+            color=QUIET_COLOUR,
         )
-        open_edge = max_speed if any(spoke.reaches for spoke in spokes) else None
+        open_edge = max_speed if any(direction.reaches for direction in directions) else None
         _draw_legend(figure, target, confidence, wind, open_edge)
     return figure
 
@@ -459,26 +467,28 @@ def _draw_legend(
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
 
-    entries: list[tuple[Artist, str]] = [
+    handles_and_labels: list[tuple[Artist, str]] = [
         (Patch(color=PLANNED, alpha=0.45), f"go: P >= {target:g} also at the\nlow end of the interval"),
-        (Line2D([], [], color=INK, linewidth=1.8), f"boundary, P = {target:g}"),
-        (Patch(color=INTERVAL, alpha=0.45), f"its interval, {100 * confidence:g} %"),
+        (Line2D([], [], color=INK_COLOUR, linewidth=1.8), f"boundary, P = {target:g}"),
+        (Patch(color=INTERVAL_COLOUR, alpha=0.45), f"its interval, {100 * confidence:g} %"),
         (Patch(color=FAIL, alpha=0.13), f"no-go: P < {target:g}"),
         (Line2D([], [], color=BLUE, marker="o", markersize=3, linewidth=0), "flown, all flyable"),
         (Line2D([], [], color=FAIL, marker="x", markersize=4, linewidth=0), "flown, some not"),
     ]
     if open_edge is not None:
-        entries.append(
+        handles_and_labels.append(
             (
-                Line2D([], [], color=QUIET, marker="^", markersize=7, linewidth=0),
+                Line2D([], [], color=QUIET_COLOUR, marker="^", markersize=7, linewidth=0),
                 f"no limit found up to\n{open_edge:g} m/s",
             )
         )
     if wind is not None:
-        entries.append((Line2D([], [], color=INK, marker="*", markersize=11, linewidth=0), "the scenario's wind"))
+        handles_and_labels.append(
+            (Line2D([], [], color=INK_COLOUR, marker="*", markersize=11, linewidth=0), "the scenario's wind")
+        )
     figure.legend(
-        [handle for handle, _ in entries],
-        [label for _, label in entries],
+        [handle for handle, _ in handles_and_labels],
+        [label for _, label in handles_and_labels],
         loc="center left",
         bbox_to_anchor=(0.735, 0.45),
         fontsize=9,
@@ -487,7 +497,7 @@ def _draw_legend(
 
 
 # ----------------------------------------------------------------------
-# Lay out the pictures for phones, so narrow that their letters stay readable.
+# Lay out the pictures for phones, with readable text.
 
 # Width of a picture, in.
 NARROW_WIDTH_IN = 5.0
@@ -496,7 +506,7 @@ _EDGE_IN = 0.15
 # Height of a line of a legend, in.
 _LEGEND_LINE_IN = 0.34
 # Number of panels in a row.
-_NARROW_COLUMNS = 3
+_NARROW_PANELS_PER_ROW = 3
 # Size of a panel, in.
 _PANEL_IN = 1.1
 # Size of a panel with its title and numbers, in.
@@ -508,7 +518,7 @@ _LINE_SPACING_RATIO = 1.3
 
 
 def narrow_figure(figure: Figure) -> Figure:
-    """Lay out a picture of this module `NARROW_WIDTH_IN` inches wide, with wrapped text and the legends below.
+    """Lay out a picture of this module with a width of `NARROW_WIDTH_IN`, wrapped text, and the legends below.
 
     >>> float(narrow_figure(draw_failures([("slopes", "leg 2", 3)], 9)).get_figwidth())
     5.0
@@ -525,15 +535,15 @@ def narrow_figure(figure: Figure) -> Figure:
         text_height += _wrap_text(text, NARROW_WIDTH_IN - 2.0 * _EDGE_IN)
     boxes: list[tuple[float, float, float, float]] = []  # left, top from the picture's top, width, height, in
     if any(axes.name == "polar" for axes in panels):
-        side = NARROW_WIDTH_IN - 1.0
-        boxes = [(0.5, text_height + 0.4, side, side)]
-        height = text_height + side + 0.9 + legend_height
+        chart_size = NARROW_WIDTH_IN - 1.0
+        boxes = [(0.5, text_height + 0.4, chart_size, chart_size)]
+        height = text_height + chart_size + 0.9 + legend_height
     elif any(axes.get_subplotspec() is not None for axes in panels):
-        step = (NARROW_WIDTH_IN - _EDGE_IN) / _NARROW_COLUMNS
-        for k in range(len(panels)):
-            row, column = divmod(k, _NARROW_COLUMNS)
+        step = (NARROW_WIDTH_IN - _EDGE_IN) / _NARROW_PANELS_PER_ROW
+        for number in range(len(panels)):
+            row, column = divmod(number, _NARROW_PANELS_PER_ROW)
             boxes.append((0.4 + step * column, text_height + 0.3 + _PANEL_STEP_IN * row, _PANEL_IN, _PANEL_IN))
-        height = text_height + 0.3 + _PANEL_STEP_IN * -(-len(panels) // _NARROW_COLUMNS)
+        height = text_height + 0.3 + _PANEL_STEP_IN * -(-len(panels) // _NARROW_PANELS_PER_ROW)
     else:
         title_height = label_height = 0.0
         for axes in figure.axes:
@@ -578,7 +588,7 @@ def _left_title(axes: Axes) -> list[Text]:
 
 
 def _wrap_text(text: Text, width: float) -> float:
-    """Break a text into lines of at most `width`, in, and return the height of all lines, in, or 0 without a line."""
+    """Break a text into lines of at most `width`, in; return the total height of the lines, in."""
     size = float(text.get_fontsize()) / 72.0
     lines = textwrap.wrap(text.get_text(), max(10, int(width / (_LETTER_WIDTH_RATIO * size))))
     text.set_text("\n".join(lines))

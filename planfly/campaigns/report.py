@@ -21,22 +21,28 @@ from logs.verdict.wording import place_text
 from logs.views.drawing import page_svg, png_bytes
 from logs.views.report.page import page_template
 from planfly.campaigns.campaign_base import CampaignBase
-from planfly.campaigns.dispersions import BY_NAME
+from planfly.campaigns.dispersions import QUANTITY_BY_NAME
 from planfly.campaigns.failure_counts import failure_lines, failures_document
-from planfly.campaigns.find_winds import ACCURACY, CALM_MPS, FEWEST, CalmFailures, WindsFound
-from planfly.campaigns.flight_row import STATIONS, FlightRow, fly_one
+from planfly.campaigns.find_winds import (
+    BOUNDARY_ACCURACY_MPS,
+    CALM_MPS,
+    MIN_FLIGHTS_PER_DIRECTION,
+    CalmFailures,
+    WindsFound,
+)
+from planfly.campaigns.flight_row import STATION_COUNT, FlightRow, fly_one
 from planfly.campaigns.fly_campaign import open_store
 from planfly.campaigns.pictures import (
     Bar,
-    Spoke,
+    ChartDirection,
     draw_clearance_fan,
     draw_crossings,
     draw_failures,
     draw_go_no_go,
     draw_probability,
     draw_tornado,
+    group_by_speed,
     narrow_figure,
-    speed_bins,
 )
 from planfly.campaigns.statistics.decision import Estimate, Goal, Tally, lower_bound, wilson
 from planfly.campaigns.statistics.wind_boundary import needs_more_flights
@@ -44,11 +50,11 @@ from planfly.campaigns.summary import (
     CampaignSummary,
     campaign_lines,
     closest_text,
-    log_name,
-    summarise,
+    summarise_campaign,
     summary_json,
+    worst_flight_log_name,
 )
-from planfly.campaigns.tables import DATABASE, WINDS_DATABASE, Store, check_not_locked, is_same_flight
+from planfly.campaigns.tables import CAMPAIGN_DATABASE, WINDS_DATABASE, Store, check_not_locked, is_same_flight
 from planfly.workflow.make_plan import Advance
 from planfly.workflow.open_flight import make_setup
 from planner.plan import plan_json
@@ -56,7 +62,7 @@ from world.errors import ArgumentError, PlanflyError
 from world.files import write_whole
 
 # Maximum number of flights drawn in the pictures of tracks; more flights do not change the pictures visibly.
-_MAX_DRAWN = 3000
+_MAX_DRAWN_FLIGHTS = 3000
 
 
 def campaign_page(base: CampaignBase, summary: CampaignSummary, store: Store, command: str) -> bytes:
@@ -81,21 +87,23 @@ def campaign_page(base: CampaignBase, summary: CampaignSummary, store: Store, co
                 "; ".join(f"{RULE_WORDS[rule].title} at {place_text(place)}" for rule, place in row.failed[:4])
                 or row.ended,
                 closest_text(row),
-                log_name(row) if row.duration > 0.0 else "",
+                worst_flight_log_name(row) if row.duration > 0.0 else "",
             )
             for row in summary.worst
         ],
         drawn=summary.dispersions.get("aircraft"),
         dispersions=[
             (
-                BY_NAME[name].title,
-                BY_NAME[name].combine if BY_NAME[name].combine == "factor" else BY_NAME[name].unit,
+                QUANTITY_BY_NAME[name].title,
+                QUANTITY_BY_NAME[name].combine
+                if QUANTITY_BY_NAME[name].combine == "factor"
+                else QUANTITY_BY_NAME[name].unit,
                 ", ".join(f"{key} {value:g}" for key, value in table.items() if key not in ("distribution", "source")),
                 table["distribution"],
                 table["source"],
             )
             for name, table in summary.dispersions.items()
-            if name in BY_NAME
+            if name in QUANTITY_BY_NAME
         ],
         pictures=pictures,
         command=command,
@@ -110,13 +118,13 @@ def _render_page(template: str, **values: object) -> str:
 
 
 def winds_page(name: str, figure: Figure, winds: WindsFound, rows: Sequence[tuple[str, ...]], command: str) -> bytes:
-    """Return the page of a go/no-go chart, and change the figure to its narrow layout."""
+    """Return the page of a go/no-go chart.  Changes the figure to the narrow layout."""
     picture = _draw_both_widths(figure, "Go/no-go chart: wind from each direction")
     page = _render_page(
         "winds.html",
         name=name,
         picture=picture,
-        answer=winds_state(winds),
+        answer=answer_state(winds),
         lines=wind_lines(winds),
         rows=rows,
         command=command,
@@ -125,17 +133,17 @@ def winds_page(name: str, figure: Figure, winds: WindsFound, rows: Sequence[tupl
 
 
 def _draw_both_widths(figure: Figure, caption: str) -> Markup:
-    """Return a picture for a page in two widths, for desktops and phones; change the figure to the narrow layout."""
-    wide = page_svg(figure, caption)
-    narrow = page_svg(narrow_figure(figure), f"{caption} (narrow)")
-    return Markup(f'<div class="wide">{wide}</div><div class="narrow">{narrow}</div>')
+    """Return a picture for a page in two widths, for desktops and phones.  Changes the figure to the narrow layout."""
+    wide_svg = page_svg(figure, caption)
+    narrow_svg = page_svg(narrow_figure(figure), f"{caption} (narrow)")
+    return Markup(f'<div class="wide">{wide_svg}</div><div class="narrow">{narrow_svg}</div>')
 
 
 def _draw_pictures(base: CampaignBase, summary: CampaignSummary, store: Store) -> list[tuple[Figure, str]]:
-    """Draw the figures of the report, and return them with their captions."""
+    """Draw the figures of the report; return each with its caption."""
     flyable = np.array([outcome == "flyable" for outcome in store.outcomes().values()])
     speed = np.maximum(0.0, base.scenario.wind.speed + store.column("wind_speed"))
-    bins = speed_bins(speed, flyable, summary.goal.confidence)
+    bins = group_by_speed(speed, flyable, summary.goal.confidence)
     counts = [
         (RULE_WORDS[entry.rule].title, place_text(place), count)
         for entry in summary.by_rule
@@ -145,7 +153,9 @@ def _draw_pictures(base: CampaignBase, summary: CampaignSummary, store: Store) -
         (draw_probability(bins, summary.goal.target), "Share of flyable flights against the mean wind's speed"),
     ]
     if summary.deciding:
-        bars = [Bar(BY_NAME[entry.quantity].title, entry.index, entry.slope) for entry in summary.sensitivities]
+        bars = [
+            Bar(QUANTITY_BY_NAME[entry.quantity].title, entry.index, entry.slope) for entry in summary.sensitivities
+        ]
         figures.append((draw_tornado(bars, RULE_WORDS[summary.deciding].title), "What the deciding margin depends on"))
     if counts:
         failures = draw_failures(counts, summary.estimate.tally.flown)
@@ -157,33 +167,35 @@ def _draw_tracks(base: CampaignBase, store: Store) -> list[tuple[Figure, str]]:
     """Draw the clearance fan and the crossings of the flights that have a track."""
     setup = make_setup(base.scenario, base.airframe, base.mission, base.seed, plan=base.plan, placed=base.placed)
     points = setup.route.waypoints
-    shapes = [np.frombuffer(data, np.float32) for data in store.blobs("clearance", _MAX_DRAWN)]
-    if not shapes:
+    clearances = [np.frombuffer(data, np.float32) for data in store.blobs("clearance", _MAX_DRAWN_FLIGHTS)]
+    if not clearances:
         return []
     outcomes = [
         outcome != "flyable"
         for outcome, has_track in zip(store.texts("outcome"), store.has_track(), strict=True)
         if has_track
     ]
-    failed = np.array(outcomes[: len(shapes)])
+    has_failed = np.array(outcomes[: len(clearances)])
     figures = []
     if base.scenario.terrain is not None:
         lengths = np.hypot(*np.diff(points[:, :2], axis=0).T)
         leg_starts = np.concatenate([[0.0], np.cumsum(lengths)])
-        distances = (np.arange(STATIONS) + 0.5) / STATIONS * leg_starts[-1]
+        distances = (np.arange(STATION_COUNT) + 0.5) / STATION_COUNT * leg_starts[-1]
         east, north = (np.interp(distances, leg_starts, points[:, axis]) for axis in range(2))
-        ground = base.scenario.terrain.height(east, north)
+        terrain_altitudes = base.scenario.terrain.height(east, north)
         min_clearance = base.scenario.limits.min_clearance_m
         figure = draw_clearance_fan(
-            np.array(shapes, dtype=np.float64), failed, ground, float(leg_starts[-1]), min_clearance
+            np.array(clearances, dtype=np.float64), has_failed, terrain_altitudes, float(leg_starts[-1]), min_clearance
         )
         figures.append((figure, "Height above ground along the path, over all flights, and the ground itself"))
-    crossings = [np.frombuffer(data, np.float32).reshape(-1, 2) for data in store.blobs("crossings", _MAX_DRAWN)]
-    # The number of stops on a return depends on the wind, so flights without the further stops have NaN.
+    crossings = [
+        np.frombuffer(data, np.float32).reshape(-1, 2) for data in store.blobs("crossings", _MAX_DRAWN_FLIGHTS)
+    ]
+    # The number of stops on a return depends on the wind; flights with fewer stops have NaN for the others.
     all_crossings = np.full((len(crossings), max(map(len, crossings)), 2), np.nan)
     for row, flight_crossings in zip(all_crossings, crossings, strict=True):
         row[: len(flight_crossings)] = flight_crossings
-    figures.append((draw_crossings(all_crossings, failed), "Where flights crossed each waypoint"))
+    figures.append((draw_crossings(all_crossings, has_failed), "Where flights crossed each waypoint"))
     return figures
 
 
@@ -192,7 +204,7 @@ def _draw_tracks(base: CampaignBase, store: Store) -> list[tuple[Figure, str]]:
 
 # Files that a campaign or a search for winds writes into its folder, and removes when it is replaced.
 CAMPAIGN_FILES = (
-    *(f"{table}{ending}" for table in (DATABASE, WINDS_DATABASE) for ending in ("", "-wal", "-shm")),
+    *(f"{table}{ending}" for table in (CAMPAIGN_DATABASE, WINDS_DATABASE) for ending in ("", "-wal", "-shm")),
     "summary.json",
     "report.html",
     "winds.json",
@@ -235,13 +247,13 @@ class OutputDirectory:
             raise PlanflyError(f"{folder}: holds another campaign; overwrite=True replaces it", file=folder)
         raise PlanflyError(f"{folder}: exists and is not empty; overwrite=True replaces its results", file=folder)
 
-    def open(self, open_base: Callable[[Path | None], CampaignBase]) -> CampaignBase:
-        """Return the opened campaign base, and clear its folder unless the campaign is resumed.
+    def open_base_and_clear(self, open_base: Callable[[Path | None], CampaignBase]) -> CampaignBase:
+        """Open the campaign base, and clear the folder unless the campaign is resumed.
 
-        The plan of a scenario is stored in the folder, from which the campaign can be resumed later.
+        The plan of a scenario is stored in the folder, so that the campaign can be resumed later.
 
-        open_base: returns the base, from the plan file of a resumed campaign, if there is one.
-        Raises PlanflyError, without changes to a folder that is refused.
+        open_base: opens the base, with the plan file of a resumed campaign, or with None.
+        Raises PlanflyError before the folder is changed.
         """
         self.check_contents()
         plan_file = self.folder / "plan.json"
@@ -275,8 +287,8 @@ def clear_campaign(folder: Path) -> None:
     Raises StoreError, and removes nothing, if another process has locked the table.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    for table in (DATABASE, WINDS_DATABASE):
-        check_not_locked(folder / table)
+    for table_name in (CAMPAIGN_DATABASE, WINDS_DATABASE):
+        check_not_locked(folder / table_name)
     for path in (*(folder / name for name in CAMPAIGN_FILES), *_worst_flight_logs(folder)):
         path.unlink(missing_ok=True)
 
@@ -295,12 +307,12 @@ def write_files(
 ) -> None:
     """Write ``summary.json``, ``report.html`` and the worst flights' logs; remove logs of other flights."""
     (folder / "worst").mkdir(exist_ok=True)
-    kept_logs = {folder / log_name(row) for row in summary.worst}
+    kept_logs = {folder / worst_flight_log_name(row) for row in summary.worst}
     for path in _worst_flight_logs(folder):
         if path not in kept_logs:
             path.unlink()
     for count, row in enumerate(summary.worst):
-        path = folder / log_name(row)
+        path = folder / worst_flight_log_name(row)
         if row.duration > 0.0 and not path.exists():
             fly_row_again(base, row, path)
         if advance is not None:
@@ -312,8 +324,7 @@ def write_files(
 def fly_row_again(base: CampaignBase, row: FlightRow, log: Path) -> FlightRow:
     """Repeat a flight of the table, and record it in a log.
 
-    Raises PlanflyError if the result differs from the table, because another machine, which computed differently, flew
-    it.
+    Raises PlanflyError if the result differs from the table, because another machine computed it differently.
     """
     new_row = fly_one(base, row.draw.index, log=log)
     if not is_same_flight(row, new_row):
@@ -326,30 +337,32 @@ def fly_row_again(base: CampaignBase, row: FlightRow, log: Path) -> FlightRow:
 # Write the data, picture and page of a go/no-go chart.
 
 # Schema of ``winds.json``.
-SCHEMA = "planfly.winds/1"
+WINDS_SCHEMA = "planfly.winds/1"
 
 
-def spokes(winds: WindsFound) -> list[Spoke]:
+def make_spokes(winds: WindsFound) -> list[ChartDirection]:
     """Return the spokes of the go/no-go chart, one for each direction."""
-    chart = []
+    directions = []
     for number, boundary in enumerate(winds.boundaries):
         counts: dict[float, list[bool]] = {}
         for direction, speed, flyable in winds.flights:
             if direction == number:
                 counts.setdefault(speed, []).append(flyable)
         marks = tuple((speed, len(outcomes), sum(outcomes)) for speed, outcomes in sorted(counts.items()))
-        chart.append(
-            Spoke(winds.from_deg(number), boundary.estimate, boundary.low, boundary.high, boundary.beyond, marks)
+        directions.append(
+            ChartDirection(
+                winds.from_deg(number), boundary.estimate, boundary.low, boundary.high, boundary.beyond, marks
+            )
         )
-    return chart
+    return directions
 
 
 def write_winds(folder: Path, base: CampaignBase, winds: WindsFound, command: str) -> None:
     """Write ``winds.json``, ``winds.png`` and ``winds.html``."""
-    goal, chart = winds.goal, spokes(winds)
+    goal, directions = winds.goal, make_spokes(winds)
     wind = base.scenario.wind
     scenario_wind = (wind.speed, math.degrees(wind.from_course)) if wind.speed else None
-    figure = draw_go_no_go(chart, goal.most, goal.target, goal.confidence, base.name, scenario_wind)
+    figure = draw_go_no_go(directions, goal.most, goal.target, goal.confidence, base.name, scenario_wind)
     rows = [
         (
             f"{spoke.from_deg:g}°",
@@ -357,10 +370,10 @@ def write_winds(folder: Path, base: CampaignBase, winds: WindsFound, command: st
             _interval_text(spoke.low, spoke.high, goal.most),
             str(sum(count for _, count, _ in spoke.flights)),
         )
-        for spoke in chart
+        for spoke in directions
     ]
     data = {
-        "schema": SCHEMA,
+        "schema": WINDS_SCHEMA,
         "name": base.name,
         "seed": base.seed,
         "target": goal.target,
@@ -379,7 +392,7 @@ def write_winds(folder: Path, base: CampaignBase, winds: WindsFound, command: st
                     for speed, count, flyable in spoke.flights
                 ],
             }
-            for spoke in chart
+            for spoke in directions
         ],
         "calm": None if winds.calm is None else _calm_document(winds.calm),
         "spread": base.dispersions.to_json(),
@@ -416,12 +429,14 @@ def _unsettled_directions(winds: WindsFound) -> list[int]:
     """Return the directions with too few flights."""
     counts = Counter(direction for direction, _, _ in winds.flights)
     return [
-        k for k, boundary in enumerate(winds.boundaries) if needs_more_flights(boundary, counts[k], ACCURACY, FEWEST)
+        k
+        for k, boundary in enumerate(winds.boundaries)
+        if needs_more_flights(boundary, counts[k], BOUNDARY_ACCURACY_MPS, MIN_FLIGHTS_PER_DIRECTION)
     ]
 
 
-def winds_state(winds: WindsFound) -> str:
-    """Return the state of the answer: "missed" in calm air, "undecided" for lack of flights, "" for boundaries."""
+def answer_state(winds: WindsFound) -> str:
+    """Return the state of the answer: "missed" in calm air, "undecided" with too few flights, otherwise ""."""
     calm = winds.calm
     if calm is not None and wilson(calm.flights - calm.failed, calm.flights)[1] < winds.goal.target:
         return "missed"
@@ -435,7 +450,8 @@ def _unsettled_lines(winds: WindsFound) -> list[str]:
         return []
     return [
         f"not settled: {len(unsettled)} of {len(winds.boundaries)} directions, for lack of flights: each needs"
-        f" at least {FEWEST}, and an interval of {2.0 * ACCURACY:g} m/s; with fewer, the interval is mostly assumption"
+        f" at least {MIN_FLIGHTS_PER_DIRECTION}, and an interval of {2.0 * BOUNDARY_ACCURACY_MPS:g} m/s; with fewer,"
+        " the interval is mostly assumption"
     ]
 
 
@@ -453,12 +469,12 @@ def _lost_lines(winds: WindsFound) -> list[str]:
     ]
 
 
-def _none_failed_lines(winds: WindsFound) -> list[str]:
-    """Return a line about directions without a failure, with the probability that their flights alone prove."""
+def _lines_without_failures(winds: WindsFound) -> list[str]:
+    """Return a line about directions without a failure, with the probability that is proved by these flights only."""
     max_speed, confidence = winds.goal.most, winds.goal.confidence
     counts_at_max = Counter(direction for direction, speed, _ in winds.flights if speed == max_speed)
-    failed = {direction for direction, _, flyable in winds.flights if not flyable}
-    counts = [counts_at_max[k] for k in range(len(winds.boundaries)) if k not in failed and counts_at_max[k]]
+    failed_directions = {direction for direction, _, flyable in winds.flights if not flyable}
+    counts = [counts_at_max[k] for k in range(len(winds.boundaries)) if k not in failed_directions and counts_at_max[k]]
     if not counts:
         return []
     min_count, probability_text = min(counts), f"{lower_bound(Tally(min(counts), 0), confidence):.3g}"
@@ -479,20 +495,25 @@ def _calm_lines(winds: WindsFound) -> list[str]:
 
 def _winds_answer(winds: WindsFound) -> str:
     """Return the answer of a search in a line, with the lowest and the highest boundary."""
-    chart, target = spokes(winds), winds.goal.target
-    lowest, highest = (select(chart, key=lambda spoke: spoke.boundary) for select in (min, max))
+    directions, target = make_spokes(winds), winds.goal.target
+    lowest_direction, highest_direction = (
+        select(directions, key=lambda spoke: spoke.boundary) for select in (min, max)
+    )
     max_speed, percent = winds.goal.most, f"{100 * winds.goal.confidence:g} %"
-    best_text = f"{_speed_text(highest.boundary, max_speed)} from {highest.from_deg:g}°"
+    best_text = f"{_speed_text(highest_direction.boundary, max_speed)} from {highest_direction.from_deg:g}°"
     if winds.calm is None:
         return (
-            f"flies with P >= {target:g}, by best estimate, in wind up to {_speed_text(lowest.boundary, max_speed)}"
-            f" from {lowest.from_deg:g}° (the lowest; {_interval_text(lowest.low, lowest.high, max_speed)} m/s"
+            f"flies with P >= {target:g}, by best estimate, in wind up to"
+            f" {_speed_text(lowest_direction.boundary, max_speed)}"
+            f" from {lowest_direction.from_deg:g}° (the lowest;"
+            f" {_interval_text(lowest_direction.low, lowest_direction.high, max_speed)} m/s"
             f" at {percent}), {best_text}"
         )
-    if highest.boundary < CALM_MPS:
+    if highest_direction.boundary < CALM_MPS:
         return f"does not fly with P >= {target:g}, by best estimate, even in calm air"
     return (
-        f"does not fly with P >= {target:g}, by best estimate, in wind from {lowest.from_deg:g}° even in calm air;"
+        f"does not fly with P >= {target:g}, by best estimate, in wind from {lowest_direction.from_deg:g}° even in calm"
+        " air;"
         f" it flies in wind up to {best_text}"
     )
 
@@ -504,7 +525,7 @@ def wind_lines(winds: WindsFound) -> list[str]:
         _winds_answer(winds),
         *_calm_lines(winds),
         *(() if winds.conditions is None else flown_lines(winds.conditions)),
-        *_none_failed_lines(winds),
+        *_lines_without_failures(winds),
         *_unsettled_lines(winds),
         *_lost_lines(winds),
         f"{len(winds.flights)} flights; intervals at {percent}, by the flights of each direction",
@@ -518,12 +539,12 @@ def wind_lines(winds: WindsFound) -> list[str]:
 def finish_campaign(
     base: CampaignBase, goal: Goal, estimate: Estimate, folder: Path, command: str, advance: Advance | None = None
 ) -> CampaignSummary:
-    """Summarise a campaign from the table in its folder, which no process may have locked, and write its files.
+    """Summarise a campaign from the unlocked table in its folder, and write its files.
 
     command: the command line that repeats the campaign, for the report.
     Raises a `world.errors.PlanflyError`, or OSError for a full disk.
     """
     with open_store(base, goal, folder, resume=True) as store:
-        summary = summarise(base, goal, estimate, store)
+        summary = summarise_campaign(base, goal, estimate, store)
         write_files(folder, base, summary, store, command, advance)
     return summary

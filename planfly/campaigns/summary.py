@@ -12,23 +12,23 @@ from logs.verdict.places import Place
 from logs.verdict.rule_words import RULE_WORDS
 from logs.verdict.wording import place_text
 from planfly.campaigns.campaign_base import CampaignBase
-from planfly.campaigns.dispersions import BY_NAME
+from planfly.campaigns.dispersions import QUANTITY_BY_NAME
 from planfly.campaigns.failure_counts import RuleFailures, count_failures, failure_lines, failures_document
-from planfly.campaigns.flight_row import FlightRow, scaled_margin
-from planfly.campaigns.statistics.decision import Estimate, Goal, first_order, rank_slope
+from planfly.campaigns.flight_row import FlightRow, scale_margin
+from planfly.campaigns.statistics.decision import Estimate, Goal, first_order_index, rank_slope
 from planfly.campaigns.tables import Store
 
 # Schema of ``summary.json``.
-SCHEMA = "planfly.campaign-summary/1"
+SUMMARY_SCHEMA = "planfly.campaign-summary/1"
 # Minimum share of a margin's variance that a quantity must explain to be named.
 _MIN_NAMED_FRACTION = 0.05
 # Number of worst flights with a log.
-WORST = 10
+WORST_FLIGHT_COUNT = 10
 
 
 @dataclass(frozen=True)
 class Sensitivity:
-    """Share of the variance of a rule's minimum margin that a quantity explains, and the sign of its effect.
+    """Fraction of the variance of a rule's minimum margin that a quantity explains, and the sign of its effect.
 
     index: first-order index, 0 to 1.
     slope: rank correlation, negative if an increase of the quantity reduces the margin.
@@ -46,8 +46,8 @@ class CampaignSummary:
     deciding: the rule that fails most often; if no rule fails, the rule with the smallest reliability index, which is
     the mean of its margins divided by their standard deviation (Cornell, "A probability-based structural code", ACI
     Journal 66, 1969); "" if there is no such rule.
-    conditions: nominal conditions of the flights, which are aircraft, weather, world and autopilot.
-    low_margin: margin of the deciding rule that one flight in twenty falls below, in `unit`; None if unknown.
+    conditions: nominal conditions of the flights: aircraft, weather, world and autopilot.
+    low_margin: 5 % quantile of the margin of the deciding rule, in `unit`; None if unknown.
     """
 
     name: str
@@ -66,10 +66,10 @@ class CampaignSummary:
     conditions: Conditions
 
 
-def summarise(base: CampaignBase, goal: Goal, estimate: Estimate, store: Store) -> CampaignSummary:
+def summarise_campaign(base: CampaignBase, goal: Goal, estimate: Estimate, store: Store) -> CampaignSummary:
     """Summarise a campaign in one pass through its table."""
     by_rule = _count_failures(store)
-    worst = tuple(store.closest(WORST))
+    worst_rows = tuple(store.worst_flights(WORST_FLIGHT_COUNT))
     deciding, low_margin = _deciding_rule(store, by_rule)
     return CampaignSummary(
         name=base.name,
@@ -80,9 +80,9 @@ def summarise(base: CampaignBase, goal: Goal, estimate: Estimate, store: Store) 
         lost=tuple(index for index, outcome in store.outcomes().items() if outcome == "lost"),
         deciding=deciding,
         low_margin=low_margin,
-        unit=next((margin.unit for row in worst for rule, margin in row.margins if rule == deciding), ""),
+        unit=next((margin.unit for row in worst_rows for rule, margin in row.margins if rule == deciding), ""),
         sensitivities=_sensitivities(base, store, deciding),
-        worst=worst,
+        worst=worst_rows,
         dispersions=base.dispersions.to_json(),
         made_of=store.made_of,
         conditions=base.conditions(),
@@ -91,7 +91,10 @@ def summarise(base: CampaignBase, goal: Goal, estimate: Estimate, store: Store) 
 
 def _count_failures(store: Store) -> tuple[RuleFailures, ...]:
     failed_lists = map(json.loads, store.texts("failed"))
-    return count_failures([(entry.pop("rule"), Place(**entry)) for entry in failed] for failed in failed_lists)
+    return count_failures(
+        [(failed_finding.pop("rule"), Place(**failed_finding)) for failed_finding in failed_findings]
+        for failed_findings in failed_lists
+    )
 
 
 def _deciding_rule(store: Store, by_rule: tuple[RuleFailures, ...]) -> tuple[str, float | None]:
@@ -123,16 +126,16 @@ def _sensitivities(base: CampaignBase, store: Store, rule: str) -> tuple[Sensiti
         name = varying.quantity.name
         values = store.column(name)[is_known]
         sensitivities.append(
-            Sensitivity(name, first_order(values, margin[is_known]), rank_slope(values, margin[is_known]))
+            Sensitivity(name, first_order_index(values, margin[is_known]), rank_slope(values, margin[is_known]))
         )
     return tuple(sorted(sensitivities, key=lambda sensitivity: -sensitivity.index))
 
 
 def summary_json(summary: CampaignSummary) -> str:
-    """Return the text of ``summary.json``, which has no times and workers and so is the same for any workers."""
+    """Return the text of ``summary.json``, without times and workers, so that it does not depend on the workers."""
     estimate = summary.estimate
     data = {
-        "schema": SCHEMA,
+        "schema": SUMMARY_SCHEMA,
         "name": summary.name,
         "seed": summary.seed,
         "target": summary.goal.target,
@@ -174,18 +177,16 @@ def _flight_data(row: FlightRow) -> dict[str, Any]:
         "ended": row.ended,
         "failed": [{"rule": rule, "where": place_text(place)} for rule, place in row.failed],
         "closest": closest_text(row),
-        "drawn": {name: _to_plain_number(value) for name, value in row.draw.values.items() if name in BY_NAME},
+        "drawn": {name: _to_plain_number(value) for name, value in row.draw.values.items() if name in QUANTITY_BY_NAME},
         "seed": row.draw.seed,
-        "log": log_name(row) if row.duration > 0.0 else None,
+        "log": worst_flight_log_name(row) if row.duration > 0.0 else None,
     }
 
 
 def closest_text(row: FlightRow) -> str:
     """Describe the minimum margin of a flight; return "" if no margin is known."""
     scaled_margins = [
-        (fraction, rule, margin)
-        for rule, margin in row.margins
-        if (fraction := scaled_margin(rule, margin)) is not None
+        (fraction, rule, margin) for rule, margin in row.margins if (fraction := scale_margin(rule, margin)) is not None
     ]
     if not scaled_margins:
         return ""
@@ -193,8 +194,8 @@ def closest_text(row: FlightRow) -> str:
     return f"{RULE_WORDS[rule].title} {margin.value:+.1f} {margin.unit} at {place_text(margin.place)}"
 
 
-def log_name(row: FlightRow) -> str:
-    """Return the file name of the log of one of the worst flights."""
+def worst_flight_log_name(row: FlightRow) -> str:
+    """Return the path of a flight's log, relative to the campaign's folder."""
     return f"worst/flight-{row.draw.index:06d}.mcap"
 
 
@@ -231,7 +232,8 @@ def _drivers_text(summary: CampaignSummary) -> str:
     if not drivers:
         return "no single quantity explains it"
     return "of its variance " + ", ".join(
-        f"{BY_NAME[sensitivity.quantity].title} explains {100.0 * sensitivity.index:.0f} %" for sensitivity in drivers
+        f"{QUANTITY_BY_NAME[sensitivity.quantity].title} explains {100.0 * sensitivity.index:.0f} %"
+        for sensitivity in drivers
     )
 
 

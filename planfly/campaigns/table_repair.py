@@ -38,30 +38,32 @@ def checksum(values: Iterable[Any]) -> str:
     return hashlib.blake2b(repr(plain_values).encode("utf-8", "surrogatepass"), digest_size=8).hexdigest()
 
 
-class Examined(NamedTuple):
+class Examination(NamedTuple):
     """Numbers of undamaged and damaged flights, both in ascending order.
 
-    sound: True if SQLite finds no error in the file, even if some rows are damaged.
-    after: last known flight of an unsound file if fewer flights are known than were requested, because later flights
-        may have been lost; -1 if no flight is known; otherwise None.
+    is_sound: True if SQLite finds no error in the file, even if some rows are damaged.
+    last_known: last known flight of an unsound file with fewer known than requested flights, because later flights may
+        have been lost; -1 if no flight is known; otherwise None.
     """
 
-    whole: list[int]
+    undamaged: list[int]
     damaged: list[int]
-    sound: bool = True
-    after: int | None = None
+    is_sound: bool = True
+    last_known: int | None = None
 
     def text(self) -> str:
         """Describe the damage and its consequence.
 
-        >>> Examined([0, 1, 3], [2]).text()
+        >>> Examination([0, 1, 3], [2]).text()
         'flight 2 is damaged and was taken out: 3 flights are intact and stay; --resume flies the missing ones'
         """
-        kept_text = f"{len(self.whole)} flights are intact and stay; --resume flies the missing ones"
+        kept_text = f"{len(self.undamaged)} flights are intact and stay; --resume flies the missing ones"
         later_text = ""
-        if self.after is not None:
+        if self.last_known is not None:
             later_text = (
-                f", and any after flight {self.after} were lost" if self.after >= 0 else ", and no flight is found"
+                f", and any after flight {self.last_known} were lost"
+                if self.last_known >= 0
+                else ", and no flight is found"
             )
         if not self.damaged:
             return f"is damaged{later_text}: {kept_text}"
@@ -75,7 +77,9 @@ class Examined(NamedTuple):
         return f"{damaged_text} and {removed_text}{later_text}: {kept_text}"
 
 
-def examine(connection: sqlite3.Connection, columns: Sequence[str], requested_count: int, max_number: int) -> Examined:
+def examine_table(
+    connection: sqlite3.Connection, columns: Sequence[str], requested_count: int, max_number: int
+) -> Examination:
     """Determine which rows of the table ``flights`` are undamaged, even in a broken file.
 
     columns: columns of the checksum, in order, with the flight's number first.
@@ -102,8 +106,11 @@ def examine(connection: sqlite3.Connection, columns: Sequence[str], requested_co
     )
     last_number = max([-1, *undamaged, *numbers])
     missing = set(range(last_number + 1)) - set(undamaged)
-    return Examined(
-        undamaged, sorted(missing), sound=False, after=last_number if last_number + 1 < requested_count else None
+    return Examination(
+        undamaged,
+        sorted(missing),
+        is_sound=False,
+        last_known=last_number if last_number + 1 < requested_count else None,
     )
 
 
@@ -116,11 +123,11 @@ def _readable_numbers(connection: sqlite3.Connection) -> list[Any]:
     return numbers
 
 
-def _check_rows(rows: Iterable[tuple[Any, ...]]) -> Examined:
-    examined = Examined([], [])
+def _check_rows(rows: Iterable[tuple[Any, ...]]) -> Examination:
+    examination = Examination([], [])
     for *values, stored_checksum in rows:
-        (examined.whole if stored_checksum == checksum(values) else examined.damaged).append(values[0])
-    return examined
+        (examination.undamaged if stored_checksum == checksum(values) else examination.damaged).append(values[0])
+    return examination
 
 
 def _read_row(connection: sqlite3.Connection, query: str, number: int) -> tuple[Any, ...] | None:

@@ -24,27 +24,34 @@ from numpy.typing import NDArray
 from logs.verdict.places import Place
 from logs.verdict.rule_words import RULE_WORDS
 from planfly.campaigns.dispersions import NAMES, Draw
-from planfly.campaigns.flight_row import FIELDS, FlightRow, LeastMargin, NarrowPass, Outcome, parse_failed
+from planfly.campaigns.flight_row import (
+    COLUMN_FIELDS,
+    FlightRow,
+    MarginalPass,
+    MinimumMargin,
+    Outcome,
+    parse_failed_findings,
+)
 from planfly.campaigns.statistics.decision import Tally
-from planfly.campaigns.table_repair import LOCKED_CODES, checksum, copy_undamaged_rows, examine, stored_value
-from planfly.runtime.stages import say
+from planfly.campaigns.table_repair import LOCKED_CODES, checksum, copy_undamaged_rows, examine_table, stored_value
+from planfly.runtime.stages import report_line
 from world.errors import PlanflyError
 
 # ----------------------------------------------------------------------
-# Convert a flight's row to values of the table's columns, and back; `FlightRow`, `RULE_WORDS` and `NAMES` define them.
+# Convert a flight's row to values of the table's columns and back; `FlightRow`, `RULE_WORDS` and `NAMES` define these.
 
 # Columns that may differ between two campaigns with the same flights.
-RUN_DEPENDENT_COLUMNS = tuple(name for name, column in FIELDS.items() if not column.same)
+RUN_DEPENDENT_COLUMNS = tuple(name for name, column in COLUMN_FIELDS.items() if not column.same)
 # Columns with arrays, stored as bytes.
-SHAPES = tuple(name for name, column in FIELDS.items() if column.kind.startswith("BLOB"))
+ARRAY_COLUMNS = tuple(name for name, column in COLUMN_FIELDS.items() if column.kind.startswith("BLOB"))
 
 
 def _row_columns() -> dict[str, str]:
-    """Return the name and kind of each column of a row, in the order of the row's fields."""
+    """Return the kind of each column, keyed by name, in the order of the row's fields."""
     columns = {"seed": "INTEGER NOT NULL", **dict.fromkeys(NAMES, "REAL NOT NULL")}
     for name in FlightRow.__dataclass_fields__:
-        if name in FIELDS:
-            columns[name] = FIELDS[name].kind
+        if name in COLUMN_FIELDS:
+            columns[name] = COLUMN_FIELDS[name].kind
         elif name == "margins":
             for rule in RULE_WORDS.values():
                 columns |= {rule.margin_column: "REAL", rule.place_column: "TEXT"}
@@ -60,7 +67,7 @@ def row_values(row: FlightRow) -> dict[str, Any]:
     """Return the value of each of `ROW_COLUMNS`."""
     values: dict[str, Any] = dict.fromkeys(ROW_COLUMNS)
     values |= {"seed": row.draw.seed, **row.draw.values}
-    values |= {name: column.write(getattr(row, name)) for name, column in FIELDS.items()}
+    values |= {name: column.write(getattr(row, name)) for name, column in COLUMN_FIELDS.items()}
     values["closeness"] = row.closeness if math.isfinite(row.closeness) else None
     for name, margin in row.margins:
         rule = RULE_WORDS[name]
@@ -70,16 +77,16 @@ def row_values(row: FlightRow) -> dict[str, Any]:
 
 
 def make_flight_row(index: int, values: Mapping[str, Any]) -> FlightRow:
-    """Return the row with a draw's index and the given values by column."""
+    """Make the row of a flight.  index: index of its draw.  values: value of each column."""
     margins = []
     for rule in RULE_WORDS.values():
-        if (place := values[rule.place_column]) is not None:
-            data = json.loads(place)
-            margins.append((rule.name, LeastMargin(values[rule.margin_column], data.pop("unit"), Place(**data))))
+        if (place_json := values[rule.place_column]) is not None:
+            data = json.loads(place_json)
+            margins.append((rule.name, MinimumMargin(values[rule.margin_column], data.pop("unit"), Place(**data))))
     return FlightRow(
         draw=Draw(index, values["seed"], {name: values[name] for name in NAMES}),
         margins=tuple(margins),
-        **{name: column.read(values[name]) for name, column in FIELDS.items()},
+        **{name: column.read(values[name]) for name, column in COLUMN_FIELDS.items()},
     )
 
 
@@ -95,7 +102,7 @@ def is_same_flight(first: FlightRow, second: FlightRow) -> bool:
 # ----------------------------------------------------------------------
 # Create the file or open it to resume, lock it for one process, and refuse other contents.
 
-# Maximum number of flights of a table whose settings state none, and of a flight's number in a damaged table.
+# Maximum number of flights in a table without this setting, and maximum flight number in a damaged table.
 _MAX_FLIGHTS = 100_000
 
 
@@ -138,8 +145,8 @@ class LockedTable:
         """Create the table, or open it to resume.
 
         settings: the request, stored in the file.
-        Raises StoreError for a file of another kind or another campaign, or held by another process, and OSError for a
-        full disk.
+        Raises StoreError for a file of another kind or campaign, and for a file that another process has locked;
+        OSError for a full disk.
         """
         self.path, self.made_of, self._kind = path, made_of, kind
         if resume and not path.is_file():
@@ -217,17 +224,17 @@ class LockedTable:
                 )
 
     def _repair(self, stored_settings: dict[str, str]) -> None:
-        """Keep the undamaged flights, report the others, and rewrite the file."""
+        """Rewrite the file with the undamaged flights, and report the damaged flights."""
         # A search may have been resumed with fewer flights than the table contains; all of them are kept.
         requested_count = json.loads(stored_settings["settings"]).get("flights", _MAX_FLIGHTS)
-        examination = examine(
+        examination = examine_table(
             self._connection, tuple(self._kind.columns), requested_count, max(requested_count, self._last_number() + 1)
         )
-        if examination.sound and not examination.damaged:
+        if examination.is_sound and not examination.damaged:
             return
         repaired_path = self.path.with_name(f".{self.path.name}.mended")
         copy_undamaged_rows(
-            self._connection, repaired_path, self._create_statements(), examination.whole, stored_settings
+            self._connection, repaired_path, self._create_statements(), examination.undamaged, stored_settings
         )
         self._connection.close()
         repaired_path.replace(self.path)
@@ -235,10 +242,10 @@ class LockedTable:
             Path(f"{self.path}{ending}").unlink(missing_ok=True)
         self._connection = sqlite3.connect(self.path, timeout=1.0, isolation_level=None)
         self._lock()
-        say(f"{self.path}: {examination.text()}")
+        report_line(f"{self.path}: {examination.text()}")
 
     def _last_number(self) -> int:
-        """Return the largest flight number that can be read from either end of the table, or -1 without any."""
+        """Return the largest flight number that can be read from either end of the table, or -1 without flights."""
         last_number = -1
         for order in ("", " DESC"):
             with suppress(sqlite3.Error, UnicodeDecodeError):
@@ -251,7 +258,7 @@ class LockedTable:
         return last_number
 
     def _check_flight_count(self, settings: Mapping[str, Any]) -> None:
-        """Raise StoreError if the table holds more flights than requested; by default, do nothing."""
+        """Raise StoreError if the table contains more flights than requested; the base class accepts any number."""
 
     def __enter__(self) -> Self:
         """Return the locked table."""
@@ -275,8 +282,8 @@ class LockedTable:
             placeholders = ", ".join("?" * (len(row) + 1))
             self._connection.execute(f"INSERT INTO flights VALUES ({placeholders})", [*row, checksum(row)])
 
-    def drop_from(self, flight: int) -> None:
-        """Delete the flights from a number on, which were still being flown when an earlier flight decided.
+    def delete_flights_from(self, flight: int) -> None:
+        """Delete all flights from a number on, because an earlier flight decided the campaign.
 
         Raises OSError for a table that was removed.
         """
@@ -285,7 +292,7 @@ class LockedTable:
             self._connection.execute("DELETE FROM flights WHERE flight >= ?", (flight,))
 
     def _check_not_removed(self) -> None:
-        """Raise OSError if the file was deleted; on POSIX writing would succeed, but everything would be lost."""
+        """Raise OSError if the file was deleted; on POSIX, writing to it would succeed, but the data would be lost."""
         try:
             is_same_file = os.path.samestat(self.path.stat(), self._file)
         except OSError:
@@ -315,7 +322,7 @@ def read_stored_settings(path: Path) -> dict[str, Any]:
 
 
 def _read_settings(connection: sqlite3.Connection) -> dict[str, str]:
-    """Return the entries of the table ``campaign`` by key."""
+    """Return the entries of the table ``campaign``, keyed by name."""
     connection.text_factory = lambda data: data.decode("utf-8", "surrogateescape")
     return dict(connection.execute("SELECT key, value FROM campaign").fetchall())
 
@@ -345,7 +352,7 @@ def check_not_locked(path: Path) -> None:
 
 
 class converted_errors:
-    """Context that converts SQLite errors about a file, to OSError for a full disk, and to StoreError for others."""
+    """Context that converts SQLite errors about a file: to OSError for a full disk, otherwise to StoreError."""
 
     def __init__(self, path: Path) -> None:
         self._path = path
@@ -376,20 +383,20 @@ class converted_errors:
 # Table of a campaign, with one row per flight, which is read by its index.
 
 # Name of the file with the table of a campaign.
-DATABASE = "campaign.sqlite"
+CAMPAIGN_DATABASE = "campaign.sqlite"
 # Kind of the table of a campaign.
 CAMPAIGN_KIND = TableKind("planfly.campaign", {"flight": "INTEGER PRIMARY KEY", **ROW_COLUMNS})
 # Columns of the table of a campaign.
-COLUMNS = tuple(CAMPAIGN_KIND.columns)
+COLUMN_NAMES = tuple(CAMPAIGN_KIND.columns)
 # Query for whole rows.
-_SELECT = f"SELECT {', '.join(COLUMNS)} FROM flights"
+_SELECT_ROWS = f"SELECT {', '.join(COLUMN_NAMES)} FROM flights"
 
 
 class Store(LockedTable):
     """Table of a campaign, locked by one process at a time; the number of a flight is the index of its draw."""
 
     def __init__(self, path: Path, made_of: str, settings: dict[str, Any], *, resume: bool) -> None:
-        """Create the table, or open it to resume, like `LockedTable`, but not for fewer flights than the table has."""
+        """Create the table, or open it to resume.  Raises StoreError if it contains more flights than requested."""
         super().__init__(path, CAMPAIGN_KIND, made_of, settings, resume=resume)
 
     def _check_flight_count(self, settings: Mapping[str, Any]) -> None:
@@ -402,57 +409,57 @@ class Store(LockedTable):
         self.insert({"flight": row.draw.index, **row_values(replace(row, made_of=self.made_of))})
 
     def outcomes(self) -> dict[int, str]:
-        """Return the outcome of each flight by its index."""
+        """Return the outcome of each flight, keyed by index."""
         return dict(self._connection.execute("SELECT flight, outcome FROM flights ORDER BY flight"))
 
     def column(self, name: str) -> NDArray[np.float64]:
         """Return a column of numbers in the order of flights, (n,); a missing value is NaN."""
-        rows = self._connection.execute(f"SELECT {_checked_column(name)} FROM flights ORDER BY flight")
+        rows = self._connection.execute(f"SELECT {_check_column(name)} FROM flights ORDER BY flight")
         return np.fromiter((math.nan if value is None else value for (value,) in rows), dtype=np.float64)
 
     def texts(self, name: str) -> list[str]:
         """Return a column of texts, in the order of flights."""
         return [
             str(value)
-            for (value,) in self._connection.execute(f"SELECT {_checked_column(name)} FROM flights ORDER BY flight")
+            for (value,) in self._connection.execute(f"SELECT {_check_column(name)} FROM flights ORDER BY flight")
         ]
 
     def blobs(self, name: str, max_count: int) -> list[bytes]:
         """Return a column of arrays as bytes, for at most `max_count` flights that have an array, in order."""
-        query = f"SELECT {_checked_column(name)} FROM flights WHERE LENGTH({name}) > 0 ORDER BY flight LIMIT ?"
+        query = f"SELECT {_check_column(name)} FROM flights WHERE LENGTH({name}) > 0 ORDER BY flight LIMIT ?"
         return [value for (value,) in self._connection.execute(query, (max_count,))]
 
     def has_track(self) -> list[bool]:
-        """Return True for each flight, in order, whose path data are stored."""
+        """Return for each flight, in order, True if its path data are stored."""
         return [
             bool(size) for (size,) in self._connection.execute("SELECT LENGTH(clearance) FROM flights ORDER BY flight")
         ]
 
-    def closest(self, max_count: int) -> list[FlightRow]:
-        """Return the worst flights, first lost flights, then failed flights, then the closest calls by margin."""
+    def worst_flights(self, max_count: int) -> list[FlightRow]:
+        """Return the worst flights: first lost flights, then failed flights, then the closest calls by margin."""
         order = "CASE outcome WHEN 'lost' THEN 0 WHEN 'not flyable' THEN 1 ELSE 2 END, closeness IS NULL, closeness"
-        rows = self._connection.execute(f"{_SELECT} ORDER BY {order}, flight LIMIT ?", (max_count,))
+        rows = self._connection.execute(f"{_SELECT_ROWS} ORDER BY {order}, flight LIMIT ?", (max_count,))
         return [_make_row(values) for values in rows]
 
     def flight(self, index: int) -> FlightRow | None:
         """Return the flight with an index, or None if the table has no such flight."""
-        values = self._connection.execute(f"{_SELECT} WHERE flight = ?", (index,)).fetchone()
+        values = self._connection.execute(f"{_SELECT_ROWS} WHERE flight = ?", (index,)).fetchone()
         return None if values is None else _make_row(values)
 
     def rows(self) -> Iterator[FlightRow]:
         """Yield all flights in order."""
-        for values in self._connection.execute(f"{_SELECT} ORDER BY flight"):
+        for values in self._connection.execute(f"{_SELECT_ROWS} ORDER BY flight"):
             yield _make_row(values)
 
 
-def _checked_column(name: str) -> str:
-    if name not in COLUMNS:
+def _check_column(name: str) -> str:
+    if name not in COLUMN_NAMES:
         raise KeyError(name)
     return name
 
 
 def _make_row(values: tuple[Any, ...]) -> FlightRow:
-    columns = dict(zip(COLUMNS, values, strict=True))
+    columns = dict(zip(COLUMN_NAMES, values, strict=True))
     return make_flight_row(columns["flight"], columns)
 
 
@@ -462,7 +469,7 @@ def _make_row(values: tuple[Any, ...]) -> FlightRow:
 # Name of the file with the table of a search.
 WINDS_DATABASE = "winds.sqlite"
 # Settings that determine the requested flights; the number of flights only determines where the sequence ends.
-FIXED = ("target", "confidence", "directions", "most")
+FIXED_SETTINGS = ("target", "confidence", "directions", "most")
 # Kind of the table of a search.
 WINDS_KIND = TableKind(
     "planfly.winds-flights",
@@ -474,7 +481,7 @@ WINDS_KIND = TableKind(
         "narrow": "TEXT NOT NULL",
         **ROW_COLUMNS,
     },
-    FIXED,
+    FIXED_SETTINGS,
 )
 
 
@@ -496,18 +503,18 @@ class RequestedFlight:
 
 @dataclass(frozen=True, slots=True)
 class FlownFlight:
-    """Outcome of a flight, the rule and place of each failed finding, and the narrow passes."""
+    """Outcome of a flight, the rule and place of each failed finding, and the marginal passes."""
 
     outcome: Outcome
     failed: tuple[tuple[str, Place], ...]
-    narrow: tuple[NarrowPass, ...] = ()
+    narrow: tuple[MarginalPass, ...] = ()
 
 
 class WindsStore(LockedTable):
     """Table of a search, locked by one process at a time."""
 
     def __init__(self, path: Path, made_of: str, settings: dict[str, Any], *, resume: bool) -> None:
-        """Create the table, or open it to resume the same search.  settings: must include `FIXED`."""
+        """Create the table, or open it to resume the same search.  settings: must include `FIXED_SETTINGS`."""
         super().__init__(path, WINDS_KIND, made_of, settings, resume=resume)
 
     def add(self, request: RequestedFlight, row: FlightRow) -> None:
@@ -523,30 +530,30 @@ class WindsStore(LockedTable):
         }
         self.insert({**request_values, **row_values(replace(row, made_of=self.made_of))})
 
-    def known(self) -> dict[int, tuple[RequestedFlight, FlownFlight]]:
-        """Return each flight of the table and its outcome, by number."""
+    def stored_flights(self) -> dict[int, tuple[RequestedFlight, FlownFlight]]:
+        """Return the request and the outcome of each flight, keyed by number."""
         rows = self._connection.execute(
             "SELECT flight, direction, asked_speed, draw, outcome, failed, narrow FROM flights ORDER BY flight"
         )
         return {
             number: (
                 RequestedFlight(number, *request),
-                FlownFlight(outcome, parse_failed(failed), parse_narrow_passes(narrow)),
+                FlownFlight(outcome, parse_failed_findings(failed), parse_marginal_passes(narrow)),
             )
             for number, *request, outcome, failed, narrow in rows
         }
 
 
-def parse_narrow_passes(text: str) -> tuple[NarrowPass, ...]:
-    """Parse the narrow passes from the text in the column.
+def parse_marginal_passes(text: str) -> tuple[MarginalPass, ...]:
+    """Parse the marginal passes from the text in the column.
 
-    >>> parse_narrow_passes('[{"rule": "slope", "margin": 0.25, "kind": "leg", "index": 3}]')[0][2]
+    >>> parse_marginal_passes('[{"rule": "slope", "margin": 0.25, "kind": "leg", "index": 3}]')[0][2]
     0.25
     """
-    return tuple(_narrow_pass(**entry) for entry in json.loads(text))
+    return tuple(_make_marginal_pass(**entry) for entry in json.loads(text))
 
 
-def _narrow_pass(rule: str, margin: float, **place: Any) -> NarrowPass:
+def _make_marginal_pass(rule: str, margin: float, **place: Any) -> MarginalPass:
     return rule, Place(**place), margin
 
 
@@ -560,35 +567,35 @@ _TYPES: dict[str, type] = {"INTEGER": np.int64, "REAL": np.float64, "TEXT": obje
 
 
 def read_table(path: Path) -> dict[str, NDArray[Any]]:
-    """Return the columns of a campaign's table by name, (n,) each, in the order of flights, without arrays.
+    """Return the columns (n,) of a campaign's table, keyed by name, in the order of flights; without array columns.
 
     Numbers are float64, NaN if missing, or int64.  Texts are Python strings, None if missing; equal strings share
     memory.  The result takes about 60 MB for 100,000 flights.
     Raises StoreError for a file that planfly did not write, or that another process has locked.
     """
-    names = tuple(name for name in CAMPAIGN_KIND.columns if name not in SHAPES)
+    names = tuple(name for name in CAMPAIGN_KIND.columns if name not in ARRAY_COLUMNS)
     with _open_to_read(path) as connection:
         (count,) = connection.execute("SELECT COUNT(*) FROM flights").fetchone()
-        table = {name: np.empty(count, dtype=_TYPES[CAMPAIGN_KIND.columns[name].split()[0]]) for name in names}
+        columns = {name: np.empty(count, dtype=_TYPES[CAMPAIGN_KIND.columns[name].split()[0]]) for name in names}
         shared_texts: dict[str | None, str | None] = {}
         cursor = connection.execute(f"SELECT {', '.join(names)} FROM flights ORDER BY flight")
         for start in range(0, count, _ROWS_PER_STEP):
             for name, values in zip(names, zip(*cursor.fetchmany(_ROWS_PER_STEP), strict=True), strict=True):
-                column = table[name]
+                column = columns[name]
                 shared_values = (
                     [shared_texts.setdefault(text, text) for text in values] if column.dtype == object else values
                 )
                 column[start : start + len(values)] = shared_values
-    return table
+    return columns
 
 
 def count_flights(path: Path) -> int:
-    """Return the number of flights in a table of either kind.  Raises StoreError for another or a locked file."""
+    """Return the number of flights in a table of either kind.  Raises StoreError for other files and locked tables."""
     with _open_to_read(path) as connection:
         return int(connection.execute("SELECT COUNT(*) FROM flights").fetchone()[0])
 
 
-def read_shapes(path: Path) -> dict[str, NDArray[np.float32]]:
+def read_path_arrays(path: Path) -> dict[str, NDArray[np.float32]]:
     """Return the stored path data of each flight, in the order of flights; NaN for flights without them.
 
     "clearance": minimum height above ground on each of 150 equal pieces of the route, m, (n, 150).
@@ -596,18 +603,18 @@ def read_shapes(path: Path) -> dict[str, NDArray[np.float32]]:
     Raises StoreError for a file that planfly did not write, or that another process has locked.
     """
     with _open_to_read(path) as connection:
-        return {name: _read_arrays(connection, name, FIELDS[name].entry) for name in SHAPES}
+        return {name: _read_arrays(connection, name, COLUMN_FIELDS[name].entry) for name in ARRAY_COLUMNS}
 
 
-def _read_arrays(connection: sqlite3.Connection, name: str, entry: tuple[int, ...]) -> NDArray[np.float32]:
-    """Return the arrays of a column, (n, m, *entry), where m is the length of the longest one."""
+def _read_arrays(connection: sqlite3.Connection, name: str, entry_shape: tuple[int, ...]) -> NDArray[np.float32]:
+    """Return the arrays of a column, (n, m, *entry_shape), where m is the length of the longest array."""
     count, size = connection.execute(f"SELECT COUNT(*), MAX(LENGTH({name})) FROM flights").fetchone()
     arrays = np.full((count, (size or 0) // np.dtype(np.float32).itemsize), np.nan, dtype=np.float32)
     for row, (data,) in zip(arrays, connection.execute(f"SELECT {name} FROM flights ORDER BY flight"), strict=True):
         if data:
             array = np.frombuffer(data, np.float32)
             row[: array.size] = array
-    return arrays.reshape(count, arrays.shape[1] // math.prod(entry), *entry)
+    return arrays.reshape(count, arrays.shape[1] // math.prod(entry_shape), *entry_shape)
 
 
 @contextmanager

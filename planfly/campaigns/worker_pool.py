@@ -53,27 +53,27 @@ def worker_pool(workers: Workers, base: CampaignBase, fly: FlyOne = fly_one) -> 
         with contextlib.closing(LocalPool(workers.count or os.cpu_count() or 1, base, fly)) as pool:
             yield pool
         return
-    address = checked_address(workers.scheduler)
+    address = check_scheduler_address(workers.scheduler)
     need_extra("cluster", "--scheduler needs")
     # Imported here because dask is an optional dependency.
-    from planfly.campaigns.dask_pool import DaskPool, connect
+    from planfly.campaigns.dask_pool import DaskPool, connect_client
 
     try:
-        client = connect(address)
+        client = connect_client(address)
     except (OSError, ValueError) as error:
         raise SchedulerError.of_argument("scheduler", address, f"no scheduler answers: {error}") from error
     with client, contextlib.closing(DaskPool(client, base, fly)) as cluster:
         yield cluster
 
 
-def checked_address(address: str) -> str:
-    """Return a scheduler's address if it is allowed, which is TLS for any host, and plain TCP on loopback only.
+def check_scheduler_address(address: str) -> str:
+    """Return a scheduler's address.  Raises SchedulerError for plain TCP beyond loopback; TLS is allowed for any host.
 
-    The reason is that the workers of a scheduler run any code sent to them.  Raises SchedulerError.
+    The reason is that the workers of a scheduler run any code sent to them.
 
-    >>> checked_address("127.0.0.1:8786"), checked_address("tls://10.0.0.7:8786")
+    >>> check_scheduler_address("127.0.0.1:8786"), check_scheduler_address("tls://10.0.0.7:8786")
     ('tcp://127.0.0.1:8786', 'tls://10.0.0.7:8786')
-    >>> checked_address("tcp://10.0.0.7:8786")
+    >>> check_scheduler_address("tcp://10.0.0.7:8786")
     Traceback (most recent call last):
     ...
     planfly.campaigns.worker_pool.SchedulerError: scheduler tcp://10.0.0.7:8786: plain TCP beyond loopback; ...

@@ -11,8 +11,8 @@ import planfly
 from planfly.terminal.arguments import complete_aircraft, files, with_completer
 from planfly.terminal.command_parser import CommandParser, LineParser
 from planfly.terminal.exit_codes import FLYABLE
-from planfly.terminal.options import call, result_options
-from planfly.terminal.output import give_answer
+from planfly.terminal.options import call_api, result_options
+from planfly.terminal.output import write_json_if_requested
 from planfly.terminal.results import print_warnings
 from world.errors import PlanflyError
 
@@ -50,18 +50,18 @@ def aircraft_options(line: LineParser) -> None:
         complete_aircraft,
     )
     parser.add_argument("--motor-braking", action="store_true", help="let the motor brake in descents")
-    own = parser.group("an aircraft of your own")
-    own.add_argument("--new", dest="folder", metavar="FOLDER", help="make its folder, which must not exist yet")
+    new_group = parser.group("an aircraft of your own")
+    new_group.add_argument("--new", dest="folder", metavar="FOLDER", help="make its folder, which must not exist yet")
     with_completer(
-        own.add_argument(
+        new_group.add_argument(
             "--from", dest="source", metavar="NAME", help="with --new: the aircraft to start from (default: aerosonde)"
         ),
         complete_aircraft,
     )
     _data_sheet_options(parser)
-    logs = parser.group("flight logs: with --mass and --span, and --out for the folder to make")
+    log_group = parser.group("flight logs: with --mass and --span, and --out for the folder to make")
     with_completer(
-        logs.add_argument(
+        log_group.add_argument(
             "--identify",
             dest="logs",
             metavar="LOG",
@@ -71,7 +71,7 @@ def aircraft_options(line: LineParser) -> None:
         files("bin", "BIN", "tlog", "ulg", "toml", "csv", "mat", "parquet", "h5"),
     )
     with_completer(
-        logs.add_argument(
+        log_group.add_argument(
             "--base",
             metavar="NAME",
             help="with --identify: the known aircraft that is most similar (default: aerosonde)",
@@ -79,7 +79,7 @@ def aircraft_options(line: LineParser) -> None:
         complete_aircraft,
     )
     with_completer(
-        logs.add_argument("--check", metavar="LOG", help="with --identify: another log, to replay with the model"),
+        log_group.add_argument("--check", metavar="LOG", help="with --identify: another log, to replay with the model"),
         files("bin", "BIN", "tlog", "ulg", "toml", "csv", "mat", "parquet", "h5"),
     )
     result_options(
@@ -90,7 +90,7 @@ def aircraft_options(line: LineParser) -> None:
 
 
 def _data_sheet_options(parser: CommandParser) -> None:
-    sheet = parser.group("a data sheet: with --new; mass, span, cruise and stall are needed, the rest is guessed")
+    group = parser.group("a data sheet: with --new; mass, span, cruise and stall are needed, the rest is guessed")
     numbers = {
         "mass": ("KG", "mass, 0.5 to 25 kg"),
         "span": ("M", "wing span, m"),
@@ -104,11 +104,11 @@ def _data_sheet_options(parser: CommandParser) -> None:
         "fuel": ("KG", "fuel carried, for an aircraft without a battery"),
     }
     for name, (unit, text) in numbers.items():
-        sheet.add_argument(f"--{name}", metavar=unit, type=float, help=text)
-    sheet.add_argument("--battery", metavar="V,AH", help="battery, such as 14.8V,5Ah")
-    sheet.add_argument("--prop", metavar="DxP", help="propeller, inches, such as 12x6")
-    sheet.add_argument("--layout", choices=("tail", "wing", "vtail"), help="(default: tail)")
-    sheet.add_argument(
+        group.add_argument(f"--{name}", metavar=unit, type=float, help=text)
+    group.add_argument("--battery", metavar="V,AH", help="battery, such as 14.8V,5Ah")
+    group.add_argument("--prop", metavar="DxP", help="propeller, inches, such as 12x6")
+    group.add_argument("--layout", choices=("tail", "wing", "vtail"), help="(default: tail)")
+    group.add_argument(
         "--params", metavar="FILE", help="a parameter file of ArduPlane; facts about the aircraft are taken from it"
     )
 
@@ -130,23 +130,23 @@ def aircraft(args: argparse.Namespace) -> int:
         raise PlanflyError.of_argument("source", args.source, allowed, shown="")
     if args.name is None:
         embedded_aircraft = list(planfly.aircraft().values())
-        for listed in embedded_aircraft:
-            size = f"{listed.mass:.5g} kg, span {listed.wing_span:.5g} m"
-            print(f"{listed.name:<14} {listed.title}: {size}, cruises at {listed.airspeed:g} m/s")
-        give_answer(args, lambda: _json_answer(embedded_aircraft))
+        for entry in embedded_aircraft:
+            size = f"{entry.mass:.5g} kg, span {entry.wing_span:.5g} m"
+            print(f"{entry.name:<14} {entry.title}: {size}, cruises at {entry.airspeed:g} m/s")
+        write_json_if_requested(args, lambda: _json_answer(embedded_aircraft))
         return FLYABLE
     out = args.out or "runs/aircraft-{name}"
-    numbers = call(planfly.describe_aircraft, args, out=out, overwrite=args.overwrite or args.out is None)
+    numbers = call_api(planfly.describe_aircraft, args, out=out, overwrite=args.overwrite or args.out is None)
     _print_numbers(numbers)
     print_warnings(numbers.lacking)
     for file in numbers.files:
         print(f"picture   {file}")
-    give_answer(args, lambda: _json_answer([numbers.aircraft], numbers))
+    write_json_if_requested(args, lambda: _json_answer([numbers.aircraft], numbers))
     return FLYABLE
 
 
 def _json_answer(entries: "Sequence[Aircraft]", numbers: "AircraftNumbers | None" = None) -> object:
-    """Return the answer for --json, for one aircraft with its numbers or for several aircraft without numbers."""
+    """Return the answer for --json: one aircraft with its numbers, or several aircraft without numbers."""
     from planfly.terminal.answers import AircraftAnswer, aircraft_detail, aircraft_entry
 
     detail = None if numbers is None else aircraft_detail(numbers)
@@ -158,7 +158,7 @@ def _make_folder(args: argparse.Namespace) -> int:
         message = f"{args.name}: --new takes only the folder; --from names the aircraft to start from"
         raise PlanflyError(message, field="--new", value=args.folder)
     folder = Path(args.folder)
-    new_aircraft = call(planfly.new_aircraft, args)
+    new_aircraft = call_api(planfly.new_aircraft, args)
     files = sorted(file.name for file in new_aircraft.folder.iterdir())
     folder_text = folder if folder.is_absolute() else f"./{folder}"
     has_sheet = any(getattr(args, name) is not None for name in (*_DATA_SHEET_KEYWORDS, "params"))
@@ -166,7 +166,7 @@ def _make_folder(args: argparse.Namespace) -> int:
     print(f"aircraft  {folder_text}/ ({', '.join(files)}), {origin_text}")
     if has_sheet:
         _print_sheet(new_aircraft)
-    give_answer(args, lambda: _json_answer([new_aircraft]))
+    write_json_if_requested(args, lambda: _json_answer([new_aircraft]))
     print(
         f"next      `planfly aircraft {shlex.quote(str(folder_text))}` shows it; `planfly fly MISSION --aircraft"
         f" {shlex.quote(str(folder_text))}` flies it"
@@ -195,38 +195,38 @@ def _identify(args: argparse.Namespace) -> int:
     ):
         if is_given:
             raise PlanflyError(f"--identify cannot be combined with {field}: {reason_text}", field=field)
-    identified = call(planfly.identify_aircraft, args, folder=args.out)
-    new_aircraft, estimate = identified.aircraft, identified.estimate
+    result = call_api(planfly.identify_aircraft, args, folder=args.out)
+    new_aircraft, estimate = result.aircraft, result.estimate
     files_made = sorted(file.name for file in new_aircraft.folder.iterdir())
     print(f"aircraft  {args.out} ({', '.join(files_made)}), from {estimate.seconds / 60.0:.1f} min of flight")
     for name, unit, (lower, value, upper) in (
-        ("climb", "deg", identified.climb),
-        ("sink", "deg", identified.sink),
-        ("power", "W", identified.power),
+        ("climb", "deg", result.climb),
+        ("sink", "deg", result.sink),
+        ("power", "W", result.power),
     ):
         print(f"  {name:<8} {value:.{0 if unit == 'W' else 1}f} {unit} at cruise, {lower:.1f} to {upper:.1f} (95 %)")
-    _print_unknown(identified)
+    _print_uncertain_properties(result)
     if "identify.waypoints" not in files_made:
         print("  no mission identify.waypoints: the logs have neither home (ORGN) nor a position on the ground (POS)")
-    for replay in identified.replays:
+    for replay in result.replays:
         rms_text = ", ".join(f"{name} {value:.2g}" for name, value in replay.rms.items())
         print(f"  replay   {replay.model}: {rms_text} (rms of {replay.windows} windows of 5 s; deg/s, deg, m/s)")
-    give_answer(args, lambda: _json_answer([new_aircraft]))
+    write_json_if_requested(args, lambda: _json_answer([new_aircraft]))
     print(f"next      planfly aircraft {shlex.quote(args.out)}; {args.out}/identify.html says how sure each number is")
     return FLYABLE
 
 
-def _print_unknown(identified: "planfly.IdentifiedAircraft") -> None:
-    """Print the properties that the logs do not show, and the flights that would show them."""
-    if not identified.estimate.dynamics:
+def _print_uncertain_properties(result: "planfly.IdentifiedAircraft") -> None:
+    """Print the properties that the logs do not determine, and what would determine them."""
+    if not result.estimate.dynamics:
         print("  performance only: under 10 rows of inertial sensors or outputs a second tell nothing of the moments")
-    for log in identified.slow:
+    for log in result.slow:
         print(f"  rows     {log.source}: {log.hertz:.1f} a second of sensors or outputs: {log.setting} records more")
-    for number in identified.wide:
+    for number in result.wide:
         print(f"  wide     {number.text}")
-    for line in identified.estimate.silent():
+    for line in result.estimate.silent():
         print(f"  not seen {line}")
-    for log_name in identified.without_current:
+    for log_name in result.without_current:
         print(
             f"  current  not used, as {log_name} has none (BAT): identify from only the other logs to use their current"
         )

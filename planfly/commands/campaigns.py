@@ -11,8 +11,14 @@ import planfly
 from planfly.terminal.arguments import complete_mission_or_scenario, files, number, with_completer
 from planfly.terminal.command_parser import CommandParser, LineParser
 from planfly.terminal.exit_codes import FLYABLE, LOSS, NOT_FLYABLE
-from planfly.terminal.options import aircraft_and_wind_options, call, result_options, steering_options, world_options
-from planfly.terminal.output import give_answer
+from planfly.terminal.options import (
+    aircraft_and_wind_options,
+    call_api,
+    result_options,
+    steering_options,
+    world_options,
+)
+from planfly.terminal.output import write_json_if_requested
 from planfly.workflow.output_paths import RESULTS
 from world.errors import PlanflyError
 from world.interruption import Interrupted
@@ -133,45 +139,45 @@ def campaign(args: argparse.Namespace) -> int:
     """Fly a campaign, resume one, or fly one of its flights again."""
     folder = _result_folder(args, "campaign")
     if args.refly is not None:
-        return _refly(args, folder)
-    with _report_kept_flights(folder, "campaign.sqlite") as interrupted:
-        result = call(planfly.campaign, args, out=folder)
+        return _fly_again(args, folder)
+    with _report_stored_flights(folder, "campaign.sqlite") as interrupted:
+        result = call_api(planfly.campaign, args, out=folder)
     if interrupted():
         return interrupted()
     from planfly.campaigns.summary import campaign_lines
 
     print("\n".join(campaign_lines(result.summary)))
     print(f"results   {folder}/ (report.html, summary.json, campaign.sqlite, worst/)")
-    give_answer(args, lambda: (folder / "summary.json").read_text(encoding="utf-8"))
+    write_json_if_requested(args, lambda: (folder / "summary.json").read_text(encoding="utf-8"))
     return _EXIT_CODES[result.answer]
 
 
 def winds(args: argparse.Namespace) -> int:
     """Find the strongest wind from each direction, or resume the search, and draw the chart."""
     folder = _result_folder(args, "winds")
-    with _report_kept_flights(folder, "winds.sqlite") as interrupted:
-        found = call(planfly.winds, args, out=folder)
+    with _report_stored_flights(folder, "winds.sqlite") as interrupted:
+        result = call_api(planfly.winds, args, out=folder)
     if interrupted():
         return interrupted()
     from planfly.campaigns.report import wind_lines
 
-    print("\n".join(wind_lines(found)))
+    print("\n".join(wind_lines(result)))
     print(f"results   {folder}/ (winds.html, winds.png, winds.json, winds.sqlite)")
-    give_answer(args, lambda: (folder / "winds.json").read_text(encoding="utf-8"))
-    return FLYABLE if found.calm is None else NOT_FLYABLE
+    write_json_if_requested(args, lambda: (folder / "winds.json").read_text(encoding="utf-8"))
+    return FLYABLE if result.calm is None else NOT_FLYABLE
 
 
 def _result_folder(args: argparse.Namespace, kind: str) -> Path:
-    """Return the folder of the files, which is the named folder or ``runs/<name>-<kind>``."""
+    """Return the folder of the results: the named folder or ``runs/<name>-<kind>``."""
     return Path(args.out) if args.out else RESULTS / f"{Path(args.target).stem}-{kind}"
 
 
-def _refly(args: argparse.Namespace, folder: Path) -> int:
+def _fly_again(args: argparse.Namespace, folder: Path) -> int:
     from logs.verdict.wording import place_text
 
     if args.json:
         raise PlanflyError("--json: only with a campaign, not with --refly", field="--json", value=args.json)
-    flight = call(planfly.campaign_flight, args, index=args.refly, out=folder)
+    flight = call_api(planfly.campaign_flight, args, index=args.refly, out=folder)
     print(f"flight {args.refly}: {flight.row.outcome}, ended: {flight.row.ended}, as in the table")
     for rule, place in flight.row.failed:
         print(f"  failed  {rule} at {place_text(place)}")
@@ -180,19 +186,19 @@ def _refly(args: argparse.Namespace, folder: Path) -> int:
 
 
 @contextmanager
-def _report_kept_flights(folder: Path, table: str) -> Iterator[Callable[[], int]]:
-    """Report the flights that are kept after an interruption, and yield a function that returns the exit code.
+def _report_stored_flights(folder: Path, table: str) -> Iterator[Callable[[], int]]:
+    """After an interruption, report the number of stored flights; yield a function that returns the exit code.
 
     The exit code is 0 without an interruption.  An interruption before the table exists is raised again.
     """
     code = 0
     try:
         yield lambda: code
-    except KeyboardInterrupt as stop:
+    except KeyboardInterrupt as interruption:
         from planfly.campaigns.tables import count_flights
 
         if not (folder / table).is_file():
             raise
         flights = count_flights(folder / table)
         print(f"planfly: interrupted; {flights} flights are kept in {folder}: continue with --resume", file=sys.stderr)
-        code = 128 + (stop.number if isinstance(stop, Interrupted) else signal.SIGINT)
+        code = 128 + (interruption.number if isinstance(interruption, Interrupted) else signal.SIGINT)

@@ -6,19 +6,19 @@ from typing import TYPE_CHECKING
 
 import planfly
 from planfly.arguments import CHOICES
-from planfly.terminal.arguments import IMPORTED_LOGS, MISSIONS, autopilots, files, with_completer
+from planfly.terminal.arguments import IMPORTED_LOG_SUFFIXES, MISSION_SUFFIXES, autopilots, files, with_completer
 from planfly.terminal.command_parser import LineParser
 from planfly.terminal.exit_codes import LOSS, verdict_code
 from planfly.terminal.options import (
     aircraft_and_wind_options,
     autopilot_options,
-    call,
+    call_api,
     imported_log_options,
     result_options,
     world_options,
 )
-from planfly.terminal.output import give_answer, give_junit
-from planfly.terminal.results import print_returns, print_verdict, print_warnings
+from planfly.terminal.output import write_json_if_requested, write_junit_if_requested
+from planfly.terminal.results import print_returns_line, print_verdict, print_warnings
 from world.errors import ArgumentError
 
 if TYPE_CHECKING:
@@ -43,7 +43,7 @@ def check_options(line: LineParser) -> None:
         parser.add_argument(
             "what", metavar="LOG|MISSION", help=f"a flight log (.mcap, or {LOGS}), or plan.json, .waypoints, .plan"
         ),
-        files("mcap", *MISSIONS, *IMPORTED_LOGS),
+        files("mcap", *MISSION_SUFFIXES, *IMPORTED_LOG_SUFFIXES),
     )
     imported_log_options(parser)
     world_options(parser)
@@ -68,36 +68,36 @@ def check_options(line: LineParser) -> None:
 def check(args: argparse.Namespace) -> int:
     """Judge a flight or a mission; return the exit code of the verdict, or 3 for an incomplete log."""
     if args.autopilots is not None:
-        return _check_by_autopilots(args)
-    judged = call(planfly.judge, args)
-    if not judged.is_log:
-        print_warnings([*judged.setup.mission.warnings, *judged.setup.scenario.notes])
-    give_answer(args, lambda: _verdict_answer(judged))
-    give_junit(args, {args.what: judged.verdict})
-    print_warnings([judged.loss] if judged.loss else [])
-    print_verdict(judged.verdict, judged.setup.notes)
-    print_returns(judged.returns_line)
-    if judged.lossy:
+        return _check_for_each_autopilot(args)
+    result = call_api(planfly.judge, args)
+    if not result.is_log:
+        print_warnings([*result.setup.mission.warnings, *result.setup.scenario.notes])
+    write_json_if_requested(args, lambda: _verdict_answer(result))
+    write_junit_if_requested(args, {args.what: result.verdict})
+    print_warnings([result.loss] if result.loss else [])
+    print_verdict(result.verdict, result.setup.notes)
+    print_returns_line(result.returns_line)
+    if result.lossy:
         return LOSS
-    return verdict_code(judged.verdict)
+    return verdict_code(result.verdict)
 
 
 # Options that are not allowed with --for, because they belong to one autopilot or to a log.
 _SINGLE_AUTOPILOT_OPTIONS = ("params", "guidance", "autopilot", "plan", "flight", "datum", "geometry")
 
 
-def _check_by_autopilots(args: argparse.Namespace) -> int:
+def _check_for_each_autopilot(args: argparse.Namespace) -> int:
     """Fly a mission by each named autopilot, and return the exit code of the worst verdict."""
     from planfly.terminal.autopilot_table import autopilot_lines
 
     for name in _SINGLE_AUTOPILOT_OPTIONS:
         if (value := getattr(args, name)) not in (None, False):
             raise ArgumentError.of_argument(name, value, "not with --for, which flies several autopilots")
-    flights = call(planfly.fly_by_each, args, mission=args.what)
+    flights = call_api(planfly.fly_by_each, args, mission=args.what)
     verdicts = {name: flight.verdict for name, flight in flights.items()}
     code = max(verdict_code(verdict) for verdict in verdicts.values())
-    give_answer(args, lambda: _verdicts_answer(verdicts, args.what, code))
-    give_junit(args, {f"{args.what} by {name}": verdict for name, verdict in verdicts.items()})
+    write_json_if_requested(args, lambda: _verdicts_answer(verdicts, args.what, code))
+    write_junit_if_requested(args, {f"{args.what} by {name}": verdict for name, verdict in verdicts.items()})
     print("\n".join(autopilot_lines(verdicts)))
     return code
 
@@ -109,7 +109,7 @@ def _verdicts_answer(verdicts: Mapping[str, "Verdict"], mission: str, code: int)
     return VerdictsDocument(exit_code=code, mission=mission, verdicts=documents)
 
 
-def _verdict_answer(judged: "Judged") -> str:
+def _verdict_answer(result: "Judged") -> str:
     from logs.verdict.verdict import verdict_json
 
-    return verdict_json(judged.verdict)
+    return verdict_json(result.verdict)

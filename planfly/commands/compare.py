@@ -9,8 +9,8 @@ import planfly
 from planfly.terminal.command_parser import LineParser
 from planfly.terminal.exit_codes import FLYABLE, LOSS
 from planfly.terminal.options import log_argument, result_options
-from planfly.terminal.output import give_answer
-from planfly.terminal.results import warn_of_loss
+from planfly.terminal.output import write_json_if_requested
+from planfly.terminal.results import warn_about_incomplete_log
 from planfly.workflow.output_paths import COMPARE_FILES
 
 if TYPE_CHECKING:
@@ -41,11 +41,11 @@ def compare(args: argparse.Namespace) -> int:
     print("\n".join(difference_lines(comparison)))
     for file in files:
         print(f"compare   {file}")
-    cut_short = [log for log in logs if not log.complete]
-    for log in cut_short:
-        warn_of_loss(log)
-    code = LOSS if cut_short else FLYABLE
-    give_answer(args, lambda: _json_answer(comparison, files, code))
+    incomplete_logs = [log for log in logs if not log.complete]
+    for log in incomplete_logs:
+        warn_about_incomplete_log(log)
+    code = LOSS if incomplete_logs else FLYABLE
+    write_json_if_requested(args, lambda: _json_answer(comparison, files, code))
     return code
 
 

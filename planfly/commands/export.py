@@ -3,11 +3,11 @@
 import argparse
 
 import planfly
-from planfly.terminal.arguments import MISSIONS, files, with_completer
+from planfly.terminal.arguments import MISSION_SUFFIXES, files, with_completer
 from planfly.terminal.command_parser import LineParser
 from planfly.terminal.exit_codes import FLYABLE, LOSS
 from planfly.terminal.options import fence_option, result_options, time_option
-from planfly.terminal.output import give_answer
+from planfly.terminal.output import write_json_if_requested
 from planfly.terminal.results import print_warnings
 
 
@@ -24,7 +24,7 @@ def export_options(line: LineParser) -> None:
             metavar="PLAN.json|MISSION|LOG.mcap",
             help="a plan that planfly made, a mission file, or a flight log",
         ),
-        files("mcap", *MISSIONS),
+        files("mcap", *MISSION_SUFFIXES),
     )
     parser.add_argument(
         "files",
@@ -41,21 +41,21 @@ def export_options(line: LineParser) -> None:
 
 def export(args: argparse.Namespace) -> int:
     """Read the source, then write every target; return 3 for an incomplete log."""
-    written = planfly.export(args.source, *args.files, fence=args.fence, at=args.at, overwrite=args.overwrite)
-    print_warnings(written.notes)
-    for file, content in zip(written.files, written.contents, strict=True):
+    result = planfly.export(args.source, *args.files, fence=args.fence, at=args.at, overwrite=args.overwrite)
+    print_warnings(result.notes)
+    for file, content in zip(result.files, result.contents, strict=True):
         print(f"{_content_kind(file.suffix.lower()):<9} {file} ({content})")
-    code = LOSS if written.loss else FLYABLE
+    code = LOSS if result.loss else FLYABLE
 
-    def answer() -> object:
+    def json_answer() -> object:
         from planfly.terminal.answers import ExportAnswer, ExportedFile
 
-        pairs = zip(written.files, written.contents, strict=True)
+        pairs = zip(result.files, result.contents, strict=True)
         exported = [ExportedFile(file=str(file), content=content) for file, content in pairs]
-        notes = [note for note in written.notes if note != written.loss]
+        notes = [note for note in result.notes if note != result.loss]
         return ExportAnswer(exit_code=code, files=exported, warnings=notes)
 
-    give_answer(args, answer)
+    write_json_if_requested(args, json_answer)
     return code
 
 

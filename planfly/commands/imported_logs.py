@@ -6,19 +6,19 @@ from typing import TYPE_CHECKING
 
 import planfly
 from planfly.commands.check import LOGS
-from planfly.terminal.arguments import IMPORTED_LOGS, complete_aircraft, files, with_completer
+from planfly.terminal.arguments import IMPORTED_LOG_SUFFIXES, complete_aircraft, files, with_completer
 from planfly.terminal.command_parser import LineParser
 from planfly.terminal.exit_codes import FLYABLE, LOSS, verdict_code
 from planfly.terminal.options import (
     aircraft_and_wind_options,
-    call,
+    call_api,
     imported_log_options,
     result_options,
     turbulence_option,
     world_options,
 )
-from planfly.terminal.output import give_answer, give_junit
-from planfly.terminal.results import print_verdict, warn_of_loss
+from planfly.terminal.output import write_json_if_requested, write_junit_if_requested
+from planfly.terminal.results import print_verdict, warn_about_incomplete_log
 from world.errors import PlanflyError
 
 if TYPE_CHECKING:
@@ -40,7 +40,7 @@ def import_log_options(line: LineParser) -> None:
             help="a log of ArduPilot, of a ground station (.tlog; extra planfly[live]), of PX4 (.ulg; extra"
             " planfly[px4-logs]), a track, or a table of columns (extra planfly[data-logs])",
         ),
-        files(*IMPORTED_LOGS),
+        files(*IMPORTED_LOG_SUFFIXES),
     )
     parser.add_argument("target", metavar="FLIGHT.mcap", nargs="?", help="the flight log to write")
     with_completer(
@@ -66,12 +66,12 @@ def import_log(args: argparse.Namespace) -> int:
         return _guess_columns(args)
     if args.target is None:
         raise PlanflyError("import needs FLIGHT.mcap, the flight log to write", field="FLIGHT.mcap")
-    flight = call(planfly.import_log, args)
+    flight = call_api(planfly.import_log, args)
     print_verdict(flight.verdict, flight.setup.route.notes)
     print(f"log       {Path(args.target)} ({len(flight.track)} rows)")
     code = LOSS if flight.lossy else verdict_code(flight.verdict)
-    give_answer(args, lambda: _import_answer(Path(args.target), flight, code))
-    give_junit(args, {args.log: flight.verdict})
+    write_json_if_requested(args, lambda: _import_answer(Path(args.target), flight, code))
+    write_junit_if_requested(args, {args.log: flight.verdict})
     return code
 
 
@@ -125,18 +125,18 @@ def refly(args: argparse.Namespace) -> int:
     source = Path(args.log)
     log = planfly.read_log(source)
     folder = args.out or source.with_name(f"{source.stem}-refly")
-    reflown = call(planfly.refly, args, log=log, out=folder, overwrite=args.overwrite or args.out is None)
-    print("\n".join(reflown.lines))
-    for file in reflown.files:
+    result = call_api(planfly.refly, args, log=log, out=folder, overwrite=args.overwrite or args.out is None)
+    print("\n".join(result.lines))
+    for file in result.files:
         print(f"refly     {file}")
     if not log.complete:
-        warn_of_loss(log)
+        warn_about_incomplete_log(log)
     code = FLYABLE if log.complete else LOSS
-    give_answer(args, lambda: _refly_answer(reflown, code))
+    write_json_if_requested(args, lambda: _refly_answer(result, code))
     return code
 
 
-def _refly_answer(reflown: "Reflown", code: int) -> object:
+def _refly_answer(result: "Reflown", code: int) -> object:
     from planfly.terminal.answers import ReflyAnswer
 
-    return ReflyAnswer(exit_code=code, lines=list(reflown.lines), files=[str(file) for file in reflown.files])
+    return ReflyAnswer(exit_code=code, lines=list(result.lines), files=[str(file) for file in result.files])

@@ -6,10 +6,10 @@ import shlex
 import planfly
 from planfly.arguments import CHOICES
 from planfly.terminal.arguments import complete_aircraft, number, place, with_completer
-from planfly.terminal.command_parser import LineParser, coloured
+from planfly.terminal.command_parser import LineParser, colour_text
 from planfly.terminal.exit_codes import FLYABLE, NOT_FLYABLE
-from planfly.terminal.options import call, result_options, terrain_option
-from planfly.terminal.output import give_answer
+from planfly.terminal.options import call_api, result_options, terrain_option
+from planfly.terminal.output import write_json_if_requested
 
 
 def new_options(line: LineParser) -> None:
@@ -52,7 +52,7 @@ def new_options(line: LineParser) -> None:
 
 def new(args: argparse.Namespace) -> int:
     """Write the scenario, and plan a path in it; return 4 if the plan is not safe, but keep the file."""
-    file = call(planfly.new_scenario, args)
+    file = call_api(planfly.new_scenario, args)
     print(f"scenario  {file}")
     if args.terrain is None:
         print("ground    flat, at mean sea level: no elevation file was named (--terrain DEM)")
@@ -60,18 +60,18 @@ def new(args: argparse.Namespace) -> int:
     code = FLYABLE if plan.safe else NOT_FLYABLE
     if plan.safe:
         ratio = plan.objectives.length_ratio
-        safe = coloured("plans     safe", "good")
-        print(f"{safe}: {len(plan.waypoints)} waypoints, {ratio:.3f} times the straight line")
+        safe_text = colour_text("plans     safe", "good")
+        print(f"{safe_text}: {len(plan.waypoints)} waypoints, {ratio:.3f} times the straight line")
     else:
-        print(coloured("plans     no safe path", "bad"))
+        print(colour_text("plans     no safe path", "bad"))
         for problem in (*plan.certificate.problems, *planfly.what_blocks(plan)):
             print(f"  {problem}")
     print(f"next      planfly run {shlex.quote(str(file))}")
 
-    def answer() -> object:
+    def json_answer() -> object:
         from planfly.terminal.answers import NewAnswer
 
         return NewAnswer(exit_code=code, file=str(file), safe=plan.safe, waypoints=len(plan.waypoints))
 
-    give_answer(args, answer)
+    write_json_if_requested(args, json_answer)
     return code

@@ -9,8 +9,8 @@ from planfly.arguments import CHOICES
 from planfly.terminal.arguments import number, problems
 from planfly.terminal.command_parser import LineParser
 from planfly.terminal.exit_codes import FLYABLE
-from planfly.terminal.options import call, result_options
-from planfly.terminal.output import give_answer
+from planfly.terminal.options import call_api, result_options
+from planfly.terminal.output import write_json_if_requested
 from planfly.workflow.output_paths import RESULTS
 
 
@@ -48,16 +48,16 @@ def paper_options(line: LineParser) -> None:
 def paper(args: argparse.Namespace) -> int:
     """Plan, and write and print the table; return 0 for every result, because "no path" is also an answer."""
     folder = Path(args.out) if args.out else RESULTS / "paper"
-    tables = call(planfly.paper_tables, args, out=folder, overwrite=args.overwrite or args.out is None)
+    tables = call_api(planfly.paper_tables, args, out=folder, overwrite=args.overwrite or args.out is None)
     from planfly.planning.paper import table_text
 
     print(table_text(tables.rows))
     print(f"results   {folder}/ (table.csv, runs.csv, runs.json, times.csv, paths-, encodings-, convergence.png)")
 
-    def answer() -> object:
+    def json_answer() -> object:
         from planfly.terminal.answers import PaperAnswer, PaperRow
 
         return PaperAnswer(exit_code=FLYABLE, folder=str(folder), rows=[PaperRow(**asdict(row)) for row in tables.rows])
 
-    give_answer(args, answer)
+    write_json_if_requested(args, json_answer)
     return FLYABLE

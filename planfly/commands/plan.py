@@ -14,11 +14,11 @@ from planfly.terminal.exit_codes import FLYABLE, NOT_FLYABLE
 from planfly.terminal.options import (
     aircraft_and_wind_options,
     autopilot_options,
-    call,
+    call_api,
     result_options,
     scenario_argument,
 )
-from planfly.terminal.output import give_answer
+from planfly.terminal.output import write_json_if_requested
 from planfly.terminal.results import print_warnings
 from planfly.workflow.output_paths import RUN_FOLDER, expand_path_pattern
 from world.errors import ScenarioError
@@ -42,21 +42,21 @@ def plan_options(line: LineParser) -> None:
     parser.extra_help = _algorithms_help
     parser.alias_keyword("seconds", "--budget")
     scenario_argument(parser, help="TOML file or embedded name")
-    planning = parser.group("planning")
-    planning.add_argument(
+    planning_group = parser.group("planning")
+    planning_group.add_argument(
         "--seed", metavar="N", type=number("seed"), help="seed of the planner (default: the scenario's, or 1)"
     )
-    planning.add_argument(
+    planning_group.add_argument(
         "--algorithm", metavar="A", help="the planner's algorithm, in place of the scenario's (see below)"
     )
-    planning.add_argument(
+    planning_group.add_argument(
         "--budget",
         metavar="N|Xs",
         type=budget,
         help="stop after N evaluations or X seconds with the best plan so far (as Ctrl-C does); a plan under a budget "
         "in seconds may differ from run to run",
     )
-    planning.add_argument(
+    planning_group.add_argument(
         "--front",
         metavar="N",
         type=number("front"),
@@ -66,15 +66,15 @@ def plan_options(line: LineParser) -> None:
         "of plan-1.json ..., front.csv, front.json and pictures (default: runs/<name>-seed<N>-front; an"
         " existing one is replaced)",
     )
-    again = parser.group("planning again in flight")
+    replanning_group = parser.group("planning again in flight")
     with_completer(
-        again.add_argument("--from", dest="old", metavar="PLAN.json", help="plan that is being flown"),
+        replanning_group.add_argument("--from", dest="old", metavar="PLAN.json", help="plan that is being flown"),
         files("json"),
     )
-    again.add_argument(
+    replanning_group.add_argument(
         "--at-leg", metavar="K", type=number("at_leg"), help="keep the legs before leg K, which have been flown"
     )
-    again.add_argument(
+    replanning_group.add_argument(
         "--add-threat",
         dest="threats",
         metavar="EAST,NORTH,KILL,DETECTION",
@@ -104,7 +104,7 @@ def plan(args: argparse.Namespace) -> int:
     out = f"{RUN_FOLDER}/{name}" if args.out is None else args.out
     evaluations, seconds = args.budget or (None, None)
     with _stop_on_interrupt() as stop:
-        plan_made = call(
+        new_plan = call_api(
             planfly.plan if args.old is None else planfly.replan,
             args,
             budget=evaluations,
@@ -113,12 +113,12 @@ def plan(args: argparse.Namespace) -> int:
             overwrite=args.overwrite or args.out is None,
             stop=stop,
         )
-    target = expand_path_pattern(out, plan_made.scenario.name, plan_made.seed)
-    print_warnings(plan_made.scenario.notes)
-    _print_plan(plan_made)
+    target = expand_path_pattern(out, new_plan.scenario.name, new_plan.seed)
+    print_warnings(new_plan.scenario.notes)
+    _print_plan(new_plan)
     print(f"plan      {target}")
-    code = FLYABLE if plan_made.safe else NOT_FLYABLE
-    give_answer(args, lambda: _json_answer(plan_made, target, code))
+    code = FLYABLE if new_plan.safe else NOT_FLYABLE
+    write_json_if_requested(args, lambda: _json_answer(new_plan, target, code))
     return code
 
 
@@ -136,7 +136,7 @@ def _plan_front(args: argparse.Namespace) -> int:
         raise ScenarioError.of_argument("budget", evaluations, allowed)
     out = FRONT_FOLDER if args.out is None else args.out
     with _stop_on_interrupt() as stop:
-        front = call(
+        front = call_api(
             planfly.plan_front,
             args,
             count=args.front,
@@ -145,12 +145,12 @@ def _plan_front(args: argparse.Namespace) -> int:
             overwrite=args.overwrite or args.out is None,
             stop=stop,
         )
-    default = front.default.plan
-    folder = expand_path_pattern(out, default.scenario.name, default.seed)
-    print_warnings(default.scenario.notes)
+    default_plan = front.default.plan
+    folder = expand_path_pattern(out, default_plan.scenario.name, default_plan.seed)
+    print_warnings(default_plan.scenario.notes)
     print("\n".join(front_lines(front, folder)))
     code = FLYABLE if front.plans else NOT_FLYABLE
-    give_answer(args, lambda: front_answer(front, folder, code))
+    write_json_if_requested(args, lambda: front_answer(front, folder, code))
     return code
 
 
@@ -177,7 +177,7 @@ def _json_answer(plan: "Plan", target: "Path", code: int) -> object:
 
 @contextmanager
 def _stop_on_interrupt() -> Iterator[Callable[[], bool]]:
-    """Yield a function that returns True after Ctrl-C, which stops a search; a second Ctrl-C ends the command."""
+    """Yield a function that returns True after Ctrl-C, to stop a search; a second Ctrl-C ends the command."""
     was_pressed = False
 
     def handle_signal(_signal: int, _frame: FrameType | None) -> None:

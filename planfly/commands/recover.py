@@ -6,9 +6,9 @@ from pathlib import Path
 import planfly
 from planfly.terminal.command_parser import LineParser
 from planfly.terminal.exit_codes import FLYABLE, LOSS
-from planfly.terminal.options import call, log_argument, result_options
-from planfly.terminal.output import give_answer
-from planfly.terminal.results import warn_of_loss
+from planfly.terminal.options import call_api, log_argument, result_options
+from planfly.terminal.output import write_json_if_requested
+from planfly.terminal.results import warn_about_incomplete_log
 
 
 def recover_options(line: LineParser) -> None:
@@ -26,19 +26,19 @@ def recover(args: argparse.Namespace) -> int:
     """Write the readable part as a new log; write nothing if the log is complete."""
     source = Path(args.log)
     target = Path(args.out) if args.out else source.with_name(f"{source.stem}-recovered.mcap")
-    log = call(planfly.recover, args, out=target)
+    log = call_api(planfly.recover, args, out=target)
     if log is None:
         print(f"{source}: complete: there is nothing to recover, and nothing was written")
-        give_answer(args, lambda: _json_answer(None, None, None))
+        write_json_if_requested(args, lambda: _json_answer(None, None, None))
         return FLYABLE
     print(f"log       {target} ({len(log.track)} rows, to {log.end_time:.1f} s)")
-    warn_of_loss(log)
-    give_answer(args, lambda: _json_answer(target, len(log.track), log.end_time))
+    warn_about_incomplete_log(log)
+    write_json_if_requested(args, lambda: _json_answer(target, len(log.track), log.end_time))
     return LOSS
 
 
-def _json_answer(target: Path | None, rows: int | None, end: float | None) -> object:
+def _json_answer(target: Path | None, rows: int | None, end_time: float | None) -> object:
     from planfly.terminal.answers import RecoverAnswer
 
     code = FLYABLE if target is None else LOSS
-    return RecoverAnswer(exit_code=code, log=None if target is None else str(target), rows=rows, end_s=end)
+    return RecoverAnswer(exit_code=code, log=None if target is None else str(target), rows=rows, end_s=end_time)

@@ -41,8 +41,8 @@ class Command(NamedTuple):
 
 
 # Section titles of the help.
-_FLY = "plan and fly"
-_LOOK = "judge and show"
+_PLAN_AND_FLY = "plan and fly"
+_JUDGE_AND_SHOW = "judge and show"
 _AUTOPILOT_LOGS = "logs of autopilots"
 _MANY_FLIGHTS = "many flights"
 _AIRCRAFT = "aircraft, scenarios and terrain"
@@ -50,19 +50,19 @@ _HELP = "help"
 
 # All commands, in the order of the help.
 COMMANDS = (
-    Command("run", _FLY, "RunAnswer"),
-    Command("plan", _FLY, "plan_answers.PlanDocument"),
-    Command("export", _FLY, "ExportAnswer"),
-    Command("fly", _FLY, "FlyAnswer"),
-    Command("studio", _FLY),
-    Command("serve", _FLY),
-    Command("check", _LOOK, "verdict_answers.CheckDocument"),
-    Command("returns", _LOOK, "returns_answers.ReturnsAnswer"),
-    Command("survey", _LOOK, "survey_answers.SurveyAnswer"),
-    Command("report", _LOOK, "ReportAnswer"),
-    Command("compare", _LOOK, "CompareAnswer"),
-    Command("replay", _LOOK, "ReplayAnswer"),
-    Command("recover", _LOOK, "RecoverAnswer"),
+    Command("run", _PLAN_AND_FLY, "RunAnswer"),
+    Command("plan", _PLAN_AND_FLY, "plan_answers.PlanDocument"),
+    Command("export", _PLAN_AND_FLY, "ExportAnswer"),
+    Command("fly", _PLAN_AND_FLY, "FlyAnswer"),
+    Command("studio", _PLAN_AND_FLY),
+    Command("serve", _PLAN_AND_FLY),
+    Command("check", _JUDGE_AND_SHOW, "verdict_answers.CheckDocument"),
+    Command("returns", _JUDGE_AND_SHOW, "returns_answers.ReturnsAnswer"),
+    Command("survey", _JUDGE_AND_SHOW, "survey_answers.SurveyAnswer"),
+    Command("report", _JUDGE_AND_SHOW, "ReportAnswer"),
+    Command("compare", _JUDGE_AND_SHOW, "CompareAnswer"),
+    Command("replay", _JUDGE_AND_SHOW, "ReplayAnswer"),
+    Command("recover", _JUDGE_AND_SHOW, "RecoverAnswer"),
     Command("import", _AUTOPILOT_LOGS, "ImportAnswer", "imported_logs", "import_log"),
     Command("refly", _AUTOPILOT_LOGS, "ReflyAnswer", "imported_logs"),
     Command("campaign", _MANY_FLIGHTS, "CampaignDocument", "campaigns"),
@@ -119,8 +119,8 @@ def _find_entry(name: str) -> Command:
 _JSON_SCHEMA_DRAFT = "https://json-schema.org/draft/2020-12/schema"
 
 
-def answering_commands() -> list[str]:
-    """Return the names of the commands that have ``--json``."""
+def commands_with_json() -> list[str]:
+    """Return the names of the commands with the option ``--json``."""
     return [command.name for command in COMMANDS if command.answer]
 
 
@@ -133,7 +133,7 @@ def answer_schema(name: str) -> dict[str, Any]:
     # Imported here: only this function needs schemas.
     from pydantic import TypeAdapter
 
-    if name not in answering_commands():
+    if name not in commands_with_json():
         raise KeyError(name)
     module, _, answer = _find_entry(name).answer.rpartition(".")
     answers = import_module(f"planfly.terminal.{module or 'answers'}")

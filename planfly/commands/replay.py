@@ -13,15 +13,15 @@ from planfly.terminal.command_parser import LineParser
 from planfly.terminal.control_characters import without_controls
 from planfly.terminal.exit_codes import FLYABLE, LOSS
 from planfly.terminal.options import (
-    call,
+    call_api,
     log_argument,
     own_link_options,
-    print_at_once,
+    print_and_flush,
     result_options,
     watch_stop_signals,
 )
-from planfly.terminal.output import give_answer, plain_stream
-from planfly.terminal.results import warn_of_loss
+from planfly.terminal.output import plain_stream, write_json_if_requested
+from planfly.terminal.results import warn_about_incomplete_log
 from world.errors import PlanflyError
 from world.running_clock import RunningClock
 
@@ -52,47 +52,47 @@ def replay_options(line: LineParser) -> None:
     )
     parser.alias_keyword("end", "--to")
     log_argument(parser)
-    part = parser.group("which part, how fast")
-    part.add_argument(
+    part_group = parser.group("which part, how fast")
+    part_group.add_argument(
         "--from", dest="start", metavar="S", type=number("start"), help="start at this time of the flight, s"
     )
-    part.add_argument(
+    part_group.add_argument(
         "--to",
         metavar="S|IP:PORT,...",
         type=time_or_stations,
         help="end at this time of the flight, s; or play the log to ground stations at this address (extra "
         "planfly[live])",
     )
-    part.add_argument(
+    part_group.add_argument(
         "--speed",
         metavar="X",
         type=number("speed"),
         help="at X times real time (default: 1 on a terminal and to Foxglove; a film of 20 s; otherwise at once)",
     )
-    part.add_argument("--at-once", action="store_true", help="print the timeline at once, also on a terminal")
-    other = parser.group("other ways to see it")
-    other.add_argument(
+    part_group.add_argument("--at-once", action="store_true", help="print the timeline at once, also on a terminal")
+    output_group = parser.group("other ways to see it")
+    output_group.add_argument(
         "--movie",
         metavar="FILE|DIR",
         help="draw the flight as FILE.gif, FILE.mp4 (by ffmpeg, or the extra planfly[films]), or DIR for PNG frames",
     )
-    other.add_argument(
+    output_group.add_argument(
         "--foxglove",
         action="store_true",
         help="play it to Foxglove on this machine over WebSocket; needs the extra planfly[foxglove], and a viewer that"
         " speaks foxglove.sdk.v1 (Foxglove since 2025, Lichtblick after 1.21)",
     )
-    other.add_argument(
+    output_group.add_argument(
         "--port",
         metavar="N",
         type=number("port"),
         default=8765,
         help="port of --foxglove (default: 8765; 0: any free port)",
     )
-    other.add_argument(
+    output_group.add_argument(
         "--allow-origin", metavar="URL,URL", help="further web pages that may connect to --foxglove (https://HOST)"
     )
-    other.add_argument(
+    output_group.add_argument(
         "--wait",
         metavar="S",
         type=number("wait"),
@@ -114,26 +114,26 @@ def replay(args: argparse.Namespace) -> int:
     if to_station or args.foxglove:
         play = planfly.play_to_stations if to_station else planfly.play_to_foxglove
         with watch_stop_signals() as stop:
-            call(play, args, log=log, stop=stop, on_message=print_at_once)
+            call_api(play, args, log=log, stop=stop, on_message=print_and_flush)
     elif args.movie:
-        for file in call(planfly.movie, args, log=log, out=args.movie)[:3]:
+        for file in call_api(planfly.movie, args, log=log, out=args.movie)[:3]:
             print(f"movie     {file}")
     elif sys.stdout.isatty() and not (args.at_once or args.quiet or args.json):
         _show_instruments(log, args)
     else:
         _print_timeline(log, args)
     if not log.complete:
-        warn_of_loss(log)
+        warn_about_incomplete_log(log)
     code = FLYABLE if log.complete else LOSS
-    give_answer(args, lambda: _json_answer(args, log, code))
+    write_json_if_requested(args, lambda: _json_answer(args, log, code))
     return code
 
 
 def _json_answer(args: argparse.Namespace, log: "FlightLog", code: int) -> object:
-    """Return the timeline of the replayed part, or of the whole flight if it is sent to ground stations."""
+    """Return the timeline of the replayed part; if the flight is sent to ground stations, of the whole flight."""
     from planfly.terminal.answers import ReplayAnswer, TimelineEvent
 
-    entries = planfly.timeline(log) if isinstance(args.to, str) else call(planfly.timeline, args, log=log)
+    entries = planfly.timeline(log) if isinstance(args.to, str) else call_api(planfly.timeline, args, log=log)
     events = [TimelineEvent(time_s=entry.time, kind=entry.kind, text=entry.text) for entry in entries]
     return ReplayAnswer(exit_code=code, log=args.log, complete=log.complete, end_s=log.end_time, timeline=events)
 
@@ -143,7 +143,7 @@ def _print_timeline(log: "FlightLog", args: argparse.Namespace) -> None:
     from logs.views.replay.timeline import entry_lines
 
     speed = args.speed
-    entries = call(planfly.timeline, args, log=log)
+    entries = call_api(planfly.timeline, args, log=log)
     start, clock = args.start or float(log.track.time[0]), RunningClock()
     for entry in entries:
         while speed and (wait := (entry.time - start) / speed - clock()) > 0.0:
@@ -154,7 +154,7 @@ def _print_timeline(log: "FlightLog", args: argparse.Namespace) -> None:
 def _show_instruments(log: "FlightLog", args: argparse.Namespace) -> None:
     """Show frames until the end or an interruption; the last frame stays on the terminal."""
     speed, lines = args.speed or 1.0, list[str]()
-    frames = call(planfly.replay, args, log=log, width=lambda: shutil.get_terminal_size().columns)
+    frames = call_api(planfly.replay, args, log=log, width=lambda: shutil.get_terminal_size().columns)
     screen = plain_stream(sys.stdout)
     print(_ENTER_SCREEN, end="", file=screen)
     try:

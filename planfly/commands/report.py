@@ -11,8 +11,8 @@ from planfly.terminal.arguments import files, with_completer
 from planfly.terminal.command_parser import LineParser
 from planfly.terminal.exit_codes import BAD_INPUT, FLYABLE, LOSS, NOT_FLYABLE, verdict_code
 from planfly.terminal.options import result_options
-from planfly.terminal.output import give_answer
-from planfly.terminal.results import warn_of_loss
+from planfly.terminal.output import write_json_if_requested
+from planfly.terminal.results import warn_about_incomplete_log
 from world.errors import PlanflyError
 
 if TYPE_CHECKING:
@@ -42,7 +42,7 @@ def report(args: argparse.Namespace) -> int:
         return BAD_INPUT
     source = Path(args.log)
     log = planfly.read_log(source)
-    written = planfly.report(
+    result = planfly.report(
         log,
         args.out or source.with_name(f"{source.stem}-report"),
         pictures=args.pictures,
@@ -50,21 +50,21 @@ def report(args: argparse.Namespace) -> int:
         overwrite=args.overwrite or args.out is None,
         command=f"planfly report {args.log}",
     )
-    for file in written.files:
+    for file in result.files:
         print(f"report    {file}")
-    code = NOT_FLYABLE if written.verdict is None else verdict_code(written.verdict)
+    code = NOT_FLYABLE if result.verdict is None else verdict_code(result.verdict)
     if not log.complete:
-        warn_of_loss(log)
+        warn_about_incomplete_log(log)
         code = LOSS
-    give_answer(args, lambda: _json_answer(written.files, written.verdict, code))
+    write_json_if_requested(args, lambda: _json_answer(result.files, result.verdict, code))
     return code
 
 
-def _json_answer(written: Sequence[Path], verdict: "Verdict | None", code: int) -> object:
+def _json_answer(files: Sequence[Path], verdict: "Verdict | None", code: int) -> object:
     from planfly.terminal.answers import ReportAnswer
 
     document = None if verdict is None else verdict.document()
-    return ReportAnswer(exit_code=code, files=[str(file) for file in written], verdict=document)
+    return ReportAnswer(exit_code=code, files=[str(file) for file in files], verdict=document)
 
 
 def _write_layout(args: argparse.Namespace) -> int:
@@ -73,5 +73,5 @@ def _write_layout(args: argparse.Namespace) -> int:
         raise PlanflyError(message, file=args.log, field="--layout", value=args.layout)
     file = planfly.foxglove_layout(args.layout, overwrite=args.overwrite)
     print(f"layout    {file}")
-    give_answer(args, lambda: _json_answer([file], None, FLYABLE))
+    write_json_if_requested(args, lambda: _json_answer([file], None, FLYABLE))
     return FLYABLE

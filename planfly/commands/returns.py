@@ -6,19 +6,19 @@ from typing import TYPE_CHECKING
 
 import planfly
 from planfly.commands.check import LOGS
-from planfly.terminal.arguments import IMPORTED_LOGS, MISSIONS, files, number, with_completer
-from planfly.terminal.command_parser import LineParser, coloured
+from planfly.terminal.arguments import IMPORTED_LOG_SUFFIXES, MISSION_SUFFIXES, files, number, with_completer
+from planfly.terminal.command_parser import LineParser, colour_text
 from planfly.terminal.exit_codes import FLYABLE, LOSS, NOT_FLYABLE
 from planfly.terminal.options import (
     aircraft_and_wind_options,
-    call,
+    call_api,
     imported_log_options,
     program_option,
     result_options,
     steering_options,
     world_options,
 )
-from planfly.terminal.output import give_answer
+from planfly.terminal.output import write_json_if_requested
 
 if TYPE_CHECKING:
     from planfly import ReturnsFound
@@ -41,7 +41,7 @@ def returns_options(line: LineParser) -> None:
         parser.add_argument(
             "what", metavar="MISSION|LOG", help=f"plan.json, .waypoints or .plan, or a flight log (.mcap, or {LOGS})"
         ),
-        files(*MISSIONS, "mcap", *IMPORTED_LOGS),
+        files(*MISSION_SUFFIXES, "mcap", *IMPORTED_LOG_SUFFIXES),
     )
     group = parser.group("the returns")
     group.add_argument(
@@ -82,38 +82,40 @@ def returns(args: argparse.Namespace) -> int:
     """Judge every return; the exit code is 0 if all are safe, 4 if one is unsafe, and 3 if some are undecided."""
     from logs.verdict.conditions import flown_lines, setup_conditions
 
-    found = call(planfly.returns, args)
-    code = FLYABLE if found.safe else LOSS if found.undecided else NOT_FLYABLE
-    print(f"returns   {coloured(found.headline, 'good' if found.safe else 'warning' if found.undecided else 'bad')}")
-    for text in flown_lines(setup_conditions(found.setup)):
+    result = call_api(planfly.returns, args)
+    code = FLYABLE if result.safe else LOSS if result.undecided else NOT_FLYABLE
+    print(
+        f"returns   {colour_text(result.headline, 'good' if result.safe else 'warning' if result.undecided else 'bad')}"
+    )
+    for text in flown_lines(setup_conditions(result.setup)):
         print(f"  {text}")
-    for text in found.cause_lines:
+    for text in result.cause_lines:
         print(f"  {text}")
-    for text in found.range_lines[:_MAX_LISTED]:
+    for text in result.range_lines[:_MAX_LISTED]:
         print(f"  {text}")
-    if len(found.range_lines) > _MAX_LISTED:
-        print(f"  and {len(found.range_lines) - _MAX_LISTED} ranges more; --json FILE has them all")
-    for text in found.program_lines:
+    if len(result.range_lines) > _MAX_LISTED:
+        print(f"  and {len(result.range_lines) - _MAX_LISTED} ranges more; --json FILE has them all")
+    for text in result.program_lines:
         print(f"  {text}")
-    print(f"  {found.no_return_line}")
-    for text in found.suggestion_lines:
-        print(coloured("  would help: ", "hint") + text)
-    if args.suggest and not found.safe and not found.suggested:
+    print(f"  {result.no_return_line}")
+    for text in result.suggestion_lines:
+        print(colour_text("  would help: ", "hint") + text)
+    if args.suggest and not result.safe and not result.suggested:
         print("  no RTL_ALTITUDE, climb or rally points were found that would help")
-    print(f"engine out: {found.glide_headline}")
-    for text in found.glide_lines[:_MAX_LISTED]:
+    print(f"engine out: {result.glide_headline}")
+    for text in result.glide_lines[:_MAX_LISTED]:
         print(f"  {text}")
-    if len(found.glide_lines) > _MAX_LISTED:
-        print(f"  and {len(found.glide_lines) - _MAX_LISTED} ranges more; --json FILE has them all")
-    for text in found.notes:
+    if len(result.glide_lines) > _MAX_LISTED:
+        print(f"  and {len(result.glide_lines) - _MAX_LISTED} ranges more; --json FILE has them all")
+    for text in result.notes:
         print(f"  note    {text}")
-    for path in found.files:
+    for path in result.files:
         print(f"  written {path}")
-    give_answer(args, lambda: _json_answer(str(args.what), found, code))
+    write_json_if_requested(args, lambda: _json_answer(str(args.what), result, code))
     return code
 
 
-def _json_answer(what: str, found: "ReturnsFound", code: int) -> object:
+def _json_answer(source: str, result: "ReturnsFound", code: int) -> object:
     from logs.verdict.conditions import setup_conditions
     from planfly.terminal.returns_answers import (
         CauseEntry,
@@ -124,13 +126,13 @@ def _json_answer(what: str, found: "ReturnsFound", code: int) -> object:
         suggestion_entry,
     )
 
-    returns, no_return = found.returns, found.returns.point_of_no_return
+    returns, no_return = result.returns, result.returns.point_of_no_return
     return ReturnsAnswer(
         exit_code=code,
-        what=what,
-        headline=found.headline,
-        safe=found.safe,
-        conditions=setup_conditions(found.setup),
+        what=source,
+        headline=result.headline,
+        safe=result.safe,
+        conditions=setup_conditions(result.setup),
         every_s=returns.every,
         least_clearance_m=returns.limit,
         causes=[
@@ -139,13 +141,13 @@ def _json_answer(what: str, found: "ReturnsFound", code: int) -> object:
         ],
         rtl_autoland=returns.autoland,
         not_judged=list(returns.open),
-        ranges=[return_entry(found, return_range) for return_range in returns.ranges],
-        by_program=program_entry(found),
+        ranges=[return_entry(result, return_range) for return_range in returns.ranges],
+        by_program=program_entry(result),
         left_out=returns.left_out,
         no_return=no_return.kind,
         no_return_s=None if math.isnan(no_return.time) else round(no_return.time, 2),
-        engine_out=glides_entry(found),
-        suggestions=[suggestion_entry(found, suggested) for suggested in found.suggested],
-        files=[str(path) for path in found.files],
-        notes=list(found.notes),
+        engine_out=glides_entry(result),
+        suggestions=[suggestion_entry(result, suggested) for suggested in result.suggested],
+        files=[str(path) for path in result.files],
+        notes=list(result.notes),
     )

@@ -8,15 +8,15 @@ from planfly.terminal.arguments import number
 from planfly.terminal.command_parser import LineParser
 from planfly.terminal.exit_codes import verdict_code
 from planfly.terminal.options import (
-    call,
+    call_api,
     flight_options,
     log_rate_option,
     result_options,
     scenario_argument,
     terrain_option,
 )
-from planfly.terminal.output import give_answer, give_junit
-from planfly.terminal.results import print_engine, print_returns, print_verdict
+from planfly.terminal.output import write_json_if_requested, write_junit_if_requested
+from planfly.terminal.results import print_engine, print_returns_line, print_verdict
 
 if TYPE_CHECKING:
     from planfly import Round, RunResult
@@ -55,12 +55,12 @@ def run_options(line: LineParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Plan, export, fly, record, judge and report, with up to N more rounds for ``--refine N``."""
-    result = call(planfly.run, args, on_round=_print_round)
+    result = call_api(planfly.run, args, on_round=_print_round)
     if args.refine:
         _print_rounds(result)
     code = verdict_code(result.verdict)
-    give_answer(args, lambda: _json_answer(result, bool(args.refine), code))
-    give_junit(args, {result.scenario: result.verdict})
+    write_json_if_requested(args, lambda: _json_answer(result, bool(args.refine), code))
+    write_junit_if_requested(args, {result.scenario: result.verdict})
     return code
 
 
@@ -84,7 +84,7 @@ def _json_answer(result: "RunResult", refined: bool, code: int) -> object:
 
 def _print_round(finished: "Round") -> None:
     print_verdict(finished.verdict, finished.notes)
-    print_returns(finished.returns_line)
+    print_returns_line(finished.returns_line)
     print_engine(finished.engine)
     files = "plan.json, mission.waypoints, mission.plan, verdict.json; nothing was flown"
     if finished.flown:

@@ -3,14 +3,14 @@
 import argparse
 
 import planfly
-from planfly.terminal.arguments import MISSIONS, files, number, with_completer
+from planfly.terminal.arguments import MISSION_SUFFIXES, files, number, with_completer
 from planfly.terminal.command_parser import LineParser
 from planfly.terminal.exit_codes import FLYABLE
 from planfly.terminal.options import (
     aircraft_and_wind_options,
-    call,
+    call_api,
     own_link_options,
-    print_at_once,
+    print_and_flush,
     steering_options,
     watch_stop_signals,
     world_options,
@@ -34,7 +34,7 @@ def serve_options(line: LineParser) -> None:
     )
     with_completer(
         parser.add_argument("mission", metavar="MISSION", nargs="?", help="a mission file to begin with"),
-        files(*MISSIONS),
+        files(*MISSION_SUFFIXES),
     )
     world_options(parser)
     aircraft_and_wind_options(parser)
@@ -61,5 +61,5 @@ def serve_options(line: LineParser) -> None:
 def serve(args: argparse.Namespace) -> int:
     """Serve until SIGINT or SIGTERM."""
     with watch_stop_signals() as stop:
-        call(planfly.serve, args, stop=stop, on_message=print_at_once)
+        call_api(planfly.serve, args, stop=stop, on_message=print_and_flush)
     return FLYABLE

@@ -8,7 +8,7 @@ from planfly.terminal.arguments import SHELLS, shell_script, with_completer
 from planfly.terminal.command_parser import LineParser
 from planfly.terminal.exit_codes import BAD_INPUT, FLYABLE
 from planfly.terminal.options import json_option
-from planfly.terminal.output import give_answer
+from planfly.terminal.output import write_json_if_requested
 from world.files import did_you_mean
 
 # Help text on how to install the completion.
@@ -58,7 +58,7 @@ def show_help_options(line: LineParser) -> None:
 def show_help(args: argparse.Namespace) -> int:
     """Print the help of planfly or of one command, or a command's schema; return 2 for an unknown command."""
     # Imported here: the registry lists this module.
-    from planfly.commands.registry import answering_commands, build_parser, schema_text
+    from planfly.commands.registry import build_parser, commands_with_json, schema_text
 
     line = build_parser()
     if args.topic is None:
@@ -69,9 +69,9 @@ def show_help(args: argparse.Namespace) -> int:
     if args.topic not in line.commands:
         return _report_bad_usage(f"{args.topic!r}: no such command{did_you_mean(args.topic, line.commands)}")
     if args.schema:
-        if args.topic not in answering_commands():
+        if args.topic not in commands_with_json():
             return _report_bad_usage(
-                f"--schema: {args.topic} has no --json; these have: {', '.join(answering_commands())}"
+                f"--schema: {args.topic} has no --json; these have: {', '.join(commands_with_json())}"
             )
         print(schema_text(args.topic), end="")
         return FLYABLE
@@ -100,11 +100,11 @@ def scenarios(args: argparse.Namespace) -> int:
     for name, description in descriptions.items():
         print(f"{name:<12} {description}")
 
-    def answer() -> object:
+    def json_answer() -> object:
         from planfly.terminal.answers import ScenarioEntry, ScenariosAnswer
 
         entries = [ScenarioEntry(name=name, description=description) for name, description in descriptions.items()]
         return ScenariosAnswer(exit_code=FLYABLE, scenarios=entries)
 
-    give_answer(args, answer)
+    write_json_if_requested(args, json_answer)
     return FLYABLE

@@ -3,14 +3,14 @@
 import argparse
 
 import planfly
-from planfly.terminal.arguments import IMPORTED_LOGS, MISSIONS, files, number, with_completer
+from planfly.terminal.arguments import IMPORTED_LOG_SUFFIXES, MISSION_SUFFIXES, files, number, with_completer
 from planfly.terminal.command_parser import LineParser
 from planfly.terminal.exit_codes import FLYABLE
 from planfly.terminal.options import (
     aircraft_and_wind_options,
     autopilot_options,
-    call,
-    print_at_once,
+    call_api,
+    print_and_flush,
     watch_stop_signals,
     world_options,
 )
@@ -42,7 +42,7 @@ def studio_options(line: LineParser) -> None:
             help="a scenario, by name or .toml, whose path is planned; plan.json, .waypoints, .plan; or a "
             "log's mission (default: jacksboro)",
         ),
-        files("toml", "mcap", *MISSIONS, *IMPORTED_LOGS),
+        files("toml", "mcap", *MISSION_SUFFIXES, *IMPORTED_LOG_SUFFIXES),
     )
     parser.add_argument(
         "--port", metavar="PORT", type=number("port"), help="port of the studio (default: 8790, or any free port)"
@@ -71,5 +71,5 @@ def studio_options(line: LineParser) -> None:
 def studio(args: argparse.Namespace) -> int:
     """Serve until SIGINT or SIGTERM."""
     with watch_stop_signals() as stop:
-        call(planfly.open_studio, args, stop=stop, on_message=print_at_once)
+        call_api(planfly.open_studio, args, stop=stop, on_message=print_and_flush)
     return FLYABLE

@@ -6,11 +6,17 @@ from shlex import quote
 from typing import TYPE_CHECKING
 
 import planfly
-from planfly.terminal.arguments import MISSIONS, camera, files, number, with_completer
-from planfly.terminal.command_parser import LineParser, coloured
+from planfly.terminal.arguments import MISSION_SUFFIXES, camera, files, number, with_completer
+from planfly.terminal.command_parser import LineParser, colour_text
 from planfly.terminal.exit_codes import NOT_FLYABLE, verdict_code
-from planfly.terminal.options import aircraft_and_wind_options, call, result_options, steering_options, world_options
-from planfly.terminal.output import give_answer
+from planfly.terminal.options import (
+    aircraft_and_wind_options,
+    call_api,
+    result_options,
+    steering_options,
+    world_options,
+)
+from planfly.terminal.output import write_json_if_requested
 
 if TYPE_CHECKING:
     from planfly import SurveyFound
@@ -26,7 +32,7 @@ def survey_options(line: LineParser) -> None:
     )
     with_completer(
         parser.add_argument("what", metavar="MISSION|LOG", help=".waypoints or .plan, or a flight log (.mcap)"),
-        files(*MISSIONS, "mcap"),
+        files(*MISSION_SUFFIXES, "mcap"),
     )
     group = parser.group("the survey")
     group.add_argument(
@@ -56,36 +62,36 @@ def survey(args: argparse.Namespace) -> int:
     """Judge every photo line; return 4 if one is not usable, otherwise the exit code of the verdict on the flight."""
     from logs.verdict.conditions import flown_lines, setup_conditions
 
-    found = call(planfly.survey, args)
-    code = verdict_code(found.verdict)
-    if not found.usable:
+    result = call_api(planfly.survey, args)
+    code = verdict_code(result.verdict)
+    if not result.usable:
         code = NOT_FLYABLE
-    print(f"survey    {coloured(found.headline, 'good' if found.usable else 'bad')}")
-    print(f"flight    {found.verdict.headline}")
-    for text in flown_lines(setup_conditions(found.setup)):
+    print(f"survey    {colour_text(result.headline, 'good' if result.usable else 'bad')}")
+    print(f"flight    {result.verdict.headline}")
+    for text in flown_lines(setup_conditions(result.setup)):
         print(f"  {text}")
-    for text in found.survey_lines:
+    for text in result.survey_lines:
         print(f"  {text}")
-    for text in found.remedy_lines:
-        print(coloured("  would help: ", "hint") + text)
-    if args.suggest and not found.usable and not found.remedies:
-        for text in found.no_remedy_lines:
+    for text in result.remedy_lines:
+        print(colour_text("  would help: ", "hint") + text)
+    if args.suggest and not result.usable and not result.remedies:
+        for text in result.no_remedy_lines:
             print(f"  {text}")
-    for path in found.files:
+    for path in result.files:
         print(f"  written {path}")
-    if missions := [path for path in found.files if path.suffix == ".waypoints"]:
+    if missions := [path for path in result.files if path.suffix == ".waypoints"]:
         # Other commands judge a mission without camera items as a path, not as a survey.
-        settings = [f" --params {quote(str(path))}" for path in found.files if path.suffix == ".param"]
+        settings = [f" --params {quote(str(path))}" for path in result.files if path.suffix == ".param"]
         params_option = settings[0] if missions[0].stem == "parameter" and settings else ""
         next_line = (
             f"next      planfly survey {quote(str(missions[0]))}{params_option} with the same options, as it was flown"
         )
-        print(coloured(next_line, "hint"))
-    give_answer(args, lambda: _json_answer(str(args.what), found, code))
+        print(colour_text(next_line, "hint"))
+    write_json_if_requested(args, lambda: _json_answer(str(args.what), result, code))
     return code
 
 
-def _json_answer(what: str, found: "SurveyFound", code: int) -> object:
+def _json_answer(source: str, result: "SurveyFound", code: int) -> object:
     from logs.verdict.conditions import setup_conditions
     from planfly.terminal.survey_answers import (
         SurveyAnswer,
@@ -97,16 +103,16 @@ def _json_answer(what: str, found: "SurveyFound", code: int) -> object:
 
     return SurveyAnswer(
         exit_code=code,
-        what=what,
-        headline=found.headline,
-        usable=found.usable,
-        conditions=setup_conditions(found.setup),
+        what=source,
+        headline=result.headline,
+        usable=result.usable,
+        conditions=setup_conditions(result.setup),
         surveys=[
-            [photo_line_entry(found.setup, line, measure) for line, measure in zip(survey.lines, lines, strict=True)]
-            for survey, lines in zip(found.surveys, found.lines, strict=True)
+            [photo_line_entry(result.setup, line, measure) for line, measure in zip(survey.lines, lines, strict=True)]
+            for survey, lines in zip(result.surveys, result.lines, strict=True)
         ],
-        overlaps=[None if overlap is None else overlap_entry(overlap) for overlap in found.overlaps],
-        remedies=[survey_remedy_entry(remedy) for remedy in found.remedies],
-        nearest=None if found.nearest is None else near_miss_entry(found.nearest),
-        files=[str(Path(path)) for path in found.files],
+        overlaps=[None if overlap is None else overlap_entry(overlap) for overlap in result.overlaps],
+        remedies=[survey_remedy_entry(remedy) for remedy in result.remedies],
+        nearest=None if result.nearest is None else near_miss_entry(result.nearest),
+        files=[str(Path(path)) for path in result.files],
     )

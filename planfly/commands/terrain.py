@@ -4,15 +4,15 @@ import argparse
 import shlex
 
 import planfly
-from planfly.terminal.arguments import MISSIONS, area, files, number, with_completer
+from planfly.terminal.arguments import MISSION_SUFFIXES, area, files, number, with_completer
 from planfly.terminal.command_parser import LineParser
 from planfly.terminal.exit_codes import FLYABLE
-from planfly.terminal.options import call, result_options
-from planfly.terminal.output import give_answer
+from planfly.terminal.options import call_api, result_options
+from planfly.terminal.output import write_json_if_requested
 from planfly.terminal.results import print_warnings
 
 # Maximum number of degree cells without data that are listed.
-_MAX_NAMED = 4
+_MAX_LISTED_CELLS = 4
 
 
 def terrain_options(line: LineParser) -> None:
@@ -28,7 +28,7 @@ def terrain_options(line: LineParser) -> None:
         area_group.add_argument(
             "--around", metavar="MISSION", help=".waypoints or .plan file: cover all of its places"
         ),
-        files(*MISSIONS),
+        files(*MISSION_SUFFIXES),
     )
     area_group.add_argument("--box", metavar="S,W,N,E", type=area, help="edges of the area, degrees")
     area_group.add_argument(
@@ -52,34 +52,36 @@ def terrain_options(line: LineParser) -> None:
 
 def terrain(args: argparse.Namespace) -> int:
     """Write the terrain of an area."""
-    cut = call(planfly.terrain, args, out=args.out or "dem.tif")
-    rows, cols = cut.shape
-    tiles = cut.tiles[0] if len(cut.tiles) == 1 else f"{len(cut.tiles)} tiles"
-    print(f"terrain   {cut.file}: {rows:,} x {cols:,} pixels from {tiles}")
-    if cut.fetched:
-        print(f"fetched   {cut.fetched / 1e6:.1f} MB")
-    if cut.absent:
-        corner_text = ", ".join(f"{lat} {lon}" for lat, lon in cut.absent[:_MAX_NAMED])
-        more_text = f" and {len(cut.absent) - _MAX_NAMED} more" if len(cut.absent) > _MAX_NAMED else ""
+    result = call_api(planfly.terrain, args, out=args.out or "dem.tif")
+    rows, cols = result.shape
+    tiles = result.tiles[0] if len(result.tiles) == 1 else f"{len(result.tiles)} tiles"
+    print(f"terrain   {result.file}: {rows:,} x {cols:,} pixels from {tiles}")
+    if result.fetched:
+        print(f"fetched   {result.fetched / 1e6:.1f} MB")
+    if result.absent:
+        corner_text = ", ".join(f"{lat} {lon}" for lat, lon in result.absent[:_MAX_LISTED_CELLS])
+        more_text = (
+            f" and {len(result.absent) - _MAX_LISTED_CELLS} more" if len(result.absent) > _MAX_LISTED_CELLS else ""
+        )
         absent_text = "treated as sea, at 0 m" if args.sea else "open sea, or not published (--sea treats it as sea)"
         print_warnings([f"no tile at {corner_text}{more_text} (south-west corners, degrees): {absent_text}"])
-    if cut.empty:
-        print_warnings([f"{cut.empty:,} of {rows * cols:,} pixels have no data"])
-    print(f"next      planfly fly MISSION --terrain {shlex.quote(str(cut.file))}")
+    if result.empty:
+        print_warnings([f"{result.empty:,} of {rows * cols:,} pixels have no data"])
+    print(f"next      planfly fly MISSION --terrain {shlex.quote(str(result.file))}")
 
-    def answer() -> object:
+    def json_answer() -> object:
         from planfly.terminal.answers import TerrainAnswer
 
         return TerrainAnswer(
             exit_code=FLYABLE,
-            file=str(cut.file),
+            file=str(result.file),
             rows=rows,
             columns=cols,
-            tiles=list(cut.tiles),
-            absent=[list(degree) for degree in cut.absent],
-            empty_pixels=cut.empty,
-            fetched_bytes=cut.fetched,
+            tiles=list(result.tiles),
+            absent=[list(degree) for degree in result.absent],
+            empty_pixels=result.empty,
+            fetched_bytes=result.fetched,
         )
 
-    give_answer(args, answer)
+    write_json_if_requested(args, json_answer)
     return FLYABLE

@@ -23,7 +23,7 @@ from planfly.workflow.airframe import Airframe, find_airframe, load_airframe
 from planfly.workflow.open_flight import make_setup
 from planfly.workflow.pipeline import fly_and_judge
 from planner.evaluation.problem import make_problem
-from planner.search.kernel_calls import FEW, FRONT, PARTS, call_kernels
+from planner.search.kernel_calls import FRONT, PARTS, SAMPLE_COUNT, call_kernels
 from planner.search.search_state import SCORE_COLUMNS, best_first
 from world.compile_events import tell_before_compiling
 from world.scenario import Scenario, from_spec
@@ -32,7 +32,7 @@ from world.scenario import Scenario, from_spec
 # Units of work: each calls kernels that no other unit calls, with the argument types that all commands use.
 
 # Scenario of the units, as TOML.
-FIELD = """
+SCENARIO_TEXT = """
 name = "field"
 [terrain]
 kind = "flat"
@@ -64,7 +64,7 @@ turbulence = "light"
 min_clearance_m = 50
 """
 # Mission of the units, as a .waypoints file.
-MISSION = """QGC WPL 110
+MISSION_TEXT = """QGC WPL 110
 0\t1\t0\t16\t0\t0\t0\t0\t46.0\t8.0\t0.0\t1
 1\t0\t3\t16\t0\t0\t0\t0\t46.0\t8.0\t100.0\t1
 2\t0\t3\t16\t0\t0\t0\t0\t46.004\t8.0\t110.0\t1
@@ -73,7 +73,7 @@ MISSION = """QGC WPL 110
 
 
 def _make_scenario() -> Scenario:
-    return from_spec(tomllib.loads(FIELD), "field")
+    return from_spec(tomllib.loads(SCENARIO_TEXT), "field")
 
 
 def _make_world() -> tuple[Scenario, Airframe]:
@@ -95,7 +95,7 @@ def _compute_tracking_error() -> None:
 
 
 def _rank_scores() -> None:
-    best_first(np.zeros((FEW, SCORE_COLUMNS)))
+    best_first(np.zeros((SAMPLE_COUNT, SCORE_COLUMNS)))
 
 
 def _plan_part(part: str) -> None:
@@ -105,18 +105,18 @@ def _plan_part(part: str) -> None:
 
 def _fly_mission() -> None:
     scenario, airframe = _make_world()
-    setup = make_setup(scenario, airframe, parse_mission(MISSION, "field.waypoints"), 1)
-    flown = fly_and_judge(setup, airframe, None)
-    returns_line(setup, flown.track)
+    setup = make_setup(scenario, airframe, parse_mission(MISSION_TEXT, "field.waypoints"), 1)
+    flight = fly_and_judge(setup, airframe, None)
+    returns_line(setup, flight.track)
     with Recorder(Path(os.devnull), setup) as recorder:
-        recorder.write(flown.track)
-        recorder.finish(flown.ended, flown.verdict)
+        recorder.write(flight.track)
+        recorder.finish(flight.ended, flight.verdict)
 
 
 def _judge_glides() -> None:
     scenario, airframe = _make_world()
-    setup = make_setup(scenario, airframe, parse_mission(MISSION, "field.waypoints"), 1)
-    return_summary(setup, None).drawn()
+    setup = make_setup(scenario, airframe, parse_mission(MISSION_TEXT, "field.waypoints"), 1)
+    return_summary(setup, None).data_for_pictures()
 
 
 # Function of each unit by name.

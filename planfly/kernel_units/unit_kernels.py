@@ -142,10 +142,10 @@ GLIDING = ("glides",)
 PLANNING_AND_FLYING = (*_SHARED, "scores", "flight", "shortening", "routes", "certificates", "paper", "sides")
 
 
-def kernels_of(units: tuple[str, ...]) -> frozenset[str]:
-    """Return all kernels of units, without repetition.
+def list_unit_kernels(units: tuple[str, ...]) -> frozenset[str]:
+    """Return the set of all kernels of units.
 
-    >>> len(kernels_of(("scores", "paper")))
+    >>> len(list_unit_kernels(("scores", "paper")))
     13
     """
     return frozenset(name for unit in units for name in UNIT_KERNELS[unit])

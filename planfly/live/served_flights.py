@@ -48,7 +48,7 @@ from logs.verdict.measures.route_requirements import route_requirements
 from logs.verdict.rule_words import rule_word
 from logs.verdict.verdict import Verdict
 from logs.verdict.wording import deciding_text, place_text
-from planfly.flight_options import MissionOptions, named_scenario
+from planfly.flight_options import MissionOptions, load_scenario_with_options
 from planfly.named_fences import read_named_fences
 from planfly.workflow.airframe import Airframe, airframe_of, choose_seed, load_airframe
 from planfly.workflow.open_flight import make_setup, open_flight
@@ -62,23 +62,23 @@ from world.scenario import Scenario, without_ground_phases
 # Duration of a loiter in LOITER and GUIDED in one log, s: each lap of a loiter is laid out, and judged, separately.
 LOITER_DURATION_S = 900.0
 # Maximum number of texts about one verdict; the log has the others.
-_MAX_TEXTS = 4
+_MAX_TEXTS_PER_VERDICT = 4
 
 
 @dataclass(frozen=True, slots=True)
 class ServeOptions:
-    """Options of the command line for serving; both processes load the files that the options name.
+    """Options of the command line for serving; both processes read the files named in the options.
 
     mission: path of a mission file, or "".
     speed: multiple of real time.
     logs: the folder of the flight logs.
-    flown: options of the flights.  An uploaded fence replaces the items of named fences, but not their zones.
+    flight_options: options of the flights.  An uploaded fence replaces the items of named fences, but not their zones.
     """
 
     mission: str
     speed: float
     logs: Path
-    flown: MissionOptions = field(default_factory=MissionOptions)
+    flight_options: MissionOptions = field(default_factory=MissionOptions)
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,25 +92,25 @@ class ServedScenario:
     fence: tuple[MissionItem, ...] = ()
 
 
-def open_served(options: ServeOptions) -> ServedScenario:
+def load_served_scenario(options: ServeOptions) -> ServedScenario:
     """Load the scenario and the mission that the options name.  Raises PlanflyError for bad input."""
     if options.mission:
-        setup = open_flight(options.mission, options.flown)
+        setup = open_flight(options.mission, options.flight_options)
         return ServedScenario(setup.scenario, airframe_of(setup), setup.seed, setup.mission)
-    scenario_name = options.flown.get("scenario")
+    scenario_name = options.flight_options.get("scenario")
     if scenario_name is None:
         allowed = "expected a mission, or a scenario in which to wait for an upload: `scenario` NAME"
         raise PlanflyError(f"mission: not named; {allowed}", field="scenario", allowed=allowed)
-    fences = read_named_fences(options.flown.get("fence") or ())
-    scenario = named_scenario(scenario_name, options.flown)
-    scenario, seed = fences.on_scenario(scenario), options.flown.get("seed")
+    fences = read_named_fences(options.flight_options.get("fence") or ())
+    scenario = load_scenario_with_options(scenario_name, options.flight_options)
+    scenario, seed = fences.add_to_scenario(scenario), options.flight_options.get("seed")
     return ServedScenario(scenario, load_airframe(scenario), choose_seed(scenario, seed), None, fences.items)
 
 
-def flown_parameters(scenario: Scenario, stated_values: Mapping[str, float]) -> dict[str, float]:
-    """Return the parameters of a scenario's autopilot by name, with stated values applied.
+def autopilot_parameters(scenario: Scenario, stated_values: Mapping[str, float]) -> dict[str, float]:
+    """Return the parameters of a scenario's autopilot, keyed by name, with stated values applied.
 
-    The cruise airspeed is the airspeed that is flown.  Raises PlanflyError for values that are not allowed.
+    The cruise airspeed is the airspeed of the airframe.  Raises PlanflyError for values that are not allowed.
     """
     airframe = load_airframe(scenario, stated_values)
     parameters = airframe.autopilot.parameters
@@ -139,7 +139,7 @@ class ServedFlights:
     """Judge missions in the served scenario, and log flights into the served folder."""
 
     def __init__(self, options: ServeOptions) -> None:
-        self._served = open_served(options)
+        self._served = load_served_scenario(options)
         self._logs = options.logs
         # Airframe with the parameters of the last judged mission.
         self._airframe = self._served.airframe
@@ -165,12 +165,12 @@ class ServedFlights:
 
     def prepare(self, request: JudgeMission) -> tuple[PreparedFlight | None, MissionJudged]:
         """Judge the geometry of a mission, and check that the flight can be started."""
-        served = self._served
+        served_scenario = self._served
         try:
             if request.parameters != self._parameters:
-                self._airframe = load_airframe(served.scenario, dict(request.parameters))
+                self._airframe = load_airframe(served_scenario.scenario, dict(request.parameters))
                 self._parameters = request.parameters
-            setup = make_setup(served.scenario, self._airframe, request.mission, served.seed)
+            setup = make_setup(served_scenario.scenario, self._airframe, request.mission, served_scenario.seed)
             # The first tick shows if the flight can start, and compiles the flight loop.
             flight = Flight(setup, self.aircraft)
             flight.block(1)
@@ -186,13 +186,15 @@ class ServedFlights:
         texts = mission_texts(setup, verdict)
         # A mission that is not judged in full is armed with a warning; for example, MAVSDK writes ground speeds.
         can_arm = verdict.flies or verdict.undecided
-        judged = MissionJudged(request.number, True, can_arm, texts, home, items, start)
-        return PreparedFlight(setup, flight.map), judged
+        mission_judged = MissionJudged(request.number, True, can_arm, texts, home, items, start)
+        return PreparedFlight(setup, flight.map), mission_judged
 
     def divert(self, request: DivertFlight, position: Floats) -> PreparedFlight:
-        """Return the flight that a station requests from the current position; a loiter lasts `LOITER_DURATION_S`."""
-        served = self._served
-        lat, lon = (on_grid(float(value)) for value in to_geo(served.scenario.origin, position[0], position[1]))
+        """Prepare the flight that a station requests at the current position; a loiter lasts `LOITER_DURATION_S`."""
+        served_scenario = self._served
+        lat, lon = (
+            on_grid(float(value)) for value in to_geo(served_scenario.scenario.origin, position[0], position[1])
+        )
         no_params = (0.0, 0.0, 0.0, 0.0)
         start_item = MissionItem(
             -1, int(Command.NAV_WAYPOINT), int(Frame.GLOBAL), no_params, lat, lon, float(position[2])
@@ -205,7 +207,9 @@ class ServedFlights:
             items = (_loiter_item(start_item, request.place),)
         mission = replace(request.mission, items=(start_item, *items), source=MODE_NAMES[request.mode])
         # The aircraft is in the air, so there is no take-off, and it does not land.
-        setup = make_setup(without_ground_phases(served.scenario), self._airframe, mission, served.seed)
+        setup = make_setup(
+            without_ground_phases(served_scenario.scenario), self._airframe, mission, served_scenario.seed
+        )
         return PreparedFlight(setup, LocalMap.around(setup))
 
     def open_log(self, setup: FlightSetup, mode: int) -> "ServedLog":
@@ -222,17 +226,19 @@ class ServedFlights:
         return ServedLog(path, setup, self.aircraft, mode)
 
 
-def _loiter_item(current: MissionItem, place: Place) -> MissionItem:
-    """Return a loiter about a place; values that the place does not state are taken from `current`."""
+def _loiter_item(current_item: MissionItem, place: Place) -> MissionItem:
+    """Return a loiter around a place; values that the place does not state are taken from `current_item`."""
     has_position = math.isfinite(place.lat_deg) and math.isfinite(place.lon_deg)
-    with_altitude = replace(current, frame=place.frame, alt=place.alt) if math.isfinite(place.alt) else current
+    item_at_altitude = (
+        replace(current_item, frame=place.frame, alt=place.alt) if math.isfinite(place.alt) else current_item
+    )
     return replace(
-        with_altitude,
+        item_at_altitude,
         seq=0,
         command=int(Command.NAV_LOITER_TIME),
         params=(LOITER_DURATION_S, 0.0, place.radius, 0.0),
-        lat_deg=on_grid(place.lat_deg) if has_position else current.lat_deg,
-        lon_deg=on_grid(place.lon_deg) if has_position else current.lon_deg,
+        lat_deg=on_grid(place.lat_deg) if has_position else current_item.lat_deg,
+        lon_deg=on_grid(place.lon_deg) if has_position else current_item.lon_deg,
     )
 
 
@@ -251,33 +257,37 @@ class ServedLog:
         self._recorder.write(block)
         self._recorder.flush()
 
-    def finish(self, ended: str, should_abort: Callable[[], bool]) -> FlightJudged:
+    def finish(self, end_reason: str, should_abort: Callable[[], bool]) -> FlightJudged:
         """Judge the flight and close the log.
 
-        A path that was abandoned within a second leaves no log.  If the process is to end, an abandoned path is not
-        judged; `planfly check` can judge it.
+        If the path was abandoned within a second, the log is deleted.  If the process is to end, an abandoned path is
+        not judged; `planfly check` can judge it.
         should_abort: see `planfly.workflow.reference_flights.judge_with_reference_flights`.
         """
         track = join_tracks(self._blocks)
-        was_left = ended.startswith((DIVERTED_TEXT, STILL_LOITERING_TEXT))
-        end = float(track.time[-1]) if len(track) else 0.0
-        if was_left and end < 1.0:
+        was_abandoned = end_reason.startswith((DIVERTED_TEXT, STILL_LOITERING_TEXT))
+        end_time = float(track.time[-1]) if len(track) else 0.0
+        if was_abandoned and end_time < 1.0:
             self._recorder.abandon()
             self._path.unlink()
             return FlightJudged(False, ())
-        self._recorder.event(end, f"flight ended: {ended}", "info" if was_left or ended == "completed" else "error")
-        if was_left and should_abort():
-            self._recorder.finish(ended)
+        self._recorder.event(
+            end_time, f"flight ended: {end_reason}", "info" if was_abandoned or end_reason == "completed" else "error"
+        )
+        if was_abandoned and should_abort():
+            self._recorder.finish(end_reason)
             return FlightJudged(False, (StatusText(f"log {self._path}, not judged yet", INFO),))
-        if ended == "completed":
+        if end_reason == "completed":
             requirements = route_requirements(self._setup)
             verdict, reference = judge_with_reference_flights(
-                requirements, self._aircraft, track, ended, should_abort=should_abort
+                requirements, self._aircraft, track, end_reason, should_abort=should_abort
             )
         else:
-            verdict, reference = judge_flight(self._setup, track, ended), None
-        self._recorder.finish(ended, verdict, reference)
-        texts = unfinished_texts(self._level, ended, verdict) if was_left else verdict_texts(self._level, verdict)
+            verdict, reference = judge_flight(self._setup, track, end_reason), None
+        self._recorder.finish(end_reason, verdict, reference)
+        texts = (
+            unfinished_texts(self._level, end_reason, verdict) if was_abandoned else verdict_texts(self._level, verdict)
+        )
         return FlightJudged(verdict.flyable, (*texts, StatusText(f"log {self._path}", INFO)))
 
     def abandon(self) -> None:
@@ -286,11 +296,11 @@ class ServedLog:
 
 
 def mission_texts(setup: FlightSetup, verdict: Verdict) -> tuple[StatusText, ...]:
-    """Return texts for stations on a mission's verdict, its size, and items that are not flown as written."""
+    """Return texts for stations: size of a mission, its verdict, and items that are not flown as written."""
     route = setup.route
     length = float(np.linalg.norm(np.diff(route.waypoints[:, :2], axis=0), axis=1).sum()) / 1000.0
     size_text = StatusText(f"mission: {len(route.waypoints)} waypoints, {length:.1f} km; {route.started}", INFO)
-    notes = tuple(StatusText(f"note: {note}", NOTICE) for note in route.notes[:_MAX_TEXTS])
+    notes = tuple(StatusText(f"note: {note}", NOTICE) for note in route.notes[:_MAX_TEXTS_PER_VERDICT])
     return (size_text, *verdict_texts("geometry", verdict), *notes)
 
 
@@ -298,37 +308,40 @@ def mission_texts(setup: FlightSetup, verdict: Verdict) -> tuple[StatusText, ...
 _RULES_OF_UNFINISHED_PATHS = ("completion", "loiter", "waypoint", "turn", "survey")
 
 
-def unfinished_texts(level: str, ended: str, verdict: Verdict) -> tuple[StatusText, ...]:
-    """Return texts on the verdict on the flown part of a path that the aircraft left early."""
-    failed = [
+def unfinished_texts(level: str, end_reason: str, verdict: Verdict) -> tuple[StatusText, ...]:
+    """Return texts on the flown part of a path that the aircraft left early."""
+    failed_findings = [
         finding
         for finding in verdict.findings
         if finding.ok is False and finding.rule not in _RULES_OF_UNFINISHED_PATHS
     ]
-    count_text = "1 finding" if len(failed) == 1 else f"{len(failed) or 'no'} findings"
-    first_text = StatusText(f"verdict ({level}): {ended}; {count_text} failed until then", INFO)
-    return (first_text, *_failed_texts(failed))
+    count_text = "1 finding" if len(failed_findings) == 1 else f"{len(failed_findings) or 'no'} findings"
+    first_text = StatusText(f"verdict ({level}): {end_reason}; {count_text} failed until then", INFO)
+    return (first_text, *_finding_texts(failed_findings))
 
 
 def verdict_texts(level: str, verdict: Verdict) -> tuple[StatusText, ...]:
     """Describe a verdict in a few lines, the worst finding first."""
-    failed = [finding for finding in verdict.findings if finding.ok is False]
+    failed_findings = [finding for finding in verdict.findings if finding.ok is False]
     if verdict.flyable:
         return (StatusText(f"verdict ({level}): FLYABLE", INFO),)
     if verdict.undecided:
         return (StatusText(f"verdict ({level}): NOT JUDGED IN FULL: {verdict.unjudged}", WARNING),)
-    deciding = () if verdict.deciding is None else (StatusText(deciding_text(verdict.deciding), WARNING),)
-    return (StatusText(f"verdict ({level}): NOT FLYABLE", WARNING), *deciding, *_failed_texts(failed))
+    deciding_texts = () if verdict.deciding is None else (StatusText(deciding_text(verdict.deciding), WARNING),)
+    return (StatusText(f"verdict ({level}): NOT FLYABLE", WARNING), *deciding_texts, *_finding_texts(failed_findings))
 
 
-def _failed_texts(failed: list[Finding]) -> list[StatusText]:
-    lines = [StatusText(f"{_heading(finding)}: {finding.reason}", WARNING) for finding in failed[:_MAX_TEXTS]]
-    if len(failed) > _MAX_TEXTS:
-        lines.append(StatusText(f"and {len(failed) - _MAX_TEXTS} more findings", WARNING))
-    return lines
+def _finding_texts(findings: list[Finding]) -> list[StatusText]:
+    texts = [
+        StatusText(f"{_finding_heading(finding)}: {finding.reason}", WARNING)
+        for finding in findings[:_MAX_TEXTS_PER_VERDICT]
+    ]
+    if len(findings) > _MAX_TEXTS_PER_VERDICT:
+        texts.append(StatusText(f"and {len(findings) - _MAX_TEXTS_PER_VERDICT} more findings", WARNING))
+    return texts
 
 
-def _heading(finding: Finding) -> str:
-    """Return the rule of a finding, and its place unless the text of the finding names the place."""
+def _finding_heading(finding: Finding) -> str:
+    """Return the rule of a finding, with its place unless the text of the finding names the place."""
     rule_name = rule_word(finding.rule)
     return rule_name if finding.placed else f"{rule_name} at {place_text(finding.place)}"

@@ -14,7 +14,7 @@ from flight.live.station_requests import vehicle_parameters
 from flight.live.telemetry import Snapshot
 from flight.live.vehicle import Standby, Vehicle
 from flight.mission.items import Home
-from planfly.live.served_flights import ServedScenario, ServeOptions, flown_parameters, fly_process
+from planfly.live.served_flights import ServedScenario, ServeOptions, autopilot_parameters, fly_process
 from world.frames import to_geo
 from world.interruption import children_ignore_sigint, end_children, uninterrupted
 from world.scenario import Scenario
@@ -26,7 +26,7 @@ _CHILD_END_TIMEOUT_S = 0.3
 def serve_vehicle(
     access: Access,
     options: ServeOptions,
-    served: ServedScenario,
+    served_scenario: ServedScenario,
     stop: Callable[[], bool],
     on_message: Callable[[str], None],
 ) -> None:
@@ -36,15 +36,15 @@ def serve_vehicle(
         exit_stack.callback(link.close)
         pool = _FlightPool(options)
         exit_stack.callback(pool.end)
-        vehicle = _make_vehicle(link, pool, served, options.speed, on_message)
+        vehicle = _make_vehicle(link, pool, served_scenario, options.speed, on_message)
         host, port = link.address
         targets = ", ".join(f"{station}:{station_port}" for station, station_port in access.to)
-        on_message(f"vehicle {SYSTEM} at {host}:{port}, calling {targets}; scenario {served.scenario.name}")
+        on_message(f"vehicle {SYSTEM} at {host}:{port}, calling {targets}; scenario {served_scenario.scenario.name}")
         on_message(f"flight logs go to {options.logs}/; Ctrl-C ends")
-        if served.mission is not None:
-            vehicle.load(served.mission)
-        elif served.fence:
-            vehicle.load_fence(served.fence)
+        if served_scenario.mission is not None:
+            vehicle.load(served_scenario.mission)
+        elif served_scenario.fence:
+            vehicle.load_fence(served_scenario.fence)
         exit_stack.callback(vehicle.close)
         vehicle.run(stop)
     dropped = ", ".join(f"{count:,} {reason}" for reason, count in asdict(link.dropped).items() if count)
@@ -53,13 +53,13 @@ def serve_vehicle(
 
 
 def _make_vehicle(
-    link: Link, pool: "_FlightPool", served: ServedScenario, speed: float, on_message: Callable[[str], None]
+    link: Link, pool: "_FlightPool", served_scenario: ServedScenario, speed: float, on_message: Callable[[str], None]
 ) -> Vehicle:
-    airframe = served.airframe
-    law_parameters = airframe.autopilot.parameters
+    airframe = served_scenario.airframe
+    autopilot_settings = airframe.autopilot.parameters
     parameters = vehicle_parameters(
-        flown=partial(flown_parameters, served.scenario),
-        not_flown=() if law_parameters is None else law_parameters.not_flown,
+        flown=partial(autopilot_parameters, served_scenario.scenario),
+        not_flown=() if autopilot_settings is None else autopilot_settings.not_flown,
         airspeed=airframe.airspeed,
         slowest=airframe.aircraft.airspeed_min,
         fastest=airframe.aircraft.airspeed_max,
@@ -67,7 +67,7 @@ def _make_vehicle(
         system=SYSTEM,
         speed=speed,
     )
-    standby = standby_at_start(served.scenario)
+    standby = standby_at_start(served_scenario.scenario)
     return Vehicle(
         link,
         pool.spawn,
@@ -87,7 +87,7 @@ class _FlightPool:
         self._children: list[multiprocessing.process.BaseProcess] = []
 
     def spawn(self) -> Connection:
-        """Start a process, and return the link's end of its pipe."""
+        """Start a process, and return the vehicle's end of its pipe."""
         for child in self._children:
             child.join(timeout=0.0)
         self._children = [child for child in self._children if child.is_alive()]
@@ -105,11 +105,11 @@ class _FlightPool:
 
 
 def standby_at_start(scenario: Scenario) -> Standby:
-    """Return state and home without a mission, at the scenario's start on the course to its destination."""
+    """Return state and home of a vehicle without a mission: at the start, on the course to the destination."""
     east, north, amsl = (float(value) for value in scenario.start)
     lat, lon = (float(value) for value in to_geo(scenario.origin, east, north))
-    ground = math.nan if scenario.terrain is None else float(scenario.terrain.height(east, north))
+    terrain_altitude = math.nan if scenario.terrain is None else float(scenario.terrain.height(east, north))
     displacement = scenario.destination - scenario.start
     course = math.atan2(float(displacement[0]), float(displacement[1]))
-    snapshot = Snapshot(time=0.0, lat_deg=lat, lon_deg=lon, amsl=amsl, height=amsl - ground, yaw=course)
-    return Standby(snapshot, Home(lat, lon, amsl if math.isnan(ground) else ground))
+    snapshot = Snapshot(time=0.0, lat_deg=lat, lon_deg=lon, amsl=amsl, height=amsl - terrain_altitude, yaw=course)
+    return Standby(snapshot, Home(lat, lon, amsl if math.isnan(terrain_altitude) else terrain_altitude))

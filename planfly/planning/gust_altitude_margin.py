@@ -31,14 +31,13 @@ from world.wind import Turbulence
 Search = Callable[[Limits], Plan]
 Gust = Literal["downdrafts", "updrafts"]
 
-# Rate of climb that a higher plan leaves unused for downdrafts, in standard deviations of the vertical gusts.
+# Climb rate that a higher plan leaves unused for downdrafts, in standard deviations of the vertical gusts.
 _UNUSED_SIGMAS = 1.2
 # Maximum fraction of the maximum climb rate that is left unused.
 _UNUSED_CLIMB_FRACTION = 0.25
-# The same fraction if a height limit lies above the plan; the more climb rate is unused, the less altitude a downdraft
-# costs.
+# The same fraction if a height limit is above the plan; with more unused climb rate, a downdraft costs less altitude.
 _UNUSED_CLIMB_FRACTION_BELOW_A_LIMIT = 0.75
-# Rate of sink that a lower plan leaves unused for updrafts, in standard deviations of the vertical gusts.
+# Sink rate that a lower plan leaves unused for updrafts, in standard deviations of the vertical gusts.
 _UNUSED_SINK_SIGMAS = 1.0
 # Maximum fraction of the maximum sink rate that is left unused.
 _UNUSED_SINK_FRACTION = 0.6
@@ -50,7 +49,7 @@ _END_HEIGHT_FRACTION = 0.5
 _FULL_HEIGHT_DISTANCE_M = 1500.0
 # Length of the parts of a leg near an end that are judged separately, m.
 _PART_LENGTH_M = 250.0
-# Height step at which a path is compared with missiles and zones, m, so that none thicker than this is missed.
+# Height step at which a path is compared with missiles and zones, m; none that is thicker than this step is missed.
 _HEIGHT_STEP_M = 2.5
 # Minimum ratio of the length of a leg's part to the tangent of the turn in this part.
 _TANGENT_RATIO = 1.05
@@ -63,18 +62,20 @@ class Shortfall(NamedTuple):
 
     gust: "downdrafts" or "updrafts".
     depth: depth of the displacement into the hazard, m.
-    into: "into" a clearance, a missile's sphere or a zone, "out of" a zone, or "above" a height, with its name.
-    where: the leg or the end of the path.
-    at_end: "start" or "destination" if no other path helps, because the end itself is too low or high; otherwise "".
-    of_threats: True for a missile or a zone.
+    hazard: text that begins with "into", "out of" or "above", and names the clearance, the missile, the zone or the
+    height.
+    place: text that names the leg or the end of the path.
+    end_name: "start" or "destination" if this end itself is too low or too high, so that no other path helps; otherwise
+    "".
+    is_threat: True for a missile or a zone.
     """
 
     gust: Gust
     depth: float
-    into: str
-    where: str
-    at_end: str = ""
-    of_threats: bool = False
+    hazard: str
+    place: str
+    end_name: str = ""
+    is_threat: bool = False
 
 
 def ensure_altitude_margin(plan: Plan, airframe: Airframe, search: Search | None = None) -> Plan:
@@ -82,7 +83,7 @@ def ensure_altitude_margin(plan: Plan, airframe: Airframe, search: Search | None
 
     If no other plan is found, the given plan is returned as not safe, with the reason in its certificate.
 
-    search: plans the same scenario within other limits; None to search for no other path.
+    search: function that plans the same scenario within other limits; None to search for no other path.
 
     >>> from planfly.workflow.airframe import load_airframe
     >>> from planner.search.plan_path import plan_path
@@ -100,7 +101,7 @@ def ensure_altitude_margin(plan: Plan, airframe: Airframe, search: Search | None
     shortfalls = find_shortfalls(plan, airframe)
     if not shortfalls:
         return plan
-    if search is not None and not any(shortfall.at_end for shortfall in shortfalls):
+    if search is not None and not any(shortfall.end_name for shortfall in shortfalls):
         other_plan = _search_other_plan(plan, airframe, search, shortfalls)
         if other_plan is not None:
             return other_plan
@@ -108,7 +109,7 @@ def ensure_altitude_margin(plan: Plan, airframe: Airframe, search: Search | None
 
 
 def _gusts_matter(plan: Plan, airframe: Airframe) -> bool:
-    """Return True if gusts may move the aircraft further than its tracking error includes."""
+    """Return True if gusts may displace the aircraft by more than its tracking error."""
     return any(
         displacement(0.0, plan.scenario.wind.turbulence)
         for _, displacement in _gust_displacements(plan.scenario, airframe.autopilot)
@@ -118,7 +119,7 @@ def _gusts_matter(plan: Plan, airframe: Airframe) -> bool:
 def _gust_displacements(
     scenario: Scenario, autopilot: Autopilot
 ) -> list[tuple[Gust, Callable[[float, Turbulence], float]]]:
-    """Return the gusts that matter, each with its displacement, m, as a function of the unused rate, m/s."""
+    """Return the relevant kinds of gusts, each with its displacement, m, as a function of the unused rate, m/s."""
     displacements: list[tuple[Gust, Callable[[float, Turbulence], float]]] = [("downdrafts", autopilot.gust_sink)]
     # Above a path there are no hazards other than a maximum height or a zone.
     if scenario.zones or scenario.limits.max_height_m is not None:
@@ -132,7 +133,7 @@ def _with_problems(plan: Plan, problems: list[str]) -> Plan:
 
 
 def _climb_problem(plan: Plan, airframe: Airframe) -> str:
-    """Return a line on why no margin is enough for downdrafts at the plan's altitude, or "" if a margin is enough.
+    """Return the reason why no margin is enough for downdrafts at the plan's altitude, or "" if a margin is enough.
 
     With a climb rate of less than `LEAST_SIGMAS`, several downdrafts follow before the aircraft has climbed back.  Of
     24 flights of a Zagi with a climb rate of 0.57 standard deviations, 3 lost more than 47 m; of 24 with 0.8, none did.
@@ -155,13 +156,13 @@ def _search_other_plan(plan: Plan, airframe: Airframe, search: Search, shortfall
         fractions.append(_UNUSED_CLIMB_FRACTION_BELOW_A_LIMIT)
     all_shortfalls = list(shortfalls)
     for unused_fraction, from_threats in product(fractions, (False, True)):
-        # Most paths pass missiles and zones at the side, so stay away from their tops only if a path led above one.
-        if from_threats and not any(shortfall.of_threats for shortfall in all_shortfalls):
+        # Most paths pass missiles and zones at the side, so a margin above them is required only if a path led above.
+        if from_threats and not any(shortfall.is_threat for shortfall in all_shortfalls):
             continue
         search_limits = limits_in_gusts(plan, airframe, unused_fraction)
-        # Without a maximum height the first of the two limits keeps only sink for updrafts, no distance.
+        # Without a maximum height, the limits without a margin at threats only leave sink rate unused.
         has_only_threats = (
-            all(shortfall.of_threats for shortfall in shortfalls) and plan.scenario.limits.max_height_m is None
+            all(shortfall.is_threat for shortfall in shortfalls) and plan.scenario.limits.max_height_m is None
         )
         if not from_threats and has_only_threats and not search_limits.reserve_height:
             continue
@@ -176,13 +177,13 @@ def _search_other_plan(plan: Plan, airframe: Airframe, search: Search, shortfall
 
 
 def _with_margin_at_threats(limits: Limits) -> Limits:
-    """Return limits that also require their margin to the ground or the maximum height at missiles and zones."""
+    """Return limits that also require the margin at missiles and zones."""
     return replace(limits, reserve_threats=max(limits.reserve_height, limits.reserve_above))
 
 
-def _exceeds_height_limit(plan: Plan, raised_by: float) -> bool:
-    """Return True if a plan raised by `raised_by`, m, exceeds a ceiling or a maximum height."""
-    if not raised_by:
+def _exceeds_height_limit(plan: Plan, height_change: float) -> bool:
+    """Return True if a plan raised by `height_change`, m, exceeds the ceiling or the maximum height."""
+    if not height_change:
         return False
     scenario, inner_points = plan.scenario, plan.waypoints[1:-1]
     if not inner_points.size:
@@ -190,7 +191,7 @@ def _exceeds_height_limit(plan: Plan, raised_by: float) -> bool:
     limits = [np.full(len(inner_points), scenario.ceiling)]
     if scenario.limits.max_height_m is not None and scenario.terrain is not None:
         limits.append(scenario.terrain.height(inner_points[:, 0], inner_points[:, 1]) + scenario.limits.max_height_m)
-    return bool((inner_points[:, 2] + raised_by > np.minimum.reduce(limits)).any())
+    return bool((inner_points[:, 2] + height_change > np.minimum.reduce(limits)).any())
 
 
 def limits_in_gusts(plan: Plan, airframe: Airframe, unused_fraction: float = _UNUSED_CLIMB_FRACTION) -> Limits:
@@ -218,7 +219,7 @@ def limits_in_gusts(plan: Plan, airframe: Airframe, unused_fraction: float = _UN
 
 
 def limits_of_alternatives(plan: Plan, airframe: Airframe) -> Limits:
-    """Return search limits for alternatives to a safe plan, which are the tightest limits that this plan meets."""
+    """Return search limits for alternatives to a safe plan: the tightest limits that this plan meets."""
     limits = airframe.limits.surely()
     if not _gusts_matter(plan, airframe):
         return limits
@@ -239,18 +240,19 @@ class _Parts(NamedTuple):
     gust: the kind of gusts.
     points: ends of the parts, (p, 3), m.
     legs: leg of each part, (p - 1,).
-    before, after: altitude that a gust may cost or add at a point, on the part before and the part after it, (p,), m.
+    margin_before, margin_after: altitude that a gust may cost or add at each point, in the part that ends there and in
+    the part that starts there, (p,), m.
     """
 
     gust: Gust
     points: Floats
     legs: list[int]
-    before: Floats
-    after: Floats
+    margin_before: Floats
+    margin_after: Floats
 
 
 def find_shortfalls(plan: Plan, airframe: Airframe) -> list[Shortfall]:
-    """Find the deepest displacement by gusts into a clearance or above a maximum height, into a missile and a zone."""
+    """Find the deepest displacement by gusts into each kind of hazard."""
     limits, autopilot, turbulence = airframe.limits.surely(), airframe.autopilot, plan.scenario.wind.turbulence
     problem = make_problem(plan.scenario, limits)
     rates = np.array([limits.rates(float(amsl)) for amsl in plan.waypoints[:, 2]])
@@ -258,22 +260,22 @@ def find_shortfalls(plan: Plan, airframe: Airframe) -> list[Shortfall]:
     for gust, displacement in _gust_displacements(plan.scenario, autopilot):
         if not displacement(0.0, turbulence):
             continue
-        is_down = gust == "downdrafts"
+        is_downdraft = gust == "downdrafts"
         max_rates, used_rates = (
-            (rates[:, 0], np.maximum(0.0, climbs)) if is_down else (rates[:, 1], np.maximum(0.0, -climbs))
+            (rates[:, 0], np.maximum(0.0, climbs)) if is_downdraft else (rates[:, 1], np.maximum(0.0, -climbs))
         )
         # Minimum of the unused rates at the start and at the end of each leg.
         unused_rates = np.minimum(max_rates[:-1] - used_rates[:, 0], max_rates[1:] - used_rates[:, 1])
         # ArduPlane and PX4 have an altitude error even without such a gust; planfly's guidance does not.
-        altitude_error = 0.0 if is_down else float(problem.certified.tracking.up)
+        altitude_error = 0.0 if is_downdraft else float(problem.certified.tracking.up)
         margins = np.array([displacement(float(rate), turbulence) + altitude_error for rate in unused_rates])
         end_margins = _END_HEIGHT_FRACTION * np.array(
-            [displacement(float(max_rates[k]), turbulence) + altitude_error for k in (0, -1)]
+            [displacement(float(max_rates[end]), turbulence) + altitude_error for end in (0, -1)]
         )
         parts = _cut_into_parts(problem, plan.waypoints, gust, margins, end_margins)
         shortfalls += [
-            _clearance_shortfall(problem, parts) if is_down else _max_height_shortfall(problem, parts),
-            _missile_shortfall(problem, parts) if is_down else None,
+            _clearance_shortfall(problem, parts) if is_downdraft else _max_height_shortfall(problem, parts),
+            _missile_shortfall(problem, parts) if is_downdraft else None,
             _zone_shortfall(problem, parts),
         ]
     return [shortfall for shortfall in shortfalls if shortfall is not None and shortfall.depth > _ROUNDING_TOLERANCE_M]
@@ -289,16 +291,16 @@ def _cut_into_parts(problem: Problem, waypoints: Floats, gust: Gust, margins: Fl
     ends = waypoints[[0, -1]]
     tangents = turn_tangents(problem.certified.aircraft, waypoints) * _TANGENT_RATIO
     points, legs = [waypoints[0]], list[int]()
-    for leg, (a, b) in enumerate(pairwise(waypoints)):
-        length = math.dist(a[:2], b[:2])
+    for leg, (leg_start, leg_end) in enumerate(pairwise(waypoints)):
+        length = math.dist(leg_start[:2], leg_end[:2])
         count = math.ceil(length / _PART_LENGTH_M)
         for distance in length * np.arange(1, count) / count:
-            point = a + (b - a) * distance / length
+            point = leg_start + (leg_end - leg_start) * distance / length
             is_near = min(math.dist(point, end) for end in ends) <= _FULL_HEIGHT_DISTANCE_M + _PART_LENGTH_M
             if is_near and tangents[leg] <= distance <= length - tangents[leg + 1]:
                 points.append(point)
                 legs.append(leg)
-        points.append(b)
+        points.append(leg_end)
         legs.append(leg)
     path, part_margins = np.array(points), margins[legs]
     end_distances = np.array([np.linalg.norm(path - end, axis=1) for end in ends])
@@ -306,11 +308,11 @@ def _cut_into_parts(problem: Problem, waypoints: Floats, gust: Gust, margins: Fl
         np.minimum(1.0, end_distances.min(axis=0) / _FULL_HEIGHT_DISTANCE_M),
         end_margins[end_distances.argmin(axis=0)],
     )
-    before, after = (
+    margin_before, margin_after = (
         nearest_end_margin + fraction * (margins_of_side - nearest_end_margin)
         for margins_of_side in ([*part_margins[:1], *part_margins], [*part_margins, *part_margins[-1:]])
     )
-    return _Parts(gust, path, legs, before, after)
+    return _Parts(gust, path, legs, margin_before, margin_after)
 
 
 def _heights_at_ends(problem: Problem, parts: _Parts) -> list[tuple[str, float, int]]:
@@ -318,59 +320,65 @@ def _heights_at_ends(problem: Problem, parts: _Parts) -> list[tuple[str, float, 
     terrain = problem.scenario.terrain
     if terrain is None:  # pragma: no cover - a problem has one
         return []
-    heights = parts.points[:, 2] - terrain.height(parts.points[:, 0], parts.points[:, 1])
-    return [("start", float(heights[0]), 0), ("destination", float(heights[-1]), -1)]
+    end_heights = parts.points[:, 2] - terrain.height(parts.points[:, 0], parts.points[:, 1])
+    return [("start", float(end_heights[0]), 0), ("destination", float(end_heights[-1]), -1)]
 
 
 def _clearance_shortfall(problem: Problem, parts: _Parts) -> Shortfall | None:
-    """Return the deepest displacement of a path by a downdraft below its clearance, or None without one."""
+    """Return the deepest displacement by a downdraft below the required clearance."""
     data = problem.certified
-    hazard = f"into the clearance of {data.clearance:g} m"
-    for name, height, k in _heights_at_ends(problem, parts):
-        if (depth := float(parts.after[k]) + data.clearance - height) > _ROUNDING_TOLERANCE_M:
-            return Shortfall(parts.gust, depth, hazard, f"at its {name}", at_end=name)
-    lowest = Shortfall(parts.gust, 0.0, hazard, "")
+    hazard_text = f"into the clearance of {data.clearance:g} m"
+    for name, height, index in _heights_at_ends(problem, parts):
+        if (depth := float(parts.margin_after[index]) + data.clearance - height) > _ROUNDING_TOLERANCE_M:
+            return Shortfall(parts.gust, depth, hazard_text, f"at its {name}", end_name=name)
+    deepest_shortfall = Shortfall(parts.gust, 0.0, hazard_text, "")
     for piece in heights_above_ground(data, parts.points):
-        k = int(piece["number"])
-        # A part needs the margin of that of its ends which is nearer to the end of the path.
-        margin = max(parts.before[k], parts.after[k]) if piece["of_arc"] else min(parts.after[k], parts.before[k + 1])
+        index = int(piece["number"])
+        # A part needs the smaller margin of its two ends, which is the margin nearer to the end of the path.
+        margin = (
+            max(parts.margin_before[index], parts.margin_after[index])
+            if piece["of_arc"]
+            else min(parts.margin_after[index], parts.margin_before[index + 1])
+        )
         depth = float(margin) + data.clearance - float(piece["height"])
-        if depth > lowest.depth:
-            lowest = Shortfall(parts.gust, depth, hazard, f"on leg {parts.legs[k]}")
-    return lowest
+        if depth > deepest_shortfall.depth:
+            deepest_shortfall = Shortfall(parts.gust, depth, hazard_text, f"on leg {parts.legs[index]}")
+    return deepest_shortfall
 
 
 def _max_height_shortfall(problem: Problem, parts: _Parts) -> Shortfall | None:
-    """Return the highest displacement by an updraft above the maximum height, or None without one."""
+    """Return the highest displacement by an updraft above the maximum height, or None without a maximum height."""
     data, max_height = problem.certified, problem.certified.airspace.max_height
     if max_height == math.inf:
         return None
-    hazard = f"above the {max_height:.0f} m over ground that are allowed"
-    for name, height, k in _heights_at_ends(problem, parts):
-        if (depth := height + float(parts.after[k]) - max_height) > _ROUNDING_TOLERANCE_M:
-            return Shortfall(parts.gust, depth, hazard, f"at its {name}", at_end=name)
+    hazard_text = f"above the {max_height:.0f} m over ground that are allowed"
+    for name, height, index in _heights_at_ends(problem, parts):
+        if (depth := height + float(parts.margin_after[index]) - max_height) > _ROUNDING_TOLERANCE_M:
+            return Shortfall(parts.gust, depth, hazard_text, f"at its {name}", end_name=name)
     pieces = airspace_pieces(data, _gust_paths(parts)[-1])
-    highest = max(pieces, key=lambda piece: float(piece["height"]))
-    where = f"on leg {parts.legs[min(int(highest['number']), len(parts.legs) - 1)]}"
-    return Shortfall(parts.gust, float(highest["height"]) - max_height, hazard, where)
+    highest_piece = max(pieces, key=lambda piece: float(piece["height"]))
+    place_text = f"on leg {parts.legs[min(int(highest_piece['number']), len(parts.legs) - 1)]}"
+    return Shortfall(parts.gust, float(highest_piece["height"]) - max_height, hazard_text, place_text)
 
 
 def _missile_shortfall(problem: Problem, parts: _Parts) -> Shortfall | None:
-    """Return the deepest displacement by a gust into the sphere of a missile, or None without one."""
+    """Return the deepest displacement by a gust into the sphere of a missile, or None."""
     threats = problem.scenario.threats
     paths = _gust_paths(parts) if (threats.kill_radius > 0.0).any() else []
-    deepest = min(paths, key=lambda path: kill_distance(problem.certified, path), default=None)
-    if deepest is None or (distance := kill_distance(problem.certified, deepest)) >= 0.0:
+    closest_path = min(paths, key=lambda path: kill_distance(problem.certified, path), default=None)
+    if closest_path is None or (distance := kill_distance(problem.certified, closest_path)) >= 0.0:
         return None
-    leg_starts, steps = deepest[:-1, None], np.diff(deepest, axis=0)[:, None]
+    leg_starts, steps = closest_path[:-1, None], np.diff(closest_path, axis=0)[:, None]
     # Nearest point of each leg to each missile, as a fraction of the leg.
     fractions = ((threats.position - leg_starts) * steps).sum(axis=2) / (steps**2).sum(axis=2)
-    nearest = leg_starts + np.clip(fractions, 0.0, 1.0)[..., None] * steps
-    outside = np.linalg.norm(nearest - threats.position, axis=2) - threats.kill_radius
-    part, missile = np.unravel_index(np.argmin(np.where(threats.kill_radius > 0.0, outside, np.inf)), outside.shape)
+    nearest_points = leg_starts + np.clip(fractions, 0.0, 1.0)[..., None] * steps
+    distance_outside = np.linalg.norm(nearest_points - threats.position, axis=2) - threats.kill_radius
+    part, missile = np.unravel_index(
+        np.argmin(np.where(threats.kill_radius > 0.0, distance_outside, np.inf)), distance_outside.shape
+    )
     leg = parts.legs[int(part)]
     return Shortfall(
-        parts.gust, -distance, f"into the reach of {threats.names[missile]}", f"on leg {leg}", of_threats=True
+        parts.gust, -distance, f"into the reach of {threats.names[missile]}", f"on leg {leg}", is_threat=True
     )
 
 
@@ -380,35 +388,35 @@ def _zone_shortfall(problem: Problem, parts: _Parts) -> Shortfall | None:
     if not is_limited(data.airspace) or not problem.scenario.zones:
         return None
     pieces = [piece for path in _gust_paths(parts) for piece in airspace_pieces(data, path)]
-    worst = min(pieces, key=lambda piece: float(piece["zones"]["nearest"]))
-    if worst["zones"]["nearest"] >= 0.0:
+    worst_piece = min(pieces, key=lambda piece: float(piece["zones"]["nearest"]))
+    if worst_piece["zones"]["nearest"] >= 0.0:
         return None
-    number = data.airspace.zones.required[int(worst["zones"]["zone"])]["number"]
+    number = data.airspace.zones.required[int(worst_piece["zones"]["zone"])]["number"]
     zone = problem.scenario.zones[int(number)]
-    hazard = f"into {zone.name}" if zone.kind == "exclusion" else f"out of {zone.name}"
-    where = f"on leg {parts.legs[min(int(worst['number']), len(parts.legs) - 1)]}"
-    return Shortfall(parts.gust, -float(worst["zones"]["nearest"]), hazard, where, of_threats=True)
+    hazard_text = f"into {zone.name}" if zone.kind == "exclusion" else f"out of {zone.name}"
+    place_text = f"on leg {parts.legs[min(int(worst_piece['number']), len(parts.legs) - 1)]}"
+    return Shortfall(parts.gust, -float(worst_piece["zones"]["nearest"]), hazard_text, place_text, is_threat=True)
 
 
 def _gust_paths(parts: _Parts) -> list[Floats]:
-    """Return the path displaced by gusts, (p, 3) each, in steps that miss no hazard, up to the full displacement."""
-    heights = np.maximum(parts.before, parts.after)
-    step_count = max(1, math.ceil(float(heights.max()) / _HEIGHT_STEP_M))
-    displacement = np.array([0.0, 0.0, -1.0 if parts.gust == "downdrafts" else 1.0]) * heights[:, None]
-    return [np.ascontiguousarray(parts.points + displacement * k / step_count) for k in range(1, step_count + 1)]
+    """Return paths (p, 3) displaced by gusts, in steps up to the full displacement, so that no hazard is missed."""
+    margins = np.maximum(parts.margin_before, parts.margin_after)
+    step_count = max(1, math.ceil(float(margins.max()) / _HEIGHT_STEP_M))
+    displacement = np.array([0.0, 0.0, -1.0 if parts.gust == "downdrafts" else 1.0]) * margins[:, None]
+    return [np.ascontiguousarray(parts.points + displacement * step / step_count) for step in range(1, step_count + 1)]
 
 
 def _shortfall_text(shortfall: Shortfall, plan: Plan, airframe: Airframe) -> str:
     """Describe a shortfall and its remedies in one line."""
-    ability = "climbs better" if shortfall.gust == "downdrafts" else "sinks faster"
-    remedies = f"less turbulence, an aircraft that {ability}"
-    is_held_down = shortfall.gust == "updrafts" and not shortfall.of_threats
-    if shortfall.at_end:
+    ability_text = "climbs better" if shortfall.gust == "downdrafts" else "sinks faster"
+    remedies = f"less turbulence, an aircraft that {ability_text}"
+    is_below_height_limit = shortfall.gust == "updrafts" and not shortfall.is_threat
+    if shortfall.end_name:
         direction = "higher" if shortfall.gust == "downdrafts" else "lower"
-        remedies += f" or a {shortfall.at_end} that is {math.ceil(shortfall.depth)} m {direction}"
-    elif is_held_down or _exceeds_height_limit(plan, limits_in_gusts(plan, airframe).reserve_height):
+        remedies += f" or a {shortfall.end_name} that is {math.ceil(shortfall.depth)} m {direction}"
+    elif is_below_height_limit or _exceeds_height_limit(plan, limits_in_gusts(plan, airframe).reserve_height):
         remedies += " or a higher limit on its height"
     else:
-        remedies = f"less turbulence, or an aircraft that {ability},"
-    gusts = f"in {plan.scenario.wind.turbulence} turbulence {shortfall.gust} may take it"
-    return f"{gusts} {shortfall.depth:.0f} m {shortfall.into} {shortfall.where}; {remedies} would help"
+        remedies = f"less turbulence, or an aircraft that {ability_text},"
+    effect_text = f"in {plan.scenario.wind.turbulence} turbulence {shortfall.gust} may take it"
+    return f"{effect_text} {shortfall.depth:.0f} m {shortfall.hazard} {shortfall.place}; {remedies} would help"

@@ -1,9 +1,9 @@
 """Limit the number of waypoints, because gusts can make an autopilot orbit a waypoint.
 
 PX4 flies on at a waypoint only within NAV_FW_ALT_RAD of its altitude; otherwise it orbits the waypoint.  Moderate
-turbulence sometimes displaces light aircraft further than this, and an orbit leaves the airspace for which the plan was
-checked.  Therefore the number of expected orbits per flight must be less than `MAX_EXPECTED_ORBITS`.  A plan that needs
-more waypoints than this allows is refused with the reason.
+turbulence sometimes displaces light aircraft by more than this, and an orbit leaves the airspace for which the plan was
+checked.  Therefore the expected number of orbits per flight must not exceed `MAX_EXPECTED_ORBITS`.  A plan that needs
+more waypoints is rejected with the reason.
 """
 
 from collections.abc import Callable
@@ -20,8 +20,8 @@ from planner.search.fewer_waypoints import drop_waypoints
 from world.geometry import turning_angles
 from world.scenario import Scenario
 
-# Maximum accepted number of expected orbits in a flight; about every second orbit leaves the corridor (of 186 flights,
-# with 58 waypoints passed too high or too low, 30 failed).
+# Maximum expected number of orbits in a flight; about every second orbit leaves the corridor (of 186 flights, with 58
+# waypoints passed too high or too low, 30 failed).
 MAX_EXPECTED_ORBITS = 0.03
 # Growth of the excursion at a corner in gusts, m; in 8 flights, gusts increased it from 28 m to 36 m at most.
 GUST_CORNER_MARGIN_M = 8.0
@@ -33,15 +33,15 @@ def limit_waypoint_orbits(
     plan: Plan,
     airframe: Airframe,
     search: Callable[[Scenario], Plan] | None = None,
-    within: Limits | None = None,
+    search_limits: Limits | None = None,
 ) -> Plan:
     """Return the plan if it has few enough waypoints for its turbulence, otherwise a plan with fewer waypoints.
 
     If no plan with fewer waypoints is found, the given plan is returned as not safe, with the reason in its
     certificate.
 
-    search: plans a scenario as the plan was planned; None to search for no other path.
-    within: limits within which the plan was made; None for the limits of the aircraft.
+    search: function that plans a scenario in the same way as the plan; None to search for no other path.
+    search_limits: limits within which the plan was made; None for the limits of the aircraft.
 
     >>> from planfly.workflow.airframe import load_airframe
     >>> from planner.search.plan_path import plan_path
@@ -57,22 +57,22 @@ def limit_waypoint_orbits(
     if not plan.safe or orbits == 0.0:
         return plan
     if orbits <= MAX_EXPECTED_ORBITS:
-        # A plan with the number of waypoints that is usual without orbits has no corner that is too sharp.
+        # A plan with the usual number of waypoints has no corner that is too sharp.
         has_usual_count = len(plan.waypoints) >= plan.scenario.planner.waypoints
         return (
             plan
             if has_usual_count or _is_accepted(plan, airframe)
             else _with_problem(plan, _corridor_problem(plan, airframe))
         )
-    fewer = drop_waypoints(plan, limits if within is None else within)
-    if _is_accepted(fewer, airframe):
-        return fewer
-    fewer_orbits, count = expected_orbits(fewer, autopilot, limits), len(fewer.waypoints) - 2
+    shorter_plan = drop_waypoints(plan, limits if search_limits is None else search_limits)
+    if _is_accepted(shorter_plan, airframe):
+        return shorter_plan
+    remaining_orbits, count = expected_orbits(shorter_plan, autopilot, limits), len(shorter_plan.waypoints) - 2
     if search is not None:
         # Assume the orbit probability per waypoint of this path; it may be lower on another path.
-        allowed_count, scenario = max(1, int(MAX_EXPECTED_ORBITS * count / fewer_orbits)), plan.scenario
-        table = scenario.planner.model_copy(update={"waypoints": allowed_count + 2})
-        other_plan = replace(search(replace(scenario, planner=table)), scenario=scenario)
+        allowed_count, scenario = max(1, int(MAX_EXPECTED_ORBITS * count / remaining_orbits)), plan.scenario
+        planner_table = scenario.planner.model_copy(update={"waypoints": allowed_count + 2})
+        other_plan = replace(search(replace(scenario, planner=planner_table)), scenario=scenario)
         if other_plan.safe and _is_accepted(other_plan, airframe):
             return other_plan
     return _with_problem(plan, _orbit_problem(plan, autopilot, limits))
@@ -84,14 +84,14 @@ def _with_problem(plan: Plan, problem: str) -> Plan:
 
 
 def _is_accepted(plan: Plan, airframe: Airframe) -> bool:
-    """Return True if few enough orbits are expected and the aircraft stays in the corridor at every corner."""
+    """Return True if few enough orbits are expected, and the aircraft stays in the corridor at every corner."""
     if expected_orbits(plan, airframe.autopilot, airframe.limits.surely()) > MAX_EXPECTED_ORBITS:
         return False
-    return max(_excursions(plan, airframe), default=0.0) <= _half_width(plan, airframe)
+    return max(_excursions(plan, airframe), default=0.0) <= _plan_corridor_half_width(plan, airframe)
 
 
-def _half_width(plan: Plan, airframe: Airframe) -> float:
-    """Return the maximum distance from the legs that a flight of the plan may have, m."""
+def _plan_corridor_half_width(plan: Plan, airframe: Airframe) -> float:
+    """Return the maximum distance from the legs for a flight of the plan, m."""
     return corridor_half_width(plan.scenario.limits.corridor_m, airframe.autopilot.acceptance_radius)
 
 
@@ -108,20 +108,20 @@ def _excursions(plan: Plan, airframe: Airframe) -> list[float]:
 
 
 def _corridor_problem(plan: Plan, airframe: Airframe) -> str:
-    """Describe the corner at which the aircraft leaves the corridor in a line."""
+    """Return a line on the corner at which the aircraft leaves the corridor."""
     excursions = _excursions(plan, airframe)
     max_excursion = max(excursions)
     return (
         f"in {plan.scenario.wind.turbulence} turbulence {airframe.autopilot.title} is {max_excursion:.0f} m off"
         f" the legs at the corner of waypoint {1 + excursions.index(max_excursion)}; the corridor is"
-        f" {_half_width(plan, airframe):.0f} m"
+        f" {_plan_corridor_half_width(plan, airframe):.0f} m"
     )
 
 
 def expected_orbits(plan: Plan, autopilot: Autopilot, limits: Limits) -> float:
     """Return the expected number of orbits at the inner waypoints of a plan in one flight.
 
-    On a leg that climbs or sinks, less of the aircraft's climb or sink rate remains to act against the gusts.
+    On a leg that climbs or sinks, less of the aircraft's climb or sink rate remains to counteract gusts.
     """
     turbulence, orbits = plan.scenario.wind.turbulence, 0.0
     for rate, waypoint in zip(limits.climb_rates(plan.waypoints)[:-1, 1].tolist(), plan.waypoints[1:-1], strict=True):
@@ -150,7 +150,7 @@ def max_waypoints_in_gusts(plan: Plan, airframe: Airframe) -> int:
 
 
 def _orbit_problem(plan: Plan, autopilot: Autopilot, limits: Limits) -> str:
-    """Return a line on why a plan is not safe in its turbulence, and on the remedies."""
+    """Return a line on the orbits that make a plan unsafe in its turbulence, and on the remedies."""
     count, name = len(plan.waypoints) - 2, autopilot.height_parameter
     orbits = expected_orbits(plan, autopilot, limits)
     radius = first_that_passes(

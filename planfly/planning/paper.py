@@ -30,14 +30,14 @@ from world.scenario import Scenario, load_scenario, with_planner
 # Numbers of threats in the problems of the paper.
 PROBLEMS = (7, 15, 30, 60)
 # Planner of the paper.
-PAPER = "umda"
+PAPER_ALGORITHM = "umda"
 # Planners for comparison.  They are the baselines of Figs. 9-12, with two ranges of the polar encoding's angle, because
 # the paper states none, and a polar encoding of planfly.
-BASELINES = ("umda-cartesian", "umda-polar", "umda-polar-45", "umda-bearing")
+BASELINE_ALGORITHMS = ("umda-cartesian", "umda-polar", "umda-polar-45", "umda-bearing")
 # The planner of the paper in a strip along the straight line, an addition of planfly that other encodings do not get.
-STRIP = "umda-strip"
-# Half width of the strip by the number of threats, m.
-STRIP_ACROSS = {7: 2500.0, 15: 2500.0, 30: 2500.0, 60: 1500.0}
+STRIP_ALGORITHM = "umda-strip"
+# Half width of the strip for each number of threats, m.
+STRIP_HALF_WIDTHS_M = {7: 2500.0, 15: 2500.0, 30: 2500.0, 60: 1500.0}
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,7 +106,7 @@ def problem_name(threats: int) -> str:
 
 
 def exposure_probability(scenario: Scenario, waypoints: Floats, kind: str) -> float:
-    """Return 1 minus the product of (1 - p) over points and units in reach; p = (scale / d)^4, at most 1.
+    """Return 1 minus the product of (1 - p) over all points and the units in reach; p = (scale / d)^4, at most 1.
 
     The points are the dividing points of the legs.  The sums of the paper (eq. 9, 10) have no upper bound, but this
     probability has one.
@@ -115,7 +115,9 @@ def exposure_probability(scenario: Scenario, waypoints: Floats, kind: str) -> fl
     kind: "kill" or "detection".
     """
     fractions = np.arange(6)[:, None] / 6.0
-    points = np.concatenate([a + fractions * (b - a) for a, b in itertools.pairwise(waypoints)])
+    points = np.concatenate(
+        [leg_start + fractions * (leg_end - leg_start) for leg_start, leg_end in itertools.pairwise(waypoints)]
+    )
     points = np.vstack([points, waypoints[-1:]])
     threats = scenario.threats
     radius, scale = getattr(threats, f"{kind}_radius"), getattr(threats, f"{kind}_scale")
@@ -126,11 +128,14 @@ def exposure_probability(scenario: Scenario, waypoints: Floats, kind: str) -> fl
 
 
 def plan_once(threats: int, algorithm: str, seed: int) -> SeededPlan:
-    """Plan once, and return the values for tables and figures.  algorithm: name of a planner, or `STRIP`."""
+    """Plan once, and return the values for tables and figures.  algorithm: name of a planner, or `STRIP_ALGORITHM`."""
     scenario = load_scenario(problem_name(threats))
     searched_algorithm = algorithm
-    if algorithm == STRIP:
-        scenario, searched_algorithm = with_planner(scenario, STRIP, across_m=STRIP_ACROSS[threats]), PAPER
+    if algorithm == STRIP_ALGORITHM:
+        scenario, searched_algorithm = (
+            with_planner(scenario, STRIP_ALGORITHM, across_m=STRIP_HALF_WIDTHS_M[threats]),
+            PAPER_ALGORITHM,
+        )
     airframe = load_airframe(scenario)
     start_time = time.process_time()
     plan = make_plan(scenario, airframe, seed, searched_algorithm)
@@ -156,12 +161,12 @@ def plan_section(
 ) -> list[SeededPlan]:
     """Make all plans, in the order of problem, algorithm and seed 1..seeds for any number of processes.
 
-    algorithm: replaces the paper's planner; the strip and the baselines are always planned, too.
-    jobs: number of processes, by default one for each core that this process may use.
+    algorithm: algorithm in place of the paper's; the strip and the baselines are always planned, too.
+    jobs: number of processes; None for one for each core that this process may use.
     Raises ScenarioError for an unknown algorithm.
     """
     names = [find_algorithm(algorithm, "algorithm").name]
-    names += [name for name in (STRIP, *BASELINES) if name not in names]
+    names += [name for name in (STRIP_ALGORITHM, *BASELINE_ALGORITHMS) if name not in names]
     tasks = [(threats, name, seed) for threats in problems for name in names for seed in range(1, seeds + 1)]
     count = min(len(tasks), jobs or usable_cores())
     plans: list[SeededPlan] = []
@@ -176,7 +181,7 @@ def plan_section(
 
 
 def usable_cores() -> int:
-    """Return the number of cores that this process may use, or of all cores if the system does not state it.
+    """Return the number of cores that this process may use, or the number of all cores if that is unknown.
 
     >>> usable_cores() >= 1
     True
@@ -186,7 +191,7 @@ def usable_cores() -> int:
 
 
 def _plan_in_processes(tasks: list[tuple[int, str, int]], count: int) -> Iterator[SeededPlan]:
-    """Yield results in the order of the tasks; the first runs in this process and compiles kernels for the others."""
+    """Yield the results in the order of the tasks; the first task runs in this process, to compile the kernels."""
     yield plan_once(*tasks[0])
     if count == 1:
         yield from (plan_once(*task) for task in tasks[1:])
@@ -212,8 +217,8 @@ def _plan_task(task: tuple[int, str, int]) -> SeededPlan:
     return plan_once(*task)
 
 
-def table(plans: Sequence[SeededPlan]) -> list[TableRow]:
-    """Return the table, with one row for each problem and algorithm, in the order of planning."""
+def make_table(plans: Sequence[SeededPlan]) -> list[TableRow]:
+    """Make the table, with one row for each problem and algorithm, in the order of planning."""
     groups: dict[tuple[int, str], list[SeededPlan]] = {}
     for seeded_plan in plans:
         groups.setdefault((seeded_plan.threats, seeded_plan.algorithm), []).append(seeded_plan)
@@ -251,13 +256,13 @@ def _column(group: list[SeededPlan], value: Callable[[SeededPlan], float]) -> Fl
 
 PAPER_SCHEMA = "planfly.planning.paper/1"
 # Files that any command may write; older files of these names are cleared first.
-FILES = ("table.csv", "runs.csv", "runs.json", "times.csv", "convergence.png")
+TABLE_FILES = ("table.csv", "runs.csv", "runs.json", "times.csv", "convergence.png")
 
 
 def file_names(problems: Sequence[int]) -> list[str]:
     """Return the names of all files in a folder for these problems."""
     pictures = [f"{kind}-{threats:02d}.png" for threats in problems for kind in ("paths", "encodings")]
-    return [*FILES, *pictures]
+    return [*TABLE_FILES, *pictures]
 
 
 def table_text(rows: Sequence[TableRow]) -> str:
@@ -287,7 +292,7 @@ def _number_text(value: float | None, digits: int) -> str:
 
 
 def write_tables(folder: Path, rows: Sequence[TableRow], plans: Sequence[SeededPlan]) -> None:
-    """Write table.csv, runs.csv and runs.json, which are reproducible for a seed, and times.csv, which is not."""
+    """Write table.csv, runs.csv and runs.json, which depend only on the seeds, and times.csv."""
     columns = [field.name for field in fields(TableRow) if field.name != "seconds_median"]
     write_whole(folder / "table.csv", _csv_text(columns, ([getattr(row, name) for name in columns] for row in rows)))
     write_whole(
@@ -398,7 +403,7 @@ def paper_tables(
     problems: Sequence[int] = PROBLEMS,
     *,
     runs: int = 15,
-    algorithm: str = PAPER,
+    algorithm: str = PAPER_ALGORITHM,
     jobs: int | None = None,
     out: str | Path | None = None,
     overwrite: bool = False,
@@ -421,7 +426,7 @@ def paper_tables(
         check_output_folder(folder, overwrite)
     with stage("planning", "planning the paper's problems") as advance:
         plans = plan_section(problems, runs, algorithm, jobs, advance)
-    rows = table(plans)
+    rows = make_table(plans)
     if folder is not None:
         folder.mkdir(parents=True, exist_ok=True)
         with hold(folder):

@@ -22,23 +22,24 @@ def make_pareto_plans(
 ) -> Front:
     """Return up to `count` plans of a front, each safe by all checks of `planfly.workflow.make_plan.make_plan`.
 
-    The default plan is made by `make_plan`; if it is not safe, the front is empty.  Alternatives that are not safe when
-    completed are left out.  If gusts make the autopilot orbit, alternatives have no more waypoints than gusts allow.
+    The default plan is made by `make_plan`; if it is not safe, the front is empty.  Alternatives that are unsafe after
+    their completion are omitted.  If gusts make the autopilot orbit, alternatives have no more waypoints than gusts
+    allow.
     stop, continues: see `make_plan`.
     """
-    default = make_plan(scenario, airframe, seed, advance=advance, stop=stop, continues=continues)
+    default_plan = make_plan(scenario, airframe, seed, advance=advance, stop=stop, continues=continues)
 
     def finish(plan: Plan) -> Plan:
         return finish_plan(plan, airframe, continues=continues)
 
     return plan_front(
         scenario,
-        limits_of_alternatives(default, airframe),
+        limits_of_alternatives(default_plan, airframe),
         count,
         seed=seed,
         progress=advance,
         stop=stop,
-        default=default,
-        waypoints=max_waypoints_in_gusts(default, airframe),
+        default=default_plan,
+        waypoints=max_waypoints_in_gusts(default_plan, airframe),
         finish=finish,
     )

@@ -26,8 +26,8 @@ LEAD_IN_LENGTH_M = 500.0
 _MAX_START_DISTANCE_M = 60.0
 # Maximum vertical distance at which a flight passes the start of a return, m.
 _MAX_START_HEIGHT_ERROR_M = 15.0
-# Delay of the simulated autopilot in following a slope after a waypoint, s, by which the altitude of the start waypoint
-# is set ahead.
+# Delay of the simulated autopilot in following a slope after a waypoint, s; the altitude of the start waypoint is
+# advanced by this delay.
 _SLOPE_DELAY_S = 3.0
 
 
@@ -62,16 +62,16 @@ def fly_return(world: ReturnWorld, start: Record) -> tuple[float, float] | None:
     position = positions_from_start(flight.track, start)
     if position is None:
         return None
-    nearest = nearest_approaches(world, position)
-    return (min(0.0, nearest.clearance) if flight.ended == "ground contact" else nearest.clearance), nearest.outside
+    approach = nearest_approaches(world, position)
+    return (min(0.0, approach.clearance) if flight.ended == "ground contact" else approach.clearance), approach.outside
 
 
 def return_setup(
     world: ReturnWorld, start: Record, landing: LandingStart | None = None
 ) -> tuple[FlightSetup, Airframe]:
-    """Return setup and airframe of a return by the simulated ArduPlane, in the mean wind, with a lead-in to its start.
+    """Make setup and airframe of a return by the simulated ArduPlane, in the mean wind, with a lead-in to its start.
 
-    landing: the landing sequence to which the return leads, or None.
+    landing: the landing sequence that ends the return, or None.
     Raises MissionError for a return without a valid route, and the ScenarioError or ParameterError of `load_airframe`.
     """
     scenario = replace(world.scenario, wind=replace(world.scenario.wind, turbulence="none"))
@@ -80,7 +80,7 @@ def return_setup(
 
 
 def positions_from_start(track: Track, start: Record) -> Floats | None:
-    """Return the positions from the start of the return, (t, 3), or None if the flight does not reach the start."""
+    """Return the positions (t, 3) from the start of the return on, or None if the flight does not reach the start."""
     start_position = np.array([float(start["east"]), float(start["north"])])
     start_distances = np.hypot(*(track.position[: round(2.0 * LEAD_IN_LENGTH_M / 10.0 * 60.0), :2] - start_position).T)
     if not start_distances.size or float(start_distances.min()) > _MAX_START_DISTANCE_M:
@@ -95,54 +95,56 @@ def nearest_approaches(world: ReturnWorld, position: Floats) -> NearestApproache
     if world.scenario.terrain is not None:
         heights = position[:, 2] - world.scenario.terrain.height(position[:, 0], position[:, 1])
         lowest_row = int(np.argmin(heights))
-        clearance, (east, north, up) = float(heights[lowest_row]), position[lowest_row].tolist()
-        lowest_position = east, north, up
-    outside, threat = math.inf, -1
+        clearance, (east, north, altitude) = float(heights[lowest_row]), position[lowest_row].tolist()
+        lowest_position = east, north, altitude
+    min_distance, threat = math.inf, -1
     threats = world.scenario.threats
-    for k in np.flatnonzero(threats.kill_radius > 0.0):
-        distance = float((np.linalg.norm(position - threats.position[k], axis=1) - threats.kill_radius[k]).min())
-        if distance < outside:
-            outside, threat = distance, int(k)
-    return NearestApproaches(clearance, lowest_position, outside, threat)
+    for index in np.flatnonzero(threats.kill_radius > 0.0):
+        distance = float(
+            (np.linalg.norm(position - threats.position[index], axis=1) - threats.kill_radius[index]).min()
+        )
+        if distance < min_distance:
+            min_distance, threat = distance, int(index)
+    return NearestApproaches(clearance, lowest_position, min_distance, threat)
 
 
 def _return_mission(world: ReturnWorld, start: Record, landing: LandingStart | None) -> Mission:
-    """Return a mission that passes the start on its course and slope, and then returns to launch."""
-    east, north, up = (float(start[name]) for name in ("east", "north", "up"))
+    """Make a mission that passes the start of a return on its course and slope, and then returns to launch."""
+    east, north, altitude = (float(start[name]) for name in ("east", "north", "up"))
     velocity_east, velocity_north, velocity_up = (float(start[f"velocity_{name}"]) for name in ("east", "north", "up"))
     ground_speed = max(1.0, math.hypot(velocity_east, velocity_north))
-    up += _SLOPE_DELAY_S * velocity_up
-    places = [
+    altitude += _SLOPE_DELAY_S * velocity_up
+    points = [
         (
             east - LEAD_IN_LENGTH_M * velocity_east / ground_speed,
             north - LEAD_IN_LENGTH_M * velocity_north / ground_speed,
-            up - LEAD_IN_LENGTH_M * velocity_up / ground_speed,
+            altitude - LEAD_IN_LENGTH_M * velocity_up / ground_speed,
         ),
-        (east, north, up),
+        (east, north, altitude),
     ]
     origin, mission = world.scenario.origin, world.setup.mission
     items = []
-    for number, place in enumerate(places, 1):
-        lat, lon = (float(value) for value in to_geo(origin, place[0], place[1]))
+    for number, point in enumerate(points, 1):
+        lat, lon = (float(value) for value in to_geo(origin, point[0], point[1]))
         params = (0.0, float(number - 1), 0.0, 0.0)
-        items.append(MissionItem(number, Command.NAV_WAYPOINT, Frame.GLOBAL, params, lat, lon, place[2]))
+        items.append(MissionItem(number, Command.NAV_WAYPOINT, Frame.GLOBAL, params, lat, lon, point[2]))
     rtl_command = int(Command.NAV_RETURN_TO_LAUNCH)
     items.append(MissionItem(3, rtl_command, int(Frame.MISSION), (0.0,) * 4, 0.0, 0.0, 0.0))
     if landing is not None:
         items += _landing_items(mission.items, landing)
     rally = []
-    for number, point in enumerate(world.rally):
-        lat, lon = (float(value) for value in to_geo(origin, point.east, point.north))
-        frame = Frame.GLOBAL_RELATIVE_ALT if point.base else Frame.GLOBAL
-        height = point.up - point.base
+    for number, rally_point in enumerate(world.rally):
+        lat, lon = (float(value) for value in to_geo(origin, rally_point.east, rally_point.north))
+        frame = Frame.GLOBAL_RELATIVE_ALT if rally_point.base else Frame.GLOBAL
+        height = rally_point.up - rally_point.base
         rally.append(MissionItem(number, Command.NAV_RALLY_POINT, frame, (0.0,) * 4, lat, lon, height))
     home = None if mission.home is None else replace(mission.home, alt=world.home.up)
     return Mission(home, tuple(items), rally=tuple(rally), source=mission.source)
 
 
 def _landing_items(items: tuple[MissionItem, ...], landing: LandingStart) -> list[MissionItem]:
-    """Return the items of a landing sequence, from its DO_LAND_START to the landing, numbered from 4."""
-    start_index = next(k for k, item in enumerate(items) if item.seq == landing.item)
-    begin_index = max(k for k in range(start_index) if items[k].command == Command.DO_LAND_START)
-    end_index = next(k for k in range(start_index, len(items)) if items[k].command in LANDINGS)
-    return [replace(item, seq=number) for number, item in enumerate(items[begin_index : end_index + 1], 4)]
+    """Return the items of a landing sequence, from DO_LAND_START to the landing, numbered from 4."""
+    start_index = next(index for index, item in enumerate(items) if item.seq == landing.item)
+    land_start_index = max(index for index in range(start_index) if items[index].command == Command.DO_LAND_START)
+    end_index = next(index for index in range(start_index, len(items)) if items[index].command in LANDINGS)
+    return [replace(item, seq=number) for number, item in enumerate(items[land_start_index : end_index + 1], 4)]

@@ -1,4 +1,4 @@
-"""Summarise returns to launch from a few places of a flight, for a line, a scene and pictures next to its verdict."""
+"""Summarise returns to launch from a few points of a flight, for a line, a scene and pictures next to its verdict."""
 
 from dataclasses import dataclass
 
@@ -12,11 +12,11 @@ from logs.verdict.returns.returns_text import headline
 from world.errors import PlanflyError
 
 
-def return_starts(setup: FlightSetup, track: Track | None, every: float) -> ReturnStarts:
-    """Return the starts of returns on the track, or on the planned path if nothing was flown.  every: interval, s."""
+def return_starts(setup: FlightSetup, track: Track | None, interval: float) -> ReturnStarts:
+    """Return the starts of returns on the track, or on the planned path if nothing was flown.  interval: s."""
     if track is not None and len(track):
-        return flown_starts(setup, track, every)
-    return planned_starts(setup, every)
+        return flown_starts(setup, track, interval)
+    return planned_starts(setup, interval)
 
 
 # Number of returns in the summary and its pictures.
@@ -25,7 +25,7 @@ _SUMMARY_RETURNS = 50
 
 @dataclass(frozen=True, slots=True)
 class ReturnSummary:
-    """Returns from a few places of a flight, without simulation in JSBSim, to accompany its verdict.
+    """Returns from a few points of a flight, without simulation in JSBSim, to accompany its verdict.
 
     line: summary of all returns in a line; "" if no return can be judged.
     world, starts, returns: data of the returns; None if no return is judged.
@@ -36,8 +36,8 @@ class ReturnSummary:
     starts: ReturnStarts | None = None
     returns: Returns | None = None
 
-    def drawn(self) -> DrawnReturns | None:
-        """Return the data of the pictures, with glides without the engine, which take some seconds to find."""
+    def data_for_pictures(self) -> DrawnReturns | None:
+        """Return the data of the pictures, including glides without the engine, which take some seconds to compute."""
         if self.world is None or self.starts is None or self.returns is None or not self.returns.each:
             return None
         return drawn_returns(self.world, self.starts, self.returns, judge_glides(self.world, self.starts))

@@ -1,7 +1,7 @@
 """Fly the worst returns to launch again by the ArduPlane program, to check planfly's simulated ArduPlane.
 
-Each return is a separate flight, on the mission with which `planfly.rtl.jsbsim_returns` flies it by the simulated
-ArduPlane.  The result of the program replaces the simulated result only if it is worse; it never improves a judgement.
+Each return is a separate flight, with the same mission as in `planfly.rtl.jsbsim_returns`.  The program's result
+replaces the simulated result only if it is worse; it never improves a judgement.
 """
 
 import math
@@ -46,9 +46,9 @@ from world.scenario import Scenario
 
 # Minimum height above ground of the lead-in to the start of a return, m; a return with a lower lead-in is not flown.
 _MIN_LEAD_IN_HEIGHT_M = 20.0
-# Maximum distance from a place at which a return that ends has arrived, m.
+# Maximum distance from its target at which a return that ends has arrived, m.
 _ARRIVAL_DISTANCE_M = 500.0
-# Maximum angle between course and bearing at which a return heads for a place, rad.
+# Maximum angle between course and bearing at which a return heads for a target, rad.
 _ARRIVAL_HEADING_TOLERANCE_RAD = math.radians(10.0)
 # Number of rows of a track per second.
 _ROWS_PER_SECOND = 60
@@ -79,7 +79,7 @@ class ProgramReturn:
 
     @property
     def worse(self) -> bool:
-        """True if the outcome by the program is worse than that by the simulated ArduPlane."""
+        """True if the program's outcome is worse than the simulated outcome."""
         return self.flown is not None and KINDS.index(self.flown.kind) < KINDS.index(self.law.kind)
 
 
@@ -95,8 +95,8 @@ class ProgramReturns:
     pairs: tuple[ProgramReturn, ...]
 
     @property
-    def flown(self) -> tuple[ProgramReturn, ...]:
-        """Returns that the program could fly."""
+    def flown_pairs(self) -> tuple[ProgramReturn, ...]:
+        """Pairs whose return the program flew."""
         return tuple(pair for pair in self.pairs if pair.flown is not None)
 
     def headline(self) -> str:
@@ -105,20 +105,20 @@ class ProgramReturns:
         >>> ProgramReturns("", ()).headline()
         'by the program: no return could be flown'
         """
-        if not self.flown:
+        if not self.flown_pairs:
             return "by the program: no return could be flown"
-        agreeing_count = sum(pair.agrees for pair in self.flown)
-        worse_count = sum(pair.worse for pair in self.flown)
+        agreeing_count = sum(pair.agrees for pair in self.flown_pairs)
+        worse_count = sum(pair.worse for pair in self.flown_pairs)
         comparison = (
             "all of them agree with the simulation"
-            if agreeing_count == len(self.flown)
+            if agreeing_count == len(self.flown_pairs)
             else f"{agreeing_count} of them agree with the simulation"
         )
         comparison += f"; {worse_count} worse than simulated, where the simulation errs" if worse_count else ""
-        return f"by {self.program} itself: {len(self.flown)} of the worst flown, {comparison}"
+        return f"by {self.program} itself: {len(self.flown_pairs)} of the worst flown, {comparison}"
 
     def lines(self, returns: Returns, scenario: Scenario) -> list[str]:
-        """Describe each return in a line with its start, both outcomes, and their agreement."""
+        """Return a line on each return, with its start, both outcomes, and their agreement."""
         texts = []
         for pair in self.pairs:
             east, north, _ = pair.law.start
@@ -139,9 +139,14 @@ class ProgramReturns:
         return texts
 
     def with_worse_results(self, returns: Returns) -> Returns:
-        """Replace each return's simulated result by the program's result where the program's result is worse."""
-        worse = {id(pair.law): pair.flown for pair in self.pairs if pair.worse}
-        return replace(returns, each=tuple(worse.get(id(ret)) or ret for ret in returns.each))
+        """Replace each simulated result by the program's result if the program's result is worse."""
+        worse_results = {id(pair.law): pair.flown for pair in self.pairs if pair.worse}
+        return replace(
+            returns,
+            each=tuple(
+                worse_results.get(id(simulated_return)) or simulated_return for simulated_return in returns.each
+            ),
+        )
 
 
 def check_is_arduplane(program: Path) -> None:
@@ -155,37 +160,38 @@ def check_is_arduplane(program: Path) -> None:
 def worst_separated_returns(
     world: ReturnWorld, starts: ReturnStarts, returns: Returns, points: int
 ) -> list[tuple[ReturnFlown, int]]:
-    """Choose at most `points` of the worst returns that can be flown, each with the number of its start.
+    """Choose at most `points` of the worst returns that can be flown, the worst first, with the index of each start.
 
-    The worst comes first.  Starts closer together than half of the path divided by `points` are skipped, because
-    neighbouring seconds show the same.
+    Starts closer together than half the path length divided by `points` are skipped, because neighbouring returns are
+    alike.
     """
     start_rows = starts.rows
     positions = np.column_stack([start_rows["east"], start_rows["north"]])
     min_distance = 0.5 * float(np.hypot(*np.diff(positions, axis=0).T).sum()) / points if len(starts) > 1 else 0.0
-    numbers = {float(time): k for k, time in enumerate(starts.time)}
-    chosen: list[tuple[ReturnFlown, int]] = []
-    for ret in sorted(returns.each, key=_badness_key):
-        k = numbers[ret.time]
+    numbers = {float(time): start_index for start_index, time in enumerate(starts.time)}
+    chosen_returns: list[tuple[ReturnFlown, int]] = []
+    for candidate in sorted(returns.each, key=_worst_first_key):
+        start_index = numbers[candidate.time]
         is_near = any(
-            np.hypot(*(positions[k] - positions[chosen_number])) < min_distance for _, chosen_number in chosen
+            np.hypot(*(positions[start_index] - positions[chosen_number])) < min_distance
+            for _, chosen_number in chosen_returns
         )
         if (
             is_near
-            or starts.low[k]
-            or not is_steady(world, start_rows[k])
-            or not _is_lead_in_clear(world, start_rows[k])
+            or starts.low[start_index]
+            or not is_steady(world, start_rows[start_index])
+            or not _is_lead_in_clear(world, start_rows[start_index])
         ):
             continue
-        chosen.append((ret, k))
-        if len(chosen) == points:
+        chosen_returns.append((candidate, start_index))
+        if len(chosen_returns) == points:
             break
-    return chosen
+    return chosen_returns
 
 
-def _badness_key(ret: ReturnFlown) -> tuple[int, float]:
-    """Return the sort key of a return: `badness`, or for a safe return how near it is to a limit."""
-    return (KINDS.index("safe"), distance_to_limit(ret)) if ret.safe else badness(ret)
+def _worst_first_key(candidate: ReturnFlown) -> tuple[int, float]:
+    """Return the sort key of a return: `badness`, or for a safe return its distance to a limit."""
+    return (KINDS.index("safe"), distance_to_limit(candidate)) if candidate.safe else badness(candidate)
 
 
 def _is_lead_in_clear(world: ReturnWorld, row: Record) -> bool:
@@ -208,56 +214,60 @@ def fly_by_program(
     Raises FlightError if the program does not start or breaks off.
     """
     program_returns, version = [], ""
-    for number, (ret, k) in enumerate(worst_separated_returns(world, starts, returns, points), 1):
+    for number, (simulated_return, start_index) in enumerate(
+        worst_separated_returns(world, starts, returns, points), 1
+    ):
         log = None if folder is None else folder / f"worst-return-{number}.mcap"
         with stage(f"flying return {number} of {points} by the program", "flying a return by a program") as advance:
             try:
-                setup, airframe = return_setup(world, starts.rows[k], ret.target.landing)
+                setup, airframe = return_setup(world, starts.rows[start_index], simulated_return.target.landing)
             except MissionError as error:
-                program_returns.append(ProgramReturn(ret, reason=str(error)))
+                program_returns.append(ProgramReturn(simulated_return, reason=str(error)))
                 continue
-            judged = fly_and_judge(setup, airframe, log, advance, autopilot=program, reference="never")
-        version = judged.setup.autopilot.version
-        judged_return = _judge_flown_return(world, ret, starts.rows[k], judged.track, judged.ended)
-        reason = "" if judged_return else f"it does not come to where the return begins ({judged.ended})"
-        program_returns.append(ProgramReturn(ret, judged_return, reason, log))
+            flight = fly_and_judge(setup, airframe, log, advance, autopilot=program, reference="never")
+        version = flight.setup.autopilot.version
+        program_return = _judge_flown_return(
+            world, simulated_return, starts.rows[start_index], flight.track, flight.ended
+        )
+        reason = "" if program_return else f"it does not come to where the return begins ({flight.ended})"
+        program_returns.append(ProgramReturn(simulated_return, program_return, reason, log))
     return ProgramReturns(version, tuple(program_returns))
 
 
 def _judge_flown_return(
-    world: ReturnWorld, law: ReturnFlown, start: Record, track: Track, ended: str
+    world: ReturnWorld, simulated_return: ReturnFlown, start: Record, track: Track, end_reason: str
 ) -> ReturnFlown | None:
     """Judge a return flown by the program; return None if the flight did not reach the start of the return."""
     path = positions_from_start(track, start)
     if path is None:
         return None
     start_row = len(track) - len(path)
-    position = _cut_at_landing(law.target, path)
-    target = _flown_target(world, law.target, position)
-    closest = nearest_approaches(world, position)
-    hits_ground = ended == "ground contact" and len(position) == len(path)
+    position = _cut_at_landing(simulated_return.target, path)
+    target = _flown_target(world, simulated_return.target, position)
+    approach = nearest_approaches(world, position)
+    hits_ground = end_reason == "ground contact" and len(position) == len(path)
     has_arrived = hits_ground or bool(
         np.hypot(*(position[-1, :2] - np.array(_end_position(target)[:2]))) < _ARRIVAL_DISTANCE_M
     )
     record: Record = np.zeros(1, RETURN_RESULT)[0]
-    clearance = min(0.0, closest.clearance) if hits_ground else closest.clearance
+    clearance = min(0.0, approach.clearance) if hits_ground else approach.clearance
     record["ended"] = (
         RETURN_GROUND_IMPACT if hits_ground or clearance <= 0.0 else RETURN_ARRIVED if has_arrived else RETURN_TIMEOUT
     )
     if math.isnan(clearance):
         record["ended"] = RETURN_OFF_TERRAIN
-    record["clearance"], record["outside"], record["threat"] = clearance, closest.outside, closest.threat
+    record["clearance"], record["outside"], record["threat"] = clearance, approach.outside, approach.threat
     used_energy = float(track.energy[start_row + len(position) - 1] - track.energy[start_row])
-    remaining_energy = law.left + law.energy - used_energy
+    remaining_energy = simulated_return.left + simulated_return.energy - used_energy
     zone = most_violated_zone(world, position[::_ROWS_PER_SECOND]) if world.airspace.zones else -1
     return replace(
-        law,
+        simulated_return,
         target=target,
-        kind=kind_of(world, record, zone, remaining_energy, law.floor),
+        kind=kind_of(world, record, zone, remaining_energy, simulated_return.floor),
         clearance=clearance,
-        clearance_at=closest.lowest_position,
-        outside=closest.outside,
-        threat=closest.threat,
+        clearance_at=approach.lowest_position,
+        outside=approach.outside,
+        threat=approach.threat,
         zone=zone,
         energy=used_energy,
         left=remaining_energy,
@@ -265,54 +275,54 @@ def _judge_flown_return(
 
 
 def _end_position(target: ReturnTarget) -> tuple[float, float, float]:
-    """Return the place where the judgement of a return ends, its loiter center or the last place before the landing."""
+    """Return the position where the judgement of a return ends: loiter center, or last waypoint before the landing."""
     if target.landing is None:
         return target.position
     return (target.landing, *target.landing.onward)[-1].place
 
 
 def _cut_at_landing(target: ReturnTarget, position: Floats) -> Floats:
-    """Cut a path to a landing sequence at the last place before the landing.  position: path points, (t, 3), m."""
+    """Cut a path to a landing sequence at the last waypoint before the landing.  position: path points, (t, 3), m."""
     if target.landing is None:
         return position
     return position[: int(np.argmin(np.linalg.norm(position - np.array(_end_position(target)), axis=1))) + 1]
 
 
-def _flown_target(world: ReturnWorld, law: ReturnTarget, position: Floats) -> ReturnTarget:
-    """Identify the target of a path, which is the place where it ends, or otherwise the place for which it heads.
+def _flown_target(world: ReturnWorld, simulated_target: ReturnTarget, position: Floats) -> ReturnTarget:
+    """Identify the target at which a path ends, or for which it heads.
 
-    All places to which a return may go are tried.  If none fits, return the target of the simulated ArduPlane.
+    All possible targets of a return are tried.  If none fits, return the target of the simulated ArduPlane.
 
     position: path points, (t, 3), m.
     """
     end_point, earlier_point = position[-1, :2], position[max(0, len(position) - 5 * _ROWS_PER_SECOND), :2]
     course = math.atan2(*(end_point - earlier_point))
-    best, best_rank = law, math.inf
-    for target in (law, *_other_targets(world, law)):
+    best_target, best_rank = simulated_target, math.inf
+    for target in (simulated_target, *_other_targets(world, simulated_target)):
         offset = np.array(_end_position(target)[:2]) - end_point
         distance = math.hypot(*offset)
         course_difference = abs(math.remainder(math.atan2(*offset) - course, math.tau))
-        # A place at which the path ends ranks before any place for which the path heads.
+        # A target at which the path ends ranks before a target for which the path heads.
         rank = (
             distance / _ARRIVAL_DISTANCE_M
             if distance < _ARRIVAL_DISTANCE_M
             else 1.0 + course_difference / _ARRIVAL_HEADING_TOLERANCE_RAD
         )
         if rank < min(best_rank, 2.0):
-            best, best_rank = target, rank
-    return best
+            best_target, best_rank = target, rank
+    return best_target
 
 
-def _other_targets(world: ReturnWorld, law: ReturnTarget) -> Iterator[ReturnTarget]:
+def _other_targets(world: ReturnWorld, simulated_target: ReturnTarget) -> Iterator[ReturnTarget]:
     """Yield home and all rally points, except the target of the simulated ArduPlane."""
     home_altitude = ArduPlane(world.parameters).return_rules.height + world.home.up
-    places = [
+    positions = [
         ("home", (world.home.east, world.home.north, home_altitude)),
         *(
-            (f"rally point {rally_point.number or k}", (rally_point.east, rally_point.north, rally_point.up))
-            for k, rally_point in enumerate(world.rally, 1)
+            (f"rally point {rally_point.number or number}", (rally_point.east, rally_point.north, rally_point.up))
+            for number, rally_point in enumerate(world.rally, 1)
         ),
     ]
-    for name, place in places:
-        if name != law.name:
-            yield ReturnTarget(place, name, "", math.nan)
+    for name, position in positions:
+        if name != simulated_target.name:
+            yield ReturnTarget(position, name, "", math.nan)

@@ -13,8 +13,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import ParamSpec, TypeVar
 
-from planfly.kernel_units.unit_kernels import kernels_of
-from planfly.runtime.stages import has_receiver, say, stage
+from planfly.kernel_units.unit_kernels import list_unit_kernels
+from planfly.runtime.stages import has_receiver, report_line, stage
 from world.compile_events import tell_before_compiling
 from world.kernel_cache import VARIABLE, can_write
 
@@ -22,9 +22,9 @@ from world.kernel_cache import VARIABLE, can_write
 # Units of kernels are compiled by separate processes, which store them in the cache.
 
 # Number of processes; more would wait for each other, because the longest unit takes nearly half of the total time.
-PROCESSES = 2
+PROCESS_COUNT = 2
 # Arguments of Python; -P leaves out the current folder, whose modules may have the names of planfly's modules.
-PROGRAM = ("-P", "-m", "planfly.kernel_units")
+PYTHON_ARGUMENTS = ("-P", "-m", "planfly.kernel_units")
 # Line that marks the end of the output of a process.
 _END_OF_OUTPUT = ""
 
@@ -33,10 +33,10 @@ def compile_units(units: list[str], folder: Path, on_ready: Callable[[int], None
     """Compile units into a cache folder; return when each unit is compiled or has failed.
 
     units: names of units, the longest first.  on_ready: called with the number of kernels that are ready.
-    The processes end with this call, also if it raises, and with this process.
+    The processes end with this call, even if it raises an error, and with this process.
     """
     units_left, lines = deque(units), queue.SimpleQueue[str]()
-    count = min(PROCESSES, len(units), os.cpu_count() or 1)
+    count = min(PROCESS_COUNT, len(units), os.cpu_count() or 1)
     processes = [_start_process(folder) for _ in range(count)]
     threads = [
         threading.Thread(target=_feed_process, args=(process, units_left, lines), daemon=True) for process in processes
@@ -65,7 +65,7 @@ def _start_process(folder: Path) -> "subprocess.Popen[str]":
     home = str(Path(__file__).parents[2])
     path = os.pathsep.join(filter(None, [home, os.environ.get("PYTHONPATH", "")]))
     return subprocess.Popen(
-        [sys.executable, *PROGRAM],
+        [sys.executable, *PYTHON_ARGUMENTS],
         env=os.environ | {"PYTHONPATH": path, "NUMBA_CACHE_DIR": str(folder)},
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
@@ -76,7 +76,7 @@ def _start_process(folder: Path) -> "subprocess.Popen[str]":
 
 
 def _feed_process(process: "subprocess.Popen[str]", units_left: "deque[str]", lines: "queue.SimpleQueue[str]") -> None:
-    """Give a process one unit after another, and queue its output lines; an empty line marks its end."""
+    """Send a process one unit after another, and queue its output lines; an empty line marks its end."""
     requests, answers = process.stdin, process.stdout
     # The process may have died, or the other process may have taken the last unit.
     with contextlib.suppress(OSError, IndexError):
@@ -102,7 +102,7 @@ _Taken = ParamSpec("_Taken")
 _Given = TypeVar("_Given")
 
 # Title of the stage; a command may show it more than once, because each group is compiled at its first use.
-TITLE = "compiling numeric kernels"
+STAGE_TITLE = "compiling numeric kernels"
 # End of the message on compiled kernels.
 _CACHE_NOTE = ", which later runs load"
 # Hint at the variable that names another cache folder.
@@ -113,10 +113,10 @@ _compiled_units: set[str] = set()
 
 @contextmanager
 def warm_up(*units: str) -> Iterator[None]:
-    """Compile all kernels of units when the work inside first needs one that is not cached.
+    """Compile all kernels of units as soon as the code inside needs a kernel that is not cached.
 
-    units: units of `planfly.kernel_units` that the work will call, longest first.  They are compiled in two processes
-    before the work continues; if the cache cannot be written, each kernel is compiled when it is called.
+    units: units of `planfly.kernel_units` that the code will call, longest first.  They are compiled in two processes
+    before the code continues; if the cache cannot be written, each kernel is compiled when it is called.
     """
     has_reported = False
 
@@ -151,16 +151,20 @@ def _report_and_compile(units: list[str]) -> None:
 
     folder = cache_folder()
     if not can_write(folder):
-        say(f"compiling the numeric kernels: {folder} cannot be written, and keeps none of them; {_CACHE_DIR_HINT}")
+        report_line(
+            f"compiling the numeric kernels: {folder} cannot be written, and keeps none of them; {_CACHE_DIR_HINT}"
+        )
         return
     if TEMPORARY:
-        say(f"compiling the numeric kernels for this command only: {WANTED} cannot be written; {_CACHE_DIR_HINT}")
-    title = TITLE if TEMPORARY else TITLE + _CACHE_NOTE
+        report_line(
+            f"compiling the numeric kernels for this command only: {WANTED} cannot be written; {_CACHE_DIR_HINT}"
+        )
+    title = STAGE_TITLE if TEMPORARY else STAGE_TITLE + _CACHE_NOTE
     if not (units and sys.executable and has_receiver()):
-        say(f"{title} ...")
+        report_line(f"{title} ...")
     if not units or not sys.executable:
         return
-    total = len(kernels_of(tuple(units)))
-    with stage(title, TITLE) as advance:
+    total = len(list_unit_kernels(tuple(units)))
+    with stage(title, STAGE_TITLE) as advance:
         advance(0, total, f"0 of {total}")
         compile_units(units, folder, lambda done: advance(done, total, f"{done} of {total}"))

@@ -15,10 +15,10 @@ _OWN_PROCESS_VARIABLE = "PLANFLY_OWN_PROCESS"
 
 
 def prepare_process() -> None:
-    """Collect garbage seldom, and limit linear algebra to one thread; call it before NumPy is imported.
+    """Collect garbage seldom, and limit linear algebra to one thread.  Call this before NumPy is imported.
 
-    Garbage collection during imports took a quarter of the start, and spinning threads a tenth; no matrix here is large
-    enough for a second thread.
+    Garbage collection during imports took a quarter of the start-up time, and spinning threads a tenth; no matrix in
+    planfly is large enough for a second thread.
     """
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     os.environ[_OWN_PROCESS_VARIABLE] = "1"
@@ -28,8 +28,8 @@ def prepare_process() -> None:
 def prepare_child() -> None:
     """Collect garbage seldom in a process that planfly started, such as the worker of a campaign.
 
-    Garbage collection in the processes of a short campaign took a sixth of its time.  If address space is limited,
-    import nothing that does not fit (`world.address_space`).
+    Garbage collection in the processes of a short campaign took a sixth of its time.  If the address space is limited,
+    import only modules that fit (`world.address_space`).
     """
     if _OWN_PROCESS_VARIABLE in os.environ:
         gc.set_threshold(200_000, 50, 50)
@@ -62,19 +62,20 @@ def limit_of_address_space() -> int | None:
     return None if limit == resource.RLIM_INFINITY else limit
 
 
-def with_large_stack(work: Callable[[], _Given]) -> _Given:
-    """Run work with its frames in one large piece of memory, and return its result.
+def with_large_stack(function: Callable[[], _Given]) -> _Given:
+    """Call a function with all frames in one large piece of memory, and return its result.
 
     CPython keeps frames in pieces of 16 KB and frees the last piece as soon as it is empty.  Numba's recursion crosses
-    the boundary between two pieces so often that a sixth of its time went into pages that the operating system took
-    back and provided again.  A frame with many values gets a piece of their size, and inner frames share it.
+    the boundary between two pieces so often that a sixth of its time was spent on memory pages that the operating
+    system reclaimed and provided again.  A frame with many values gets a piece of their size, and inner frames share
+    this piece.
 
     >>> with_large_stack(lambda: 7)
     7
     """
-    large_frame_code = _run.__code__.replace(co_stacksize=_STACK_VALUES)
-    return FunctionType(large_frame_code, globals())(work)
+    large_frame_code = _call.__code__.replace(co_stacksize=_STACK_VALUES)
+    return FunctionType(large_frame_code, globals())(function)
 
 
-def _run(work: Callable[[], _Given]) -> _Given:
-    return work()
+def _call(function: Callable[[], _Given]) -> _Given:
+    return function()

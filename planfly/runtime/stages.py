@@ -19,11 +19,11 @@ class Receiver(NamedTuple):
     """Receiver of progress.
 
     stage: begins a stage with its title and its kind, and returns the function that takes its progress.
-    say: takes a line that belongs to no stage.
+    report_line: takes a line that belongs to no stage.
     """
 
     stage: Callable[[str, str], AbstractContextManager[Advance]]
-    say: Callable[[str], None]
+    report_line: Callable[[str], None]
 
 
 # Receiver of the progress of the running work.
@@ -32,7 +32,7 @@ _receiver: ContextVar[Receiver | None] = ContextVar("receiver", default=None)
 
 @contextmanager
 def send_progress_to(receiver: Receiver) -> Iterator[None]:
-    """Send the progress of the work inside to a receiver."""
+    """Send the progress of the code inside to a receiver."""
     token = _receiver.set(receiver)
     try:
         yield
@@ -52,11 +52,11 @@ def stage(title: str, kind: str = "") -> AbstractContextManager[Advance]:
     return contextlib.nullcontext(_ignore_progress) if receiver is None else receiver.stage(title, kind or title)
 
 
-def say(line: str) -> None:
+def report_line(line: str) -> None:
     """Report a line about the work; without a receiver it is logged as a warning."""
     receiver = _receiver.get()
     if receiver is not None:
-        receiver.say(line)
+        receiver.report_line(line)
         return
     # Imported here: the command line has a receiver, and answers --help at once.
     import logging
@@ -65,10 +65,10 @@ def say(line: str) -> None:
 
 
 def report_replaced(*files: Path) -> None:
-    """Report each existing file that is replaced; for example, a program's flight may replace a simulated flight."""
+    """Report each existing file that will be replaced; for example, a program's log may replace a simulated flight."""
     for file in files:
         if file.exists():
-            say(f"{file} is there: replaced")
+            report_line(f"{file} is there: replaced")
 
 
 def has_receiver() -> bool:

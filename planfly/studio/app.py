@@ -11,7 +11,7 @@ from logs.theme import css_variables
 from planfly.studio.guard import App, Guard
 from planfly.studio.server import Server
 
-_TYPES = {".html": "text/html", ".css": "text/css", ".js": "text/javascript", ".svg": "image/svg+xml"}
+_MEDIA_TYPES = {".html": "text/html", ".css": "text/css", ".js": "text/javascript", ".svg": "image/svg+xml"}
 FILES = (
     *("studio.html", "studio.css", "studio.js", "link.js", "axes.js", "map.js", "profile.js", "hands.js", "panel.js"),
     *("scene.js", "settings.js", "legend.js", "icon.svg"),
@@ -25,24 +25,24 @@ def page_files() -> dict[str, tuple[bytes, str]]:
     'text/html; charset=utf-8'
     """
     folder = resources.files("planfly.studio") / "page"
-    found = {f"/{name}": ((folder / name).read_bytes(), _media_type(name)) for name in FILES}
-    found["/"] = found.pop("/studio.html")
-    found["/theme.css"] = (css_variables().encode(), _media_type("theme.css"))
-    return found
+    files = {f"/{name}": ((folder / name).read_bytes(), _media_type(name)) for name in FILES}
+    files["/"] = files.pop("/studio.html")
+    files["/theme.css"] = (css_variables().encode(), _media_type("theme.css"))
+    return files
 
 
 def _media_type(name: str) -> str:
-    return f"{_TYPES[name[name.rindex('.') :]]}; charset=utf-8"
+    return f"{_MEDIA_TYPES[name[name.rindex('.') :]]}; charset=utf-8"
 
 
 def make_app(server: Server, port: int) -> App:
     """Make the whole application, including its guard."""
     files = page_files()
 
-    def answer(request: Request) -> Response:
+    def serve_file(request: Request) -> Response:
         data, media_type = files[request.url.path]
         return Response(data, media_type=media_type)
 
-    routes: list[Route | WebSocketRoute] = [Route(path, answer, methods=["GET"]) for path in files]
+    routes: list[Route | WebSocketRoute] = [Route(path, serve_file, methods=["GET"]) for path in files]
     routes.append(WebSocketRoute("/session", server.serve))
     return Guard(Starlette(routes=routes), port)

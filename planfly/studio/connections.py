@@ -7,21 +7,21 @@ from typing import Any
 from uvicorn.protocols.http.h11_impl import H11Protocol
 from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
 
-from planfly.studio.messages import MAX_FIRST
+from planfly.studio.messages import MAX_FIRST_MESSAGE_CHARACTERS
 
 # Lifetime of an HTTP connection, s.  The files of the page are read much faster; its websocket lasts as long as the
 # page.
-LIFETIME = 10.0
+HTTP_LIFETIME_S = 10.0
 # Maximum number of connections that have not given a token; a page has a few.
-MAX_UNKNOWN = 32
+MAX_UNKNOWN_CONNECTIONS = 32
 # Key in a websocket's scope of the function that allows messages of full size, called when the token has been given.
-WELCOME = "planfly.welcome"
+ALLOW_FULL_SIZE = "planfly.welcome"
 # Counter that numbers connections in the order in which they were made.
 _numbers = itertools.count()
 
 
-class _Unknown:
-    """Connection that has not given a token; if there are more than `MAX_UNKNOWN`, the oldest is closed.
+class _UnknownConnection:
+    """Connection that has not given a token; if there are more than `MAX_UNKNOWN_CONNECTIONS`, the oldest is closed.
 
     number: position in the order of connections, or None if the connection has given a token or is ending.
     """
@@ -32,39 +32,39 @@ class _Unknown:
 
     def _register(self) -> None:
         self.number = next(_numbers)
-        unknown = [one for one in self.connections if getattr(one, "number", None) is not None]
-        if len(unknown) > MAX_UNKNOWN:
-            min(unknown, key=lambda one: one.number)._drop()
+        unknown = [connection for connection in self.connections if getattr(connection, "number", None) is not None]
+        if len(unknown) > MAX_UNKNOWN_CONNECTIONS:
+            min(unknown, key=lambda connection: connection.number)._drop()
 
     def _drop(self) -> None:
         self.number = None
         self.transport.abort()
 
 
-class ShortLived(_Unknown, H11Protocol):
-    """HTTP on a connection that ends after `LIFETIME`, so that silent connections make room for others."""
+class ShortLived(_UnknownConnection, H11Protocol):
+    """HTTP on a connection that ends after `HTTP_LIFETIME_S`, so that silent connections make room for others."""
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
-        """Start a connection, and schedule its end."""
+        """Register the connection, and schedule its end."""
         super().connection_made(transport)
         self._register()
-        asyncio.get_running_loop().call_later(LIFETIME, self._end, transport)
+        asyncio.get_running_loop().call_later(HTTP_LIFETIME_S, self._close_if_http, transport)
 
-    def _end(self, transport: asyncio.Transport) -> None:
+    def _close_if_http(self, transport: asyncio.Transport) -> None:
         # If a websocket has replaced this protocol, the connection stays open.
         if transport.get_protocol() is self:
             transport.abort()
 
 
-class FirstMessageBounded(_Unknown, WebSocketsSansIOProtocol):
-    """Websocket that reads no message above `MAX_FIRST` until the token is given."""
+class FirstMessageBounded(_UnknownConnection, WebSocketsSansIOProtocol):
+    """Websocket that reads no message above `MAX_FIRST_MESSAGE_CHARACTERS` until the token is given."""
 
     def __init__(self, *args: Any, **kwargs: Any) -> None:
         super().__init__(*args, **kwargs)
-        self._limit_messages(MAX_FIRST)
+        self._limit_messages(MAX_FIRST_MESSAGE_CHARACTERS)
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        """Start a connection."""
+        """Register the connection."""
         super().connection_made(transport)
         self._register()
 
@@ -72,14 +72,14 @@ class FirstMessageBounded(_Unknown, WebSocketsSansIOProtocol):
         """Start a websocket, and add the function that allows messages of full size to its scope."""
         super().handle_connect(event)
         scope: Any = getattr(self, "scope", {})
-        scope[WELCOME] = self._welcome
+        scope[ALLOW_FULL_SIZE] = self._allow_full_size
 
-    def _welcome(self) -> None:
+    def _allow_full_size(self) -> None:
         self.number = None
         self._limit_messages(self.config.ws_max_size)
 
-    def _limit_messages(self, most: int) -> None:
+    def _limit_messages(self, max_size: int) -> None:
         # The first name is that of websockets 16 and later, the second that of earlier versions.
         for name in ("max_message_size", "max_size"):
             if hasattr(self.conn, name):
-                setattr(self.conn, name, most)
+                setattr(self.conn, name, max_size)

@@ -19,7 +19,7 @@ from logs.recording.setup_attachments import PLAN_FILE, SCENARIO_FILE
 from logs.views.exports.map_files import kml_text, map_zones, plan_line
 from planfly.api.imported import read_imported
 from planfly.flight_logs import MCAP_MAGIC, is_log
-from planfly.flight_options import LogOptions, MissionOptions, apply_options, named_scenario
+from planfly.flight_options import LogOptions, MissionOptions, apply_options, load_scenario_with_options
 from planfly.studio.edit_context import EditContext
 from planfly.workflow.airframe import Airframe, choose_seed, load_airframe
 from planfly.workflow.imported_flights import ImportedFlight
@@ -43,10 +43,10 @@ DROPPED = (".waypoints", ".txt", ".plan", ".json", ".mcap", ".bin", ".tlog", ".u
 KINDS = {"waypoints": ".waypoints", "plan": ".plan", "plan.json": ".json", "kml": ".kml"}
 # All file types that can be saved.
 SAVED = KINDS | {"parm": ".parm"}
-# Latitudes and longitudes within this difference are the same place, degrees; files round to 1e-7 degrees.
-_SAME_PLACE_DEG = 2e-7
-# Altitudes within this difference are the same, m.
-_SAME_ALTITUDE_M = 0.02
+# Latitudes and longitudes within this difference are equal, degrees; files round to 1e-7 degrees.
+_POSITION_TOLERANCE_DEG = 2e-7
+# Altitudes within this difference are equal, m.
+_ALTITUDE_TOLERANCE_M = 0.02
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,12 +54,12 @@ class Document:
     """Opened mission and its origin.
 
     name: name shown to the user.
-    stem: stem of the names of saved files.
+    stem: stem of the file names under which it is saved.
     setup: setup of the opened mission.
     kind: key in `KINDS`, or "" if the document was not a mission file.
-    data: bytes of the file, which an unchanged mission is saved as.
+    data: bytes of the file; an unchanged mission is saved as these bytes.
     path: the file that the command named; None for any other document.
-    on_disk: bytes of this file, as last known.
+    on_disk: bytes of this file when it was last read or written.
     to_plan: True for a scenario that has no path yet.
     """
 
@@ -76,7 +76,7 @@ class Document:
 def open_document(target: str, options: MissionOptions) -> Document:
     """Open a scenario, a plan, a mission or a log, by name or path.  Raises PlanflyError."""
     if target in embedded_names() or target.lower().endswith(".toml"):
-        return _scenario_document(named_scenario(target, options), options.get("seed"))
+        return _scenario_document(load_scenario_with_options(target, options), options.get("seed"))
     path = Path(target)
     setup = _open_file(path, options)
     kind = next((kind for kind, suffix in KINDS.items() if suffix == path.suffix.lower()), "")
@@ -86,51 +86,54 @@ def open_document(target: str, options: MissionOptions) -> Document:
 
 
 def open_dropped(name: str, data: bytes, options: MissionOptions) -> Document:
-    """Open a file that was dropped on the page, by its bytes and the suffix of its name.  Raises PlanflyError."""
+    """Open a file that was dropped on the page, from its bytes; the suffix of its name tells its type.
+
+    Raises PlanflyError.
+    """
     suffix = Path(name).suffix.lower()
-    shown = "".join(ch if ch.isprintable() and ch not in "/\\" else "_" for ch in name)[-60:] or "dropped"
+    shown_name = "".join(ch if ch.isprintable() and ch not in "/\\" else "_" for ch in name)[-60:] or "dropped"
     if suffix not in DROPPED:
-        raise MissionError.at(shown, "suffix", suffix, f"allowed {', '.join(DROPPED)}", shown=repr(suffix))
+        raise MissionError.at(shown_name, "suffix", suffix, f"allowed {', '.join(DROPPED)}", shown=repr(suffix))
     if suffix == ".json":
-        _refuse_other_files(shown, data)
+        _check_plan_names_no_files(shown_name, data)
     with temporary_folder("planfly-studio-") as folder:
         file = folder / f"dropped{suffix}"
         file.write_bytes(data)
         if data.startswith(MCAP_MAGIC):
-            _refuse_log_naming_files(shown, file)
+            _check_log_names_no_files(shown_name, file)
         try:
-            opened = open_document(str(file), options)
+            document = open_document(str(file), options)
         except PlanflyError as error:
-            raise PlanflyError(str(error).replace(str(file), shown), file=shown) from None
-    return replace(opened, name=shown, stem=Path(shown).stem, path=None)
+            raise PlanflyError(str(error).replace(str(file), shown_name), file=shown_name) from None
+    return replace(document, name=shown_name, stem=Path(shown_name).stem, path=None)
 
 
-def _refuse_log_naming_files(name: str, file: Path) -> None:
-    """Raise PlanflyError for a log whose scenario, or whose plan's scenario, names files of this machine."""
-    found = Container()
+def _check_log_names_no_files(name: str, file: Path) -> None:
+    """Raise PlanflyError if the scenario in a log, or the scenario of its plan, names files of this machine."""
+    container = Container()
     with file.open("rb") as stream, contextlib.suppress(PlanflyError, *PARSE_ERRORS):
         stream.seek(len(MAGIC))
         # Errors in the log are reported when the log is read; here the attachments before an error are checked.
-        for _ in read_chunks(stream, found):
+        for _ in read_chunks(stream, container):
             pass
-    if SCENARIO_FILE in found.attachments:
-        _refuse_other_files(name, b'{"scenario": ' + found.attachments[SCENARIO_FILE] + b"}")
-    _refuse_other_files(name, found.attachments.get(PLAN_FILE, b""))
+    if SCENARIO_FILE in container.attachments:
+        _check_plan_names_no_files(name, b'{"scenario": ' + container.attachments[SCENARIO_FILE] + b"}")
+    _check_plan_names_no_files(name, container.attachments.get(PLAN_FILE, b""))
 
 
-def _refuse_other_files(name: str, data: bytes) -> None:
-    """Raise PlanflyError for a plan whose scenario names files of this machine, which a page must not read."""
+def _check_plan_names_no_files(name: str, data: bytes) -> None:
+    """Raise PlanflyError if the scenario of a plan names files of this machine, because a page must not read these."""
     try:
         scenario = json.loads(data)["scenario"]
-        named = [scenario.get("terrain", {}).get("path"), scenario.get("flight", {}).get("params")]
-        named += [scenario.get("zones_file"), _aircraft_folder(scenario.get("flight", {}).get("aircraft"))]
+        named_files = [scenario.get("terrain", {}).get("path"), scenario.get("flight", {}).get("params")]
+        named_files += [scenario.get("zones_file"), _aircraft_folder(scenario.get("flight", {}).get("aircraft"))]
     except (ValueError, LookupError, TypeError, AttributeError, RecursionError):
         # Errors in the plan are reported when the plan is read.
         return
-    for one in named:
-        if one is not None and str(one) not in EMBEDDED:
+    for file in named_files:
+        if file is not None and str(file) not in EMBEDDED:
             allowed = "a plan that names other files is opened by the command: planfly studio plan.json"
-            raise MissionError.at(name, "scenario", str(one)[:60], allowed)
+            raise MissionError.at(name, "scenario", str(file)[:60], allowed)
 
 
 def _aircraft_folder(aircraft: Any) -> str | None:
@@ -151,7 +154,7 @@ def _open_file(path: Path, options: MissionOptions) -> FlightSetup:
 def _read_imported_log(path: Path, options: MissionOptions) -> ImportedFlight:
     """Read the flight of another program's log.
 
-    Raises PlanflyError; for a track without a mission, its message fits the studio.
+    Raises PlanflyError, for a track without a mission with a message for users of the studio.
     """
     world: LogOptions = {
         "scenario": options.get("scenario"),
@@ -163,8 +166,8 @@ def _read_imported_log(path: Path, options: MissionOptions) -> ImportedFlight:
     except LogError as error:
         if "holds no mission" not in str(error):
             raise
-        alone = "a flight's track without a mission: open the file of its mission"
-        raise MissionError(f"{path}: {alone}", file=path) from None
+        reason = "a flight's track without a mission: open the file of its mission"
+        raise MissionError(f"{path}: {reason}", file=path) from None
 
 
 def _log_mission_setup(scenario: Scenario, mission: Mission, seed: int) -> FlightSetup:
@@ -173,10 +176,10 @@ def _log_mission_setup(scenario: Scenario, mission: Mission, seed: int) -> Fligh
 
 
 def _scenario_document(scenario: Scenario, seed: int | None) -> Document:
-    """Return a document of a scenario, with a straight line from start to destination until a path is planned."""
-    airframe, number = load_airframe(scenario), choose_seed(scenario, seed)
-    mission = planned_mission(straight_plan(scenario, number), airframe)
-    setup = make_setup(scenario, airframe, mission, number)
+    """Make a document of a scenario, with a straight line from start to destination until a path is planned."""
+    airframe, chosen_seed = load_airframe(scenario), choose_seed(scenario, seed)
+    mission = planned_mission(straight_plan(scenario, chosen_seed), airframe)
+    setup = make_setup(scenario, airframe, mission, chosen_seed)
     return Document(scenario.name, scenario.name, setup, to_plan=True)
 
 
@@ -206,28 +209,28 @@ class Saved:
     losses: tuple[str, ...] = ()
 
 
-def save_document(document: Document, desk: EditContext, judged: JudgedMission, kind: str) -> Saved:
-    """Return the mission under edit in one of `KINDS`.  Raises PlanflyError if the format cannot hold it.
+def save_document(document: Document, context: EditContext, judged: JudgedMission, kind: str) -> Saved:
+    """Return the edited mission as a file of one of `SAVED`.  Raises PlanflyError if the format cannot store it.
 
     An unchanged mission in its original format is saved as the original bytes.
     """
     mission, name = judged.mission, f"{document.stem}{SAVED[kind]}"
     if kind == "parm":
-        return _saved_parameters(name, desk)
-    before = document.setup.scenario
-    same = kind != "plan.json" or desk.scenario is before
-    if kind == document.kind and mission is document.setup.mission and same:
-        return Saved(name, document.data, _lost_settings(before, desk))
+        return _saved_parameters(name, context)
+    opened_scenario = document.setup.scenario
+    has_same_world = kind != "plan.json" or context.scenario is opened_scenario
+    if kind == document.kind and mission is document.setup.mission and has_same_world:
+        return Saved(name, document.data, _lost_settings(opened_scenario, context))
     if kind == "plan.json":
-        return _saved_plan(name, desk, judged)
+        return _saved_plan(name, context, judged)
     if kind == "kml":
-        text = kml_text(desk.scenario.name, [plan_line(judged.setup)], map_zones(judged.setup))
+        text = kml_text(context.scenario.name, [plan_line(judged.setup)], map_zones(judged.setup))
         return Saved(
             name, _to_bytes(text), ("only a map: it does not contain the commands, speeds and frames of the items",)
         )
     mission = replace(mission, autopilot=judged.setup.autopilot.name)
     text = mission_text(mission, "waypoints" if kind == "waypoints" else "plan")
-    losses = (*_format_losses(desk, mission, text, name, kind), *_lost_settings(before, desk))
+    losses = (*_format_losses(context, mission, text, name, kind), *_lost_settings(opened_scenario, context))
     return Saved(name, text.encode(), losses)
 
 
@@ -235,143 +238,171 @@ def _to_bytes(text: str | bytes) -> bytes:
     return text.encode() if isinstance(text, str) else text
 
 
-def _format_losses(desk: EditContext, mission: Mission, text: str, name: str, kind: str) -> tuple[str, ...]:
-    """List the contents of a mission and its world that a ground station's file cannot store."""
-    kept, found = parse_mission(text, name), []
-    apart: Mapping[str, tuple[int, str]] = {
-        "fence items": (len(mission.fences) - len(kept.fences), ".plan holds them"),
-        "rally points": (len(mission.rally) - len(kept.rally), ".plan holds them"),
+def _format_losses(context: EditContext, mission: Mission, text: str, name: str, kind: str) -> tuple[str, ...]:
+    """Describe the contents of a mission and its scenario that a ground station's file cannot store."""
+    parsed, losses = parse_mission(text, name), []
+    lost_counts: Mapping[str, tuple[int, str]] = {
+        "fence items": (len(mission.fences) - len(parsed.fences), ".plan holds them"),
+        "rally points": (len(mission.rally) - len(parsed.rally), ".plan holds them"),
         "survey plans": (
             len(mission.survey_plans),
             "their items stay; what the ground station keeps next to them is lost",
         ),
     }
-    found += [f"{count} {what}: {how}" for what, (count, how) in apart.items() if count > 0]
-    if kind == "waypoints" and mission.cruise_speed != kept.cruise_speed and mission.cruise_speed is not None:
-        found.append("the ground station's cruise speed")
-    threats, zones = len(desk.scenario.threats), len(desk.scenario.zones)
-    world = [f"{count} {what}" for count, what in ((threats, "threats"), (zones, "zones")) if count]
-    if world:
-        found.append(f"the scenario's {' and '.join(world)}: planfly export writes them as a fence")
-    return tuple(found)
+    losses += [
+        f"{count} {content}: {explanation}" for content, (count, explanation) in lost_counts.items() if count > 0
+    ]
+    if kind == "waypoints" and mission.cruise_speed != parsed.cruise_speed and mission.cruise_speed is not None:
+        losses.append("the ground station's cruise speed")
+    threats, zones = len(context.scenario.threats), len(context.scenario.zones)
+    world_contents = [f"{count} {content}" for count, content in ((threats, "threats"), (zones, "zones")) if count]
+    if world_contents:
+        losses.append(f"the scenario's {' and '.join(world_contents)}: planfly export writes them as a fence")
+    return tuple(losses)
 
 
-def _lost_settings(before: Scenario, desk: EditContext) -> tuple[str, ...]:
-    """List the settings changed in the studio, which a ground station's file cannot store."""
-    now = desk.scenario
-    differs = {
-        "wind": before.spec.wind != now.spec.wind,
-        "aircraft, autopilot or airspeed": before.spec.flight != now.spec.flight,
-        "limits": before.spec.limits != now.spec.limits or before.ceiling != now.ceiling,
+def _lost_settings(opened_scenario: Scenario, context: EditContext) -> tuple[str, ...]:
+    """Describe the settings changed in the studio, which a ground station's file cannot store."""
+    scenario = context.scenario
+    differences = {
+        "wind": opened_scenario.spec.wind != scenario.spec.wind,
+        "aircraft, autopilot or airspeed": opened_scenario.spec.flight != scenario.spec.flight,
+        "limits": opened_scenario.spec.limits != scenario.spec.limits or opened_scenario.ceiling != scenario.ceiling,
     }
-    names = [name for name, other in differs.items() if other]
-    lost = (f"the settings changed here: {', '.join(names)}",) if names else ()
-    return (*lost, *_lost_parameters(desk))
+    names = [name for name, is_different in differences.items() if is_different]
+    losses = (f"the settings changed here: {', '.join(names)}",) if names else ()
+    return (*losses, *_lost_parameters(context))
 
 
-def _lost_parameters(desk: EditContext) -> tuple[str, ...]:
-    """Return a line on the autopilot parameters set in the studio, which only a parameter file stores, or nothing."""
-    count = len(desk.parameters.values)
+def _lost_parameters(context: EditContext) -> tuple[str, ...]:
+    """Describe the autopilot parameters set in the studio, which only a parameter file can store."""
+    count = len(context.parameters.values)
     return (f"{count} parameter{'s' if count != 1 else ''} set here: .parm holds them",) if count else ()
 
 
-def _saved_parameters(name: str, desk: EditContext) -> Saved:
+def _saved_parameters(name: str, context: EditContext) -> Saved:
     """Return a file of the parameters set in the studio.  Raises PlanflyError if no parameter was set."""
-    if not desk.parameters.values:
+    if not context.parameters.values:
         raise PlanflyError("no parameter was set here: Settings sets them", field="form")
-    return Saved(name, desk.parameters.text(f"set in planfly studio for {desk.airframe.autopilot.title}").encode())
+    return Saved(
+        name, context.parameters.text(f"set in planfly studio for {context.airframe.autopilot.title}").encode()
+    )
 
 
-def _saved_plan(name: str, desk: EditContext, judged: JudgedMission) -> Saved:
-    """Return the mission as a plan of its scenario, with the present certificate of its path."""
+def _saved_plan(name: str, context: EditContext, judged: JudgedMission) -> Saved:
+    """Return the mission as a plan of its scenario, with the current certificate of its path."""
     plan = judged.setup.plan
     if plan is not None:
         return Saved(name, plan_json(plan).encode())
-    made = certified_plan(desk, judged)
-    changed = not desk.planned or planned_mission(made, desk.airframe).items != judged.mission.items
-    losses = ["the items: a plan holds only places, from which its mission is made again"] if changed else []
-    if not made.feasible:
-        problem = (made.certificate.problems or ("violations are counted",))[0]
+    new_plan = make_certified_plan(context, judged)
+    has_changed_items = not context.planned or planned_mission(new_plan, context.airframe).items != judged.mission.items
+    losses = ["the items: a plan holds only places, from which its mission is made again"] if has_changed_items else []
+    if not new_plan.feasible:
+        problem = (new_plan.certificate.problems or ("violations are counted",))[0]
         losses.append(f"it is a plan that is not feasible: {problem}")
-    return Saved(name, plan_json(made).encode(), (*losses, *_lost_parameters(desk)))
+    return Saved(name, plan_json(new_plan).encode(), (*losses, *_lost_parameters(context)))
 
 
-def _require_plain_waypoints(mission: Mission) -> None:
-    """Raise MissionError for items that a plan would drop, which are take-off, landing and speed changes en route."""
-    first = next((k for k, item in enumerate(mission.items) if item.has_position), 0)
-    for k, item in enumerate(mission.items):
+def _check_plain_waypoints(mission: Mission) -> None:
+    """Raise MissionError for items that a plan cannot store: take-off, landing and speed changes en route."""
+    first = next((index for index, item in enumerate(mission.items) if item.has_position), 0)
+    for index, item in enumerate(mission.items):
         lost = "its take-off" if item.command in TAKEOFFS else "its landing" if item.command in LANDINGS else ""
-        if item.command == Command.DO_CHANGE_SPEED and k > first:
+        if item.command == Command.DO_CHANGE_SPEED and index > first:
             lost = "a change of speed along its way"
         if lost:
-            why = f"a plan.json of edited waypoints does not hold {lost} (item {item.seq}): save a .plan, or plan again"
-            raise MissionError(f"{mission.source}: {why}", file=mission.source, field=f"item {item.seq}")
+            reason = (
+                f"a plan.json of edited waypoints does not hold {lost} (item {item.seq}): save a .plan, or plan again"
+            )
+            raise MissionError(f"{mission.source}: {reason}", file=mission.source, field=f"item {item.seq}")
 
 
-def certified_plan(desk: EditContext, judged: JudgedMission) -> Plan:
+def make_certified_plan(context: EditContext, judged: JudgedMission) -> Plan:
     """Make a plan of the waypoints of the route, scored and certified like plans of the planner.
 
-    Raises MissionError for a mission without a scenario, and for a mission with items other than plain waypoints,
-    because a plan cannot store it.
+    Raises MissionError for a mission without a scenario, and for items that a plan cannot store.
     """
-    mission, route, scenario = judged.mission, judged.setup.route, desk.scenario
+    mission, route, scenario = judged.mission, judged.setup.route, context.scenario
     name = mission.source
     if scenario.external:
         raise MissionError(
             f"{name}: a plan needs a scenario, and this mission came without one (--scenario)", file=name
         )
-    plain = not route.arcs.any() and len(set(route.items[route.items >= 0].tolist())) == (route.items >= 0).sum()
+    has_unique_waypoints = (
+        not route.arcs.any() and len(set(route.items[route.items >= 0].tolist())) == (route.items >= 0).sum()
+    )
     if (
-        not plain
+        not has_unique_waypoints
         or route.return_to is not None
-        or any(one.frame not in AMSL and one.has_position for one in mission.items)
+        or any(item.frame not in AMSL and item.has_position for item in mission.items)
     ):
         raise MissionError(f"{name}: a plan holds plain waypoints above mean sea level, once each", file=name)
-    if (made := _plan_with_ground_phases(desk, mission)) is not None:
-        return made
-    _require_plain_waypoints(mission)
-    return _scored_plan(desk, np.array(route.waypoints)[route.items >= 0])
+    if (plan := _plan_with_ground_phases(context, mission)) is not None:
+        return plan
+    _check_plain_waypoints(mission)
+    return _scored_plan(context, np.array(route.waypoints)[route.items >= 0])
 
 
-def _scored_plan(desk: EditContext, waypoints: Floats) -> Plan:
-    problem = make_problem(desk.scenario, desk.airframe.limits.surely())
+def _scored_plan(context: EditContext, waypoints: Floats) -> Plan:
+    problem = make_problem(context.scenario, context.airframe.limits.surely())
     certificate = certify(problem, waypoints)
     counts, objectives = paper_scores(problem.certified, waypoints[None])
     scores = Violations(*counts[0]), Objectives(*objectives[0])
-    return Plan(desk.scenario, waypoints, *scores, certificate, desk.seed, "edited", 0, np.zeros((0, 3)))
+    return Plan(context.scenario, waypoints, *scores, certificate, context.seed, "edited", 0, np.zeros((0, 3)))
 
 
-def _plan_with_ground_phases(desk: EditContext, mission: Mission) -> Plan | None:
+def _plan_with_ground_phases(context: EditContext, mission: Mission) -> Plan | None:
     """Return the edited plan with its unchanged departure and approach, or None if it has neither.
 
-    Departure and approach were certified with the turns at their ends, so the adjacent legs in the air must be
-    unchanged.  Raises MissionError if these legs were changed.
+    Departure and approach were certified with the turns at their ends, so the adjacent legs must be unchanged.  Raises
+    MissionError if these legs were changed.
     """
-    base = desk.opened.plan
-    if base is None or base.ways is None or (base.ways.climb, base.ways.descent) == (None, None):
+    opened_plan = context.opened_setup.plan
+    if (
+        opened_plan is None
+        or opened_plan.ways is None
+        or (opened_plan.ways.climb, opened_plan.ways.descent) == (None, None)
+    ):
         return None
-    climb, descent, points = base.ways.climb, base.ways.descent, desk.points(mission)
-    before = 0 if climb is None else 1 + len(climb.waypoints)
-    after = 0 if descent is None else len(descent.waypoints) + len(descent.line_up) + 1
-    waypoints = points[before : len(points) - after]
-    kept = len(waypoints) > 1 and all(
-        way is None or np.allclose(waypoints[ends], base.waypoints[ends], atol=_SAME_ALTITUDE_M)
-        for way, ends in ((climb, slice(2)), (descent, slice(-2, None)))
+    climb, descent, points = opened_plan.ways.climb, opened_plan.ways.descent, context.item_positions(mission)
+    departure_count = 0 if climb is None else 1 + len(climb.waypoints)
+    approach_count = 0 if descent is None else len(descent.waypoints) + len(descent.line_up) + 1
+    waypoints = points[departure_count : len(points) - approach_count]
+    is_unchanged = len(waypoints) > 1 and all(
+        procedure is None or np.allclose(waypoints[ends], opened_plan.waypoints[ends], atol=_ALTITUDE_TOLERANCE_M)
+        for procedure, ends in ((climb, slice(2)), (descent, slice(-2, None)))
     )
-    if kept:
-        made = replace(_scored_plan(desk, waypoints), ways=base.ways)
-        own = [one for one in base.certificate.problems if one.startswith(("climb-out: ", "landing: "))]
-        made = replace(made, certificate=replace(made.certificate, problems=(*made.certificate.problems, *own)))
-        if _have_same_places(planned_mission(made, desk.airframe), mission):
-            return made
-    why = "its departure or landing, or a leg next to them, is no longer that of its plan: save a .plan, or plan again"
-    raise MissionError(f"{mission.source}: {why}", file=mission.source)
+    if is_unchanged:
+        plan = replace(_scored_plan(context, waypoints), ways=opened_plan.ways)
+        ground_problems = [
+            problem for problem in opened_plan.certificate.problems if problem.startswith(("climb-out: ", "landing: "))
+        ]
+        plan = replace(
+            plan, certificate=replace(plan.certificate, problems=(*plan.certificate.problems, *ground_problems))
+        )
+        if _have_same_items(planned_mission(plan, context.airframe), mission):
+            return plan
+    reason = (
+        "its departure or landing, or a leg next to them, is no longer that of its plan: save a .plan, or plan again"
+    )
+    raise MissionError(f"{mission.source}: {reason}", file=mission.source)
 
 
-def _have_same_places(one: Mission, other: Mission) -> bool:
-    """Return True if two missions have the same commands at the same places."""
-    done = [[(item.command, item.has_position or item.params) for item in mission.items] for mission in (one, other)]
-    if done[0] != done[1]:
+def _have_same_items(mission_a: Mission, mission_b: Mission) -> bool:
+    """Return True if two missions have the same commands at the same positions."""
+    commands = [
+        [(item.command, item.has_position or item.params) for item in mission.items]
+        for mission in (mission_a, mission_b)
+    ]
+    if commands[0] != commands[1]:
         return False
-    here, there = (np.array([(item.lat_deg, item.lon_deg, item.alt) for item in it.items]) for it in (one, other))
-    return bool((np.abs(here - there) <= (_SAME_PLACE_DEG, _SAME_PLACE_DEG, _SAME_ALTITUDE_M)).all())
+    positions_a, positions_b = (
+        np.array([(item.lat_deg, item.lon_deg, item.alt) for item in mission.items])
+        for mission in (mission_a, mission_b)
+    )
+    return bool(
+        (
+            np.abs(positions_a - positions_b)
+            <= (_POSITION_TOLERANCE_DEG, _POSITION_TOLERANCE_DEG, _ALTITUDE_TOLERANCE_M)
+        ).all()
+    )

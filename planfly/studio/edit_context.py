@@ -23,11 +23,11 @@ _DEFAULT_PARAMETERS = SetParameters()
 
 @dataclass(frozen=True, slots=True)
 class EditContext(MissionContext):
-    """Everything that a mission under edit is judged with.
+    """Settings in which an edited mission is judged.
 
     terrain: elevation file named for a mission without a scenario, or None.
-    fences: fences named with a mission; their zones are part of every scenario that is made around it.
-    parameters: parameters of the autopilot that were set in the studio.
+    fences: fences named with the mission; their zones are added to every scenario that is made around it.
+    parameters: autopilot parameters that were set in the studio.
     """
 
     terrain: str | None = None
@@ -49,38 +49,40 @@ class EditContext(MissionContext):
             fences=fences,
         )
 
-    def flown_as(self, scenario: Scenario, parameters: SetParameters) -> "EditContext":
-        """Return the context of the same mission in another scenario, with its weather, aircraft and autopilot.
+    def with_settings(self, scenario: Scenario, parameters: SetParameters) -> "EditContext":
+        """Return the context of the opened mission in another scenario and with other autopilot parameters.
 
-        The certificate of a plan applies only to the world in which it was planned.
+        The new context has no plan, because the certificate of a plan applies only to the scenario it was made for.
         """
         airframe = parameters.airframe(scenario)
-        setup = make_setup(scenario, airframe, self.opened.mission, self.seed)
-        return replace(self, scenario=scenario, airframe=airframe, opened=setup, parameters=parameters)
+        setup = make_setup(scenario, airframe, self.opened_setup.mission, self.seed)
+        return replace(self, scenario=scenario, airframe=airframe, opened_setup=setup, parameters=parameters)
 
-    def of_plan(self, plan: Plan, mission: Mission) -> "EditContext":
+    def with_plan(self, plan: Plan, mission: Mission) -> "EditContext":
         """Return the context of a new plan; its certificate applies until the mission is changed."""
         setup = make_setup(self.scenario, self.airframe, mission, self.seed, plan=plan)
-        return replace(self, opened=setup, planned=True)
+        return replace(self, opened_setup=setup, planned=True)
 
-    def around(self, mission: Mission) -> "EditContext":
-        """Return the context, with a new scenario if the mission has left the scenario that was made around it."""
+    def around_mission(self, mission: Mission) -> "EditContext":
+        """Return this context, or one with a new scenario if the mission has left the scenario made around it."""
         if not self.scenario.external:
             return self
-        points = self.points(mission)[:, :2]
+        points = self.item_positions(mission)[:, :2]
         (west, east), (south, north) = self.scenario.bounds.tolist()
-        low, high = points.min(axis=0), points.max(axis=0)
+        min_corner, max_corner = points.min(axis=0), points.max(axis=0)
         if (
-            low[0] > west + _EDGE_DISTANCE_M
-            and high[0] < east - _EDGE_DISTANCE_M
-            and low[1] > south + _EDGE_DISTANCE_M
-            and high[1] < north - _EDGE_DISTANCE_M
+            min_corner[0] > west + _EDGE_DISTANCE_M
+            and max_corner[0] < east - _EDGE_DISTANCE_M
+            and min_corner[1] > south + _EDGE_DISTANCE_M
+            and max_corner[1] < north - _EDGE_DISTANCE_M
         ):
             return self
-        made = implied_scenario(mission, self.terrain, self.scenario.flight, vertical_legs=True).scenario
-        spec = made.spec.model_copy(update={"wind": self.scenario.spec.wind, "limits": self.scenario.spec.limits})
-        made = replace(made, spec=spec, wind=self.scenario.wind, limits=self.scenario.limits)
-        return replace(self, scenario=self.fences.on_scenario(made))
+        new_scenario = implied_scenario(mission, self.terrain, self.scenario.flight, vertical_legs=True).scenario
+        spec = new_scenario.spec.model_copy(
+            update={"wind": self.scenario.spec.wind, "limits": self.scenario.spec.limits}
+        )
+        new_scenario = replace(new_scenario, spec=spec, wind=self.scenario.wind, limits=self.scenario.limits)
+        return replace(self, scenario=self.fences.add_to_scenario(new_scenario))
 
     # ------------------------------------------------------------------
     # Verdicts while a mission is dragged.
@@ -89,11 +91,11 @@ class EditContext(MissionContext):
         """Return the route of a mission, without the notes for the user."""
         frame, fly_over = self.airframe, self.scenario.flight.fly_over
         rules = frame.autopilot.route_rules
-        laid = lay_route(self.placed(mission), frame.airspeed, fly_over, frame.limits, rules)
-        return with_end_courses(laid, self.scenario, frame.limits)
+        route = lay_route(self.place_mission(mission), frame.airspeed, fly_over, frame.limits, rules)
+        return with_end_courses(route, self.scenario, frame.limits)
 
-    def part(self, mission: Mission, route: Route) -> FlightSetup:
-        """Return a setup for judging the legs and corners of a part of the route; nothing is flown."""
+    def part_setup(self, mission: Mission, route: Route) -> FlightSetup:
+        """Return a setup for judging the legs and corners of ``route``, which may be a part of the mission's route."""
         frame = self.airframe
         return FlightSetup(
             scenario=self.scenario,

@@ -12,39 +12,41 @@ _MAX_FILES = 200
 _READABLE_SUFFIXES = (*DROPPED, *PARAMETER_FILES)
 
 
-def folder_json(folder: Path | None) -> Json:
-    """List the missions, plans, logs and parameter files of a folder, without links that lead out of the folder.
+def folder_message(folder: Path | None) -> Json:
+    """List the missions, plans, logs and parameter files of a folder, except links to other folders.
 
-    >>> folder_json(Path("no such folder"))["files"]
+    >>> folder_message(Path("no such folder"))["files"]
     []
     """
     if folder is None:
         return {"folder": "", "files": []}
     try:
-        inside = folder.resolve(strict=True)
-        found = sorted(one for one in inside.iterdir() if one.suffix.lower() in _READABLE_SUFFIXES and one.is_file())
+        resolved_folder = folder.resolve(strict=True)
+        files = sorted(
+            file for file in resolved_folder.iterdir() if file.suffix.lower() in _READABLE_SUFFIXES and file.is_file()
+        )
     except OSError:
         return {"folder": "", "files": []}
     return {
-        "folder": shown_path(inside),
-        "files": [one.name for one in found[:_MAX_FILES] if one.resolve().parent == inside],
+        "folder": home_relative_text(resolved_folder),
+        "files": [file.name for file in files[:_MAX_FILES] if file.resolve().parent == resolved_folder],
     }
 
 
-def shown_path(path: Path) -> str:
-    """Return the full path as users write it, with ~ for their home folder.
+def home_relative_text(path: Path) -> str:
+    """Return the full path, with ~ for the user's home folder.
 
-    >>> shown_path(Path.home() / "missions"), shown_path(Path("/srv"))
+    >>> home_relative_text(Path.home() / "missions"), home_relative_text(Path("/srv"))
     ('~/missions', '/srv')
     """
-    whole, home = path.resolve(), Path.home().resolve()
-    return str("~" / whole.relative_to(home)) if whole.is_relative_to(home) else str(whole)
+    full_path, home = path.resolve(), Path.home().resolve()
+    return str("~" / full_path.relative_to(home)) if full_path.is_relative_to(home) else str(full_path)
 
 
-def file_inside(folder: Path | None, name: str) -> Path:
-    """Return a file by its path in the folder.  Raises MissionError if the file is outside or of another type.
+def find_file_in_folder(folder: Path | None, name: str) -> Path:
+    """Return a file by its path in the folder.  Raises MissionError for a file outside the folder or of another type.
 
-    >>> file_inside(Path("/tmp"), "../etc/passwd")
+    >>> find_file_in_folder(Path("/tmp"), "../etc/passwd")
     Traceback (most recent call last):
         ...
     world.errors.MissionError: open: name: '../etc/passwd': expected a file in /tmp
@@ -53,12 +55,12 @@ def file_inside(folder: Path | None, name: str) -> Path:
         allowed = "the command named no file, so there is no folder to open from: drop the file here"
         raise MissionError.at("open", "name", name[:60], allowed, shown=repr(name[:60]))
     try:
-        inside = folder.resolve(strict=True)
-        path = (inside / name).resolve(strict=True)
-        there = path.is_file() and path.is_relative_to(inside) and ".." not in Path(name).parts
+        resolved_folder = folder.resolve(strict=True)
+        path = (resolved_folder / name).resolve(strict=True)
+        is_inside = path.is_file() and path.is_relative_to(resolved_folder) and ".." not in Path(name).parts
     except (OSError, ValueError, RuntimeError):
-        there = False
-    if not there:
+        is_inside = False
+    if not is_inside:
         raise MissionError.at("open", "name", name[:60], f"expected a file in {folder}", shown=repr(name[:60]))
     if path.suffix.lower() not in _READABLE_SUFFIXES:
         raise MissionError.at(

@@ -44,60 +44,62 @@ class GroundGrid:
     heights: NDArray[np.float32]
 
 
-def ground_grid(terrain: Terrain, east: Range, north: Range) -> GroundGrid:
+def sample_ground_grid(terrain: Terrain, east: Range, north: Range) -> GroundGrid:
     """Return a coarse grid of the terrain heights of a map."""
     heights = _sample_heights(terrain, east, north, _GRID_SIZE)
     return GroundGrid(east, north, heights.astype(np.float32))
 
 
-def ground_picture(terrain: Terrain, east: Range, north: Range, *, dark: bool) -> bytes:
-    """Return a picture of the terrain of a map as WebP, north up."""
+def draw_ground(terrain: Terrain, east: Range, north: Range, *, dark: bool) -> bytes:
+    """Draw the terrain of a map as a WebP picture, north up."""
     heights = _sample_heights(terrain, east, north, _PICTURE_PIXELS)
-    known = np.isfinite(heights)
+    is_known = np.isfinite(heights)
     unknown = np.array(theme.rgba("unknown", dark=dark)[:3])
-    if not known.any():
+    if not is_known.any():
         picture = np.broadcast_to(unknown, (*heights.shape, 3))
         return _to_webp(picture)
-    low, high = float(heights[known].min()), float(heights[known].max())
+    min_height, max_height = float(heights[is_known].min()), float(heights[is_known].max())
     pitch = (north[1] - north[0]) / (heights.shape[0] - 1)
-    picture = _tint_by_height(heights, low, max(high, low + 1.0), dark=dark)
-    if high - low >= 1.0:
-        picture *= relief(heights, pitch, high - low)[..., None]
-        picture = _draw_contours(picture, heights, nice_step(high - low, _MAX_CONTOURS), dark=dark)
-    picture[~known] = unknown
+    picture = _tint_by_height(heights, min_height, max(max_height, min_height + 1.0), dark=dark)
+    if max_height - min_height >= 1.0:
+        picture *= relief(heights, pitch, max_height - min_height)[..., None]
+        picture = _draw_contours(picture, heights, nice_step(max_height - min_height, _MAX_CONTOURS), dark=dark)
+    picture[~is_known] = unknown
     return _to_webp(picture)
 
 
 def _sample_heights(terrain: Terrain, east: Range, north: Range, pixels: int) -> Floats:
     width, height = east[1] - east[0], north[1] - north[0]
-    longer = max(width, height)
-    columns, rows = (max(2, round(pixels * side / longer)) for side in (width, height))
+    longer_side = max(width, height)
+    columns, rows = (max(2, round(pixels * length / longer_side)) for length in (width, height))
     return np.asarray(terrain.height(np.linspace(*east, columns)[None, :], np.linspace(*north, rows)[:, None]))
 
 
-def _tint_by_height(heights: Floats, low: float, high: float, *, dark: bool) -> Floats:
+def _tint_by_height(heights: Floats, min_height: float, max_height: float, *, dark: bool) -> Floats:
     """Return the color of each height, 0 to 1, (rows, columns, 3)."""
     ramp = np.array([theme.rgb(text) for text in (theme.GROUND_DARK if dark else theme.GROUND)])
-    share = np.nan_to_num((heights - low) / (high - low)) * (len(ramp) - 1)
-    return np.stack([np.interp(share, np.arange(len(ramp)), ramp[:, k]) for k in range(3)], axis=-1)
+    ramp_position = np.nan_to_num((heights - min_height) / (max_height - min_height)) * (len(ramp) - 1)
+    return np.stack([np.interp(ramp_position, np.arange(len(ramp)), ramp[:, k]) for k in range(3)], axis=-1)
 
 
 def _draw_contours(picture: Floats, heights: Floats, step: float, *, dark: bool) -> Floats:
     """Return a picture with contours drawn over it, bold at every fifth level."""
-    filled = np.nan_to_num(heights, nan=float(np.nanmean(heights)))
-    slope = np.hypot(*np.gradient(filled))
+    filled_heights = np.nan_to_num(heights, nan=float(np.nanmean(heights)))
+    slope = np.hypot(*np.gradient(filled_heights))
     ink = np.array(theme.rgba("contour", dark=dark)[:3])
     for spacing, half_width, strength in ((step, 0.5, _CONTOUR_OPACITY), (step * _BOLD_STRIDE, 0.8, _CONTOUR_OPACITY)):
-        away = np.abs(filled / spacing - np.round(filled / spacing)) * spacing / np.maximum(slope, 1e-6)
+        pixel_distance = (
+            np.abs(filled_heights / spacing - np.round(filled_heights / spacing)) * spacing / np.maximum(slope, 1e-6)
+        )
         # Draw no contour on flat ground, even if its height is near a level.
-        covered = np.clip(half_width + 0.5 - away, 0.0, 1.0) * np.clip(slope / (0.02 * step), 0.0, 1.0)
-        share = (strength * covered)[..., None]
-        picture = picture * (1.0 - share) + ink * share
+        coverage = np.clip(half_width + 0.5 - pixel_distance, 0.0, 1.0) * np.clip(slope / (0.02 * step), 0.0, 1.0)
+        opacity = (strength * coverage)[..., None]
+        picture = picture * (1.0 - opacity) + ink * opacity
     return picture
 
 
 def _to_webp(picture: Floats) -> bytes:
     pixels = np.round(np.clip(picture[::-1], 0.0, 1.0) * 255.0).astype(np.uint8)
-    out = io.BytesIO()
-    Image.fromarray(pixels).save(out, "WEBP", quality=_WEBP_QUALITY, method=2)
-    return out.getvalue()
+    stream = io.BytesIO()
+    Image.fromarray(pixels).save(stream, "WEBP", quality=_WEBP_QUALITY, method=2)
+    return stream.getvalue()

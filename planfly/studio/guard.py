@@ -1,4 +1,4 @@
-"""Accept only requests of pages that the studio served, on this machine, at the printed address.
+"""Accept only requests from pages that the studio served, on this machine, at the printed address.
 
 A page of any site may send requests to 127.0.0.1, and a site may point its own host name to this address.  Browsers
 send the site as Origin, the host name as Host, and the source of a request as Sec-Fetch-Site; no page can change these
@@ -14,16 +14,16 @@ Send = Callable[[MutableMapping[str, Any]], Awaitable[None]]
 App = Callable[[Scope, Receive, Send], Awaitable[None]]
 Headers = Iterable[tuple[bytes, bytes]]
 
-NAMES = ("127.0.0.1", "localhost", "[::1]")
-POLICY = (
+HOST_NAMES = ("127.0.0.1", "localhost", "[::1]")
+CONTENT_SECURITY_POLICY = (
     "default-src 'none'; script-src 'self'; style-src 'self'; connect-src 'self'; img-src 'self' blob: data:; "
     "base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
 )
 # Headers that announce the body of a request.
-_BODIES = (b"content-length", b"transfer-encoding")
+_BODY_HEADERS = (b"content-length", b"transfer-encoding")
 # Headers of every answer, including refusals.
 HEADERS = (
-    (b"content-security-policy", POLICY.encode()),
+    (b"content-security-policy", CONTENT_SECURITY_POLICY.encode()),
     (b"x-content-type-options", b"nosniff"),
     (b"referrer-policy", b"no-referrer"),
     (b"cross-origin-resource-policy", b"same-origin"),
@@ -33,25 +33,27 @@ HEADERS = (
 )
 
 
-def refusal(scope: Scope, port: int) -> tuple[int, str]:
+def check_request(scope: Scope, port: int) -> tuple[int, str]:
     """Return the status and the text of a refusal, or (0, "") if the request is accepted.
 
     >>> asked = {"type": "http", "method": "GET", "path": "/", "headers": [(b"host", b"evil.test:80")]}
-    >>> refusal(asked, 80)
+    >>> check_request(asked, 80)
     (421, 'this host is not served here')
     """
     headers = [(name.lower(), value.decode("latin-1").strip().lower()) for name, value in scope["headers"]]
     hosts, origins, sites = (
-        [value for name, value in headers if name == wanted] for wanted in (b"host", b"origin", b"sec-fetch-site")
+        [value for name, value in headers if name == header] for header in (b"host", b"origin", b"sec-fetch-site")
     )
-    own = {f"{name}:{port}" for name in NAMES}
-    if len(hosts) != 1 or hosts[0] not in own:
+    allowed_hosts = {f"{name}:{port}" for name in HOST_NAMES}
+    if len(hosts) != 1 or hosts[0] not in allowed_hosts:
         return 421, "this host is not served here"
     if origins and (len(origins) > 1 or origins[0] != f"http://{hosts[0]}"):
         return 403, "requests from another page are refused"
     if scope["type"] == "websocket":
         return (0, "") if origins else (403, "a page must state its origin")
-    if scope.get("method") not in ("GET", "HEAD") or any(name in _BODIES and value != "0" for name, value in headers):
+    if scope.get("method") not in ("GET", "HEAD") or any(
+        name in _BODY_HEADERS and value != "0" for name, value in headers
+    ):
         return 405, "only GET and HEAD without a body are answered"
     if sites and sites != ["same-origin"] and sites != ["none"] and not _is_page_visit(scope, headers):
         return 403, "requests from another page are refused"
@@ -60,8 +62,10 @@ def refusal(scope: Scope, port: int) -> tuple[int, str]:
 
 def _is_page_visit(scope: Scope, headers: list[tuple[bytes, str]]) -> bool:
     """Return True for a visit of the page itself, which shows nothing before a token is given."""
-    found = dict(headers)
-    is_document = found.get(b"sec-fetch-mode") == "navigate" and found.get(b"sec-fetch-dest") == "document"
+    header_values = dict(headers)
+    is_document = (
+        header_values.get(b"sec-fetch-mode") == "navigate" and header_values.get(b"sec-fetch-dest") == "document"
+    )
     return scope["path"] == "/" and is_document
 
 
@@ -77,23 +81,26 @@ class Guard:
         if scope["type"] not in ("http", "websocket"):
             await self._app(scope, receive, send)
             return
-        status, words = refusal(scope, self._port)
+        status, reason = check_request(scope, self._port)
         if status and scope["type"] == "websocket":
             await receive()
             await send({"type": "websocket.close", "code": 1008})
             return
 
-        async def answer(message: MutableMapping[str, Any]) -> None:
+        async def send_with_headers(message: MutableMapping[str, Any]) -> None:
             if message["type"] == "http.response.start":
                 message["headers"] = [*message.get("headers", []), *HEADERS]
             await send(message)
 
         if status:
-            text = words.encode()
-            plain = [(b"content-type", b"text/plain; charset=utf-8"), (b"content-length", str(len(text)).encode())]
+            text = reason.encode()
+            response_headers = [
+                (b"content-type", b"text/plain; charset=utf-8"),
+                (b"content-length", str(len(text)).encode()),
+            ]
             # Close the connection, because the rest of a refused request is not read.
-            plain.append((b"connection", b"close"))
-            await answer({"type": "http.response.start", "status": status, "headers": plain})
-            await answer({"type": "http.response.body", "body": text})
+            response_headers.append((b"connection", b"close"))
+            await send_with_headers({"type": "http.response.start", "status": status, "headers": response_headers})
+            await send_with_headers({"type": "http.response.body", "body": text})
             return
-        await self._app(scope, receive, answer)
+        await self._app(scope, receive, send_with_headers)

@@ -10,11 +10,11 @@ MAX_STEPS = 1_000
 
 @dataclass(slots=True)
 class History:
-    """Missions, each made from the previous one.
+    """Missions, each made from the previous mission by an edit.
 
     first: the mission as opened.
     steps: the result of each edit, with its description.
-    at: number of steps that are in effect.
+    position: number of steps that are in effect.
 
     >>> history = History(Mission(None, ()))
     >>> history.add(Mission(None, (), source="moved"), "move item 3")
@@ -24,34 +24,34 @@ class History:
 
     first: Mission
     steps: list[tuple[Mission, str]] = field(default_factory=list)
-    at: int = 0
+    position: int = 0
 
     @property
     def mission(self) -> Mission:
         """Mission at the current step."""
-        return self.steps[self.at - 1][0] if self.at else self.first
+        return self.steps[self.position - 1][0] if self.position else self.first
 
     @property
     def undo_text(self) -> str:
         """Text of the next undo; "" if there is nothing to undo."""
-        return self.steps[self.at - 1][1] if self.at else ""
+        return self.steps[self.position - 1][1] if self.position else ""
 
     @property
     def redo_text(self) -> str:
         """Text of the next redo; "" if there is nothing to redo."""
-        return self.steps[self.at][1] if self.at < len(self.steps) else ""
+        return self.steps[self.position][1] if self.position < len(self.steps) else ""
 
     def add(self, mission: Mission, text: str) -> None:
         """Record an edit, and drop undone edits; if there are too many steps, drop the oldest."""
-        self.steps = [*self.steps[: self.at], (mission, text)][-MAX_STEPS:]
-        self.at = len(self.steps)
+        self.steps = [*self.steps[: self.position], (mission, text)][-MAX_STEPS:]
+        self.position = len(self.steps)
 
     def undo(self) -> bool:
         """Undo the last edit; return True if there was one."""
-        self.at, before = max(0, self.at - 1), self.at
-        return self.at != before
+        self.position, previous_position = max(0, self.position - 1), self.position
+        return self.position != previous_position
 
     def redo(self) -> bool:
         """Redo the last undone edit; return True if there was one."""
-        self.at, before = min(len(self.steps), self.at + 1), self.at
-        return self.at != before
+        self.position, previous_position = min(len(self.steps), self.position + 1), self.position
+        return self.position != previous_position

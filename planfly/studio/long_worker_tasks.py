@@ -1,4 +1,4 @@
-"""Judge returns along the route, and fly campaigns, in the studio's second process."""
+"""Judge RTL flights along the route, and fly campaigns, in the studio's second process."""
 
 from collections import Counter
 from pathlib import Path
@@ -20,57 +20,67 @@ from world.extras import need_extra
 # Maximum number of returns that are judged along the route.
 _MAX_RETURNS = 240
 # Maximum number of ranges of the route that are named.
-_MAX_RANGES = 6
+_MAX_LISTED_RANGES = 6
 # Number of flights in a campaign.
-FLIGHTS = 24
+FLIGHT_COUNT = 24
 
 
 def returns(payload: tuple[EditContext, Mission], advance: Advance) -> dict[str, Any]:
-    """Fly the mission, and judge a return to launch from every part of it."""
-    desk, mission = payload
-    setup = desk.setup(mission)
-    if mission.home is None or desk.scenario.terrain is None:
-        lacks = "home" if mission.home is None else "terrain"
-        raise MissionError(f"{mission.source}: returns are not judged without a {lacks}", field=lacks)
+    """Fly the mission, and judge a return to launch from points along the whole flight."""
+    context, mission = payload
+    setup = context.setup(mission)
+    if mission.home is None or context.scenario.terrain is None:
+        missing = "home" if mission.home is None else "terrain"
+        raise MissionError(f"{mission.source}: returns are not judged without a {missing}", field=missing)
     world = return_world(setup)
-    flown = fly_and_judge(
-        setup, desk.airframe, None, lambda done, total, remark: advance(0.5 * done, total, remark), reference="never"
+    flight = fly_and_judge(
+        setup, context.airframe, None, lambda done, total, remark: advance(0.5 * done, total, remark), reference="never"
     )
-    every = max(1.0, (float(flown.track.time[-1]) if len(flown.track) else 0.0) / _MAX_RETURNS)
-    starts = return_starts(setup, flown.track, every)
+    interval = max(1.0, (float(flight.track.time[-1]) if len(flight.track) else 0.0) / _MAX_RETURNS)
+    starts = return_starts(setup, flight.track, interval)
     remark = f"flying {len(starts)} returns"
-    found = judge_returns(
-        world, starts, every, advance=lambda done, total: advance(0.5 + 0.5 * done / max(1.0, total), 1.0, remark)
+    returns = judge_returns(
+        world, starts, interval, advance=lambda done, total: advance(0.5 + 0.5 * done / max(1.0, total), 1.0, remark)
     )
-    lines = [range_text(one, found, desk.scenario) for one in found.ranges[:_MAX_RANGES]]
+    lines = [
+        range_text(return_range, returns, context.scenario) for return_range in returns.ranges[:_MAX_LISTED_RANGES]
+    ]
     return {
-        "state": "ok" if found.safe else "open" if found.undecided else "fail",
-        "headline": headline(found),
-        "lines": [*lines, *filter(None, [no_return_text(found)])],
+        "state": "ok" if returns.safe else "open" if returns.undecided else "fail",
+        "headline": headline(returns),
+        "lines": [*lines, *filter(None, [no_return_text(returns)])],
     }
 
 
 def campaign(payload: tuple[EditContext, Mission], advance: Advance) -> dict[str, Any]:
-    """Fly the mission `FLIGHTS` times, each in its own wind, aircraft, terrain and start."""
+    """Fly the mission `FLIGHT_COUNT` times, each time with another wind, aircraft, terrain error and start."""
     need_extra("campaigns")
     from planfly.campaigns.statistics.decision import wilson
 
-    desk, mission = payload
-    setup = desk.setup(mission)
+    context, mission = payload
+    setup = context.setup(mission)
     base = CampaignBase(
-        *(desk.scenario, desk.airframe, mission, desk.placed(mission), setup.plan, default_dispersions(), desk.seed),
+        *(
+            context.scenario,
+            context.airframe,
+            mission,
+            context.place_mission(mission),
+            setup.plan,
+            default_dispersions(),
+            context.seed,
+        ),
         name=Path(mission.source).stem,
     )
-    flyable, fails = 0, Counter[str]()
-    for index in range(FLIGHTS):
-        advance(index, FLIGHTS, f"{flyable} of {index} flyable")
+    flyable, failure_counts = 0, Counter[str]()
+    for index in range(FLIGHT_COUNT):
+        advance(index, FLIGHT_COUNT, f"{flyable} of {index} flyable")
         row = fly_one(base, index)
         flyable += row.outcome == "flyable"
-        fails.update({rule for rule, _ in row.failed})
-    low, high = wilson(flyable, FLIGHTS)
-    common = [f"{rule} fails in {count}" for rule, count in fails.most_common(5)]
+        failure_counts.update({rule for rule, _ in row.failed})
+    lower, upper = wilson(flyable, FLIGHT_COUNT)
+    common = [f"{rule} fails in {count}" for rule, count in failure_counts.most_common(5)]
     return {
-        "state": "ok" if flyable == FLIGHTS else "open" if flyable else "fail",
-        "headline": f"{flyable} of {FLIGHTS} flights are flyable: {low:.0%} to {high:.0%} at 95 %",
-        "lines": [*common, f"planfly campaign flies more: {FLIGHTS} say little about rare failures"],
+        "state": "ok" if flyable == FLIGHT_COUNT else "open" if flyable else "fail",
+        "headline": f"{flyable} of {FLIGHT_COUNT} flights are flyable: {lower:.0%} to {upper:.0%} at 95 %",
+        "lines": [*common, f"planfly campaign flies more: {FLIGHT_COUNT} say little about rare failures"],
     }

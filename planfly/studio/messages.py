@@ -9,11 +9,11 @@ from typing import Annotated, Any, Literal, get_args
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
 
 # Maximum length of a message, characters.
-MAX_MESSAGE = 256 * 1024
+MAX_MESSAGE_CHARACTERS = 256 * 1024
 # Maximum length of a message with a dropped file, which is sent as text, characters.
-MAX_DROPPED_MESSAGE = 24 * 2**20
+MAX_DROPPED_MESSAGE_CHARACTERS = 24 * 2**20
 # Maximum length of the first message, whose sender is still unknown, characters.
-MAX_FIRST = 1024
+MAX_FIRST_MESSAGE_CHARACTERS = 1024
 
 
 class _Message(BaseModel):
@@ -41,16 +41,17 @@ class Hello(_Message):
 
 
 class Look(_Message):
-    """Change between light and dark page, which needs another picture of the ground."""
+    """Change between light and dark page; the page needs a new picture of the terrain."""
 
     kind: Literal["look"]
     dark: bool
 
 
 class Drag(_Message):
-    """Drag of an item, which changes nothing yet.
+    """Position of an item during a drag, which changes nothing yet.
 
-    rev: revision of the dragged sheet.  n: increasing number.  k: the item.  whole: true to judge the whole mission.
+    rev: revision that is dragged.  n: increasing number.  k: index of the item.
+    whole: true to judge the whole mission.
     """
 
     kind: Literal["drag"]
@@ -75,7 +76,7 @@ class Move(_Message):
 
 
 class Insert(_Message):
-    """Insertion of a waypoint behind an item, half way to the altitude of the next."""
+    """Insertion of a waypoint after an item, at the mean altitude of this item and the next."""
 
     kind: Literal["insert"]
     rev: _Rev
@@ -93,7 +94,7 @@ class Delete(_Message):
 
 
 class Raise(_Message):
-    """Change of altitude of items by metres; without a list of all items."""
+    """Change of the altitude of items by ``by`` metres.  ks: indices of the items; null for all items."""
 
     kind: Literal["raise"]
     rev: _Rev
@@ -108,7 +109,7 @@ class Step(_Message):
 
 
 class Apply(_Message):
-    """Application of a suggestion of a finding.  flown: true for a finding of the flight."""
+    """Application of a finding's suggestion.  flown: true for a finding of the flight."""
 
     kind: Literal["apply"]
     rev: _Rev
@@ -118,10 +119,10 @@ class Apply(_Message):
 
 
 class Settings(_Message):
-    """Change of settings; anything not stated stays.  Values are checked like the values of a scenario.
+    """Change of settings; fields that are not given stay unchanged.  Values are checked like the values of a scenario.
 
-    limits: entries of [limits]; null removes one.  ceiling: m AMSL.
-    parameter: one autopilot parameter, as NAME=VALUE.  without: names that are no longer set.
+    limits: entries of [limits]; null removes an entry.  ceiling: m AMSL.
+    parameter: one autopilot parameter, as NAME=VALUE.  without: names of the parameters to reset.
     parameter_file: name of a parameter file, whose text is parameter_text.
     """
 
@@ -157,7 +158,7 @@ class Plan(_Message):
 class Choose(_Message):
     """Choice of one of the planned paths.
 
-    rev: revision of the sheet that they were planned for.
+    rev: revision of the mission for which they were planned.
     """
 
     kind: Literal["choose"]
@@ -166,13 +167,13 @@ class Choose(_Message):
 
 
 class Ask(_Message):
-    """Request to fly, to do a long task, or to stop the work under way."""
+    """Request to fly, to do a long task, or to stop the work in progress."""
 
     kind: Literal["fly", "returns", "campaign", "stop"]
 
 
 class Save(_Message):
-    """Request to save the mission: to the page, or over the file that the command named."""
+    """Request to save the mission: as a download of the page, or over the file that the command named."""
 
     kind: Literal["save"]
     form: Literal["waypoints", "plan", "plan.json", "kml", "parm"]
@@ -184,7 +185,7 @@ class Open(_Message):
 
     kind: Literal["open"]
     name: Annotated[str, Field(min_length=1, max_length=1_000)]
-    data: Annotated[str, Field(max_length=MAX_DROPPED_MESSAGE)] | None = None
+    data: Annotated[str, Field(max_length=MAX_DROPPED_MESSAGE_CHARACTERS)] | None = None
 
 
 Message = (
@@ -204,18 +205,18 @@ def read_message(text: str | bytes) -> Message:
     pydantic_core._pydantic_core.ValidationError: ...
     """
     size = len(text)
-    if size > MAX_MESSAGE and '"open"' not in str(text[:200]):
+    if size > MAX_MESSAGE_CHARACTERS and '"open"' not in str(text[:200]):
         raise ValueError("a message that is too long")
     return _ADAPTER.validate_json(text)
 
 
-def fault_of(error: ValidationError) -> str:
-    """Describe the error in a message of a known kind in a line; return "" for a text that is not such a message.
+def describe_error(error: ValidationError) -> str:
+    """Describe the error in a message in a line; return "" for a text that is no message of a known kind.
 
     >>> try:
     ...     read_message('{"kind": "raise", "rev": 1, "by": 1e9}')
     ... except ValidationError as error:
-    ...     fault_of(error)
+    ...     describe_error(error)
     'raise: by: Input should be less than or equal to 9000'
     """
     first = error.errors(include_url=False, include_context=False, include_input=False)[0]

@@ -21,85 +21,99 @@ from world.scenario_tables import MAP_EXTENT
 _MAX_MOVED_ITEMS = 8
 # Distance between successive waypoints below which they may be merged, or offset from each other, m.
 _MERGE_DISTANCE_M = 2.0
-# Tolerance between a place computed alone and in an array, m, because the last digits of a sine differ.
-_PLACE_TOLERANCE_M = 1e-6
-# Commands because of which a place of a mission may not correspond to exactly one row of the route.
+# Tolerance between a position computed alone and in an array, m, because the last digits of a sine differ.
+_POSITION_TOLERANCE_M = 1e-6
+# Commands with which a position item may not correspond to exactly one row of the route.
 _IRREGULAR_COMMANDS = frozenset(
     {Command.DO_JUMP, Command.DO_JUMP_TAG, Command.DO_SET_HOME, Command.CONDITION_GATE, Command.NAV_RETURN_TO_LAUNCH}
 )
 
 
-def moved_route(route: Route, before: Mission, now: Mission, scenario: Scenario, frame: Airframe) -> Route | None:
-    """Return the route after a few waypoints were moved, or None if it has to be laid out again.
+def update_moved_route(
+    route: Route, previous_mission: Mission, mission: Mission, scenario: Scenario, airframe: Airframe
+) -> Route | None:
+    """Return the route after a few waypoints were moved, or None if the route must be laid out again.
 
-    It has to be laid out again if a move may change more than the row of the waypoint.  This is so next to loiters,
-    merged places and kept altitudes, and with jumps, gates, returns, landings and courses at the ends.
+    The route must be laid out again if a move may change more than the row of the waypoint: next to loiters, merged
+    waypoints and kept altitudes, and with jumps, gates, RTL, landings and courses at the ends.
 
     route: route of the previous mission.
     """
-    if len(before.items) != len(now.items):
+    if len(previous_mission.items) != len(mission.items):
         return None
-    pairs = [(old, new) for old, new in zip(before.items, now.items, strict=True) if old is not new]
+    pairs = [
+        (old_item, new_item)
+        for old_item, new_item in zip(previous_mission.items, mission.items, strict=True)
+        if old_item is not new_item
+    ]
     if (
         len(pairs) > _MAX_MOVED_ITEMS
-        or not all(_is_move_of_waypoint(*pair) for pair in pairs)
-        or not _is_plain(route, now, scenario)
+        or not all(_is_waypoint_move(*pair) for pair in pairs)
+        or not _has_one_stop_per_item(route, mission, scenario)
     ):
         return None
     rows = {seq: row for row, seq in enumerate(route.items.tolist())}
-    waypoints = {one.seq for one in now.items if one.command == Command.NAV_WAYPOINT}
-    rules = frame.autopilot.route_rules
-    points, acceptance, changed = np.array(route.waypoints), np.array(route.acceptance), set[int]()
-    for old, new in pairs:
-        row, was, place = rows[new.seq], _map_place(old, before, scenario), _map_place(new, now, scenario)
+    waypoint_seqs = {points_array.seq for points_array in mission.items if points_array.command == Command.NAV_WAYPOINT}
+    rules = airframe.autopilot.route_rules
+    points, acceptance, changed_rows = np.array(route.waypoints), np.array(route.acceptance), set[int]()
+    for old_item, new_item in pairs:
+        row, old_position, new_position = (
+            rows[new_item.seq],
+            _map_position(old_item, previous_mission, scenario),
+            _map_position(new_item, mission, scenario),
+        )
         neighbours = [k for k in (row - 1, row + 1) if 0 <= k <= route.legs]
-        if was is None or place is None or math.dist(was, points[row]) > _PLACE_TOLERANCE_M:
+        if old_position is None or new_position is None or math.dist(old_position, points[row]) > _POSITION_TOLERANCE_M:
             return None
-        if any(int(route.items[k]) not in waypoints or route.arcs[k] for k in neighbours):
+        if any(int(route.items[k]) not in waypoint_seqs or route.arcs[k] for k in neighbours):
             return None
-        points[row], acceptance[row] = place, min(max(0.0, new.params[1]), rules.acceptance_limit)
-        changed |= {row, *neighbours}
-    if any(_is_near(one, k) for one in (points, route.waypoints) for k in changed if k):
+        points[row], acceptance[row] = new_position, min(max(0.0, new_item.params[1]), rules.acceptance_limit)
+        changed_rows |= {row, *neighbours}
+    if any(_is_near_previous(points_array, k) for points_array in (points, route.waypoints) for k in changed_rows if k):
         return None
-    over = fly_over_waypoints(points, route.airspeed, acceptance, frame.limits, rules.turn_distance)
-    fly_over = np.where(route.arcs > 0.0, False, scenario.flight.fly_over | over)
+    must_fly_over = fly_over_waypoints(points, route.airspeed, acceptance, airframe.limits, rules.turn_distance)
+    fly_over = np.where(route.arcs > 0.0, False, scenario.flight.fly_over | must_fly_over)
     return replace(route, waypoints=points, acceptance=acceptance, fly_over=fly_over)
 
 
-def _is_move_of_waypoint(old: MissionItem, new: MissionItem) -> bool:
-    """Return True if a waypoint differs only in its place and its acceptance radius."""
-    params = (*old.params[:1], new.params[1], *old.params[2:])
-    same = replace(old, lat_deg=new.lat_deg, lon_deg=new.lon_deg, alt=new.alt, params=params) == new
-    return same and new.command == Command.NAV_WAYPOINT and old.has_position and new.has_position
+def _is_waypoint_move(old_item: MissionItem, new_item: MissionItem) -> bool:
+    """Return True if a waypoint differs only in its position and its acceptance radius."""
+    params = (*old_item.params[:1], new_item.params[1], *old_item.params[2:])
+    is_same = (
+        replace(old_item, lat_deg=new_item.lat_deg, lon_deg=new_item.lon_deg, alt=new_item.alt, params=params)
+        == new_item
+    )
+    return is_same and new_item.command == Command.NAV_WAYPOINT and old_item.has_position and new_item.has_position
 
 
-def _is_plain(route: Route, mission: Mission, scenario: Scenario) -> bool:
-    """Return True if each place of a mission is one stop of its route, with an altitude independent of other places."""
+def _has_one_stop_per_item(route: Route, mission: Mission, scenario: Scenario) -> bool:
+    """Return True if each position item is one stop of the route, with an altitude independent of other items."""
     if route.return_from >= 0 or route.straight_to >= 0 or math.isfinite(route.landing_ground):
         return False
     if scenario.start_course is not None or scenario.destination_course is not None:
         return False
-    flown = set(route.items.tolist())
+    flown_seqs = set(route.items.tolist())
     return not any(
-        one.command in _IRREGULAR_COMMANDS or (one.command in PLACES and (one.seq not in flown or math.isnan(one.alt)))
-        for one in mission.items
+        item.command in _IRREGULAR_COMMANDS
+        or (item.command in PLACES and (item.seq not in flown_seqs or math.isnan(item.alt)))
+        for item in mission.items
     )
 
 
-def _map_place(item: MissionItem, mission: Mission, scenario: Scenario) -> tuple[float, float, float] | None:
+def _map_position(item: MissionItem, mission: Mission, scenario: Scenario) -> tuple[float, float, float] | None:
     """Return east, north and altitude of a waypoint, m, or None if it depends on other items or is off the map."""
     x, y = to_map(scenario.origin, [item.lat_deg], [item.lon_deg])
-    east, north, home, up = float(x[0]), float(y[0]), mission.home, math.nan
+    east, north, home, altitude = float(x[0]), float(y[0]), mission.home, math.nan
     if item.frame in AMSL:
-        up = item.alt
+        altitude = item.alt
     elif item.frame in OVER_HOME and home is not None:
-        up = home.alt + item.alt
+        altitude = home.alt + item.alt
     elif item.frame in OVER_TERRAIN and scenario.terrain is not None:
-        up = float(scenario.terrain.height(east, north)) + item.alt
-    known = LOWEST <= up <= HIGHEST and max(abs(east), abs(north)) <= MAP_EXTENT
-    return (east, north, up) if known else None
+        altitude = float(scenario.terrain.height(east, north)) + item.alt
+    is_valid = LOWEST <= altitude <= HIGHEST and max(abs(east), abs(north)) <= MAP_EXTENT
+    return (east, north, altitude) if is_valid else None
 
 
-def _is_near(points: Floats, row: int) -> bool:
-    """Return True if a waypoint is so near to the previous one that both may be merged."""
+def _is_near_previous(points: Floats, row: int) -> bool:
+    """Return True if a waypoint is so near to the previous waypoint that both may be merged."""
     return math.dist(points[row - 1, :2], points[row, :2]) < _MERGE_DISTANCE_M

@@ -25,11 +25,11 @@ if TYPE_CHECKING:
 
 HOST = "127.0.0.1"
 # Default port, so that an open page finds a restarted studio; if it is taken, any free port is used.
-USUAL_PORT = 8790
+DEFAULT_PORT = 8790
 # Interval between two calls of `stop`, s.
 _POLL_INTERVAL_S = 0.1
 # Time to complete open requests at the end, s.
-_GRACE_S = 2
+_SHUTDOWN_TIMEOUT_S = 2
 
 
 def _never_stop() -> bool:
@@ -64,14 +64,14 @@ def open_studio(
     Raises a `planfly.PlanflyError` for bad input.
     """
     check_arguments(seed=options["seed"], port=port)
-    listener = _listen(port)
+    listener = _open_listener(port)
     with contextlib.closing(listener):
         target = str(what)
-        kept = Path(keep) / f"{_stem(target)}.json"
-        session, restored = open_session(target, options, kept)
+        autosave_file = Path(keep) / f"{_stem(target)}.json"
+        session, restored = open_session(target, options, autosave_file)
         if restored:
-            back = "; undo takes it back" if session.undo_text else ""
-            on_message(f"earlier edits are restored (kept in {kept}){back}")
+            undo_hint = "; undo takes it back" if session.undo_text else ""
+            on_message(f"earlier edits are restored (kept in {autosave_file}){undo_hint}")
         for file in session.unreadable:
             on_message(f"{file}: cannot be read as a kept session; it stays as it is, and nothing is kept meanwhile")
         # Imported here: only serving needs the extra.
@@ -79,7 +79,7 @@ def open_studio(
 
         token = secrets.token_urlsafe(24)
         path = session.document.path
-        server = Server(session, token, kept, None if path is None else path.parent)
+        server = Server(session, token, autosave_file, None if path is None else path.parent)
         address = f"http://{HOST}:{listener.getsockname()[1]}/#t={token}"
         with _open_page(address) if browser else contextlib.nullcontext():
             on_message(f"studio  {address}")
@@ -98,26 +98,26 @@ def _stem(target: str) -> str:
     return f"{path.stem}-{hashlib.sha256(str(path.resolve()).encode()).hexdigest()[:8]}"
 
 
-def _listen(port: int | None) -> socket.socket:
+def _open_listener(port: int | None) -> socket.socket:
     """Return the socket to which pages connect.  Raises PlanflyError for a port that is taken."""
-    for one in (USUAL_PORT, 0) if port is None else (port,):
+    for candidate in (DEFAULT_PORT, 0) if port is None else (port,):
         try:
-            return socket.create_server((HOST, one))
+            return socket.create_server((HOST, candidate))
         except OSError as error:
-            fault = error
-    raise PlanflyError.of_argument("port", port, f"{HOST}:{port} is not free: {fault.strerror}")
+            bind_error = error
+    raise PlanflyError.of_argument("port", port, f"{HOST}:{port} is not free: {bind_error.strerror}")
 
 
 @contextlib.contextmanager
 def _open_page(address: str) -> Iterator[None]:
-    """Open an address in the browser by a temporary file, so that no list of processes shows its token."""
+    """Open an address in the browser through a temporary file, so that no list of processes shows the token."""
     with temporary_folder("planfly-studio-") as folder:
         file = folder / "studio.html"
         file.touch(0o600)
-        shown = html.escape(address, quote=True)
+        escaped_address = html.escape(address, quote=True)
         file.write_text(
-            f'<!doctype html><meta charset="utf-8"><meta http-equiv="refresh" content="0;url={shown}">'
-            f'<title>planfly studio</title><a href="{shown}">planfly studio</a>\n',
+            f'<!doctype html><meta charset="utf-8"><meta http-equiv="refresh" content="0;url={escaped_address}">'
+            f'<title>planfly studio</title><a href="{escaped_address}">planfly studio</a>\n',
             encoding="utf-8",
         )
         with contextlib.suppress(webbrowser.Error):
@@ -131,7 +131,7 @@ async def _serve(server: "Server", listener: socket.socket, stop: Callable[[], b
 
     from planfly.studio.app import make_app
     from planfly.studio.connections import FirstMessageBounded, ShortLived
-    from planfly.studio.messages import MAX_DROPPED_MESSAGE, MAX_MESSAGE
+    from planfly.studio.messages import MAX_DROPPED_MESSAGE_CHARACTERS, MAX_MESSAGE_CHARACTERS
 
     class Quiet(uvicorn.Server):
         """Server that leaves signals to the caller."""
@@ -149,22 +149,22 @@ async def _serve(server: "Server", listener: socket.socket, stop: Callable[[], b
         date_header=False,
         lifespan="off",
         ws=FirstMessageBounded,
-        ws_max_size=MAX_DROPPED_MESSAGE + MAX_MESSAGE,
-        timeout_graceful_shutdown=_GRACE_S,
+        ws_max_size=MAX_DROPPED_MESSAGE_CHARACTERS + MAX_MESSAGE_CHARACTERS,
+        timeout_graceful_shutdown=_SHUTDOWN_TIMEOUT_S,
         h11_max_incomplete_event_size=16_384,
         http=ShortLived,
     )
-    web = Quiet(config)
-    serving = asyncio.create_task(web.serve(sockets=[listener]))
-    running = asyncio.create_task(server.run())
+    web_server = Quiet(config)
+    serve_task = asyncio.create_task(web_server.serve(sockets=[listener]))
+    run_task = asyncio.create_task(server.run())
     try:
-        while not stop() and not serving.done() and not running.done():
+        while not stop() and not serve_task.done() and not run_task.done():
             await asyncio.sleep(_POLL_INTERVAL_S)
     finally:
-        web.should_exit = True
-        running.cancel()
-        ended = await asyncio.gather(serving, running, return_exceptions=True)
+        web_server.should_exit = True
+        run_task.cancel()
+        results = await asyncio.gather(serve_task, run_task, return_exceptions=True)
         await server.close()
-    for one in ended:
-        if isinstance(one, Exception):
-            raise one
+    for result in results:
+        if isinstance(result, Exception):
+            raise result

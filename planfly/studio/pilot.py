@@ -1,6 +1,6 @@
-"""Run the studio's worker process, which does the newest task and cancels the previous one.
+"""Run tasks in a worker process of the studio; a newer task cancels the task in progress.
 
-A task is a function with an argument that can be pickled; it reports progress regularly, and is cancelled at a report.
+A task is a function and an argument that can be pickled.  It reports progress regularly, and is cancelled at a report.
 The process is spawned, never forked, because the server has threads.  A process that dies is started again.
 """
 
@@ -18,14 +18,14 @@ from typing import Any
 from world.errors import PlanflyError
 
 # Maximum time for a cancelled task or its process to end, s; kernels may have to be compiled in this time.
-PATIENCE = 60.0
+CANCEL_TIMEOUT_S = 60.0
 # Function called with the amount done, the total amount and a remark.
 Advance = Callable[[float, float, str], None]
 
 
 @dataclass(frozen=True, slots=True)
 class Work:
-    """Work to be done.
+    """Task for a worker process.
 
     number: increasing number, which the answers repeat.
     function: dotted name of a function that takes a payload and a progress callback, and raises `Cancelled`.
@@ -59,10 +59,10 @@ def internal_text(error: Exception) -> str:
 
 
 class Cancelled(Exception):
-    """Raised within a task that is replaced by newer work."""
+    """Raised within a task that is replaced by a newer task."""
 
 
-class Pilot:
+class WorkerProcess:
     """Interface of the server to a worker process.  Its methods may be called from any thread, and never block.
 
     A thread sends the newest task, so that a process that does not read its pipe blocks no caller.
@@ -72,26 +72,26 @@ class Pilot:
         self,
         name: str,
         on_answer: Callable[[Answer], None],
-        patience: float = PATIENCE,
+        patience: float = CANCEL_TIMEOUT_S,
         pack: Callable[[Work | None], bytes] = pickle.dumps,
     ) -> None:
         """Prepare a worker; nothing is started before `ask`.
 
         on_answer: called from its own thread.
         patience: maximum time for a cancelled task to end, s.
-        pack: pickles a task, called from the sending thread; it must pickle objects that another thread may change in
-        that thread.
+        pack: pickles a task; called from the sending thread, it must pickle objects that another thread may change in
+        that other thread.
         """
         self._name, self._on_answer, self._patience, self._pack = name, on_answer, patience, pack
         self._changed = threading.Condition(threading.RLock())
         self._process: multiprocessing.process.BaseProcess | None = None
         self._pipe: Connection | None = None
         # Newest task, True if it was sent, and the numbers of tasks that were sent but not answered.
-        self._wanted: Work | None = None
+        self._newest_task: Work | None = None
         self._sent, self._closed = True, False
         self._unanswered: list[int] = []
         self._sender: threading.Thread | None = None
-        self._watch: threading.Timer | None = None
+        self._timer: threading.Timer | None = None
 
     @property
     def pid(self) -> int | None:
@@ -99,28 +99,28 @@ class Pilot:
         return None if self._process is None else self._process.pid
 
     def start(self) -> None:
-        """Start the process before it is needed; a process that cannot be started is reported when it is needed."""
+        """Start the process before the first task; a failure is reported only with the first task."""
         with self._changed, contextlib.suppress(OSError):
             self._ensure_process()
 
     def ask(self, work: Work) -> None:
         """Do a task, and cancel any task in progress."""
-        self._set_wanted(work)
+        self._set_newest_task(work)
 
     def cancel(self) -> None:
         """Cancel the task in progress."""
-        self._set_wanted(None)
+        self._set_newest_task(None)
 
-    def _set_wanted(self, work: Work | None) -> None:
+    def _set_newest_task(self, work: Work | None) -> None:
         with self._changed:
-            dropped = self._wanted if not self._sent else None
-            self._wanted, self._sent = work, False
-            if self._unanswered and self._watch is None:
-                self._watch = threading.Timer(self._patience, self._kill_if_stuck, (self._pipe, self._unanswered[0]))
-                self._watch.daemon = True
-                self._watch.start()
+            dropped = self._newest_task if not self._sent else None
+            self._newest_task, self._sent = work, False
+            if self._unanswered and self._timer is None:
+                self._timer = threading.Timer(self._patience, self._kill_if_stuck, (self._pipe, self._unanswered[0]))
+                self._timer.daemon = True
+                self._timer.start()
             if self._sender is None:
-                self._sender = threading.Thread(target=self._send, name=f"{self._name}: sends", daemon=True)
+                self._sender = threading.Thread(target=self._send_tasks, name=f"{self._name}: sends", daemon=True)
                 self._sender.start()
             self._changed.notify_all()
         if dropped is not None:
@@ -130,7 +130,7 @@ class Pilot:
         """End the process."""
         with self._changed:
             self._closed = True
-            self._cancel_watch()
+            self._cancel_timer()
             process, pipe = self._process, self._pipe
             self._process = self._pipe = None
             self._changed.notify_all()
@@ -140,14 +140,14 @@ class Pilot:
         if pipe is not None:
             pipe.close()
 
-    def _send(self) -> None:
+    def _send_tasks(self) -> None:
         """Send the newest task until the worker is closed."""
         while True:
             with self._changed:
                 self._changed.wait_for(lambda: self._closed or not self._sent)
                 if self._closed:
                     return
-                work, self._sent = self._wanted, True
+                work, self._sent = self._newest_task, True
                 self._unanswered += [] if work is None else [work.number]
             try:
                 with self._changed:
@@ -169,44 +169,46 @@ class Pilot:
                 with self._changed:
                     if self._pipe is pipe:
                         self._pipe = self._process = None
-                    if work is not None and self._wanted is work:
+                    if work is not None and self._newest_task is work:
                         self._sent = False
-                        self._unanswered = [one for one in self._unanswered if one != work.number]
+                        self._unanswered = [number for number in self._unanswered if number != work.number]
 
-    def _fail_unsent(self, work: Work | None, fault: str) -> None:
-        """Answer `work`, which could not be sent, with `fault`."""
+    def _fail_unsent(self, work: Work | None, reason: str) -> None:
+        """Answer `work`, which could not be sent, with `reason`."""
         with self._changed:
             if work is None or self._closed:
                 return
-            self._unanswered = [one for one in self._unanswered if one != work.number]
-            self._wanted = None if self._wanted is work else self._wanted
-        self._on_answer(Answer(work.number, "fault", fault))
+            self._unanswered = [number for number in self._unanswered if number != work.number]
+            self._newest_task = None if self._newest_task is work else self._newest_task
+        self._on_answer(Answer(work.number, "fault", reason))
 
     def _kill_if_stuck(self, pipe: Connection, number: int) -> None:
         """Kill a process that is still doing a cancelled task; a new process then does the newest task."""
         with self._changed:
-            self._watch = None
+            self._timer = None
             if self._closed or self._pipe is not pipe or number not in self._unanswered:
                 return
             process, self._process, self._pipe = self._process, None, None
-            left = self._drop_unwanted()
-            self._sent = self._wanted is None
+            dropped_numbers = self._drop_unanswered()
+            self._sent = self._newest_task is None
             self._changed.notify_all()
         if process is not None:
             process.kill()
-        for one in left:
-            self._on_answer(Answer(one, "cancelled"))
+        for dropped_number in dropped_numbers:
+            self._on_answer(Answer(dropped_number, "cancelled"))
 
-    def _drop_unwanted(self) -> list[int]:
-        """Clear the unanswered tasks of a lost process, and return those other than the newest task."""
-        left = [one for one in self._unanswered if self._wanted is None or one != self._wanted.number]
+    def _drop_unanswered(self) -> list[int]:
+        """Clear the unanswered tasks of a lost process, and return their numbers without the newest task."""
+        dropped_numbers = [
+            number for number in self._unanswered if self._newest_task is None or number != self._newest_task.number
+        ]
         self._unanswered = []
-        return left
+        return dropped_numbers
 
-    def _cancel_watch(self) -> None:
-        if self._watch is not None:
-            self._watch.cancel()
-        self._watch = None
+    def _cancel_timer(self) -> None:
+        if self._timer is not None:
+            self._timer.cancel()
+        self._timer = None
 
     def _ensure_process(self) -> Connection:
         """Return the pipe to a running process, started if necessary."""
@@ -215,7 +217,7 @@ class Pilot:
         context = multiprocessing.get_context("spawn")
         ours, theirs = context.Pipe()
         # Not a daemon: a campaign starts child processes.
-        process = context.Process(target=work_on, args=(theirs,), name=self._name)
+        process = context.Process(target=run_worker, args=(theirs,), name=self._name)
         try:
             process.start()
         except OSError:
@@ -224,11 +226,11 @@ class Pilot:
         finally:
             theirs.close()
         self._process, self._pipe = process, ours
-        threading.Thread(target=self._listen, args=(ours,), name=self._name, daemon=True).start()
+        threading.Thread(target=self._forward_answers, args=(ours,), name=self._name, daemon=True).start()
         return ours
 
-    def _listen(self, pipe: Connection) -> None:
-        """Forward answers; a process that ends before its answer is reported as a fault of its task."""
+    def _forward_answers(self, pipe: Connection) -> None:
+        """Forward answers until the pipe closes; if the process ends without an answer, report a fault of its task."""
         while True:
             try:
                 answer = pipe.recv()
@@ -238,78 +240,78 @@ class Pilot:
             if answer.kind != "progress":
                 self._record_answer(pipe, answer)
             self._on_answer(answer)
-        fault = "the process that worked on this has ended: ask again"
+        reason = "the process that worked on this has ended: ask again"
         with self._changed:
             if self._closed or self._pipe is not pipe:
                 return
             self._pipe = self._process = None
-            left = [Answer(one, "cancelled") for one in self._drop_unwanted()]
-            if self._wanted is not None and self._sent:
-                left.append(Answer(self._wanted.number, "fault", fault))
-                self._wanted = None
-        for answer in left:
+            answers = [Answer(number, "cancelled") for number in self._drop_unanswered()]
+            if self._newest_task is not None and self._sent:
+                answers.append(Answer(self._newest_task.number, "fault", reason))
+                self._newest_task = None
+        for answer in answers:
             self._on_answer(answer)
 
     def _record_answer(self, pipe: Connection, answer: Answer) -> None:
         """Record that a task has ended."""
         with self._changed:
-            if self._wanted is not None and answer.number == self._wanted.number:
-                self._wanted = None
+            if self._newest_task is not None and answer.number == self._newest_task.number:
+                self._newest_task = None
             if self._pipe is pipe and answer.number in self._unanswered:
                 first = self._unanswered[0]
                 self._unanswered.remove(answer.number)
                 if answer.number == first:
-                    self._cancel_watch()
+                    self._cancel_timer()
 
 
 # ----------------------------------------------------------------------
 # Within the process.
 
 
-def work_on(pipe: Connection) -> None:
-    """Do tasks, always the newest, until the pipe closes."""
+def run_worker(pipe: Connection) -> None:
+    """Run the newest task from the pipe, again and again, until the pipe closes."""
     import signal
 
     # An interrupt at the terminal is handled by the server.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    waiting: Work | None = None
+    pending_task: Work | None = None
     while True:
         try:
-            work = _newest(pipe, waiting if waiting is not None else pipe.recv())
-            waiting = None if work is None else _do(pipe, work)
+            task = _receive_newest(pipe, pending_task if pending_task is not None else pipe.recv())
+            pending_task = None if task is None else _run_task(pipe, task)
         except (EOFError, OSError):
             return
 
 
-def _newest(pipe: Connection, work: Work | None) -> Work | None:
-    """Return the newest task that has arrived; the others are answered as cancelled."""
+def _receive_newest(pipe: Connection, task: Work | None) -> Work | None:
+    """Return the newest task in the pipe; answer the other tasks as cancelled."""
     while pipe.poll():
-        newer = pipe.recv()
-        if work is not None:
-            pipe.send(Answer(work.number, "cancelled"))
-        work = newer
-    return work
+        newer_task = pipe.recv()
+        if task is not None:
+            pipe.send(Answer(task.number, "cancelled"))
+        task = newer_task
+    return task
 
 
-def _do(pipe: Connection, work: Work) -> Work | None:
-    """Do one task and answer; return the task that has replaced it, or None."""
-    newer: list[Work | None] = []
+def _run_task(pipe: Connection, task: Work) -> Work | None:
+    """Run a task and send its answer; return the task that has replaced it, or None."""
+    newer_tasks: list[Work | None] = []
 
     def advance(done: float, total: float, remark: str) -> None:
         if pipe.poll():
-            newer.append(pipe.recv())
+            newer_tasks.append(pipe.recv())
             raise Cancelled
-        pipe.send(Answer(work.number, "progress", (float(done), float(total), remark)))
+        pipe.send(Answer(task.number, "progress", (float(done), float(total), remark)))
 
-    module, _, function = work.function.rpartition(".")
+    module, _, function = task.function.rpartition(".")
     try:
-        value = getattr(import_module(module), function)(work.payload, advance)
-        answer = Answer(work.number, "done", value)
+        value = getattr(import_module(module), function)(task.payload, advance)
+        answer = Answer(task.number, "done", value)
     except Cancelled:
-        answer = Answer(work.number, "cancelled")
+        answer = Answer(task.number, "cancelled")
     except PlanflyError as error:
-        answer = Answer(work.number, "fault", str(error))
+        answer = Answer(task.number, "fault", str(error))
     except INTERNAL as error:
-        answer = Answer(work.number, "fault", internal_text(error))
+        answer = Answer(task.number, "fault", internal_text(error))
     pipe.send(answer)
-    return newer[-1] if newer else None
+    return newer_tasks[-1] if newer_tasks else None

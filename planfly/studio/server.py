@@ -24,10 +24,10 @@ from pydantic import ValidationError
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from planfly.studio import messages
-from planfly.studio.connections import WELCOME
+from planfly.studio.connections import ALLOW_FULL_SIZE
 from planfly.studio.documents import open_document, open_dropped
-from planfly.studio.folder import file_inside, folder_json, shown_path
-from planfly.studio.ground_picture import ground_grid, ground_picture
+from planfly.studio.folder import find_file_in_folder, folder_message, home_relative_text
+from planfly.studio.ground_picture import draw_ground, sample_ground_grid
 from planfly.studio.jobs import Jobs
 from planfly.studio.messages import read_message
 from planfly.studio.pilot import INTERNAL, Answer, Work, internal_text
@@ -42,16 +42,16 @@ Given = TypeVar("Given")
 # Maximum number of pages.
 MAX_PAGES = 4
 # Maximum time until a page sends its token, s.
-PATIENCE = 5.0
+TOKEN_TIMEOUT_S = 5.0
 # Interval between two autosaves, s.
-KEEPING = 3.0
+AUTOSAVE_INTERVAL_S = 3.0
 # Pause after each message of a page, s, so that a page that floods the server leaves time for other pages.
 MESSAGE_PAUSE_S = 0.002
 # Maximum number of frames that wait for a slow page.
 _MAX_WAITING_FRAMES = 64
-# Pause in which an answer is sent before the next place of a drag is judged, s.
+# Pause in which an answer is sent before the next position of a drag is judged, s.
 _SEND_PAUSE_S = 0.001
-# Interval at which the server checks for a page that has gone, s.
+# Interval at which the server checks whether a page has gone, s.
 _PLACE_CHECK_INTERVAL_S = 0.05
 # Code that closes a websocket without a token.
 NO_TOKEN = 4403
@@ -65,7 +65,11 @@ NOT_UNDERSTOOD = 1007
 
 @dataclass(eq=False)
 class Page:
-    """Page that has given its token."""
+    """Page that has sent its token.
+
+    seen: hash of the terrain that was sent last, and whether that page was dark.
+    full: set when the queue of frames has overflowed.
+    """
 
     socket: WebSocket
     dark: bool
@@ -88,20 +92,20 @@ class Page:
 class Server:
     """The server, without the listening sockets."""
 
-    def __init__(self, session: Session, token: str, kept: Path | None, folder: Path | None) -> None:
-        """Prepare the server.  kept: autosave file.  folder: files that the page may open, or None."""
-        self.session, self._token, self._kept = session, token, kept
+    def __init__(self, session: Session, token: str, autosave_file: Path | None, folder: Path | None) -> None:
+        """Prepare the server.  folder: folder of the files that the page may open, or None."""
+        self.session, self._token, self._autosave_file = session, token, autosave_file
         self._folder = folder
         self._pages: set[Page] = set()
-        self._judging = ThreadPoolExecutor(1, "studio-judge")
-        self._drawing = ThreadPoolExecutor(1, "studio-draw")
-        self._order = asyncio.Lock()
-        self._grounds: dict[tuple[int, bool], tuple[bytes, ...]] = {}
+        self._judge_thread = ThreadPoolExecutor(1, "studio-judge")
+        self._draw_thread = ThreadPoolExecutor(1, "studio-draw")
+        self._change_lock = asyncio.Lock()
+        self._ground_frames: dict[tuple[int, bool], tuple[bytes, ...]] = {}
         self.jobs = Jobs(self._forward_answer, self._pack_work)
         self._loop: asyncio.AbstractEventLoop | None = None
         self._take_task: asyncio.Future[None] | None = None
         self._autosave_error = ""
-        self.welcomed = threading.Event()
+        self.first_page_served = threading.Event()
 
     # ------------------------------------------------------------------
     # Start and end.
@@ -109,16 +113,16 @@ class Server:
     async def run(self) -> None:
         """Autosave until the server ends."""
         self._loop = asyncio.get_running_loop()
-        self.jobs.start(self.session)
+        self.jobs.start_first_work(self.session)
         while True:
-            await asyncio.sleep(KEEPING)
-            await self._keep()
+            await asyncio.sleep(AUTOSAVE_INTERVAL_S)
+            await self._autosave()
 
-    async def _keep(self) -> None:
-        if self._kept is not None and (self.session.has_news or self.session.kept_rev):
+    async def _autosave(self) -> None:
+        if self._autosave_file is not None and (self.session.needs_autosave or self.session.autosaved_rev):
             # On a full disk the studio goes on without autosave, and reports the error once.
             try:
-                await self._run_judging(lambda: self.session.keep(self._kept or Path()))
+                await self._run_judging(lambda: self.session.autosave(self._autosave_file or Path()))
             except (OSError, PlanflyError) as error:
                 if not self._autosave_error:
                     self._broadcast({"kind": "fault", "job": "keep", "text": f"edits are not being kept: {error}"})
@@ -128,38 +132,41 @@ class Server:
 
     async def close(self) -> None:
         """Autosave, and end the processes."""
-        await self._keep()
+        await self._autosave()
         self.jobs.close()
-        self._judging.shutdown(wait=False, cancel_futures=True)
-        self._drawing.shutdown(wait=False, cancel_futures=True)
+        self._judge_thread.shutdown(wait=False, cancel_futures=True)
+        self._draw_thread.shutdown(wait=False, cancel_futures=True)
 
-    async def _run_judging(self, work: Callable[[], Given]) -> Given:
-        return await asyncio.get_running_loop().run_in_executor(self._judging, work)
+    async def _run_judging(self, function: Callable[[], Given]) -> Given:
+        return await asyncio.get_running_loop().run_in_executor(self._judge_thread, function)
 
     def _pack_work(self, work: Work | None) -> bytes:
         """Pickle a task in the judging thread, because judging fills caches of the pickled objects."""
-        return self._judging.submit(pickle.dumps, work).result()
+        return self._judge_thread.submit(pickle.dumps, work).result()
 
     # ------------------------------------------------------------------
     # One page.
 
     async def serve(self, socket: WebSocket) -> None:
-        """Serve a page until it goes."""
+        """Serve a page until it disconnects."""
         await socket.accept()
         page = await self._welcome(socket)
         if page is None:
             return
         self._pages.add(page)
-        self.welcomed.set()
-        tasks = [asyncio.create_task(self._write(page)), asyncio.create_task(self._preview(page))]
-        hearing, full = asyncio.create_task(self._handle_page(page)), asyncio.create_task(page.full.wait())
+        self.first_page_served.set()
+        tasks = [asyncio.create_task(self._write_frames(page)), asyncio.create_task(self._judge_drags(page))]
+        messages_task, full_task = (
+            asyncio.create_task(self._handle_messages(page)),
+            asyncio.create_task(page.full.wait()),
+        )
         try:
-            await asyncio.wait((hearing, full), return_when=asyncio.FIRST_COMPLETED)
-            if full.done():
+            await asyncio.wait((messages_task, full_task), return_when=asyncio.FIRST_COMPLETED)
+            if full_task.done():
                 with contextlib.suppress(RuntimeError, WebSocketDisconnect, asyncio.TimeoutError):
-                    await asyncio.wait_for(socket.close(TOO_SLOW), PATIENCE)
+                    await asyncio.wait_for(socket.close(TOO_SLOW), TOKEN_TIMEOUT_S)
             else:
-                hearing.result()
+                messages_task.result()
         except WebSocketDisconnect:
             pass
         except ValueError:
@@ -167,11 +174,11 @@ class Server:
                 await socket.close(NOT_UNDERSTOOD)
         finally:
             self._pages.discard(page)
-            for task in (*tasks, hearing, full):
+            for task in (*tasks, messages_task, full_task):
                 task.cancel()
-            await asyncio.gather(*tasks, hearing, full, return_exceptions=True)
+            await asyncio.gather(*tasks, messages_task, full_task, return_exceptions=True)
 
-    async def _handle_page(self, page: Page) -> None:
+    async def _handle_messages(self, page: Page) -> None:
         await self._show_all(page)
         while True:
             await self._handle_message(page, await _receive_text(page.socket))
@@ -185,96 +192,96 @@ class Server:
         """Return the page if its first message has the token; otherwise close the websocket and return None."""
         code = NO_TOKEN
         with contextlib.suppress(ValueError, asyncio.TimeoutError, WebSocketDisconnect):
-            text = await asyncio.wait_for(_receive_text(socket), PATIENCE)
-            if len(text) > messages.MAX_FIRST:
+            text = await asyncio.wait_for(_receive_text(socket), TOKEN_TIMEOUT_S)
+            if len(text) > messages.MAX_FIRST_MESSAGE_CHARACTERS:
                 raise ValueError("a first message that is too long")
-            first = read_message(text)
-            given = isinstance(first, messages.Hello) and hmac.compare_digest(
-                first.token.encode(), self._token.encode()
+            message = read_message(text)
+            has_token = isinstance(message, messages.Hello) and hmac.compare_digest(
+                message.token.encode(), self._token.encode()
             )
-            if given and isinstance(first, messages.Hello):
-                socket.scope.get(WELCOME, lambda: None)()
+            if has_token and isinstance(message, messages.Hello):
+                socket.scope.get(ALLOW_FULL_SIZE, lambda: None)()
                 code = TOO_MANY
-                # A page that has gone counts until the server notices it, which takes time on a busy machine.
-                await asyncio.wait_for(self._wait_for_free_place(), PATIENCE)
-                return Page(socket, first.dark)
+                # A page that has gone occupies a place until the server notices this, which may take some time.
+                await asyncio.wait_for(self._wait_for_free_place(), TOKEN_TIMEOUT_S)
+                return Page(socket, message.dark)
         with contextlib.suppress(RuntimeError):
             await socket.close(code)
         return None
 
-    async def _write(self, page: Page) -> None:
+    async def _write_frames(self, page: Page) -> None:
         while True:
             frame = await page.frames.get()
             with contextlib.suppress(WebSocketDisconnect, RuntimeError):
                 await (page.socket.send_bytes(frame) if isinstance(frame, bytes) else page.socket.send_text(frame))
 
-    async def _preview(self, page: Page) -> None:
-        """Judge the newest place of a drag, one at a time."""
+    async def _judge_drags(self, page: Page) -> None:
+        """Judge the newest position of a drag, one at a time."""
         while True:
             await page.dragged.wait()
             page.dragged.clear()
-            asked, page.drag = page.drag, None
-            if asked is None:
+            drag, page.drag = page.drag, None
+            if drag is None:
                 continue
             try:
-                found = await self._run_judging(functools.partial(self.session.preview, asked))
+                result = await self._run_judging(functools.partial(self.session.preview, drag))
             except StaleEdit:
                 # The page waits for an answer before it sends another drag.
-                page.send({"kind": "preview", "n": asked.n, "stale": True})
+                page.send({"kind": "preview", "n": drag.n, "stale": True})
                 continue
             except PlanflyError as error:
-                found = {"fault": str(error)}
+                result = {"fault": str(error)}
             except INTERNAL as error:
-                found = {"fault": internal_text(error)}
-            page.send({"kind": "preview", "rev": asked.rev, "n": asked.n, "k": asked.k, **found})
-            # Let the answer be sent before the next place is judged, which keeps the interpreter busy.
+                result = {"fault": internal_text(error)}
+            page.send({"kind": "preview", "rev": drag.rev, "n": drag.n, "k": drag.k, **result})
+            # Let the answer be sent before the next position is judged, which keeps the interpreter busy.
             await asyncio.sleep(_SEND_PAUSE_S)
 
     async def _show_all(self, page: Page) -> None:
-        page.send({"kind": "choices", **self.jobs.choices(), **folder_json(self._folder)})
-        page.send(self.session.world_shown())
-        for message in (*self.jobs.under_way(), self._sheet(), *self.jobs.shown()):
+        page.send({"kind": "choices", **self.jobs.choices(), **folder_message(self._folder)})
+        page.send(self.session.world_message())
+        for message in (*self.jobs.progress_messages(), self._sheet_message(), *self.jobs.result_messages()):
             page.send(message)
         await self._show_ground(page)
 
-    def _sheet(self) -> Json:
-        """Return the mission as page data; "planning" is true for a placeholder whose path is searched."""
-        return {**self.session.sheet(), "planning": self.jobs.plans_first_path(self.session)}
+    def _sheet_message(self) -> Json:
+        """Return the mission as page data; "planning" is true for a placeholder until its path is found."""
+        return {**self.session.sheet(), "planning": self.jobs.is_planning_first_path(self.session)}
 
     async def _show_ground(self, page: Page) -> None:
-        """Send the terrain of the current world to a page, once for each world and for light or dark."""
-        terrain, world = self.session.desk.scenario.terrain, self.session.world_shown()
-        key = (hash(json.dumps(world["shown"])), page.dark)
+        """Send the terrain of the current world to a page, once for each world and each color scheme."""
+        terrain, world_message = self.session.context.scenario.terrain, self.session.world_message()
+        key = (hash(json.dumps(world_message["shown"])), page.dark)
         if terrain is None or page.seen == key:
             return
         page.seen = key
-        east, north = world["shown"]
-        if key not in self._grounds:
-            self._grounds.clear()
+        east, north = world_message["shown"]
+        if key not in self._ground_frames:
+            self._ground_frames.clear()
 
             def draw() -> tuple[bytes, ...]:
-                grid = ground_grid(terrain, tuple(east), tuple(north))
-                head = {"east": east, "north": north, "rows": grid.heights.shape[0], "columns": grid.heights.shape[1]}
-                picture = ground_picture(terrain, tuple(east), tuple(north), dark=page.dark)
+                grid = sample_ground_grid(terrain, tuple(east), tuple(north))
+                header = {"east": east, "north": north, "rows": grid.heights.shape[0], "columns": grid.heights.shape[1]}
+                picture = draw_ground(terrain, tuple(east), tuple(north), dark=page.dark)
                 heights = np.ascontiguousarray(grid.heights, dtype="<f4").tobytes()
-                return _make_frame("H", head, heights), _make_frame("G", {"east": east, "north": north}, picture)
+                return _make_frame("H", header, heights), _make_frame("G", {"east": east, "north": north}, picture)
 
-            self._grounds[key] = await asyncio.get_running_loop().run_in_executor(self._drawing, draw)
-        for frame in self._grounds[key]:
+            self._ground_frames[key] = await asyncio.get_running_loop().run_in_executor(self._draw_thread, draw)
+        for frame in self._ground_frames[key]:
             page.send(frame)
 
     # ------------------------------------------------------------------
     # Messages of a page.
 
     async def _handle_message(self, page: Page, text: str) -> None:
-        """Act on a message.  Raises ValueError for a message that is not understood."""
+        """Handle a message.  Raises ValueError for a message that is not understood."""
         try:
             message = read_message(text)
         except ValidationError as error:
-            fault = messages.fault_of(error)
-            if not fault:
+            description = messages.describe_error(error)
+            if not description:
                 raise
-            page.send({"kind": "fault", "text": fault})
+            page.send({"kind": "fault", "text": description})
             return
         if isinstance(message, messages.Drag):
             page.drag = message
@@ -288,7 +295,7 @@ class Server:
             await self._dispatch(page, message)
         except StaleEdit:
             page.send({"kind": "stale"})
-            page.send(self._sheet())
+            page.send(self._sheet_message())
         except PlanflyError as error:
             page.send({"kind": "fault", "text": str(error)})
         except INTERNAL as error:
@@ -304,32 +311,34 @@ class Server:
             case messages.Plan():
                 self.jobs.plan(message, session)
             case messages.Save():
-                work = session.save_over if message.over else lambda: session.save(message.form)
-                async with self._order:
-                    saved = await self._run_judging(work)
+                save_mission = session.save_over if message.over else lambda: session.save(message.form)
+                async with self._change_lock:
+                    saved = await self._run_judging(save_mission)
                 content = "" if message.over else base64.b64encode(saved.data).decode()
-                where = shown_path(session.document.path.parent) if message.over and session.document.path else ""
-                answer = {"name": saved.name, "losses": list(saved.losses), "where": where, "data": content}
+                folder = (
+                    home_relative_text(session.document.path.parent) if message.over and session.document.path else ""
+                )
+                answer = {"name": saved.name, "losses": list(saved.losses), "where": folder, "data": content}
                 page.send({"kind": "saved", "unsaved": session.is_unsaved, **answer})
             case messages.Hello():
                 raise ValueError("a page must send its token only once")
             case _:
-                await self._change(message)
+                await self._change_session(message)
 
-    async def _change(self, message: messages.Message) -> None:
+    async def _change_session(self, message: messages.Message) -> None:
         """Change the session and send the result to every page."""
         session = self.session
-        async with self._order:
-            rev, world = session.rev, session.world_rev
+        async with self._change_lock:
+            rev, world_rev = session.rev, session.world_rev
             await self._run_judging(lambda: self._apply_change(message))
             if session.rev == rev:
                 return
-            shown = await self._run_judging(self._sheet)
-        if session.world_rev != world:
-            self._broadcast(session.world_shown())
-        self._broadcast(shown)
+            sheet = await self._run_judging(self._sheet_message)
+        if session.world_rev != world_rev:
+            self._broadcast(session.world_message())
+        self._broadcast(sheet)
         self.jobs.fly(session)
-        if session.world_rev != world:
+        if session.world_rev != world_rev:
             for page in list(self._pages):
                 await self._show_ground(page)
 
@@ -339,10 +348,10 @@ class Server:
             case messages.Move() | messages.Insert() | messages.Delete() | messages.Raise() | messages.Apply():
                 session.edit(message)
             case messages.Step():
-                before = session.history
+                previous_history = session.history
                 session.step(message.kind)
-                if session.history is not before:
-                    self.jobs.forget()
+                if session.history is not previous_history:
+                    self.jobs.drop_results()
             case messages.Settings():
                 session.change_settings(message)
             case messages.Choose():
@@ -350,19 +359,19 @@ class Server:
             case messages.Open() if message.data is None and message.name.lower().endswith(PARAMETER_FILES):
                 session.change_settings(self._read_parameter_file(message.name))
             case messages.Open():
-                opened = self._open_file(message)
-                if self._kept is not None and session.has_news:
+                document = self._open_file(message)
+                if self._autosave_file is not None and session.needs_autosave:
                     # An error here is reported at the next regular autosave.
                     with contextlib.suppress(OSError, PlanflyError):
-                        session.keep(self._kept)
-                session.open(opened)
-                if self._kept is not None:
-                    session.restore(session.kept_file(self._kept))
-                self.jobs.forget()
+                        session.autosave(self._autosave_file)
+                session.open(document)
+                if self._autosave_file is not None:
+                    session.restore(session.autosave_path(self._autosave_file))
+                self.jobs.drop_results()
 
     def _open_file(self, message: messages.Open) -> Any:
         if message.data is None:
-            return open_document(str(file_inside(self._folder, message.name)), self.session.options)
+            return open_document(str(find_file_in_folder(self._folder, message.name)), self.session.options)
         try:
             data = base64.b64decode(message.data, validate=True)
         except binascii.Error as error:
@@ -371,31 +380,31 @@ class Server:
 
     def _read_parameter_file(self, name: str) -> messages.Settings:
         """Return the settings in a parameter file of the folder."""
-        path = file_inside(self._folder, name)
-        data = read_small_file(path, messages.MAX_MESSAGE, "parameter", PlanflyError)
+        path = find_file_in_folder(self._folder, name)
+        data = read_small_file(path, messages.MAX_MESSAGE_CHARACTERS, "parameter", PlanflyError)
         text = utf8_text(data, path, PlanflyError)
         return messages.Settings(kind="settings", parameter_file=path.name, parameter_text=text)
 
     # ------------------------------------------------------------------
     # Answers of the processes.
 
-    def _forward_answer(self, pilot: str, answer: Answer) -> None:
+    def _forward_answer(self, worker: str, answer: Answer) -> None:
         """Forward an answer from the thread of a process's pipe to the event loop."""
         if self._loop is not None and not self._loop.is_closed():
             with contextlib.suppress(RuntimeError):
-                self._loop.call_soon_threadsafe(self._handle_answer, pilot, answer)
+                self._loop.call_soon_threadsafe(self._handle_answer, worker, answer)
 
-    def _handle_answer(self, pilot: str, answer: Answer) -> None:
-        for message in self.jobs.answered(pilot, answer, self.session):
+    def _handle_answer(self, worker: str, answer: Answer) -> None:
+        for message in self.jobs.handle_answer(worker, answer, self.session):
             self._broadcast(message)
         if self.jobs.take_initial_plan(self.session):
-            chosen = messages.Choose(kind="choose", rev=self.session.rev, which=0)
-            self._take_task = asyncio.ensure_future(self._take_initial_plan(chosen))
+            choice = messages.Choose(kind="choose", rev=self.session.rev, which=0)
+            self._take_task = asyncio.ensure_future(self._take_initial_plan(choice))
 
-    async def _take_initial_plan(self, chosen: messages.Choose) -> None:
+    async def _take_initial_plan(self, message: messages.Choose) -> None:
         """Use the path that was planned at the start of the studio, unless the mission was edited in the meantime."""
         try:
-            await self._change(chosen)
+            await self._change_session(message)
         except StaleEdit:
             self._broadcast(
                 {
@@ -425,7 +434,7 @@ async def _receive_text(socket: WebSocket) -> str:
     return str(text)
 
 
-def _make_frame(kind: str, head: Json, body: bytes) -> bytes:
+def _make_frame(kind: str, header: Json, body: bytes) -> bytes:
     """Return a binary frame of its kind, the length of its head, the head as JSON, and the body."""
-    text = json.dumps(head).encode()
+    text = json.dumps(header).encode()
     return kind.encode() + struct.pack("<I", len(text)) + text + body

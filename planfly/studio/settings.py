@@ -28,7 +28,7 @@ _MAX_LISTED_NAMES = 8
 class SetParameters:
     """Parameters of the autopilot that were set in the studio.
 
-    values: values by the names and in the units of the autopilot.
+    values: values by name, in the units of the autopilot.
     file: name of the file that was read last, or "".
     unused: names in this file that the simulated autopilot does not use.
     """
@@ -42,106 +42,120 @@ class SetParameters:
         return parameters_text(self.values, title)
 
     def airframe(self, scenario: Scenario) -> Airframe:
-        """Return the airframe of a scenario with these parameters and their source.  Raises PlanflyError."""
-        made = load_airframe(scenario, self.values)
-        stored = made.autopilot.store()
-        if not self.values or stored.parameters is None:
-            return made
-        labelled = stored.parameters._replace(source=self.file or stored.parameters.source or "the studio")
-        return replace(made, autopilot=made.autopilot.restore(stored._replace(parameters=labelled)))
+        """Load the airframe of a scenario with these parameters and their source.  Raises PlanflyError."""
+        airframe = load_airframe(scenario, self.values)
+        stored_autopilot = airframe.autopilot.store()
+        if not self.values or stored_autopilot.parameters is None:
+            return airframe
+        parameters = stored_autopilot.parameters._replace(
+            source=self.file or stored_autopilot.parameters.source or "the studio"
+        )
+        return replace(airframe, autopilot=airframe.autopilot.restore(stored_autopilot._replace(parameters=parameters)))
 
 
-def changed_world(scenario: Scenario, asked: Settings) -> Scenario:
+def apply_scenario_settings(scenario: Scenario, settings: Settings) -> Scenario:
     """Return a scenario with the requested settings.  Raises PlanflyError for an invalid value."""
     wind = None
-    if asked.wind_speed is not None or asked.wind_from is not None:
-        speed = scenario.wind.speed if asked.wind_speed is None else asked.wind_speed
-        from_deg = float(np.degrees(scenario.wind.from_course)) if asked.wind_from is None else asked.wind_from
+    if settings.wind_speed is not None or settings.wind_from is not None:
+        speed = scenario.wind.speed if settings.wind_speed is None else settings.wind_speed
+        from_deg = float(np.degrees(scenario.wind.from_course)) if settings.wind_from is None else settings.wind_from
         wind = (float(speed), from_deg)
-    if asked.aircraft is not None and ("/" in asked.aircraft or "\\" in asked.aircraft):
+    if settings.aircraft is not None and ("/" in settings.aircraft or "\\" in settings.aircraft):
         raise PlanflyError("aircraft: expected a name that planfly aircraft lists", field="aircraft")
     options: FlightOptions = {
         "wind": wind,
-        "turbulence": asked.turbulence,
-        "aircraft": asked.aircraft,
-        "airspeed": asked.airspeed,
-        "autopilot": asked.autopilot,
+        "turbulence": settings.turbulence,
+        "aircraft": settings.aircraft,
+        "airspeed": settings.airspeed,
+        "autopilot": settings.autopilot,
     }
-    changed = apply_options(scenario, options)
-    if asked.limits is None and asked.ceiling is None:
-        return changed
-    spec = changed.to_json()
-    limits = spec.get("limits", {}) | (asked.limits or {})
+    new_scenario = apply_options(scenario, options)
+    if settings.limits is None and settings.ceiling is None:
+        return new_scenario
+    spec = new_scenario.to_json()
+    limits = spec.get("limits", {}) | (settings.limits or {})
     spec["limits"] = {name: value for name, value in limits.items() if value is not None}
-    if asked.ceiling is not None:
+    if settings.ceiling is not None:
         if scenario.external:
             raise PlanflyError("ceiling: only a scenario has an area with a ceiling", field="ceiling")
-        spec["area"]["ceiling_amsl_m"] = asked.ceiling
-    return from_spec(spec, changed.name, ground=changed.terrain, external=changed.external)
+        spec["area"]["ceiling_amsl_m"] = settings.ceiling
+    return from_spec(spec, new_scenario.name, ground=new_scenario.terrain, external=new_scenario.external)
 
 
-def changed_parameters(old: SetParameters, scenario: Scenario, asked: Settings) -> SetParameters:
+def apply_parameter_settings(current: SetParameters, scenario: Scenario, settings: Settings) -> SetParameters:
     """Return the parameters after a change of settings, for the autopilot of a scenario.
 
-    If the autopilot changes, no parameter is kept.  A file replaces all parameters, a single parameter only itself.
+    A change of the autopilot discards all parameters.  A file replaces all parameters; a single parameter replaces only
+    its own value.
     Raises PlanflyError for a name that the simulated autopilot does not have, and for a value that is not allowed.
     """
-    if asked.autopilot is not None:
-        old = SetParameters()
-    values = {name: value for name, value in old.values.items() if name not in (asked.without or ())}
-    made = SetParameters(values, old.file if values else "", old.unused if values else ())
-    if asked.parameter_file is not None:
-        return read_parameters(scenario, asked.parameter_text or "", asked.parameter_file)
-    if asked.parameter is not None:
-        found = read_parameters(scenario, asked.parameter, "parameter")
-        if found.unused:
-            name, known = found.unused[0], [one.name for one in _autopilot_parameters(scenario).values]
-            allowed = f"expected a parameter of the simulated autopilot{did_you_mean(name, known)}"
+    if settings.autopilot is not None:
+        current = SetParameters()
+    values = {name: value for name, value in current.values.items() if name not in (settings.without or ())}
+    result = SetParameters(values, current.file if values else "", current.unused if values else ())
+    if settings.parameter_file is not None:
+        return read_parameters(scenario, settings.parameter_text or "", settings.parameter_file)
+    if settings.parameter is not None:
+        single = read_parameters(scenario, settings.parameter, "parameter")
+        if single.unused:
+            name, known_names = (
+                single.unused[0],
+                [parameter.name for parameter in _load_autopilot_parameters(scenario).values],
+            )
+            allowed = f"expected a parameter of the simulated autopilot{did_you_mean(name, known_names)}"
             raise PlanflyError(f"parameter: {name}: {allowed}", field="parameter", value=name, allowed=allowed)
-        made = SetParameters(values | found.values, made.file, made.unused)
-    return made
+        result = SetParameters(values | single.values, result.file, result.unused)
+    return result
 
 
 def read_parameters(scenario: Scenario, text: str, name: str) -> SetParameters:
     """Read autopilot parameters from the text of a file.  Raises PlanflyError, which names the file."""
-    asked = _autopilot_parameters(scenario).by_origin("file")
+    scenario_values = _load_autopilot_parameters(scenario).by_origin("file")
     with temporary_folder("planfly-studio-") as folder:
         file = folder / "set.parm"
         file.write_text(text, encoding="utf-8")
         try:
-            made = _autopilot_parameters(with_flight(scenario, params=str(file)))
+            parameters = _load_autopilot_parameters(with_flight(scenario, params=str(file)))
         except PlanflyError as error:
             raise PlanflyError(str(error).replace(str(file), name), file=name) from None
-    stated = made.by_origin("file")
+    file_values = parameters.by_origin("file")
     # Leave out parameters that only the scenario sets, because they belong to the scenario.
-    own = {one: value for one, value in stated.items() if one not in asked or one in parse_parameters(text, name)}
-    return SetParameters(own, name, made.unused)
+    own_values = {
+        parameter: value
+        for parameter, value in file_values.items()
+        if parameter not in scenario_values or parameter in parse_parameters(text, name)
+    }
+    return SetParameters(own_values, name, parameters.unused)
 
 
-def _autopilot_parameters(scenario: Scenario) -> Parameters:
+def _load_autopilot_parameters(scenario: Scenario) -> Parameters:
     """Return the autopilot parameters of a scenario.  Raises PlanflyError if its autopilot has none."""
-    made = load_autopilot(scenario, find_airframe(scenario)[0])
-    if made.parameters is None:
-        raise PlanflyError(f"{made.title} has no parameters: choose another autopilot", field="parameter")
-    return made.parameters
+    autopilot = load_autopilot(scenario, find_airframe(scenario)[0])
+    if autopilot.parameters is None:
+        raise PlanflyError(f"{autopilot.title} has no parameters: choose another autopilot", field="parameter")
+    return autopilot.parameters
 
 
-def settings_json(scenario: Scenario, frame: Airframe, own: SetParameters) -> dict[str, Any]:
+def settings_json(scenario: Scenario, airframe: Airframe, set_parameters: SetParameters) -> dict[str, Any]:
     """Return the current settings as page data."""
-    limits, parameters = scenario.to_json().get("limits", {}), frame.autopilot.parameters
-    more = f" and {len(own.unused) - _MAX_LISTED_NAMES} more" if len(own.unused) > _MAX_LISTED_NAMES else ""
+    limits, parameters = scenario.to_json().get("limits", {}), airframe.autopilot.parameters
+    remainder_text = (
+        f" and {len(set_parameters.unused) - _MAX_LISTED_NAMES} more"
+        if len(set_parameters.unused) > _MAX_LISTED_NAMES
+        else ""
+    )
     return {
-        "aircraft": frame.aircraft.name,
-        "autopilot": frame.autopilot.name,
-        "autopilot_title": frame.autopilot.title,
-        "airspeed": round(frame.airspeed, 1),
+        "aircraft": airframe.aircraft.name,
+        "autopilot": airframe.autopilot.name,
+        "autopilot_title": airframe.autopilot.title,
+        "airspeed": round(airframe.airspeed, 1),
         "wind_speed": float(scenario.wind.speed),
         "wind_from": round(float(np.degrees(scenario.wind.from_course)), 1),
         "turbulence": scenario.wind.turbulence,
         "limits": {name: limits.get(name) for name in LIMITS} | {"min_clearance_m": scenario.limits.min_clearance_m},
         "ceiling": None if scenario.external else float(scenario.ceiling),
-        "parameters": dict(own.values),
-        "parameter_file": own.file,
-        "unused": ", ".join(own.unused[:_MAX_LISTED_NAMES]) + more,
+        "parameters": dict(set_parameters.values),
+        "parameter_file": set_parameters.file,
+        "unused": ", ".join(set_parameters.unused[:_MAX_LISTED_NAMES]) + remainder_text,
         "known": {} if parameters is None else {name: value for name, value, _ in parameters.values},
     }

@@ -1,7 +1,7 @@
-"""States of legs, corners, threats and zones according to a verdict, each with the closest limit.
+"""States of legs, corners, threats and zones according to a verdict.
 
-A state is "fail", "open" (not judged, therefore not flyable), "near" a limit, or "ok".  Numbers and words are taken
-from the finding that is closest to its limit.
+A state is "fail", "open" (not judged, therefore not flyable), "near" (close to a limit) or "ok".  Its text describes
+the finding that is closest to its limit.
 """
 
 import math
@@ -15,14 +15,14 @@ from logs.verdict.rule_words import RULE_WORDS
 
 # Fraction of the limit that is near the limit, for a rule whose margin has no scale, such as turns.
 _NEAR_FRACTION = 0.1
-_ORDER = {"fail": 0, "open": 1, "near": 2, "ok": 3}
+_SEVERITY_ORDER = {"fail": 0, "open": 1, "near": 2, "ok": 3}
 
 
 class State(NamedTuple):
     """State of a place.
 
-    closeness: margin as a multiple of a noticeable difference; below 1 is near the limit, below 0 beyond it.
-    text: the finding in a few words, shown at the pointer.
+    closeness: margin as a multiple of a noticeable difference; below 1 is near the limit, below 0 beyond the limit.
+    text: short text of the finding, shown at the pointer.
     """
 
     state: str
@@ -31,7 +31,7 @@ class State(NamedTuple):
 
 
 class PlaceStates(NamedTuple):
-    """States by the numbers of the route; places without findings have none.
+    """States of the legs and corners of a route that have findings, and failed threats and zones.
 
     legs: states by leg.
     corners: states by waypoint.
@@ -45,7 +45,7 @@ class PlaceStates(NamedTuple):
 
 
 def place_states(requirements: RouteRequirements, findings: Sequence[Finding], *, shift: int = 0) -> PlaceStates:
-    """Return the states of all places; a failed threat, zone or bound also sets the state of the legs that violate it.
+    """Return the states of legs, corners, threats and zones; a failed threat or zone also fails the legs that enter it.
 
     shift: number added to the legs and corners of a part of a route.
     """
@@ -53,18 +53,18 @@ def place_states(requirements: RouteRequirements, findings: Sequence[Finding], *
     corners: dict[int, State] = {}
     threats: set[int] = set()
     zones: set[int] = set()
-    is_open = {id(item) for item in undecided_findings(findings)}
-    for item in findings:
-        state = state_of(item, unjudged=id(item) in is_open)
+    open_ids = {id(finding) for finding in undecided_findings(findings)}
+    for finding in findings:
+        state = finding_state(finding, unjudged=id(finding) in open_ids)
         if state is None:
             continue
-        place = item.place
+        place = finding.place
         if place.kind == "leg" and place.index is not None:
             _set_worse_state(legs, (place.index + shift,), state)
         elif place.kind == "waypoint" and place.index is not None:
             _set_worse_state(corners, (place.index + shift,), state)
         elif state.state == "fail":
-            _set_worse_state(legs, (leg + shift for leg in violated_legs(requirements, item)), state)
+            _set_worse_state(legs, (leg + shift for leg in violated_legs(requirements, finding)), state)
             if place.index is not None:
                 (threats if place.kind in ("missile", "radar") else zones).add(place.index)
     return PlaceStates(legs, corners, frozenset(threats), frozenset(zones))
@@ -72,13 +72,16 @@ def place_states(requirements: RouteRequirements, findings: Sequence[Finding], *
 
 def _set_worse_state(states: dict[int, State], numbers: Iterable[int], state: State) -> None:
     for number in numbers:
-        old = states.get(number)
-        if old is None or (_ORDER[state.state], state.closeness) < (_ORDER[old.state], old.closeness):
+        previous = states.get(number)
+        if previous is None or (_SEVERITY_ORDER[state.state], state.closeness) < (
+            _SEVERITY_ORDER[previous.state],
+            previous.closeness,
+        ):
             states[number] = state
 
 
-def state_of(item: Finding, *, unjudged: bool = False) -> State | None:
-    """Return the state of a place according to one finding, or None for a finding that does not affect it.
+def finding_state(finding: Finding, *, unjudged: bool = False) -> State | None:
+    """Return the state according to one finding, or None for a finding that does not affect the state.
 
     unjudged: True if the verdict is withheld because of this finding.
 
@@ -87,32 +90,34 @@ def state_of(item: Finding, *, unjudged: bool = False) -> State | None:
     >>> slope = make_finding(
     ...     "slope", Place("leg", 1), ok=True, reason="", planned=13.5, limit=14.2, margin=0.7, unit="deg"
     ... )
-    >>> state_of(slope)
+    >>> finding_state(slope)
     State(state='near', closeness=0.7, text='slope 13.5° (≤ 14.2°)')
     """
-    if item.ok is None:
-        return State("open", 0.0, f"{_rule_name(item)}: {item.brief or item.reason}") if unjudged else None
-    if item.ok is False:
-        return State("fail", -math.inf if item.margin is None else item.margin, f"{_rule_name(item)}: {item.brief}")
-    if item.margin is None or item.planned is None:
+    if finding.ok is None:
+        return State("open", 0.0, f"{_rule_name(finding)}: {finding.brief or finding.reason}") if unjudged else None
+    if finding.ok is False:
+        return State(
+            "fail", -math.inf if finding.margin is None else finding.margin, f"{_rule_name(finding)}: {finding.brief}"
+        )
+    if finding.margin is None or finding.planned is None:
         return None
-    closeness = _closeness(item)
-    return State("near" if closeness < 1.0 else "ok", closeness, _value_text(item))
+    closeness = _closeness(finding)
+    return State("near" if closeness < 1.0 else "ok", closeness, _value_text(finding))
 
 
-def _rule_name(item: Finding) -> str:
-    return RULE_WORDS[item.rule].word
+def _rule_name(finding: Finding) -> str:
+    return RULE_WORDS[finding.rule].word
 
 
-def _closeness(item: Finding) -> float:
-    scale, margin = RULE_WORDS[item.rule].scale, item.margin or 0.0
+def _closeness(finding: Finding) -> float:
+    scale, margin = RULE_WORDS[finding.rule].scale, finding.margin or 0.0
     if scale is None:
-        if item.limit is None or not item.limit:
+        if finding.limit is None or not finding.limit:
             return math.inf
-        scale = _NEAR_FRACTION * abs(item.limit)
+        scale = _NEAR_FRACTION * abs(finding.limit)
     return margin / scale
 
 
-def _value_text(item: Finding) -> str:
-    value, limit = item.compared_texts()
-    return f"{_rule_name(item)} {value}" + (f" ({limit})" if limit else "")
+def _value_text(finding: Finding) -> str:
+    value, limit = finding.compared_texts()
+    return f"{_rule_name(finding)} {value}" + (f" ({limit})" if limit else "")

@@ -1,4 +1,4 @@
-"""Make the data that the page draws, which are the world, the mission with its states, and its profile, in m."""
+"""Make the data that the page draws, in m: the world, the mission with its states, and the profile."""
 
 from collections.abc import Sequence
 from itertools import pairwise
@@ -47,7 +47,7 @@ _MIN_WIDTH_RATIO = 1.5
 _MIN_HEIGHT_RATIO = 0.9
 
 
-def rounded(values: Any, digits: int = 1) -> Any:
+def round_to_json(values: Any, digits: int = 1) -> Any:
     """Return an array as lists of rounded numbers; numbers that are not finite become None."""
     array = np.round(np.asarray(values, dtype=np.float64), digits)
     if np.isfinite(array).all():
@@ -59,32 +59,34 @@ def rounded(values: Any, digits: int = 1) -> Any:
 # Data of the world.
 
 
-def world_json(desk: EditContext, setup: FlightSetup) -> Json:
+def world_json(context: EditContext, setup: FlightSetup) -> Json:
     """Return page data of the world of a mission, with its area, threats, zones, ends and limits."""
-    scenario, mission = desk.scenario, setup.mission
-    extent = scenario.bounds if scenario.external else map_extent(scenario, desk.points(mission), [])
+    scenario, mission = context.scenario, setup.mission
+    extent = scenario.bounds if scenario.external else map_extent(scenario, context.item_positions(mission), [])
     return {
         "name": scenario.name,
         "origin": [scenario.origin.lat_deg, scenario.origin.lon_deg],
-        "extent": rounded(extent),
-        "shown": rounded(_with_surroundings(np.asarray(extent, dtype=np.float64))),
-        "bounds": None if scenario.external else rounded(scenario.bounds),
+        "extent": round_to_json(extent),
+        "shown": round_to_json(_widen_extent(np.asarray(extent, dtype=np.float64))),
+        "bounds": None if scenario.external else round_to_json(scenario.bounds),
         "floor": None if scenario.external else float(scenario.floor),
         "ceiling": None if scenario.external else float(scenario.ceiling),
         "clearance": float(scenario.limits.min_clearance_m),
-        "ends": None if scenario.external else rounded(np.stack([scenario.start, scenario.destination])),
+        "ends": None if scenario.external else round_to_json(np.stack([scenario.start, scenario.destination])),
         "ground": scenario.terrain is not None,
         "threats": _threats_json(scenario.threats),
         "zones": _zones_json(scenario, mission, setup),
     }
 
 
-def _with_surroundings(extent: Floats) -> Floats:
-    """Return a map extent widened so that ground fills a window of another shape.  extent: (2, 2), m."""
-    middle, size = extent.mean(axis=1), np.diff(extent, axis=1)[:, 0]
-    longest = float(size.max())
-    half = 0.5 * np.maximum(_GROUND_RATIO * size, np.array([_MIN_WIDTH_RATIO * longest, _MIN_HEIGHT_RATIO * longest]))
-    return np.stack([middle - half, middle + half], axis=1)
+def _widen_extent(extent: Floats) -> Floats:
+    """Widen a map extent, so that the terrain fills a window of another shape.  extent: (2, 2), m."""
+    center, size = extent.mean(axis=1), np.diff(extent, axis=1)[:, 0]
+    longer_side = float(size.max())
+    half_size = 0.5 * np.maximum(
+        _GROUND_RATIO * size, np.array([_MIN_WIDTH_RATIO * longer_side, _MIN_HEIGHT_RATIO * longer_side])
+    )
+    return np.stack([center - half_size, center + half_size], axis=1)
 
 
 def _threats_json(threats: Threats) -> list[Json]:
@@ -96,19 +98,24 @@ def _threats_json(threats: Threats) -> list[Json]:
         strict=True,
     )
     return [
-        {"name": name, "at": rounded(at), "kill": round(kill, 1), "detection": round(detection, 1)}
-        for name, at, kill, detection in rows
+        {
+            "name": name,
+            "at": round_to_json(position),
+            "kill": round(kill_radius, 1),
+            "detection": round(detection_radius, 1),
+        }
+        for name, position, kill_radius, detection_radius in rows
     ]
 
 
 def _zones_json(scenario: Scenario, mission: Mission, setup: FlightSetup) -> list[Json]:
-    """Return page data of the scenario's zones, then of the mission's fence zones, in the order that findings use."""
+    """Return page data of the scenario's zones, then of the fence zones; findings number them in this order."""
     zones = airspace_of(setup).zones if mission.fences else scenario.zones
     return [
         {
             "name": zone_label(zone),
             "kind": zone.kind,
-            "rings": [rounded(ring) for ring in zone_rings(zone)],
+            "rings": [round_to_json(ring) for ring in zone_rings(zone)],
         }
         for zone in zones
     ]
@@ -118,20 +125,20 @@ def _zones_json(scenario: Scenario, mission: Mission, setup: FlightSetup) -> lis
 # Data of the mission.
 
 
-def sheet_json(desk: EditContext, judged: JudgedMission) -> Json:
-    """Describe a mission with its whole geometric verdict: items, route, path, states, findings, profile."""
+def sheet_json(context: EditContext, judged: JudgedMission) -> Json:
+    """Return page data of a mission and its geometric verdict: items, route, path, states, findings and profile."""
     verdict, setup = judged.verdict, judged.setup
     states = place_states(judged.requirements, verdict.findings)
     path = judged.requirements.path
     return {
-        "items": items_json(desk, judged.mission),
+        "items": items_json(context, judged.mission),
         **route_json(judged.mission, setup.route, 0, setup.route.legs),
         "path": _leg_paths(path.points, path.legs, 0, setup.route.legs),
         "states": states_json(states, 0, setup.route.legs),
         "violated": {"threats": sorted(states.threats), "zones": sorted(states.zones)},
         "verdict": verdict_json(verdict),
         "findings": findings_json(verdict),
-        "profile": profile_json(desk.scenario, setup),
+        "profile": profile_json(context.scenario, setup),
         "total": {
             "km": round(float(route_distance(setup.route.waypoints)[-1]) / 1000.0, 2),
             "s": round(path.times[-1]),
@@ -141,60 +148,60 @@ def sheet_json(desk: EditContext, judged: JudgedMission) -> Json:
 
 def window_json(mission: Mission, route: Route, windows: Sequence[Window]) -> Json:
     """Return page data of the legs and corners that were judged near a moved item."""
-    return {"total_legs": route.legs, "windows": [_window_json(mission, route, one) for one in windows]}
+    return {"total_legs": route.legs, "windows": [_window_json(mission, route, window) for window in windows]}
 
 
 def _window_json(mission: Mission, route: Route, window: Window) -> Json:
     first, last = window.first, window.last
     path = window.requirements.path
-    states = place_states(window.requirements, window.findings, shift=window.begin)
+    states = place_states(window.requirements, window.findings, shift=window.start)
     return {
         "first": first,
         "last": last,
         **route_json(mission, route, first, last),
-        "path": _leg_paths(path.points, path.legs + window.begin, first, last),
+        "path": _leg_paths(path.points, path.legs + window.start, first, last),
         "states": states_json(states, first, last),
     }
 
 
-def items_json(desk: EditContext, mission: Mission) -> list[Json]:
-    """Return page data of the items that can be moved, with their places on the map and in the mission."""
-    points, flown = desk.points(mission), desk.flown(mission)
-    found = []
-    for k, (east, north, up) in zip(places(mission), points.tolist(), strict=True):
+def items_json(context: EditContext, mission: Mission) -> list[Json]:
+    """Return page data of the items that can be moved, with their positions on the map and in the mission."""
+    points, flown_seqs = context.item_positions(mission), context.reached_items(mission)
+    entries = []
+    for k, (east, north, altitude) in zip(places(mission), points.tolist(), strict=True):
         item = mission.items[k]
-        found.append(
+        entries.append(
             {
                 "k": k,
                 "seq": item.seq,
                 "what": command_name(item.command).removeprefix("NAV_").replace("_", " ").lower(),
-                "at": rounded([east, north, up]),
+                "at": round_to_json([east, north, altitude]),
                 "alt": None if np.isnan(item.alt) else round(item.alt, 1),
                 "frame": "AMSL" if item.frame in AMSL else "over home" if item.frame in OVER_HOME else "over ground",
                 "lat": item.lat_deg,
                 "lon": item.lon_deg,
-                "state": "" if item.seq in flown else "not flown",
+                "state": "" if item.seq in flown_seqs else "not flown",
             }
         )
-    return found
+    return entries
 
 
 def route_json(mission: Mission, route: Route, first: int, last: int) -> Json:
-    """Return page data of the waypoints of a route from first to last, each with the index of its item, or -1."""
+    """Return page data of the waypoints from first to last, each with the index of its item, or -1 without an item."""
     numbers = {item.seq: k for k, item in enumerate(mission.items)}
     items = [numbers.get(seq, -1) for seq in route.items[first : last + 1].tolist()]
-    return {"route": rounded(route.waypoints[first : last + 1]), "of": items}
+    return {"route": round_to_json(route.waypoints[first : last + 1]), "of": items}
 
 
 def _leg_paths(points: Floats, legs: NDArray[np.int64], first: int, last: int) -> list[list[float]]:
     """Return the path of each leg as a flat list of east, north, up, east, north, up, ..., m."""
     edges = np.searchsorted(legs, np.arange(first, last + 1))
-    flat = np.round(points, 1)
-    return [flat[begin : end + 1].ravel().tolist() for begin, end in pairwise(edges.tolist())]
+    rounded_points = np.round(points, 1)
+    return [rounded_points[start : end + 1].ravel().tolist() for start, end in pairwise(edges.tolist())]
 
 
 def states_json(states: PlaceStates, first: int, last: int) -> Json:
-    """Return the states of legs and corners in order, each as a pair of state and text."""
+    """Return the states of legs and corners in order, each as state and text."""
     return {
         "legs": [_state_pair(states.legs.get(k, _OK_STATE)) for k in range(first, last)],
         "corners": [_state_pair(states.corners.get(k, _OK_STATE)) for k in range(first, last + 1)],
@@ -210,33 +217,35 @@ def _state_pair(state: State) -> list[str]:
 
 
 def verdict_json(verdict: Verdict) -> Json:
-    """Return page data of the verdict's answer and its lines."""
-    shown = verdict.present()
+    """Return page data of a verdict's answer and its lines."""
+    presentation = verdict.present()
     return {
-        "state": shown.state,
+        "state": presentation.state,
         "answer": verdict.answer,
-        "headline": shown.headline,
-        "lines": list(shown.details),
+        "headline": presentation.headline,
+        "lines": list(presentation.details),
         "level": verdict.level,
         "failed": len(verdict.failed),
     }
 
 
 def findings_json(verdict: Verdict) -> list[Json]:
-    """List page data of failed and undecided findings, then of each rule's finding closest to its limit."""
-    return [_finding_json(number, item) for number, item in verdict.present().worth_listing(_MAX_LISTED_FINDINGS)]
+    """Return page data of the failed and undecided findings, then of the finding closest to its limit for each rule."""
+    return [_finding_json(number, finding) for number, finding in verdict.present().worth_listing(_MAX_LISTED_FINDINGS)]
 
 
-def _finding_json(number: int, item: Finding) -> Json:
+def _finding_json(number: int, finding: Finding) -> Json:
     return {
         "number": number,
-        "rule": RULE_WORDS[item.rule].title,
-        "ok": item.ok,
-        "where": item.where,
-        "kind": item.place.kind,
-        "index": item.place.index,
-        "text": item.reason,
-        "suggestions": [{"text": suggestion_text(one), "apply": can_apply(one)} for one in item.suggestions],
+        "rule": RULE_WORDS[finding.rule].title,
+        "ok": finding.ok,
+        "where": finding.where,
+        "kind": finding.place.kind,
+        "index": finding.place.index,
+        "text": finding.reason,
+        "suggestions": [
+            {"text": suggestion_text(suggestion), "apply": can_apply(suggestion)} for suggestion in finding.suggestions
+        ],
     }
 
 
@@ -245,40 +254,40 @@ def _finding_json(number: int, item: Finding) -> Json:
 
 
 def profile_json(scenario: Scenario, setup: FlightSetup) -> Json:
-    """Return page data of the terrain below the route, its waypoints' distances, and the threats and zones above."""
+    """Return page data of the terrain along the route, the distances of waypoints, and the threats and zones."""
     route = setup.route.waypoints
-    at = route_distance(route)
-    distance, points = route_samples(route, max(float(at[-1]) / _PROFILE_SAMPLES, 1.0))
+    waypoint_distance = route_distance(route)
+    distance, points = route_samples(route, max(float(waypoint_distance[-1]) / _PROFILE_SAMPLES, 1.0))
     ground = ground_under(scenario, points)
-    low = float(min(points[:, 2].min(), np.nanmin(ground) if ground is not None else np.inf)) - 50.0
-    high = float(points[:, 2].max()) + 300.0
-    plane = PathPlane(distance, points, ground, low, high)
+    bottom = float(min(points[:, 2].min(), np.nanmin(ground) if ground is not None else np.inf)) - 50.0
+    top = float(points[:, 2].max()) + 300.0
+    view = PathPlane(distance, points, ground, bottom, top)
     cuts: list[Json] = []
     if len(scenario.threats) <= _MAX_CUTS:
         cuts += [
             {
                 "role": layer.role,
                 "name": layer.name,
-                "x": rounded(layer.x),
-                "top": rounded(layer.y),
-                "low": rounded(layer.low),
+                "x": round_to_json(layer.x),
+                "top": round_to_json(layer.y),
+                "low": round_to_json(layer.low),
             }
-            for layer in threat_cuts(scenario.threats, plane, frozenset())[0]
+            for layer in threat_cuts(scenario.threats, view, frozenset())[0]
         ]
     if len(scenario.zones) <= _MAX_CUTS:
         cuts += [
             {
                 "role": "zone",
                 "name": cut.zone.name,
-                "x": rounded(distance),
-                "top": rounded(np.where(cut.where, cut.top, np.nan)),
-                "low": rounded(cut.bottom),
+                "x": round_to_json(distance),
+                "top": round_to_json(np.where(cut.where, cut.top, np.nan)),
+                "low": round_to_json(cut.bottom),
             }
-            for cut in zone_cuts(scenario.zones, plane)
+            for cut in zone_cuts(scenario.zones, view)
         ]
     return {
-        "at": rounded(at),
-        "x": rounded(distance),
-        "ground": None if ground is None else rounded(ground),
+        "at": round_to_json(waypoint_distance),
+        "x": round_to_json(distance),
+        "ground": None if ground is None else round_to_json(ground),
         "cuts": cuts,
     }

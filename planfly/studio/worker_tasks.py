@@ -23,7 +23,7 @@ from planfly.studio.changes import flight_figures
 from planfly.studio.edit_context import EditContext
 from planfly.studio.pilot import Advance
 from planfly.studio.states import place_states
-from planfly.studio.view_model import findings_json, rounded, states_json, verdict_json
+from planfly.studio.view_model import findings_json, round_to_json, states_json, verdict_json
 from planfly.workflow.airframe import Airframe
 from planfly.workflow.apply_suggestion import can_apply
 from planfly.workflow.make_plan import make_plan
@@ -35,9 +35,9 @@ from world.arrays import Floats
 from world.scenario import Scenario, from_spec
 
 # Maximum duration of a search for one path, for which a user waits, s.
-SECONDS = 25.0
+MAX_SEARCH_SECONDS = 25.0
 # Maximum duration of a search for several paths, s.
-SECONDS_FOR_SEVERAL = 60.0
+MAX_SEARCH_SECONDS_FOR_SEVERAL = 60.0
 # Maximum number of rows of a flown track that the page draws.
 _MAX_DRAWN_ROWS = 1_500
 
@@ -45,65 +45,72 @@ _MAX_DRAWN_ROWS = 1_500
 def fly(payload: tuple[EditContext, Mission], advance: Advance) -> dict[str, Any]:
     """Fly a mission with its simulated autopilot, judge the flight, and return the results as page data.
 
-    Its findings are without suggestions, which `try_suggestions` tries: a failed flight's "judged" is for it, pickled.
+    The findings have no suggestions.  "judged" is the pickled flight for `try_suggestions`, or empty if nothing failed.
     """
-    desk, mission = payload
-    setup = desk.setup(mission)
-    flown = fly_and_judge(setup, desk.airframe, None, advance, reference="never")
-    judged = JudgedMission(mission, setup, flown.requirements, flown.verdict)
-    untried = replace(flown.verdict, findings=with_passing_suggestions(flown.verdict.findings, ()))
-    states = place_states(flown.requirements, flown.verdict.findings)
-    seconds = round(float(flown.track.time[-1]), 1) if len(flown.track) else 0.0
+    context, mission = payload
+    setup = context.setup(mission)
+    flight = fly_and_judge(setup, context.airframe, None, advance, reference="never")
+    judged_mission = JudgedMission(mission, setup, flight.requirements, flight.verdict)
+    verdict_without_suggestions = replace(
+        flight.verdict, findings=with_passing_suggestions(flight.verdict.findings, ())
+    )
+    states = place_states(flight.requirements, flight.verdict.findings)
+    seconds = round(float(flight.track.time[-1]), 1) if len(flight.track) else 0.0
     return {
-        "verdict": verdict_json(flown.verdict),
-        "findings": findings_json(untried),
-        "judged": pickle.dumps(judged) if flown.verdict.failed else b"",
+        "verdict": verdict_json(flight.verdict),
+        "findings": findings_json(verdict_without_suggestions),
+        "judged": pickle.dumps(judged_mission) if flight.verdict.failed else b"",
         "states": states_json(states, 0, setup.route.legs),
         "violated": {"threats": sorted(states.threats), "zones": sorted(states.zones)},
-        "ended": flown.ended,
+        "ended": flight.ended,
         "autopilot": setup.autopilot.title,
         "seconds": seconds,
-        "figures": flight_figures(mission, setup.route, flown.verdict.findings, seconds),
-        **_track_json(setup.route.waypoints, flown.track, flown.verdict.leg_ends),
+        "figures": flight_figures(mission, setup.route, flight.verdict.findings, seconds),
+        **_track_json(setup.route.waypoints, flight.track, flight.verdict.leg_ends),
     }
 
 
 def try_suggestions(payload: tuple[EditContext, bytes], advance: Advance) -> dict[str, Any]:
-    """Return the findings of a flight as page data, with the suggestions that pass a trial flight, and their missions.
+    """Return the findings of a flight as page data, with the suggestions that passed a trial, and their missions.
 
-    The missions are by numbers of finding and suggestion; a suggestion that changes no item has none.
+    The missions are keyed by the numbers of finding and suggestion; a suggestion that changes no item has no mission.
     """
-    desk, pickled = payload
-    judged: JudgedMission = pickle.loads(pickled)
+    context, pickled = payload
+    judged_mission: JudgedMission = pickle.loads(pickled)
 
     def report() -> bool:
         advance(0.0, MAX_TRIAL_FLIGHTS, "trying suggestions")
         return False
 
-    passed = SuggestionTrials(desk, judged, report).passing()
-    findings = with_passing_suggestions(judged.verdict.findings, tried_suggestions(passed))
+    passed_trials = SuggestionTrials(context, judged_mission, report).find_passing()
+    findings = with_passing_suggestions(judged_mission.verdict.findings, tried_suggestions(passed_trials))
     missions = {
-        (number, which): one.setup.mission
-        for number, item in enumerate(judged.verdict.findings)
+        (number, which): trial.setup.mission
+        for number, finding in enumerate(judged_mission.verdict.findings)
         for which, suggestion in enumerate(findings[number].suggestions)
-        for one in passed
-        if one.finding is item and one.suggestion == suggestion and can_apply(suggestion)
+        for trial in passed_trials
+        if trial.finding is finding and trial.suggestion == suggestion and can_apply(suggestion)
     }
-    return {"findings": findings_json(replace(judged.verdict, findings=findings)), "missions": missions}
+    return {"findings": findings_json(replace(judged_mission.verdict, findings=findings)), "missions": missions}
 
 
 def _track_json(route: Floats, track: Track, leg_ends: Sequence[float]) -> dict[str, Any]:
-    """Return a flown track for the map, and its progress along the route for the profile.
+    """Return a flown track for the map, and its distance along the route for the profile.
 
-    leg_ends: time at which each leg but the last ended, by the verdict, s; these times replace the guidance's record.
+    leg_ends: time at which each leg except the last ended according to the verdict, s; these times replace the recorded
+    leg numbers.
     """
     if not len(track):
         return {"track": [], "along": []}
     if len(leg_ends) == len(route) - 2:
         track = replace(track, leg=np.searchsorted(np.array(leg_ends), track.time).astype(track.leg.dtype))
     rows = np.union1d(np.arange(0, len(track), max(1, len(track) // _MAX_DRAWN_ROWS)), [len(track) - 1])
-    along = np.asarray(track_distance(route, track))
-    return {"track": rounded(track.position[rows]), "along": rounded(along[rows]), "time": rounded(track.time[rows])}
+    distance = np.asarray(track_distance(route, track))
+    return {
+        "track": round_to_json(track.position[rows]),
+        "along": round_to_json(distance[rows]),
+        "time": round_to_json(track.time[rows]),
+    }
 
 
 # ----------------------------------------------------------------------
@@ -111,8 +118,8 @@ def _track_json(route: Floats, track: Track, leg_ends: Sequence[float]) -> dict[
 
 
 @dataclass(frozen=True, slots=True)
-class PlanAsked:
-    """Request to plan between two places in the world of a scenario.
+class PlanRequest:
+    """Request to plan between two points of a scenario.
 
     ends: start and destination, (2, 3), m; None for the ends of the scenario.
     algorithm: name of the algorithm; None for the default.
@@ -128,21 +135,21 @@ class PlanAsked:
     ways: int = 1
 
 
-def plan(asked: PlanAsked, advance: Advance) -> list[FrontPlan]:
+def plan(request: PlanRequest, advance: Advance) -> list[FrontPlan]:
     """Plan one or several paths, the shortest first; if no path is safe, return the best one."""
-    scenario = asked.scenario if asked.ends is None else between(asked.scenario, *asked.ends)
-    seconds = SECONDS if asked.ways == 1 else SECONDS_FOR_SEVERAL
-    airframe, seed, stop = asked.airframe, asked.seed, partial(_stop_reason, time.monotonic() + seconds)
+    scenario = request.scenario if request.ends is None else with_ends(request.scenario, *request.ends)
+    seconds = MAX_SEARCH_SECONDS if request.ways == 1 else MAX_SEARCH_SECONDS_FOR_SEVERAL
+    airframe, seed, stop = request.airframe, request.seed, partial(_stop_reason, time.monotonic() + seconds)
     # Between two items of a mission, the path must join the leg after the second.
-    onward = asked.ends is not None
-    if asked.ways > 1:
-        front = make_pareto_plans(scenario, airframe, seed, asked.ways, advance, stop=stop, continues=onward)
+    joins_next_leg = request.ends is not None
+    if request.ways > 1:
+        front = make_pareto_plans(scenario, airframe, seed, request.ways, advance, stop=stop, continues=joins_next_leg)
         return list(front.plans) or [front.default]
-    made = make_plan(scenario, airframe, seed, asked.algorithm, advance, stop=stop, continues=onward)
-    # A single path needs no comparison, so quantities that take longer to compute are left out.
-    length = float(np.linalg.norm(np.diff(made.waypoints, axis=0), axis=1).sum())
-    clearance = float(made.certificate.clearance) + scenario.limits.min_clearance_m
-    return [FrontPlan(made, length, math.nan, clearance, math.nan, math.nan)]
+    new_plan = make_plan(scenario, airframe, seed, request.algorithm, advance, stop=stop, continues=joins_next_leg)
+    # A single path needs no comparison, so quantities that take longer to compute are omitted.
+    length = float(np.linalg.norm(np.diff(new_plan.waypoints, axis=0), axis=1).sum())
+    clearance = float(new_plan.certificate.clearance) + scenario.limits.min_clearance_m
+    return [FrontPlan(new_plan, length, math.nan, clearance, math.nan, math.nan)]
 
 
 def _stop_reason(deadline: float) -> str:
@@ -150,11 +157,11 @@ def _stop_reason(deadline: float) -> str:
     return "budget" if time.monotonic() > deadline else ""
 
 
-def between(scenario: Scenario, start: tuple[float, ...], destination: tuple[float, ...]) -> Scenario:
+def with_ends(scenario: Scenario, start: tuple[float, ...], destination: tuple[float, ...]) -> Scenario:
     """Return a scenario with other ends in the air, without courses.  start, destination: (3,), m."""
     spec = scenario.to_json()
-    for key, (east, north, up) in (("start", start), ("destination", destination)):
-        spec[key] = {"east_m": east, "north_m": north, "amsl_m": up}
+    for key, (east, north, altitude) in (("start", start), ("destination", destination)):
+        spec[key] = {"east_m": east, "north_m": north, "amsl_m": altitude}
     for key in ("launch", "landing"):
         spec.pop(key, None)
     return from_spec(spec, scenario.name, ground=scenario.terrain, external=scenario.external)

@@ -18,7 +18,7 @@ from logs.verdict.trials import least_change
 from logs.verdict.verdict import Verdict
 from planfly.workflow.airframe import Airframe, load_airframe
 from planfly.workflow.open_flight import make_setup
-from planfly.workflow.reference_flights import deciding_parameter
+from planfly.workflow.reference_flights import find_passing_parameter
 from planfly.workflow.trial_flight import Trial
 from world.errors import PlanflyError
 from world.scenario import with_flight
@@ -37,7 +37,7 @@ _MIN_AIRSPEED_RATIO = 1.1
 
 @dataclass(frozen=True, slots=True)
 class SurveyRemedy:
-    """Change of a survey with which it was flown and passed.
+    """Change with which a survey was flown and passed.
 
     kind: kind of the change.  name: name of the changed parameter; "" for other kinds.
     current, value: turn-around in m, interleave stride (fly every n-th line), course in degrees, value of the
@@ -79,8 +79,9 @@ class NearMiss:
 
 @dataclass(frozen=True, slots=True)
 class TriedRemedies:
-    """Result of the trials: the changes with which all lines can be used.
+    """Result of the trials.
 
+    remedies: changes with which all lines can be used.
     nearest: the best change that did not pass, if none passed; None if none was better than the mission itself.
     kept: reason why no other layout was tried; "" if layouts were tried.
     """
@@ -93,10 +94,10 @@ class TriedRemedies:
 def survey_remedies(
     setup: FlightSetup, airframe: Airframe, verdict: Verdict, on_trial: Callable[[str], None] = lambda _: None
 ) -> TriedRemedies:
-    """Find single changes with which all photo lines can be flown, and return the smallest change of each kind.
+    """Find single changes with which all photo lines can be used, and return the smallest change of each kind.
 
-    If no single change is enough, try turn-arounds with a parameter of the autopilot half way to its farthest value, or
-    with a lower airspeed: at most four flights for each of about five changes.
+    If no single change is enough, try longer turn-arounds together with another parameter value or a lower airspeed: at
+    most four flights for each of about five changes.
 
     verdict: verdict on the flight of the setup.  on_trial: called before each flight with a description of the change.
     A change passes if no photo line fails, and no other rule fails that did not fail before.
@@ -104,17 +105,17 @@ def survey_remedies(
     if _all_lines_usable(verdict) or not surveys_of(setup):
         return TriedRemedies()
     trials = _Trials(setup, airframe, verdict, on_trial)
-    longer_turn_around = trials.turn_around()
+    longer_turn_around = trials.find_turn_around()
     candidates = [
-        trials.side(),
+        trials.try_other_side(),
         longer_turn_around,
-        trials.every(math.inf if longer_turn_around is None else longer_turn_around.value),
-        trials.course(),
-        trials.parameter(),
-        trials.airspeed() or trials.mission_airspeed(),
+        trials.find_stride(math.inf if longer_turn_around is None else longer_turn_around.value),
+        trials.find_course(),
+        trials.find_parameter(),
+        trials.airspeed() or trials.try_default_airspeed(),
     ]
     if not any(candidates):
-        candidates.append(trials.parameter_and_turn_around() or trials.airspeed_and_turn_around())
+        candidates.append(trials.find_parameter_and_turn_around() or trials.find_airspeed_and_turn_around())
     remedies = tuple(remedy for remedy in candidates if remedy is not None)
     return TriedRemedies(remedies, None if remedies else trials.nearest, trials.kept)
 
@@ -144,7 +145,7 @@ def _all_lines_usable(verdict: Verdict) -> bool:
 
 
 # Verdict on a flight, the mission that was flown, and the length of its path, m.
-_FlownMission = tuple[Verdict, Mission, float]
+_TrialFlight = tuple[Verdict, Mission, float]
 
 
 class _Trials:
@@ -157,7 +158,7 @@ class _Trials:
         self, setup: FlightSetup, airframe: Airframe, verdict: Verdict, on_trial: Callable[[str], None]
     ) -> None:
         self._setup, self._airframe, self._on_trial = setup, airframe, on_trial
-        self._worst_before, self._verdict, self._change_prefix = _worst_margins(verdict), verdict, ""
+        self._original_worst_margins, self._verdict, self._change_prefix = _worst_margins(verdict), verdict, ""
         lost_legs = {
             finding.place.index for finding in verdict.findings if finding.rule == "survey" and finding.ok is not True
         }
@@ -182,7 +183,7 @@ class _Trials:
         placed = place_stops(mission, scenario.origin, scenario.terrain, vertical_legs=True)
         return make_setup(scenario, airframe, mission, self._setup.seed, placed=placed)
 
-    def _fly(self, mission: Mission, airframe: Airframe, description: str) -> _FlownMission | None:
+    def _fly(self, mission: Mission, airframe: Airframe, description: str) -> _TrialFlight | None:
         """Fly a mission; return None if it has no valid route."""
         description = self._change_prefix + description
         self._on_trial(description)
@@ -191,15 +192,15 @@ class _Trials:
         except PlanflyError:
             return None
         usable, lines = _count_usable(trial.flight_verdict)
-        nearest, failed = self.nearest, len(trial.flight_verdict.failed)
-        best_usable = _count_usable(self._verdict)[0] if nearest is None else nearest.usable
+        best_trial, failed_count = self.nearest, len(trial.flight_verdict.failed)
+        best_usable = _count_usable(self._verdict)[0] if best_trial is None else best_trial.usable
         if usable > best_usable or (
-            nearest is not None and usable == best_usable and failed < len(nearest.verdict.failed)
+            best_trial is not None and usable == best_usable and failed_count < len(best_trial.verdict.failed)
         ):
             self.nearest = NearMiss(description, usable, lines, trial.flight_verdict)
         return trial.flight_verdict, mission, trial.setup.path.length
 
-    def _fly_layout(self, layout: SurveyLayout, description: str) -> _FlownMission | None:
+    def _fly_layout(self, layout: SurveyLayout, description: str) -> _TrialFlight | None:
         """Fly the surveys in another layout; return None if that layout cannot be made."""
         mission, setup = self._setup.mission, self._setup
         # Start with the last survey, because a changed survey may be detected as two, which renumbers later surveys.
@@ -215,38 +216,39 @@ class _Trials:
                 return None
         return self._fly(mission, self._airframe, description)
 
-    def _passes(self, flown: _FlownMission | None) -> TypeGuard[_FlownMission]:
-        """Return True if all lines are usable, no other rule fails than before, and no failure is noticeably worse."""
+    def _passes(self, flight: _TrialFlight | None) -> TypeGuard[_TrialFlight]:
+        """Return True if all lines are usable, no further rule fails, and no failure is noticeably worse."""
         return (
-            flown is not None
-            and _all_lines_usable(flown[0])
+            flight is not None
+            and _all_lines_usable(flight[0])
             and all(
-                rule in self._worst_before and worst >= self._worst_before[rule] - (RULE_WORDS[rule].scale or math.inf)
-                for rule, worst in _worst_margins(flown[0]).items()
+                rule in self._original_worst_margins
+                and worst_margin >= self._original_worst_margins[rule] - (RULE_WORDS[rule].scale or math.inf)
+                for rule, worst_margin in _worst_margins(flight[0]).items()
             )
         )
 
     # ------------------------------------------------------------------
     # The remedies, one change each.
 
-    def turn_around(self) -> SurveyRemedy | None:
-        """Find the shortest turn-around that passes, among those longer than the current one."""
+    def find_turn_around(self) -> SurveyRemedy | None:
+        """Find the shortest turn-around that passes, among the turn-arounds longer than the current one."""
         return self._shortest_turn_around(
-            1, [metres for metres in TURN_AROUNDS if metres > self._current_turn_around + 1.0], 0.0
+            1, [length for length in TURN_AROUNDS if length > self._current_turn_around + 1.0], 0.0
         )
 
-    def side(self) -> SurveyRemedy | None:
+    def try_other_side(self) -> SurveyRemedy | None:
         """Try to fly the lines from the other side, so that turns are into the wind."""
         if self._setup.scenario.wind.speed <= 0.0:
             return None
-        flown = self._fly_layout(
+        flight = self._fly_layout(
             SurveyLayout(self._current_turn_around, backwards=True), "the lines from the other side"
         )
         return (
-            SurveyRemedy("side", "", 0.0, 1.0, "", *flown, self._current_turn_around) if self._passes(flown) else None
+            SurveyRemedy("side", "", 0.0, 1.0, "", *flight, self._current_turn_around) if self._passes(flight) else None
         )
 
-    def every(self, max_turn_around: float) -> SurveyRemedy | None:
+    def find_stride(self, max_turn_around: float) -> SurveyRemedy | None:
         """Find the smallest interleave stride that passes, with turn-arounds shorter than `max_turn_around`, m.
 
         The lead-in to the first line is `max_turn_around`, the turn-around that passes without interleaving.
@@ -254,41 +256,45 @@ class _Trials:
         lead_in = max_turn_around if math.isfinite(max_turn_around) else 0.0
         turn_arounds = [
             self._current_turn_around,
-            *(metres for metres in TURN_AROUNDS if self._current_turn_around + 1.0 < metres < max_turn_around),
+            *(length for length in TURN_AROUNDS if self._current_turn_around + 1.0 < length < max_turn_around),
         ]
         max_line_count = max(len(survey.lines) for survey in self._surveys)
         remedies = (
-            self._shortest_turn_around(every, turn_arounds, lead_in)
-            for every in INTERLEAVE_STRIDES
-            if 2 * every <= max_line_count
+            self._shortest_turn_around(stride, turn_arounds, lead_in)
+            for stride in INTERLEAVE_STRIDES
+            if 2 * stride <= max_line_count
         )
         return next((remedy for remedy in remedies if remedy is not None), None)
 
-    def _shortest_turn_around(self, every: int, turn_arounds: Sequence[float], lead_in: float) -> SurveyRemedy | None:
-        """Bisect increasing turn-arounds, m, for the shortest that makes all lines usable; return it if it passes.
+    def _shortest_turn_around(self, stride: int, turn_arounds: Sequence[float], lead_in: float) -> SurveyRemedy | None:
+        """Find the shortest of increasing turn-arounds, m, with which all lines are usable; return it if it passes.
 
-        A turn-around with which the flight runs out of energy before its end is too long.
+        The search is a bisection.  A turn-around is too long if the flight runs out of energy before its end.
         """
-        order_text = "" if every == 1 else f"every {nth(every)} line, "
-        flights: dict[float, _FlownMission | None] = {}
+        order_text = "" if stride == 1 else f"every {ordinal_text(stride)} line, "
+        flights: dict[float, _TrialFlight | None] = {}
 
-        def long_enough(metres: float) -> bool:
-            layout = SurveyLayout(metres, every, lead_in=lead_in)
-            flown = flights[metres] = self._fly_layout(layout, f"{order_text}turn-arounds of {metres:.0f} m")
-            if flown is None:
+        def is_long_enough(length: float) -> bool:
+            layout = SurveyLayout(length, stride, lead_in=lead_in)
+            flight = flights[length] = self._fly_layout(layout, f"{order_text}turn-arounds of {length:.0f} m")
+            if flight is None:
                 return False
-            runs_out = {"completion", "energy"} <= _worst_margins(flown[0]).keys() - self._worst_before.keys()
-            return runs_out or _all_lines_usable(flown[0])
+            runs_out = {"completion", "energy"} <= _worst_margins(
+                flight[0]
+            ).keys() - self._original_worst_margins.keys()
+            return runs_out or _all_lines_usable(flight[0])
 
-        shortest = least_change(turn_arounds, long_enough)
-        flown = None if shortest is None else flights[shortest]
-        if shortest is None or not self._passes(flown):
+        shortest_length = least_change(turn_arounds, is_long_enough)
+        flight = None if shortest_length is None else flights[shortest_length]
+        if shortest_length is None or not self._passes(flight):
             return None
-        if every == 1:
-            return SurveyRemedy("turn-around", "", self._current_turn_around, shortest, "m", *flown, shortest)
-        return SurveyRemedy("every", "", 1.0, float(every), "lines", *flown, shortest, lead_in)
+        if stride == 1:
+            return SurveyRemedy(
+                "turn-around", "", self._current_turn_around, shortest_length, "m", *flight, shortest_length
+            )
+        return SurveyRemedy("every", "", 1.0, float(stride), "lines", *flight, shortest_length, lead_in)
 
-    def course(self) -> SurveyRemedy | None:
+    def find_course(self) -> SurveyRemedy | None:
         """Try lines along and across the wind; return the shortest route that passes."""
         wind = self._setup.scenario.wind
         if wind.speed <= 0.0:
@@ -296,27 +302,27 @@ class _Trials:
         current_course, remedies = self._surveys[0].course, []
         for course in _other_courses(current_course, wind.from_course):
             current_degrees, degrees = (math.degrees(angle) % 180.0 for angle in (current_course, course))
-            flown = self._fly_layout(
+            flight = self._fly_layout(
                 SurveyLayout(self._current_turn_around, 1, course), f"lines on course {degrees:.0f}°"
             )
-            if self._passes(flown):
+            if self._passes(flight):
                 remedies.append(
-                    SurveyRemedy("course", "", current_degrees, degrees, "deg", *flown, self._current_turn_around)
+                    SurveyRemedy("course", "", current_degrees, degrees, "deg", *flight, self._current_turn_around)
                 )
         return min(remedies, key=lambda remedy: remedy.length, default=None)
 
-    def parameter(self) -> SurveyRemedy | None:
+    def find_parameter(self) -> SurveyRemedy | None:
         """Find an autopilot parameter with which another value passes."""
-        passed_flights: list[_FlownMission] = []
+        passed_flights: list[_TrialFlight] = []
 
-        def passes(law: Autopilot) -> bool:
-            airframe = replace(self._airframe, autopilot=law)
-            flown = self._fly(self._setup.mission, airframe, "another parameter of the autopilot")
-            if self._passes(flown):
-                passed_flights.append(flown)
-            return self._passes(flown)
+        def passes_with(autopilot: Autopilot) -> bool:
+            airframe = replace(self._airframe, autopilot=autopilot)
+            flight = self._fly(self._setup.mission, airframe, "another parameter of the autopilot")
+            if self._passes(flight):
+                passed_flights.append(flight)
+            return self._passes(flight)
 
-        deciding = deciding_parameter(self._airframe.autopilot, self._verdict.findings, passes)
+        deciding = find_passing_parameter(self._airframe.autopilot, self._verdict.findings, passes_with)
         if deciding is None:
             return None
         return SurveyRemedy(
@@ -324,11 +330,11 @@ class _Trials:
         )
 
     def airspeed(self) -> SurveyRemedy | None:
-        """Find the highest reduced airspeed that passes, for a mission that sets no airspeed itself."""
+        """Find the highest reduced airspeed that passes; None for a mission that sets its own airspeed."""
         for speed, airframe in self._slower_airspeeds():
-            flown = self._fly(self._setup.mission, airframe, f"{speed:g} m/s")
-            if self._passes(flown):
-                return SurveyRemedy("airspeed", "", self._airframe.airspeed, speed, "m/s", *flown)
+            flight = self._fly(self._setup.mission, airframe, f"{speed:g} m/s")
+            if self._passes(flight):
+                return SurveyRemedy("airspeed", "", self._airframe.airspeed, speed, "m/s", *flight)
         return None
 
     # ------------------------------------------------------------------
@@ -340,30 +346,32 @@ class _Trials:
         trials._airframe, trials._change_prefix = airframe, f"{change}, "
         if mission is not None:
             trials._setup = replace(self._setup, mission=mission)
-        remedy = trials.turn_around()
+        remedy = trials.find_turn_around()
         self.nearest = trials.nearest
         return remedy
 
-    def parameter_and_turn_around(self) -> SurveyRemedy | None:
-        """Try each parameter of the autopilot half way to its farthest value, with longer turn-arounds."""
-        law = self._airframe.autopilot
+    def find_parameter_and_turn_around(self) -> SurveyRemedy | None:
+        """Try each autopilot parameter half way to its farthest value, together with longer turn-arounds."""
+        autopilot = self._airframe.autopilot
         values = (
-            {} if law.parameters is None else {parameter.name: parameter.value for parameter in law.parameters.values}
+            {}
+            if autopilot.parameters is None
+            else {parameter.name: parameter.value for parameter in autopilot.parameters.values}
         )
-        for name, step, farthest, unit, _ in law.side_candidates if values else ():
+        for name, step, farthest, unit, _ in autopilot.side_candidates if values else ():
             current = values[name]
             value = round(
                 current + math.copysign(step, farthest - current) * (abs(farthest - current) // (2.0 * step)), 6
             )
             if value == current:
                 continue
-            airframe = replace(self._airframe, autopilot=law.with_parameters(**{name: value}))
+            airframe = replace(self._airframe, autopilot=autopilot.with_parameters(**{name: value}))
             remedy = self._turn_around_with(f"{name} {value:g}", airframe)
             if remedy is not None:
                 return replace(remedy, kind="parameter", name=name, current=current, value=value, unit=unit)
         return None
 
-    def airspeed_and_turn_around(self) -> SurveyRemedy | None:
+    def find_airspeed_and_turn_around(self) -> SurveyRemedy | None:
         """Try the lowest of the slower airspeeds with longer turn-arounds."""
         for speed, airframe in [*self._slower_airspeeds()][-1:]:
             remedy = self._turn_around_with(f"{speed:g} m/s", airframe)
@@ -371,7 +379,7 @@ class _Trials:
                 return replace(remedy, kind="airspeed", current=self._airframe.airspeed, value=speed, unit="m/s")
         return None
 
-    def mission_airspeed(self) -> SurveyRemedy | None:
+    def try_default_airspeed(self) -> SurveyRemedy | None:
         """Try the default airspeed with longer turn-arounds, if the mission sets less than the minimum."""
         mission, default_airspeed = self._setup.mission, self._airframe.airspeed
         slow_items = [
@@ -406,13 +414,13 @@ class _Trials:
                 yield speed, load_airframe(with_flight(self._setup.scenario, airspeed_mps=speed))
 
 
-def nth(count: int) -> str:
-    """Return the ordinal of a number as a word.
+def ordinal_text(number: int) -> str:
+    """Return the ordinal of a number as text.
 
-    >>> nth(2), nth(5)
+    >>> ordinal_text(2), ordinal_text(5)
     ('second', '5th')
     """
-    return {2: "second", 3: "third", 4: "fourth"}.get(count, f"{count}th")
+    return {2: "second", 3: "third", 4: "fourth"}.get(number, f"{number}th")
 
 
 def _commanded_airspeed(item: MissionItem) -> float:

@@ -7,13 +7,13 @@ from flight.mission.surveys import Survey
 from logs.verdict.measures.photo_lines import LineMeasure, OverlapMeasure
 from logs.verdict.rules.survey_rule import FRONT, SIDE, lost_text, overlap_text
 from logs.verdict.tolerances import PHOTO_COVERAGE_FRACTION, PHOTO_OVERLAP_FRACTION
-from planfly.surveys.survey_remedies import NearMiss, SurveyRemedy, nth
+from planfly.surveys.survey_remedies import NearMiss, SurveyRemedy, ordinal_text
 
 
-def usable(measure: LineMeasure | None) -> bool:
+def is_line_usable(measure: LineMeasure | None) -> bool:
     """Return True if enough of a photo line is usable.
 
-    >>> usable(None)
+    >>> is_line_usable(None)
     False
     """
     return measure is not None and measure.good >= PHOTO_COVERAGE_FRACTION
@@ -25,7 +25,7 @@ def lines_headline(measures: list[LineMeasure | None]) -> str:
     >>> lines_headline([None, None])
     '0 of 2 photo lines can be used; line 1 is the worst: not flown'
     """
-    usable_count = sum(usable(measure) for measure in measures)
+    usable_count = sum(is_line_usable(measure) for measure in measures)
     summary = f"{usable_count} of {len(measures)} photo lines can be used"
     if usable_count == len(measures):
         return summary
@@ -39,7 +39,7 @@ def lines_headline(measures: list[LineMeasure | None]) -> str:
 
 
 def line_text(number: int, measure: LineMeasure | None) -> str:
-    """Describe the length of one photo line, its usable share, and why the rest is not usable."""
+    """Describe the length of a photo line, its usable fraction, and the causes of the loss."""
     if measure is None:
         return f"line {number:<3} not flown"
     text = f"line {number:<3} {measure.length:6.0f} m  {100.0 * measure.good:5.1f} % can be used"
@@ -85,19 +85,21 @@ def has_required_overlap(measure: OverlapMeasure | None) -> bool:
     )
 
 
-def needed_text(survey: Survey, lines: Sequence[LineMeasure | None]) -> str:
-    """Describe the places from which lines are usable, which shows the turn-arounds that would be needed."""
+def usable_segments_text(survey: Survey, lines: Sequence[LineMeasure | None]) -> str:
+    """Describe how far behind their start the lines become usable, as a hint on the necessary turn-arounds."""
     usable_lines = [measure for measure in lines if measure is not None and measure.good > 0.0]
     if not usable_lines:
         return (
             f"no place of its {len(lines)} lines, {survey.spacing:.0f} m apart, can be used, as there is no "
             "room to turn"
         )
-    latest_start, longest = (
+    latest_start, max_length = (
         max(measure.late for measure in usable_lines),
         max(measure.length for measure in usable_lines),
     )
-    text = f"lines can be used from up to {latest_start:.0f} m behind their begin on; the longest has {longest:.0f} m"
+    text = (
+        f"lines can be used from up to {latest_start:.0f} m behind their begin on; the longest has {max_length:.0f} m"
+    )
     return (
         f"{text}, and {len(lines) - len(usable_lines)} of {len(lines)} none that can"
         if len(usable_lines) < len(lines)
@@ -105,9 +107,12 @@ def needed_text(survey: Survey, lines: Sequence[LineMeasure | None]) -> str:
     )
 
 
-def near_miss_text(near: NearMiss) -> str:
-    """Describe the best trial that did not pass, and the reason why it did not."""
-    return f"{near.what}: {near.usable} of {near.lines} photo lines can be used; {near.verdict.headline}"
+def near_miss_text(near_miss: NearMiss) -> str:
+    """Describe the best trial that did not pass, and the reason of its failure."""
+    return (
+        f"{near_miss.what}: {near_miss.usable} of {near_miss.lines} photo lines can be used;"
+        f" {near_miss.verdict.headline}"
+    )
 
 
 def remedy_text(remedy: SurveyRemedy, length: float) -> str:
@@ -121,7 +126,7 @@ def remedy_text(remedy: SurveyRemedy, length: float) -> str:
             first_line_text = (
                 f" and {remedy.lead_in:.0f} m onto the first" if remedy.lead_in > remedy.turn_around else ""
             )
-            order_text = f"every {nth(round(remedy.value))} line first"
+            order_text = f"every {ordinal_text(round(remedy.value))} line first"
             change = f"{order_text}, with turn-arounds of {remedy.turn_around:.0f} m{first_line_text}"
         case "course":
             change = f"lines on course {remedy.value:.0f}° instead of {remedy.current:.0f}°"

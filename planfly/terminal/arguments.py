@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from logs.importers.open_log import SUFFIXES
-from planfly.arguments import CAMERA, CHOICES, RANGES, is_camera, is_place, is_wind
+from planfly.arguments import CAMERA_FORMAT, CHOICES, RANGES, is_camera, is_place, is_wind
 
 # ----------------------------------------------------------------------
 # Convert command line texts to values within the ranges of the API's keywords.
@@ -37,7 +37,7 @@ def number(keyword: str) -> Callable[[str], Any]:
 
 
 def wind(text: str) -> tuple[float, float]:
-    """Parse SPEED,FROM of a steady wind, m/s and degrees from north."""
+    """Parse SPEED,FROM, the speed of a steady wind, m/s, and the direction it blows from, degrees."""
     try:
         speed, from_deg = (float(part) for part in text.split(","))
     except ValueError:
@@ -61,12 +61,12 @@ def camera(text: str) -> tuple[float, ...]:
     except ValueError:
         numbers = ()
     if not is_camera(numbers) or sensor.lower().count("x") != 1:
-        raise argparse.ArgumentTypeError(f"{text!r}: expected WxH,FOCAL or WxH,FOCAL,FRONT,SIDE: {CAMERA}")
+        raise argparse.ArgumentTypeError(f"{text!r}: expected WxH,FOCAL or WxH,FOCAL,FRONT,SIDE: {CAMERA_FORMAT}")
     return numbers
 
 
 def place(text: str) -> tuple[float, float]:
-    """Parse LAT,LON of a place, degrees."""
+    """Parse LAT,LON of a position, degrees."""
     try:
         lat, lon = (float(part) for part in text.split(","))
     except ValueError:
@@ -79,7 +79,7 @@ def place(text: str) -> tuple[float, float]:
 
 
 def area(text: str) -> tuple[float, ...]:
-    """Parse S,W,N,E, the edges of an area, degrees; the API checks that they form an area."""
+    """Parse S,W,N,E, the edges of an area, degrees; the API checks the order of the edges."""
     try:
         edges = tuple(float(part) for part in text.split(","))
     except ValueError:
@@ -99,7 +99,7 @@ def autopilots(text: str) -> list[str]:
 
 
 def time_or_stations(text: str) -> float | str:
-    """Parse a time of the flight, s, or return the addresses of ground stations, which contain a colon, unchanged."""
+    """Parse a time of the flight, s; return a text with a colon, the addresses of ground stations, unchanged."""
     if ":" in text:
         return text
     return number("end")(text)
@@ -151,9 +151,9 @@ SHELLS = ("bash", "zsh", "fish")
 # Root folder of the embedded files.  It is computed because importing their modules would load NumPy.
 _ROOT = Path(__file__).parents[2]
 # Suffixes of plans and mission files.
-MISSIONS = ("json", "waypoints", "plan", "txt")
+MISSION_SUFFIXES = ("json", "waypoints", "plan", "txt")
 # Suffixes of the logs of other programs.
-IMPORTED_LOGS = ("BIN", "log", *(suffix[1:] for suffix in SUFFIXES))
+IMPORTED_LOG_SUFFIXES = ("BIN", "log", *(suffix[1:] for suffix in SUFFIXES))
 
 
 def with_completer(action: argparse.Action, completer: Completer) -> argparse.Action:
@@ -196,7 +196,7 @@ def complete_aircraft(prefix: str, **_context: object) -> list[str]:
 
 def complete_mission_or_scenario(prefix: str, **context: object) -> list[str]:
     """Return the scenarios, plans and missions that start with `prefix`."""
-    return [*complete_scenario(prefix, **context), *files(*MISSIONS)(prefix)]
+    return [*complete_scenario(prefix, **context), *files(*MISSION_SUFFIXES)(prefix)]
 
 
 def complete_for_shell(parser: argparse.ArgumentParser) -> None:

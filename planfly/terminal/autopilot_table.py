@@ -6,7 +6,7 @@ from logs.verdict.conditions import flown_lines
 from logs.verdict.presentation import RuleFindings
 from logs.verdict.rule_words import RULE_WORDS
 from logs.verdict.verdict import Verdict
-from planfly.terminal.command_parser import STATE_STYLES, coloured
+from planfly.terminal.command_parser import STATE_STYLES, colour_text
 
 # Space between two columns.
 _GAP = "  "
@@ -15,7 +15,7 @@ _GAP = "  "
 def autopilot_lines(verdicts: Mapping[str, Verdict]) -> list[str]:
     """Return the table with a row for each rule, then the first lines of the verdict on each autopilot.
 
-    verdicts: verdict by the name of the autopilot, in the order of the columns.
+    verdicts: verdict for each autopilot, keyed by name, in the order of the columns.
 
     >>> flies = Verdict((), flyable=True, complete=True, lines=("flyable",), level="flown")
     >>> fails = Verdict((), flyable=False, complete=True, lines=("not flyable: speed", "NAV_ACC_RAD 10"), level="flown")
@@ -27,12 +27,12 @@ def autopilot_lines(verdicts: Mapping[str, Verdict]) -> list[str]:
     px4: not flyable: speed; NAV_ACC_RAD 10
     """
     rows = [("", *verdicts), ("verdict", *(_answer_text(verdict) for verdict in verdicts.values()))]
-    by_rule = [{rule.words.name: rule for rule in verdict.present().rules} for verdict in verdicts.values()]
-    for words in RULE_WORDS.values():
-        findings_by_autopilot = [rules.get(words.name) for rules in by_rule]
+    rules_by_name = [{rule.words.name: rule for rule in verdict.present().rules} for verdict in verdicts.values()]
+    for rule_words in RULE_WORDS.values():
+        findings_by_autopilot = [rules.get(rule_words.name) for rules in rules_by_name]
         if any(findings_by_autopilot):
-            rows.append((words.title, *map(_rule_summary, findings_by_autopilot)))
-    widths = [max(len(row[k]) for row in rows) for k in range(len(rows[0]))]
+            rows.append((rule_words.title, *map(_rule_summary, findings_by_autopilot)))
+    widths = [max(len(row[column]) for row in rows) for column in range(len(rows[0]))]
     lines = []
     for title, *cells in rows:
         padded = [f"{cell:<{width}}" for cell, width in zip(cells, widths[1:], strict=True)]
@@ -41,7 +41,7 @@ def autopilot_lines(verdicts: Mapping[str, Verdict]) -> list[str]:
         first, *other_lines = verdict.lines or ("",)
         # If another parameter value passes, the second line of the verdict names that value.
         remedy = f"; {other_lines[0]}" if other_lines and not verdict.flyable else ""
-        lines.append(f"{name}: " + coloured(first, STATE_STYLES[verdict.state]) + remedy)
+        lines.append(f"{name}: " + colour_text(first, STATE_STYLES[verdict.state]) + remedy)
         if verdict.conditions is not None:
             condition_texts = flown_lines(verdict.conditions)
             lines += [f"  {line}" for line in condition_texts]
@@ -55,7 +55,7 @@ def _answer_text(verdict: Verdict) -> str:
 
 
 def _rule_summary(rule: RuleFindings | None) -> str:
-    """Return the number of findings of a rule that failed, or the number of passing findings if none failed."""
+    """Return the number of failed findings of a rule, or the number of judged findings if none failed."""
     if rule is None or not rule.judged:
         return "not judged" if rule else ""
     return f"{len(rule.failed)} of {rule.judged} failed" if rule.failed else f"{rule.judged} ok"

@@ -41,12 +41,12 @@ def wants_colour(stream: TextIO) -> bool:
     return stream.isatty() and os.environ.get("TERM", "") != "dumb"
 
 
-def coloured(text: str, style: Style, stream: TextIO | None = None) -> str:
+def colour_text(text: str, style: Style, stream: TextIO | None = None) -> str:
     """Return a text in a style if the stream is shown in colour, otherwise unchanged.
 
     stream: None for standard output.
 
-    >>> coloured("flyable", "good")
+    >>> colour_text("flyable", "good")
     'flyable'
     """
     if not wants_colour(stream if stream is not None else sys.stdout):
@@ -60,10 +60,10 @@ _HEADING = re.compile(r"^(\S[^\n]*:)(?=$| planfly)", re.MULTILINE)
 _OPTION_IN_TEXT = re.compile(r"(?<![\w/-])--?[a-z][a-z-]*")
 
 
-def coloured_help(text: str) -> str:
+def colour_help(text: str) -> str:
     r"""Return a help text with colours for a terminal; the text itself is not changed.
 
-    >>> coloured_help("usage: planfly fly [--at TIME]").split("\x1b")
+    >>> colour_help("usage: planfly fly [--at TIME]").split("\x1b")
     ['', '[33musage:', '[0m planfly fly [', '[36m--at', '[0m TIME]']
     """
     for pattern, code in ((_OPTION_IN_TEXT, _STYLES["hint"]), (_HEADING, _STYLES["warning"])):
@@ -72,10 +72,10 @@ def coloured_help(text: str) -> str:
 
 
 # Long option as one word.
-_OPTION = re.compile(r"--[a-z][a-z-]*")
+_LONG_OPTION = re.compile(r"--[a-z][a-z-]*")
 
 
-class OptionTaker(Protocol):
+class OptionGroup(Protocol):
     """Parser, or group of a parser's options."""
 
     def add_argument(self, *names: str, **settings: Any) -> argparse.Action:
@@ -94,18 +94,18 @@ class CommandParser(argparse.ArgumentParser):
     def error(self, message: str) -> NoReturn:
         """Print the message in one line, like for all other bad input, and exit."""
         line = f"{self.prog}: {message} (see {self.prog} --help)"
-        self.exit(BAD_INPUT, coloured(line, "bad", sys.stderr) + "\n")
+        self.exit(BAD_INPUT, colour_text(line, "bad", sys.stderr) + "\n")
 
     def format_help(self) -> str:
-        """Return the help text, with the paragraph `extra_text`, which is made only when the help is printed."""
+        """Return the help text with the paragraph of `extra_help`."""
         epilog, extra_text = self.epilog, self.extra_help()
         if extra_text:
             self.epilog = (epilog or "").replace(EXIT_CODES, f"{extra_text}\n\n{EXIT_CODES}")
         text = super().format_help()
         self.epilog = epilog
-        return coloured_help(text) if wants_colour(sys.stdout) else text
+        return colour_help(text) if wants_colour(sys.stdout) else text
 
-    def group(self, title: str, description: str | None = None) -> OptionTaker:
+    def group(self, title: str, description: str | None = None) -> OptionGroup:
         """Add a group of options, which the help shows under a title, and return it."""
         return self.add_argument_group(title, description)
 
@@ -114,13 +114,13 @@ class CommandParser(argparse.ArgumentParser):
         self._aliases[keyword] = option
 
     def keywords(self) -> dict[str, str]:
-        """Return the options by API keyword."""
+        """Return the option for each API keyword."""
         options_by_dest = {action.dest: action.option_strings[-1] for action in self._actions if action.option_strings}
         return options_by_dest | self._aliases
 
     def options(self) -> list[str]:
         """Return the long options of the parser."""
-        return list(dict.fromkeys(_OPTION.findall(self.format_usage())))
+        return list(dict.fromkeys(_LONG_OPTION.findall(self.format_usage())))
 
 
 class LineParser(CommandParser):
@@ -177,7 +177,7 @@ class LineParser(CommandParser):
     def parse_args(  # type: ignore[override]
         self, args: Sequence[str] | None = None, namespace: argparse.Namespace | None = None
     ) -> argparse.Namespace:
-        """Return the arguments by name.  For bad usage, print one line with a suggestion and raise SystemExit."""
+        """Parse the command line.  For bad usage, print one line with a suggestion and raise SystemExit."""
         words = _join_negative_numbers(sys.argv[1:] if args is None else list(args))
         if words and not words[0].startswith("-") and words[0] not in self.commands:
             hint = did_you_mean(words[0], self.commands) or f"; there are {', '.join(self.commands)}"
@@ -198,15 +198,15 @@ class LineParser(CommandParser):
         return parsed
 
 
-# Several numbers of which the first is negative, which argparse would take for an option.
-_NEGATIVES = re.compile(r"-\.?\d[^=]*")
+# Comma-separated numbers that start with a negative number, which argparse would take for an option.
+_NEGATIVE_NUMBERS = re.compile(r"-\.?\d[^=]*")
 
 
 def _join_negative_numbers(words: list[str]) -> list[str]:
-    """Return a command line with each negative number joined to the option before it, as in --from=-33.9,18.4."""
+    """Join each negative number of a command line to the option before it, as in --from=-33.9,18.4."""
     joined_words: list[str] = []
     for word in words:
-        if _NEGATIVES.fullmatch(word) and joined_words and _OPTION.fullmatch(joined_words[-1]):
+        if _NEGATIVE_NUMBERS.fullmatch(word) and joined_words and _LONG_OPTION.fullmatch(joined_words[-1]):
             joined_words[-1] += f"={word}"
         else:
             joined_words.append(word)
@@ -221,7 +221,7 @@ _KEYWORD = re.compile(r"`(\w+)`|\b(\w+)=True\b")
 
 
 def error_text(error: PlanflyError, parser: CommandParser) -> str:
-    """Return the text of an error, with keywords of the API replaced by the options of a command.
+    """Return an error's text in which keywords of the API are replaced by the options of a command.
 
     >>> parser = CommandParser(prog="planfly replay")
     >>> _ = parser.add_argument("--from", dest="start")

@@ -1,6 +1,6 @@
 """Add options that several commands share, and call the API with them.
 
-The dest of an option is the matching keyword of the API, so that `call` passes it without further code.
+The dest of an option is the matching keyword of the API, so that `call_api` passes it without further code.
 """
 
 import argparse
@@ -13,7 +13,7 @@ from typing import Any, TypeVar
 
 from planfly.arguments import CHOICES
 from planfly.terminal.arguments import (
-    MISSIONS,
+    MISSION_SUFFIXES,
     complete_aircraft,
     complete_scenario,
     files,
@@ -21,25 +21,25 @@ from planfly.terminal.arguments import (
     wind,
     with_completer,
 )
-from planfly.terminal.command_parser import CommandParser, OptionTaker
+from planfly.terminal.command_parser import CommandParser, OptionGroup
 from world.airspace.zone_suffixes import SUFFIXES as ZONES
 from world.elevation_formats import EMBEDDED, SUFFIXES
 
 Result = TypeVar("Result")
 
 
-def call(function: Callable[..., Result], args: argparse.Namespace, **overrides: Any) -> Result:
+def call_api(function: Callable[..., Result], args: argparse.Namespace, **overrides: Any) -> Result:
     """Call a function of the API with the options that match its keywords, and return its result.
 
-    Options that were not given (None) leave the keyword at its default.
+    An option that was not given (None) leaves its keyword at the default.
     overrides: keywords that override the options.
 
-    >>> call(lambda *, seed=1, out="here": (seed, out), argparse.Namespace(seed=3, out=None, json=None))
+    >>> call_api(lambda *, seed=1, out="here": (seed, out), argparse.Namespace(seed=3, out=None, json=None))
     (3, 'here')
     """
-    keywords = inspect.signature(function).parameters
-    arguments = {name: value for name, value in vars(args).items() if name in keywords} | overrides
-    return function(**{name: value for name, value in arguments.items() if value is not None})
+    parameters = inspect.signature(function).parameters
+    options = {name: value for name, value in vars(args).items() if name in parameters} | overrides
+    return function(**{name: value for name, value in options.items() if value is not None})
 
 
 # ----------------------------------------------------------------------
@@ -67,7 +67,7 @@ def result_options(
         )
 
 
-def json_option(group: OptionTaker, command: str) -> None:
+def json_option(group: OptionGroup, command: str) -> None:
     """Add the options for an answer as JSON, and for no printed text."""
     group.add_argument(
         "--json",
@@ -84,7 +84,7 @@ def json_option(group: OptionTaker, command: str) -> None:
 # Options for the world of a flight, its aircraft and its autopilot.
 
 
-def world_options(parser: CommandParser) -> OptionTaker:
+def world_options(parser: CommandParser) -> OptionGroup:
     """Add the options for the world in which a mission is judged, and return their group."""
     group = parser.group("where it flies")
     with_completer(
@@ -98,15 +98,15 @@ def world_options(parser: CommandParser) -> OptionTaker:
     return group
 
 
-def terrain_option(group: OptionTaker) -> None:
+def terrain_option(group: OptionGroup) -> None:
     """Add the option for the terrain."""
     suffixes, names = ", ".join(SUFFIXES), ", ".join(EMBEDDED)
     help_text = f"elevation file ({suffixes}), a folder or .vrt of such tiles, or an embedded name: {names}"
     group.add_argument("--terrain", metavar="DEM", help=help_text)
 
 
-def fence_option(group: OptionTaker) -> None:
-    """Add the option for fences in addition to the mission's own."""
+def fence_option(group: OptionGroup) -> None:
+    """Add the option for fences in addition to the fences of the mission."""
     option = group.add_argument(
         "--fence",
         metavar="FILE",
@@ -115,10 +115,10 @@ def fence_option(group: OptionTaker) -> None:
         help="also keep within this fence: .fence, .waypoints, .txt or .plan, or zones: .geojson, .json (of ED-269 and "
         "ED-318, too), .kml, .openair, .gpkg; repeatable",
     )
-    with_completer(option, files("fence", *(suffix[1:] for suffix in ZONES), *MISSIONS))
+    with_completer(option, files("fence", *(suffix[1:] for suffix in ZONES), *MISSION_SUFFIXES))
 
 
-def time_option(group: OptionTaker) -> None:
+def time_option(group: OptionGroup) -> None:
     """Add the option for the time of the flight."""
     group.add_argument(
         "--at",
@@ -156,14 +156,14 @@ def aircraft_and_wind_options(parser: CommandParser) -> None:
     time_option(group)
 
 
-def turbulence_option(group: OptionTaker) -> None:
+def turbulence_option(group: OptionGroup) -> None:
     """Add the option for the turbulence."""
     group.add_argument(
         "--turbulence", choices=CHOICES["turbulence"], help="turbulence (default: the scenario's, or none)"
     )
 
 
-def autopilot_options(parser: CommandParser) -> OptionTaker:
+def autopilot_options(parser: CommandParser) -> OptionGroup:
     """Add the options for the autopilot, and return their group."""
     group = parser.group("autopilot")
     option = group.add_argument(
@@ -188,7 +188,7 @@ def autopilot_options(parser: CommandParser) -> OptionTaker:
     return group
 
 
-def steering_options(parser: CommandParser) -> OptionTaker:
+def steering_options(parser: CommandParser) -> OptionGroup:
     """Add the options for the autopilot and its position errors, and return their group."""
     group = autopilot_options(parser)
     group.add_argument(
@@ -200,7 +200,7 @@ def steering_options(parser: CommandParser) -> OptionTaker:
     return group
 
 
-def program_option(group: OptionTaker, help_text: str) -> None:
+def program_option(group: OptionGroup, help_text: str) -> None:
     """Add the option for the program of an autopilot.  help_text: help text."""
     group.add_argument("--sitl", metavar="PATH", help=help_text)
 
@@ -243,7 +243,7 @@ def flight_options(parser: CommandParser) -> None:
     )
 
 
-def log_rate_option(group: OptionTaker) -> None:
+def log_rate_option(group: OptionGroup) -> None:
     """Add the option for the rows per second in the log."""
     group.add_argument(
         "--log-hz",
@@ -256,12 +256,12 @@ def log_rate_option(group: OptionTaker) -> None:
 
 
 def imported_log_options(parser: CommandParser) -> None:
-    """Add the options for facts that a log of another program does not state."""
+    """Add the options for information that may be missing in a log of another program."""
     group = parser.group("an autopilot's log")
     option = group.add_argument(
         "--plan", metavar="MISSION", help="mission that was to be flown (default: the mission in the log)"
     )
-    with_completer(option, files(*MISSIONS))
+    with_completer(option, files(*MISSION_SUFFIXES))
     group.add_argument(
         "--flight",
         metavar="N",
@@ -308,7 +308,7 @@ def own_link_options(parser: CommandParser, *, bind: str) -> None:
 
 @contextlib.contextmanager
 def watch_stop_signals() -> Iterator[Callable[[], bool]]:
-    """Yield a function that returns True after SIGINT or SIGTERM; these do not interrupt the closing of logs."""
+    """Yield a function that returns True after SIGINT or SIGTERM; the signals do not interrupt the closing of logs."""
     should_stop = False
 
     def request_stop(_number: int, _frame: FrameType | None) -> None:
@@ -323,6 +323,6 @@ def watch_stop_signals() -> Iterator[Callable[[], bool]]:
             signal.signal(number, handler)
 
 
-def print_at_once(text: str) -> None:
+def print_and_flush(text: str) -> None:
     """Print a line of a long-running command, and flush the stream."""
     print(text, flush=True)

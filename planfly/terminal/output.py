@@ -104,9 +104,9 @@ def _with_stream_name(error: OSError) -> OSError:
 
 
 def open_standard_streams() -> None:
-    """Open those of the three standard streams that are closed, and let them accept any text.
+    """Open closed standard streams, and let all three accept any text.
 
-    If one stayed closed, the next file would get its descriptor, and text that a library prints would go to that file.
+    If a stream stayed closed, the next file would get its descriptor, and text printed by a library would go there.
     """
     for descriptor in range(3):
         try:
@@ -134,14 +134,14 @@ def printable(text: str) -> str:
 
 
 def plain_stream(stream: TextIO) -> TextIO:
-    """Return the stream for text that moves the cursor, below a stream without control characters."""
+    """Return the underlying stream, which accepts text that moves the cursor."""
     plain: TextIO = getattr(stream, "plain", stream)
     return plain
 
 
 @contextlib.contextmanager
 def safe_streams() -> Iterator[None]:
-    """Keep control characters from both standard streams, and tolerate that the reader of standard output closes it."""
+    """Keep control characters out of standard output and error, and tolerate a reader that closes standard output."""
     tolerant = _TolerantStream(sys.stdout)
     with contextlib.redirect_stdout(tolerant), contextlib.redirect_stderr(_SafeStream(sys.stderr)):
         try:
@@ -160,11 +160,12 @@ _MAX_BYTES = 20_000
 class _LastDuration(NamedTuple):
     """Duration of the previous stage of a kind.
 
-    each: seconds per unit of work, 0 if its units are unknown.  whole: seconds for the whole stage.
+    per_unit: seconds per unit of work, 0 if its units are unknown.
+    total: seconds for the whole stage.
     """
 
-    each: float
-    whole: float
+    per_unit: float
+    total: float
 
 
 def _durations_file() -> Path:
@@ -178,8 +179,8 @@ def _last_durations() -> dict[str, _LastDuration]:
     """Return the last duration by kind of stage; empty if the file is missing or invalid."""
     durations = {}
     with contextlib.suppress(OSError, ValueError, RecursionError):
-        stored = json.loads(read_at_most(_durations_file(), _MAX_BYTES, "durations"))
-        for kind, values in stored.items() if isinstance(stored, dict) else ():
+        stored_durations = json.loads(read_at_most(_durations_file(), _MAX_BYTES, "durations"))
+        for kind, values in stored_durations.items() if isinstance(stored_durations, dict) else ():
             numbers = values if isinstance(values, list) and len(values) == 2 else [math.nan]
             if all(isinstance(value, int | float) and 0.0 <= value < math.inf for value in numbers):
                 durations[str(kind)] = _LastDuration(*map(float, numbers))
@@ -226,10 +227,10 @@ class _TimeLeft:
         self._kind, self._number = kind, next(_stage_numbers)
         self._started = time.monotonic()
         self._first_report: tuple[float, float] | None = None
-        self._done, self._due = 0.0, _FIRST_REPORT_DELAY_S
+        self._done, self._next_report_time = 0.0, _FIRST_REPORT_DELAY_S
 
     def estimate(self, done: float, total: float) -> str:
-        """Return the time left as text; "" without progress since the first report, at the end, or without a total."""
+        """Return the time left as text; "" at the end, without a total, or without progress since the first report."""
         if self._first_report is None:
             self._first_report = time.monotonic(), done
         self._done, units_done = done, done - self._first_report[1]
@@ -237,21 +238,23 @@ class _TimeLeft:
             return ""
         return f"{_duration_text(self._measured_time() * (total - done) / units_done)} left"
 
-    def initial_estimate(self, to_do: float) -> str:
-        """Return an estimate as text before any progress is measured.  to_do: units of work, 0 if unknown."""
-        last = _last_durations().get(self._kind)
-        if last is not None and to_do > 0.0 and last.each > 0.0:
-            return f"about {_duration_text(last.each * to_do)}, at the pace of the last time here"
-        if last is not None:
-            return f"the last one here took {_duration_text(last.whole)}"
-        return "no estimate yet" if to_do > 0.0 else "no estimate"
+    def initial_estimate(self, remaining_units: float) -> str:
+        """Return an estimate as text before any progress is measured.  remaining_units: units of work, 0 if unknown."""
+        last_duration = _last_durations().get(self._kind)
+        if last_duration is not None and remaining_units > 0.0 and last_duration.per_unit > 0.0:
+            return (
+                f"about {_duration_text(last_duration.per_unit * remaining_units)}, at the pace of the last time here"
+            )
+        if last_duration is not None:
+            return f"the last one here took {_duration_text(last_duration.total)}"
+        return "no estimate yet" if remaining_units > 0.0 else "no estimate"
 
     def is_due(self) -> bool:
-        """Return True if the next progress line is due, and schedule the one after it."""
-        passed = self._measured_time()
-        if passed < self._due:
+        """Return True if the next progress line is due, and schedule the line after that."""
+        elapsed = self._measured_time()
+        if elapsed < self._next_report_time:
             return False
-        self._due = min(_REPORT_INTERVAL_RATIO * passed, passed + _MAX_REPORT_INTERVAL_S)
+        self._next_report_time = min(_REPORT_INTERVAL_RATIO * elapsed, elapsed + _MAX_REPORT_INTERVAL_S)
         return True
 
     def elapsed(self) -> float:
@@ -271,7 +274,7 @@ class _TimeLeft:
 
 
 def _duration_text(seconds: float) -> str:
-    """Return an estimated duration in words.
+    """Return an estimated duration as text.
 
     >>> _duration_text(0.4), _duration_text(89.0), _duration_text(600.0), _duration_text(9000.0)
     ('1 s', '89 s', '10 min', '2.5 h')
@@ -291,20 +294,20 @@ def progress(title: str, kind: str = "") -> Iterator[Advance]:
     """
     time_left = _TimeLeft(kind or title)
     display = _Bar(title, time_left) if sys.stderr.isatty() else _Lines(title, time_left)
-    with display, _refreshed_regularly(display):
+    with display, _refresh_regularly(display):
         yield display.advance
     time_left.store_duration()
 
 
 @contextmanager
-def _refreshed_regularly(display: "_Bar | _Lines") -> Iterator[None]:
+def _refresh_regularly(display: "_Bar | _Lines") -> Iterator[None]:
     """Update the elapsed time of a stage at intervals from a thread, or not at all if no thread can start."""
-    ended = threading.Event()
+    stage_ended = threading.Event()
 
     def refresh() -> None:
         # The reader of the stream may have gone; the work itself handles this error.
         with contextlib.suppress(OSError, ValueError):
-            while not ended.wait(_REFRESH_INTERVAL_S):
+            while not stage_ended.wait(_REFRESH_INTERVAL_S):
                 display.refresh()
 
     thread = threading.Thread(target=refresh, name="progress", daemon=True)
@@ -313,10 +316,10 @@ def _refreshed_regularly(display: "_Bar | _Lines") -> Iterator[None]:
     try:
         yield
     finally:
-        ended.set()
+        stage_ended.set()
 
 
-def _join_texts(*parts: str) -> str:
+def _join_nonempty(*parts: str) -> str:
     return ", ".join(filter(None, parts))
 
 
@@ -334,7 +337,7 @@ class _Bar:
     def __init__(self, title: str, time_left: _TimeLeft) -> None:
         from tqdm import tqdm
 
-        self._left, self._lock = time_left, threading.Lock()
+        self._time_left, self._lock = time_left, threading.Lock()
         self._remark, self._is_measured = "", False
         self._initial_estimate = time_left.initial_estimate(0.0)
         bar_format = "{desc:<22} {bar:30} {percentage:3.0f} %{postfix}"
@@ -356,21 +359,21 @@ class _Bar:
         with self._lock:
             percent = 100.0 * done / total if total > 0 else 0.0
             self._bar.update(max(0.0, min(100.0, percent) - self._bar.n))
-            estimate = self._left.estimate(done, total)
+            estimate = self._time_left.estimate(done, total)
             self._remark = remark
             if estimate or _states_time_left(remark) or 0.0 < total <= done:
                 self._is_measured = True
             if not self._is_measured:
-                self._initial_estimate = self._left.initial_estimate(max(0.0, total - done))
+                self._initial_estimate = self._time_left.initial_estimate(max(0.0, total - done))
                 estimate = self._initial_estimate
-            text = _join_texts(remark, "" if _states_time_left(remark) else estimate)
+            text = _join_nonempty(remark, "" if _states_time_left(remark) else estimate)
             self._bar.set_postfix_str(printable(text))
 
     def refresh(self) -> None:
         """Show the elapsed time until progress is measured."""
         with self._lock:
             if not self._is_measured and not self._bar.disable:
-                text = _join_texts(self._remark, self._initial_estimate, f"{self._left.elapsed():.0f} s so far")
+                text = _join_nonempty(self._remark, self._initial_estimate, f"{self._time_left.elapsed():.0f} s so far")
                 self._bar.set_postfix_str(printable(text))
 
 
@@ -381,7 +384,7 @@ class _Lines:
     """
 
     def __init__(self, title: str, time_left: _TimeLeft) -> None:
-        self._title, self._left, self._lock = title, time_left, threading.Lock()
+        self._title, self._time_left, self._lock = title, time_left, threading.Lock()
         self._remark, self._printed_at = "", 0.0
         self._has_started = self._knows_total = self._is_over = False
 
@@ -393,51 +396,53 @@ class _Lines:
             self._is_over = True
             if error is None:
                 remark_text = f": {self._remark}" if self._remark else ""
-                _print_line(f"{self._title}: done in {self._left.elapsed():.1f} s{remark_text}")
+                _print_line(f"{self._title}: done in {self._time_left.elapsed():.1f} s{remark_text}")
 
     def advance(self, done: float, total: float, remark: str = "") -> None:
         """Print the progress of the work if a line is due."""
         with self._lock:
             self._remark = remark
-            estimate = self._left.estimate(done, total)
+            estimate = self._time_left.estimate(done, total)
             knew_total, self._knows_total = self._knows_total, self._knows_total or total > 0.0
             estimate_at_start = (
                 ""
                 if knew_total
                 else remark
                 if _states_time_left(remark)
-                else self._left.initial_estimate(max(0.0, total - done))
+                else self._time_left.initial_estimate(max(0.0, total - done))
             )
             if not self._has_started:
                 self._print_first_line(
                     estimate_at_start
                     if _states_time_left(remark)
-                    else _join_texts(remark if total > 0.0 else "", estimate_at_start)
+                    else _join_nonempty(remark if total > 0.0 else "", estimate_at_start)
                 )
             elif total > 0.0 and not knew_total:
                 # The first line was printed before the total was known.
                 self._print(
-                    f"{self._title}: {_join_texts('' if _states_time_left(remark) else remark, estimate_at_start)}"
+                    f"{self._title}: {_join_nonempty('' if _states_time_left(remark) else remark, estimate_at_start)}"
                 )
-            elif estimate and self._left.is_due():
-                self._print(f"{self._title}: {_join_texts(remark, '' if _states_time_left(remark) else estimate)}")
+            elif estimate and self._time_left.is_due():
+                self._print(f"{self._title}: {_join_nonempty(remark, '' if _states_time_left(remark) else estimate)}")
 
     def refresh(self) -> None:
-        """Name a stage that reports nothing, and print its elapsed time at intervals."""
+        """Print the first line of a stage that reports nothing, and then its elapsed time at intervals."""
         with self._lock:
             if self._is_over:
                 return
             if not self._has_started:
-                self._print_first_line(self._left.initial_estimate(0.0))
-            elif self._left.elapsed() - self._printed_at >= _MAX_REPORT_INTERVAL_S:
-                self._print(f"{self._title}: {_join_texts(self._remark, f'{self._left.elapsed():.0f} s so far')}")
+                self._print_first_line(self._time_left.initial_estimate(0.0))
+            elif self._time_left.elapsed() - self._printed_at >= _MAX_REPORT_INTERVAL_S:
+                self._print(
+                    f"{self._title}: {_join_nonempty(self._remark, f'{self._time_left.elapsed():.0f} s so far')}"
+                )
 
     def _print_first_line(self, estimate: str) -> None:
         self._has_started = True
         self._print(f"{self._title} ... ({estimate})")
 
     def _print(self, line: str) -> None:
-        self._printed_at = self._left.elapsed()
+        self._printed_at = self._time_left.elapsed()
         _print_line(line)
 
 
@@ -470,13 +475,13 @@ _output: ContextVar[TextIO | None] = ContextVar("output", default=None)
 
 
 @contextlib.contextmanager
-def redirected_output(args: argparse.Namespace) -> Iterator[None]:
+def redirect_output(args: argparse.Namespace) -> Iterator[None]:
     """Redirect printed lines: to nowhere with --quiet, to standard error if standard output gets the answer.
 
     Raises PlanflyError if the file for the answer exists, or if the command reads this file.
     """
-    answer, quiet = getattr(args, "json", None), getattr(args, "quiet", False)
-    for target in (answer, getattr(args, "junit", None)):
+    answer_target, quiet = getattr(args, "json", None), getattr(args, "quiet", False)
+    for target in (answer_target, getattr(args, "junit", None)):
         if target not in (None, STANDARD_OUTPUT):
             _check_not_input(Path(target), args)
             check_output_file(Path(target), getattr(args, "overwrite", False))
@@ -487,22 +492,22 @@ def redirected_output(args: argparse.Namespace) -> Iterator[None]:
             if quiet:
                 null_file = contexts.enter_context(Path(os.devnull).open("w", encoding="utf-8"))
                 contexts.enter_context(contextlib.redirect_stdout(null_file))
-            elif answer == STANDARD_OUTPUT:
+            elif answer_target == STANDARD_OUTPUT:
                 contexts.enter_context(contextlib.redirect_stdout(sys.stderr))
             yield
     finally:
         _output.reset(token)
 
 
-def give_answer(args: argparse.Namespace, answer: Callable[[], object | str]) -> None:
-    """Write the answer of a command if one was requested; it is computed only then.
+def write_json_if_requested(args: argparse.Namespace, make_answer: Callable[[], object | str]) -> None:
+    """Write the answer of a command as JSON if requested.
 
-    answer: returns an instance of a class of `planfly.terminal.answers`, or its text.
+    make_answer: returns an instance of a class of `planfly.terminal.answers`, or JSON text; called only if requested.
     """
     target = getattr(args, "json", None)
     if target is None:
         return
-    content = answer()
+    content = make_answer()
     text = content if isinstance(content, str) else answer_text(content)
     if target == STANDARD_OUTPUT:
         print(escaped_json(text), end="", file=_output.get() or sys.stdout)
@@ -510,26 +515,26 @@ def give_answer(args: argparse.Namespace, answer: Callable[[], object | str]) ->
         write_whole(Path(target), text)
 
 
-def give_junit(args: argparse.Namespace, verdicts: Mapping[str, "Verdict"]) -> None:
-    """Write verdicts as JUnit XML if requested.  verdicts: by the name of the judged mission or flight."""
+def write_junit_if_requested(args: argparse.Namespace, verdicts: Mapping[str, "Verdict"]) -> None:
+    """Write verdicts as JUnit XML if requested.  verdicts: verdict of each judged mission or flight, keyed by name."""
     if args.junit is not None:
         from logs.verdict.junit import junit_text
 
         write_whole(Path(args.junit), junit_text({name: verdict.present() for name, verdict in verdicts.items()}))
 
 
-def give_junit_error(args: argparse.Namespace, message: str) -> None:
-    """Write an error as JUnit XML if requested.  message: the line that the command ends with."""
+def write_junit_error_if_requested(args: argparse.Namespace, message: str) -> None:
+    """Write an error as JUnit XML if requested.  message: line that the command prints at its end."""
     target = getattr(args, "junit", None)
     if target is not None:
         from logs.verdict.junit import junit_error_text
 
-        judged = next(getattr(args, name) for name in ("what", "mission", "scenario", "log") if hasattr(args, name))
-        write_whole(Path(target), junit_error_text(str(judged), message))
+        source = next(getattr(args, name) for name in ("what", "mission", "scenario", "log") if hasattr(args, name))
+        write_whole(Path(target), junit_error_text(str(source), message))
 
 
 def _check_not_input(target: Path, args: argparse.Namespace) -> None:
-    """Raise PlanflyError if the answer would be written to a file that another argument of the command line names."""
+    """Raise PlanflyError if another argument of the command line names the target file."""
     file_names = [
         value for key, value in vars(args).items() if isinstance(value, str) and key not in ("json", "junit", "command")
     ]

@@ -81,25 +81,25 @@ def front_answer(front: "Front", folder: Path, code: int) -> FrontAnswer:
     from planfly.api.fronts import table_rows
     from planfly.api.planning import conditions_of_plan
 
-    default = front.default.plan
+    default_plan = front.default.plan
     entries = []
     for row in table_rows(front):
         number = row.pop("plan")
         entries.append(FrontEntry(file=str(folder / f"plan-{number}.json"), **row))
     return FrontAnswer(
         exit_code=code,
-        scenario=default.scenario.name,
-        seed=default.seed,
+        scenario=default_plan.scenario.name,
+        seed=default_plan.seed,
         folder=str(folder),
         fourth="time" if front.fourth == "time" else "energy",
         asked=front.asked,
         plans=entries,
-        problems=[] if front.plans else list(default.certificate.problems),
-        conditions=conditions_of_plan(default),
+        problems=[] if front.plans else list(default_plan.certificate.problems),
+        conditions=conditions_of_plan(default_plan),
     )
 
 
-def fewer_line(front: "Front") -> str:
+def fewer_plans_line(front: "Front") -> str:
     """Return a line with the reason why a front has fewer plans than requested."""
     from planner.search.plan_front import NOTICED, NOTICED_CLEARANCE, NOTICED_EXPOSURE
 
@@ -117,11 +117,11 @@ def front_lines(front: "Front", folder: Path) -> list[str]:
     from planfly.api.fronts import PICTURES
     from planfly.api.planning import conditions_of_plan
 
-    default = front.default.plan
+    default_plan = front.default.plan
     if not front.plans:
-        reasons = [f"  failed  {problem}" for problem in default.certificate.problems]
+        reasons = [f"  failed  {problem}" for problem in default_plan.certificate.problems]
         return ["no safe plan, so no front", *reasons, f"front     {folder}/ (front.csv, front.json)"]
-    conditions = conditions_of_plan(default)
+    conditions = conditions_of_plan(default_plan)
     comparison = f", none better than another in length, exposure, height above ground and {front.fourth} at once"
     lines = [
         "front of 1 safe plan" if len(front.plans) == 1 else f"front of {len(front.plans)} safe plans{comparison}",
@@ -137,6 +137,6 @@ def front_lines(front: "Front", folder: Path) -> list[str]:
         )
         lines.append(f"  {number:>4}{values}")
     if len(front.plans) < front.asked:
-        lines.append(f"  note    {fewer_line(front)}")
+        lines.append(f"  note    {fewer_plans_line(front)}")
     names = f"plan-1.json ... plan-{len(front.plans)}.json" if len(front.plans) > 1 else "plan-1.json"
     return [*lines, f"front     {folder}/ ({names}, front.csv, front.json, {', '.join(PICTURES)})"]

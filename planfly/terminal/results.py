@@ -4,7 +4,7 @@ import sys
 from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
-from planfly.terminal.command_parser import coloured
+from planfly.terminal.command_parser import colour_text
 
 if TYPE_CHECKING:
     from logs.recording.reader import FlightLog
@@ -12,15 +12,15 @@ if TYPE_CHECKING:
 
 
 def print_verdict(verdict: "Verdict", notes: Iterable[str]) -> None:
-    """Print the summary of a verdict, its failed rules, and then each rule's finding closest to its limit."""
+    """Print the summary of a verdict, its failed rules, and the finding closest to its limit for each rule."""
     # Imported here because --help does not need it.
     from planfly.terminal.verdict_lines import verdict_lines
 
     print("\n".join(verdict_lines(verdict, notes)))
 
 
-def print_returns(line: str) -> None:
-    """Print the line on returns to launch, unless it is empty."""
+def print_returns_line(line: str) -> None:
+    """Print the line on returns to launch, unless the line is empty."""
     if line:
         print(f"returns   {line} (more: planfly returns)")
 
@@ -34,11 +34,11 @@ def print_engine(engine: str) -> None:
 def print_warnings(warnings: Iterable[str]) -> None:
     """Print warnings on standard error."""
     for warning in warnings:
-        print(coloured("warning:", "warning", sys.stderr) + f" {warning}", file=sys.stderr)
+        print(colour_text("warning:", "warning", sys.stderr) + f" {warning}", file=sys.stderr)
 
 
-def warn_of_loss(log: "FlightLog") -> None:
-    """Print a warning on standard error that names the part missing from an incomplete log."""
+def warn_about_incomplete_log(log: "FlightLog") -> None:
+    """Print a warning on standard error about the missing part of an incomplete log."""
     from planfly.flight_logs import loss_text
 
     print_warnings([loss_text(log)])

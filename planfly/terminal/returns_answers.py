@@ -10,7 +10,7 @@ from logs.verdict.returns.glides_text import glide_range_text, glides_headline
 from logs.verdict.returns.judge_glides import MARGIN
 from logs.verdict.returns.judge_returns import ReturnFlown, ReturnRange
 from logs.verdict.returns.returns_text import headline, range_text
-from planfly.api.returning import ReturnsFound, Suggested
+from planfly.api.returning import RemedyTrial, ReturnsFound
 from planfly.terminal.verdict_answers import STRICT
 from world.frames import to_geo
 
@@ -209,30 +209,30 @@ class ReturnsAnswer:
     notes: list[str]
 
 
-def suggestion_entry(found: ReturnsFound, suggested: Suggested) -> ReturnSuggestion:
-    """Return the entry of a suggestion."""
+def suggestion_entry(result: ReturnsFound, suggestion: RemedyTrial) -> ReturnSuggestion:
+    """Return a suggested remedy, with the numbers of safe and unsafe returns after it, for the JSON answer."""
     rally = None
-    if suggested.remedy.rally is not None:
+    if suggestion.remedy.rally is not None:
         rally = []
-        for point in suggested.remedy.rally:
-            lat, lon = (float(value) for value in to_geo(found.setup.scenario.origin, point.east, point.north))
+        for point in suggestion.remedy.rally:
+            lat, lon = (float(value) for value in to_geo(result.setup.scenario.origin, point.east, point.north))
             rally.append(
                 RallyEntry(lat_deg=round(lat, 7), lon_deg=round(lon, 7), over_home_m=round(point.up - point.base, 1))
             )
     return ReturnSuggestion(
-        parameters=suggested.remedy.parameters,
+        parameters=suggestion.remedy.parameters,
         rally=rally,
-        safe=suggested.returns.count("safe"),
-        unsafe=len(suggested.returns.each) - suggested.returns.count("safe"),
-        headline=headline(suggested.returns),
+        safe=suggestion.returns.count("safe"),
+        unsafe=len(suggestion.returns.each) - suggestion.returns.count("safe"),
+        headline=headline(suggestion.returns),
     )
 
 
-def program_entry(found: ReturnsFound) -> ByProgram | None:
-    """Return the entry of the returns flown by the ArduPlane program, or None if it flew none."""
-    if found.by_program is None:
+def program_entry(result: ReturnsFound) -> ByProgram | None:
+    """Return the entry of the returns that the ArduPlane program flew, or None if the program was not used."""
+    if result.by_program is None:
         return None
-    names = {log.name: str(log) for log in found.files}
+    names = {log.name: str(log) for log in result.files}
     entries = [
         ProgramReturnEntry(
             at_s=round(pair.law.time, 2),
@@ -245,17 +245,17 @@ def program_entry(found: ReturnsFound) -> ByProgram | None:
             reason=pair.reason,
             log=None if pair.log is None else names.get(pair.log.name),
         )
-        for pair in found.by_program.pairs
+        for pair in result.by_program.pairs
     ]
-    return ByProgram(version=found.by_program.program, returns=entries)
+    return ByProgram(version=result.by_program.program, returns=entries)
 
 
-def _measured_return(flown: ReturnFlown) -> MeasuredReturn:
+def _measured_return(simulated_return: ReturnFlown) -> MeasuredReturn:
     return MeasuredReturn(
-        kind=flown.kind,
-        target=flown.target.name,
-        clearance_m=_round_to_tenths(flown.clearance),
-        outside_m=_round_to_tenths(flown.outside),
+        kind=simulated_return.kind,
+        target=simulated_return.target.name,
+        clearance_m=_round_to_tenths(simulated_return.clearance),
+        outside_m=_round_to_tenths(simulated_return.outside),
     )
 
 
@@ -264,9 +264,9 @@ def _round_to_tenths(value: float) -> float | None:
     return round(value, 1) if math.isfinite(value) else None
 
 
-def glides_entry(found: ReturnsFound) -> GlidesEntry:
-    """Return the entry of the places reachable without the engine."""
-    glides = found.glides
+def glides_entry(result: ReturnsFound) -> GlidesEntry:
+    """Return the entry of the glides without the engine."""
+    glides = result.glides
     entries = []
     for glide_range in glides.ranges:
         glide = glide_range.least
@@ -308,25 +308,25 @@ def glides_entry(found: ReturnsFound) -> GlidesEntry:
     )
 
 
-def return_entry(found: ReturnsFound, return_range: ReturnRange) -> ReturnEntry:
+def return_entry(result: ReturnsFound, return_range: ReturnRange) -> ReturnEntry:
     """Return the entry of a range of returns."""
-    worst, scenario, rounded = return_range.worst, found.setup.scenario, _round_to_tenths
+    worst_return, scenario, tenths = return_range.worst, result.setup.scenario, _round_to_tenths
 
     return ReturnEntry(
         first_s=round(return_range.first, 2),
         last_s=round(return_range.last, 2),
         count=return_range.count,
-        kind=worst.kind,
-        target=worst.target.name,
-        reason=worst.target.reason,
-        worst_at_s=round(worst.time, 2),
-        clearance_m=rounded(worst.clearance),
-        clearance_east_m=rounded(worst.clearance_at[0]),
-        clearance_north_m=rounded(worst.clearance_at[1]),
-        outside_m=rounded(worst.outside),
-        threat=scenario.threats.names[worst.threat] if worst.kind == "threat" else None,
-        zone=found.returns.airspace.zones[worst.zone].name if worst.zone >= 0 else None,
-        energy_wh=rounded(worst.energy),
-        left_wh=rounded(worst.left),
-        text=range_text(return_range, found.returns, scenario),
+        kind=worst_return.kind,
+        target=worst_return.target.name,
+        reason=worst_return.target.reason,
+        worst_at_s=round(worst_return.time, 2),
+        clearance_m=tenths(worst_return.clearance),
+        clearance_east_m=tenths(worst_return.clearance_at[0]),
+        clearance_north_m=tenths(worst_return.clearance_at[1]),
+        outside_m=tenths(worst_return.outside),
+        threat=scenario.threats.names[worst_return.threat] if worst_return.kind == "threat" else None,
+        zone=result.returns.airspace.zones[worst_return.zone].name if worst_return.zone >= 0 else None,
+        energy_wh=tenths(worst_return.energy),
+        left_wh=tenths(worst_return.left),
+        text=range_text(return_range, result.returns, scenario),
     )

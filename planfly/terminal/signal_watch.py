@@ -16,7 +16,7 @@ from world.files import remove_temporary_folders
 from world.interruption import Interrupted, interrupt, remove_unfinished
 
 # Signals that end a command.
-ENDING = (signal.SIGINT, signal.SIGTERM)
+ENDING_SIGNALS = (signal.SIGINT, signal.SIGTERM)
 # Time from a signal until the process is ended by force, s, not counting the time that it waited for a processor.
 GRACE_S = 0.7
 # Maximum time from a signal until the process is ended by force, including the time waited for a processor, s.
@@ -26,7 +26,7 @@ _REMOVAL_TIMEOUT_S = 0.5
 # Delay before a signal that could not be handled is raised again, and between two tries to remove files, s.
 _RETRY_INTERVAL_S = 0.02
 # Packages during whose code an exception must not be raised.
-_COMPILERS = ("numba", "llvmlite")
+_COMPILER_PACKAGES = ("numba", "llvmlite")
 
 
 @contextlib.contextmanager
@@ -40,7 +40,7 @@ def end_on_signals(grace: float = GRACE_S) -> Iterator[list[int]]:
 
     Yields a list to which the number of a signal is added when it arrives.
     """
-    read, write = _signal_pipe()
+    read_number, write_handle = _signal_pipe()
     received: list[int] = []
     is_ending = False
 
@@ -56,7 +56,7 @@ def end_on_signals(grace: float = GRACE_S) -> Iterator[list[int]]:
         received.append(number)
         interrupt(number)
 
-    def raise_again(unraisable: "sys.UnraisableHookArgs") -> None:
+    def raise_signal_again(unraisable: "sys.UnraisableHookArgs") -> None:
         # The exception was raised in a callback of a library, which dropped it.  Raise the signal again a little later.
         nonlocal is_ending
         if isinstance(unraisable.exc_value, Interrupted):
@@ -66,14 +66,14 @@ def end_on_signals(grace: float = GRACE_S) -> Iterator[list[int]]:
             sys.__unraisablehook__(unraisable)
 
     watcher = threading.Thread(
-        target=_end_process_after_signal, args=(read, received, grace), name="signals", daemon=True
+        target=_end_process_after_signal, args=(read_number, received, grace), name="signals", daemon=True
     )
     watcher.start()
     # Python's C code writes the number of the signal to the pipe at once, whatever the main thread is doing.
-    signal.set_wakeup_fd(write, warn_on_full_buffer=False)
-    for number in ENDING:
+    signal.set_wakeup_fd(write_handle, warn_on_full_buffer=False)
+    for number in ENDING_SIGNALS:
         signal.signal(number, handle_signal)
-    sys.unraisablehook = raise_again
+    sys.unraisablehook = raise_signal_again
     try:
         yield received
     finally:
@@ -89,14 +89,14 @@ def _called_by_compiled_code(frame: FrameType | None) -> bool:
     """
     while frame is not None:
         module = str(frame.f_globals.get("__name__"))
-        if module.partition(".")[0] in _COMPILERS or module.startswith("namedtuple_"):
+        if module.partition(".")[0] in _COMPILER_PACKAGES or module.startswith("namedtuple_"):
             return True
         frame = frame.f_back
     return False
 
 
 def _signal_pipe() -> tuple[Callable[[int], bytes], int]:
-    """Return a function that reads signal numbers, and the non-blocking handle to which Python writes them."""
+    """Return a function that reads signal numbers, and the non-blocking handle for Python to write the numbers to."""
     if hasattr(os, "set_blocking"):
         read, write = os.pipe()
         os.set_blocking(write, False)
@@ -109,16 +109,16 @@ def _signal_pipe() -> tuple[Callable[[int], bytes], int]:
     return receiver.recv, sender.detach()
 
 
-def _end_process_after_signal(read: Callable[[int], bytes], received: list[int], grace: float) -> None:
-    """Wait for the first signal, append its number to `received`, let the command end itself, then end the process."""
-    while (number := read(1)[0]) not in ENDING:
+def _end_process_after_signal(read_number: Callable[[int], bytes], received: list[int], grace: float) -> None:
+    """Wait for the first signal, append its number to `received`, give the command time to end, and end the process."""
+    while (number := read_number(1)[0]) not in ENDING_SIGNALS:
         pass
     # Append the number here, too, because a command may have its own signal handlers.
     received.append(number)
-    start_time, start_wait = time.monotonic(), _processor_wait_time()
+    start_time, start_wait_time = time.monotonic(), _processor_wait_time()
     while (
         elapsed := time.monotonic() - start_time
-    ) < _MAX_GRACE_S and elapsed - _processor_wait_time() + start_wait < grace:
+    ) < _MAX_GRACE_S and elapsed - _processor_wait_time() + start_wait_time < grace:
         time.sleep(_RETRY_INTERVAL_S)
     with contextlib.suppress(OSError):
         os.write(2, b"planfly: interrupted\n")

@@ -99,22 +99,22 @@ class SurveyAnswer:
 
 
 def photo_line_entry(setup: FlightSetup, line: PhotoLine, measure: LineMeasure | None) -> PhotoLineEntry:
-    """Return the entry of a photo line, with the measures of the flown line, or None if it was not flown."""
+    """Return the entry of a photo line.  measure: measures of the flown line, or None if the line was not flown."""
     first, last = (int(setup.route.items[i]) for i in (line.first, line.last))
 
-    def rounded(value: float | None) -> float | None:
+    def round_to_1e4(value: float | None) -> float | None:
         return None if value is None else round(value, 4)
 
     return PhotoLineEntry(
         first_item=first,
         last_item=last,
         length_m=None if measure is None else round(measure.length, 1),
-        usable=rounded(None if measure is None else measure.good),
-        away=rounded(None if measure is None else measure.away),
-        banked=rounded(None if measure is None else measure.banked),
-        high=rounded(None if measure is None else measure.high),
-        dark=rounded(None if measure is None else measure.dark),
-        lost_m=[] if measure is None else [(round(begin, 1), round(end, 1)) for begin, end in measure.lost],
+        usable=round_to_1e4(None if measure is None else measure.good),
+        away=round_to_1e4(None if measure is None else measure.away),
+        banked=round_to_1e4(None if measure is None else measure.banked),
+        high=round_to_1e4(None if measure is None else measure.high),
+        dark=round_to_1e4(None if measure is None else measure.dark),
+        lost_m=[] if measure is None else [(round(start, 1), round(end, 1)) for start, end in measure.lost],
         photos=None if measure is None else measure.photos,
         missed=None if measure is None else measure.missed,
     )

@@ -6,7 +6,7 @@ from logs.verdict.findings import Finding
 from logs.verdict.presentation import RuleFindings
 from logs.verdict.rule_words import RULE_WORDS, rule_word
 from logs.verdict.verdict import Verdict
-from planfly.terminal.command_parser import STATE_STYLES, coloured
+from planfly.terminal.command_parser import STATE_STYLES, colour_text
 
 # Maximum number of failed findings of a rule that are listed after the worst finding.
 _MAX_LISTED = 6
@@ -17,9 +17,9 @@ _TITLE_WIDTH = 2 + max(len(rule.title) for rule in RULE_WORDS.values())
 
 
 def verdict_lines(verdict: Verdict, notes: Iterable[str]) -> list[str]:
-    """Return the summary, the failures, each rule's finding closest to its limit, and notes, coloured on a terminal."""
+    """Return the lines of a verdict: summary, failures, the finding closest to its limit for each rule, and notes."""
     presentation = verdict.present()
-    lines = [coloured(presentation.headline, STATE_STYLES[presentation.state]), *presentation.details]
+    lines = [colour_text(presentation.headline, STATE_STYLES[presentation.state]), *presentation.details]
     for rule in presentation.failed_rules:
         lines += _failed_lines(rule)
     lines += [
@@ -28,24 +28,28 @@ def verdict_lines(verdict: Verdict, notes: Iterable[str]) -> list[str]:
     ]
     # One flight would decide all findings with the same suggestion.
     deciding_flights = dict.fromkeys(finding.suggestion for finding in presentation.undecided if finding.suggestions)
-    lines += [coloured("          would tell: ", "hint") + text for text in deciding_flights]
+    lines += [colour_text("          would tell: ", "hint") + text for text in deciding_flights]
     for rule in presentation.rules:
-        count = f"{presentation.zones:,} zones; " if rule.words.name == "fence" and presentation.zones > 1 else ""
-        lines.append(f"  {rule.words.title:<{_TITLE_WIDTH}}{count}{_rule_summary(rule)}")
+        zone_count_text = (
+            f"{presentation.zones:,} zones; " if rule.words.name == "fence" and presentation.zones > 1 else ""
+        )
+        lines.append(f"  {rule.words.title:<{_TITLE_WIDTH}}{zone_count_text}{_rule_summary(rule)}")
     return [*lines, *(f"  note    {note}" for note in notes)]
 
 
 def _failed_lines(rule: RuleFindings) -> list[str]:
-    """Describe the worst failed finding of a rule with its suggested change, and list the other places."""
-    worst, *others = rule.failed
+    """Return lines on the worst failed finding of a rule, its suggestion, and the places of the other failures."""
+    worst_finding, *other_findings = rule.failed
     rule_name = rule.words.word
-    where = f"{rule_name}, {len(rule.failed)} of {rule.judged}; the worst at" if others else f"{rule_name} at"
-    lines = [coloured("  failed  ", "bad") + f"{where} {worst.where}: {worst.reason}"]
-    if worst.suggestions:
-        lines.append(coloured("          would pass: ", "hint") + worst.suggestion)
-    if others:
-        other_places = "; ".join(map(_place_and_value, others[:_MAX_LISTED]))
-        more_text = f"; {len(others) - _MAX_LISTED} more" if len(others) > _MAX_LISTED else ""
+    places_text = (
+        f"{rule_name}, {len(rule.failed)} of {rule.judged}; the worst at" if other_findings else f"{rule_name} at"
+    )
+    lines = [colour_text("  failed  ", "bad") + f"{places_text} {worst_finding.where}: {worst_finding.reason}"]
+    if worst_finding.suggestions:
+        lines.append(colour_text("          would pass: ", "hint") + worst_finding.suggestion)
+    if other_findings:
+        other_places = "; ".join(map(_place_and_value, other_findings[:_MAX_LISTED]))
+        more_text = f"; {len(other_findings) - _MAX_LISTED} more" if len(other_findings) > _MAX_LISTED else ""
         lines.append(f"          also at {other_places}{more_text}")
     return lines
 
@@ -66,6 +70,6 @@ def _rule_summary(rule: RuleFindings) -> str:
     if not value or not limit:
         return rule.count_text
     relation = "furthest beyond its limit" if closest.ok is False else "closest to its limit"
-    where = "" if closest.place.kind == "flight" else f"{relation} at {closest.where}: "
-    source = f", {closest.limit_source}" if closest.limit_source in _LIMIT_SOURCES else ""
-    return f"{rule.count_text}; {where}{margin.of} {value} (limit {limit}{source})"
+    place_text = "" if closest.place.kind == "flight" else f"{relation} at {closest.where}: "
+    source_text = f", {closest.limit_source}" if closest.limit_source in _LIMIT_SOURCES else ""
+    return f"{rule.count_text}; {place_text}{margin.of} {value} (limit {limit}{source_text})"

@@ -14,7 +14,7 @@ from flight.autopilots.catalog import load_autopilot
 from flight.dynamics.envelope_tables import load_envelope
 from flight.simulation.setup import FlightSetup, make_limits
 from planner.plan import Plan
-from planner.search.lay_ground_ways import FinalLaw, with_ground_ways
+from planner.search.lay_ground_ways import FinalModel, with_ground_ways
 from world.errors import FlightError, ScenarioError
 from world.scenario import Scenario
 
@@ -45,10 +45,10 @@ class Airframe:
         return self.limits.max_bank
 
 
-def with_departure_and_approach(plan: Plan, airframe: Airframe, flown: Plan | None = None) -> Plan:
-    """Return a plan with the departure and approach that its scenario requires, if any.
+def with_departure_and_approach(plan: Plan, airframe: Airframe, flown_plan: Plan | None = None) -> Plan:
+    """Add the departure and approach that the scenario of a plan requires, if any.
 
-    flown: the plan being flown, whose departure is kept; None for a new plan.
+    flown_plan: the plan being flown, whose departure is reused; None for a new plan.
 
     >>> import numpy as np
     >>> from planner.plan import Certificate
@@ -61,16 +61,16 @@ def with_departure_and_approach(plan: Plan, airframe: Airframe, flown: Plan | No
     True
     """
     autopilot, cruise = airframe.autopilot, airframe.airspeed
-    law = FinalLaw(
+    final_law = FinalModel(
         airspeed=lambda tailwind, amsl: autopilot.landing_airspeed(cruise, tailwind, amsl),
         slope=lambda height, distance, tailwind, amsl: autopilot.landing_glide(height, distance, tailwind, amsl).slope,
     )
-    flown_climb = None if flown is None or flown.ways is None else flown.ways.climb
-    return with_ground_ways(plan, airframe.limits.surely(), law, flown_climb)
+    flown_departure = None if flown_plan is None or flown_plan.ways is None else flown_plan.ways.climb
+    return with_ground_ways(plan, airframe.limits.surely(), final_law, flown_departure)
 
 
 def choose_seed(scenario: Scenario, seed: int | None) -> int:
-    """Return the requested seed; if it is None, the scenario's seed, or 1 if the scenario has none."""
+    """Return the requested seed; if it is None, the seed of the scenario, or 1 if the scenario has no seed."""
     if seed is not None:
         return seed
     return scenario.planner.seed if scenario.planner.seed is not None else 1
@@ -79,7 +79,7 @@ def choose_seed(scenario: Scenario, seed: int | None) -> int:
 def load_airframe(scenario: Scenario, parameters: Mapping[str, float] | None = None) -> Airframe:
     """Load the scenario's aircraft, its envelope and autopilot, and the limits that scenario and aircraft set.
 
-    parameters: autopilot parameters that replace those of its file, by the autopilot's names and in its units.
+    parameters: autopilot parameters that replace the file's parameters, by name and in the units of the autopilot.
     Raises ScenarioError for an unknown aircraft or autopilot, or a speed that the aircraft cannot fly, and
     ParameterError for an unreadable parameter file, or values that are not allowed.
 
@@ -101,7 +101,7 @@ def load_airframe(scenario: Scenario, parameters: Mapping[str, float] | None = N
 
 
 def airframe_of(setup: FlightSetup) -> Airframe:
-    """Return the airframe that a setup was made with.  Raises FlightError if the catalog lacks the aircraft.
+    """Return the airframe of a setup.  Raises FlightError if the catalog does not contain the aircraft.
 
     >>> from logs.recording.example_log import example_log
     >>> airframe_of(example_log().setup).aircraft.name
@@ -112,7 +112,7 @@ def airframe_of(setup: FlightSetup) -> Airframe:
 
 
 def bank_limit(scenario: Scenario, autopilot: Autopilot) -> float:
-    """Return the bank limit in turns, rad: the lower of the scenario's limit and the autopilot's limit."""
+    """Return the bank limit in turns, rad: the lower limit of scenario and autopilot."""
     return min(math.radians(scenario.flight.max_bank_deg), autopilot.bank_limit)
 
 
@@ -160,7 +160,7 @@ def cruise_airspeed(scenario: Scenario, aircraft: Aircraft, autopilot: Autopilot
 
 
 def tightened_airframe(airframe: Airframe, scenario: Scenario) -> Airframe:
-    """Return an airframe with the limits and the maximum bank of a tightened scenario for the same aircraft."""
+    """Return the airframe with the limits and the maximum bank of a tightened scenario."""
     old_limits = airframe.limits
     limits = make_limits(scenario, old_limits.envelope, old_limits.airspeed, bank_limit(scenario, airframe.autopilot))
     return replace(airframe, limits=replace(limits, tracking=old_limits.tracking))

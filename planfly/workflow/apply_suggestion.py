@@ -22,7 +22,7 @@ from world.errors import MissionError
 from world.geometry import leg_courses, signed_turns
 
 # Direction east and north of a change to a side.
-_SIDES = {"north": (0.0, 1.0), "east": (1.0, 0.0), "south": (0.0, -1.0), "west": (-1.0, 0.0)}
+_SIDE_DIRECTIONS = {"north": (0.0, 1.0), "east": (1.0, 0.0), "south": (0.0, -1.0), "west": (-1.0, 0.0)}
 # Number of steps from a corner to the straight line in which a turn is made gentler.
 _TURN_STEPS = 40
 # Distance from a sphere's surface that a step aims at, m, as in the planner; the navigation error may be a third of it.
@@ -38,28 +38,28 @@ def can_apply(suggestion: Suggestion) -> bool:
     >>> can_apply((Change("battery", FLIGHT, None, 1.2, "1"),))
     False
     """
-    return bool(suggestion) and all(change.what in _CHANGES for change in suggestion)
+    return bool(suggestion) and all(change.what in _CHANGE_FUNCTIONS for change in suggestion)
 
 
 def apply_suggestion(
-    context: MissionContext, judged: JudgedMission, finding: Finding, suggestion: Suggestion
+    context: MissionContext, judged_mission: JudgedMission, finding: Finding, suggestion: Suggestion
 ) -> Mission:
     """Return the mission with all changes of a suggestion of a finding.
 
     Raises MissionError if no item can be moved for the suggestion, or if it does not change the mission's items.
     """
-    source = judged.mission.source
+    source = judged_mission.mission.source
     if not can_apply(suggestion):
         raise MissionError(f"{source}: this suggestion does not change its items", field="suggestion")
     missions = []
-    # Away from a missile, try to move a single waypoint first: each one that moves may fail elsewhere.
+    # Away from a missile, try to move a single waypoint first, because each moved waypoint may fail elsewhere.
     for max_moves in (1, None) if any(change.what == "distance" for change in suggestion) else (None,):
-        edited = _EditedMission(context, judged, max_moves)
+        edited_mission = _EditedMission(context, judged_mission, max_moves)
         for change in suggestion:
-            _CHANGES[change.what](edited, change, finding)
-        if not edited.changed:
+            _CHANGE_FUNCTIONS[change.what](edited_mission, change, finding)
+        if not edited_mission.is_changed:
             raise MissionError(f"{source}: no item of the mission lies there: move one by hand", field="suggestion")
-        missions.append(edited.mission)
+        missions.append(edited_mission.mission)
     return (
         min(missions, key=lambda mission: len(context.judge(mission).verdict.failed))
         if len(missions) > 1
@@ -72,40 +72,40 @@ class _EditedMission:
 
     def __init__(self, context: MissionContext, judged: JudgedMission, max_moves: int | None) -> None:
         self.context, self.mission, self.route = context, judged.mission, judged.setup.route
-        self.requirements, self.max_moves, self.changed = judged.requirements, max_moves, False
+        self.requirements, self.max_moves, self.is_changed = judged.requirements, max_moves, False
 
-    def index_of(self, waypoint: int) -> int | None:
+    def item_index(self, waypoint: int) -> int | None:
         """Return the index of a waypoint's item in the mission's list, or None if the waypoint has no item."""
         seq = int(self.route.items[waypoint])
-        indices = [k for k in places(self.mission) if self.mission.items[k].seq == seq]
+        indices = [index for index in places(self.mission) if self.mission.items[index].seq == seq]
         return indices[0] if indices else None
 
-    def points(self) -> Floats:
+    def waypoint_positions(self) -> Floats:
         """Return the waypoints of the route before the change, (w, 3), m."""
         return np.asarray(self.route.waypoints)
 
-    def shift(self, waypoints: Sequence[int], offset: Floats) -> None:
-        """Move the items of waypoints, each once, except landings.  offset: east, north and up, m."""
-        for index in dict.fromkeys(self.index_of(waypoint) for waypoint in waypoints):
+    def move_items(self, waypoints: Sequence[int], offset: Floats) -> None:
+        """Move the items of waypoints, except landings, each item once.  offset: east, north and up, m."""
+        for index in dict.fromkeys(self.item_index(waypoint) for waypoint in waypoints):
             if index is None or self.mission.items[index].command in LANDINGS:
                 continue
-            position = self.context.points(self.mission)[places(self.mission).index(index)]
+            position = self.context.item_positions(self.mission)[places(self.mission).index(index)]
             if offset[0] or offset[1]:
                 self.mission = moved(
-                    self.mission, index, *self.context.geographic(*(position[:2] + offset[:2]).tolist())
+                    self.mission, index, *self.context.to_geographic(*(position[:2] + offset[:2]).tolist())
                 )
             if offset[2] and math.isfinite(position[2]):
                 self.mission = at_height(self.mission, index, float(position[2] + offset[2]), float(position[2]))
-            self.mission, self.changed = self.context.retuned(self.mission, index), True
+            self.mission, self.is_changed = self.context.with_updated_radii(self.mission, index), True
 
-    def ends_of(self, legs: Sequence[int]) -> list[int]:
-        """Return the waypoints at the ends of legs, without the ends of the route unless no others exist."""
+    def end_waypoints(self, legs: Sequence[int]) -> list[int]:
+        """Return the waypoints at the ends of legs, without the ends of the route unless there are no others."""
         ends = sorted({end for leg in legs for end in (leg, leg + 1)})
         inner_ends = [end for end in ends if 0 < end < self.route.legs]
         return inner_ends or ends
 
 
-def _leg_of_change(change: Change, route: Route) -> int:
+def _changed_leg(change: Change, route: Route) -> int:
     if change.place.kind != "leg" or change.place.index is None or change.place.index >= route.legs:
         raise MissionError("this suggestion names no leg of the route", field="suggestion")
     return change.place.index
@@ -113,21 +113,21 @@ def _leg_of_change(change: Change, route: Route) -> int:
 
 def _lengthen_leg(edited: _EditedMission, change: Change, _finding: Finding) -> None:
     """Lengthen a leg by moving the rest of the route along the leg's course, so that no other leg changes."""
-    leg = _leg_of_change(change, edited.route)
-    course = float(leg_courses(edited.points())[leg])
+    leg = _changed_leg(change, edited.route)
+    course = float(leg_courses(edited.waypoint_positions())[leg])
     extra_length = change.wanted - (change.current or 0.0)
-    later_waypoints = range(leg + 1, len(edited.points()))
-    edited.shift(list(later_waypoints), extra_length * np.array([math.sin(course), math.cos(course), 0.0]))
+    later_waypoints = range(leg + 1, len(edited.waypoint_positions()))
+    edited.move_items(list(later_waypoints), extra_length * np.array([math.sin(course), math.cos(course), 0.0]))
 
 
 def _reduce_rise(edited: _EditedMission, change: Change, _finding: Finding) -> None:
-    """Reduce the climb or descent of a leg by moving both ends by half, or one end if the other ends the route."""
-    leg, points = _leg_of_change(change, edited.route), edited.points()
+    """Reduce the climb or descent of a leg by moving both ends by half; an end of the route stays if possible."""
+    leg, points = _changed_leg(change, edited.route), edited.waypoint_positions()
     excess = float(points[leg + 1, 2] - points[leg, 2]) - change.wanted
     is_first, is_last = leg == 0, leg + 1 == edited.route.legs
     end_fraction = 0.0 if is_last and not is_first else 1.0 if is_first and not is_last else 0.5
-    edited.shift([leg], np.array([0.0, 0.0, (1.0 - end_fraction) * excess]))
-    edited.shift([leg + 1], np.array([0.0, 0.0, -end_fraction * excess]))
+    edited.move_items([leg], np.array([0.0, 0.0, (1.0 - end_fraction) * excess]))
+    edited.move_items([leg + 1], np.array([0.0, 0.0, -end_fraction * excess]))
 
 
 def _set_airspeed(edited: _EditedMission, change: Change, _finding: Finding) -> None:
@@ -136,80 +136,83 @@ def _set_airspeed(edited: _EditedMission, change: Change, _finding: Finding) -> 
     airspeed = change.wanted if change.most is None else 0.5 * (change.wanted + change.most)
     legs = range(route.legs)
     if place.kind == "leg":
-        legs = range(_leg_of_change(change, route), _leg_of_change(change, route) + 1)
+        legs = range(_changed_leg(change, route), _changed_leg(change, route) + 1)
     elif place.kind == "waypoint" and place.index is not None:
         legs = range(max(0, place.index - 1), min(route.legs, place.index + 1))
     for leg in reversed(legs):
-        index = edited.index_of(leg + 1)
+        index = edited.item_index(leg + 1)
         if index is not None:
             edited.mission = at_speed(edited.mission, index, airspeed, float(route.airspeed[leg]))
-            edited.changed = True
+            edited.is_changed = True
 
 
 def _make_turn_gentler(edited: _EditedMission, change: Change, _finding: Finding) -> None:
     """Make a turn gentler by moving the waypoint towards the line between its neighbours."""
-    points, index = edited.points(), change.place.index
+    points, index = edited.waypoint_positions(), change.place.index
     if index is None or not 0 < index < edited.route.legs:
         return
-    before, corner, after = points[index - 1], points[index], points[index + 1]
-    chord = after[:2] - before[:2]
-    fraction = float(np.clip((corner[:2] - before[:2]) @ chord / max(float(chord @ chord), 1.0), 0.1, 0.9))
-    straight_point = before[:2] + fraction * chord
+    previous, corner, next_waypoint = points[index - 1], points[index], points[index + 1]
+    chord = next_waypoint[:2] - previous[:2]
+    fraction = float(np.clip((corner[:2] - previous[:2]) @ chord / max(float(chord @ chord), 1.0), 0.1, 0.9))
+    straight_point = previous[:2] + fraction * chord
 
     def is_gentle(step: int) -> bool:
         bent_points = np.array(
-            [before, [*(corner[:2] + step / _TURN_STEPS * (straight_point - corner[:2])), corner[2]], after]
+            [previous, [*(corner[:2] + step / _TURN_STEPS * (straight_point - corner[:2])), corner[2]], next_waypoint]
         )
         return math.degrees(abs(float(signed_turns(bent_points)[0]))) <= change.wanted - 0.1
 
     step = first_that_passes(range(1, _TURN_STEPS + 1), is_gentle)
     if step is not None:
-        edited.shift([index], np.array([*(step / _TURN_STEPS * (straight_point - corner[:2])), 0.0]))
+        edited.move_items([index], np.array([*(step / _TURN_STEPS * (straight_point - corner[:2])), 0.0]))
 
 
 def _change_altitude(edited: _EditedMission, change: Change, finding: Finding) -> None:
     """Raise or lower a leg, or the legs that violate a zone, by a step."""
-    rise = change.wanted if change.what == "height" else -change.wanted
+    altitude_change = change.wanted if change.what == "height" else -change.wanted
     legs = (
-        [_leg_of_change(change, edited.route)]
+        [_changed_leg(change, edited.route)]
         if change.place.kind == "leg"
         else violated_legs(edited.requirements, finding)
     )
     ends = sorted({end for leg in legs for end in (leg, leg + 1)})
-    edited.shift(ends, np.array([0.0, 0.0, rise]))
+    edited.move_items(ends, np.array([0.0, 0.0, altitude_change]))
 
 
 def _move_inside_area(edited: _EditedMission, change: Change, _finding: Finding) -> None:
     """Move waypoints inside that are too near to the edges, floor or ceiling of the area."""
-    scenario, points = edited.context.scenario, edited.points()
+    scenario, points = edited.context.scenario, edited.waypoint_positions()
     (west, east), (south, north) = scenario.bounds.tolist()
     min_position = np.array([west, south, scenario.floor]) + change.wanted
     max_position = np.array([east, north, scenario.ceiling]) - change.wanted
     clipped = np.clip(points, min_position, max_position)
     is_outside = ((points < min_position - change.wanted) | (points > max_position + change.wanted)).any(axis=1)
-    for k in np.flatnonzero(is_outside).tolist():
-        edited.shift([k], clipped[k] - points[k])
+    for waypoint in np.flatnonzero(is_outside).tolist():
+        edited.move_items([waypoint], clipped[waypoint] - points[waypoint])
 
 
 def _move_away_from_missile(edited: _EditedMission, change: Change, finding: Finding) -> None:
     """Move the waypoints near the sphere of a missile away from it."""
-    centre = edited.context.scenario.threats.position[change.place.index or 0]
-    legs, points = violated_legs(edited.requirements, finding), edited.points()
-    from_missile = points[:, :2] - centre[:2]
-    distance = np.hypot(from_missile[:, 0], from_missile[:, 1])
-    for k in sorted(edited.ends_of(legs), key=lambda end: float(distance[end]))[: edited.max_moves]:
-        if distance[k] > 1.0:
-            edited.shift([k], np.array([*((change.wanted + _SPHERE_MARGIN_M) * from_missile[k] / distance[k]), 0.0]))
+    missile_position = edited.context.scenario.threats.position[change.place.index or 0]
+    legs, points = violated_legs(edited.requirements, finding), edited.waypoint_positions()
+    offset = points[:, :2] - missile_position[:2]
+    distance = np.hypot(offset[:, 0], offset[:, 1])
+    for waypoint in sorted(edited.end_waypoints(legs), key=lambda end: float(distance[end]))[: edited.max_moves]:
+        if distance[waypoint] > 1.0:
+            edited.move_items(
+                [waypoint],
+                np.array([*((change.wanted + _SPHERE_MARGIN_M) * offset[waypoint] / distance[waypoint]), 0.0]),
+            )
 
 
 def _move_sideways(edited: _EditedMission, change: Change, finding: Finding) -> None:
     """Move the legs on which a zone is violated to one side."""
-    east, north = _SIDES[change.what]
+    east, north = _SIDE_DIRECTIONS[change.what]
     legs = violated_legs(edited.requirements, finding)
-    edited.shift(edited.ends_of(legs), change.wanted * np.array([east, north, 0.0]))
+    edited.move_items(edited.end_waypoints(legs), change.wanted * np.array([east, north, 0.0]))
 
 
-_CHANGES: dict[str, Callable[[_EditedMission, Change, Finding], None]] = {
+_CHANGE_FUNCTIONS: dict[str, Callable[[_EditedMission, Change, Finding], None]] = {
     "length": _lengthen_leg,
     "rise": _reduce_rise,
     "airspeed": _set_airspeed,
@@ -218,5 +221,5 @@ _CHANGES: dict[str, Callable[[_EditedMission, Change, Finding], None]] = {
     "descent": _change_altitude,
     "inset": _move_inside_area,
     "distance": _move_away_from_missile,
-    **dict.fromkeys(_SIDES, _move_sideways),
+    **dict.fromkeys(_SIDE_DIRECTIONS, _move_sideways),
 }

@@ -1,4 +1,4 @@
-"""Write a flight log that survives an interruption: the file is complete up to that moment, or is removed."""
+"""Write a flight log that survives an interruption: the file is complete up to the interruption, or is removed."""
 
 import contextlib
 import os
@@ -29,7 +29,7 @@ class FlightLimits:
     hours: maximum simulated time, h.
     megabytes: maximum size of the log, 10^6 bytes.
 
-    >>> FlightLimits(megabytes=20.0).log_full(20_000_001)
+    >>> FlightLimits(megabytes=20.0).log_limit_reason(20_000_001)
     'log limit: 20 MB are written; --max-log raises it'
     """
 
@@ -40,8 +40,8 @@ class FlightLimits:
         """Return the maximum number of guidance ticks of dt seconds each."""
         return round(3600.0 * self.hours / dt)
 
-    def log_full(self, size: int) -> str:
-        """Return the reason to end a flight whose log has this size in bytes, or "" if the flight may continue."""
+    def log_limit_reason(self, size: int) -> str:
+        """Return the reason to end a flight with a log of `size` bytes, or "" if the flight may continue."""
         if size <= 1e6 * self.megabytes:
             return ""
         return f"log limit: {self.megabytes:g} MB are written; --max-log raises it"
@@ -79,7 +79,7 @@ INTERRUPTED = "interrupted"
 
 
 class CrashSafeLog:
-    """Context manager around `Recorder` that leaves a valid log wherever Ctrl-C interrupts the flight.
+    """Context manager around `Recorder` that leaves a valid log if Ctrl-C interrupts the flight.
 
     The log of an interrupted flight ends with the last row flown and has no verdict; `planfly check` can judge it.  A
     log without a row is removed.  After an error the log stays unfinished, as with `Recorder`.
@@ -147,7 +147,7 @@ class CrashSafeLog:
                 Path(os.path.realpath(self._path)).unlink(missing_ok=True)
 
     def write(self, rows: Rows) -> None:
-        """Record rows as they come from the flight."""
+        """Record rows of the flight."""
         with uninterrupted(), self._errors_with_file_name():
             self._recorder.write_rows(rows)
             self._rows += len(rows)
@@ -162,11 +162,11 @@ class CrashSafeLog:
         self._recorder.event(time, text, level)
 
     def finish(
-        self, ended: str, verdict: Verdict, reference: ReferenceFlights | None, returns: DrawnReturns | None = None
+        self, end_reason: str, verdict: Verdict, reference: ReferenceFlights | None, returns: DrawnReturns | None = None
     ) -> None:
         """Write the results of a judged flight, and close the log."""
         with uninterrupted(), self._errors_with_file_name():
-            self._recorder.finish(ended, verdict, reference, returns)
+            self._recorder.finish(end_reason, verdict, reference, returns)
             self._is_open = False
 
     @contextlib.contextmanager

@@ -11,11 +11,11 @@ from world.scenario_tables import OWN_GUIDANCE
 
 
 def with_file_autopilot(scenario: Scenario, mission: Mission | None = None) -> Scenario:
-    """Return the scenario with the autopilot that its parameter file or its mission was written for.
+    """Return the scenario with the autopilot for which its parameter file or its mission was written.
 
     An autopilot named by the user stays, and so does planfly's own guidance.  If no file names an autopilot, the
-    scenario is not changed.  Raises ParameterError or MissionError if a file was written for another autopilot than the
-    named one, if two files were written for different autopilots, and if a parameter file has names of both.
+    scenario is not changed.  Raises ParameterError or MissionError if a file was not written for the named autopilot,
+    if two files were written for different autopilots, and if a parameter file has parameters of both autopilots.
 
     >>> from world.scenario import load_scenario
     >>> made = with_file_autopilot(load_scenario("paper-07"), Mission(None, (), autopilot="px4", source="field.plan"))
@@ -38,12 +38,12 @@ def with_file_autopilot(scenario: Scenario, mission: Mission | None = None) -> S
     if mission_autopilot != table.autopilot and table.autopilot in TITLES:
         if table.autopilot_from is None:
             raise MissionError.from_error(
-                other_autopilot(mission.source, mission_autopilot, _FIRMWARE[mission_autopilot], table.autopilot)
+                other_autopilot(mission.source, mission_autopilot, _FIRMWARE_TEXTS[mission_autopilot], table.autopilot)
             )
         other_file = f"{table.autopilot_from} for {TITLES[table.autopilot]}"
         allowed = "expected files of one autopilot"
         message = (
-            f"{mission.source}: written for {TITLES[mission_autopilot]} ({_FIRMWARE[mission_autopilot]}),"
+            f"{mission.source}: written for {TITLES[mission_autopilot]} ({_FIRMWARE_TEXTS[mission_autopilot]}),"
             f" but {other_file}; {allowed}"
         )
         raise MissionError(message, file=mission.source, field="autopilot", value=mission_autopilot, allowed=allowed)
@@ -51,7 +51,7 @@ def with_file_autopilot(scenario: Scenario, mission: Mission | None = None) -> S
 
 
 # Text by which a .plan file states its autopilot.
-_FIRMWARE = {ARDUPILOT: "firmwareType 3", PX4: "firmwareType 12"}
+_FIRMWARE_TEXTS = {ARDUPILOT: "firmwareType 3", PX4: "firmwareType 12"}
 
 
 def _with_parameter_file_autopilot(scenario: Scenario, params: str) -> Scenario:
@@ -64,8 +64,8 @@ def _with_parameter_file_autopilot(scenario: Scenario, params: str) -> Scenario:
 
 
 def _set_autopilot(scenario: Scenario, autopilot: str, file: str) -> Scenario:
-    """Return the scenario with an autopilot taken from `file`, which is stated even if it is the default."""
+    """Set the autopilot of a scenario, and the file that names it, even if it is the default autopilot."""
     params = scenario.flight.params
-    changed = with_flight(scenario, autopilot=autopilot, params=params)
-    table = changed.flight.model_copy(update={"autopilot_from": file})
-    return replace(changed, spec=changed.spec.model_copy(update={"flight": table}), flight=table)
+    new_scenario = with_flight(scenario, autopilot=autopilot, params=params)
+    table = new_scenario.flight.model_copy(update={"autopilot_from": file})
+    return replace(new_scenario, spec=new_scenario.spec.model_copy(update={"flight": table}), flight=table)

@@ -35,7 +35,7 @@ from planfly.named_fences import read_named_fences
 from planfly.workflow.airframe import find_airframe, load_airframe
 from planfly.workflow.file_autopilots import with_file_autopilot
 from planfly.workflow.make_plan import Advance
-from planfly.workflow.open_flight import existing_mission, mission_of_plan
+from planfly.workflow.open_flight import check_mission_exists, mission_of_plan
 from planner.plan import read_plan
 from world.errors import LogError, MissionError
 from world.scenario import Scenario, load_scenario, with_flight, with_wind
@@ -54,7 +54,7 @@ class ImportedFlight:
     setup: setup of the flight, with the log as its source.
     track: rows of the flight.
     events: messages of the vehicle.
-    ended: how the flight ended, according to the log.
+    ended: description of the flight's end, according to the log.
     """
 
     setup: FlightSetup
@@ -80,18 +80,18 @@ def import_flight(path: Path, options: LogOptions) -> ImportedFlight:
     """Read a log, place the flight in its scenario and judge it.
 
     Raises LogError for a file that is not the log of an aeroplane's flight, and for a log without a mission if the
-    options name none.  Raises MissionError for a plan that was not flown.
+    options name no mission.  Raises MissionError for a plan that was not flown.
     """
     plan, fences = options.get("plan"), read_named_fences(options.get("fence") or ())
     flight = make_flight(open_log(path), options.get("flight"))
     mission, mission_origin, planned_in = _planned_mission(path, flight, options)
-    mission = fences.on_mission(mission)
+    mission = fences.add_to_mission(mission)
     has_plan_heights = plan is not None or flight.mission is None or flight.mission.with_heights
     if not has_plan_heights:
         mission = with_flown_heights(mission, flight.lat, flight.lon, flight.up)
     _check_plan_autopilot(path, mission, flight.raw.program)
-    scenario, placed = _scenario_and_placed_mission(mission, options, planned_in)
-    scenario, wind_source = _with_wind_of_log(fences.on_scenario(apply_options(scenario, options)), flight, options)
+    scenario, placed = _choose_scenario_and_place_mission(mission, options, planned_in)
+    scenario, wind_source = _with_wind_of_log(fences.add_to_scenario(apply_options(scenario, options)), flight, options)
     aircraft_options = (options.get("aircraft"), options.get("scenario"), planned_in)
     aircraft_known = any(option is not None for option in aircraft_options)
     logged_autopilot = autopilot_of_log(flight.raw.program, flight.raw.parameters, flight.raw.source)
@@ -133,12 +133,12 @@ def import_flight(path: Path, options: LogOptions) -> ImportedFlight:
     if plan is not None and (mismatch := plan_mismatch(setup, track)) is not None:
         raise MissionError(f"{path}: not a flight of {plan}; {mismatch.text}", file=path)
     verdict = judge_flight(setup, track, "")
-    ended = "completed" if verdict.complete else _completion_text(verdict)
-    return ImportedFlight(setup, track, _vehicle_events(flight), verdict, ended)
+    end_reason = "completed" if verdict.complete else _completion_text(verdict)
+    return ImportedFlight(setup, track, _vehicle_events(flight), verdict, end_reason)
 
 
 def _check_plan_autopilot(path: Path, mission: Mission, program: str) -> None:
-    """Raise MissionError if the plan was written for another autopilot than that of the log."""
+    """Raise MissionError if the plan was not written for the autopilot of the log."""
     flown_autopilot = next(
         (name for name, title in TITLES.items() if program.lower().startswith(title[:5].lower())), ""
     )
@@ -154,7 +154,7 @@ def _planned_mission(path: Path, flight: LoggedFlight, options: LogOptions) -> t
     Raises LogError if neither the options nor the log contain the mission.
     """
     if (named_plan := options.get("plan")) is not None:
-        plan_path, terrain = existing_mission(Path(named_plan)), options.get("terrain")
+        plan_path, terrain = check_mission_exists(Path(named_plan)), options.get("terrain")
         if plan_path.suffix.lower() != ".json":
             return read_mission(plan_path), f"of {plan_path.name}", None
         plan = read_plan(plan_path, terrain=None if terrain is None else str(terrain))
@@ -172,10 +172,10 @@ def _planned_mission(path: Path, flight: LoggedFlight, options: LogOptions) -> t
     return logged.mission, f"{logged.origin} of the log{time_text}, {len(logged.mission.items)} items", None
 
 
-def _scenario_and_placed_mission(
+def _choose_scenario_and_place_mission(
     mission: Mission, options: LogOptions, planned_in: Scenario | None
 ) -> tuple[Scenario, PlacedMission]:
-    """Return the scenario in which a flight is judged, and the mission placed in that scenario."""
+    """Return the scenario for judging a flight, and the mission placed in this scenario."""
     scenario, named_scenario = planned_in, options.get("scenario")
     terrain = None if options.get("terrain") is None else str(options["terrain"])
     if named_scenario is not None:
@@ -225,9 +225,9 @@ def _flight_setup(
 
 
 def _path_limits(scenario: Scenario, autopilot: Autopilot, flight: LoggedFlight, default_airspeed: float) -> Limits:
-    """Return the limits at the airspeed stated by autopilot or scenario; if neither states one, at the flown airspeed.
+    """Return the limits at the airspeed stated by autopilot or scenario, or otherwise at the flown airspeed.
 
-    default_airspeed: airspeed of the aircraft, m/s, used if the log has no airspeed either.
+    default_airspeed: airspeed of the aircraft, m/s, used if the log has no airspeed.
     """
     aircraft, _ = find_airframe(scenario)
     envelope = load_envelope(aircraft, motor_braking=scenario.flight.motor_braking)
@@ -250,7 +250,7 @@ def _sha256(path: Path) -> str:
 
 
 def _describe_gaps(flight: LoggedFlight) -> tuple[str, ...]:
-    """Describe the parts of the flight that the log lacks, before its start, after its end and between its rows."""
+    """Describe the parts of the flight that are missing in the log: before its start, after its end, between rows."""
     notes = []
     if flight.begins:
         notes.append(f"the log begins in flight, at {flight.time[0]:.1f} s")
@@ -263,25 +263,25 @@ def _describe_gaps(flight: LoggedFlight) -> tuple[str, ...]:
 
 
 def _describe_other_flights(flight: LoggedFlight) -> tuple[str, ...]:
-    """Describe the other flights that the log contains, in a tuple of one line; empty if there are none."""
+    """Return a line on the other flights in the log; empty if there are no other flights."""
     if flight.count == 1:
         return ()
-    others = ", ".join(
+    other_flights = ", ".join(
         f"at {start:.0f} s ({mission_time:.0f} s along its mission)" for start, mission_time in flight.others
     )
-    return (f"flight {flight.number} of {flight.count} is judged; the others began {others} (--flight N)",)
+    return (f"flight {flight.number} of {flight.count} is judged; the others began {other_flights} (--flight N)",)
 
 
 def _describe_mission_change(flight: LoggedFlight, mission: Mission, options: LogOptions) -> tuple[str, ...]:
-    """Describe how the mission of the log differs from the plan, in a tuple of one line; empty if they agree."""
+    """Return a line on the difference between the log's mission and the plan; empty if they agree."""
     if options.get("plan") is None or flight.mission is None:
         return ()
     logged_items = flight.mission.mission.items
     pairs = zip(logged_items, mission.items, strict=False)
     changed = [
-        logged.seq
-        for logged, planned in pairs
-        if (logged.x, logged.y, logged.alt) != (planned.x, planned.y, planned.alt)
+        logged_item.seq
+        for logged_item, planned_item in pairs
+        if (logged_item.x, logged_item.y, logged_item.alt) != (planned_item.x, planned_item.y, planned_item.alt)
     ]
     if len(logged_items) == len(mission.items) and not changed:
         return ()
@@ -327,22 +327,22 @@ def fly_again(
     advance: Advance,
     max_stretches: int = 9,
 ) -> tuple[Reflight, ...]:
-    """Fly each stretch of followed legs again in the wind of the log, and return the comparisons, longest first.
+    """Fly each sequence of followed legs again in the wind of the log, and return the comparisons, longest first.
 
     setup: setup of the imported flight, with its source.
-    aircraft: aircraft to fly instead of the setup's aircraft; None keeps that.
-    turbulence: turbulence to fly in instead of the scenario's; None keeps that.
-    max_stretches: maximum number of stretches; if there are more, the longest are flown.
+    aircraft: aircraft of the simulated flight; None for the setup's aircraft.
+    turbulence: turbulence of the simulated flight; None for the scenario's turbulence.
+    max_stretches: maximum number of sequences; if there are more, the longest are flown.
 
     Raises LogError for a flight that followed no part of its mission, and StartError if the model cannot start.
     """
     return tuple(
-        _refly_stretch(setup, legs, aircraft, turbulence, advance)
+        _refly_followed_legs(setup, legs, aircraft, turbulence, advance)
         for legs in _followed_legs(setup, track)[:max_stretches]
     )
 
 
-def _refly_stretch(
+def _refly_followed_legs(
     setup: FlightSetup, legs: FlownLegs, aircraft: str | None, turbulence: str | None, advance: Advance
 ) -> Reflight:
     scenario = with_wind(with_flight(setup.scenario, aircraft=aircraft), None, None, turbulence)
@@ -366,11 +366,11 @@ def _refly_stretch(
     for block in simulate(flight):
         blocks.append(block)
         advance(block.distance, length, f"{block.distance / 1000:.1f} of {length / 1000:.1f} km")
-    track, ended = track_of(blocks), blocks[-1].ended
+    track, end_reason = track_of(blocks), blocks[-1].ended
     if len(track) < 2:
-        raise LogError(f"{scenario.name}: {model.name} flew none of the mission: {ended}", file=scenario.name)
+        raise LogError(f"{scenario.name}: {model.name} flew none of the mission: {end_reason}", file=scenario.name)
     stands_in = setup.source is not None and not setup.source.aircraft_known and aircraft is None
-    return compare_with_model(model_setup, legs, track, ended, stands_in=stands_in)
+    return compare_with_model(model_setup, legs, track, end_reason, stands_in=stands_in)
 
 
 def _followed_legs(setup: FlightSetup, track: Track) -> list[FlownLegs]:

@@ -22,7 +22,7 @@ from world.scenario import Scenario
 Advance = Callable[[float, float, str], None]
 
 
-def planned_for(scenario: Scenario, airframe: Airframe) -> Conditions:
+def planning_conditions(scenario: Scenario, airframe: Airframe) -> Conditions:
     """Return the conditions for which a scenario is planned."""
     return conditions_of(scenario, airframe.aircraft.name, airframe.airspeed, airframe.autopilot)
 
@@ -35,36 +35,36 @@ def make_plan(
     advance: Advance | None = None,
     *,
     stop: StopCondition | None = None,
-    flown: tuple[Plan, int] | None = None,
+    flown_plan_and_leg: tuple[Plan, int] | None = None,
     continues: bool = False,
 ) -> Plan:
-    """Plan a path within the certain part of the limits of scenario and aircraft.
+    """Plan a path within the limits of scenario and aircraft, less the uncertainty of the aircraft's limits.
 
     All commands use this function, so that they agree on which plan is safe.  If gusts make the autopilot orbit at
     waypoints, the plan has as few such waypoints as possible (`planfly.planning.gust_orbits`).  If gusts change the
     altitude of the aircraft, the plan has a margin for the change (`planfly.planning.gust_altitude_margin`).  The
     departure and the approach are added.  If the autopilot loiters at the end of the mission, the certificate names the
-    hazards that the loiter may come too close to.
+    hazards that may be too close to the loiter.
 
     A plan may take several searches, which share the scenario's budget of evaluations.
 
     stop: stop condition of `planner.search.plan_path.plan_path`.
-    flown: the plan being flown, and the leg from which it is replanned; None for a new plan.
+    flown_plan_and_leg: the plan being flown, and the leg from which it is replanned; None for a new plan.
     continues: True if the mission continues beyond the destination of the plan.
     """
     limits = airframe.limits.surely()
 
     def complete_plan(plan: Plan, search: Search) -> Plan:
-        def limit_orbits(candidate: Plan, limits_used: Limits) -> Plan:
-            return limit_waypoint_orbits(candidate, airframe, lambda world: search(world, limits_used), limits_used)
+        def limit_orbits(candidate: Plan, search_limits: Limits) -> Plan:
+            return limit_waypoint_orbits(candidate, airframe, lambda world: search(world, search_limits), search_limits)
 
-        def search_within(limits_used: Limits) -> Plan:
-            return limit_orbits(search(plan.scenario, limits_used), limits_used)
+        def search_within(search_limits: Limits) -> Plan:
+            return limit_orbits(search(plan.scenario, search_limits), search_limits)
 
         return ensure_altitude_margin(limit_orbits(plan, limits), airframe, search_within)
 
-    if flown is not None:
-        old_plan, leg = flown
+    if flown_plan_and_leg is not None:
+        old_plan, leg = flown_plan_and_leg
         new_plan = replan(
             scenario,
             limits,
@@ -76,25 +76,25 @@ def make_plan(
             stop=stop,
             settle=complete_plan,
         )
-        return _with_ground_phases(new_plan, airframe, old_plan, continues=continues)
+        return _add_ground_phases(new_plan, airframe, old_plan, continues=continues)
 
-    def search(world: Scenario, limits_used: Limits) -> Plan:
-        return plan_path(world, limits_used, seed=seed, algorithm=algorithm, progress=advance, stop=stop)
+    def search(world: Scenario, search_limits: Limits) -> Plan:
+        return plan_path(world, search_limits, seed=seed, algorithm=algorithm, progress=advance, stop=stop)
 
     searches = SharedBudget(search)
     plan = searches.total(complete_plan(searches(scenario, limits), searches))
-    return _with_ground_phases(plan, airframe, continues=continues)
+    return _add_ground_phases(plan, airframe, continues=continues)
 
 
 def finish_plan(plan: Plan, airframe: Airframe, *, continues: bool = False) -> Plan:
-    """Apply the steps of `make_plan` after its search to a plan, without another search."""
-    return _with_ground_phases(
+    """Apply to a plan the steps that `make_plan` takes after its search, without another search."""
+    return _add_ground_phases(
         ensure_altitude_margin(limit_waypoint_orbits(plan, airframe), airframe), airframe, continues=continues
     )
 
 
-def _with_ground_phases(plan: Plan, airframe: Airframe, old_plan: Plan | None = None, *, continues: bool) -> Plan:
-    """Return the plan with its departure and approach, and with the hazards near its final loiter in the certificate.
+def _add_ground_phases(plan: Plan, airframe: Airframe, old_plan: Plan | None = None, *, continues: bool) -> Plan:
+    """Add departure and approach to a plan, and the hazards near its final loiter to its certificate.
 
     old_plan: the plan being flown, or None.
     """
@@ -102,9 +102,9 @@ def _with_ground_phases(plan: Plan, airframe: Airframe, old_plan: Plan | None = 
     if continues or not airframe.autopilot.loiter_rules.ends_in_circle:
         return plan
     setup = make_setup(plan.scenario, airframe, mission_of_plan(plan, airframe), plan.seed, plan=plan)
-    hazards = end_loiter_hazards(route_requirements(setup))
-    if hazards is None or not hazards[1]:
+    loiter_hazards = end_loiter_hazards(route_requirements(setup))
+    if loiter_hazards is None or not loiter_hazards[1]:
         return plan
-    loiter_text = f"{airframe.autopilot.title} circles about the destination, up to {hazards[0]:.0f} m from it"
-    problems = (*plan.certificate.problems, f"{loiter_text}: {', '.join(hazards[1])}")
+    loiter_text = f"{airframe.autopilot.title} circles about the destination, up to {loiter_hazards[0]:.0f} m from it"
+    problems = (*plan.certificate.problems, f"{loiter_text}: {', '.join(loiter_hazards[1])}")
     return replace(plan, certificate=replace(plan.certificate, problems=problems))

@@ -39,18 +39,18 @@ class MissionContext:
     """Context in which a changed mission is judged.
 
     scenario: world of the mission.  airframe: aircraft loaded for the mission.  seed: seed of the flight.
-    opened: the setup as it was opened, with its plan if there is one.
+    opened_setup: the setup as it was opened, with its plan if there is one.
     planned: True if planfly set the acceptance radii, which then follow the turns.
     """
 
     scenario: Scenario
     airframe: Airframe
     seed: int
-    opened: FlightSetup
+    opened_setup: FlightSetup
     planned: bool = False
 
     @classmethod
-    def around_setup(cls, setup: FlightSetup) -> "MissionContext":
+    def from_setup(cls, setup: FlightSetup) -> "MissionContext":
         """Return the context of a setup's mission, flown by the control law of its autopilot.
 
         Raises FlightError if the aircraft is missing.
@@ -62,17 +62,17 @@ class MissionContext:
     # ------------------------------------------------------------------
     # Places.
 
-    def placed(self, mission: Mission) -> PlacedMission:
+    def place_mission(self, mission: Mission) -> PlacedMission:
         """Return the stops of a mission on the map, with jumps unrolled."""
         return place_stops(mission, self.scenario.origin, self.scenario.terrain, vertical_legs=True)
 
-    def points(self, mission: Mission, placed: PlacedMission | None = None) -> Floats:
+    def item_positions(self, mission: Mission, placed: PlacedMission | None = None) -> Floats:
         """Return east, north and altitude AMSL of each place of `flight.mission.edits.places`, (n, 3) m.
 
         The altitude of a landing is the altitude of its touchdown.  An item that no flight reaches has the altitude
         that it states, NaN if not known.
         """
-        placed = self.placed(mission) if placed is None else placed
+        placed = self.place_mission(mission) if placed is None else placed
         heights = {stop.stop.item: float(stop.position[2]) for stop in reversed(placed.stops)}
         items = [mission.items[k] for k in places(mission)]
         east, north = to_map(self.scenario.origin, [item.lat_deg for item in items], [item.lon_deg for item in items])
@@ -98,23 +98,23 @@ class MissionContext:
             east, north = float(home_east), float(home_north)
         return math.nan if terrain is None else float(terrain.height(east, north)) + item.alt
 
-    def flown(self, mission: Mission) -> frozenset[int]:
+    def reached_items(self, mission: Mission) -> frozenset[int]:
         """Return the numbers of the items that a flight reaches."""
-        return frozenset(stop.stop.item for stop in self.placed(mission).stops)
+        return frozenset(stop.stop.item for stop in self.place_mission(mission).stops)
 
-    def geographic(self, east: float, north: float) -> tuple[float, float]:
+    def to_geographic(self, east: float, north: float) -> tuple[float, float]:
         """Return latitude and longitude of a place on the map, degrees."""
         lat, lon = to_geo(self.scenario.origin, east, north)
         return float(lat), float(lon)
 
-    def retuned(self, mission: Mission, index: int) -> Mission:
+    def with_updated_radii(self, mission: Mission, index: int) -> Mission:
         """Adapt the acceptance radii of a planned mission to its turns near an item."""
         if not self.planned:
             return mission
         item_indices = places(mission)
         position = int(np.searchsorted(item_indices, index))
         nearby = item_indices[max(0, position - 2) : position + 3]
-        points = self._planned_points(mission, nearby)
+        points = self._planned_positions(mission, nearby)
         airframe = self.airframe
         radii = acceptance_radii(self.scenario, points, airframe.airspeed, airframe.max_bank, airframe.limits.tracking)
         items = list(mission.items)
@@ -126,7 +126,7 @@ class MissionContext:
                 items[k] = replace(items[k], params=(params[0], radius, *params[2:]))
         return replace(mission, items=tuple(items))
 
-    def _planned_points(self, mission: Mission, indices: tuple[int, ...]) -> Floats:
+    def _planned_positions(self, mission: Mission, indices: tuple[int, ...]) -> Floats:
         """Return the places of a planned mission, AMSL; a landing has the altitude of the item before it."""
         items = [mission.items[k] for k in indices]
         east, north = to_map(self.scenario.origin, [item.lat_deg for item in items], [item.lon_deg for item in items])
@@ -142,9 +142,9 @@ class MissionContext:
     def setup(self, mission: Mission) -> FlightSetup:
         """Make the flight setup of a mission.  Raises MissionError for a mission that cannot be laid out."""
         # The mission of the setup names its autopilot, so compare the items, not the missions.
-        if mission.items is self.opened.mission.items and self.scenario is self.opened.scenario:
-            return self.opened
-        return make_setup(self.scenario, self.airframe, mission, self.seed, placed=self.placed(mission))
+        if mission.items is self.opened_setup.mission.items and self.scenario is self.opened_setup.scenario:
+            return self.opened_setup
+        return make_setup(self.scenario, self.airframe, mission, self.seed, placed=self.place_mission(mission))
 
     def judge(self, mission: Mission) -> JudgedMission:
         """Judge the whole geometry of a mission."""

@@ -13,7 +13,7 @@ from flight.mission.preflight_notes import field_notes
 from flight.mission.route import lay_route, with_end_courses
 from flight.mission_files.formats import read_mission
 from flight.simulation.setup import FDM_HZ, EngineChoice, FlightSetup
-from planfly.flight_options import MissionOptions, apply_options, named_scenario
+from planfly.flight_options import MissionOptions, apply_options, load_scenario_with_options
 from planfly.named_fences import read_named_fences
 from planfly.workflow.airframe import Airframe, choose_seed, load_airframe
 from planfly.workflow.file_autopilots import with_file_autopilot
@@ -27,14 +27,14 @@ PLAN_FILE = "plan.json"
 
 
 def with_engine(setup: FlightSetup, engine: EngineChoice) -> FlightSetup:
-    """Return a setup with a flight model; it is copied only if needed, because a copy computes its path again."""
+    """Return a setup with another flight model; a setup with this model is returned as it is, without a copy."""
     return setup if setup.engine == engine else replace(setup, engine=engine)
 
 
 def open_flight(source: Plan | str | Path, options: MissionOptions, program: Path | None = None) -> FlightSetup:
     """Make the setup of a plan, or of a plan.json, .waypoints or .plan file.
 
-    The scenario is the named scenario, the plan's own, or for a mission file a scenario implied by its items.
+    The scenario is the named scenario, the scenario of the plan, or for a mission file a scenario implied by its items.
 
     program: the autopilot program that flies, or None for a simulated autopilot.
     Raises MissionError, ScenarioError, ParameterError or TerrainError.
@@ -53,37 +53,40 @@ def open_flight(source: Plan | str | Path, options: MissionOptions, program: Pat
         options.get("scenario"),
         _terrain_option(options),
     )
-    mission = fences.on_mission(check_fixed_wing(read_mission(existing_mission(Path(source)))))
+    mission = fences.add_to_mission(check_fixed_wing(read_mission(check_mission_exists(Path(source)))))
     if named_world is not None:
-        scenario = named_scenario(named_world, options, program)
+        scenario = load_scenario_with_options(named_world, options, program)
         placed = place_stops(mission, scenario.origin, scenario.terrain, vertical_legs=True)
     else:
-        implied = implied_scenario(mission, terrain, vertical_legs=True)
-        scenario, placed = apply_options(implied.scenario, options, program), implied.placed
-    scenario = with_file_autopilot(fences.on_scenario(scenario), mission)
+        implied_world = implied_scenario(mission, terrain, vertical_legs=True)
+        scenario, placed = apply_options(implied_world.scenario, options, program), implied_world.placed
+    scenario = with_file_autopilot(fences.add_to_scenario(scenario), mission)
     seed = choose_seed(scenario, options.get("seed"))
     return make_setup(scenario, load_airframe(scenario), mission, seed, placed=placed)
 
 
 def _open_plan(source: Plan | str | Path, options: MissionOptions, program: Path | None) -> FlightSetup:
-    """Make the setup of a plan in its own scenario, or of its mission in the scenario that the options name."""
+    """Make the setup of a plan in its own scenario, or of the plan's mission in the scenario named by the options."""
     fences, named_world, terrain = (
         read_named_fences(options.get("fence") or ()),
         options.get("scenario"),
         _terrain_option(options),
     )
     if not isinstance(source, Plan):
-        plan, file = read_plan(existing_mission(Path(source)), terrain=terrain), str(source)
+        plan, file = read_plan(check_mission_exists(Path(source)), terrain=terrain), str(source)
     else:
         plan, file = source if terrain is None else parse_plan(plan_json(source), PLAN_FILE, terrain=terrain), PLAN_FILE
-    scenario = fences.on_scenario(apply_options(plan.scenario, options, program))
+    scenario = fences.add_to_scenario(apply_options(plan.scenario, options, program))
     airframe, seed = load_airframe(scenario), options.get("seed")
-    mission, chosen_seed = fences.on_mission(mission_of_plan(plan, airframe, file)), plan.seed if seed is None else seed
+    mission, chosen_seed = (
+        fences.add_to_mission(mission_of_plan(plan, airframe, file)),
+        plan.seed if seed is None else seed,
+    )
     if named_world is None:
         return make_setup(scenario, airframe, mission, chosen_seed, plan=plan)
-    # The plan's waypoints are in the map coordinates of its own scenario; in another scenario its mission items are
-    # flown, like those of a file.
-    scenario = fences.on_scenario(named_scenario(named_world, options, program))
+    # The plan's waypoints are in the map coordinates of its own scenario.  Therefore its mission items are flown in
+    # another scenario.
+    scenario = fences.add_to_scenario(load_scenario_with_options(named_world, options, program))
     return make_setup(scenario, load_airframe(scenario), mission, chosen_seed)
 
 
@@ -92,8 +95,8 @@ def _terrain_option(options: MissionOptions) -> str | None:
     return None if terrain is None else str(terrain)
 
 
-def existing_mission(path: Path) -> Path:
-    """Return the path if its file exists; otherwise raise MissionError, which suggests the most similar name."""
+def check_mission_exists(path: Path) -> Path:
+    """Return the path.  Raises MissionError if it does not exist, with the most similar name as a suggestion."""
     if not path.is_file():
         hint = did_you_mean(path.name, _mission_file_names(path.parent))
         raise MissionError(f"{path}: no such file; expected a plan.json, .waypoints or .plan file{hint}", file=path)
@@ -127,7 +130,7 @@ def check_fixed_wing(mission: Mission) -> Mission:
 
 
 def mission_of_plan(plan: Plan, airframe: Airframe, source: str = PLAN_FILE) -> Mission:
-    """Return the waypoints of a plan as a mission without fences.  source: the plan's file name, for messages."""
+    """Make a mission without fences from the waypoints of a plan.  source: the plan's file name, for messages."""
     return plan_mission(plan, airframe.airspeed, airframe.max_bank, source, airframe.limits.tracking)
 
 
@@ -141,9 +144,9 @@ def make_setup(
     placed: PlacedMission | None = None,
     fdm_hz: Literal[60, 120] = FDM_HZ,
 ) -> FlightSetup:
-    """Make the setup that determines the flight of a mission in a scenario.
+    """Make the setup of a mission's flight in a scenario.
 
-    placed: the mission placed on the map of the scenario, if already known.
+    placed: the mission placed on the map of the scenario, if already computed.
     fdm_hz: step rate of JSBSim, Hz.
     Raises MissionError for a mission without a valid route, and for a fence without valid zones.
     """

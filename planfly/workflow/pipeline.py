@@ -1,4 +1,4 @@
-"""Plan, fly, record and judge a mission, with one function of frozen data for each stage."""
+"""Plan, fly, record and judge a mission, with one function for each stage."""
 
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -20,7 +20,7 @@ from logs.verdict.verdict import Verdict
 from planfly.rtl.return_summary import ReturnSummary, return_summary
 from planfly.workflow.airframe import Airframe, choose_seed, load_airframe
 from planfly.workflow.crash_safe_log import CrashSafeLog, FlightLimits
-from planfly.workflow.make_plan import Advance, make_plan, planned_for
+from planfly.workflow.make_plan import Advance, make_plan, planning_conditions
 from planfly.workflow.mission_context import JudgedMission
 from planfly.workflow.open_flight import make_setup, mission_of_plan
 from planfly.workflow.reference_flights import FlyReference, judge_with_reference_flights
@@ -88,7 +88,7 @@ class JudgedFlight:
     events: entries of the log in addition to the rows.
     engine: flight model that flew, and the reason; "" for a flight that did not start.
     reference: the results of reference flights; None if none were flown.
-    returns: returns from a few places of the flight; None if they were not requested.
+    returns: returns from a few points of the flight; None if they were not requested.
     """
 
     setup: FlightSetup
@@ -114,10 +114,10 @@ def plan_then_fly(scenario: Scenario, *, seed: int | None = None, log: Path | No
     plan = make_plan(scenario, airframe, chosen_seed)
     mission = replace(mission_of_plan(plan, airframe, "plan"), autopilot=airframe.autopilot.name)
     if not plan.feasible:
-        return PlanThenFly(plan, mission, None, judge_plan_only(plan, planned_for(scenario, airframe)))
+        return PlanThenFly(plan, mission, None, judge_plan_only(plan, planning_conditions(scenario, airframe)))
     setup = make_setup(scenario, airframe, mission, chosen_seed, plan=plan)
-    flown = fly_and_judge(setup, airframe, log)
-    return PlanThenFly(plan, mission, flown.track, flown.verdict)
+    flight = fly_and_judge(setup, airframe, log)
+    return PlanThenFly(plan, mission, flight.track, flight.verdict)
 
 
 def fly_and_judge(
@@ -141,14 +141,14 @@ def fly_and_judge(
     off_nominal: differences between the flight and the assumptions of plan and guidance; ignored if a program flies.
     reference: cases in which reference flights are flown, see
     `planfly.workflow.reference_flights.judge_with_reference_flights`.
-    returns: True judges returns from a few places, and draws them in the log.  Without a log no returns are judged.
+    returns: True judges returns from a few points, and draws them in the log.  Without a log no returns are judged.
     limits: limits of the flight time and of the size of the log.
 
     If the flight cannot start, or `planfly.workflow.trial_flight.reason_not_to_start` gives a reason not to start it,
     the result has no row and no log; its verdict covers the route and says that the flight did not start.  Raises
     FlightError if a program does not fly the mission to its end; then no log is left.
     """
-    task = _Task(airframe, log, advance, every, limits, reference, returns=returns)
+    task = _FlightOptions(airframe, log, advance, every, limits, reference, returns=returns)
     requirements = route_requirements(setup)
     reason = reason_not_to_start(requirements)
     if reason:
@@ -166,8 +166,8 @@ def fly_and_judge(
 
 
 @dataclass(frozen=True, slots=True)
-class _Task:
-    """Arguments of `fly_and_judge` that concern one flight."""
+class _FlightOptions:
+    """Arguments of `fly_and_judge` for one flight."""
 
     airframe: Airframe
     log: Path | None
@@ -178,18 +178,18 @@ class _Task:
     returns: bool
 
 
-def _fly_with_program(task: _Task, setup: FlightSetup, program: ProgramAutopilot) -> JudgedFlight:
+def _fly_with_program(task: _FlightOptions, setup: FlightSetup, program: ProgramAutopilot) -> JudgedFlight:
     with program.start(setup, task.airframe.aircraft) as flight:
         flight.prepare()
         try:
-            judged = _record_and_judge(task, route_requirements(flight.setup), flight)
+            judged_flight = _record_and_judge(task, route_requirements(flight.setup), flight)
         except FlightError:
             if task.log is not None:
                 task.log.unlink(missing_ok=True)
             raise
         if task.log is not None:
             flight.keep_log(task.log.with_suffix(program.log_suffix))
-    return judged
+    return judged_flight
 
 
 def autopilot_log(log: Path, program: Path) -> Path:
@@ -201,59 +201,63 @@ def autopilot_log(log: Path, program: Path) -> Path:
     return log.with_suffix(program_autopilot(program).log_suffix)
 
 
-def _record_and_judge(task: _Task, requirements: RouteRequirements, flight: Airborne) -> JudgedFlight:
+def _record_and_judge(task: _FlightOptions, requirements: RouteRequirements, flight: Airborne) -> JudgedFlight:
     """Fly to the end, record the flight if a log is named, and judge the recorded rows."""
     flight.max_ticks = min(flight.max_ticks, task.limits.max_ticks(flight.dt))
     if task.log is None:
-        track, ended = _fly(task, flight, None)
-        return _judge_rows(task, requirements, track, ended, flight.engine)
+        track, end_reason = _simulate_and_record(task, flight, None)
+        return _judge_rows(task, requirements, track, end_reason, flight.engine)
     with CrashSafeLog(task.log, flight.setup, every=task.every, batch=BATCH_S) as recorder:
-        track, recorder.ended = _fly(task, flight, recorder)
+        track, recorder.ended = _simulate_and_record(task, flight, recorder)
         rows = thin_track(track, task.every)
-        judged = _judge_rows(task, requirements, rows, recorder.ended, flight.engine)
-        for event in judged.events:
+        judged_flight = _judge_rows(task, requirements, rows, recorder.ended, flight.engine)
+        for event in judged_flight.events:
             recorder.event(event.time, event.text, event.level)
-        summary = return_summary(flight.setup, judged.track) if task.returns else None
+        summary = return_summary(flight.setup, judged_flight.track) if task.returns else None
         drawn_returns = None if summary is None else summary.draw_returns_without_glides()
-        recorder.finish(judged.ended, judged.verdict, judged.reference, drawn_returns)
-    return replace(judged, returns=summary)
+        recorder.finish(judged_flight.ended, judged_flight.verdict, judged_flight.reference, drawn_returns)
+    return replace(judged_flight, returns=summary)
 
 
-def _fly(task: _Task, flight: Airborne, recorder: CrashSafeLog | None) -> tuple[Track, str]:
+def _simulate_and_record(task: _FlightOptions, flight: Airborne, recorder: CrashSafeLog | None) -> tuple[Track, str]:
     """Fly to the end or until the log is full, recording each block; return the track and the reason for the end."""
-    blocks, ended, length = list[FlightBlock](), "", flight.path.length
+    blocks, end_reason, length = list[FlightBlock](), "", flight.path.length
     for block in simulate(flight):
         blocks.append(block)
-        ended = block.ended
+        end_reason = block.ended
         if recorder is not None and len(block.rows):
             recorder.write(block.rows)
-            ended = ended or task.limits.log_full(recorder.size)
+            end_reason = end_reason or task.limits.log_limit_reason(recorder.size)
         if task.advance is not None:
             task.advance(block.distance, length, f"{block.distance / 1000:.1f} of {length / 1000:.1f} km")
-        if ended:
+        if end_reason:
             break
-    return track_of(blocks), ended
+    return track_of(blocks), end_reason
 
 
 def _judge_unflown(
-    requirements: RouteRequirements, log: Path | None, ended: str, reference: FlyReference
+    requirements: RouteRequirements, log: Path | None, end_reason: str, reference: FlyReference
 ) -> JudgedFlight:
     """Judge a flight without a row, and remove the log of an earlier flight."""
     if log is not None:
         log.unlink(missing_ok=True)
     setup, track = requirements.setup, join_tracks([])
-    verdict = judge_flight(setup, track, ended, requirements=requirements)
+    verdict = judge_flight(setup, track, end_reason, requirements=requirements)
     if reference != "never":
         verdict = with_tried_suggestions(JudgedMission(setup.mission, setup, requirements, verdict))
-    return JudgedFlight(setup, requirements, track, ended, verdict, ())
+    return JudgedFlight(setup, requirements, track, end_reason, verdict, ())
 
 
-def _judge_rows(task: _Task, requirements: RouteRequirements, track: Track, ended: str, engine: str) -> JudgedFlight:
-    end = float(track.time[-1]) if len(track) else 0.0
+def _judge_rows(
+    task: _FlightOptions, requirements: RouteRequirements, track: Track, end_reason: str, engine: str
+) -> JudgedFlight:
+    end_time = float(track.time[-1]) if len(track) else 0.0
     events = (
         LogEvent(0.0, f"flight model: {engine}", "info"),
-        LogEvent(end, f"flight ended: {ended}", "info" if ended == "completed" else "error"),
+        LogEvent(end_time, f"flight ended: {end_reason}", "info" if end_reason == "completed" else "error"),
     )
     aircraft = task.airframe.aircraft
-    verdict, reference_flights = judge_with_reference_flights(requirements, aircraft, track, ended, fly=task.reference)
-    return JudgedFlight(requirements.setup, requirements, track, ended, verdict, events, engine, reference_flights)
+    verdict, reference_flights = judge_with_reference_flights(
+        requirements, aircraft, track, end_reason, fly=task.reference
+    )
+    return JudgedFlight(requirements.setup, requirements, track, end_reason, verdict, events, engine, reference_flights)

@@ -33,10 +33,10 @@ _VERTICAL_RULES = ("clearance", "height", "bounds", "slope", "energy", "stall", 
 PassesWithAutopilot = Callable[[Autopilot], bool]
 
 
-def deciding_parameter(
+def find_passing_parameter(
     autopilot: Autopilot, findings: tuple[Finding, ...], passes: PassesWithAutopilot
 ) -> DecidingParameter | None:
-    """Return the first parameter that lets the flight pass with another value, and the nearest such value, or None.
+    """Find the first parameter with which the flight passes at another value, and its nearest passing value, or None.
 
     findings: findings of the flight that failed.
     passes: flies with the given autopilot and returns True if that flight passes; called about ten times.
@@ -50,19 +50,19 @@ def deciding_parameter(
     >>> from logs.verdict.places import Place
     >>> low = make_finding("clearance", Place("leg", 4), ok=False, reason="", flown=52.0, limit=60.0, margin=-8.0)
     >>> quick = lambda law: law.parameters.tecs_height_demand_time < 1.3
-    >>> found = deciding_parameter(ArduPlane(ArduPilotParameters.defaults()), (low,), quick)
+    >>> found = find_passing_parameter(ArduPlane(ArduPilotParameters.defaults()), (low,), quick)
     >>> found.name, found.current, found.passing
     ('TECS_HDEM_TCONST', 3.0, 1.2)
     """
-    failed = first_failed(findings)
-    if failed is None or autopilot.parameters is None or failed.rule == "mission":
+    failed_finding = first_failed(findings)
+    if failed_finding is None or autopilot.parameters is None or failed_finding.rule == "mission":
         # No flight parameter changes the rejection of a mission.
         return None
     values = {parameter.name: parameter.value for parameter in autopilot.parameters.values}
     vertical_candidates, lateral_candidates = autopilot.height_candidates, autopilot.side_candidates
     for name, step, farthest, unit, min_value in (
         (*vertical_candidates, *lateral_candidates)
-        if failed.rule in _VERTICAL_RULES
+        if failed_finding.rule in _VERTICAL_RULES
         else (*lateral_candidates, *vertical_candidates)
     ):
         current = values[name]
@@ -71,38 +71,44 @@ def deciding_parameter(
             return passes(autopilot.with_parameters(**{name: value}))
 
         # Do not suggest values below the documented range.
-        passing = _nearest_passing_value(max(current, min_value - step), step, farthest, with_value)
-        if passing is not None:
-            deviation = _deviation_at_failure(failed, findings)
-            return DecidingParameter(name, current, passing, unit, failed.rule, failed.place, deviation)
+        passing_value = _nearest_passing_value(max(current, min_value - step), step, farthest, with_value)
+        if passing_value is not None:
+            deviation = _deviation_at_failure(failed_finding, findings)
+            return DecidingParameter(
+                name, current, passing_value, unit, failed_finding.rule, failed_finding.place, deviation
+            )
     return None
 
 
 def _nearest_passing_value(
     current: float, step: float, farthest: float, passes: Callable[[float], bool]
 ) -> float | None:
-    """Return the passing value nearest to the current value, in steps towards `farthest`; None if `farthest` fails."""
+    """Return the passing value nearest to the current value, in steps to `farthest`; None if `farthest` fails."""
     step_count = int(abs(farthest - current) / step + 1e-6)
     sign = 1.0 if farthest > current else -1.0
     values = [round(current + sign * k * step, 6) for k in range(1, step_count + 1)]
     if not values or not passes(values[-1]):
         return None
-    nearest = least_change(values[:-1], passes)
-    return values[-1] if nearest is None else nearest
+    nearest_value = least_change(values[:-1], passes)
+    return values[-1] if nearest_value is None else nearest_value
 
 
-def _deviation_at_failure(failed: Finding, findings: tuple[Finding, ...]) -> float | None:
+def _deviation_at_failure(failed_finding: Finding, findings: tuple[Finding, ...]) -> float | None:
     """Return the cross-track or altitude error at the place of the failure, m, or None if unknown."""
-    if failed.rule == "corridor":
-        return failed.flown
-    if failed.place.kind != "leg" or failed.rule not in ("clearance", "height"):
+    if failed_finding.rule == "corridor":
+        return failed_finding.flown
+    if failed_finding.place.kind != "leg" or failed_finding.rule not in ("clearance", "height"):
         return None
-    slope_findings = [finding for finding in findings if finding.rule == "slope" and finding.place == failed.place]
+    slope_findings = [
+        finding for finding in findings if finding.rule == "slope" and finding.place == failed_finding.place
+    ]
     errors = [fact.value for finding in slope_findings for fact in finding.facts if fact.what == "height error"]
     return errors[0] if errors else None
 
 
-def airframe_answer(setup: FlightSetup, aircraft: Aircraft, should_abort: AbortCheck = never_abort) -> AirframeAnswer:
+def judge_airframe_flight(
+    setup: FlightSetup, aircraft: Aircraft, should_abort: AbortCheck = never_abort
+) -> AirframeAnswer:
     """Fly a setup with planfly's guidance and the exact position, and judge that flight.
 
     The flight has the same true airspeeds as a flight by ArduPlane.  ArduPlane treats airspeeds as equivalent
@@ -113,20 +119,20 @@ def airframe_answer(setup: FlightSetup, aircraft: Aircraft, should_abort: AbortC
     trial = Trial(
         replace(setup, autopilot=PlanflyGuidance(), nav="perfect", route=airframe_route), aircraft, should_abort
     )
-    track, ended = trial.flight
+    track, end_reason = trial.flight
     if not len(track):
-        return AirframeAnswer(False, f"not flyable: {ended}", (("completion", FLIGHT),))
+        return AirframeAnswer(False, f"not flyable: {end_reason}", (("completion", FLIGHT),))
     verdict = trial.flight_verdict
-    failed = tuple((finding.rule, finding.place) for finding in verdict.findings if finding.ok is False)
+    failed_places = tuple((finding.rule, finding.place) for finding in verdict.findings if finding.ok is False)
     # Undecided findings on take-off and landing do not apply to this flight.
     answer = "flyable in the air" if verdict.flies and not verdict.flyable else verdict.headline
-    return AirframeAnswer(verdict.flies, answer, failed)
+    return AirframeAnswer(verdict.flies, answer, failed_places)
 
 
 def find_deciding_parameter(
     setup: FlightSetup, aircraft: Aircraft, verdict: Verdict, should_abort: AbortCheck = never_abort
 ) -> DecidingParameter | None:
-    """Find a parameter that lets a failed flight pass with another value, or return None.
+    """Find a parameter with which a failed flight passes at another value, or return None.
 
     verdict: verdict on the flight with the setup's own parameters.
     should_abort: see `judge_with_reference_flights`.
@@ -147,11 +153,11 @@ def find_deciding_parameter(
     spec = scenario.spec.model_copy(update={"limits": limits})
     same_setup = setup.in_scenario(replace(scenario, spec=spec, limits=limits))
 
-    def passes(law: Autopilot) -> bool:
-        trial_verdict = Trial(replace(same_setup, autopilot=law), aircraft, should_abort).flight_verdict
+    def passes(autopilot: Autopilot) -> bool:
+        trial_verdict = Trial(replace(same_setup, autopilot=autopilot), aircraft, should_abort).flight_verdict
         return trial_verdict.flies and passes_with_margin(trial_verdict.findings, findings)
 
-    return deciding_parameter(setup.autopilot, findings, passes)
+    return find_passing_parameter(setup.autopilot, findings, passes)
 
 
 # Cross-track error of a simulated autopilot against the real one, as a fraction of the distance from the legs.  Nine in
@@ -191,33 +197,36 @@ def judge_with_reference_flights(
     requirements: RouteRequirements,
     aircraft: Aircraft,
     track: Track,
-    ended: str,
+    end_reason: str,
     *,
     fly: FlyReference = "failed",
     should_abort: AbortCheck = never_abort,
 ) -> tuple[Verdict, ReferenceFlights | None]:
     """Judge a flight, with reference flights that explain the verdict but do not decide it, and tried suggestions.
 
-    requirements: the route requirements of the setup that was flown.  track, ended: the flight and its end.
+    requirements: the route requirements of the flown setup.
+    track, end_reason: the flight, and the reason for its end.
     fly: cases in which reference flights are flown: "failed" if a finding of the flight fails, "always" also if all
     pass.  A flight of planfly's own guidance has no reference flight, but its suggestions are tried.
-    should_abort: called throughout the reference flights; once it returns True, they are aborted, and the verdict holds
-    the results up to that moment.
+    should_abort: called throughout the reference flights; once it returns True, they are aborted, and the verdict
+    contains the results up to that moment.
     """
     setup = requirements.setup
-    verdict = judge_flight(setup, track, ended, requirements=requirements)
+    verdict = judge_flight(setup, track, end_reason, requirements=requirements)
     if fly == "never" or (fly == "failed" and not verdict.failed):
         return verdict, None
     reference = ReferenceFlights(tried=() if verdict.failed else None)
     with suppress(TrialAborted):
         if setup.autopilot.level != "airframe":
-            reference = replace(reference, airframe=airframe_answer(setup, aircraft, should_abort))
+            reference = replace(reference, airframe=judge_airframe_flight(setup, aircraft, should_abort))
         if reference.airframe is not None and reference.airframe.flyable:
             reference = replace(reference, deciding=find_deciding_parameter(setup, aircraft, verdict, should_abort))
         if verdict.failed:
-            judged = JudgedMission(setup.mission, setup, requirements, verdict)
-            passed_trials = SuggestionTrials(MissionContext.around_setup(setup), judged, should_abort).passing()
+            judged_mission = JudgedMission(setup.mission, setup, requirements, verdict)
+            passed_trials = SuggestionTrials(
+                MissionContext.from_setup(setup), judged_mission, should_abort
+            ).find_passing()
             reference = replace(reference, tried=tried_suggestions(passed_trials))
     if reference == ReferenceFlights():
         return verdict, None
-    return judge_flight(setup, track, ended, reference=reference, requirements=requirements), reference
+    return judge_flight(setup, track, end_reason, reference=reference, requirements=requirements), reference

@@ -1,4 +1,4 @@
-"""Trials of the suggestions of a verdict: only those with which their finding passes are offered.
+"""Trials of the suggestions of a verdict; a suggestion is offered only if its trial passes.
 
 A suggestion is applied to the mission, judged by geometry, and flown if the verdict is on a flight.  It passes if its
 finding is gone and no more findings fail than before.  A step that is too small, such as a height, is enlarged by the
@@ -30,9 +30,9 @@ MAX_TRIAL_FLIGHTS = 4
 # Greatest number of missions that are tried for one suggestion: the suggestion itself and larger steps.
 _MAX_STEPS = 10
 # Greatest number of failed findings with suggestions; if more fail, no single change is worth a trial.
-_MAX_FAILED = 40
+_MAX_FAILED_FINDINGS = 40
 # Changes by a step, m, which are enlarged while the finding fails.
-_STEPS = frozenset(("height", "descent", "inset", "distance", "north", "east", "south", "west"))
+_STEP_KINDS = frozenset(("height", "descent", "inset", "distance", "north", "east", "south", "west"))
 # Factor on the part that a step still lacks.
 _GROWTH_FACTOR = 1.5
 # Length added to the part that a step still lacks, m.
@@ -40,13 +40,15 @@ _GROWTH_M = 2.0
 
 
 def finding_key(finding: Finding) -> tuple[str, str, int | None, str]:
-    """Return the key of a finding that survives a change: rule and place, without item numbers, which may shift."""
+    """Return the identity of a finding across changes: rule and place, without item numbers, which may shift."""
     return finding.rule, finding.place.kind, finding.place.index, finding.place.name
 
 
-def fails_no_more(before: Verdict, after: Verdict, finding: Finding) -> bool:
+def is_improved(old_verdict: Verdict, new_verdict: Verdict, finding: Finding) -> bool:
     """Return True if a finding does not fail after a change, and no more findings fail than before."""
-    return len(after.failed) <= len(before.failed) and finding_key(finding) not in map(finding_key, after.failed)
+    return len(new_verdict.failed) <= len(old_verdict.failed) and finding_key(finding) not in map(
+        finding_key, new_verdict.failed
+    )
 
 
 @dataclass(frozen=True)
@@ -59,7 +61,7 @@ class PassedTrial:
 
 
 def tried_suggestions(passed_trials: Sequence[PassedTrial]) -> tuple[TriedSuggestions, ...]:
-    """Return the suggestions that passed, by finding."""
+    """Return the suggestions that passed, grouped by finding."""
     trials_by_finding: dict[int, list[PassedTrial]] = {}
     for trial in passed_trials:
         trials_by_finding.setdefault(id(trial.finding), []).append(trial)
@@ -76,13 +78,14 @@ def judge_mission(setup: FlightSetup) -> Verdict:
     return with_tried_suggestions(JudgedMission(setup.mission, setup, requirements, verdict))
 
 
-def with_tried_suggestions(judged: JudgedMission) -> Verdict:
+def with_tried_suggestions(judged_mission: JudgedMission) -> Verdict:
     """Return the verdict on a mission with only those suggestions that pass a trial."""
-    if not judged.verdict.failed:
-        return judged.verdict
-    passed_trials = SuggestionTrials(MissionContext.around_setup(judged.setup), judged).passing()
+    if not judged_mission.verdict.failed:
+        return judged_mission.verdict
+    passed_trials = SuggestionTrials(MissionContext.from_setup(judged_mission.setup), judged_mission).find_passing()
     return replace(
-        judged.verdict, findings=with_passing_suggestions(judged.verdict.findings, tried_suggestions(passed_trials))
+        judged_mission.verdict,
+        findings=with_passing_suggestions(judged_mission.verdict.findings, tried_suggestions(passed_trials)),
     )
 
 
@@ -101,10 +104,10 @@ class SuggestionTrials:
     _trials: dict[object, Trial] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        self._current = Trial(self.judged.setup, self.context.airframe.aircraft)
+        self._current_trial = Trial(self.judged.setup, self.context.airframe.aircraft)
 
-    def passing(self) -> list[PassedTrial]:
-        """Try the first suggestion of each finding, then the second of each, and return those that pass."""
+    def find_passing(self) -> list[PassedTrial]:
+        """Try the first suggestion of each finding, then the second and so on, and return the suggestions that pass."""
         requests = [
             (number, rank, finding)
             for rank, finding in enumerate(self._findings_to_try())
@@ -123,7 +126,7 @@ class SuggestionTrials:
             [finding for finding in rule.failed if finding.suggestions]
             for rule in self.judged.verdict.present().failed_rules
         ]
-        if sum(map(len, findings_by_rule)) > _MAX_FAILED:
+        if sum(map(len, findings_by_rule)) > _MAX_FAILED_FINDINGS:
             return []
         ranked = [(rank, finding) for rule in findings_by_rule for rank, finding in enumerate(rule)]
         return [
@@ -131,7 +134,7 @@ class SuggestionTrials:
         ]
 
     def try_suggestion(self, finding: Finding, number: int) -> PassedTrial | None:
-        """Return a suggestion of a finding, enlarged if necessary, with which its trial passes, or None."""
+        """Return a passing trial of a suggestion, enlarged if necessary, or None."""
         candidates = islice(self._growing_suggestions(finding, finding.suggestions[number]), _MAX_STEPS)
         passed_candidate = first_that_passes(candidates, lambda candidate: self._passes(finding, candidate[1]))
         return (
@@ -139,76 +142,82 @@ class SuggestionTrials:
         )
 
     def _passes(self, finding: Finding, trial: Trial) -> bool:
-        if not fails_no_more(self._current.geometry_verdict, trial.geometry_verdict, finding):
+        if not is_improved(self._current_trial.geometry_verdict, trial.geometry_verdict, finding):
             return False
         if self.judged.verdict.level != "flown":
             return True
         if "flight_verdict" not in vars(trial):
             self._flights_left -= 1
-        return self._flights_left >= 0 and fails_no_more(self.judged.verdict, trial.flight_verdict, finding)
+        return self._flights_left >= 0 and is_improved(self.judged.verdict, trial.flight_verdict, finding)
 
     def _growing_suggestions(self, finding: Finding, suggestion: Suggestion) -> Iterator[tuple[Suggestion, Trial]]:
-        """Yield a suggestion and then larger ones, each with its trial."""
-        judged, grown_finding, total = self.judged, finding, suggestion
+        """Yield a suggestion and then larger suggestions, each with its trial."""
+        judged_mission, grown_finding, total_suggestion = self.judged, finding, suggestion
         while True:
             if self.should_abort():
                 raise TrialAborted
             try:
-                mission, setup = self._changed_flight(judged, grown_finding, suggestion)
+                mission, setup = self._changed_flight(judged_mission, grown_finding, suggestion)
             except PlanflyError:
                 return
             new_trial = Trial(setup, self.context.airframe.aircraft, self.should_abort)
             trial = self._trials.setdefault((mission.items, setup.battery), new_trial)
-            yield total, trial
-            after = trial.flight_verdict if "flight_verdict" in vars(trial) else trial.geometry_verdict
-            missing_steps = _missing_steps(finding, total, after)
+            yield total_suggestion, trial
+            verdict = trial.flight_verdict if "flight_verdict" in vars(trial) else trial.geometry_verdict
+            missing_steps = _missing_steps(finding, total_suggestion, verdict)
             if missing_steps is None:
                 return
             grown_finding, suggestion = missing_steps
-            judged, total = (
-                JudgedMission(mission, trial.setup, trial.requirements, after),
-                _merge_steps(total, suggestion),
+            judged_mission, total_suggestion = (
+                JudgedMission(mission, trial.setup, trial.requirements, verdict),
+                _merge_steps(total_suggestion, suggestion),
             )
 
     def _changed_flight(
-        self, judged: JudgedMission, finding: Finding, suggestion: Suggestion
+        self, judged_mission: JudgedMission, finding: Finding, suggestion: Suggestion
     ) -> tuple[Mission, FlightSetup]:
-        """Return mission and setup with a suggestion; a shorter flight is tried as a larger store of energy."""
-        setup = replace(judged.setup, autopilot=judged.setup.autopilot.law)
+        """Apply a suggestion to mission and setup; a shorter duration is tried as a larger battery."""
+        setup = replace(judged_mission.setup, autopilot=judged_mission.setup.autopilot.law)
         match suggestion:
             case (Change(what="battery" | "tank") as change,):
-                return judged.mission, replace(setup, battery=change.wanted * setup.battery)
+                return judged_mission.mission, replace(setup, battery=change.wanted * setup.battery)
             case (Change(what="duration") as change,):
-                return judged.mission, replace(setup, battery=setup.battery / (1.0 - 0.01 * change.wanted))
-        mission = apply_suggestion(self.context, judged, finding, suggestion)
+                return judged_mission.mission, replace(setup, battery=setup.battery / (1.0 - 0.01 * change.wanted))
+        mission = apply_suggestion(self.context, judged_mission, finding, suggestion)
         return mission, self.context.setup(mission)
 
 
-def _missing_steps(finding: Finding, suggestion: Suggestion, after: Verdict) -> tuple[Finding, Suggestion] | None:
-    """Return the finding that still fails after a suggestion by steps, and the steps that it needs, or None.
+def _missing_steps(finding: Finding, suggestion: Suggestion, verdict: Verdict) -> tuple[Finding, Suggestion] | None:
+    """Return a finding that still fails after a suggestion of steps, and the steps that it needs; None if none fails.
 
-    If the finding itself is gone, another leg that fails by the same rule needs steps.
+    If the finding itself is gone, another leg that fails the same rule is returned.
     """
     kinds = {change.what for change in suggestion}
-    if not kinds <= _STEPS:
+    if not kinds <= _STEP_KINDS:
         return None
-    same_finding = [failed for failed in after.failed if finding_key(failed) == finding_key(finding)]
-    same_rule_legs = [failed for failed in after.failed if failed.rule == finding.rule and failed.place.kind == "leg"]
-    for failed in (*same_finding, *same_rule_legs):
-        for needed_suggestion in failed.suggestions:
+    same_finding = [
+        failed_finding for failed_finding in verdict.failed if finding_key(failed_finding) == finding_key(finding)
+    ]
+    same_rule_legs = [
+        failed_finding
+        for failed_finding in verdict.failed
+        if failed_finding.rule == finding.rule and failed_finding.place.kind == "leg"
+    ]
+    for failed_finding in (*same_finding, *same_rule_legs):
+        for needed_suggestion in failed_finding.suggestions:
             if {change.what for change in needed_suggestion} == kinds:
                 steps = (
                     replace(change, wanted=_GROWTH_FACTOR * change.wanted + _GROWTH_M) for change in needed_suggestion
                 )
-                return failed, tuple(steps)
+                return failed_finding, tuple(steps)
     return None
 
 
 def _merge_steps(suggestion: Suggestion, further_steps: Suggestion) -> Suggestion:
-    """Return a suggestion with further steps, each added to the step of the same kind at the same place."""
+    """Add further steps to a suggestion, each to the step of the same kind at the same place."""
     steps: dict[object, Change] = {}
     for change in (*suggestion, *further_steps):
         key = change.what, change.place.kind, change.place.index
-        before = steps[key].wanted if key in steps else 0.0
-        steps[key] = replace(change, wanted=float(round(before + change.wanted)))
+        previous_step = steps[key].wanted if key in steps else 0.0
+        steps[key] = replace(change, wanted=float(round(previous_step + change.wanted)))
     return tuple(steps.values())

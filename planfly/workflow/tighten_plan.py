@@ -19,11 +19,11 @@ from world.scenario import Scenario, from_spec
 Spec = dict[str, Any]
 
 # Margin added to the shortfall of clearance in a flight, m.
-CLEARANCE_BUFFER = 5.0
+CLEARANCE_BUFFER_M = 5.0
 # Margin added to the depth to which a flight entered a missile's sphere, m.
-MISSILE_BUFFER = 10.0
+MISSILE_BUFFER_M = 10.0
 # Margin added to the distance by which a flight violated a zone, m.
-ZONE_BUFFER = 5.0
+ZONE_BUFFER_M = 5.0
 # Factor on a limit that is already the limit of the aircraft, if the flight fails nevertheless.
 TIGHTENING_FACTOR = 0.9
 # Minimum bank to which a plan is tightened, degrees.
@@ -32,7 +32,7 @@ MIN_BANK_DEG = 5.0
 NEXT_ROUND_REMARK = "tightened and planned again"
 
 # Keys of the scenario's numbers that can be tightened.
-Tightened = Literal[
+TightenedKey = Literal[
     "max_climb_deg",
     "max_dive_deg",
     "max_turn_deg",
@@ -53,7 +53,7 @@ class Tightening:
     name: the threat to which the number belongs, or "" if it belongs to the scenario itself.
     """
 
-    what: Tightened
+    what: TightenedKey
     current: float | str
     wanted: float | str
     name: str = ""
@@ -80,13 +80,15 @@ def tightening_text(change: Tightening) -> str:
 def tighten_limits(scenario: Scenario, verdict: Verdict) -> tuple[Scenario, list[Tightening]]:
     """Return the scenario for the next round of planning, and its changes; empty if nothing can be tightened."""
     spec = copy.deepcopy(scenario.to_json())
-    failed = [finding for finding in verdict.findings if finding.ok is False]
-    changes = _tighten_slopes(spec, failed) + _tighten_turns(spec, scenario, failed)
+    failed_findings = [finding for finding in verdict.findings if finding.ok is False]
+    changes = _tighten_slopes(spec, failed_findings) + _tighten_turns(spec, scenario, failed_findings)
     if not changes:
         # These limits are tightened only if the flight followed slopes and turns.  A flight that cannot follow its plan
         # is also too low or too close, which is not a separate cause.
-        changes = _raise_clearance(spec, scenario, failed) + _enlarge_missiles(spec, failed)
-        changes += _lower_max_height(spec, scenario, failed) + _widen_zone_margin(spec, scenario, failed)
+        changes = _raise_clearance(spec, scenario, failed_findings) + _enlarge_missiles(spec, failed_findings)
+        changes += _lower_max_height(spec, scenario, failed_findings) + _widen_zone_margin(
+            spec, scenario, failed_findings
+        )
     if not changes:
         return scenario, []
     return from_spec(spec, scenario.name, ground=scenario.terrain), changes
@@ -96,19 +98,22 @@ def _limits_table(spec: Spec) -> Spec:
     return spec.setdefault("limits", {})
 
 
-def _tighten_slopes(spec: Spec, failed: list[Finding]) -> list[Tightening]:
+def _tighten_slopes(spec: Spec, failed_findings: list[Finding]) -> list[Tightening]:
     changes = []
-    keys: tuple[tuple[Tightened, float], ...] = (("max_climb_deg", 1.0), ("max_dive_deg", -1.0))
+    keys: tuple[tuple[TightenedKey, float], ...] = (("max_climb_deg", 1.0), ("max_dive_deg", -1.0))
     for key, sign in keys:
         planned_angles = [
-            sign * finding.planned for finding in failed if finding.rule == "slope" and finding.planned is not None
+            sign * finding.planned
+            for finding in failed_findings
+            if finding.rule == "slope" and finding.planned is not None
         ]
         steep_angles = [angle for angle in planned_angles if angle > 0.0]
         if not steep_angles:
             continue
         current = _limits_table(spec).get(key, "aircraft")
         exceeds_aircraft = any(
-            finding.limit_source == "aircraft" and finding.margin and finding.margin < 0.0 for finding in failed
+            finding.limit_source == "aircraft" and finding.margin and finding.margin < 0.0
+            for finding in failed_findings
         )
         tightened: float | str = "aircraft"
         if current == "aircraft" or not exceeds_aircraft:
@@ -120,8 +125,8 @@ def _tighten_slopes(spec: Spec, failed: list[Finding]) -> list[Tightening]:
     return changes
 
 
-def _tighten_turns(spec: Spec, scenario: Scenario, failed: list[Finding]) -> list[Tightening]:
-    if not any(finding.rule in ("turn", "waypoint", "corridor") for finding in failed):
+def _tighten_turns(spec: Spec, scenario: Scenario, failed_findings: list[Finding]) -> list[Tightening]:
+    if not any(finding.rule in ("turn", "waypoint", "corridor") for finding in failed_findings):
         return []
     current = _limits_table(spec).get("max_turn_deg", "aircraft")
     if current != "aircraft":
@@ -136,47 +141,51 @@ def _tighten_turns(spec: Spec, scenario: Scenario, failed: list[Finding]) -> lis
     return [Tightening("max_bank_deg", bank, tightened)]
 
 
-def _raise_clearance(spec: Spec, scenario: Scenario, failed: list[Finding]) -> list[Tightening]:
-    shortfalls = [-finding.margin for finding in failed if finding.rule == "clearance" and finding.margin is not None]
+def _raise_clearance(spec: Spec, scenario: Scenario, failed_findings: list[Finding]) -> list[Tightening]:
+    shortfalls = [
+        -finding.margin for finding in failed_findings if finding.rule == "clearance" and finding.margin is not None
+    ]
     if not shortfalls:
         return []
     current = scenario.limits.min_clearance_m
-    tightened = round(current + max(0.0, *shortfalls) + CLEARANCE_BUFFER, 1)
+    tightened = round(current + max(0.0, *shortfalls) + CLEARANCE_BUFFER_M, 1)
     _limits_table(spec)["min_clearance_m"] = tightened
     return [Tightening("min_clearance_m", current, tightened)]
 
 
-def _lower_max_height(spec: Spec, scenario: Scenario, failed: list[Finding]) -> list[Tightening]:
+def _lower_max_height(spec: Spec, scenario: Scenario, failed_findings: list[Finding]) -> list[Tightening]:
     """Lower the maximum height above ground in `spec` if the flight exceeded it and can fly lower."""
     current = scenario.limits.max_height_m
-    excesses = [-finding.margin for finding in failed if finding.rule == "height" and finding.margin is not None]
+    excesses = [
+        -finding.margin for finding in failed_findings if finding.rule == "height" and finding.margin is not None
+    ]
     if current is None or not excesses:
         return []
-    tightened = round(current - max(0.0, *excesses) - CLEARANCE_BUFFER, 1)
+    tightened = round(current - max(0.0, *excesses) - CLEARANCE_BUFFER_M, 1)
     if tightened <= float(_limits_table(spec).get("min_clearance_m", scenario.limits.min_clearance_m)):
         return []
     _limits_table(spec)["max_height_m"] = tightened
     return [Tightening("max_height_m", current, tightened)]
 
 
-def _widen_zone_margin(spec: Spec, scenario: Scenario, failed: list[Finding]) -> list[Tightening]:
+def _widen_zone_margin(spec: Spec, scenario: Scenario, failed_findings: list[Finding]) -> list[Tightening]:
     """Widen the margin around zones in `spec` if the flight violated a zone and the plan itself did not."""
     flight_violations = [
-        finding for finding in failed if finding.rule == "fence" and not (finding.planned or 0.0) > ROUNDING_M
+        finding for finding in failed_findings if finding.rule == "fence" and not (finding.planned or 0.0) > ROUNDING_M
     ]
     depths = [-finding.margin for finding in flight_violations if finding.margin is not None]
     if not depths:
         return []
     scenario_margin = scenario.planner.zone_margin_m
     current = CERTIFIED_ZONE_MARGIN if scenario_margin is None else scenario_margin
-    tightened = round(current + max(depths) + ZONE_BUFFER, 1)
+    tightened = round(current + max(depths) + ZONE_BUFFER_M, 1)
     spec.setdefault("planner", {})["zone_margin_m"] = tightened
     return [Tightening("zone_margin_m", current, tightened)]
 
 
-def _enlarge_missiles(spec: Spec, failed: list[Finding]) -> list[Tightening]:
+def _enlarge_missiles(spec: Spec, failed_findings: list[Finding]) -> list[Tightening]:
     changes = []
-    for finding in failed:
+    for finding in failed_findings:
         if finding.planned:
             # The plan itself enters the sphere, because the planner found no path outside.  It would find none outside
             # a larger sphere either.
@@ -186,7 +195,7 @@ def _enlarge_missiles(spec: Spec, failed: list[Finding]) -> list[Tightening]:
             continue
         threat = spec["threats"][finding.place.index]
         current = threat["kill_radius_m"]
-        threat["kill_radius_m"] = current + round(depth + SUGGESTION_LENGTH_MARGIN_M) + MISSILE_BUFFER
+        threat["kill_radius_m"] = current + round(depth + SUGGESTION_LENGTH_MARGIN_M) + MISSILE_BUFFER_M
         changes.append(Tightening("kill_radius_m", current, threat["kill_radius_m"], threat_text(finding.place)))
     return changes
 
@@ -200,7 +209,7 @@ FlyRound = Callable[[Scenario], tuple[Verdict, bool]]
 def refine(
     scenario: Scenario, max_rounds: int, fly_round: FlyRound, keep_results: Callable[[int], None]
 ) -> tuple[Verdict, Rounds]:
-    """Plan and fly in rounds, each with limits tightened by the previous round, until one flies or none can follow.
+    """Plan and fly in rounds, each with limits tightened after the previous round, until a round is flyable.
 
     max_rounds: maximum number of rounds after the first.
     fly_round: plans in a scenario and flies; returns the verdict, and True if the plan was flown.
@@ -211,32 +220,32 @@ def refine(
     rounds: Rounds = []
     planning_scenario, changes = scenario, list[Tightening]()
     for number in range(max_rounds + 1):
-        verdict, flown = fly_round(planning_scenario)
+        verdict, was_flown = fly_round(planning_scenario)
         rounds.append(
             {
                 "round": number,
                 "changes": [tightening_text(change) for change in changes],
-                "flown": flown,
+                "flown": was_flown,
                 "flyable": verdict.flyable,
                 "summary": verdict.headline,
                 "next": "",
             }
         )
         planning_scenario, changes = tighten_limits(planning_scenario, verdict)
-        rounds[-1]["next"] = _next_step_remark(verdict, flown, number == max_rounds, changes)
+        rounds[-1]["next"] = _next_step_remark(verdict, was_flown, number == max_rounds, changes)
         if rounds[-1]["next"] != NEXT_ROUND_REMARK:
             break
         keep_results(number)
     return verdict, rounds
 
 
-def _next_step_remark(verdict: Verdict, flown: bool, is_last: bool, changes: list[Tightening]) -> str:
-    """Return the remark on the step after a round, which is `NEXT_ROUND_REMARK` or the reason to end."""
+def _next_step_remark(verdict: Verdict, was_flown: bool, is_last: bool, changes: list[Tightening]) -> str:
+    """Return the remark on the step after a round: `NEXT_ROUND_REMARK` or the reason to end."""
     if verdict.flyable:
         return "done: it flies"
     if verdict.undecided:
         return "ended: nothing failed, and the aircraft is not known well enough for the rest"
-    if not flown:
+    if not was_flown:
         return "ended: within these limits no feasible plan was found"
     if not changes:
         return "ended: nothing is left to tighten; the planner knows no path that meets what failed"

@@ -17,8 +17,8 @@ from logs.verdict.measures.route_requirements import RouteRequirements, route_re
 from logs.verdict.verdict import Verdict
 from world.errors import StartError
 
-# A mission is not flown if it is predicted to need more than this multiple of the energy carried, because the flight
-# would show nothing more.
+# A mission is not flown if its predicted energy exceeds this multiple of the energy carried, because the flight would
+# show nothing new.
 MAX_ENERGY_RATIO = 2.0
 
 
@@ -31,7 +31,7 @@ AbortCheck = Callable[[], bool]
 
 
 def never_abort() -> bool:
-    """Return False, so that trials are flown to their end."""
+    """Return False, so that no trial is aborted."""
     return False
 
 
@@ -81,8 +81,8 @@ class Trial:
 def reason_not_to_start(requirements: RouteRequirements) -> str:
     """Return the reason not to start a flight, or "" if it may start.
 
-    A flight is not started if it is predicted to need more than `MAX_ENERGY_RATIO` times the energy carried.  The
-    prediction is skipped if even full power throughout needs no more.
+    A flight is not started if its predicted energy exceeds `MAX_ENERGY_RATIO` times the energy carried.  The prediction
+    is skipped if even full power throughout the flight would not exceed this energy.
     """
     setup = requirements.setup
     duration, full_power = setup.path.length / float(setup.route.airspeed.min()), setup.envelope.power_full

@@ -11,7 +11,7 @@ from enum import IntEnum
 import numpy as np
 
 from planner.evaluation.problem import ProblemArrays
-from planner.evaluation.travel_cost import LENGTH, TravelCost, leg_cost
+from planner.evaluation.travel_cost import LENGTH_COST, TravelCost, leg_cost
 from world.arrays import Floats
 from world.frames import polymap
 from world.geometry import window_exposure
@@ -23,13 +23,13 @@ _EXPOSURE = 1
 _CLEARANCE = 2
 _TIME = 3
 _ENERGY = 4
-SECONDS = LENGTH._replace(length=0.0, time=1.0)
+SECONDS = LENGTH_COST._replace(length=0.0, time=1.0)
 
 
 class Value(IntEnum):
     """Columns of a path's values."""
 
-    LENGTH = 0
+    LENGTH_COST = 0
     EXPOSURE = 1
     CLEARANCE = 2
     TIME = 3

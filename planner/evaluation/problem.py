@@ -16,7 +16,7 @@ from aircraft.tracking import zero_tracking_error
 from planner.airspace.zone_limits import PlannerAirspace, ZoneMargins, make_airspace
 from planner.evaluation.encoding import Space
 from planner.evaluation.threat_index import MissileIndex, ThreatCells, make_missile_index, make_threat_cells
-from planner.evaluation.travel_cost import LENGTH, TravelCost
+from planner.evaluation.travel_cost import LENGTH_COST, TravelCost
 from planner.plan import Objective, Violation
 from world.arrays import Floats, Heights
 from world.by_reference import by_reference
@@ -382,7 +382,7 @@ def _certified_arrays(scenario: Scenario, limits: Limits, terrain: Terrain) -> P
             _zone_margins(scenario, CERTIFIED_ZONE_MARGIN, vertical_zone_margin, end_fraction),
             vertical + limits.reserve_above,
         ),
-        travel=LENGTH,
+        travel=LENGTH_COST,
     )
     return _shrink_area(arrays, float(tracking.across), float(tracking.up)) if tracking.has_error else arrays
 

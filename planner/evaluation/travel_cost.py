@@ -1,13 +1,13 @@
 """Cost of a leg: its length, its time in the mean wind, or the energy of its flight.
 
-The air carries the aircraft along. A leg d that is held at true airspeed V in the wind w takes the time T for which
-|d - w T| = V T: the wind triangle, in three dimensions, whose larger part is horizontal (Zermelo's problem in a steady
-wind, "Über das Navigationsproblem bei ruhender oder veränderlicher Windverteilung", Zeitschrift für Angewandte
-Mathematik und Mechanik 11, 1931). There is no such time where the wind is faster than the aircraft and leads elsewhere.
-Wind and airspeed change with height, so a leg is the sum of Simpson's rule over its two ends and its middle.
+A leg d that is flown at true airspeed V in the wind w takes the time T with |d - w T| = V T. This is the wind triangle
+in three dimensions, whose larger part is horizontal (Zermelo's problem in a steady wind, "Über das Navigationsproblem
+bei ruhender oder veränderlicher Windverteilung", Zeitschrift für Angewandte Mathematik und Mechanik 11, 1931). There is
+no such time if the wind is faster than the aircraft and does not blow along the leg. Wind and airspeed change with
+height, so a leg is integrated by Simpson's rule over its two ends and its middle.
 
-In a wind that is the same everywhere a straight line takes the least time, and T is a norm of d plus a term that every
-path to the same destination shares. What differs then is the direction of a detour, by at most V / sqrt(V^2 - w^2).
+In a uniform wind a straight line takes the least time, and T is a norm of d plus a term that is the same for all paths
+to a destination. Then only the direction of a detour matters, by at most V / sqrt(V^2 - w^2).
 """
 
 import math
@@ -23,11 +23,11 @@ from world.by_reference import by_reference
 from world.kernels import compiled, inner
 
 # The third coordinate.
-UP = 2
+UP_AXIS = 2
 # Half-step of the finite difference in height, m.
-HEIGHT_STEP = 2.0
+HEIGHT_STEP_M = 2.0
 # Ground speed assumed on a leg that is not flyable, as a fraction of the airspeed, so that a search avoids it.
-UNFLYABLE_SHARE = 0.01
+UNFLYABLE_SPEED_RATIO = 0.01
 # Fractions of a leg for Simpson's rule.
 _SIMPSON_FRACTIONS = (0.0, 0.5, 1.0)
 # Weights of Simpson's rule.
@@ -36,12 +36,12 @@ _SIMPSON_WEIGHTS = (1.0 / 6.0, 4.0 / 6.0, 1.0 / 6.0)
 
 @by_reference
 class TravelCost(NamedTuple):
-    """Weights of what a path costs, and the power of steady flight by height, for compiled functions.
+    """Weights of length, time and energy in a path's cost, and the power at each height, for compiled functions.
 
     length: cost per metre of path. time: per second. energy: per joule.
-    level, linear, square: (h,) power (W) at the heights of the performance table and at its airspeed, as level +
-    linear x + square x^2, where x is the sine of the climb angle to the air.
-    lowest, highest: (h,) bounds of x, beyond which power is constant: idle and full throttle.
+    level, linear, square: (h,) coefficients of the power (W) at the heights of the performance table and at its
+    airspeed: level + linear x + square x^2, where x is the sine of the climb angle to the air.
+    min_sine, max_sine: (h,) bounds of x, beyond which power is constant: idle and full throttle.
     """
 
     length: float
@@ -50,15 +50,15 @@ class TravelCost(NamedTuple):
     level: Floats
     linear: Floats
     square: Floats
-    lowest: Floats
-    highest: Floats
+    min_sine: Floats
+    max_sine: Floats
 
 
 Objective = Literal["length", "time", "energy"]
-_NONE = np.zeros(0)
-_NONE.setflags(write=False)
+_EMPTY_TABLE = np.zeros(0)
+_EMPTY_TABLE.setflags(write=False)
 # Cost of a search for the shortest path.
-LENGTH = TravelCost(1.0, 0.0, 0.0, _NONE, _NONE, _NONE, _NONE, _NONE)
+LENGTH_COST = TravelCost(1.0, 0.0, 0.0, _EMPTY_TABLE, _EMPTY_TABLE, _EMPTY_TABLE, _EMPTY_TABLE, _EMPTY_TABLE)
 
 
 def make_travel_cost(objective: Objective, envelope: Envelope, table: PerformanceTable) -> TravelCost | None:
@@ -73,16 +73,16 @@ def make_travel_cost(objective: Objective, envelope: Envelope, table: Performanc
     25.0
     """
     if objective == "length":
-        return LENGTH
-    return time_cost(table) if objective == "time" else energy_cost(envelope, table)
+        return LENGTH_COST
+    return make_time_cost(table) if objective == "time" else make_energy_cost(envelope, table)
 
 
-def time_cost(table: PerformanceTable) -> TravelCost:
+def make_time_cost(table: PerformanceTable) -> TravelCost:
     """Return the cost of a path's time, in m of level flight in still air."""
-    return LENGTH._replace(length=0.0, time=float(table.airspeed))
+    return LENGTH_COST._replace(length=0.0, time=float(table.airspeed))
 
 
-def energy_cost(envelope: Envelope, table: PerformanceTable) -> TravelCost | None:
+def make_energy_cost(envelope: Envelope, table: PerformanceTable) -> TravelCost | None:
     """Return the cost of a path's energy, in m of level flight in still air.
 
     Return None if the aircraft's power is unknown.
@@ -100,7 +100,7 @@ def energy_cost(envelope: Envelope, table: PerformanceTable) -> TravelCost | Non
 
 
 def _power_parabola(envelope: Envelope, airspeed: float, amsl: float) -> tuple[float, float, float, float, float]:
-    """Return the coefficients of power by the sine of the climb angle, and the bounds of this sine.
+    """Return the coefficients of power as a function of the sine of the climb angle, and the bounds of this sine.
 
     All are NaN if power is unknown.
     """
@@ -116,7 +116,7 @@ def _power_parabola(envelope: Envelope, airspeed: float, amsl: float) -> tuple[f
 
 
 class LegTime(NamedTuple):
-    """Time of a leg (s), its derivatives by the leg (s/m), and D of `leg_time`.
+    """Time of a leg (s), its derivatives with respect to the leg (s/m), and D of `leg_time`.
 
     is_flyable: True if the aircraft can hold the leg's course in the wind.
     """
@@ -133,18 +133,21 @@ class LegTime(NamedTuple):
 def leg_time(dx: float, dy: float, dz: float, wind_east: float, wind_north: float, airspeed: float) -> LegTime:
     """Return the time of a leg (m) at an airspeed in a wind (m/s): the smaller positive T with |d - w T| = V T.
 
-    It solves |d|^2 - 2 T w.d - (V^2 - w^2) T^2 = 0: T = |d|^2 / (w.d + D), D^2 = (w.d)^2 + (V^2 - w^2) |d|^2. Its
-    derivative by d is (d - w T) / D.
+    T solves |d|^2 - 2 T w.d - (V^2 - w^2) T^2 = 0: T = |d|^2 / (w.d + D), D^2 = (w.d)^2 + (V^2 - w^2) |d|^2. Its
+    derivative with respect to d is (d - w T) / D.
     """
     length2 = max(1e-6, dx * dx + dy * dy + dz * dz)
-    along = wind_east * dx + wind_north * dy
-    square = along * along + (airspeed * airspeed - wind_east * wind_east - wind_north * wind_north) * length2
-    root = math.sqrt(max(0.0, square))
-    if square <= 0.0 or along + root <= 1e-9 * length2:
-        length, speed = math.sqrt(length2), UNFLYABLE_SHARE * airspeed
+    tailwind_product = wind_east * dx + wind_north * dy
+    discriminant = (
+        tailwind_product * tailwind_product
+        + (airspeed * airspeed - wind_east * wind_east - wind_north * wind_north) * length2
+    )
+    root = math.sqrt(max(0.0, discriminant))
+    if discriminant <= 0.0 or tailwind_product + root <= 1e-9 * length2:
+        length, speed = math.sqrt(length2), UNFLYABLE_SPEED_RATIO * airspeed
         scale = 1.0 / (length * speed)
         return LegTime(length / speed, scale * dx, scale * dy, scale * dz, speed * length, False)
-    seconds = length2 / (along + root)
+    seconds = length2 / (tailwind_product + root)
     return LegTime(
         seconds, (dx - wind_east * seconds) / root, (dy - wind_north * seconds) / root, dz / root, root, True
     )
@@ -158,31 +161,31 @@ class _FlightConditions(NamedTuple):
     level: float
     linear: float
     square: float
-    lowest: float
-    highest: float
+    min_sine: float
+    max_sine: float
 
 
 @inner
-def _at_height(travel: TravelCost, table: PerformanceTable, amsl: float) -> _FlightConditions:
+def _conditions_at_altitude(travel: TravelCost, table: PerformanceTable, amsl: float) -> _FlightConditions:
     """Return airspeed, wind and power at an altitude, m."""
     airspeed, wind = true_airspeed(table, amsl), wind_speed_at(table, amsl)
     if travel.energy == 0.0:
         return _FlightConditions(airspeed, wind, 0.0, 0.0, 0.0, -1.0, 1.0)
-    count, k = table.amsl.size, 0
-    while k + 2 < count and table.amsl[k + 1] <= amsl:
-        k += 1
+    count, row = table.amsl.size, 0
+    while row + 2 < count and table.amsl[row + 1] <= amsl:
+        row += 1
     fraction = 0.0
     if count > 1:
-        fraction = min(1.0, max(0.0, (amsl - table.amsl[k]) / (table.amsl[k + 1] - table.amsl[k])))
-    j = min(k + 1, count - 1)
+        fraction = min(1.0, max(0.0, (amsl - table.amsl[row]) / (table.amsl[row + 1] - table.amsl[row])))
+    next_row = min(row + 1, count - 1)
     return _FlightConditions(
         airspeed,
         wind,
-        travel.level[k] + fraction * (travel.level[j] - travel.level[k]),
-        travel.linear[k] + fraction * (travel.linear[j] - travel.linear[k]),
-        travel.square[k] + fraction * (travel.square[j] - travel.square[k]),
-        travel.lowest[k] + fraction * (travel.lowest[j] - travel.lowest[k]),
-        travel.highest[k] + fraction * (travel.highest[j] - travel.highest[k]),
+        travel.level[row] + fraction * (travel.level[next_row] - travel.level[row]),
+        travel.linear[row] + fraction * (travel.linear[next_row] - travel.linear[row]),
+        travel.square[row] + fraction * (travel.square[next_row] - travel.square[row]),
+        travel.min_sine[row] + fraction * (travel.min_sine[next_row] - travel.min_sine[row]),
+        travel.max_sine[row] + fraction * (travel.max_sine[next_row] - travel.max_sine[row]),
     )
 
 
@@ -190,12 +193,12 @@ def _at_height(travel: TravelCost, table: PerformanceTable, amsl: float) -> _Fli
 def _timed_cost(
     travel: TravelCost, table: PerformanceTable, dx: float, dy: float, dz: float, amsl: float
 ) -> tuple[float, bool]:
-    """Return the cost of the time and the energy of a leg flown at one height, and True if the leg is flyable."""
-    conditions, (wx, wy) = _at_height(travel, table, amsl), downwind(table)
+    """Return the cost of time and energy of a leg at one altitude, and True if the leg is flyable."""
+    conditions, (wx, wy) = _conditions_at_altitude(travel, table, amsl), downwind(table)
     time = leg_time(dx, dy, dz, conditions.wind * wx, conditions.wind * wy, conditions.airspeed)
     cost = travel.time * time.seconds
     if travel.energy != 0.0:
-        sine = min(conditions.highest, max(conditions.lowest, dz / (conditions.airspeed * time.seconds)))
+        sine = min(conditions.max_sine, max(conditions.min_sine, dz / (conditions.airspeed * time.seconds)))
         cost += (
             travel.energy * time.seconds * (conditions.level + sine * (conditions.linear + conditions.square * sine))
         )
@@ -203,17 +206,19 @@ def _timed_cost(
 
 
 @inner
-def leg_cost(travel: TravelCost, table: PerformanceTable, a: NDArray[np.float64], b: NDArray[np.float64]) -> float:
-    """Return the cost of the leg a-b; inf if it is not flyable."""
-    dx, dy, dz = b[0] - a[0], b[1] - a[1], b[2] - a[2]
+def leg_cost(
+    travel: TravelCost, table: PerformanceTable, start: NDArray[np.float64], end: NDArray[np.float64]
+) -> float:
+    """Return the cost of a leg; inf if it is not flyable."""
+    dx, dy, dz = end[0] - start[0], end[1] - start[1], end[2] - start[2]
     total = travel.length * math.sqrt(dx * dx + dy * dy + dz * dz)
     if travel.time == 0.0 and travel.energy == 0.0:
         return total
-    for k in range(3):
-        cost, is_flyable = _timed_cost(travel, table, dx, dy, dz, a[2] + _SIMPSON_FRACTIONS[k] * dz)
+    for point in range(3):
+        timed_cost, is_flyable = _timed_cost(travel, table, dx, dy, dz, start[2] + _SIMPSON_FRACTIONS[point] * dz)
         if not is_flyable:
             return math.inf
-        total += _SIMPSON_WEIGHTS[k] * cost
+        total += _SIMPSON_WEIGHTS[point] * timed_cost
     return total
 
 
@@ -224,7 +229,7 @@ def path_cost(travel: TravelCost, table: PerformanceTable, path: Floats) -> floa
     >>> from planfly.workflow.airframe import load_airframe
     >>> from world.scenario import load_scenario
     >>> table = load_airframe(load_scenario("tight")).limits.performance()
-    >>> path_cost(LENGTH, table, np.array([[0.0, 0.0, 9.0], [30.0, 0.0, 9.0], [30.0, 40.0, 9.0]]))
+    >>> path_cost(LENGTH_COST, table, np.array([[0.0, 0.0, 9.0], [30.0, 0.0, 9.0], [30.0, 40.0, 9.0]]))
     70.0
     """
     total = 0.0
@@ -234,23 +239,22 @@ def path_cost(travel: TravelCost, table: PerformanceTable, path: Floats) -> floa
 
 
 class LegModel(NamedTuple):
-    """Scratch of `model_leg`: derivatives (2, 3) of a leg's cost by its ends, and its curvature (2, 3, 2, 3)."""
+    """Scratch of `model_leg`: derivatives (2, 3) of a leg's cost with respect to its ends, curvature (2, 3, 2, 3)."""
 
     slopes: Floats
     curvature: Floats
 
 
 @inner
-def model_leg(travel: TravelCost, table: PerformanceTable, a: Floats, b: Floats, model: LegModel) -> float:
-    """Return the cost of the leg a-b, finite for any leg.
+def model_leg(travel: TravelCost, table: PerformanceTable, start: Floats, finish: Floats, model: LegModel) -> float:
+    """Return the cost of a leg, finite for any leg; fill its derivatives with respect to its ends, and its curvature.
 
-    Also fills its derivatives by a and b and its curvature.
     The curvature is the sum of the curvatures of the length, of the time at each height, and of the power, all convex;
-    what couples height and course is left out, so that the matrix has no negative eigenvalue.
+    the coupling of height and course is omitted, so that the matrix has no negative eigenvalue.
     """
     slopes, curvature = model.slopes, model.curvature
     slopes[:], curvature[:] = 0.0, 0.0
-    dx, dy, dz = b[0] - a[0], b[1] - a[1], b[2] - a[2]
+    dx, dy, dz = finish[0] - start[0], finish[1] - start[1], finish[2] - start[2]
     length = max(1e-3, math.sqrt(dx * dx + dy * dy + dz * dz))
     (wx, wy), step = downwind(table), (dx, dy, dz)
     step_curvature = np.empty((3, 3))
@@ -265,19 +269,19 @@ def model_leg(travel: TravelCost, table: PerformanceTable, a: Floats, b: Floats,
     total = travel.length * length
     if travel.time == 0.0 and travel.energy == 0.0:
         return total
-    for k in range(3):
-        fraction, weight = _SIMPSON_FRACTIONS[k], _SIMPSON_WEIGHTS[k]
-        amsl = a[2] + fraction * dz
-        conditions = _at_height(travel, table, amsl)
+    for point in range(3):
+        fraction, weight = _SIMPSON_FRACTIONS[point], _SIMPSON_WEIGHTS[point]
+        amsl = start[2] + fraction * dz
+        conditions = _conditions_at_altitude(travel, table, amsl)
         time = leg_time(dx, dy, dz, conditions.wind * wx, conditions.wind * wy, conditions.airspeed)
         # The cost is time x rate, plus a cost per metre of climb.
-        rate, climb_cost, power_curvature, cost = travel.time, 0.0, 0.0, travel.time * time.seconds
+        rate, climb_cost, power_curvature, timed_cost = travel.time, 0.0, 0.0, travel.time * time.seconds
         if travel.energy != 0.0:
             sine = dz / (conditions.airspeed * time.seconds)
-            is_interior = conditions.lowest < sine < conditions.highest
-            sine = min(conditions.highest, max(conditions.lowest, sine))
+            is_interior = conditions.min_sine < sine < conditions.max_sine
+            sine = min(conditions.max_sine, max(conditions.min_sine, sine))
             power = conditions.level + sine * (conditions.linear + conditions.square * sine)
-            cost += travel.energy * power * time.seconds
+            timed_cost += travel.energy * power * time.seconds
             slope = conditions.linear + 2.0 * conditions.square * sine if is_interior else 0.0
             rate += travel.energy * (power - slope * sine)
             climb_cost = travel.energy * slope / conditions.airspeed
@@ -285,28 +289,30 @@ def model_leg(travel: TravelCost, table: PerformanceTable, a: Floats, b: Floats,
                 power_curvature = max(
                     0.0, travel.energy * 2.0 * conditions.square / (conditions.airspeed**2 * time.seconds)
                 )
-        total += weight * cost
+        total += weight * timed_cost
         gradient = (time.by_east, time.by_north, time.by_up)
         _fill_time_curvature(step_curvature, time, conditions, wx, wy)
-        step_curvature[UP, UP] += power_curvature / max(1e-9, rate)
+        step_curvature[UP_AXIS, UP_AXIS] += power_curvature / max(1e-9, rate)
         _add_step_model(curvature, slopes, step_curvature, weight * rate, gradient, weight * rate)
-        slopes[0, UP] -= weight * climb_cost
-        slopes[1, UP] += weight * climb_cost
-        cost_above, _ = _timed_cost(travel, table, dx, dy, dz, amsl + HEIGHT_STEP)
-        cost_below, _ = _timed_cost(travel, table, dx, dy, dz, amsl - HEIGHT_STEP)
-        height_slope = weight * (cost_above - cost_below) / (2.0 * HEIGHT_STEP)
-        height_curvature = weight * max(0.0, cost_above - 2.0 * cost + cost_below) / HEIGHT_STEP**2
+        slopes[0, UP_AXIS] -= weight * climb_cost
+        slopes[1, UP_AXIS] += weight * climb_cost
+        cost_above, _ = _timed_cost(travel, table, dx, dy, dz, amsl + HEIGHT_STEP_M)
+        cost_below, _ = _timed_cost(travel, table, dx, dy, dz, amsl - HEIGHT_STEP_M)
+        height_slope = weight * (cost_above - cost_below) / (2.0 * HEIGHT_STEP_M)
+        height_curvature = weight * max(0.0, cost_above - 2.0 * timed_cost + cost_below) / HEIGHT_STEP_M**2
         end_weights = (1.0 - fraction, fraction)
         for end in range(2):
-            slopes[end, UP] += end_weights[end] * height_slope
+            slopes[end, UP_AXIS] += end_weights[end] * height_slope
             for other_end in range(2):
-                curvature[end, UP, other_end, UP] += height_curvature * end_weights[end] * end_weights[other_end]
+                curvature[end, UP_AXIS, other_end, UP_AXIS] += (
+                    height_curvature * end_weights[end] * end_weights[other_end]
+                )
     return total
 
 
 @inner
 def _fill_length_curvature(curvature: Floats, step: tuple[float, float, float], length: float) -> Floats:
-    """Fill the curvature (3, 3) of a leg's length by its step."""
+    """Fill the curvature (3, 3) of a leg's length with respect to its step."""
     for axis in range(3):
         for other_axis in range(3):
             identity = 1.0 if axis == other_axis else 0.0
@@ -338,7 +344,7 @@ def _add_step_model(
     gradient: tuple[float, float, float],
     slope_factor: float,
 ) -> None:
-    """Add curvature and gradient by a leg's step to those by its ends: minus at a, plus at b."""
+    """Convert curvature and gradient with respect to a leg's step to its ends (minus at the start), and add them."""
     for axis in range(3):
         slopes[0, axis] -= slope_factor * gradient[axis]
         slopes[1, axis] += slope_factor * gradient[axis]

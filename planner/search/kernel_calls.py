@@ -11,7 +11,7 @@ from planner.evaluation.front_scores import front_values
 from planner.evaluation.graded_scores import graded_scores
 from planner.evaluation.paper_scores import paper_scores
 from planner.evaluation.problem import Problem, make_problem
-from planner.evaluation.travel_cost import energy_cost
+from planner.evaluation.travel_cost import make_energy_cost
 from planner.optimisers.hypervolume import covering_order
 from planner.search.search_state import best_first, score_table
 from planner.seeding.grids import GridRoute, grid_route, make_grid
@@ -33,7 +33,7 @@ STAGES = 12
 # Maximum number of routes.
 MAX_ROUTES = 2
 # Evaluations of a pattern search, and size of a set of objectives.
-FEW = 4
+SAMPLE_COUNT = 4
 # Offset of the path's middle point to the side, m.
 LATERAL_OFFSET = 300.0
 # Offset of the path's middle point upwards, m.
@@ -69,7 +69,7 @@ def _score(task: _Task) -> None:
     scores = score_table(*graded_scores(task.problem.search, np.stack([task.path, task.path])))
     best_first(scores)
     vector = rotated_vectors(task.problem.space, task.encoding, task.path[None])[0]
-    search_patterns(task.problem.search, task.encoding, vector, FEW)
+    search_patterns(task.problem.search, task.encoding, vector, SAMPLE_COUNT)
 
 
 def _certify(task: _Task) -> None:
@@ -105,8 +105,8 @@ def _score_samples(task: _Task) -> None:
 
 def _choose(task: _Task) -> None:
     data = task.problem.search
-    front_values(data, energy_cost(task.problem.limits.envelope, data.aircraft), task.path[None])
-    covering_order(np.eye(FEW), np.full(FEW, 2.0), FEW)
+    front_values(data, make_energy_cost(task.problem.limits.envelope, data.aircraft), task.path[None])
+    covering_order(np.eye(SAMPLE_COUNT), np.full(SAMPLE_COUNT, 2.0), SAMPLE_COUNT)
 
 
 _PARTS = (_score, _certify, _shorten, _find_route, _find_side_routes, _score_samples)

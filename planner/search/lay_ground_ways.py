@@ -23,11 +23,11 @@ from planner.ground_ways import ClimbOut, Descent, GroundWays
 from planner.plan import Certificate, Plan
 from planner.search.algorithms import find_algorithm, limits_for
 from planner.search.pose_chains import (
-    LAP_SIDE,
+    LAP_SIDE_RADII,
     MAX_LAPS,
-    Spot,
+    MapPoint,
     TurnLengths,
-    arc_lengths,
+    arc_turn_lengths,
     candidate_chains,
     climb_altitudes,
     descent_altitudes,
@@ -39,11 +39,11 @@ from world.geometry import leg_courses, leg_runs
 from world.scenario import Scenario
 from world.terrain import Terrain
 
-# Slope of departure and approach as a fraction of the aircraft's steepest climb and dive at cruise airspeed; a take-off
-# climbs at least as steeply (MIN_CLIMB of the verdict).
-SHARE = 0.7
+# Slope of departure and approach as a fraction of the aircraft's steepest climb and dive at cruise airspeed; the climb
+# of a take-off is at least as steep (MIN_CLIMB of the verdict).
+SLOPE_FRACTION = 0.7
 # Slope of a glide as a fraction of the steepest dive at the landing airspeed.
-GLIDE_SHARE = 0.85
+GLIDE_SLOPE_FRACTION = 0.85
 # Fractions of these slopes that are tried in turn: the arc of a turn is steeper than its legs, by a quarter at a right
 # angle.
 _SLOPE_FACTORS = (1.0, 0.75, 0.6)
@@ -59,7 +59,7 @@ _FIRST_LEG_FACTORS = (1.0, 1.7)
 _TAKEOFF_DONE_FRACTION = 0.8
 # Distance from home within which terrain is ignored, m (LAUNCH_RUN of the verdict).
 _LAUNCH_RUN_M = 50.0
-# Required height above ground beyond it, as a fraction of the height climbed, up to the scenario's clearance.
+# Required height above ground beyond this distance, as a fraction of the height climbed; at most the clearance.
 _CLIMB_CLEARANCE_FRACTION = 0.5
 # Spacing of the ground samples under the climb and the glide, m.
 _GROUND_SPACING_M = 10.0
@@ -83,7 +83,7 @@ _LINE_UP_RADII = 4.0
 _MIN_LINE_UP_M = 500.0
 # Distance before the landing point within which the glide may meet the ground, m.
 _GROUND_CONTACT_ZONE_M = 60.0
-# Required height of the glide above ground before that, as a fraction of its height over the landing point.
+# Required height of the glide above ground before this zone, as a fraction of its height over the landing point.
 _GLIDE_CLEARANCE_FRACTION = 0.4
 # Upper limit of this height, m.
 _MAX_GLIDE_CLEARANCE_M = 10.0
@@ -103,7 +103,7 @@ _MAX_CERTIFIED = 500
 _MAX_FINALS = 8
 
 
-class FinalLaw(NamedTuple):
+class FinalModel(NamedTuple):
     """Airspeed and slope that the autopilot flies on a final.
 
     airspeed: true airspeed on the glide, m/s, as a function of tailwind (m/s) and altitude (m AMSL).
@@ -115,12 +115,15 @@ class FinalLaw(NamedTuple):
     slope: Callable[[float, float, float, float], float]
 
 
-def with_ground_ways(plan: Plan, limits: Limits, final: FinalLaw, climbed: ClimbOut | None = None) -> Plan:
+def with_ground_ways(
+    plan: Plan, limits: Limits, final_model: FinalModel, kept_departure: ClimbOut | None = None
+) -> Plan:
     """Add the departure and approach that a plan's scenario requires, or the reason why they are missing.
 
-    The scenario requires them by `[launch]` and `[landing]`; a plan without either table is returned unchanged.
+    They are required by the tables `[launch]` and `[landing]`; without these tables the plan is returned unchanged.
     limits: limits of the plan.
-    climbed: the departure to keep of a plan whose first legs are flown already.
+    final_model: airspeed and slope of the autopilot on a final.
+    kept_departure: departure of a plan whose first legs have already been flown.
     """
     scenario = plan.scenario
     if scenario.home is None or scenario.terrain is None or (scenario.launch is None and scenario.landing is None):
@@ -129,12 +132,12 @@ def with_ground_ways(plan: Plan, limits: Limits, final: FinalLaw, climbed: Climb
     climb = descent = None
     problems: list[str] = []
     if plan.flown_legs:
-        climb = climbed
+        climb = kept_departure
     elif scenario.launch is not None:
-        climb, reason = _find_climb_out(site, scenario.launch)
+        climb, reason = _find_departure(site, scenario.launch)
         problems += [f"climb-out: {reason}"] if reason else []
     if scenario.landing is not None:
-        descent, reason = _find_descent(site, scenario.landing, final)
+        descent, reason = _find_approach(site, scenario.landing, final_model)
         problems += [f"landing: {reason}"] if reason else []
     certificate = replace(plan.certificate, problems=(*plan.certificate.problems, *problems))
     return replace(plan, ways=GroundWays(climb, descent), certificate=certificate)
@@ -174,44 +177,47 @@ class _Site:
         for aircraft_slope, certified_slope, stated_limit in zip(
             self.limits.slopes(course, amsl), certified, stated_limits, strict=True
         ):
-            slope = min(SHARE * math.tan(aircraft_slope), math.tan(max(0.0, certified_slope - 1.1 * ANGLE_MARGIN)))
+            slope = min(
+                SLOPE_FRACTION * math.tan(aircraft_slope), math.tan(max(0.0, certified_slope - 1.1 * ANGLE_MARGIN))
+            )
             slopes.append(
                 slope if stated_limit is None else min(slope, math.tan(max(0.0, stated_limit - 1.1 * ANGLE_MARGIN)))
             )
         return slopes[0], slopes[1]
 
-    def min_path_length(self, height_change: float, side: int) -> float:
-        """Return the length of the shortest path that gains (side 0) or loses (side 1) a height, m."""
+    def min_path_length(self, height_change: float, phase: int) -> float:
+        """Return the length of the shortest path that gains (phase 0) or loses (phase 1) a height, m."""
         altitude = float(max(self.scenario.start[2], self.scenario.destination[2]))
-        max_slope = max(self.slopes(course, altitude)[side] for course in np.arange(8) * (math.pi / 4.0))
+        max_slope = max(self.slopes(course, altitude)[phase] for course in np.arange(8) * (math.pi / 4.0))
         return max(0.0, abs(height_change)) / max_slope if max_slope > 0.0 else math.inf
 
-    def certify_chain(self, chain: Floats, ends: tuple[Floats, Floats]) -> Certificate:
+    def certify_chain(self, chain: Floats, end_points: tuple[Floats, Floats]) -> Certificate:
         """Certify a chain (n, 3).
 
-        ends: two places, (3,) m; if a place is closer to the ground than required, less height is required near the
-            place.
+        end_points: two points, (3,) m; if a point is closer to the ground than required, the required height is lower
+            near the point.
         """
         data = self.problem.certified
         start_buffer, end_buffer = (
-            min(data.buffer, 0.75 * max(0.0, self.height_above_ground(place) - data.clearance - 0.01)) for place in ends
+            min(data.buffer, 0.75 * max(0.0, self.height_above_ground(point) - data.clearance - 0.01))
+            for point in end_points
         )
-        relaxed = data._replace(
-            start=_read_only(ends[0]),
-            destination=_read_only(ends[1]),
+        relaxed_data = data._replace(
+            start=_read_only(end_points[0]),
+            destination=_read_only(end_points[1]),
             start_buffer=start_buffer,
             destination_buffer=end_buffer,
             start_course=math.nan,
             destination_course=math.nan,
         )
-        return certify(replace(self.problem, certified=relaxed), np.ascontiguousarray(chain))
+        return certify(replace(self.problem, certified=relaxed_data), np.ascontiguousarray(chain))
 
-    def height_above_ground(self, place: Floats) -> float:
-        """Return the height of a place above ground, m."""
-        return float(place[2] - self.terrain.height(place[0], place[1]))
+    def height_above_ground(self, point: Floats) -> float:
+        """Return the height of a point (3,) above ground, m."""
+        return float(point[2] - self.terrain.height(point[0], point[1]))
 
     def describe_obstacle(self, chain: Sequence[Sequence[float]]) -> str:
-        """Describe the missile or zone that a chain low over the ground enters; "" if it enters none."""
+        """Describe the missile or zone that a low chain enters; "" if it enters none."""
         certificate = certify(self.low_problem, np.array(chain, dtype=np.float64))
         if certificate.kill_distance <= 0.0:
             return f"{-certificate.kill_distance:.0f} m inside a missile's reach"
@@ -234,12 +240,12 @@ def _make_site(plan: Plan, limits: Limits, home: Floats, terrain: Terrain) -> _S
     turn_radius = max(
         algorithm_limits.turn_radius(course, course + math.pi, altitude) for course in (0.0, 0.5 * math.pi)
     )
-    turn_lengths = arc_lengths(turn_radius)
+    turn_lengths = arc_turn_lengths(turn_radius)
     if (tracking := algorithm_limits.tracking) is not None:
         # An estimate, as ground speeds depend on the course; the certificate decides.
         speed_ratio = 1.0 + _WIND_FRACTION * scenario.wind.speed / algorithm_limits.airspeed
         lengths_before, lengths_after = (
-            _turn_lengths_at(table, speed_ratio) for table in (tracking.before, tracking.after)
+            _interpolate_turn_lengths(table, speed_ratio) for table in (tracking.before, tracking.after)
         )
         turn_lengths = TurnLengths(
             *(
@@ -250,26 +256,26 @@ def _make_site(plan: Plan, limits: Limits, home: Floats, terrain: Terrain) -> _S
     return _Site(plan, algorithm_limits, home, terrain, problem, low_problem, turn_radius, turn_lengths)
 
 
-def _turn_lengths_at(table: Floats, speed_ratio: float) -> list[float]:
-    """Interpolate a tracking error's table, (t,) m, at a ground speed as a fraction of the airspeed."""
-    return [float(np.interp(speed_ratio, SPEED_SHARES, row)) for row in table]
+def _interpolate_turn_lengths(length_table: Floats, speed_ratio: float) -> list[float]:
+    """Interpolate the turn lengths of a tracking error, m, at a ratio of ground speed to airspeed."""
+    return [float(np.interp(speed_ratio, SPEED_SHARES, row)) for row in length_table]
 
 
-def _read_only(place: Floats) -> Floats:
-    """Return a read-only copy of a place, because a writable array would make the kernels compile again."""
-    out = np.array(place, dtype=np.float64)
-    out.setflags(write=False)
-    return out
+def _read_only(position: Floats) -> Floats:
+    """Return a read-only copy of a position, because a writable array would make the kernels compile again."""
+    copy = np.array(position, dtype=np.float64)
+    copy.setflags(write=False)
+    return copy
 
 
-def _chain(spots: Sequence[Spot], heights: Floats) -> Floats:
-    return np.column_stack([np.array(spots), heights])
+def _join_altitudes(points: Sequence[MapPoint], altitudes: Floats) -> Floats:
+    return np.column_stack([np.array(points), altitudes])
 
 
-def _ground_profile(terrain: Terrain, begin: Spot, course: float, length: float) -> tuple[Floats, Floats]:
-    """Return distances from a place along a course, m, and the ground heights at those distances, m, NaN if unknown."""
+def _ground_profile(terrain: Terrain, start: MapPoint, course: float, length: float) -> tuple[Floats, Floats]:
+    """Return distances from a start along a course, m, and the terrain altitudes there, m; NaN if unknown."""
     distances = np.arange(0.0, length + _GROUND_SPACING_M, _GROUND_SPACING_M)
-    east, north = begin[0] + distances * math.sin(course), begin[1] + distances * math.cos(course)
+    east, north = start[0] + distances * math.sin(course), start[1] + distances * math.cos(course)
     return distances, terrain.height(east, north)
 
 
@@ -280,7 +286,7 @@ class _BestRejected:
         self.count, self._margin, self.problem = 0, -math.inf, ""
 
     def add(self, certificate: Certificate | None) -> None:
-        """Count a rejected path; a path whose certificate has no problem is in a missile's range."""
+        """Count a rejected path; a path without a problem in its certificate is inside a missile's reach."""
         if certificate is None:
             return
         self.count += 1
@@ -294,7 +300,7 @@ class _BestRejected:
 # Departure.
 
 
-def _find_climb_out(site: _Site, launch: Launch) -> tuple[ClimbOut | None, str]:
+def _find_departure(site: _Site, launch: Launch) -> tuple[ClimbOut | None, str]:
     """Return the shortest accepted departure, or None and the reason."""
     data, target = site.problem.certified, site.plan.waypoints[0]
     home_altitude, start_altitude = float(site.home[2]), float(target[2])
@@ -304,9 +310,9 @@ def _find_climb_out(site: _Site, launch: Launch) -> tuple[ClimbOut | None, str]:
     if not launches:
         return None, reason
     best_rejected = _BestRejected()
-    for laps in _lap_counts(site, start_altitude - home_altitude, 0):
-        for _, course, spots in sorted(_list_departures(site, launches, laps), key=lambda path: path[0]):
-            outcome = _make_climb_out(site, course, spots, takeoff_altitude)
+    for laps in _list_lap_counts(site, start_altitude - home_altitude, 0):
+        for _, course, points in sorted(_list_departures(site, launches, laps), key=lambda path: path[0]):
+            outcome = _make_departure(site, course, points, takeoff_altitude)
             if isinstance(outcome, ClimbOut):
                 return outcome, ""
             best_rejected.add(outcome)
@@ -327,123 +333,126 @@ def _find_climb_out(site: _Site, launch: Launch) -> tuple[ClimbOut | None, str]:
     )
 
 
-def _make_climb_out(
-    site: _Site, course: float, spots: list[Spot], takeoff_altitude: float
+def _make_departure(
+    site: _Site, course: float, points: list[MapPoint], takeoff_altitude: float
 ) -> ClimbOut | Certificate | None:
-    """Return the departure over these corners, its certificate if it is rejected, or None if it cannot be flown.
+    """Return the departure over these points, its certificate if it is rejected, or None if it cannot be flown.
 
-    takeoff_altitude: altitude that the take-off climbs to, m AMSL.
+    takeoff_altitude: altitude at the end of the take-off, m AMSL.
     """
     next_waypoints, first_waypoint = site.plan.waypoints[1:3], site.plan.waypoints[0]
     goal_altitude, top_altitude = float(first_waypoint[2]), max(takeoff_altitude, float(first_waypoint[2]))
     certificate = None
     for slope_factor in _SLOPE_FACTORS:
-        heights = climb_altitudes(
-            spots,
+        altitudes = climb_altitudes(
+            points,
             float(site.home[2]),
-            partial(_scaled_slope, site, slope_factor, 0, top_altitude),
+            partial(_scale_slope, site, slope_factor, 0, top_altitude),
             takeoff_altitude,
             goal_altitude,
         )
-        if heights[-1] < goal_altitude - 1e-6:
+        if altitudes[-1] < goal_altitude - 1e-6:
             break
-        chain = np.concatenate([_chain(spots, heights), next_waypoints])
+        chain = np.concatenate([_join_altitudes(points, altitudes), next_waypoints])
         certificate = site.certify_chain(chain, (first_waypoint, chain[0]))
         if certificate.ok and certificate.kill_distance > 0.0:
             return ClimbOut(
-                site.home, course, takeoff_altitude, chain[1 : len(spots) - 1], site.slopes(course, top_altitude)[0]
+                site.home, course, takeoff_altitude, chain[1 : len(points) - 1], site.slopes(course, top_altitude)[0]
             )
     return certificate
 
 
-class _Start(NamedTuple):
-    """Launch: course (rad), place where the take-off is complete, and end of the first leg."""
+class _Launch(NamedTuple):
+    """Launch: course (rad), point where the take-off is complete, and end of the first leg."""
 
     course: float
-    takeoff_end: Spot
-    end: Spot
+    takeoff_end: MapPoint
+    end: MapPoint
 
 
-def _find_launches(site: _Site, launch: Launch, takeoff_height: float, altitude: float) -> tuple[list[_Start], str]:
-    """Return the launches that climb clear of ground, missiles and zones; if there are none, return the reason, too.
+def _find_launches(site: _Site, launch: Launch, takeoff_height: float, altitude: float) -> tuple[list[_Launch], str]:
+    """Return the launches that are clear of ground, missiles and zones, and the reason if there are none.
 
     takeoff_height: height above home up to which the launch climbs straight ahead, m.
     altitude: altitude of the climb performance, m AMSL.
     """
     courses = (
-        [2.0 * math.pi * k / _LAUNCH_COURSE_COUNT for k in range(_LAUNCH_COURSE_COUNT)]
+        [2.0 * math.pi * worst_index / _LAUNCH_COURSE_COUNT for worst_index in range(_LAUNCH_COURSE_COUNT)]
         if launch.course is None
         else [launch.course]
     )
-    home, launches, best = (float(site.home[0]), float(site.home[1])), [], (-math.inf, "")
+    home, launches, best_rejected = (float(site.home[0]), float(site.home[1])), [], (-math.inf, "")
     for course in courses:
-        climb = site.slopes(course, altitude)[0]
-        if climb <= 0.0:
+        climb_slope = site.slopes(course, altitude)[0]
+        if climb_slope <= 0.0:
             continue
-        min_length = takeoff_height / climb * _FIRST_LEG_FACTOR_AND_M[0] + _FIRST_LEG_FACTOR_AND_M[1]
+        min_length = takeoff_height / climb_slope * _FIRST_LEG_FACTOR_AND_M[0] + _FIRST_LEG_FACTOR_AND_M[1]
         for length_factor in _FIRST_LEG_FACTORS:
             length = min_length * length_factor
-            distances, ground = _ground_profile(site.terrain, home, course, length)
-            heights = climb * distances
-            required = np.minimum(site.problem.certified.clearance, _CLIMB_CLEARANCE_FRACTION * heights)
-            margins = (site.home[2] + heights - ground - required)[distances > _LAUNCH_RUN_M]
+            distances, terrain_heights = _ground_profile(site.terrain, home, course, length)
+            heights = climb_slope * distances
+            required_heights = np.minimum(site.problem.certified.clearance, _CLIMB_CLEARANCE_FRACTION * heights)
+            margins = (site.home[2] + heights - terrain_heights - required_heights)[distances > _LAUNCH_RUN_M]
             direction = f"on {round(math.degrees(course)) % 360}°"
             if not (margins >= 0.0).all():
                 worst_margin = float(np.nanmin(margins)) if not np.isnan(margins).all() else -math.inf
-                k = int(np.argmin(np.where(np.isnan(margins), math.inf, margins)))
-                distance = float(distances[distances > _LAUNCH_RUN_M][k])
+                worst_index = int(np.argmin(np.where(np.isnan(margins), math.inf, margins)))
+                distance = float(distances[distances > _LAUNCH_RUN_M][worst_index])
                 reason = (
                     f"the nearest, {direction}, is {-worst_margin:.0f} m too low over the ground"
                     f" {distance:.0f} m from home"
                 )
-                best = max(best, (worst_margin, reason))
+                best_rejected = max(best_rejected, (worst_margin, reason))
                 break
             east, north = math.sin(course), math.cos(course)
             end = (home[0] + length * east, home[1] + length * north)
-            takeoff_distance = _TAKEOFF_DONE_FRACTION * takeoff_height / climb
+            takeoff_distance = _TAKEOFF_DONE_FRACTION * takeoff_height / climb_slope
             home_altitude = float(site.home[2])
-            obstacle = site.describe_obstacle([(*home, home_altitude), (*end, home_altitude + climb * length)])
+            obstacle = site.describe_obstacle([(*home, home_altitude), (*end, home_altitude + climb_slope * length)])
             if obstacle:
-                best = max(best, (-1e6, f"{direction} it is {obstacle}"))
+                best_rejected = max(best_rejected, (-1e6, f"{direction} it is {obstacle}"))
                 break
             launches.append(
-                _Start(course, (home[0] + takeoff_distance * east, home[1] + takeoff_distance * north), end)
+                _Launch(course, (home[0] + takeoff_distance * east, home[1] + takeoff_distance * north), end)
             )
     subject = "the launch course leads" if launch.course is not None else f"none of {len(courses)} launch courses leads"
     negation = "" if launch.course is None else "not "
     return (
         launches,
-        f"{subject} {negation}free of ground, missiles and zones at {SHARE:.0%} of the steepest climb: {best[1]}",
+        f"{subject} {negation}free of ground, missiles and zones at {SLOPE_FRACTION:.0%} of the steepest climb: "
+        f"{best_rejected[1]}",
     )
 
 
-def _list_departures(site: _Site, launches: Sequence[_Start], laps: int) -> Iterator[tuple[float, float, list[Spot]]]:
-    """Yield the cost, launch course and corners of departures from home to the plan's first waypoint."""
+def _list_departures(
+    site: _Site, launches: Sequence[_Launch], laps: int
+) -> Iterator[tuple[float, float, list[MapPoint]]]:
+    """Yield the cost, launch course and points of departures from home to the plan's first waypoint."""
     target, start_course = site.plan.waypoints[0], site.scenario.start_course
     next_course = float(leg_courses(site.plan.waypoints[:2])[0]) if start_course is None else start_course
     end, home = (float(target[0]), float(target[1])), (float(site.home[0]), float(site.home[1]))
     next_point = (float(site.plan.waypoints[1, 0]), float(site.plan.waypoints[1, 1]))
     min_length = site.min_path_length(float(target[2] - site.home[2]), 0) + math.dist(end, next_point)
-    for course, takeoff_end, begin in launches:
+    for course, takeoff_end, first_leg_end in launches:
         tailwind = site.scenario.wind.along(course, float(site.home[2]))[0]
-        for corners in candidate_chains(begin, course, end, next_course, site.turn_radius, laps):
-            spots = [home, begin, *corners, end]
+        for corners in candidate_chains(first_leg_end, course, end, next_course, site.turn_radius, laps):
+            points = [home, first_leg_end, *corners, end]
             measures, takeoff_run = (
-                measure_path([takeoff_end, *spots[1:], next_point], site.turn_lengths),
+                measure_path([takeoff_end, *points[1:], next_point], site.turn_lengths),
                 math.dist(home, takeoff_end),
             )
             if measures.fits and takeoff_run + measures.length >= min_length:
                 yield (
                     takeoff_run + measures.cost + (_TAILWIND_COST_M if tailwind > _MAX_TAILWIND_MPS else 0.0),
                     course,
-                    spots,
+                    points,
                 )
 
 
-def _lap_counts(site: _Site, height_change: float, side: int) -> list[int]:
-    """Return the numbers of laps with which to try to gain (side 0) or lose (side 1) a height, m, fewest first."""
+def _list_lap_counts(site: _Site, height_change: float, phase: int) -> list[int]:
+    """Return the lap counts to try for gaining (phase 0) or losing (phase 1) a height, m, fewest first."""
     max_laps = math.ceil(
-        site.min_path_length(height_change, side) / _SLOPE_FACTORS[-1] / (4.0 * LAP_SIDE * site.turn_radius)
+        site.min_path_length(height_change, phase) / _SLOPE_FACTORS[-1] / (4.0 * LAP_SIDE_RADII * site.turn_radius)
     )
     return list(range(min(MAX_LAPS, max_laps) + 1))
 
@@ -462,7 +471,7 @@ class _Final(NamedTuple):
     point: Floats
 
 
-def _find_descent(site: _Site, strip: LandingStrip, final_law: FinalLaw) -> tuple[Descent | None, str]:
+def _find_approach(site: _Site, strip: LandingStrip, final_law: FinalModel) -> tuple[Descent | None, str]:
     """Return the first accepted approach, or None and the reason."""
     field_altitude = float(site.terrain.height(strip.east, strip.north))
     point = np.array([strip.east, strip.north, field_altitude])
@@ -470,13 +479,13 @@ def _find_descent(site: _Site, strip: LandingStrip, final_law: FinalLaw) -> tupl
     courses = (
         [landing_course]
         if landing_course is not None
-        else [2.0 * math.pi * k / _LANDING_COURSE_COUNT for k in range(_LANDING_COURSE_COUNT)]
+        else [2.0 * math.pi * number / _LANDING_COURSE_COUNT for number in range(_LANDING_COURSE_COUNT)]
     )
     finals, reasons = [], []
     for course in courses:
-        fault = _describe_strip_fault(site.terrain, strip, course)
-        if fault:
-            reasons.append(fault)
+        strip_fault = _describe_strip_fault(site.terrain, strip, course)
+        if strip_fault:
+            reasons.append(strip_fault)
             continue
         course_finals, reason = _find_finals(site, strip, course, point, final_law)
         finals += course_finals
@@ -513,13 +522,13 @@ def _describe_strip_fault(terrain: Terrain, strip: LandingStrip, course: float) 
 
 
 def _find_finals(
-    site: _Site, strip: LandingStrip, course: float, point: Floats, law: FinalLaw
+    site: _Site, strip: LandingStrip, course: float, point: Floats, final_model: FinalModel
 ) -> tuple[list[_Final], str]:
-    """Return the unobstructed flyable finals on a course, the shallowest and shortest first, or the reason for none."""
+    """Return the clear and flyable finals on a course, the shallowest and shortest first, and the reason if none."""
     field_altitude = float(point[2])
     tailwind = site.scenario.wind.along(course, field_altitude)[0]
-    max_slope = GLIDE_SHARE * math.tan(
-        site.limits.slopes(course, field_altitude, law.airspeed(tailwind, field_altitude))[1]
+    max_slope = GLIDE_SLOPE_FRACTION * math.tan(
+        site.limits.slopes(course, field_altitude, final_model.airspeed(tailwind, field_altitude))[1]
     )
     lengths = _FINAL_LENGTHS_M if strip.approach is None else (strip.approach,)
     slopes = _FINAL_SLOPES_RAD if strip.slope is None else (strip.slope,)
@@ -527,24 +536,26 @@ def _find_finals(
         ((final_length, final_slope) for final_length in lengths for final_slope in slopes),
         key=lambda pair: (pair[1] > _PX4_MAX_SLOPE_RAD, pair),
     )
-    finals, best = list[_Final](), (-math.inf, "")
+    finals, best_rejected = list[_Final](), (-math.inf, "")
     for length, slope in pairs:
         height = length * math.tan(slope)
-        flown_slope = law.slope(height, length, tailwind, field_altitude)
+        flown_slope = final_model.slope(height, length, tailwind, field_altitude)
         if flown_slope > max_slope:
             flown_deg, max_deg = math.degrees(math.atan(flown_slope)), math.degrees(math.atan(max_slope))
-            best = max(
-                best,
+            best_rejected = max(
+                best_rejected,
                 (-1e6, f"a glide of {flown_deg:.1f}° is steeper than the {max_deg:.1f}° that can be flown there"),
             )
             continue
         final = _Final(course, length, height, _line_up_points(site, point, course, length, height), point)
         margin, obstacle = _check_final(site, final)
         if obstacle:
-            best = max(best, (margin, f"a final of {length:.0f} m at {math.degrees(slope):.1f}° {obstacle}"))
+            best_rejected = max(
+                best_rejected, (margin, f"a final of {length:.0f} m at {math.degrees(slope):.1f}° {obstacle}")
+            )
         else:
             finals.append(final)
-    return finals, f"on {round(math.degrees(course)) % 360}° {best[1]}"
+    return finals, f"on {round(math.degrees(course)) % 360}° {best_rejected[1]}"
 
 
 def _line_up_points(site: _Site, point: Floats, course: float, length: float, height: float) -> Floats:
@@ -554,23 +565,28 @@ def _line_up_points(site: _Site, point: Floats, course: float, length: float, he
 
 
 def _check_final(site: _Site, final: _Final) -> tuple[float, str]:
-    """Return a final's margin to its obstacle, m, negative if blocked, and the obstacle's description, or ""."""
-    begin, point = final.line_up[1], final.point
-    distances, ground = _ground_profile(site.terrain, (float(begin[0]), float(begin[1])), final.course, final.length)
+    """Return a final's margin, m, negative if the final is blocked, and a description of its obstacle, or ""."""
+    glide_start, point = final.line_up[1], final.point
+    distances, terrain_heights = _ground_profile(
+        site.terrain, (float(glide_start[0]), float(glide_start[1])), final.course, final.length
+    )
     heights = final.height * (1.0 - distances / final.length)
     margins = (
-        float(point[2]) + heights - ground - np.minimum(_MAX_GLIDE_CLEARANCE_M, _GLIDE_CLEARANCE_FRACTION * heights)
+        float(point[2])
+        + heights
+        - terrain_heights
+        - np.minimum(_MAX_GLIDE_CLEARANCE_M, _GLIDE_CLEARANCE_FRACTION * heights)
     )
     judged_margins = margins[distances <= final.length - _GROUND_CONTACT_ZONE_M]
     if np.isnan(judged_margins).any():
         return -math.inf, "leads over ground that is not known"
     if judged_margins.min(initial=0.0) < 0.0:
         return float(judged_margins.min()), f"is {-float(judged_margins.min()):.0f} m too low over the ground"
-    obstacle = site.describe_obstacle([begin.tolist(), [float(point[0]), float(point[1]), float(begin[2])]])
-    obstacle = obstacle or site.describe_obstacle([[*begin[:2].tolist(), float(point[2])], point.tolist()])
+    obstacle = site.describe_obstacle([glide_start.tolist(), [float(point[0]), float(point[1]), float(glide_start[2])]])
+    obstacle = obstacle or site.describe_obstacle([[*glide_start[:2].tolist(), float(point[2])], point.tolist()])
     if obstacle:
         return -math.inf, f"is {obstacle}"
-    point_above = np.array([point[0], point[1], begin[2]])
+    point_above = np.array([point[0], point[1], glide_start[2]])
     chain = np.concatenate([final.line_up, point_above[None]])
     certificate = site.certify_chain(chain, (chain[0], chain[0]))
     if not certificate.ok:
@@ -584,39 +600,43 @@ def _find_path_to_line_up(site: _Site, final: _Final) -> tuple[Floats | None, st
     last_waypoint, end_altitude = waypoints[-1], float(waypoints[-1, 2])
     destination_course = site.scenario.destination_course
     course = float(leg_courses(waypoints[-2:])[0]) if destination_course is None else destination_course
-    begin, end = (
+    start, end = (
         (float(last_waypoint[0]), float(last_waypoint[1])),
         (float(final.line_up[0, 0]), float(final.line_up[0, 1])),
     )
     previous_waypoints = waypoints[-3:-1]
-    previous_spots = [(float(waypoint[0]), float(waypoint[1])) for waypoint in previous_waypoints]
+    previous_points = [(float(waypoint[0]), float(waypoint[1])) for waypoint in previous_waypoints]
     glide_start = (float(final.line_up[1, 0]), float(final.line_up[1, 1]))
     best_rejected = _BestRejected()
     point_above = np.array([final.point[0], final.point[1], line_up_altitude])
-    side = int(line_up_altitude < end_altitude)
-    extra_length = math.dist(previous_spots[-1], begin) + math.dist(end, glide_start)
-    extra_length += sum(math.dist(a, b) for a, b in pairwise(previous_spots))
-    min_length = site.min_path_length(end_altitude - line_up_altitude, side) + extra_length
-    for laps in _lap_counts(site, end_altitude - line_up_altitude, side):
+    phase = int(line_up_altitude < end_altitude)
+    extra_length = math.dist(previous_points[-1], start) + math.dist(end, glide_start)
+    extra_length += sum(math.dist(leg_start, leg_end) for leg_start, leg_end in pairwise(previous_points))
+    min_length = site.min_path_length(end_altitude - line_up_altitude, phase) + extra_length
+    for laps in _list_lap_counts(site, end_altitude - line_up_altitude, phase):
         paths = [
-            [begin, *corners, end]
-            for corners in candidate_chains(begin, course, end, final.course, site.turn_radius, laps)
+            [start, *corners, end]
+            for corners in candidate_chains(start, course, end, final.course, site.turn_radius, laps)
         ]
-        measured = [(measure_path([*previous_spots, *spots, glide_start], site.turn_lengths), spots) for spots in paths]
-        fitting = [
-            (measures.cost, spots) for measures, spots in measured if measures.fits and measures.length >= min_length
+        measured_paths = [
+            (measure_path([*previous_points, *points, glide_start], site.turn_lengths), points) for points in paths
         ]
-        for _, spots in sorted(fitting):
+        fitting_paths = [
+            (measures.cost, points)
+            for measures, points in measured_paths
+            if measures.fits and measures.length >= min_length
+        ]
+        for _, points in sorted(fitting_paths):
             for slope_factor in _SLOPE_FACTORS:
-                heights = _approach_altitudes(site, spots, slope_factor, end_altitude, line_up_altitude)
-                if abs(heights[0] - end_altitude) > 1e-6 or abs(heights[-1] - line_up_altitude) > 1e-6:
+                altitudes = _approach_altitudes(site, points, slope_factor, end_altitude, line_up_altitude)
+                if abs(altitudes[0] - end_altitude) > 1e-6 or abs(altitudes[-1] - line_up_altitude) > 1e-6:
                     break
                 chain = np.concatenate(
-                    [previous_waypoints, _chain(spots, heights), final.line_up[1:], point_above[None]]
+                    [previous_waypoints, _join_altitudes(points, altitudes), final.line_up[1:], point_above[None]]
                 )
                 certificate = site.certify_chain(chain, (last_waypoint, last_waypoint))
                 if certificate.ok and certificate.kill_distance > 0.0:
-                    return chain[len(previous_waypoints) + 1 : len(previous_waypoints) + len(spots) - 1], ""
+                    return chain[len(previous_waypoints) + 1 : len(previous_waypoints) + len(points) - 1], ""
                 best_rejected.add(certificate)
             if best_rejected.count >= _MAX_CERTIFIED:
                 break
@@ -634,27 +654,28 @@ def _find_path_to_line_up(site: _Site, final: _Final) -> tuple[Floats | None, st
 
 
 def _approach_altitudes(
-    site: _Site, spots: list[Spot], slope_factor: float, begin_altitude: float, end_altitude: float
+    site: _Site, points: list[MapPoint], slope_factor: float, start_altitude: float, end_altitude: float
 ) -> Floats:
     """Return the altitudes of a path between two altitudes at a fraction of its slope limits, (n,) m AMSL."""
-    top_altitude = max(begin_altitude, end_altitude)
-    climb, dive = (partial(_scaled_slope, site, slope_factor, side, top_altitude) for side in (0, 1))
-    return descent_altitudes(spots, begin_altitude, climb, dive, end_altitude)
+    top_altitude = max(start_altitude, end_altitude)
+    climb, dive = (partial(_scale_slope, site, slope_factor, phase, top_altitude) for phase in (0, 1))
+    return descent_altitudes(points, start_altitude, climb, dive, end_altitude)
 
 
-def _scaled_slope(site: _Site, factor: float, side: int, altitude: float, course: float) -> float:
-    """Return a fraction of the climb (side 0) or dive (1) slope on a course, m per m."""
-    return factor * site.slopes(course, altitude)[side]
+def _scale_slope(site: _Site, factor: float, phase: int, altitude: float, course: float) -> float:
+    """Return a fraction of the climb slope (phase 0) or dive slope (phase 1) on a course, m per m."""
+    return factor * site.slopes(course, altitude)[phase]
 
 
 def _min_go_around_height(site: _Site, final: _Final) -> float | None:
-    """Return the minimum height above home of a go-around that returns to the line-up, m, or None if none does.
+    """Return the minimum height above home of a go-around that flies back to the line-up, m, or None.
 
-    It climbs straight ahead from the landing point at `SHARE` of the steepest climb, then flies back to the line-up.
+    The go-around climbs straight ahead from the landing point at `SLOPE_FRACTION` of the steepest climb, and then flies
+    back to the line-up.
     """
     home_altitude, field_altitude = float(site.home[2]), float(final.point[2])
     target = final.line_up[0]
-    # Above the line-up: an aircraft that aborts above the go-around height turns at once, between the hills.
+    # The height is above the line-up, because an aircraft that aborts above the go-around height turns at once.
     min_height = max(
         _MIN_GO_AROUND_HEIGHT_M,
         field_altitude - home_altitude + _MIN_GO_AROUND_HEIGHT_M,
@@ -664,16 +685,16 @@ def _min_go_around_height(site: _Site, final: _Final) -> float | None:
         math.ceil(min_height / _GO_AROUND_STEP_M) * _GO_AROUND_STEP_M, _MAX_GO_AROUND_HEIGHT_M, _GO_AROUND_STEP_M
     ).tolist():
         top_altitude = home_altitude + height
-        climb = site.slopes(final.course, top_altitude)[0]
-        if climb <= 0.0:
+        climb_slope = site.slopes(final.course, top_altitude)[0]
+        if climb_slope <= 0.0:
             return None
-        distances, ground = _ground_profile(
+        distances, terrain_heights = _ground_profile(
             site.terrain,
             (float(final.point[0]), float(final.point[1])),
             final.course,
-            (top_altitude - field_altitude) / climb,
+            (top_altitude - field_altitude) / climb_slope,
         )
-        margins = (field_altitude + climb * distances - ground)[distances > _LAUNCH_RUN_M]
+        margins = (field_altitude + climb_slope * distances - terrain_heights)[distances > _LAUNCH_RUN_M]
         turn_point = np.array(
             [
                 final.point[0] + distances[-1] * math.sin(final.course),
@@ -687,13 +708,13 @@ def _min_go_around_height(site: _Site, final: _Final) -> float | None:
 
 
 def _return_clearance(site: _Site, turn_point: Floats, target: Floats) -> float:
-    """Return the minimum height above ground on the way from a go-around back to the line-up, m; -inf if unknown."""
+    """Return the minimum height above ground from a go-around back to the line-up, m; -inf if unknown."""
     length = float(leg_runs(np.stack([turn_point, target]))[0])
     fractions = np.linspace(0.0, 1.0, max(2, math.ceil(length / _GROUND_SPACING_M)))
-    east, north = (turn_point[k] + fractions * (target[k] - turn_point[k]) for k in range(2))
+    east, north = (turn_point[axis] + fractions * (target[axis] - turn_point[axis]) for axis in range(2))
     if target[2] > turn_point[2]:
-        climb = site.slopes(math.atan2(target[0] - turn_point[0], target[1] - turn_point[1]), float(target[2]))[0]
-        altitudes = np.minimum(target[2], turn_point[2] + max(0.0, climb) * length * fractions)
+        climb_slope = site.slopes(math.atan2(target[0] - turn_point[0], target[1] - turn_point[1]), float(target[2]))[0]
+        altitudes = np.minimum(target[2], turn_point[2] + max(0.0, climb_slope) * length * fractions)
     else:
         altitudes = turn_point[2] + fractions * (target[2] - turn_point[2])
     heights = altitudes - site.terrain.height(east, north)

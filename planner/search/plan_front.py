@@ -22,7 +22,7 @@ from planner.evaluation.graded_scores import graded_scores
 from planner.evaluation.paper_scores import paper_scores
 from planner.evaluation.problem import Problem, ProblemArrays, make_problem, threat_records
 from planner.evaluation.threat_index import make_missile_index
-from planner.evaluation.travel_cost import TravelCost, energy_cost, time_cost
+from planner.evaluation.travel_cost import TravelCost, make_energy_cost, make_time_cost
 from planner.optimisers.front_sampling import FrontSampling
 from planner.optimisers.hypervolume import covering_order
 from planner.plan import Objective, Objectives, Plan, Violations
@@ -237,9 +237,9 @@ def front_task(scenario: Scenario, limits: Limits) -> FrontTask:
     algorithm = find_algorithm(None, scenario.name)
     problem = make_problem(scenario, limits_for(algorithm, limits))
     aircraft = problem.search.aircraft
-    energy = energy_cost(limits.envelope, aircraft)
+    energy = make_energy_cost(limits.envelope, aircraft)
     by_energy = energy is not None and scenario.planner.objective != "time"
-    travel = energy if energy is not None and by_energy else time_cost(aircraft)
+    travel = energy if energy is not None and by_energy else make_time_cost(aircraft)
     frame = rotated_frame(problem.space.start, problem.space.destination)
     scored = _with_margins(problem, MARGINS[0])
     return FrontTask(problem, scored, frame, energy, "energy" if by_energy else "time", travel)

@@ -19,7 +19,7 @@ from planner.plan import Certificate, Objectives, Plan, Violations
 from planner.search.algorithms import find_algorithm, limits_for
 from planner.search.generations import may_try_again, path_generations, waypoint_generations
 from planner.search.infeasibility_proof import is_closed
-from planner.search.search_cheapest import objective_cost, search_cheapest
+from planner.search.search_cheapest import make_objective_cost, search_cheapest_path
 from planner.search.search_state import (
     Archive,
     Improved,
@@ -99,7 +99,7 @@ def plan_path(
     found_algorithm = find_algorithm(algorithm or scenario.planner.algorithm, scenario.name)
     _check_options(scenario, limits.airspeed)
     problem = make_problem(scenario, limits_for(found_algorithm, limits))
-    cost = objective_cost(scenario, limits, problem)
+    cost = make_objective_cost(scenario, limits, problem)
     encoding = ENCODINGS[found_algorithm.encoding](problem.space, scenario.planner.waypoints)
     # A path is never further from missile spheres than its own ends.
     end_distance = min(
@@ -117,7 +117,7 @@ def plan_path(
         required_distance,
         improved,
     )
-    waypoints, certificate = search_cheapest(search, _search_repeatedly(search, previous), cost)
+    waypoints, certificate = search_cheapest_path(search, _search_repeatedly(search, previous), cost)
     violations, objectives = paper_scores(problem.certified, waypoints[None])
     return Plan(
         scenario=scenario,

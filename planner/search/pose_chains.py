@@ -1,8 +1,8 @@
-"""Construct paths of a few straight legs from one place and course to another, also with laps.
+"""Construct paths of a few straight legs from one point and course to another, also with laps.
 
-The legs of a path must hold its turns, and the path must gain or lose a height.  `candidate_chains` lists horizontal
-candidates, `measure_path` computes their lengths and checks that the legs hold the turns, and `climb_altitudes` and
-`descent_altitudes` give the altitudes of the corners.
+The legs of a path must be long enough for its turns, and the path must gain or lose a height.  `candidate_chains` lists
+horizontal candidates, `measure_path` computes their lengths and checks the legs, and `climb_altitudes` and
+`descent_altitudes` compute the altitudes of the corners.
 """
 
 import math
@@ -15,18 +15,18 @@ from world.arrays import Floats
 from world.geometry import leg_courses, leg_runs
 
 # East and north, m.
-Spot = tuple[float, float]
-# Steepest slope (m per m) on a course (rad).
-Slope = Callable[[float], float]
+MapPoint = tuple[float, float]
+# Function that returns the steepest slope (m per m) on a course (rad).
+SlopeOnCourse = Callable[[float], float]
 
 # Sharpest turn of a path, rad.
-SHARPEST = math.radians(120.0)
+MAX_TURN_RAD = math.radians(120.0)
 # Step of the turns in a table of turn lengths, from 0 on, rad.
-STEP = math.radians(15.0)
+TURN_STEP_RAD = math.radians(15.0)
 # Number of turns in a table of turn lengths.
-STEPS = 11
-# Largest fraction of a leg that its turns may take; the rest is needed to settle on the leg.
-TURN_SHARE = 0.95
+TURN_STEP_COUNT = 11
+# Maximum fraction of a leg that its turns may occupy; the rest is needed to settle on the leg.
+MAX_TURN_FRACTION = 0.95
 # Cost of a turn of one radian, m of path length; the cost grows with the square of the turn.
 _TURN_COST_M = 250.0
 # Lengths of the last leg, in radii of the tightest turn.
@@ -40,32 +40,32 @@ _FIRST_DIRECTION_COUNT = 16
 # Directions from the end of a base leg back to its start, relative to the final course, rad.
 _BASE_LEG_TURNS_RAD = tuple(math.radians(side * turn) for side in (-1, 1) for turn in (60.0, 90.0, 120.0))
 # Side of a lap, in radii of the tightest turn.
-LAP_SIDE = 5.5
+LAP_SIDE_RADII = 5.5
 # Maximum number of laps.
 MAX_LAPS = 8
 
 
 def candidate_chains(
-    begin: Spot, course: float, end: Spot, end_course: float, turn_radius: float, laps: int
-) -> Iterator[list[Spot]]:
-    """Yield lists of corners between two places: none, or one near the start and up to two before the end.
+    start: MapPoint, course: float, end: MapPoint, end_course: float, turn_radius: float, laps: int
+) -> Iterator[list[MapPoint]]:
+    """Yield lists of corners between two points: none, or one near the start and up to two before the end.
 
-    course, end_course: course of the leg before the beginning, and of the leg after the end, rad.
+    course, end_course: course of the leg before the start, and of the leg after the end, rad.
     turn_radius: radius of the tightest turn, m.  laps: number of laps before these corners.
     """
-    lap_chains: list[list[Spot]] = [[]]
+    lap_chains: list[list[MapPoint]] = [[]]
     if laps:
-        lap_chains = [_lap_corners(begin, course, side * LAP_SIDE * turn_radius, laps) for side in (1.0, -1.0)]
-    last_corners = [_move(end, end_course, -radii * turn_radius) for radii in _LAST_LEG_RADII]
-    short_ends: list[list[Spot]] = [[], *([last_corner] for last_corner in last_corners)]
+        lap_chains = [_lap_corners(start, course, sign * LAP_SIDE_RADII * turn_radius, laps) for sign in (1.0, -1.0)]
+    last_corners = [_offset_point(end, end_course, -radii * turn_radius) for radii in _LAST_LEG_RADII]
+    short_ends: list[list[MapPoint]] = [[], *([last_corner] for last_corner in last_corners)]
     base_ends = [
-        [_move(last_corner, end_course + turn, radii * turn_radius), last_corner]
+        [_offset_point(last_corner, end_course + turn, radii * turn_radius), last_corner]
         for last_corner in last_corners[1:3]
         for turn in _BASE_LEG_TURNS_RAD
         for radii in _BASE_LEG_RADII
     ]
     first_corners = [
-        [_move(begin, 2.0 * math.pi * k / _FIRST_DIRECTION_COUNT, radii * turn_radius)]
+        [_offset_point(start, 2.0 * math.pi * k / _FIRST_DIRECTION_COUNT, radii * turn_radius)]
         for radii in _FIRST_LEG_RADII
         for k in range(_FIRST_DIRECTION_COUNT)
     ]
@@ -80,52 +80,52 @@ def candidate_chains(
                 yield [*lap_corners, *first_corner, *end_corners]
 
 
-def _lap_corners(begin: Spot, course: float, side: float, laps: int) -> list[Spot]:
-    """Return the corners of square laps that begin and end at a place on its course; left-hand if side < 0."""
-    across = course + math.copysign(0.5 * math.pi, side)
-    ahead = _move(begin, course, abs(side))
-    corner = _move(ahead, across, abs(side))
-    back = _move(begin, across, abs(side))
-    return [ahead, corner, back, begin] * laps
+def _lap_corners(start: MapPoint, course: float, signed_side: float, laps: int) -> list[MapPoint]:
+    """Return the corners of square laps that start and end at `start` on its course; left-hand for a negative side."""
+    cross_course = course + math.copysign(0.5 * math.pi, signed_side)
+    ahead_corner = _offset_point(start, course, abs(signed_side))
+    far_corner = _offset_point(ahead_corner, cross_course, abs(signed_side))
+    cross_corner = _offset_point(start, cross_course, abs(signed_side))
+    return [ahead_corner, far_corner, cross_corner, start] * laps
 
 
-def _move(spot: Spot, course: float, distance: float) -> Spot:
-    return spot[0] + distance * math.sin(course), spot[1] + distance * math.cos(course)
+def _offset_point(point: MapPoint, course: float, distance: float) -> MapPoint:
+    return point[0] + distance * math.sin(course), point[1] + distance * math.cos(course)
 
 
 class TurnLengths(NamedTuple):
-    """Lengths of leg (m) that turns take before and after their corners, for turns from 0 in steps of `STEP`."""
+    """Leg lengths, m, that turns occupy before and after corners, for turns from 0 in steps of `TURN_STEP_RAD`."""
 
     before: tuple[float, ...]
     after: tuple[float, ...]
 
     def lengths(self, turn: float) -> tuple[float, float]:
         """Return the lengths before and after the corner of a turn (rad), m."""
-        position = min(turn / STEP, len(self.before) - 1.001)
-        k = int(position)
-        fraction = position - k
+        position = min(turn / TURN_STEP_RAD, len(self.before) - 1.001)
+        index = int(position)
+        fraction = position - index
         return (
-            self.before[k] + fraction * (self.before[k + 1] - self.before[k]),
-            self.after[k] + fraction * (self.after[k + 1] - self.after[k]),
+            self.before[index] + fraction * (self.before[index + 1] - self.before[index]),
+            self.after[index] + fraction * (self.after[index + 1] - self.after[index]),
         )
 
 
-def arc_lengths(radius: float) -> TurnLengths:
-    """Return the turn lengths of arcs of the given radius (m), which are the lengths of their tangents.
+def arc_turn_lengths(radius: float) -> TurnLengths:
+    """Return the turn lengths of arcs of a radius (m): the lengths of their tangents.
 
-    >>> [round(length) for length in arc_lengths(150.0).lengths(math.radians(90.0))]
+    >>> [round(length) for length in arc_turn_lengths(150.0).lengths(math.radians(90.0))]
     [150, 150]
     """
-    tangents = tuple(radius * math.tan(0.5 * STEP * k) for k in range(STEPS))
+    tangents = tuple(radius * math.tan(0.5 * TURN_STEP_RAD * k) for k in range(TURN_STEP_COUNT))
     return TurnLengths(tangents, tangents)
 
 
 class PathMeasures(NamedTuple):
     """Horizontal measures of a path.
 
-    length: m.  cost: length plus a cost of sharp turns, as their arcs are shorter, and so steeper, than the legs.
+    length: m.  cost: length plus a cost of sharp turns, because their arcs are shorter, and so steeper, than the legs.
     max_turn: sharpest turn, rad.
-    max_fraction: largest fraction of a leg that its turns take up.
+    max_fraction: largest fraction of a leg that its turns occupy.
     """
 
     length: float
@@ -136,66 +136,72 @@ class PathMeasures(NamedTuple):
     @property
     def fits(self) -> bool:
         """True if no turn is too sharp, and each leg is long enough for the turns at its ends."""
-        return self.max_turn <= SHARPEST and self.max_fraction <= TURN_SHARE
+        return self.max_turn <= MAX_TURN_RAD and self.max_fraction <= MAX_TURN_FRACTION
 
 
-def measure_path(spots: Sequence[Spot], turn_lengths: TurnLengths) -> PathMeasures:
-    """Measure a path; with plain numbers for speed, as tens of thousands of paths are measured.
+def measure_path(points: Sequence[MapPoint], turn_lengths: TurnLengths) -> PathMeasures:
+    """Measure a path, with plain numbers for speed, because tens of thousands of paths are measured.
 
-    >>> measure_path([(0.0, 0.0), (0.0, 1000.0), (1000.0, 1000.0)], arc_lengths(150.0)).fits
+    >>> measure_path([(0.0, 0.0), (0.0, 1000.0), (1000.0, 1000.0)], arc_turn_lengths(150.0)).fits
     True
-    >>> measure_path([(0.0, 0.0), (0.0, 1000.0), (1000.0, 1000.0)], arc_lengths(990.0)).fits
+    >>> measure_path([(0.0, 0.0), (0.0, 1000.0), (1000.0, 1000.0)], arc_turn_lengths(990.0)).fits
     False
     """
     length = max_turn = max_fraction = squared_turns = length_taken = east = north = leg_length = 0.0
-    for k in range(len(spots) - 1):
-        to_east, to_north = spots[k + 1][0] - spots[k][0], spots[k + 1][1] - spots[k][1]
+    for k in range(len(points) - 1):
+        to_east, to_north = points[k + 1][0] - points[k][0], points[k + 1][1] - points[k][1]
         to_length = math.hypot(to_east, to_north)
         if to_length < 1.0:
             return PathMeasures(length, math.inf, math.pi, math.inf)
         if k:
             turn = abs(math.atan2(east * to_north - north * to_east, east * to_east + north * to_north))
             max_turn, squared_turns = max(max_turn, turn), squared_turns + turn * turn
-            before, after = turn_lengths.lengths(turn)
-            max_fraction, length_taken = max(max_fraction, (length_taken + before) / leg_length), after
+            length_before, length_after = turn_lengths.lengths(turn)
+            max_fraction, length_taken = max(max_fraction, (length_taken + length_before) / leg_length), length_after
         length, east, north, leg_length = length + to_length, to_east, to_north, to_length
     max_fraction = max(max_fraction, length_taken / leg_length) if leg_length else math.inf
     return PathMeasures(length, length + _TURN_COST_M * squared_turns, max_turn, max_fraction)
 
 
 def climb_altitudes(
-    spots: Sequence[Spot], begin_altitude: float, climb: Slope, min_altitude: float, end_altitude: float
+    points: Sequence[MapPoint], start_altitude: float, climb: SlopeOnCourse, min_altitude: float, end_altitude: float
 ) -> Floats:
-    """Return the altitudes of a path that climbs as steeply as allowed, at its n places, (n,) m.
+    """Return the altitudes (n,) at the n points of a path that climbs as steeply as allowed, m.
 
-    begin_altitude: altitude at the first place, m.
+    start_altitude: altitude at the first point, m.
     min_altitude: minimum altitude except at the end, m.
     end_altitude: final altitude, which is not exceeded, m; the last altitude is lower if the path is too short.
 
     >>> climb_altitudes([(0.0, 0.0), (0.0, 500.0), (0.0, 1500.0)], 0.0, lambda course: 0.1, 20.0, 100.0).tolist()
     [20.0, 50.0, 100.0]
     """
-    points = np.array(spots)
-    climbs = [climb(course) * run for course, run in zip(leg_courses(points), leg_runs(points), strict=True)]
-    reachable = begin_altitude + np.concatenate([[0.0], np.cumsum(climbs)])
-    altitudes = np.maximum(min_altitude, np.minimum(reachable, end_altitude))
-    altitudes[-1] = min(end_altitude, reachable[-1])
+    point_array = np.array(points)
+    climbs = [
+        climb(course) * leg_length
+        for course, leg_length in zip(leg_courses(point_array), leg_runs(point_array), strict=True)
+    ]
+    reachable_altitudes = start_altitude + np.concatenate([[0.0], np.cumsum(climbs)])
+    altitudes = np.maximum(min_altitude, np.minimum(reachable_altitudes, end_altitude))
+    altitudes[-1] = min(end_altitude, reachable_altitudes[-1])
     return altitudes
 
 
 def descent_altitudes(
-    spots: Sequence[Spot], begin_altitude: float, climb: Slope, dive: Slope, end_altitude: float
+    points: Sequence[MapPoint], start_altitude: float, climb: SlopeOnCourse, dive: SlopeOnCourse, end_altitude: float
 ) -> Floats:
-    """Return the altitudes of a path that descends late or climbs early, at its n places, (n,) m.
+    """Return the altitudes (n,) at the n points of a path that descends late or climbs early, m.
 
     The first or the last altitude differs from the requested one if the path is too short.
 
     >>> descent_altitudes([(0.0, 0.0), (0.0, 500.0), (0.0, 1500.0)], 200.0, lambda _: 0.1, lambda _: 0.1, 50.0).tolist()
     [200.0, 150.0, 50.0]
     """
-    points = np.array(spots)
-    if end_altitude > begin_altitude:
-        return climb_altitudes(spots, begin_altitude, climb, begin_altitude, end_altitude)
-    descents = [dive(course) * run for course, run in zip(leg_courses(points), leg_runs(points), strict=True)]
-    reachable = end_altitude + np.concatenate([np.cumsum(descents[::-1])[::-1], [0.0]])
-    return np.minimum(begin_altitude, reachable)
+    point_array = np.array(points)
+    if end_altitude > start_altitude:
+        return climb_altitudes(points, start_altitude, climb, start_altitude, end_altitude)
+    descents = [
+        dive(course) * leg_length
+        for course, leg_length in zip(leg_courses(point_array), leg_runs(point_array), strict=True)
+    ]
+    reachable_altitudes = end_altitude + np.concatenate([np.cumsum(descents[::-1])[::-1], [0.0]])
+    return np.minimum(start_altitude, reachable_altitudes)

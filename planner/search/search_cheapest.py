@@ -29,107 +29,114 @@ from world.geometry import path_length
 from world.scenario import Scenario
 
 # Grids for routes on other sides. Number of stages.
-STAGES = 50
+GRID_STAGE_COUNT = 50
 # Size of the area of highest ground, as a fraction of a step.
-SPREAD = 0.2
+GRID_SPREAD = 0.2
 # Spacing across, as a fraction of a step.
-RATIO = 1.0 / 3.0
+GRID_SPACING_RATIO = 1.0 / 3.0
 # Reductions of the spheres, one for each grid.
-SHRINKS = (0.2, 0.5)
+SPHERE_REDUCTIONS = (0.2, 0.5)
 # Maximum number of routes per grid.
 MAX_ROUTES = 8
 # Maximum length of a route relative to the shortest path.
-SLACK = 1.2
+MAX_LENGTH_RATIO = 1.2
 # Maximum repetitions from equidistant waypoints.
 MAX_REPEATS = 4
 # Minimum gain for another repetition, as a fraction of the cost.
 MIN_GAIN = 2e-5
-# Additional margins with which a path is tried until it is certified: to spheres and ground, m, and of slopes, rad. The
+# Additional margins that are tried in turn until a path is certified: to spheres and ground, m, and of slopes, rad. The
 # steepest climb of a leg is at its strongest wind, which changes with the leg's altitudes.
 EXTRA_MARGINS = ((0.1, 0.0), (2.0, math.radians(0.2)), (2.0, math.radians(0.6)))
-# Fractions of the step from the shortest path towards a cheaper one that violates the airspace, which shortening
-# ignores.
-SHARES = (1.0, 0.75, 0.5, 0.25, 0.1)
+# Fractions of the step from the best path to a cheaper path, which may violate the airspace, because shortening ignores
+# the airspace.
+STEP_FRACTIONS = (1.0, 0.75, 0.5, 0.25, 0.1)
 
 _CertifiedPath = tuple[Floats, Certificate]
 
 
-def objective_cost(scenario: Scenario, limits: Limits, problem: Problem) -> TravelCost:
-    """Return the cost that a scenario's plan minimises. Raises ScenarioError for energy if the power is unknown."""
+def make_objective_cost(scenario: Scenario, limits: Limits, problem: Problem) -> TravelCost:
+    """Make the cost that a scenario's plan minimises. Raises ScenarioError for energy if the power is unknown."""
     objective = scenario.planner.objective or "length"
-    cost = make_travel_cost(objective, limits.envelope, problem.search.aircraft)
-    if cost is None:
+    travel_cost = make_travel_cost(objective, limits.envelope, problem.search.aircraft)
+    if travel_cost is None:
         allowed = 'the power of this aircraft is not known; "length" and "time" can be planned for'
         raise ScenarioError.at(scenario.name, "planner.objective", objective, allowed)
-    return cost
+    return travel_cost
 
 
-def search_cheapest(search: Search, shortest: _CertifiedPath, cost: TravelCost) -> _CertifiedPath:
-    """Return the cheapest path and its certificate, or the shortest path if no equally safe path costs less."""
-    is_by_length = cost.time == 0.0 and cost.energy == 0.0
-    if is_by_length or not search.meets_goal(shortest[1]):
-        return shortest
-    data = search.problem.search._replace(travel=cost)
-    cheapest = shortest
-    with suppress(SearchEnded):
-        for start in _start_paths(search, shortest[0]):
-            if search.must_end():
-                return cheapest
-            cheapest = _choose_cheaper(search, data, start, cheapest)
-    for _ in range(MAX_REPEATS):
-        previous_cost = _cost_or_inf(data, cheapest[0])
-        for start in (resample(cheapest[0], len(cheapest[0])), cheapest[0]):
-            if search.must_end():
-                return cheapest
-            cheapest = _choose_cheaper(search, data, start, cheapest)
-        if _cost_or_inf(data, cheapest[0]) > (1.0 - MIN_GAIN) * previous_cost:
-            break
-    return cheapest
+def search_cheapest_path(search: Search, shortest_path: _CertifiedPath, weights: TravelCost) -> _CertifiedPath:
+    """Return the cheapest path and its certificate, or the shortest path if no equally safe path is cheaper.
 
-
-def _cost_or_inf(data: ProblemArrays, path: Floats) -> float:
-    """Return the cost of a path (w, 3), m; inf if a leg cannot be held against the wind."""
-    return float(path_cost(data.travel, data.aircraft, np.array(path, dtype=np.float64)))
-
-
-def _start_paths(search: Search, shortest: Floats) -> Iterator[Floats]:
-    """Yield start paths (w, 3): the shortest, also with equal legs, the straight line, and other routes.
-
-    Raises SearchEnded if the search is asked to stop.
+    weights: weights of length, time and energy in the cost.
     """
-    count, space, data = len(shortest), search.problem.space, search.problem.search
-    yield shortest
-    yield resample(shortest, count)
+    minimises_length = weights.time == 0.0 and weights.energy == 0.0
+    if minimises_length or not search.meets_goal(shortest_path[1]):
+        return shortest_path
+    evaluation_data = search.problem.search._replace(travel=weights)
+    cheapest_path = shortest_path
+    with suppress(SearchEnded):
+        for start in _start_paths(search, shortest_path[0]):
+            if search.must_end():
+                return cheapest_path
+            cheapest_path = _choose_cheaper(search, evaluation_data, start, cheapest_path)
+    for _ in range(MAX_REPEATS):
+        previous_cost = _cost_or_inf(evaluation_data, cheapest_path[0])
+        for start in (resample(cheapest_path[0], len(cheapest_path[0])), cheapest_path[0]):
+            if search.must_end():
+                return cheapest_path
+            cheapest_path = _choose_cheaper(search, evaluation_data, start, cheapest_path)
+        if _cost_or_inf(evaluation_data, cheapest_path[0]) > (1.0 - MIN_GAIN) * previous_cost:
+            break
+    return cheapest_path
+
+
+def _cost_or_inf(evaluation_data: ProblemArrays, path: Floats) -> float:
+    """Return the cost of a path (w, 3), m; inf if a leg cannot be flown against the wind."""
+    return float(path_cost(evaluation_data.travel, evaluation_data.aircraft, np.array(path, dtype=np.float64)))
+
+
+def _start_paths(search: Search, shortest_path: Floats) -> Iterator[Floats]:
+    """Yield start paths (w, 3): the shortest path, also with equal legs, the straight line, and other routes.
+
+    Raises SearchEnded if the search must stop.
+    """
+    count, space, evaluation_data = len(shortest_path), search.problem.space, search.problem.search
+    yield shortest_path
+    yield resample(shortest_path, count)
     yield resample(np.stack([space.start, space.destination]), count)
-    if is_limited(data.airspace) or search.encoding.name != "rotated":
+    if is_limited(evaluation_data.airspace) or search.encoding.name != "rotated":
         return
     frame = rotated_frame(space.start, space.destination)
     span = (float(search.encoding.lower[1::3].min()), float(search.encoding.upper[1::3].max()))
-    bound = SLACK * float(path_length(shortest))
-    for shrink in SHRINKS:
-        grid = optimistic_grid(data, frame, span, STAGES, shrink=shrink, spread=SPREAD, ratio=RATIO)
-        for route in side_routes(data, frame, grid, bound, MAX_ROUTES, search.pause):
+    bound = MAX_LENGTH_RATIO * float(path_length(shortest_path))
+    for shrink in SPHERE_REDUCTIONS:
+        grid = optimistic_grid(
+            evaluation_data, frame, span, GRID_STAGE_COUNT, shrink=shrink, spread=GRID_SPREAD, ratio=GRID_SPACING_RATIO
+        )
+        for route in side_routes(evaluation_data, frame, grid, bound, MAX_ROUTES, search.pause):
             yield resample(frame.restore(route.points), count)
 
 
-def _choose_cheaper(search: Search, data: ProblemArrays, start: Floats, best: _CertifiedPath) -> _CertifiedPath:
-    """Return the cheaper of the best path and the result of shortening a start (w, 3)."""
+def _choose_cheaper(
+    search: Search, evaluation_data: ProblemArrays, start: Floats, best_path: _CertifiedPath
+) -> _CertifiedPath:
+    """Shorten a start path (w, 3), and return the cheaper of the result and the best path."""
     path = start
     for extra_margin, slope_margin in EXTRA_MARGINS:
-        stricter = data._replace(angle_margin=data.angle_margin + slope_margin)
+        stricter_data = evaluation_data._replace(angle_margin=evaluation_data.angle_margin + slope_margin)
         try:
-            path, evaluations = shorten_path(stricter, path, extra_margin=extra_margin, pause=search.pause)
+            path, evaluations = shorten_path(stricter_data, path, extra_margin=extra_margin, pause=search.pause)
         except SearchEnded:
-            return best
+            return best_path
         search.evaluations += evaluations
-        best_cost = _cost_or_inf(data, best[0])
-        if not _cost_or_inf(data, path) < best_cost:
-            return best
-        for fraction in SHARES if is_limited(data.airspace) else SHARES[:1]:
-            candidate = np.ascontiguousarray(best[0] + fraction * (path - best[0]))
+        best_cost = _cost_or_inf(evaluation_data, best_path[0])
+        if not _cost_or_inf(evaluation_data, path) < best_cost:
+            return best_path
+        for fraction in STEP_FRACTIONS if is_limited(evaluation_data.airspace) else STEP_FRACTIONS[:1]:
+            candidate = np.ascontiguousarray(best_path[0] + fraction * (path - best_path[0]))
             certificate = certify(search.problem, candidate)
-            if search.meets_goal(certificate) and _cost_or_inf(data, candidate) < best_cost:
+            if search.meets_goal(certificate) and _cost_or_inf(evaluation_data, candidate) < best_cost:
                 if search.improved is not None:
                     search.improved(candidate)
                 return candidate, certificate
-    return best
+    return best_path

@@ -12,7 +12,7 @@ sys.path.insert(0, str(ROOT / "docs"))
 from making.docstrings import as_rst
 from making.mission_commands import command_table
 from making.placeholders import filled
-from making.schemas import answer_table, answering_commands
+from making.schemas import answer_table, commands_with_json
 from making.tolerances import tolerance_list
 
 sys.path.pop(0)
@@ -56,7 +56,7 @@ def test_angles_are_degrees_and_nothing_else_is() -> None:
 
 def test_every_command_with_an_answer_has_a_row() -> None:
     table = answer_table()
-    assert [name for name in answering_commands() if f"\n| `{name}` | `planfly." not in table] == []
+    assert [name for name in commands_with_json() if f"\n| `{name}` | `planfly." not in table] == []
 
 
 def test_every_command_that_an_autopilot_takes_has_a_row() -> None:

@@ -13,7 +13,7 @@ import sys
 import tempfile
 from pathlib import Path
 
-from planfly.kernel_units.ready_kernels import MISSION
+from planfly.kernel_units.ready_kernels import MISSION_TEXT
 from planfly.kernel_units.unit_kernels import GLIDING, PLANNING_AND_FLYING
 from planfly.runtime.first_start import compile_units
 from planfly.runtime.process_setup import prepare_process, with_large_stack
@@ -96,7 +96,7 @@ def main() -> int:
     with tempfile.TemporaryDirectory(prefix="planfly-kernels-") as name:
         folder = Path(name)
         (folder / "field.toml").write_text(FIELD, encoding="utf-8")
-        (folder / "field.waypoints").write_text(MISSION, encoding="utf-8")
+        (folder / "field.waypoints").write_text(MISSION_TEXT, encoding="utf-8")
         # The longest of what is beside each other, and no kernel's.
         reading = subprocess.Popen([*PYTEST, "-n", "0", "--collect-only"], cwd=ROOT)
         compile_units([*PLANNING_AND_FLYING, *GLIDING, FRONT], cache_folder(), lambda _: None)

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 import planfly
-from planfly.own_packages import PACKAGES, hidden_package
+from planfly.own_packages import PACKAGES, find_hidden_package
 
 ROOT = Path(planfly.__file__).parents[1]
 # The interpreter's own command: a script whose folder, not the current one, is on Python's path.
@@ -113,4 +113,4 @@ def test_a_link_to_our_own_files_hides_nothing(tmp_path: Path) -> None:
     (tmp_path / "planfly").symlink_to(ROOT / "planfly")
     for name in PACKAGES:
         (tmp_path / name).symlink_to(ROOT / name)
-    assert hidden_package(tmp_path) is None
+    assert find_hidden_package(tmp_path) is None

@@ -51,7 +51,7 @@ def first_of_a_front(scenario: Scenario) -> Plan:
 
 
 def planned_in_the_studio(scenario: Scenario, ways: int = 1, ends: Any = None) -> Plan:
-    asked = works.PlanAsked(scenario, load_airframe(scenario), SEED, ways=ways, ends=ends)
+    asked = works.PlanRequest(scenario, load_airframe(scenario), SEED, ways=ways, ends=ends)
     return works.plan(asked, lambda done, total, remark: None)[0].plan
 
 

@@ -26,7 +26,7 @@ for line in sys.stdin:
 def _helper(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     file = tmp_path / "helper.py"
     file.write_text(HELPER, encoding="utf-8")
-    monkeypatch.setattr(first_start, "PROGRAM", (str(file),))
+    monkeypatch.setattr(first_start, "PYTHON_ARGUMENTS", (str(file),))
 
 
 def test_each_unit_is_done_once_by_one_of_two_processes(tmp_path: Path) -> None:

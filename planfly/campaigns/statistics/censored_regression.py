@@ -67,8 +67,8 @@ class BinaryLink(Protocol):
     def information(self, x: Floats, width: float = 0.0) -> Floats:
         """Return the Fisher information of a flight about its predictor.
 
-        width: range of predictors above its own within which a passed flight gives its margin; 0 for a flight that
-        only gives pass or fail.
+        width: range of predictors above ``x`` within which a passed flight gives its margin; 0 for a flight that gives
+        only pass or fail.
         """
 
     def derivatives(self, x: Floats, failed: Bools) -> tuple[Floats, Floats]:
@@ -150,7 +150,7 @@ class _ComplementaryLogLog:
         )
         # As for the probit: rate * ratio * exp(-rate) for failures, integrals over the rate for passes.
         failure_information = rate * _rate_ratio(rate) * np.exp(-rate)
-        pass_information = np.maximum(_square_above(rate) - _square_above(upper_rate), 0.0)
+        pass_information = np.maximum(_square_integral_above(rate) - _square_integral_above(upper_rate), 0.0)
         return failure_information + pass_information + upper_rate * upper_rate * np.exp(-upper_rate)
 
     def derivatives(self, x: Floats, failed: Bools) -> tuple[Floats, Floats]:
@@ -167,13 +167,13 @@ class _ComplementaryLogLog:
         return 1.0 - rate, -rate
 
 
-def _square_above(rate: Floats) -> Floats:
+def _square_integral_above(rate: Floats) -> Floats:
     """Return the integral of (1 - r)^2 exp(-r) from a rate to infinity."""
     return (rate * rate + 1.0) * np.exp(-rate)
 
 
 def _rate_ratio(rate: Floats) -> Floats:
-    """Return rate / (exp(rate) - 1): near 1 for a small rate, 0 for a large one."""
+    """Return rate / (exp(rate) - 1), which is near 1 for a small rate and near 0 for a large rate."""
     with np.errstate(over="ignore"):
         ratio: Floats = rate / np.expm1(rate)
     return ratio
@@ -251,7 +251,7 @@ _DRAW_SIGMAS = (0.1, 0.4, 1.5)
 # Standard deviation of the prior of the margin's coefficient, 1/scale, which is truncated to positive values.
 _MARGIN_SIGMA = 10.0
 # Start of Newton's method, constant and log of the wind's coefficient: few failures, and more in more wind.
-_START = (-3.0, np.log(0.3))
+_START_COEFFICIENTS = (-3.0, np.log(0.3))
 # Start of the margin's coefficient.
 _MARGIN_START = 1.0
 # Maximum number of Newton steps.
@@ -288,8 +288,8 @@ class Outcomes:
     given_passed: bool = False
 
     @property
-    def narrow(self) -> Bools:
-        """Flights (n,) that passed by a known margin of less than a scale."""
+    def marginal(self) -> Bools:
+        """True for each flight, (n,), that passed by a known margin of less than a scale."""
         return (self.margin > 0.0) & (self.margin < 1.0)
 
     def as_pass_or_fail(self) -> "Outcomes":
@@ -308,13 +308,13 @@ class RegressionFit:
 
     mean, covariance: (2 + d,) and (2 + d, 2 + d) of the terms' coefficients, as a normal approximation about the mode.
     log_evidence: logarithm of the evidence of the outcomes.
-    by_margin: decrease of the predictor per scale of margin; 0 if no margin is known.
+    margin_coefficient: decrease of the predictor per scale of margin; 0 if no margin is known.
     """
 
     mean: Floats
     covariance: Floats
     log_evidence: float
-    by_margin: float
+    margin_coefficient: float
     _posterior: "_Posterior"
     _mode: Floats
 
@@ -343,8 +343,10 @@ def fit_regression(outcomes: Outcomes, link: BinaryLink, nearby_fit: RegressionF
     for deviation in priors:
         posterior = _Posterior(outcomes, link, deviation)
         fits += [
-            _fit(posterior, start)
-            for start in ([posterior.start()] if nearby_fit is None else [posterior.start(), nearby_fit._mode])
+            _find_mode(posterior, start_point)
+            for start_point in (
+                [posterior.start_point()] if nearby_fit is None else [posterior.start_point(), nearby_fit._mode]
+            )
         ]
     return max(fits, key=lambda fit: fit.log_evidence)
 
@@ -357,23 +359,23 @@ class _Posterior:
     """
 
     def __init__(self, outcomes: Outcomes, link: BinaryLink, draw_deviation: float) -> None:
-        self._outcomes, self._link, self._narrow_passes = outcomes, link, outcomes.narrow
-        self.by_margin = bool(self._narrow_passes.any())
+        self._outcomes, self._link, self._marginal_passes = outcomes, link, outcomes.marginal
+        self.margin_coefficient = bool(self._marginal_passes.any())
         self.size = outcomes.terms.shape[1]
         deviations = np.full(self.size, draw_deviation)
         deviations[:2] = _CONSTANT_SIGMA, _WIND_LOG_SIGMA
         # The margin is a regressor of passed flights: F(terms . beta + k * margin) is the share that passes by less.
-        self._terms = np.column_stack((outcomes.terms, outcomes.margin)) if self.by_margin else outcomes.terms
-        self.deviations = np.append(deviations, _MARGIN_SIGMA) if self.by_margin else deviations
+        self._terms = np.column_stack((outcomes.terms, outcomes.margin)) if self.margin_coefficient else outcomes.terms
+        self.deviations = np.append(deviations, _MARGIN_SIGMA) if self.margin_coefficient else deviations
         self._precision = self.deviations**-2
         self._prior_mean = np.zeros(self.deviations.size)
         self._prior_mean[1] = np.log(_WIND_MEDIAN)
 
-    def start(self) -> Floats:
-        """Return the start of Newton's method."""
+    def start_point(self) -> Floats:
+        """Return the start point of Newton's method."""
         point = np.zeros(self.deviations.size)
-        point[:2] = _START
-        if self.by_margin:
+        point[:2] = _START_COEFFICIENTS
+        if self.margin_coefficient:
             point[-1] = _MARGIN_START
         return point
 
@@ -387,7 +389,9 @@ class _Posterior:
         """Return the log-density (n,) at n points, up to a constant."""
         beta, deviations, failed = self.coefficients(points), points - self._prior_mean, self._outcomes.failed
         predictor = self._terms @ beta.T
-        predictor_without_margin = self._outcomes.terms @ beta[:, : self.size].T if self.by_margin else predictor
+        predictor_without_margin = (
+            self._outcomes.terms @ beta[:, : self.size].T if self.margin_coefficient else predictor
+        )
         # Practically impossible, and its logarithm is so large that the other terms would be lost to rounding.
         is_possible = (predictor_without_margin[~failed] < _MAX_PREDICTOR).all(axis=0)
         predictor, predictor_without_margin = (
@@ -396,11 +400,11 @@ class _Posterior:
         )
         log_densities: Floats = -0.5 * (deviations * deviations) @ self._precision
         log_densities += self._link.log_cdf(predictor[failed]).sum(axis=0)
-        log_densities += self._link.log_survival(predictor[~failed & ~self._narrow_passes]).sum(axis=0)
-        if self.by_margin:
+        log_densities += self._link.log_survival(predictor[~failed & ~self._marginal_passes]).sum(axis=0)
+        if self.margin_coefficient:
             is_possible &= beta[:, -1] > 0.0
-            log_densities += self._link.log_density(predictor[self._narrow_passes]).sum(axis=0)
-            log_densities += self._narrow_passes.sum() * np.log(np.where(is_possible, beta[:, -1], 1.0))
+            log_densities += self._link.log_density(predictor[self._marginal_passes]).sum(axis=0)
+            log_densities += self._marginal_passes.sum() * np.log(np.where(is_possible, beta[:, -1], 1.0))
         if self._outcomes.given_passed:
             log_densities -= self._link.log_survival(predictor_without_margin).sum(axis=0)
         return np.where(is_possible, log_densities, -np.inf)
@@ -408,8 +412,8 @@ class _Posterior:
     def sample(self, mode: Floats) -> Floats:
         """Return (s, size) equally likely coefficients of the terms.
 
-        With few failures the wind's coefficient is uncertain by factors, and the constant depends strongly on it.  The
-        constant is therefore replaced by the predictor at the wind where it is best known, which does not.
+        With few failures the wind's coefficient is uncertain by factors, and the constant depends strongly on it.
+        Therefore the constant is replaced by the predictor at the wind where the predictor is best known.
         """
         eigenvalues, axes = np.linalg.eigh(self.slope_and_curvature(mode)[1])
         covariance = axes / np.maximum(np.abs(eigenvalues), _MIN_CURVATURE) @ axes.T
@@ -438,20 +442,20 @@ class _Posterior:
         beta, scale = self.coefficients(point), np.ones(point.size)
         predictor, terms = self._terms @ beta, self._terms
         first, second = self._link.derivatives(predictor, self._outcomes.failed)
-        if self.by_margin:
+        if self.margin_coefficient:
             narrow_first, narrow_second = self._link.density_derivatives(predictor)
             first, second = (
-                np.where(self._narrow_passes, narrow_first, first),
-                np.where(self._narrow_passes, narrow_second, second),
+                np.where(self._marginal_passes, narrow_first, first),
+                np.where(self._marginal_passes, narrow_second, second),
             )
         slope, curvature = -terms.T @ first, -(terms * second[:, None]).T @ terms
         if self._outcomes.given_passed:
             terms_without_margin = self._outcomes.terms
-            first, second = self._link.derivatives(self._at_no_margin(beta), self._outcomes.failed)
+            first, second = self._link.derivatives(self._predictor_without_margin(beta), self._outcomes.failed)
             slope[: self.size] += terms_without_margin.T @ first
             curvature[: self.size, : self.size] += (terms_without_margin * second[:, None]).T @ terms_without_margin
-        if self.by_margin:
-            count = int(self._narrow_passes.sum())
+        if self.margin_coefficient:
+            count = int(self._marginal_passes.sum())
             slope[-1] -= count / beta[-1]
             curvature[-1, -1] += count / beta[-1] ** 2
         # Chain rule for the logarithm of the wind's coefficient.
@@ -460,38 +464,39 @@ class _Posterior:
         curvature[1, 1] += slope[1]
         return slope + self._precision * (point - self._prior_mean), curvature + np.diag(self._precision)
 
-    def _at_no_margin(self, beta: Floats) -> Floats:
+    def _predictor_without_margin(self, beta: Floats) -> Floats:
         return self._outcomes.terms @ beta[: self.size]
 
 
-def _fit(posterior: _Posterior, start: Floats) -> RegressionFit:
+def _find_mode(posterior: _Posterior, start_point: Floats) -> RegressionFit:
     """Find the posterior's mode from a start, and the inverse of its curvature there.
 
-    Newton's method with halved steps, and with the absolute eigenvalues of the curvature where the loss is not convex,
-    as may be with margins only (Nocedal and Wright, Numerical Optimization, 2nd edition, 2006, sections 3.4 and 19.2).
+    The search is Newton's method with halved steps, and with the absolute eigenvalues of the curvature where the loss
+    is not convex, which is possible with margins only (Nocedal and Wright, Numerical Optimization, 2nd edition, 2006,
+    sections 3.4 and 19.2).
     """
     size = posterior.size
 
     def loss(point: Floats) -> float:
         return -float(posterior.log_density(point[None])[0])
 
-    value = loss(start)
+    value = loss(start_point)
     for _ in range(_MAX_STEPS):
-        slope, curvature = posterior.slope_and_curvature(start)
+        slope, curvature = posterior.slope_and_curvature(start_point)
         eigenvalues, axes = np.linalg.eigh(curvature)
         step = axes @ (axes.T @ slope / np.maximum(np.abs(eigenvalues), _MIN_CURVATURE))
         # The margin's coefficient stays positive: limit the step towards 0, where halved steps would end otherwise.
-        margin_step = step[-1] if posterior.by_margin else 0.0
-        fraction = min(1.0, _MAX_MARGIN_STEP_FRACTION * start[-1] / margin_step) if margin_step > 0.0 else 1.0
-        while not (new_value := loss(start - fraction * step)) <= value and fraction > _MIN_STEP_FRACTION:
+        margin_step = step[-1] if posterior.margin_coefficient else 0.0
+        fraction = min(1.0, _MAX_MARGIN_STEP_FRACTION * start_point[-1] / margin_step) if margin_step > 0.0 else 1.0
+        while not (new_value := loss(start_point - fraction * step)) <= value and fraction > _MIN_STEP_FRACTION:
             fraction *= 0.5
-        start, value = start - fraction * step, new_value
+        start_point, value = start_point - fraction * step, new_value
         if float(np.abs(fraction * step).max()) < _STEP_TOLERANCE:
             break
-    curvature, beta = posterior.slope_and_curvature(start)[1], posterior.coefficients(start)
+    curvature, beta = posterior.slope_and_curvature(start_point)[1], posterior.coefficients(start_point)
     evidence = -value - np.log(posterior.deviations).sum() - 0.5 * float(np.linalg.slogdet(curvature)[1])
     covariance: Floats = np.linalg.inv(curvature)[:size, :size].astype(np.float64)
     covariance[1] *= beta[1]
     covariance[:, 1] *= beta[1]
-    by_margin = float(beta[-1]) if posterior.by_margin else 0.0
-    return RegressionFit(beta[:size], covariance, float(evidence), by_margin, posterior, start)
+    margin_coefficient = float(beta[-1]) if posterior.margin_coefficient else 0.0
+    return RegressionFit(beta[:size], covariance, float(evidence), margin_coefficient, posterior, start_point)

@@ -24,7 +24,7 @@ class Interval(NamedTuple):
 
 
 class Tally(NamedTuple):
-    """Numbers of flights by outcome.
+    """Number of flights with each outcome.
 
     lost: flights that could not be simulated; treated as failures in lower bounds and as successes in upper bounds.
     """
@@ -40,7 +40,7 @@ class Tally(NamedTuple):
 
     @property
     def share(self) -> float:
-        """Share of flyable flights, with lost flights as not flyable; NaN without a flight."""
+        """Fraction of flyable flights, with lost flights as not flyable; NaN without a flight."""
         return self.flyable / self.flown if self.flown else math.nan
 
 
@@ -121,7 +121,7 @@ class StoppingBound:
     """Bound that is valid at every number of flights, for a target probability (0 to 1) and a confidence.
 
     >>> bound = StoppingBound(0.99)
-    >>> bound.fewest, bound.interval(299, 0).low >= 0.99, bound.interval(298, 0).low >= 0.99
+    >>> bound.min_flights, bound.interval(299, 0).low >= 0.99, bound.interval(298, 0).low >= 0.99
     (299, True, False)
     """
 
@@ -129,7 +129,7 @@ class StoppingBound:
     confidence: float = 0.95
 
     @property
-    def fewest(self) -> int:
+    def min_flights(self) -> int:
         """Number of flights that reach the target without a failure."""
         return math.ceil((self._required_evidence + _MIXTURE_LOSS) / -math.log(self.target))
 
@@ -140,10 +140,12 @@ class StoppingBound:
     @cached_property
     def parts(self) -> tuple[tuple[float, float, float], ...]:
         """Weight, a and b of each part of the mixture."""
-        scale, min_failures, max_failures = float(self.fewest), 0.0, 1.0
+        scale, min_failures, max_failures = float(self.min_flights), 0.0, 1.0
         for _ in range(_BISECTIONS):
             failures = 0.5 * (min_failures + max_failures)
-            evidence = _log_mixture(self._parts(scale, failures), self.fewest, 0) - self.fewest * math.log(self.target)
+            evidence = _log_mixture(self._parts(scale, failures), self.min_flights, 0) - self.min_flights * math.log(
+                self.target
+            )
             min_failures, max_failures = (
                 (failures, max_failures) if evidence >= self._required_evidence else (min_failures, failures)
             )
@@ -155,27 +157,27 @@ class StoppingBound:
         return (1.0 - _JEFFREYS_WEIGHT, scale, max(failures, 1e-9)), (_JEFFREYS_WEIGHT, 0.5, 0.5)
 
     def evidence(self, successes: int, failures: int, p: float) -> float:
-        """Return the logarithm of E(p): p is excluded if it is ``-log(1 - confidence)`` or more."""
+        """Return the logarithm of E(p); p is excluded if this logarithm is at least ``-log(1 - confidence)``."""
         likelihood = _times_log(successes, p) + _times_log(failures, 1.0 - p)
         return _log_mixture(self.parts, successes, failures) - likelihood
 
     def excludes(self, successes: int, failures: int, p: float, *, above: bool) -> bool:
-        """Return True if p is excluded and the share of successes is above p (or below it if not ``above``)."""
+        """Return True if p is excluded and the fraction of successes is above p (below p if ``above`` is False)."""
         fraction = successes / max(1, successes + failures)
         is_beyond = fraction > p if above else fraction < p
         return is_beyond and self.evidence(successes, failures, p) >= self._required_evidence
 
     def interval(self, successes: int, failures: int) -> Interval:
-        """Return the interval of all p that are not excluded, around the share of successes, where E is smallest."""
+        """Return the interval of all p that are not excluded; it contains the fraction of successes."""
         trials = successes + failures
         if not trials:
             return Interval(0.0, 1.0)
         fraction = successes / trials
-        lower = 0.0 if not successes else self._edge(successes, failures, 0.0, fraction)
-        upper = 1.0 if not failures else self._edge(successes, failures, 1.0, fraction)
+        lower = 0.0 if not successes else self._find_edge(successes, failures, 0.0, fraction)
+        upper = 1.0 if not failures else self._find_edge(successes, failures, 1.0, fraction)
         return Interval(lower, upper)
 
-    def _edge(self, successes: int, failures: int, excluded: float, included: float) -> float:
+    def _find_edge(self, successes: int, failures: int, excluded: float, included: float) -> float:
         """Find the edge between excluded and other values of p by bisection; return its excluded side."""
         for _ in range(_BISECTIONS):
             candidate = 0.5 * (excluded + included)
@@ -186,7 +188,7 @@ class StoppingBound:
         return excluded
 
     def bounds(self, tally: Tally) -> Interval:
-        """Return the interval of a tally; lost flights are failures for its lower end, successes for its upper end."""
+        """Return the interval of a tally; lost flights are failures for the lower end, successes for the upper end."""
         lower = self.interval(tally.flyable, tally.failed + tally.lost).low
         upper = self.interval(tally.flyable + tally.lost, tally.failed).high
         return Interval(lower, upper)
@@ -208,7 +210,7 @@ def _log_mixture(parts: tuple[tuple[float, float, float], ...], successes: int, 
 Answer = Literal["reached", "missed", "undecided", "none asked"]
 
 # Default confidence of a bound.
-USUAL_CONFIDENCE = 0.95
+DEFAULT_CONFIDENCE = 0.95
 
 
 @dataclass(frozen=True)
@@ -224,7 +226,7 @@ class Goal:
     target: float | None
     stops: bool
     flights: int
-    confidence: float = USUAL_CONFIDENCE
+    confidence: float = DEFAULT_CONFIDENCE
     changed: bool = False
 
     @property
@@ -261,9 +263,9 @@ class Estimator:
         self._bound = StoppingBound(goal.target, goal.confidence) if goal.stops and goal.target is not None else None
 
     @property
-    def fewest(self) -> int:
+    def min_flights(self) -> int:
         """Smallest number of flights that may decide."""
-        return self._bound.fewest if self._bound is not None else self._goal.flights
+        return self._bound.min_flights if self._bound is not None else self._goal.flights
 
     def decides(self, tally: Tally) -> bool:
         """Return True if a tally decides a goal that stops."""
@@ -283,9 +285,9 @@ class Estimator:
             lower, upper = lower_bound(tally, confidence), upper_bound(tally, confidence)
             interval_low = clopper_pearson(tally.flyable, tally.flown, confidence).low
             interval = Interval(interval_low, clopper_pearson(tally.flyable + tally.lost, tally.flown, confidence).high)
-        return Estimate(tally, lower, upper, interval, self._answer(lower, upper))
+        return Estimate(tally, lower, upper, interval, self._goal_status(lower, upper))
 
-    def _answer(self, lower: float, upper: float) -> Answer:
+    def _goal_status(self, lower: float, upper: float) -> Answer:
         target = self._goal.target
         if target is None:
             return "none asked"
@@ -303,24 +305,24 @@ class Estimator:
 # as in Kelley's epsilon squared (PNAS 21, 1935), so that a quantity without effect has an index of 0.
 
 # Minimum number of flights for an index.
-MIN_FLIGHTS = 30
+MIN_FLIGHTS_FOR_INDEX = 30
 # Maximum number of groups.
 _MAX_GROUPS = 64
 
 
-def first_order(x: Floats, y: Floats) -> float:
+def first_order_index(x: Floats, y: Floats) -> float:
     """Return the first-order index of y (n,) to x (n,), 0 to 1.
 
-    0 below `MIN_FLIGHTS`, or if y does not vary.
+    0 below `MIN_FLIGHTS_FOR_INDEX`, or if y does not vary.
 
     >>> random = np.random.default_rng(1)
     >>> x = random.random((4000, 2))
-    >>> [round(first_order(x[:, k], 3.0 * x[:, 0] + x[:, 1]), 1) for k in range(2)]
+    >>> [round(first_order_index(x[:, k], 3.0 * x[:, 0] + x[:, 1]), 1) for k in range(2)]
     [0.9, 0.1]
     """
     count = x.size
     total = float(((y - y.mean()) ** 2).sum()) if count else 0.0
-    if count < MIN_FLIGHTS or total <= 1e-12 * count or np.ptp(x) == 0.0:
+    if count < MIN_FLIGHTS_FOR_INDEX or total <= 1e-12 * count or np.ptp(x) == 0.0:
         return 0.0
     groups = int(min(_MAX_GROUPS, max(4, round(2.0 * count ** (1.0 / 3.0)))))
     parts = np.array_split(y[np.argsort(x, kind="stable")], groups)

@@ -21,7 +21,7 @@ Bools = NDArray[np.bool_]
 
 
 # ----------------------------------------------------------------------
-# Distribution of the wind at which flights begin to fail, for flights with nothing known but pass or fail.
+# Distribution of the wind at which flights begin to fail, for flights of which only pass or fail is known.
 #
 # Each flight has its own wind above which it fails.  The distribution of this wind over flights is assumed to be
 # normal, or Gumbel's distribution for minima with its longer tail, both equally likely a priori, with unknown mean and
@@ -45,15 +45,15 @@ class FailureLaws:
     """Distributions on the grid: (n,) arrays, normal ones first.
 
     location, scale: m/s; mean and standard deviation of a normal distribution.
-    normals: number of normal distributions; the others are Gumbel distributions of the same means and deviations.
+    normal_count: number of normal distributions; the others are Gumbel distributions of the same means and deviations.
     """
 
     location: Floats
     scale: Floats
-    normals: int
+    normal_count: int
 
     @classmethod
-    def up_to(cls, max_speed: float) -> "FailureLaws":
+    def for_winds_up_to(cls, max_speed: float) -> "FailureLaws":
         """Make the grid for winds up to ``max_speed``, m/s."""
         means = np.arange(-_GRID_BELOW_MPS, max_speed + _GRID_ABOVE_MPS, _MEAN_STEP_MPS)
         mean, deviation = (grid.ravel() for grid in np.meshgrid(means, _SIGMAS_MPS, indexing="ij"))
@@ -62,34 +62,36 @@ class FailureLaws:
         location = mean + np.euler_gamma * scale
         return cls(np.concatenate((mean, location)), np.concatenate((deviation, scale)), mean.size)
 
-    def log_shares(self, speed: float) -> tuple[Floats, Floats]:
-        """Return the logarithms (n,) of the probabilities of failure and of success at a wind, m/s."""
+    def log_probabilities(self, speed: float) -> tuple[Floats, Floats]:
+        """Return the logarithms (n,) of the failure probability and the success probability in a wind, m/s."""
         from scipy.special import log_ndtr
         from scipy.stats import gumbel_l
 
         standard = (speed - self.location) / self.scale
-        normal, gumbel = standard[: self.normals], standard[self.normals :]
+        normal, gumbel = standard[: self.normal_count], standard[self.normal_count :]
         log_failure = np.concatenate((log_ndtr(normal), gumbel_l.logcdf(gumbel)))
         return log_failure, np.concatenate((log_ndtr(-normal), gumbel_l.logsf(gumbel)))
 
     def quantile(self, fraction: float) -> Floats:
-        """Return the wind (n,) at which this share of flights fails, m/s."""
+        """Return the wind (n,) in which a fraction of flights fails, m/s."""
         from scipy.special import ndtri
         from scipy.stats import gumbel_l
 
         standard = np.full(self.scale.size, float(gumbel_l.ppf(fraction)))
-        standard[: self.normals] = float(ndtri(fraction))
+        standard[: self.normal_count] = float(ndtri(fraction))
         return self.location + standard * self.scale
 
-    def quantile_at(self, fraction: float, speeds: Floats, flyable: NDArray[np.bool_], probabilities: Floats) -> Floats:
-        """Return quantiles (k,) of the posterior of the wind at which this share of flights fails, m/s.
+    def posterior_quantiles(
+        self, fraction: float, speeds: Floats, flyable: NDArray[np.bool_], probabilities: Floats
+    ) -> Floats:
+        """Return posterior quantiles (k,) of the wind in which a fraction of flights fails, m/s.
 
         speeds, flyable: (m,) winds and outcomes of the flights.
         probabilities: (k,) probabilities of the quantiles, 0 to 1.
         """
         log_weights = np.zeros(self.location.size)
-        for speed, counts in _counts_by_wind(speeds, flyable).items():
-            log_failure, log_success = self.log_shares(speed)
+        for speed, counts in _count_by_wind(speeds, flyable).items():
+            log_failure, log_success = self.log_probabilities(speed)
             log_weights += counts[0] * log_failure + counts[1] * log_success
         weights = np.exp(log_weights - log_weights.max())
         values = self.quantile(fraction)
@@ -98,8 +100,8 @@ class FailureLaws:
         return values[order][np.minimum(np.searchsorted(cumulative, probabilities), values.size - 1)]
 
 
-def _counts_by_wind(speeds: Floats, flyable: NDArray[np.bool_]) -> dict[float, tuple[int, int]]:
-    """Return the numbers of failed and of flyable flights, by wind."""
+def _count_by_wind(speeds: Floats, flyable: NDArray[np.bool_]) -> dict[float, tuple[int, int]]:
+    """Return the numbers of failed and flyable flights, keyed by wind."""
     return {
         float(speed): (int((~flyable[speeds == speed]).sum()), int(flyable[speeds == speed].sum()))
         for speed in np.unique(speeds)
@@ -123,7 +125,7 @@ class FailureMode:
     mean, covariance: (2 + d,) and (2 + d, 2 + d) of the coefficients of its terms.
     sample: returns (s, 2 + d) equally likely coefficients; rarely needed.
     log_evidence: logarithm of the evidence of the outcomes, for this link.
-    by_margin: decrease of the predictor per scale of margin; 0 if margins say nothing about failure.
+    margin_coefficient: decrease of the predictor per scale of margin; 0 if margins say nothing about failure.
     """
 
     link: BinaryLink
@@ -131,11 +133,11 @@ class FailureMode:
     covariance: Floats
     sample: Callable[[], Floats]
     log_evidence: float
-    by_margin: float = 0.0
+    margin_coefficient: float = 0.0
 
 
 def fit_mode(terms: Floats, failed: Bools, margin: Floats, link: BinaryLink) -> FailureMode:
-    """Fit a failure mode of n flights, jointly with their margins or alone, whichever has more evidence.
+    """Fit a failure mode of n flights, with or without their margins, whichever has more evidence.
 
     terms: (n, 2 + d) terms of each flight: one, the wind relative to some origin, and the draws.
     failed: (n,).  margin: (n,) margin of each passed flight as a fraction of a scale: 1 for a scale or more, 0 for
@@ -144,14 +146,14 @@ def fit_mode(terms: Floats, failed: Bools, margin: Floats, link: BinaryLink) -> 
     >>> from planfly.campaigns.statistics.censored_regression import PROBIT
     >>> wind = np.linspace(-5.0, 5.0, 200)
     >>> terms, failed, chance = np.column_stack((np.ones(200), wind)), wind > 2.0, np.random.default_rng(1).random(200)
-    >>> fit_mode(terms, failed, (2.0 - wind).clip(0.0, 1.0), PROBIT).by_margin > 0.0
+    >>> fit_mode(terms, failed, (2.0 - wind).clip(0.0, 1.0), PROBIT).margin_coefficient > 0.0
     True
-    >>> fit_mode(terms, failed, chance, PROBIT).by_margin
+    >>> fit_mode(terms, failed, chance, PROBIT).margin_coefficient
     0.0
     """
     outcomes = Outcomes(terms, failed, np.where(failed, 0.0, margin))
     joint_fit = fit_regression(outcomes, link)
-    if not outcomes.narrow.any():
+    if not outcomes.marginal.any():
         return _make_mode(link, joint_fit, joint_fit.log_evidence)
     failure_fit, passed_outcomes = fit_regression(outcomes.as_pass_or_fail(), link), outcomes.margins_given_pass()
     # The separate distribution of the margins may have either link.
@@ -164,21 +166,21 @@ def fit_mode(terms: Floats, failed: Bools, margin: Floats, link: BinaryLink) -> 
 
 
 def _make_mode(link: BinaryLink, fit: RegressionFit, log_evidence: float) -> FailureMode:
-    return FailureMode(link, fit.mean, fit.covariance, fit.sample, log_evidence, fit.by_margin)
+    return FailureMode(link, fit.mean, fit.covariance, fit.sample, log_evidence, fit.margin_coefficient)
 
 
 # Origin of the wind in the terms, m/s, to which the prior of the constant applies.
-ORIGIN = 10.0
+WIND_ORIGIN_MPS = 10.0
 
 
-def regressors(speeds: Floats | float, draws: Floats) -> Floats:
-    """Return the terms (n, 2 + d) of flights: one, the wind relative to `ORIGIN`, and the draws.
+def make_terms(speeds: Floats | float, draws: Floats) -> Floats:
+    """Return the terms (n, 2 + d) of flights: one, the wind relative to `WIND_ORIGIN_MPS`, and the draws.
 
     speeds: (n,) or one for all, m/s.  draws: (n, d) in standard deviations from their means.
     """
     terms = np.empty((len(draws), 2 + draws.shape[1]))
     terms[:, 0] = 1.0
-    terms[:, 1] = np.asarray(speeds) - ORIGIN
+    terms[:, 1] = np.asarray(speeds) - WIND_ORIGIN_MPS
     terms[:, 2:] = draws
     return terms
 
@@ -189,28 +191,25 @@ def fit_modes(
     link: BinaryLink,
     margin: Sequence[Mapping[Hashable, float] | None] = (),
 ) -> tuple[FailureMode, ...]:
-    """Fit the failure modes of n flights, the most frequent first, then the most frequent among the other flights.
+    """Fit the failure modes of n flights: first the most frequent mode, then the most frequent of the other flights.
 
-    terms: (n, 2 + d), of `regressors`.
+    terms: (n, 2 + d), of `make_terms`.
     failed: modes in which each flight failed; empty if it was flyable.
-    margin: modes that each flight passed narrowly, with the margin as a fraction of a scale, 0 to 1, or 0 for a pass of
-    unknown margin; other modes were passed by a scale or more.  None for a flight without known margins.
+    margin: modes that each flight passed marginally, with the margin as a fraction of a scale, 0 to 1, or 0 for a pass
+    of unknown margin; other modes were passed by a scale or more.  None for a flight without known margins.
 
     >>> from planfly.campaigns.statistics.censored_regression import PROBIT
     >>> speeds = np.linspace(0.0, 20.0, 200)
     >>> ways = [frozenset({"slope"}) if speed > 12.0 else frozenset() for speed in speeds]
-    >>> (mode,) = fit_modes(regressors(speeds, np.empty((200, 0))), ways, PROBIT)
+    >>> (mode,) = fit_modes(make_terms(speeds, np.empty((200, 0))), ways, PROBIT)
     >>> round(float(10.0 - mode.mean[0] / mode.mean[1]), 1)
     12.0
     """
     modes: list[FailureMode] = []
     margins = margin or [None] * len(failed)
-    is_left = np.ones(len(failed), dtype=bool)
+    is_remaining = np.ones(len(failed), dtype=bool)
     while counts := Counter(
-        mode
-        for is_remaining, failed_modes in zip(is_left, failed, strict=True)
-        if is_remaining
-        for mode in failed_modes
+        mode for remains, failed_modes in zip(is_remaining, failed, strict=True) if remains for mode in failed_modes
     ):
         # Ties are broken by name, as the order of a set differs between processes.
         most_common = min(counts, key=lambda mode: (-counts[mode], repr(mode)))
@@ -221,13 +220,13 @@ def fit_modes(
                 for margins_of_flight in margins
             ]
         )
-        modes.append(fit_mode(terms[is_left], has_failed[is_left], passed_margins[is_left], link))
-        is_left &= ~has_failed
+        modes.append(fit_mode(terms[is_remaining], has_failed[is_remaining], passed_margins[is_remaining], link))
+        is_remaining &= ~has_failed
     return tuple(modes)
 
 
-def fail_shares(modes: Sequence[FailureMode], terms: Floats) -> Floats:
-    """Return the failure probability (n,), in any mode, of flights (n, 2 + d), by the means of the modes."""
+def failure_probabilities(modes: Sequence[FailureMode], terms: Floats) -> Floats:
+    """Return the probability (n,) that flights (n, 2 + d) fail in any mode, from the mean coefficients of the modes."""
     success: Floats = np.ones(len(terms))
     for mode in modes:
         success *= mode.link.survival(terms @ mode.mean)
@@ -235,13 +234,15 @@ def fail_shares(modes: Sequence[FailureMode], terms: Floats) -> Floats:
 
 
 def boundary_speed(modes: Sequence[FailureMode], draws: Floats, failing_fraction: float, max_speed: float) -> float:
-    """Find the wind up to `max_speed`, m/s, in which this fraction of draws (m, d) should fail, by bisection."""
-    mode_predictors = [(mode.link, regressors(ORIGIN, draws) @ mode.mean, float(mode.mean[1])) for mode in modes]
+    """Find the wind, m/s, up to `max_speed`, in which a fraction of draws (m, d) is expected to fail, by bisection."""
+    mode_predictors = [
+        (mode.link, make_terms(WIND_ORIGIN_MPS, draws) @ mode.mean, float(mode.mean[1])) for mode in modes
+    ]
 
     def exceeds_fraction(speed: float) -> bool:
         success: Floats = np.ones(len(draws))
-        for link, predictor, by_wind in mode_predictors:
-            success *= link.survival(predictor + by_wind * (speed - ORIGIN))
+        for link, predictor, wind_slope in mode_predictors:
+            success *= link.survival(predictor + wind_slope * (speed - WIND_ORIGIN_MPS))
         return bool(1.0 - success.mean() >= failing_fraction)
 
     if not exceeds_fraction(max_speed):
@@ -254,35 +255,38 @@ def boundary_speed(modes: Sequence[FailureMode], draws: Floats, failing_fraction
 
 
 @dataclass(frozen=True)
-class FailingShare:
-    """Share of flights that fail in a wind, and its derivatives.
+class FailureFraction:
+    """Fraction of flights that fail in a wind, and its derivatives.
 
-    slopes: (2 + d,) derivatives by the coefficients of each mode.  by_wind: derivative by the wind, 1/(m/s).
+    slopes: (2 + d,) derivatives with respect to the coefficients of each mode.
+    wind_slope: derivative with respect to the wind, 1/(m/s).
     """
 
     share: float
     slopes: list[Floats]
-    by_wind: float
+    wind_slope: float
 
 
-def failing_share(modes: Sequence[FailureMode], draws: Floats, speed: float) -> FailingShare:
-    """Return the share of draws (m, d) that is expected to fail in a wind, m/s."""
-    terms = regressors(speed, draws)
+def failure_fraction(modes: Sequence[FailureMode], draws: Floats, speed: float) -> FailureFraction:
+    """Return the fraction of draws (m, d) that is expected to fail in a wind, m/s."""
+    terms = make_terms(speed, draws)
     predictors = [terms @ mode.mean for mode in modes]
     success = [mode.link.survival(predictor) for mode, predictor in zip(modes, predictors, strict=True)]
-    slopes, by_wind = [], 0.0
-    for k, mode in enumerate(modes):
-        success_of_others = np.prod(success[:k] + success[k + 1 :], axis=0)
-        slopes.append(terms.T @ (mode.link.density(predictors[k]) * success_of_others) / len(draws))
-        by_wind += float(slopes[-1][0] * mode.mean[1])
-    return FailingShare(1.0 - float(np.prod(success, axis=0).mean()), slopes, by_wind)
+    slopes, wind_slope = [], 0.0
+    for number, mode in enumerate(modes):
+        success_of_others = np.prod(success[:number] + success[number + 1 :], axis=0)
+        slopes.append(terms.T @ (mode.link.density(predictors[number]) * success_of_others) / len(draws))
+        wind_slope += float(slopes[-1][0] * mode.mean[1])
+    return FailureFraction(1.0 - float(np.prod(success, axis=0).mean()), slopes, wind_slope)
 
 
 def boundary_slopes(modes: Sequence[FailureMode], draws: Floats, speed: float) -> list[Floats]:
-    """Return the boundary's derivatives (2 + d,) by each mode's coefficients, m/s, by the implicit function theorem.
+    """Return the derivatives (2 + d,) of the boundary with respect to each mode's coefficients, m/s.
+
+    They follow from the implicit function theorem.
 
     draws: (m, d).  speed: the boundary, m/s.
     """
-    failing = failing_share(modes, draws, speed)
+    failing = failure_fraction(modes, draws, speed)
     # If more wind does not cause more failures, nothing is known about the boundary.
-    return [-slope / max(failing.by_wind, 1e-9) for slope in failing.slopes]
+    return [-slope / max(failing.wind_slope, 1e-9) for slope in failing.slopes]

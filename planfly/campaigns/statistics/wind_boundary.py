@@ -1,9 +1,9 @@
-"""Estimate the largest wind in which a mission flies with a given probability, from flights in chosen winds.
+"""Estimate the largest wind in which a mission is flyable with a given probability, from flights in chosen winds.
 
-If some flights were flyable and some failed, the share of flights that fail in a wind is the mean of the failure modes
-over the possible draws, and the boundary is the wind in which that share is 1 - P (`boundary_quantiles`).  The links
-are equally likely a priori, and are weighted by their evidence.  If all flights were flyable, or all failed, one
-distribution of `FailureLaws` is used.
+If some flights were flyable and some failed, the fraction of flights that fail in a wind is the mean of the failure
+modes over the possible draws, and the boundary is the wind in which this fraction is 1 - P (`boundary_quantiles`).  The
+links are equally likely a priori, and are weighted by their evidence.  If all flights were flyable, or all failed,
+`FailureLaws` are used.
 """
 
 from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
@@ -14,14 +14,14 @@ import numpy as np
 
 from planfly.campaigns.statistics.censored_regression import LINKS
 from planfly.campaigns.statistics.failure_modes import (
-    ORIGIN,
+    WIND_ORIGIN_MPS,
     FailureLaws,
     FailureMode,
     boundary_slopes,
     boundary_speed,
-    fail_shares,
+    failure_probabilities,
     fit_modes,
-    regressors,
+    make_terms,
 )
 from world.arrays import Floats
 
@@ -57,10 +57,11 @@ def boundary_quantiles(
     max_speed: float,
     probabilities: Sequence[float],
 ) -> list[float]:
-    """Return quantiles of the boundary's posterior, m/s, from 0 to ``max_speed``, at these probabilities, 0 to 1.
+    """Return quantiles of the boundary's posterior, m/s, from 0 to ``max_speed``.
 
     draws: (m, d) possible draws, evenly spread also if only the first few are used.
-    failing_fraction: share of flights that fail at the boundary, above 0 and below 1.
+    failing_fraction: fraction of flights that fail at the boundary, above 0 and below 1.
+    probabilities: probability of each quantile, 0 to 1.
 
     >>> from planfly.campaigns.statistics.censored_regression import PROBIT
     >>> sample = np.column_stack((np.linspace(-0.1, 0.1, 101), np.full(101, 0.5)))
@@ -89,7 +90,9 @@ def _boundaries(modes: Sequence[FailureMode], draws: Floats, failing_fraction: f
         np.random.default_rng(number).permutation(mode.sample()) if number else mode.sample()
         for number, mode in enumerate(modes)
     ]
-    bracket_shares, all_shares = (_Shares(modes, samples, some_draws) for some_draws in (draws[:_BRACKET_DRAWS], draws))
+    bracket_shares, all_shares = (
+        _FailureFractions(modes, samples, some_draws) for some_draws in (draws[:_BRACKET_DRAWS], draws)
+    )
     lower, upper = np.zeros(len(samples[0])), np.full(len(samples[0]), max_speed)
     while (upper - lower).max() > _BRACKET_WIDTH_MPS:
         speed_between = 0.5 * (lower + upper)
@@ -100,25 +103,25 @@ def _boundaries(modes: Sequence[FailureMode], draws: Floats, failing_fraction: f
     previous_error = all_shares.logarithms(previous_speed) - np.log(failing_fraction)
     for _ in range(_SECANT_STEPS):
         error = all_shares.logarithms(speed) - np.log(failing_fraction)
-        by_wind = np.maximum(
+        wind_slope = np.maximum(
             (error - previous_error) / np.where(speed == previous_speed, 1.0, speed - previous_speed), 1e-9
         )
-        previous_speed, previous_error, speed = speed, error, np.clip(speed - error / by_wind, 0.0, max_speed)
+        previous_speed, previous_error, speed = speed, error, np.clip(speed - error / wind_slope, 0.0, max_speed)
     return speed
 
 
-class _Shares:
+class _FailureFractions:
     """Failing share of each sample; draws: (m, d)."""
 
     def __init__(self, modes: Sequence[FailureMode], samples: list[Floats], draws: Floats) -> None:
         self._modes, self._samples = modes, samples
-        self._at_origin = [regressors(ORIGIN, draws) @ sample.T for sample in samples]
+        self._at_origin = [make_terms(WIND_ORIGIN_MPS, draws) @ sample.T for sample in samples]
 
     def logarithms(self, speeds: Floats) -> Floats:
         """Return the logarithms (n,) of the failing shares, each at its own wind, m/s."""
         success = np.ones_like(self._at_origin[0])
         for mode, sample, predictor in zip(self._modes, self._samples, self._at_origin, strict=True):
-            success *= mode.link.survival(predictor + sample[:, 1] * (speeds - ORIGIN))
+            success *= mode.link.survival(predictor + sample[:, 1] * (speeds - WIND_ORIGIN_MPS))
         return np.log(np.maximum(1.0 - success.mean(axis=0), _MIN_PROBABILITY))
 
 
@@ -127,18 +130,18 @@ class DrawnNumbers:
     """Draws of the quantities that vary between flights, other than the wind, in standard deviations from the means.
 
     population: (m, d) evenly spread possible draws; each represents the same share of flights.
-    drawn: returns (stop - start, d) draws of the flights from one index to before another.
+    draw: function of start and stop index that returns the draws of these flights, (stop - start, d).
     """
 
     population: Floats
-    drawn: Callable[[int, int], Floats]
+    draw: Callable[[int, int], Floats]
     _known: list[Floats] = field(default_factory=list)
 
     def first(self, count: int) -> Floats:
         """Return the first `count` draws (count, d), which are computed once."""
         known_count = sum(len(block) for block in self._known)
         if known_count < count:
-            self._known.append(self.drawn(known_count, max(count, known_count + 500)))
+            self._known.append(self.draw(known_count, max(count, known_count + 500)))
         if len(self._known) > 1:
             self._known[:] = [np.concatenate(self._known)]
         return self._known[0][:count] if self._known else self.population[:0]
@@ -218,7 +221,7 @@ class Direction:
     def fits(self) -> tuple[FailureFit, ...]:
         """Return the failure modes for each link, for a direction with both failed and flyable flights."""
         if self._fits is None or self._fits[0] != len(self.speeds):
-            terms = regressors(np.array(self.speeds), self.numbers.first(max(self.draws) + 1)[self.draws])
+            terms = make_terms(np.array(self.speeds), self.numbers.first(max(self.draws) + 1)[self.draws])
             modes_by_link = [fit_modes(terms, self.failed, link, self.margin) for link in LINKS]
             evidence = np.array([sum(mode.log_evidence for mode in modes) for modes in modes_by_link])
             weights = np.exp(evidence - evidence.max())
@@ -249,7 +252,7 @@ class Direction:
         probabilities = (tail, 0.5, 1.0 - tail)
         if self.all_flew or self.all_failed:
             is_flyable = np.full(len(self.speeds), self.all_flew)
-            lower, median, upper = self._laws.quantile_at(
+            lower, median, upper = self._laws.posterior_quantiles(
                 failing_fraction, np.array(self.speeds), is_flyable, np.array(probabilities)
             )
         else:
@@ -261,7 +264,7 @@ class Direction:
 
     @cached_property
     def _laws(self) -> FailureLaws:
-        return FailureLaws.up_to(self.most)
+        return FailureLaws.for_winds_up_to(self.most)
 
 
 def needs_more_flights(boundary: WindBoundary, flights: int, accuracy: float, min_flights: int) -> bool:
@@ -284,7 +287,7 @@ def needs_more_flights(boundary: WindBoundary, flights: int, accuracy: float, mi
 # not avoided.  Only the likelihood of the flights enters the fit: the choice does not bias it.
 
 # Step of the winds that are flown, m/s.
-GRID = 0.1
+WIND_GRID_MPS = 0.1
 # Smallest expected failing share of the compared winds.  A fit near the centre of a distribution need not be valid in
 # its tail, where the boundary is.
 _MIN_FAILING_SHARE = 1e-3
@@ -305,13 +308,13 @@ _LARGEST_WIND_TOLERANCE_MPS = 0.3
 def next_flights(direction: Direction, count: int) -> list[tuple[float, int]]:
     """Return wind, m/s, and draw of the `count` most informative flights."""
     if direction.all_flew or direction.all_failed:
-        speed = _bisected_speed(direction)
+        speed = _bisect_speed(direction)
         draws = _extreme_draws(direction) if speed == direction.most else []
         return [(speed, draw) for draw in (draws + _next_draws(direction, count, draws))[:count]]
-    return _most_informative(direction, count)
+    return _choose_most_informative(direction, count)
 
 
-def _bisected_speed(direction: Direction) -> float:
+def _bisect_speed(direction: Direction) -> float:
     max_speed = direction.most
     if not direction.speeds:
         return _round_to_grid(0.5 * max_speed, max_speed)
@@ -338,13 +341,13 @@ def _next_draws(direction: Direction, count: int, other_draws: list[int]) -> lis
 
 
 def _extreme_draws(direction: Direction) -> list[int]:
-    """Return the draws with the largest and the smallest value of each quantity, without flown draws."""
+    """Return the draws with the largest and the smallest value of each quantity that have not been flown."""
     numbers = direction.numbers.first(_EXTREME_DRAW_POOL)
     extreme_draws = [int(select(numbers[:, k])) for k in range(numbers.shape[1]) for select in (np.argmax, np.argmin)]
     return [draw for draw in dict.fromkeys(extreme_draws) if draw not in set(direction.draws)]
 
 
-def _most_informative(direction: Direction, count: int) -> list[tuple[float, int]]:
+def _choose_most_informative(direction: Direction, count: int) -> list[tuple[float, int]]:
     fits, max_speed, flown_count = direction.fits(), direction.most, len(direction.draws)
     min_speeds, max_speeds = (
         [boundary_speed(fit.modes, direction.numbers.population, failing_fraction, max_speed) for fit in fits]
@@ -353,53 +356,57 @@ def _most_informative(direction: Direction, count: int) -> list[tuple[float, int
     speeds = np.unique(
         [_round_to_grid(wind, max_speed) for wind in np.linspace(min(min_speeds), max(max_speeds), _WIND_COUNT)]
     )
-    beliefs = [_Belief(fit) for fit in fits]
+    posteriors = [_ExpectedPosterior(fit) for fit in fits]
     # Without drawn quantities all draws are equivalent.
     draw_count = _COMPARED_DRAWS if direction.numbers.population.shape[1] else 1
     flights: list[tuple[float, int]] = []
     for number in range(flown_count, flown_count + count):
         used_draws = [draw for _, draw in flights]
         draws = _next_draws(direction, 1 if number % _NEXT_DRAW_INTERVAL == 0 else draw_count, used_draws)
-        drawn = direction.numbers.first(max(draws) + 1)[draws]
-        terms = regressors(np.repeat(speeds, len(draws)), np.tile(drawn, (speeds.size, 1)))
-        best = int(np.argmax(sum(belief.gains(terms) for belief in beliefs) + _gains_between(fits, terms)))
-        flights.append((float(speeds[best // len(draws)]), draws[best % len(draws)]))
-        for belief in beliefs:
-            belief.expect(terms[best])
+        draw_values = direction.numbers.first(max(draws) + 1)[draws]
+        terms = make_terms(np.repeat(speeds, len(draws)), np.tile(draw_values, (speeds.size, 1)))
+        best_index = int(
+            np.argmax(sum(posterior.expected_gains(terms) for posterior in posteriors) + _gains_between(fits, terms))
+        )
+        flights.append((float(speeds[best_index // len(draws)]), draws[best_index % len(draws)]))
+        for posterior in posteriors:
+            posterior.include_flight(terms[best_index])
     return flights
 
 
 def _gains_between(fits: tuple[FailureFit, ...], terms: Floats) -> Floats:
-    """Return the expected reduction (n,) of the boundary's variance between fits by each flight, m2/s2.
+    """Return the expected reduction (n,) of the boundary's variance between the fits after each flight, m2/s2.
 
-    The outcome of a flight discriminates between the fits: the reduction is the variance of the boundary's mean given
+    The outcome of a flight discriminates between the fits; the reduction is the variance of the boundary's mean given
     the outcome.
     """
     weights, speeds = (np.array(column) for column in zip(*((fit.weight, fit.speed) for fit in fits), strict=True))
     deviations = speeds - weights @ speeds
-    failure = np.array([fail_shares(fit.modes, terms) for fit in fits])
+    failure = np.array([failure_probabilities(fit.modes, terms) for fit in fits])
     mean_failure = np.clip(weights @ failure, 1e-300, 1.0 - 1e-16)
     # Mean deviation of the boundary, weighted by failure; for success it has the opposite sign.
     weighted_deviation = (weights * deviations) @ failure
     return weighted_deviation**2 / mean_failure + weighted_deviation**2 / (1.0 - mean_failure)
 
 
-class _Belief:
+class _ExpectedPosterior:
     """Expected posterior of a fit after the chosen flights."""
 
     def __init__(self, fit: FailureFit) -> None:
         self._fit = fit
         self._covariances = [mode.covariance for mode in fit.modes]
 
-    def gains(self, terms: Floats) -> Floats:
+    def expected_gains(self, terms: Floats) -> Floats:
         """Return the expected reduction (n,) of the boundary's variance by each flight (n, 2 + d), m2/s2."""
-        gains: Floats = np.zeros(len(terms))
+        expected_gains: Floats = np.zeros(len(terms))
         for k, information in enumerate(self._informations(terms)):
             projected, slope = terms @ self._covariances[k], self._fit.slopes[k]
-            gains += (projected @ slope) ** 2 * information / (1.0 + information * (projected * terms).sum(axis=1))
-        return self._fit.weight * gains
+            expected_gains += (
+                (projected @ slope) ** 2 * information / (1.0 + information * (projected * terms).sum(axis=1))
+            )
+        return self._fit.weight * expected_gains
 
-    def expect(self, row: Floats) -> None:
+    def include_flight(self, row: Floats) -> None:
         """Include a flight (2 + d,) as flown, with unknown outcome."""
         for k, information in enumerate(self._informations(row[None])):
             projected = self._covariances[k] @ row
@@ -412,9 +419,9 @@ class _Belief:
         reach_probability: Floats = np.ones(len(terms))
         for mode in self._fit.modes:
             predictor = terms @ mode.mean
-            yield reach_probability * mode.link.information(predictor, mode.by_margin)
+            yield reach_probability * mode.link.information(predictor, mode.margin_coefficient)
             reach_probability = reach_probability * mode.link.survival(predictor)
 
 
 def _round_to_grid(speed: float, max_speed: float) -> float:
-    return min(max_speed, max(0.0, round(speed / GRID) * GRID))
+    return min(max_speed, max(0.0, round(speed / WIND_GRID_MPS) * WIND_GRID_MPS))

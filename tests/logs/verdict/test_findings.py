@@ -34,7 +34,7 @@ from logs.verdict.rules.registry import RULES
 from logs.verdict.verdict import Verdict, verdict_json
 from logs.verdict.wording import place_text, suggestions_text
 from logs.views.report.text import rule_rows
-from planfly.campaigns.flight_row import least_margins
+from planfly.campaigns.flight_row import find_minimum_margins
 from planfly.terminal.verdict_lines import verdict_lines
 from tests.logs.verdict.judging import ROUTE, bad_plan, judge, leg, of, suggested, waypoint
 from tests.mission_lines import setup_of, wp
@@ -271,7 +271,7 @@ def test_a_failed_finding_is_closest_to_its_limit_everywhere(
         assert f"at leg {leg}" in line
     (row,) = rule_rows(findings)
     assert row.where == ("" if leg is None else f"leg {leg}")
-    assert [(rule, least.value) for rule, least in least_margins(tuple(findings))] == (
+    assert [(rule, least.value) for rule, least in find_minimum_margins(tuple(findings))] == (
         [] if margin is None else [("slope", margin)]
     )
 

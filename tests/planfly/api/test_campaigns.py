@@ -17,7 +17,7 @@ from planfly.campaigns.fly_campaign import fly_campaign, open_store
 from planfly.campaigns.report import OutputDirectory
 from planfly.campaigns.statistics.decision import Estimate, Goal
 from planfly.campaigns.statistics.wind_boundary import Direction
-from planfly.campaigns.tables import DATABASE, RequestedFlight, Store, WindsStore
+from planfly.campaigns.tables import CAMPAIGN_DATABASE, RequestedFlight, Store, WindsStore
 from planfly.campaigns.worker_pool import Workers
 from planfly.runtime.stages import Advance
 from tests.planfly.campaigns.made_campaigns import all_fly, short_base, table, write_short
@@ -35,7 +35,7 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> list[tuple[CampaignBase, WindsGoal
 
     def found(base: CampaignBase, goal: WindsGoal, _: object, store: WindsStore, __: object) -> WindsFound:
         seen.append((base, goal))
-        if not store.known():
+        if not store.stored_flights():
             store.add(RequestedFlight(0, 0, 5.0, 0), made_row(base))
         directions = [Direction(goal.most, goal.target, no_numbers(), goal.confidence) for _ in range(goal.directions)]
         for draw, (number, speed, flyable) in enumerate(FLIGHTS):
@@ -132,7 +132,7 @@ def test_a_fence_that_is_named_is_kept_to(tmp_path: Path) -> None:
             mission,
             {"scenario": scenario, "fence": fences},
             default_dispersions(),
-            OutputDirectory(tmp_path / name, DATABASE, resume=False, overwrite=False),
+            OutputDirectory(tmp_path / name, CAMPAIGN_DATABASE, resume=False, overwrite=False),
         )
         for name, fences in (("a", [circle, zone]), ("b", []))
     )
@@ -163,7 +163,7 @@ def test_a_plan_at_hand_is_flown_as_its_file_is(tmp_path: Path, monkeypatch: pyt
             target,
             {"seed": 3, "wind": (4.0, 90.0)},
             default_dispersions(),
-            OutputDirectory(tmp_path / name, DATABASE, resume=False, overwrite=False),
+            OutputDirectory(tmp_path / name, CAMPAIGN_DATABASE, resume=False, overwrite=False),
         )
         for name, target in (("a", plan), ("b", tmp_path / "plan.json"))
     ]

@@ -10,7 +10,7 @@ import pytest
 
 import planfly
 from aircraft.catalog import load_aircraft
-from planfly.campaigns.tables import DATABASE
+from planfly.campaigns.tables import CAMPAIGN_DATABASE
 from tests.world.made.made_scenario import SMALL
 
 _ITEM = "{}\t0\t3\t16\t0\t0\t0\t0\t{}\t8.0\t500\t1\n"
@@ -114,7 +114,7 @@ CASES: dict[str, tuple[Callable[[], object], _Known]] = {
     ),
     "a campaign that is not there": (
         lambda: planfly.campaign(_file("a.waypoints", _MISSION), out="none", resume=True),
-        _Known(DATABASE, "", None, ""),
+        _Known(CAMPAIGN_DATABASE, "", None, ""),
     ),
     "a scheduler": (
         lambda: planfly.campaign(_file("a.waypoints", _MISSION), scheduler="udp://host"),

@@ -10,7 +10,7 @@ import pytest
 import planfly
 from aircraft.catalog import aircraft_names, load_aircraft
 from planfly.cli import main
-from planfly.flight_options import FlightOptions, apply_options, named_scenario
+from planfly.flight_options import FlightOptions, apply_options, load_scenario_with_options
 from planfly.workflow.airframe import load_airframe
 from planner.plan import plan_json, read_plan
 from planner.search.plan_path import plan_path
@@ -23,9 +23,12 @@ from world.scenario import embedded_names, load_scenario, with_wind
 def test_a_scenario_is_named_in_three_ways(tmp_path: Path) -> None:
     (tmp_path / "mine.toml").write_text(FIELD)
     named = load_scenario("tight")
-    assert named_scenario(named, {}).to_json() == named.to_json()
-    assert named_scenario("tight", {}).name == "tight"
-    as_text, as_path = named_scenario(str(tmp_path / "mine.toml"), {}), named_scenario(tmp_path / "mine.toml", {})
+    assert load_scenario_with_options(named, {}).to_json() == named.to_json()
+    assert load_scenario_with_options("tight", {}).name == "tight"
+    as_text, as_path = (
+        load_scenario_with_options(str(tmp_path / "mine.toml"), {}),
+        load_scenario_with_options(tmp_path / "mine.toml", {}),
+    )
     assert as_text.to_json() == as_path.to_json()
 
 

@@ -9,7 +9,7 @@ from typing import Any
 from logs.verdict.places import Place
 from planfly.campaigns.campaign_base import CampaignBase, GivenWind, open_campaign
 from planfly.campaigns.dispersions import Dispersions, default_dispersions, draw_flight
-from planfly.campaigns.flight_row import FlightRow, LeastMargin
+from planfly.campaigns.flight_row import FlightRow, MinimumMargin
 from planfly.campaigns.tables import RUN_DEPENDENT_COLUMNS
 
 SCENARIO = """\
@@ -82,7 +82,7 @@ def made_flight(base: CampaignBase, index: int, wind: GivenWind | None = None) -
     luck = draw.seed % 1000 / 1000.0
     strong = 12.0 if wind is not None and wind.from_deg == 270.0 else 8.0
     good = luck < 0.9 if wind is None else wind.speed < strong + luck - 0.5
-    margin = LeastMargin(1.0 if good else -1.0, "m", Place("leg", 1))
+    margin = MinimumMargin(1.0 if good else -1.0, "m", Place("leg", 1))
     failed = () if good else (("clearance", Place("leg", 1)),)
     return FlightRow(
         draw,

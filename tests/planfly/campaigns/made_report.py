@@ -5,10 +5,10 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from planfly.campaigns.campaign_base import CampaignBase
-from planfly.campaigns.flight_row import fly_one, lost_row
+from planfly.campaigns.flight_row import fly_one, make_lost_row
 from planfly.campaigns.fly_campaign import open_store
 from planfly.campaigns.statistics.decision import Estimator, Goal
-from planfly.campaigns.summary import CampaignSummary, summarise
+from planfly.campaigns.summary import CampaignSummary, summarise_campaign
 from planfly.campaigns.tables import Store
 from tests.planfly.campaigns.made_campaigns import made_flight
 
@@ -19,5 +19,7 @@ def made_report(base: CampaignBase, folder: Path) -> Iterator[tuple[Store, Campa
     goal = Goal(0.8, False, 60)
     with open_store(base, goal, folder, resume=False) as store:
         for k in range(60):
-            store.add(fly_one(base, k) if k < 2 else made_flight(base, k) if k < 59 else lost_row(base, k, "lost: x"))
-        yield store, summarise(base, goal, Estimator(goal).estimate(store.tally()), store)
+            store.add(
+                fly_one(base, k) if k < 2 else made_flight(base, k) if k < 59 else make_lost_row(base, k, "lost: x")
+            )
+        yield store, summarise_campaign(base, goal, Estimator(goal).estimate(store.tally()), store)

@@ -11,7 +11,7 @@ from planfly.campaigns import find_winds as find_winds_module
 from planfly.campaigns.campaign_base import CampaignBase
 from planfly.campaigns.find_winds import WindsFound, WindsGoal, find_winds, open_winds_store
 from planfly.campaigns.flight_requests import FinishedFlight, FlightRequest, FlyOne
-from planfly.campaigns.tables import WINDS_DATABASE, WINDS_KIND, RequestedFlight, make_flight_row, parse_narrow_passes
+from planfly.campaigns.tables import WINDS_DATABASE, WINDS_KIND, RequestedFlight, make_flight_row, parse_marginal_passes
 from planfly.campaigns.worker_pool import Workers
 from tests.planfly.campaigns.made_campaigns import made_flight, table
 from tests.soak import SOAK
@@ -43,8 +43,8 @@ def flying_here() -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(find_winds_module, "worker_pool", hire_here)
         if not SOAK:
-            patch.setattr(find_winds_module, "_POPULATION", 512)
-            patch.setattr(find_winds_module, "_MAX_EACH", 12)
+            patch.setattr(find_winds_module, "_POPULATION_SIZE", 512)
+            patch.setattr(find_winds_module, "_MAX_FLIGHTS_EACH", 12)
         yield
 
 
@@ -65,7 +65,7 @@ def keep_part(base: CampaignBase, whole: Path, part: Path, numbers: set[int], go
         for values in table(whole / WINDS_DATABASE):
             if values[0] in numbers:
                 known = dict(zip(WINDS_KIND.columns, (*values, 0.0, ""), strict=True))
-                row = replace(make_flight_row(known["draw"], known), narrow=parse_narrow_passes(known["narrow"]))
+                row = replace(make_flight_row(known["draw"], known), narrow=parse_marginal_passes(known["narrow"]))
                 store.add(RequestedFlight(*values[:4]), row)
 
 

@@ -9,7 +9,13 @@ import pytest
 
 from aircraft.catalog import make_own_folder, read_aircraft
 from aircraft.data_sheet import DataSheet
-from planfly.campaigns.campaign_base import CampaignBase, GivenWind, check_level_flight_at_medians, open_campaign, vary
+from planfly.campaigns.campaign_base import (
+    CampaignBase,
+    GivenWind,
+    check_level_flight_at_medians,
+    open_campaign,
+    vary_flight,
+)
 from planfly.campaigns.dispersions import (
     QUANTITIES,
     Dispersions,
@@ -68,7 +74,7 @@ def drawn(**values: float) -> Draw:
 
 
 def test_the_nominal_draw_is_the_setup_itself(base: CampaignBase) -> None:
-    made = vary(base, drawn())
+    made = vary_flight(base, drawn())
     wind, own = made.setup.scenario.wind, base.scenario.wind
     assert (wind.speed, wind.turbulence) == (own.speed, own.turbulence)
     assert wind.from_course == pytest.approx(own.from_course)
@@ -89,7 +95,7 @@ def test_the_nominal_draw_is_the_setup_itself(base: CampaignBase) -> None:
     ],
 )
 def test_wind(base: CampaignBase, values: dict[str, float], speed: float, from_deg: float, turbulence: str) -> None:
-    setup = vary(base, drawn(**values)).setup
+    setup = vary_flight(base, drawn(**values)).setup
     for wind in (setup.scenario.wind, setup.limits.wind):
         assert (wind.speed, wind.turbulence) == (speed, turbulence)
         assert math.degrees(wind.from_course) == pytest.approx(from_deg)
@@ -99,17 +105,17 @@ def test_wind(base: CampaignBase, values: dict[str, float], speed: float, from_d
 
 def test_gusts_are_the_flights_own_whatever_the_scenario_states(base: CampaignBase) -> None:
     fixed = replace(base, scenario=replace(base.scenario, wind=replace(base.scenario.wind, seed=3)))
-    assert vary(fixed, drawn()).setup.scenario.wind.seed is None
+    assert vary_flight(fixed, drawn()).setup.scenario.wind.seed is None
 
 
 def test_a_mean_wind_takes_the_scenarios_place(base: CampaignBase) -> None:
-    wind = vary(base, drawn(wind_gradient=0.002), GivenWind(11.0, 45.0)).setup.scenario.wind
+    wind = vary_flight(base, drawn(wind_gradient=0.002), GivenWind(11.0, 45.0)).setup.scenario.wind
     assert (wind.speed, math.degrees(wind.from_course), wind.gradient) == (11.0, pytest.approx(45.0), 0.002)
 
 
 def test_aircraft_battery_terrain_and_start(base: CampaignBase) -> None:
     values = {"mass": 1.1, "drag": 0.9, "control_power": 0.8, "battery": 0.5, "terrain_height": 7.0}
-    made = vary(base, drawn(**values, start_east=1.0, start_north=-2.0, start_up=3.0))
+    made = vary_flight(base, drawn(**values, start_east=1.0, start_north=-2.0, start_up=3.0))
     variation = made.off_nominal.variation
     assert (variation.mass, variation.drag, variation.control) == (1.1, 0.9, 0.8)
     assert made.setup.battery == pytest.approx(0.5 * base.airframe.battery)
@@ -118,7 +124,7 @@ def test_aircraft_battery_terrain_and_start(base: CampaignBase) -> None:
     assert ground is not None
     assert float(ground.height(500.0, 0.0)) == pytest.approx(107.0)
     # The route stays where it was planned.
-    np.testing.assert_array_equal(made.setup.route.waypoints, vary(base, drawn()).setup.route.waypoints)
+    np.testing.assert_array_equal(made.setup.route.waypoints, vary_flight(base, drawn()).setup.route.waypoints)
 
 
 # ----------------------------------------------------------------------
@@ -149,11 +155,11 @@ def test_an_aircraft_brings_its_draws(sheet: Path) -> None:
         properties, first, second = (next(file).strip().split(",") for _ in range(3))
     nominal = {one.name: one.nominal for one in QUANTITIES}
     for seed, row in ((1024, first), (513, second)):
-        found = vary(made, Draw(0, seed, nominal)).off_nominal.variation.properties
+        found = vary_flight(made, Draw(0, seed, nominal)).off_nominal.variation.properties
         assert [name for name, _ in found] == properties
         assert [value for _, value in found] == pytest.approx([float(value) for value in row])
     # Each flight's aircraft is one that is known.
-    varied = vary(made, Draw(0, 1, nominal))
+    varied = vary_flight(made, Draw(0, 1, nominal))
     assert (varied.setup.envelope.climb_sd, varied.setup.envelope.descent_sd) == (0.0, 0.0)
     assert varied.setup.envelope.fastest_sd == 0.0 < made.airframe.limits.envelope.fastest_sd
     assert varied.setup.envelope.power_sd == 0.0 < made.airframe.limits.envelope.power_sd
@@ -181,7 +187,7 @@ def test_a_file_without_draws_flies_the_folders_or_leaves_slopes_open(sheet: Pat
     spread.write_text(f'[{quantity}]\ndistribution = "norm"\nloc = 1\nscale = 0.05\nsource = "x"\n')
     made = _opened(sheet, read_dispersions(spread))
     assert [one.quantity.name for one in made.dispersions.varying] == [quantity]
-    varied = vary(made, Draw(0, 1, {one.name: one.nominal for one in QUANTITIES}))
+    varied = vary_flight(made, Draw(0, 1, {one.name: one.nominal for one in QUANTITIES}))
     assert (made.dispersions.draws is not None) is drawn
     assert bool(varied.off_nominal.variation.properties) is drawn
     # What is not known is either flown or left open.

@@ -11,16 +11,16 @@ import planfly
 from planfly.api import campaigns
 from planfly.campaigns.campaign_base import CampaignBase
 from planfly.campaigns.campaign_result import (
+    DEFAULT_FLIGHTS,
     MAX_FLIGHTS,
-    USUAL_FLIGHTS,
     CampaignResult,
     campaign_line,
     make_goal,
     winds_line,
 )
 from planfly.campaigns.find_winds import WindsGoal
-from planfly.campaigns.flight_row import STATIONS
-from planfly.campaigns.tables import DATABASE, read_table
+from planfly.campaigns.flight_row import STATION_COUNT
+from planfly.campaigns.tables import CAMPAIGN_DATABASE, read_table
 from planfly.commands.registry import build_parser
 from tests.planfly.campaigns.made_report import made_report
 
@@ -98,7 +98,7 @@ def test_the_public_name_is_the_package_s() -> None:
 def test_what_it_tells(base: CampaignBase, tmp_path: Path) -> None:
     with made_report(base, tmp_path) as (store, summary):
         tally = store.tally()
-    result = CampaignResult(summary, read_table(tmp_path / DATABASE), tmp_path / DATABASE)
+    result = CampaignResult(summary, read_table(tmp_path / CAMPAIGN_DATABASE), tmp_path / CAMPAIGN_DATABASE)
     assert result.probability == tally.flyable / 60
     assert result.interval.low < result.probability < result.interval.high
     assert result.bounds.low > result.interval.low
@@ -107,7 +107,7 @@ def test_what_it_tells(base: CampaignBase, tmp_path: Path) -> None:
     assert list(flights["flight"]) == list(range(60))
     assert list(flights["outcome"]).count("lost") == 1
     assert "clearance" not in flights
-    assert result.shapes()["clearance"].shape == (60, STATIONS)
+    assert result.shapes()["clearance"].shape == (60, STATION_COUNT)
     with pytest.raises(ValueError, match="kept no folder; give it one by out"):
         CampaignResult(summary, result.columns).shapes()
 
@@ -128,6 +128,6 @@ def test_numbers_that_are_none(given: tuple[int | None, float | None, float | No
 
 
 def test_how_many_flights_are_meant() -> None:
-    assert make_goal(None, None, None, 0.95).flights == USUAL_FLIGHTS
+    assert make_goal(None, None, None, 0.95).flights == DEFAULT_FLIGHTS
     assert make_goal(None, 0.99, None, 0.95).flights == MAX_FLIGHTS
     assert make_goal(7, None, 0.9, 0.95).target == 0.9

@@ -9,9 +9,9 @@ pytest.importorskip("distributed")
 from distributed import CancelledError, KilledWorker
 
 from planfly.campaigns.campaign_base import CampaignBase
-from planfly.campaigns.dask_pool import CampaignPlugin, DaskPool, connect
-from planfly.campaigns.flight_requests import LOST, FlightRequest, WorkerError
-from planfly.campaigns.flight_row import FlightRow, lost_row
+from planfly.campaigns.dask_pool import CampaignPlugin, DaskPool, connect_client
+from planfly.campaigns.flight_requests import LOST_REASON, FlightRequest, WorkerError
+from planfly.campaigns.flight_row import FlightRow, make_lost_row
 from planfly.campaigns.tables import is_same_flight
 from planfly.campaigns.worker_pool import Workers, worker_pool
 from tests.planfly.campaigns.made_campaigns import made_flight
@@ -22,7 +22,7 @@ from tests.soak import only_in_soak
 def test_each_flight_comes_back_once_and_a_foreign_worker_is_refused(
     base: CampaignBase, scheduler: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    with connect(scheduler) as client:
+    with connect_client(scheduler) as client:
         orders = iter(range(12))
         pool = DaskPool(client, base, made_flight)
         flown = list(pool.fly(lambda: next((FlightRequest(k) for k in orders), None)))
@@ -150,7 +150,7 @@ def test_a_flight_is_lost_that_is_given_up_three_times(
     flown = list(DaskPool(client, base).fly(lambda: next((FlightRequest(k) for k in orders), None)))
     assert client.sent == [0, *[1] * (1 + min(times, 2)), 2]
     assert [one.request.index for one in flown] == [0, 1, 2]
-    assert flown[1].row == (made_flight(base, 1) if times < 3 else lost_row(base, 1, LOST))
+    assert flown[1].row == (made_flight(base, 1) if times < 3 else make_lost_row(base, 1, LOST_REASON))
 
 
 def test_a_flight_that_is_cancelled_as_the_scheduler_went_ends_the_campaign(

@@ -7,9 +7,9 @@ import pytest
 from scipy import stats
 
 from planfly.campaigns.dispersions import (
-    BY_NAME,
     NAMES,
     QUANTITIES,
+    QUANTITY_BY_NAME,
     SpreadError,
     Varying,
     default_dispersions,
@@ -22,7 +22,7 @@ def test_names_are_unlike_and_nominals_lie_in_their_range() -> None:
     assert len(set(NAMES)) == len(QUANTITIES)
     for one in QUANTITIES:
         assert one.low < one.nominal < one.high
-    assert (BY_NAME["mass"].nominal, BY_NAME["wind_speed"].nominal) == (1.0, 0.0)
+    assert (QUANTITY_BY_NAME["mass"].nominal, QUANTITY_BY_NAME["wind_speed"].nominal) == (1.0, 0.0)
 
 
 # ----------------------------------------------------------------------
@@ -48,7 +48,7 @@ def test_values_are_the_distributions_own() -> None:
 
 
 def test_what_lies_beyond_the_range_is_never_drawn() -> None:
-    wide = Varying(BY_NAME["mass"], "norm", (("loc", 1.0), ("scale", 0.2)), "by hand")
+    wide = Varying(QUANTITY_BY_NAME["mass"], "norm", (("loc", 1.0), ("scale", 0.2)), "by hand")
     values = [wide.value(share) for share in np.linspace(0.0, 1.0, 201)]
     assert min(values) == pytest.approx(0.5)
     assert max(values) == pytest.approx(2.0)

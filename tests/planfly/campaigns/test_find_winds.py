@@ -27,7 +27,7 @@ from planfly.campaigns.find_winds import (
     open_winds_store,
 )
 from planfly.campaigns.flight_requests import FlyOne
-from planfly.campaigns.flight_row import FlightRow, fly_one, lost_row
+from planfly.campaigns.flight_row import FlightRow, fly_one, make_lost_row
 from planfly.campaigns.report import wind_lines
 from planfly.campaigns.tables import WINDS_DATABASE, FlownFlight, RequestedFlight, StoreError
 from planfly.campaigns.worker_pool import Workers
@@ -122,7 +122,7 @@ def test_how_narrowly_flights_passed_makes_the_boundary_surer(
     wind_base: CampaignBase, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """As many flights; and what is told is still there when the search goes on."""
-    monkeypatch.setattr(find_winds_module, "_MAX_EACH", 6)
+    monkeypatch.setattr(find_winds_module, "_MAX_FLIGHTS_EACH", 6)
     goal = replace(GOAL, directions=4 if SOAK else 2, flights=scaled(120, 60))
     told = searched(wind_base, tmp_path / "told", goal, fly=flight_that_states_its_margin)
     bare = searched(wind_base, tmp_path / "bare", goal)
@@ -218,8 +218,8 @@ def surer_but_in_the_west(base: CampaignBase, index: int, wind: GivenWind | None
 @pytest.mark.usefixtures("here")
 def test_progress_tells_what_is_known(wind_base: CampaignBase, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("planfly.campaigns.worker_pool.REPORT_INTERVAL_S", 0.0)
-    monkeypatch.setattr(find_winds_module, "FEWEST", 36)
-    monkeypatch.setattr(find_winds_module, "ACCURACY", 1.2)
+    monkeypatch.setattr(find_winds_module, "MIN_FLIGHTS_PER_DIRECTION", 36)
+    monkeypatch.setattr(find_winds_module, "BOUNDARY_ACCURACY_MPS", 1.2)
     goal = replace(GOAL, flights=600)
     told: list[tuple[float, float, str]] = []
     with open_winds_store(wind_base, goal, tmp_path, resume=False) as store:
@@ -249,7 +249,7 @@ def test_a_deadly_flight_is_named_and_counts_against(wind_base: CampaignBase, tm
 
     def here(base: CampaignBase, index: int, wind: Any) -> Any:
         dies = index == 9 and wind.from_deg == 90.0
-        return lost_row(base, index, "lost: its workers died") if dies else made_flight(base, index, wind)
+        return make_lost_row(base, index, "lost: its workers died") if dies else made_flight(base, index, wind)
 
     with flying_here():
         want = searched(wind_base, tmp_path / "one", goal, fly=here)

@@ -15,14 +15,14 @@ from logs.verdict.verdict import Verdict
 from planfly.campaigns.campaign_base import CampaignBase
 from planfly.campaigns.dispersions import parse_dispersions
 from planfly.campaigns.flight_row import (
-    STATIONS,
-    NarrowPass,
+    STATION_COUNT,
+    MarginalPass,
     clearance_profile,
-    failed_findings,
+    find_marginal_passes,
+    find_minimum_margins,
     fly_one,
-    least_margins,
-    lost_row,
-    narrow_passes,
+    list_failed_findings,
+    make_lost_row,
     waypoint_crossings,
 )
 from planfly.campaigns.tables import is_same_flight
@@ -42,10 +42,10 @@ MISSILE = {"name": "Alfa", "north_m": 1000.0, "amsl_m": 300.0, "kill_radius_m": 
 LEG = Place("leg", 1)
 
 
-def passed_beside(away: float, *findings: Finding) -> tuple[NarrowPass, ...]:
+def passed_beside(away: float, *findings: Finding) -> tuple[MarginalPass, ...]:
     """Of a straight track this far outside a missile's sphere, m."""
     setup = make_setup([[0, 0, 300], [0, 2000, 300]], threats=[MISSILE | {"east_m": 500.0 + away}])
-    return narrow_passes(findings, setup.scenario, fly_path(setup))
+    return find_marginal_passes(findings, setup.scenario, fly_path(setup))
 
 
 @pytest.mark.parametrize(("away", "left"), [(2.5, 0.25), (9.9, 0.99)])
@@ -135,9 +135,9 @@ def test_the_profile_has_the_least_of_each_piece() -> None:
     )
     profile = clearance_profile(ROUTE, track)
     # Pieces of 600 / STATIONS = 4 m.
-    assert STATIONS == 150
+    assert STATION_COUNT == 150
     assert (profile[0], profile[37], profile[149]) == (8.0, 7.0, 6.0)
-    assert np.isnan(profile).sum() == STATIONS - 3
+    assert np.isnan(profile).sum() == STATION_COUNT - 3
 
 
 def test_crossings_are_right_of_and_above() -> None:
@@ -184,7 +184,7 @@ def test_a_flight_is_that_of_fly_in_the_same_wind(base: CampaignBase, tmp_path: 
     assert speed != own.speed
     assert (row.outcome == "flyable") is flown.verdict.flyable
     assert row.duration == float(flown.track.time[-1])
-    assert dict(row.margins) == dict(least_margins(flown.verdict.findings))
+    assert dict(row.margins) == dict(find_minimum_margins(flown.verdict.findings))
     assert len(row.margins) > 5
 
 
@@ -211,31 +211,31 @@ def test_the_draw_shows_in_the_flight(base: CampaignBase) -> None:
 
 def test_a_flight_that_failed_nothing_but_is_not_whole_names_completion() -> None:
     verdict = Verdict((), flyable=False, complete=False, lines=("x",), level="flown")
-    assert failed_findings(verdict) == (("completion", Place("flight")),)
+    assert list_failed_findings(verdict) == (("completion", Place("flight")),)
     finding = make_finding("turn", Place("waypoint", 1), ok=False, reason="x")
-    assert failed_findings(replace(verdict, findings=(finding,))) == (("turn", Place("waypoint", 1)),)
+    assert list_failed_findings(replace(verdict, findings=(finding,))) == (("turn", Place("waypoint", 1)),)
 
 
 def test_a_way_from_the_ground_that_is_left_open_counts_for_no_flight() -> None:
     ways = [make_finding("climbout", Place("waypoint", 0), ok=None, reason="x", check=check) for check in CHECKS]
     verdict = Verdict((ways[0],), flyable=False, complete=True, lines=("x",), level="flown", unjudged="x")
     assert verdict.flies
-    assert failed_findings(verdict) == ()
+    assert list_failed_findings(verdict) == ()
     for other in (
         replace(verdict, findings=tuple(ways)),
         replace(verdict, findings=(ways[0], make_finding("turn", Place("waypoint", 1), ok=False, reason="x"))),
         replace(verdict, complete=False),
     ):
         assert not other.flies
-        assert failed_findings(other)
+        assert list_failed_findings(other)
 
 
 def test_a_lost_flight_keeps_its_draw(base: CampaignBase) -> None:
-    assert lost_row(base, 4, "died").draw == fly_one(base, 4).draw
+    assert make_lost_row(base, 4, "died").draw == fly_one(base, 4).draw
 
 
 @pytest.mark.parametrize(("corridor", "energy"), [(-6.0, -25.0), (-6.0, -35.0), (6.0, 25.0), (6.0, 35.0)])
 def test_ten_metres_of_a_corridor_are_as_far_as_50_wh(base: CampaignBase, corridor: float, energy: float) -> None:
     findings = (finding("corridor", corridor, ok=corridor > 0.0), finding("energy", energy, ok=energy > 0.0))
-    row = replace(lost_row(base, 0, ""), margins=least_margins(findings))
+    row = replace(make_lost_row(base, 0, ""), margins=find_minimum_margins(findings))
     assert row.closeness == pytest.approx(min(corridor / 10.0, energy / 50.0))

@@ -17,8 +17,8 @@ import pytest
 
 from planfly.campaigns import fly_campaign as fly_campaign_module
 from planfly.campaigns.campaign_base import CampaignBase, GivenWind
-from planfly.campaigns.flight_requests import LOST, FlightRequest, FlyOne
-from planfly.campaigns.flight_row import FlightRow, fly_one, lost_row
+from planfly.campaigns.flight_requests import LOST_REASON, FlightRequest, FlyOne
+from planfly.campaigns.flight_row import FlightRow, fly_one, make_lost_row
 from planfly.campaigns.fly_campaign import (
     _FlightTally,
     _fly_remaining,
@@ -28,8 +28,8 @@ from planfly.campaigns.fly_campaign import (
     resumed_goal,
 )
 from planfly.campaigns.statistics.decision import Estimate, Estimator, Goal, Tally, lower_bound
-from planfly.campaigns.summary import summarise
-from planfly.campaigns.tables import DATABASE, StoreError, read_stored_settings, read_table
+from planfly.campaigns.summary import summarise_campaign
+from planfly.campaigns.tables import CAMPAIGN_DATABASE, StoreError, read_stored_settings, read_table
 from planfly.campaigns.worker_pool import WorkerPool, Workers
 from tests.planfly.campaigns.kills import finish_client, kill_while_it_flies, start_client, workers_killed
 from tests.planfly.campaigns.made_campaigns import (
@@ -47,7 +47,7 @@ pytestmark = pytest.mark.filterwarnings("default")
 
 def flown(base: CampaignBase, goal: Goal, folder: Path, workers: Workers, fly: FlyOne = made_flight) -> Estimate:
     folder.mkdir(exist_ok=True)
-    resume = (folder / DATABASE).exists()
+    resume = (folder / CAMPAIGN_DATABASE).exists()
     with open_store(base, goal, folder, resume=resume) as store:
         return fly_campaign(base, goal, workers, store, fly=fly)
 
@@ -56,7 +56,7 @@ def expected(base: CampaignBase, folder: Path, count: int, fly: FlyOne = made_fl
     """The table as one process writes it, flight after flight."""
     folder.mkdir()
     keep(base, folder, range(count), fly)
-    return table(folder / DATABASE)
+    return table(folder / CAMPAIGN_DATABASE)
 
 
 def keep(base: CampaignBase, folder: Path, flights: Iterable[int], fly: FlyOne = made_flight) -> None:
@@ -76,7 +76,7 @@ def test_it_decides_in_the_order_of_indices_whoever_was_quicker(order: int) -> N
     for index in shuffled:
         book.add(index, "flyable")
     # 59 flights without a failure show 0.95; those beyond are not looked at.
-    assert book.decided
+    assert book.is_decided
     assert book.tally == Tally(59, 0)
     assert book.next_request() is None
 
@@ -115,11 +115,11 @@ def test_the_table_is_the_same_for_any_workers_and_after_a_stop(base: CampaignBa
     goal, want = Goal(None, False, count), expected(base, tmp_path / "one", count)
     for workers in (1, 2, 4) if SOAK else ():
         flown(base, goal, tmp_path / f"w{workers}", Workers(workers))
-        assert table(tmp_path / f"w{workers}" / DATABASE) == want
+        assert table(tmp_path / f"w{workers}" / CAMPAIGN_DATABASE) == want
     # Part of it first, with a gap, as one who was stopped leaves it.
     keep(base, tmp_path / "part", (0, 1, 2, 5, 9))
     flown(base, goal, tmp_path / "part", Workers(2))
-    assert table(tmp_path / "part" / DATABASE) == want
+    assert table(tmp_path / "part" / CAMPAIGN_DATABASE) == want
 
 
 def test_a_campaign_that_is_gone_on_with_keeps_its_goal(base: CampaignBase, tmp_path: Path) -> None:
@@ -153,12 +153,12 @@ def test_fewer_flights_than_were_flown_are_refused_and_none_is_lost(base: Campai
     with open_store(base, Goal(None, False, 5), tmp_path, resume=False) as store:
         for k in range(5):
             store.add(made_flight(base, k, None))
-    before = table(tmp_path / DATABASE)
+    before = table(tmp_path / CAMPAIGN_DATABASE)
     with pytest.raises(StoreError, match="flights 4: 5 have been flown there"):
         open_store(base, Goal(None, False, 4), tmp_path, resume=True)
-    assert table(tmp_path / DATABASE) == before
+    assert table(tmp_path / CAMPAIGN_DATABASE) == before
     # Nor are the refused question's settings kept.
-    assert read_stored_settings(tmp_path / DATABASE)["flights"] == 5
+    assert read_stored_settings(tmp_path / CAMPAIGN_DATABASE)["flights"] == 5
     assert resumed_goal(None, tmp_path) == Goal(None, False, 5)
     with open_store(base, Goal(None, False, 5), tmp_path, resume=True) as store:
         assert store.tally().flown == 5
@@ -170,13 +170,13 @@ def test_real_flights_are_the_same_on_any_workers(base: CampaignBase, tmp_path: 
     for workers in (1, 2, 4):
         keep(base, tmp_path / f"w{workers}", (1, 7)[: workers - 1], fly_one)
         flown(base, goal, tmp_path / f"w{workers}", Workers(workers), fly_one)
-        assert table(tmp_path / f"w{workers}" / DATABASE) == want
+        assert table(tmp_path / f"w{workers}" / CAMPAIGN_DATABASE) == want
     note("campaign: real flights on 1, 2 and 4 workers", flights=20, other=0)
 
 
 def lost_fifth(base: CampaignBase, index: int, wind: GivenWind | None = None) -> FlightRow:
     """Make a flight; flight 5 is one that a pool has given up."""
-    return lost_row(base, 5, LOST) if index == 5 else made_flight(base, index, wind)
+    return make_lost_row(base, 5, LOST_REASON) if index == 5 else made_flight(base, index, wind)
 
 
 def test_a_deadly_flight_is_named_and_counts_against(
@@ -187,10 +187,10 @@ def test_a_deadly_flight_is_named_and_counts_against(
     goal, count = Goal(None, False, 12), 12
     found = flown(base, goal, tmp_path, Workers(2), lost_fifth)
     others = [row for row in expected(base, tmp_path / "one", count) if row[0] != 5]
-    assert [row for row in table(tmp_path / DATABASE) if row[0] != 5] == others
+    assert [row for row in table(tmp_path / CAMPAIGN_DATABASE) if row[0] != 5] == others
     with open_store(base, goal, tmp_path, resume=True) as store:
-        assert store.flight(5) == lost_row(base, 5, LOST)
-        assert summarise(base, goal, found, store).lost == (5,)
+        assert store.flight(5) == make_lost_row(base, 5, LOST_REASON)
+        assert summarise_campaign(base, goal, found, store).lost == (5,)
     flyable = found.tally.flyable
     assert found.tally == Tally(flyable, 11 - flyable, 1)
     assert found.lower == lower_bound(Tally(flyable, 12 - flyable))
@@ -201,7 +201,7 @@ def test_prove_keeps_the_flights_that_decide_and_no_more(base: CampaignBase, tmp
     goal = Goal(0.9, True, 500)
     found = flown(base, goal, tmp_path / "p", Workers(2), all_fly)
     assert found.answer == "reached"
-    assert table(tmp_path / "p" / DATABASE) == expected(base, tmp_path / "one", 29, all_fly)
+    assert table(tmp_path / "p" / CAMPAIGN_DATABASE) == expected(base, tmp_path / "one", 29, all_fly)
 
 
 @pytest.mark.skipif(not SOAK, reason="stopped for twelve seconds: in make soak")
@@ -219,8 +219,8 @@ def test_a_sleeping_laptop_costs_no_worker(tmp_path: Path) -> None:
     os.killpg(client.pid, signal.SIGCONT)
     client.communicate(timeout=120.0)
     assert client.returncode == 0
-    assert table(folder / DATABASE) == expected(short_base(folder), tmp_path / "one", count)
-    assert len(set(read_table(folder / DATABASE)["worker"])) == 2
+    assert table(folder / CAMPAIGN_DATABASE) == expected(short_base(folder), tmp_path / "one", count)
+    assert len(set(read_table(folder / CAMPAIGN_DATABASE)["worker"])) == 2
     note("campaign: stopped for 12 s", flights=count, workers_lost=0)
 
 
@@ -236,10 +236,10 @@ def test_a_killed_client_loses_no_flight(tmp_path: Path) -> None:
         # None that was written is flown again.
         assert not said & written
         written |= said
-        assert written <= {row[0] for row in table(folder / DATABASE)}
+        assert written <= {row[0] for row in table(folder / CAMPAIGN_DATABASE)}
     last = finish_client("campaign", folder, count)
     assert not last & written
-    assert table(folder / DATABASE) == expected(short_base(folder), tmp_path / "one", count)
+    assert table(folder / CAMPAIGN_DATABASE) == expected(short_base(folder), tmp_path / "one", count)
     note("campaign: kill -9 of its client", kills=kills, flights=count, lost=0)
 
 
@@ -251,7 +251,7 @@ def test_a_killed_worker_loses_no_flight(base: CampaignBase, tmp_path: Path) -> 
     with open_store(base, goal, tmp_path, resume=False) as store, workers_killed(kills, begun, pause=pause) as killed:
         fly_campaign(base, goal, Workers(2), store, lambda done, *_: begun.set() if done else None, fly=slow_flight)
     assert len(killed) == kills
-    assert table(tmp_path / DATABASE) == expected(base, tmp_path / "one", count)
+    assert table(tmp_path / CAMPAIGN_DATABASE) == expected(base, tmp_path / "one", count)
     note("campaign: kill -9 of its workers", kills=kills, flights=count, lost=0)
 
 
@@ -294,7 +294,7 @@ def test_a_real_scheduler_with_a_worker_killed_gives_the_same_table(
         keep(base, tmp_path / name, flights)
         with open_store(base, goal, tmp_path / name, resume=True) as store:
             fly_campaign(base, goal, Workers(None, address), store, kill_one, fly=slow_flight)
-        assert table(tmp_path / name / DATABASE) == want
-        rows += read_table(tmp_path / name / DATABASE)["worker"].tolist()
+        assert table(tmp_path / name / CAMPAIGN_DATABASE) == want
+        rows += read_table(tmp_path / name / CAMPAIGN_DATABASE)["worker"].tolist()
     assert worker.poll() is not None
     assert {row.partition("://")[0] for row in rows if "://" in row} == {"tcp"}

@@ -14,8 +14,8 @@ import pytest
 
 from planfly.campaigns import local_pool
 from planfly.campaigns.campaign_base import CampaignBase, GivenWind
-from planfly.campaigns.flight_requests import LOST, FlightRequest, FlyOne
-from planfly.campaigns.flight_row import FlightRow, lost_row
+from planfly.campaigns.flight_requests import LOST_REASON, FlightRequest, FlyOne
+from planfly.campaigns.flight_row import FlightRow, make_lost_row
 from planfly.campaigns.local_pool import MAX_FAILED_STARTS, LocalPool
 from planfly.campaigns.tables import is_same_flight
 from tests.planfly.campaigns.kills import spawned_processes, start_client
@@ -125,7 +125,7 @@ def test_a_flight_that_kills_its_process_is_flown_twice_again_and_then_lost_and_
     with pool(1, base, fly_killed) as made:
         rows = {one.request.index: one.row for one in made.fly(requests(8))}
     assert sorted(path.name for path in tmp_path.iterdir()) == ["3-0", "4-0", "4-1", "4-2"]
-    assert rows.pop(4) == lost_row(base, 4, LOST)
+    assert rows.pop(4) == make_lost_row(base, 4, LOST_REASON)
     assert sorted(rows) == [0, 1, 2, 3, 5, 6, 7]
     assert all(is_same_flight(row, made_flight(base, k)) for k, row in rows.items())
 

@@ -11,7 +11,7 @@ from logs.views.drawing import png_bytes
 from planfly.campaigns.pictures import (
     MAX_BARS,
     Bar,
-    Spoke,
+    ChartDirection,
     covariance_ellipse,
     draw_clearance_fan,
     draw_crossings,
@@ -19,8 +19,8 @@ from planfly.campaigns.pictures import (
     draw_go_no_go,
     draw_probability,
     draw_tornado,
+    group_by_speed,
     narrow_figure,
-    speed_bins,
 )
 from planfly.campaigns.statistics.decision import wilson
 
@@ -43,14 +43,14 @@ def test_none_is_said_and_many_are_cut() -> None:
 
 
 def test_flights_are_put_together_by_metres_a_second() -> None:
-    bins = speed_bins(np.array([0.0, 0.99, 1.0, 5.5, 5.6]), np.array([True, False, True, False, False]))
+    bins = group_by_speed(np.array([0.0, 0.99, 1.0, 5.5, 5.6]), np.array([True, False, True, False, False]))
     assert [(one.low, one.high, one.flights, one.flyable) for one in bins] == [(0, 1, 2, 1), (1, 2, 1, 1), (5, 6, 2, 0)]
     assert bins[0].interval == wilson(1, 2)
-    assert speed_bins(np.zeros(0), np.zeros(0, dtype=bool)) == []
+    assert group_by_speed(np.zeros(0), np.zeros(0, dtype=bool)) == []
 
 
 def test_lines_lie_at_the_shares() -> None:
-    bins = speed_bins(np.array([0.2, 0.7, 2.5]), np.array([True, False, True]))
+    bins = group_by_speed(np.array([0.2, 0.7, 2.5]), np.array([True, False, True]))
     figure = draw_probability(bins, 0.9)
     heights = {float(line.get_ydata()[0]) for line in figure.axes[0].lines}
     assert heights == {0.5, 1.0, 0.9}
@@ -127,7 +127,7 @@ def test_ellipses_are_whole() -> None:
 # ----------------------------------------------------------------------
 # The go/no-go chart.
 
-SPOKES = [Spoke(90.0 * k, 8.0 + k, 7.5 + k, 8.5 + k, False, ((6.0, 3, 3), (9.0, 3, 1))) for k in range(4)]
+SPOKES = [ChartDirection(90.0 * k, 8.0 + k, 7.5 + k, 8.5 + k, False, ((6.0, 3, 3), (9.0, 3, 1))) for k in range(4)]
 
 
 def test_the_boundary_passes_through_each_direction() -> None:
@@ -179,7 +179,7 @@ PICTURES = {
     "failures": lambda: draw_failures([("photo lines", f"waypoint {k} (item {k + 2})", 1200) for k in range(14)], 1200),
     "none failed": lambda: draw_failures([], 7),
     "probability": lambda: draw_probability(
-        speed_bins(RANDOM.uniform(0.0, 9.0, 80), RANDOM.uniform(size=80) > 0.5), 0.9
+        group_by_speed(RANDOM.uniform(0.0, 9.0, 80), RANDOM.uniform(size=80) > 0.5), 0.9
     ),
     "tornado": lambda: draw_tornado([Bar("terrain height", 0.6, -0.7), Bar("drag", 0.2, 0.1)], "loss of control"),
     "fan": lambda: draw_clearance_fan(RANDOM.uniform(60.0, 90.0, (40, 50)), FAILED, np.full(50, 100.0), 4000.0, 60.0),

@@ -12,24 +12,24 @@ from logs.verdict.places import Place
 from logs.views.report.page import page_template
 from planfly.campaigns.campaign_base import CampaignBase
 from planfly.campaigns.failure_counts import RuleFailures
-from planfly.campaigns.find_winds import FEWEST, CalmFailures, WindsFound, WindsGoal
+from planfly.campaigns.find_winds import MIN_FLIGHTS_PER_DIRECTION, CalmFailures, WindsFound, WindsGoal
 from planfly.campaigns.flight_row import fly_one
 from planfly.campaigns.fly_campaign import open_store
 from planfly.campaigns.report import (
     OutputDirectory,
+    answer_state,
     clear_campaign,
     finish_campaign,
     fly_row_again,
-    spokes,
+    make_spokes,
     wind_lines,
-    winds_state,
     write_files,
     write_winds,
 )
 from planfly.campaigns.statistics.decision import Estimator, Goal
 from planfly.campaigns.statistics.wind_boundary import WindBoundary
 from planfly.campaigns.summary import campaign_lines
-from planfly.campaigns.tables import DATABASE, StoreError
+from planfly.campaigns.tables import CAMPAIGN_DATABASE, StoreError
 from tests.planfly.campaigns.made_campaigns import all_fly, made_flight
 from tests.planfly.campaigns.made_report import made_report
 from world.errors import MissionError, PlanflyError
@@ -61,13 +61,13 @@ def test_a_flight_that_comes_out_otherwise_is_told(base: CampaignBase, tmp_path:
 
 
 def asked(folder: Path, *, resume: bool = False, overwrite: bool = False) -> OutputDirectory:
-    return OutputDirectory(folder, DATABASE, resume, overwrite)
+    return OutputDirectory(folder, CAMPAIGN_DATABASE, resume, overwrite)
 
 
 @pytest.mark.parametrize(
     ("lies_there", "words"),
     [
-        (DATABASE, "holds a campaign; resume=True continues it, overwrite=True replaces it"),
+        (CAMPAIGN_DATABASE, "holds a campaign; resume=True continues it, overwrite=True replaces it"),
         ("winds.sqlite", "holds another campaign; overwrite=True replaces it"),
         ("mine.txt", "exists and is not empty; overwrite=True replaces its results"),
     ],
@@ -87,16 +87,16 @@ def test_a_mission_that_cannot_be_opened_leaves_what_lies_there(tmp_path: Path) 
     def not_opened(_planned: Path | None) -> CampaignBase:
         raise MissionError("x")
 
-    (tmp_path / DATABASE).write_bytes(b"")
+    (tmp_path / CAMPAIGN_DATABASE).write_bytes(b"")
     with pytest.raises(MissionError):
         asked(tmp_path, overwrite=True).open(not_opened)
-    assert (tmp_path / DATABASE).exists()
+    assert (tmp_path / CAMPAIGN_DATABASE).exists()
 
 
 def test_only_a_campaign_is_gone_on_with_and_by_its_own_plan(base: CampaignBase, tmp_path: Path) -> None:
     with pytest.raises(PlanflyError, match=r"campaign.sqlite: no campaign there to continue"):
         asked(tmp_path, resume=True).open(lambda _: base)
-    (tmp_path / DATABASE).write_bytes(b"")
+    (tmp_path / CAMPAIGN_DATABASE).write_bytes(b"")
     planned: list[Path | None] = []
 
     def noted(path: Path | None) -> CampaignBase:
@@ -105,9 +105,9 @@ def test_only_a_campaign_is_gone_on_with_and_by_its_own_plan(base: CampaignBase,
 
     asked(tmp_path, resume=True).open(noted)
     assert planned == [tmp_path / "plan.json"]
-    assert (tmp_path / DATABASE).exists()
+    assert (tmp_path / CAMPAIGN_DATABASE).exists()
     with pytest.raises(PlanflyError, match="is a file; expected a folder"):
-        asked(tmp_path / DATABASE).open(lambda _: base)
+        asked(tmp_path / CAMPAIGN_DATABASE).open(lambda _: base)
 
 
 # ----------------------------------------------------------------------
@@ -122,7 +122,7 @@ FOUND = WindsFound(
 
 
 def test_flights_are_counted_by_wind() -> None:
-    first = spokes(FOUND)[0]
+    first = make_spokes(FOUND)[0]
     assert (first.from_deg, first.flights) == (0.0, ((8.0, 2, 1),))
     assert wind_lines(FOUND)[0] == (
         "flies with P >= 0.9, by best estimate, in wind up to 7.0 m/s from 0° (the lowest; 6.5 to 7.5 m/s at 95 %),"
@@ -154,12 +154,12 @@ def test_rules_that_fail_in_calm_air_are_named_with_their_places() -> None:
 
 def test_the_page_is_red_only_where_flights_show_that_calm_air_is_missed() -> None:
     """Of 4 flights none that flies shows P < 0.9 (at most 0.49 at 95 %), one of which fails does not."""
-    settled = tuple((k, 5.0, True) for k in range(4) for _ in range(FEWEST))
+    settled = tuple((k, 5.0, True) for k in range(4) for _ in range(MIN_FLIGHTS_PER_DIRECTION))
     narrow = tuple(WindBoundary(5.0, 4.9, 5.1, False) for _ in range(4))
-    assert winds_state(FOUND) == "undecided"
-    assert winds_state(replace(FOUND, flights=settled, boundaries=narrow)) == ""
+    assert answer_state(FOUND) == "undecided"
+    assert answer_state(replace(FOUND, flights=settled, boundaries=narrow)) == ""
     for failed, state in ((4, "missed"), (1, "undecided"), (0, "undecided")):
-        assert winds_state(replace(FOUND, calm=CalmFailures(0.0, 4, failed, ()))) == state
+        assert answer_state(replace(FOUND, calm=CalmFailures(0.0, 4, failed, ()))) == state
     page = page_template("winds.html", "planfly.campaigns").render(
         name="x", colours="", picture="", answer="undecided", lines=["not settled"], rows=[], command="x"
     )
@@ -183,7 +183,7 @@ def test_what_flights_show_by_themselves_where_none_failed() -> None:
 def test_directions_for_which_flights_did_not_last_are_said() -> None:
     assert any("not settled: 4 of 4 directions" in line for line in wind_lines(FOUND))
     boundary = WindBoundary(7.0, 6.8, 7.3, False)
-    settled = WindsFound(FOUND.goal, (boundary,), tuple((0, 7.0, True) for _ in range(FEWEST)))
+    settled = WindsFound(FOUND.goal, (boundary,), tuple((0, 7.0, True) for _ in range(MIN_FLIGHTS_PER_DIRECTION)))
     assert not any("not settled" in line for line in wind_lines(settled))
     fewer = WindsFound(FOUND.goal, (boundary,), settled.flights[1:])
     assert any("not settled: 1 of 1" in line for line in wind_lines(fewer))

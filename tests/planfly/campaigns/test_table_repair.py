@@ -15,20 +15,20 @@ import numpy as np
 import pytest
 
 from planfly.campaigns.campaign_base import CampaignBase
-from planfly.campaigns.flight_row import FlightRow, fly_one, lost_row
+from planfly.campaigns.flight_row import FlightRow, fly_one, make_lost_row
 from planfly.campaigns.fly_campaign import fly_campaign, open_store
 from planfly.campaigns.statistics.decision import Goal, Tally
-from planfly.campaigns.table_repair import Examined, checksum, examine, stored_value
+from planfly.campaigns.table_repair import Examination, checksum, examine_table, stored_value
 from planfly.campaigns.tables import (
+    CAMPAIGN_DATABASE,
     CAMPAIGN_KIND,
-    DATABASE,
     WINDS_KIND,
     RequestedFlight,
     Store,
     StoreError,
     WindsStore,
     count_flights,
-    read_shapes,
+    read_path_arrays,
     read_stored_settings,
     read_table,
 )
@@ -65,7 +65,7 @@ def campaign_of(folder: Path, rows: list[FlightRow]) -> Kept:
         assert store.texts("ended") == [row.ended for row in found.values()]
         assert store.has_track() == [bool(row.clearance) for row in found.values()]
         assert store.blobs("clearance", 99) == [row.clearance for row in found.values() if row.clearance]
-        assert len(store.closest(FLIGHTS)) == len(found)
+        assert len(store.worst_flights(FLIGHTS)) == len(found)
         return found
 
     path = folder / "campaign.sqlite"
@@ -83,14 +83,16 @@ def search_of(folder: Path, rows: list[FlightRow]) -> Kept:
     with opened(path, resume=False) as store:
         for k, row in enumerate(rows):
             store.add(RequestedFlight(k, k % 16, 0.1 * k, row.draw.index), row)
-        return Kept(path, opened, WindsStore.known, store.known())
+        return Kept(path, opened, WindsStore.stored_flights, store.stored_flights())
 
 
 @pytest.fixture(scope="module", params=[campaign_of, search_of])
 def kept(request: pytest.FixtureRequest, base: CampaignBase, tmp_path_factory: pytest.TempPathFactory) -> Kept:
     real = [fly_one(base, k) for k in range(4)]
     made = [made_flight(base, k) for k in range(4, FLIGHTS - 1)]
-    made_kept: Kept = request.param(tmp_path_factory.mktemp("whole"), [*real, *made, lost_row(base, 39, "lost: x")])
+    made_kept: Kept = request.param(
+        tmp_path_factory.mktemp("whole"), [*real, *made, make_lost_row(base, 39, "lost: x")]
+    )
     return made_kept
 
 
@@ -108,7 +110,7 @@ def gone_on_with(kept: Kept, path: Path) -> int | None:
     assert count_flights(path) == len(left)
     assert read_stored_settings(path)["flights"] == FLIGHTS
     if isinstance(store, Store):
-        assert {len(values) for values in (*read_table(path).values(), *read_shapes(path).values())} == {len(left)}
+        assert {len(values) for values in (*read_table(path).values(), *read_path_arrays(path).values())} == {len(left)}
     return len(left)
 
 
@@ -118,13 +120,13 @@ def test_changed_bytes_leave_rows_that_are_whole(
     kept: Kept, tmp_path: Path, first: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     whole = kept.path.read_bytes()
-    examined: list[Examined] = []
+    examined: list[Examination] = []
 
-    def examine_and_keep(*given: Any) -> Examined:
-        examined.append(examine(*given))
+    def examine_and_keep(*given: Any) -> Examination:
+        examined.append(examine_table(*given))
         return examined[-1]
 
-    monkeypatch.setattr("planfly.campaigns.tables.examine", examine_and_keep)
+    monkeypatch.setattr("planfly.campaigns.tables.examine_table", examine_and_keep)
     left, refused = [], 0
     for seed in range(first, first + 20):
         rng, data = random.Random(seed), bytearray(whole)
@@ -136,10 +138,10 @@ def test_changed_bytes_leave_rows_that_are_whole(
         path.write_bytes(data)
         examined.clear()
         found = gone_on_with(kept, path)
-        if examined and not examined[0].sound:
+        if examined and not examined[0].is_sound:
             # Each flight that is gone is named, but for those behind the last that is known of.
-            last = examined[0].after if examined[0].after is not None else FLIGHTS - 1
-            assert examined[0].damaged == sorted(set(range(last + 1)) - set(examined[0].whole)), seed
+            last = examined[0].last_known if examined[0].last_known is not None else FLIGHTS - 1
+            assert examined[0].damaged == sorted(set(range(last + 1)) - set(examined[0].undamaged)), seed
         if found is None:
             refused += 1
         else:
@@ -204,7 +206,7 @@ def test_what_is_damaged_is_named_and_flown_again(base: CampaignBase, tmp_path: 
         with open_store(base, goal, tmp_path / folder, resume=False) as store:
             for k in range(12):
                 store.add(made_flight(base, k))
-    path, told = tmp_path / "one" / DATABASE, list[str]()
+    path, told = tmp_path / "one" / CAMPAIGN_DATABASE, list[str]()
     with closing(sqlite3.connect(path, isolation_level=None)) as connection:
         connection.execute("UPDATE flights SET outcome = 'lost', failed = '[]' WHERE flight = 3")
         connection.execute("UPDATE flights SET margin_clearance = 99.0 WHERE flight = 7")
@@ -218,7 +220,7 @@ def test_what_is_damaged_is_named_and_flown_again(base: CampaignBase, tmp_path: 
     with store:
         assert store.tally().flown == 9
         assert fly_campaign(base, goal, workers, store, fly=made_flight).tally.flown == 12
-    assert table(path) == table(tmp_path / "two" / DATABASE)
+    assert table(path) == table(tmp_path / "two" / CAMPAIGN_DATABASE)
 
 
 def test_a_checksum_is_of_values_as_sqlite_gives_them_back() -> None:
@@ -235,14 +237,14 @@ def test_a_checksum_is_of_values_as_sqlite_gives_them_back() -> None:
 
 
 def test_many_damaged_flights_are_counted() -> None:
-    assert Examined([3], [], sound=False).text().startswith("is damaged: 1 flights are intact")
+    assert Examination([3], [], sound=False).text().startswith("is damaged: 1 flights are intact")
     assert (
-        Examined([0, 2], [1], sound=False, after=2)
+        Examination([0, 2], [1], sound=False, after=2)
         .text()
         .startswith(
             "flight 1 is damaged and was taken out, and any after flight 2 were lost: 2 flights are intact and stay;"
         )
     )
-    found = Examined([], [], sound=False, after=-1).text()
+    found = Examination([], [], sound=False, after=-1).text()
     assert found.startswith("is damaged, and no flight is found: 0 flights are intact and stay;")
-    assert Examined([], list(range(20))).text().startswith("flights 0, 1, 2, 3, 4, 5, 6, 7 and 12 more are damaged")
+    assert Examination([], list(range(20))).text().startswith("flights 0, 1, 2, 3, 4, 5, 6, 7 and 12 more are damaged")

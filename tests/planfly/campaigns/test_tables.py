@@ -12,18 +12,18 @@ import pytest
 
 from logs.verdict.places import Place
 from planfly.campaigns.campaign_base import CampaignBase, GivenWind
-from planfly.campaigns.flight_row import STATIONS, FlightRow, fly_one, lost_row
+from planfly.campaigns.flight_row import STATION_COUNT, FlightRow, fly_one, make_lost_row
 from planfly.campaigns.statistics.decision import Tally
 from planfly.campaigns.tables import (
-    COLUMNS,
-    FIXED,
-    SHAPES,
+    ARRAY_COLUMNS,
+    COLUMN_NAMES,
+    FIXED_SETTINGS,
     FlownFlight,
     RequestedFlight,
     Store,
     StoreError,
     WindsStore,
-    read_shapes,
+    read_path_arrays,
     read_table,
 )
 from tests.planfly.campaigns.made_campaigns import all_fly, made_flight, table
@@ -31,7 +31,7 @@ from tests.soak import SOAK, note
 
 
 def test_rows_come_back_as_they_were_in_order_of_index(base: CampaignBase, tmp_path: Path) -> None:
-    real, made, lost = replace(fly_one(base, 2), narrow=()), made_flight(base, 0), lost_row(base, 1, "died")
+    real, made, lost = replace(fly_one(base, 2), narrow=()), made_flight(base, 0), make_lost_row(base, 1, "died")
     with Store(tmp_path / "c.sqlite", "a", {}, resume=False) as store:
         for row in (real, made, lost):
             store.add(row)
@@ -43,10 +43,10 @@ def test_rows_come_back_as_they_were_in_order_of_index(base: CampaignBase, tmp_p
         assert store.tally() == Tally(1, 1, 1)
         assert store.outcomes()[1] == "lost"
         # The lost first, then the one that failed.
-        assert [row.draw.index for row in store.closest(3)] == [1, 0, 2]
+        assert [row.draw.index for row in store.worst_flights(3)] == [1, 0, 2]
         assert store.has_track() == [False, False, True]
         assert store.column("mass").tolist() == [row.draw.values["mass"] for row in rows]
-        store.drop_from(1)
+        store.delete_flights_from(1)
         assert list(store.outcomes()) == [0]
         with pytest.raises(StoreError, match="UNIQUE"):
             store.add(made)
@@ -70,8 +70,8 @@ def test_what_was_asked_for_comes_back_in_order(base: CampaignBase, tmp_path: Pa
         store.add(later, all_fly(base, 2))
         store.add(RequestedFlight(8, 3, 15.0, 3), bad)
         # The draw of another direction's flight: a number of its own.
-        store.add(first, lost_row(base, 2, "lost: x"))
-        assert list(store.known().items()) == [
+        store.add(first, make_lost_row(base, 2, "lost: x"))
+        assert list(store.stored_flights().items()) == [
             (2, (first, FlownFlight("lost", ()))),
             (7, (later, FlownFlight("flyable", ()))),
             (
@@ -94,7 +94,7 @@ def test_what_was_asked_for_comes_back_in_order(base: CampaignBase, tmp_path: Pa
     ],
 )
 def test_another_question_is_refused_by_name(tmp_path: Path, name: str, value: float, words: str) -> None:
-    assert name in FIXED
+    assert name in FIXED_SETTINGS
     opened(tmp_path / "w.sqlite", resume=False).__exit__(None, None, None)
     with pytest.raises(StoreError, match=words):
         opened(tmp_path / "w.sqlite", **{name: value})
@@ -115,11 +115,11 @@ def kept(path: Path, rows: list[FlightRow]) -> Path:
 
 
 def test_numbers_are_arrays_and_words_are_words(base: CampaignBase, tmp_path: Path) -> None:
-    rows = [fly_one(base, 0), made_flight(base, 1), lost_row(base, 2, "lost: x")]
+    rows = [fly_one(base, 0), made_flight(base, 1), make_lost_row(base, 2, "lost: x")]
     # Characters that an address of a file would take for something else.
     (tmp_path / "50 % ?#").mkdir()
     table = read_table(kept(tmp_path / "50 % ?#" / "c.sqlite", rows))
-    assert tuple(table) == tuple(name for name in COLUMNS if name not in SHAPES)
+    assert tuple(table) == tuple(name for name in COLUMN_NAMES if name not in ARRAY_COLUMNS)
     assert table["flight"].tolist() == [0, 1, 2]
     assert table["mass"].tolist() == [row.draw.values["mass"] for row in rows]
     assert {table[name].dtype for name in ("flight", "seed")} == {np.dtype(np.int64)}
@@ -131,9 +131,9 @@ def test_numbers_are_arrays_and_words_are_words(base: CampaignBase, tmp_path: Pa
 
 def test_shapes_are_read_on_asking(base: CampaignBase, tmp_path: Path) -> None:
     real = fly_one(base, 0)
-    shapes = read_shapes(kept(tmp_path / "c.sqlite", [real, made_flight(base, 1)]))
+    shapes = read_path_arrays(kept(tmp_path / "c.sqlite", [real, made_flight(base, 1)]))
     clearance, crossings = shapes["clearance"], shapes["crossings"]
-    assert clearance.shape == (2, STATIONS)
+    assert clearance.shape == (2, STATION_COUNT)
     assert clearance[0].tobytes() == real.clearance
     assert crossings.shape[::2] == (2, 2)
     assert crossings[0].tobytes() == real.crossings
@@ -144,7 +144,7 @@ def test_shapes_are_read_on_asking(base: CampaignBase, tmp_path: Path) -> None:
 def test_flights_of_different_routes_have_their_shapes_in_one_array(base: CampaignBase, tmp_path: Path) -> None:
     """Wind decides how many stops a way back has: the shorter arrays end with NaN."""
     rows = [replace(made_flight(base, k), crossings=np.zeros((k, 2), np.float32).tobytes()) for k in (1, 3)]
-    crossings = read_shapes(kept(tmp_path / "c.sqlite", rows))["crossings"]
+    crossings = read_path_arrays(kept(tmp_path / "c.sqlite", rows))["crossings"]
     assert crossings.shape == (2, 3, 2)
     assert np.isnan(crossings).sum(axis=(1, 2)).tolist() == [4, 0]
 
@@ -152,7 +152,7 @@ def test_flights_of_different_routes_have_their_shapes_in_one_array(base: Campai
 def test_a_table_without_a_flight_has_columns_without_one(tmp_path: Path) -> None:
     path = kept(tmp_path / "c.sqlite", [])
     assert {len(values) for values in read_table(path).values()} == {0}
-    assert {name: values.shape for name, values in read_shapes(path).items()} == {
+    assert {name: values.shape for name, values in read_path_arrays(path).items()} == {
         "clearance": (0, 0),
         "crossings": (0, 0, 2),
     }
@@ -169,7 +169,7 @@ def test_memory_is_that_of_the_numbers(base: CampaignBase, tmp_path: Path) -> No
     path = kept(tmp_path / "c.sqlite", [replace(fly_one(base, 0), worker="tcp://127.0.0.1:40123")])
     numbers = f"WITH RECURSIVE n(k) AS (SELECT 1 UNION ALL SELECT k + 1 FROM n WHERE k < {count - 1}) "
     with closing(sqlite3.connect(path, isolation_level=None)) as connection:
-        same = ", ".join((*COLUMNS[1:], "checksum"))
+        same = ", ".join((*COLUMN_NAMES[1:], "checksum"))
         connection.execute(f"INSERT INTO flights {numbers} SELECT k, {same} FROM n, flights")
     tracemalloc.start()
     table = read_table(path)

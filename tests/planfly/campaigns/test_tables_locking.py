@@ -12,7 +12,7 @@ import pytest
 
 from logs.verdict.rule_words import RULE_WORDS
 from planfly.campaigns.campaign_base import CampaignBase
-from planfly.campaigns.flight_row import FlightRow, fly_one, lost_row
+from planfly.campaigns.flight_row import FlightRow, fly_one, make_lost_row
 from planfly.campaigns.statistics.decision import Tally
 from planfly.campaigns.tables import (
     CAMPAIGN_KIND,
@@ -32,7 +32,7 @@ from tests.planfly.campaigns.made_campaigns import all_fly, made_flight, table
 
 
 def test_values_make_the_row_again(base: CampaignBase) -> None:
-    for row in (fly_one(base, 1), made_flight(base, 2), lost_row(base, 3, "lost: x")):
+    for row in (fly_one(base, 1), made_flight(base, 2), make_lost_row(base, 3, "lost: x")):
         values = row_values(row)
         assert tuple(values) == tuple(ROW_COLUMNS)
         # But for its narrow passes, which a search's table keeps for itself.

@@ -14,7 +14,7 @@ from planfly.campaigns.worker_pool import (
     FlightRate,
     SchedulerError,
     Workers,
-    checked_address,
+    check_scheduler_address,
     worker_pool,
 )
 from tests.planfly.campaigns.made_campaigns import made_flight, write_short
@@ -31,7 +31,7 @@ from world.interruption import Interrupted
     ],
 )
 def test_loopback_and_tls_are_let_in(address: str, whole: str) -> None:
-    assert checked_address(address) == whole
+    assert check_scheduler_address(address) == whole
 
 
 @pytest.mark.parametrize(
@@ -39,13 +39,13 @@ def test_loopback_and_tls_are_let_in(address: str, whole: str) -> None:
 )
 def test_plain_tcp_beyond_loopback_is_refused(address: str) -> None:
     with pytest.raises(SchedulerError, match="plain TCP beyond loopback"):
-        checked_address(address)
+        check_scheduler_address(address)
 
 
 @pytest.mark.parametrize("address", ["", "127.0.0.1", "ws://127.0.0.1:1", "tcp://:8786", "tcp://[", "tls://x"])
 def test_what_is_no_address_is_told(address: str) -> None:
     with pytest.raises(SchedulerError, match="expected"):
-        checked_address(address)
+        check_scheduler_address(address)
 
 
 @pytest.mark.filterwarnings("default")
@@ -94,7 +94,7 @@ def test_a_cluster_forgets_a_campaign_however_it_ends(
             # As dask does where one of the workers has just died.
             raise OSError("Stream is closed")
 
-    monkeypatch.setattr(dask_pool, "connect", lambda _: Client())
+    monkeypatch.setattr(dask_pool, "connect_client", lambda _: Client())
     with pytest.raises(type(error)), worker_pool(Workers(1, "tcp://127.0.0.1:8786"), base, made_flight):
         raise error
     assert told == [told[0], told[0], "closed"]

@@ -126,7 +126,7 @@ def test_a_planned_scenario_goes_on_with_its_plan(tmp_path: Path, scheduler: str
     plan = (out / "plan.json").read_bytes()
     main([*line, "--flights", "2", "--resume"])
     assert (out / "plan.json").read_bytes() == plan
-    base = open_campaign(str(scenario), default_dispersions(), {}, planned=out / "plan.json")
+    base = open_campaign(str(scenario), default_dispersions(), {}, plan_file=out / "plan.json")
     with open_store(base, Goal(0.5, False, 2), out, resume=True) as store:
         assert [row.draw.index for row in store.rows()] == [0, 1]
         assert all(is_same_flight(row, fly_one(base, row.draw.index)) for row in store.rows())

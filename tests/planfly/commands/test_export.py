@@ -12,7 +12,7 @@ from flight.autopilots.parameter_files import read_parameter_file
 from flight.autopilots.planfly.autopilot import PlanflyGuidance
 from flight.mission_files.formats import read_mission
 from logs.recording.reader import read_log
-from planfly.api.exporting import judged_parameters
+from planfly.api.exporting import judging_parameters_text
 from planfly.cli import main
 from planner.plan import plan_json
 from tests.mission_lines import a_plan
@@ -111,7 +111,7 @@ def test_the_parameters_that_a_plan_is_judged_with(plan_file: Path, tmp_path: Pa
 
 def test_planflys_own_guidance_has_none_of_these_parameters() -> None:
     with pytest.raises(MissionError, match=r"^a\.waypoints: .* has no parameters of take-off, landing and returns$"):
-        judged_parameters("a.waypoints", PlanflyGuidance())
+        judging_parameters_text("a.waypoints", PlanflyGuidance())
 
 
 @pytest.mark.parametrize("name", ["a.kmz", "a.json", "a"])

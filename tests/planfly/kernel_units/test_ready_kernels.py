@@ -9,7 +9,13 @@ import pytest
 
 from planfly.kernel_units import ready_kernels
 from planfly.kernel_units.ready_kernels import is_ready, run_unit
-from planfly.kernel_units.unit_kernels import FRONT_PLANNING, GLIDING, PLANNING_AND_FLYING, UNIT_KERNELS, kernels_of
+from planfly.kernel_units.unit_kernels import (
+    FRONT_PLANNING,
+    GLIDING,
+    PLANNING_AND_FLYING,
+    UNIT_KERNELS,
+    list_unit_kernels,
+)
 from world.compile_events import kernel_is_compiled
 from world.kernels import compiled
 
@@ -43,7 +49,7 @@ def test_units_call_what_is_counted_for_them() -> None:
         missed, said, called = json.loads(done.stdout)
     for unit, lines in said.items():
         assert sorted(lines) == sorted(f"ready {name}" for name in UNIT_KERNELS[unit]), unit
-    assert called == sorted(kernels_of((*PLANNING_AND_FLYING, *GLIDING, *FRONT_PLANNING)))
+    assert called == sorted(list_unit_kernels((*PLANNING_AND_FLYING, *GLIDING, *FRONT_PLANNING)))
 
 
 # ----------------------------------------------------------------------

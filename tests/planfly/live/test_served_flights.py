@@ -24,7 +24,7 @@ from logs.verdict.findings import Finding
 from logs.verdict.places import FLIGHT, DecidingParameter, Place
 from logs.verdict.verdict import Verdict
 from planfly.live import served_flights
-from planfly.live.served_flights import ServedFlights, ServeOptions, open_served, verdict_texts
+from planfly.live.served_flights import ServedFlights, ServeOptions, load_served_scenario, verdict_texts
 from tests.logs.made_flight import make_track
 from tests.planfly.conftest import FIELD
 from tests.setups import waypoint_mission
@@ -63,7 +63,7 @@ def options(tmp_path: Path) -> ServeOptions:
 
 
 def mission(options: ServeOptions, *points: tuple[float, float, float]) -> Mission:
-    origin = open_served(options).scenario.origin
+    origin = load_served_scenario(options).scenario.origin
     return waypoint_mission(np.array(points), np.full(len(points) - 1, 25.0), origin)
 
 
@@ -88,7 +88,7 @@ def test_a_mission_is_judged_before_it_is_flown(options: ServeOptions) -> None:
 
 
 def circle(options: ServeOptions, east: float, radius: float) -> MissionItem:
-    lat, lon = to_geo(open_served(options).scenario.origin, east, 0.0)
+    lat, lon = to_geo(load_served_scenario(options).scenario.origin, east, 0.0)
     params = (radius, 0.0, 0.0, 0.0)
     return MissionItem(
         0, int(Command.NAV_FENCE_CIRCLE_EXCLUSION), int(Frame.GLOBAL), params, float(lat), float(lon), 0.0
@@ -125,7 +125,7 @@ def test_a_diverted_flight_lands_nowhere_whatever_strip_there_is(options: ServeO
     strip = '[home]\nplace = "start"\n[landing]\neast_m = 2500\nnorth_m = 0\n[flight]\nautopilot = "ardupilot"\n'
     (tmp_path / "field.toml").write_text(FIELD + strip, encoding="utf-8")
     way = mission(options, (0.0, 0.0, 100.0), (1000.0, 0.0, 100.0), (1900.0, 0.0, 55.0))
-    lat, lon = (float(value) for value in to_geo(open_served(options).scenario.origin, 2500.0, 0.0))
+    lat, lon = (float(value) for value in to_geo(load_served_scenario(options).scenario.origin, 2500.0, 0.0))
     land = MissionItem(4, int(Command.NAV_LAND), int(Frame.GLOBAL), (0.0,) * 4, lat, lon, 0.0)
     whole = replace(way, items=(*way.items, land))
     flights = ServedFlights(options)

@@ -162,7 +162,7 @@ def test_the_whole_is_kept_1500_m_from_an_end(away: float, safe: bool) -> None:
     plan = plan_along(airframe, scenario, np.array(low) + np.array([0.0, 0.0, GROUND]))
     shortfalls = find_shortfalls(plan, airframe)
     assert bool(shortfalls) is not safe
-    assert {one.into for one in shortfalls} <= {"into the clearance of 50 m"}
+    assert {one.hazard for one in shortfalls} <= {"into the clearance of 50 m"}
 
 
 def test_below_a_height_limit_more_climb_is_left_in_place_of_height() -> None:
@@ -200,7 +200,7 @@ def test_a_leg_counts_with_the_least_climb_that_it_leaves() -> None:
     airframe = load_airframe(scenario)
     way = np.array([[0, 0, 780], [6000, 0, 79], [8000, 0, 79]]) + np.array([0.0, 0.0, GROUND])
     (lacks,) = find_shortfalls(plan_along(airframe, scenario, way), airframe)
-    assert lacks.where == "on leg 0"
+    assert lacks.place == "on leg 0"
     assert lacks.depth == pytest.approx(12.0 * (2.33 * GUST - airframe.limits.rates(GROUND + 780.0)[0]) - 29.0, abs=0.3)
 
 
@@ -217,7 +217,7 @@ def test_a_tailwind_makes_a_climb_faster(from_deg: float, sign: float) -> None:
     climbs = slope * (airframe.airspeed + sign * 5.0)
     left = min(airframe.limits.rates(GROUND + up)[0] for up in (80.0, 150.0)) - climbs
     (lacks,) = find_shortfalls(plan, airframe)
-    assert lacks.where == "on leg 1"
+    assert lacks.place == "on leg 1"
     assert lacks.depth == pytest.approx(12.0 * (2.33 * GUST - left) - 30.0, abs=0.5)
 
 
@@ -257,7 +257,7 @@ def test_what_is_thinner_than_the_height_is_not_jumped_over(tables: dict[str, An
     plan = plan_along(airframe, scenario, [scenario.start, scenario.destination])
     assert plan.safe
     (shortfall,) = find_shortfalls(plan, airframe)
-    assert shortfall.of_threats
+    assert shortfall.is_threat
     assert 1.0 < shortfall.depth <= 4.1
 
 
@@ -393,8 +393,8 @@ def test_a_leg_that_sinks_leaves_less() -> None:
     sinks = 110.0 / 1500.0 * airframe.limits.performance().airspeed
     assert airframe.limits.rates(190.0)[1] - sinks < 0.6 * GUST
     (shortfall,) = find_shortfalls(plan_along(airframe, scenario, way), airframe)
-    assert shortfall.into == "above the 230 m over ground that are allowed"
-    assert shortfall.where in {"on leg 0", "on leg 1"}
+    assert shortfall.hazard == "above the 230 m over ground that are allowed"
+    assert shortfall.place in {"on leg 0", "on leg 1"}
     assert shortfall.depth == pytest.approx(60.0 * GUST - 40.0 + airframe.limits.tracking.up, abs=5.0)  # type: ignore[union-attr]
     # Without a limit above it nothing is wrong.
     free = from_spec(band_of(230.0).to_json() | {"limits": {"min_clearance_m": 50.0}}, "free")

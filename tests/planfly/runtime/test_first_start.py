@@ -9,7 +9,7 @@ from pathlib import Path
 import numba
 import pytest
 
-from planfly.kernel_units.unit_kernels import kernels_of
+from planfly.kernel_units.unit_kernels import list_unit_kernels
 from planfly.runtime import first_start
 from planfly.runtime.first_start import warm_up
 from planfly.runtime.stages import send_progress_to
@@ -49,7 +49,7 @@ def shared(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> list[list[str]]:
 
 
 def test_units_are_counted_before_the_work_goes_on(shared: list[list[str]], capsys: pytest.CaptureFixture[str]) -> None:
-    whole = len(kernels_of(("scores", "paper")))
+    whole = len(list_unit_kernels(("scores", "paper")))
     with send_progress_to(ON_STANDARD_ERROR), warm_up("scores", "paper"):
         assert capsys.readouterr().err == ""
         assert numba.njit(lambda a: a + 1)(1) == 2

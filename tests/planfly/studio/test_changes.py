@@ -4,7 +4,7 @@ import re
 
 from flight.mission import edits
 from planfly.studio import messages
-from planfly.studio.changes import Figures, changes, flight_figures
+from planfly.studio.changes import Figures, describe_changes, flight_figures
 from planfly.studio.session import Session
 from tests.planfly.studio.drafts import drawn_session
 
@@ -20,14 +20,14 @@ def test_a_height_that_fails_and_is_mended_is_said_with_its_leg_and_figures() ->
     before = figures_of(session)
     session.edit(messages.Raise(kind="raise", rev=session.rev, by=-90.0))
     low = figures_of(session, 103.0)
-    said = changes(before, low)
+    said = describe_changes(before, low)
     words = re.compile(r"(leg \d+\u2013\d+): clearance ([\d.]+) m \u2192 ([-\d.]+) m, fails now")
     place, was, now = next(found.groups() for line in said if (found := words.fullmatch(line)))
     assert float(was) > 60.0 > float(now)
     assert said[-1] == "3 s longer"
     session.step("undo")
-    assert f"{place}: clearance {now} m \u2192 {was} m, now passes" in changes(low, figures_of(session))
-    assert changes(before, figures_of(session)) == ["nothing"]
+    assert f"{place}: clearance {now} m \u2192 {was} m, now passes" in describe_changes(low, figures_of(session))
+    assert describe_changes(before, figures_of(session)) == ["nothing"]
 
 
 def test_items_that_have_other_numbers_are_the_same() -> None:
@@ -35,18 +35,22 @@ def test_items_that_have_other_numbers_are_the_same() -> None:
     session = drawn_session(8, 8)
     before = figures_of(session)
     own = edits.places(session.mission)
-    (east, north, _), (far, further, _) = session.place_of(own[0]), session.place_of(own[1])
-    assert [one.place for one in before.found.values() if one.ok is False] == ["item 6", "leg 1\u20132", "leg 2\u20133"]
+    (east, north, _), (far, further, _) = session.item_position(own[0]), session.item_position(own[1])
+    assert [one.place for one in before.results.values() if one.ok is False] == [
+        "item 6",
+        "leg 1\u20132",
+        "leg 2\u20133",
+    ]
     middle = {"east": 0.5 * (east + far), "north": 0.5 * (north + further)}
     session.edit(messages.Insert(kind="insert", rev=session.rev, after=own[0], **middle))
     inserted = figures_of(session)
-    assert [re.sub(r"-[\d.]+", "-", line) for line in changes(before, inserted)] == [
+    assert [re.sub(r"-[\d.]+", "-", line) for line in describe_changes(before, inserted)] == [
         "leg 1\u20132: slope -\u00b0, fails now",
         "leg 2\u20133: slope -\u00b0, fails now",
         "the former leg 1\u20132: slope -\u00b0, is gone",
     ]
     session.edit(messages.Delete(kind="delete", rev=session.rev, ks=[edits.places(session.mission)[1]]))
-    assert [re.sub(r"-[\d.]+", "-", line) for line in changes(inserted, figures_of(session))] == [
+    assert [re.sub(r"-[\d.]+", "-", line) for line in describe_changes(inserted, figures_of(session))] == [
         "leg 1\u20132: slope -\u00b0, fails now",
         "the former leg 1\u20132: slope -\u00b0, is gone",
         "the former leg 2\u20133: slope -\u00b0, is gone",
@@ -58,5 +62,5 @@ def test_without_a_failure_the_closest_figures_are_said() -> None:
     session.edit(messages.Raise(kind="raise", rev=session.rev, by=150.0))
     before = figures_of(session)
     session.edit(messages.Raise(kind="raise", rev=session.rev, by=5.0))
-    said = changes(before, figures_of(session))
+    said = describe_changes(before, figures_of(session))
     assert any(line.startswith("closest to its limit: clearance") for line in said), said

@@ -10,7 +10,7 @@ from flight.mission_files.formats import mission_text
 from logs.recording.example_log import write_example_log
 from planfly.flight_options import MissionOptions
 from planfly.studio.documents import DROPPED, open_dropped, straight_plan
-from planfly.studio.folder import file_inside, folder_json
+from planfly.studio.folder import find_file_in_folder, folder_message
 from planner.plan import plan_json
 from tests.logs.importers.written_logs import dataflash, gpx, igc, kml, px4, telemetry
 from tests.planfly.studio.drafts import drawn_session, world_of
@@ -59,8 +59,8 @@ def test_each_suffix_is_tried() -> None:
 def test_a_file_of_each_suffix_is_opened(suffix: str, tmp_path: Path) -> None:
     write, items = FORMS[suffix]
     data = write(tmp_path / f"a{suffix}").read_bytes()
-    assert file_inside(tmp_path, f"a{suffix}") == tmp_path.resolve() / f"a{suffix}"
-    assert f"a{suffix}" in folder_json(tmp_path)["files"]
+    assert find_file_in_folder(tmp_path, f"a{suffix}") == tmp_path.resolve() / f"a{suffix}"
+    assert f"a{suffix}" in folder_message(tmp_path)["files"]
     if not items:
         with pytest.raises(PlanflyError, match=f"^A{suffix.upper()}: a flight's track without a mission"):
             open_dropped(f"A{suffix.upper()}", data, MissionOptions())
@@ -80,13 +80,13 @@ def test_no_path_leads_out_of_the_folder(tmp_path: Path) -> None:
     (inside / "link.plan").symlink_to(tmp_path / "m.plan")
     (inside / "notes.md").write_text("", encoding="utf-8")
     for name in ("m.plan", "deeper/m.plan", str(inside / "m.plan")):
-        assert file_inside(inside, name).is_relative_to(inside.resolve())
+        assert find_file_in_folder(inside, name).is_relative_to(inside.resolve())
     outside = ("../m.plan", "deeper/../../m.plan", "link.plan", str(tmp_path / "m.plan"), "deeper", "none.plan")
     for name in (*outside, "a\0.plan", "/etc/passwd", "."):
         with pytest.raises(MissionError, match=r"expected a file in .*"):
-            file_inside(inside, name)
+            find_file_in_folder(inside, name)
     with pytest.raises(MissionError, match=r"suffix: '.md': allowed"):
-        file_inside(inside, "notes.md")
+        find_file_in_folder(inside, "notes.md")
     with pytest.raises(MissionError, match="drop the file here"):
-        file_inside(None, "m.plan")
-    assert folder_json(inside)["files"] == ["m.plan"]
+        find_file_in_folder(None, "m.plan")
+    assert folder_message(inside)["files"] == ["m.plan"]

@@ -15,7 +15,7 @@ from logs.verdict.findings import Finding
 from logs.verdict.judge_geometry import place_findings
 from logs.verdict.measures.route_requirements import RouteRequirements, route_requirements
 from planfly.studio.incremental_verdict import judge_windows
-from planfly.studio.moved_route import moved_route
+from planfly.studio.moved_route import update_moved_route
 from planfly.studio.session import Session
 from planfly.studio.states import violated_legs
 from tests.planfly.studio.drafts import drawn_session
@@ -47,8 +47,8 @@ def same(found: list[Any], wanted: list[Any]) -> bool:
 
 def changed(session: Session, k: int, how: str, rng: np.random.Generator) -> tuple[Mission, int]:
     """The mission with a place moved, raised, inserted or deleted, and the place about which it has changed."""
-    east, north, _ = session.place_of(k)
-    lat, lon = session.desk.geographic(*(np.array([east, north]) + rng.normal(0.0, 150.0, 2)).tolist())
+    east, north, _ = session.item_position(k)
+    lat, lon = session.context.to_geographic(*(np.array([east, north]) + rng.normal(0.0, 150.0, 2)).tolist())
     match how:
         case "up":
             return edits.raised(session.mission, [k], float(rng.normal(0.0, 60.0))), k
@@ -69,15 +69,15 @@ def test_windows_say_what_the_whole_says() -> None:
         how = ("move", "up", "insert", "move", "delete")[seed % 5]
         try:
             mission, k = changed(session, int(rng.choice(edits.places(session.mission))), how, rng)
-            found = judge_windows(session.desk, mission, k, session.judged.setup)
-            whole = by_place(place_findings(route_requirements(session.desk.setup(mission))))
+            found = judge_windows(session.context, mission, k, session.judged.setup)
+            whole = by_place(place_findings(route_requirements(session.context.setup(mission))))
         except MissionError:
             continue
         route, windows = found
         windowed += windows[0].last - windows[0].first < route.legs
         inside: Judged = {}
         for window in windows:
-            inside |= by_place(window.findings, window.begin)
+            inside |= by_place(window.findings, window.start)
         covered = {
             key: rows
             for key, rows in whole.items()
@@ -111,19 +111,19 @@ def fenced(
 def test_windows_violate_the_zones_that_the_whole_does() -> None:
     rng, found = np.random.default_rng(4), 0
     session = drawn_session(11, 30, jumps=False)
-    (west, east), (south, north) = session.desk.scenario.bounds.tolist()
+    (west, east), (south, north) = session.context.scenario.bounds.tolist()
     places = np.column_stack([rng.uniform(west, east, ZONES), rng.uniform(south, north, ZONES)]).tolist()
     zones = [Zone(str(k), "exclusion", Cylinder(x, y, 120.0)) for k, (x, y) in enumerate(places)]
     zones.append(Zone("stay", "inclusion", Cylinder(0.0, 0.0, 0.7 * east)))
-    desk = replace(session.desk, scenario=replace(session.desk.scenario, zones=tuple(zones)))
+    context = replace(session.context, scenario=replace(session.context.scenario, zones=tuple(zones)))
     for k in edits.places(session.mission)[::8]:
-        x, y = places[min(range(ZONES), key=lambda one: math.dist(places[one], session.place_of(k)[:2]))]
-        mission = edits.moved(session.mission, k, *desk.geographic(x, y))
-        _, windows = judge_windows(desk, mission, k)
-        whole = route_requirements(desk.setup(mission))
+        x, y = places[min(range(ZONES), key=lambda one: math.dist(places[one], session.item_position(k)[:2]))]
+        mission = edits.moved(session.mission, k, *context.to_geographic(x, y))
+        _, windows = judge_windows(context, mission, k)
+        whole = route_requirements(context.setup(mission))
         legs, again = fenced(whole, place_findings(whole), 0)
         for one in windows:
-            seen, _ = fenced(one.requirements, one.findings, one.begin)
+            seen, _ = fenced(one.requirements, one.findings, one.start)
             for leg in range(one.first, one.last):
                 # A zone that is entered twice is violated from the first time to the last for the whole.
                 assert seen.get(leg, set()) - again == legs.get(leg, set()) - again
@@ -136,14 +136,14 @@ def test_a_moved_route_is_the_one_that_is_laid() -> None:
     for seed in range(MOVED):
         session = drawn_session(seed, 12, jumps=False)
         rng = np.random.default_rng(20_000 + seed)
-        setup, desk = session.judged.setup, session.desk
+        setup, context = session.judged.setup, session.context
         for how in ("move", "up", "move"):
             try:
                 mission, _ = changed(session, int(rng.choice(edits.places(session.mission))), how, rng)
-                laid = desk.route(mission)
+                laid = context.route(mission)
             except MissionError:
                 continue
-            made = moved_route(setup.route, setup.mission, mission, desk.scenario, desk.airframe)
+            made = update_moved_route(setup.route, setup.mission, mission, context.scenario, context.airframe)
             if made is None:
                 continue
             moved += 1
@@ -154,7 +154,7 @@ def test_a_moved_route_is_the_one_that_is_laid() -> None:
 
 def test_what_a_move_may_change_elsewhere_has_the_route_laid_anew() -> None:
     session = drawn_session(11, 12, jumps=False)
-    desk, mission, setup = session.desk, session.mission, session.judged.setup
+    context, mission, setup = session.context, session.mission, session.judged.setup
     own = edits.places(mission)
     circles = {k for k in own if mission.items[k].command != Command.NAV_WAYPOINT}
     beside = next(a for a, b in pairwise(own) if a not in circles and b in circles)
@@ -162,7 +162,7 @@ def test_what_a_move_may_change_elsewhere_has_the_route_laid_anew() -> None:
 
     def made(k: int, place: MissionItem, north: float = 0.0) -> Route | None:
         after = edits.moved(mission, k, place.lat_deg + north, place.lon_deg)
-        return moved_route(setup.route, mission, after, desk.scenario, desk.airframe)
+        return update_moved_route(setup.route, mission, after, context.scenario, context.airframe)
 
     assert made(free, mission.items[free], 0.001) is not None
     assert made(beside, mission.items[beside], 0.001) is None
@@ -174,15 +174,15 @@ def test_what_a_move_may_change_elsewhere_has_the_route_laid_anew() -> None:
 def test_a_move_is_seen_where_it_matters() -> None:
     session = drawn_session(11, 60)
     k = edits.places(session.mission)[40]
-    east, north, _ = session.place_of(k)
-    mission = edits.moved(session.mission, k, *session.desk.geographic(east + 400.0, north))
-    found = judge_windows(session.desk, mission, k)
+    east, north, _ = session.item_position(k)
+    mission = edits.moved(session.mission, k, *session.context.to_geographic(east + 400.0, north))
+    found = judge_windows(session.context, mission, k)
     assert found[1][0].last - found[1][0].first < found[0].legs
     before = by_place(session.judged.verdict.findings)
     changed = [
         key
         for window in found[1]
-        for key, rows in by_place(window.findings, window.begin).items()
+        for key, rows in by_place(window.findings, window.start).items()
         if not same(rows, before.get(key, []))
     ]
     assert len(changed) >= 3

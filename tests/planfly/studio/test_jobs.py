@@ -8,7 +8,7 @@ from planfly.flight_options import MissionOptions
 from planfly.studio import jobs as jobs_module
 from planfly.studio import messages
 from planfly.studio.documents import open_document
-from planfly.studio.jobs import LONG, PILOT, Jobs
+from planfly.studio.jobs import FLIGHT_WORKER, LONG_WORKER, Jobs
 from planfly.studio.pilot import Answer, Work
 from planfly.studio.session import Session
 from planfly.studio.worker_tasks import fly, try_suggestions
@@ -33,55 +33,57 @@ class Asked:
 def jobs(monkeypatch: pytest.MonkeyPatch) -> Jobs:
     monkeypatch.setattr(jobs_module, "_REPORT_INTERVAL_S", 0.0)
     made = Jobs(lambda name, answer: None)
-    made._pilots.update({PILOT: Asked(), LONG: Asked()})  # type: ignore[dict-item]
+    made._workers.update({FLIGHT_WORKER: Asked(), LONG_WORKER: Asked()})  # type: ignore[dict-item]
     return made
 
 
 def asked(jobs: Jobs, pilot: str) -> list[Work]:
-    return jobs._pilots[pilot].works  # type: ignore[attr-defined, no-any-return]
+    return jobs._workers[pilot].works  # type: ignore[attr-defined, no-any-return]
 
 
 def test_a_work_that_another_replaces_is_said_to_have_stopped(jobs: Jobs) -> None:
     session = drawn_session(8, 8)
     jobs.ask("returns", session)
     jobs.ask("campaign", session)
-    first, second = asked(jobs, LONG)
-    assert jobs.answered(LONG, Answer(first.number, "progress", (1.0, 2.0, "")), session) == []
-    assert jobs.answered(LONG, Answer(first.number, "cancelled"), session) == [{"kind": "stopped", "job": "returns"}]
-    assert jobs.answered(LONG, Answer(first.number, "cancelled"), session) == []
+    first, second = asked(jobs, LONG_WORKER)
+    assert jobs.handle_answer(LONG_WORKER, Answer(first.number, "progress", (1.0, 2.0, "")), session) == []
+    assert jobs.handle_answer(LONG_WORKER, Answer(first.number, "cancelled"), session) == [
+        {"kind": "stopped", "job": "returns"}
+    ]
+    assert jobs.handle_answer(LONG_WORKER, Answer(first.number, "cancelled"), session) == []
     # One that is asked for again goes on for the pages.
     jobs.ask("campaign", session)
-    assert jobs.answered(LONG, Answer(second.number, "cancelled"), session) == []
+    assert jobs.handle_answer(LONG_WORKER, Answer(second.number, "cancelled"), session) == []
 
 
 def test_progress_never_runs_backwards_and_is_told_to_new_pages(jobs: Jobs) -> None:
     session = drawn_session(8, 8)
     jobs.ask("campaign", session)
-    (work,) = asked(jobs, LONG)
+    (work,) = asked(jobs, LONG_WORKER)
     shares = []
     for done, total in ((1.0, 4.0), (3.0, 4.0), (1.0, 9.0), (0.0, 0.0), (8.0, 9.0)):
-        (message,) = jobs.answered(LONG, Answer(work.number, "progress", (done, total, "on")), session)
+        (message,) = jobs.handle_answer(LONG_WORKER, Answer(work.number, "progress", (done, total, "on")), session)
         shares.append(message["share"])
     assert shares == [0.25, 0.75, 0.75, 0.75, 0.889]
-    assert [(one["job"], one["share"]) for one in jobs.under_way()] == [("campaign", 0.889)]
+    assert [(one["job"], one["share"]) for one in jobs.progress_messages()] == [("campaign", 0.889)]
     jobs.ask("campaign", session)
-    assert jobs.under_way()[0]["share"] == 0.0
-    assert jobs.under_way()[0]["number"] != work.number
+    assert jobs.progress_messages()[0]["share"] == 0.0
+    assert jobs.progress_messages()[0]["number"] != work.number
 
 
 def test_a_scenario_is_planned_first_and_not_judged_meanwhile(jobs: Jobs) -> None:
     session = Session.of(open_document("tight", MissionOptions()), MissionOptions())
-    jobs.start(session)
-    assert jobs.plans_first_path(session)
-    (work,) = asked(jobs, LONG)
-    jobs.answered(LONG, Answer(work.number, "fault", "no"), session)
-    assert not jobs.plans_first_path(session)
+    jobs.start_first_work(session)
+    assert jobs.is_planning_first_path(session)
+    (work,) = asked(jobs, LONG_WORKER)
+    jobs.handle_answer(LONG_WORKER, Answer(work.number, "fault", "no"), session)
+    assert not jobs.is_planning_first_path(session)
 
 
 def answer_of(jobs: Jobs, session: Session, function: Any) -> dict[str, Any]:
-    work = asked(jobs, PILOT)[-1]
+    work = asked(jobs, FLIGHT_WORKER)[-1]
     value = function(work.payload, lambda done, total, remark: None)
-    (message,) = jobs.answered(PILOT, Answer(work.number, "done", value), session)
+    (message,) = jobs.handle_answer(FLIGHT_WORKER, Answer(work.number, "done", value), session)
     return message
 
 
@@ -92,13 +94,13 @@ def test_what_failed_in_flight_is_offered_with_changes_that_were_flown(jobs: Job
     # The flight's own list offers nothing that was not tried.
     assert before["verdict"]["failed"]
     assert [one["suggestions"] for one in before["findings"] if one["suggestions"]] == []
-    assert asked(jobs, PILOT)[-1].function.endswith("try_suggestions")
+    assert asked(jobs, FLIGHT_WORKER)[-1].function.endswith("try_suggestions")
     tried = answer_of(jobs, session, try_suggestions)
     offered = [
         (one, which) for one in tried["findings"] for which, each in enumerate(one["suggestions"]) if each["apply"]
     ]
     assert offered
-    assert jobs.shown()[0]["findings"] == tried["findings"]
+    assert jobs.result_messages()[0]["findings"] == tried["findings"]
     finding, which = offered[0]
     apply = messages.Apply(kind="apply", rev=session.rev, finding=finding["number"], which=which, flown=True)
     session.edit(apply)
@@ -114,7 +116,7 @@ def test_what_failed_in_flight_is_offered_with_changes_that_were_flown(jobs: Job
 
 def test_trials_end_when_other_work_comes() -> None:
     session = drawn_session(8, 8)
-    flown = fly((session.desk, session.mission), lambda done, total, remark: None)
+    flown = fly((session.context, session.mission), lambda done, total, remark: None)
 
     class Ended(Exception):
         pass
@@ -123,4 +125,4 @@ def test_trials_end_when_other_work_comes() -> None:
         raise Ended
 
     with pytest.raises(Ended):
-        try_suggestions((session.desk, flown["judged"]), other)
+        try_suggestions((session.context, flown["judged"]), other)

@@ -19,7 +19,7 @@ from logs.recording.example_log import write_example_log
 from planfly.flight_options import MissionOptions
 from planfly.studio import documents, messages
 from planfly.studio.documents import open_document, open_dropped, straight_plan
-from planfly.studio.jobs import LONG, Jobs
+from planfly.studio.jobs import LONG_WORKER, Jobs
 from planfly.studio.pilot import Answer, Work
 from planfly.studio.server import NO_TOKEN, Page, Server
 from planfly.studio.session import Session, StaleEdit, open_session
@@ -55,7 +55,7 @@ def flight_to_the_ground() -> Mission:
 def test_all_are_raised_but_the_landing_and_its_height_is_its_touchdowns() -> None:
     session = session_of(flight_to_the_ground())
     landing = session.mission.items[-1]
-    assert session.place_of(8)[2] == landing.alt
+    assert session.item_position(8)[2] == landing.alt
     session.edit(messages.Raise(kind="raise", rev=session.rev, by=25.0))
     assert session.mission.items[-1] == landing
     assert session.mission.items[1].alt == flight_to_the_ground().items[1].alt + 25.0
@@ -133,7 +133,7 @@ def test_an_edited_plan_keeps_its_ways_to_the_ground_while_the_legs_next_to_them
     first = next(
         n
         for n, k in enumerate(places)
-        if np.allclose(session.desk.points(session.mission)[n], base.waypoints[0], atol=0.02)
+        if np.allclose(session.context.item_positions(session.mission)[n], base.waypoints[0], atol=0.02)
     )
     middle = places[first + len(base.waypoints) // 2]
     session.edit(messages.Raise(kind="raise", rev=session.rev, by=-2.0, ks=[middle]))
@@ -148,7 +148,7 @@ def test_an_edited_plan_keeps_its_ways_to_the_ground_while_the_legs_next_to_them
     kinds = [item.command for item in reopened.mission.items]
     assert kinds == [item.command for item in session.mission.items]
     assert kinds[-1] == Command.NAV_LAND
-    here, there = (one.desk.points(one.mission) for one in (session, reopened))
+    here, there = (one.context.item_positions(one.mission) for one in (session, reopened))
     assert np.abs(here - there).max() < 0.02
     # The turn at the first waypoint is the climb-out's, too.
     session.edit(messages.Raise(kind="raise", rev=session.rev, by=1.0, ks=[places[first + 1]]))
@@ -158,7 +158,7 @@ def test_an_edited_plan_keeps_its_ways_to_the_ground_while_the_legs_next_to_them
 
 def test_a_planned_path_is_taken_of_the_sheet_that_it_is_of_alone() -> None:
     session = planned_session()
-    plan = straight_plan(session.desk.scenario, 3)
+    plan = straight_plan(session.context.scenario, 3)
     session.plans = ([plan], None)
     session.edit(messages.Raise(kind="raise", rev=session.rev, by=5.0))
     mission = session.mission
@@ -175,13 +175,15 @@ def test_a_planned_path_is_taken_of_the_sheet_that_it_is_of_alone() -> None:
 
 def test_a_path_that_was_searched_for_an_older_sheet_is_not_taken(monkeypatch: pytest.MonkeyPatch) -> None:
     session, asked = planned_session(), []
-    monkeypatch.setattr("planfly.studio.jobs.Pilot.ask", lambda self, work: asked.append(work))
-    monkeypatch.setattr("planfly.studio.jobs.Pilot.start", lambda self: None)
+    monkeypatch.setattr("planfly.studio.jobs.WorkerProcess.ask", lambda self, work: asked.append(work))
+    monkeypatch.setattr("planfly.studio.jobs.WorkerProcess.start", lambda self: None)
     jobs = Jobs(lambda name, answer: None)
-    jobs.start(session)
+    jobs.start_first_work(session)
     assert [work.function for work in asked] == ["planfly.studio.worker_tasks.plan"]
     session.edit(messages.Raise(kind="raise", rev=session.rev, by=5.0))
-    answers = jobs.answered(LONG, Answer(asked[0].number, "done", [straight_plan(session.desk.scenario, 3)]), session)
+    answers = jobs.handle_answer(
+        LONG_WORKER, Answer(asked[0].number, "done", [straight_plan(session.context.scenario, 3)]), session
+    )
     assert [one["kind"] for one in answers] == ["stopped", "fault"]
     assert not jobs.take_initial_plan(session)
     # What was restored is flown, not planned anew.
@@ -192,7 +194,7 @@ def test_a_path_that_was_searched_for_an_older_sheet_is_not_taken(monkeypatch: p
 
 def test_a_certificate_does_not_outlive_settings() -> None:
     session = planned_session()
-    session.plans = ([straight_plan(session.desk.scenario, 3)], None)
+    session.plans = ([straight_plan(session.context.scenario, 3)], None)
     session.replace_plan(messages.Choose(kind="choose", rev=session.rev, which=0))
     assert session.sheet()["planned"]
     session.change_settings(messages.Settings(kind="settings", wind_speed=9.0))
@@ -210,13 +212,13 @@ def test_a_log_that_names_other_files_is_refused(tmp_path: Path, monkeypatch: py
     data = write_example_log(tmp_path / "l.mcap").read_bytes()
     open_dropped("l.mcap", data, MissionOptions())
     seen: list[bytes] = []
-    monkeypatch.setattr(documents, "_refuse_other_files", lambda name, text: seen.append(text))
+    monkeypatch.setattr(documents, "_check_plan_names_no_files", lambda name, text: seen.append(text))
     open_dropped("l.waypoints", data, MissionOptions())
     monkeypatch.undo()
     scenario = json.loads(seen[0])
     scenario["scenario"].setdefault("flight", {})["params"] = "/etc/passwd"
     with pytest.raises(MissionError, match="names other files"):
-        documents._refuse_other_files("l.mcap", json.dumps(scenario).encode())
+        documents._check_plan_names_no_files("l.mcap", json.dumps(scenario).encode())
 
 
 def test_only_the_commands_file_is_written_over_and_not_if_it_was_changed(tmp_path: Path) -> None:
@@ -246,13 +248,13 @@ def test_an_opening_is_undone_and_each_document_is_kept_for_itself(tmp_path: Pat
     session, _ = open_session(str(file), MissionOptions(scenario="jacksboro"), kept)
     session.edit(messages.Raise(kind="raise", rev=session.rev, by=10.0))
     mine = session.mission
-    session.keep(kept)
+    session.autosave(kept)
     number = session.sheet()["document"]
     session.open(open_document(str(other), session.options))
     assert session.sheet()["document"] > number
     session.edit(messages.Raise(kind="raise", rev=session.rev, by=20.0))
     theirs = session.mission
-    session.keep(kept)
+    session.autosave(kept)
     assert open_session(str(file), MissionOptions(scenario="jacksboro"), kept)[0].mission.items == mine.items
     session.step("undo")
     assert session.sheet()["undo"] == "open other.waypoints"
@@ -278,14 +280,14 @@ def test_the_zones_of_a_named_fence_stand_in_the_next_world(tmp_path: Path) -> N
     fence.write_text(json.dumps({"type": "FeatureCollection", "features": [shape]}), encoding="utf-8")
     world = MissionOptions(terrain="jacksboro", fence=(str(fence),))
     session = Session.of(open_dropped("m.waypoints", mission_text(mission, "waypoints").encode(), world), world)
-    assert len(session.desk.scenario.zones) == 1
+    assert len(session.context.scenario.zones) == 1
     k = edits.places(session.mission)[-1]
-    east, north, _ = session.place_of(k)
+    east, north, _ = session.item_position(k)
     before = session.world_rev
     session.edit(messages.Move(kind="move", rev=session.rev, k=k, east=east + 2500.0, north=north))
     assert session.world_rev == before + 1
-    assert [zone["name"] for zone in session.world_shown()["zones"]] != []
-    assert len(session.desk.scenario.zones) == 1
+    assert [zone["name"] for zone in session.world_message()["zones"]] != []
+    assert len(session.context.scenario.zones) == 1
 
 
 # ----------------------------------------------------------------------
@@ -332,7 +334,7 @@ def test_a_stale_drag_is_answered() -> None:
         server, page = server_of(session), Page(NoSocket(), dark=False)  # type: ignore[arg-type]
         drag = {"kind": "drag", "rev": session.rev + 1, "n": 7, "k": 2, "east": 0.0, "north": 0.0}
         await server._handle_message(page, json.dumps(drag))
-        task = asyncio.create_task(server._preview(page))
+        task = asyncio.create_task(server._judge_drags(page))
         while page.frames.empty():
             await asyncio.sleep(0.01)
         task.cancel()
@@ -366,8 +368,8 @@ def test_a_full_disk_is_said_once(tmp_path: Path) -> None:
         server = server_of(session, tmp_path / "file" / "kept.json")
         page = Page(NoSocket(), dark=False)  # type: ignore[arg-type]
         server._pages.add(page)
-        await server._keep()
-        await server._keep()
+        await server._autosave()
+        await server._autosave()
         return sent(page)
 
     (fault,) = asyncio.run(run())

@@ -16,7 +16,7 @@ import pytest
 
 from flight.mission.items import MissionItem
 from flight.mission_files.formats import mission_text, parse_mission
-from planfly.studio.autosave import mission_from
+from planfly.studio.autosave import mission_from_data
 from tests.browser import Browser
 from tests.logs.views.report.page_in_browser import grave_findings, prefer
 from tests.planfly.studio.drafts import drawn_session
@@ -176,7 +176,7 @@ def kept_items(studio: Studio) -> list[tuple[MissionItem, ...]]:
     """The items of each mission that is kept, as a file has them."""
     first = drawn_session(8, 8).mission
     kept = [json.loads(file.read_text())["mission"] for file in (studio.folder / "kept").glob("*.json")]
-    return [parse_mission(mission_text(mission_from(one, first), "waypoints"), "m").items for one in kept]
+    return [parse_mission(mission_text(mission_from_data(one, first), "waypoints"), "m").items for one in kept]
 
 
 def test_it_opens_with_the_mission_and_asks_for_nothing_elsewhere(page: Browser, studio: Studio) -> None:

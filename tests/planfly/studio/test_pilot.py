@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from planfly.studio.pilot import Answer, Pilot, Work
+from planfly.studio.pilot import Answer, Work, WorkerProcess
 
 WORKS = "tests.planfly.studio.light_works"
 COUNT = f"{WORKS}.count"
@@ -21,7 +21,7 @@ class Heard:
 
     def __init__(self, **more: Any) -> None:
         self.answers: queue.SimpleQueue[Answer] = queue.SimpleQueue()
-        self.pilot = Pilot("test", self.answers.put, **more)
+        self.pilot = WorkerProcess("test", self.answers.put, **more)
 
     def next(self, *kinds: str) -> Answer:
         deadline = time.monotonic() + 60.0

@@ -17,7 +17,7 @@ from websockets.sync.client import ClientConnection
 
 from flight.mission_files.formats import mission_text
 from planfly.studio import connections, messages
-from planfly.studio.jobs import LONG, Jobs
+from planfly.studio.jobs import LONG_WORKER, Jobs
 from tests.planfly.studio.drafts import drawn_session
 from tests.planfly.studio.served import PageProgram, Served, served
 from tests.soak import SOAK, note, only_in_soak, scaled
@@ -166,11 +166,13 @@ def test_a_body_of_a_gigabyte_is_not_read(studio: Served) -> None:
             pass
         assert sent < 64 * 2**20
     with studio.socket() as one:
-        assert code_of(one, "x" * (messages.MAX_DROPPED_MESSAGE + messages.MAX_MESSAGE + 1)) == 1009
+        assert (
+            code_of(one, "x" * (messages.MAX_DROPPED_MESSAGE_CHARACTERS + messages.MAX_MESSAGE_CHARACTERS + 1)) == 1009
+        )
 
 
 def test_a_connection_that_asks_for_nothing_ends(studio: Served, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(connections, "LIFETIME", 0.4)
+    monkeypatch.setattr(connections, "HTTP_LIFETIME_S", 0.4)
     address = ("127.0.0.1", studio.port)
     with studio.page() as page, contextlib.ExitStack() as links:
         silent, half, kept = (links.enter_context(socket.create_connection(address, timeout=20)) for _ in range(3))
@@ -192,7 +194,7 @@ def test_connections_without_a_token_are_few(studio: Served) -> None:
     before = process.num_fds()
     with contextlib.ExitStack() as links, studio.page() as earlier:
         earlier.until("sheet")
-        count = 3 * connections.MAX_UNKNOWN
+        count = 3 * connections.MAX_UNKNOWN_CONNECTIONS
         for _ in range(count):
             links.enter_context(contextlib.closing(socket.create_connection(address, timeout=20)))
         for _ in range(count):
@@ -200,7 +202,7 @@ def test_connections_without_a_token_are_few(studio: Served) -> None:
             link.sendall(HANDSHAKE.format(port=studio.port).encode())
             assert link.recv(12) == b"HTTP/1.1 101"
         # Both ends are in this process.  The server's: the unknown ones, and those of the pages.
-        assert process.num_fds() - before - 2 * count <= connections.MAX_UNKNOWN + 20
+        assert process.num_fds() - before - 2 * count <= connections.MAX_UNKNOWN_CONNECTIONS + 20
         with studio.page() as page:
             page.until("sheet")
         earlier.send(kind="save", form="kml")
@@ -209,12 +211,12 @@ def test_connections_without_a_token_are_few(studio: Served) -> None:
 
 def test_a_first_message_is_bounded_before_it_is_read(studio: Served) -> None:
     with studio.socket() as one:
-        assert code_of(one, "x" * (messages.MAX_FIRST + 1)) == 1009
+        assert code_of(one, "x" * (messages.MAX_FIRST_MESSAGE_CHARACTERS + 1)) == 1009
     with studio.socket() as one:
-        assert code_of(one, "x" * messages.MAX_FIRST) == 4403
+        assert code_of(one, "x" * messages.MAX_FIRST_MESSAGE_CHARACTERS) == 4403
     with studio.page() as page:
         page.until("sheet")
-        assert code_after(page, " " * messages.MAX_FIRST + '{"kind": "stop"}') == 0
+        assert code_after(page, " " * messages.MAX_FIRST_MESSAGE_CHARACTERS + '{"kind": "stop"}') == 0
 
 
 def test_four_pages_are_enough(studio: Served) -> None:
@@ -281,7 +283,7 @@ def fuzzed(rng: np.random.Generator) -> str | bytes:
         case 3:
             return '{"kind": "move", "rev": 1, "k": 0, "east": NaN, "north": Infinity}'
         case 4:
-            return "x" * (messages.MAX_MESSAGE + 10)
+            return "x" * (messages.MAX_MESSAGE_CHARACTERS + 10)
     data: dict[str, object] = {"kind": str(rng.choice(kinds))}
     for name in rng.choice(
         ["rev", "k", "east", "north", "up", "ks", "by", "form", "name", "data", "token", "which"], 4
@@ -334,7 +336,7 @@ def test_a_long_work_is_stopped(studio: Served, monkeypatch: pytest.MonkeyPatch)
         # Of a campaign nothing counts here but that it takes long.
         count = "tests.planfly.studio.light_works.count"
         monkeypatch.setattr(
-            Jobs, "ask", lambda self, kind, session: self._send_work(LONG, kind, count, 10**6, session.rev)
+            Jobs, "ask", lambda self, kind, session: self._send_work(LONG_WORKER, kind, count, 10**6, session.rev)
         )
     with studio.page() as page:
         page.until("sheet")

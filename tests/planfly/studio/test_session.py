@@ -14,7 +14,7 @@ from flight.mission_files.formats import mission_text, parse_mission
 from logs.verdict.verdict import verdict_json
 from planfly.flight_options import MissionOptions
 from planfly.studio import messages
-from planfly.studio.autosave import mission_data, mission_from
+from planfly.studio.autosave import mission_data, mission_from_data
 from planfly.studio.documents import open_document, open_dropped, straight_plan
 from planfly.studio.session import Session, StaleEdit, open_session
 from planfly.workflow.suggestion_trials import with_tried_suggestions
@@ -30,7 +30,7 @@ def draw_edit(session: Session, rng: np.random.Generator) -> None:
     """One edit at random, or an undo or a redo; one that no mission may have is refused and changes nothing."""
     kind = rng.choice(["move", "up", "insert", "delete", "raise", "undo", "redo", "apply"])
     k = int(rng.choice(edits.places(session.mission)))
-    east, north, up = session.place_of(k)
+    east, north, up = session.item_position(k)
     east, north = (float(np.clip(v + rng.normal(0.0, 200.0), -9000.0, 9000.0)) for v in (east, north))
     rev = session.rev
     match kind:
@@ -106,7 +106,7 @@ def test_an_edit_of_an_older_sheet_is_refused() -> None:
 def test_a_preview_changes_nothing_and_is_what_the_move_comes_to() -> None:
     session = drawn_session(6, 14)
     k, before = edits.places(session.mission)[5], session.mission
-    east, north, _ = session.place_of(k)
+    east, north, _ = session.item_position(k)
     asked = messages.Drag(kind="drag", rev=session.rev, n=1, k=k, east=east + 300.0, north=north, whole=True)
     shown = session.preview(asked)["sheet"]
     assert session.mission is before
@@ -190,7 +190,7 @@ def test_what_was_done_is_there_after_the_server_died(tmp_path: Path) -> None:
     session, restored = open_session(str(file), MissionOptions(scenario="jacksboro"), kept)
     assert not restored
     session.edit(messages.Raise(kind="raise", rev=session.rev, by=10.0))
-    session.keep(kept)
+    session.autosave(kept)
     again, restored = open_session(str(file), MissionOptions(scenario="jacksboro"), kept)
     assert restored
     assert again.mission.items == session.mission.items
@@ -208,10 +208,10 @@ def test_settings_and_a_planned_path_are_there_after_the_server_died(tmp_path: P
     file, kept, world = tmp_path / "m.waypoints", tmp_path / "m.json", MissionOptions(scenario="jacksboro-air")
     file.write_text(mission_text(drawn_session(8, 10).mission, "waypoints"), encoding="utf-8")
     session, _ = open_session(str(file), world, kept)
-    assert not session.has_news
+    assert not session.needs_autosave
     session.change_settings(messages.Settings(kind="settings", wind_speed=9.0, limits={"min_clearance_m": 33.0}))
     session.change_settings(messages.Settings(kind="settings", parameter="WP_RADIUS=55"))
-    session.keep(kept)
+    session.autosave(kept)
     again, restored = open_session(str(file), world, kept)
     assert restored
     assert again.mission is again.history.first
@@ -219,16 +219,16 @@ def test_settings_and_a_planned_path_are_there_after_the_server_died(tmp_path: P
     assert again.settings_json() == session.settings_json()
     assert verdict_json(again.judged.verdict) == verdict_json(session.judged.verdict)
     # A path that was planned there, with its certificate; and then without, when it was edited.
-    again.plans = ([straight_plan(again.desk.scenario, 3)], None)
+    again.plans = ([straight_plan(again.context.scenario, 3)], None)
     again.replace_plan(messages.Choose(kind="choose", rev=again.rev, which=0))
-    again.keep(kept)
+    again.autosave(kept)
     third, _ = open_session(str(file), world, kept)
     assert third.sheet()["planned"]
     assert third.save("plan.json").data == again.save("plan.json").data
     third.edit(messages.Raise(kind="raise", rev=third.rev, by=5.0))
-    third.keep(kept)
+    third.autosave(kept)
     fourth, _ = open_session(str(file), world, kept)
-    assert (fourth.sheet()["planned"], fourth.desk.planned) == (False, True)
+    assert (fourth.sheet()["planned"], fourth.context.planned) == (False, True)
     assert fourth.settings_json() == session.settings_json()
     assert fourth.mission.items == third.mission.items
 
@@ -238,14 +238,14 @@ def test_what_cannot_be_set_any_more_leaves_the_edits(tmp_path: Path) -> None:
     session.change_settings(messages.Settings(kind="settings", wind_speed=9.0))
     session.edit(messages.Raise(kind="raise", rev=session.rev, by=10.0))
     kept = tmp_path / "m.json"
-    session.keep(kept)
+    session.autosave(kept)
     data = json.loads(kept.read_text(encoding="utf-8"))
     data["settings"]["flight"]["aircraft"] = "gone"
     kept.write_text(json.dumps(data), encoding="utf-8")
     again = drawn_session(8, 10)
     assert again.restore(kept)
     assert again.mission.items == session.mission.items
-    assert again.desk.scenario.wind.speed != 9.0
+    assert again.context.scenario.wind.speed != 9.0
 
 
 # Changes of a kept session: whole texts, and values of keys.
@@ -267,7 +267,7 @@ SHAPES: dict[str, Any] = {
 def test_an_altered_kept_session_is_left_alone(shape: str, tmp_path: Path) -> None:
     kept, session = tmp_path / "m.json", drawn_session(8, 10)
     session.edit(messages.Raise(kind="raise", rev=session.rev, by=10.0))
-    session.keep(kept)
+    session.autosave(kept)
     changed = SHAPES[shape]
     if isinstance(changed, dict):
         changed = json.dumps(json.loads(kept.read_text(encoding="utf-8")) | changed)
@@ -279,13 +279,13 @@ def test_an_altered_kept_session_is_left_alone(shape: str, tmp_path: Path) -> No
     assert again.unreadable == [kept]
     assert (again.mission, again.judged) == before[:2]
     again.edit(messages.Raise(kind="raise", rev=again.rev, by=10.0))
-    again.keep(kept)
+    again.autosave(kept)
     assert kept.read_bytes() == altered
 
 
 def test_a_mission_comes_back_from_its_data() -> None:
     mission = drawn_session(9, 20).mission
-    assert mission_from(mission_data(mission), mission) == mission
+    assert mission_from_data(mission_data(mission), mission) == mission
 
 
 @pytest.mark.parametrize(("rule", "by"), [("clearance", -90.0), ("threat", 150.0)])
@@ -337,14 +337,14 @@ def test_a_mission_without_a_scenario_takes_its_world_along() -> None:
     )
     session = Session.of(document, MissionOptions(terrain="jacksboro"))
     k = edits.places(session.mission)[-1]
-    east, north, _ = session.place_of(k)
+    east, north, _ = session.item_position(k)
     world = session.world_rev
     session.edit(messages.Move(kind="move", rev=session.rev, k=k, east=east + 2500.0, north=north))
     assert session.world_rev == world + 1
-    assert session.desk.scenario.bounds[0, 1] >= session.place_of(k)[0]
+    assert session.context.scenario.bounds[0, 1] >= session.item_position(k)[0]
 
 
 def test_the_world_names_what_findings_number() -> None:
     session = session_of(drawn_session(6, 14).mission)
-    world = session.world_shown()
-    assert [one["name"] for one in world["threats"]] == list(session.desk.scenario.threats.names)
+    world = session.world_message()
+    assert [one["name"] for one in world["threats"]] == list(session.context.scenario.threats.names)

@@ -6,7 +6,7 @@ import pytest
 from planfly.flight_options import MissionOptions
 from planfly.studio import messages
 from planfly.studio.documents import open_document
-from planfly.studio.jobs import LONG, Jobs
+from planfly.studio.jobs import LONG_WORKER, Jobs
 from planfly.studio.pilot import Answer, Work
 from planfly.studio.session import Session
 from planfly.studio.worker_tasks import plan
@@ -16,9 +16,9 @@ from world.errors import PlanflyError
 @pytest.mark.usefixtures("short_fronts")
 def test_other_ways_are_of_one_search_and_none_is_better_than_another(monkeypatch: pytest.MonkeyPatch) -> None:
     # Kernels may have to be compiled first.
-    monkeypatch.setattr("planfly.studio.worker_tasks.SECONDS_FOR_SEVERAL", 600.0)
+    monkeypatch.setattr("planfly.studio.worker_tasks.MAX_SEARCH_SECONDS_FOR_SEVERAL", 600.0)
     asked: list[Work] = []
-    monkeypatch.setattr("planfly.studio.jobs.Pilot.ask", lambda self, work: asked.append(work))
+    monkeypatch.setattr("planfly.studio.jobs.WorkerProcess.ask", lambda self, work: asked.append(work))
     session, jobs = (
         Session.of(open_document("hard-07", MissionOptions()), MissionOptions()),
         Jobs(lambda name, answer: None),
@@ -29,7 +29,7 @@ def test_other_ways_are_of_one_search_and_none_is_better_than_another(monkeypatc
     shares: list[float] = []
     found = plan(asked[-1].payload, lambda done, total, remark: shares.append(done / max(1.0, total)))
     assert shares
-    (shown,) = jobs.answered(LONG, Answer(asked[-1].number, "done", found), session)
+    (shown,) = jobs.handle_answer(LONG_WORKER, Answer(asked[-1].number, "done", found), session)
     ways = shown["ways"]
     assert 2 <= len(ways) <= 3
     assert all(one["state"] == "safe" for one in ways)

@@ -10,7 +10,7 @@ import sys
 import pytest
 
 from planfly.commands.registry import build_parser
-from planfly.terminal.command_parser import CommandParser, LineParser, coloured, wants_colour
+from planfly.terminal.command_parser import CommandParser, LineParser, colour_text, wants_colour
 
 
 class Terminal(io.StringIO):
@@ -40,7 +40,7 @@ def test_who_wants_colour(
         monkeypatch.setenv(name, value)
     assert wants_colour(stream) is wanted
     # Red is 31 of ISO 6429, and 0 ends it.
-    assert coloured("bad", "bad", stream) == ("\x1b[31mbad\x1b[0m" if wanted else "bad")
+    assert colour_text("bad", "bad", stream) == ("\x1b[31mbad\x1b[0m" if wanted else "bad")
 
 
 def seen(*argv: str, **settings: str) -> str:

@@ -12,7 +12,7 @@ from planfly.commands.registry import build_parser
 from planfly.terminal.command_parser import CommandParser
 from planfly.terminal.options import (
     aircraft_and_wind_options,
-    call,
+    call_api,
     flight_options,
     result_options,
     steering_options,
@@ -25,9 +25,9 @@ def test_a_call_states_the_keywords_that_the_options_name() -> None:
         return mission, seed, out, fence
 
     args = argparse.Namespace(mission="a.plan", seed=3, out=None, fence=[], json="-", overwrite=True)
-    assert call(api, args) == ("a.plan", 3, "here", [])
-    assert call(api, args, seed=4, out="there") == ("a.plan", 4, "there", [])
-    assert call(api, args, seed=None) == ("a.plan", 1, "here", [])
+    assert call_api(api, args) == ("a.plan", 3, "here", [])
+    assert call_api(api, args, seed=4, out="there") == ("a.plan", 4, "there", [])
+    assert call_api(api, args, seed=None) == ("a.plan", 1, "here", [])
 
 
 # ----------------------------------------------------------------------

@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from planfly.terminal import output
-from planfly.terminal.command_parser import coloured
+from planfly.terminal.command_parser import colour_text
 from planfly.terminal.output import progress
 from tests.soak import only_in_soak
 
@@ -75,14 +75,14 @@ def test_colours_of_planfly_are_kept(capsys: pytest.CaptureFixture[str], monkeyp
     monkeypatch.setenv("FORCE_COLOR", "1")
     monkeypatch.delenv("NO_COLOR", raising=False)
     with output.safe_streams():
-        print(coloured("flyable", "good") + "\x1b[2J\x1b[8m")
+        print(colour_text("flyable", "good") + "\x1b[2J\x1b[8m")
     assert capsys.readouterr().out == "\x1b[32mflyable\x1b[0m\\x1b[2J\\x1b[8m\n"
 
 
 def test_an_answer_on_standard_output_stays_json(capsys: pytest.CaptureFixture[str]) -> None:
     arguments = argparse.Namespace(json="-", quiet=False, command="test")
-    with output.safe_streams(), output.redirected_output(arguments):
-        output.give_answer(arguments, lambda: json.dumps({"title": HOSTILE}, ensure_ascii=False) + "\n")
+    with output.safe_streams(), output.redirect_output(arguments):
+        output.write_json_if_requested(arguments, lambda: json.dumps({"title": HOSTILE}, ensure_ascii=False) + "\n")
     text = capsys.readouterr().out
     assert json.loads(text) == {"title": HOSTILE}
     assert text[:-1].isprintable()

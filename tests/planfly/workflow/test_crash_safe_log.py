@@ -92,7 +92,7 @@ def opened_calm(path: Path) -> FlightSetup:
 
 @pytest.mark.parametrize(("size", "full"), [(20_000_000, False), (20_000_001, True)])
 def test_a_log_is_full_beyond_its_limit(size: int, full: bool) -> None:
-    assert bool(FlightLimits(megabytes=20.0).log_full(size)) is full
+    assert bool(FlightLimits(megabytes=20.0).log_limit_reason(size)) is full
 
 
 def test_the_limit_of_time_is_in_ticks() -> None:

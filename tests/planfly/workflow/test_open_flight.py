@@ -16,9 +16,9 @@ from logs.verdict.judge_flight import judge_geometry
 from planfly.cli import main
 from planfly.flight_logs import is_log
 from planfly.flight_options import MissionOptions
-from planfly.live.served_flights import ServeOptions, open_served
+from planfly.live.served_flights import ServeOptions, load_served_scenario
 from planfly.named_fences import read_named_fences
-from planfly.plan_fence import fence_of_plan
+from planfly.plan_fence import add_plan_fence
 from planfly.workflow.airframe import airframe_of, load_airframe
 from planfly.workflow.make_plan import make_plan
 from planfly.workflow.open_flight import mission_of_plan, open_flight
@@ -143,7 +143,7 @@ def test_serve_begins_with_the_fence_that_is_named(mission: Path) -> None:
     Path("a.fence").write_text(circle(0.0), encoding="ascii")
     Path("mill.geojson").write_text(feature(650.0), encoding="ascii")
     options: MissionOptions = {"fence": ["a.fence", "mill.geojson"]}
-    served = open_served(ServeOptions(str(mission), 1.0, Path("logs"), options))
+    served = load_served_scenario(ServeOptions(str(mission), 1.0, Path("logs"), options))
     assert served.mission is not None
     assert len(served.mission.fences) == 1
     assert [zone.name for zone in served.scenario.zones] == ["mill"]
@@ -168,7 +168,7 @@ def test_export_and_serve_leave_out_what_is_not_active_then(at: str | None, coun
     assert main(["export", str(mission), "map.kml", "out.plan", *fenced]) == 0
     assert Path("map.kml").read_text(encoding="utf-8").count("<name>mill (R) (keep out)") == count
     assert bool(read_mission(Path("out.plan")).fences) == bool(count)
-    served = open_served(ServeOptions(str(mission), 1.0, Path("logs"), {"fence": "mill.openair", "at": at}))
+    served = load_served_scenario(ServeOptions(str(mission), 1.0, Path("logs"), {"fence": "mill.openair", "at": at}))
     assert len(served.scenario.zones) == count
 
 
@@ -201,7 +201,7 @@ def missile(east: float, north: float, radius: float) -> dict[str, Any]:
 
 
 def circles(setup: FlightSetup) -> list[float]:
-    mission, _ = fence_of_plan(setup)
+    mission, _ = add_plan_fence(setup)
     return [shape[0].params[0] for shape in fence_shapes(mission.fences) if shape[0].command == 5004]
 
 
@@ -224,14 +224,14 @@ def test_the_judge_finds_the_fence_kept() -> None:
     """All circles together fail the rule `fence`; those that are exported do not."""
     threats = [missile(198.0, 700.0, 200.0), missile(-900.0, 0.0, 150.0)]
     setup = setup_of(*CORNER, threats=threats)
-    mission, notes = fence_of_plan(setup)
+    mission, notes = add_plan_fence(setup)
     assert any(note.startswith("left out of the fence, as the mission passes above or below: m198;") for note in notes)
 
     def failed(fences: Any) -> list[str]:
         judged = judge_geometry(replace(setup, mission=replace(setup.mission, fences=fences)))
         return [item.rule for item in judged.findings if item.rule == "fence" and item.ok is False]
 
-    every, _ = fence_of_plan(setup_of(wp(-2000.0, -2000.0), wp(-1500.0, -2000.0), threats=threats))
+    every, _ = add_plan_fence(setup_of(wp(-2000.0, -2000.0), wp(-1500.0, -2000.0), threats=threats))
     assert failed(mission.fences) == []
     assert failed(every.fences) == ["fence"]
 

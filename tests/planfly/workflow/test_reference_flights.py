@@ -27,9 +27,9 @@ from planfly.live.served_flights import ServedLog
 from planfly.workflow.airframe import load_airframe
 from planfly.workflow.pipeline import JudgedFlight, fly_and_judge
 from planfly.workflow.reference_flights import (
-    airframe_answer,
-    deciding_parameter,
     find_deciding_parameter,
+    find_passing_parameter,
+    judge_airframe_flight,
     judge_with_reference_flights,
     passes_with_margin,
 )
@@ -80,7 +80,7 @@ class Flights:
 )
 def test_the_nearest_value_that_passes_is_named(most: float, passing: float) -> None:
     flights = Flights(lambda new: new.tecs_height_demand_time <= most)
-    found = deciding_parameter(ArduPlane(ArduPilotParameters.defaults()), (LOW, HEIGHTS), flights)
+    found = find_passing_parameter(ArduPlane(ArduPilotParameters.defaults()), (LOW, HEIGHTS), flights)
     assert found is not None
     assert (found.name, found.current, found.passing, found.unit) == ("TECS_HDEM_TCONST", 3.0, passing, "s")
     assert (found.rule, found.place, found.off) == ("clearance", LEG, -8.4)
@@ -95,7 +95,7 @@ def test_no_value_below_the_documented_range_is_named(present: float, passing: f
         return law.parameters["FW_R_LIM"] > math.radians(present + 0.5)
 
     law = Px4(Px4Parameters.defaults("1.17")).with_parameters(FW_R_LIM=present)
-    found = deciding_parameter(law, (WIDE,), banks_further)
+    found = find_passing_parameter(law, (WIDE,), banks_further)
     assert found is not None
     assert (found.name, found.current, found.passing) == ("FW_R_LIM", present, passing)
 
@@ -103,16 +103,16 @@ def test_no_value_below_the_documented_range_is_named(present: float, passing: f
 def test_nothing_decides_how_a_mission_is_flown_that_is_not_taken() -> None:
     refused = make_finding("mission", Place("mission", item=1), ok=False, reason="")
     flights = Flights(lambda _: True)
-    assert deciding_parameter(ArduPlane(ArduPilotParameters.defaults()), (refused,), flights) is None
+    assert find_passing_parameter(ArduPlane(ArduPilotParameters.defaults()), (refused,), flights) is None
     assert flights.count == 0
 
 
 def test_what_failed_says_where_to_look_first() -> None:
     passes = Flights(lambda new: new.tecs_height_demand_time < 2.0 or new.navl1_period < 15.0)
-    found = deciding_parameter(ArduPlane(ArduPilotParameters.defaults()), (LOW,), passes)
+    found = find_passing_parameter(ArduPlane(ArduPilotParameters.defaults()), (LOW,), passes)
     assert found is not None
     assert found.name == "TECS_HDEM_TCONST"
-    found = deciding_parameter(ArduPlane(ArduPilotParameters.defaults()), (WIDE,), passes)
+    found = find_passing_parameter(ArduPlane(ArduPilotParameters.defaults()), (WIDE,), passes)
     assert found is not None
     assert (found.name, found.passing, found.off) == ("NAVL1_PERIOD", 14.0, 210.0)
 
@@ -126,16 +126,16 @@ def test_what_failed_says_where_to_look_first() -> None:
     ],
 )
 def test_both_ways(name: str, passes: Callable[[ArduPilotParameters], bool], passing: float) -> None:
-    found = deciding_parameter(ArduPlane(ArduPilotParameters.defaults()), (WIDE,), Flights(passes))
+    found = find_passing_parameter(ArduPlane(ArduPilotParameters.defaults()), (WIDE,), Flights(passes))
     assert found is not None
     assert (found.name, found.passing) == (name, passing)
 
 
 def test_none_where_none_decides() -> None:
     flights = Flights(lambda new: False)
-    assert deciding_parameter(ArduPlane(ArduPilotParameters.defaults()), (WIDE,), flights) is None
+    assert find_passing_parameter(ArduPlane(ArduPilotParameters.defaults()), (WIDE,), flights) is None
     assert flights.count == 8
-    assert deciding_parameter(ArduPlane(ArduPilotParameters.defaults()), (HEIGHTS,), flights) is None
+    assert find_passing_parameter(ArduPlane(ArduPilotParameters.defaults()), (HEIGHTS,), flights) is None
 
 
 def test_a_value_beyond_the_farthest_is_not_tried() -> None:
@@ -146,13 +146,13 @@ def test_a_value_beyond_the_farthest_is_not_tried() -> None:
         seen.append(new.tecs_height_demand_time)
         return False
 
-    assert deciding_parameter(ArduPlane(quick), (LOW,), Flights(passes)) is None
+    assert find_passing_parameter(ArduPlane(quick), (LOW,), Flights(passes)) is None
     assert set(seen) == {1.0}
 
 
 def test_findings_that_pass_are_not_blamed() -> None:
     fine: Finding = make_finding("corridor", LEG, ok=True, reason="")
-    assert deciding_parameter(ArduPlane(ArduPilotParameters.defaults()), (fine,), lambda new: True) is None
+    assert find_passing_parameter(ArduPlane(ArduPilotParameters.defaults()), (fine,), lambda new: True) is None
 
 
 # ----------------------------------------------------------------------
@@ -263,7 +263,7 @@ def test_a_flight_that_passes_has_a_reference_flight_only_on_request() -> None:
     assert [level.name for level in usual.verdict.levels] == ["geometry", "autopilot"]
     asked = fly_and_judge(setup, airframe, None, reference="always")
     assert asked.reference is not None
-    assert asked.reference.airframe == airframe_answer(setup, AIRCRAFT)
+    assert asked.reference.airframe == judge_airframe_flight(setup, AIRCRAFT)
     assert asked.reference.deciding is None
     assert asked.verdict.findings == usual.verdict.findings
     assert [line for line in asked.verdict.lines if line not in usual.verdict.lines] == [
@@ -290,4 +290,4 @@ def test_planflys_guidance_has_no_flight_beside_it() -> None:
 
 def test_the_airframe_knows_where_it_is_whatever_the_autopilot_does() -> None:
     lost = replace(over_a_hill(30.0), nav="gnss", autopilot=ArduPlane(ArduPilotParameters.defaults()))
-    assert airframe_answer(lost, AIRCRAFT) == airframe_answer(replace(lost, nav="perfect"), AIRCRAFT)
+    assert judge_airframe_flight(lost, AIRCRAFT) == judge_airframe_flight(replace(lost, nav="perfect"), AIRCRAFT)

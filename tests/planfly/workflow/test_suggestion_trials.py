@@ -17,14 +17,14 @@ from planfly.workflow.suggestion_trials import (
     MAX_TRIAL_FLIGHTS,
     MAX_TRIED_FINDINGS,
     SuggestionTrials,
-    fails_no_more,
+    is_improved,
     tried_suggestions,
     with_tried_suggestions,
 )
 from tests.planfly.studio.drafts import drawn_session
 
 SESSION = drawn_session(5, 12)
-CONTEXT = MissionContext.around_setup(SESSION.judged.setup)
+CONTEXT = MissionContext.from_setup(SESSION.judged.setup)
 
 
 def higher(leg: int, metres: float) -> Suggestion:
@@ -42,11 +42,11 @@ def verdict_of(*findings: Finding, level: str = "flown") -> Verdict:
 
 def test_a_finding_that_is_gone_is_worth_no_other() -> None:
     before = verdict_of(low(1), low(2))
-    assert fails_no_more(before, verdict_of(low(2), low(3)), low(1))
-    assert not fails_no_more(before, verdict_of(low(1)), low(1))
-    assert not fails_no_more(before, verdict_of(low(2), low(3), low(4)), low(1))
+    assert is_improved(before, verdict_of(low(2), low(3)), low(1))
+    assert not is_improved(before, verdict_of(low(1)), low(1))
+    assert not is_improved(before, verdict_of(low(2), low(3), low(4)), low(1))
     # An item that was inserted shifts the numbers of those behind it.
-    assert not fails_no_more(before, verdict_of(low(1, item=7)), low(1, item=6))
+    assert not is_improved(before, verdict_of(low(1, item=7)), low(1, item=6))
 
 
 @dataclass
@@ -86,7 +86,7 @@ def test_a_step_that_is_too_small_in_flight_is_enlarged_by_what_is_missing(monke
     """12 m and once and a half of the 6 m that still lack, and 2 m."""
     item = low(1, higher(1, 12.0))
     trials, flights = trials_of(monkeypatch, [item], lambda up: [] if up > 20.0 else [low(1, higher(1, 6.0))])
-    [tried] = tried_suggestions(trials.passing())
+    [tried] = tried_suggestions(trials.find_passing())
     assert tried.suggestions == (higher(1, 23.0),)
     assert flights.count == 2
 
@@ -95,39 +95,39 @@ def test_another_leg_that_then_fails_is_raised_with_it(monkeypatch: pytest.Monke
     item, other = low(1, higher(1, 12.0)), low(4, higher(4, 10.0))
     state = iter([[other, low(5)], []])
     trials, _ = trials_of(monkeypatch, [item], lambda up: next(state))
-    [tried] = tried_suggestions(trials.passing())
+    [tried] = tried_suggestions(trials.find_passing())
     assert tried.suggestions == ((*higher(1, 12.0), *higher(4, 17.0)),)
 
 
 def test_what_helps_nothing_or_harms_elsewhere_is_not_offered(monkeypatch: pytest.MonkeyPatch) -> None:
     item = low(1, higher(1, 12.0))
     trials, _ = trials_of(monkeypatch, [item], lambda up: [low(1)])
-    assert trials.passing() == []
+    assert trials.find_passing() == []
     trials, _ = trials_of(monkeypatch, [item], lambda up: [low(2), low(3)])
-    assert trials.passing() == []
+    assert trials.find_passing() == []
 
 
 def test_flights_are_few_and_shared(monkeypatch: pytest.MonkeyPatch) -> None:
     items = [low(leg, higher(leg, 12.0), higher(leg, 14.0)) for leg in range(1, 9)]
     trials, flights = trials_of(monkeypatch, items, lambda up: items)
-    assert trials.passing() == []
+    assert trials.find_passing() == []
     assert flights.count == MAX_TRIAL_FLIGHTS
     # The same mission is flown once, and the first of each finding before the second of any.
     same = [low(leg, higher(1, 12.0), higher(1, 14.0)) for leg in range(1, 9)]
     trials, flights = trials_of(monkeypatch, same, lambda up: [])
-    assert len(trials.passing()) == 2 * MAX_TRIED_FINDINGS
+    assert len(trials.find_passing()) == 2 * MAX_TRIED_FINDINGS
     assert flights.count == 2
 
 
 def test_by_geometry_every_suggestion_that_is_offered_mends() -> None:
     """And one that leads beyond the ceiling is not offered."""
-    desk = SESSION.desk
-    judged = desk.judge(raised(SESSION.mission, places(SESSION.mission), -90.0))
+    context = SESSION.context
+    judged = context.judge(raised(SESSION.mission, places(SESSION.mission), -90.0))
     [first, *_] = [item for item in judged.verdict.failed if item.rule == "clearance"]
     wrong = replace(first, suggestions=(higher(first.place.index or 0, 9000.0), *first.suggestions))
     findings = tuple(wrong if item is first else item for item in judged.verdict.findings)
     offered = with_tried_suggestions(replace(judged, verdict=replace(judged.verdict, findings=findings)))
     after = {(item.rule, item.place): item.suggestions for item in offered.failed}
     assert after[first.rule, first.place] == first.suggestions[:1]
-    for one in SuggestionTrials(desk, judged).passing():
-        assert fails_no_more(judged.verdict, desk.judge(one.setup.mission).verdict, one.finding)
+    for one in SuggestionTrials(context, judged).find_passing():
+        assert is_improved(judged.verdict, context.judge(one.setup.mission).verdict, one.finding)

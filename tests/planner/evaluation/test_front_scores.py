@@ -7,7 +7,7 @@ import pytest
 
 from planner.evaluation.front_scores import Value, front_values
 from planner.evaluation.problem import Problem, SlopeBounds
-from planner.evaluation.travel_cost import LENGTH
+from planner.evaluation.travel_cost import LENGTH_COST
 from world.frames import polymap
 from world.kernels import read_only
 
@@ -17,12 +17,12 @@ def test_the_values_of_a_path_are_plain_sums(problem: Problem) -> None:
     path = np.array([data.start, [1500.0, 900.0, 320.0], [4100.0, 800.0, 300.0], data.destination])
     heights = np.ones(len(data.aircraft.amsl))
     # 200 W whatever the climb.
-    power = LENGTH._replace(level=200.0 * heights, linear=0.0 * heights, square=0.0 * heights)
+    power = LENGTH_COST._replace(level=200.0 * heights, linear=0.0 * heights, square=0.0 * heights)
     values = front_values(data, power._replace(lowest=-heights, highest=heights), path[None])[0]
     steps = (np.arange(40_000) + 0.5) / 40_000
     points = np.concatenate([a + steps[:, None] * (b - a) for a, b in itertools.pairwise(path)])
     lengths = np.linalg.norm(np.diff(path, axis=0), axis=1)
-    assert values[Value.LENGTH] == pytest.approx(lengths.sum(), rel=1e-12)
+    assert values[Value.LENGTH_COST] == pytest.approx(lengths.sum(), rel=1e-12)
     # Still air, and the airspeed of the limits.
     seconds = lengths / data.aircraft.airspeed
     assert values[Value.TIME] == pytest.approx(seconds.sum(), rel=1e-12)

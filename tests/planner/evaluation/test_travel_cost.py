@@ -7,11 +7,11 @@ import pytest
 
 from aircraft.path_limits import PerformanceTable
 from planfly.workflow.airframe import load_airframe
-from planner.evaluation.travel_cost import LENGTH, TravelCost, make_travel_cost, path_cost
+from planner.evaluation.travel_cost import LENGTH_COST, TravelCost, make_travel_cost, path_cost
 from tests.setups import falling_envelope
 from world.scenario import load_scenario
 
-SECONDS = LENGTH._replace(length=0.0, time=1.0)
+SECONDS = LENGTH_COST._replace(length=0.0, time=1.0)
 NORTH, EAST = [0.0, 3000.0, 100.0], [3000.0, 0.0, 100.0]
 
 
@@ -51,7 +51,7 @@ def test_a_leg_takes_the_time_of_its_wind_triangle(end: list[float], wind: float
 def test_a_path_costs_the_sum_of_its_legs_and_length_costs_its_length() -> None:
     path = np.array([[0.0, 0.0, 100.0], NORTH, [4000.0, 3000.0, 100.0]])
     assert path_cost(SECONDS, table(wind=15.0), path) == pytest.approx(3000.0 / 40.0 + 4000.0 / 20.0)
-    assert path_cost(LENGTH, table(wind=15.0), path) == 7000.0
+    assert path_cost(LENGTH_COST, table(wind=15.0), path) == 7000.0
 
 
 def test_a_climb_through_a_shear_takes_what_a_fine_sum_says() -> None:
@@ -83,4 +83,4 @@ def test_energy_is_the_envelopes_power_over_the_time_of_the_wind_triangle(climb:
 
 def test_without_the_aircrafts_power_there_is_no_cost_of_energy() -> None:
     assert make_travel_cost("energy", falling_envelope(), table()) is None
-    assert make_travel_cost("length", falling_envelope(), table()) is LENGTH
+    assert make_travel_cost("length", falling_envelope(), table()) is LENGTH_COST

@@ -12,7 +12,7 @@ import pytest
 from aircraft.path_limits import Limits
 from planfly.workflow.airframe import load_airframe
 from planner.plan import Certificate, Plan
-from planner.search.lay_ground_ways import FinalLaw, with_ground_ways
+from planner.search.lay_ground_ways import FinalModel, with_ground_ways
 from tests.setups import spec_around
 from world.arrays import Floats
 from world.geometry import leg_courses, leg_runs
@@ -26,7 +26,7 @@ PATH = np.array([[0.0, 0.0, 300.0], [0.0, 2500.0, 300.0], [0.0, 5000.0, 300.0]])
 FIELD = {"east_m": 2000.0, "north_m": 2500.0}
 CALM = {"speed_mps": 0.0, "from_deg": 0.0}
 # A glide flown as it is laid out, at 22 m/s.
-LAW = FinalLaw(airspeed=lambda tail, amsl: 22.0, slope=lambda height, run, tail, amsl: height / run)
+LAW = FinalModel(airspeed=lambda tail, amsl: 22.0, slope=lambda height, run, tail, amsl: height / run)
 
 
 def level(east: Floats, north: Floats) -> Floats:
@@ -56,7 +56,7 @@ def limits() -> Limits:
     return load_airframe(scenario_of(launch={"method": "hand"})).limits
 
 
-def laid(heights: Ground = level, law: FinalLaw = LAW, **tables: Any) -> Plan:
+def laid(heights: Ground = level, law: FinalModel = LAW, **tables: Any) -> Plan:
     scenario = scenario_of(heights, **tables)
     certificate = Certificate(0.1, 100.0, 0.1, 50.0, 500.0, 100.0, ())
     zeros = np.zeros(4)

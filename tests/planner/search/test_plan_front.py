@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from aircraft.path_limits import Limits
-from planfly.terminal.plan_answers import fewer_line
+from planfly.terminal.plan_answers import fewer_plans_line
 from planner.plan import Plan, plan_json
 from planner.search import plan_front as fronts
 from planner.search.plan_front import Front, fit_margins, front_task, noticed_amounts, plan_front
@@ -174,4 +174,4 @@ def test_plans_that_are_not_safe_when_completed_are_left_out_and_counted(
     assert [one.plan for one in made.plans] == [front.default.plan]
     assert made.refused > 2
     note = f"1 of the 3 requested: {made.refused} that were found are not safe when completed, and no other"
-    assert note in fewer_line(made)
+    assert note in fewer_plans_line(made)

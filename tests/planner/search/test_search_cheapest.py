@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from planfly.workflow.airframe import load_airframe
-from planner.evaluation.travel_cost import LENGTH, energy_cost, path_cost
+from planner.evaluation.travel_cost import LENGTH_COST, make_energy_cost, path_cost
 from planner.plan import Plan
 from planner.search.plan_path import plan_path
 from tests.setups import spec_around
@@ -33,7 +33,7 @@ def planned(scenario: Scenario) -> tuple[Plan, float]:
     limits = load_airframe(scenario).limits
     plan = plan_path(scenario, limits, seed=1)
     assert plan.safe, plan.certificate.problems
-    seconds = path_cost(LENGTH._replace(length=0.0, time=1.0), limits.performance(), np.array(plan.waypoints))
+    seconds = path_cost(LENGTH_COST._replace(length=0.0, time=1.0), limits.performance(), np.array(plan.waypoints))
     return plan, seconds
 
 
@@ -69,7 +69,7 @@ def test_a_plan_for_energy_takes_less_of_the_envelopes_power_than_the_straight_l
     scenario = plain("energy", 0.0)
     limits = load_airframe(scenario).limits
     table = limits.performance()
-    cost = energy_cost(limits.envelope, table)
+    cost = make_energy_cost(limits.envelope, table)
     assert cost is not None
     (straight, _), (sparing, _) = planned(plain("length", 0.0)), planned(scenario)
     used, least = (path_cost(cost, table, np.array(one.waypoints)) / cost.energy for one in (straight, sparing))

@@ -562,6 +562,6 @@ def test_a_fence_of_openair_beside_a_scenario(tmp_path: Path) -> None:
     text = path.read_text(encoding="utf-8").replace("DP 46:00:00N", "V X=46:01:00N 008:00:00E\nDC 1")
     path.write_text(text, encoding="utf-8")
     (tmp_path / "small.toml").write_text(SMALL, encoding="utf-8")
-    scenario = read_named_fences([str(path)]).on_scenario(load_scenario(str(tmp_path / "small.toml")))
+    scenario = read_named_fences([str(path)]).add_to_scenario(load_scenario(str(tmp_path / "small.toml")))
     assert [zone.name for zone in scenario.zones] == ["CTR (D)"]
     assert scenario.notes == (f"{path}: 1 zone keeps nobody out: class G, open to all",)

@@ -160,7 +160,7 @@ def test_coefficients_are_found(link: BinaryLink, law: Any, known: bool) -> None
     assert fit.mean == pytest.approx(TRUTH, abs=0.1)
     assert (np.abs(fit.mean - TRUTH) < 4.0 * deviations).all()
     assert deviations.max() < 0.06
-    assert fit.by_margin == (pytest.approx(1.0 / SPREAD, rel=0.03) if known else 0.0)
+    assert fit.margin_coefficient == (pytest.approx(1.0 / SPREAD, rel=0.03) if known else 0.0)
 
 
 @pytest.mark.parametrize("known", [True, False])
@@ -191,7 +191,7 @@ def test_margins_alone_give_the_coefficients_of_the_law_it_has(link: BinaryLink,
     fit = fit_regression(made(20_000, 8, law).margins_given_pass(), link)
     assert (np.abs(fit.mean - TRUTH) < 4.0 * np.sqrt(np.diag(fit.covariance))).all()
     assert np.sqrt(np.diag(fit.covariance)).max() < 0.1
-    assert fit.by_margin == pytest.approx(1.0 / SPREAD, rel=0.1)
+    assert fit.margin_coefficient == pytest.approx(1.0 / SPREAD, rel=0.1)
 
 
 def battery_flights(seed: int) -> Outcomes:
@@ -297,7 +297,7 @@ def test_the_evidence_of_margins_is_the_integral_over_the_prior() -> None:
         fails += norm.logcdf(a) if one < 0.0 else by_so_much
         passes += 0.0 if one < 0.0 else by_so_much - norm.logsf(a)
     fit = fit_regression(outcomes, PROBIT)
-    assert fit.by_margin == pytest.approx(2.0, rel=0.15)
+    assert fit.margin_coefficient == pytest.approx(2.0, rel=0.15)
     assert fit.log_evidence == pytest.approx(logs_sum(fails, 0.01 * 0.01), abs=0.1)
     alone = fit_regression(outcomes.margins_given_pass(), PROBIT)
     assert alone.log_evidence == pytest.approx(logs_sum(passes, 0.01 * 0.01), abs=0.3)

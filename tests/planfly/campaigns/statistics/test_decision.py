@@ -82,14 +82,14 @@ CHANCE = 0.999
 @pytest.mark.parametrize(("target", "flights"), [(0.9, 29), (0.95, 59), (0.99, 299)])
 def test_without_a_failure_it_takes_no_more_flights_than_a_fixed_number(target: float, flights: int) -> None:
     bound = StoppingBound(target)
-    assert bound.fewest == flights == math.ceil(math.log(0.05) / math.log(target))
+    assert bound.min_flights == flights == math.ceil(math.log(0.05) / math.log(target))
     assert bound.interval(flights, 0).low >= target > bound.interval(flights - 1, 0).low
 
 
 @pytest.mark.parametrize("target", [0.9, 0.99, 0.999])
 def test_what_the_fewest_flights_leave_is_kept_for_failures(target: float) -> None:
     bound = StoppingBound(target)
-    assert 0.0 <= bound.evidence(bound.fewest, 0, target) - math.log(20.0) < 1e-3
+    assert 0.0 <= bound.evidence(bound.min_flights, 0, target) - math.log(20.0) < 1e-3
 
 
 def test_a_probability_is_excluded_on_the_side_that_is_asked() -> None:

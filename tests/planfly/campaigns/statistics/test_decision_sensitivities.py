@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from planfly.campaigns.statistics.decision import MIN_FLIGHTS, first_order, rank_slope
+from planfly.campaigns.statistics.decision import MIN_FLIGHTS_FOR_INDEX, first_order_index, rank_slope
 
 
 def ishigami(x: np.ndarray) -> np.ndarray:
@@ -28,22 +28,22 @@ def test_ishigami_within_a_twentieth(seed: int, count: int) -> None:
     # Of a thousand the estimate itself scatters: its standard error is a fiftieth.
     most = 0.05 if count == 8000 else 0.08
     for k, exact in enumerate(exact_first_order()):
-        assert first_order(x[:, k], y) == pytest.approx(exact, abs=most)
+        assert first_order_index(x[:, k], y) == pytest.approx(exact, abs=most)
 
 
 def test_what_does_nothing_comes_to_nothing() -> None:
     random = np.random.default_rng(3)
-    found = [first_order(random.random(300), random.random(300)) for _ in range(200)]
+    found = [first_order_index(random.random(300), random.random(300)) for _ in range(200)]
     # Without the correction it would be groups / flights, 13 / 300.
     assert np.mean(found) < 0.02
 
 
 def test_too_few_or_nothing_that_varies_says_nothing() -> None:
-    x = np.linspace(0.0, 1.0, MIN_FLIGHTS)
-    assert first_order(x, x) > 0.9
-    assert first_order(x[1:], x[1:]) == 0.0
-    assert first_order(x, np.ones(x.size)) == 0.0
-    assert first_order(np.ones(x.size), x) == 0.0
+    x = np.linspace(0.0, 1.0, MIN_FLIGHTS_FOR_INDEX)
+    assert first_order_index(x, x) > 0.9
+    assert first_order_index(x[1:], x[1:]) == 0.0
+    assert first_order_index(x, np.ones(x.size)) == 0.0
+    assert first_order_index(np.ones(x.size), x) == 0.0
 
 
 def test_rank_slope_says_which_way() -> None:

@@ -13,10 +13,10 @@ from planfly.campaigns.statistics.failure_modes import (
     FailureMode,
     boundary_slopes,
     boundary_speed,
-    failing_share,
+    failure_fraction,
     fit_mode,
     fit_modes,
-    regressors,
+    make_terms,
 )
 from world.arrays import Floats
 
@@ -26,31 +26,31 @@ PARTS = np.array([0.025, 0.5, 0.975])
 @pytest.mark.parametrize("speed", [6.0, 12.0, 19.0])
 def test_the_laws_are_scipys(speed: float) -> None:
     """Means, spreads, probabilities and quantiles of both."""
-    laws = FailureLaws.up_to(20.0)
-    fails, flies = laws.log_shares(speed)
-    assert laws.location.size == 2 * laws.normals
-    for k in range(0, laws.normals, 997):
+    laws = FailureLaws.for_winds_up_to(20.0)
+    fails, flies = laws.log_probabilities(speed)
+    assert laws.location.size == 2 * laws.normal_count
+    for k in range(0, laws.normal_count, 997):
         mean, spread = laws.location[k], laws.scale[k]
         assert fails[k] == pytest.approx(norm(mean, spread).logcdf(speed), rel=1e-9)
         assert laws.quantile(0.01)[k] == pytest.approx(norm(mean, spread).ppf(0.01))
-        gumbel = gumbel_l(laws.location[k + laws.normals], laws.scale[k + laws.normals])
+        gumbel = gumbel_l(laws.location[k + laws.normal_count], laws.scale[k + laws.normal_count])
         assert gumbel.stats() == pytest.approx((mean, spread**2))
-        assert flies[k + laws.normals] == pytest.approx(gumbel.logsf(speed), rel=1e-9)
-        assert laws.quantile(0.01)[k + laws.normals] == pytest.approx(gumbel.ppf(0.01))
+        assert flies[k + laws.normal_count] == pytest.approx(gumbel.logsf(speed), rel=1e-9)
+        assert laws.quantile(0.01)[k + laws.normal_count] == pytest.approx(gumbel.ppf(0.01))
 
 
 def test_a_law_that_flights_follow_is_found() -> None:
     law = norm(9.0, 1.0)
     speeds = np.repeat(np.arange(4.0, 14.0, 0.5), 100)
     flew = speeds < law.rvs(speeds.size, random_state=np.random.default_rng(2))
-    low, middle, high = FailureLaws.up_to(20.0).quantile_at(0.1, speeds, flew, PARTS)
+    low, middle, high = FailureLaws.for_winds_up_to(20.0).posterior_quantiles(0.1, speeds, flew, PARTS)
     assert low < law.ppf(0.1) < high
     assert middle == pytest.approx(law.ppf(0.1), abs=0.25)
 
 
 def test_the_more_flew_the_further_the_boundary() -> None:
-    laws = FailureLaws.up_to(20.0)
-    few, many = (laws.quantile_at(0.01, np.full(n, 20.0), np.full(n, True), PARTS) for n in (10, 300))
+    laws = FailureLaws.for_winds_up_to(20.0)
+    few, many = (laws.posterior_quantiles(0.01, np.full(n, 20.0), np.full(n, True), PARTS) for n in (10, 300))
     assert (many > few).all()
     # 299 of 299 show a share of 1 % with 95 % confidence: by any law the boundary is beyond, or as good as.
     assert many[0] > 19.5
@@ -80,7 +80,7 @@ def made(count: int, seed: int, *, one_law: bool) -> tuple[Floats, NDArray[np.bo
 def test_margins_count_where_failing_is_of_its_law(seed: int) -> None:
     """By a normal law as the flights were made: 1/0.6 of the margin, and 0.4 and 0.8 of the wind and the first draw."""
     mode = fit_mode(*made(400, seed, one_law=True), PROBIT)
-    assert mode.by_margin == pytest.approx(1.0 / 0.6, rel=0.25)
+    assert mode.margin_coefficient == pytest.approx(1.0 / 0.6, rel=0.25)
     assert mode.mean == pytest.approx([-2.0, 0.4, 0.8, 0.0], abs=0.4)
 
 
@@ -90,7 +90,7 @@ def test_margins_count_for_nothing_where_failing_is_of_another(link: BinaryLink,
     """One law would have the first draw, which alone decides, as of little account: it leaves the margin as it is."""
     terms, failed, margin = made(400, seed, one_law=False)
     mode, bare = fit_mode(terms, failed, margin, link), fit_mode(terms, failed, np.zeros(400), link)
-    assert mode.by_margin == 0.0
+    assert mode.margin_coefficient == 0.0
     assert mode.mean == pytest.approx(bare.mean)
     assert mode.mean[2] > 2.0
 
@@ -122,7 +122,7 @@ FIRST, SECOND = np.array([-1.0, 0.6, 1.5, 0.0]), np.array([-1.5, 0.3, -1.0, 0.5]
 def made_flights(count: int, seed: int, link: BinaryLink = PROBIT) -> tuple[np.ndarray, list[frozenset[Hashable]]]:
     """Flights that fail by slope, by threat, by both or not at all, whatever the other does."""
     random = np.random.default_rng(seed)
-    terms = regressors(random.uniform(2.0, 18.0, count), random.normal(size=(count, 2)))
+    terms = make_terms(random.uniform(2.0, 18.0, count), random.normal(size=(count, 2)))
     ways: list[set[Hashable]] = [set() for _ in range(count)]
     for name, beta in (("slope", FIRST), ("threat", SECOND)):
         for k in np.flatnonzero(np.log(random.random(count)) < link.log_cdf(terms @ beta)):
@@ -146,7 +146,7 @@ def test_coefficients_are_found(link: BinaryLink) -> None:
 def test_each_way_has_the_margin_that_flights_had_of_it() -> None:
     """Room of the slope, of the slope's law, sharpens the slope's fit and leaves the threat's; another's, neither."""
     random = np.random.default_rng(2)
-    terms = regressors(random.uniform(2.0, 18.0, 600), random.normal(size=(600, 2)))
+    terms = make_terms(random.uniform(2.0, 18.0, 600), random.normal(size=(600, 2)))
     slope, threat = (random.normal(size=600) - terms @ beta for beta in (FIRST, SECOND))
     ways: list[frozenset[Hashable]] = [
         frozenset(name for name, margin in (("slope", one), ("threat", other)) if margin < 0.0)
@@ -154,7 +154,7 @@ def test_each_way_has_the_margin_that_flights_had_of_it() -> None:
     ]
     shares: list[dict[Hashable, float]] = [{} if margin < 0.0 else {"slope": min(1.0, margin)} for margin in slope]
     bare, known = fit_modes(terms, ways, PROBIT), fit_modes(terms, ways, PROBIT, shares)
-    assert [mode.by_margin > 0.0 for mode in known] == [True, False]
+    assert [mode.margin_coefficient > 0.0 for mode in known] == [True, False]
     assert np.diag(known[0].covariance).sum() < 0.8 * np.diag(bare[0].covariance).sum()
     assert known[1].mean == pytest.approx(bare[1].mean)
     other: list[dict[Hashable, float]] = [{"bounds": 0.5}] * len(ways)
@@ -165,14 +165,14 @@ def test_each_way_has_the_margin_that_flights_had_of_it() -> None:
 def test_a_margin_that_is_not_known_is_not_taken_for_much() -> None:
     """A flight that passed by a scale or more tells that; one of which it is not known, that it passed."""
     random = np.random.default_rng(4)
-    terms = regressors(random.uniform(2.0, 18.0, 1500), random.normal(size=(1500, 2)))
+    terms = make_terms(random.uniform(2.0, 18.0, 1500), random.normal(size=(1500, 2)))
     slope = 0.5 * (random.normal(size=1500) - terms @ FIRST)
     ways: list[frozenset[Hashable]] = [frozenset({"slope"} if margin < 0.0 else ()) for margin in slope]
     shares: list[dict[Hashable, float] | None] = [{"slope": margin} if 0.0 <= margin < 1.0 else {} for margin in slope]
     half: list[dict[Hashable, float] | None] = [some if k % 2 else None for k, some in enumerate(shares)]
     for known in (shares, half):
         (mode,) = fit_modes(terms, ways, PROBIT, known)
-        assert mode.by_margin == pytest.approx(2.0, rel=0.15)
+        assert mode.margin_coefficient == pytest.approx(2.0, rel=0.15)
         assert mode.mean == pytest.approx(FIRST, abs=0.2)
 
 
@@ -221,8 +221,8 @@ def test_slopes_are_the_boundarys_derivatives(link: BinaryLink) -> None:
 def test_the_share_that_fails_and_its_derivatives(link: BinaryLink) -> None:
     """Of two ways of which either often comes: against the share itself, a little moved."""
     draws, betas = np.random.default_rng(1).normal(size=(4096, 2)), [FIRST, SECOND]
-    found = failing_share([mode_of(beta, link) for beta in betas], draws, 11.0)
-    flies = np.prod([link.survival(regressors(11.0, draws) @ beta) for beta in betas], axis=0)
+    found = failure_fraction([mode_of(beta, link) for beta in betas], draws, 11.0)
+    flies = np.prod([link.survival(make_terms(11.0, draws) @ beta) for beta in betas], axis=0)
     assert found.share == pytest.approx(1.0 - flies.mean())
     assert 0.3 < found.share < 0.9
     for which in (0, 1):
@@ -231,7 +231,9 @@ def test_the_share_that_fails_and_its_derivatives(link: BinaryLink) -> None:
             for by in (-1e-3, 1e-3):
                 changed = [beta.copy() for beta in betas]
                 changed[which][k] += by
-                moved.append(failing_share([mode_of(beta, link) for beta in changed], draws, 11.0).share)
+                moved.append(failure_fraction([mode_of(beta, link) for beta in changed], draws, 11.0).share)
             assert found.slopes[which][k] == pytest.approx((moved[1] - moved[0]) / 2e-3, rel=1e-3, abs=1e-6)
-    low, high = (failing_share([mode_of(beta, link) for beta in betas], draws, 11.0 + by).share for by in (-1e-3, 1e-3))
-    assert found.by_wind == pytest.approx((high - low) / 2e-3, rel=1e-3)
+    low, high = (
+        failure_fraction([mode_of(beta, link) for beta in betas], draws, 11.0 + by).share for by in (-1e-3, 1e-3)
+    )
+    assert found.wind_slope == pytest.approx((high - low) / 2e-3, rel=1e-3)

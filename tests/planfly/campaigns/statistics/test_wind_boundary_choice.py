@@ -8,7 +8,13 @@ from scipy.stats import norm
 
 from planfly.campaigns.statistics.censored_regression import PROBIT
 from planfly.campaigns.statistics.failure_modes import FailureMode
-from planfly.campaigns.statistics.wind_boundary import Direction, FailureFit, _Belief, _gains_between, next_flights
+from planfly.campaigns.statistics.wind_boundary import (
+    Direction,
+    FailureFit,
+    _ExpectedPosterior,
+    _gains_between,
+    next_flights,
+)
 from tests.planfly.campaigns.statistics.made_directions import above, fly, no_numbers, normal_numbers
 from tests.soak import scaled
 
@@ -92,9 +98,9 @@ def told_of(fit: FailureFit, row: np.ndarray) -> list[float]:
 def test_a_flight_gains_what_it_takes_from_the_boundarys_variance() -> None:
     """By the posterior's precision with the flight's information added, inverted: of three modes, one after another."""
     fit = fit_of([-1.0, 0.4, 0.8], [-2.0, 0.3, -0.5], [-0.5, 0.2, 0.1], weight=0.7)
-    belief, known = _Belief(fit), [mode.covariance for mode in fit.modes]
+    belief, known = _ExpectedPosterior(fit), [mode.covariance for mode in fit.modes]
     for _ in range(2):
-        gains, after = belief.gains(ROWS), []
+        gains, after = belief.expected_gains(ROWS), []
         for k, row in enumerate(ROWS):
             changed = [
                 np.linalg.inv(np.linalg.inv(one) + told * np.outer(row, row))
@@ -104,15 +110,15 @@ def test_a_flight_gains_what_it_takes_from_the_boundarys_variance() -> None:
             assert gains[k] == pytest.approx(0.7 * lost, rel=1e-6)
             after.append(changed)
         # The same once more, after the second was flown.
-        belief.expect(ROWS[1])
+        belief.include_flight(ROWS[1])
         known = after[1]
 
 
 def test_a_flight_that_surely_fails_by_one_way_tells_nothing_of_the_next() -> None:
     alone, behind = fit_of([-1.0, 0.4, 0.8]), fit_of([9.0, 0.0, 0.0], [-1.0, 0.4, 0.8])
     behind = replace(behind, modes=(behind.modes[0], alone.modes[0]), slopes=[np.zeros(3), alone.slopes[0]])
-    assert (_Belief(alone).gains(ROWS) > 1e-3).all()
-    assert (_Belief(behind).gains(ROWS) < 1e-12).all()
+    assert (_ExpectedPosterior(alone).expected_gains(ROWS) > 1e-3).all()
+    assert (_ExpectedPosterior(behind).expected_gains(ROWS) < 1e-12).all()
 
 
 def test_what_tells_between_fits_is_what_their_boundaries_are_apart() -> None:

@@ -5,15 +5,15 @@ import json
 import jsonschema
 import pytest
 
-from planfly.commands.registry import answer_objects, answer_schema, answering_commands, build_parser, schema_text
+from planfly.commands.registry import answer_objects, answer_schema, build_parser, commands_with_json, schema_text
 
 
 def test_every_command_with_json_has_a_schema_and_no_other() -> None:
     asked = {name for name, parser in build_parser().commands.items() if "--json" in parser.options()}
-    assert asked == set(answering_commands())
+    assert asked == set(commands_with_json())
 
 
-@pytest.mark.parametrize("command", answering_commands())
+@pytest.mark.parametrize("command", commands_with_json())
 def test_each_is_a_schema_that_asks_for_its_name(command: str) -> None:
     schema = answer_schema(command)
     jsonschema.Draft202012Validator.check_schema(schema)
@@ -25,7 +25,7 @@ def test_each_is_a_schema_that_asks_for_its_name(command: str) -> None:
 
 
 def test_no_two_answers_have_one_name() -> None:
-    objects = [one for command in answering_commands() for one in answer_objects(answer_schema(command))]
+    objects = [one for command in commands_with_json() for one in answer_objects(answer_schema(command))]
     names = [one["properties"]["schema"]["const"] for one in objects]
     assert len(set(names)) == len(names)
 
