@@ -253,10 +253,10 @@ def badness(finding: Finding) -> tuple[int, float]:
     ), 0.0 if finding.margin is None else finding.margin
 
 
-def reason_of(faults: Sequence[Message], facts: Sequence[str] = ()) -> str:
+def finding_reason(faults: Sequence[Message], facts: Sequence[str] = ()) -> str:
     """Join faults, followed by the facts in brackets; without faults, join only the facts.
 
-    >>> reason_of([message("bank 40.0° beyond 35.0°")], ["turns 62.0°", "radius 76 m"])
+    >>> finding_reason([message("bank 40.0° beyond 35.0°")], ["turns 62.0°", "radius 76 m"])
     'bank 40.0° beyond 35.0° (turns 62.0°; radius 76 m)'
     """
     facts_text = "; ".join(facts)

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 
 from logs.verdict.findings import Finding
-from logs.verdict.wording import compared_texts, place_text, shortened
+from logs.verdict.wording import compared_texts, place_text, shorten_statement
 
 # Function that phrases a failed finding; its first argument is the rule's name for people.
 HeadlinePhrase = Callable[[str, Finding], str]
@@ -18,12 +18,12 @@ def _with_place(noun: str, finding: Finding, text: str) -> str:
 
 def name_reason(noun: str, finding: Finding) -> str:
     """Name the place and the reason in brief."""
-    return _with_place(noun, finding, shortened(finding.brief))
+    return _with_place(noun, finding, shorten_statement(finding.brief))
 
 
 def name_event(noun: str, finding: Finding) -> str:
     """Name the brief reason of an event that ends the flight, without its place."""
-    return f"{noun} ({shortened(finding.brief)})"
+    return f"{noun} ({shorten_statement(finding.brief)})"
 
 
 def name_shortfall(noun: str, finding: Finding) -> str:

@@ -12,9 +12,9 @@ from logs.verdict.findings import (
     UNKNOWN_AIRCRAFT,
     Finding,
     badness,
+    finding_reason,
     make_finding,
     message,
-    reason_of,
     undecided_findings,
 )
 from logs.verdict.measures.route_requirements import RouteRequirements, route_requirements
@@ -281,7 +281,7 @@ def judge_unflown(requirements: RouteRequirements, ended: str, *, log_complete: 
     setup = requirements.setup
     faults = [message(ended), *([] if log_complete else [message("the log is damaged or unfinished")])]
     stopped = make_finding(
-        "completion", FLIGHT, ok=False, reason=reason_of(faults), faults=faults, method="nothing was flown"
+        "completion", FLIGHT, ok=False, reason=finding_reason(faults), faults=faults, method="nothing was flown"
     )
     predicted = geometric_findings(requirements)
     passes = not any(finding.ok is False for finding in predicted)

@@ -197,10 +197,10 @@ def gentle_launch_text(acceleration: float, trigger: tuple[float, str]) -> str:
     return f"the launch accelerates at {acceleration:.1f} m/s², less than {trigger[1]} {trigger[0]:g}"
 
 
-def shortened(statement: str) -> str:
+def shorten_statement(statement: str) -> str:
     """Cut a statement to the maximum length in a headline.
 
-    >>> shortened("bank 80° at 3.0 s"), len(shortened("m" * 200))
+    >>> shorten_statement("bank 80° at 3.0 s"), len(shorten_statement("m" * 200))
     ('bank 80° at 3.0 s', 80)
     """
     return statement if len(statement) <= _MAX_STATEMENT_LENGTH else statement[: _MAX_STATEMENT_LENGTH - 3] + "..."

@@ -27,34 +27,34 @@ Profile = list[tuple[float, float]]
 _PIECE_LENGTH_M = 100.0
 
 
-class Way(NamedTuple):
+class GroundPath(NamedTuple):
     """Path of n points, m, (n, 3), and the run to each point, m, (n,)."""
 
     points: Floats
     run: Floats
 
-    def between(self, first: float, last: float) -> "Way":
+    def between(self, first: float, last: float) -> "GroundPath":
         """Return the part between two runs, m."""
         inner_runs = self.run[(self.run > first) & (self.run < last)]
         runs = np.concatenate([[first], inner_runs, [max(first, last)]])
-        return Way(np.stack([np.interp(runs, self.run, self.points[:, k]) for k in range(3)], axis=1), runs)
+        return GroundPath(np.stack([np.interp(runs, self.run, self.points[:, k]) for k in range(3)], axis=1), runs)
 
 
-def track_way(track: Track) -> Way:
+def track_path(track: Track) -> GroundPath:
     """Return the horizontal path of a flown track."""
     position = np.asarray(track.position, dtype=np.float64)
     step = np.diff(position[:, :2], axis=0)
-    return Way(position, np.concatenate([[0.0], np.cumsum(np.hypot(step[:, 0], step[:, 1]))]))
+    return GroundPath(position, np.concatenate([[0.0], np.cumsum(np.hypot(step[:, 0], step[:, 1]))]))
 
 
-def straight_way(begin: Sequence[float] | Floats, course: float, profile: Profile) -> Way:
+def straight_path(begin: Sequence[float] | Floats, course: float, profile: Profile) -> GroundPath:
     """Return a path on one course (rad) from a start (east, north, m)."""
     run, up = np.array(profile, dtype=np.float64).T
     east, north = begin[0] + run * math.sin(course), begin[1] + run * math.cos(course)
-    return Way(np.stack([east, north, up], axis=1), run)
+    return GroundPath(np.stack([east, north, up], axis=1), run)
 
 
-def way_clearance(ground: Terrain, way: Way) -> tuple[float, float]:
+def min_path_clearance(ground: Terrain, way: GroundPath) -> tuple[float, float]:
     """Return the minimum height above ground on a path and the run at which it occurs, m.
 
     The height is NaN if part of the ground is not known, unless the path hits known ground.
@@ -70,7 +70,7 @@ def way_clearance(ground: Terrain, way: Way) -> tuple[float, float]:
     return float(heights[lowest]), float(run[lowest] + clearances[lowest][1] * (run[lowest + 1] - run[lowest]))
 
 
-def first_obstacle_on(requirements: RouteRequirements, way: Way) -> str:
+def first_hazard_on_path(requirements: RouteRequirements, way: GroundPath) -> str:
     """Return the name of the first missile sphere or zone that a path enters, or "" if it enters none.
 
     Ignore zones that contain the path's start, and inclusion zones with a floor.
@@ -97,7 +97,7 @@ def first_obstacle_on(requirements: RouteRequirements, way: Way) -> str:
 # The mission items at which such paths begin and end.
 
 
-def is_laid_out(requirements: RouteRequirements) -> bool:
+def has_ground_paths(requirements: RouteRequirements) -> bool:
     """Return True if ground paths apply: known terrain, not an imported flight or an airborne plan."""
     setup = requirements.setup
     has_ground_phases = setup.plan is None or setup.plan.ways is not None

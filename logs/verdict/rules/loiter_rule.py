@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from flight.mission.itinerary import loiter_of
-from logs.verdict.findings import UNKNOWN_WAY, Finding, Message, badness, make_finding, message, reason_of
+from logs.verdict.findings import UNKNOWN_WAY, Finding, Message, badness, finding_reason, make_finding, message
 from logs.verdict.measures.circle_reach import end_loiter_hazards, hazards_within
 from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.track_alignment import AlignedTrack, approaches
@@ -30,7 +30,7 @@ from world.geometry import tangent_length
 
 
 @dataclass(frozen=True, slots=True)
-class Circle:
+class LoiterCircle:
     """One loiter of a route.
 
     first, last: waypoints of the first and last corner; neither is an end of the route.
@@ -46,10 +46,10 @@ class Circle:
     turns: float
 
 
-def circles(requirements: RouteRequirements) -> list[Circle]:
+def loiter_circles(requirements: RouteRequirements) -> list[LoiterCircle]:
     """Return the loiters of a route, in flying order."""
     arcs, items = requirements.setup.route.arcs, requirements.setup.route.items
-    loiters: list[Circle] = []
+    loiters: list[LoiterCircle] = []
     i = 0
     while i < len(arcs):
         last = i
@@ -57,7 +57,7 @@ def circles(requirements: RouteRequirements) -> list[Circle]:
             last += 1
         if arcs[i] > 0.0:
             angle = float(np.abs(requirements.turns[i : last + 1]).sum())
-            loiters.append(Circle(i, last, _center(requirements, i), float(arcs[i]), angle / (2.0 * math.pi)))
+            loiters.append(LoiterCircle(i, last, _center(requirements, i), float(arcs[i]), angle / (2.0 * math.pi)))
             i = last
         i += 1
     return loiters
@@ -73,7 +73,7 @@ def _center(requirements: RouteRequirements, i: int) -> Floats:
     )
 
 
-def fold_loiters(
+def merge_loiter_findings(
     requirements: RouteRequirements, aligned: AlignedTrack | None, findings: Sequence[Finding]
 ) -> tuple[Finding, ...]:
     """Merge the findings at each loiter's corners into one, and keep only each rule's worst finding on its legs."""
@@ -89,7 +89,7 @@ def fold_loiters(
         indices = sorted(k for rule in rules for place in places for k in positions.get((rule, place), ()))
         return [(k, finding) for k in indices if (finding := merged[k]) is not None and finding.rule in rules]
 
-    for circle in circles(requirements):
+    for circle in loiter_circles(requirements):
         # If the mission ends on its loiter, that end is on it too.
         last_items = requirements.setup.route.items[circle.last : circle.last + 2]
         last = (
@@ -150,7 +150,7 @@ def end_findings(
 
 
 def _loiter_finding(
-    requirements: RouteRequirements, aligned: AlignedTrack | None, circle: Circle, corner_findings: list[Finding]
+    requirements: RouteRequirements, aligned: AlignedTrack | None, circle: LoiterCircle, corner_findings: list[Finding]
 ) -> Finding:
     inner = slice(circle.first, circle.last + 1)
     is_known = bool(np.isfinite(requirements.turn_limit[inner]).all())
@@ -200,7 +200,7 @@ def _loiter_finding(
         "loiter",
         requirements.waypoint(circle.first),
         ok=ok,
-        reason=reason_of(faults, facts),
+        reason=finding_reason(faults, facts),
         faults=faults,
         planned=circle.radius,
         flown=mean_radius,
@@ -215,7 +215,7 @@ def _loiter_finding(
     )
 
 
-def _flown_radii(aligned: AlignedTrack, circle: Circle) -> Floats:
+def _flown_radii(aligned: AlignedTrack, circle: LoiterCircle) -> Floats:
     """Return the distances from a loiter's center, flown from the first to the last corner, m, (n,).
 
     The array is empty if the loiter was not flown to its end.
@@ -227,7 +227,7 @@ def _flown_radii(aligned: AlignedTrack, circle: Circle) -> Floats:
     return np.asarray(np.hypot(offsets[:, 0], offsets[:, 1]))
 
 
-def _uses_parameter_radius(requirements: RouteRequirements, circle: Circle) -> bool:
+def _uses_parameter_radius(requirements: RouteRequirements, circle: LoiterCircle) -> bool:
     """Return True if the autopilot takes a loiter's radius from its parameter.
 
     The mission item then has no radius that the autopilot reads.
@@ -238,7 +238,7 @@ def _uses_parameter_radius(requirements: RouteRequirements, circle: Circle) -> b
 
 
 def _held_bank(
-    requirements: RouteRequirements, circle: Circle, min_radius: float, corner_findings: list[Finding]
+    requirements: RouteRequirements, circle: LoiterCircle, min_radius: float, corner_findings: list[Finding]
 ) -> float:
     """Return the bank with which a loiter was held that is tighter than the bank limit allows, rad.
 
@@ -254,7 +254,7 @@ def _held_bank(
     return min(requirements.setup.autopilot.bank_limit, needed)
 
 
-def _hazards_text(requirements: RouteRequirements, circle: Circle, min_radius: float) -> str:
+def _hazards_text(requirements: RouteRequirements, circle: LoiterCircle, min_radius: float) -> str:
     """Describe the hazards too close to a loiter that is flown wider than drawn; return "" if there are none."""
     heights = requirements.points[circle.first : circle.last + 1, 2]
     reach = LOITER_SWING_RADII * min_radius
@@ -265,7 +265,7 @@ def _hazards_text(requirements: RouteRequirements, circle: Circle, min_radius: f
     return f"{reach_text}, {', '.join(hazards)}; only a flight tells where it circles"
 
 
-def _has_reached(requirements: RouteRequirements, aligned: AlignedTrack, circle: Circle) -> bool:
+def _has_reached(requirements: RouteRequirements, aligned: AlignedTrack, circle: LoiterCircle) -> bool:
     """Return True if the flight came close enough to a loiter to count as having reached it.
 
     The corners do not show this, because a flight that leaves the loiter when its time is over may miss all of them.
@@ -275,7 +275,7 @@ def _has_reached(requirements: RouteRequirements, aligned: AlignedTrack, circle:
     return bool(distances.min() <= circle.radius + turn_distance + WAYPOINT_PASS_MARGIN_M)
 
 
-def _small_radius_faults(requirements: RouteRequirements, circle: Circle, min_radius: float) -> list[Message]:
+def _small_radius_faults(requirements: RouteRequirements, circle: LoiterCircle, min_radius: float) -> list[Message]:
     """Return a fault if a loiter is smaller than the radius at the bank limit (m)."""
     if circle.radius >= min_radius - RADIUS_TOLERANCE_FRACTION:
         return []
@@ -286,7 +286,7 @@ def _small_radius_faults(requirements: RouteRequirements, circle: Circle, min_ra
     return [message(f"radius {circle.radius:.0f} m; {need_text} in this wind")]
 
 
-def _unheld_corners_message(circle: Circle, failed: list[Finding]) -> Message:
+def _unheld_corners_message(circle: LoiterCircle, failed: list[Finding]) -> Message:
     """State the number of corners that were not held, and the worst corner."""
     worst = min(failed, key=badness)
     corners = len({finding.place for finding in failed})
@@ -309,6 +309,6 @@ RULE = Rule(
         "LOITER_WIDENING_FRACTION",
     ),
     judge=end_findings,
-    merge=fold_loiters,
+    merge=merge_loiter_findings,
     log=LogNeeds(aircraft=True),
 )

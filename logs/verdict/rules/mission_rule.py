@@ -129,7 +129,7 @@ def _unjoined_finding(setup: FlightSetup) -> Finding:
     """Report that an autopilot leaves the route for a place inside a loiter, or a loiter about another center.
 
     For an imported flight this is undecided, not a fault; see
-    `logs.verdict.rules.completion_rule.imported_completion`.
+    `logs.verdict.rules.completion_rule.imported_completion_finding`.
     """
     first, *others = setup.route.unjoined
     autopilot = setup.autopilot.title

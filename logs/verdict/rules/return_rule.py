@@ -54,7 +54,9 @@ def return_findings(
     has_passed_end = aligned is not None and bool(aligned.passed[-1])
     goes_on_to_land = requirements.setup.route.return_until <= requirements.legs
     return _flown_finding(
-        requirements, has_passed_end and (goes_on_to_land or (aligned is not None and circled(requirements, aligned)))
+        requirements,
+        has_passed_end
+        and (goes_on_to_land or (aligned is not None and has_completed_return_loiter(requirements, aligned))),
     )
 
 
@@ -145,7 +147,7 @@ _DEMANDS: dict[ReturnDemand, Callable[[ReturnWorld, ReturnStarts, float], _Answe
 }
 
 
-def circled(requirements: RouteRequirements, aligned: AlignedTrack) -> bool:
+def has_completed_return_loiter(requirements: RouteRequirements, aligned: AlignedTrack) -> bool:
     """Return True if a track flew its return loiter for at least one lap and for the loiter's full duration.
 
     The time starts when the aircraft is near the center and at the loiter's altitude, as for a simulated flight
@@ -201,7 +203,7 @@ def _finding(requirements: RouteRequirements, ok: bool | None, outcome: str) -> 
     ]
 
 
-def without_style(
+def without_path_following_findings(
     requirements: RouteRequirements, aligned: AlignedTrack | None, findings: Sequence[Finding]
 ) -> tuple[Finding, ...]:
     """Remove the findings on how well the return follows its drawn path.
@@ -238,5 +240,5 @@ RULE = Rule(
     name="return",
     judge=return_findings,
     judge_end=flown_return_findings,
-    merge=without_style,
+    merge=without_path_following_findings,
 )

@@ -2,7 +2,7 @@
 
 import math
 
-from logs.verdict.findings import UNKNOWN_AIRCRAFT, Fact, Finding, Message, make_finding, message, reason_of
+from logs.verdict.findings import UNKNOWN_AIRCRAFT, Fact, Finding, Message, finding_reason, make_finding, message
 from logs.verdict.measures.acceptance import step_height
 from logs.verdict.measures.route_requirements import RouteRequirements, slope_limit, steep_arc
 from logs.verdict.measures.slopes import LegFit, SlopeMeasure, measure_slope
@@ -87,7 +87,7 @@ def _finding(requirements: RouteRequirements, leg: int, measure: SlopeMeasure | 
         "slope",
         requirements.leg(leg),
         ok=ok,
-        reason=reason_of(faults, facts if measure is not None or not faults else ()),
+        reason=finding_reason(faults, facts if measure is not None or not faults else ()),
         faults=faults,
         planned=math.degrees(planned),
         flown=None if fit is None else math.degrees(fit.value),

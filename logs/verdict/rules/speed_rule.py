@@ -5,7 +5,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from logs.verdict.findings import NOT_FLOWN, UNKNOWN_AIRCRAFT, Fact, Finding, Message, make_finding, message, reason_of
+from logs.verdict.findings import (
+    NOT_FLOWN,
+    UNKNOWN_AIRCRAFT,
+    Fact,
+    Finding,
+    Message,
+    finding_reason,
+    make_finding,
+    message,
+)
 from logs.verdict.measures.route_requirements import RouteRequirements, slope_limit
 from logs.verdict.measures.slopes import measure_ability, steady_rows
 from logs.verdict.measures.track_alignment import AlignedTrack
@@ -97,7 +106,7 @@ def _speed_finding(requirements: RouteRequirements, aligned: AlignedTrack | None
         "speed",
         requirements.leg(leg),
         ok=None if ok and is_unflown else ok,
-        reason=reason_of(faults, notes),
+        reason=finding_reason(faults, notes),
         faults=faults,
         planned=commanded,
         flown=mean,

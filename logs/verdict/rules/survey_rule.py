@@ -9,7 +9,7 @@ import math
 import numpy as np
 
 from flight.mission.surveys import PhotoLine, Survey
-from logs.verdict.findings import UNKNOWN_WAY, Fact, Finding, Message, make_finding, message, reason_of
+from logs.verdict.findings import UNKNOWN_WAY, Fact, Finding, Message, finding_reason, make_finding, message
 from logs.verdict.measures.circle_reach import hazards_within
 from logs.verdict.measures.photo_lines import LineMeasure, OverlapMeasure, measure_line, measure_overlap
 from logs.verdict.measures.route_requirements import RouteRequirements, turn_limit
@@ -73,7 +73,7 @@ def _overlap_findings(requirements: RouteRequirements, aligned: AlignedTrack | N
                 "survey",
                 _line_place(requirements, line),
                 ok=ok,
-                reason=reason_of(faults, [] if faults else [text]),
+                reason=finding_reason(faults, [] if faults else [text]),
                 faults=faults,
                 planned=100.0 * overlap if aligned is None else 100.0 * required,
                 flown=None if aligned is None else 100.0 * overlap,
@@ -248,7 +248,7 @@ def _finding(
         "survey",
         _line_place(requirements, line),
         ok=ok,
-        reason=reason_of(faults, facts),
+        reason=finding_reason(faults, facts),
         faults=faults,
         planned=100.0 * usable_fraction if geometric else 100.0,
         flown=None if geometric else 100.0 * usable_fraction,

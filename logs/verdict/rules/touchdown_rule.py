@@ -14,11 +14,11 @@ import numpy as np
 
 from flight.mission.ground_ways import Approach
 from flight.simulation.track import Track
-from logs.verdict.findings import GROUND_WAY, Fact, Finding, Message, make_finding, message, reason_of
+from logs.verdict.findings import GROUND_WAY, Fact, Finding, Message, finding_reason, make_finding, message
 from logs.verdict.measures.path_sweeps import path_clearance
 from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.track_alignment import AlignedTrack
-from logs.verdict.measures.ways import first_obstacle_on, track_way
+from logs.verdict.measures.ways import first_hazard_on_path, track_path
 from logs.verdict.places import Place
 from logs.verdict.rule import Rule
 from logs.verdict.tolerances import (
@@ -87,7 +87,7 @@ def touchdown_findings(
         return [make_finding("touchdown", place, ok=False, reason=fault.text, faults=[fault], unit="m")]
     landing = _measure_landing(requirements, track, terrain, approach, touchdown_row)._replace(over=point_height)
     faults = _detect_faults(approach, landing)
-    if entered := first_obstacle_on(requirements, track_way(track)):
+    if entered := first_hazard_on_path(requirements, track_path(track)):
         faults.append(message(f"the final enters {entered}"))
     has_gusts = requirements.setup.scenario.wind.turbulence != "none"
     return [_finding(place, approach, landing, faults, has_gusts=has_gusts)]
@@ -96,7 +96,7 @@ def touchdown_findings(
 def _planned_findings(place: Place, approach: Approach) -> list[Finding]:
     """Before a flight, return a finding if the strip is too short to judge the touch-down."""
     messages = _short_strip_messages(approach)
-    reason = reason_of(messages)
+    reason = finding_reason(messages)
     return (
         [make_finding("touchdown", place, ok=None, reason=reason, faults=messages, check=GROUND_WAY)]
         if messages
@@ -139,7 +139,7 @@ def _finding(place: Place, approach: Approach, landing: _Landing, faults: list[M
         "touchdown",
         place,
         ok=False if faults else None if undecided else True,
-        reason=reason_of(messages, _describe_landing(approach, landing)),
+        reason=finding_reason(messages, _describe_landing(approach, landing)),
         faults=messages,
         flown=farthest,
         limit=limit,

@@ -6,7 +6,7 @@ import numpy as np
 
 from flight.guidance.navigation_error import ERRORS
 from flight.mission.route import SHARPEST_FLY_BY_RAD
-from logs.verdict.findings import Fact, Finding, Message, make_finding, message, reason_of
+from logs.verdict.findings import Fact, Finding, Message, finding_reason, make_finding, message
 from logs.verdict.measures.acceptance import negligible_kink, reach
 from logs.verdict.measures.route_requirements import RouteRequirements, turn_limit
 from logs.verdict.measures.track_alignment import AlignedTrack
@@ -86,7 +86,7 @@ def _finding(
         "turn",
         requirements.waypoint(i),
         ok=ok,
-        reason=reason_of(faults, facts if measure is not None or not faults else ()),
+        reason=finding_reason(faults, facts if measure is not None or not faults else ()),
         faults=faults,
         planned=math.degrees(planned),
         flown=None if angle is None else math.degrees(angle),

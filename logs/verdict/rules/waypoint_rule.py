@@ -9,7 +9,7 @@ import math
 
 import numpy as np
 
-from logs.verdict.findings import Fact, Finding, Message, make_finding, message, reason_of
+from logs.verdict.findings import Fact, Finding, Message, finding_reason, make_finding, message
 from logs.verdict.measures.acceptance import Reach, reach
 from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.track_alignment import AlignedTrack, along_across, approaches
@@ -50,7 +50,7 @@ def _planned_finding(requirements: RouteRequirements, i: int) -> Finding:
         "waypoint",
         requirements.waypoint(i),
         ok=not faults,
-        reason=reason_of(faults) if faults else fact,
+        reason=finding_reason(faults) if faults else fact,
         faults=faults,
         planned=offset,
         limit=condition.radius,
@@ -99,7 +99,7 @@ def _flown_finding(requirements: RouteRequirements, aligned: AlignedTrack | None
                 f": the flight ended on {place_text_within(last_leg)} {math.hypot(distance, height_error):.0f} m away"
             )
             faults = [message("not reached", text)]
-            ok, reason = False, reason_of(faults)
+            ok, reason = False, finding_reason(faults)
             if not aligned.passed[i - 1]:
                 # The flight was not flying to this waypoint: its distance says nothing.
                 distance, ok, facts = math.nan, None, ()
