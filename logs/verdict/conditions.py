@@ -12,7 +12,7 @@ from aircraft.catalog import find_again
 from aircraft.tracking import CORRIDOR_RADII
 from flight.autopilots.autopilot import Autopilot
 from flight.simulation.setup import FlightSetup
-from logs.verdict.measures.route_requirements import airspace_of, surveys_of
+from logs.verdict.measures.route_requirements import judged_airspace, judged_surveys
 from world.errors import FlightError
 from world.json_schema import DocumentConfig
 from world.scenario import Scenario
@@ -107,7 +107,7 @@ def _airspeed_source(scenario: Scenario, autopilot: Autopilot) -> AirspeedSource
 def setup_conditions(setup: FlightSetup) -> Conditions:
     """Return the conditions of the verdict on a flight, or on a mission that is not flown."""
     conditions = conditions_of(setup.scenario, setup.aircraft, setup.airspeed, setup.autopilot)
-    conditions = replace(conditions, navigation=setup.nav, zones=len(airspace_of(setup).zones))
+    conditions = replace(conditions, navigation=setup.nav, zones=len(judged_airspace(setup).zones))
     source = setup.source
     if source is None:
         return conditions
@@ -186,7 +186,7 @@ def corridor_line(setup: FlightSetup) -> str:
     lines.  Return "" if the corridor is stated, or if a survey's cross-track errors are judged line by line.
     """
     half_width, radius = setup.corridor, setup.autopilot.acceptance_radius or 0.0
-    if setup.scenario.limits.corridor_m is not None or surveys_of(setup):
+    if setup.scenario.limits.corridor_m is not None or judged_surveys(setup):
         return ""
     origin = "planfly's default"
     if CORRIDOR_RADII * radius >= half_width:

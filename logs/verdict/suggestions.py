@@ -207,7 +207,7 @@ def suggest_gentler_turn(
         return ()
     place, allowed = requirements.waypoint(corner), limit - SUGGESTION_ANGLE_MARGIN_RAD
     alternatives: list[_Sized] = []
-    if source == "aircraft" and math.isfinite(requirements.before[corner]):
+    if source == "aircraft" and math.isfinite(requirements.length_before[corner]):
         speed = _turn_speed(requirements, corner)
         if speed is not None:
             current_speed = float(max(requirements.setup.route.airspeed[corner - 1 : corner + 1]))
@@ -225,14 +225,14 @@ def suggest_gentler_turn(
 def _longer_legs(requirements: RouteRequirements, corner: int) -> list[_Sized]:
     """Suggest longer legs at a waypoint, to fit its turn and the neighbouring turns; return [] if all turns fit."""
     needed_before = (
-        requirements.before[corner]
-        + requirements.after[corner - 1]
+        requirements.length_before[corner]
+        + requirements.length_after[corner - 1]
         + requirements.reversal[corner - 1]
         + SUGGESTION_LENGTH_MARGIN_M
     )
     needed_after = (
-        requirements.after[corner]
-        + requirements.before[corner + 1]
+        requirements.length_after[corner]
+        + requirements.length_before[corner + 1]
         + requirements.reversal[corner]
         + SUGGESTION_LENGTH_MARGIN_M
     )
@@ -325,7 +325,9 @@ def _turn_speed(requirements: RouteRequirements, corner: int) -> float | None:
     """Return the highest airspeed below the commanded one at which a waypoint's turn fits its legs, or None."""
     current_speed = float(max(requirements.setup.route.airspeed[corner - 1 : corner + 1]))
     available = min(
-        available_lengths(requirements.runs, requirements.before, requirements.after, requirements.reversal, corner)
+        available_lengths(
+            requirements.runs, requirements.length_before, requirements.length_after, requirements.reversal, corner
+        )
     )
     factor = _true_airspeed_ratio(requirements, corner)
     altitude = float(requirements.points[corner, 2])

@@ -6,7 +6,7 @@ from flight.mission.surveys import Survey
 from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track
 from logs.verdict.measures.photo_lines import LineMeasure, measure_line
-from logs.verdict.measures.route_requirements import RouteRequirements, route_requirements, surveys_of
+from logs.verdict.measures.route_requirements import RouteRequirements, judged_surveys, route_requirements
 from logs.verdict.measures.track_alignment import align_track
 from logs.views.charts import Chart, Label, Layer, Panel, parted
 from world.arrays import Floats
@@ -22,7 +22,7 @@ def survey_chart(setup: FlightSetup, track: Track) -> Chart | None:
 
     Return None without a flown survey.
     """
-    if not surveys_of(setup):
+    if not judged_surveys(setup):
         return None
     requirements = route_requirements(setup)
     aligned = align_track(requirements, track)
@@ -76,14 +76,14 @@ def _panel(
 
 def _lost_stretches(measure: LineMeasure | None) -> tuple[tuple[float, float], ...]:
     """Return the lost stretches of a line, m; a line that was not flown is lost as a whole."""
-    return ((0.0, np.inf),) if measure is None else measure.lost
+    return ((0.0, np.inf),) if measure is None else measure.lost_spans
 
 
 def _used(measure: LineMeasure | None) -> list[tuple[float, float]]:
     """Return the usable stretches of a line, m."""
     if measure is None:
         return []
-    edges = [0.0, *(metres for stretch in measure.lost for metres in stretch), measure.length]
+    edges = [0.0, *(metres for stretch in measure.lost_spans for metres in stretch), measure.length]
     return [(low, high) for low, high in zip(edges[::2], edges[1::2], strict=True) if high > low]
 
 

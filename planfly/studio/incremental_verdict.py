@@ -135,7 +135,7 @@ def _speed_factor(desk: EditContext, amsl: float) -> float:
 
 
 def _judge_window(setup: FlightSetup, first: int, last: int, begin: int) -> Window:
-    requirements = replace(route_requirements(setup), zones_on=(first - begin, last - begin - 1))
+    requirements = replace(route_requirements(setup), zone_check_legs=(first - begin, last - begin - 1))
     findings = tuple(item for item in place_findings(requirements) if _is_within(item, first - begin, last - begin))
     return Window(first, last, begin, requirements, findings)
 

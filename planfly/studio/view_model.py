@@ -12,7 +12,7 @@ from flight.mission.items import AMSL, OVER_HOME, Mission, command_name
 from flight.mission.route import Route
 from flight.simulation.setup import FlightSetup
 from logs.verdict.findings import Finding
-from logs.verdict.measures.route_requirements import airspace_of
+from logs.verdict.measures.route_requirements import judged_airspace
 from logs.verdict.rule_words import RULE_WORDS
 from logs.verdict.verdict import Verdict
 from logs.verdict.wording import suggestion_text
@@ -103,7 +103,7 @@ def _threats_json(threats: Threats) -> list[Json]:
 
 def _zones_json(scenario: Scenario, mission: Mission, setup: FlightSetup) -> list[Json]:
     """Return page data of the scenario's zones, then of the mission's fence zones, in the order that findings use."""
-    zones = airspace_of(setup).zones if mission.fences else scenario.zones
+    zones = judged_airspace(setup).zones if mission.fences else scenario.zones
     return [
         {
             "name": zone_label(zone),

@@ -109,20 +109,20 @@ def photo_line_entry(setup: FlightSetup, line: PhotoLine, measure: LineMeasure |
         first_item=first,
         last_item=last,
         length_m=None if measure is None else round(measure.length, 1),
-        usable=rounded(None if measure is None else measure.good),
-        away=rounded(None if measure is None else measure.away),
+        usable=rounded(None if measure is None else measure.usable),
+        away=rounded(None if measure is None else measure.off_line),
         banked=rounded(None if measure is None else measure.banked),
-        high=rounded(None if measure is None else measure.high),
-        dark=rounded(None if measure is None else measure.dark),
-        lost_m=[] if measure is None else [(round(begin, 1), round(end, 1)) for begin, end in measure.lost],
+        high=rounded(None if measure is None else measure.off_height),
+        dark=rounded(None if measure is None else measure.camera_off),
+        lost_m=[] if measure is None else [(round(begin, 1), round(end, 1)) for begin, end in measure.lost_spans],
         photos=None if measure is None else measure.photos,
-        missed=None if measure is None else measure.missed,
+        missed=None if measure is None else measure.missed_photos,
     )
 
 
 def overlap_entry(overlap: OverlapMeasure) -> OverlapEntry:
     """Return the entry of the overlap of a survey."""
-    first_line, second_line = sorted(overlap.pair)
+    first_line, second_line = sorted(overlap.line_pair)
     return OverlapEntry(
         front=None if overlap.front is None else round(overlap.front, 4),
         front_asked=overlap.camera.front,

@@ -133,7 +133,7 @@ def met_waypoints(requirements: RouteRequirements, aligned: AlignedTrack) -> NDA
     """
     edge_distance = np.maximum(requirements.fly_by_offset + FINAL_WAYPOINT_TOLERANCE_M, requirements.setup.corridor)
     is_inner = (aligned.rows > 0) & (aligned.rows < len(aligned.track) - 1)
-    is_near = np.where(is_inner, aligned.distance < CAPTURE_RADIUS_M, aligned.distance <= edge_distance)
+    is_near = np.where(is_inner, aligned.apex_distance < CAPTURE_RADIUS_M, aligned.apex_distance <= edge_distance)
     return np.flatnonzero(is_near)
 
 

@@ -162,7 +162,7 @@ def _profile(requirements: RouteRequirements, aligned: AlignedTrack, places: Seq
     speed = np.hypot(track.velocity[:, 0], track.velocity[:, 1]).astype(np.float64)
     bank, energy = track.attitude[:, ROLL].astype(np.float64), track.energy.astype(np.float64)
     for leg, along_leg in enumerate(places):
-        if not aligned.flew(leg):
+        if not aligned.has_flown(leg):
             parts.append(np.full((5, len(along_leg)), math.nan))
             continue
         rows = aligned.leg_rows(leg)
@@ -233,7 +233,7 @@ def _turn_pair(
         math.degrees(float(pairs[0][0].turns[k])),
         overshoot=both(flown_pass.overshoot, model_pass.overshoot),
         bank=both(flown_turn.peak_bank, model_turn.peak_bank, 180.0 / math.pi),
-        passed=both(flown_pass.nearest, model_pass.nearest),
+        passed=both(flown_pass.distance, model_pass.distance),
     )
 
 

@@ -41,7 +41,7 @@ from flight.mission.return_path import (
 )
 from flight.simulation.setup import FlightSetup
 from logs.verdict.measures.path_moves import MOVE
-from logs.verdict.measures.route_requirements import Airspace, airspace_of
+from logs.verdict.measures.route_requirements import Airspace, judged_airspace
 from logs.verdict.measures.zone_visits import path_zones
 from logs.verdict.returns.return_starts import ReturnStarts
 from logs.verdict.tolerances import CLEARANCE_TOLERANCE_M, ENERGY_RESERVE_FRACTION
@@ -396,7 +396,7 @@ def return_world(setup: FlightSetup) -> ReturnWorld:
         places[1:],
         point_mass(aircraft, setup.envelope, setup.airspeed, setup.scenario.wind),
         surroundings(setup.scenario),
-        airspace_of(setup),
+        judged_airspace(setup),
         setup_parameters is not parameters,
         setup_parameters is not None and setup_parameters is not parameters,
         landing_starts(setup.mission, setup.scenario.origin, setup.scenario.terrain),

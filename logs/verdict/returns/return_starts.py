@@ -9,7 +9,7 @@ from aircraft.envelope import GRAVITY, ground_speed
 from flight.autopilots.arduplane.rtl_point_mass import RETURN_START
 from flight.simulation.setup import FlightSetup
 from flight.simulation.track import ROLL, Track
-from logs.verdict.measures.flown_phases import by_the_ground
+from logs.verdict.measures.flown_phases import ground_phase_rows
 from logs.verdict.measures.path_moves import path_moves
 from world.arrays import Flags, Floats
 from world.geometry import leg_courses
@@ -87,7 +87,7 @@ def _no_starts(*, flown: bool) -> ReturnStarts:
 def _low_and_slow_rows(setup: FlightSetup, track: Track, rows: NDArray[np.intp]) -> tuple[Flags, Flags]:
     """Flag the rows that are low in a flown take-off or landing, and those also too slow to fly, (n,) each."""
     ways, terrain = setup.ground_ways, setup.scenario.terrain
-    is_ground_phase = by_the_ground(track, ways)[rows]
+    is_ground_phase = ground_phase_rows(track, ways)[rows]
     position = np.asarray(track.position[rows], dtype=np.float64)
     if terrain is None or not ways:
         return is_ground_phase, is_ground_phase.copy()

@@ -159,8 +159,8 @@ def _fields_by_leg(requirements: RouteRequirements) -> dict[int, tuple[tuple[flo
     point.  The legs before a landing begin at DO_LAND_START, or are the last two legs if the mission has no such item.
     Of these, only the final and the legs after the last waypoint that meets the limit on height above ground count.
     """
-    setup, ground = requirements.setup, requirements.ground
-    procedures = setup.ground_ways if ground is None else ground.ways
+    setup, ground = requirements.setup, requirements.ground_phases
+    procedures = setup.ground_ways if ground is None else ground.procedures
     fields_of_leg: dict[int, tuple[tuple[float, float], ...]] = {}
     if procedures.take_off is not None:
         fields_of_leg[procedures.take_off.waypoint] = (
@@ -243,7 +243,7 @@ def _flown_clearance(
     is_planned_short: bool,
 ) -> Finding:
     min_clearance, ok, reason, limit = math.nan, None, "the leg was not flown", requirement.limit
-    if aligned is not None and aligned.flew(leg):
+    if aligned is not None and aligned.has_flown(leg):
         # The first leg includes what came before it, the last leg what came after.
         first = 0 if leg == 0 else int(aligned.rows[leg])
         last = len(aligned.track) - 1 if leg + 1 == requirements.legs else int(aligned.rows[leg + 1])
@@ -291,7 +291,7 @@ def _flown_clearance(
 def _time_and_place_text(aligned: AlignedTrack, k: int, fraction: float) -> str:
     """Describe when and where the aircraft was at a fraction of track segment `k`."""
     time = aligned.track.time
-    return f"at {time[k] + fraction * (time[k + 1] - time[k]):.1f} s, {aligned.where(k, fraction)}"
+    return f"at {time[k] + fraction * (time[k + 1] - time[k]):.1f} s, {aligned.position_text(k, fraction)}"
 
 
 RULE = Rule(

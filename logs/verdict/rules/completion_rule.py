@@ -65,7 +65,7 @@ def _ending_place_text(requirements: RouteRequirements, aligned: AlignedTrack | 
     if aligned is None or aligned.passed[-1]:
         return ""
     row = len(aligned.track) - 1
-    return f" on {place_text_within(requirements.leg(aligned.leg_at(row)))} {aligned.where(row)}"
+    return f" on {place_text_within(requirements.leg(aligned.leg_at(row)))} {aligned.position_text(row)}"
 
 
 def _record_faults(aligned: AlignedTrack) -> list[Message]:

@@ -37,7 +37,7 @@ def _leg_finding(requirements: RouteRequirements, aligned: AlignedTrack | None, 
         facts.append(f"its turns are planned within {planned:.1f} m of the legs")
         if not ok:
             faults.append(message(f"its turns lead {planned:.0f} m off the legs", f"; the corridor is {limit:.0f} m"))
-    elif aligned is None or not aligned.flew(leg):
+    elif aligned is None or not aligned.has_flown(leg):
         facts.append("the leg was not flown")
     else:
         rows = _rows_after_takeoff(requirements, aligned, leg, limit)
@@ -71,8 +71,8 @@ def _rows_after_takeoff(requirements: RouteRequirements, aligned: AlignedTrack, 
     The aircraft has joined the leg once it flies on the leg's course and within the limit (m) of its line.  A take-off
     ends on the launch course, which may differ from the course of the leg.
     """
-    rows, ground = aligned.leg_rows(leg), requirements.ground
-    if ground is None or ground.ways.take_off is None or ground.ways.take_off.waypoint != leg:
+    rows, ground = aligned.leg_rows(leg), requirements.ground_phases
+    if ground is None or ground.procedures.take_off is None or ground.procedures.take_off.waypoint != leg:
         return rows
     course_error = np.abs(np.sin(0.5 * (aligned.course[rows] - requirements.courses[leg])))
     lateral_offset = along_across(requirements, leg, np.asarray(aligned.track.position[rows], dtype=np.float64))[1]

@@ -29,8 +29,8 @@ def energy_findings(
     if not geometric:
         # The energy of a flown take-off and landing is included.
         track = None if aligned is None else aligned.track
-        if requirements.ground is not None:
-            track = requirements.ground.track
+        if requirements.ground_phases is not None:
+            track = requirements.ground_phases.track
         energy = math.nan if track is None else float(track.energy.max())
         max_current = math.nan if track is None else float(track.current.max())
     is_measured = setup.source is not None and not geometric

@@ -50,15 +50,17 @@ def fence_findings(
     """Judge each zone that plan or flight touches; if no zone is violated, report it.  Return [] without zones."""
     airspace = requirements.airspace
     findings = []
-    if airspace.fault:
-        findings.append(make_finding("fence", MISSION, ok=None, reason=f"its fence is not judged: {airspace.fault}"))
+    if airspace.fence_fault:
+        findings.append(
+            make_finding("fence", MISSION, ok=None, reason=f"its fence is not judged: {airspace.fence_fault}")
+        )
     if not airspace.zones:
         return findings
     if not geometric and aligned is None:
         return [*findings, make_finding("fence", FLIGHT, ok=None, reason="nothing was flown", unit="m", method=_METHOD)]
     terrain = requirements.setup.scenario.terrain
-    if geometric and requirements.zones_on is not None:
-        return findings + _findings_on_legs(requirements, *requirements.zones_on)
+    if geometric and requirements.zone_check_legs is not None:
+        return findings + _findings_on_legs(requirements, *requirements.zone_check_legs)
     planned_visits = path_zones(planned_moves(requirements), airspace.records, terrain)
     flown_visits = None if aligned is None else path_zones(flown_moves(aligned), airspace.records, terrain)
     visits = [planned_visits] if flown_visits is None else [planned_visits, flown_visits]
@@ -81,7 +83,7 @@ def _findings_on_legs(requirements: RouteRequirements, first: int, last: int) ->
     """Judge the zones that the planned path touches on legs `first` to `last`."""
     airspace, path = requirements.airspace, requirements.path
     start, end = np.searchsorted(path.legs, [first, last + 1]).tolist()
-    numbers = airspace.about(path.points[start : end + 1])
+    numbers = airspace.zones_near(path.points[start : end + 1])
     records = ZoneRecords(airspace.records.zones[numbers], airspace.records.edges)
     planned = path_zones(planned_moves(requirements, first, last), records, requirements.setup.scenario.terrain)
     touched_indices = np.flatnonzero((planned["depth"] > 0.0) | planned["unknown"])
@@ -183,7 +185,7 @@ def _zone_source(requirements: RouteRequirements, zone_number: int) -> str:
 
     Without a scenario, a zone given on the command line has the source "fence".
     """
-    if zone_number >= requirements.airspace.of_scenario:
+    if zone_number >= requirements.airspace.scenario_zone_count:
         return "mission"
     return "fence" if requirements.setup.scenario.external else "scenario"
 

@@ -103,7 +103,7 @@ def climbout_findings(
     home, terrain = requirements.setup.mission.home, requirements.setup.scenario.terrain
     if not has_ground_paths(requirements) or home is None or terrain is None:
         return []
-    if requirements.ground is not None and requirements.ground.ways.take_off is not None:
+    if requirements.ground_phases is not None and requirements.ground_phases.procedures.take_off is not None:
         return []
     east, north = to_map(requirements.setup.scenario.origin, home.lat_deg, home.lon_deg)
     start = (float(east), float(north))
@@ -233,7 +233,7 @@ def _takeoff_profile(
 
 def _find_obstacles(requirements: RouteRequirements, path: GroundPath) -> _Obstacles:
     """Return the obstacles on a path from home; the first `LAUNCH_RUN_M` of the path may be close to the ground."""
-    terrain, end = requirements.setup.scenario.terrain, float(path.run[-1])
+    terrain, end = requirements.setup.scenario.terrain, float(path.distance[-1])
     entered_hazard = first_hazard_on_path(requirements, path)
     if terrain is None or end <= LAUNCH_RUN_M:
         return _Obstacles(math.inf, 0.0, entered_hazard)
@@ -359,7 +359,7 @@ def approach_findings(
     landing, terrain, setup = landing_item(requirements), requirements.setup.scenario.terrain, requirements.setup
     if landing is None or terrain is None or not has_ground_paths(requirements):
         return []
-    if requirements.ground is not None and requirements.ground.ways.approach is not None:
+    if requirements.ground_phases is not None and requirements.ground_phases.procedures.approach is not None:
         return []
     waypoint, leg = landing[0], landing[0] - 1
     place, item_text = requirements.waypoint(waypoint), _item_text(requirements.waypoint(waypoint))

@@ -49,7 +49,7 @@ def height_findings(
         track = aligned.track
         path_heights = _Path(track.position, track.time, *max_segment_heights(terrain, track.position))
         flown_maxima = [
-            _max_heights(path_heights, _leg_segments(requirements, aligned, leg)) if aligned.flew(leg) else None
+            _max_heights(path_heights, _leg_segments(requirements, aligned, leg)) if aligned.has_flown(leg) else None
             for leg in range(requirements.legs)
         ]
     return [

@@ -33,10 +33,10 @@ def launch_findings(
     requirements: RouteRequirements, _aligned: AlignedTrack | None, *, geometric: bool = False
 ) -> list[Finding]:
     """Judge a flown take-off with one finding."""
-    ground = requirements.ground
-    if ground is None or ground.ways.take_off is None:
+    ground = requirements.ground_phases
+    if ground is None or ground.procedures.take_off is None:
         return []
-    return [_launch_finding(requirements, ground, ground.ways.take_off)]
+    return [_launch_finding(requirements, ground, ground.procedures.take_off)]
 
 
 def _launch_finding(requirements: RouteRequirements, ground: FlownGround, take_off: TakeOff) -> Finding:
@@ -105,7 +105,7 @@ def _climb_clearance(requirements: RouteRequirements, path: GroundPath) -> tuple
         return math.nan, math.nan
     # On a runway the aircraft is on the ground: heights apply from lift-off on.
     first_distance = LAUNCH_RUN_M
-    take_off = None if requirements.ground is None else requirements.ground.ways.take_off
+    take_off = None if requirements.ground_phases is None else requirements.ground_phases.procedures.take_off
     if take_off is not None and take_off.launch.method == "runway":
         standing_height = float(position[0, 2] - take_off.home[2])
         heights = position[:, 2] - terrain.height(position[:, 0], position[:, 1])

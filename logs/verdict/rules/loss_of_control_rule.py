@@ -41,7 +41,7 @@ def departure_findings(
         faults.append(
             message(
                 f"ground contact at {time:.1f} s on {place_text(requirements.leg(aligned.leg_at(k)))}",
-                f", {aligned.where(k, float(aligned.clearance_fraction[k]))}",
+                f", {aligned.position_text(k, float(aligned.clearance_fraction[k]))}",
             )
         )
     min_airspeed = -_max_finite(-track.airspeed.astype(np.float64))

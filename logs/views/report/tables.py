@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from flight.mission_files.formats import mission_text
 from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track, control_limits, held_at_limit
-from logs.verdict.measures.flown_phases import by_the_ground
+from logs.verdict.measures.flown_phases import ground_phase_rows
 from logs.verdict.measures.path_sweeps import passages
 from logs.views.report.text import NOTHING, number, quantity
 from world.arrays import Floats
@@ -111,7 +111,7 @@ def flight_sentence(setup: FlightSetup, track: Track | None) -> str:
         return ""
     seconds, distance = float(track.time[-1] - track.time[0]), float(path_length(track.position)) / 1000.0
     above = ground_clearance(setup, track)
-    landed = by_the_ground(track, setup.ground_ways)
+    landed = ground_phase_rows(track, setup.ground_ways)
     low = NOTHING if above is None else number(_min_finite(above[~landed]), digits=0)
     between = " between take-off and landing" if landed.any() else ""
     height = f", never less than {low} m above ground{between}" if low != NOTHING else ""

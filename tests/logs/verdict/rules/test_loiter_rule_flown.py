@@ -55,7 +55,7 @@ def test_a_circle_is_joined_and_left_on_tangents(radius: float) -> None:
     # Clockwise it is left towards the east after a quarter of a turn more, the other way round after three.
     quarter = 0.25 if radius > 0.0 else 0.75
     assert circle.turns == pytest.approx(2.0 + quarter + (joined + left) / (2.0 * math.pi), abs=1e-4)
-    assert circle.middle == pytest.approx(MIDDLE, abs=0.01)
+    assert circle.center == pytest.approx(MIDDLE, abs=0.01)
     assert circle.radius == abs(radius)
 
 
@@ -64,8 +64,8 @@ def test_two_circles_are_two() -> None:
     requirements = route_requirements(setup_of(*lines, wp(2500, 4500)))
     first, second = loiter_circles(requirements)
     assert (first.radius, second.radius, second.first) == (200.0, 150.0, first.last + 1)
-    assert first.middle == pytest.approx(MIDDLE, abs=0.02)
-    assert second.middle == pytest.approx([1500.0, 2500.0], abs=0.02)
+    assert first.center == pytest.approx(MIDDLE, abs=0.02)
+    assert second.center == pytest.approx([1500.0, 2500.0], abs=0.02)
 
 
 @pytest.mark.parametrize("wider", [0.0, 5.0, -4.0])
@@ -82,7 +82,7 @@ def test_the_radius_as_flown_is_told(wider: float) -> None:
     assert low == pytest.approx(200.0 + min(wider, 0.0), abs=0.06)
     assert high == pytest.approx(200.0 + max(wider, 0.0), abs=0.06)
     assert f"{circle.turns:.2f} turns with 200 m" in item.reason
-    assert item.margin == pytest.approx(200.0 - float(requirements.tightest[circle.first : circle.last + 1].max()))
+    assert item.margin == pytest.approx(200.0 - float(requirements.min_radius[circle.first : circle.last + 1].max()))
 
 
 @pytest.mark.parametrize(("mean", "told"), [(259.0, False), (261.0, True)])
