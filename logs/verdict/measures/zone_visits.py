@@ -342,15 +342,15 @@ def _bisect_move(
         part = parts[top]
         fraction = part.last - part.first
         span, change = fraction * move.length, fraction * climb
-        sufficient_depth = 0.0 if in_order else max(visit.depth, known_depth) + DEPTH_PRECISION
+        target_depth = 0.0 if in_order else max(visit.depth, known_depth) + DEPTH_PRECISION
         min_depth, max_depth = depth_bounds(exclusion, part, span, change, math.inf)
-        is_certain = max_depth <= sufficient_depth or (in_order and min_depth > 0.0)
-        is_certain = is_certain or max(span, change) <= EDGE_PRECISION or _is_unknown(exclusion, part)
+        is_certain = max_depth <= target_depth or (in_order and min_depth > 0.0) or max(span, change) <= EDGE_PRECISION
+        is_certain = is_certain or _is_unknown(exclusion, part)
         if not is_certain:
             # Bound again with the nearest edges, which takes longer.
             max_distance = farthest_from_outline(records, z, move, part, span)
             min_depth, max_depth = depth_bounds(exclusion, part, span, change, max_distance)
-            is_certain = max_depth <= sufficient_depth
+            is_certain = max_depth <= target_depth
         if is_certain:
             if in_order:
                 _add_part(move, part, exclusion, visit)
