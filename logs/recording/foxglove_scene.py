@@ -276,12 +276,12 @@ def returns_scene(time_ns: int, drawn: DrawnReturns, terrain: Terrain | None) ->
     The coloured line lies below the path, so that plan and track stay visible.
     """
     entity = _entity(time_ns, "returns")
-    for kind, segment in drawn.by_kind:
+    for kind, segment in drawn.segments_by_outcome:
         points = np.array([ret.start for ret in segment]) - np.array([0.0, 0.0, _PATH_OFFSET_M])
         _add_line(entity, f"return-{kind}", points, 6.0)
     for number, worst in enumerate(drawn.worst, 1):
-        _add_line(entity, "return-way", worst.way)
-        entity.texts.append(_label(worst.at + np.array([0.0, 0.0, _LABEL_HEIGHT_M]), f"return {number}"))
+        _add_line(entity, "return-way", worst.path)
+        entity.texts.append(_label(worst.marked_position + np.array([0.0, 0.0, _LABEL_HEIGHT_M]), f"return {number}"))
     footprint = drawn.glides.footprint
     if footprint is not None and terrain is not None:
         for band in footprint.bands():

@@ -26,8 +26,10 @@ def glide_chart(setup: FlightSetup, drawn: DrawnReturns) -> MapChart | None:
     sites = np.array([[site.east, site.north, 0.0] for site in glides.sites])
     extent = map_extent(scenario, route, [sites, np.array([glide.start for glide in glides.each])])
     layers = footprint_layers(drawn, extent)
-    layers += way_layers(drawn.by_reach, _LOOKS, lambda glide: glide.start[:2], lambda glide: _glide_text(glide, drawn))
-    down = np.array([glide.own.at for glide in glides.each if glide.own.end == "ground"])
+    layers += way_layers(
+        drawn.segments_by_reach, _LOOKS, lambda glide: glide.start[:2], lambda glide: _glide_text(glide, drawn)
+    )
+    down = np.array([glide.own.impact for glide in glides.each if glide.own.end == "ground"])
     if len(down):
         name = "where ArduPlane's own return comes down"
         layers.append(Layer("dots", name, "comes-down", down[:, 0], down[:, 1], quiet=True))
@@ -48,7 +50,7 @@ def glide_chart(setup: FlightSetup, drawn: DrawnReturns) -> MapChart | None:
 
 
 def _glide_text(glide: Glide, drawn: DrawnReturns) -> str:
-    spare = drawn.glides.spare(glide)
+    spare = drawn.glides.altitude_left(glide)
     left_text = f", {spare:.0f} m left over" if spare >= 0.0 else ""
     return f"{glide.time:.0f} s: {reached_text(glide.reach)}{left_text}"
 

@@ -121,8 +121,8 @@ UNIT_KERNELS: dict[str, tuple[str, ...]] = {
         "aircraft.envelope.ground_speed",
         "flight.autopilots.arduplane.rtl_point_mass.fly_stages",
         _GLIDES_MODULE + "glide_map._fill_slopes",
-        _GLIDES_MODULE + "glide_map._search",
-        _GLIDES_MODULE + "glide_reach._look_ahead",
+        _GLIDES_MODULE + "glide_map._settle_cells",
+        _GLIDES_MODULE + "glide_reach._fill_reach",
         "world.highest_ground._fill_cells",
     ),
 }

@@ -25,13 +25,13 @@ from flight.mission.return_path import ReturnTarget
 from flight.simulation.track import Track
 from logs.verdict.returns.judge_returns import (
     KINDS,
-    ReturnFlown,
     Returns,
     ReturnWorld,
+    SimulatedReturn,
     badness,
+    classify_return,
     distance_to_limit,
     is_steady,
-    kind_of,
     most_violated_zone,
 )
 from logs.verdict.returns.return_starts import ReturnStarts
@@ -64,8 +64,8 @@ class ProgramReturn:
     log: the log of the flight, or None if it was not kept.
     """
 
-    law: ReturnFlown
-    flown: ReturnFlown | None = None
+    law: SimulatedReturn
+    flown: SimulatedReturn | None = None
     reason: str = ""
     log: Path | None = None
 
@@ -154,7 +154,7 @@ def check_is_arduplane(program: Path) -> None:
 
 def worst_separated_returns(
     world: ReturnWorld, starts: ReturnStarts, returns: Returns, points: int
-) -> list[tuple[ReturnFlown, int]]:
+) -> list[tuple[SimulatedReturn, int]]:
     """Choose at most `points` of the worst returns that can be flown, each with the number of its start.
 
     The worst comes first.  Starts closer together than half of the path divided by `points` are skipped, because
@@ -164,7 +164,7 @@ def worst_separated_returns(
     positions = np.column_stack([start_rows["east"], start_rows["north"]])
     min_distance = 0.5 * float(np.hypot(*np.diff(positions, axis=0).T).sum()) / points if len(starts) > 1 else 0.0
     numbers = {float(time): k for k, time in enumerate(starts.time)}
-    chosen: list[tuple[ReturnFlown, int]] = []
+    chosen: list[tuple[SimulatedReturn, int]] = []
     for ret in sorted(returns.each, key=_badness_key):
         k = numbers[ret.time]
         is_near = any(
@@ -172,7 +172,7 @@ def worst_separated_returns(
         )
         if (
             is_near
-            or starts.low[k]
+            or starts.is_low[k]
             or not is_steady(world, start_rows[k])
             or not _is_lead_in_clear(world, start_rows[k])
         ):
@@ -183,7 +183,7 @@ def worst_separated_returns(
     return chosen
 
 
-def _badness_key(ret: ReturnFlown) -> tuple[int, float]:
+def _badness_key(ret: SimulatedReturn) -> tuple[int, float]:
     """Return the sort key of a return: `badness`, or for a safe return how near it is to a limit."""
     return (KINDS.index("safe"), distance_to_limit(ret)) if ret.safe else badness(ret)
 
@@ -225,8 +225,8 @@ def fly_by_program(
 
 
 def _judge_flown_return(
-    world: ReturnWorld, law: ReturnFlown, start: Record, track: Track, ended: str
-) -> ReturnFlown | None:
+    world: ReturnWorld, law: SimulatedReturn, start: Record, track: Track, ended: str
+) -> SimulatedReturn | None:
     """Judge a return flown by the program; return None if the flight did not reach the start of the return."""
     path = positions_from_start(track, start)
     if path is None:
@@ -248,19 +248,19 @@ def _judge_flown_return(
         record["ended"] = RETURN_OFF_TERRAIN
     record["clearance"], record["outside"], record["threat"] = clearance, closest.outside, closest.threat
     used_energy = float(track.energy[start_row + len(position) - 1] - track.energy[start_row])
-    remaining_energy = law.left + law.energy - used_energy
+    remaining_energy = law.energy_left + law.energy - used_energy
     zone = most_violated_zone(world, position[::_ROWS_PER_SECOND]) if world.airspace.zones else -1
     return replace(
         law,
         target=target,
-        kind=kind_of(world, record, zone, remaining_energy, law.floor),
+        kind=classify_return(world, record, zone, remaining_energy, law.required_height),
         clearance=clearance,
-        clearance_at=closest.lowest_position,
-        outside=closest.outside,
+        lowest_position=closest.lowest_position,
+        sphere_distance=closest.outside,
         threat=closest.threat,
         zone=zone,
         energy=used_energy,
-        left=remaining_energy,
+        energy_left=remaining_energy,
     )
 
 

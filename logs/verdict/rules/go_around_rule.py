@@ -337,7 +337,13 @@ def _simulate_go_arounds(
         ]
     )
     results = fly_go_arounds(
-        start_records, top_altitude, landing.pitch, landing.destinations, world.parameters, world.aircraft, world.around
+        start_records,
+        top_altitude,
+        landing.pitch,
+        landing.destinations,
+        world.parameters,
+        world.aircraft,
+        world.environment,
     )
     return [
         _judge_go_around(

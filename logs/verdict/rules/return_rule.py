@@ -134,10 +134,10 @@ def _judge_glides(world: ReturnWorld, starts: ReturnStarts, _: float) -> _Answer
     straight ahead.
     """
     is_low = heights_above_ground(world, starts) < world.limit
-    glides = judge_glides(world, starts.at(np.flatnonzero(~is_low)))
+    glides = judge_glides(world, starts.subset(np.flatnonzero(~is_low)))
     left_out = f"; {is_low.sum()} lower than {world.limit:.0f} m above ground are left out" if is_low.any() else ""
     reason = f"without the engine: {glides_headline(glides)}{left_out}"
-    return _Answer(glides.somewhere, reason, f"glides that keep {MARGIN:.0f} m above ground")
+    return _Answer(glides.always_reaches_ground, reason, f"glides that keep {MARGIN:.0f} m above ground")
 
 
 # The go-around has its own rule.

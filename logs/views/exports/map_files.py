@@ -22,7 +22,7 @@ from logs.verdict.measures.route_requirements import with_fence_zones
 from logs.verdict.returns.drawn_returns import DrawnReturns
 from logs.verdict.returns.glide_footprint import BAND_ROLES, Part
 from logs.verdict.returns.glides_text import reached_text
-from logs.verdict.returns.returns_text import outcome_text, way_text
+from logs.verdict.returns.returns_text import outcome_text, segment_text
 from world.airspace.zones_on_map import zone_parts
 from world.arrays import Floats
 from world.frames import to_geo
@@ -127,14 +127,14 @@ def map_zones(setup: FlightSetup) -> list[MapZone]:
 def return_lines(setup: FlightSetup, drawn: DrawnReturns) -> list[MapLine]:
     """Return the path by outcome of returns, the worst returns, and the path by glide destination."""
     limit, lines = drawn.returns.limit, []
-    for kind, segment in drawn.by_kind:
-        name = f"{segment[0].time:.0f} to {segment[-1].time:.0f} s: {way_text(kind)}"
+    for kind, segment in drawn.segments_by_outcome:
+        name = f"{segment[0].time:.0f} to {segment[-1].time:.0f} s: {segment_text(kind)}"
         lines.append(_line(setup, name, [ret.start for ret in segment], "returns to launch", f"return-{kind}"))
     for number, worst in enumerate(drawn.worst, 1):
-        ret = worst.flown
+        ret = worst.simulated
         name = f"{number}: from {ret.time:.0f} s to {ret.target.name}: {outcome_text(ret, limit)}"
-        lines.append(_line(setup, name, worst.way, "the worst returns", "return-way"))
-    for reach, glides in drawn.by_reach:
+        lines.append(_line(setup, name, worst.path, "the worst returns", "return-way"))
+    for reach, glides in drawn.segments_by_reach:
         name = f"{glides[0].time:.0f} to {glides[-1].time:.0f} s: {reached_text(reach)}"
         lines.append(_line(setup, name, [ret.start for ret in glides], "without its engine", f"reach-{reach}"))
     return lines

@@ -32,7 +32,7 @@ from logs.recording.foxglove_scene import (
 from logs.recording.reader import read_log
 from logs.recording.recorder import _CHANNELS, RETURNS_TOPIC, ZONES_TOPIC, Recorder
 from logs.recording.state_channel import EPOCH_NS, FIELDS, STATE_TOPIC
-from logs.verdict.returns.judge_glides import NOT_ASKED
+from logs.verdict.returns.judge_glides import NO_GLIDES
 from tests.clients import need
 from tests.logs.made_flight import make_setup, make_track
 from tests.logs.verdict.returns.hill import hill_drawn, hill_setup
@@ -220,8 +220,8 @@ def test_returns_are_lines_in_the_colours_of_what_they_come_to(tmp_path: Path) -
     update = SceneUpdate()
     update.ParseFromString(returns_scene(0, drawn, setup.scenario.terrain))
     (entity,) = update.entities
-    ways = list(entity.lines)[: len(drawn.by_kind)]
-    for line, (kind, ones) in zip(ways, drawn.by_kind, strict=True):
+    ways = list(entity.lines)[: len(drawn.segments_by_outcome)]
+    for line, (kind, ones) in zip(ways, drawn.segments_by_outcome, strict=True):
         colour = (line.color.r, line.color.g, line.color.b, line.color.a)
         assert colour == pytest.approx(theme.rgba(f"return-{kind}", dark=True))
         assert len(line.points) == len(ones)
@@ -232,13 +232,13 @@ def test_returns_are_lines_in_the_colours_of_what_they_come_to(tmp_path: Path) -
     assert [text.text for text in entity.texts] == [f"return {k}" for k in range(1, len(drawn.worst) + 1)]
     terrain = setup.scenario.terrain
     assert terrain is not None
-    ground = list(entity.lines)[len(drawn.by_kind) + len(drawn.worst) :]
+    ground = list(entity.lines)[len(drawn.segments_by_outcome) + len(drawn.worst) :]
     assert ground
     for point in (line.points[0] for line in ground):
         assert 0.0 < point.z - float(terrain.height(point.x, point.y)) < 10.0
     plain = SceneUpdate()
-    plain.ParseFromString(returns_scene(0, replace(drawn, glides=NOT_ASKED), terrain))
-    assert len(plain.entities[0].lines) == len(drawn.by_kind) + len(drawn.worst)
+    plain.ParseFromString(returns_scene(0, replace(drawn, glides=NO_GLIDES), terrain))
+    assert len(plain.entities[0].lines) == len(drawn.segments_by_outcome) + len(drawn.worst)
 
 
 def test_a_log_shows_returns_from_its_start_though_they_were_judged_at_its_end(tmp_path: Path) -> None:
