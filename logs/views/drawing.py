@@ -168,7 +168,7 @@ def page_svg(figure: Figure, description: str) -> str:
     own = f"p{zlib.crc32(description.encode()):x}-"
     drawn = re.sub(r'( id="|href="#|url\(#)', rf"\g<1>{own}", drawn)
     head = " ".join(['<svg role="img"', f'aria-label="{escape(description)}"', box[0] if box else "", *sorted(names)])
-    return f"{head}>{theme.with_variables(drawn)}".rstrip()
+    return f"{head}>{theme.replace_colours_by_css_variables(drawn)}".rstrip()
 
 
 def _rendered(figure: Figure, kind: str, metadata: Any) -> bytes:

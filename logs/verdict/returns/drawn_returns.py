@@ -96,7 +96,7 @@ class DrawnReturns:
         return group_segments(self.glides.each, lambda glide: glide.reach)
 
 
-Element = TypeVar("One")
+Element = TypeVar("Element")
 Key = TypeVar("Key")
 
 

@@ -37,7 +37,7 @@ def flight_columns(log: FlightLog) -> dict[str, NDArray[Any]]:
     lat, lon = to_geo(log.setup.scenario.origin, track.position[:, 0], track.position[:, 1])
     columns: dict[str, NDArray[Any]] = {}
     for field in FIELDS:
-        columns[field.name] = field.of(getattr(track, field.source))
+        columns[field.name] = field.select(getattr(track, field.source))
         if field.name == "time_s":
             columns["latitude_deg"], columns["longitude_deg"] = np.asarray(lat), np.asarray(lon)
     return columns

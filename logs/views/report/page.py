@@ -163,7 +163,7 @@ def script_text(names: tuple[str, ...]) -> str:
     """
     files = resources.files("logs.views.report").joinpath("templates", "scripts")
     parts = [files.joinpath(f"{name}.js").read_text(encoding="utf-8") for name in (*names, "start")]
-    looks = f"const LOOKS = {json.dumps(theme.page_looks(), separators=(',', ':'))};"
+    looks = f"const LOOKS = {json.dumps(theme.page_styles(), separators=(',', ':'))};"
     return "\n".join(['\n(function () {\n"use strict";', looks, *parts]) + "})();\n"
 
 

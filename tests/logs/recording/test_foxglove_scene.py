@@ -17,8 +17,8 @@ from mcap.reader import make_reader
 
 from logs import theme
 from logs.recording.foxglove_scene import (
-    AIRCRAFT,
-    SPAN,
+    AIRCRAFT_FRAME,
+    MODEL_SPAN_M,
     aircraft_glb,
     aircraft_scene,
     body_rotation,
@@ -65,8 +65,8 @@ def test_the_model_has_the_right_sides() -> None:
 def test_the_scene_carries_it_in_the_aircrafts_frame() -> None:
     (entity,) = SceneUpdate.FromString(aircraft_scene(EPOCH_NS)).entities
     (model,) = entity.models
-    assert (entity.frame_id, entity.frame_locked, model.media_type) == (AIRCRAFT, True, "model/gltf-binary")
-    assert (model.scale.x, model.scale.y, model.scale.z) == (SPAN,) * 3
+    assert (entity.frame_id, entity.frame_locked, model.media_type) == (AIRCRAFT_FRAME, True, "model/gltf-binary")
+    assert (model.scale.x, model.scale.y, model.scale.z) == (MODEL_SPAN_M,) * 3
     assert np.ptp(seen(model.data).bounds[:, 2]) * model.scale.y == pytest.approx(100.0)
     assert model.pose.orientation.w == 1.0
 
@@ -138,12 +138,12 @@ def test_the_start_is_in_view() -> None:
     """Wherever on the map that is: the camera keeps to the aircraft, some ten of its drawn spans away."""
     panel = json.loads(layout_text())["configById"]["3D!planfly"]
     assert (panel["followTf"], panel["followMode"], panel["cameraState"]["target"]) == (
-        AIRCRAFT,
+        AIRCRAFT_FRAME,
         "follow-position",
         [0, 0, 0],
     )
-    assert 8.0 < panel["cameraState"]["distance"] / SPAN < 20.0
-    assert panel["scene"]["transforms"]["axisScale"] < SPAN
+    assert 8.0 < panel["cameraState"]["distance"] / MODEL_SPAN_M < 20.0
+    assert panel["scene"]["transforms"]["axisScale"] < MODEL_SPAN_M
     assert panel["topics"]["/scene/aircraft"]["visible"]
 
 
