@@ -45,7 +45,7 @@ LONGER = {
     "logs/verdict/rules/ground_ways_rule.py:climbout_findings": 64,
     "logs/verdict/rules/loiter_rule.py:_loiter_finding": 64,
     "logs/verdict/rules/speed_rule.py:_speed_finding": 62,
-    "logs/views/exports/log_files.py:_topics": 100,
+    "logs/views/exports/log_files.py:_make_topics": 100,
     "logs/views/profile.py:profile_chart": 65,
     "planfly/api/drafting.py:new_scenario": 61,
     "planfly/api/identifying.py:identify_aircraft": 66,

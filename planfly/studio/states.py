@@ -55,7 +55,7 @@ def place_states(requirements: RouteRequirements, findings: Sequence[Finding], *
     zones: set[int] = set()
     is_open = {id(item) for item in undecided_findings(findings)}
     for item in findings:
-        state = state_of(item, unjudged=id(item) in is_open)
+        state = finding_state(item, unjudged=id(item) in is_open)
         if state is None:
             continue
         place = item.place
@@ -77,7 +77,7 @@ def _set_worse_state(states: dict[int, State], numbers: Iterable[int], state: St
             states[number] = state
 
 
-def state_of(item: Finding, *, unjudged: bool = False) -> State | None:
+def finding_state(item: Finding, *, unjudged: bool = False) -> State | None:
     """Return the state of a place according to one finding, or None for a finding that does not affect it.
 
     unjudged: True if the verdict is withheld because of this finding.
@@ -87,7 +87,7 @@ def state_of(item: Finding, *, unjudged: bool = False) -> State | None:
     >>> slope = make_finding(
     ...     "slope", Place("leg", 1), ok=True, reason="", planned=13.5, limit=14.2, margin=0.7, unit="deg"
     ... )
-    >>> state_of(slope)
+    >>> finding_state(slope)
     State(state='near', closeness=0.7, text='slope 13.5° (≤ 14.2°)')
     """
     if item.ok is None:

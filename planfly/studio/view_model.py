@@ -18,7 +18,7 @@ from logs.verdict.verdict import Verdict
 from logs.verdict.wording import suggestion_text
 from logs.views.failures import route_distance, route_samples
 from logs.views.map import map_extent
-from logs.views.profile import ground_under
+from logs.views.profile import terrain_altitudes
 from logs.views.threats_and_zones import PathPlane, threat_cuts, zone_cuts, zone_label
 from planfly.studio.edit_context import EditContext
 from planfly.studio.incremental_verdict import Window
@@ -249,7 +249,7 @@ def profile_json(scenario: Scenario, setup: FlightSetup) -> Json:
     route = setup.route.waypoints
     at = route_distance(route)
     distance, points = route_samples(route, max(float(at[-1]) / _PROFILE_SAMPLES, 1.0))
-    ground = ground_under(scenario, points)
+    ground = terrain_altitudes(scenario, points)
     low = float(min(points[:, 2].min(), np.nanmin(ground) if ground is not None else np.inf)) - 50.0
     high = float(points[:, 2].max()) + 300.0
     plane = PathPlane(distance, points, ground, low, high)

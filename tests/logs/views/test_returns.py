@@ -55,8 +55,8 @@ def test_the_way_is_coloured_where_returns_begin(shown: tuple[FlightSetup, Drawn
             known = np.isfinite(layer.x)
             assert layer.x[known].tolist() == [one.start[0] for one in ones]
             assert layer.y[known].tolist() == [one.start[1] for one in ones]
-            assert len(layer.words) == len(layer.x)
-            assert layer.words[0].startswith(f"{ones[0].time:.0f} s: to home: ")
+            assert len(layer.hover_texts) == len(layer.x)
+            assert layer.hover_texts[0].startswith(f"{ones[0].time:.0f} s: to home: ")
     kinds = {kind for kind, _ in drawn.segments_by_outcome}
     assert {"safe", "ground", "threat"} <= kinds
 
