@@ -511,7 +511,7 @@ class HomeTable(PositionTable):
 
 
 LaunchMethod = Literal["catapult", "hand", "runway"]
-# Largest incline of a runway, degrees above level, as for a landing strip (`world.airfield.STEEPEST_STRIP`).
+# Largest incline of a runway, degrees above level, as for a landing strip (`world.airfield.STEEPEST_STRIP_SLOPE`).
 STEEPEST_RUNWAY = 5.0
 
 

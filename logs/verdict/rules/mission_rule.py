@@ -42,7 +42,7 @@ from logs.verdict.tolerances import (
     PX4_LANDING_BUFFER_RAD,
     PX4_WAYPOINT_SPACING_M,
 )
-from world.airfield import STEEPEST_STRIP
+from world.airfield import STEEPEST_STRIP_SLOPE
 from world.frames import GeoOrigin, to_map
 
 C = Command
@@ -178,8 +178,8 @@ def _unflown_findings(setup: FlightSetup) -> Iterator[Finding]:
                 if item.command == C.DO_CHANGE_SPEED and item.params[0] == 1.0
             ]
     slopes = landing_slopes(setup.mission, setup.route, setup.scenario)
-    if setup.source is None and slopes is not None and max(map(abs, slopes)) > STEEPEST_STRIP:
-        steepest_text = f"{max(map(abs, slopes)):.1%}, and at most {STEEPEST_STRIP:.0%} can be landed on"
+    if setup.source is None and slopes is not None and max(map(abs, slopes)) > STEEPEST_STRIP_SLOPE:
+        steepest_text = f"{max(map(abs, slopes)):.1%}, and at most {STEEPEST_STRIP_SLOPE:.0%} can be landed on"
         reason = f"NAV_LAND: the ground there slopes by {steepest_text}: the touchdown is not judged"
         remarks.append((int(setup.route.items[-1]), reason))
     # An imported flight was flown with its settings.
