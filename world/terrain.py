@@ -60,7 +60,7 @@ class Terrain:
     def height(self, east: ArrayLike, north: ArrayLike) -> Floats:
         """Return the ground height in m at map positions, any shape; NaN outside the raster or on nodata."""
         es, ns = np.broadcast_arrays(np.asarray(east, dtype=np.float64), np.asarray(north, dtype=np.float64))
-        return _heights_many(self.heights, self.to_pixel.record, es.ravel(), ns.ravel()).reshape(es.shape)
+        return _ground_heights(self.heights, self.to_pixel.record, es.ravel(), ns.ravel()).reshape(es.shape)
 
     def clearance(self, a: ArrayLike, b: ArrayLike) -> tuple[float, float]:
         """Return the smallest height above ground on the segment a-b, and the fraction of the segment there.
@@ -129,7 +129,9 @@ def ground_height(heights: Heights, to_pixel: PolyMapRecord, east: float, north:
 
 
 @compiled
-def _heights_many(heights: Heights, to_pixel: PolyMapRecord, east: Floats, north: Floats) -> Floats:  # pragma: no cover
+def _ground_heights(
+    heights: Heights, to_pixel: PolyMapRecord, east: Floats, north: Floats
+) -> Floats:  # pragma: no cover
     ground_heights = np.empty(east.size)
     for k in range(east.size):
         ground_heights[k] = ground_height(heights, to_pixel, east[k], north[k])

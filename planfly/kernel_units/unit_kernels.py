@@ -7,8 +7,8 @@ actual calls.
 # Kernels of terrain and map projection.
 _FIELD = (
     "world.least_squares._least_squares",
-    "world.frames._polymap_many",
-    "world.terrain._heights_many",
+    "world.frames._evaluate_polymap",
+    "world.terrain._ground_heights",
 )
 # Kernel of the tracking error.
 _TRACKING_KERNELS = ("flight.autopilots.arduplane.tracking_error._fill_corners",)
