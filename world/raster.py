@@ -26,8 +26,8 @@ from world.frames import GeoOrigin, fit_polymap, to_geo, to_map
 from world.gdal_raster import PIXELS_AT_ONCE, open_geotiff, open_hgt
 from world.height_datum import HeightDatum, StatedDatum, height_datum
 from world.raster_file import (
-    RasterFile,
     PixelMap,
+    RasterFile,
     file_sha256,
     is_ground,
     longitude_near,

@@ -134,7 +134,7 @@ class Scenario:
 
     def to_json(self) -> dict[str, Any]:
         """Return the scenario as plain JSON data, from which `from_spec` makes it again."""
-        stated_spec = self.spec.model_copy(update={"flight": self.spec.flight.stated()})
+        stated_spec = self.spec.model_copy(update={"flight": self.spec.flight.with_stated_defaults()})
         return stated_spec.model_dump(mode="json", exclude_none=True)
 
 
@@ -261,7 +261,7 @@ def from_spec(
     spec = _with_file_zones(
         spec.model_copy(update={"origin": origin_table, "area": area_table}), file_zones, source, origin, bounds
     )
-    return _assemble(spec, source, origin, bounds, ground, external=external, replaced=terrain is not None)
+    return _assemble_scenario(spec, source, origin, bounds, ground, external=external, replaced=terrain is not None)
 
 
 def _with_whole_paths(flight: FlightTable, base: Path | None) -> FlightTable:
@@ -328,7 +328,7 @@ def _open_terrain(table: TerrainTable, source: str, base: Path | None) -> tuple[
     return raster, table.model_copy(update={"path": stored_path, "sha256": raster.sha256})
 
 
-def _assemble(
+def _assemble_scenario(
     spec: ScenarioFile,
     source: str,
     origin: GeoOrigin,
