@@ -20,7 +20,7 @@ from logs.verdict.returns.judge_glides import judge_glides
 from logs.verdict.returns.judge_returns import ReturnWorld, judge_returns, return_world
 from logs.verdict.returns.return_starts import ReturnStarts, flown_starts
 from logs.verdict.returns.returns_text import headline
-from logs.verdict.returns.suggest_returns import suggest_rally
+from logs.verdict.returns.suggest_returns import suggest_rally_points
 from planfly.rtl.jsbsim_returns import fly_return
 
 Result = TypeVar("Result")
@@ -46,14 +46,14 @@ def fresh_places(flown: planfly.FlownMission, every: float, count: int) -> Retur
     off = np.abs((starts.time / every + 0.5) % 1.0 - 0.5) * every
     unseen = np.flatnonzero(off > 0.4 * every)
     chosen = np.random.default_rng(_SEED).choice(unseen, size=min(count, len(unseen)), replace=False)
-    return starts.at(np.sort(chosen))
+    return starts.subset(np.sort(chosen))
 
 
 def fly_fresh(world: ReturnWorld, starts: ReturnStarts, whole: int) -> None:
     """Fly returns from fresh places, and print the number of unsafe ones."""
     found = judge_returns(world, starts, 0.0)
     low = [one.clearance for one in found.each]
-    outside = [one.outside for one in found.each]
+    outside = [one.sphere_distance for one in found.each]
     print(f"from {len(low)} fresh places by the law: {headline(found)}")
     print(f"  below {world.limit:.0f} m: {sum(one < world.limit for one in low)}, least {min(low):.1f} m;", end=" ")
     print(f"inside a sphere: {sum(one <= 0.0 for one in outside)}, nearest {min(outside):.1f} m outside")
@@ -81,7 +81,7 @@ def main() -> None:
         "what is drawn of them, but for the drawing", lambda: drawn_returns(world, starts, returns, glides)
     )
     begun = perf_counter()
-    rally = suggest_rally(world, starts)
+    rally = suggest_rally_points(world, starts)
     search = perf_counter() - begun
     print(f"{'the search for rally points, once':45s} {search:6.2f} s")
     print(
@@ -93,7 +93,7 @@ def main() -> None:
         print("no rally points were found")
         return
     print(f"{len(rally.rally)} rally points suggested")
-    fly_fresh(rally.on(world), fresh_places(flown, args.every, args.fresh), args.whole)
+    fly_fresh(rally.apply_to(world), fresh_places(flown, args.every, args.fresh), args.whole)
 
 
 if __name__ == "__main__":

@@ -29,15 +29,15 @@ class Look:
     """Style in which a role is drawn.
 
     light, dark: colour on light and on dark ground, "#rrggbb".
-    width: of its lines, points; on a page 1.25 pixels stand for a point.
+    width: width of its lines, points; on a page a point is 1.25 pixels.
     dash: lengths of strokes and gaps in the same unit, () for a solid line.
     fill: opacity of its areas.
-    size: of its dots; 0 where it has none.
+    size: size of its dots; 0 without dots.
     face: role of the colour inside its dots, "" for its own.
-    edge: role of the colour about its areas, "" for its own.
+    edge: role of the colour around its areas, "" for its own.
     marker: shape of its dots: "circle", "triangle", "star" or "cross".
-    hatch: of its areas in print, in matplotlib's terms.
-    halo: whether print draws a pale rim about its lines, which lie on coloured ground.
+    hatch: hatch of its areas in print, in matplotlib's notation.
+    halo: True if its lines have a pale rim in print, because they lie on coloured ground.
     """
 
     light: str
@@ -178,7 +178,7 @@ AIRCRAFT_PARTS = ("#ebebe0", "#d91a1a", "#1a9933")
 
 
 def colour(name: str, *, dark: bool = False) -> str:
-    """Return the colour of a role, or of what stands around the data.  Raises KeyError.
+    """Return the colour of a role, or of an element of the page around the data.  Raises KeyError.
 
     >>> colour("flown"), colour("paper", dark=True)
     ('#000000', '#16181c')
@@ -189,17 +189,17 @@ def colour(name: str, *, dark: bool = False) -> str:
 
 
 def rgb(text: str) -> tuple[float, float, float]:
-    """Red, green and blue, 0 to 1.
+    """Convert a colour "#rrggbb" to red, green and blue, 0 to 1.
 
     >>> rgb("#ff0033")
     (1.0, 0.0, 0.2)
     """
-    red, green, blue = (int(text[at : at + 2], 16) / 255.0 for at in (1, 3, 5))
+    red, green, blue = (int(text[start : start + 2], 16) / 255.0 for start in (1, 3, 5))
     return red, green, blue
 
 
 def rgba(name: str, opacity: float = 1.0, *, dark: bool = False) -> tuple[float, float, float, float]:
-    """Red, green, blue and opacity of a role, 0 to 1.
+    """Return red, green, blue and opacity of a role, 0 to 1.
 
     >>> rgba("flown", 0.5)
     (0.0, 0.0, 0.0, 0.5)
@@ -207,10 +207,10 @@ def rgba(name: str, opacity: float = 1.0, *, dark: bool = False) -> tuple[float,
     return (*rgb(colour(name, dark=dark)), opacity)
 
 
-def drawn_colours() -> tuple[str, ...]:
-    """Return what a picture of few colours keeps as it is: each role's, and paper and ink.
+def palette_colours() -> tuple[str, ...]:
+    """Return the colours that a picture with a reduced palette keeps: those of all roles, paper and ink.
 
-    >>> colour("missile") in drawn_colours()
+    >>> colour("missile") in palette_colours()
     True
     """
     return tuple(
@@ -219,7 +219,7 @@ def drawn_colours() -> tuple[str, ...]:
 
 
 def css_variables() -> str:
-    """Return the colours as CSS variables (``--missile``), light, and dark on a screen whose reader prefers it.
+    """Return the colours as CSS variables (``--missile``): light, and dark for screens that prefer a dark scheme.
 
     >>> "--missile: #" in css_variables()
     True
@@ -237,17 +237,20 @@ def css_variables() -> str:
 _HEX = re.compile(r"#[0-9a-f]{6}\b")
 
 
-def with_variables(drawn: str) -> str:
-    """Return a drawing's text with the variables of `css_variables` in place of its light colours.
+def replace_colours_by_css_variables(svg: str) -> str:
+    """Replace the light colours in an SVG's text by the variables of `css_variables`.
 
-    Of roles that have one light colour the first counts, what stands around the data before the data.
+    If several roles share a light colour, the variable of the first role is used; the roles of the page come before the
+    roles of the data.
 
-    >>> with_variables("fill: #1d1d1f; stroke: #123456")
+    >>> replace_colours_by_css_variables("fill: #1d1d1f; stroke: #123456")
     'fill: var(--ink); stroke: #123456'
     """
-    names = {text: f"ground-{k}" for k, text in reversed(list(enumerate(GROUND)))}
-    names |= {colour(name): name for name in reversed((*PAGE, *LOOKS))}
-    return _HEX.sub(lambda match: f"var(--{names[match[0]]})" if match[0] in names else match[0], drawn)
+    variable_by_colour = {text: f"ground-{k}" for k, text in reversed(list(enumerate(GROUND)))}
+    variable_by_colour |= {colour(name): name for name in reversed((*PAGE, *LOOKS))}
+    return _HEX.sub(
+        lambda match: f"var(--{variable_by_colour[match[0]]})" if match[0] in variable_by_colour else match[0], svg
+    )
 
 
 # Pixels of a page to a point of print, and plotly.js' names of markers.
@@ -255,10 +258,10 @@ _PIXELS = 1.25
 _SYMBOLS = {"circle": "circle", "triangle": "triangle-up", "star": "star", "cross": "x-thin"}
 
 
-def page_looks() -> dict[str, dict[str, object]]:
-    """Widths, dashes, opacities and sizes by role, for the page's script; colours are in `css_variables`.
+def page_styles() -> dict[str, dict[str, object]]:
+    """Return width, dash, opacity and size of each role for the page's script; colours are in `css_variables`.
 
-    >>> page_looks()["missile"]["dash"]
+    >>> page_styles()["missile"]["dash"]
     'solid'
     """
     return {

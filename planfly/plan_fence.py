@@ -3,7 +3,7 @@
 from flight.mission.fences import fence_zones, with_fences
 from flight.mission.items import Mission, MissionItem
 from flight.simulation.setup import FlightSetup
-from logs.verdict.rules.fence_rule import zone_test
+from logs.verdict.rules.fence_rule import make_zone_test
 
 
 def add_plan_fence(setup: FlightSetup) -> tuple[Mission, tuple[str, ...]]:
@@ -16,7 +16,7 @@ def add_plan_fence(setup: FlightSetup) -> tuple[Mission, tuple[str, ...]]:
     >>> [item.command for item in mission.fences]  # the area; the example has no missiles
     [5001, 5001, 5001, 5001]
     """
-    is_entered_zone = zone_test(setup)
+    is_entered_zone = make_zone_test(setup)
 
     def is_entered_shape(shape: tuple[MissionItem, ...]) -> bool:
         return any(is_entered_zone(zone) for zone in fence_zones(shape, setup.scenario.origin))

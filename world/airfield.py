@@ -1,6 +1,6 @@
-"""Home, launch, landing strip and returns of a scenario.
+"""Home, launch, landing strip and return requirements of a scenario.
 
-The flight of a scenario without these tables begins and ends in the air.  Places are m east and north of the map's
+The flight of a scenario without these tables begins and ends in the air.  Positions are m east and north of the map's
 origin, courses are radians clockwise from north, and home is on the scenario's ground.
 """
 
@@ -12,7 +12,7 @@ import numpy as np
 from world.arrays import Floats
 from world.errors import ScenarioError
 from world.frames import GeoOrigin
-from world.map_positions import check_above_ground, check_in_area, map_place, map_position
+from world.map_positions import check_above_ground, check_in_area, map_coordinates, map_position
 from world.scenario_tables import (
     HomeTable,
     LandingTable,
@@ -24,8 +24,8 @@ from world.scenario_tables import (
 from world.terrain import Terrain
 from world.wind import Wind
 
-# Default launch length, m: the rail of a small catapult, two steps and the swing of an arm, a runway.  A catapult of
-# 6 m at 12 degrees launched the Aerosonde without loss of height.
+# Default launch length, m: the rail of a small catapult, a throw (two steps and the swing of an arm), a runway.  A
+# catapult of 6 m at 12 degrees launched the Aerosonde without loss of height.
 _LAUNCH_LENGTH_M: dict[LaunchMethod, float] = {"catapult": 6.0, "hand": 2.0, "runway": 200.0}
 # Default launch incline, rad.
 _LAUNCH_INCLINE_RAD: dict[LaunchMethod, float] = {
@@ -34,7 +34,7 @@ _LAUNCH_INCLINE_RAD: dict[LaunchMethod, float] = {
     "runway": 0.0,
 }
 # Steepest slope of a strip, along and across, m per m.
-STEEPEST_STRIP = 0.10
+STEEPEST_STRIP_SLOPE = 0.10
 # Smallest width over which the slope across a strip is measured, m.
 _MIN_MEASURED_WIDTH_M = 60.0
 # Release speed of a catapult as a fraction of the slowest level flight, as catapults are usually set.
@@ -130,9 +130,9 @@ class LandingStrip:
 
 
 def strip_slopes(ground: Terrain, strip: LandingStrip, course: float) -> tuple[float, float]:
-    """Return the ground slope of a strip along a landing course (rad) and across it to the right, m per m.
+    """Return the ground slope of a strip along a landing course, and across it to the right, m per m.
 
-    Each is the mean slope between the two ends, or NaN if the ground height at an end is not known.
+    course: rad.  A slope is the mean between two ends of the strip, or NaN if the ground height at an end is not known.
     """
     slopes = []
     for heading, length in ((course, strip.length), (course + 0.5 * math.pi, max(_MIN_MEASURED_WIDTH_M, strip.width))):
@@ -144,10 +144,10 @@ def strip_slopes(ground: Terrain, strip: LandingStrip, course: float) -> tuple[f
 
 @dataclass(frozen=True, slots=True)
 class ReturnRequirements:
-    """Requirements on returns, and the return settings of a planned mission.
+    """Requirements on RTL (return to launch), glides and go-arounds, and the RTL settings of a planned mission.
 
-    require: contains "rtl" if every return to launch must be safe, "glide" if the engine may fail anywhere, "go_around"
-        if a landing may be aborted anywhere on its glide.
+    require: contains "rtl" if every RTL must be safe, "glide" if the engine may fail anywhere, "go_around" if a landing
+        may be aborted anywhere on its glide.
     rtl_altitude: height above home, m; None if the scenario sets none.
     rally: (n, 3) east, north, m AMSL.
     rtl_autoland: ArduPlane's RTL_AUTOLAND; None if the scenario sets none.
@@ -172,19 +172,19 @@ class ReturnRequirements:
 def make_home(
     table: HomeTable | None, source: str, origin: GeoOrigin, ground: Terrain | None, bounds: Floats, start: Floats
 ) -> Floats | None:
-    """Return home on the ground, m, (3,), or None without a table.
+    """Convert a scenario's [home] table to a position on the ground (3,) m; None without a table.
 
     start: (3,) m, above home if place = "start".  source: name of the file in messages.
     Raises ScenarioError if home is outside the area (2, 2), or if the ground height there is not known.
     """
     if table is None:
         return None
-    place = (float(start[0]), float(start[1])) if table.place == "start" else map_place(table, origin)
-    return _place_on_ground("home", place, source, ground, bounds)
+    position = (float(start[0]), float(start[1])) if table.place == "start" else map_coordinates(table, origin)
+    return _position_on_ground("home", position, source, ground, bounds)
 
 
 def make_launch(table: LaunchTable | None) -> Launch | None:
-    """Return the launch that a table states, or None without a table."""
+    """Convert a scenario's [launch] table to a launch; None without a table."""
     if table is None:
         return None
     incline = _LAUNCH_INCLINE_RAD[table.method] if table.incline_deg is None else math.radians(table.incline_deg)
@@ -195,26 +195,26 @@ def make_launch(table: LaunchTable | None) -> Launch | None:
 def make_landing(
     table: LandingTable | None, source: str, origin: GeoOrigin, ground: Terrain | None, bounds: Floats
 ) -> LandingStrip | None:
-    """Return the landing strip that a table states, or None without a table.
+    """Convert a scenario's [landing] table to a landing strip; None without a table.
 
     Raises ScenarioError as `make_home` does.
     """
     if table is None:
         return None
-    place = map_place(table, origin)
-    _place_on_ground("landing", place, source, ground, bounds)
+    position = map_coordinates(table, origin)
+    _position_on_ground("landing", position, source, ground, bounds)
     course = None if isinstance(table.course_deg, str) else math.radians(table.course_deg)
     slope = None if table.slope_deg is None else math.radians(table.slope_deg)
-    return LandingStrip(*place, course, table.length_m, table.width_m, table.approach_m, slope)
+    return LandingStrip(*position, course, table.length_m, table.width_m, table.approach_m, slope)
 
 
-def make_returns(
+def make_return_requirements(
     table: ReturnsTable | None, source: str, origin: GeoOrigin, ground: Terrain | None
 ) -> ReturnRequirements | None:
-    """Return the requirements and settings of returns that a table states, or None without a table.
+    """Convert a scenario's [returns] table to RTL requirements; None without a table.
 
-    Raises ScenarioError for a rally point that is not above the ground, and for a height above ground where the ground
-    is not known.
+    Raises ScenarioError for a rally point that is not above the ground, and for a height above ground at a position
+    with unknown ground.
     """
     if table is None:
         return None
@@ -226,15 +226,16 @@ def make_returns(
     return ReturnRequirements(tuple(table.require or ()), table.rtl_altitude_m, np.array(points), table.rtl_autoland)
 
 
-def _place_on_ground(
-    key: str, place: tuple[float, float], source: str, ground: Terrain | None, bounds: Floats
+def _position_on_ground(
+    key: str, position: tuple[float, float], source: str, ground: Terrain | None, bounds: Floats
 ) -> Floats:
-    """Return a place on the ground, m, (3,)."""
-    check_in_area(key, np.array(place), source, bounds)
-    ground_height = float(ground.height(*place)) if ground is not None else math.nan
+    """Add the ground height to a position; return it as (3,) m.  Raises ScenarioError as `make_home` does."""
+    check_in_area(key, np.array(position), source, bounds)
+    ground_height = float(ground.height(*position)) if ground is not None else math.nan
     if math.isnan(ground_height):
         message = (
-            f"{source}: {key}: east {place[0]:.0f} m, north {place[1]:.0f} m: the elevation file knows no ground there"
+            f"{source}: {key}: east {position[0]:.0f} m, north {position[1]:.0f} m: the elevation file"
+            " knows no ground there"
         )
         raise ScenarioError(message, file=source, field=key)
-    return np.array([*place, ground_height])
+    return np.array([*position, ground_height])

@@ -64,64 +64,69 @@ def by_reference(cls: _Class) -> _Class:
     members = {name: getattr(cls, name) for name in ("__doc__", "__module__", "__qualname__")}
     # A named tuple has no __dict__ to store the layout; its subclass has one.
     marked_class = type(
-        cls.__name__, (cls,), members | {"_address": property(_address), "__getstate__": lambda _: None}
+        cls.__name__, (cls,), members | {"_address": property(_instance_address), "__getstate__": lambda _: None}
     )
-    typeof_impl.register(marked_class)(lambda value, _: _layout(value).reference)
+    typeof_impl.register(marked_class)(lambda value, _: _get_layout(value).reference)
     return cast("_Class", marked_class)
 
 
-def _layout(value: Any) -> _Layout:
+def _get_layout(value: Any) -> _Layout:
     attributes: dict[str, Any] = vars(value)
     if "_layout" not in attributes:
         tuple_type = _value_type(typeof_impl.dispatch(tuple)(value, None))
-        attributes["_layout"] = _Layout(Reference(tuple_type), _in_memory(tuple_type, value))
+        attributes["_layout"] = _Layout(Reference(tuple_type), _lay_out_in_memory(tuple_type, value))
     return attributes["_layout"]
 
 
-def _address(value: Any) -> int:
-    return ctypes.addressof(_layout(value).memory)
+def _instance_address(value: Any) -> int:
+    return ctypes.addressof(_get_layout(value).memory)
 
 
-def _value_type(kind: Any) -> Any:
+def _value_type(numba_type: Any) -> Any:
     """Return the type with references replaced by their named tuples, as they are laid out in memory."""
-    if isinstance(kind, Reference):
-        return kind.tuple_type
-    if isinstance(kind, types.Array):
+    if isinstance(numba_type, Reference):
+        return numba_type.tuple_type
+    if isinstance(numba_type, types.Array):
         # Writable and read-only arrays share a kernel; copies in another process may be writable.
-        return kind.copy(readonly=True)
-    if _is_named(kind):
-        return types.BaseTuple.from_types([_value_type(member) for member in kind.types], kind.instance_class)
-    return kind
+        return numba_type.copy(readonly=True)
+    if _is_named(numba_type):
+        return types.BaseTuple.from_types(
+            [_value_type(member) for member in numba_type.types], numba_type.instance_class
+        )
+    return numba_type
 
 
-def _is_named(kind: Any) -> bool:
-    return isinstance(kind, types.BaseNamedTuple)
+def _is_named(numba_type: Any) -> bool:
+    return isinstance(numba_type, types.BaseNamedTuple)
 
 
-def _is_tuple(kind: Any) -> bool:
-    return isinstance(kind, types.BaseTuple)
+def _is_tuple(numba_type: Any) -> bool:
+    return isinstance(numba_type, types.BaseTuple)
 
 
-def _in_memory(kind: Any, value: Any) -> Any:
+def _lay_out_in_memory(numba_type: Any, value: Any) -> Any:
     """Lay out a value of a numba type in memory, as ctypes data with an address."""
-    if isinstance(kind, types.Array):
+    if isinstance(numba_type, types.Array):
         # Numba's array structure: two owner pointers, both null, then these fields.
         array_fields = [0, 0, value.size, value.itemsize, value.ctypes.data, *value.shape, *value.strides]
         return (ctypes.c_ssize_t * len(array_fields))(*array_fields)
-    if isinstance(kind, types.Record):
-        return (ctypes.c_uint8 * kind.size).from_buffer_copy(value.tobytes())
-    if _is_tuple(kind):
-        parts = [_in_memory(member, member_value) for member, member_value in zip(kind.types, value, strict=True)]
+    if isinstance(numba_type, types.Record):
+        return (ctypes.c_uint8 * numba_type.size).from_buffer_copy(value.tobytes())
+    if _is_tuple(numba_type):
+        parts = [
+            _lay_out_in_memory(member, member_value)
+            for member, member_value in zip(numba_type.types, value, strict=True)
+        ]
         fields = [(f"field{k}", type(part)) for k, part in enumerate(parts)]
         structure: Any = type("Fields", (ctypes.Structure,), {"_fields_": fields})
         return structure(*parts)
-    return _NUMBERS[kind](value)
+    return _NUMBERS[numba_type](value)
 
 
-def _member(kind: Reference, name: str) -> tuple[int, Any]:
+def _find_field(reference: Reference, name: str) -> tuple[int, Any]:
     """Return the index and type of a field; the type is a pointer if the field's class is marked."""
-    index = kind.tuple_type.fields.index(name)
-    member = kind.tuple_type.types[index]
+    index = reference.tuple_type.fields.index(name)
+    member = reference.tuple_type.types[index]
     if _is_named(member) and hasattr(member.instance_class, "_address"):
         return index, Reference(member)
     return index, member
@@ -138,12 +143,12 @@ class _Field(AttributeTemplate):
     key = Reference
 
     def generic_resolve(self, kind: Any, name: str) -> Any:  # type: ignore[override]  # numba names no argument
-        return _member(kind, name)[1] if name in kind.tuple_type.fields else None
+        return _find_field(kind, name)[1] if name in kind.tuple_type.fields else None
 
 
 @lower_getattr_generic(Reference)
-def _read_field(context: Any, builder: Any, kind: Reference, pointer: Any, name: str) -> Any:
-    index, member = _member(kind, name)
+def _read_field(context: Any, builder: Any, reference: Reference, pointer: Any, name: str) -> Any:
+    index, member = _find_field(reference, name)
     field_pointer = cgutils.gep_inbounds(builder, pointer, 0, index)
     if isinstance(member, Reference):
         return field_pointer

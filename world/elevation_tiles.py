@@ -86,22 +86,22 @@ def _virtual_files(path: Path) -> list[Path]:
 
 
 def join_tiles(tiles: Sequence[RasterFile], name: str) -> RasterFile:
-    """Join tiles into one raster.  name: used in messages.
+    """Join tiles into one raster.  name: its name in messages.
 
     Where tiles overlap, the first tile with data is used.  Raises TerrainError for tiles that are not on one grid.
     """
     first = tiles[0]
     if len(tiles) == 1:
         return replace(first, name=name)
-    places = [_place_on_grid(first, tile) for tile in tiles]
-    top, left = (min(place[k] for place in places) for k in (0, 1))
-    rows = max(row + tile.shape[0] for (row, _), tile in zip(places, tiles, strict=True)) - top
-    cols = max(col + tile.shape[1] for (_, col), tile in zip(places, tiles, strict=True)) - left
-    starts = [(row - top, col - left) for row, col in places]
+    positions = [_place_on_grid(first, tile) for tile in tiles]
+    top, left = (min(position[k] for position in positions) for k in (0, 1))
+    rows = max(row + tile.shape[0] for (row, _), tile in zip(positions, tiles, strict=True)) - top
+    cols = max(col + tile.shape[1] for (_, col), tile in zip(positions, tiles, strict=True)) - left
+    offsets = [(row - top, col - left) for row, col in positions]
 
     def read(r0: int, r1: int, c0: int, c1: int) -> NDArray[np.float32]:
         block = np.full((r1 - r0, c1 - c0), np.nan, dtype=np.float32)
-        for (row, col), tile in zip(starts, tiles, strict=True):
+        for (row, col), tile in zip(offsets, tiles, strict=True):
             first_row, last_row = max(r0, row), min(r1, row + tile.shape[0])
             first_col, last_col = max(c0, col), min(c1, col + tile.shape[1])
             if first_row < last_row and first_col < last_col:
@@ -119,8 +119,8 @@ def join_tiles(tiles: Sequence[RasterFile], name: str) -> RasterFile:
         first,
         name=name,
         shape=(rows, cols),
-        to_source=lambda lon, lat: _shift_pixels(first.to_source(lon, lat), -left, -top),
-        to_place=lambda col, row: first.to_place(col + left, row + top),
+        to_pixels=lambda lon, lat: _shift_pixels(first.to_pixels(lon, lat), -left, -top),
+        to_lon_lat=lambda col, row: first.to_lon_lat(col + left, row + top),
         corners=corners,
         sha256=digest,
         read=read,
@@ -129,19 +129,22 @@ def join_tiles(tiles: Sequence[RasterFile], name: str) -> RasterFile:
 
 
 def _shift_pixels(
-    place: tuple[NDArray[np.float64], NDArray[np.float64]], cols: int, rows: int
+    pixels: tuple[NDArray[np.float64], NDArray[np.float64]], cols: int, rows: int
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    return place[0] + cols, place[1] + rows
+    return pixels[0] + cols, pixels[1] + rows
 
 
 def _place_on_grid(first: RasterFile, tile: RasterFile) -> tuple[int, int]:
-    """Return row and column of a tile's first pixel on the grid of the first tile.  Raises TerrainError."""
+    """Return row and column of a tile's first pixel on the grid of the first tile.
+
+    Raises TerrainError if the tile is not on this grid.
+    """
     if tile.crs != first.crs:
         allowed = f"all tiles need the reference system of {first.name}"
         raise TerrainError(f"{tile.name}: another reference system; {allowed}", file=tile.name, allowed=allowed)
     rows, cols = tile.shape
-    lon, lat = tile.to_place(np.array([0.0, cols - 1.0]), np.array([0.0, rows - 1.0]))
-    col, row = first.to_source(lon, lat)
+    lon, lat = tile.to_lon_lat(np.array([0.0, cols - 1.0]), np.array([0.0, rows - 1.0]))
+    col, row = first.to_pixels(lon, lat)
     position = (round(float(row[0])), round(float(col[0])))
     offset = max(
         math.hypot(col[0] - position[1], row[0] - position[0]),

@@ -44,7 +44,7 @@ class PlanflyError(Exception):
 
     @classmethod
     def at(cls, file: str | Path, field: str, value: Any, allowed: str, *, shown: str | None = None) -> Self:
-        """Make an error about one value in one place, with a message of these four parts.
+        """Make an error about one value in a file, with a message of these four parts.
 
         shown: text of the value in the message; None for its str(), "" to omit it.
 
@@ -80,9 +80,9 @@ class PlanflyError(Exception):
 
     @classmethod
     def from_error(cls, error: "PlanflyError", file: str | Path = "", field: str = "", value: Any = None) -> Self:
-        """Convert an error to this class and to the place that led to it, and keep its attributes.
+        """Convert an error to this class, with the location that led to it, and keep its attributes.
 
-        file, field, value: the place that led to the error, added before the message; empty to keep the message.
+        file, field, value: location that led to the error, added before the message; empty to keep the message.
         They become the attributes if the error names no field; otherwise its own field and value are kept, and its
         file if it has one.
 

@@ -149,9 +149,9 @@ def did_you_mean(name: str, known_names: Iterable[str]) -> str:
     # Imported here, as most runs report no fault.
     from difflib import get_close_matches
 
-    by_folded = {candidate.casefold(): candidate for candidate in known_names}
-    matches = get_close_matches(name.casefold(), by_folded, n=1)
-    return f": did you mean {by_folded[matches[0]]!r}?" if matches else ""
+    names_by_folded_name = {candidate.casefold(): candidate for candidate in known_names}
+    matches = get_close_matches(name.casefold(), names_by_folded_name, n=1)
+    return f": did you mean {names_by_folded_name[matches[0]]!r}?" if matches else ""
 
 
 # ----------------------------------------------------------------------
@@ -175,11 +175,11 @@ def write_whole(path: Path, data: str | bytes) -> None:
         target = _resolve_link(path) if path.is_symlink() else path
         # Cut by bytes, as a name may have 255 bytes and a letter may take up to four.
         name = target.name.encode()[:200].decode("utf-8", "ignore")
-        temporary = target.with_name(f".{name}.{os.getpid()}-{os.urandom(4).hex()}")
-        with uninterrupted(), unfinished(temporary):
-            with temporary.open("xb") as file:
+        temporary_path = target.with_name(f".{name}.{os.getpid()}-{os.urandom(4).hex()}")
+        with uninterrupted(), unfinished(temporary_path):
+            with temporary_path.open("xb") as file:
                 file.write(content)
-            temporary.replace(target)
+            temporary_path.replace(target)
     except OSError as error:
         if error.errno is None:
             raise
@@ -199,22 +199,22 @@ def write_folder(path: Path, files: Mapping[str, bytes], kept_names: Iterable[st
     ...     print((Path(home) / "made" / "b" / "c.txt").read_text())
     2
     """
-    temporary = path.with_name(f".{path.name[:50]}.{os.getpid()}-{os.urandom(4).hex()}")
+    temporary_path = path.with_name(f".{path.name[:50]}.{os.getpid()}-{os.urandom(4).hex()}")
     try:
-        with uninterrupted(), unfinished(temporary):
-            temporary.mkdir()
+        with uninterrupted(), unfinished(temporary_path):
+            temporary_path.mkdir()
             for name, content in files.items():
-                (temporary / name).parent.mkdir(parents=True, exist_ok=True)
-                (temporary / name).write_bytes(content)
+                (temporary_path / name).parent.mkdir(parents=True, exist_ok=True)
+                (temporary_path / name).write_bytes(content)
             if kept_names is not None and path.is_dir():
                 for name in kept_names:
-                    (path / name).rename(temporary / name)
-                replaced_folder = temporary.with_name(f"{temporary.name}.old")
+                    (path / name).rename(temporary_path / name)
+                replaced_folder = temporary_path.with_name(f"{temporary_path.name}.old")
                 path.rename(replaced_folder)
-                temporary.rename(path)
+                temporary_path.rename(path)
                 shutil.rmtree(replaced_folder)
             else:
-                temporary.rename(path)
+                temporary_path.rename(path)
     except OSError as error:
         raise OSError(error.errno, error.strerror, str(path)) from error
 
@@ -241,10 +241,8 @@ def temporary_folder(prefix: str) -> Iterator[Path]:
         yield folder
 
 
-def remove_temporary_folders(process: int) -> bool:
-    """Remove the folders of `temporary_folder` that a killed process has left behind.
-
-    Return True if there were none.
+def remove_temporary_folders(process_id: int) -> bool:
+    """Remove the folders of `temporary_folder` that a killed process did not remove; return True if there were none.
 
     >>> with temporary_folder("planfly-") as folder:
     ...     remove_temporary_folders(os.getpid()), folder.exists()
@@ -252,7 +250,7 @@ def remove_temporary_folders(process: int) -> bool:
     """
     # The name pattern of `temporary_folder`.
     candidates = Path(tempfile.gettempdir()).glob("planfly-*-*")
-    remaining = [folder for folder in candidates if folder.name.split("-")[-2] == str(process)]
+    remaining = [folder for folder in candidates if folder.name.split("-")[-2] == str(process_id)]
     for folder in remaining:
         shutil.rmtree(folder, ignore_errors=True)
     return not remaining
@@ -260,9 +258,8 @@ def remove_temporary_folders(process: int) -> bool:
 
 @contextlib.contextmanager
 def hold(path: Path) -> Iterator[None]:
-    """Lock an existing file or folder for this process.
+    """Lock an existing file or folder for this process, until the end of the block.
 
-    Another process that tries to lock it within the block is refused.
     The system releases the lock when the process ends, in any way.  Raises PlanflyError if another process holds the
     lock, and OSError if the file cannot be opened.
 

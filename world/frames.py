@@ -1,7 +1,7 @@
-"""Map frames: the azimuthal equidistant plane about an origin, and fast polynomial copies of any frame change.
+"""Map frames: the azimuthal equidistant plane about an origin, and fast polynomial approximations of conversions.
 
-World axes are ``east, north, up``: east and north in the AEQD plane on WGS84, up the height above mean sea
-level, kept apart from the map so that Earth curvature never leaks into altitude.
+World axes are ``east, north, up``: east and north in the AEQD plane on WGS84, up the height above mean sea level.
+Altitude is separate from the map, so that the curvature of the Earth does not affect it.
 """
 
 import itertools
@@ -50,7 +50,7 @@ class GeoOrigin:
 
 
 @lru_cache(maxsize=32)
-def _aeqd(origin: GeoOrigin) -> "Proj":
+def _make_projection(origin: GeoOrigin) -> "Proj":
     # Imported here and below, as pyproj imports an HTTP client, and a scenario in metres needs neither.
     from pyproj import Proj
 
@@ -58,27 +58,25 @@ def _aeqd(origin: GeoOrigin) -> "Proj":
 
 
 def to_map(origin: GeoOrigin, lat_deg: ArrayLike, lon_deg: ArrayLike) -> tuple[Floats, Floats]:
-    """Convert geodetic positions in degrees to east and north in metres.
-
-    Any shape, which the result keeps.
+    """Convert geodetic positions in degrees to east and north in metres, in arrays of the same shape.
 
     >>> east, north = to_map(GeoOrigin(46.0, 8.0), [46.0, 46.01], [8.01, 8.0])
     >>> east.round(1).tolist(), north.round(1).tolist()
     ([774.6, 0.0], [0.0, 1111.5])
     """
-    return transform_points(_aeqd(origin), np.asarray(lon_deg, dtype=np.float64), np.asarray(lat_deg, dtype=np.float64))
+    return transform_points(
+        _make_projection(origin), np.asarray(lon_deg, dtype=np.float64), np.asarray(lat_deg, dtype=np.float64)
+    )
 
 
 def to_geo(origin: GeoOrigin, east: ArrayLike, north: ArrayLike) -> tuple[Floats, Floats]:
-    """Convert map positions in metres to latitude and longitude in degrees.
-
-    Any shape, which the result keeps.
+    """Convert map positions in metres to latitude and longitude in degrees, in arrays of the same shape.
 
     >>> lat, lon = to_geo(GeoOrigin(46.0, 8.0), 0.0, 10_000.0)
     >>> float(lat.round(6)), float(lon.round(6))
     (46.089967, 8.0)
     """
-    inverse = partial(_aeqd(origin), inverse=True)
+    inverse = partial(_make_projection(origin), inverse=True)
     lon, lat = transform_points(inverse, np.asarray(east, dtype=np.float64), np.asarray(north, dtype=np.float64))
     return lat, lon
 
@@ -130,10 +128,10 @@ def height_unit(crs: str) -> tuple[str, float]:
     )
 
 
-def wkt_of(crs: str, *, with_height: bool = False) -> str:
-    """Return a CRS that PROJ knows, such as "EPSG:4326", as well-known text.
+def crs_to_wkt(crs: str, *, with_height: bool = False) -> str:
+    """Convert a CRS that PROJ knows, such as "EPSG:4326", to well-known text.
 
-    with_height: give a two-dimensional CRS the height above its ellipsoid.
+    with_height: True to add the height above the ellipsoid to a two-dimensional CRS.
     """
     from pyproj import CRS
 
@@ -172,8 +170,8 @@ class PolyMap:
     def __call__(self, x: ArrayLike, y: ArrayLike) -> tuple[Floats, Floats]:
         """Return both components at arrays of positions."""
         xs, ys = np.broadcast_arrays(np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64))
-        out = _polymap_many(self.record, xs.ravel(), ys.ravel())
-        return out[0].reshape(xs.shape), out[1].reshape(xs.shape)
+        components = _evaluate_polymap(self.record, xs.ravel(), ys.ravel())
+        return components[0].reshape(xs.shape), components[1].reshape(xs.shape)
 
     def to_rows(self) -> Floats:
         """Return the polynomial as rows of numbers, (2 + 2n, n), as stored in a log; `from_rows` reads them.
@@ -233,7 +231,7 @@ def fit_polymap(
     nodes_u, nodes_v = grid(14)
     check_u, check_v = grid(23)
     node_values, check_values = targets(nodes_u, nodes_v), targets(check_u, check_v)
-    best: PolyMap | None = None
+    best_map: PolyMap | None = None
     for size in range(2, MAX_TERMS + 1):
         powers = [(i, j) for i, j in itertools.product(range(size), repeat=2) if i + j < size]
         basis = np.stack([nodes_u**i * nodes_v**j for i, j in powers], axis=1)
@@ -243,17 +241,17 @@ def fit_polymap(
             for (i, j), coefficient in zip(powers, solution, strict=True):
                 block[i, j] = coefficient
         record = _make_record(centre, half_widths, *blocks)
-        check_results = _polymap_many(
+        check_results = _evaluate_polymap(
             record, centre[0] + half_widths[0] * check_u, centre[1] + half_widths[1] * check_v
         )
         residual = max(float(np.max(np.abs(check_results[k] - check_values[k]))) for k in range(2))
-        if best is None or residual < best.residual:
-            best = PolyMap(record, residual)
+        if best_map is None or residual < best_map.residual:
+            best_map = PolyMap(record, residual)
         if residual <= tolerance:
             break
-    if best is None:  # pragma: no cover - the loop always runs
+    if best_map is None:  # pragma: no cover - the loop always runs
         raise ValueError("no polynomial was fitted")
-    return best
+    return best_map
 
 
 @inlined
@@ -275,8 +273,8 @@ def polymap(record: PolyMapRecord, x: float, y: float) -> tuple[float, float]:
 
 
 @compiled
-def _polymap_many(record: PolyMapRecord, x: Floats, y: Floats) -> Floats:
-    out = np.empty((2, x.size))
+def _evaluate_polymap(record: PolyMapRecord, x: Floats, y: Floats) -> Floats:
+    components = np.empty((2, x.size))
     for k in range(x.size):
-        out[0, k], out[1, k] = polymap(record, x[k], y[k])
-    return out
+        components[0, k], components[1, k] = polymap(record, x[k], y[k])
+    return components

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from world.arrays import Floats
 from world.errors import TerrainError
-from world.frames import crs_transformer, height_unit, is_geographic, transform_points, wkt_of
+from world.frames import crs_to_wkt, crs_transformer, height_unit, is_geographic, transform_points
 from world.raster_file import Grid, RasterFile, file_sha256, longitude_near, one_line, outline, require_min_pixels
 
 # Options of GDAL: read only this file, no file next to it, and no file that is named in it.
@@ -56,30 +56,30 @@ def open_hgt(file: Path, _name: str) -> RasterFile:
 
 
 def _open_dataset(file: Path, driver: str) -> Any:
-    """Open a file in GDAL with one driver; call it inside `GUARD` only."""
+    """Open a file in GDAL with one driver, within the options `GUARD`."""
     import rasterio
 
     return rasterio.open(os.fspath(file.resolve()), driver=driver)
 
 
-def _open_raster_file(file: Path, driver: str, unreadable: str) -> RasterFile:
+def _open_raster_file(file: Path, driver: str, failure_text: str) -> RasterFile:
     import rasterio
     from rasterio.errors import NotGeoreferencedWarning, RasterioError
 
     try:
         with warnings.catch_warnings(), rasterio.Env(**GUARD):
-            # For a file without a place on Earth, GDAL would return columns and rows.
+            # For a file without a position on Earth, GDAL would return columns and rows.
             warnings.simplefilter("error", NotGeoreferencedWarning)
             with _open_dataset(file, driver) as source:
                 _check_layout(file, source)
                 shape, grid = (source.height, source.width), tuple(source.transform)[:6]
-                scale, crs = (source.scales[0], source.offsets[0]), _crs_of(file, driver, source)
-                unit = _unit_of(source.units[0] or "", {**source.tags(), **source.tags(1)}.items())
+                scale, crs = (source.scales[0], source.offsets[0]), _read_crs(file, driver, source)
+                unit = _height_unit(source.units[0] or "", {**source.tags(), **source.tags(1)}.items())
                 may_have_gaps = driver == "GTiff" and source.nodata is None
     except NotGeoreferencedWarning:
         _raise_unplaced(file)
     except (RasterioError, ValueError, TypeError, OSError) as error:
-        raise TerrainError(f"{file}: {unreadable}: {_first_error_line(error)}", file=file) from error
+        raise TerrainError(f"{file}: {failure_text}: {_first_error_line(error)}", file=file) from error
 
     def read(top: int, bottom: int, left: int, right: int) -> NDArray[np.float32]:
         try:
@@ -95,7 +95,7 @@ def _open_raster_file(file: Path, driver: str, unreadable: str) -> RasterFile:
 
 
 def _first_error_line(error: BaseException) -> str:
-    """Return the text of the first error of a chain in one line, because the last error only refers to earlier ones."""
+    """Return the first error of a chain of causes as one line; the last error only refers to earlier ones."""
     while error.__cause__ is not None:
         error = error.__cause__
     return one_line(error)
@@ -103,14 +103,14 @@ def _first_error_line(error: BaseException) -> str:
 
 def _check_layout(file: Path, source: Any) -> None:
     """Raise TerrainError unless the file has one band of real numbers in blocks that are small enough to unpack."""
-    kind = np.dtype(source.dtypes[0]).kind
-    if source.count != 1 or kind not in "iuf":
+    number_kind = np.dtype(source.dtypes[0]).kind
+    if source.count != 1 or number_kind not in "iuf":
         allowed = "an elevation file has 1 band of numbers"
-        raise TerrainError.at(file, "bands", source.count, allowed, shown=f"{source.count} of kind {kind!r}")
-    block = math.prod(source.block_shapes[0])
-    if block > MAX_BLOCK_PIXELS:
+        raise TerrainError.at(file, "bands", source.count, allowed, shown=f"{source.count} of kind {number_kind!r}")
+    block_pixels = math.prod(source.block_shapes[0])
+    if block_pixels > MAX_BLOCK_PIXELS:
         allowed = f"at most {MAX_BLOCK_PIXELS:,} are; tile the file"
-        raise TerrainError.at(file, "pixels of a block, read whole", block, allowed, shown=f"{block:,}")
+        raise TerrainError.at(file, "pixels of a block, read whole", block_pixels, allowed, shown=f"{block_pixels:,}")
     require_min_pixels(file, (source.height, source.width))
 
 
@@ -121,8 +121,8 @@ def _raise_unplaced(file: Path) -> NoReturn:
     raise TerrainError(f"{file}: no coordinate reference system and position are stated{unread_text}", file=file)
 
 
-def _crs_of(file: Path, driver: str, source: Any) -> str | None:
-    """Return the reference system of an open file as WKT; None if it has none."""
+def _read_crs(file: Path, driver: str, source: Any) -> str | None:
+    """Read the reference system of an open file as WKT; None if it has none."""
     import rasterio
 
     if source.crs is None:
@@ -131,10 +131,10 @@ def _crs_of(file: Path, driver: str, source: Any) -> str | None:
     # GDAL drops the height axis of a three-dimensional system in a GeoTIFF 1.0 file, unless it takes EPSG's definition.
     with rasterio.Env(GTIFF_SRS_SOURCE="EPSG"), _open_dataset(file, driver) as epsg_source:
         has_height = "CS[ellipsoidal,3]" in epsg_source.crs.to_wkt(version="WKT2_2019")
-    return wkt_of(wkt, with_height=has_height)
+    return crs_to_wkt(wkt, with_height=has_height)
 
 
-def _unit_of(unit: str, tags: Iterable[tuple[str, str]]) -> str:
+def _height_unit(unit: str, tags: Iterable[tuple[str, str]]) -> str:
     """Return the unit of a file's heights: the unit of its band, or feet if a tag says so; "" if not stated.
 
     GDAL treats the tags of other programs as remarks, and would report such heights as metres although they are feet.
@@ -152,7 +152,7 @@ def _unit_of(unit: str, tags: Iterable[tuple[str, str]]) -> str:
 def _make_raster_file(
     file: Path, shape: tuple[int, int], grid: Grid, crs: str | None, unit: str, read: Any
 ) -> RasterFile:
-    """Return a raster file with its georeferencing; its heights must be in metres.  Raises TerrainError."""
+    """Make a raster file from its georeferencing.  Raises TerrainError, also if its heights are not in metres."""
     a, b, c, d, e, f = grid
     determinant = a * e - b * d
     if crs is None or determinant == 0.0:
@@ -168,7 +168,7 @@ def _make_raster_file(
     rows, cols = shape
     middle_longitude = a * cols / 2 + b * rows / 2 + c if is_geographic(crs) else math.nan
 
-    def to_source(lon: Floats, lat: Floats) -> tuple[Floats, Floats]:
+    def to_pixels(lon: Floats, lat: Floats) -> tuple[Floats, Floats]:
         x, y = (
             np.asarray(coordinates)
             for coordinates in transform_points(transformer.transform, np.asarray(lon), np.asarray(lat))
@@ -178,7 +178,7 @@ def _make_raster_file(
         col, row = (e * (x - c) - b * (y - f)) / determinant, (a * (y - f) - d * (x - c)) / determinant
         return col - 0.5, row - 0.5
 
-    def to_place(col: Floats, row: Floats) -> tuple[Floats, Floats]:
+    def to_lon_lat(col: Floats, row: Floats) -> tuple[Floats, Floats]:
         pixel_x, pixel_y = col + 0.5, row + 0.5
         x, y = a * pixel_x + b * pixel_y + c, d * pixel_x + e * pixel_y + f
         lon, lat = transformer.transform(np.asarray(x), np.asarray(y), direction="INVERSE")
@@ -186,10 +186,10 @@ def _make_raster_file(
 
     # The coordinates of a damaged file may overflow.
     with np.errstate(all="ignore"):
-        corners = np.stack(to_place(*outline(cols, rows)), axis=1)
+        corners = np.stack(to_lon_lat(*outline(cols, rows)), axis=1)
     if not (np.isfinite(corners).all() and np.abs(corners[:, 1]).max() <= 90.0):
         raise TerrainError(f"{file}: its outline does not lie on Earth", file=file)
-    return RasterFile(str(file), shape, to_source, to_place, corners, file_sha256(file), read, grid, crs)
+    return RasterFile(str(file), shape, to_pixels, to_lon_lat, corners, file_sha256(file), read, grid, crs)
 
 
 # ----------------------------------------------------------------------
@@ -197,7 +197,7 @@ def _make_raster_file(
 
 
 def _read_strips(source: Any, window: tuple[int, int, int, int], scale: float, offset: float) -> NDArray[np.float32]:
-    """Return the heights of a window (top, bottom, left, right), read a few rows at a time; NaN without data."""
+    """Read the heights of a window (top, bottom, left, right) in strips of rows; NaN for missing data."""
     top, bottom, left, right = window
     heights = np.empty((bottom - top, right - left), dtype=np.float32)
     rows_at_once = max(1, PIXELS_AT_ONCE // (right - left))
@@ -211,7 +211,7 @@ def _read_strips(source: Any, window: tuple[int, int, int, int], scale: float, o
 
 
 def _clear_unwritten(source: Any, heights: NDArray[np.float32], top: int, left: int) -> None:
-    """Set missing blocks of a GeoTIFF to NaN, because GDAL reads 0 if the file has no value for missing data."""
+    """Set the heights of blocks that a GeoTIFF does not contain to NaN; GDAL reads 0 without a nodata value."""
     rows, cols = source.block_shapes[0]
     bottom, right = top + len(heights), left + heights.shape[1]
     for block_row in range(top // rows, -(-bottom // rows)):
@@ -251,7 +251,7 @@ def block_spans(file: Path, window: tuple[int, int, int, int]) -> Iterator[tuple
 
 
 def geotiff_bytes(heights: NDArray[np.float32], grid: Grid, crs: str, nodata: float) -> bytes:
-    """Return a GeoTIFF of heights in metres, packed by deflate.  crs: a definition that PROJ accepts."""
+    """Return the bytes of a GeoTIFF of heights, m, compressed with deflate.  crs: a definition that PROJ accepts."""
     import rasterio
     from rasterio.io import MemoryFile
 

@@ -1,7 +1,7 @@
 """Vertical datum of an elevation file: mean sea level, or the ellipsoid, which is some 47 m lower in the Alps.
 
-Heights above an ellipsoid are converted with PROJ's grid of the geoid if this machine has it, and refused otherwise.  A
-datum that the user states overrides the datum of the file.
+Heights above an ellipsoid are converted with PROJ's grid of the geoid if this machine has it, and rejected otherwise.
+A datum that the user states overrides the datum of the file.
 """
 
 import warnings
@@ -57,23 +57,26 @@ def is_above_ellipsoid(crs: str) -> bool:
     return any("ellipsoid" in name.lower() for name in names)
 
 
-def height_datum(crs: str | None, stated: StatedDatum | None) -> HeightDatum:
+def height_datum(crs: str | None, stated_datum: StatedDatum | None) -> HeightDatum:
     """Determine the vertical datum of a file.
 
     crs: the file's reference system, or None if unknown.
-    stated: datum stated by the user, a `NamedDatum` or a number, which overrides the file's; None if not stated.
+    stated_datum: datum stated by the user, a `NamedDatum` or a number, which overrides the file's; None if not stated.
 
     Raises ValueError for heights above an ellipsoid without an installed grid of a geoid, and for depths.
     """
-    if stated is not None and not isinstance(stated, str):
+    if stated_datum is not None and not isinstance(stated_datum, str):
         return HeightDatum(
-            f"{_MEAN_SEA_LEVEL}, at {stated:g} m of the file's heights as stated", _constant_sea_level(stated)
+            f"{_MEAN_SEA_LEVEL}, at {stated_datum:g} m of the file's heights as stated",
+            _constant_sea_level(stated_datum),
         )
-    if stated in ("egm96", "egm2008"):
-        return HeightDatum(f"{_MEAN_SEA_LEVEL} ({stated.upper()}, as stated)")
-    if stated == "ellipsoid" or (crs is not None and is_above_ellipsoid(crs)):
-        name, transformer = _geoid()
-        return HeightDatum(f"{_MEAN_SEA_LEVEL}, converted from the ellipsoid by {name}", _undulation(transformer))
+    if stated_datum in ("egm96", "egm2008"):
+        return HeightDatum(f"{_MEAN_SEA_LEVEL} ({stated_datum.upper()}, as stated)")
+    if stated_datum == "ellipsoid" or (crs is not None and is_above_ellipsoid(crs)):
+        name, transformer = _find_geoid()
+        return HeightDatum(
+            f"{_MEAN_SEA_LEVEL}, converted from the ellipsoid by {name}", _make_sea_level_function(transformer)
+        )
     if crs is not None and _is_depth(crs):
         raise ValueError("heights count downwards, as depths")
     name = "" if crs is None else _vertical_name(crs)
@@ -84,8 +87,8 @@ def _constant_sea_level(height: float) -> Callable[[Floats, Floats], Floats]:
     return lambda lon, _: np.full(np.shape(lon), height)
 
 
-def _undulation(transformer: Any) -> Callable[[Floats, Floats], Floats]:
-    """Return a function for the geoid's height above the ellipsoid: minus the converted ellipsoidal height 0."""
+def _make_sea_level_function(transformer: Any) -> Callable[[Floats, Floats], Floats]:
+    """Make a function for the geoid's height above the ellipsoid, which is minus the converted ellipsoidal height 0."""
 
     def heights(lon: Floats, lat: Floats) -> Floats:
         _, _, negated_heights = transformer.transform(lon, lat, np.zeros(np.shape(lon)))
@@ -95,8 +98,8 @@ def _undulation(transformer: Any) -> Callable[[Floats, Floats], Floats]:
 
 
 @cache
-def _geoid() -> tuple[str, Any]:
-    """Return the name of the first geoid with an installed grid, and the conversion to heights above it."""
+def _find_geoid() -> tuple[str, Any]:
+    """Find the first geoid with an installed grid; return its name and the conversion to heights above it."""
     from pyproj import Transformer
     from pyproj.transformer import TransformerGroup
 

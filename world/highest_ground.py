@@ -15,9 +15,8 @@ from world.terrain import Terrain, segment_clearance
 
 
 def highest_in_cells(terrain: Terrain, west: float, south: float, cell: float, rows: int, columns: int) -> Floats:
-    """Return the highest ground (rows, columns) in square cells with their sides, m.
+    """Return the highest ground (rows, columns) in square cells, sides included, m; NaN if part of a cell has no data.
 
-    The height is NaN if part of the cell has no data.
     west, south: outer corner of the first cell, m.  cell: side of a cell, m.  Rows go north, columns east.
 
     >>> from world.terrain import gridded
@@ -27,46 +26,54 @@ def highest_in_cells(terrain: Terrain, west: float, south: float, cell: float, r
     >>> highest_in_cells(cone, -30.0, -10.0, 20.0, 1, 3).round(6).tolist()
     [[40.0, 50.0, 40.0]]
     """
-    out = np.full((rows, columns), -math.inf)
-    _fill_cells(terrain.heights, terrain.to_pixel.record, west, south, cell, out)
-    return out
+    max_heights = np.full((rows, columns), -math.inf)
+    _fill_cells(terrain.heights, terrain.to_pixel.record, west, south, cell, max_heights)
+    return max_heights
 
 
 @compiled
-def _fill_cells(heights: Heights, to_pixel: PolyMapRecord, west: float, south: float, cell: float, out: Floats) -> None:
-    rows, columns = out.shape
-    begin, end = np.zeros(3), np.zeros(3)
+def _fill_cells(
+    heights: Heights, to_pixel: PolyMapRecord, west: float, south: float, cell: float, max_heights: Floats
+) -> None:
+    rows, columns = max_heights.shape
+    start, end = np.zeros(3), np.zeros(3)
     for i in range(rows + 1):
         for j in range(columns + 1):
-            begin[0], begin[1] = west + j * cell, south + i * cell
+            start[0], start[1] = west + j * cell, south + i * cell
             if j < columns:
-                end[0], end[1] = west + (j + 1) * cell, begin[1]
-                side_height = -segment_clearance(heights, to_pixel, begin, end)[0]
-                _raise_cell(out, i - 1, j, side_height)
-                _raise_cell(out, i, j, side_height)
+                end[0], end[1] = west + (j + 1) * cell, start[1]
+                side_height = -segment_clearance(heights, to_pixel, start, end)[0]
+                _raise_cell(max_heights, i - 1, j, side_height)
+                _raise_cell(max_heights, i, j, side_height)
             if i < rows:
-                end[0], end[1] = begin[0], south + (i + 1) * cell
-                side_height = -segment_clearance(heights, to_pixel, begin, end)[0]
-                _raise_cell(out, i, j - 1, side_height)
-                _raise_cell(out, i, j, side_height)
+                end[0], end[1] = start[0], south + (i + 1) * cell
+                side_height = -segment_clearance(heights, to_pixel, start, end)[0]
+                _raise_cell(max_heights, i, j - 1, side_height)
+                _raise_cell(max_heights, i, j, side_height)
     for i in range(rows):
         for j in range(columns):
-            if not math.isnan(out[i, j]):
-                _raise_cell(out, i, j, _highest_pixel(heights, to_pixel, west + j * cell, south + i * cell, cell))
+            if not math.isnan(max_heights[i, j]):
+                _raise_cell(
+                    max_heights, i, j, _highest_pixel(heights, to_pixel, west + j * cell, south + i * cell, cell)
+                )
 
 
 @inner
-def _raise_cell(out: Floats, i: int, j: int, height: float) -> None:
+def _raise_cell(max_heights: Floats, i: int, j: int, height: float) -> None:
     """Raise cell (i, j) of `out` to a height if it is lower; ignore a cell outside the array, and keep NaN."""
-    if 0 <= i < out.shape[0] and 0 <= j < out.shape[1] and (height > out[i, j] or math.isnan(height)):
-        out[i, j] = height
+    if (
+        0 <= i < max_heights.shape[0]
+        and 0 <= j < max_heights.shape[1]
+        and (height > max_heights[i, j] or math.isnan(height))
+    ):
+        max_heights[i, j] = height
 
 
 @inner
 def _highest_pixel(heights: Heights, to_pixel: PolyMapRecord, west: float, south: float, cell: float) -> float:
     """Return the height of the highest pixel in a cell whose sides are straight in pixel coordinates.
 
-    It is -inf without a pixel in the cell, and NaN if one of them has no data.
+    Returns -inf for a cell without a pixel, and NaN if a pixel has no data.
     """
     col, row = polymap(to_pixel, west, south)
     east_col, east_row = polymap(to_pixel, west + cell, south)

@@ -12,10 +12,10 @@ def html_table(title: str, rows: Iterable[Sequence[object]], head: Sequence[str]
     >>> html_table("a<b", [("length", 1.5)])
     '<div><strong>a&lt;b</strong><table><tbody><tr><td>length</td><td>1.5</td></tr></tbody></table></div>'
     """
-    body = "".join(_row("td", row) for row in rows)
-    heading = f"<thead>{_row('th', head)}</thead>" if head else ""
+    body = "".join(_row_html("td", row) for row in rows)
+    heading = f"<thead>{_row_html('th', head)}</thead>" if head else ""
     return f"<div><strong>{escape(title)}</strong><table>{heading}<tbody>{body}</tbody></table></div>"
 
 
-def _row(cell: str, values: Iterable[object]) -> str:
-    return f"<tr>{''.join(f'<{cell}>{escape(str(value))}</{cell}>' for value in values)}</tr>"
+def _row_html(tag: str, values: Iterable[object]) -> str:
+    return f"<tr>{''.join(f'<{tag}>{escape(str(value))}</{tag}>' for value in values)}</tr>"

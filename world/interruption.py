@@ -65,7 +65,7 @@ def interrupt(number: int, _frame: FrameType | None = None) -> None:
 
 
 class uninterrupted:
-    """Complete the block, and raise a signal that arrived meanwhile at its end.
+    """Complete the block, then raise `Interrupted` for a signal that arrived in the meantime.
 
     >>> import signal
     >>> try:
@@ -83,7 +83,7 @@ class uninterrupted:
         _state.depth += 1
 
     def __exit__(self, *_: object) -> None:
-        """Raise the signal that arrived meanwhile, if any."""
+        """Raise `Interrupted` for a signal that arrived in the meantime."""
         _state.depth -= 1
         if _state.waiting and not _state.depth:
             number, _state.waiting = _state.waiting, 0
@@ -92,7 +92,7 @@ class uninterrupted:
 
 @contextlib.contextmanager
 def unfinished(path: Path) -> Iterator[None]:
-    """Register a temporary file or folder, and remove it at the end; `remove_unfinished` removes it, too.
+    """Register a temporary file or folder for `remove_unfinished`, and remove it at the end of the block.
 
     A folder that cannot be removed at the end, because another process still writes in it, stays registered.
 
@@ -104,24 +104,24 @@ def unfinished(path: Path) -> Iterator[None]:
         yield
     finally:
         with uninterrupted():
-            if _remove(path):
+            if _remove_path(path):
                 _state.unfinished.discard(path)
 
 
 def remove_unfinished() -> bool:
     """Remove all registered temporary files and folders, for a process that must end at once.
 
-    Returns True if none is left.
+    Returns True if all are removed.
 
     >>> remove_unfinished()
     True
     """
-    removed = [_remove(path) for path in tuple(_state.unfinished)]
-    return all(removed)
+    are_removed = [_remove_path(path) for path in tuple(_state.unfinished)]
+    return all(are_removed)
 
 
-def _remove(path: Path) -> bool:
-    """Remove a file or folder as far as possible; return True if it is gone."""
+def _remove_path(path: Path) -> bool:
+    """Remove a file or folder as far as possible; return True if it no longer exists."""
     if path.is_dir():
         shutil.rmtree(path, ignore_errors=True)
     else:

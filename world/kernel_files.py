@@ -31,7 +31,7 @@ class CheckedCacheFiles(IndexDataCacheFile):
     def load(self, key: Any) -> Any:
         """Return the compiled form for a key, or None."""
         name = self._load_index().get(key)
-        return None if name is None else _read(self._folder / name, repr(key))
+        return None if name is None else _read_checked(self._folder / name, repr(key))
 
     def save(self, key: Any, data: Any) -> None:
         """Save a compiled form.  A kernel that cannot be saved is compiled again by the next process."""
@@ -45,7 +45,7 @@ class CheckedCacheFiles(IndexDataCacheFile):
 
     def _load_index(self) -> dict[Any, str]:
         """Return the names of data files by key."""
-        version, stamp, forms = _read(self._folder / self._index_name, "") or (None, None, {})
+        version, stamp, forms = _read_checked(self._folder / self._index_name, "") or (None, None, {})
         return forms if (version, stamp) == (self._version, self._source_stamp) else {}
 
     def _save_index(self, overloads: dict[Any, str]) -> None:
@@ -54,7 +54,7 @@ class CheckedCacheFiles(IndexDataCacheFile):
     def _write(self, path: Path, label: str, data: Any) -> None:
         content = dumps(data)  # type: ignore[no-untyped-call]
         with self._open_for_write(path) as file:
-            file.write(_digest(label, content) + content)
+            file.write(_compute_digest(label, content) + content)
 
 
 def check_files(dispatcher: Any) -> None:
@@ -64,17 +64,17 @@ def check_files(dispatcher: Any) -> None:
     cache._cache_file = CheckedCacheFiles(cache.cache_path, cache._impl.filename_base, cache_file._source_stamp)
 
 
-def _read(path: Path, label: str) -> Any:
+def _read_checked(path: Path, label: str) -> Any:
     """Return the object in a file, or None if its digest does not match or it cannot be read."""
     try:
         content = path.read_bytes()
     except OSError:
         return None
     stated_digest, content = content[:_DIGEST_BYTES], content[_DIGEST_BYTES:]
-    return pickle.loads(content) if stated_digest == _digest(label, content) else None
+    return pickle.loads(content) if stated_digest == _compute_digest(label, content) else None
 
 
-def _digest(label: str, content: bytes) -> bytes:
+def _compute_digest(label: str, content: bytes) -> bytes:
     # BLAKE2 takes a third of the time of SHA-256 where the processor has no instructions for SHA-256.
     digest = hashlib.blake2b(label.encode() + b"\0", digest_size=_DIGEST_BYTES)
     digest.update(content)

@@ -72,7 +72,7 @@ def compiled(kernel: _Kernel) -> _Kernel:
     >>> steepest_slopes(np.array([[0.0, 3.0], [0.0, 3.0]], dtype=np.float32), 1.0).round(3)
     array([[3.]], dtype=float32)
     """
-    return cast("_Kernel", _compiled(kernel))
+    return cast("_Kernel", _make_dispatcher(kernel))
 
 
 def compiled_inline(kernel: _Kernel) -> _Kernel:
@@ -82,7 +82,7 @@ def compiled_inline(kernel: _Kernel) -> _Kernel:
     >>> round(wrap(4.0), 6)
     -2.283185
     """
-    return cast("_Kernel", _compiled(kernel, forceinline=True))
+    return cast("_Kernel", _make_dispatcher(kernel, forceinline=True))
 
 
 def inner(kernel: _Kernel) -> _Kernel:
@@ -108,7 +108,7 @@ def inlined(kernel: _Kernel) -> _Kernel:
     return cast("_Kernel", _InnerKernel(kernel, forceinline=True))
 
 
-def _compiled(kernel: Any, **options: bool) -> Any:
+def _make_dispatcher(kernel: Any, **options: bool) -> Any:
     njit: Any = numba.njit
     # The wrapper for C is only needed to pass a kernel to another one as a value, which no kernel here does.
     dispatcher = njit(cache=_usable is not None, error_model="numpy", no_cfunc_wrapper=True, **options)(kernel)
@@ -127,12 +127,12 @@ class _InnerKernel:
     @functools.cached_property
     def dispatcher(self) -> Any:
         """Numba's dispatcher, made when a kernel that calls it is compiled; cached kernels contain it already."""
-        return _compiled(vars(self)["__wrapped__"], no_cpython_wrapper=True, **self._options)
+        return _make_dispatcher(vars(self)["__wrapped__"], no_cpython_wrapper=True, **self._options)
 
     @functools.cached_property
     def _wrapper(self) -> Any:
         kernel = self
-        return _compiled(lambda *given: kernel(*given))
+        return _make_dispatcher(lambda *arguments: kernel(*arguments))
 
     def __reduce__(self) -> str:
         """Return its name, which distinguishes the wrapper functions in the cache."""
@@ -164,7 +164,7 @@ def _type_of_inner_kernel(kernel: _InnerKernel, _: Any) -> _InnerType:
 
 
 @inlined
-def copy_into(out: NDArray[Any], values: NDArray[Any]) -> None:
+def copy_into(target: NDArray[Any], values: NDArray[Any]) -> None:
     """Copy numbers (n,) into an array, or part of one, of the same length, which is not checked.
 
     Numba's ``out[:] = values`` checks the length, and compiles its error message with Unicode handling into each
@@ -176,7 +176,7 @@ def copy_into(out: NDArray[Any], values: NDArray[Any]) -> None:
     array([3., 4.])
     """
     for k in range(values.size):
-        out[k] = values[k]
+        target[k] = values[k]
 
 
 @inner

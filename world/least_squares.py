@@ -28,38 +28,38 @@ def least_squares(basis: Floats, values: Floats) -> Floats:
 
 @compiled
 def _least_squares(basis: Floats, values: Floats) -> Floats:
-    count, size = basis.shape
+    row_count, column_count = basis.shape
     # Orthogonalise the columns and the values together.
-    q, r = np.empty((count, size + 1)), np.zeros((size, size + 1))
-    for n in range(count):
-        for k in range(size):
+    q, r = np.empty((row_count, column_count + 1)), np.zeros((column_count, column_count + 1))
+    for n in range(row_count):
+        for k in range(column_count):
             q[n, k] = basis[n, k]
-        q[n, size] = values[n]
-    is_dependent = np.zeros(size, dtype=np.bool_)
+        q[n, column_count] = values[n]
+    is_dependent = np.zeros(column_count, dtype=np.bool_)
     max_norm = 0.0
-    for k in range(size):
-        max_norm = max(max_norm, _dot(basis, k, k))
-    for k in range(size):
-        norm = _dot(q, k, k)
+    for k in range(column_count):
+        max_norm = max(max_norm, _dot_product(basis, k, k))
+    for k in range(column_count):
+        norm = _dot_product(q, k, k)
         is_dependent[k] = norm <= _DEPENDENT_NORM_RATIO * max_norm
         if is_dependent[k]:
             continue
-        for j in range(k + 1, size + 1):
-            r[k, j] = _dot(q, k, j) / norm
-            for n in range(count):
+        for j in range(k + 1, column_count + 1):
+            r[k, j] = _dot_product(q, k, j) / norm
+            for n in range(row_count):
                 q[n, j] -= r[k, j] * q[n, k]
-    out = np.zeros(size)
-    for k in range(size - 1, -1, -1):
+    coefficients = np.zeros(column_count)
+    for k in range(column_count - 1, -1, -1):
         if is_dependent[k]:
             continue
-        out[k] = r[k, size]
-        for j in range(k + 1, size):
-            out[k] -= r[k, j] * out[j]
-    return out
+        coefficients[k] = r[k, column_count]
+        for j in range(k + 1, column_count):
+            coefficients[k] -= r[k, j] * coefficients[j]
+    return coefficients
 
 
 @inner
-def _dot(columns: Floats, first: int, second: int) -> float:
+def _dot_product(columns: Floats, first: int, second: int) -> float:
     """Return the dot product of two columns."""
     total = 0.0
     for n in range(columns.shape[0]):

@@ -1,4 +1,4 @@
-"""Place the positions of a scenario file on the map: its ends, its points on the ground, and its threats."""
+"""Convert the positions of a scenario file to its map: start, destination, points on the ground, and threats."""
 
 import math
 
@@ -12,7 +12,7 @@ from world.terrain import Terrain
 from world.threats import Threats, threat_label
 
 
-def map_place(table: PositionTable, origin: GeoOrigin) -> tuple[float, float]:
+def map_coordinates(table: PositionTable, origin: GeoOrigin) -> tuple[float, float]:
     """Return east and north of a position, m."""
     if table.east_m is not None and table.north_m is not None:
         return table.east_m, table.north_m
@@ -21,12 +21,12 @@ def map_place(table: PositionTable, origin: GeoOrigin) -> tuple[float, float]:
 
 
 def map_position(table: PointTable, key: str, source: str, origin: GeoOrigin, ground: Terrain | None) -> Floats:
-    """Return east, north, up (3,) m of a position; a height above ground is added to the terrain.
+    """Return east, north, up (3,) m of a position, with the terrain height added to a height above ground.
 
-    key, source: names of the table and its file in messages.  Raises ScenarioError for a height above ground without
-    terrain.
+    key, source: names of the table and its file in messages.  Raises ScenarioError for a height above ground at a
+    position without terrain.
     """
-    east, north = map_place(table, origin)
+    east, north = map_coordinates(table, origin)
     if table.amsl_m is not None:
         return np.array([east, north, table.amsl_m])
     ground_height = float(ground.height(east, north)) if ground is not None else math.nan
@@ -41,18 +41,24 @@ def map_position(table: PointTable, key: str, source: str, origin: GeoOrigin, gr
 
 
 def check_in_area(key: str, point: Floats, source: str, bounds: Floats) -> None:
-    """Raise ScenarioError for a place (2,) or (3,) outside the area (2, 2), m."""
+    """Raise ScenarioError for a position (2,) or (3,) outside the area (2, 2), m."""
     for axis, name in enumerate(("east", "north")):
-        low, high = bounds[axis]
-        if not low <= point[axis] <= high:
-            shown, allowed = f"{name} {point[axis]:.0f} m", f"outside the area {low:.0f}..{high:.0f}"
-            raise ScenarioError.at(source, key, float(point[axis]), allowed, shown=shown)
+        min_coordinate, max_coordinate = bounds[axis]
+        if not min_coordinate <= point[axis] <= max_coordinate:
+            value_text, allowed = (
+                f"{name} {point[axis]:.0f} m",
+                f"outside the area {min_coordinate:.0f}..{max_coordinate:.0f}",
+            )
+            raise ScenarioError.at(source, key, float(point[axis]), allowed, shown=value_text)
 
 
 def check_inside(
     key: str, point: Floats, source: str, bounds: Floats, floor: float, ceiling: float, ground: Terrain | None
 ) -> None:
-    """Raise ScenarioError for an end (3,) outside the area (2, 2), floor and ceiling (m AMSL), or in the ground."""
+    """Raise ScenarioError for a start or destination (3,) outside the area (2, 2) or floor..ceiling, or in the ground.
+
+    floor, ceiling: m AMSL.
+    """
     check_in_area(key, point, source, bounds)
     amsl = f"{point[2]:.0f} m AMSL"
     if not floor <= point[2] <= ceiling:
@@ -70,9 +76,9 @@ def check_above_ground(key: str, point: Floats, source: str, ground: Terrain | N
 
 
 def make_threats(tables: list[ThreatTable], source: str, origin: GeoOrigin, ground: Terrain | None) -> Threats:
-    """Place the threats of a scenario file on the map, each on the ground unless it gives a height.
+    """Convert the threats of a scenario file to its map; a threat without a height is on the ground.
 
-    Raises ScenarioError for a threat without an altitude AMSL at a place without terrain.
+    Raises ScenarioError for a threat without an altitude AMSL at a position without terrain.
     """
     positions = np.zeros((len(tables), 3))
     for k, table in enumerate(tables):

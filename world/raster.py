@@ -26,8 +26,8 @@ from world.frames import GeoOrigin, fit_polymap, to_geo, to_map
 from world.gdal_raster import PIXELS_AT_ONCE, open_geotiff, open_hgt
 from world.height_datum import HeightDatum, StatedDatum, height_datum
 from world.raster_file import (
+    PixelMap,
     RasterFile,
-    ToSource,
     file_sha256,
     is_ground,
     longitude_near,
@@ -69,19 +69,19 @@ def grid_in_degrees(
         raise TerrainError.at(name, "west, east, south, north edge", list(edges), allowed)
     pitch_x, pitch_y = (east - west) / cols, (north - south) / rows
 
-    def to_source(lon: Floats, lat: Floats) -> tuple[Floats, Floats]:
+    def to_pixels(lon: Floats, lat: Floats) -> tuple[Floats, Floats]:
         near = longitude_near(lon, (west + east) / 2)
         return (near - west) / pitch_x - 0.5, (north - lat) / pitch_y - 0.5
 
     def read(top: int, bottom: int, left: int, right: int) -> NDArray[np.float32]:
         return heights[top:bottom, left:right].astype(np.float32)
 
-    def to_place(col: Floats, row: Floats) -> tuple[Floats, Floats]:
+    def to_lon_lat(col: Floats, row: Floats) -> tuple[Floats, Floats]:
         return west + (col + 0.5) * pitch_x, north - (row + 0.5) * pitch_y
 
-    corners = np.stack(to_place(*outline(cols, rows)), axis=1)
+    corners = np.stack(to_lon_lat(*outline(cols, rows)), axis=1)
     grid = (pitch_x, 0.0, west, 0.0, -pitch_y, north)
-    return RasterFile(name, (rows, cols), to_source, to_place, corners, file_sha256(file), read, grid)
+    return RasterFile(name, (rows, cols), to_pixels, to_lon_lat, corners, file_sha256(file), read, grid)
 
 
 # ----------------------------------------------------------------------
@@ -98,18 +98,18 @@ _SHIPPED_TILE_TOLERANCE_DEG = 1e-5
 def open_npz(file: Path, name: str) -> RasterFile:
     """Open an .npz with `elevation` (rows from north to south) and xmin, xmax, ymin, ymax: pixel edges in degrees.
 
-    The order within each pair does not matter, except in the tile that planfly ships: see `_edges`.
+    The order within each pair does not matter, except in the tile that planfly ships: see `_edges_in_degrees`.
     Raises TerrainError.
     """
     heights, edges = _read_npz(file, name)
     if heights.ndim != 2 or heights.dtype.kind not in "iuf":
         allowed = "expected a 2-D array of numbers"
-        shown = f"{heights.dtype} of shape {heights.shape}"
-        raise TerrainError.at(name, "elevation", heights.shape, allowed, shown=shown)
-    return grid_in_degrees(file, name, heights, _edges(edges, heights.shape[0]))
+        shape_text = f"{heights.dtype} of shape {heights.shape}"
+        raise TerrainError.at(name, "elevation", heights.shape, allowed, shown=shape_text)
+    return grid_in_degrees(file, name, heights, _edges_in_degrees(edges, heights.shape[0]))
 
 
-def _edges(stated_edges: list[float], rows: int) -> tuple[float, float, float, float]:
+def _edges_in_degrees(stated_edges: list[float], rows: int) -> tuple[float, float, float, float]:
     """Return the west, east, south and north edges, deg, from a file's xmin, xmax, ymin, ymax.
 
     In the shipped tile of 344 rows, ymax, 36.44625, is the north edge.  Its ymin, 36.73292, is the north edge plus the
@@ -129,22 +129,22 @@ def _edges(stated_edges: list[float], rows: int) -> tuple[float, float, float, f
 
 
 def _read_npz(file: Path, name: str) -> tuple[NDArray[np.generic], list[float]]:
-    """Read the heights as stored, and xmin, xmax, ymin, ymax."""
-    edges = ("xmin", "xmax", "ymin", "ymax")
+    """Return the heights as stored in the file, and xmin, xmax, ymin, ymax."""
+    edge_keys = ("xmin", "xmax", "ymin", "ymax")
     try:
         with zipfile.ZipFile(file) as archive:
             # A few kilobytes of zeros unpack to gigabytes: check the size before unpacking.
-            size = max((entry.file_size for entry in archive.infolist()), default=0)
+            size = max((member.file_size for member in archive.infolist()), default=0)
         if size > 8 * MAX_PIXELS:
             allowed = f"at most {8 * MAX_PIXELS:,} are read"
             raise TerrainError(f"{name}: {size:,} bytes unpacked: {allowed}", file=name, value=size, allowed=allowed)
         with np.load(file, allow_pickle=False) as data:
-            for key in ("elevation", *edges):
+            for key in ("elevation", *edge_keys):
                 if key not in data.files:
                     message = f"{name}: field {key}: missing (elevation, xmin, xmax, ymin, ymax)"
                     raise TerrainError(message, file=name, field=key)
             heights = np.asarray(data["elevation"])
-            return heights, [float(np.asarray(data[key]).item()) for key in edges]
+            return heights, [float(np.asarray(data[key]).item()) for key in edge_keys]
     # RuntimeError and NotImplementedError: an encrypted entry, an unknown compression.
     except AddressSpaceError:
         raise
@@ -175,7 +175,7 @@ def open_raster(path: str, base: Path | None = None, datum: StatedDatum | None =
     """
     if path in EMBEDDED:
         raster = open_npz(_EMBEDDED_FOLDER / EMBEDDED[path], path)
-        return replace(raster, datum=_datum_of(raster, datum))
+        return replace(raster, datum=_determine_datum(raster, datum))
     if path.startswith("/vsi") or "://" in path:
         allowed = "only local files are read, not URLs or virtual file systems"
         raise TerrainError(f"{path}: terrain path: {allowed}", file=path, allowed=allowed)
@@ -205,7 +205,7 @@ def open_raster(path: str, base: Path | None = None, datum: StatedDatum | None =
         *suffix_formats,
     ):
         raster = _OPENERS[known_format.suffix](file, path)
-        return replace(raster, datum=_datum_of(raster, datum))
+        return replace(raster, datum=_determine_datum(raster, datum))
     expected = _or_list([known_format.name for known_format in FORMATS])
     raise TerrainError(f"{file}: not an elevation file; expected {expected}", file=file)
 
@@ -222,9 +222,9 @@ def open_tiles(paths: Sequence[str], base: Path | None = None, datum: StatedDatu
     return tiles[0] if len(tiles) == 1 else join_tiles(tiles, f"{paths[0]} and {len(paths) - 1} more")
 
 
-def _datum_of(raster: RasterFile, stated: StatedDatum | None) -> HeightDatum:
+def _determine_datum(raster: RasterFile, stated_datum: StatedDatum | None) -> HeightDatum:
     try:
-        return height_datum(raster.crs, stated)
+        return height_datum(raster.crs, stated_datum)
     except ValueError as error:
         allowed = (
             "give PROJ the grid of a geoid (projsync --file us_nga_egm96_15.tif), or state the height of mean sea level"
@@ -244,7 +244,7 @@ def _or_list(names: Sequence[str]) -> str:
 
 # Largest allowed error of the polynomial from map to pixels, in pixels.
 PIXEL_TOLERANCE = 1e-3
-# Number of places along each side of a window at which mean sea level is sampled.
+# Number of points along each side of a window at which mean sea level is sampled.
 _SEA_LEVEL_SAMPLES = 200
 # Number of pixels without data checked in one step: one inside the area is enough to refuse it.
 _HOLES_PER_STEP = 2**16
@@ -253,8 +253,8 @@ _HOLES_PER_STEP = 2**16
 def read_terrain(raster: RasterFile, origin: GeoOrigin, bounds: ArrayLike, buffer: float) -> Terrain:
     """Read the window of ``raster`` over map bounds [[e0, e1], [n0, n1]] and a buffer around them, m, as `Terrain`.
 
-    Raises TerrainError if the bounds reach beyond the tile, if data is missing inside them, or if the window is too
-    large.  The buffer is cut at the tile's edge without a message.
+    Raises TerrainError if the bounds extend beyond the tile, if data is missing inside them, or if the window is too
+    large.  The buffer is clipped at the tile's edge without a message.
 
     >>> raster = open_raster("jacksboro")
     >>> terrain = read_terrain(raster, raster.centre, [[-500.0, 500.0], [-500.0, 500.0]], 100.0)
@@ -284,7 +284,7 @@ def read_terrain(raster: RasterFile, origin: GeoOrigin, bounds: ArrayLike, buffe
     heights[~is_ground(heights)] = np.nan
     _convert_to_sea_level(heights, raster, top, left)
     to_pixel = fit_polymap(
-        lambda e, n: _window_pixels(raster.to_source, origin, e, n, left, top),
+        lambda e, n: _window_pixels(raster.to_pixels, origin, e, n, left, top),
         box + np.array([-buffer, buffer]),
         PIXEL_TOLERANCE,
     )
@@ -320,33 +320,35 @@ def _convert_to_sea_level(heights: NDArray[np.float32], raster: RasterFile, top:
     """Convert the heights of a window to heights above mean sea level, in place.
 
     top, left: first row and column of the window in the file.
-    Mean sea level is sampled at places so close together that it is nearly a plane between them.
+    Mean sea level is sampled at points so close together that it is nearly a plane between them.
     Raises TerrainError if mean sea level is not known there.
     """
     if raster.datum.sea_level is None:
         return
-    rows, cols = (begin + np.arange(size) for begin, size in zip((top, left), heights.shape, strict=True))
-    row, col = (np.linspace(axis[0], axis[-1], min(len(axis), _SEA_LEVEL_SAMPLES)) for axis in (rows, cols))
-    across, down = np.meshgrid(col, row)
-    lon, lat = raster.to_place(across.ravel(), down.ravel())
-    level = raster.datum.sea_level(lon, lat)
-    if not np.isfinite(level).all():
-        bad_index = int(np.argmin(np.isfinite(level)))
-        place = f"longitude {lon[bad_index]:.4f}, latitude {lat[bad_index]:.4f}"
-        raise TerrainError(f"{raster.name}: {place}: the geoid's height is not known there", file=raster.name)
-    sea_levels = np.stack([np.interp(cols, col, level_row) for level_row in level.reshape(across.shape)])
-    sample_row = np.interp(rows, row, np.arange(row.size))
-    upper_row = np.minimum(sample_row.astype(np.intp), row.size - 2)
+    rows, cols = (first + np.arange(size) for first, size in zip((top, left), heights.shape, strict=True))
+    sample_row_numbers, col = (
+        np.linspace(axis[0], axis[-1], min(len(axis), _SEA_LEVEL_SAMPLES)) for axis in (rows, cols)
+    )
+    sample_cols, sample_rows = np.meshgrid(col, sample_row_numbers)
+    lon, lat = raster.to_lon_lat(sample_cols.ravel(), sample_rows.ravel())
+    sea_level = raster.datum.sea_level(lon, lat)
+    if not np.isfinite(sea_level).all():
+        bad_index = int(np.argmin(np.isfinite(sea_level)))
+        position_text = f"longitude {lon[bad_index]:.4f}, latitude {lat[bad_index]:.4f}"
+        raise TerrainError(f"{raster.name}: {position_text}: the geoid's height is not known there", file=raster.name)
+    sea_levels = np.stack([np.interp(cols, col, level_row) for level_row in sea_level.reshape(sample_cols.shape)])
+    sample_row = np.interp(rows, sample_row_numbers, np.arange(sample_row_numbers.size))
+    upper_row = np.minimum(sample_row.astype(np.intp), sample_row_numbers.size - 2)
     fraction = (sample_row - upper_row)[:, None]
     rows_at_once = max(1, PIXELS_AT_ONCE // cols.size)
-    for begin in range(0, rows.size, rows_at_once):
-        rows_part = slice(begin, begin + rows_at_once)
-        upper, lower = sea_levels[upper_row[rows_part]], sea_levels[upper_row[rows_part] + 1]
-        heights[rows_part] -= (upper + (lower - upper) * fraction[rows_part]).astype(np.float32)
+    for first_row in range(0, rows.size, rows_at_once):
+        row_slice = slice(first_row, first_row + rows_at_once)
+        upper, lower = sea_levels[upper_row[row_slice]], sea_levels[upper_row[row_slice] + 1]
+        heights[row_slice] -= (upper + (lower - upper) * fraction[row_slice]).astype(np.float32)
 
 
 def _check_holes(terrain: Terrain, box: Floats, per_metre: Floats) -> None:
-    """Raise TerrainError if a pixel without data contributes to a height inside the box.
+    """Raise TerrainError if a height inside the box depends on a pixel without data.
 
     per_metre: (2, 2) columns and rows per metre of the map, in the centre of the box.
     """
@@ -356,8 +358,8 @@ def _check_holes(terrain: Terrain, box: Floats, per_metre: Floats) -> None:
     to_map_metres = np.linalg.inv(per_metre)
     # Each height is interpolated from the four pixels around it.
     footprint = np.abs(to_map_metres).sum(axis=1)[:, None]
-    for begin in range(0, rows.size, _HOLES_PER_STEP):
-        part = slice(begin, begin + _HOLES_PER_STEP)
+    for first_hole in range(0, rows.size, _HOLES_PER_STEP):
+        part = slice(first_hole, first_hole + _HOLES_PER_STEP)
         pixels = np.stack([cols[part], rows[part]]).astype(np.float64)
         # Newton's method with a constant slope: the map deviates from an affine map by only a few metres over the box.
         positions = np.repeat(box.mean(axis=1)[:, None], pixels.shape[1], axis=1)
@@ -381,15 +383,15 @@ def _outline_window(
     (w, e), (s, n) = box + np.array([-buffer, buffer])
     east = np.concatenate([w + ramp * (e - w), w + ramp * (e - w), np.full(41, w), np.full(41, e)])
     north = np.concatenate([np.full(41, s), np.full(41, n), s + ramp * (n - s), s + ramp * (n - s)])
-    col, row = _window_pixels(raster.to_source, origin, east, north, 0, 0)
+    col, row = _window_pixels(raster.to_pixels, origin, east, north, 0, 0)
     return float(col.min()), float(col.max()), float(row.min()), float(row.max())
 
 
 def _window_pixels(
-    to_source: ToSource, origin: GeoOrigin, east: Floats, north: Floats, left: int, top: int
+    to_pixels: PixelMap, origin: GeoOrigin, east: Floats, north: Floats, left: int, top: int
 ) -> tuple[Floats, Floats]:
     lat, lon = to_geo(origin, east, north)
-    col, row = to_source(lon, lat)
+    col, row = to_pixels(lon, lat)
     return np.asarray(col) - left, np.asarray(row) - top
 
 

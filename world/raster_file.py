@@ -1,4 +1,4 @@
-"""Opened and checked elevation file: its grid, its place on Earth and its heights, read as windows."""
+"""Opened and checked elevation file: its grid, its position on Earth and its heights, read as windows."""
 
 import hashlib
 from collections.abc import Callable
@@ -13,7 +13,7 @@ from world.errors import TerrainError
 from world.frames import GeoOrigin
 from world.height_datum import UNSTATED, HeightDatum
 
-ToSource = Callable[[Floats, Floats], tuple[Floats, Floats]]
+PixelMap = Callable[[Floats, Floats], tuple[Floats, Floats]]
 # Affine coefficients (a, b, c, d, e, f) from columns and rows: x = a col + b row + c, y = d col + e row + f.
 Grid = tuple[float, ...]
 ReadWindow = Callable[[int, int, int, int], NDArray[np.float32]]
@@ -30,7 +30,7 @@ HIGHEST_GROUND_M = 9000.0
 class RasterFile:
     """Elevation file that was opened and checked; its heights are not read yet.
 
-    to_source: map from longitude, latitude (deg) to fractional (col, row) of pixel centres; to_place: its inverse.
+    to_pixels: map from longitude, latitude (deg) to fractional (col, row) of pixel centres; to_lon_lat: its inverse.
     shape: (rows, cols).
     corners: (n, 2) longitude, latitude along the outline of the pixel centres, deg.
     grid: affine coefficients (a, b, c, d, e, f) from columns and rows of pixel corners to the reference
@@ -38,13 +38,13 @@ class RasterFile:
     read: rows and columns (top, bottom, left, right), half-open, to a float32 block with NaN for missing data, heights
     as stored in the file.
     crs: the file's reference system as WKT; None if it has none.
-    datum: the surface that the heights are measured from.
+    datum: vertical datum of the heights.
     """
 
     name: str
     shape: tuple[int, int]
-    to_source: ToSource
-    to_place: ToSource
+    to_pixels: PixelMap
+    to_lon_lat: PixelMap
     corners: Floats
     sha256: str
     read: ReadWindow
@@ -61,7 +61,7 @@ class RasterFile:
 
 
 def is_ground(heights: NDArray[np.float32]) -> NDArray[np.bool_]:
-    """Return a mask of the heights, m, that are ground and not missing data, stated or not.
+    """Return a mask of the heights, m, that are ground, and not NaN or a value for missing data.
 
     >>> is_ground(np.array([-9999.0, 480.0, np.nan], dtype=np.float32)).tolist()
     [False, True, False]
@@ -77,15 +77,15 @@ def longitude_near(lon: NDArray[np.float64] | float, centre: float) -> Floats:
 
 def outline(cols: int, rows: int) -> tuple[Floats, Floats]:
     """Return columns and rows, (84,) each, along the outline of a raster's pixel centres."""
-    ramp = np.linspace(0.0, 1.0, 21)
+    fractions = np.linspace(0.0, 1.0, 21)
     zeros, ones = np.zeros(21), np.ones(21)
-    col = np.concatenate([ramp, ramp, zeros, ones]) * (cols - 1)
-    row = np.concatenate([zeros, ones, ramp, ramp]) * (rows - 1)
+    col = np.concatenate([fractions, fractions, zeros, ones]) * (cols - 1)
+    row = np.concatenate([zeros, ones, fractions, fractions]) * (rows - 1)
     return col, row
 
 
 def shift_grid(grid: Grid, rows: int, cols: int) -> Grid:
-    """Return the grid with its first pixel moved by ``rows`` and ``cols``.
+    """Return the grid with its first pixel shifted by ``rows`` and ``cols``.
 
     >>> shift_grid((30.0, 0.0, 400.0, 0.0, -30.0, 900.0), 1, 2)
     (30.0, 0.0, 460.0, 0.0, -30.0, 870.0)

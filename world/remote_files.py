@@ -1,7 +1,7 @@
 """Fetch parts of a file on a web server, and keep them on this machine so that each is fetched only once.
 
-The copy has the full size of the file, with holes where nothing was fetched yet; a notes file next to it lists the
-bytes that it holds.  A part is complete when all requested bytes have arrived, from the version of the file that was
+The copy has the full size of the file, with holes for parts that are not fetched yet; a notes file next to it lists the
+bytes that it contains.  A part is complete when all requested bytes have arrived, from the version of the file that was
 found first.
 
 GDAL can read such files itself (``/vsicurl``), but cannot replace this module: it keeps nothing for the next
@@ -59,7 +59,7 @@ class RemoteFile:
     """File on a server, and its copy.
 
     size: size in bytes.  version: its ETag or its time of change; "" if the server states neither.
-    parts: the parts that the copy holds, [begin, end), and the SHA-256 of each.
+    parts: the parts that the copy contains, [begin, end), and the SHA-256 of each.
     """
 
     url: str
@@ -68,10 +68,10 @@ class RemoteFile:
     copy: Path
     parts: dict[tuple[int, int], str] = field(default_factory=dict)
 
-    def missing(self, begin: int, end: int) -> list[tuple[int, int]]:
-        """Return the parts of [begin, end) that the copy does not hold yet.
+    def missing_parts(self, begin: int, end: int) -> list[tuple[int, int]]:
+        """Return the parts of [begin, end) that the copy does not contain yet.
 
-        >>> RemoteFile("", 100, "", Path("a"), {(10, 20): "", (30, 40): ""}).missing(15, 50)
+        >>> RemoteFile("", 100, "", Path("a"), {(10, 20): "", (30, 40): ""}).missing_parts(15, 50)
         [(20, 30), (40, 50)]
         """
         parts = []
@@ -89,7 +89,7 @@ class RemoteFile:
         on_bytes: called with the number of bytes of each chunk.
         Raises TerrainError.
         """
-        for part_begin, part_end in self.missing(begin, min(end, self.size)):
+        for part_begin, part_end in self.missing_parts(begin, min(end, self.size)):
             for attempt in range(_MAX_ATTEMPTS):
                 try:
                     self._fetch_part(part_begin, part_end, on_bytes)
@@ -106,7 +106,7 @@ class RemoteFile:
         with _open_url(self.url, headers) as answer:
             if answer.status == 200:
                 # A server without range requests sends the whole file; so does a server whose file has changed.
-                if _content_length(answer) != self.size or _version(answer) != self.version:
+                if _content_length(answer) != self.size or _file_version(answer) != self.version:
                     raise _IncompleteAnswer("it has changed since the fetch began: try again")
                 begin, end = 0, self.size
             elif answer.headers.get("Content-Range") != f"bytes {begin}-{end - 1}/{self.size}":
@@ -134,7 +134,7 @@ class RemoteFile:
                 raise _IncompleteAnswer(f"{position - begin:,} of {end - begin:,} bytes came")
 
     def forget(self) -> None:
-        """Start over with an empty copy.  Raises OSError."""
+        """Replace the copy by an empty one.  Raises OSError."""
         _notes_path(self.copy).unlink(missing_ok=True)
         self.parts = {}
         # A new file, so that another process that reads the old one can go on.
@@ -152,7 +152,7 @@ def find_remote(url: str, folder: Path) -> RemoteFile | None:
     for attempt in range(_MAX_ATTEMPTS):
         try:
             with _open_url(url, {}, "HEAD") as answer:
-                size, version = _content_length(answer), _version(answer)
+                size, version = _content_length(answer), _file_version(answer)
             break
         except urllib.error.HTTPError as error:
             if error.code in _ABSENT_STATUSES:
@@ -182,10 +182,10 @@ def _open_url(url: str, headers: dict[str, str], method: str = "GET") -> http.cl
 
 
 class _TimedHead(http.client.HTTPConnection):
-    """Connection whose answer must begin in time, head included: a timeout of the socket begins again at each byte."""
+    """Connection whose answer's head must arrive in time; a socket's timeout starts again with each byte."""
 
     def getresponse(self) -> http.client.HTTPResponse:
-        """Return the answer once its head has come.  Raises OSError if it does not come in time."""
+        """Return the answer after its head has arrived.  Raises OSError if the head does not arrive in time."""
         is_late = threading.Event()
 
         def cut() -> None:
@@ -212,7 +212,7 @@ class _TimedHead(http.client.HTTPConnection):
 
 
 class _TimedHeadOverTls(_TimedHead, http.client.HTTPSConnection):
-    """The same over TLS."""
+    """Connection as `_TimedHead`, over TLS."""
 
 
 class _HttpHandler(urllib.request.HTTPHandler):
@@ -227,7 +227,7 @@ class _HttpsHandler(urllib.request.HTTPSHandler):
 
 @cache
 def _make_opener() -> urllib.request.OpenerDirector:
-    """Return an opener for http and https only, redirects included."""
+    """Make an opener for http and https only, also for redirects."""
     opener = urllib.request.OpenerDirector()
     for handler in (
         urllib.request.ProxyHandler,
@@ -263,7 +263,7 @@ def _content_length(answer: http.client.HTTPResponse) -> int:
     return int(length_text) if length_text.isdecimal() else 0
 
 
-def _version(answer: http.client.HTTPResponse) -> str:
+def _file_version(answer: http.client.HTTPResponse) -> str:
     tag = str(answer.headers.get("ETag") or "")
     # A weak ETag may match different bytes, and is not allowed in range requests.
     return tag if tag and not tag.startswith("W/") else str(answer.headers.get("Last-Modified") or "")
@@ -285,7 +285,7 @@ def _notes_path(copy: Path) -> Path:
 
 
 def _read_notes(copy: Path, size: int) -> dict[tuple[int, int], str]:
-    """Return the parts that a copy holds unchanged; an empty mapping if the notes are damaged."""
+    """Return the parts of a copy whose digests match its notes; an empty mapping if the notes are damaged."""
     try:
         entries = json.loads(_notes_path(copy).read_text(encoding="ascii"))
         parts = {(int(part_begin), int(part_end)): str(digest) for part_begin, part_end, digest in entries}

@@ -10,11 +10,19 @@ from typing import Any
 
 import numpy as np
 
-from world.airfield import LandingStrip, Launch, ReturnRequirements, make_home, make_landing, make_launch, make_returns
+from world.airfield import (
+    LandingStrip,
+    Launch,
+    ReturnRequirements,
+    make_home,
+    make_landing,
+    make_launch,
+    make_return_requirements,
+)
 from world.airspace.zone_files import FileZones, read_zone_files
 from world.airspace.zone_times import is_active, parse_span
 from world.airspace.zones import Zone
-from world.airspace.zones_on_map import MAX_ZONE_DISTANCE, check_ends, make_zones, near_zones
+from world.airspace.zones_on_map import MAX_ZONE_DISTANCE, check_ends, make_zones, select_near_zones
 from world.arrays import Floats
 from world.elevation_formats import EMBEDDED
 from world.errors import ScenarioError, TerrainError
@@ -69,7 +77,7 @@ class Scenario:
     zones: airspace zones to keep out of or to stay in.
     external: True if made around a mission file without a scenario: the bounds are then not a limit, and the empty
     threats mean unknown threats.
-    home: (3,) place of the aircraft on the ground before the flight; None if not stated.
+    home: (3,) position of the aircraft on the ground before the flight; None if not stated.
     launch, landing: launch at home and landing strip; None for a flight that begins, or ends, in the air.
     returns: requirements and settings of returns; None without any.
     """
@@ -125,8 +133,8 @@ class Scenario:
         return tuple(notes)
 
     def to_json(self) -> dict[str, Any]:
-        """Return the scenario as plain JSON data; `from_spec` reads it back."""
-        stated_spec = self.spec.model_copy(update={"flight": self.spec.flight.stated()})
+        """Return the scenario as plain JSON data, from which `from_spec` makes it again."""
+        stated_spec = self.spec.model_copy(update={"flight": self.spec.flight.with_stated_defaults()})
         return stated_spec.model_dump(mode="json", exclude_none=True)
 
 
@@ -146,7 +154,7 @@ def embedded_scenarios() -> dict[str, ScenarioFile]:
 
 
 def load_scenario(name_or_path: str, terrain: str | None = None) -> Scenario:
-    """Read a scenario: an embedded name or a TOML file.  ``terrain`` replaces its terrain by a file.
+    """Read a scenario by its embedded name or from a TOML file; ``terrain`` names a file that replaces its terrain.
 
     Raises ScenarioError for a file that is missing or has a fault, and TerrainError for its elevation file.
 
@@ -164,17 +172,17 @@ def load_scenario(name_or_path: str, terrain: str | None = None) -> Scenario:
     except OSError:  # a name that is too long
         is_missing = True
     if is_missing:
-        suggestion = did_you_mean(name_or_path, [*names, *_scenario_files_near(path)])
+        suggestion = did_you_mean(name_or_path, [*names, *_sibling_toml_files(path)])
         message = f"{name_or_path}: no such file, and not an embedded scenario ({', '.join(names)}){suggestion}"
         raise ScenarioError(message, file=name_or_path)
     spec = parse_scenario(read_scenario_text(path), str(path))
     return from_spec(spec, str(path), base=path.parent, terrain=terrain)
 
 
-def _scenario_files_near(path: Path) -> list[str]:
-    """Return the scenario files in the folder of a missing file, named as the missing file was."""
+def _sibling_toml_files(missing_file: Path) -> list[str]:
+    """List the .toml files in the folder of a missing file, as paths relative or absolute like its path."""
     try:
-        return [str(file) for file in sorted(path.parent.glob("*.toml"))]
+        return [str(file) for file in sorted(missing_file.parent.glob("*.toml"))]
     except OSError:
         return []
 
@@ -186,7 +194,7 @@ def embedded_names() -> list[str]:
     'jacksboro'
     """
     folder = resources.files("world") / "scenarios"
-    names = sorted(item.name.removesuffix(".toml") for item in folder.iterdir() if item.name.endswith(".toml"))
+    names = sorted(file.name.removesuffix(".toml") for file in folder.iterdir() if file.name.endswith(".toml"))
     return sorted(names, key=lambda name: name != "jacksboro")
 
 
@@ -253,7 +261,7 @@ def from_spec(
     spec = _with_file_zones(
         spec.model_copy(update={"origin": origin_table, "area": area_table}), file_zones, source, origin, bounds
     )
-    return _assemble(spec, source, origin, bounds, ground, external=external, replaced=terrain is not None)
+    return _assemble_scenario(spec, source, origin, bounds, ground, external=external, replaced=terrain is not None)
 
 
 def _with_whole_paths(flight: FlightTable, base: Path | None) -> FlightTable:
@@ -282,10 +290,10 @@ def _with_terrain(spec: ScenarioFile, terrain: str, source: str, base: Path | No
 def _with_file_zones(
     spec: ScenarioFile, file_zones: FileZones, source: str, origin: GeoOrigin, bounds: Floats
 ) -> ScenarioFile:
-    """Add the zones of other files to a scenario's own zones, if they are near."""
+    """Add the zones of other files to a scenario's own zones, if they are near its area."""
     if not file_zones.zones and not file_zones.notes:
         return spec
-    zones_nearby = near_zones(file_zones.zones, source, origin, bounds)
+    zones_nearby = select_near_zones(file_zones.zones, source, origin, bounds)
     notes = [*(spec.zone_notes or ()), *file_zones.notes]
     if far_count := len(file_zones.zones) - len(zones_nearby):
         notes.append(
@@ -308,19 +316,19 @@ def _active_zones(spec: ScenarioFile) -> list[ZoneTable]:
 def _open_terrain(table: TerrainTable, source: str, base: Path | None) -> tuple[RasterFile, TerrainTable]:
     """Open a scenario's elevation file, and return it with a table of its path and hash."""
     paths = [str(table.path)] if not isinstance(table.path, list) else table.path
-    shown = ", ".join(paths)
+    path_text = ", ".join(paths)
     try:
         raster = open_tiles(paths, base, table.height_datum)
     except TerrainError as error:
-        raise TerrainError.from_error(error, source, "terrain.path", shown) from error
+        raise TerrainError.from_error(error, source, "terrain.path", path_text) from error
     if table.sha256 not in (None, raster.sha256):
-        raise ScenarioError.at(source, "terrain.path", shown, "the file has changed since (its SHA-256 differs)")
+        raise ScenarioError.at(source, "terrain.path", path_text, "the file has changed since (its SHA-256 differs)")
     whole_paths = [path if path in EMBEDDED else whole_path(Path(base or "", path)) for path in paths]
     stored_path = whole_paths if isinstance(table.path, list) else whole_paths[0]
     return raster, table.model_copy(update={"path": stored_path, "sha256": raster.sha256})
 
 
-def _assemble(
+def _assemble_scenario(
     spec: ScenarioFile,
     source: str,
     origin: GeoOrigin,
@@ -375,7 +383,7 @@ def _assemble(
         home=make_home(spec.home, source, origin, ground, bounds, start),
         launch=make_launch(spec.launch),
         landing=make_landing(spec.landing, source, origin, ground, bounds),
-        returns=make_returns(spec.returns, source, origin, ground),
+        returns=make_return_requirements(spec.returns, source, origin, ground),
     )
 
 
@@ -425,12 +433,12 @@ def with_absolute_ends(spec: dict[str, Any], start: Floats, destination: Floats)
     >>> with_absolute_ends(data, np.array([0.0, 0.0, 250.0]), np.array([900.0, 0.0, 300.0]))["start"]
     {'east_m': 0.0, 'north_m': 0.0, 'amsl_m': 250.0}
     """
-    changed = dict(spec)
+    changed_spec = dict(spec)
     for key, point in (("start", start), ("destination", destination)):
         if isinstance(spec.get(key), dict):
             other_entries = {name: value for name, value in spec[key].items() if name != "height_m"}
-            changed[key] = other_entries | {"amsl_m": float(point[2])}
-    return changed
+            changed_spec[key] = other_entries | {"amsl_m": float(point[2])}
+    return changed_spec
 
 
 def with_wind(scenario: Scenario, speed: float | None, from_course: float | None, turbulence: str | None) -> Scenario:
@@ -448,8 +456,8 @@ def with_wind(scenario: Scenario, speed: float | None, from_course: float | None
         changes |= {"speed_mps": speed, "from_deg": math.degrees(from_course)}
     if turbulence is not None:
         changes["turbulence"] = turbulence
-    changed = checked_table(lambda: WindTable(**(table.model_dump() | changes)), f"{scenario.name}: wind")
-    spec = scenario.spec.model_copy(update={"wind": changed})
+    changed_table = checked_table(lambda: WindTable(**(table.model_dump() | changes)), f"{scenario.name}: wind")
+    spec = scenario.spec.model_copy(update={"wind": changed_table})
     wind = replace(
         scenario.wind,
         speed=spec.wind.speed_mps,
@@ -468,15 +476,15 @@ def with_flight(scenario: Scenario, **changes: Any) -> Scenario:
     >>> with_flight(load_scenario("tight"), airspeed_mps=28.0, nav=None).flight.airspeed_mps
     28.0
     """
-    changed = {key: value for key, value in changes.items() if value is not None}
-    entries = scenario.flight.model_dump() | ({"aircraft_by_default": None} if "aircraft" in changed else {})
-    if "guidance" in changed or "params" in changed or "autopilot" in changed:
+    new_entries = {key: value for key, value in changes.items() if value is not None}
+    entries = scenario.flight.model_dump() | ({"aircraft_by_default": None} if "aircraft" in new_entries else {})
+    if "guidance" in new_entries or "params" in new_entries or "autopilot" in new_entries:
         # Parameters without an autopilot belong to the autopilot that the scenario names, if that has parameters.
         has_parameters = entries["autopilot_from"] is not None or entries["autopilot"] in (None, OWN_GUIDANCE)
-        names_autopilot = bool(set(changed) & {"guidance", "autopilot"}) or has_parameters
+        names_autopilot = bool(set(new_entries) & {"guidance", "autopilot"}) or has_parameters
         entries |= {"guidance": None, "params": None, "autopilot_from": None}
         entries |= {"autopilot": None, "px4_version": None} if names_autopilot else {}
-    table = checked_table(lambda: FlightTable(**(entries | changed)), f"{scenario.name}: flight")
+    table = checked_table(lambda: FlightTable(**(entries | new_entries)), f"{scenario.name}: flight")
     return replace(scenario, spec=scenario.spec.model_copy(update={"flight": table}), flight=table)
 
 
@@ -494,7 +502,7 @@ def without_ground_phases(scenario: Scenario) -> Scenario:
 
 
 def with_zones(scenario: Scenario, tables: Sequence[ZoneTable], source: str, notes: Sequence[str] = ()) -> Scenario:
-    """Return a scenario with additional zones, if they are near.
+    """Return a scenario with additional zones, if they are near its area.
 
     source: name of the zones in messages.  notes: notes on reading their file.
     Raises ScenarioError for an invalid shape, for a level above ground without terrain, and for more zones than a
@@ -518,10 +526,9 @@ def with_zones(scenario: Scenario, tables: Sequence[ZoneTable], source: str, not
 
 
 def at_time(scenario: Scenario, at: str | None) -> Scenario:
-    """Return a scenario flown at a time, as `world.airspace.zone_times.parse_span` reads it.
+    """Return a scenario that is flown at a time; None keeps its present time.
 
-    None keeps its own.
-    Raises ScenarioError for an invalid time.
+    at: time span as `world.airspace.zone_times.parse_span` reads it.  Raises ScenarioError for an invalid time.
 
     >>> at_time(load_scenario("tight"), "2026-05-01T10:00Z").spec.at
     '2026-05-01T10:00Z'
@@ -539,14 +546,15 @@ def at_time(scenario: Scenario, at: str | None) -> Scenario:
 
 def with_threats(
     scenario: Scenario,
-    added: Sequence[tuple[float, float, float, float]],
+    added_threats: Sequence[tuple[float, float, float, float]],
     source: str,
     existing: Sequence[ThreatTable] = (),
 ) -> Scenario:
     """Return a scenario with additional threats on the ground.
 
-    added: east, north, kill radius and detection radius of each, m; a radius of 0 for no missile or radar.  The ratio
-    of scale to radius is the median of the scenario's threats, or a quarter for kill and a third for detection.
+    added_threats: east, north, kill radius and detection radius of each, m; a radius of 0 for no missile or radar.
+    The ratio of scale to radius is the median of the scenario's threats, or a quarter for kill and a third for
+    detection.
     source: name of the threats in messages.  existing: tables to insert before the added threats.
     Raises ScenarioError for a threat that is not allowed in a scenario file.
 
@@ -563,7 +571,7 @@ def with_threats(
     kill_ratio = scale_ratio(threats.kill_radius, threats.kill_scale, KILL_SCALE_RATIO)
     detection_ratio = scale_ratio(threats.detection_radius, threats.detection_scale, DETECTION_SCALE_RATIO)
     tables = [*scenario.spec.threats, *existing]
-    for index, (east, north, kill, detection) in enumerate(added):
+    for index, (east, north, kill, detection) in enumerate(added_threats):
         data: dict[str, Any] = {"name": f"pop-up {len(existing) + index + 1}", "east_m": east, "north_m": north}
         if kill != 0.0:
             data |= {"kill_radius_m": kill, "kill_scale_m": kill * kill_ratio}
@@ -583,5 +591,5 @@ def with_planner(scenario: Scenario, source: str, **changes: Any) -> Scenario:
     7
     """
     table = scenario.planner.model_dump() | changes
-    changed = checked_table(lambda: PlannerTable(**table), source)
-    return replace(scenario, spec=scenario.spec.model_copy(update={"planner": changed}), planner=changed)
+    changed_table = checked_table(lambda: PlannerTable(**table), source)
+    return replace(scenario, spec=scenario.spec.model_copy(update={"planner": changed_table}), planner=changed_table)

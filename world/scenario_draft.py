@@ -1,4 +1,4 @@
-"""Make a commented scenario file to begin with, from two places and their terrain, with examples to switch on."""
+"""Make a commented scenario file to start from, for two positions and their terrain, with commented-out examples."""
 
 import json
 import math
@@ -50,7 +50,7 @@ class Place(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Draft:
-    """Contents of a scenario file to begin with.
+    """Contents of a scenario file to start from.
 
     terrain: path of the elevation file as the scenario states it; None for flat ground at mean sea level.
     start, destination: places at `height` m above ground.
@@ -90,7 +90,7 @@ def make_draft(
     autopilot: str = "ardupilot",
     px4_version: str | None = None,
 ) -> Draft:
-    """Lay out a scenario from one place to another.
+    """Make the draft of a scenario from a start to a destination.
 
     height: height of start and destination above ground, m.
     raster: elevation file; None for flat ground.  terrain: path of that file as the scenario file states it.
@@ -102,13 +102,13 @@ def make_draft(
     east, north = (float(value) for value in to_map(GeoOrigin(*start), destination.lat, destination.lon))
     length = math.hypot(east, north)
     if not _MIN_LENGTH_M <= length <= _MAX_LENGTH_M:
-        problem = f"expected {_MIN_LENGTH_M:g} m to {_MAX_LENGTH_M / 1000.0:g} km from `start`"
-        raise ArgumentError.of_argument("destination", destination, problem, shown=_place_text(destination, length))
+        message = f"expected {_MIN_LENGTH_M:g} m to {_MAX_LENGTH_M / 1000.0:g} km from `start`"
+        raise ArgumentError.of_argument("destination", destination, message, shown=_place_text(destination, length))
     midpoint = to_geo(GeoOrigin(*start), east / 2.0, north / 2.0)
     origin = GeoOrigin(round(float(midpoint[0]), 5), round(float(midpoint[1]), 5))
     if abs(origin.lat_deg) > _MAX_LATITUDE_DEG:
-        problem = f"the scenario must lie within {_MAX_LATITUDE_DEG:g}° of latitude"
-        raise ArgumentError.of_argument("destination", destination, problem, shown=_place_text(destination))
+        message = f"the scenario must lie within {_MAX_LATITUDE_DEG:g}° of latitude"
+        raise ArgumentError.of_argument("destination", destination, message, shown=_place_text(destination))
     endpoints = np.array([to_map(origin, *place) for place in (start, destination)])
     margin = min(max(_MARGIN_FRACTION * length, _MIN_MARGIN_M), _MAX_MARGIN_M)
     highest_ground, bounds = 0.0, _enclosing_box(endpoints, margin)
@@ -126,17 +126,19 @@ def make_draft(
 def _survey_ground(
     raster: RasterFile, origin: GeoOrigin, places: Mapping[str, Place], endpoints: Floats, margin: float
 ) -> tuple[Floats, float]:
-    """Return an area (2, 2) around two places with elevation data, and its highest ground, m.
+    """Return an area (2, 2) with elevation data around start and destination, and its highest ground, m.
 
-    places: the two places by their keywords; ends: (2, 2) the same on the map, m.  margin: width of ground on all
-    sides, m.  Raises ArgumentError for a place that the file does not cover, and TerrainError.
+    places: start and destination by their keywords.  endpoints: (2, 2) the same on the map, m.
+    margin: width of ground on all sides, m.
+
+    Raises ArgumentError for a place that the file does not cover, and TerrainError.
     """
     for fraction in _MARGIN_REDUCTIONS:
         bounds = _clip_to_file(_enclosing_box(endpoints, fraction * margin), raster, origin)
-        for (keyword, place), end in zip(places.items(), endpoints, strict=True):
-            if not ((bounds[:, 0] + _EDGE_M <= end) & (end <= bounds[:, 1] - _EDGE_M)).all():
-                problem = f"outside {raster.name} or within {_EDGE_M:g} m of its edge: it covers {cover_text(raster)}"
-                raise ArgumentError.of_argument(keyword, place, problem, shown=_place_text(place))
+        for (keyword, place), endpoint in zip(places.items(), endpoints, strict=True):
+            if not ((bounds[:, 0] + _EDGE_M <= endpoint) & (endpoint <= bounds[:, 1] - _EDGE_M)).all():
+                message = f"outside {raster.name} or within {_EDGE_M:g} m of its edge: it covers {cover_text(raster)}"
+                raise ArgumentError.of_argument(keyword, place, message, shown=_place_text(place))
         try:
             return bounds, float(np.nanmax(read_terrain(raster, origin, bounds, 0.0).heights))
         except TerrainError:
@@ -146,7 +148,7 @@ def _survey_ground(
 
 
 def _enclosing_box(endpoints: Floats, margin: float) -> Floats:
-    """Return the box (2, 2) about two places (2, 2) with a margin, m."""
+    """Return the box (2, 2) around two positions (2, 2) and a margin, m."""
     return np.stack([endpoints.min(axis=0) - margin, endpoints.max(axis=0) + margin], axis=1)
 
 
@@ -156,7 +158,7 @@ def _place_text(place: Place, length: float | None = None) -> str:
 
 
 def _clip_to_file(area: Floats, raster: RasterFile, origin: GeoOrigin) -> Floats:
-    """Return a box (2, 2) cut to the area that the file covers."""
+    """Clip a box (2, 2) to the area that the file covers."""
     if is_covered(raster, origin, area):
         return area
     tile_area = tile_bounds(raster, origin)
@@ -201,8 +203,8 @@ def draft_text(draft: Draft) -> str:
     )
 
 
-def _toml(value: str) -> str:
-    """Return a TOML string; JSON's escapes are valid in TOML."""
+def _quote(value: str) -> str:
+    """Convert a text to a TOML string; JSON's escapes are valid in TOML."""
     return json.dumps(value, ensure_ascii=False)
 
 
@@ -210,7 +212,7 @@ def _number_text(value: float) -> str:
     return f"{value:.8g}"
 
 
-def _line(key: str, value: str, comment: str = "") -> str:
+def _toml_line(key: str, value: str, comment: str = "") -> str:
     return f"{f'{key} = {value}':<30}# {comment}" if comment else f"{key} = {value}"
 
 
@@ -221,7 +223,7 @@ def _head_text(draft: Draft) -> str:
     return f"""\
 # From {start} to {destination}.  Lines that begin with "# " and a key are examples: take the "# " away.
 # All keys: docs/scenario-file.md of planfly.
-name = {_toml(draft.name)}
+name = {_quote(draft.name)}
 
 [origin]                      # where east_m = north_m = 0: half way
 lat_deg = {_number_text(draft.origin.lat_deg)}
@@ -233,18 +235,18 @@ def _terrain_text(draft: Draft) -> str:
     if draft.terrain is None:
         return f"""\
 [terrain]
-{_line("kind", '"flat"', "no elevation file was named: flat ground says nothing of hills")}
-{_line("amsl_m", "0", "height of the ground above mean sea level")}
+{_toml_line("kind", '"flat"', "no elevation file was named: flat ground says nothing of hills")}
+{_toml_line("amsl_m", "0", "height of the ground above mean sea level")}
 # For measured ground take these lines in place of the two above:
 # kind = "dem"
-{_line("# path", '"dem.tif"', "an elevation file, a folder of tiles, or a .vrt")}
+{_toml_line("# path", '"dem.tif"', "an elevation file, a folder of tiles, or a .vrt")}
 """
     comment = "the tile that planfly ships" if draft.terrain in EMBEDDED else "counted from this file's folder"
     return f"""\
 [terrain]
 kind = "dem"
-{_line("path", _toml(draft.terrain), comment)}
-{_line("# vertical_error_m", "5", "as its source states it: clearance is then also shown minus this")}
+{_toml_line("path", _quote(draft.terrain), comment)}
+{_toml_line("# vertical_error_m", "5", "as its source states it: clearance is then also shown minus this")}
 """
 
 
@@ -259,14 +261,14 @@ def _area_and_ends_text(draft: Draft) -> str:
 [{key}]
 lat_deg = {_number_text(place.lat)}
 lon_deg = {_number_text(place.lon)}
-{_line("height_m", _number_text(draft.height), "above ground; amsl_m counts from mean sea level")}
-{_line("# course_deg", "0", course)}
+{_toml_line("height_m", _number_text(draft.height), "above ground; amsl_m counts from mean sea level")}
+{_toml_line("# course_deg", "0", course)}
 """)
     return f"""\
 [area]                        # where a path may lead, m from [origin]
 east_m = [{east0}, {east1}]
 north_m = [{north0}, {north1}]
-{_line("ceiling_amsl_m", _number_text(draft.ceiling), "above mean sea level")}
+{_toml_line("ceiling_amsl_m", _number_text(draft.ceiling), "above mean sea level")}
 
 """ + "\n".join(ends)
 
@@ -274,29 +276,30 @@ north_m = [{north0}, {north1}]
 def _limits_text(draft: Draft) -> str:
     return f"""\
 [limits]                      # turns and slopes: what the aircraft can do, unless a number is given
-{_line("min_clearance_m", _number_text(draft.clearance), "above ground")}
-{_line("# max_height_m", _number_text(max(400.0, 2.0 * draft.height)), "above ground")}
-{_line("# max_turn_deg", "60", "at a waypoint")}
-{_line("# corridor_m", "60", "half width about the legs; by default what the autopilot needs")}
+{_toml_line("min_clearance_m", _number_text(draft.clearance), "above ground")}
+{_toml_line("# max_height_m", _number_text(max(400.0, 2.0 * draft.height)), "above ground")}
+{_toml_line("# max_turn_deg", "60", "at a waypoint")}
+{_toml_line("# corridor_m", "60", "half width about the legs; by default what the autopilot needs")}
 """
 
 
 def _flight_text(draft: Draft) -> str:
-    version = "" if draft.px4_version is None else f"\npx4_version = {_toml(draft.px4_version)}"
+    autopilots = """"ardupilot", "px4", or "planfly": planfly's own guidance"""
+    version = "" if draft.px4_version is None else f"\npx4_version = {_quote(draft.px4_version)}"
     return f"""\
 [flight]
-{_line("aircraft", _toml(draft.aircraft), "planfly aircraft lists them; a folder of your own")}
-{_line("autopilot", _toml(draft.autopilot), '"ardupilot", "px4", or "planfly": planfly' + "'s own guidance")}{version}
-{_line("# params", '"mine.param"', "its parameters, as a ground station saves them")}
-{_line("# airspeed_mps", _number_text(draft.airspeed), "equivalent, by planfly's guidance true; by default this")}
+{_toml_line("aircraft", _quote(draft.aircraft), "planfly aircraft lists them; a folder of your own")}
+{_toml_line("autopilot", _quote(draft.autopilot), autopilots)}{version}
+{_toml_line("# params", '"mine.param"', "its parameters, as a ground station saves them")}
+{_toml_line("# airspeed_mps", _number_text(draft.airspeed), "equivalent, by planfly's guidance true; by default this")}
 
 [wind]
-{_line("speed_mps", "0", "your forecast, 0 to 40")}
-{_line("from_deg", "0", "that it blows from: 270 is a west wind")}
-{_line("turbulence", '"none"', '"light" or "moderate"')}
+{_toml_line("speed_mps", "0", "your forecast, 0 to 40")}
+{_toml_line("from_deg", "0", "that it blows from: 270 is a west wind")}
+{_toml_line("turbulence", '"none"', '"light" or "moderate"')}
 
 [planner]
-{_line("seed", "1", "the same seed finds the same path")}
+{_toml_line("seed", "1", "the same seed finds the same path")}
 """
 
 
@@ -304,7 +307,7 @@ def _examples_text(draft: Draft) -> str:
     """Return the commented examples: a threat and a zone near the straight line, small enough to fly around."""
     radius = max(50.0, round(float(np.diff(draft.box, axis=1).min()) / 200.0) * 10.0)
     threat, zone = (
-        Place(*(float(x) for x in to_geo(draft.origin, *point))) for point in _example_places(draft, radius)
+        Place(*(float(degrees) for degrees in to_geo(draft.origin, *point))) for point in _example_places(draft, radius)
     )
     return f"""\
 # A threat: a missile, a radar, or both; on the ground unless a height is given.
@@ -312,10 +315,10 @@ def _examples_text(draft: Draft) -> str:
 # name = "battery"
 # lat_deg = {threat.lat:.5f}
 # lon_deg = {threat.lon:.5f}
-{_line("# kill_radius_m", _number_text(radius))}
-{_line("# kill_scale_m", _number_text(round(radius / 4.0)), "how softly its reach ends")}
-{_line("# detection_radius_m", _number_text(2.0 * radius))}
-{_line("# detection_scale_m", _number_text(round(radius / 2.0)))}
+{_toml_line("# kill_radius_m", _number_text(radius))}
+{_toml_line("# kill_scale_m", _number_text(round(radius / 4.0)), "how softly its reach ends")}
+{_toml_line("# detection_radius_m", _number_text(2.0 * radius))}
+{_toml_line("# detection_scale_m", _number_text(round(radius / 2.0)))}
 
 # A zone to keep out of ("inclusion": to stay in); files of zones: zones_file = "airspace.geojson" above all tables.
 # [[zones]]
@@ -323,8 +326,8 @@ def _examples_text(draft: Draft) -> str:
 # kind = "exclusion"
 # lat_deg = {zone.lat:.5f}
 # lon_deg = {zone.lon:.5f}
-{_line("# radius_m", _number_text(radius))}
-{_line("# ceiling_agl_m", "300", "it may be flown over above this height above ground")}
+{_toml_line("# radius_m", _number_text(radius))}
+{_toml_line("# ceiling_agl_m", "300", "it may be flown over above this height above ground")}
 
 # What the way home is judged by.
 # [returns]
@@ -333,9 +336,12 @@ def _examples_text(draft: Draft) -> str:
 
 
 def _example_places(draft: Draft, radius: float) -> tuple[tuple[float, float], tuple[float, float]]:
-    """Return two places, one on either side of the straight line, a third of its length from each end, m."""
+    """Return a position on each side of the straight line, a third of its length from each end, m."""
     endpoints = np.array([to_map(draft.origin, *place) for place in (draft.start, draft.destination)])
-    along = endpoints[1] - endpoints[0]
-    offset = np.array([-along[1], along[0]]) / (math.hypot(*along) or 1.0) * radius * 0.5
-    first, second = endpoints[0] + along / 3.0 + offset, endpoints[1] - along / 3.0 - offset
-    return (float(first[0]), float(first[1])), (float(second[0]), float(second[1]))
+    straight_line = endpoints[1] - endpoints[0]
+    offset = np.array([-straight_line[1], straight_line[0]]) / (math.hypot(*straight_line) or 1.0) * radius * 0.5
+    first_position, second_position = (
+        endpoints[0] + straight_line / 3.0 + offset,
+        endpoints[1] - straight_line / 3.0 - offset,
+    )
+    return (float(first_position[0]), float(first_position[1])), (float(second_position[0]), float(second_position[1]))

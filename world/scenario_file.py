@@ -57,10 +57,10 @@ def check_scenario(data: Any, source: str) -> ScenarioFile:
         raise ScenarioError(**first_fault(error, data, ScenarioFile).at(source)) from error
 
 
-def checked_table(make: Callable[[], Table], source: str) -> Table:
+def checked_table(make_table: Callable[[], Table], source: str) -> Table:
     """Make a table of values from outside a checked file; a ScenarioError begins with ``source``."""
     try:
-        return make()
+        return make_table()
     except ValidationError as error:
         raise ScenarioError(**first_fault(error).at(source)) from error
 
@@ -87,12 +87,12 @@ class Fault(NamedTuple):
     text: str
 
     def at(self, source: str, part: str = "") -> dict[str, Any]:
-        """Return the arguments of a `PlanflyError`.
+        """Return the arguments of a `PlanflyError` with this fault.
 
         source: the file.  part: the part of the file with the fault.
         """
-        begin = f"{source}: {part}" if part else source
-        message = f"{begin}: {self.text}"
+        location = f"{source}: {part}" if part else source
+        message = f"{location}: {self.text}"
         return {"message": message, "file": source, "field": self.field, "value": self.value, "allowed": self.allowed}
 
 
@@ -110,45 +110,49 @@ def first_fault(error: ValidationError, data: Any = None, model: type[BaseModel]
     ...     print(first_fault(error))
     Fault(field='speed_mps', value=41.0, allowed='allowed 0..40', text='speed_mps: 41.0: allowed 0..40')
     """
-    faults = error.errors(include_url=False)
+    errors = error.errors(include_url=False)
     # A misspelt key is reported as missing, too; the misspelling is the more useful message.
-    misspelt = [fault for fault in faults if fault["type"] == "extra_forbidden" and _suggestion(fault["loc"], model)]
-    first = (misspelt or faults)[0]
-    keys = [str(part) for part in (first["loc"] if data is None else _data_keys(first["loc"], data))]
+    misspelt_keys = [
+        error_entry
+        for error_entry in errors
+        if error_entry["type"] == "extra_forbidden" and _spelling_suggestion(error_entry["loc"], model)
+    ]
+    first_error = (misspelt_keys or errors)[0]
+    keys = [str(part) for part in (first_error["loc"] if data is None else _data_keys(first_error["loc"], data))]
     # A check of planfly raises its own error; use its message.
-    message = str(first["ctx"]["error"]) if first["type"] == "value_error" else first["msg"]
-    if first["type"] == "model_type":
+    message = str(first_error["ctx"]["error"]) if first_error["type"] == "value_error" else first_error["msg"]
+    if first_error["type"] == "model_type":
         message = "expected a table"
-    elif first["type"] == "too_short":
-        message = f"expected at least {first['ctx']['min_length']}"
-    value = first.get("input")
+    elif first_error["type"] == "too_short":
+        message = f"expected at least {first_error['ctx']['min_length']}"
+    value = first_error.get("input")
     if isinstance(value, dict | list):
         value = None
-    shown = "" if isinstance(first.get("input"), dict | list) else f": {_shown_text(value)}"
-    if first["type"] == "extra_forbidden":
-        message = f"unknown key{_suggestion(first['loc'], model)}"
-        shown = ""
-    if first["type"] == "missing":
-        value, shown = None, ""
-        keys = [str(part) for part in first["loc"]]
-    remainder = f" (and {len(faults) - 1} more)" if len({fault["loc"][:2] for fault in faults}) > 1 else ""
+    value_text = "" if isinstance(first_error.get("input"), dict | list) else f": {_shown_text(value)}"
+    if first_error["type"] == "extra_forbidden":
+        message = f"unknown key{_spelling_suggestion(first_error['loc'], model)}"
+        value_text = ""
+    if first_error["type"] == "missing":
+        value, value_text = None, ""
+        keys = [str(part) for part in first_error["loc"]]
+    remainder = f" (and {len(errors) - 1} more)" if len({error_entry["loc"][:2] for error_entry in errors}) > 1 else ""
     field = ".".join(key if key.isprintable() else json.dumps(key) for key in keys)
     # A check of the whole file names its key itself.
-    prefix = "" if not field and first["type"] == "value_error" else f"{field or 'file'}{shown}: "
+    prefix = "" if not field and first_error["type"] == "value_error" else f"{field or 'file'}{value_text}: "
     return Fault(field, value, message, f"{prefix}{message}{remainder}")
 
 
-def _suggestion(parts: Sequence[str | int], model: type[BaseModel] | None) -> str:
-    """Return a text that suggests a known key for an unknown one."""
+def _spelling_suggestion(parts: Sequence[str | int], model: type[BaseModel] | None) -> str:
+    """Return the end of a message that suggests a known key for an unknown one; "" without one."""
     return "" if model is None else did_you_mean(str(parts[-1]), _known_keys(parts[:-1], model))
 
 
 def _known_keys(parts: Sequence[str | int], model: type[BaseModel]) -> list[str]:
-    """Return the known keys of the tables at or below the first key of a place, or of the whole model."""
-    table = model.model_fields.get(str(parts[0])) if parts else None
-    if table is None:
+    """Return the known keys of the tables at or below the first key of a location, or of the whole model."""
+    key_field = model.model_fields.get(str(parts[0])) if parts else None
+    if key_field is None:
         return list(model.model_fields)
-    tables = [table.annotation]
+    tables = [key_field.annotation]
     keys: list[str] = []
     # The list grows during the loop, as a table's fields may be tables, in lists and unions.
     for table_type in tables:
@@ -161,7 +165,7 @@ def _known_keys(parts: Sequence[str | int], model: type[BaseModel]) -> list[str]
 
 
 def _data_keys(parts: tuple[str | int, ...], data: Any) -> list[str | int]:
-    """Return the parts of a place that are keys of the data; pydantic also names the branches of unions."""
+    """Return the parts of a location that are keys of the data, without pydantic's names of the branches of unions."""
     keys = []
     for part in parts:
         known_keys = range(len(data)) if isinstance(data, list) else data if isinstance(data, dict) else ()

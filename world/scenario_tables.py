@@ -269,7 +269,7 @@ def _check_one_position(table: "PositionTable") -> None:
 
 
 class PositionTable(ScenarioTable):
-    """A place on the map: east_m, north_m or lat_deg, lon_deg."""
+    """A position on the map: east_m, north_m or lat_deg, lon_deg."""
 
     east_m: Metres | None = None
     north_m: Metres | None = None
@@ -461,8 +461,8 @@ class FlightTable(ScenarioTable):
         default_nav: Navigation = "perfect" if autopilot == OWN_GUIDANCE else "gnss"
         return Steering(autopilot, self.guidance or "path", self.nav or default_nav)
 
-    def stated(self) -> "FlightTable":
-        """Return the same flight with autopilot, release and navigation stated, as plans and logs store it."""
+    def with_stated_defaults(self) -> "FlightTable":
+        """Return a copy with the default autopilot, release and navigation as entries, as plans and logs store it."""
         autopilot, guidance, nav = self.steering
         autopilot_entries: dict[str, str] = (
             {"autopilot": autopilot} if autopilot != OWN_GUIDANCE else {"guidance": guidance}
@@ -483,10 +483,7 @@ class WindTable(ScenarioTable):
 
 
 class HomeTable(PositionTable):
-    """[home]: the place on the ground where the mission begins.
-
-    It is a position, or place = "start" for the ground below the start.
-    """
+    """[home]: the position on the ground where the mission begins; place = "start" for the ground below the start."""
 
     place: Literal["start"] | None = None
 
@@ -511,7 +508,7 @@ class HomeTable(PositionTable):
 
 
 LaunchMethod = Literal["catapult", "hand", "runway"]
-# Largest incline of a runway, degrees above level, as for a landing strip (`world.airfield.STEEPEST_STRIP`).
+# Largest incline of a runway, degrees above level, as for a landing strip (`world.airfield.STEEPEST_STRIP_SLOPE`).
 STEEPEST_RUNWAY = 5.0
 
 
@@ -582,7 +579,7 @@ class LandingTable(PositionTable):
 
 
 class RallyTable(PointTable):
-    """[returns] rally: a point that a return may fly to, at an altitude AMSL or a height above the ground there."""
+    """[returns] rally: a rally point for RTL, at an altitude AMSL or a height above the ground there."""
 
     @model_validator(mode="after")
     def _check_height(self) -> "RallyTable":
@@ -592,10 +589,7 @@ class RallyTable(PointTable):
 
 
 def _check_autoland(value: Any) -> Any:
-    """Return a value of RTL_AUTOLAND.
-
-    Raise ValueError for any other, also for true and 1.0, which equal 1.
-    """
+    """Return the value; raise ValueError if it is not one of RTL_AUTOLAND, also for true and 1.0, which equal 1."""
     if type(value) is not int or value not in (1, 2, 3):
         raise ValueError("allowed 1, 2 or 3")
     return value
@@ -607,10 +601,10 @@ ReturnDemand = Literal["rtl", "glide", "go_around"]
 
 
 class ReturnsTable(ScenarioTable):
-    """[returns]: requirements of the verdict on returns from any point, and return settings of a planned mission.
+    """[returns]: requirements of the verdict on RTL from any point, and RTL settings of a planned mission.
 
-    require: "rtl" if every return to launch must be safe, "glide" if the engine may fail anywhere, "go_around" if a
-        landing may be aborted anywhere on its glide.
+    require: "rtl" if every RTL (return to launch) must be safe, "glide" if the engine may fail anywhere, "go_around" if
+        a landing may be aborted anywhere on its glide.
     rtl_altitude_m: height above home that a return climbs or descends to.
     rtl_autoland: ArduPlane's RTL_AUTOLAND: 1 for home and then the landing, 2 for straight to the landing, 3 for a
         loiter at home.

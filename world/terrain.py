@@ -17,9 +17,9 @@ from world.frames import PolyMap, PolyMapRecord, fit_polymap, polymap
 from world.kernels import compiled, inlined
 
 # Longest piece of a segment that is treated as straight in the raster's grid, m: at 60 degrees latitude a 500 m piece
-# bows by 9 mm.
+# bends by 9 mm.
 STRAIGHT_PIECE = 500.0
-# Error tolerance of the map from positions to pixels, pixels: a place on the edge is not outside because of it.
+# Error tolerance of the map from positions to pixels, pixels; a position on the raster's edge counts as inside.
 EDGE = 2e-3
 # Side of the tiles with a stored steepest slope, pixels.
 TILE = 16
@@ -33,8 +33,8 @@ class Terrain:
     to_pixel: map (east, north) to fractional (col, row).
     spacing: the finer pixel pitch, m.
     source, sha256: name and hash of the elevation file.
-    datum: the vertical datum as stated.
-    vertical_error: stated error, m, or None if not stated.
+    datum: vertical datum that the file states.
+    vertical_error: error that the file states, m, or None.
     """
 
     heights: Heights
@@ -60,14 +60,13 @@ class Terrain:
     def height(self, east: ArrayLike, north: ArrayLike) -> Floats:
         """Return the ground height in m at map positions, any shape; NaN outside the raster or on nodata."""
         es, ns = np.broadcast_arrays(np.asarray(east, dtype=np.float64), np.asarray(north, dtype=np.float64))
-        return _heights_many(self.heights, self.to_pixel.record, es.ravel(), ns.ravel()).reshape(es.shape)
+        return _ground_heights(self.heights, self.to_pixel.record, es.ravel(), ns.ravel()).reshape(es.shape)
 
     def clearance(self, a: ArrayLike, b: ArrayLike) -> tuple[float, float]:
         """Return the smallest height above ground on the segment a-b, and the fraction of the segment there.
 
-        a, b: (3,) m.
-
-        It is exact for the bilinear surface, and NaN if the segment leaves the raster or its data.
+        a, b: (3,) m.  The height is exact for the bilinear surface, and NaN if the segment leaves the raster or its
+        data.
         """
         start, end = np.asarray(a, dtype=np.float64), np.asarray(b, dtype=np.float64)
         clearance, fraction = segment_clearance(self.heights, self.to_pixel.record, start, end)
@@ -81,9 +80,9 @@ def _make_locked(heights: Heights, *others: Any) -> Terrain:
 
 @inlined
 def pixel_height(heights: Heights, col: float, row: float) -> float:
-    """Return the bilinear height at fractional pixel coordinates.
+    """Return the bilinear height at fractional pixel coordinates, NaN outside the raster.
 
-    It is NaN further than `EDGE` beyond the outer pixel centres.
+    The raster extends `EDGE` beyond the outer pixel centres.
     """
     rows, cols = heights.shape
     if not (-EDGE <= col <= cols - 1 + EDGE and -EDGE <= row <= rows - 1 + EDGE):
@@ -103,7 +102,7 @@ def pixel_height(heights: Heights, col: float, row: float) -> float:
 def steepest_slopes(heights: Heights, pitch: float) -> Heights:
     """Return the steepest possible slope of the bilinear ground in each tile of `TILE` x `TILE` cells, m per m.
 
-    It follows from the steps between pixels and their pitch (m).  Pixels without data (NaN) are ignored.
+    pitch: distance between pixels, m.  Pixels without data (NaN) are ignored.
     """
     rows, cols = heights.shape
     tiles = np.zeros(((rows - 2) // TILE + 1, (cols - 2) // TILE + 1), dtype=np.float32)
@@ -130,11 +129,13 @@ def ground_height(heights: Heights, to_pixel: PolyMapRecord, east: float, north:
 
 
 @compiled
-def _heights_many(heights: Heights, to_pixel: PolyMapRecord, east: Floats, north: Floats) -> Floats:  # pragma: no cover
-    out = np.empty(east.size)
+def _ground_heights(
+    heights: Heights, to_pixel: PolyMapRecord, east: Floats, north: Floats
+) -> Floats:  # pragma: no cover
+    ground_heights = np.empty(east.size)
     for k in range(east.size):
-        out[k] = ground_height(heights, to_pixel, east[k], north[k])
-    return out
+        ground_heights[k] = ground_height(heights, to_pixel, east[k], north[k])
+    return ground_heights
 
 
 @compiled
@@ -143,29 +144,29 @@ def segment_clearance(heights: Heights, to_pixel: PolyMapRecord, a: Floats, b: F
 
     The height is NaN if the segment leaves the raster.
     """
-    pieces = max(1, math.ceil(math.hypot(b[0] - a[0], b[1] - a[1]) / STRAIGHT_PIECE))
+    piece_count = max(1, math.ceil(math.hypot(b[0] - a[0], b[1] - a[1]) / STRAIGHT_PIECE))
     min_clearance = math.inf
     min_fraction = 0.0
     col1, row1 = polymap(to_pixel, a[0], a[1])
-    for piece in range(pieces):
-        begin_fraction = piece / pieces
-        end_fraction = (piece + 1) / pieces
+    for piece in range(piece_count):
+        start_fraction = piece / piece_count
+        end_fraction = (piece + 1) / piece_count
         col0, row0 = col1, row1
         col1, row1 = polymap(to_pixel, a[0] + end_fraction * (b[0] - a[0]), a[1] + end_fraction * (b[1] - a[1]))
         clearance, fraction = _piece_clearance(
-            heights, col0, row0, a[2] + begin_fraction * (b[2] - a[2]), col1, row1, a[2] + end_fraction * (b[2] - a[2])
+            heights, col0, row0, a[2] + start_fraction * (b[2] - a[2]), col1, row1, a[2] + end_fraction * (b[2] - a[2])
         )
         if math.isnan(clearance):
-            return math.nan, begin_fraction + fraction * (end_fraction - begin_fraction)
+            return math.nan, start_fraction + fraction * (end_fraction - start_fraction)
         if clearance < min_clearance:
             min_clearance = clearance
-            min_fraction = begin_fraction + fraction * (end_fraction - begin_fraction)
+            min_fraction = start_fraction + fraction * (end_fraction - start_fraction)
     return min_clearance, min_fraction
 
 
 @inlined
 def _next_crossing(start: float, step: float, fraction: float) -> float:
-    """Return the next fraction at which start + fraction * step is a whole number; inf if there is none."""
+    """Return the next larger fraction at which start + fraction * step is a whole number; inf if there is none."""
     if step == 0.0:
         return math.inf
     position = start + fraction * step
@@ -177,42 +178,56 @@ def _next_crossing(start: float, step: float, fraction: float) -> float:
 def _piece_clearance(
     heights: Heights, col0: float, row0: float, up0: float, col1: float, row1: float, up1: float
 ) -> tuple[float, float]:
-    """Return the smallest height above ground on a piece straight in pixels, and its fraction.
+    """Return the smallest height above ground on a piece that is straight in pixels, and the fraction there.
 
-    The height is NaN if the piece leaves the data.
-    col, row, up: coordinates of the two ends.  Within a cell the height above the bilinear ground is a parabola.
+    The height is NaN if the piece leaves the data.  Within a cell the height above the bilinear ground is a parabola.
+
+    col, row, up: coordinates of the two ends.
     """
-    dc, dr, du = col1 - col0, row1 - row0, up1 - up0
-    begin = 0.0
-    begin_clearance = up0 - pixel_height(heights, col0, row0)
-    min_clearance, min_fraction = begin_clearance, 0.0
-    if math.isnan(begin_clearance):
+    delta_col, delta_row, delta_up = col1 - col0, row1 - row0, up1 - up0
+    start_fraction = 0.0
+    start_clearance = up0 - pixel_height(heights, col0, row0)
+    min_clearance, min_fraction = start_clearance, 0.0
+    if math.isnan(start_clearance):
         return math.nan, 0.0
-    while begin < 1.0:
-        end = min(1.0, _next_crossing(col0, dc, begin), _next_crossing(row0, dr, begin))
-        if end <= begin:
-            end = min(1.0, begin + 1e-6)
-        mid = 0.5 * (begin + end)
-        mid_clearance = up0 + mid * du - pixel_height(heights, col0 + mid * dc, row0 + mid * dr)
-        end_clearance = up0 + end * du - pixel_height(heights, col0 + end * dc, row0 + end * dr)
-        if math.isnan(mid_clearance) or math.isnan(end_clearance):
-            return math.nan, mid
+    while start_fraction < 1.0:
+        end_fraction = min(
+            1.0, _next_crossing(col0, delta_col, start_fraction), _next_crossing(row0, delta_row, start_fraction)
+        )
+        if end_fraction <= start_fraction:
+            end_fraction = min(1.0, start_fraction + 1e-6)
+        middle_fraction = 0.5 * (start_fraction + end_fraction)
+        middle_clearance = (
+            up0
+            + middle_fraction * delta_up
+            - pixel_height(heights, col0 + middle_fraction * delta_col, row0 + middle_fraction * delta_row)
+        )
+        end_clearance = (
+            up0
+            + end_fraction * delta_up
+            - pixel_height(heights, col0 + end_fraction * delta_col, row0 + end_fraction * delta_row)
+        )
+        if math.isnan(middle_clearance) or math.isnan(end_clearance):
+            return math.nan, middle_fraction
         if end_clearance < min_clearance:
-            min_clearance, min_fraction = end_clearance, end
+            min_clearance, min_fraction = end_clearance, end_fraction
         # The parabola through the three values; its vertex is used if it lies between them.
-        curvature = 2.0 * (begin_clearance - 2.0 * mid_clearance + end_clearance)
+        curvature = 2.0 * (start_clearance - 2.0 * middle_clearance + end_clearance)
         if curvature > 0.0:
-            x = (3.0 * begin_clearance - 4.0 * mid_clearance + end_clearance) / (2.0 * curvature)
-            if 0.0 < x < 1.0:
+            vertex_fraction = (3.0 * start_clearance - 4.0 * middle_clearance + end_clearance) / (2.0 * curvature)
+            if 0.0 < vertex_fraction < 1.0:
                 vertex_clearance = (
-                    begin_clearance
-                    - (3.0 * begin_clearance - 4.0 * mid_clearance + end_clearance) * x
-                    + curvature * x * x
+                    start_clearance
+                    - (3.0 * start_clearance - 4.0 * middle_clearance + end_clearance) * vertex_fraction
+                    + curvature * vertex_fraction * vertex_fraction
                 )
                 if vertex_clearance < min_clearance:
-                    min_clearance, min_fraction = vertex_clearance, begin + x * (end - begin)
-        begin_clearance = end_clearance
-        begin = end
+                    min_clearance, min_fraction = (
+                        vertex_clearance,
+                        start_fraction + vertex_fraction * (end_fraction - start_fraction),
+                    )
+        start_clearance = end_clearance
+        start_fraction = end_fraction
     return min_clearance, min_fraction
 
 
@@ -235,7 +250,7 @@ def flat_terrain(bounds: Floats, amsl: float, buffer: float) -> Terrain:
 
 
 class Peak(NamedTuple):
-    """Gaussian hill: place and height of its summit, and its standard deviation, m."""
+    """Gaussian hill: position and height of its summit, and its standard deviation, m."""
 
     east: float
     north: float
@@ -252,8 +267,8 @@ def peaks_terrain(bounds: Floats, peaks: Sequence[Peak], buffer: float) -> Terra
     width = max(float(np.ptp(bounds[0])), float(np.ptp(bounds[1]))) + 2 * buffer
     pitch = max(min(peak.sigma for peak in peaks) / 16.0, width / 1500.0) if len(peaks) else width / 8.0
 
-    def axis(low: float, high: float) -> Floats:
-        return np.linspace(low - buffer, high + buffer, 2 + int((high - low + 2 * buffer) / pitch))
+    def axis(minimum: float, maximum: float) -> Floats:
+        return np.linspace(minimum - buffer, maximum + buffer, 2 + int((maximum - minimum + 2 * buffer) / pitch))
 
     east, north = axis(*bounds[0]), axis(*bounds[1])
     heights = np.zeros((north.size, east.size))

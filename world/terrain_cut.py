@@ -84,8 +84,8 @@ def cut_from_files(source: Path, box: Box, out: Path) -> CutTerrain:
 
 
 def _window(raster: RasterFile, box: Box) -> tuple[int, int, int, int]:
-    """Return rows and columns (top, bottom, left, right) of an area.  Raises TerrainError if not covered."""
-    col, row = raster.to_source(*_outline(box))
+    """Return rows and columns (top, bottom, left, right) of an area.  Raises TerrainError if it is not covered."""
+    col, row = raster.to_pixels(*_outline(box))
     rows, cols = raster.shape
     if not (col.min() >= 0.0 and row.min() >= 0.0 and col.max() <= cols - 1 and row.max() <= rows - 1):
         south, west, north, east = box
@@ -100,9 +100,9 @@ def _window(raster: RasterFile, box: Box) -> tuple[int, int, int, int]:
 def _outline(box: Box) -> tuple[Floats, Floats]:
     """Return longitudes and latitudes along the edge of an area."""
     ramp = np.linspace(0.0, 1.0, 41)
-    across, up = box.west + ramp * (box.east - box.west), box.south + ramp * (box.north - box.south)
-    lon = np.concatenate([across, across, np.full(41, box.west), np.full(41, box.east)])
-    lat = np.concatenate([np.full(41, box.south), np.full(41, box.north), up, up])
+    lons, lats = box.west + ramp * (box.east - box.west), box.south + ramp * (box.north - box.south)
+    lon = np.concatenate([lons, lons, np.full(41, box.west), np.full(41, box.east)])
+    lat = np.concatenate([np.full(41, box.south), np.full(41, box.north), lats, lats])
     return lon, lat
 
 
@@ -117,8 +117,8 @@ def _write_geotiff(out: Path, heights: Heights, grid: Sequence[float], crs: str)
         raise TerrainError(f"{out}: {allowed}", file=out, value=heights.size, allowed=allowed)
     if _count_empty(heights) == heights.size:
         raise TerrainError(f"{out}: no data in the area: the tiles have none there", file=out)
-    stored = np.where(is_ground(heights), heights, np.float32(_NODATA))
-    write_whole(out, geotiff_bytes(stored, tuple(grid), crs, _NODATA))
+    filled_heights = np.where(is_ground(heights), heights, np.float32(_NODATA))
+    write_whole(out, geotiff_bytes(filled_heights, tuple(grid), crs, _NODATA))
 
 
 # ----------------------------------------------------------------------
@@ -135,10 +135,10 @@ def tile_name(lat: int, lon: int) -> str:
     return f"Copernicus_DSM_COG_10_{north}{abs(lat):02d}_00_{east}{abs(lon):03d}_00_DEM"
 
 
-def degrees_of(box: Box) -> list[tuple[int, int]]:
+def degree_corners(box: Box) -> list[tuple[int, int]]:
     """Return the south-west corners of the degrees that an area touches; longitudes in -180..179.
 
-    >>> degrees_of(Box(46.9, 8.2, 47.1, 8.3)), degrees_of(Box(-0.1, 179.9, 0.0, 180.1))
+    >>> degree_corners(Box(46.9, 8.2, 47.1, 8.3)), degree_corners(Box(-0.1, 179.9, 0.0, 180.1))
     ([(46, 8), (47, 8)], [(-1, 179), (-1, -180), (0, 179), (0, -180)])
     """
     lats = range(math.floor(box.south), math.floor(box.north) + 1)
@@ -157,7 +157,7 @@ def cut_from_server(server: str, box: Box, out: Path, cache: Path, progress: Cut
     """
     # The edge of a tile is half a pixel off its degree: an area close to that edge needs the neighbouring tile, too.
     fetched_box = Box(box.south - 0.001, box.west - 0.001, box.north + 0.001, box.east + 0.001)
-    degrees = degrees_of(fetched_box)
+    degrees = degree_corners(fetched_box)
     if len(degrees) > MAX_FETCHED:
         allowed = f"at most {MAX_FETCHED} are fetched; choose a smaller area"
         raise TerrainError(f"{server}: {len(degrees)} tiles: {allowed}", file=server, allowed=allowed)
@@ -169,37 +169,37 @@ def cut_from_server(server: str, box: Box, out: Path, cache: Path, progress: Cut
     remotes = {degree: remote for degree, remote in remote_files.items() if remote is not None}
     if not remotes:
         raise TerrainError(f"{server}: no tile of the area is there: open sea, or not such a server", file=server)
-    fetched = 0
+    fetched_bytes = 0
     tiles = []
     for index, (degree, remote) in enumerate(remotes.items()):
 
-        def count(byte_count: int, tile_index: int = index, name: str = remote.copy.name) -> None:
-            nonlocal fetched
-            fetched += byte_count
-            progress(len(remotes) + 9.0 * tile_index, 10.0 * len(remotes), f"{name}: {fetched / 1e6:.1f} MB")
+        def count_bytes(byte_count: int, tile_index: int = index, name: str = remote.copy.name) -> None:
+            nonlocal fetched_bytes
+            fetched_bytes += byte_count
+            progress(len(remotes) + 9.0 * tile_index, 10.0 * len(remotes), f"{name}: {fetched_bytes / 1e6:.1f} MB")
 
-        tiles.append(_place_tile(_fetch_tile(remote, fetched_box, count), degree, box))
+        tiles.append(_place_tile(_fetch_tile(remote, fetched_box, count_bytes), degree, box))
     heights, grid = _merge_tiles(tiles, box)
-    absent = tuple(degree for degree, remote in remote_files.items() if remote is None)
+    absent_degrees = tuple(degree for degree, remote in remote_files.items() if remote is None)
     if sea:
-        _fill_sea(heights, grid, absent)
+        _fill_sea(heights, grid, absent_degrees)
     _write_geotiff(out, heights, grid, _SYSTEM)
     rows, cols = heights.shape
     names = tuple(tile_name(*degree) for degree in remotes)
-    return CutTerrain(out, (rows, cols), names, absent, _count_empty(heights), fetched)
+    return CutTerrain(out, (rows, cols), names, absent_degrees, _count_empty(heights), fetched_bytes)
 
 
-def _fetch_tile(remote: RemoteFile, box: Box, count: Callable[[int], None]) -> RasterFile:
+def _fetch_tile(remote: RemoteFile, box: Box, count_bytes: Callable[[int], None]) -> RasterFile:
     """Return the copy of a tile with the blocks that cover an area.  Raises TerrainError.
 
     A copy that cannot be read, for example after a power cut or because of a proxy, is fetched a second time.
     """
     for is_last in (not remote.parts, True):
         try:
-            tile = _open_copy(remote, count, (_DIRECTORY_BYTES, remote.size) if is_last else (_DIRECTORY_BYTES,))
+            tile = _open_copy(remote, count_bytes, (_DIRECTORY_BYTES, remote.size) if is_last else (_DIRECTORY_BYTES,))
             window = _padded_window(tile, box)
             for begin, end in block_spans(remote.copy, window):
-                remote.fetch(begin, end, count)
+                remote.fetch(begin, end, count_bytes)
             if window[0] < window[1] and window[2] < window[3]:
                 tile.read(*window)
             return replace(tile, name=remote.url)
@@ -215,14 +215,14 @@ class _UnreadableError(Exception):
     """A copy is not a GeoTIFF, or has a block that cannot be unpacked."""
 
 
-def _open_copy(remote: RemoteFile, count: Callable[[int], None], sizes: Sequence[int]) -> RasterFile:
+def _open_copy(remote: RemoteFile, count_bytes: Callable[[int], None], sizes: Sequence[int]) -> RasterFile:
     """Fetch the directory of a tile, and open its copy.  Raises TerrainError and _UnreadableError.
 
-    sizes: numbers of bytes to fetch from the beginning, tried in turn.  The directory may be longer than in a
-    cloud-optimised file, or at the end.
+    sizes: numbers of bytes to fetch from the start of the file, tried in turn.  The directory may be longer than in a
+    cloud-optimised file, or at the end of the file.
     """
     for size in sizes:
-        remote.fetch(0, size, count)
+        remote.fetch(0, size, count_bytes)
         try:
             tile = open_geotiff(remote.copy, remote.url)
         except TerrainError:
@@ -240,7 +240,7 @@ def _open_copy(remote: RemoteFile, count: Callable[[int], None], sizes: Sequence
 
 def _padded_window(tile: RasterFile, box: Box) -> tuple[int, int, int, int]:
     """Return rows and columns of a tile in an area, with a margin that interpolation to another grid may need."""
-    col, row = tile.to_source(*_outline(box))
+    col, row = tile.to_pixels(*_outline(box))
     rows, cols = tile.shape
     ends = (
         (row.min() - _MARGIN_PIXELS, row.max() + _MARGIN_PIXELS + 2.0),
@@ -271,7 +271,7 @@ class _PlacedTile(NamedTuple):
 
 
 def _place_tile(tile: RasterFile, degree: tuple[int, int], box: Box) -> _PlacedTile:
-    """Place a tile on its degree, in the same turn of longitude as the area.  Raises TerrainError."""
+    """Determine the grid of a degree's tile, with longitudes in the same turn as the area.  Raises TerrainError."""
     dx, column_skew, west, row_skew, dy, north = tile.grid
     if column_skew or row_skew or not dx > 0.0 > dy:
         raise TerrainError(f"{tile.name}: expected a grid of longitudes and latitudes", file=tile.name)
@@ -308,7 +308,7 @@ def _merge_tiles(tiles: list[_PlacedTile], box: Box) -> tuple[Heights, tuple[flo
 
 
 def _fill_from_tile(heights: Heights, lat: Floats, lon: Floats, tile: _PlacedTile) -> None:
-    """Fill the empty places of a grid of latitudes and longitudes from a tile, interpolated between its pixels."""
+    """Fill the empty points of a grid of latitudes and longitudes with heights interpolated in a tile."""
     rows, cols = tile.raster.shape
     col, row = (lon - tile.west) / tile.dx - 0.5, (tile.north - lat) / tile.dy - 0.5
     # A tile of another pitch reaches half of its own pixel beyond the centres of its outermost pixels.
@@ -336,21 +336,21 @@ def _interpolate(tile_heights: Heights, row: Floats, col: Floats) -> Heights:
     """Interpolate heights (m, n) bilinearly at rows (m,) and columns (n,)."""
     r0, c0 = np.floor(row).astype(int), np.floor(col).astype(int)
     r1, c1 = np.minimum(r0 + 1, tile_heights.shape[0] - 1), np.minimum(c0 + 1, tile_heights.shape[1] - 1)
-    v, u = (row - r0)[:, None], (col - c0)[None, :]
+    row_fractions, col_fractions = (row - r0)[:, None], (col - c0)[None, :]
 
     def blend(first: Heights, second: Heights, fraction: Floats) -> Floats:
         return np.where(fraction == 0.0, first, (1.0 - fraction) * first + fraction * second)
 
-    upper = blend(tile_heights[np.ix_(r0, c0)], tile_heights[np.ix_(r0, c1)], u)
-    lower = blend(tile_heights[np.ix_(r1, c0)], tile_heights[np.ix_(r1, c1)], u)
-    return blend(upper.astype(np.float32), lower.astype(np.float32), v).astype(np.float32)
+    upper = blend(tile_heights[np.ix_(r0, c0)], tile_heights[np.ix_(r0, c1)], col_fractions)
+    lower = blend(tile_heights[np.ix_(r1, c0)], tile_heights[np.ix_(r1, c1)], col_fractions)
+    return blend(upper.astype(np.float32), lower.astype(np.float32), row_fractions).astype(np.float32)
 
 
-def _fill_sea(heights: Heights, grid: Sequence[float], sea: Sequence[tuple[int, int]]) -> None:
-    """Set missing heights to 0 m in the degrees ``sea``, which have no tile."""
+def _fill_sea(heights: Heights, grid: Sequence[float], sea_degrees: Sequence[tuple[int, int]]) -> None:
+    """Set missing heights to 0 m in the degrees ``sea_degrees``, which have no tile."""
     dx, _, west, _, dy, north = grid
     lon, lat = west + (np.arange(heights.shape[1]) + 0.5) * dx, north + (np.arange(len(heights)) + 0.5) * dy
-    for south_degree, west_degree in sea:
+    for south_degree, west_degree in sea_degrees:
         # Tiles reach half a pixel beyond their degree; one pixel is added.
         columns = np.abs((lon - west_degree - 0.5 + 180.0) % 360.0 - 180.0) <= 0.5 + abs(dx)
         rows = np.abs(lat - south_degree - 0.5) <= 0.5 + abs(dy)

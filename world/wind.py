@@ -16,16 +16,16 @@ W20 = {"none": 0.0, "light": 7.7, "moderate": 15.4}
 
 @compiled_inline
 def mean_wind_speed(speed: float, gradient: float, reference_amsl: float, amsl: float) -> float:
-    """Return the mean wind speed (m/s) at an altitude (m): linear from the reference altitude, and never below 0."""
+    """Return the mean wind speed (m/s) at an altitude (m AMSL), linear in altitude and never below 0."""
     return max(0.0, speed + gradient * (amsl - reference_amsl))
 
 
 @compiled
 def _mean_wind_speeds(speed: float, gradient: float, reference_amsl: float, amsl: Floats) -> Floats:
-    out = np.empty(amsl.size)
+    speeds = np.empty(amsl.size)
     for k in range(amsl.size):
-        out[k] = mean_wind_speed(speed, gradient, reference_amsl, amsl[k])
-    return out
+        speeds[k] = mean_wind_speed(speed, gradient, reference_amsl, amsl[k])
+    return speeds
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,7 +48,7 @@ class Wind:
 
     @property
     def to_course(self) -> float:
-        """Return the direction that the wind blows towards, rad clockwise from north."""
+        """Direction that the wind blows towards, rad clockwise from north."""
         return self.from_course + math.pi
 
     def at(self, amsl: float) -> tuple[float, float]:
@@ -75,7 +75,7 @@ class Wind:
         return max(math.hypot(*self.at(float(altitude))) for altitude in amsl)
 
     def along(self, course: float, amsl: float) -> tuple[float, float]:
-        """Return tailwind and crosswind (from the left positive) on a course (rad), m/s."""
+        """Return tailwind and crosswind on a course (rad), m/s; crosswind from the left is positive."""
         east, north = self.at(amsl)
         return (
             east * math.sin(course) + north * math.cos(course),

@@ -14,7 +14,7 @@ from flight.mission.items import Command, Mission
 from flight.mission.placing import return_places
 from flight.mission.return_path import ReturnPlace, ReturnRules
 from flight.mission.route import Route
-from world.airfield import STEEPEST_STRIP, LandingStrip, strip_slopes
+from world.airfield import STEEPEST_STRIP_SLOPE, LandingStrip, strip_slopes
 from world.arrays import Floats
 from world.errors import MissionError
 from world.frames import to_map
@@ -186,7 +186,7 @@ def _note_landing_ground(mission: Mission, route: Route, scenario: Scenario) -> 
         ground = f"over {length:.0f} m around its point the ground {along} along it, and {across} to the right"
         if along == across == _LEVEL_TEXT:
             ground = f"over {length:.0f} m around its point the ground {_LEVEL_TEXT}"
-        if max(abs(slope) for slope in slopes) > STEEPEST_STRIP:
-            ground += f" ({STEEPEST_STRIP:.0%} is the limit for a plan's landing)"
+        if max(abs(slope) for slope in slopes) > STEEPEST_STRIP_SLOPE:
+            ground += f" ({STEEPEST_STRIP_SLOPE:.0%} is the limit for a plan's landing)"
     strip_text = "no [landing] states its strip, so touch-down and roll-out are not judged"
     yield f"item {last_item}: lands on {round(math.degrees(course)) % 360}°{wind}; {ground}; {strip_text}"

@@ -37,11 +37,11 @@ from world.terrain import Terrain
 from world.threats import Threats
 
 # Name of the frame of the map.
-MAP = "map"
+MAP_FRAME = "map"
 # Name of the frame of the aircraft.
-AIRCRAFT = "aircraft"
+AIRCRAFT_FRAME = "aircraft"
 # Foxglove log level by name.
-LEVELS = {"debug": Log.DEBUG, "info": Log.INFO, "warning": Log.WARNING, "error": Log.ERROR, "fatal": Log.FATAL}
+LOG_LEVELS = {"debug": Log.DEBUG, "info": Log.INFO, "warning": Log.WARNING, "error": Log.ERROR, "fatal": Log.FATAL}
 # Largest number of vertices along a side of the terrain mesh.
 MAX_VERTICES = 80
 
@@ -56,20 +56,20 @@ _MESH_POINTS = TriangleListPrimitive.POINTS_FIELD_NUMBER
 _MESH_COLOURS = TriangleListPrimitive.COLORS_FIELD_NUMBER
 
 # Colour of the lowest ground.
-_LOW = np.array(theme.rgb(theme.GROUND[0]))
+_LOWEST_COLOUR = np.array(theme.rgb(theme.GROUND[0]))
 # Colour of the highest ground.
-_HIGH = np.array(theme.rgb(theme.GROUND[-2]))
+_HIGHEST_COLOUR = np.array(theme.rgb(theme.GROUND[-2]))
 # Scenes have a black background: use the theme's colours for dark ground.
-_KILL = theme.rgba("missile", 0.35, dark=True)
-_DETECTION = theme.rgba("radar", 0.15, dark=True)
-_PLAN = theme.rgba("planned", dark=True)
-_TRACK = theme.rgba("flown", dark=True)
-_KEEP_OUT = theme.rgba("zone", dark=True)
-_STAY_IN = theme.rgba("highlight", dark=True)
+_KILL_COLOUR = theme.rgba("missile", 0.35, dark=True)
+_DETECTION_COLOUR = theme.rgba("radar", 0.15, dark=True)
+_PLAN_COLOUR = theme.rgba("planned", dark=True)
+_TRACK_COLOUR = theme.rgba("flown", dark=True)
+_EXCLUSION_COLOUR = theme.rgba("zone", dark=True)
+_INCLUSION_COLOUR = theme.rgba("highlight", dark=True)
 # Height of a name above the ground around it, m.
 _LABEL_HEIGHT_M = 40.0
 # Half the side of the square of ground that a name stays above, m.
-_NEAR = 300.0
+_LABEL_GROUND_DISTANCE_M = 300.0
 # Distance of the coloured path below the flight, m.
 _PATH_OFFSET_M = 6.0
 # Height of an outline above the ground, m.
@@ -104,14 +104,14 @@ def body_rotation(attitude: ArrayLike) -> Floats:
 
 
 def log_message(time_ns: int, text: str, level: str, name: str = "planfly") -> Log:
-    """Return one event as a message.  level: a key of `LEVELS`.  name: source of the message."""
-    return Log(timestamp=timestamp(time_ns), level=LEVELS[level], message=text, name=name)
+    """Return one event as a message.  level: a key of `LOG_LEVELS`.  name: source of the message."""
+    return Log(timestamp=timestamp(time_ns), level=LOG_LEVELS[level], message=text, name=name)
 
 
 def terrain_scene(time_ns: int, scenario: Scenario) -> bytes:
     """Draw the ground of the area as a coloured mesh of at most `MAX_VERTICES` vertices a side."""
     entity = _entity(time_ns, "terrain")
-    mesh = b"" if scenario.terrain is None else _mesh(scenario.terrain, scenario.bounds)
+    mesh = b"" if scenario.terrain is None else _encode_mesh(scenario.terrain, scenario.bounds)
     return length_delimited(2, entity.SerializeToString(deterministic=True) + mesh)
 
 
@@ -133,7 +133,7 @@ def _terrain_mesh(terrain: Terrain, bounds: Floats) -> tuple[Floats, Floats, NDA
     )
     fraction = np.where(is_known, (up - min_value) / max(max_value - min_value, 1.0), 0.0)
     points = np.stack([mesh_east, mesh_north, np.where(is_known, up, min_value)], axis=-1)
-    return points, _LOW + fraction[..., None] * (_HIGH - _LOW), is_known
+    return points, _LOWEST_COLOUR + fraction[..., None] * (_HIGHEST_COLOUR - _LOWEST_COLOUR), is_known
 
 
 def terrain_points(scenario: Scenario) -> tuple[Floats, Floats]:
@@ -144,19 +144,19 @@ def terrain_points(scenario: Scenario) -> tuple[Floats, Floats]:
     return points[is_known], colours[is_known]
 
 
-def _mesh(terrain: Terrain, bounds: Floats) -> bytes:
+def _encode_mesh(terrain: Terrain, bounds: Floats) -> bytes:
     """Return the encoded triangles field of the ground's entity; empty if no ground is known."""
-    ground, colours, is_known = _terrain_mesh(terrain, bounds)
+    corner_points, colours, is_known = _terrain_mesh(terrain, bounds)
     if not is_known.any():
         return b""
-    up = ground[..., 2]
+    up = corner_points[..., 2]
     vertex_numbers = np.arange(up.size).reshape(up.shape)
     sw, se, nw, ne = vertex_numbers[:-1, :-1], vertex_numbers[:-1, 1:], vertex_numbers[1:, :-1], vertex_numbers[1:, 1:]
     corners = np.stack([sw, se, ne, sw, ne, nw], axis=-1).reshape(-1, 6)
     has_known_corners = is_known.ravel()[corners].all(axis=1)
     mesh = TriangleListPrimitive(pose=_pose((0.0, 0.0, 0.0)), color=_colour(theme.rgba("terrain")))
     mesh.indices.extend(corners[has_known_corners].ravel().tolist())
-    points = ground.reshape(-1, 3)
+    points = corner_points.reshape(-1, 3)
     # Round to 2^-4 m and 2^-7 of a colour: the mesh is for display only, and takes a quarter of the bytes.
     rgba = np.hstack([np.round(colours.reshape(-1, 3) * 128.0) / 128.0, np.ones((len(points), 1))])
     body = mesh.SerializeToString(deterministic=True)
@@ -170,45 +170,53 @@ def threats_scene(time_ns: int, threats: Threats, terrain: Terrain | None) -> by
     entity = _entity(time_ns, "threats")
     for k, name in enumerate(threats.names):
         center = threats.position[k]
-        for radius, colour in ((threats.kill_radius[k], _KILL), (threats.detection_radius[k], _DETECTION)):
+        for radius, colour in (
+            (threats.kill_radius[k], _KILL_COLOUR),
+            (threats.detection_radius[k], _DETECTION_COLOUR),
+        ):
             if radius > 0.0:
                 diameter = 2.0 * float(radius)
                 entity.spheres.add(
                     pose=_pose(center), size=Vector3(x=diameter, y=diameter, z=diameter), color=_colour(colour)
                 )
-        entity.texts.append(_label(_label_position(center, terrain), name))
-    return _update(entity)
+        entity.texts.append(_make_label(_label_position(center, terrain), name))
+    return _encode_update(entity)
 
 
-def _label_position(place: Floats, terrain: Terrain | None) -> Floats:
-    """Return a position for a name, at least `_LABEL_HEIGHT_M` above the highest known ground within `_NEAR`."""
-    east, north, up = (float(value) for value in place)
+def _label_position(position: Floats, terrain: Terrain | None) -> Floats:
+    """Return the position of a label: above the point and the highest known ground around it."""
+    east, north, up = (float(value) for value in position)
     top_altitude = up
     if terrain is not None:
-        steps = np.linspace(-_NEAR, _NEAR, 9)
+        steps = np.linspace(-_LABEL_GROUND_DISTANCE_M, _LABEL_GROUND_DISTANCE_M, 9)
         nearby_heights = terrain.height(*np.meshgrid(east + steps, north + steps))
         top_altitude = float(np.max(nearby_heights, where=np.isfinite(nearby_heights), initial=up))
     return np.array([east, north, top_altitude + _LABEL_HEIGHT_M])
 
 
-def _label(place: Floats, name: str) -> TextPrimitive:
+def _make_label(position: Floats, name: str) -> TextPrimitive:
     return TextPrimitive(
-        pose=_pose(place), billboard=True, font_size=14.0, scale_invariant=True, color=_colour(_TRACK), text=name
+        pose=_pose(position),
+        billboard=True,
+        font_size=14.0,
+        scale_invariant=True,
+        color=_colour(_TRACK_COLOUR),
+        text=name,
     )
 
 
 def plan_scene(time_ns: int, waypoints: Floats, items: Sequence[int]) -> bytes:
     """Draw legs between waypoints (w, 3) as a line, and waypoints as dots with numbers and mission items."""
     entity = _entity(time_ns, "plan")
-    legs = _line(_PLAN)
+    legs = _line(_PLAN_COLOUR)
     legs.points.extend(_points(waypoints))
     entity.lines.append(legs)
     for point in waypoints:
-        entity.spheres.add(pose=_pose(point), size=Vector3(x=40.0, y=40.0, z=40.0), color=_colour(_PLAN))
+        entity.spheres.add(pose=_pose(point), size=Vector3(x=40.0, y=40.0, z=40.0), color=_colour(_PLAN_COLOUR))
     for number, (point, item) in enumerate(zip(waypoints, items, strict=True)):
         text = f"{number} (item {item})" if item >= 0 else str(number)
-        entity.texts.append(_label(point + np.array([0.0, 0.0, _LABEL_HEIGHT_M]), text))
-    return _update(entity)
+        entity.texts.append(_make_label(point + np.array([0.0, 0.0, _LABEL_HEIGHT_M]), text))
+    return _encode_update(entity)
 
 
 def track_scene(time_ns: int, positions: Floats) -> bytes:
@@ -218,12 +226,12 @@ def track_scene(time_ns: int, positions: Floats) -> bytes:
     return length_delimited(2, entity + length_delimited(_ENTITY_LINES, line))
 
 
-def _update(entity: SceneEntity) -> bytes:
+def _encode_update(entity: SceneEntity) -> bytes:
     return SceneUpdate(entities=[entity]).SerializeToString(deterministic=True)
 
 
 def _entity(time_ns: int, name: str) -> SceneEntity:
-    return SceneEntity(timestamp=timestamp(time_ns), frame_id=MAP, id=name, frame_locked=True)
+    return SceneEntity(timestamp=timestamp(time_ns), frame_id=MAP_FRAME, id=name, frame_locked=True)
 
 
 def _colour(rgba: tuple[float, float, float, float]) -> Color:
@@ -247,7 +255,7 @@ def _line(colour: tuple[float, float, float, float]) -> LinePrimitive:
     )
 
 
-_TRACK_LINE = _line(_TRACK).SerializeToString(deterministic=True)
+_TRACK_LINE = _line(_TRACK_COLOUR).SerializeToString(deterministic=True)
 
 
 def _points(points: Floats) -> Iterable[Point3]:
@@ -263,11 +271,11 @@ def zones_scene(time_ns: int, scenario: Scenario, waypoints: Floats) -> bytes:
         for wall in walls:
             step = max(1, (len(wall) - 1) // MAX_POSTS)
             for path in (wall[:, 0], wall[:, 1], *wall[:-1:step]):
-                edge = _line(_KEEP_OUT if zone.kind == "exclusion" else _STAY_IN)
+                edge = _line(_EXCLUSION_COLOUR if zone.kind == "exclusion" else _INCLUSION_COLOUR)
                 edge.points.extend(_points(path))
                 entity.lines.append(edge)
-        entity.texts.append(_label(_label_position(walls[0][0, 1], scenario.terrain), zone.name))
-    return _update(entity)
+        entity.texts.append(_make_label(_label_position(walls[0][0, 1], scenario.terrain), zone.name))
+    return _encode_update(entity)
 
 
 def returns_scene(time_ns: int, drawn: DrawnReturns, terrain: Terrain | None) -> bytes:
@@ -276,18 +284,20 @@ def returns_scene(time_ns: int, drawn: DrawnReturns, terrain: Terrain | None) ->
     The coloured line lies below the path, so that plan and track stay visible.
     """
     entity = _entity(time_ns, "returns")
-    for kind, segment in drawn.by_kind:
+    for kind, segment in drawn.segments_by_outcome:
         points = np.array([ret.start for ret in segment]) - np.array([0.0, 0.0, _PATH_OFFSET_M])
         _add_line(entity, f"return-{kind}", points, 6.0)
     for number, worst in enumerate(drawn.worst, 1):
-        _add_line(entity, "return-way", worst.way)
-        entity.texts.append(_label(worst.at + np.array([0.0, 0.0, _LABEL_HEIGHT_M]), f"return {number}"))
+        _add_line(entity, "return-way", worst.path)
+        entity.texts.append(
+            _make_label(worst.marked_position + np.array([0.0, 0.0, _LABEL_HEIGHT_M]), f"return {number}")
+        )
     footprint = drawn.glides.footprint
     if footprint is not None and terrain is not None:
         for band in footprint.bands():
             _add_parts(entity, BAND_ROLES[band.up_to], band.parts, terrain)
         _add_parts(entity, "landable", footprint.landings(), terrain)
-    return _update(entity)
+    return _encode_update(entity)
 
 
 def _add_parts(entity: SceneEntity, role: str, parts: Sequence[Part], terrain: Terrain) -> None:
@@ -312,7 +322,7 @@ def _add_line(entity: SceneEntity, role: str, points: Floats, thickness: float =
 # trimesh would save 15 lines of glTF, but it rounds colours to 8 bits, makes three nodes, and takes 0.5 s to import.
 
 # Wing span of the model, m, for every aircraft: at its true size it would be invisible among hills.
-SPAN = 100.0
+MODEL_SPAN_M = 100.0
 MEDIA_TYPE = "model/gltf-binary"
 
 # Points of the model: forward, left, up in spans.
@@ -329,7 +339,7 @@ _LEFT = [
     [(-0.32, 0.0, 0.03), (-0.42, 0.18, 0.03), (-0.46, 0.0, 0.03)],
 ]
 _RIGHT = [[(x, -y, z) for x, y, z in reversed(triangle)] for triangle in _LEFT]
-_PARTS = tuple(
+_MODEL_PARTS = tuple(
     (triangles, (*theme.rgb(text), 1.0))
     for triangles, text in zip((_BODY, _LEFT, _RIGHT), theme.AIRCRAFT_PARTS, strict=True)
 )
@@ -344,13 +354,15 @@ _VERTICES = 34962
 
 
 def model_corners() -> Singles:
-    """Return the corners of the triangles (t, 3, 3), m forward, left and up; the model is `SPAN` wide."""
-    return np.array([triangle for triangles, _ in _PARTS for triangle in triangles], dtype=np.float32) * SPAN
+    """Return the corners of the triangles (t, 3, 3), m forward, left and up; the model is `MODEL_SPAN_M` wide."""
+    return (
+        np.array([triangle for triangles, _ in _MODEL_PARTS for triangle in triangles], dtype=np.float32) * MODEL_SPAN_M
+    )
 
 
 def model_colours() -> Singles:
     """Return the colours of the triangles (t, 4): red, green, blue, opacity, 0 to 1."""
-    return np.array([colour for triangles, colour in _PARTS for _ in triangles], dtype=np.float32)
+    return np.array([colour for triangles, colour in _MODEL_PARTS for _ in triangles], dtype=np.float32)
 
 
 def aircraft_glb() -> bytes:
@@ -358,7 +370,7 @@ def aircraft_glb() -> bytes:
     pieces = b""
     views: list[dict[str, Any]] = []
     accessors, primitives, materials = [], [], []
-    for triangles, colour in _PARTS:
+    for triangles, colour in _MODEL_PARTS:
         forward_left_up = np.array(triangles, dtype=np.float32).reshape(-1, 3)
         points = np.stack([forward_left_up[:, 0], forward_left_up[:, 2], -forward_left_up[:, 1]], axis=1)
         data = points.tobytes()
@@ -399,13 +411,13 @@ def aircraft_scene(time_ns: int) -> bytes:
     """Return the model as a SceneUpdate in the frame of the aircraft, so that the transforms move it."""
     model = ModelPrimitive(
         pose=Pose(position=Vector3(), orientation=Quaternion(x=0.0, y=0.0, z=0.0, w=1.0)),
-        scale=Vector3(x=SPAN, y=SPAN, z=SPAN),
+        scale=Vector3(x=MODEL_SPAN_M, y=MODEL_SPAN_M, z=MODEL_SPAN_M),
         color=_colour(theme.rgba("paper")),
         media_type=MEDIA_TYPE,
         data=aircraft_glb(),
     )
     entity = SceneEntity(
-        timestamp=timestamp(time_ns), frame_id=AIRCRAFT, id="aircraft", frame_locked=True, models=[model]
+        timestamp=timestamp(time_ns), frame_id=AIRCRAFT_FRAME, id="aircraft", frame_locked=True, models=[model]
     )
     return SceneUpdate(entities=[entity]).SerializeToString(deterministic=True)
 

@@ -16,7 +16,14 @@ from numpy.typing import NDArray
 from flight.simulation.setup import FlightSetup
 from logs import theme
 from logs.recording import foxglove_scene as scene
-from logs.recording.foxglove_scene import AIRCRAFT, MAP, log_message, model_corners, terrain_points, timestamp
+from logs.recording.foxglove_scene import (
+    AIRCRAFT_FRAME,
+    MAP_FRAME,
+    log_message,
+    model_corners,
+    terrain_points,
+    timestamp,
+)
 from logs.recording.mcap_writer import SECOND_NS, MessageRecords, single_record, stamped_records
 from logs.recording.state_channel import (
     EPOCH_NS,
@@ -38,11 +45,11 @@ from world.threats import Threats
 # parts lose the points that are nearest to the straight line between their neighbours.
 
 # Time between messages, s.
-EVERY = 2
+TRACK_INTERVAL_S = 2
 # Greatest number of points of one message.
 MAX_POINTS = 96
 # Number of points to which a message is thinned when it has reached the greatest number.
-THINNED = 64
+THINNED_POINT_COUNT = 64
 
 
 class TrackSoFar:
@@ -53,7 +60,7 @@ class TrackSoFar:
         self._count = 0
 
     def add(self, position: Floats) -> Floats:
-        """Add a position (3,), `EVERY` s after the last, and return the track (n, 3), valid until the next call.
+        """Add a position (3,) `TRACK_INTERVAL_S` s after the last; return the track (n, 3), valid until the next call.
 
         >>> track = TrackSoFar()
         >>> for k in range(500):
@@ -64,8 +71,8 @@ class TrackSoFar:
         self._points[self._count] = position
         self._count += 1
         if self._count > MAX_POINTS:
-            self._points[:THINNED] = thin_line(self._points, THINNED)
-            self._count = THINNED
+            self._points[:THINNED_POINT_COUNT] = thin_line(self._points, THINNED_POINT_COUNT)
+            self._count = THINNED_POINT_COUNT
         return self._points[: self._count]
 
 
@@ -95,7 +102,7 @@ def thin_line(points: Floats, point_count: int) -> Floats:
 # Events in flight, recorded when they happen: starts of legs, entry into and exit from the reach of threats.
 
 # `name` of these events in the log; events that a timeline computes itself are not read back.
-NAME = "flight"
+EVENT_SOURCE = "flight"
 # Interval between checks of threats, ns.
 _CHECK_INTERVAL_NS = 200_000_000
 
@@ -112,7 +119,7 @@ class FlightEvents:
             "radar range": np.zeros(len(self._threats.names), dtype=bool),
         }
 
-    def take(self, log_times: Ints, position: Floats, leg: Floats) -> Iterator[MessageRecords]:
+    def event_records(self, log_times: Ints, position: Floats, leg: Floats) -> Iterator[MessageRecords]:
         """Yield messages of rows.  log_times: (n,) ns.  position: (n, 3) m.  leg: (n,) the active leg."""
         if not len(log_times):
             return
@@ -148,7 +155,7 @@ class FlightEvents:
         return self._event_record(time, text, level if has_entered else "info")
 
     def _event_record(self, time: int, text: str, level: str) -> MessageRecords:
-        message = log_message(time, text, level, NAME).SerializeToString(deterministic=True)
+        message = log_message(time, text, level, EVENT_SOURCE).SerializeToString(deterministic=True)
         return single_record(self._channel, time, message)
 
 
@@ -169,11 +176,11 @@ def _colour_bytes(role: str) -> Colour:
     return red, green, blue, opacity
 
 
-_PLAN = _colour_bytes("planned")
-_TRACK = _colour_bytes("flown")
-_AIRCRAFT = _colour_bytes("highlight")
-_KILL = _colour_bytes("missile")
-_DETECTION = _colour_bytes("radar")
+_PLAN_COLOUR = _colour_bytes("planned")
+_TRACK_COLOUR = _colour_bytes("flown")
+_AIRCRAFT_COLOUR = _colour_bytes("highlight")
+_KILL_COLOUR = _colour_bytes("missile")
+_DETECTION_COLOUR = _colour_bytes("radar")
 # Distance between points of a line, m.
 _POINT_SPACING_M = 30.0
 # Greatest number of points of a line.
@@ -184,7 +191,7 @@ _SPHERE_POINTS = 150
 _SIDE_INTERVALS = 7
 
 
-def cloud(time_ns: int, frame: str, points: Floats, colours: NDArray[np.uint8] | Colour) -> bytes:
+def point_cloud(time_ns: int, frame: str, points: Floats, colours: NDArray[np.uint8] | Colour) -> bytes:
     """Make a PointCloud of points (n, 3) m in a frame, rounded to 1/16 m.
 
     colours: (n, 4) red, green, blue, alpha, or one for all.
@@ -215,17 +222,17 @@ def ground_cloud(time_ns: int, scenario: Scenario) -> bytes:
     """Return the corners of the mesh of the ground as points."""
     points, colours = terrain_points(scenario)
     shades = np.hstack([np.round(colours * 255.0), np.full((len(points), 1), 255.0)]).astype(np.uint8)
-    return cloud(time_ns, MAP, points, shades)
+    return point_cloud(time_ns, MAP_FRAME, points, shades)
 
 
 def plan_cloud(time_ns: int, waypoints: Floats) -> bytes:
     """Return the legs between waypoints (w, 3) as points."""
-    return cloud(time_ns, MAP, along(waypoints), _PLAN)
+    return point_cloud(time_ns, MAP_FRAME, points_along_legs(waypoints), _PLAN_COLOUR)
 
 
 def track_cloud(time_ns: int, positions: Floats) -> bytes:
     """Return the flown positions (n, 3) as points."""
-    return cloud(time_ns, MAP, positions, _TRACK)
+    return point_cloud(time_ns, MAP_FRAME, positions, _TRACK_COLOUR)
 
 
 def aircraft_cloud(time_ns: int) -> bytes:
@@ -240,7 +247,7 @@ def aircraft_cloud(time_ns: int) -> bytes:
     points = (first_weight * first + second_weight * second + (1.0 - first_weight - second_weight) * third).reshape(
         -1, 3
     )
-    return cloud(time_ns, AIRCRAFT, np.unique(np.round(points, 2), axis=0), _AIRCRAFT)
+    return point_cloud(time_ns, AIRCRAFT_FRAME, np.unique(np.round(points, 2), axis=0), _AIRCRAFT_COLOUR)
 
 
 def threats_cloud(time_ns: int, threats: Threats) -> bytes:
@@ -251,15 +258,15 @@ def threats_cloud(time_ns: int, threats: Threats) -> bytes:
         [np.sqrt(1.0 - height**2) * np.cos(angle), np.sqrt(1.0 - height**2) * np.sin(angle), height], axis=1
     )
     points, shades = [np.zeros((0, 3))], [np.zeros((0, 4), dtype=np.uint8)]
-    for radii, colour in ((threats.kill_radius, _KILL), (threats.detection_radius, _DETECTION)):
+    for radii, colour in ((threats.kill_radius, _KILL_COLOUR), (threats.detection_radius, _DETECTION_COLOUR)):
         for center, radius in zip(threats.position, radii, strict=True):
             if radius > 0.0:
                 points.append(center + float(radius) * sphere)
                 shades.append(np.tile(np.array(colour, dtype=np.uint8), (_SPHERE_POINTS, 1)))
-    return cloud(time_ns, MAP, np.concatenate(points), np.concatenate(shades))
+    return point_cloud(time_ns, MAP_FRAME, np.concatenate(points), np.concatenate(shades))
 
 
-def along(waypoints: Floats) -> Floats:
+def points_along_legs(waypoints: Floats) -> Floats:
     """Return points at even distances on the legs between waypoints (w, 3), including the waypoints."""
     lengths = np.sqrt((np.diff(waypoints, axis=0) ** 2).sum(axis=1))
     spacing = max(_POINT_SPACING_M, float(lengths.sum()) / _MAX_SAMPLES)
@@ -288,9 +295,9 @@ _MIN_CLOUD_INTERVAL_S = 10.0
 # Least ratio of successive times of these messages, which limits their number.
 _CLOUD_RATIO = 1.05
 # Constant parts of the messages after their timestamps, in protobuf's encoding.
-_TRANSFORM_NAMES = FrameTransform(parent_frame_id=scene.MAP, child_frame_id=scene.AIRCRAFT).SerializeToString(
-    deterministic=True
-)
+_TRANSFORM_NAMES = FrameTransform(
+    parent_frame_id=scene.MAP_FRAME, child_frame_id=scene.AIRCRAFT_FRAME
+).SerializeToString(deterministic=True)
 _TRANSFORM = np.dtype(
     [
         ("names", np.uint8, (len(_TRANSFORM_NAMES),)),
@@ -298,7 +305,7 @@ _TRANSFORM = np.dtype(
         ("rotation", submessage_dtype(_XYZW)),
     ]
 )
-_FIX_NAMES = LocationFix(frame_id=scene.AIRCRAFT).SerializeToString(deterministic=True)
+_FIX_NAMES = LocationFix(frame_id=scene.AIRCRAFT_FRAME).SerializeToString(deterministic=True)
 _FIX = np.dtype([("names", np.uint8, (len(_FIX_NAMES),)), *tagged_doubles(_GEO)])
 
 
@@ -343,14 +350,14 @@ class Poses:
         self._so_far = TrackSoFar()
         self._next_cloud = 0.0  # s
 
-    def take(self, log_times: Ints, position: Floats, attitude: Floats) -> Iterator[MessageRecords]:
-        """Yield messages of the first good row in each slot, a fix each second, and the track every `EVERY` s.
+    def pose_records(self, log_times: Ints, position: Floats, attitude: Floats) -> Iterator[MessageRecords]:
+        """Yield a transform for each slot, a fix each second, and the track every `TRACK_INTERVAL_S` s.
 
         log_times: (n,) ns, of whole seconds.  position, attitude: (n, 3).
         """
         good_rows = np.flatnonzero(np.isfinite(position).all(axis=1) & np.isfinite(attitude).all(axis=1))
         slots = log_times[good_rows] // _SLOT_NS
-        chosen_rows = good_rows[_changes(slots, self._slot)]
+        chosen_rows = good_rows[_change_indices(slots, self._slot)]
         if good_rows.size:
             self._tail = position[good_rows[-1:]]
         if not chosen_rows.size:
@@ -359,14 +366,14 @@ class Poses:
         chosen_times = log_times[chosen_rows]
         yield transform_messages(self._channels[TF_TOPIC], chosen_times, position[chosen_rows], attitude[chosen_rows])
         seconds = chosen_times // SECOND_NS
-        starts = chosen_rows[_changes(seconds, self._second)]
+        starts = chosen_rows[_change_indices(seconds, self._second)]
         if not starts.size:
             return
         self._second = int(seconds[-1])
         firsts = position[starts]
         yield fix_messages(self._channels[FIX_TOPIC], log_times[starts], self._origin, firsts)
         self._path.append(firsts)
-        for k in np.flatnonzero((log_times[starts] - EPOCH_NS) // SECOND_NS % EVERY == 0).tolist():
+        for k in np.flatnonzero((log_times[starts] - EPOCH_NS) // SECOND_NS % TRACK_INTERVAL_S == 0).tolist():
             log_time = int(log_times[starts[k]])
             with np.errstate(over="ignore", invalid="ignore"):
                 line = np.round(self._so_far.add(firsts[k]) * 16.0) / 16.0
@@ -388,6 +395,6 @@ class Poses:
         return single_record(self._channels[TRACK_POINTS], log_time, points)
 
 
-def _changes(values: Ints, previous: int) -> Ints:
+def _change_indices(values: Ints, previous: int) -> Ints:
     """Return the indices at which non-decreasing values change, starting from ``previous``."""
     return np.flatnonzero(np.diff(values, prepend=previous) > 0)

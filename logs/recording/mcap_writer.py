@@ -84,7 +84,7 @@ class _ChunkIndex(NamedTuple):
 
     content_start: int
     content_end: int
-    at: int
+    position: int
     length: int
     offsets: tuple[tuple[int, int], ...]
     index_length: int
@@ -94,14 +94,14 @@ class _ChunkIndex(NamedTuple):
     def record(self) -> bytes:
         """Return its chunk index record."""
         offsets = b"".join(_OFFSET.pack(channel, position) for channel, position in self.offsets)
-        times = _CHUNK_INDEX.pack(self.content_start, self.content_end, self.at, self.length, len(offsets))
+        times = _CHUNK_INDEX.pack(self.content_start, self.content_end, self.position, self.length, len(offsets))
         sizes = _SIZES.pack(self.compressed, self.size)
         content = times + offsets + self.index_length.to_bytes(8, "little") + _COMPRESSION + sizes
         return FRAME.pack(Opcode.CHUNK_INDEX, len(content)) + content
 
 
 class ContainerWriter:
-    """Writer of a container: magic and header, then attachments and chunks, and the summary at `finish`."""
+    """Writer of a container: magic and header, then attachments and chunks, and the summary at `write_end`."""
 
     def __init__(self, file: BinaryIO, profile: str, level: int = 3) -> None:
         """Begin a container in an empty file open for writing.
@@ -111,24 +111,24 @@ class ContainerWriter:
         self._file = file
         self._compressor = zstandard.ZstdCompressor(level=level)
         self._crc = 0
-        self._at = 0
+        self._offset = 0
         self._schemas: dict[str, Schema] = {}
         self._channels: list[Channel] = []
         self._unwritten: list[McapRecord] = []
         self._attachments: list[AttachmentIndex] = []
         self._chunks: list[_ChunkIndex] = []
         self._counts: Counter[int] = Counter()
-        self._put(MAGIC + _bytes(Header(profile=profile, library=profile)))
+        self._write_bytes(MAGIC + _bytes(Header(profile=profile, library=profile)))
 
-    def attach(self, name: str, media_type: str, data: bytes, log_time: int) -> None:
+    def write_attachment(self, name: str, media_type: str, data: bytes, log_time: int) -> None:
         """Write an attachment."""
         record = _bytes(Attachment(create_time=0, log_time=log_time, name=name, media_type=media_type, data=data))
-        index = AttachmentIndex(self._at, len(record), log_time, 0, len(data), name, media_type)
+        index = AttachmentIndex(self._offset, len(record), log_time, 0, len(data), name, media_type)
         self._attachments.append(index)
-        self._put(record)
+        self._write_bytes(record)
 
-    def channel(self, topic: str, schema: str, data: bytes) -> int:
-        """Add a protobuf channel and return its number; it is written into the next chunk.
+    def add_channel(self, topic: str, schema: str, data: bytes) -> int:
+        """Add a protobuf channel to the next chunk, and return its number.
 
         schema: full name of the message.  data: its FileDescriptorSet.
         """
@@ -140,14 +140,14 @@ class ContainerWriter:
         self._unwritten.append(channel)
         return channel.id
 
-    def front(self) -> bytes:
-        """Return the schemas and channels not yet in any chunk, for the beginning of the next chunk."""
+    def take_new_records(self) -> bytes:
+        """Take the records of the schemas and channels that are not in any chunk yet, for the next chunk."""
         front = b"".join(_bytes(record) for record in self._unwritten)
         self._unwritten.clear()
         return front
 
-    def copy(self, data: bytes) -> None:
-        """Write a chunk of another file, from its records.
+    def copy_chunk(self, data: bytes) -> None:
+        """Write the records of another file's chunk as a chunk.
 
         Raises ValueError and the errors of mcap's classes.
 
@@ -172,36 +172,36 @@ class ContainerWriter:
             position += len(parts[-1])
         times = [log_time for pairs in index.values() for log_time, _ in pairs]
         start, end = (min(times), max(times)) if times else (0, 0)
-        self.chunk(ChunkContent(data, b"".join(parts), tuple(channels), start, end))
+        self.write_chunk(ChunkContent(data, b"".join(parts), tuple(channels), start, end))
 
-    def chunk(self, content: ChunkContent) -> None:
+    def write_chunk(self, content: ChunkContent) -> None:
         """Write a chunk."""
         data = self._compressor.compress(content.records)
         size = len(content.records)
         header = _CHUNK.pack(content.start, content.end, size, zlib.crc32(content.records)) + _COMPRESSION
         header += len(data).to_bytes(8, "little")
         length = FRAME.size + len(header) + len(data)
-        index_start = self._at + length
+        index_start = self._offset + length
         offsets = tuple(
             (channel_index.channel, index_start + channel_index.offset) for channel_index in content.channels
         )
         for channel_index in content.channels:
             self._counts[channel_index.channel] += channel_index.messages
         self._chunks.append(
-            _ChunkIndex(content.start, content.end, self._at, length, offsets, len(content.index), len(data), size)
+            _ChunkIndex(content.start, content.end, self._offset, length, offsets, len(content.index), len(data), size)
         )
         frame = FRAME.pack(Opcode.CHUNK, length - FRAME.size)
-        self._put(b"".join((frame, header, data, content.index)))
+        self._write_bytes(b"".join((frame, header, data, content.index)))
 
     @property
     def last_time(self) -> int:
         """Return the log_time of the newest message, ns; 0 before the first chunk."""
         return max((chunk.content_end for chunk in self._chunks), default=0)
 
-    def finish(self) -> None:
+    def write_end(self) -> None:
         """Write the end of the data section and the summary; the file stays open."""
-        self._put(_bytes(DataEnd(self._crc)))
-        start = self._at
+        self._write_bytes(_bytes(DataEnd(self._crc)))
+        start = self._offset
         groups = [
             (Opcode.SCHEMA, [_bytes(schema) for schema in self._schemas.values()]),
             (Opcode.CHANNEL, [_bytes(channel) for channel in self._channels]),
@@ -219,7 +219,7 @@ class ContainerWriter:
         footer = _bytes(Footer(start, start + len(summary), 0))
         # The CRC covers the summary and the footer up to the CRC itself.
         crc = zlib.crc32(summary + offsets + footer[:-4])
-        self._put(summary + offsets + footer[:-4] + crc.to_bytes(4, "little") + MAGIC)
+        self._write_bytes(summary + offsets + footer[:-4] + crc.to_bytes(4, "little") + MAGIC)
 
     def _statistics(self) -> Statistics:
         return Statistics(
@@ -241,13 +241,13 @@ class ContainerWriter:
         except OSError as error:
             raise _with_file_name(error, self._file) from error
 
-    def _put(self, data: bytes) -> None:
+    def _write_bytes(self, data: bytes) -> None:
         try:
             self._file.write(data)
         except OSError as error:
             raise _with_file_name(error, self._file) from error
         self._crc = zlib.crc32(data, self._crc)
-        self._at += len(data)
+        self._offset += len(data)
 
 
 def _with_file_name(error: OSError, file: BinaryIO) -> OSError:
@@ -337,148 +337,150 @@ class Layout:
 
 
 @inner
-def _put(out: Bytes, position: int, value: int, size: int) -> int:
+def _write_number(buffer: Bytes, position: int, value: int, size: int) -> int:
     """Write a little-endian number of ``size`` bytes, and return the position of its end."""
     for k in range(size):
-        out[position + k] = (value >> (8 * k)) & 0xFF
+        buffer[position + k] = (value >> (8 * k)) & 0xFF
     return position + size
 
 
 @inner
-def _put_varint(out: Bytes, position: int, value: int) -> int:
+def _write_varint(buffer: Bytes, position: int, value: int) -> int:
     while value > 127:
-        out[position] = (value & 127) | 128
+        buffer[position] = (value & 127) | 128
         value >>= 7
         position += 1
-    out[position] = value
+    buffer[position] = value
     return position + 1
 
 
 @compiled
-def _put_head(out: Bytes, position: int, size: int, channel: int, log_time: int) -> int:
+def _write_message_header(buffer: Bytes, position: int, size: int, channel: int, log_time: int) -> int:
     """Write the frame and header of a message record; ``size`` is the size of the message."""
-    out[position] = MESSAGE_OPCODE
-    position = _put(out, position + 1, MESSAGE_HEADER + size, 8)
-    position = _put(out, position, channel, 2)
-    position = _put(out, position, 0, 4)
-    position = _put(out, position, log_time, 8)
-    return _put(out, position, log_time, 8)
+    buffer[position] = MESSAGE_OPCODE
+    position = _write_number(buffer, position + 1, MESSAGE_HEADER + size, 8)
+    position = _write_number(buffer, position, channel, 2)
+    position = _write_number(buffer, position, 0, 4)
+    position = _write_number(buffer, position, log_time, 8)
+    return _write_number(buffer, position, log_time, 8)
 
 
 @compiled
-def _stamped(log_times: Ints, channel: int, tag: int, bodies: Bytes) -> tuple[Bytes, Ints]:
+def _stamp_messages(log_times: Ints, channel: int, tag: int, bodies: Bytes) -> tuple[Bytes, Ints]:
     count, body_size = bodies.shape
     # The timestamp takes at most 2 + 12 bytes: tag and length, then two tags and two varints of five bytes.
-    out = np.empty(count * (FRAME_SIZE + MESSAGE_HEADER + 14 + body_size), dtype=np.uint8)
+    buffer = np.empty(count * (FRAME_SIZE + MESSAGE_HEADER + 14 + body_size), dtype=np.uint8)
     offsets = np.zeros(count + 1, dtype=np.int64)
     timestamp = np.empty(16, dtype=np.uint8)
     position = 0
     for k in range(count):
         log_time = log_times[k]
         timestamp[0] = 0x08
-        size = _put_varint(timestamp, 1, log_time // SECOND_NS)
+        size = _write_varint(timestamp, 1, log_time // SECOND_NS)
         timestamp[size] = 0x10
-        size = _put_varint(timestamp, size + 1, log_time % SECOND_NS)
-        position = _put_head(out, position, 2 + size + body_size, channel, log_time)
-        out[position], out[position + 1] = tag, size
+        size = _write_varint(timestamp, size + 1, log_time % SECOND_NS)
+        position = _write_message_header(buffer, position, 2 + size + body_size, channel, log_time)
+        buffer[position], buffer[position + 1] = tag, size
         position += 2
-        copy_into(out[position : position + size], timestamp[:size])
+        copy_into(buffer[position : position + size], timestamp[:size])
         position += size
-        copy_into(out[position : position + body_size], bodies[k])
+        copy_into(buffer[position : position + body_size], bodies[k])
         position += body_size
         offsets[k + 1] = position
-    return out[:position], offsets
+    return buffer[:position], offsets
 
 
 def stamped_records(log_times: Ints, channel: int, timestamp_field: int, bodies: Bytes) -> MessageRecords:
-    """Return records of messages that consist of a timestamp and bytes of one size.
+    """Return the records of messages with a timestamp and a body of constant size.
 
     log_times: (n,) ns since 1970.  timestamp_field: field number of the timestamp.  bodies: (n, size) bytes after the
     timestamp, in protobuf's encoding.
     """
     tag = timestamp_field << 3 | 2  # length-delimited
-    blob, offsets = _stamped(np.ascontiguousarray(log_times), channel, tag, bodies)
+    blob, offsets = _stamp_messages(np.ascontiguousarray(log_times), channel, tag, bodies)
     return MessageRecords(channel, log_times, offsets, blob)
 
 
 def single_record(channel: int, log_time: int, data: bytes) -> MessageRecords:
     """Return the record of one message with the bytes ``data``."""
-    out = np.empty(FRAME_SIZE + MESSAGE_HEADER + len(data), dtype=np.uint8)
-    position = _put_head(out, 0, len(data), channel, log_time)
-    out[position:] = np.frombuffer(data, np.uint8)
-    return MessageRecords(channel, np.array([log_time]), np.array([0, len(out)]), out)
+    record = np.empty(FRAME_SIZE + MESSAGE_HEADER + len(data), dtype=np.uint8)
+    position = _write_message_header(record, 0, len(data), channel, log_time)
+    record[position:] = np.frombuffer(data, np.uint8)
+    return MessageRecords(channel, np.array([log_time]), np.array([0, len(record)]), record)
 
 
 @compiled
-def _order(
-    row_times: Ints, row_length: int, row_channel: int, others: Entries, front: int, limit: int
+def _merge_by_time(
+    row_times: Ints, row_length: int, row_channel: int, other_messages: Entries, front_size: int, limit: int
 ) -> tuple[Entries, Ints]:
     """Merge rows and other messages by time; return all messages (n,) and the first of each chunk.
 
     At equal times a row comes last.  The array of first messages ends with n.
     """
-    count = len(row_times) + len(others)
+    count = len(row_times) + len(other_messages)
     merged = np.empty(count, dtype=ENTRY)
     firsts = np.empty(count + 1, dtype=np.int64)
-    chunks, size, i, j = 0, front, 0, 0
+    chunks, size, i, j = 0, front_size, 0, 0
     for k in range(count):
-        entry = merged[k]
-        if i < len(row_times) and (j >= len(others) or row_times[i] < others[j].log_time):
-            entry.source, entry.length, entry.channel = FROM_ROWS, row_length, row_channel
-            entry.log_time = row_times[i]
+        message = merged[k]
+        if i < len(row_times) and (j >= len(other_messages) or row_times[i] < other_messages[j].log_time):
+            message.source, message.length, message.channel = FROM_ROWS, row_length, row_channel
+            message.log_time = row_times[i]
             i += 1
         else:
-            other = others[j]
-            entry.source, entry.length, entry.channel = other.source, other.length, other.channel
-            entry.log_time = other.log_time
+            other = other_messages[j]
+            message.source, message.length, message.channel = other.source, other.length, other.channel
+            message.log_time = other.log_time
             j += 1
-        second = entry.log_time // SECOND_NS
+        second = message.log_time // SECOND_NS
         if k == 0 or (
-            k > firsts[chunks - 1] and (size + entry.length > limit or second != merged[k - 1].log_time // SECOND_NS)
+            k > firsts[chunks - 1] and (size + message.length > limit or second != merged[k - 1].log_time // SECOND_NS)
         ):
             firsts[chunks] = k
             chunks += 1
-            size = front if k == 0 else 0
-        entry.offset = size
-        size += entry.length
+            size = front_size if k == 0 else 0
+        message.offset = size
+        size += message.length
     firsts[chunks] = count
     return merged, firsts[: chunks + 1]
 
 
 @compiled
-def _fill(entries: Entries, rows: Bytes, blob: Bytes, front: Bytes) -> Bytes:
+def _copy_messages(entries: Entries, rows: Bytes, blob: Bytes, front: Bytes) -> Bytes:
     """Copy the messages one after the other, after ``front``."""
     total = len(front)
     for k in range(len(entries)):
         total += entries[k].length
-    out = np.empty(total, dtype=np.uint8)
-    copy_into(out[: len(front)], front)
+    blob_out = np.empty(total, dtype=np.uint8)
+    copy_into(blob_out[: len(front)], front)
     position, row = len(front), 0
     for k in range(len(entries)):
         length, source = entries[k].length, entries[k].source
         if source == FROM_ROWS:
-            copy_into(out[position : position + length], rows[row])
+            copy_into(blob_out[position : position + length], rows[row])
             row += 1
         else:
-            copy_into(out[position : position + length], blob[source : source + length])
+            copy_into(blob_out[position : position + length], blob[source : source + length])
         position += length
-    return out
+    return blob_out
 
 
 @compiled
-def _index(entries: Entries, firsts: Ints, front: int, max_channel: int) -> tuple[Bytes, Chunks, ChannelIndexes]:
+def _index_messages(
+    entries: Entries, firsts: Ints, front_size: int, max_channel: int
+) -> tuple[Bytes, Chunks, ChannelIndexes]:
     """Return the message index records of each chunk by channel, and the tables of `Layout`.
 
     max_channel: highest channel number.
     """
     count = len(firsts) - 1
-    out = np.empty(len(entries) * _INDEX_ENTRY + count * (max_channel + 1) * _INDEX_HEAD, dtype=np.uint8)
+    index_records = np.empty(len(entries) * _INDEX_ENTRY + count * (max_channel + 1) * _INDEX_HEAD, dtype=np.uint8)
     chunks = np.zeros(count, dtype=CHUNK)
     channels = np.zeros((count, max_channel + 1), dtype=CHANNEL_INDEX)
     position, start = 0, 0
     for c in range(count):
         chunk, first, stop = chunks[c], firsts[c], firsts[c + 1]
-        size = front if c == 0 else 0
+        size = front_size if c == 0 else 0
         for k in range(first, stop):
             channels[c, entries[k].channel].messages += 1
             size += entries[k].length
@@ -492,45 +494,47 @@ def _index(entries: Entries, firsts: Ints, front: int, max_channel: int) -> tupl
                 continue
             index.offset = position - chunk.index_start
             length = index.messages * _INDEX_ENTRY
-            out[position] = _INDEX_OPCODE
-            position = _put(out, position + 1, 6 + length, 8)
-            position = _put(out, position, channel, 2)
-            position = _put(out, position, length, 4)
+            index_records[position] = _INDEX_OPCODE
+            position = _write_number(index_records, position + 1, 6 + length, 8)
+            position = _write_number(index_records, position, channel, 2)
+            position = _write_number(index_records, position, length, 4)
             for k in range(first, stop):
                 if entries[k].channel == channel:
-                    position = _put(out, position, entries[k].log_time, 8)
-                    position = _put(out, position, entries[k].offset, 8)
+                    position = _write_number(index_records, position, entries[k].log_time, 8)
+                    position = _write_number(index_records, position, entries[k].offset, 8)
         chunk.index_stop = position
-    return out[:position], chunks, channels
+    return index_records[:position], chunks, channels
 
 
-def lay_out(
-    rows: Bytes, row_times: Ints, row_channel: int, others: list[MessageRecords], front: bytes, limit: int
+def lay_out_chunks(
+    rows: Bytes, row_times: Ints, row_channel: int, other_messages: list[MessageRecords], front: bytes, limit: int
 ) -> Layout:
     """Order message records by time, and index them in chunks of at most one second and ``limit`` bytes.
 
     rows: (n, size) records of the channel ``row_channel``, at ``row_times`` (ns); at equal times a row comes last.
     front: bytes before the first message.  A message of more than ``limit`` bytes gets its own chunk.
     """
-    max_channel = max([row_channel, *(messages.channel for messages in others)])
-    blob = np.concatenate([np.zeros(0, np.uint8), *(messages.blob for messages in others)])
-    merged, firsts = _order(row_times, rows.shape[1], row_channel, _entries(others), len(front), limit)
+    max_channel = max([row_channel, *(messages.channel for messages in other_messages)])
+    blob = np.concatenate([np.zeros(0, np.uint8), *(messages.blob for messages in other_messages)])
+    merged, firsts = _merge_by_time(
+        row_times, rows.shape[1], row_channel, _message_entries(other_messages), len(front), limit
+    )
     if not len(merged):
         none = np.zeros(0, np.uint8)
         return Layout(none, none, np.zeros(0, CHUNK), np.zeros((0, max_channel + 1), CHANNEL_INDEX))
-    records = _fill(merged, rows, blob, np.frombuffer(front, np.uint8))
-    index, chunks, channels = _index(merged, firsts, len(front), max_channel)
+    records = _copy_messages(merged, rows, blob, np.frombuffer(front, np.uint8))
+    index, chunks, channels = _index_messages(merged, firsts, len(front), max_channel)
     return Layout(records, index, chunks, channels)
 
 
-def _entries(others: list[MessageRecords]) -> Entries:
-    """Return messages in order of time, with their starts in the joined blobs.
+def _message_entries(other_messages: list[MessageRecords]) -> Entries:
+    """Return the messages in order of time, with their starts in the joined blobs.
 
     Their offsets are not set yet.
     """
-    entries: Entries = np.zeros(sum(len(messages.log_times) for messages in others), dtype=ENTRY)
+    entries: Entries = np.zeros(sum(len(messages.log_times) for messages in other_messages), dtype=ENTRY)
     first, start = 0, 0
-    for messages in others:
+    for messages in other_messages:
         part = entries[first : first + len(messages.log_times)]
         part["source"] = messages.offsets[:-1] + start
         part["length"] = np.diff(messages.offsets)

@@ -20,8 +20,8 @@ from mcap.records import Message as MessageRecord
 from flight.simulation.setup import FlightSetup
 from flight.simulation.track import LATEST, Track
 from logs.importers.open_log import is_imported_log
-from logs.recording.foxglove_scene import LEVELS
-from logs.recording.foxglove_updates import NAME as NOTED_IN_FLIGHT
+from logs.recording.foxglove_scene import LOG_LEVELS
+from logs.recording.foxglove_updates import EVENT_SOURCE as NOTED_IN_FLIGHT
 from logs.recording.mcap_reader import FRAME, MAGIC, PARSE_ERRORS, Container, read_chunks, record_stream, records
 from logs.recording.mcap_writer import FRAME_SIZE, MESSAGE_HEADER
 from logs.recording.setup_attachments import (
@@ -93,7 +93,7 @@ def log_messages(path: Path) -> Iterator[LogMessage]:
         file.seek(len(MAGIC))
         for data in read_chunks(file, Container()):
             try:
-                yield from _messages(data, schemas, channels)
+                yield from _parse_messages(data, schemas, channels)
             except (*PARSE_ERRORS, DecodeError, KeyError):
                 return
 
@@ -114,13 +114,13 @@ def log_channels(path: Path) -> list[LogChannel]:
     with path.open("rb") as file:
         file.seek(len(MAGIC))
         for data in read_chunks(file, Container()):
-            for _ in _messages(data, {}, channels):
+            for _ in _parse_messages(data, {}, channels):
                 pass
             break
     return list(channels.values())
 
 
-def _messages(data: bytes, schemas: dict[int, Schema], channels: dict[int, LogChannel]) -> Iterator[LogMessage]:
+def _parse_messages(data: bytes, schemas: dict[int, Schema], channels: dict[int, LogChannel]) -> Iterator[LogMessage]:
     for opcode, _, content in records(data):
         if opcode == Opcode.SCHEMA:
             schema = Schema.read(record_stream(content))
@@ -145,14 +145,14 @@ def _messages(data: bytes, schemas: dict[int, Schema], channels: dict[int, LogCh
 # A log as one flight.
 
 _MESSAGE = struct.Struct("<HIQQ")
-_LEVEL_NAMES = {number: name for name, number in LEVELS.items()}
+_LEVEL_NAMES = {number: name for name, number in LOG_LEVELS.items()}
 
 
 @dataclass(frozen=True, slots=True)
 class LogEvent:
     """One event of the log: time in s (to the nanosecond), text and level.
 
-    level: a key of `logs.recording.foxglove_scene.LEVELS`.
+    level: a key of `logs.recording.foxglove_scene.LOG_LEVELS`.
     """
 
     time: float
@@ -221,7 +221,7 @@ class _MessageCollector:
         self._parser = state_class()
 
     def add(self, data: bytes) -> None:
-        """Take the records of one chunk.  Raises one of `PARSE_ERRORS` or DecodeError."""
+        """Add the records of one chunk.  Raises one of `PARSE_ERRORS` or DecodeError."""
         self.chunks += 1
         position = 0
         while position < len(data):
@@ -233,16 +233,16 @@ class _MessageCollector:
             if opcode == 0:
                 raise ValueError("a record of no kind")
             if opcode == Opcode.MESSAGE:
-                position = self._message(data, position, start, end)
+                position = self._add_message(data, position, start, end)
                 continue
             if opcode == Opcode.SCHEMA:
                 schema = Schema.read(record_stream(data[start:end]))
                 self._schemas[schema.id] = schema.name
             elif opcode == Opcode.CHANNEL:
-                self._channel(Channel.read(record_stream(data[start:end])))
+                self._add_channel(Channel.read(record_stream(data[start:end])))
             position = end
 
-    def _channel(self, channel: Channel) -> None:
+    def _add_channel(self, channel: Channel) -> None:
         if channel.id in self._channels:
             return
         self._channels[channel.id] = (channel.topic, self._schemas.get(channel.schema_id, ""))
@@ -252,8 +252,8 @@ class _MessageCollector:
             self._state_channel = channel.id
             self._matcher = RowMatcher(channel.id)
 
-    def _message(self, data: bytes, position: int, start: int, end: int) -> int:
-        """Take the message at ``position``, or all successive state rows from there; return the next position."""
+    def _add_message(self, data: bytes, position: int, start: int, end: int) -> int:
+        """Add the message at ``position``, or all successive state rows from there; return the next position."""
         channel, _, log_time, _ = _MESSAGE.unpack_from(data, start)
         if channel == self._state_channel and self._matcher is not None:
             matched = self._matcher.match(data, position)
@@ -279,7 +279,7 @@ def read_log(path: Path | str) -> FlightLog:
     """Read a flight log; return a damaged or unfinished log up to its damage, with ``complete`` False.
 
     Raises LogError, in one line, for a file that is missing, empty, not an MCAP file or not a planfly log, or that
-    holds no complete second of flight.
+    contains no complete second of flight.
 
     >>> import tempfile
     >>> from logs.recording.example_log import write_example_log
@@ -309,30 +309,34 @@ def read_log(path: Path | str) -> FlightLog:
     if SETUP_FILE not in container.attachments and container.problem:
         raise LogError(f"{path}: holds no setup: {container.problem}", file=path)
     stored_setup = unpack_setup(container.attachments, str(path))
-    rows, fault = _usable_rows(messages.rows(), len(stored_setup.setup.route.waypoints))
+    rows, row_fault = _usable_rows(messages.rows(), len(stored_setup.setup.route.waypoints))
     if not len(rows):
         raise LogError(
-            f"{path}: holds no complete second of flight: {fault or container.problem or 'an empty log'}", file=path
+            f"{path}: holds no complete second of flight: {row_fault or container.problem or 'an empty log'}", file=path
         )
-    ended, wrong = _result(container.attachments, len(rows))
-    verdict, garbled = _verdict(container.attachments)
-    reference, unread = _reference(container.attachments)
-    lost = fault or container.problem
-    recovered = not lost and RECOVERY_FILE in container.attachments
-    lost = _loss(container.attachments[RECOVERY_FILE]) if recovered else lost or wrong or garbled or unread
+    end_reason, result_fault = _read_result(container.attachments, len(rows))
+    verdict, verdict_fault = _read_verdict(container.attachments)
+    reference, reference_fault = _read_reference(container.attachments)
+    loss = row_fault or container.problem
+    is_recovered = not loss and RECOVERY_FILE in container.attachments
+    loss = (
+        _recorded_loss(container.attachments[RECOVERY_FILE])
+        if is_recovered
+        else loss or result_fault or verdict_fault or reference_fault
+    )
     track = decode_rows(rows)
     return FlightLog(
         source=str(path),
         setup=stored_setup.setup,
         track=track,
         events=tuple(sorted(messages.events, key=lambda event: event.time)),
-        ended=ended,
+        ended=end_reason,
         recorded_verdict=verdict,
         versions=stored_setup.versions,
-        complete=not lost,
-        problem=f"recovered: {lost}" if recovered else lost,
+        complete=not loss,
+        problem=f"recovered: {loss}" if is_recovered else loss,
         end_time=float(track.time[-1]),
-        lost=lost,
+        lost=loss,
         reference=reference,
     )
 
@@ -348,7 +352,7 @@ def _check_magic(magic: bytes, path: Path) -> None:
 
 
 def _usable_rows(rows: StateRecords, waypoints: int) -> tuple[StateRecords, str]:
-    """Return the rows before the first invalid row, and the fault of that row, "" if all rows are valid."""
+    """Return the rows before the first invalid row, and that row's fault; "" if all rows are valid."""
     state = rows["state"]
     time = state["time_s"]
     is_increasing = np.isfinite(time) & (time >= 0.0) & (time < LATEST)
@@ -366,33 +370,33 @@ def _usable_rows(rows: StateRecords, waypoints: int) -> tuple[StateRecords, str]
     return rows, ""
 
 
-def _result(attachments: dict[str, bytes], rows: int) -> tuple[str | None, str]:
+def _read_result(attachments: dict[str, bytes], row_count: int) -> tuple[str | None, str]:
     """Return the recorded end of the flight, and any fault of its record."""
     if RESULT_FILE not in attachments:
         return None, "the recording stopped before the flight had ended"
-    data = _object(attachments[RESULT_FILE])
-    ended = data.get("ended")
-    if not isinstance(ended, str):
+    data = _parse_object(attachments[RESULT_FILE])
+    end_reason = data.get("ended")
+    if not isinstance(end_reason, str):
         return None, f"{RESULT_FILE} does not say how the flight ended"
-    if data.get("rows") != rows:
-        return ended, f"{rows} of {data.get('rows')} rows are there"
-    return ended, ""
+    if data.get("rows") != row_count:
+        return end_reason, f"{row_count} of {data.get('rows')} rows are there"
+    return end_reason, ""
 
 
-def _loss(recovery: bytes) -> str:
-    """Return the loss before the log was recovered, according to its recovery note."""
-    lost = _object(recovery).get("lost")
+def _recorded_loss(recovery: bytes) -> str:
+    """Return the loss that the log's recovery note states."""
+    lost = _parse_object(recovery).get("lost")
     return lost if isinstance(lost, str) and lost else "what was lost is not known"
 
 
-def _verdict(attachments: dict[str, bytes]) -> tuple[dict[str, Any] | None, str]:
+def _read_verdict(attachments: dict[str, bytes]) -> tuple[dict[str, Any] | None, str]:
     if VERDICT_FILE not in attachments:
         return None, ""
-    verdict = _object(attachments[VERDICT_FILE])
+    verdict = _parse_object(attachments[VERDICT_FILE])
     return (verdict, "") if verdict else (None, f"{VERDICT_FILE} is not a JSON object")
 
 
-def _reference(attachments: dict[str, bytes]) -> tuple[ReferenceFlights | None, str]:
+def _read_reference(attachments: dict[str, bytes]) -> tuple[ReferenceFlights | None, str]:
     if REFERENCE_FILE not in attachments:
         return None, ""
     try:
@@ -401,7 +405,7 @@ def _reference(attachments: dict[str, bytes]) -> tuple[ReferenceFlights | None, 
         return None, str(error)
 
 
-def _object(data: bytes) -> dict[str, Any]:
+def _parse_object(data: bytes) -> dict[str, Any]:
     try:
         found = json.loads(data)
     except (ValueError, RecursionError):

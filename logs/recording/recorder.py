@@ -35,7 +35,7 @@ from logs.recording.mcap_writer import (
     Layout,
     MessageRecords,
     last_log_time,
-    lay_out,
+    lay_out_chunks,
     single_record,
 )
 from logs.recording.setup_attachments import REFERENCE_FILE, RESULT_FILE, VERDICT_FILE, media_type, pack_setup
@@ -46,7 +46,7 @@ from logs.recording.state_channel import (
     STATE_TOPIC,
     as_bytes,
     encode_rows,
-    schema_of,
+    file_descriptor_set,
     state_schema,
     times_ns,
 )
@@ -126,7 +126,7 @@ class Recorder:
         try:
             # A thinned log is meant to cost little: compress faster, a quarter more bytes for half the time.
             self._writer = ContainerWriter(self._file, PROFILE, 3 if every == 1 else -1)
-            self._begin(attachments, setup)
+            self._write_setup(attachments, setup)
         except OSError:
             self._file.close()
             raise
@@ -144,13 +144,13 @@ class Recorder:
         if kind is not None:
             self.abandon()
         elif self._open:
-            self._close()
+            self._close_file()
 
     def abandon(self) -> None:
         """Close the file after an error, without a result, and ignore errors of closing: report the first error."""
         if self._open:
             with contextlib.suppress(OSError):
-                self._close()
+                self._close_file()
 
     def write(self, block: Track) -> None:
         """Append rows.  Raises ValueError unless their times increase, from 0 on, across all blocks."""
@@ -175,9 +175,9 @@ class Recorder:
         self._received += len(rows)
         self._skipped = rows[-1:] if (self._received - 1) % self._every else None
         if len(recorded_rows):
-            self._append(recorded_rows)
+            self._append_rows(recorded_rows)
 
-    def _append(self, rows: Rows) -> None:
+    def _append_rows(self, rows: Rows) -> None:
         self._pending.append(rows)
         previous_ns, self._last_ns = self._last_ns, round(rows["time"][-1] * 1e9) + EPOCH_NS
         if self._last_ns // self._batch_ns > previous_ns // self._batch_ns:
@@ -198,8 +198,8 @@ class Recorder:
 
     def event(self, time: float, text: str, level: str = "info") -> None:
         """Record an event at ``time`` (s); level: debug, info, warning, error or fatal.  Raises ValueError."""
-        if level not in scene.LEVELS:
-            raise ValueError(f"level {level!r}: expected {', '.join(scene.LEVELS)}")
+        if level not in scene.LOG_LEVELS:
+            raise ValueError(f"level {level!r}: expected {', '.join(scene.LOG_LEVELS)}")
         if not 0.0 <= time < LATEST:
             raise ValueError(f"time {time} s: expected 0..{LATEST:g}")
         log_time = round(time * 1e9) + EPOCH_NS
@@ -208,40 +208,42 @@ class Recorder:
 
     def finish(
         self,
-        ended: str,
+        end_reason: str,
         verdict: Verdict | None = None,
         reference: ReferenceFlights | None = None,
         returns: DrawnReturns | None = None,
     ) -> None:
-        """Write end, verdict, results of reference flights and returns, then close the file."""
+        """Write the reason for the flight's end, verdict, reference flights and returns, then close the file."""
         if self._skipped is not None:
-            self._append(self._skipped)
+            self._append_rows(self._skipped)
             self._skipped = None
         self._write_pending(None)
         end = max(self._last_ns, EPOCH_NS)
-        self._write([*self._poses.whole(end)])
+        self._write_messages([*self._poses.whole(end)])
         if returns is not None:
             self._add_scene(RETURNS_TOPIC, scene.returns_scene(EPOCH_NS, returns, self._terrain))
         if reference is not None:
-            self._attach(REFERENCE_FILE, reference_flights_json(reference).encode(), end)
+            self._write_attachment(REFERENCE_FILE, reference_flights_json(reference).encode(), end)
         if verdict is not None:
-            self._attach(VERDICT_FILE, verdict_json(verdict).encode(), end)
+            self._write_attachment(VERDICT_FILE, verdict_json(verdict).encode(), end)
         result = {
             "schema": RESULT_SCHEMA,
-            "ended": ended,
+            "ended": end_reason,
             "rows": self._written,
             "end_time_s": (end - EPOCH_NS) / 1e9,
         }
-        self._attach(RESULT_FILE, (json.dumps(result, indent=1) + "\n").encode(), end)
-        self._close()
+        self._write_attachment(RESULT_FILE, (json.dumps(result, indent=1) + "\n").encode(), end)
+        self._close_file()
 
-    def _begin(self, attachments: dict[str, bytes], setup: FlightSetup) -> None:
+    def _write_setup(self, attachments: dict[str, bytes], setup: FlightSetup) -> None:
         for name, data in attachments.items():
-            self._attach(name, data, EPOCH_NS)
-        self._channels[STATE_TOPIC] = self._writer.channel(STATE_TOPIC, STATE_NAME, state_schema())
+            self._write_attachment(name, data, EPOCH_NS)
+        self._channels[STATE_TOPIC] = self._writer.add_channel(STATE_TOPIC, STATE_NAME, state_schema())
         for topic, kind in _CHANNELS.items():
             descriptor = kind.DESCRIPTOR
-            self._channels[topic] = self._writer.channel(topic, descriptor.full_name, schema_of(descriptor))
+            self._channels[topic] = self._writer.add_channel(
+                topic, descriptor.full_name, file_descriptor_set(descriptor)
+            )
         scenes = {
             "/scene/terrain": scene.terrain_scene(EPOCH_NS, setup.scenario),
             "/scene/threats": scene.threats_scene(EPOCH_NS, setup.scenario.threats, setup.scenario.terrain),
@@ -256,31 +258,31 @@ class Recorder:
         if zoned.zones:
             self._scene_channel(ZONES_TOPIC)
             scenes[ZONES_TOPIC] = scene.zones_scene(EPOCH_NS, zoned, setup.route.waypoints)
-        self._write([single_record(self._channels[name], EPOCH_NS, update) for name, update in scenes.items()])
+        self._write_messages([single_record(self._channels[name], EPOCH_NS, update) for name, update in scenes.items()])
         self._writer.flush()
 
     def _scene_channel(self, topic: str) -> int:
         """Return the channel number of a topic that not every log has."""
         descriptor = SceneUpdate.DESCRIPTOR
-        self._channels[topic] = self._writer.channel(topic, descriptor.full_name, schema_of(descriptor))
+        self._channels[topic] = self._writer.add_channel(topic, descriptor.full_name, file_descriptor_set(descriptor))
         return self._channels[topic]
 
     def _add_scene(self, topic: str, update: bytes) -> None:
         """Add a scene that is known only at the end, but is shown from the start of the flight."""
-        self._write([single_record(self._scene_channel(topic), EPOCH_NS, update)])
+        self._write_messages([single_record(self._scene_channel(topic), EPOCH_NS, update)])
         self._writer.flush()
 
-    def _close(self) -> None:
+    def _close_file(self) -> None:
         """Write pending rows and events, the summary and the end of the file."""
         self._open = False
         try:
             self._write_pending(None)
-            self._writer.finish()
+            self._writer.write_end()
         finally:
             self._file.close()
 
-    def _attach(self, name: str, data: bytes, log_time: int) -> None:
-        self._writer.attach(name, media_type(name), data, log_time)
+    def _write_attachment(self, name: str, data: bytes, log_time: int) -> None:
+        self._writer.write_attachment(name, media_type(name), data, log_time)
 
     def _write_pending(self, end_ns: int | None) -> None:
         """Write the pending rows and events before ``end_ns``, or all if it is None, in chunks of at most a second."""
@@ -291,22 +293,26 @@ class Recorder:
         events = [event for event in self._events if end_ns is None or event.log_times[0] < end_ns]
         self._events = [event for event in self._events if end_ns is not None and event.log_times[0] >= end_ns]
         rows, log_times = rows[:stop], log_times[:stop]
-        pose_records = self._poses.take(log_times, rows["position"], rows["attitude"])
-        event_records = self._flight_events.take(log_times, rows["position"], rows["leg"])
-        self._write([*pose_records, *event_records, *events], rows, log_times)
+        pose_records = self._poses.pose_records(log_times, rows["position"], rows["attitude"])
+        event_records = self._flight_events.event_records(log_times, rows["position"], rows["leg"])
+        self._write_messages([*pose_records, *event_records, *events], rows, log_times)
         self._writer.flush()
 
-    def _write(self, others: list[MessageRecords], rows: Rows = _NO_ROWS, log_times: Ints = _NO_TIMES) -> None:
+    def _write_messages(
+        self, other_messages: list[MessageRecords], rows: Rows = _NO_ROWS, log_times: Ints = _NO_TIMES
+    ) -> None:
         """Write rows and other messages in order of time; at equal times the row comes last."""
         channel = self._channels[STATE_TOPIC]
         encoded = encode_rows(rows, self._written, channel)
         self._written += len(rows)
-        layout = lay_out(as_bytes(encoded), log_times, channel, others, self._writer.front(), CHUNK_SIZE)
-        for content in _chunks(layout):
-            self._writer.chunk(content)
+        layout = lay_out_chunks(
+            as_bytes(encoded), log_times, channel, other_messages, self._writer.take_new_records(), CHUNK_SIZE
+        )
+        for content in _chunk_contents(layout):
+            self._writer.write_chunk(content)
 
 
-def _chunks(layout: Layout) -> Iterator[ChunkContent]:
+def _chunk_contents(layout: Layout) -> Iterator[ChunkContent]:
     records, index = memoryview(layout.records), layout.index.tobytes()  # type: ignore[arg-type]  # an array is a buffer
     # Convert to lists first: reading the fields chunk by chunk costs a microsecond each.
     bounds = {name: layout.chunks[name].tolist() for name in CHUNK.names or ()}
@@ -326,7 +332,7 @@ def _chunks(layout: Layout) -> Iterator[ChunkContent]:
 
 
 def thin_track(track: Track, every: int) -> Track:
-    """Return the rows of a flight that a `Recorder` with ``every`` records: every n-th row, and the last.
+    """Return the rows that a `Recorder` with ``every`` records: every n-th row, and the last row.
 
     >>> from logs.recording.example_log import example_log
     >>> thin_track(example_log().track, 100).time

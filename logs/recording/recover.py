@@ -18,14 +18,14 @@ RECOVERY_SCHEMA = "planfly.recovery/1"
 
 
 @dataclass(frozen=True, slots=True)
-class Recovered:
+class RecoveredLog:
     """A recovered log: its bytes, and its flight."""
 
     data: bytes
     log: FlightLog
 
 
-def recover_log(path: Path) -> Recovered | None:
+def recover_log(path: Path) -> RecoveredLog | None:
     """Rebuild a log up to its first damage; return None for a complete log.
 
     Chunks and attachments before the damage are kept unchanged.  The result of the flight and the verdict are omitted,
@@ -50,18 +50,18 @@ def recover_log(path: Path) -> Recovered | None:
     for name, data in container.attachments.items():
         if name not in (RESULT_FILE, VERDICT_FILE, RECOVERY_FILE):
             media, stamp = container.media[name]
-            writer.attach(name, media, data, stamp)
+            writer.write_attachment(name, media, data, stamp)
     for chunk in chunks:
         try:
-            writer.copy(chunk)
+            writer.copy_chunk(chunk)
         except PARSE_ERRORS:
             # The reader stopped here, too.
             break
     note = {"schema": RECOVERY_SCHEMA, "lost": log.lost, "rows": len(log.track), "end_time_s": log.end_time}
     text = (json.dumps(note, indent=1) + "\n").encode()
-    writer.attach(RECOVERY_FILE, media_type(RECOVERY_FILE), text, writer.last_time)
-    writer.finish()
-    return Recovered(file.getvalue(), log)
+    writer.write_attachment(RECOVERY_FILE, media_type(RECOVERY_FILE), text, writer.last_time)
+    writer.write_end()
+    return RecoveredLog(file.getvalue(), log)
 
 
 def _whole_chunks(path: Path) -> tuple[Container, list[bytes]]:

@@ -72,7 +72,7 @@ def heights_name(part: int) -> str:
 
 
 def media_type(name: str) -> str:
-    """Return the media type of an attachment, by the suffix of its name."""
+    """Return the media type that belongs to the suffix of an attachment's name."""
     return _MEDIA_TYPES[PurePath(name).suffix]
 
 
@@ -88,7 +88,7 @@ _ENCODING = "float32 bits, difference to the west modulo 2^32, byte planes (low 
 _MAX_PART_HEIGHTS = 4 * 2**20
 
 
-class _File(SetupModel):
+class _TerrainFile(SetupModel):
     model_config = ConfigDict(validate_by_name=True, validate_by_alias=True)
     file_schema: Annotated[str, Field(alias="schema", pattern=f"^{TERRAIN_SCHEMA}$")] = TERRAIN_SCHEMA
     encoding: Annotated[str, Field(max_length=200)] = _ENCODING
@@ -109,8 +109,8 @@ def pack_terrain(terrain: Terrain) -> dict[str, bytes]:
     rows, cols = terrain.heights.shape
     parts = {}
     for k, (first, last) in enumerate(_row_blocks(rows, cols)):
-        parts[heights_name(k)] = _pack(terrain.heights[first:last])
-    file = _File(
+        parts[heights_name(k)] = _pack_heights(terrain.heights[first:last])
+    file = _TerrainFile(
         rows=rows,
         cols=cols,
         spacing_m=terrain.spacing,
@@ -133,7 +133,7 @@ def unpack_terrain(attachments: dict[str, bytes], source: str) -> Terrain:
     for heights that are missing, damaged or of wrong size, and for an invalid map.
     """
     try:
-        file = _File.model_validate_json(attachments[TERRAIN_FILE])
+        file = _TerrainFile.model_validate_json(attachments[TERRAIN_FILE])
     except ValidationError as error:
         raise LogError(**first_fault(error).at(source, TERRAIN_FILE)) from error
     if file.rows * file.cols > MAX_PIXELS:
@@ -146,7 +146,7 @@ def unpack_terrain(attachments: dict[str, bytes], source: str) -> Terrain:
         raise LogError(message, file=source, field="parts", value=len(file.parts))
     heights = np.empty((file.rows, file.cols), dtype=np.float32)
     for name, (first, last) in zip(file.parts, blocks, strict=True):
-        heights[first:last] = _unpack(attachments[name], last - first, file.cols, f"{source}: {name}")
+        heights[first:last] = _unpack_heights(attachments[name], last - first, file.cols, f"{source}: {name}")
     rows = _check_coefficients(file.map_to_pixel, source)
     return Terrain(
         heights=heights,
@@ -164,22 +164,22 @@ def _row_blocks(rows: int, cols: int) -> list[tuple[int, int]]:
     return [(first, min(rows, first + step)) for first in range(0, rows, step)]
 
 
-def _pack(heights: NDArray[np.float32]) -> bytes:
+def _pack_heights(heights: NDArray[np.float32]) -> bytes:
     bits = np.ascontiguousarray(heights, dtype="<f4").view("<u4")
     bits = np.diff(bits, axis=1, prepend=np.zeros((len(bits), 1), dtype="<u4"))
     planes = np.ascontiguousarray(bits.reshape(-1, 1).view(np.uint8).T)
     return bytes(zstandard.ZstdCompressor(level=3).compress(planes.tobytes()))
 
 
-def _unpack(data: bytes, rows: int, cols: int, where: str) -> NDArray[Any]:
+def _unpack_heights(data: bytes, rows: int, cols: int, name: str) -> NDArray[Any]:
     size = rows * cols * 4
     try:
         # Use a reader, not decompress(): the size declared by the frame cannot be trusted.
         raw = zstandard.ZstdDecompressor(max_window_size=2**27).stream_reader(data).read(size + 1)
     except zstandard.ZstdError as error:
-        raise LogError(f"{where}: cannot be decompressed: {error}", file=where) from error
+        raise LogError(f"{name}: cannot be decompressed: {error}", file=name) from error
     if len(raw) != size:
-        raise LogError(f"{where}: expected {rows} x {cols} heights: the size differs", file=where)
+        raise LogError(f"{name}: expected {rows} x {cols} heights: the size differs", file=name)
     bits = np.ascontiguousarray(np.frombuffer(raw, np.uint8).reshape(4, -1).T).view("<u4").reshape(rows, cols)
     return np.cumsum(bits, axis=1, dtype=np.uint32).astype("<u4").view("<f4")
 
@@ -190,8 +190,8 @@ def _check_coefficients(rows: list[list[float]], source: str) -> NDArray[np.floa
         shape_text = f"{len(rows)} rows of {size}"
         raise LogError.at(f"{source}: {TERRAIN_FILE}", "map_to_pixel", shape_text, "expected 2 + 2n rows of n")
     if not (math.fabs(rows[1][0]) > 0.0 and math.fabs(rows[1][1]) > 0.0):
-        shown = f"half-widths {rows[1][:2]}"
-        raise LogError.at(f"{source}: {TERRAIN_FILE}", "map_to_pixel", rows[1][:2], "not above 0", shown=shown)
+        shown_value = f"half-widths {rows[1][:2]}"
+        raise LogError.at(f"{source}: {TERRAIN_FILE}", "map_to_pixel", rows[1][:2], "not above 0", shown=shown_value)
     return np.array(rows)
 
 
@@ -217,7 +217,7 @@ _PACKAGES = (
 )
 
 
-class _Setup(SetupModel):
+class _SetupFile(SetupModel):
     model_config = ConfigDict(validate_by_name=True, validate_by_alias=True)
     file_schema: Annotated[str, Field(alias="schema", pattern=f"^{LOG_SCHEMA}$")] = LOG_SCHEMA
     aircraft: str
@@ -251,7 +251,7 @@ class StoredSetup:
 
 
 @functools.cache
-def _versions() -> tuple[tuple[str, str], ...]:
+def _cached_versions() -> tuple[tuple[str, str], ...]:
     return tuple(_find_versions().items())
 
 
@@ -262,7 +262,7 @@ def package_versions() -> dict[str, str]:
     >>> versions["numpy"] == metadata.version("numpy")
     True
     """
-    return dict(_versions())
+    return dict(_cached_versions())
 
 
 def _find_versions() -> dict[str, str]:
@@ -289,7 +289,7 @@ def pack_setup(setup: FlightSetup) -> dict[str, bytes]:
     if setup.scenario.terrain is not None:
         attachments |= pack_terrain(setup.scenario.terrain)
     stored_autopilot = setup.autopilot.store()
-    file = _Setup(
+    file = _SetupFile(
         aircraft=setup.aircraft,
         airspeed_mps=setup.airspeed,
         max_bank_rad=setup.max_bank,
@@ -301,22 +301,22 @@ def pack_setup(setup: FlightSetup) -> dict[str, bytes]:
         guidance_hz=setup.guidance_hz,
         fdm_hz=setup.fdm_hz,
         parameters=None if stored_autopilot.parameters is None else parameters_table(stored_autopilot.parameters),
-        program=None if stored_autopilot.program is None else ProgramTable.of(stored_autopilot.program),
+        program=None if stored_autopilot.program is None else ProgramTable.from_dataclass(stored_autopilot.program),
         autopilot=stored_name(setup.autopilot),
         autopilot_version=stored_autopilot.version or None,
         source=setup.source,
-        mission=MissionTable.of(setup.mission),
-        route=RouteTable.of(setup.route),
-        envelope=EnvelopeTable.of(setup.envelope),
+        mission=MissionTable.from_dataclass(setup.mission),
+        route=RouteTable.from_dataclass(setup.route),
+        envelope=EnvelopeTable.from_dataclass(setup.envelope),
         versions=package_versions(),
         sha256={name: hashlib.sha256(data).hexdigest() for name, data in attachments.items()},
     )
-    unstated: dict[str, Any] = {
+    omitted_fields: dict[str, Any] = {
         name: True for name in ("autopilot", "autopilot_version") if getattr(file, name) is None
     }
     if not file.mission.survey_plans:
-        unstated["mission"] = {"survey_plans"}
-    return {SETUP_FILE: _json_bytes(file.model_dump(by_alias=True, exclude=unstated)), **attachments}
+        omitted_fields["mission"] = {"survey_plans"}
+    return {SETUP_FILE: _json_bytes(file.model_dump(by_alias=True, exclude=omitted_fields)), **attachments}
 
 
 def unpack_setup(attachments: dict[str, bytes], source: str) -> StoredSetup:
@@ -328,7 +328,7 @@ def unpack_setup(attachments: dict[str, bytes], source: str) -> StoredSetup:
     if SETUP_FILE not in attachments:
         raise LogError(f"{source}: not a planfly log: an MCAP file without {SETUP_FILE}", file=source)
     try:
-        file = _Setup.model_validate_json(attachments[SETUP_FILE])
+        file = _SetupFile.model_validate_json(attachments[SETUP_FILE])
     except ValidationError as error:
         raise LogError(**first_fault(error).at(source, SETUP_FILE)) from error
     for name, digest in file.sha256.items():
@@ -337,21 +337,21 @@ def unpack_setup(attachments: dict[str, bytes], source: str) -> StoredSetup:
         if hashlib.sha256(attachments[name]).hexdigest() != digest:
             message = f"{source}: {name}: altered: its SHA-256 is not the one in {SETUP_FILE}"
             raise LogError(message, file=source, field=name)
-    listed = {name: attachments[name] for name in file.sha256}
-    terrain = unpack_terrain(listed, source) if TERRAIN_FILE in listed else None
-    scenario = _scenario(listed, source, terrain, file.external)
-    where = f"{source}: {SETUP_FILE}"
-    envelope = file.envelope.envelope(where)
+    listed_attachments = {name: attachments[name] for name in file.sha256}
+    terrain = unpack_terrain(listed_attachments, source) if TERRAIN_FILE in listed_attachments else None
+    scenario = _read_scenario(listed_attachments, source, terrain, file.external)
+    file_name = f"{source}: {SETUP_FILE}"
+    envelope = file.envelope.envelope(file_name)
     setup = FlightSetup(
         scenario=scenario,
         mission=file.mission.mission(),
-        route=file.route.route(where),
+        route=file.route.route(file_name),
         limits=make_limits(scenario, envelope, file.airspeed_mps, file.max_bank_rad),
         aircraft=file.aircraft,
         battery=file.battery_wh,
         seed=file.seed,
-        plan=_plan(listed, source, terrain) if PLAN_FILE in listed else None,
-        autopilot=_autopilot(file, where),
+        plan=_read_plan(listed_attachments, source, terrain) if PLAN_FILE in listed_attachments else None,
+        autopilot=_read_autopilot(file, file_name),
         nav=file.nav,
         guidance_hz=file.guidance_hz,
         fdm_hz=file.fdm_hz,
@@ -360,19 +360,19 @@ def unpack_setup(attachments: dict[str, bytes], source: str) -> StoredSetup:
     return StoredSetup(setup, file.versions)
 
 
-def _autopilot(file: _Setup, where: str) -> Autopilot:
-    stored = StoredAutopilot(
+def _read_autopilot(file: _SetupFile, file_name: str) -> Autopilot:
+    stored_autopilot = StoredAutopilot(
         file.guidance,
         None if file.parameters is None else read_parameters(file.parameters),
         None if file.program is None else file.program.program(),
         file.autopilot_version or "",
     )
     try:
-        return restore_autopilot(file.autopilot, stored)
+        return restore_autopilot(file.autopilot, stored_autopilot)
     except ParameterError as error:
-        raise LogError(f"{where}: parameters.values: {error}", file=where, field="parameters.values") from error
+        raise LogError(f"{file_name}: parameters.values: {error}", file=file_name, field="parameters.values") from error
     except KeyError as error:
-        raise LogError.at(where, "autopilot", file.autopilot, "not an autopilot of this version") from error
+        raise LogError.at(file_name, "autopilot", file.autopilot, "not an autopilot of this version") from error
 
 
 def _json_bytes(data: Any) -> bytes:
@@ -390,7 +390,7 @@ def _finite_or_text(data: Any) -> Any:
     return data
 
 
-def _text(attachments: dict[str, bytes], name: str, source: str) -> str:
+def _decode_text(attachments: dict[str, bytes], name: str, source: str) -> str:
     try:
         return attachments[name].decode()
     except KeyError:
@@ -400,36 +400,36 @@ def _text(attachments: dict[str, bytes], name: str, source: str) -> str:
         raise LogError(message, file=source, field=name) from error
 
 
-def _scenario(attachments: dict[str, bytes], source: str, terrain: Terrain | None, external: bool) -> Scenario:
-    where = f"{source}: {SCENARIO_FILE}"
+def _read_scenario(attachments: dict[str, bytes], source: str, terrain: Terrain | None, external: bool) -> Scenario:
+    file_name = f"{source}: {SCENARIO_FILE}"
     try:
-        spec = json.loads(_text(attachments, SCENARIO_FILE, source))
+        spec = json.loads(_decode_text(attachments, SCENARIO_FILE, source))
     except (ValueError, RecursionError) as error:
-        raise LogError(f"{where}: not valid JSON: {error}", file=where) from error
-    _check_terrain_is_stored(spec, terrain, where)
+        raise LogError(f"{file_name}: not valid JSON: {error}", file=file_name) from error
+    _check_terrain_is_stored(spec, terrain, file_name)
     try:
-        return from_spec(spec, where, ground=terrain, external=external)
+        return from_spec(spec, file_name, ground=terrain, external=external)
     except PlanflyError as error:
         raise LogError.from_error(error) from error
 
 
-def _plan(attachments: dict[str, bytes], source: str, terrain: Terrain | None) -> Plan:
-    where = f"{source}: {PLAN_FILE}"
-    text = _text(attachments, PLAN_FILE, source)
+def _read_plan(attachments: dict[str, bytes], source: str, terrain: Terrain | None) -> Plan:
+    file_name = f"{source}: {PLAN_FILE}"
+    text = _decode_text(attachments, PLAN_FILE, source)
     try:
         data = json.loads(text)
     except (ValueError, RecursionError) as error:
-        raise LogError(f"{where}: not valid JSON: {error}", file=where) from error
-    _check_terrain_is_stored(data.get("scenario") if isinstance(data, dict) else None, terrain, where)
+        raise LogError(f"{file_name}: not valid JSON: {error}", file=file_name) from error
+    _check_terrain_is_stored(data.get("scenario") if isinstance(data, dict) else None, terrain, file_name)
     try:
-        return parse_plan(text, where, ground=terrain)
+        return parse_plan(text, file_name, ground=terrain)
     except PlanflyError as error:
         raise LogError.from_error(error) from error
 
 
-def _check_terrain_is_stored(spec: Any, terrain: Terrain | None, where: str) -> None:
+def _check_terrain_is_stored(spec: Any, terrain: Terrain | None, file_name: str) -> None:
     """Raise LogError if reading the log would open an elevation file."""
-    table = spec.get("terrain") if isinstance(spec, dict) else None
-    kind = table.get("kind") if isinstance(table, dict) else None
+    terrain_table = spec.get("terrain") if isinstance(spec, dict) else None
+    kind = terrain_table.get("kind") if isinstance(terrain_table, dict) else None
     if terrain is None and kind != "none":
-        raise LogError.at(where, "terrain.kind", kind, f"the log holds no {TERRAIN_FILE}", shown=repr(kind))
+        raise LogError.at(file_name, "terrain.kind", kind, f"the log holds no {TERRAIN_FILE}", shown=repr(kind))

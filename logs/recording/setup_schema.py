@@ -22,7 +22,7 @@ from flight.mission.route import ROUTE_COLUMNS_WITH_NAN, Route
 from world.errors import LogError
 from world.geometry import leg_runs
 
-Made = TypeVar("Made")
+Data = TypeVar("Data")
 
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 # Columns and tables are arrays in the dataclass and lists in the file.
@@ -30,7 +30,7 @@ _LISTED = BeforeValidator(lambda value: value.tolist() if isinstance(value, np.n
 _Finites = Annotated[list[Finite], _LISTED]
 _Column = Annotated[list[float], _LISTED]
 _Table = Annotated[list[list[float]], _LISTED]  # by airspeed, then by height
-_Place = Annotated[list[Finite], Field(min_length=3, max_length=3)]
+_Position = Annotated[list[Finite], Field(min_length=3, max_length=3)]
 # A height or another value that may be unknown: NaN in the dataclass, null in the file.
 _Height = Annotated[Finite | None, BeforeValidator(lambda value: None if value != value else value)]
 
@@ -45,8 +45,8 @@ class SetupModel(BaseModel):
     name: ClassVar[str] = ""
 
     @classmethod
-    def of(cls, value: object) -> Self:
-        """Return the table of a dataclass, from its fields."""
+    def from_dataclass(cls, value: object) -> Self:
+        """Make the table of a dataclass from its fields."""
         return cls.model_validate(value, from_attributes=True, by_alias=False, by_name=True)
 
     def fault(self, file: str, field: str, message: str) -> LogError:
@@ -55,9 +55,9 @@ class SetupModel(BaseModel):
         return LogError(f"{file}: {key}: {message}", file=file, field=key)
 
 
-def _from_table(kind: type[Made], table: SetupModel, **replaced: Any) -> Made:
-    """Make a dataclass from the values of a table, with some values replaced."""
-    return kind(**(dict(table) | replaced))
+def _make_from_table(data_class: type[Data], table: SetupModel, **replacements: Any) -> Data:
+    """Make a dataclass from the values of a table; ``replacements`` take precedence."""
+    return data_class(**(dict(table) | replacements))
 
 
 class _Item(SetupModel):
@@ -92,7 +92,9 @@ class _SurveyPlan(SetupModel):
 
     def plan(self) -> SurveyPlan:
         """Return the plan of the table."""
-        return _from_table(SurveyPlan, self, camera=None if self.camera is None else _from_table(Camera, self.camera))
+        return _make_from_table(
+            SurveyPlan, self, camera=None if self.camera is None else _make_from_table(Camera, self.camera)
+        )
 
 
 class MissionTable(SetupModel):
@@ -110,17 +112,17 @@ class MissionTable(SetupModel):
     def mission(self) -> Mission:
         """Return the mission of the table."""
         lists = {"items": self.items, "fences": self.fences, "rally": self.rally}
-        items = {name: tuple(_from_table(MissionItem, item) for item in table) for name, table in lists.items()}
+        items = {name: tuple(_make_from_table(MissionItem, item) for item in table) for name, table in lists.items()}
         plans = tuple(plan.plan() for plan in self.survey_plans)
-        home = None if self.home is None else _from_table(Home, self.home)
-        return _from_table(Mission, self, home=home, survey_plans=plans, **items)
+        home = None if self.home is None else _make_from_table(Home, self.home)
+        return _make_from_table(Mission, self, home=home, survey_plans=plans, **items)
 
 
 class RouteTable(SetupModel):
     """A `Route` as a table: one value a waypoint, and for airspeed one value a leg."""
 
     name = "route"
-    waypoints: Annotated[list[_Place], Field(min_length=2, alias="waypoints_east_north_amsl_m"), _LISTED]
+    waypoints: Annotated[list[_Position], Field(min_length=2, alias="waypoints_east_north_amsl_m"), _LISTED]
     airspeed: Annotated[_Finites, Field(alias="airspeed_mps")]
     acceptance: Annotated[_Column, Field(alias="acceptance_m")]
     fly_over: Annotated[list[bool], _LISTED]
@@ -174,7 +176,7 @@ class RouteTable(SetupModel):
         columns = {"waypoints": waypoints, "items": items, "stops": stops}
         for name in ROUTE_COLUMNS_WITH_NAN:
             columns[name] = np.array([math.nan if value is None else value for value in getattr(self, name)])
-        return _from_table(Route, self, return_to=circle, **columns, **ground_heights)
+        return _make_from_table(Route, self, return_to=circle, **columns, **ground_heights)
 
 
 class EnvelopeTable(SetupModel):
@@ -222,7 +224,7 @@ class EnvelopeTable(SetupModel):
             found_shape = [len(values), *({len(row) for row in values} if len(shape) == 2 else ())]
             if found_shape != shape:
                 raise self.fault(file, field, f"shape {found_shape}: expected {shape}")
-        return _from_table(Envelope, self, **empty_powers)
+        return _make_from_table(Envelope, self, **empty_powers)
 
 
 class ParametersTable(SetupModel):
@@ -261,4 +263,4 @@ class ProgramTable(SetupModel):
 
     def program(self) -> AutopilotProgram:
         """Return the autopilot of the table."""
-        return _from_table(AutopilotProgram, self)
+        return _make_from_table(AutopilotProgram, self)

@@ -117,7 +117,7 @@ class StateField(NamedTuple):
     source: str
     component: int | None
 
-    def of(self, values: NDArray[Any]) -> NDArray[Any]:
+    def select(self, values: NDArray[Any]) -> NDArray[Any]:
         """Return the column of this field from the values (t,) or (t, n) of the track's field."""
         return values if self.component is None else values[:, self.component]
 
@@ -185,7 +185,7 @@ def state_schema() -> bytes:
     return descriptor_pb2.FileDescriptorSet(file=[STATE_FILE]).SerializeToString(deterministic=True)
 
 
-def schema_of(descriptor: "Descriptor") -> bytes:
+def file_descriptor_set(descriptor: "Descriptor") -> bytes:
     """Return the FileDescriptorSet of a message, with each file after the files that it imports."""
     files: dict[str, FileDescriptor] = {}
 
@@ -235,7 +235,7 @@ def encode_rows(rows: NDArray[np.record], first_row: int, channel: int) -> State
     state["row"] = numbers
     with np.errstate(over="ignore", invalid="ignore"):
         for field in FIELDS:
-            state[field.name] = field.of(rows[field.source])
+            state[field.name] = field.select(rows[field.source])
     return records
 
 

@@ -12,7 +12,7 @@ from aircraft.catalog import find_again
 from aircraft.tracking import CORRIDOR_RADII
 from flight.autopilots.autopilot import Autopilot
 from flight.simulation.setup import FlightSetup
-from logs.verdict.measures.route_requirements import airspace_of, surveys_of
+from logs.verdict.measures.route_requirements import judged_airspace, judged_surveys
 from world.errors import FlightError
 from world.json_schema import DocumentConfig
 from world.scenario import Scenario
@@ -65,25 +65,25 @@ class Conditions(DocumentConfig):
     """Number of zones of the scenario and of the mission's fence."""
 
 
-def conditions_of(scenario: Scenario, aircraft: str, airspeed: float, autopilot: Autopilot) -> Conditions:
+def plan_conditions(scenario: Scenario, aircraft: str, airspeed: float, autopilot: Autopilot) -> Conditions:
     """Return the conditions of a plan made in a scenario.  aircraft: its name or folder.  airspeed: m/s."""
-    table, wind, terrain = scenario.flight, scenario.wind, scenario.terrain
+    flight_table, wind, terrain = scenario.flight, scenario.wind, scenario.terrain
     mass = None
     # The aircraft of a log may not be on this machine.
     with suppress(FlightError):
-        mass = find_again(aircraft, table.aircraft).mass
+        mass = find_again(aircraft, flight_table.aircraft).mass
     return Conditions(
         aircraft=aircraft,
         mass_kg=mass,
-        aircraft_named=not table.aircraft_by_default,
+        aircraft_named=not flight_table.aircraft_by_default,
         airspeed_mps=airspeed,
         airspeed_kind="equivalent" if autopilot.equivalent_airspeeds else "true",
         airspeed_source=_airspeed_source(scenario, autopilot),
         wind_mps=wind.speed,
         wind_from_deg=round(math.degrees(wind.from_course) % 360.0, 9),
         turbulence=wind.turbulence,
-        navigation=table.steering.nav,
-        autopilot=autopilot.described(aircraft) + _autopilot_source(table),
+        navigation=flight_table.steering.nav,
+        autopilot=autopilot.described(aircraft) + _autopilot_source(flight_table),
         autopilot_version=autopilot.version,
         terrain=None if terrain is None else terrain.source,
         height_datum=None if terrain is None else terrain.datum,
@@ -91,11 +91,11 @@ def conditions_of(scenario: Scenario, aircraft: str, airspeed: float, autopilot:
     )
 
 
-def _autopilot_source(table: FlightTable) -> str:
-    """Return a clause that names the file from which a non-default autopilot was taken; "" if there is none."""
-    if table.autopilot_from is None or table.steering.autopilot == DEFAULT_AUTOPILOT:
+def _autopilot_source(flight_table: FlightTable) -> str:
+    """Return a clause with the file that chose a non-default autopilot; "" if no file chose it."""
+    if flight_table.autopilot_from is None or flight_table.steering.autopilot == DEFAULT_AUTOPILOT:
         return ""
-    return f"; taken from {table.autopilot_from}, as no autopilot was named"
+    return f"; taken from {flight_table.autopilot_from}, as no autopilot was named"
 
 
 def _airspeed_source(scenario: Scenario, autopilot: Autopilot) -> AirspeedSource:
@@ -106,8 +106,8 @@ def _airspeed_source(scenario: Scenario, autopilot: Autopilot) -> AirspeedSource
 
 def setup_conditions(setup: FlightSetup) -> Conditions:
     """Return the conditions of the verdict on a flight, or on a mission that is not flown."""
-    conditions = conditions_of(setup.scenario, setup.aircraft, setup.airspeed, setup.autopilot)
-    conditions = replace(conditions, navigation=setup.nav, zones=len(airspace_of(setup).zones))
+    conditions = plan_conditions(setup.scenario, setup.aircraft, setup.airspeed, setup.autopilot)
+    conditions = replace(conditions, navigation=setup.nav, zones=len(judged_airspace(setup).zones))
     source = setup.source
     if source is None:
         return conditions
@@ -129,14 +129,14 @@ def condition_lines(conditions: Conditions) -> list[str]:
     return [_aircraft_line(conditions), _world_line(conditions)]
 
 
-def autopilot_line(conditions: Conditions, *, flown: bool) -> str:
-    """Return a line on the autopilot that flew, or for which a mission is judged without a flight."""
-    return f"{'Flown by' if flown else 'Autopilot'}: {conditions.autopilot}"
+def autopilot_line(conditions: Conditions, *, is_flown: bool) -> str:
+    """Return a line on the autopilot.  is_flown: True if it flew; False if only a mission is judged."""
+    return f"{'Flown by' if is_flown else 'Autopilot'}: {conditions.autopilot}"
 
 
 def flown_lines(conditions: Conditions) -> list[str]:
     """Return all lines on a flight: aircraft, weather and world, and autopilot."""
-    return [*condition_lines(conditions), autopilot_line(conditions, flown=True)]
+    return [*condition_lines(conditions), autopilot_line(conditions, is_flown=True)]
 
 
 def _aircraft_line(conditions: Conditions) -> str:
@@ -159,17 +159,23 @@ def _world_line(conditions: Conditions) -> str:
         wind_text = "wind from each direction"
     elif conditions.wind_mps > 0.0:
         wind_text = f"wind {conditions.wind_mps:.3g} m/s from {conditions.wind_from_deg:.0f} degrees"
-    turbulence = ""
+    turbulence_text = ""
     if conditions.turbulence is not None:
-        turbulence = ", no turbulence" if conditions.turbulence == "none" else f", {conditions.turbulence} turbulence"
-    navigation = "" if conditions.navigation is None else f"; navigation {_NAVIGATION_TEXTS[conditions.navigation]}"
-    ground = (
+        turbulence_text = (
+            ", no turbulence" if conditions.turbulence == "none" else f", {conditions.turbulence} turbulence"
+        )
+    navigation_text = (
+        "" if conditions.navigation is None else f"; navigation {_NAVIGATION_TEXTS[conditions.navigation]}"
+    )
+    terrain_text = (
         "no terrain"
         if conditions.terrain is None
         else f"terrain {conditions.terrain}, heights above {conditions.height_datum}"
     )
-    zones = "" if not conditions.zones else "; 1 zone" if conditions.zones == 1 else f"; {conditions.zones:,} zones"
-    return f"Conditions: {wind_text}{turbulence}{navigation}; {ground}{zones}"
+    zones_text = (
+        "" if not conditions.zones else "; 1 zone" if conditions.zones == 1 else f"; {conditions.zones:,} zones"
+    )
+    return f"Conditions: {wind_text}{turbulence_text}{navigation_text}; {terrain_text}{zones_text}"
 
 
 # Legs are side by side if their courses are parallel or opposite within this angle, and at least half of the shorter
@@ -186,13 +192,13 @@ def corridor_line(setup: FlightSetup) -> str:
     lines.  Return "" if the corridor is stated, or if a survey's cross-track errors are judged line by line.
     """
     half_width, radius = setup.corridor, setup.autopilot.acceptance_radius or 0.0
-    if setup.scenario.limits.corridor_m is not None or surveys_of(setup):
+    if setup.scenario.limits.corridor_m is not None or judged_surveys(setup):
         return ""
     origin = "planfly's default"
     if CORRIDOR_RADII * radius >= half_width:
         origin = f"{CORRIDOR_RADII:g} times {setup.autopilot.title}'s acceptance radius of {radius:.0f} m"
     line = f"Corridor: {half_width:.0f} m to either side of the legs, {origin} ([limits] corridor_m states one)"
-    gap = least_gap(setup.route.waypoints)
+    gap = min_leg_spacing(setup.route.waypoints)
     if gap is None or gap[0] >= half_width:
         return line
     metres, leg = gap
@@ -202,7 +208,7 @@ def corridor_line(setup: FlightSetup) -> str:
     )
 
 
-def least_gap(waypoints: NDArray[np.float64]) -> tuple[float, int] | None:
+def min_leg_spacing(waypoints: NDArray[np.float64]) -> tuple[float, int] | None:
     """Return the minimum distance between a leg and the leg after the next, m, and the first leg's number.
 
     Only legs that are side by side are compared; return None if there are none.
@@ -210,9 +216,9 @@ def least_gap(waypoints: NDArray[np.float64]) -> tuple[float, int] | None:
     waypoints: east, north and up, m, (w, 3).
 
     >>> lines = np.array([[0, 0, 0], [0, 900, 0], [40, 900, 0], [40, 0, 0]], dtype=float)
-    >>> least_gap(lines)
+    >>> min_leg_spacing(lines)
     (40.0, 0)
-    >>> least_gap(lines[:3]) is None
+    >>> min_leg_spacing(lines[:3]) is None
     True
     """
     gaps: list[tuple[float, int]] = []
@@ -230,4 +236,4 @@ def least_gap(waypoints: NDArray[np.float64]) -> tuple[float, int] | None:
             offset = 0.5 * (other_start + other_end) - start
             gaps.append((abs(float(direction[0] * offset[1] - direction[1] * offset[0])), k))
     # A line that is flown twice is not a survey.
-    return min((leg_vector for leg_vector in gaps if leg_vector[0] >= _SAME_LINE_DISTANCE_M), default=None)
+    return min((gap for gap in gaps if gap[0] >= _SAME_LINE_DISTANCE_M), default=None)

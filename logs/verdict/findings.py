@@ -76,7 +76,7 @@ class Finding:
 
     @property
     def effective_limit(self) -> float | None:
-        """Value up to which the rule passes, the limit with its tolerance; None without a limit.
+        """Limit including its tolerance; None without a limit.
 
         If a finding fails by other evidence than its number, this is the limit without tolerance.
 
@@ -95,7 +95,7 @@ class Finding:
 
     @property
     def value(self) -> float | None:
-        """The value that is compared with the limit: the flown value, or the planned value if it has the margin."""
+        """The value compared with the limit: the flown value, or the planned value if the margin is its margin."""
         if self.flown is None or self.planned is None or self.limit is None or self.margin is None:
             return self.planned if self.flown is None else self.flown
         errors = {value: abs(abs(value - self.limit) - abs(self.margin)) for value in (self.flown, self.planned)}
@@ -152,7 +152,7 @@ def message(brief: str, rest: str = "", *, placed: bool = False) -> Message:
 
 
 def undecided_findings(findings: Iterable[Finding]) -> tuple[Finding, ...]:
-    """Return the findings that leave the verdict undecided, such as those on an aircraft that is not known well enough.
+    """Return the findings that leave the verdict undecided, such as findings on an insufficiently known aircraft.
 
     >>> slope = make_finding("slope", Place("leg", 1), ok=None, reason="", check=UNKNOWN_AIRCRAFT)
     >>> undecided_findings([slope]) == (slope,)
@@ -162,21 +162,21 @@ def undecided_findings(findings: Iterable[Finding]) -> tuple[Finding, ...]:
 
 
 def closest_to_limit(findings: Iterable[Finding]) -> Finding | None:
-    """Return the failed finding that is furthest beyond its limit, or else the finding closest to its limit.
+    """Return the failed finding furthest beyond its limit, or else the finding closest to its limit.
 
-    A finding that fails by other evidence than its number has no margin and is ranked after failed findings with a
-    margin.  Return None if no finding failed or was judged by a number.
+    A finding that fails by other evidence than its number has no margin; it comes after failed findings with a margin.
+    Return None if no finding failed or was judged by a number.
 
     >>> wide, close = (make_finding("slope", Place("leg", 1), ok=True, reason="", margin=m) for m in (9.0, 4.0))
     >>> failed = make_finding("slope", Place("leg", 2), ok=False, reason="too slow", margin=5.0)
     >>> closest_to_limit([wide, close]) is close, closest_to_limit([wide, failed, close]) is failed
     (True, True)
     """
-    judged = (
+    judged_findings = (
         finding for finding in findings if finding.ok is False or (finding.ok is True and finding.margin is not None)
     )
     return min(
-        judged,
+        judged_findings,
         key=lambda finding: (finding.ok is True, math.inf if finding.margin is None else finding.margin),
         default=None,
     )
@@ -242,7 +242,7 @@ def _rounded_or_none(value: float | None) -> float | None:
 
 
 def badness(finding: Finding) -> tuple[int, float]:
-    """Return a sort key that puts the worst finding first: failed, not judged, passed, and within each by margin.
+    """Return a sort key that puts the worst finding first: failed, unjudged, then passed; each sorted by margin.
 
     >>> near, far = (make_finding("slope", Place("leg", 1), ok=True, reason="", margin=m) for m in (4.0, 9.0))
     >>> badness(near) < badness(far)
@@ -253,10 +253,10 @@ def badness(finding: Finding) -> tuple[int, float]:
     ), 0.0 if finding.margin is None else finding.margin
 
 
-def reason_of(faults: Sequence[Message], facts: Sequence[str] = ()) -> str:
-    """Join faults, followed by the facts in brackets; without faults, join only the facts.
+def finding_reason(faults: Sequence[Message], facts: Sequence[str] = ()) -> str:
+    """Return the reason of a finding: its faults, followed by its facts in brackets; or only its facts.
 
-    >>> reason_of([message("bank 40.0° beyond 35.0°")], ["turns 62.0°", "radius 76 m"])
+    >>> finding_reason([message("bank 40.0° beyond 35.0°")], ["turns 62.0°", "radius 76 m"])
     'bank 40.0° beyond 35.0° (turns 62.0°; radius 76 m)'
     """
     facts_text = "; ".join(facts)

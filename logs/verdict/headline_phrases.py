@@ -3,14 +3,14 @@
 from collections.abc import Callable
 
 from logs.verdict.findings import Finding
-from logs.verdict.wording import compared_texts, place_text, shortened
+from logs.verdict.wording import compared_texts, place_text, shorten_statement
 
 # Function that phrases a failed finding; its first argument is the rule's name for people.
 HeadlinePhrase = Callable[[str, Finding], str]
 
 
 def _with_place(noun: str, finding: Finding, text: str) -> str:
-    """Join a rule's noun, its place (unless the place is the whole flight), and a text in brackets."""
+    """Join a rule's noun, the finding's place (unless it is the whole flight), and a text in brackets."""
     if finding.place.kind == "flight":
         return f"{noun} ({text})"
     return f"{noun} {'at' if finding.place.kind == 'waypoint' else 'on'} {place_text(finding.place)} ({text})"
@@ -18,12 +18,12 @@ def _with_place(noun: str, finding: Finding, text: str) -> str:
 
 def name_reason(noun: str, finding: Finding) -> str:
     """Name the place and the reason in brief."""
-    return _with_place(noun, finding, shortened(finding.brief))
+    return _with_place(noun, finding, shorten_statement(finding.brief))
 
 
 def name_event(noun: str, finding: Finding) -> str:
     """Name the brief reason of an event that ends the flight, without its place."""
-    return f"{noun} ({shortened(finding.brief)})"
+    return f"{noun} ({shorten_statement(finding.brief)})"
 
 
 def name_shortfall(noun: str, finding: Finding) -> str:
@@ -35,14 +35,14 @@ def name_shortfall(noun: str, finding: Finding) -> str:
 
 
 def name_excess(noun: str, finding: Finding) -> str:
-    """Compare the worse of planned and flown value with the limit, or name the reason if both are within the limit."""
+    """Compare the worse of planned and flown value with the limit; if both are within it, name the reason."""
     values = [value for value in (finding.flown, finding.planned) if value is not None]
-    worst = max(values, key=abs, default=None)
+    worst_value = max(values, key=abs, default=None)
     limit = finding.effective_limit
-    if limit is None or worst is None or abs(worst) <= abs(limit):
+    if limit is None or worst_value is None or abs(worst_value) <= abs(limit):
         return name_reason(noun, finding)
-    sign = " > " if worst > 0.0 else " < "
-    return _with_place(noun, finding, sign.join(compared_texts(worst, limit, finding.unit)))
+    sign = " > " if worst_value > 0.0 else " < "
+    return _with_place(noun, finding, sign.join(compared_texts(worst_value, limit, finding.unit)))
 
 
 def name_circle(noun: str, finding: Finding) -> str:
@@ -69,7 +69,7 @@ def name_missile(_noun: str, finding: Finding) -> str:
 
 
 def name_photo_line(noun: str, finding: Finding) -> str:
-    """Phrase the shortfall of a photo line: its usable share, or its photos' overlap, against the required minimum."""
+    """Compare a photo line's usable fraction, or the overlap of its photos, with the required minimum."""
     return name_shortfall(finding.check or noun, finding)
 
 

@@ -34,7 +34,7 @@ __all__ = ["judge_flight", "judge_geometry", "judge_plan_only"]
 def judge_flight(
     setup: FlightSetup,
     track: Track,
-    ended: str,
+    end_reason: str,
     *,
     log_complete: bool = True,
     envelope: bool = True,
@@ -46,7 +46,7 @@ def judge_flight(
     Any track is judged, however short or damaged; missing data makes the verdict incomplete.  A track without rows is a
     flight that never began, so its route is judged at the level "geometric".
 
-    ended: "completed", or the reason why the flight ended early.  log_complete: True if the record has its end.
+    end_reason: "completed", or the reason why the flight ended early.  log_complete: True if the record has its end.
     envelope: True to apply the aircraft's envelope as well as the evidence of the flight, False for only the evidence.
     reference: results of reference flights.  requirements: the setup's route requirements if already known.
 
@@ -70,13 +70,13 @@ def judge_flight(
         return judge_imported_flight(setup, track, log_complete=log_complete)
     whole_requirements = requirements or route_requirements(setup, envelope=envelope)
     if not len(track):
-        return judge_unflown(whole_requirements, ended, log_complete=log_complete)
-    in_air, aligned = flown_phases(whole_requirements, track)
-    findings = flown_findings(in_air, aligned, ended, log_complete)
+        return judge_unflown(whole_requirements, end_reason, log_complete=log_complete)
+    air_requirements, aligned = flown_phases(whole_requirements, track)
+    findings = flown_findings(air_requirements, aligned, end_reason, log_complete)
     complete = all(finding.ok is True for finding in findings if finding.rule == "completion")
     unjudged = undecided_text(findings)
     flyable = complete and not unjudged and not any(finding.ok is False for finding in findings)
-    findings = with_suggestions(in_air, aligned, findings)
+    findings = with_suggestions(air_requirements, aligned, findings)
     findings = with_passing_suggestions(findings, None if reference is None else reference.tried)
     levels = _level_answers(whole_requirements, findings, flyable, reference)
     deciding = None if reference is None or flyable else reference.deciding
@@ -85,7 +85,7 @@ def judge_flight(
     return Verdict(
         *(findings, flyable, complete, lines, "flown", levels, deciding),
         notes=setup.notes,
-        leg_ends=() if aligned is None else leg_ends(in_air, aligned),
+        leg_ends=() if aligned is None else leg_ends(air_requirements, aligned),
         program=setup.autopilot.program,
         parameters=setup.autopilot.parameters,
         unjudged=unjudged,
@@ -94,47 +94,57 @@ def judge_flight(
 
 
 def _level_answers(
-    requirements: RouteRequirements, flown: tuple[Finding, ...], flyable: bool, reference: ReferenceFlights | None
+    requirements: RouteRequirements,
+    flight_findings: tuple[Finding, ...],
+    flyable: bool,
+    reference: ReferenceFlights | None,
 ) -> tuple[LevelAnswer, ...]:
-    """Return the answers of geometry, of the airframe's reference flight, and of the flight itself.
+    """Return the answers of all levels: geometry, the airframe's reference flight, and the flight itself.
 
     The first two include their disagreements with the flight.  Without the envelope, only the flight's own answer is
     returned.
     """
     levels, source = [], requirements.setup.envelope.source
     if requirements.envelope:
-        predicted = (*blocking_item_findings(requirements.setup), *geometric_findings(requirements, flown))
-        fails = any(finding.ok is False for finding in predicted)
-        passes = not fails and not undecided_findings(predicted)
-        differing = _disagreements(
-            "geometry", {(finding.rule, finding.place): finding.ok for finding in predicted}, flown
+        geometric = (*blocking_item_findings(requirements.setup), *geometric_findings(requirements, flight_findings))
+        has_failed = any(finding.ok is False for finding in geometric)
+        passes = not has_failed and not undecided_findings(geometric)
+        disagreements = _disagreements(
+            "geometry", {(finding.rule, finding.place): finding.ok for finding in geometric}, flight_findings
         )
-        headline_text = headline(predicted, passes, source)
-        levels.append(LevelAnswer("geometry", passes, headline_text, differing, undecided=not passes and not fails))
+        headline_text = headline(geometric, passes, source)
+        levels.append(
+            LevelAnswer("geometry", passes, headline_text, disagreements, undecided=not passes and not has_failed)
+        )
     if requirements.envelope and reference is not None and reference.airframe is not None:
         airframe = reference.airframe
-        passed = {
-            (finding.rule, finding.place): (finding.rule, finding.place) not in airframe.failed for finding in flown
+        passes_by_place = {
+            (finding.rule, finding.place): (finding.rule, finding.place) not in airframe.failed
+            for finding in flight_findings
         }
-        differing = _disagreements("airframe", passed, flown)
-        # What is not flyable although nothing of it failed was left open.
+        disagreements = _disagreements("airframe", passes_by_place, flight_findings)
+        # An airframe that is not flyable although nothing failed was left undecided.
         is_undecided = not airframe.flyable and not airframe.failed
-        levels.append(LevelAnswer("airframe", airframe.flyable, airframe.headline, differing, undecided=is_undecided))
-    undecided = bool(undecided_findings(flown)) and not any(finding.ok is False for finding in flown)
+        levels.append(
+            LevelAnswer("airframe", airframe.flyable, airframe.headline, disagreements, undecided=is_undecided)
+        )
+    undecided = bool(undecided_findings(flight_findings)) and not any(
+        finding.ok is False for finding in flight_findings
+    )
     own_answer = LevelAnswer(
-        flown_level(requirements.setup), flyable, headline(flown, flyable, source), undecided=undecided
+        flown_level(requirements.setup), flyable, headline(flight_findings, flyable, source), undecided=undecided
     )
     return (*levels, own_answer)
 
 
 def _disagreements(
-    level: str, outcomes: Mapping[tuple[str, Place], bool | None], flown: tuple[Finding, ...]
+    level: str, outcomes: Mapping[tuple[str, Place], bool | None], flight_findings: tuple[Finding, ...]
 ) -> tuple[Disagreement, ...]:
     """Return the disagreements between a level and the flight, in the order of the level's findings."""
-    judged = {(finding.rule, finding.place): finding.ok for finding in flown}
+    flight_outcomes = {(finding.rule, finding.place): finding.ok for finding in flight_findings}
     disagreements = []
     for (rule, place), passes_there in outcomes.items():
-        passes_here = judged.get((rule, place))
+        passes_here = flight_outcomes.get((rule, place))
         if passes_there is not None and passes_here is not None and passes_there != passes_here:
             disagreements.append(Disagreement(rule, place, level, passes_there, passes_here))
     return tuple(disagreements)

@@ -12,9 +12,9 @@ from logs.verdict.findings import (
     UNKNOWN_AIRCRAFT,
     Finding,
     badness,
+    finding_reason,
     make_finding,
     message,
-    reason_of,
     undecided_findings,
 )
 from logs.verdict.measures.route_requirements import RouteRequirements, route_requirements
@@ -46,12 +46,14 @@ def blocking_item_findings(setup: FlightSetup) -> list[Finding]:
     return [finding for finding in findings if finding.ok is False or undecided_findings([finding])]
 
 
-def geometric_findings(requirements: RouteRequirements, flown: Sequence[Finding] | None = None) -> tuple[Finding, ...]:
+def geometric_findings(
+    requirements: RouteRequirements, flight_findings: Sequence[Finding] | None = None
+) -> tuple[Finding, ...]:
     """Return findings on a route's geometry, judged by the aircraft's envelope.
 
-    flown: findings on the route's flight, from which the findings of rules with `Rule.of_route` are copied.
+    flight_findings: findings on the route's flight, from which the findings of rules with `Rule.of_route` are copied.
     """
-    return _run_rules(requirements, None, (), geometric=True, flown=flown)
+    return _run_rules(requirements, None, (), geometric=True, flight_findings=flight_findings)
 
 
 def place_findings(requirements: RouteRequirements) -> tuple[Finding, ...]:
@@ -65,37 +67,42 @@ def track_findings(requirements: RouteRequirements, aligned: AlignedTrack | None
 
 
 def flown_findings(
-    requirements: RouteRequirements, aligned: AlignedTrack | None, ended: str, log_complete: bool
+    requirements: RouteRequirements, aligned: AlignedTrack | None, end_reason: str, log_complete: bool
 ) -> tuple[Finding, ...]:
     """Return findings on the track of a flight and on how the flight ended.
 
-    ended: "completed", or the reason why the flight ended early.
+    end_reason: "completed", or the reason why the flight ended early.
     log_complete: True if the record has its end.
     """
     end_judges = [rule.judge_end for rule in RULES.values() if rule.judge_end is not None]
-    at_end = tuple(finding for judge in end_judges for finding in judge(requirements, aligned, ended, log_complete))
-    return (*blocking_item_findings(requirements.setup), *_run_rules(requirements, aligned, at_end, geometric=False))
+    end_findings = tuple(
+        finding for judge in end_judges for finding in judge(requirements, aligned, end_reason, log_complete)
+    )
+    return (
+        *blocking_item_findings(requirements.setup),
+        *_run_rules(requirements, aligned, end_findings, geometric=False),
+    )
 
 
 def _run_rules(
     requirements: RouteRequirements,
     aligned: AlignedTrack | None,
-    at_end: Sequence[Finding],
+    end_findings: Sequence[Finding],
     *,
     geometric: bool,
     whole: bool = True,
-    flown: Sequence[Finding] | None = None,
+    flight_findings: Sequence[Finding] | None = None,
 ) -> tuple[Finding, ...]:
-    """Run all rules and return their findings, followed by `at_end`, merged.
+    """Run all rules and return their findings, followed by `end_findings`, merged.
 
-    at_end: findings on how the flight ended.
+    end_findings: findings on how the flight ended.
     whole: True to include rules that judge the flight as a whole.
-    flown: as in `geometric_findings`.
+    flight_findings: as in `geometric_findings`.
     """
 
     def rule_findings(rule: Rule, judge: Judge) -> Sequence[Finding]:
-        if rule.of_route and flown is not None:
-            return [finding for finding in flown if finding.rule == rule.name]
+        if rule.of_route and flight_findings is not None:
+            return [finding for finding in flight_findings if finding.rule == rule.name]
         return judge(requirements, aligned, geometric=geometric)
 
     findings: tuple[Finding, ...] = tuple(
@@ -104,12 +111,12 @@ def _run_rules(
         if rule.judge is not None and (whole or not rule.whole)
         for finding in rule_findings(rule, rule.judge)
     )
-    findings = (*findings, *at_end)
+    findings = (*findings, *end_findings)
     for rule in RULES.values():
         if rule.merge is not None:
             findings = rule.merge(requirements, aligned, findings)
     if whole:
-        findings = (*one_per_stop(findings), *_other_side_findings(requirements, findings))
+        findings = (*worst_finding_per_stop(findings), *_other_side_findings(requirements, findings))
     return findings
 
 
@@ -118,7 +125,7 @@ _RULES_OF_PLACE = ("clearance", "threat", "fence")
 
 
 def _other_side_findings(requirements: RouteRequirements, findings: Sequence[Finding]) -> list[Finding]:
-    """Return undecided findings on course reversals that fail if the aircraft turns to the other side.
+    """Return undecided findings on course reversals that fail only if the aircraft turns to the other side.
 
     A flight shows only one side, which depends on the navigation error of the day: of 12 ArduPlane flights through a
     turn of 180 degrees, 4 turned left.
@@ -127,47 +134,47 @@ def _other_side_findings(requirements: RouteRequirements, findings: Sequence[Fin
     corners = reversals(setup.route)
     if setup.source is not None or not corners.size:
         return []
-    sides = [
+    failures_by_side = [
         {
             (finding.rule, finding.place): finding
             for name in _RULES_OF_PLACE
             if (judge := RULES[name].judge) is not None
-            for finding in judge(side, None, geometric=True)
+            for finding in judge(side_requirements, None, geometric=True)
             if finding.ok is False
         }
-        for side in (route_requirements(setup), route_requirements(setup.turned_to_other_side()))
+        for side_requirements in (route_requirements(setup), route_requirements(setup.turned_to_other_side()))
     ]
-    failed = {(finding.rule, finding.place) for finding in findings if finding.ok is False}
-    places = ", ".join(place_text(requirements.waypoint(int(i))) for i in corners)
-    findings_of_one_side = []
-    for key in (sides[0].keys() ^ sides[1].keys()) - failed:
-        finding = sides[0].get(key) or sides[1][key]
-        brief = f"a reversal of the course at {places} may turn to either side, and one side fails"
+    failed_keys = {(finding.rule, finding.place) for finding in findings if finding.ok is False}
+    corners_text = ", ".join(place_text(requirements.waypoint(int(i))) for i in corners)
+    one_sided_findings = []
+    for key in (failures_by_side[0].keys() ^ failures_by_side[1].keys()) - failed_keys:
+        finding = failures_by_side[0].get(key) or failures_by_side[1][key]
+        brief = f"a reversal of the course at {corners_text} may turn to either side, and one side fails"
         fault = message(brief, f": {finding.reason}")
-        findings_of_one_side.append(
+        one_sided_findings.append(
             make_finding(finding.rule, finding.place, ok=None, reason=fault.text, faults=[fault], check=NOT_FLOWN)
         )
-    return sorted(findings_of_one_side, key=lambda finding: (finding.rule, str(finding.place)))
+    return sorted(one_sided_findings, key=lambda finding: (finding.rule, str(finding.place)))
 
 
-def one_per_stop(findings: Sequence[Finding]) -> tuple[Finding, ...]:
-    """Keep only each rule's worst finding at the corners of a stop, and its worst finding at the legs of a stop.
+def worst_finding_per_stop(findings: Sequence[Finding]) -> tuple[Finding, ...]:
+    """Keep each rule's worst finding on the corners of a stop, and its worst finding on the stop's legs.
 
     >>> from logs.verdict.places import Place
     >>> legs = [Place("leg", k, to_item=4, number=2) for k in (2, 3, 4)]
     >>> margins = zip(legs, (9.0, 4.0, 7.0))
     >>> heights = [make_finding("clearance", leg, ok=True, reason="", margin=margin) for leg, margin in margins]
-    >>> [item.place.index for item in one_per_stop(heights)]
+    >>> [item.place.index for item in worst_finding_per_stop(heights)]
     [3]
     """
-    worst: dict[tuple[object, ...], Finding] = {}
+    worst_by_stop: dict[tuple[object, ...], Finding] = {}
     for k, finding in enumerate(findings):
         place = finding.place
         has_stop = place.kind in ("leg", "waypoint") and place.number is not None
         key = (finding.rule, finding.check, place.kind, place.number, place.item, place.to_item) if has_stop else (k,)
-        if key not in worst or badness(finding) < badness(worst[key]):
-            worst[key] = finding
-    return tuple(worst.values())
+        if key not in worst_by_stop or badness(finding) < badness(worst_by_stop[key]):
+            worst_by_stop[key] = finding
+    return tuple(worst_by_stop.values())
 
 
 def with_suggestions(
@@ -190,9 +197,11 @@ def with_suggestions(
 
 
 def with_passing_suggestions(
-    findings: tuple[Finding, ...], tried: Sequence[TriedSuggestions] | None
+    findings: tuple[Finding, ...], trials: Sequence[TriedSuggestions] | None
 ) -> tuple[Finding, ...]:
-    """Keep only suggestions of failed findings that passed their trials; keep all suggestions if ``tried`` is None.
+    """Drop suggestions of failed findings that did not pass their trials.
+
+    trials: suggestions that passed; None to keep all suggestions.
 
     >>> from logs.verdict.places import Change, Place
     >>> higher = ((Change("height", Place("leg", 2), None, 12.0, "m"),),)
@@ -203,11 +212,13 @@ def with_passing_suggestions(
     >>> [bool(item.suggestions) for item in passing]
     [False, True]
     """
-    if tried is None:
+    if trials is None:
         return findings
-    passed = {(suggested.rule, suggested.place): suggested.suggestions for suggested in tried}
+    passing_suggestions = {(trial.rule, trial.place): trial.suggestions for trial in trials}
     return tuple(
-        replace(finding, suggestions=passed.get((finding.rule, finding.place), ())) if finding.ok is False else finding
+        replace(finding, suggestions=passing_suggestions.get((finding.rule, finding.place), ()))
+        if finding.ok is False
+        else finding
         for finding in findings
     )
 
@@ -244,10 +255,10 @@ def judge_geometry(setup: FlightSetup, requirements: RouteRequirements | None = 
         *([_infeasible_finding(setup.plan)] if setup.plan is not None and not setup.plan.feasible else []),
     )
     complete = setup.plan is None or setup.plan.feasible
-    unjudged, fails = undecided_text(findings), any(finding.ok is False for finding in findings)
-    flyable = complete and not unjudged and not fails
+    unjudged, has_failed = undecided_text(findings), any(finding.ok is False for finding in findings)
+    flyable = complete and not unjudged and not has_failed
     headline_text = headline(findings, flyable, setup.envelope.source)
-    levels = (LevelAnswer("geometry", flyable, headline_text, undecided=bool(unjudged) and not fails),)
+    levels = (LevelAnswer("geometry", flyable, headline_text, undecided=bool(unjudged) and not has_failed),)
     conditions = setup_conditions(setup)
     return Verdict(
         findings,
@@ -267,10 +278,10 @@ def flown_level(setup: FlightSetup) -> LevelName:
     return setup.autopilot.level
 
 
-def judge_unflown(requirements: RouteRequirements, ended: str, *, log_complete: bool = True) -> Verdict:
-    """Judge a flight without rows by its route's geometry and the reason why nothing was flown; never complete.
+def judge_unflown(requirements: RouteRequirements, end_reason: str, *, log_complete: bool = True) -> Verdict:
+    """Judge a flight without rows by its route's geometry; the verdict is never complete.
 
-    ended: reason why nothing was flown.
+    end_reason: reason why nothing was flown.
     log_complete: True if the record has its end.
 
     >>> from logs.recording.example_log import example_log
@@ -279,15 +290,15 @@ def judge_unflown(requirements: RouteRequirements, ended: str, *, log_complete: 
     ('geometric', 'not flyable: completion (not started: no progress against the wind), ...')
     """
     setup = requirements.setup
-    faults = [message(ended), *([] if log_complete else [message("the log is damaged or unfinished")])]
-    stopped = make_finding(
-        "completion", FLIGHT, ok=False, reason=reason_of(faults), faults=faults, method="nothing was flown"
+    faults = [message(end_reason), *([] if log_complete else [message("the log is damaged or unfinished")])]
+    end_finding = make_finding(
+        "completion", FLIGHT, ok=False, reason=finding_reason(faults), faults=faults, method="nothing was flown"
     )
-    predicted = geometric_findings(requirements)
-    passes = not any(finding.ok is False for finding in predicted)
-    findings = (*with_suggestions(requirements, None, predicted), stopped)
+    route_findings = geometric_findings(requirements)
+    passes = not any(finding.ok is False for finding in route_findings)
+    findings = (*with_suggestions(requirements, None, route_findings), end_finding)
     levels = (
-        LevelAnswer("geometry", passes, headline(predicted, passes)),
+        LevelAnswer("geometry", passes, headline(route_findings, passes)),
         LevelAnswer(flown_level(setup), False, headline(findings, False)),
     )
     conditions = setup_conditions(setup)
@@ -296,7 +307,7 @@ def judge_unflown(requirements: RouteRequirements, ended: str, *, log_complete: 
 
 
 def judge_plan_only(plan: Plan, conditions: Conditions | None = None) -> Verdict:
-    """Judge a run that found no feasible plan, so that nothing was flown, at the level "plan"; never complete.
+    """Judge a run without a feasible plan at the level "plan"; the verdict is never complete.
 
     conditions: conditions for which the plan was made.
 
@@ -344,8 +355,10 @@ def judge_plan_only(plan: Plan, conditions: Conditions | None = None) -> Verdict
 
 def _infeasible_finding(plan: Plan) -> Finding:
     problems = plan.certificate.problems or ("the search still counts violations",)
-    first, *others = problems
-    fault = message(f"no feasible plan was found: {first}", "".join(f"; {problem}" for problem in others))
+    first_problem, *other_problems = problems
+    fault = message(
+        f"no feasible plan was found: {first_problem}", "".join(f"; {problem}" for problem in other_problems)
+    )
     return make_finding(
         "completion", PLAN, ok=False, reason=fault.text, faults=[fault], source="plan", method="certificate"
     )
@@ -353,10 +366,12 @@ def _infeasible_finding(plan: Plan) -> Finding:
 
 def _plan_lines(findings: list[Finding], plan: Plan, conditions: Conditions | None) -> tuple[str, ...]:
     failed = [finding for finding in findings if finding.ok is False and finding.rule != "completion"]
-    first, further_lines = headline(findings, False), []
+    headline_text, further_lines = headline(findings, False), []
     if failed:
         text = ", ".join(f"{finding.rule} ({finding.reason})" for finding in failed)
-        first = f"not flyable: no feasible plan was found: {text}"
+        headline_text = f"not flyable: no feasible plan was found: {text}"
         further_lines = ["Nothing was flown", *(f"Problem: {problem}" for problem in plan.certificate.problems)]
-    said = [] if conditions is None else [*condition_lines(conditions), autopilot_line(conditions, flown=False)]
-    return (first, *said, *further_lines)
+    condition_texts = (
+        [] if conditions is None else [*condition_lines(conditions), autopilot_line(conditions, is_flown=False)]
+    )
+    return (headline_text, *condition_texts, *further_lines)

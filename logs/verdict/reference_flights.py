@@ -53,8 +53,10 @@ def parse_reference_flights(text: str | bytes, source: str) -> ReferenceFlights:
     except ValidationError as error:
         raise LogError(**first_fault(error).at(source)) from error
     rules = [rule for rule, _ in file.airframe.failed] if file.airframe is not None else []
-    rules += [entry.rule for entry in (file.deciding, *(file.tried or ())) if entry is not None]
-    unknown = [rule for rule in rules if rule not in RULE_WORDS]
-    if unknown:
-        raise LogError(f"{source}: {unknown[0]!r} is not a rule", file=source, field="rule", value=unknown[0])
+    rules += [answer.rule for answer in (file.deciding, *(file.tried or ())) if answer is not None]
+    unknown_rules = [rule for rule in rules if rule not in RULE_WORDS]
+    if unknown_rules:
+        raise LogError(
+            f"{source}: {unknown_rules[0]!r} is not a rule", file=source, field="rule", value=unknown_rules[0]
+        )
     return ReferenceFlights(file.airframe, file.deciding, file.tried)

@@ -62,7 +62,7 @@ _VERTICAL_SHIFTS: tuple[tuple[Quantity, str, float], ...] = (("height", "up", 1.
 def suggest_passing_zone(
     requirements: RouteRequirements, aligned: AlignedTrack | None, finding: Finding
 ) -> tuple[Suggestion, ...]:
-    """Suggest passing a zone further to one side, or higher or lower; the smallest change first.
+    """Suggest passing a zone further to one side, higher or lower, with the smallest change first.
 
     finding: the finding on the violated zone.
 
@@ -74,19 +74,21 @@ def suggest_passing_zone(
         return ()
     first_leg, last_leg = int(facts["entry leg"]), int(facts["exit leg"])
     record, terrain = zone_records([requirements.airspace.zones[zone_index]]), requirements.setup.scenario.terrain
-    planned, flown = finding.planned or 0.0, finding.flown or 0.0
-    if aligned is not None and planned <= ROUNDING_M:
+    planned_depth, flown_depth = finding.planned or 0.0, finding.flown or 0.0
+    if aligned is not None and planned_depth <= ROUNDING_M:
         moves, extra_depth = flown_moves(aligned, first_leg, last_leg), 0.0
     else:
-        moves, extra_depth = planned_moves(requirements, first_leg, last_leg), max(0.0, flown - planned)
+        moves, extra_depth = planned_moves(requirements, first_leg, last_leg), max(0.0, flown_depth - planned_depth)
     leg_moves = moves[(moves["leg"] >= first_leg) & (moves["leg"] <= last_leg)]
     changes = []
     for shifts in (_HORIZONTAL_SHIFTS, _VERTICAL_SHIFTS):
-        best: tuple[float, Change] | None = None
+        smallest_shift: tuple[float, Change] | None = None
         for direction, axis, sign in shifts:
-            shift = _smallest_shift(leg_moves, record, terrain, axis, sign, math.inf if best is None else best[0])
+            shift = _smallest_shift(
+                leg_moves, record, terrain, axis, sign, math.inf if smallest_shift is None else smallest_shift[0]
+            )
             if shift is not None:
-                best = (
+                smallest_shift = (
                     shift,
                     Change(
                         direction,
@@ -96,15 +98,15 @@ def suggest_passing_zone(
                         "m",
                     ),
                 )
-        if best is not None:
-            changes.append(best)
+        if smallest_shift is not None:
+            changes.append(smallest_shift)
     return tuple((change,) for _, change in sorted(changes, key=lambda sized: sized[0]))
 
 
 def _smallest_shift(
     moves: Records, zone: ZoneRecords, terrain: Terrain | None, axis: str, sign: float, max_shift: float
 ) -> float | None:
-    """Return the smallest shift (m) in one direction that ends a violation, or None if none below ``max_shift`` does.
+    """Return the smallest shift (m) in one direction that ends a violation; None if it exceeds ``max_shift``.
 
     A path at some depth beyond a limit needs a shift of at least that depth, so shifting by the depth at each step
     misses no smaller shift.  Ground that rises faster than the step may be missed.
@@ -132,7 +134,7 @@ _MAX_RELATIVE_CHANGE = 9.0
 
 
 def _smallest_first(alternatives: list[_Sized]) -> tuple[Suggestion, ...]:
-    """Sort alternatives by the relative size of their changes, stably, and drop those that are too large."""
+    """Sort alternatives by the relative size of their changes, and drop changes that are too large."""
     helpful = [sized for sized in alternatives if sized[0] <= _MAX_RELATIVE_CHANGE]
     return tuple(suggestion for _, suggestion in sorted(helpful, key=lambda sized: sized[0]))
 
@@ -148,49 +150,51 @@ def suggest_gentler_slope(
     if leg is None:
         return ()
     if finding.check == UNKNOWN_AIRCRAFT:
-        what: Quantity = "full throttle" if requirements.slopes[leg] > 0.0 else "no throttle"
-        return ((Change(what, finding.place, None, MIN_EVIDENCE_FLIGHT_S, "s"),),)
+        quantity: Quantity = "full throttle" if requirements.slopes[leg] > 0.0 else "no throttle"
+        return ((Change(quantity, finding.place, None, MIN_EVIDENCE_FLIGHT_S, "s"),),)
     limit, source = slope_limit(requirements, leg)
-    planned = abs(float(requirements.slopes[leg]))
-    rise = abs(float(requirements.points[leg + 1, 2] - requirements.points[leg, 2]))
-    run = float(requirements.runs[leg])
-    if planned <= limit and finding.flown is not None:
+    planned_slope = abs(float(requirements.slopes[leg]))
+    height_change = abs(float(requirements.points[leg + 1, 2] - requirements.points[leg, 2]))
+    leg_length = float(requirements.runs[leg])
+    if planned_slope <= limit and finding.flown is not None:
         # The geometry passes and the flight failed: the slope that was flown is the limit.
         limit = min(limit, abs(math.radians(finding.flown)))
-    allowed = limit - SUGGESTION_ANGLE_MARGIN_RAD
-    if allowed <= 0.0 or planned <= allowed:
+    max_slope = limit - SUGGESTION_ANGLE_MARGIN_RAD
+    if max_slope <= 0.0 or planned_slope <= max_slope:
         return _gentler_arc(requirements, leg)
     place, sign = requirements.leg(leg), 1.0 if requirements.slopes[leg] >= 0.0 else -1.0
-    gentler_rise, longer_length = run * math.tan(allowed), rise / math.tan(allowed)
+    gentler_height_change, longer_length = leg_length * math.tan(max_slope), height_change / math.tan(max_slope)
     alternatives: list[_Sized] = []
-    if gentler_rise >= MIN_SUGGESTED_RISE_M:
-        change = Change("rise", place, sign * rise, sign * math.floor(gentler_rise), "m")
-        alternatives.append((1.0 - gentler_rise / rise, (change,)))
-    speed = _slope_speed(requirements, leg, planned + SUGGESTION_ANGLE_MARGIN_RAD) if source == "aircraft" else None
+    if gentler_height_change >= MIN_SUGGESTED_RISE_M:
+        change = Change("rise", place, sign * height_change, sign * math.floor(gentler_height_change), "m")
+        alternatives.append((1.0 - gentler_height_change / height_change, (change,)))
+    speed = (
+        _slope_speed(requirements, leg, planned_slope + SUGGESTION_ANGLE_MARGIN_RAD) if source == "aircraft" else None
+    )
     if speed is not None:
         current_speed = float(requirements.setup.route.airspeed[leg])
         alternatives.append(
             (abs(speed - current_speed) / current_speed, (Change("airspeed", place, current_speed, speed, "m/s"),))
         )
     # A leg that goes straight up has no length to compare with.
-    relative = longer_length / run - 1.0 if run >= MIN_LEG_LENGTH_M else _MAX_RELATIVE_CHANGE
-    alternatives.append((relative, (Change("length", place, run, float(math.ceil(longer_length)), "m"),)))
+    relative_growth = longer_length / leg_length - 1.0 if leg_length >= MIN_LEG_LENGTH_M else _MAX_RELATIVE_CHANGE
+    alternatives.append((relative_growth, (Change("length", place, leg_length, float(math.ceil(longer_length)), "m"),)))
     return _smallest_first(alternatives)
 
 
 def _gentler_arc(requirements: RouteRequirements, leg: int) -> tuple[Suggestion, ...]:
-    """Suggest gentler legs before and after a fly-by arc that is too steep although neither leg is."""
-    steep = steep_arc(requirements, leg)
-    if steep is None:
+    """Suggest gentler legs before and after a fly-by arc that is too steep."""
+    arc = steep_arc(requirements, leg)
+    if arc is None:
         return ()
-    slope_ratio = math.tan(math.atan(steep.limit) - SUGGESTION_ANGLE_MARGIN_RAD) / abs(steep.tangent)
+    slope_ratio = math.tan(math.atan(arc.limit) - SUGGESTION_ANGLE_MARGIN_RAD) / abs(arc.tangent)
     changes = []
     for k in (leg, leg + 1):
-        rise = slope_ratio * float(requirements.points[k + 1, 2] - requirements.points[k, 2])
+        height_change = slope_ratio * float(requirements.points[k + 1, 2] - requirements.points[k, 2])
         # A leg of opposite slope makes the arc flatter, and is kept.
-        if rise * steep.tangent > 0.0:
-            requested_rise = math.copysign(math.floor(abs(rise)), rise)
-            changes.append(Change("rise", requirements.leg(k), None, requested_rise, "m"))
+        if height_change * arc.tangent > 0.0:
+            requested_height_change = math.copysign(math.floor(abs(height_change)), height_change)
+            changes.append(Change("rise", requirements.leg(k), None, requested_height_change, "m"))
     return (tuple(changes),) if changes else ()
 
 
@@ -202,12 +206,12 @@ def suggest_gentler_turn(
     if corner is None:
         return ()
     limit, source = turn_limit(requirements, corner)
-    planned = abs(float(requirements.turns[corner]))
-    if planned <= limit or limit <= SUGGESTION_ANGLE_MARGIN_RAD:
+    planned_turn = abs(float(requirements.turns[corner]))
+    if planned_turn <= limit or limit <= SUGGESTION_ANGLE_MARGIN_RAD:
         return ()
-    place, allowed = requirements.waypoint(corner), limit - SUGGESTION_ANGLE_MARGIN_RAD
+    place, max_turn = requirements.waypoint(corner), limit - SUGGESTION_ANGLE_MARGIN_RAD
     alternatives: list[_Sized] = []
-    if source == "aircraft" and math.isfinite(requirements.before[corner]):
+    if source == "aircraft" and math.isfinite(requirements.length_before[corner]):
         speed = _turn_speed(requirements, corner)
         if speed is not None:
             current_speed = float(max(requirements.setup.route.airspeed[corner - 1 : corner + 1]))
@@ -215,39 +219,39 @@ def suggest_gentler_turn(
                 (1.0 - speed / current_speed, (Change("airspeed", place, current_speed, speed, "m/s"),))
             )
         alternatives += _longer_legs(requirements, corner)
-    degrees = _gentler_turn(requirements, corner, allowed)
+    degrees = _gentler_turn(requirements, corner, max_turn)
     if degrees > 0.0:
-        change = Change("turn", place, math.degrees(planned), degrees, "deg")
-        alternatives.append((1.0 - allowed / planned, (change,)))
+        change = Change("turn", place, math.degrees(planned_turn), degrees, "deg")
+        alternatives.append((1.0 - max_turn / planned_turn, (change,)))
     return _smallest_first(alternatives)
 
 
 def _longer_legs(requirements: RouteRequirements, corner: int) -> list[_Sized]:
-    """Suggest longer legs at a waypoint, to fit its turn and the neighbouring turns; return [] if all turns fit."""
+    """Suggest longer legs at a waypoint that fit its turn and the neighbouring turns; return [] if all turns fit."""
     needed_before = (
-        requirements.before[corner]
-        + requirements.after[corner - 1]
+        requirements.length_before[corner]
+        + requirements.length_after[corner - 1]
         + requirements.reversal[corner - 1]
         + SUGGESTION_LENGTH_MARGIN_M
     )
     needed_after = (
-        requirements.after[corner]
-        + requirements.before[corner + 1]
+        requirements.length_after[corner]
+        + requirements.length_before[corner + 1]
         + requirements.reversal[corner]
         + SUGGESTION_LENGTH_MARGIN_M
     )
     changes = []
     relative_growth = 0.0
-    for leg, needed in ((corner - 1, needed_before), (corner, needed_after)):
-        run = float(requirements.runs[leg])
-        if math.isfinite(needed) and needed > run:
-            changes.append(Change("length", requirements.leg(leg), run, float(math.ceil(needed)), "m"))
-            relative_growth = max(relative_growth, needed / run - 1.0)
+    for leg, needed_length in ((corner - 1, needed_before), (corner, needed_after)):
+        leg_length = float(requirements.runs[leg])
+        if math.isfinite(needed_length) and needed_length > leg_length:
+            changes.append(Change("length", requirements.leg(leg), leg_length, float(math.ceil(needed_length)), "m"))
+            relative_growth = max(relative_growth, needed_length / leg_length - 1.0)
     return [(relative_growth, tuple(changes))] if changes else []
 
 
-def _gentler_turn(requirements: RouteRequirements, corner: int, allowed: float) -> float:
-    """Return the largest passing turn up to ``allowed`` (rad), in degrees in steps of 0.1; 0 if none passes.
+def _gentler_turn(requirements: RouteRequirements, corner: int, max_turn: float) -> float:
+    """Return the largest passing turn up to ``max_turn`` (rad), in degrees in steps of 0.1; 0 if none passes.
 
     The route after the waypoint is rotated with the turn.  In wind the next turns change with their courses, and so
     does the length available to this turn.
@@ -265,7 +269,7 @@ def _gentler_turn(requirements: RouteRequirements, corner: int, allowed: float) 
     )
     tables, local_corner = performance_tables(nearby_route, requirements.limits), corner - first_point
     for _ in range(SUGGESTION_TRIAL_COUNT):
-        degrees = math.floor(10.0 * math.degrees(allowed)) / 10.0
+        degrees = math.floor(10.0 * math.degrees(max_turn)) / 10.0
         if degrees <= 0.0:
             return 0.0
         points = np.array(requirements.points[first_point:end_point])
@@ -277,7 +281,7 @@ def _gentler_turn(requirements: RouteRequirements, corner: int, allowed: float) 
         limit, _ = tighter_turn(requirements, corner, float(trial.limit[local_corner]))
         if limit >= math.radians(degrees):
             return degrees
-        allowed = min(allowed, limit) - SUGGESTION_ANGLE_MARGIN_RAD
+        max_turn = min(max_turn, limit) - SUGGESTION_ANGLE_MARGIN_RAD
     return 0.0
 
 
@@ -308,38 +312,42 @@ def _level_speeds(requirements: RouteRequirements, amsl: float, current_speed: f
 
 
 def _slope_speed(requirements: RouteRequirements, leg: int, slope: float) -> float | None:
-    """Return the airspeed nearest to the commanded one at which the aircraft holds a slope on a leg, or None."""
+    """Return the airspeed nearest to the command at which the aircraft holds a leg's slope, or None."""
     course, direction = float(requirements.courses[leg]), 0 if requirements.slopes[leg] >= 0.0 else 1
     altitudes = (float(requirements.points[leg, 2]), float(requirements.points[leg + 1, 2]))
     factor = _true_airspeed_ratio(requirements, leg)
 
-    def passes(speed: float) -> bool:
+    def can_hold_slope(speed: float) -> bool:
         table = requirements.limits.performance(speed * factor)
         return min(aircraft_slopes(table, course, altitude)[direction] for altitude in altitudes) >= slope
 
     commanded = float(requirements.setup.route.airspeed[leg])
-    return first_that_passes(_level_speeds(requirements, max(altitudes), commanded, factor), passes)
+    return first_that_passes(_level_speeds(requirements, max(altitudes), commanded, factor), can_hold_slope)
 
 
 def _turn_speed(requirements: RouteRequirements, corner: int) -> float | None:
-    """Return the highest airspeed below the commanded one at which a waypoint's turn fits its legs, or None."""
+    """Return the maximum airspeed below the command at which a waypoint's turn fits its legs, or None."""
     current_speed = float(max(requirements.setup.route.airspeed[corner - 1 : corner + 1]))
-    available = min(
-        available_lengths(requirements.runs, requirements.before, requirements.after, requirements.reversal, corner)
+    available_length = min(
+        available_lengths(
+            requirements.runs, requirements.length_before, requirements.length_after, requirements.reversal, corner
+        )
     )
     factor = _true_airspeed_ratio(requirements, corner)
     altitude = float(requirements.points[corner, 2])
 
-    def fits(speed: float) -> bool:
+    def does_turn_fit(speed: float) -> bool:
         table = requirements.limits.performance(speed * factor)
         radius = turn_radius_between(table, requirements.courses[corner - 1], requirements.courses[corner], altitude)
         lengths = turn_lengths(
             abs(float(requirements.turns[corner])), radius, bool(requirements.setup.route.fly_over[corner])
         )
-        return max(lengths) + SUGGESTION_LENGTH_MARGIN_M <= available
+        return max(lengths) + SUGGESTION_LENGTH_MARGIN_M <= available_length
 
-    slower = [speed for speed in _level_speeds(requirements, altitude, current_speed, factor) if speed < current_speed]
-    return first_that_passes(sorted(slower, reverse=True), fits)
+    slower_speeds = [
+        speed for speed in _level_speeds(requirements, altitude, current_speed, factor) if speed < current_speed
+    ]
+    return first_that_passes(sorted(slower_speeds, reverse=True), does_turn_fit)
 
 
 def _whole_metres(metres: float) -> float:
@@ -355,12 +363,12 @@ def suggest_wider_berth(
     if missile is None or finding.place.kind != "missile":
         return ()
     threats = requirements.setup.scenario.threats
-    only = slice(missile, missile + 1)
-    spheres = (threats.position[only], threats.kill_radius[only], threats.kill_scale[only])
-    nearest = path_spheres(requirements.path.points, requirements.path.times, *spheres).closest[0]
+    index = slice(missile, missile + 1)
+    spheres = (threats.position[index], threats.kill_radius[index], threats.kill_scale[index])
+    min_distance = path_spheres(requirements.path.points, requirements.path.times, *spheres).closest[0]
     if aligned is not None and len(aligned.track) > 1:
-        nearest = min(nearest, path_spheres(aligned.track.position, aligned.track.time, *spheres).closest[0])
-    extra_distance = _whole_metres(threats.kill_radius[missile] - nearest + SUGGESTION_LENGTH_MARGIN_M)
+        min_distance = min(min_distance, path_spheres(aligned.track.position, aligned.track.time, *spheres).closest[0])
+    extra_distance = _whole_metres(threats.kill_radius[missile] - min_distance + SUGGESTION_LENGTH_MARGIN_M)
     return ((Change("distance", finding.place, None, extra_distance, "m"),),)
 
 
@@ -372,7 +380,7 @@ def suggest_flying_higher(
         return ()
     shortfall = -finding.margin + SUGGESTION_LENGTH_MARGIN_M
     if finding.planned is not None:
-        # A flight that ended early did not reach the lowest place.
+        # A flight that ended early did not reach the lowest point.
         shortfall = max(shortfall, finding.limit - finding.planned + SUGGESTION_LENGTH_MARGIN_M)
     return (
         ((Change("height", finding.place, None, _whole_metres(shortfall), "m"),),)
@@ -411,9 +419,9 @@ def suggest_using_less_energy(
     ratio = energy / finding.limit
     envelope = requirements.setup.envelope
     storage: Quantity = "battery" if envelope.volts or not envelope.power_level.size else "tank"
-    shorter = Change("duration", FLIGHT, None, float(math.ceil(100.0 * (1.0 - 1.0 / ratio))), "%")
-    larger = Change(storage, FLIGHT, None, math.ceil(100.0 * ratio) / 100.0, "1")
-    return (shorter,), (larger,)
+    shorter_flight = Change("duration", FLIGHT, None, float(math.ceil(100.0 * (1.0 - 1.0 / ratio))), "%")
+    larger_storage = Change(storage, FLIGHT, None, math.ceil(100.0 * ratio) / 100.0, "1")
+    return (shorter_flight,), (larger_storage,)
 
 
 def suggest_flying_faster(

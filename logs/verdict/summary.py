@@ -21,16 +21,16 @@ from logs.verdict.tolerances import NOTABLE_HEIGHT_ERROR_M
 from logs.verdict.wording import deciding_text, disagreement_text, place_text
 
 # Maximum number of failed findings that the first line names.
-_NAMED = 4
+_MAX_NAMED_FINDINGS = 4
 # Introductions of the lines on the other levels.
-_LEVELS = {
+_LEVEL_TITLES = {
     "geometry": "By geometry only",
     "airframe": "By the airframe (planfly's guidance, exact navigation)",
 }
 
 
 def headline(findings: Sequence[Finding], flyable: bool, source: str = "") -> str:
-    """Write the first line: the answer, and the findings that failed, were not judged or narrowly passed.
+    """Write the first line: the answer, with the failed, unjudged or narrowly passed findings.
 
     source: the source of the aircraft's model, if the model is uncertain.
     """
@@ -39,11 +39,11 @@ def headline(findings: Sequence[Finding], flyable: bool, source: str = "") -> st
         unjudged = [_unjudged_text(findings, rule) for rule in RULE_WORDS.values() if rule.unjudged]
         notes = [*filter(None, unjudged), *_near_miss_notes(findings), *_altitude_notes(findings)]
         return "; ".join(["flyable", *notes, *source_notes])
-    failed = _failed_by_urgency(findings)
-    if not failed and (open_text := undecided_text(findings)):
+    failed_findings = _failed_by_urgency(findings)
+    if not failed_findings and (open_text := undecided_text(findings)):
         return "; ".join([f"not judged in full: {open_text}", *source_notes])
-    named_findings = _headline_findings(failed)
-    unnamed_count = len(failed) - len(named_findings)
+    named_findings = _headline_findings(failed_findings)
+    unnamed_count = len(failed_findings) - len(named_findings)
     text = (
         "not flyable: "
         + ", ".join(_headline_phrase(item) for item in named_findings)
@@ -67,50 +67,57 @@ def undecided_text(findings: Sequence[Finding]) -> str:
         for finding in open_findings
         if finding.check == UNKNOWN_WAY
     ]
-    path_text = f"only a flight tells where {' and '.join(paths[:_NAMED])} is flown" if paths else ""
+    path_text = f"only a flight tells where {' and '.join(paths[:_MAX_NAMED_FINDINGS])} is flown" if paths else ""
     aircraft_text = _unknown_aircraft_text([finding for finding in open_findings if finding.check == UNKNOWN_AIRCRAFT])
     other_briefs = [finding.brief for finding in open_findings if finding.check in APART_FROM_FLIGHT]
     item_briefs = [finding.brief for finding in open_findings if finding.check == NOT_FLOWN]
-    rest_texts = [f"{len(item_briefs) - _NAMED} more items"] if len(item_briefs) > _NAMED else []
-    return "; ".join(filter(None, [aircraft_text, path_text, *item_briefs[:_NAMED], *rest_texts, *other_briefs]))
+    rest_texts = (
+        [f"{len(item_briefs) - _MAX_NAMED_FINDINGS} more items"] if len(item_briefs) > _MAX_NAMED_FINDINGS else []
+    )
+    return "; ".join(
+        filter(None, [aircraft_text, path_text, *item_briefs[:_MAX_NAMED_FINDINGS], *rest_texts, *other_briefs])
+    )
 
 
-def _unknown_aircraft_text(undecided: Sequence[Finding]) -> str:
-    """Describe the findings for which the aircraft is not known well enough; return "" if there are none."""
-    slopes = [finding for finding in undecided if finding.rule == "slope"]
-    if len(slopes) < len(undecided):
-        speed_count = sum(finding.rule == "speed" for finding in undecided)
+def _unknown_aircraft_text(open_findings: Sequence[Finding]) -> str:
+    """Describe the findings on an insufficiently known aircraft; return "" if there are none."""
+    slopes = [finding for finding in open_findings if finding.rule == "slope"]
+    if len(slopes) < len(open_findings):
+        speed_count = sum(finding.rule == "speed" for finding in open_findings)
         subjects = [
             f"{name}{'s' if count > 1 or name == 'slope' else ''} on {count} leg{'s' if count > 1 else ''}"
             for name, count in (("slope", len(slopes)), ("airspeed", speed_count))
             if count
         ]
-        subjects += ["energy"] if len(slopes) + speed_count < len(undecided) else []
+        subjects += ["energy"] if len(slopes) + speed_count < len(open_findings) else []
         is_singular = len(subjects) == 1 and (subjects == ["energy"] or speed_count == 1)
         verb = "is" if is_singular else "are"
-        listed = " and ".join(filter(None, [", ".join(subjects[:-1]), subjects[-1]]))
-        return f"{listed} {verb} too close to the limit to judge with what is known of the aircraft"
+        subject_text = " and ".join(filter(None, [", ".join(subjects[:-1]), subjects[-1]]))
+        return f"{subject_text} {verb} too close to the limit to judge with what is known of the aircraft"
     if not slopes:
         return ""
-    if len(slopes) > _NAMED:
+    if len(slopes) > _MAX_NAMED_FINDINGS:
         return f"slopes on {len(slopes)} legs are too close to the limit to judge with what is known of the aircraft"
-    places = [place_text(finding.place) + ("," if finding.place.to_item is not None else "") for finding in slopes]
+    place_names = [place_text(finding.place) + ("," if finding.place.to_item is not None else "") for finding in slopes]
     noun, verb = ("slopes", "are") if len(slopes) > 1 else ("slope", "is")
-    return f"{noun} on {' and '.join(places)} {verb} too close to the limit to judge with what is known of the aircraft"
+    return (
+        f"{noun} on {' and '.join(place_names)} {verb} too close to the limit to judge with what is known of"
+        " the aircraft"
+    )
 
 
-def first_failed(findings: Sequence[Finding]) -> Finding | None:
+def most_urgent_failure(findings: Sequence[Finding]) -> Finding | None:
     """Return the failed finding that the headline names first, or None if nothing failed.
 
     >>> from logs.verdict.findings import make_finding
     >>> from logs.verdict.places import FLIGHT
     >>> findings = [make_finding(rule, FLIGHT, ok=False, reason="") for rule in ("energy", "completion")]
-    >>> first = first_failed(findings)
+    >>> first = most_urgent_failure(findings)
     >>> first.rule
     'completion'
     """
-    failed = _failed_by_urgency(findings)
-    return _headline_findings(failed)[0] if failed else None
+    failed_findings = _failed_by_urgency(findings)
+    return _headline_findings(failed_findings)[0] if failed_findings else None
 
 
 def _failed_by_urgency(findings: Sequence[Finding]) -> list[Finding]:
@@ -158,15 +165,15 @@ def _altitude_notes(findings: Sequence[Finding]) -> list[str]:
 
 
 def _headline_findings(failed: list[Finding]) -> list[Finding]:
-    """Return at most four failed findings, the worst of each rule before the second worst of any rule."""
+    """Select at most four failed findings: the worst of each rule before the second worst of any rule."""
     margins = [0.0 if finding.margin is None else finding.margin for finding in failed]
-    by_margin = sorted(range(len(failed)), key=margins.__getitem__)
+    indices_by_margin = sorted(range(len(failed)), key=margins.__getitem__)
     counts: dict[str, int] = {}
-    rank = {}
-    for k in by_margin:
-        rank[k] = counts[failed[k].rule] = counts.get(failed[k].rule, 0) + 1
-    chosen = sorted(range(len(failed)), key=lambda k: (rank[k], k))[:_NAMED]
-    return [failed[k] for k in sorted(chosen)]
+    rank_in_rule = {}
+    for k in indices_by_margin:
+        rank_in_rule[k] = counts[failed[k].rule] = counts.get(failed[k].rule, 0) + 1
+    chosen_indices = sorted(range(len(failed)), key=lambda k: (rank_in_rule[k], k))[:_MAX_NAMED_FINDINGS]
+    return [failed[k] for k in sorted(chosen_indices)]
 
 
 def _headline_phrase(finding: Finding) -> str:
@@ -183,15 +190,15 @@ def summary_lines(
     conditions: Conditions,
     deciding: DecidingParameter | None = None,
 ) -> tuple[str, ...]:
-    """Write the summary: answer, airframe or autopilot, start, conditions, autopilot, what was not judged, levels.
+    """Write the lines of the summary: answer, start, conditions, autopilot, unjudged rules, warnings, levels.
 
     levels: answers of all levels; the verdict's own is last and has the headline.
     """
-    *others, own_answer = levels
+    *other_answers, own_answer = levels
     lines = [own_answer.headline, *_airframe_or_autopilot_lines(levels, deciding, setup)]
     lines.append(f"Start: {setup.started}" if setup.started else "Start: not stated")
-    lines += [*condition_lines(conditions), autopilot_line(conditions, flown=level == "flown")]
-    lines += _parameter_lines(setup, flown=level == "flown")
+    lines += [*condition_lines(conditions), autopilot_line(conditions, is_flown=level == "flown")]
+    lines += _parameter_lines(setup, is_flown=level == "flown")
     lines += _ignored_settings_lines(setup)
     reasons: dict[str, str] = {}
     for finding in findings:
@@ -219,9 +226,9 @@ def summary_lines(
         lines += [line] if (line := corridor_line(setup)) else []
     if level == "geometric":
         lines.append("Level: geometric, from the route and the aircraft's envelope, without a flight")
-    for other in others:
-        agreement = f"; {_agreement_text(other)}" if level == "flown" else ""
-        lines.append(f"{_LEVELS[other.name]}: {other.headline}{agreement}")
+    for answer in other_answers:
+        agreement = f"; {_agreement_text(answer)}" if level == "flown" else ""
+        lines.append(f"{_LEVEL_TITLES[answer.name]}: {answer.headline}{agreement}")
     return tuple(lines)
 
 
@@ -241,26 +248,30 @@ def _airframe_or_autopilot_lines(
     return [f"The aircraft can fly this, but {setup.autopilot.title}{parameters_note} cannot{reason}"]
 
 
-def _parameter_lines(setup: FlightSetup, *, flown: bool) -> list[str]:
-    """Describe the source of the parameters if a file sets any, and the names in the file that have no effect.
+def _parameter_lines(setup: FlightSetup, *, is_flown: bool) -> list[str]:
+    """Describe the sources of the parameters, and names in the parameter file that have no effect.
 
-    Without a flight, only faults of the file are described.
+    Return [] without a parameter file.  Without a flight, only faults of the file are described.
     """
     parameters = setup.autopilot.parameters
     if parameters is None or not parameters.source:
         return []
     misfits = [f"Parameters that do not fit: {'; '.join(parameters.misfits)}"] if parameters.misfits else []
-    if not flown and all(len(name) <= LONGEST_NAME for name in parameters.unused):
+    if not is_flown and all(len(name) <= LONGEST_NAME for name in parameters.unused):
         return misfits
     counts = {origin: len(parameters.by_origin(origin)) for origin in ("file", "aircraft", "default")}
     # A name that is too long is a mistake in the file, and the others belong to other hardware.
-    longest_first = sorted(parameters.unused, key=lambda name: len(name) <= LONGEST_NAME)
-    unused = [
+    unused_by_length = sorted(parameters.unused, key=lambda name: len(name) <= LONGEST_NAME)
+    unused_names = [
         name if len(name) <= LONGEST_NAME else f"{name} (longer than {LONGEST_NAME} characters)"
-        for name in longest_first[:_NAMED]
+        for name in unused_by_length[:_MAX_NAMED_FINDINGS]
     ]
-    unnamed_count = len(parameters.unused) - len(unused)
-    notes = f"; not used: {', '.join(unused)}{f', +{unnamed_count} more' if unnamed_count else ''}" if unused else ""
+    unnamed_count = len(parameters.unused) - len(unused_names)
+    notes = (
+        f"; not used: {', '.join(unused_names)}{f', +{unnamed_count} more' if unnamed_count else ''}"
+        if unused_names
+        else ""
+    )
     not_flown = [name for name in parameters.not_flown if name in parameters.by_origin("file")]
     notes += f"; read but not simulated: {', '.join(not_flown)}" if not_flown else ""
     notes += f"; beyond {setup.autopilot.title}'s documented ranges, but flown: {', '.join(parameters.beyond)}" * bool(
@@ -274,15 +285,20 @@ def _parameter_lines(setup: FlightSetup, *, flown: bool) -> list[str]:
 
 
 def _ignored_settings_lines(setup: FlightSetup) -> list[str]:
-    """Name the settings of the scenario's returns for which the autopilot has no parameter."""
-    returns, parameters = setup.scenario.returns, setup.autopilot.parameters
-    if returns is None or returns.rtl_autoland is None or parameters is None or hasattr(parameters, "rtl_autoland"):
+    """Name the settings of the scenario's [returns] for which the autopilot has no parameter."""
+    rtl_settings, parameters = setup.scenario.returns, setup.autopilot.parameters
+    if (
+        rtl_settings is None
+        or rtl_settings.rtl_autoland is None
+        or parameters is None
+        or hasattr(parameters, "rtl_autoland")
+    ):
         return []
     return [f"Not used: rtl_autoland of [returns], for which {setup.autopilot.title} has no parameter"]
 
 
 def _terrain_error_lines(findings: Sequence[Finding], setup: FlightSetup) -> list[str]:
-    """Return a line with the lowest clearance less the terrain's stated error, or no line without that error."""
+    """Return a line with the minimum clearance less the terrain's stated error; [] if no error is stated."""
     error = None if setup.scenario.terrain is None else setup.scenario.terrain.vertical_error
     clearances = [
         finding.planned if finding.flown is None else finding.flown
@@ -291,19 +307,22 @@ def _terrain_error_lines(findings: Sequence[Finding], setup: FlightSetup) -> lis
     ]
     if error is None or not clearances:
         return []
-    lowest, required = min(clearances), setup.scenario.limits.min_clearance_m
+    min_clearance, required_clearance = min(clearances), setup.scenario.limits.min_clearance_m
     return [
-        f"Terrain's stated error: {error:g} m; the lowest clearance is {lowest:.1f} m, or {lowest - error:.1f}"
+        f"Terrain's stated error: {error:g} m; the lowest clearance is {min_clearance:.1f} m, or"
+        f" {min_clearance - error:.1f}"
         " m with that error subtracted"
-        f" ({required:g} m are required)"
+        f" ({required_clearance:g} m are required)"
     ]
 
 
 def _agreement_text(other: LevelAnswer) -> str:
     """Describe where the verdict and another level agree or differ."""
-    differing = other.disagreements
-    if not differing:
+    disagreements = other.disagreements
+    if not disagreements:
         is_geometry = other.name == "geometry"
         return "flight and geometry agree on every finding that both have" if is_geometry else "both flights agree"
-    rest_text = f", +{len(differing) - _NAMED} more" if len(differing) > _NAMED else ""
-    return "; ".join(map(disagreement_text, differing[:_NAMED])) + rest_text
+    rest_text = (
+        f", +{len(disagreements) - _MAX_NAMED_FINDINGS} more" if len(disagreements) > _MAX_NAMED_FINDINGS else ""
+    )
+    return "; ".join(map(disagreement_text, disagreements[:_MAX_NAMED_FINDINGS])) + rest_text

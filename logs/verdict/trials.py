@@ -29,8 +29,8 @@ def least_change(changes: Sequence[Candidate], passes: Callable[[Candidate], boo
     >>> tried
     [50, 20, 30]
     """
-    failing, passing = -1, len(changes)
-    while passing - failing > 1:
-        middle = (failing + passing) // 2
-        failing, passing = (failing, middle) if passes(changes[middle]) else (middle, passing)
-    return changes[passing] if passing < len(changes) else None
+    last_failing, first_passing = -1, len(changes)
+    while first_passing - last_failing > 1:
+        middle = (last_failing + first_passing) // 2
+        last_failing, first_passing = (last_failing, middle) if passes(changes[middle]) else (middle, first_passing)
+    return changes[first_passing] if first_passing < len(changes) else None

@@ -73,46 +73,46 @@ def change_text(change: Change) -> str:
     >>> change_text(Change("full throttle", Place("leg", 3), None, 20.0, "s"))
     'fly a climb of 20 s at full throttle and give its log to planfly aircraft --identify'
     """
-    where, wanted = place_text_within(change.place), change.wanted
+    place_name, requested_value = place_text_within(change.place), change.wanted
     match change.what:
         case "length":
             return f"make {_length_text(change)}"
         case "rise":
             return _rise_text(change)
         case "airspeed" if change.most is not None:
-            return f"command {wanted:.1f} to {change.most:.1f} m/s on {place_text(change.place)}"
+            return f"command {requested_value:.1f} to {change.most:.1f} m/s on {place_text(change.place)}"
         case "airspeed":
-            return f"fly it at {wanted:g} m/s instead of {change.current:g} m/s"
+            return f"fly it at {requested_value:g} m/s instead of {change.current:g} m/s"
         case "turn":
-            return f"turn at most {wanted:.1f}° there"
+            return f"turn at most {requested_value:.1f}° there"
         case "height" | "descent":
-            step = f"{wanted:.0f} m {'higher' if change.what == 'height' else 'lower'}"
-            return f"fly {where} {step}" if change.place.kind == "leg" else f"pass {change.place.name} {step}"
+            step = f"{requested_value:.0f} m {'higher' if change.what == 'height' else 'lower'}"
+            return f"fly {place_name} {step}" if change.place.kind == "leg" else f"pass {change.place.name} {step}"
         case "north" | "east" | "south" | "west":
             verb = "stay in" if change.place.kind == "inclusion" else "pass"
-            return f"{verb} {change.place.name} {wanted:.0f} m further {change.what}"
+            return f"{verb} {change.place.name} {requested_value:.0f} m further {change.what}"
         case "inset":
-            return f"bring the path {wanted:.0f} m further inside"
+            return f"bring the path {requested_value:.0f} m further inside"
         case "distance":
-            return f"pass {threat_text(change.place)} {wanted:.0f} m further away"
+            return f"pass {threat_text(change.place)} {requested_value:.0f} m further away"
     return _other_change_text(change)
 
 
 def _other_change_text(change: Change) -> str:
     """Phrase a change of anything but the path as an instruction."""
-    wanted = change.wanted
+    requested_value = change.wanted
     match change.what:
         case "duration":
-            return f"shorten the flight by {wanted:.0f} %"
+            return f"shorten the flight by {requested_value:.0f} %"
         case "full throttle" | "no throttle":
             climb = change.what == "full throttle"
-            what = (
-                f"a climb of {wanted:.0f} s at full throttle"
+            flight_text = (
+                f"a climb of {requested_value:.0f} s at full throttle"
                 if climb
-                else f"a glide of {wanted:.0f} s without throttle"
+                else f"a glide of {requested_value:.0f} s without throttle"
             )
-            return f"fly {what} and give its log to planfly aircraft --identify"
-    return f"take a {change.what} {wanted:.2f} times as large"
+            return f"fly {flight_text} and give its log to planfly aircraft --identify"
+    return f"take a {change.what} {requested_value:.2f} times as large"
 
 
 def _rise_text(change: Change) -> str:
@@ -126,8 +126,8 @@ def _rise_text(change: Change) -> str:
 
 def _length_text(change: Change) -> str:
     current = change.current or 0.0
-    instead = "; it has no length now" if current < MIN_LEG_LENGTH_M else f" instead of {current:.0f} m"
-    return f"{place_text_within(change.place)} {change.wanted:.0f} m long{instead}"
+    comparison = "; it has no length now" if current < MIN_LEG_LENGTH_M else f" instead of {current:.0f} m"
+    return f"{place_text_within(change.place)} {change.wanted:.0f} m long{comparison}"
 
 
 def suggestion_text(suggestion: Suggestion) -> str:
@@ -163,9 +163,9 @@ def disagreement_text(disagreement: Disagreement) -> str:
     'speed at leg 0 passes by geometry and fails in flight'
     """
     verbs = {True: "passes", False: "fails"}
-    where = f"{disagreement.rule} at {place_text_within(disagreement.place)}"
+    rule_and_place = f"{disagreement.rule} at {place_text_within(disagreement.place)}"
     return (
-        f"{where} {verbs[disagreement.there]} {_LEVEL_PHRASES[disagreement.level]}"
+        f"{rule_and_place} {verbs[disagreement.there]} {_LEVEL_PHRASES[disagreement.level]}"
         f" and {verbs[disagreement.here]} in flight"
     )
 
@@ -176,12 +176,12 @@ def deciding_text(deciding: DecidingParameter) -> str:
     >>> deciding_text(DecidingParameter("TECS_HDEM_TCONST", 3.0, 1.2, "s", "clearance", Place("leg", 4), -8.2))
     'TECS_HDEM_TCONST 3 puts it 8 m low on leg 4; 1.2 would pass'
     """
-    where, error = place_text(deciding.place), deciding.off
-    effect = f"fails {deciding.rule} at {where}"
+    place_name, error = place_text(deciding.place), deciding.off
+    effect = f"fails {deciding.rule} at {place_name}"
     if error is not None and deciding.rule == "corridor":
-        effect = f"takes it {abs(error):.0f} m off {where}"
+        effect = f"takes it {abs(error):.0f} m off {place_name}"
     elif error is not None:
-        effect = f"puts it {abs(error):.0f} m {'low' if error < 0.0 else 'high'} on {where}"
+        effect = f"puts it {abs(error):.0f} m {'low' if error < 0.0 else 'high'} on {place_name}"
     return f"{deciding.name} {deciding.current:g} {effect}; {deciding.passing:g} would pass"
 
 
@@ -197,10 +197,10 @@ def gentle_launch_text(acceleration: float, trigger: tuple[float, str]) -> str:
     return f"the launch accelerates at {acceleration:.1f} m/s², less than {trigger[1]} {trigger[0]:g}"
 
 
-def shortened(statement: str) -> str:
+def shorten_statement(statement: str) -> str:
     """Cut a statement to the maximum length in a headline.
 
-    >>> shortened("bank 80° at 3.0 s"), len(shortened("m" * 200))
+    >>> shorten_statement("bank 80° at 3.0 s"), len(shorten_statement("m" * 200))
     ('bank 80° at 3.0 s', 80)
     """
     return statement if len(statement) <= _MAX_STATEMENT_LENGTH else statement[: _MAX_STATEMENT_LENGTH - 3] + "..."

@@ -56,15 +56,15 @@ def draw_envelope(aircraft: Aircraft, envelope: Envelope) -> Figure:
         else:
             idle = "the motor brakes" if envelope.motor_braking else "without current (the motor does not brake)"
         subtitle = f"JSBSim trims; climbs at full throttle, descents: {idle}; shaded: the speeds that guidance uses"
-        _title(figure, f"{aircraft.title}: what it can do in steady flight", subtitle)
-        _slopes(axes[0, 0], aircraft, envelope)
+        _write_title(figure, f"{aircraft.title}: what it can do in steady flight", subtitle)
+        _draw_slopes(axes[0, 0], aircraft, envelope)
         _level_speeds(axes[0, 1], aircraft, envelope)
-        _in_wind(axes[1, 0], aircraft, envelope)
-        _turns(axes[1, 1], aircraft)
+        _draw_slopes_in_wind(axes[1, 0], aircraft, envelope)
+        _draw_turns(axes[1, 1], aircraft)
     return figure
 
 
-def _slopes(axes: Any, aircraft: Aircraft, envelope: Envelope) -> None:
+def _draw_slopes(axes: Any, aircraft: Aircraft, envelope: Envelope) -> None:
     heights = np.linspace(0, envelope.amsl.size - 1, len(theme.SHADES)).round().astype(int)
     for k, j in enumerate(heights):
         look = {"color": theme.SHADES[k], "linestyle": _DASHES[k], "linewidth": 1.3}
@@ -72,7 +72,7 @@ def _slopes(axes: Any, aircraft: Aircraft, envelope: Envelope) -> None:
         axes.plot(envelope.airspeed, -np.degrees(envelope.descent[:, j]), **look)
     axes.axhline(0.0, color=theme.colour("area"), linewidth=0.8)
     _shade_guidance_speeds(axes, aircraft)
-    _frame(axes, "steepest climb and descent to the air", "airspeed (m/s)", "flight path (°)")
+    _set_up_axes(axes, "steepest climb and descent to the air", "airspeed (m/s)", "flight path (°)")
     _legend_above(axes, "height AMSL", 3)
 
 
@@ -91,11 +91,11 @@ def _level_speeds(axes: Any, aircraft: Aircraft, envelope: Envelope) -> None:
     _shade_guidance_speeds(axes, aircraft)
     span = float(np.nanmax(max_speeds) - np.nanmin(min_speeds))
     axes.set_xlim(float(np.nanmin(min_speeds)) - 0.08 * span, float(np.nanmax(max_speeds)) + 0.08 * span)
-    _frame(axes, "level flight", "airspeed (m/s)", "height AMSL (m)")
+    _set_up_axes(axes, "level flight", "airspeed (m/s)", "height AMSL (m)")
     _legend_above(axes, "", 2)
 
 
-def _in_wind(axes: Any, aircraft: Aircraft, envelope: Envelope) -> None:
+def _draw_slopes_in_wind(axes: Any, aircraft: Aircraft, envelope: Envelope) -> None:
     speeds = np.linspace(aircraft.airspeed_min, aircraft.airspeed_max, 60)
     for k, wind in enumerate(_WINDS):
         climb, dive = np.degrees([envelope.slope_limits(float(v), TRIM_AMSL, wind) for v in speeds]).T
@@ -104,17 +104,17 @@ def _in_wind(axes: Any, aircraft: Aircraft, envelope: Envelope) -> None:
         axes.plot(speeds, climb, label=name, **look)
         axes.plot(speeds, -dive, **look)
     axes.axhline(0.0, color=theme.colour("area"), linewidth=0.8)
-    _frame(axes, f"steepest climb and dive over the ground, at {TRIM_AMSL:.0f} m", "airspeed (m/s)", "slope (°)")
+    _set_up_axes(axes, f"steepest climb and dive over the ground, at {TRIM_AMSL:.0f} m", "airspeed (m/s)", "slope (°)")
     _legend_above(axes, "", 3)
 
 
-def _turns(axes: Any, aircraft: Aircraft) -> None:
+def _draw_turns(axes: Any, aircraft: Aircraft) -> None:
     speeds = np.linspace(aircraft.airspeed_min, aircraft.airspeed_max + 10.0, 80)
     for k, bank in enumerate(_BANKS_DEG):
         radii = [turn_radius(float(v), math.radians(bank)) for v in speeds]
         axes.plot(speeds, radii, color=theme.SHADES[k], linestyle=_DASHES[k], linewidth=1.3, label=f"{bank}° of bank")
     _shade_guidance_speeds(axes, aircraft)
-    _frame(axes, "turn radius", "ground speed (m/s)", "radius (m)")
+    _set_up_axes(axes, "turn radius", "ground speed (m/s)", "radius (m)")
     axes.set_ylim(0.0, None)
     _legend_above(axes, "", 2)
 
@@ -137,7 +137,9 @@ def draw_trims(aircraft: Aircraft, trims: Sequence[TrimRow], modes: Mapping[floa
         figure = new_figure(8.0)
         axes = figure.subplots(2, 2)
         figure.subplots_adjust(left=0.075, right=0.93, top=0.87, bottom=0.065, wspace=0.28, hspace=0.32)
-        _title(figure, f"{aircraft.title}: level flight and its modes", f"JSBSim trims at {TRIM_AMSL:.0f} m AMSL, calm")
+        _write_title(
+            figure, f"{aircraft.title}: level flight and its modes", f"JSBSim trims at {TRIM_AMSL:.0f} m AMSL, calm"
+        )
         speeds = np.array([row.trim.airspeed for row in trims])
         for k, name in enumerate(("alpha", "elevator", "aileron", "rudder")):
             values = np.degrees([getattr(row.trim, name) for row in trims])
@@ -153,15 +155,15 @@ def draw_trims(aircraft: Aircraft, trims: Sequence[TrimRow], modes: Mapping[floa
                 label=label,
             )
         axes[0, 0].axhline(0.0, color=theme.colour("area"), linewidth=0.8)
-        _frame(axes[0, 0], "angle of attack and surfaces", "airspeed (m/s)", "angle (°)")
+        _set_up_axes(axes[0, 0], "angle of attack and surfaces", "airspeed (m/s)", "angle (°)")
         _legend_above(axes[0, 0], "", 2)
-        _power(axes[0, 1], aircraft, speeds, trims)
-        _roots(axes[1, 0], modes, all_modes=True)
-        _roots(axes[1, 1], modes, all_modes=False)
+        _draw_power(axes[0, 1], aircraft, speeds, trims)
+        _draw_roots(axes[1, 0], modes, all_modes=True)
+        _draw_roots(axes[1, 1], modes, all_modes=False)
     return figure
 
 
-def _power(axes: Any, aircraft: Aircraft, speeds: Floats, trims: Sequence[TrimRow]) -> None:
+def _draw_power(axes: Any, aircraft: Aircraft, speeds: Floats, trims: Sequence[TrimRow]) -> None:
     axes.plot(
         speeds,
         [100.0 * row.trim.throttle for row in trims],
@@ -177,12 +179,12 @@ def _power(axes: Any, aircraft: Aircraft, speeds: Floats, trims: Sequence[TrimRo
     other.set_ylabel("power (kW)")
     other.set_ylim(0.0, 1.15 * float(power.max(initial=0.1)))
     axes.set_ylim(0.0, 105.0)
-    _frame(axes, "throttle and power", "airspeed (m/s)", "throttle (%)")
+    _set_up_axes(axes, "throttle and power", "airspeed (m/s)", "throttle (%)")
     lines = [*axes.get_lines(), *other.get_lines()]
     axes.legend(lines, [line.get_label() for line in lines], loc="lower right")
 
 
-def _roots(axes: Any, modes: Mapping[float, Sequence[Mode]], *, all_modes: bool) -> None:
+def _draw_roots(axes: Any, modes: Mapping[float, Sequence[Mode]], *, all_modes: bool) -> None:
     """Draw the upper half of the root plane: all modes, or only the slow ones near the origin."""
     slow = {"phugoid", "spiral", "roll-spiral"}
     labelled: set[str] = set()
@@ -205,7 +207,7 @@ def _roots(axes: Any, modes: Mapping[float, Sequence[Mode]], *, all_modes: bool)
     axes.axvline(0.0, color=theme.colour("area"), linewidth=0.8)
     slow_or_fast = f"from {min(modes):g} m/s (hollow) to {max(modes):g} m/s (filled)" if modes else ""
     title = f"modes {slow_or_fast}" if all_modes else "the slow ones, nearer"
-    _frame(axes, title, "real part (1/s): right of 0 is unstable", "imaginary part (rad/s)")
+    _set_up_axes(axes, title, "real part (1/s): right of 0 is unstable", "imaginary part (rad/s)")
     min_x, max_x = axes.get_xlim()
     axes.set_xlim(min_x - 0.05 * (max_x - min_x), max_x + 0.05 * (max_x - min_x))
     axes.xaxis.set_major_locator(MaxNLocator(6))
@@ -231,21 +233,23 @@ def draw_steps(aircraft: Aircraft, steps: Sequence[StepResponse]) -> Figure:
         axes = figure.subplots(deep, len(steps), squeeze=False, sharex="col")
         figure.subplots_adjust(left=0.05, right=0.985, top=0.865, bottom=0.065, wspace=0.24, hspace=0.28)
         level = f"level flight at {aircraft.airspeed:g} m/s and {TRIM_AMSL:.0f} m"
-        _title(figure, f"{aircraft.title}: how it answers", f"from {level}, one control moved at 1 s, no guidance")
+        _write_title(
+            figure, f"{aircraft.title}: how it answers", f"from {level}, one control moved at 1 s, no guidance"
+        )
         for column, step in enumerate(steps):
             for row in range(deep):
                 panel = axes[row, column]
                 if row >= len(step.quantities):
                     panel.axis("off")
                     continue
-                _answer(panel, step, row)
+                _draw_step_response(panel, step, row)
             top = axes[0, column].get_position()
             figure.text(top.x0, top.y1 + 0.035, _step_title(step), fontsize=9.0, fontweight="bold")
             axes[-1, column].set_xlabel("time (s)")
     return figure
 
 
-def _answer(axes: Any, step: StepResponse, row: int) -> None:
+def _draw_step_response(axes: Any, step: StepResponse, row: int) -> None:
     name, unit, factor = _ROWS[step.quantities[row]]
     values = factor * step.change[:, row]
     axes.axhline(0.0, color=theme.colour("rim"), linewidth=0.6)
@@ -283,7 +287,7 @@ def _shade_guidance_speeds(axes: Any, aircraft: Aircraft) -> None:
     axes.axvline(aircraft.airspeed, color=theme.colour("quiet"), linewidth=0.8, linestyle=":")
 
 
-def _frame(axes: Any, title: str, x: str, y: str) -> None:
+def _set_up_axes(axes: Any, title: str, x: str, y: str) -> None:
     axes.set_title(title, fontsize=9.5)
     axes.set_xlabel(x)
     axes.set_ylabel(y)
@@ -291,7 +295,7 @@ def _frame(axes: Any, title: str, x: str, y: str) -> None:
     axes.set_axisbelow(True)
 
 
-def _title(figure: Figure, title: str, subtitle: str) -> None:
+def _write_title(figure: Figure, title: str, subtitle: str) -> None:
     height = figure.get_figheight()
     figure.text(0.06, 1.0 - 0.28 / height, title, fontsize=12, fontweight="bold", va="center")
     figure.text(0.06, 1.0 - 0.55 / height, subtitle, fontsize=8.5, color=theme.colour("quiet"), va="center")

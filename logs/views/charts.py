@@ -36,7 +36,7 @@ class Layer:
     dashed: True for the second of two lines of one role.
     quiet: True for a layer in the legend but not in the read-out of the page.
     legend: common legend text of several layers; "" for the name.
-    words: text of the page on each point, or one text on the whole layer; empty to show the values.
+    hover_texts: text of the page on each point, or one text on the whole layer; empty to show the values.
     flight: in a map, the number of the flight whose moments are the points; the page already has them.
     """
 
@@ -49,7 +49,7 @@ class Layer:
     dashed: bool = False
     quiet: bool = False
     legend: str = ""
-    words: tuple[str, ...] = ()
+    hover_texts: tuple[str, ...] = ()
     flight: int | None = None
 
 
@@ -308,7 +308,12 @@ def _layer_json(layer: Layer) -> Json:
         document |= {"x": numbers(layer.x, telling_digits(layer.x)), "y": numbers(layer.y, telling_digits(layer.y))}
     if layer.low is not None:
         document["low"] = numbers(layer.low, telling_digits(layer.low))
-    rarer: Json = {"dashed": layer.dashed, "quiet": layer.quiet, "legend": layer.legend, "words": list(layer.words)}
+    rarer: Json = {
+        "dashed": layer.dashed,
+        "quiet": layer.quiet,
+        "legend": layer.legend,
+        "words": list(layer.hover_texts),
+    }
     rarer = {word: value for word, value in rarer.items() if value}
     return document | rarer | ({} if layer.flight is None else {"flight": layer.flight})
 

@@ -56,7 +56,7 @@ def both_along(flights: tuple[NamedFlight, NamedFlight]) -> Chart:
 
     Without terrain there is no panel of the height above ground.
     """
-    flown = [_distance(flight.track) for flight in flights]
+    flown = [_distance_flown(flight.track) for flight in flights]
     along = np.linspace(0.0, max(float(distance[-1]) for distance in flown), _POINTS)
 
     def both(values: list[Floats]) -> tuple[Layer, ...]:
@@ -70,26 +70,26 @@ def both_along(flights: tuple[NamedFlight, NamedFlight]) -> Chart:
         Panel("height", "m AMSL", both([track.position[:, 2] for track in tracks])),
         Panel("height above ground", "m", both([_height_above_ground(flight) for flight in flights])),
         Panel("airspeed", "m/s", both([doubles(track.airspeed) for track in tracks]), min_span=4.0),
-        Panel("bank, right +", "°", both([np.degrees(doubles(_roll(track))) for track in tracks])),
+        Panel("bank, right +", "°", both([np.degrees(doubles(_roll_angle(track))) for track in tracks])),
         Panel("cross-track, right +", "m", both([doubles(track.cross_track) for track in tracks]), min_span=0.1),
-        Panel("throttle", "%", both([100.0 * doubles(_throttle(track)) for track in tracks])),
+        Panel("throttle", "%", both([100.0 * doubles(_throttle_fraction(track)) for track in tracks])),
     )
     return Chart("Two flights along their paths", "distance flown over the ground", "km", panels)
 
 
-def _roll(track: Track) -> NDArray[np.float32]:
+def _roll_angle(track: Track) -> NDArray[np.float32]:
     roll: NDArray[np.float32]
     roll, _, _ = track.attitude.T
     return roll
 
 
-def _throttle(track: Track) -> NDArray[np.float32]:
+def _throttle_fraction(track: Track) -> NDArray[np.float32]:
     throttle: NDArray[np.float32]
     _, _, _, throttle = track.controls.T
     return throttle
 
 
-def _distance(track: Track) -> Floats:
+def _distance_flown(track: Track) -> Floats:
     steps = np.nan_to_num(np.hypot(*np.diff(track.position[:, :2], axis=0).T))
     return np.concatenate([[0.0], np.cumsum(steps)])
 

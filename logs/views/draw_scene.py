@@ -62,9 +62,9 @@ class Projection:
     def project(self, points: Floats) -> Floats:
         """Return picture coordinates and depth towards the viewer, m: (..., 3) from points (..., 3)."""
         e, n, u = np.moveaxis(points - self.middle, -1, 0)
-        out, side = math.cos(self.azimuth), math.sin(self.azimuth)
-        across = -side * e + out * n
-        toward = out * e + side * n
+        cos_azimuth, sin_azimuth = math.cos(self.azimuth), math.sin(self.azimuth)
+        across = -sin_azimuth * e + cos_azimuth * n
+        toward = cos_azimuth * e + sin_azimuth * n
         height = self.stretch * u
         sin, cos = math.sin(_ELEVATION), math.cos(_ELEVATION)
         return np.stack([across, cos * height - sin * toward, sin * height + cos * toward], axis=-1)
@@ -84,42 +84,42 @@ def draw_scene(view: SceneView) -> Figure:
     so that it does not appear as a strip.
     """
     setup, track, failed = view.setup, view.track, view.failed
-    all_of_it = scene_bounds(setup, track)
-    bounds = _widened(all_of_it)
-    narrow = not np.array_equal(bounds, all_of_it)
+    scene_limits = scene_bounds(setup, track)
+    bounds = _widen_bounds(scene_limits)
+    is_narrow = not np.array_equal(bounds, scene_limits)
     terrain = setup.scenario.terrain
     grid = ground_grid(terrain, bounds, _MAX_CELLS)
     route = setup.shown_waypoints
-    projection = _projection(route, bounds, exaggeration(setup, bounds, grid), narrow)
+    projection = _make_projection(route, bounds, exaggeration(setup, bounds, grid), is_narrow)
     with clean_style():
-        figure, axes = _frame(setup, projection, bounds, grid)
+        figure, axes = _make_axes(setup, projection, bounds, grid)
         handles = _ground_surface(axes, projection, grid, bounds)
-        handles += _threats(axes, projection, setup, failed)
-        handles += _zones(axes, projection, setup)
+        handles += _draw_threats(axes, projection, setup, failed)
+        handles += _draw_zones(axes, projection, setup)
         placer = LabelPlacer(axes)
         handles += _draw_paths(axes, projection, terrain, route, track, failed, placer)
         _draw_labels(setup, projection, route, failed, placer)
         name = shorten(setup.scenario.name, 60)
-        times = "true to scale" if projection.stretch == 1.0 else f"heights × {projection.stretch:g}"
-        side = _compass_name(projection.azimuth)
-        axes.set_title(f"{name}: seen from the {side}, {times}", fontweight="bold")
+        scale_text = "true to scale" if projection.stretch == 1.0 else f"heights × {projection.stretch:g}"
+        viewer_side = _compass_name(projection.azimuth)
+        axes.set_title(f"{name}: seen from the {viewer_side}, {scale_text}", fontweight="bold")
         draw_legend(figure, handles, _LEFT + 0.1, (_BOTTOM - 0.08) / float(figure.get_figheight()))
     return figure
 
 
-def _widened(bounds: Floats) -> Floats:
+def _widen_bounds(bounds: Floats) -> Floats:
     """Widen the bounds of a narrow scene, (2, 2) m, to the smallest allowed ratio of the sides."""
     sides = np.ptp(bounds, axis=1)
     widening = 0.5 * np.maximum(_MIN_SIDE_RATIO * sides.max() - sides, 0.0)
     return np.asarray(bounds + np.stack([-widening, widening], axis=1))
 
 
-def _projection(route: Floats, bounds: Floats, stretch: float, narrow: bool) -> Projection:
+def _make_projection(route: Floats, bounds: Floats, stretch: float, is_narrow: bool) -> Projection:
     step = route[-1] - route[0]
     azimuth = math.atan2(step[1], step[0]) - math.pi / 2.0
     if math.sin(azimuth) > 0.0:
         azimuth += math.pi
-    azimuth += _NARROW_SCENE_AZIMUTH_RAD if narrow else 0.0
+    azimuth += _NARROW_SCENE_AZIMUTH_RAD if is_narrow else 0.0
     return Projection(azimuth, np.array([*bounds.mean(axis=1), float(route[:, 2].mean())]), stretch)
 
 
@@ -128,18 +128,20 @@ def _compass_name(azimuth: float) -> str:
     return names[round(azimuth / (math.pi / 4.0)) % 8]
 
 
-def _frame(setup: FlightSetup, projection: Projection, bounds: Floats, grid: GroundGrid | None) -> tuple[Figure, Any]:
+def _make_axes(
+    setup: FlightSetup, projection: Projection, bounds: Floats, grid: GroundGrid | None
+) -> tuple[Figure, Any]:
     min_altitude = float(np.nanmin(grid.heights)) if grid is not None else float(setup.route.waypoints[:, 2].min())
     corners = np.array([[e, n, min_altitude] for e in bounds[0] for n in bounds[1]])
     threats = setup.scenario.threats
     tops = threats.position + np.maximum(threats.kill_radius, threats.detection_radius)[:, None] * np.array([0, 0, 1.0])
-    drawn = [projection.project(corners), projection.project(setup.route.waypoints), projection.project(tops)]
+    projected_parts = [projection.project(corners), projection.project(setup.route.waypoints), projection.project(tops)]
     if grid is not None:
         e, n = np.meshgrid(grid.east, grid.north)
         surface = projection.project(np.stack([e, n, grid.heights], axis=-1)).reshape(-1, 3)
-        drawn.append(surface[np.isfinite(surface).all(axis=1)])
-    together = np.vstack(drawn)[:, :2]
-    min_corner, max_corner = together.min(axis=0), together.max(axis=0)
+        projected_parts.append(surface[np.isfinite(surface).all(axis=1)])
+    projected_points = np.vstack(projected_parts)[:, :2]
+    min_corner, max_corner = projected_points.min(axis=0), projected_points.max(axis=0)
     padding = 0.03 * float((max_corner - min_corner).max())
     min_corner, max_corner = min_corner - padding, max_corner + padding
     figure_width = WIDTH - _LEFT - _RIGHT
@@ -175,7 +177,7 @@ def _ground_surface(axes: Any, projection: Projection, grid: GroundGrid | None, 
                 zorder=1,
             )
         )
-        return [_handle("band", "level-ground", "no terrain: level at mid height")]
+        return [_legend_handle("band", "level-ground", "no terrain: level at mid height")]
     e, n = np.meshgrid(grid.east, grid.north)
     corners = projection.project(np.stack([e, n, grid.heights], axis=-1))
     cells = np.stack([corners[:-1, :-1], corners[:-1, 1:], corners[1:, 1:], corners[1:, :-1]], axis=2).reshape(-1, 4, 3)
@@ -206,7 +208,7 @@ def _ground_surface(axes: Any, projection: Projection, grid: GroundGrid | None, 
     return []
 
 
-def _threats(axes: Any, projection: Projection, setup: FlightSetup, failed: Failures) -> list[Any]:
+def _draw_threats(axes: Any, projection: Projection, setup: FlightSetup, failed: Failures) -> list[Any]:
     """Draw outlines of the upper halves of spheres, at the altitude of their centers.
 
     Entered spheres are broad.
@@ -214,63 +216,67 @@ def _threats(axes: Any, projection: Projection, setup: FlightSetup, failed: Fail
     threats = setup.scenario.threats
     handles: list[Any] = []
     # Stretched dome of radius 1: far half of its outline, and near half of its base.
-    tall = math.hypot(math.sin(_ELEVATION), projection.stretch * math.cos(_ELEVATION))
-    round_it = np.linspace(0.0, 2.0 * math.pi, 97)
-    vertical = np.where(round_it < math.pi, tall, math.sin(_ELEVATION)) * np.sin(round_it)
-    shape = np.column_stack([np.cos(round_it), vertical])
+    top_height = math.hypot(math.sin(_ELEVATION), projection.stretch * math.cos(_ELEVATION))
+    angles = np.linspace(0.0, 2.0 * math.pi, 97)
+    vertical = np.where(angles < math.pi, top_height, math.sin(_ELEVATION)) * np.sin(angles)
+    shape = np.column_stack([np.cos(angles), vertical])
     looks: tuple[tuple[str, Floats, dict[str, Any]], ...] = (
         ("missile", threats.kill_radius, {"facecolor": theme.rgba("missile", theme.LOOKS["missile"].fill)}),
         ("radar", threats.detection_radius, {"facecolor": "none", "linestyle": (0, (4, 2.5))}),
     )
-    for kind, radii, look in looks:
-        look |= {"edgecolor": theme.colour(kind)}
-        some = np.flatnonzero(radii > 0.0)
-        for k in some:
+    for kind, radii, style in looks:
+        style |= {"edgecolor": theme.colour(kind)}
+        indices = np.flatnonzero(radii > 0.0)
+        for k in indices:
             dome = projection.project(threats.position[k])[:2] + float(radii[k]) * shape
-            axes.add_patch(Polygon(dome, linewidth=0.9, zorder=3, **look))
-        for entered in (place.index or 0 for place in failed.threats if place.kind == kind):
-            dome = projection.project(threats.position[entered])[:2] + float(radii[entered]) * shape
+            axes.add_patch(Polygon(dome, linewidth=0.9, zorder=3, **style))
+        for entered_index in (place.index or 0 for place in failed.threats if place.kind == kind):
+            dome = projection.project(threats.position[entered_index])[:2] + float(radii[entered_index]) * shape
             axes.add_patch(Polygon(dome, fill=False, edgecolor=theme.colour("fail"), linewidth=2.2, zorder=4.6))
-        if some.size:
-            handles.append(_handle("band", kind, f"{kind}'s reach"))
+        if indices.size:
+            handles.append(_legend_handle("band", kind, f"{kind}'s reach"))
     return handles
 
 
-def _zones(axes: Any, projection: Projection, setup: FlightSetup) -> list[Any]:
+def _draw_zones(axes: Any, projection: Projection, setup: FlightSetup) -> list[Any]:
     """Draw walls of the zones, from ground or floor to the ceiling, or to above the path."""
     zones, route = setup.scenario.zones, setup.route.waypoints
     min_altitude, max_altitude = float(route[:, 2].min()), float(route[:, 2].max()) + 50.0
     for zone in zones:
         fill = theme.rgba("zone", 0.10 if zone.kind == "exclusion" else 0.03)
         for wall in zone_walls(zone, setup.scenario.terrain, min_altitude, max_altitude):
-            drawn = projection.project(wall)[:, :, :2]
-            sides = np.concatenate([drawn[:-1], drawn[1:, ::-1]], axis=1)
+            projected_wall = projection.project(wall)[:, :, :2]
+            sides = np.concatenate([projected_wall[:-1], projected_wall[1:, ::-1]], axis=1)
             axes.add_collection(PolyCollection(list(sides), facecolor=fill, edgecolor="none", zorder=3.2))
             width = 1.1 if zone.kind == "exclusion" else 2.0
             for edge in (0, 1):
                 axes.plot(
-                    *drawn[:, edge].T, color=theme.colour("zone"), linewidth=width, alpha=0.4 + 0.6 * edge, zorder=3.3
+                    *projected_wall[:, edge].T,
+                    color=theme.colour("zone"),
+                    linewidth=width,
+                    alpha=0.4 + 0.6 * edge,
+                    zorder=3.3,
                 )
     kinds = {zone.kind for zone in zones}
-    handles = [_handle("area", "zone", "zone to keep out of")] if "exclusion" in kinds else []
-    return handles + ([_handle("line", "stay-in", "edge of a zone to stay in")] if "inclusion" in kinds else [])
+    handles = [_legend_handle("area", "zone", "zone to keep out of")] if "exclusion" in kinds else []
+    return handles + ([_legend_handle("line", "stay-in", "edge of a zone to stay in")] if "inclusion" in kinds else [])
 
 
-def _handle(kind: LayerKind, role: str, text: str) -> Any:
+def _legend_handle(kind: LayerKind, role: str, text: str) -> Any:
     """Return the handle of a line in the legend."""
     none = np.zeros(0)
     return legend_handle(LegendEntry(text, (Layer(kind, text, role, none, none),)))
 
 
-def _hidden(projection: Projection, terrain: Terrain | None, points: Floats) -> NDArray[np.bool_]:
+def _find_hidden_points(projection: Projection, terrain: Terrain | None, points: Floats) -> NDArray[np.bool_]:
     """Return flags of the points (n, 3) that the ground hides from the viewer."""
-    hidden = np.zeros(len(points), dtype=bool)
+    is_hidden = np.zeros(len(points), dtype=bool)
     if terrain is None:
-        return hidden
+        return is_hidden
     for distance in np.geomspace(2.0 * terrain.spacing, 15_000.0, 70):
         sight_points = points + distance * projection.toward
-        hidden |= terrain.height(sight_points[:, 0], sight_points[:, 1]) > sight_points[:, 2]
-    return hidden
+        is_hidden |= terrain.height(sight_points[:, 0], sight_points[:, 1]) > sight_points[:, 2]
+    return is_hidden
 
 
 def _draw_paths(
@@ -300,12 +306,12 @@ def _draw_paths(
             solid_capstyle="butt",
         )
     _draw_path(axes, projection, terrain, samples, theme.colour("planned"), 3.6, 5)
-    handles: list[Any] = [_handle("line", "planned", "planned path")]
+    handles: list[Any] = [_legend_handle("line", "planned", "planned path")]
     if track is not None:
         _draw_path(
             axes, projection, terrain, track.position[drawn_rows(track, _MAX_TRACK)], theme.colour("flown"), 1.2, 6
         )
-        handles.append(_handle("line", "flown", "flown track"))
+        handles.append(_legend_handle("line", "flown", "flown track"))
     corners = projection.project(route)
     placer.avoid(*projection.project(samples)[:, :2].T)
     axes.plot(
@@ -320,13 +326,15 @@ def _draw_paths(
     for waypoint in failed.waypoints:
         axes.plot(*corners[waypoint, :2], "o", markersize=12, mfc="none", mec=theme.colour("fail"), mew=2.2, zorder=7.5)
     if terrain is not None:
-        handles.append(_handle("line", "pole", "waypoint above the ground"))
+        handles.append(_legend_handle("line", "pole", "waypoint above the ground"))
     marks: tuple[tuple[object, LayerKind, str, str], ...] = (
         (failed.legs, "line", "failing-leg", "leg that fails a rule"),
         (failed.waypoints, "rings", "fail", "waypoint that fails a rule"),
         (failed.threats, "line", "fail", "threat that is entered"),
     )
-    return handles + [_handle(kind, role, text) for some, kind, role, text in marks if some]
+    return handles + [
+        _legend_handle(kind, role, text) for failing_elements, kind, role, text in marks if failing_elements
+    ]
 
 
 def _draw_path(
@@ -334,13 +342,13 @@ def _draw_path(
 ) -> None:
     """Draw a path, thin and dashed where the ground hides it."""
     projected = projection.project(points)
-    hidden = _hidden(projection, terrain, points)
-    open_part = np.where(hidden[:, None], np.nan, projected[:, :2])
+    is_hidden = _find_hidden_points(projection, terrain, points)
+    visible_part = np.where(is_hidden[:, None], np.nan, projected[:, :2])
     # Include the neighbours of hidden rows, so that the two parts meet.
-    is_near_hidden = hidden | np.roll(hidden, 1) | np.roll(hidden, -1)
-    shut_part = np.where(is_near_hidden[:, None], projected[:, :2], np.nan)
-    axes.plot(*open_part.T, color=colour, linewidth=width, zorder=order, solid_capstyle="round")
-    axes.plot(*shut_part.T, color=colour, linewidth=0.5 * width, alpha=0.6, linestyle=(0, (2, 1.5)), zorder=order)
+    is_near_hidden = is_hidden | np.roll(is_hidden, 1) | np.roll(is_hidden, -1)
+    hidden_part = np.where(is_near_hidden[:, None], projected[:, :2], np.nan)
+    axes.plot(*visible_part.T, color=colour, linewidth=width, zorder=order, solid_capstyle="round")
+    axes.plot(*hidden_part.T, color=colour, linewidth=0.5 * width, alpha=0.6, linestyle=(0, (2, 1.5)), zorder=order)
 
 
 def _draw_labels(

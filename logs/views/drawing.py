@@ -126,15 +126,15 @@ def png_bytes(figure: Figure) -> bytes:
     >>> int.from_bytes(data[16:20], "big"), int.from_bytes(data[20:24], "big")
     (1500, 300)
     """
-    return _rendered(figure, "png", {"Software": None})
+    return _render(figure, "png", {"Software": None})
 
 
-def few_colours(png: bytes) -> bytes:
+def reduce_colours(png: bytes) -> bytes:
     """Return a PNG with at most 256 colours.
 
     Shaded ground then takes a fifth of its size, without a visible change on paper.
 
-    >>> few_colours(png_bytes(new_figure(1.0)))[1:4]
+    >>> reduce_colours(png_bytes(new_figure(1.0)))[1:4]
     b'PNG'
     """
     buffer = io.BytesIO()
@@ -146,7 +146,7 @@ def few_colours(png: bytes) -> bytes:
 
 def svg_bytes(figure: Figure) -> bytes:
     """Render the figure as an SVG with letters as outlines; the same figure gives the same bytes."""
-    return _rendered(figure, "svg", {"Date": None, "Creator": None})
+    return _render(figure, "svg", {"Date": None, "Creator": None})
 
 
 def page_svg(figure: Figure, description: str) -> str:
@@ -163,15 +163,15 @@ def page_svg(figure: Figure, description: str) -> str:
     box = re.search(r'viewBox="[^"]*"', opening)
     names = re.findall(r'xmlns(?::\w+)?="[^"]*"', opening)
     # Remove the unused names of groups: they would be duplicates in a page of several pictures.
-    drawn = re.sub(r'<g id="[^"]*"', "<g", re.sub(r"<metadata>.*?</metadata>", "", body, flags=re.DOTALL))
+    content = re.sub(r'<g id="[^"]*"', "<g", re.sub(r"<metadata>.*?</metadata>", "", body, flags=re.DOTALL))
     # Make the used names unique to the picture.
-    own = f"p{zlib.crc32(description.encode()):x}-"
-    drawn = re.sub(r'( id="|href="#|url\(#)', rf"\g<1>{own}", drawn)
+    prefix = f"p{zlib.crc32(description.encode()):x}-"
+    content = re.sub(r'( id="|href="#|url\(#)', rf"\g<1>{prefix}", content)
     head = " ".join(['<svg role="img"', f'aria-label="{escape(description)}"', box[0] if box else "", *sorted(names)])
-    return f"{head}>{theme.with_variables(drawn)}".rstrip()
+    return f"{head}>{theme.replace_colours_by_css_variables(content)}".rstrip()
 
 
-def _rendered(figure: Figure, kind: str, metadata: Any) -> bytes:
+def _render(figure: Figure, kind: str, metadata: Any) -> bytes:
     buffer = io.BytesIO()
     with clean_style(), warnings.catch_warnings():
         # A name in letters that the font lacks shows as boxes, without a warning.
@@ -193,51 +193,55 @@ def write_png(figure: Figure, path: FilePath) -> None:
 
 
 def draw_chart(chart: Chart) -> Figure:
-    """Draw a chart of panels; panels without a value are left out if another one has any.
+    """Draw a chart of panels; a panel without values is omitted if another panel has values.
 
     Stacked panels get one common legend if each look has the same meaning in all, and some looks repeat.
     """
     panels = chart.shown_panels() if chart.panels else ()
-    shared = chart.legend == "beside" and shares_legend(panels)
+    has_shared_legend = chart.legend == "beside" and can_share_legend(panels)
     entries = legend_entries(panels) if chart.legend == "below" else ()
-    top = (_TOP if chart.legend == "beside" else _PLAIN_TOP) + (_SHARED_LEGEND if shared else 0.0)
-    right = _LEGENDS if chart.legend == "beside" and not shared else _RIGHT
-    columns = _columns(entries)
-    below = _legend_height(entries, columns)
+    top_margin = (_TOP if chart.legend == "beside" else _PLAIN_TOP) + (_SHARED_LEGEND if has_shared_legend else 0.0)
+    right_margin = _LEGENDS if chart.legend == "beside" and not has_shared_legend else _RIGHT
+    columns = _legend_column_count(entries)
+    legend_height = _legend_height(entries, columns)
     rows = 1 if chart.widths else len(panels)
     gap = _GAP if chart.shared else _OWN_AXIS_GAP
-    total = top + _BOTTOM + below + max(1, rows) * chart.inches + max(0, rows - 1) * gap
+    total = top_margin + _BOTTOM + legend_height + max(1, rows) * chart.inches + max(0, rows - 1) * gap
     with clean_style():
         figure = new_figure(total)
         for k, panel in enumerate(panels):
             row = 0 if chart.widths else k
-            base = _BOTTOM + below + (rows - 1 - row) * (chart.inches + gap)
-            left, wide = _across(chart, k, right)
-            axes = figure.add_axes((left, base / total, wide, chart.inches / total))
+            base = _BOTTOM + legend_height + (rows - 1 - row) * (chart.inches + gap)
+            left, width = _panel_extent(chart, k, right_margin)
+            axes = figure.add_axes((left, base / total, width, chart.inches / total))
             _draw_panel(axes, chart, panel, numbered=k == 0)
-            if chart.legend == "beside" and not shared:
-                _legend_beside(axes)
+            if chart.legend == "beside" and not has_shared_legend:
+                _add_legend_beside(axes)
             if chart.shared and row < rows - 1:
                 axes.tick_params(labelbottom=False)
             else:
                 axes.set_xlabel(_axis_label(chart, panel, axes))
-        look: dict[str, Any] = {"fontsize": 11, "fontweight": "bold", "va": "center"}
-        figure.text(_LEFT / WIDTH, 1 - 0.3 / total, chart.title, **look)
-        if shared:
-            _legend_above(figure, 1 - 0.45 / total)
+        text_style: dict[str, Any] = {"fontsize": 11, "fontweight": "bold", "va": "center"}
+        figure.text(_LEFT / WIDTH, 1 - 0.3 / total, chart.title, **text_style)
+        if has_shared_legend:
+            _add_legend_above(figure, 1 - 0.45 / total)
         if entries:
-            draw_legend(figure, [legend_handle(entry) for entry in entries], _LEFT, (below - 0.02) / total, columns)
+            draw_legend(
+                figure, [legend_handle(entry) for entry in entries], _LEFT, (legend_height - 0.02) / total, columns
+            )
     return figure
 
 
-def _across(chart: Chart, k: int, right: float) -> tuple[float, float]:
-    """Return left edge and width of a panel as fractions of the width of the picture."""
-    full = WIDTH - _LEFT - right
+def _panel_extent(chart: Chart, k: int, right: float) -> tuple[float, float]:
+    """Return a panel's left edge and width as fractions of the picture's width."""
+    total_width = WIDTH - _LEFT - right
     if not chart.widths:
-        return _LEFT / WIDTH, full / WIDTH
+        return _LEFT / WIDTH, total_width / WIDTH
     gap = 0.75 * (len(chart.widths) - 1)
-    before = sum(chart.widths[:k])
-    return (_LEFT + before * (full - gap) + 0.75 * k) / WIDTH, chart.widths[k] * (full - gap) / WIDTH
+    width_before = sum(chart.widths[:k])
+    return (_LEFT + width_before * (total_width - gap) + 0.75 * k) / WIDTH, chart.widths[k] * (
+        total_width - gap
+    ) / WIDTH
 
 
 def _axis_label(chart: Chart, panel: Panel, axes: Any) -> str:
@@ -245,19 +249,20 @@ def _axis_label(chart: Chart, panel: Panel, axes: Any) -> str:
     if not chart.scaled:
         return label
     frame = axes.get_window_extent()
-    across = np.ptp(axes.get_xlim()) * 1000.0 / frame.width
-    stretch = across / (np.ptp(axes.get_ylim()) / frame.height)
-    return f"{label}; heights are drawn {stretch:.2g} times larger than distances"
+    metres_per_pixel = np.ptp(axes.get_xlim()) * 1000.0 / frame.width
+    height_scale = metres_per_pixel / (np.ptp(axes.get_ylim()) / frame.height)
+    return f"{label}; heights are drawn {height_scale:.2g} times larger than distances"
 
 
-def shares_legend(panels: Sequence[Panel]) -> bool:
-    """Return True if all panels can share a legend: each look has one meaning, each meaning one look, and some repeat.
+def can_share_legend(panels: Sequence[Panel]) -> bool:
+    """Return True if all panels can share a legend: looks and meanings correspond one to one, and some repeat.
 
     >>> none = np.zeros(2)
     >>> flown, asked = Layer("line", "flown", "flown", none, none), Layer("line", "asked", "commanded", none, none)
-    >>> shares_legend([Panel("bank", "", (asked, flown)), Panel("speed", "", (asked, flown))])
+    >>> can_share_legend([Panel("bank", "", (asked, flown)), Panel("speed", "", (asked, flown))])
     True
-    >>> shares_legend([Panel("bank", "", (flown,)), Panel("height", "", (Layer("line", "own", "flown", none, none),))])
+    >>> own = Layer("line", "own", "flown", none, none)
+    >>> can_share_legend([Panel("bank", "", (flown,)), Panel("height", "", (own,))])
     False
     """
     entries: list[tuple[str, Any]] = [
@@ -267,9 +272,9 @@ def shares_legend(panels: Sequence[Panel]) -> bool:
         if layer.role != "held"
     ]
     entries += [(label, "limit") for panel in panels for label, _ in panel.limits if label]
-    different = set(entries)
-    labels, looks = ({entry[side] for entry in different} for side in (0, 1))
-    return len(labels) == len(looks) == len(different) < len(entries)
+    distinct_entries = set(entries)
+    labels, looks = ({entry[column] for entry in distinct_entries} for column in (0, 1))
+    return len(labels) == len(looks) == len(distinct_entries) < len(entries)
 
 
 def _draw_panel(axes: Any, chart: Chart, panel: Panel, *, numbered: bool) -> None:
@@ -337,15 +342,15 @@ def _draw_marks(axes: Any, marks: Sequence[tuple[float, str]], *, numbered: bool
 
 def _number_places(axes: Any, panel: Panel) -> None:
     """Label the horizontal axis with waypoints or legs, with failing ones in the colour of failures."""
-    places = np.unique(np.concatenate([layer.x for layer in panel.layers]))
+    positions = np.unique(np.concatenate([layer.x for layer in panel.layers]))
     failing = {float(x) for layer in panel.layers if layer.kind == "rings" for x in layer.x}
-    step = -(-len(places) // _MAX_TICKS)
-    ticks = sorted({*places[::step].tolist(), *sorted(failing)[:_MAX_TICKS]})
+    step = -(-len(positions) // _MAX_TICKS)
+    ticks = sorted({*positions[::step].tolist(), *sorted(failing)[:_MAX_TICKS]})
     axes.set_xticks(ticks, [f"{tick:.0f}" for tick in ticks])
     for text, tick in zip(axes.get_xticklabels(), ticks, strict=True):
         if tick in failing:
             text.set(color=theme.colour("fail"), fontweight="bold")
-    axes.set_xlim(places[0] - 0.8, places[-1] + 0.8)
+    axes.set_xlim(positions[0] - 0.8, positions[-1] + 0.8)
 
 
 # Layers.
@@ -362,7 +367,7 @@ def draw_layers(axes: Any, panel: Panel, above: float = 2.0) -> None:
             value,
             color=look.light,
             linewidth=look.width,
-            linestyle=_dashes(look),
+            linestyle=_dash_pattern(look),
             label=label or None,
             zorder=above + 0.95,
         )
@@ -375,20 +380,22 @@ def draw_layers(axes: Any, panel: Panel, above: float = 2.0) -> None:
         )
 
 
-def _dashes(look: theme.Look, dashed: bool = False) -> Any:
+def _dash_pattern(look: theme.Look, dashed: bool = False) -> Any:
     pattern = look.dash or ((8.0, 3.5) if dashed else ())
     return (0, tuple(part / max(look.width, 0.1) for part in pattern)) if pattern else "-"
 
 
 def _draw_line(axes: Any, layer: Layer, look: theme.Look, **options: Any) -> None:
-    blot = layer.role == "failing-leg" and np.hypot(np.ptp(layer.x), np.ptp(layer.y)) < 0.02 * np.ptp(axes.get_xlim())
-    cap = "round" if blot or layer.role in ("planned", "inside") else "butt"
+    is_short = layer.role == "failing-leg" and np.hypot(np.ptp(layer.x), np.ptp(layer.y)) < 0.02 * np.ptp(
+        axes.get_xlim()
+    )
+    cap = "round" if is_short or layer.role in ("planned", "inside") else "butt"
     (line,) = axes.plot(
         layer.x,
         layer.y,
         color=look.light,
         linewidth=look.width,
-        linestyle=_dashes(look, layer.dashed),
+        linestyle=_dash_pattern(look, layer.dashed),
         solid_capstyle=cap,
         solid_joinstyle="round",
         **options,
@@ -415,7 +422,7 @@ def _area_look(look: theme.Look) -> dict[str, Any]:
         "facecolor": (*theme.rgb(look.light), look.fill),
         "edgecolor": edge,
         "linewidth": look.width,
-        "linestyle": _dashes(look),
+        "linestyle": _dash_pattern(look),
         "hatch": look.hatch or None,
     }
 
@@ -482,7 +489,7 @@ _DRAWERS: dict[str, Any] = {
 
 
 def write_labels(axes: Any, panel: Panel) -> None:
-    """Write the labels of a panel, the most important first, clear of each other and of the paths."""
+    """Write a panel's labels, the most important first, without overlap with each other or the paths."""
     placer = LabelPlacer(axes)
     for layer in panel.layers:
         if layer.kind == "line" and layer.role in ("planned", "flown", "other"):
@@ -494,16 +501,16 @@ def write_labels(axes: Any, panel: Panel) -> None:
 def write_label(placer: LabelPlacer, label: Label) -> None:
     """Write one label in the style of its rank."""
     size, gap = theme.LABELS[label.rank]
-    look: dict[str, Any] = {"size": size, "gap": gap if label.prefer != (0, 0) else 0.0, "prefer": label.prefer}
-    look["color"] = theme.colour(label.role)
+    options: dict[str, Any] = {"size": size, "gap": gap if label.prefer != (0, 0) else 0.0, "prefer": label.prefer}
+    options["color"] = theme.colour(label.role)
     if label.rank == "fail":
         frame = {"boxstyle": "round,pad=0.2", "facecolor": theme.colour("paper"), "edgecolor": theme.colour("fail")}
-        look["bbox"] = frame | {"linewidth": 0.9}
+        options["bbox"] = frame | {"linewidth": 0.9}
     elif label.rank == "name":
-        look["optional"] = True
+        options["optional"] = True
     else:
-        look["fontweight"] = "bold"
-    placer.place(label.text, label.x, label.y, **look)
+        options["fontweight"] = "bold"
+    placer.place(label.text, label.x, label.y, **options)
 
 
 def legend_handle(entry: LegendEntry) -> Any:
@@ -518,7 +525,7 @@ def legend_handle(entry: LegendEntry) -> Any:
         return Line2D([], [], label=text, **_dot_look(look) | {"alpha": 1.0})
     if layer.kind == "rings":
         return Line2D([], [], label=text, **_ring_look(look) | {"markersize": 9.0})
-    dashes: Any = "-" if layer.kind == "dashes" else _dashes(look, layer.dashed)
+    dashes: Any = "-" if layer.kind == "dashes" else _dash_pattern(look, layer.dashed)
     return Line2D([], [], label=text, color=look.light, linewidth=min(look.width, 6.0), linestyle=dashes)
 
 
@@ -540,12 +547,14 @@ def draw_legend(figure: Figure, handles: list[Any], left: float, top: float, col
     )
 
 
-def _columns(entries: Sequence[LegendEntry]) -> int:
+def _legend_column_count(entries: Sequence[LegendEntry]) -> int:
     """Return the number of legend columns that fit into a picture, at most four."""
     for columns in (4, 3, 2):
         rows = -(-len(entries) // columns)
-        widest = [max(len(e.text[:36]) for e in entries[k : k + rows]) for k in range(0, len(entries), rows or 1)]
-        if sum(0.45 + 0.062 * letters for letters in widest) < WIDTH - 1.0:
+        column_widths = [
+            max(len(e.text[:36]) for e in entries[k : k + rows]) for k in range(0, len(entries), rows or 1)
+        ]
+        if sum(0.45 + 0.062 * letters for letters in column_widths) < WIDTH - 1.0:
             return columns
     return 1
 
@@ -558,13 +567,13 @@ def _legend_height(entries: Sequence[LegendEntry], columns: int) -> float:
     return 0.1 + _LEGEND_LINE * lines
 
 
-def _legend_beside(axes: Any) -> None:
+def _add_legend_beside(axes: Any) -> None:
     handles, labels = axes.get_legend_handles_labels()
     look: dict[str, Any] = {"loc": "center left", "bbox_to_anchor": (1.01, 0.5), "handlelength": 1.6}
     axes.legend(handles, [textwrap.fill(str(label), 23) for label in labels], borderaxespad=0.2, **look)
 
 
-def _legend_above(figure: Figure, top: float) -> None:
+def _add_legend_above(figure: Figure, top: float) -> None:
     """Draw each entry of the panels once, in a row.
 
     top: upper edge as a fraction of the height of the figure.

@@ -49,27 +49,27 @@ class Failures:
         return place_text(self.places.get((kind, number), Place(kind, number)))
 
     def threat_names(self) -> dict[int, str]:
-        """Return the verdict's name of each failing threat, by its index; a failing missile names its threat."""
+        """Return the verdict's name of each failing threat, keyed by its index; the missile's name takes precedence."""
         radars_first = sorted(self.threats, key=lambda place: place.kind == "missile")
         return {place.index or 0: place_text(place) for place in radars_first}
 
 
 def failures(verdict: Verdict | None, waypoint_count: int) -> Failures:
-    """Find the failing places of a verdict; places outside the route are left out."""
-    failed = [finding for finding in verdict.findings if finding.ok is False] if verdict is not None else []
-    places = [finding.place for finding in failed if finding.place.index is not None]
+    """Collect the failures of a verdict by place; places outside the route are ignored."""
+    failed_findings = [finding for finding in verdict.findings if finding.ok is False] if verdict is not None else []
+    places = [finding.place for finding in failed_findings if finding.place.index is not None]
     return Failures(
-        legs=_rules_at(failed, "leg", waypoint_count - 1),
-        waypoints=_rules_at(failed, "waypoint", waypoint_count),
+        legs=_failed_rules_by_number(failed_findings, "leg", waypoint_count - 1),
+        waypoints=_failed_rules_by_number(failed_findings, "waypoint", waypoint_count),
         threats=tuple(dict.fromkeys(place for place in places if place.kind in ("missile", "radar"))),
         places={(place.kind, place.index or 0): place for place in places},
     )
 
 
-def _rules_at(failed: list[Finding], kind: PlaceKind, count: int) -> dict[int, tuple[str, ...]]:
-    """Return the rules that failed at the first `count` places of a kind, by number of the place."""
+def _failed_rules_by_number(failed_findings: list[Finding], kind: PlaceKind, count: int) -> dict[int, tuple[str, ...]]:
+    """Return the failed rules of each leg or waypoint below number `count`, keyed by its number."""
     rules_by_place: dict[int, list[str]] = {}
-    for finding in failed:
+    for finding in failed_findings:
         place = finding.place
         if place.kind == kind and place.index is not None and place.index < count:
             rules = rules_by_place.setdefault(place.index, [])
@@ -108,20 +108,20 @@ def paths_differ(a: Floats, b: Floats, tolerance: float) -> bool:
 
     a, b: (n, 3) and (m, 3) m.
     """
-    return max(_farthest(a, b), _farthest(b, a)) > tolerance
+    return max(_max_distance(a, b), _max_distance(b, a)) > tolerance
 
 
-def _farthest(points: Floats, path: Floats) -> float:
+def _max_distance(points: Floats, path: Floats) -> float:
     """Return the largest distance (m) of the points from the path."""
     start, step = path[:-1], np.diff(path, axis=0)
     length2 = (step**2).sum(axis=1)
-    farthest = 0.0
+    max_distance = 0.0
     for point in points:
         dot = ((point - start) * step).sum(axis=1)
         fraction = np.clip(np.divide(dot, length2, out=np.zeros_like(dot), where=length2 > 0.0), 0.0, 1.0)
         nearest_point = start + fraction[:, None] * step
-        farthest = max(farthest, float(np.sqrt(((nearest_point - point) ** 2).sum(axis=1).min())))
-    return farthest
+        max_distance = max(max_distance, float(np.sqrt(((nearest_point - point) ** 2).sum(axis=1).min())))
+    return max_distance
 
 
 def track_distance(waypoints: Floats, track: Track) -> Floats:
@@ -156,7 +156,7 @@ def fail_labels(failed: Failures, corners: Floats, threats_at: Mapping[int, tupl
     return tuple(Label(text, float(x), float(y), "fail", "fail") for text, x, y in labels[:_MAX_LABELS])
 
 
-def radius_of(threats: Threats, place: Place) -> float:
+def threat_radius(threats: Threats, place: Place) -> float:
     """Return the radius (m) of the missile or radar sphere of a failing place."""
     radii = threats.kill_radius if place.kind == "missile" else threats.detection_radius
     return float(radii[place.index or 0])
@@ -167,5 +167,5 @@ def inside_threats(failed: Failures, threats: Threats, track: Track) -> NDArray[
     inside = np.zeros(len(track), dtype=bool)
     for place in failed.threats:
         offsets = track.position - threats.position[place.index or 0]
-        inside |= (offsets**2).sum(axis=1) < radius_of(threats, place) ** 2
+        inside |= (offsets**2).sum(axis=1) < threat_radius(threats, place) ** 2
     return inside

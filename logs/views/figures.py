@@ -80,7 +80,7 @@ class FigureEntry:
     still: bool = False
 
 
-def _paths(subject: Subject) -> dict[str, Any]:
+def _path_arguments(subject: Subject) -> dict[str, Any]:
     plan = subject.setup.plan
     return {
         "plan_waypoints": plan.waypoints if plan is not None else None,
@@ -91,11 +91,11 @@ def _paths(subject: Subject) -> dict[str, Any]:
     }
 
 
-def _map(subject: Subject) -> MapChart:
-    return flight_map(subject.setup.scenario, **_paths(subject), waypoint_words=waypoint_names(subject.setup))
+def _make_map(subject: Subject) -> MapChart:
+    return flight_map(subject.setup.scenario, **_path_arguments(subject), waypoint_texts=waypoint_names(subject.setup))
 
 
-def _scene(subject: Subject) -> SceneView:
+def _make_scene(subject: Subject) -> SceneView:
     waypoints = len(subject.setup.route.waypoints)
     return SceneView(subject.setup, subject.track, failures(subject.verdict, waypoints))
 
@@ -129,7 +129,7 @@ def _of_returns(name: str) -> Callable[[Subject], View | None]:
     return view
 
 
-def _text(words: str) -> Callable[[Subject], str]:
+def _fixed_caption(words: str) -> Callable[[Subject], str]:
     return lambda _: words
 
 
@@ -150,7 +150,7 @@ FIGURES = (
     FigureEntry(
         "map",
         "Map",
-        _map,
+        _make_map,
         alternative=lambda subject: f"Map, north up: {subject.things}",
         caption=_map_caption,
         still=True,
@@ -159,7 +159,7 @@ FIGURES = (
         "profile",
         "Profile",
         lambda subject: profile_chart(
-            subject.setup.scenario, **_paths(subject), above_ground=subject.setup.route.above_ground
+            subject.setup.scenario, **_path_arguments(subject), above_ground=subject.setup.route.above_ground
         ),
         alternative=lambda subject: (
             f"Heights along the path: terrain, required clearance, {subject.flown('planned and flown', 'planned')} "
@@ -175,9 +175,9 @@ FIGURES = (
     FigureEntry(
         "scene",
         "3-D view",
-        _scene,
+        _make_scene,
         alternative=lambda subject: f"View from aside: {subject.things}",
-        caption=_text(
+        caption=_fixed_caption(
             "Domes are the missiles' reach, dashed the radars'; thin poles stand from the ground to the waypoints. "
             "What a ridge hides shows faintly."
         ),
@@ -186,11 +186,11 @@ FIGURES = (
         "turns",
         "Turn by turn, leg by leg",
         lambda subject: turn_chart(subject.setup.scenario.name, subject.verdict),
-        alternative=_text(
+        alternative=_fixed_caption(
             "Bars, dots and dashes: planned, flown and limit of each turn, slope, height above ground, waypoint, and "
             "of the distance from the legs."
         ),
-        caption=_text(
+        caption=_fixed_caption(
             "Bar: planned. Dot: flown. Dash: limit (the tighter of the scenario's and the aircraft's; for a "
             "waypoint the distance that counts as reached). Ringed: fails."
         ),
@@ -199,7 +199,7 @@ FIGURES = (
         "returns",
         "Returns to launch",
         _of_returns("returns"),
-        alternative=_text(
+        alternative=_fixed_caption(
             "Map, north up: the route coloured by the outcome of a return from there, and the worst returns."
         ),
         caption=lambda subject: (
@@ -211,8 +211,8 @@ FIGURES = (
         "worst-returns",
         "The worst returns",
         _of_returns("worst-returns"),
-        alternative=_text("Heights along the worst returns: terrain, required clearance and spheres."),
-        caption=_text(
+        alternative=_fixed_caption("Heights along the worst returns: terrain, required clearance and spheres."),
+        caption=_fixed_caption(
             "Simulated with ArduPlane's laws on a point mass, in the mean wind, from the place where each "
             "return begins."
         ),
@@ -221,11 +221,11 @@ FIGURES = (
         "return-heights",
         "Called home, or without an engine",
         _of_returns("return-heights"),
-        alternative=_text(
+        alternative=_fixed_caption(
             "Over time: the flight's height by what comes of a return, the least height from which one is safe, and "
             "the height that a glide without the engine has left over."
         ),
-        caption=_text(
+        caption=_fixed_caption(
             "Lowest safe height: where a return from the flight's height is not safe, the nearest height above "
             "it from which "
             "a return is safe; elsewhere, how low the flight may come before it is not. Left over: the flight's "
@@ -236,7 +236,7 @@ FIGURES = (
         "glide",
         "Without its engine",
         _of_returns("glide"),
-        alternative=_text(
+        alternative=_fixed_caption(
             "Map, north up: the lowest height from which a glide reaches home, flat ground, and the route coloured "
             "by what can be reached from there."
         ),
@@ -251,10 +251,10 @@ FIGURES = (
         "survey",
         "Photo lines",
         _of_flight(survey_chart),
-        alternative=_text(
+        alternative=_fixed_caption(
             "Each survey's photo lines from above, laid level: what can be used, what is lost, and the flown track."
         ),
-        caption=_text(
+        caption=_fixed_caption(
             "Broad: flown on the line, level, at its height over ground and with the camera on. Marked: lost. The axes "
             "have different scales."
         ),
@@ -263,10 +263,10 @@ FIGURES = (
         "time",
         "Over time",
         _of_flight(time_chart),
-        alternative=_text(
+        alternative=_fixed_caption(
             "Plots over time: airspeed, bank, load factor, cross-track error, height error, height above ground."
         ),
-        caption=_text(
+        caption=_fixed_caption(
             "Cross-track and height error are what guidance saw, against the path with its corners rounded. Height "
             "above ground is computed from track and terrain."
         ),
@@ -275,10 +275,10 @@ FIGURES = (
         "exposure",
         "Exposure",
         _of_flight(exposure_chart),
-        alternative=_text(
+        alternative=_fixed_caption(
             "Plots along the flown distance: strength and sum of the exposure to missiles and to radars."
         ),
-        caption=_text(
+        caption=_fixed_caption(
             "Strength is the sum over all units of (scale/distance)⁴ inside their reach: 1 at one scale's distance "
             "(Yang, Tang and Lozano 2014, eq. 9 and 10, as a density). So far: its sum over time."
         ),
@@ -287,28 +287,30 @@ FIGURES = (
         "controls",
         "Controls",
         _of_flight(control_chart),
-        alternative=_text(
+        alternative=_fixed_caption(
             "Plots over time: elevator, aileron, rudder and throttle, commanded and as they stood, with their limits."
         ),
-        caption=_text("Shaded: the command stands at the control's limit, and the aircraft can give no more."),
+        caption=_fixed_caption("Shaded: the command stands at the control's limit, and the aircraft can give no more."),
     ),
     FigureEntry(
         "energy",
         "Energy",
         _of_flight(energy_chart),
-        alternative=_text(
+        alternative=_fixed_caption(
             "Plots over time: battery energy used, power, current, and the aircraft's energy as a height."
         ),
-        caption=_text("Energy as height: height and airspeed²/2g. Its slope is climb that the motor pays for."),
+        caption=_fixed_caption(
+            "Energy as height: height and airspeed²/2g. Its slope is climb that the motor pays for."
+        ),
     ),
     FigureEntry(
         "envelope",
         "Envelope",
         lambda subject: envelope_chart(subject.setup, subject.track),
-        alternative=_text(
+        alternative=_fixed_caption(
             "Path angle over airspeed with the steepest climbs and descents, and bank over airspeed with its limit."
         ),
-        caption=_text(
+        caption=_fixed_caption(
             "Lines: the steepest steady climb and descent of the aircraft, from trims of its model. A dot may stand "
             "outside for a moment, in a gust or a pull-up; a leg may not."
         ),

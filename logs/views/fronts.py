@@ -18,7 +18,7 @@ LEAST_LENGTH = 0.01
 
 
 @dataclass(frozen=True, slots=True)
-class _Named:
+class _NamedPlan:
     """Best plan in one objective: its number from 0, name and role."""
 
     row: int
@@ -26,7 +26,7 @@ class _Named:
     role: str
 
 
-def _named(front: Front) -> list[_Named]:
+def _named_plans(front: Front) -> list[_NamedPlan]:
     """Return the best plan in each objective.
 
     A plan that is best in several is named for the first of them.
@@ -34,11 +34,11 @@ def _named(front: Front) -> list[_Named]:
     rows = front.objectives()
     names = ("shortest", "least exposed", "highest above ground", f"least {front.fourth}")
     roles = ("front-shortest", "front-unseen", "front-high", "front-sparing")
-    named_plans: dict[int, _Named] = {}
+    named_plans: dict[int, _NamedPlan] = {}
     for k, (name, role) in enumerate(zip(names, roles, strict=True)):
         if np.ptp(rows[:, k]) > 0.0 or k == 0:
             row = int(np.argmin(rows[:, k]))
-            named_plans.setdefault(row, _Named(row, name, role))
+            named_plans.setdefault(row, _NamedPlan(row, name, role))
     return list(named_plans.values())
 
 
@@ -47,7 +47,7 @@ def front_map(front: Front) -> MapChart:
 
     The best in each objective are numbered and stand out.
     """
-    scenario, named_plans = front.plans[0].plan.scenario, _named(front)
+    scenario, named_plans = front.plans[0].plan.scenario, _named_plans(front)
     marked = {plan.row for plan in named_plans}
     layers, labels = [], []
     for row, plan in enumerate(front.plans):
@@ -75,7 +75,7 @@ def front_map(front: Front) -> MapChart:
 
 def front_chart(front: Front) -> Chart:
     """Return exposure, height above ground, and energy or time of each plan over its length."""
-    named_plans, plans = _named(front), front.plans
+    named_plans, plans = _named_plans(front), front.plans
     along = np.array([plan.length for plan in plans]) / 1e3
     other_rows = np.setdiff1d(np.arange(len(plans)), [plan.row for plan in named_plans])
     columns = [

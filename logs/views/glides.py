@@ -9,7 +9,7 @@ from logs.verdict.returns.glides_text import reached_text, site_text
 from logs.verdict.returns.judge_glides import REACHES, Glide, Reach
 from logs.views.charts import Label, Layer
 from logs.views.map import Extent, MapChart, NamedWind, end_labels, map_extent, world_map
-from logs.views.returns import way_layers
+from logs.views.returns import path_layers
 
 # Role and name of the path by destination within reach without an engine.
 _LOOKS: dict[Reach, tuple[str, str]] = {reach: (f"reach-{reach}", reached_text(reach)) for reach in REACHES}
@@ -26,13 +26,17 @@ def glide_chart(setup: FlightSetup, drawn: DrawnReturns) -> MapChart | None:
     sites = np.array([[site.east, site.north, 0.0] for site in glides.sites])
     extent = map_extent(scenario, route, [sites, np.array([glide.start for glide in glides.each])])
     layers = footprint_layers(drawn, extent)
-    layers += way_layers(drawn.by_reach, _LOOKS, lambda glide: glide.start[:2], lambda glide: _glide_text(glide, drawn))
-    down = np.array([glide.own.at for glide in glides.each if glide.own.end == "ground"])
+    layers += path_layers(
+        drawn.segments_by_reach, _LOOKS, lambda glide: glide.start[:2], lambda glide: _glide_text(glide, drawn)
+    )
+    down = np.array([glide.own.impact for glide in glides.each if glide.own.end == "ground"])
     if len(down):
         name = "where ArduPlane's own return comes down"
         layers.append(Layer("dots", name, "comes-down", down[:, 0], down[:, 1], quiet=True))
     names = tuple(site_text(site) for site in glides.sites)
-    layers.append(Layer("dots", "home, rally point or landing", "waypoint", sites[:, 0], sites[:, 1], words=names))
+    layers.append(
+        Layer("dots", "home, rally point or landing", "waypoint", sites[:, 0], sites[:, 1], hover_texts=names)
+    )
     labels = [
         Label(name, site.east, site.north, "end", "waypoint") for name, site in zip(names, glides.sites, strict=True)
     ]
@@ -48,13 +52,13 @@ def glide_chart(setup: FlightSetup, drawn: DrawnReturns) -> MapChart | None:
 
 
 def _glide_text(glide: Glide, drawn: DrawnReturns) -> str:
-    spare = drawn.glides.spare(glide)
+    spare = drawn.glides.altitude_left(glide)
     left_text = f", {spare:.0f} m left over" if spare >= 0.0 else ""
     return f"{glide.time:.0f} s: {reached_text(glide.reach)}{left_text}"
 
 
 def footprint_layers(drawn: DrawnReturns, extent: Extent) -> list[Layer]:
-    """Return layers for bands of the minimum height above ground to reach a chosen place, and for flat ground.
+    """Return layers of the glide footprint: minimum heights above ground to reach a site, and flat ground.
 
     The list is empty without a map.
     """
@@ -64,12 +68,12 @@ def footprint_layers(drawn: DrawnReturns, extent: Extent) -> list[Layer]:
     layers, place = [], "home, rally point or landing" if len(drawn.glides.sites) > 1 else "home"
     for band in footprint.bands(*extent):
         name = f"{place} in reach from {band.up_to:.0f} m above ground"
-        layers.append(_area(name, BAND_ROLES[band.up_to], band.parts))
+        layers.append(_area_layer(name, BAND_ROLES[band.up_to], band.parts))
     flat = footprint.landings(*extent)
-    return layers + ([_area("flat ground according to the elevation file", "landable", flat)] if flat else [])
+    return layers + ([_area_layer("flat ground according to the elevation file", "landable", flat)] if flat else [])
 
 
-def _area(name: str, role: str, parts: tuple[Part, ...]) -> Layer:
+def _area_layer(name: str, role: str, parts: tuple[Part, ...]) -> Layer:
     gap = np.full((1, 2), np.nan)
     x, y = np.vstack([piece for part in parts for ring in part for piece in (ring, gap)])[:-1].T
-    return Layer("area", name, role, x, y, words=(name,))
+    return Layer("area", name, role, x, y, hover_texts=(name,))

@@ -45,7 +45,7 @@ class LabelPlacer:
 
     def avoid(self, east: ArrayLike, north: ArrayLike, spacing: float = 6.0) -> None:
         """Keep labels off a line through these data positions, sampled every `spacing` pixels."""
-        points = self._pixels(east, north)
+        points = self._to_pixels(east, north)
         points = points[np.isfinite(points).all(axis=1)]
         if len(points) < 2:
             self.lines = np.vstack([self.lines, points])
@@ -77,23 +77,23 @@ class LabelPlacer:
 
         A framed label, and a label that had to move away, gets a line to its point.
         """
-        (px, py) = self._pixels([x], [y])[0]
+        (px, py) = self._to_pixels([x], [y])[0]
         if not (math.isfinite(px) and math.isfinite(py)):
             return
         pad = 5.0 if "bbox" in style else 1.0
         width = 0.62 * size * len(text) * DPI / 72.0 + 2 * pad
         height = 1.25 * size * DPI / 72.0 + 2 * pad
-        best, best_cost, moved = self._box(px, py, width, height, gap, prefer), math.inf, 0
+        best, best_cost, moved = self._make_box(px, py, width, height, gap, prefer), math.inf, 0
         for ring, heights in enumerate(
             _FRAMED_DISTANCES if "bbox" in style else _OPTIONAL_DISTANCES if optional else _UNFRAMED_DISTANCES
         ):
             for rank, direction in enumerate((prefer, *_DIRECTIONS)):
-                box = self._box(px, py, width, height, gap + heights * height, direction)
+                box = self._make_box(px, py, width, height, gap + heights * height, direction)
                 order = 0.0 if "bbox" in style else self._order_cost(box, px, py)
-                cost = self._cost(box) + order + 0.05 * rank + 1.5 * ring
+                cost = self._box_cost(box) + order + 0.05 * rank + 1.5 * ring
                 if cost < best_cost:
                     best, best_cost, moved = box, cost, ring
-        if optional and any(_overlap(best, other) for other in self.boxes):
+        if optional and any(_do_overlap(best, other) for other in self.boxes):
             return
         self.boxes.append(best)
         self.points.append((px, py))
@@ -108,26 +108,26 @@ class LabelPlacer:
             **{"color": theme.colour("ink"), "zorder": 9, **style},
         )
         if "bbox" in style:
-            self._lead(best, px, py, style["bbox"]["edgecolor"], 0.8)
+            self._draw_lead_line(best, px, py, style["bbox"]["edgecolor"], 0.8)
         else:
             if moved:
-                self._lead(best, px, py, style.get("color", theme.colour("ink")), 0.5)
+                self._draw_lead_line(best, px, py, style.get("color", theme.colour("ink")), 0.5)
             artist.set_path_effects(
                 [patheffects.withStroke(linewidth=1.8, foreground=theme.colour("paper"), alpha=0.85)]
             )
 
-    def _lead(self, box: Box, x: float, y: float, color: str, width: float) -> None:
+    def _draw_lead_line(self, box: Box, x: float, y: float, color: str, width: float) -> None:
         """Draw a thin line from under a label to its point."""
         middle = (0.5 * (box[0] + box[2]), 0.5 * (box[1] + box[3]))
         line_ends = self.axes.transData.inverted().transform([middle, (x, y)])
         self.axes.plot(line_ends[:, 0], line_ends[:, 1], "-", color=color, linewidth=width, zorder=8.9, gid="leader")
 
-    def _pixels(self, east: ArrayLike, north: ArrayLike) -> Floats:
+    def _to_pixels(self, east: ArrayLike, north: ArrayLike) -> Floats:
         points = np.column_stack([np.asarray(east, dtype=np.float64), np.asarray(north, dtype=np.float64)])
         return np.asarray(self.axes.transData.transform(points), dtype=np.float64)
 
     @staticmethod
-    def _box(x: float, y: float, width: float, height: float, distance: float, direction: tuple[int, int]) -> Box:
+    def _make_box(x: float, y: float, width: float, height: float, distance: float, direction: tuple[int, int]) -> Box:
         dx, dy = direction
         # A diagonal label approaches the point with its corner, so it may stand closer.
         offset = distance * (0.7 if dx and dy else 1.0)
@@ -155,13 +155,13 @@ class LabelPlacer:
                 cost += _ORDER_COST
         return cost
 
-    def _cost(self, box: Box) -> float:
+    def _box_cost(self, box: Box) -> float:
         frame = self.axes.get_window_extent()
         cost = 0.0
         if box[0] < frame.x0 or box[1] < frame.y0 or box[2] > frame.x1 or box[3] > frame.y1:
             cost += 60.0
         for other in self.boxes:
-            if _overlap(box, other):
+            if _do_overlap(box, other):
                 cost += _OVERLAP_COST
         if len(self.lines):
             inside = (
@@ -174,5 +174,5 @@ class LabelPlacer:
         return cost
 
 
-def _overlap(a: Box, b: Box) -> bool:
+def _do_overlap(a: Box, b: Box) -> bool:
     return a[0] < b[2] and b[0] < a[2] and a[1] < b[3] and b[1] < a[3]

@@ -83,7 +83,7 @@ def flight_map(
     route_waypoints: Floats | None,
     track: Track | None,
     verdict: Verdict | None,
-    waypoint_words: Sequence[str] = (),
+    waypoint_texts: Sequence[str] = (),
     stops: Sequence[int] | None = None,
 ) -> MapChart:
     """Return the map of a plan, or of its flight.
@@ -92,7 +92,7 @@ def flight_map(
     numbered and carries the verdict's marks; a plan that differs from it by more than 1 m is drawn as a second line.
     Missiles are drawn as the outline of the sphere (line) and its section at the altitude of the nearest path point
     (fill).
-    waypoint_words: text of the page on each waypoint.
+    waypoint_texts: text of the page on each waypoint.
     stops: displayed number of each waypoint of the route; None if each waypoint is a stop.
     """
     return map_chart(
@@ -103,7 +103,7 @@ def flight_map(
         tracks=(DrawnTrack("flown track", track),) if track is not None else (),
         winds=(NamedWind(scenario.wind),),
         verdict=verdict,
-        waypoint_words=waypoint_words,
+        waypoint_texts=waypoint_texts,
         stops=stops,
     )
 
@@ -117,7 +117,7 @@ def map_chart(
     tracks: Sequence[DrawnTrack],
     winds: Sequence[NamedWind],
     verdict: Verdict | None,
-    waypoint_words: Sequence[str] = (),
+    waypoint_texts: Sequence[str] = (),
     stops: Sequence[int] | None = None,
 ) -> MapChart:
     """Return a map as `flight_map` does, with any number of tracks and winds.
@@ -132,12 +132,12 @@ def map_chart(
     layers: list[Layer] = []
     labels: list[Label] = []
     if route is not None:
-        layers += _paths(route, plan_waypoints, failed)
-    layers += [_flown(drawn) for drawn in tracks]
+        layers += _path_layers(route, plan_waypoints, failed)
+    layers += [_track_layer(drawn) for drawn in tracks]
     for drawn in tracks if failed.threats else ():
-        layers += _inside(scenario, drawn.track, failed)
+        layers += _inside_threat_layers(scenario, drawn.track, failed)
     if route is not None:
-        layers += _waypoints(route, stops, failed, waypoint_words)
+        layers += _waypoint_layers(route, stops, failed, waypoint_texts)
         centres = {k: (float(east), float(north)) for k, (east, north, _) in enumerate(scenario.threats.position)}
         labels += fail_labels(failed, route[:, :2], centres)
     labels += end_labels(scenario, route, None if route is None else stops)
@@ -163,7 +163,11 @@ def world_map(
     route: (w, 3) m, whose altitudes determine the filled sections of missiles.  entered: threats whose rule fails.
     """
     east, north = extent
-    around = [*_area(scenario), *threat_circles(scenario.threats, route, entered), *zone_shapes(scenario.zones)]
+    around = [
+        *_area_edge_layers(scenario),
+        *threat_circles(scenario.threats, route, entered),
+        *zone_shapes(scenario.zones),
+    ]
     names = [*threat_names(scenario.threats, entered), *zone_names(scenario.zones)]
     names = [name for name in names if east[0] < name.x < east[1] and north[0] < name.y < north[1]]
     origin = scenario.origin
@@ -213,7 +217,7 @@ def map_extent(scenario: Scenario, route: Floats | None, ways: Sequence[Floats])
     return (west, east), (south, north)
 
 
-def _area(scenario: Scenario) -> list[Layer]:
+def _area_edge_layers(scenario: Scenario) -> list[Layer]:
     """Draw the edge of the scenario's area.
 
     Bounds made around an external mission limit nothing and are not drawn.
@@ -225,7 +229,7 @@ def _area(scenario: Scenario) -> list[Layer]:
     return [Layer("line", "edge of the area", "area", x, y, quiet=True)]
 
 
-def _paths(route: Floats, plan: Floats | None, failed: Failures) -> list[Layer]:
+def _path_layers(route: Floats, plan: Floats | None, failed: Failures) -> list[Layer]:
     """Draw failing legs under the route, and the plan if it differs."""
     differs = plan is not None and paths_differ(plan, route, 1.0)
     legs = [route[k : k + 2] for k in failed.legs]
@@ -236,14 +240,14 @@ def _paths(route: Floats, plan: Floats | None, failed: Failures) -> list[Layer]:
     return [*layers, Layer("line", name, "planned", route[:, 0], route[:, 1], quiet=True)]
 
 
-def _flown(drawn: DrawnTrack) -> Layer:
-    count = len(drawn.track)
+def _track_layer(drawn_track: DrawnTrack) -> Layer:
+    count = len(drawn_track.track)
     rows = np.union1d(np.arange(0, count, max(1, count // _MAX_POINTS)), [count - 1])
-    east, north, _ = drawn.track.position[rows].T
-    return Layer("line", drawn.label, drawn.role, east, north, flight=drawn.flight)
+    east, north, _ = drawn_track.track.position[rows].T
+    return Layer("line", drawn_track.label, drawn_track.role, east, north, flight=drawn_track.flight)
 
 
-def _inside(scenario: Scenario, track: Track, failed: Failures) -> list[Layer]:
+def _inside_threat_layers(scenario: Scenario, track: Track, failed: Failures) -> list[Layer]:
     """Return the part of a track inside a threat whose rule fails."""
     inside = inside_threats(failed, scenario.threats, track)
     if not inside.any():
@@ -252,11 +256,15 @@ def _inside(scenario: Scenario, track: Track, failed: Failures) -> list[Layer]:
     return [Layer("line", "flown inside a threat's reach", "inside", east, north, quiet=True)]
 
 
-def _waypoints(route: Floats, stops: Sequence[int], failed: Failures, words: Sequence[str]) -> list[Layer]:
-    first = stop_rows(stops)
-    dots = "waypoint" if len(first) <= _MAX_DOTS else "waypoint-small"
-    texts = tuple(words[k] for k in first) if words else ()
-    layers = [Layer("dots", "waypoint, numbered", dots, route[first, 0], route[first, 1], words=texts)]
+def _waypoint_layers(
+    route: Floats, stops: Sequence[int], failed: Failures, texts_by_waypoint: Sequence[str]
+) -> list[Layer]:
+    stop_starts = stop_rows(stops)
+    dot_role = "waypoint" if len(stop_starts) <= _MAX_DOTS else "waypoint-small"
+    texts = tuple(texts_by_waypoint[k] for k in stop_starts) if texts_by_waypoint else ()
+    layers = [
+        Layer("dots", "waypoint, numbered", dot_role, route[stop_starts, 0], route[stop_starts, 1], hover_texts=texts)
+    ]
     if failed.waypoints:
         east, north = route[list(failed.waypoints), :2].T
         layers.append(Layer("rings", "waypoint that fails a rule", "fail", east, north, quiet=True))
@@ -265,15 +273,15 @@ def _waypoints(route: Floats, stops: Sequence[int], failed: Failures, words: Seq
 
 def _end_markers(scenario: Scenario) -> list[Layer]:
     return [
-        Layer("dots", name, name, point[:1], point[1:2], words=(name,))
+        Layer("dots", name, name, point[:1], point[1:2], hover_texts=(name,))
         for name, point in (("start", scenario.start), ("destination", scenario.destination))
     ]
 
 
 def end_labels(scenario: Scenario, route: Floats | None, stops: Sequence[int] | None = None) -> list[Label]:
-    """Label start and destination, with one label if they are at one place.
+    """Label start and destination, with one label if they coincide.
 
-    Where the first or last waypoint coincides with them, its number is part of the label.
+    If the first or last waypoint coincides with them, its number is part of the label.
     """
     labels = []
     for point, row, name in ((scenario.start, 0, "start"), (scenario.destination, -1, "destination")):
@@ -294,14 +302,16 @@ def _are_close(a: Floats, b: Floats) -> bool:
 
 
 def _waypoint_labels(scenario: Scenario, route: Floats, stops: Sequence[int], failed: Failures) -> list[Label]:
-    first = stop_rows(stops)
-    step = max(1, -(-len(first) // _MAX_NUMBERS))
+    stop_starts = stop_rows(stops)
+    step = max(1, -(-len(stop_starts) // _MAX_NUMBERS))
     last = len(route) - 1
-    hidden = {k for k, end in ((0, scenario.start), (last, scenario.destination)) if _are_close(route[k], end)}
-    shown = {k for n, k in enumerate(first) if n % step == 0} | set(failed.waypoints)
+    unlabelled_waypoints = {
+        k for k, end in ((0, scenario.start), (last, scenario.destination)) if _are_close(route[k], end)
+    }
+    numbered_waypoints = {k for n, k in enumerate(stop_starts) if n % step == 0} | set(failed.waypoints)
     return [
         Label(str(stops[k]), float(route[k, 0]), float(route[k, 1]), "number", "waypoint")
-        for k in sorted(shown - hidden)
+        for k in sorted(numbered_waypoints - unlabelled_waypoints)
     ]
 
 

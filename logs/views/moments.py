@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track
-from logs.recording.foxglove_scene import SPAN, model_colours, model_corners
+from logs.recording.foxglove_scene import MODEL_SPAN_M, model_colours, model_corners
 from logs.verdict.places import Place
 from logs.verdict.wording import place_text
 from logs.views.charts import numbers
@@ -88,4 +88,4 @@ def aircraft_model() -> dict[str, Any]:
     def rounded(values: NDArray[np.float32]) -> Any:
         return np.round(values.astype(np.float64), 4).tolist()
 
-    return {"corners": rounded(model_corners() / SPAN), "colours": rounded(model_colours()[:, :3])}
+    return {"corners": rounded(model_corners() / MODEL_SPAN_M), "colours": rounded(model_colours()[:, :3])}

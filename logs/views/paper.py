@@ -65,7 +65,7 @@ def draw_paths(scenario: Scenario, algorithm: str, paths: Sequence[PaperPath]) -
     safe = sum(path.safe for path in paths)
     title = f"{scenario.name}: {len(paths)} runs of {algorithm}, {safe} safe"
     with clean_style():
-        figure, axes, around = _map(scenario, title, _LEGEND)
+        figure, axes, around = _draw_ground_and_threats(scenario, title, _LEGEND)
         handles: list[Any] = []
         for is_safe, look, label in ((True, _LOOKS[0], "safe"), (False, _LOOKS[1], "not safe")):
             chosen = [path for path in paths if path.safe == is_safe]
@@ -77,7 +77,7 @@ def draw_paths(scenario: Scenario, algorithm: str, paths: Sequence[PaperPath]) -
                 span = f"{min(ratios):.3f}" + (f" to {max(ratios):.3f}" if len(ratios) > 1 else "")
                 text = f"{len(chosen)} path{'s' if len(chosen) > 1 else ''} {label}\nPLR {span}"
                 handles.append(Line2D([], [], linewidth=1.6, label=text, **look))
-        handles += _ends(axes, scenario, [path.waypoints for path in paths])
+        handles += _draw_ends(axes, scenario, [path.waypoints for path in paths])
         draw_legend(figure, handles + around, _LEFT, (_LEGEND - 0.02) / figure.get_figheight())
     return figure
 
@@ -96,7 +96,7 @@ def draw_encodings(scenario: Scenario, chosen: Mapping[str, PaperPath], seed: in
     """
     with clean_style():
         title = f"{scenario.name}: one path of each encoding, seed {seed}"
-        figure, axes, around = _map(scenario, title, _TALL_LEGEND)
+        figure, axes, around = _draw_ground_and_threats(scenario, title, _TALL_LEGEND)
         handles = []
         for (name, path), look, marker in zip(chosen.items(), _LOOKS, _MARKERS, strict=False):
             axes.plot(
@@ -104,12 +104,12 @@ def draw_encodings(scenario: Scenario, chosen: Mapping[str, PaperPath], seed: in
             )
             text = f"{name}\n{'safe' if path.safe else 'not safe'}, PLR {path.length_ratio:.3f}"
             handles.append(Line2D([], [], linewidth=1.8, marker=marker, markersize=3.5, label=text, **look))
-        handles += _ends(axes, scenario, [path.waypoints for path in chosen.values()])
+        handles += _draw_ends(axes, scenario, [path.waypoints for path in chosen.values()])
         draw_legend(figure, handles + around, _LEFT, (_TALL_LEGEND - 0.02) / figure.get_figheight())
     return figure
 
 
-def _map(scenario: Scenario, title: str, legend: float) -> tuple[Figure, Any, list[Any]]:
+def _draw_ground_and_threats(scenario: Scenario, title: str, legend: float) -> tuple[Figure, Any, list[Any]]:
     """Draw ground and threats; return figure, axes and their legend handles.
 
     legend: height of the legend, inches.
@@ -127,7 +127,7 @@ def _map(scenario: Scenario, title: str, legend: float) -> tuple[Figure, Any, li
     return figure, axes, around + [legend_handle(entry) for entry in legend_entries([threats])]
 
 
-def _ends(axes: Any, scenario: Scenario, paths: Sequence[Floats]) -> list[Any]:
+def _draw_ends(axes: Any, scenario: Scenario, paths: Sequence[Floats]) -> list[Any]:
     """Draw start and destination, with labels clear of the paths."""
     placer = LabelPlacer(axes)
     for path in paths:

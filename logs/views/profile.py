@@ -61,13 +61,13 @@ def profile_chart(
     ('km', ['planned', 'waypoint, numbered'])
     """
     route = route_waypoints if route_waypoints is not None else plan_waypoints
-    straight = route is None
+    is_line = route is None
     if route is None:
         route = np.vstack([scenario.start, scenario.destination])
     track = track if track is not None and len(track) else None
     waypoint_distances = route_distance(route)
     distance, points = route_samples(route, max(float(waypoint_distances[-1]) / _SAMPLES, 1.0))
-    ground = ground_under(scenario, points)
+    ground = terrain_altitudes(scenario, points)
     if above_ground is not None and ground is not None and len(above_ground) == len(route):
         points[:, 2] = _planned_altitudes(
             waypoint_distances, route, above_ground, distance, points[:, 2], ground, scenario
@@ -76,36 +76,38 @@ def profile_chart(
     plane = PathPlane(distance / 1000.0, points, ground, min_altitude, max_altitude)
     failed = failures(verdict, len(route))
     stops = range(len(route)) if stops is None else stops
-    first = stop_rows(stops)
+    starts = stop_rows(stops)
     zones, zone_names = zone_bands(scenario.zones, plane)
     cuts, cut_names = threat_cuts(scenario.threats, plane, frozenset(failed.threat_names()))
-    flown, entered = _flown(scenario, route, track, failed, plane)
+    flown, entered = _flown_layers(scenario, route, track, failed, plane)
     layers = [*zones, *cuts, *ground_bands(scenario, plane), *_failing_legs(waypoint_distances, route, failed)]
-    layers += [] if straight else [Layer("line", "planned", "planned", plane.kilometres, points[:, 2])]
+    layers += [] if is_line else [Layer("line", "planned", "planned", plane.kilometres, points[:, 2])]
     layers += flown
     labels: list[Label] = []
-    if not straight:
-        dots = "waypoint" if len(first) <= _MAX_DOTS else "waypoint-small"
+    if not is_line:
+        role = "waypoint" if len(starts) <= _MAX_DOTS else "waypoint-small"
         layers.append(
-            Layer("dots", "waypoint, numbered", dots, waypoint_distances[first] / 1000.0, route[first, 2], quiet=True)
+            Layer("dots", "waypoint, numbered", role, waypoint_distances[starts] / 1000.0, route[starts, 2], quiet=True)
         )
         labels = _waypoint_labels(waypoint_distances, route, stops, failed)
     layers += _failing_waypoints(waypoint_distances, route, failed)
     corners = np.column_stack([waypoint_distances / 1000.0, route[:, 2]])
     labels = [*fail_labels(failed, corners, entered), *labels, *cut_names, *zone_names]
-    limits, note = _bounds(scenario, min_altitude, max_altitude)
+    limits, note = _limit_lines(scenario, min_altitude, max_altitude)
     panel = Panel(
         "height", "m AMSL", tuple(layers), limits, span=(min_altitude, max_altitude), note=note, labels=tuple(labels)
     )
-    return _chart(scenario, waypoint_distances, first, panel, straight=straight)
+    return _make_chart(scenario, waypoint_distances, starts, panel, is_straight=is_line)
 
 
-def _chart(scenario: Scenario, waypoint_distances: Floats, first: list[int], panel: Panel, *, straight: bool) -> Chart:
+def _make_chart(
+    scenario: Scenario, waypoint_distances: Floats, starts: list[int], panel: Panel, *, is_straight: bool
+) -> Chart:
     """Return the panel as a chart.
 
     waypoint_distances: distance of each waypoint along the route, m.  first: waypoints at which a stop begins.
     """
-    path = "the straight line from start to destination" if straight else "the planned path"
+    path = "the straight line from start to destination" if is_straight else "the planned path"
     title = f"{shorten(scenario.name, 60)}: heights along the path"
     return Chart(
         title if scenario.terrain is not None else f"{title} (no terrain was given)",
@@ -116,7 +118,7 @@ def _chart(scenario: Scenario, waypoint_distances: Floats, first: list[int], pan
         # The leg to a loiter includes the loiter.
         marks=tuple(
             (float(waypoint_distances[end]) / 1000.0, f"leg {n}")
-            for n, end in enumerate(_leg_begins(first, len(waypoint_distances)))
+            for n, end in enumerate(_leg_start_waypoints(starts, len(waypoint_distances)))
         ),
         tall=420,
         inches=4.05,
@@ -125,37 +127,37 @@ def _chart(scenario: Scenario, waypoint_distances: Floats, first: list[int], pan
     )
 
 
-def _leg_begins(first: list[int], count: int) -> list[int]:
-    """Return the waypoints at which the displayed legs begin; each leg begins at the end of the stop before it."""
-    return [0, *(k - 1 for k in first[2:])] if count > 1 else []
+def _leg_start_waypoints(stop_starts: list[int], count: int) -> list[int]:
+    """Return the waypoint at which each displayed leg begins, which is the end of the stop before it."""
+    return [0, *(k - 1 for k in stop_starts[2:])] if count > 1 else []
 
 
 def _planned_altitudes(
     waypoint_distances: Floats,
     route: Floats,
-    above: Floats,
+    height_above_ground: Floats,
     distance: Floats,
     up: Floats,
     ground: Floats,
     scenario: Scenario,
 ) -> Floats:
-    """Return the planned altitude at each route sample, m AMSL, (s,); terrain-following legs keep above the ground.
+    """Return the planned altitude at each route sample, m AMSL, (s,), including terrain-following legs.
 
     waypoint_distances: distance of each waypoint along the route, m.
-    above: height above ground at the end of each leg, m, (w,); NaN if the leg does not follow the terrain.
+    height_above_ground: height above ground at the end of each leg, m, (w,); NaN if it does not follow the terrain.
     distance, up, ground: distance, straight-line altitude and ground altitude of each sample, m, (s,).
     """
-    ground_altitudes = ground_under(scenario, route)
+    ground_altitudes = terrain_altitudes(scenario, route)
     starts = route[:, 2] - (0.0 if ground_altitudes is None else ground_altitudes)
     leg = np.clip(np.searchsorted(waypoint_distances, distance, side="left"), 1, len(waypoint_distances) - 1)
     fraction = (distance - waypoint_distances[leg - 1]) / np.maximum(
         waypoint_distances[leg] - waypoint_distances[leg - 1], 1e-9
     )
-    followed = ground + starts[leg - 1] + fraction * (above[leg] - starts[leg - 1])
-    return np.where(np.isfinite(followed), followed, up)
+    altitudes = ground + starts[leg - 1] + fraction * (height_above_ground[leg] - starts[leg - 1])
+    return np.where(np.isfinite(altitudes), altitudes, up)
 
 
-def ground_under(scenario: Scenario, points: Floats) -> Floats | None:
+def terrain_altitudes(scenario: Scenario, points: Floats) -> Floats | None:
     """Return the terrain elevation (s,) under the points, or None if unknown at all of them."""
     if scenario.terrain is None:
         return None
@@ -174,11 +176,11 @@ def _altitude_limits(
     if ground is not None:
         heights.append(ground)
         if scenario.limits.max_height_m is not None:
-            highest = float(route[:, 2].max()) + scenario.limits.max_height_m
-            heights.append(np.minimum(ground + scenario.limits.max_height_m, highest))
-    together = np.concatenate(heights)
-    together = together[np.isfinite(together)]
-    min_altitude, max_altitude = float(together.min()), float(together.max())
+            max_limit = float(route[:, 2].max()) + scenario.limits.max_height_m
+            heights.append(np.minimum(ground + scenario.limits.max_height_m, max_limit))
+    altitudes = np.concatenate(heights)
+    altitudes = altitudes[np.isfinite(altitudes)]
+    min_altitude, max_altitude = float(altitudes.min()), float(altitudes.max())
     span = max(max_altitude - min_altitude, _MIN_SPAN)
     if max_altitude < scenario.ceiling <= max_altitude + 1.2 * span:
         max_altitude = scenario.ceiling
@@ -192,19 +194,21 @@ def ground_bands(scenario: Scenario, plane: PathPlane) -> list[Layer]:
     if ground is None:
         return []
     layers = []
-    required, highest = scenario.limits.min_clearance_m, scenario.limits.max_height_m
-    if required > 0.0:
+    min_clearance, max_height = scenario.limits.min_clearance_m, scenario.limits.max_height_m
+    if min_clearance > 0.0:
         layers.append(
-            Layer("band", f"required clearance, {required:g} m", "clearance", along, ground + required, ground)
+            Layer(
+                "band", f"required clearance, {min_clearance:g} m", "clearance", along, ground + min_clearance, ground
+            )
         )
     layers.append(Layer("band", "terrain", "terrain", along, ground, np.full(len(ground), plane.low)))
-    if highest is not None:
-        name = f"greatest height, {highest:g} m above ground"
-        layers.append(Layer("line", name, "limit", along, ground + highest))
+    if max_height is not None:
+        name = f"greatest height, {max_height:g} m above ground"
+        layers.append(Layer("line", name, "limit", along, ground + max_height))
     return layers
 
 
-def _flown(
+def _flown_layers(
     scenario: Scenario, route: Floats, track: Track | None, failed: Failures, plane: PathPlane
 ) -> tuple[list[Layer], dict[int, tuple[float, float]]]:
     """Return flown altitudes, and entered threats along the flight, or along a plan that was not flown."""
@@ -215,16 +219,16 @@ def _flown(
     line = Layer("line", "flown", "flown", progress[rows], heights[rows])
     if not failed.threats:
         return [line], {}
-    ground = ground_under(scenario, track.position)
-    layers, places = entered_cuts(
+    ground = terrain_altitudes(scenario, track.position)
+    layers, label_positions = entered_cuts(
         scenario.threats, failed, PathPlane(progress, track.position, ground, plane.low, plane.high)
     )
-    inside = np.where(inside_threats(failed, scenario.threats, track), heights, np.nan)
+    altitudes_inside = np.where(inside_threats(failed, scenario.threats, track), heights, np.nan)
     return [
         *layers,
         line,
-        Layer("line", "flown inside a threat's reach", "inside", progress, inside, quiet=True),
-    ], places
+        Layer("line", "flown inside a threat's reach", "inside", progress, altitudes_inside, quiet=True),
+    ], label_positions
 
 
 def _failing_legs(waypoint_distances: Floats, route: Floats, failed: Failures) -> list[Layer]:
@@ -253,20 +257,24 @@ def _failing_waypoints(waypoint_distances: Floats, route: Floats, failed: Failur
 
 
 def _waypoint_labels(waypoint_distances: Floats, route: Floats, stops: Sequence[int], failed: Failures) -> list[Label]:
-    first = stop_rows(stops)
-    step = max(1, -(-len(first) // _MAX_NUMBERS))
-    shown = {k for n, k in enumerate(first) if n % step == 0 or n == len(first) - 1} | set(failed.waypoints)
+    stop_starts = stop_rows(stops)
+    step = max(1, -(-len(stop_starts) // _MAX_NUMBERS))
+    numbered_waypoints = {k for n, k in enumerate(stop_starts) if n % step == 0 or n == len(stop_starts) - 1} | set(
+        failed.waypoints
+    )
     return [
         Label(str(stops[k]), float(waypoint_distances[k]) / 1000.0, float(route[k, 2]), "number", "waypoint")
-        for k in sorted(shown)
+        for k in sorted(numbered_waypoints)
     ]
 
 
-def _bounds(scenario: Scenario, min_altitude: float, max_altitude: float) -> tuple[tuple[tuple[str, float], ...], str]:
+def _limit_lines(
+    scenario: Scenario, min_altitude: float, max_altitude: float
+) -> tuple[tuple[tuple[str, float], ...], str]:
     """Return ceiling and floor as level lines, and a note on a ceiling outside the picture."""
     if scenario.external:
         return (), ""
     ceiling, floor = f"ceiling, {scenario.ceiling:.0f} m AMSL", f"floor, {scenario.floor:.0f} m AMSL"
-    shown = tuple((name, value) for name, value in ((ceiling, scenario.ceiling), (floor, scenario.floor)))
+    limits = tuple((name, value) for name, value in ((ceiling, scenario.ceiling), (floor, scenario.floor)))
     note = "" if min_altitude < scenario.ceiling < max_altitude else f"{ceiling}, off the picture"
-    return tuple((name, value) for name, value in shown if min_altitude < value < max_altitude), note
+    return tuple((name, value) for name, value in limits if min_altitude < value < max_altitude), note

@@ -9,42 +9,43 @@ from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track
 from logs.verdict.returns.drawn_returns import DrawnReturns, WorstReturn
 from logs.verdict.returns.judge_glides import Glides
-from logs.verdict.returns.judge_returns import KINDS, Kind, ReturnFlown
-from logs.verdict.returns.returns_text import outcome_text, way_text
+from logs.verdict.returns.judge_returns import KINDS, Kind, SimulatedReturn
+from logs.verdict.returns.returns_text import outcome_text, segment_text
 from logs.views.charts import Chart, Label, Layer, Panel, parted, series, shorten
 from logs.views.map import MapChart, NamedWind, end_labels, map_extent, world_map
-from logs.views.profile import ground_bands, ground_under
+from logs.views.profile import ground_bands, terrain_altitudes
 from logs.views.threats_and_zones import PathPlane, threat_cuts, zone_bands
 from world.arrays import Floats
 from world.scenario import Scenario
 
 # Role and name of the path by outcome of the returns; the safe outcome is drawn lowest.
-_LOOKS: dict[Kind, tuple[str, str]] = {kind: (f"return-{kind}", way_text(kind)) for kind in reversed(KINDS)}
+_LOOKS: dict[Kind, tuple[str, str]] = {kind: (f"return-{kind}", segment_text(kind)) for kind in reversed(KINDS)}
 # Smallest range of altitudes that a profile shows, m.
 _MIN_SPAN = 100.0
 # Number of ground samples under a flight.
 _GROUND_POINTS = 1200
 
 Key = TypeVar("Key", bound=str)
-One = TypeVar("One")
+Element = TypeVar("Element")
 
 
-def way_layers(
-    stretches: Sequence[tuple[Key, Sequence[One]]],
+def path_layers(
+    segments: Sequence[tuple[Key, Sequence[Element]]],
     looks: dict[Key, tuple[str, str]],
-    place: Callable[[One], tuple[float, float]],
-    words: Callable[[One], str],
+    position_of: Callable[[Element], tuple[float, float]],
+    text_of: Callable[[Element], str],
 ) -> list[Layer]:
     """Return the path in one layer for each look, in the order of the looks.
 
-    looks: role and name of each kind of stretch.  place: coordinates of a point.  words: text of the page on a point.
+    segments: key and elements of each segment of the path.
+    looks: role and name of each key.  position_of: coordinates of an element.  text_of: hover text of an element.
     """
     layers = []
     for role, name in dict.fromkeys(looks.values()):
-        segments = [segment for kind, segment in stretches if looks[kind] == (role, name)]
-        x, y = parted([np.array([place(element) for element in segment]) for segment in segments])
-        texts = [text for segment in segments for text in (*map(words, segment), "")]
-        layers.append(Layer("line", name, role, x, y, words=tuple(texts)))
+        matching_segments = [elements for kind, elements in segments if looks[kind] == (role, name)]
+        x, y = parted([np.array([position_of(element) for element in elements]) for elements in matching_segments])
+        texts = [text for elements in matching_segments for text in (*map(text_of, elements), "")]
+        layers.append(Layer("line", name, role, x, y, hover_texts=tuple(texts)))
     return [layer for layer in layers if layer.x.size]
 
 
@@ -53,31 +54,41 @@ def returns_map(setup: FlightSetup, drawn: DrawnReturns) -> MapChart:
     scenario, route = setup.scenario, setup.route.waypoints
     limit = drawn.returns.limit
 
-    def return_text(ret: ReturnFlown) -> str:
+    def return_text(ret: SimulatedReturn) -> str:
         return f"{ret.time:.0f} s: to {ret.target.name}: {outcome_text(ret, limit)}"
 
-    layers = way_layers(drawn.by_kind, _LOOKS, lambda ret: ret.start[:2], return_text)
+    layers = path_layers(drawn.segments_by_outcome, _LOOKS, lambda ret: ret.start[:2], return_text)
     for worst in drawn.worst:
         name = "path of one of the worst returns, numbered"
         layers.append(
-            Layer("line", name, "return-way", worst.way[:, 0], worst.way[:, 1], words=(return_text(worst.flown),))
+            Layer(
+                "line",
+                name,
+                "return-way",
+                worst.path[:, 0],
+                worst.path[:, 1],
+                hover_texts=(return_text(worst.simulated),),
+            )
         )
-    unsafe = [worst for worst in drawn.worst if not worst.flown.safe]
+    unsafe = [worst for worst in drawn.worst if not worst.simulated.safe]
     if unsafe:
-        positions = np.array([worst.at for worst in unsafe])
-        texts = tuple(return_text(worst.flown) for worst in unsafe)
-        layers.append(Layer("rings", "where it goes wrong", "fail", positions[:, 0], positions[:, 1], words=texts))
+        positions = np.array([worst.marked_position for worst in unsafe])
+        texts = tuple(return_text(worst.simulated) for worst in unsafe)
+        layers.append(
+            Layer("rings", "where it goes wrong", "fail", positions[:, 0], positions[:, 1], hover_texts=texts)
+        )
     targets = {ret.target.name: ret.target.position for ret in drawn.returns.each}
-    layers += _targets(targets)
+    layers += _target_layers(targets)
     labels = [
-        Label(str(number), float(worst.at[0]), float(worst.at[1]), "number", "fail")
+        Label(str(number), float(worst.marked_position[0]), float(worst.marked_position[1]), "number", "fail")
         for number, worst in enumerate(drawn.worst, 1)
     ]
     labels += [
-        Label(shorten(name, 30), place[0], place[1], "end", "waypoint", (1, 1)) for name, place in targets.items()
+        Label(shorten(name, 30), position[0], position[1], "end", "waypoint", (1, 1))
+        for name, position in targets.items()
     ]
-    ways = [worst.way for worst in drawn.worst] + [np.array(list(targets.values()) or np.zeros((0, 3)))]
-    extent = map_extent(scenario, route, [*ways, np.array([ret.start for ret in drawn.returns.each])])
+    paths = [worst.path for worst in drawn.worst] + [np.array(list(targets.values()) or np.zeros((0, 3)))]
+    extent = map_extent(scenario, route, [*paths, np.array([ret.start for ret in drawn.returns.each])])
     return world_map(
         scenario,
         "returns to launch from points along the route",
@@ -89,11 +100,11 @@ def returns_map(setup: FlightSetup, drawn: DrawnReturns) -> MapChart:
     )
 
 
-def _targets(targets: dict[str, tuple[float, float, float]]) -> list[Layer]:
+def _target_layers(targets: dict[str, tuple[float, float, float]]) -> list[Layer]:
     if not targets:
         return []
     east, north, _ = np.array(list(targets.values())).T
-    return [Layer("dots", "where it returns to", "waypoint", east, north, words=tuple(targets))]
+    return [Layer("dots", "where it returns to", "waypoint", east, north, hover_texts=tuple(targets))]
 
 
 # ----------------------------------------------------------------------
@@ -108,9 +119,9 @@ def worst_returns_chart(setup: FlightSetup, drawn: DrawnReturns) -> Chart | None
     if not drawn.worst:
         return None
     scenario = setup.scenario
-    spans = [_span(scenario, worst) for worst in drawn.worst]
+    spans = [_altitude_span(scenario, worst) for worst in drawn.worst]
     span = (min(bottom for bottom, _ in spans), max(top for _, top in spans))
-    panels = tuple(_profile(scenario, worst, number, span) for number, worst in enumerate(drawn.worst, 1))
+    panels = tuple(_profile_panel(scenario, worst, number, span) for number, worst in enumerate(drawn.worst, 1))
     return Chart(
         f"{shorten(scenario.name, 60)}: the worst returns to launch",
         "distance since it turned back",
@@ -123,28 +134,30 @@ def worst_returns_chart(setup: FlightSetup, drawn: DrawnReturns) -> Chart | None
     )
 
 
-def _span(scenario: Scenario, worst: WorstReturn) -> tuple[float, float]:
+def _altitude_span(scenario: Scenario, worst: WorstReturn) -> tuple[float, float]:
     """Return lowest and highest altitude of a path and the ground under it, with a margin, m."""
-    ground = ground_under(scenario, worst.way)
-    altitudes = np.concatenate([worst.way[:, 2], np.zeros(0) if ground is None else ground])
+    ground = terrain_altitudes(scenario, worst.path)
+    altitudes = np.concatenate([worst.path[:, 2], np.zeros(0) if ground is None else ground])
     min_altitude, max_altitude = float(np.nanmin(altitudes)), float(np.nanmax(altitudes))
     margin = 0.1 * max(max_altitude - min_altitude, _MIN_SPAN)
     return min_altitude - margin, max_altitude + margin
 
 
-def _profile(scenario: Scenario, worst: WorstReturn, number: int, span: tuple[float, float]) -> Panel:
-    path = worst.way
+def _profile_panel(scenario: Scenario, worst: WorstReturn, number: int, span: tuple[float, float]) -> Panel:
+    path = worst.path
     along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(path[:, :2], axis=0).T))]) / 1000.0
-    plane = PathPlane(along, path, ground_under(scenario, path), *span)
+    plane = PathPlane(along, path, terrain_altitudes(scenario, path), *span)
     zones, zone_names = zone_bands(scenario.zones, plane)
     cuts, cut_names = threat_cuts(scenario.threats, plane, frozenset())
     layers = [*zones, *cuts, *ground_bands(scenario, plane)]
     layers.append(Layer("line", "path of the return", "return-way", along, path[:, 2]))
-    if not worst.flown.safe:
-        nearest = int(np.argmin(np.linalg.norm(path - worst.at, axis=1)))
-        layers.append(Layer("rings", "where it goes wrong", "fail", along[[nearest]], worst.at[[2]], quiet=True))
-    title = f"{number}: from {worst.flown.time:.0f} s"
-    note = way_text(worst.flown.kind).removeprefix("a return ")
+    if not worst.simulated.safe:
+        nearest_row = int(np.argmin(np.linalg.norm(path - worst.marked_position, axis=1)))
+        layers.append(
+            Layer("rings", "where it goes wrong", "fail", along[[nearest_row]], worst.marked_position[[2]], quiet=True)
+        )
+    title = f"{number}: from {worst.simulated.time:.0f} s"
+    note = segment_text(worst.simulated.kind).removeprefix("a return ")
     return Panel(title, "m AMSL", tuple(layers), span=span, note=note, labels=(*cut_names, *zone_names))
 
 
@@ -160,17 +173,22 @@ def return_heights_chart(setup: FlightSetup, drawn: DrawnReturns, track: Track |
     if not drawn.returns.each:
         return None
     scenario, limit = setup.scenario, drawn.returns.limit
-    time, places = _flown_places(drawn, track)
-    ground, least_altitudes = ground_under(scenario, places), drawn.least
-    altitudes = np.concatenate([places[:, 2], least_altitudes.height, np.zeros(0) if ground is None else ground])
+    time, positions = _path_positions(drawn, track)
+    ground, least_altitudes = terrain_altitudes(scenario, positions), drawn.min_safe_altitudes
+    altitudes = np.concatenate([positions[:, 2], least_altitudes.altitude, np.zeros(0) if ground is None else ground])
     min_altitude, max_altitude = float(np.nanmin(altitudes)), float(np.nanmax(altitudes))
     margin = 0.06 * max(max_altitude - min_altitude, _MIN_SPAN)
     span = (min_altitude - margin, max_altitude + margin)
-    name = f"least height for a safe return (no line: none up to {least_altitudes.searched:.0f} m more)"
+    name = f"least height for a safe return (no line: none up to {least_altitudes.search_range:.0f} m more)"
     layers = [
-        *ground_bands(scenario, PathPlane(time, places, ground, *span)),
-        *way_layers(drawn.by_kind, _LOOKS, lambda ret: (ret.time, ret.start[2]), lambda ret: outcome_text(ret, limit)),
-        Layer("line", name, "limit", least_altitudes.time, least_altitudes.height),
+        *ground_bands(scenario, PathPlane(time, positions, ground, *span)),
+        *path_layers(
+            drawn.segments_by_outcome,
+            _LOOKS,
+            lambda ret: (ret.time, ret.start[2]),
+            lambda ret: outcome_text(ret, limit),
+        ),
+        Layer("line", name, "limit", least_altitudes.time, least_altitudes.altitude),
     ]
     panels = [Panel("height", "m AMSL", tuple(layers), span=span)]
     if drawn.glides.each:
@@ -187,7 +205,7 @@ def return_heights_chart(setup: FlightSetup, drawn: DrawnReturns, track: Track |
     )
 
 
-def _flown_places(drawn: DrawnReturns, track: Track | None) -> tuple[Floats, Floats]:
+def _path_positions(drawn: DrawnReturns, track: Track | None) -> tuple[Floats, Floats]:
     """Return times, s, (t,), and positions, m, (t, 3), of the path, from the track or from the starts of returns."""
     first, last = drawn.returns.each[0].time, max(ret.time for ret in drawn.returns.each)
     if track is not None and drawn.returns.flown:
@@ -196,7 +214,7 @@ def _flown_places(drawn: DrawnReturns, track: Track | None) -> tuple[Floats, Flo
         rows = rows[:: max(1, len(rows) // _GROUND_POINTS)]
         if rows.size:
             return track.time[rows], track.position[rows]
-    returns = [ret for _, group in drawn.by_kind for ret in group]
+    returns = [ret for _, group in drawn.segments_by_outcome for ret in group]
     return np.array([ret.time for ret in returns]), np.array([ret.start for ret in returns])
 
 
@@ -208,10 +226,10 @@ def _glide_margin_panel(glides: Glides) -> Panel:
         column = np.array(values)
         return series(name, role, time, np.where(np.isfinite(column), column, np.nan))
 
-    layers = [line("left over for home", "left-home", [glide.left[0] for glide in glides.each])]
+    layers = [line("left over for home", "left-home", [glide.altitudes_left[0] for glide in glides.each])]
     if len(glides.sites) > 1:
-        best_site_margins = [max(glide.left[1:]) for glide in glides.each]
+        best_site_margins = [max(glide.altitudes_left[1:]) for glide in glides.each]
         layers.append(line("left over for a rally point or landing place", "left-site", best_site_margins))
-    layers.append(line("left over for flat ground", "left-flat", [glide.flat for glide in glides.each]))
+    layers.append(line("left over for flat ground", "left-flat", [glide.flat_altitude_left for glide in glides.each]))
     limits = (("nothing left over", 0.0),)
     return Panel("height left over without the engine", "m", tuple(layers), limits, min_span=_MIN_SPAN)

@@ -105,7 +105,7 @@ def scene_data(view: SceneView) -> dict[str, object]:
         "name": setup.scenario.name,
         "bounds": np.round(bounds, 1).tolist(),
         "stretch": exaggeration(setup, bounds, grid),
-        "ground": None if grid is None else _ground(grid),
+        "ground": None if grid is None else _ground_data(grid),
         "threats": [
             {
                 "name": name,
@@ -138,7 +138,7 @@ def _zone_walls(setup: FlightSetup) -> dict[str, object]:
     }
 
 
-def _ground(grid: GroundGrid) -> dict[str, object]:
+def _ground_data(grid: GroundGrid) -> dict[str, object]:
     low, high = float(np.nanmin(grid.heights)), float(np.nanmax(grid.heights))
     share = (grid.heights - low) / max(high - low, 1e-6)
     steps = np.where(np.isfinite(share), np.round(share * (MISSING - 1)), MISSING).astype("<u2")

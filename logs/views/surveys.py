@@ -6,7 +6,7 @@ from flight.mission.surveys import Survey
 from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track
 from logs.verdict.measures.photo_lines import LineMeasure, measure_line
-from logs.verdict.measures.route_requirements import RouteRequirements, route_requirements, surveys_of
+from logs.verdict.measures.route_requirements import RouteRequirements, judged_surveys, route_requirements
 from logs.verdict.measures.track_alignment import align_track
 from logs.views.charts import Chart, Label, Layer, Panel, parted
 from world.arrays import Floats
@@ -22,7 +22,7 @@ def survey_chart(setup: FlightSetup, track: Track) -> Chart | None:
 
     Return None without a flown survey.
     """
-    if not surveys_of(setup):
+    if not judged_surveys(setup):
         return None
     requirements = route_requirements(setup)
     aligned = align_track(requirements, track)
@@ -33,7 +33,7 @@ def survey_chart(setup: FlightSetup, track: Track) -> Chart | None:
         measured = [measure_line(requirements, aligned, survey, line) for line in survey.lines]
         rows = slice(int(aligned.rows[survey.first]), int(aligned.rows[survey.last]) + 1)
         name = "survey" if len(requirements.surveys) == 1 else f"survey {number}"
-        panels.append(_panel(requirements, survey, measured, aligned.track.position[rows], name))
+        panels.append(_survey_panel(requirements, survey, measured, aligned.track.position[rows], name))
     return Chart(
         f"{setup.scenario.name}: photo lines",
         "along the first line",
@@ -45,50 +45,56 @@ def survey_chart(setup: FlightSetup, track: Track) -> Chart | None:
     )
 
 
-def _panel(
-    requirements: RouteRequirements, survey: Survey, measured: list[LineMeasure | None], position: Floats, name: str
+def _survey_panel(
+    requirements: RouteRequirements,
+    survey: Survey,
+    line_measures: list[LineMeasure | None],
+    position: Floats,
+    name: str,
 ) -> Panel:
     origin = requirements.points[survey.first, :2]
     unit = np.array([np.sin(survey.course), np.cos(survey.course)])
     axes = np.stack([unit, [-unit[1], unit[0]]], axis=1)
 
-    def laid(places: Floats) -> Floats:
-        return (places[:, :2] - origin) @ axes
+    def to_panel(positions: Floats) -> Floats:
+        return (positions[:, :2] - origin) @ axes
 
-    used, lost = [np.zeros((0, 2))], [np.zeros((0, 2))]
+    usable_parts, lost_parts = [np.zeros((0, 2))], [np.zeros((0, 2))]
     labels = []
     step = -(-len(survey.lines) // _MAX_NUMBERED_LINES)
-    for number, (line, measure) in enumerate(zip(survey.lines, measured, strict=True), 1):
-        corners = laid(requirements.points[line.first : line.last + 1])
-        for to, stretches in ((lost, _lost_stretches(measure)), (used, _used(measure))):
-            for low, high in stretches:
-                to.append(_part(corners, low, high))
+    for number, (line, measure) in enumerate(zip(survey.lines, line_measures, strict=True), 1):
+        corners = to_panel(requirements.points[line.first : line.last + 1])
+        for parts, spans in ((lost_parts, _lost_spans(measure)), (usable_parts, _usable_spans(measure))):
+            for span_start, span_end in spans:
+                parts.append(_line_part(corners, span_start, span_end))
         if (number - 1) % step == 0:
             labels.append(Label(str(number), float(corners[0, 0]), float(corners[0, 1]), "number"))
-    thin = laid(position[:: max(1, len(position) // _POINTS)])
+    track_points = to_panel(position[:: max(1, len(position) // _POINTS)])
     layers = (
-        Layer("line", "photo line, flown as photos need it", "planned", *parted(used), quiet=True),
-        Layer("line", "photo line, lost", "fail", *parted(lost), quiet=True),
-        Layer("line", "flown track", "flown", thin[:, 0], thin[:, 1], quiet=True),
+        Layer("line", "photo line, flown as photos need it", "planned", *parted(usable_parts), quiet=True),
+        Layer("line", "photo line, lost", "fail", *parted(lost_parts), quiet=True),
+        Layer("line", "flown track", "flown", track_points[:, 0], track_points[:, 1], quiet=True),
     )
     return Panel(f"{name}: to the left of its first line", "m", layers, labels=tuple(labels))
 
 
-def _lost_stretches(measure: LineMeasure | None) -> tuple[tuple[float, float], ...]:
+def _lost_spans(measure: LineMeasure | None) -> tuple[tuple[float, float], ...]:
     """Return the lost stretches of a line, m; a line that was not flown is lost as a whole."""
-    return ((0.0, np.inf),) if measure is None else measure.lost
+    return ((0.0, np.inf),) if measure is None else measure.lost_spans
 
 
-def _used(measure: LineMeasure | None) -> list[tuple[float, float]]:
+def _usable_spans(measure: LineMeasure | None) -> list[tuple[float, float]]:
     """Return the usable stretches of a line, m."""
     if measure is None:
         return []
-    edges = [0.0, *(metres for stretch in measure.lost for metres in stretch), measure.length]
-    return [(low, high) for low, high in zip(edges[::2], edges[1::2], strict=True) if high > low]
+    edges = [0.0, *(metres for span in measure.lost_spans for metres in span), measure.length]
+    return [(start, end) for start, end in zip(edges[::2], edges[1::2], strict=True) if end > start]
 
 
-def _part(corners: Floats, low: float, high: float) -> Floats:
+def _line_part(corners: Floats, start: float, end: float) -> Floats:
     """Return the part of a line (n, 2) between two distances along it, m."""
-    run = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(corners, axis=0).T))])
-    at = np.concatenate([[low], run[(run > low) & (run < high)], [min(high, run[-1])]])
-    return np.stack([np.interp(at, run, corners[:, axis]) for axis in range(2)], axis=1)
+    distances = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(corners, axis=0).T))])
+    cut_distances = np.concatenate(
+        [[start], distances[(distances > start) & (distances < end)], [min(end, distances[-1])]]
+    )
+    return np.stack([np.interp(cut_distances, distances, corners[:, axis]) for axis in range(2)], axis=1)

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from logs.views.charts import Label, Layer, shorten
-from logs.views.failures import Failures, radius_of, route_samples
+from logs.views.failures import Failures, route_samples, threat_radius
 from world.airspace.zone_kernels import edge_distance, zone_records
 from world.airspace.zones import Zone, ZoneLevel
 from world.airspace.zones_on_map import level_heights, zone_rings
@@ -31,16 +31,16 @@ def threat_circles(threats: Threats, route: Floats | None, entered: frozenset[in
 
     route: (w, 3) m, or None to show only the spheres.  entered: threats whose rule fails.
     """
-    radars, reach, missiles, units = [], [], [], []
-    shown = np.flatnonzero(threats.kill_radius > 0.0)
-    at_path = np.zeros(len(threats))
-    if shown.size:
-        at_path[shown] = kill_radius_at_path(threats, shown, route)
-    called = "missile: its reach at path height" if route is not None else "missile: circle of its sphere"
+    radars, sections, missiles, units = [], [], [], []
+    missile_indices = np.flatnonzero(threats.kill_radius > 0.0)
+    radius_at_path = np.zeros(len(threats))
+    if missile_indices.size:
+        radius_at_path[missile_indices] = kill_radius_at_path(threats, missile_indices, route)
+    section_name = "missile: its reach at path height" if route is not None else "missile: circle of its sphere"
     for k, name in enumerate(threats.names):
         kill, detection = float(threats.kill_radius[k]), float(threats.detection_radius[k])
         centre = threats.position[k, :2]
-        words = (_threat_words(name, kill, detection),)
+        texts = (_threat_text(name, kill, detection),)
         if detection > 0.0:
             x, y = circle(centre, detection)
             radars.append(
@@ -54,19 +54,19 @@ def threat_circles(threats: Threats, route: Floats | None, entered: frozenset[in
                     legend="radar: circle of its sphere (at altitude it reaches less far)",
                 )
             )
-        if at_path[k] > 0.0:
-            x, y = circle(centre, float(at_path[k]))
-            reach.append(Layer("area", name, "missile-reach", x, y, legend=called, words=words))
+        if radius_at_path[k] > 0.0:
+            x, y = circle(centre, float(radius_at_path[k]))
+            sections.append(Layer("area", name, "missile-reach", x, y, legend=section_name, hover_texts=texts))
         if kill > 0.0:
             x, y = circle(centre, kill)
-            fails = k in entered
-            legend = "threat that is entered" if fails else "missile: circle of its sphere"
-            missiles.append(Layer("line", name, "fail" if fails else "missile", x, y, quiet=True, legend=legend))
-        units.append(Layer("dots", "", "unit", centre[:1], centre[1:], words=words))
-    return (*radars, *reach, *missiles, *units)
+            is_entered = k in entered
+            legend = "threat that is entered" if is_entered else "missile: circle of its sphere"
+            missiles.append(Layer("line", name, "fail" if is_entered else "missile", x, y, quiet=True, legend=legend))
+        units.append(Layer("dots", "", "unit", centre[:1], centre[1:], hover_texts=texts))
+    return (*radars, *sections, *missiles, *units)
 
 
-def _threat_words(name: str, kill: float, detection: float) -> str:
+def _threat_text(name: str, kill: float, detection: float) -> str:
     return "\n".join(
         [
             name,
@@ -92,19 +92,19 @@ def threat_names(threats: Threats, names: frozenset[int] = frozenset()) -> tuple
     )
 
 
-def kill_radius_at_path(threats: Threats, chosen: NDArray[np.intp], route: Floats | None) -> Floats:
-    """Return the section radius (m) of each chosen missile sphere at the nearest altitude of the path."""
-    radius = threats.kill_radius[chosen]
+def kill_radius_at_path(threats: Threats, indices: NDArray[np.intp], route: Floats | None) -> Floats:
+    """Return the radius (m) of each missile sphere's section at the altitude of the nearest path point."""
+    radius = threats.kill_radius[indices]
     if route is None:
         return radius
     _, points = route_samples(route, max(50.0, float(radius.min()) / 20.0))
     points = points[:: max(1, len(points) // 2000)]
-    found = np.zeros(len(chosen))
-    for row, k in enumerate(chosen):
-        nearest = points[np.argmin(((points[:, :2] - threats.position[k, :2]) ** 2).sum(axis=1))]
-        above = float(nearest[2] - threats.position[k, 2])
-        found[row] = np.sqrt(max(0.0, float(radius[row]) ** 2 - above**2))
-    return found
+    section_radii = np.zeros(len(indices))
+    for row, k in enumerate(indices):
+        nearest_point = points[np.argmin(((points[:, :2] - threats.position[k, :2]) ** 2).sum(axis=1))]
+        height_offset = float(nearest_point[2] - threats.position[k, 2])
+        section_radii[row] = np.sqrt(max(0.0, float(radius[row]) ** 2 - height_offset**2))
+    return section_radii
 
 
 def sphere_cuts(centre: Floats, radius: float, points: Floats) -> tuple[Floats, Floats]:
@@ -112,32 +112,35 @@ def sphere_cuts(centre: Floats, radius: float, points: Floats) -> tuple[Floats, 
 
     centre: (3,), points: (s, 3) m.
     """
-    beside2 = ((points[:, :2] - centre[:2]) ** 2).sum(axis=1)
-    half = np.sqrt(np.where(beside2 <= radius**2, radius**2 - beside2, np.nan))
-    return centre[2] - half, centre[2] + half
+    distance_square = ((points[:, :2] - centre[:2]) ** 2).sum(axis=1)
+    half_height = np.sqrt(np.where(distance_square <= radius**2, radius**2 - distance_square, np.nan))
+    return centre[2] - half_height, centre[2] + half_height
 
 
 def outline_anchor(
-    kilometres: Floats, lower: Floats, upper: Floats, low: Floats, high: float
+    kilometres: Floats, lower: Floats, upper: Floats, min_altitudes: Floats, max_altitude: float
 ) -> tuple[float, float, tuple[int, int]] | None:
-    """Find where a name touches the section of a sphere inside a picture from low to high (m AMSL).
+    """Find the anchor of a name on a sphere's section within the altitude range of a picture.
 
     kilometres, lower, upper: (s,), NaN outside the sphere; low: (s,), the ground where it hides the sphere.  Returns
     km, m AMSL and the side of the name; None if no part of the outline is in the picture.
     """
-    over = np.flatnonzero(np.isfinite(upper))
-    top, foot = over[np.argmax(upper[over])], over[np.argmin(lower[over])]
-    if low[top] < upper[top] < high:
+    rows_inside = np.flatnonzero(np.isfinite(upper))
+    top, bottom = rows_inside[np.argmax(upper[rows_inside])], rows_inside[np.argmin(lower[rows_inside])]
+    if min_altitudes[top] < upper[top] < max_altitude:
         return float(kilometres[top]), float(upper[top]), (0, 1)
-    if low[foot] < lower[foot] < high:
-        return float(kilometres[foot]), float(lower[foot]), (0, -1)
+    if min_altitudes[bottom] < lower[bottom] < max_altitude:
+        return float(kilometres[bottom]), float(lower[bottom]), (0, -1)
     for edge in (upper, lower):
         # From the left: the highest point of the first part of the outline within the picture.
-        seen = over[(edge[over] > low[over]) & (edge[over] < high - 0.04 * (high - low.min()))]
-        if seen.size:
-            first = seen[: np.flatnonzero(np.diff(seen, append=seen[-1] + 2) > 1)[0] + 1]
-            at = first[np.argmax(edge[first])]
-            return float(kilometres[at]), float(edge[at]), (1, 0)
+        visible_rows = rows_inside[
+            (edge[rows_inside] > min_altitudes[rows_inside])
+            & (edge[rows_inside] < max_altitude - 0.04 * (max_altitude - min_altitudes.min()))
+        ]
+        if visible_rows.size:
+            first_part = visible_rows[: np.flatnonzero(np.diff(visible_rows, append=visible_rows[-1] + 2) > 1)[0] + 1]
+            anchor_row = first_part[np.argmax(edge[first_part])]
+            return float(kilometres[anchor_row]), float(edge[anchor_row]), (1, 0)
     return None
 
 
@@ -161,27 +164,31 @@ class PathPlane:
         return base if self.ground is None else np.fmax(self.ground, self.low)
 
 
-def threat_cuts(threats: Threats, plane: PathPlane, named: frozenset[int]) -> tuple[list[Layer], list[Label]]:
+def threat_cuts(
+    threats: Threats, plane: PathPlane, labelled_elsewhere: frozenset[int]
+) -> tuple[list[Layer], list[Label]]:
     """Return the sections of missile and radar spheres, radars first, and their names, once for each unit.
 
-    named: threats with their own labels.
+    labelled_elsewhere: threats with their own labels.
     """
     layers: list[Layer] = []
     labels: dict[int, Label] = {}
-    low, high = plane.points[:, :2].min(axis=0), plane.points[:, :2].max(axis=0)
-    away = np.hypot(*np.maximum(np.maximum(low - threats.position[:, :2], threats.position[:, :2] - high), 0.0).T)
+    min_corner, max_corner = plane.points[:, :2].min(axis=0), plane.points[:, :2].max(axis=0)
+    distances = np.hypot(
+        *np.maximum(np.maximum(min_corner - threats.position[:, :2], threats.position[:, :2] - max_corner), 0.0).T
+    )
     for kind, radii in (("radar", threats.detection_radius), ("missile", threats.kill_radius)):
-        for k in np.flatnonzero((radii > 0.0) & (away <= radii)):
+        for k in np.flatnonzero((radii > 0.0) & (distances <= radii)):
             lower, upper = sphere_cuts(threats.position[k], float(radii[k]), plane.points)
-            over = np.flatnonzero(np.isfinite(upper))
-            if not over.size:
+            rows_inside = np.flatnonzero(np.isfinite(upper))
+            if not rows_inside.size:
                 continue
             # Add one sample on either side, so that the outline ends at the edge of the sphere.
-            cut = slice(max(0, int(over[0]) - 1), int(over[-1]) + 2)
+            rows = slice(max(0, int(rows_inside[0]) - 1), int(rows_inside[-1]) + 2)
             name, legend = f"{threats.names[k][:40]} ({kind})", f"{kind}'s sphere over the path"
-            layers.append(Layer("band", name, kind, plane.kilometres[cut], upper[cut], lower[cut], legend=legend))
+            layers.append(Layer("band", name, kind, plane.kilometres[rows], upper[rows], lower[rows], legend=legend))
             anchor = outline_anchor(plane.kilometres, lower, upper, plane.visible_low(), plane.high)
-            if anchor is not None and k not in named:
+            if anchor is not None and k not in labelled_elsewhere:
                 role = "radar" if kind == "radar" else "ink"
                 labels[int(k)] = Label(shorten(threats.names[k], 20), anchor[0], anchor[1], "name", role, anchor[2])
     return layers, list(labels.values())[:_MAX_CUT_NAMES]
@@ -190,19 +197,19 @@ def threat_cuts(threats: Threats, plane: PathPlane, named: frozenset[int]) -> tu
 def entered_cuts(
     threats: Threats, failed: Failures, plane: PathPlane
 ) -> tuple[list[Layer], dict[int, tuple[float, float]]]:
-    """Return the section along the flight of each sphere whose rule fails, and its label position, by index."""
-    layers, places = [], {}
+    """Return the sections of entered spheres along the flight, and their label positions, keyed by threat."""
+    layers, label_positions = [], {}
     for place in failed.threats:
         k = place.index or 0
-        lower, upper = sphere_cuts(threats.position[k], radius_of(threats, place), plane.points)
+        lower, upper = sphere_cuts(threats.position[k], threat_radius(threats, place), plane.points)
         if not np.isfinite(upper).any():
             continue
         legend = "threat that is entered"
         layers.append(Layer("band", legend, "entered", plane.kilometres, upper, lower, quiet=True))
         anchor = outline_anchor(plane.kilometres, lower, upper, plane.visible_low(), plane.high)
         if anchor is not None:
-            places[k] = anchor[:2]
-    return layers, places
+            label_positions[k] = anchor[:2]
+    return layers, label_positions
 
 
 # Zones of airspace.
@@ -235,11 +242,13 @@ def zone_shapes(zones: tuple[Zone, ...]) -> tuple[Layer, ...]:
     for zone in zones:
         gap = np.full((1, 2), np.nan)
         x, y = np.vstack([np.vstack([ring, gap]) for ring in zone_rings(zone)])[:-1].T
-        words = (zone_label(zone),)
+        texts = (zone_label(zone),)
         if zone.kind == "exclusion":
-            layers.append(Layer("area", zone.name, "zone", x, y, legend="zone to keep out of", words=words))
+            layers.append(Layer("area", zone.name, "zone", x, y, legend="zone to keep out of", hover_texts=texts))
         else:
-            layers.append(Layer("line", zone.name, "stay-in", x, y, legend="edge of a zone to stay in", words=words))
+            layers.append(
+                Layer("line", zone.name, "stay-in", x, y, legend="edge of a zone to stay in", hover_texts=texts)
+            )
     return tuple(layers)
 
 
@@ -247,13 +256,13 @@ def zone_names(zones: tuple[Zone, ...]) -> tuple[Label, ...]:
     """Label zones: exclusion zones at the center, inclusion zones at their northernmost corner."""
     if len(zones) > _MAX_ZONE_NAMES:
         return ()
-    found = []
+    labels = []
     for zone in zones:
         ring = zone_rings(zone)[0]
-        inside = zone.kind == "exclusion"
-        east, north = (ring[:-1].mean(axis=0) if inside else ring[np.argmax(ring[:, 1])]).tolist()
-        found.append(Label(zone_label(zone), east, north, "name", "zone", (0, 0) if inside else (0, 1)))
-    return tuple(found)
+        is_exclusion = zone.kind == "exclusion"
+        east, north = (ring[:-1].mean(axis=0) if is_exclusion else ring[np.argmax(ring[:, 1])]).tolist()
+        labels.append(Label(zone_label(zone), east, north, "name", "zone", (0, 0) if is_exclusion else (0, 1)))
+    return tuple(labels)
 
 
 @dataclass(frozen=True, slots=True)
@@ -273,32 +282,36 @@ class ZoneCut:
 
 def zone_cuts(zones: tuple[Zone, ...], plane: PathPlane) -> list[ZoneCut]:
     """Return the sections of zones in the plane, without zones away from the path."""
-    low, high, points = plane.low, plane.high, plane.points
-    under = np.full(len(points), low)
+    min_altitude, max_altitude, points = plane.low, plane.high, plane.points
+    terrain = np.full(len(points), min_altitude)
     if plane.ground is not None:
-        under = np.where(np.isfinite(plane.ground), plane.ground, low)
+        terrain = np.where(np.isfinite(plane.ground), plane.ground, min_altitude)
     records, cuts = zone_records(zones), []
     for z, zone in enumerate(zones):
-        over = np.array([edge_distance(records, z, east, north) <= 0.0 for east, north, _ in points])
-        floor = np.clip(level_heights(zone.floor, under, low), low, high)
-        ceiling = np.clip(level_heights(zone.ceiling, under, high), low, high)
-        bands = [(floor, ceiling, over)]
+        is_over_zone = np.array([edge_distance(records, z, east, north) <= 0.0 for east, north, _ in points])
+        floor = np.clip(level_heights(zone.floor, terrain, min_altitude), min_altitude, max_altitude)
+        ceiling = np.clip(level_heights(zone.ceiling, terrain, max_altitude), min_altitude, max_altitude)
+        bands = [(floor, ceiling, is_over_zone)]
         if zone.kind == "inclusion":
-            full = np.full(len(points), low), np.full(len(points), high)
-            bands = [(full[0], floor, over), (ceiling, full[1], over), (*full, ~over)]
-        cuts += [ZoneCut(zone, bottom, top, where & (top > bottom)) for bottom, top, where in bands]
+            whole_range = np.full(len(points), min_altitude), np.full(len(points), max_altitude)
+            bands = [
+                (whole_range[0], floor, is_over_zone),
+                (ceiling, whole_range[1], is_over_zone),
+                (*whole_range, ~is_over_zone),
+            ]
+        cuts += [ZoneCut(zone, bottom, top, is_forbidden & (top > bottom)) for bottom, top, is_forbidden in bands]
     return [cut for cut in cuts if cut.where.any()]
 
 
 def zone_bands(zones: tuple[Zone, ...], plane: PathPlane) -> tuple[list[Layer], list[Label]]:
-    """Return the sections of zones in the plane, and the names of exclusion zones in the center of each."""
+    """Return the sections of zones in the plane, and labels of exclusion zones at the section's center."""
     layers, labels = [], []
     for cut in zone_cuts(zones, plane):
-        keep_out = cut.zone.kind == "exclusion"
-        legend = "zone to keep out of" if keep_out else "outside a zone to stay in"
+        is_exclusion = cut.zone.kind == "exclusion"
+        legend = "zone to keep out of" if is_exclusion else "outside a zone to stay in"
         top = np.where(cut.where, cut.top, np.nan)
         layers.append(Layer("band", zone_label(cut.zone), "zone", plane.kilometres, top, cut.bottom, legend=legend))
-        if keep_out:
+        if is_exclusion:
             middle = int(np.flatnonzero(cut.where)[cut.where.sum() // 2])
             amsl = 0.5 * float(cut.bottom[middle] + cut.top[middle])
             labels.append(Label(zone_label(cut.zone), float(plane.kilometres[middle]), amsl, "name", "zone", (0, 0)))

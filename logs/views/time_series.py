@@ -131,13 +131,13 @@ def exposure_rates(position: Floats, centres: Floats, radii: Floats, scales: Flo
     position: (t, 3) m.  centres: (m, 3).  radii, scales: (m,).  Returns (t - 1,), 1 at a distance of one scale; NaN
     where the track is unknown.
     """
-    return _rates(
+    return _exposure_rates(
         np.ascontiguousarray(position), np.ascontiguousarray(centres), np.ascontiguousarray(radii), scales.copy()
     )
 
 
 @compiled
-def _rates(position: Floats, centres: Floats, radii: Floats, scales: Floats) -> Floats:
+def _exposure_rates(position: Floats, centres: Floats, radii: Floats, scales: Floats) -> Floats:
     count = position.shape[0] - 1
     out = np.zeros(max(0, count))
     for k in range(count):

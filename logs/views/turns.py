@@ -59,7 +59,7 @@ def turn_chart(name: str, verdict: Verdict) -> Chart:
     ()
     """
     panels = tuple(
-        _panel(rule, title, unit, place, values)
+        _rule_panel(rule, title, unit, place, values)
         for rule, place, title, unit in PLACE_PANELS
         if (values := place_values(verdict.findings, rule))
     )
@@ -67,7 +67,7 @@ def turn_chart(name: str, verdict: Verdict) -> Chart:
     return Chart(title, "", "", panels, shared=False, tall=170, inches=1.55, legend="below")
 
 
-def _panel(rule: str, title: str, unit: str, place: str, values: list[PlaceValue]) -> Panel:
+def _rule_panel(rule: str, title: str, unit: str, place: str, values: list[PlaceValue]) -> Panel:
     at = np.array([value.number for value in values], dtype=np.float64)
     planned, flown, limit = (
         np.array([getattr(value, name) for value in values]) for name in ("planned", "flown", "limit")

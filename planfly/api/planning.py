@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Unpack
 
 from flight.autopilots.catalog import load_autopilot
-from logs.verdict.conditions import Conditions, conditions_of
+from logs.verdict.conditions import Conditions, plan_conditions
 from planfly.arguments import check_arguments
 from planfly.flight_options import PlanOptions, load_scenario_with_options, takes_options
 from planfly.kernel_units.unit_kernels import PLANNING
@@ -171,7 +171,7 @@ def conditions_of_plan(plan: Plan) -> Conditions:
     """Return the aircraft, speed, weather, autopilot and terrain that a plan was made for."""
     aircraft, _ = find_airframe(plan.scenario)
     autopilot = load_autopilot(plan.scenario, aircraft)
-    return conditions_of(plan.scenario, aircraft.name, cruise_airspeed(plan.scenario, aircraft, autopilot), autopilot)
+    return plan_conditions(plan.scenario, aircraft.name, cruise_airspeed(plan.scenario, aircraft, autopilot), autopilot)
 
 
 def what_blocks(plan: Plan) -> tuple[str, ...]:

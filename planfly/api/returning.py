@@ -15,18 +15,18 @@ from logs.recording.reader import FlightLog, read_log
 from logs.recording.recorder import Recorder
 from logs.verdict.returns.drawn_returns import DrawnReturns, drawn_returns
 from logs.verdict.returns.glides_text import glide_notes, glide_range_text, glides_headline
-from logs.verdict.returns.judge_glides import NOT_ASKED, Glides, judge_glides
+from logs.verdict.returns.judge_glides import NO_GLIDES, Glides, judge_glides
 from logs.verdict.returns.judge_returns import Returns, ReturnWorld, judge_returns, return_world
 from logs.verdict.returns.return_starts import ReturnStarts
 from logs.verdict.returns.returns_text import (
     causes_text,
     headline,
     landing_text,
-    no_return_text,
+    point_of_no_return_text,
     range_text,
     remedy_text,
 )
-from logs.verdict.returns.suggest_returns import Remedy, helps, suggest_parameters, suggest_rally
+from logs.verdict.returns.suggest_returns import Remedy, is_improvement, suggest_parameters, suggest_rally_points
 from logs.views.exports.map_files import glide_shapes, kml_text, map_zones, plan_line, return_lines, track_line
 from planfly.api.flying import FlownMission, check_keywords_not_given, named_program
 from planfly.arguments import check_arguments
@@ -73,7 +73,7 @@ class ReturnsFound:
 
     setup: FlightSetup
     returns: Returns
-    glides: Glides = NOT_ASKED
+    glides: Glides = NO_GLIDES
     suggested: tuple[RemedyTrial, ...] = ()
     files: tuple[Path, ...] = ()
     by_program: ProgramReturns | None = None
@@ -114,8 +114,8 @@ class ReturnsFound:
 
     @property
     def no_return_line(self) -> str:
-        """Line on the point of no return, after which the battery is too low for the return."""
-        return no_return_text(self.returns)
+        """Description of the point after which the battery is too low for the return."""
+        return point_of_no_return_text(self.returns)
 
     @property
     def glide_headline(self) -> str:
@@ -136,10 +136,10 @@ class ReturnsFound:
     def notes(self) -> tuple[str, ...]:
         """Notes on how the returns were flown."""
         notes = ["by the simulated ArduPlane on a point mass, in the mean wind"]
-        if self.returns.again:
-            max_difference = max(abs(difference) for difference in self.returns.again)
+        if self.returns.jsbsim_differences:
+            max_difference = max(abs(difference) for difference in self.returns.jsbsim_differences)
             notes.append(
-                f"{len(self.returns.again)} returns close to a limit were flown again in JSBSim; both"
+                f"{len(self.returns.jsbsim_differences)} returns close to a limit were flown again in JSBSim; both"
                 f" simulations differ by up to {max_difference:.0f} m"
             )
         if self.returns.stands_in:
@@ -310,16 +310,16 @@ def _suggest_remedies(
     """Fly the returns again with each remedy, and return the remedies that help."""
     # Remedies do not help a return that sinks to the ground in a take-off or a landing.
     judged_times = [judged_return.time for judged_return in result.returns.each]
-    airborne_starts = starts.at(np.flatnonzero(np.isin(starts.time, judged_times)))
+    airborne_starts = starts.subset(np.flatnonzero(np.isin(starts.time, judged_times)))
     with stage("looking for what would make them safe"):
         remedies = suggest_parameters(world, airborne_starts)
-        rally = suggest_rally(world, airborne_starts)
+        rally = suggest_rally_points(world, airborne_starts)
     remedies += [] if rally is None else [rally]
     with stage(f"flying the returns of {len(remedies)} suggestions", "flying suggested returns"):
         trials = [
-            RemedyTrial(remedy, judge_returns(remedy.on(world), starts, every, fly_return)) for remedy in remedies
+            RemedyTrial(remedy, judge_returns(remedy.apply_to(world), starts, every, fly_return)) for remedy in remedies
         ]
-    return tuple(trial for trial in trials if helps(result.returns, trial.returns))
+    return tuple(trial for trial in trials if is_improvement(result.returns, trial.returns))
 
 
 def _draw_files(setup: FlightSetup, track: Track, returns: DrawnReturns) -> dict[str, bytes]:

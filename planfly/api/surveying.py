@@ -13,7 +13,7 @@ from flight.simulation.track import Track
 from logs.recording.reader import FlightLog, read_log
 from logs.verdict.judge_flight import judge_flight
 from logs.verdict.measures.photo_lines import LineMeasure, OverlapMeasure, measure_line, measure_overlap
-from logs.verdict.measures.route_requirements import RouteRequirements, route_requirements, surveys_of
+from logs.verdict.measures.route_requirements import RouteRequirements, judged_surveys, route_requirements
 from logs.verdict.measures.track_alignment import align_track
 from logs.verdict.verdict import Verdict
 from logs.views.surveys import survey_chart
@@ -250,7 +250,7 @@ def _with_parallel_lines_as_survey(scenario: Scenario) -> Scenario:
 
 def _check_has_survey(setup: FlightSetup) -> None:
     """Raise MissionError for a mission without a survey."""
-    if not surveys_of(setup):
+    if not judged_surveys(setup):
         source = setup.mission.source
         raise MissionError(
             f"{source}: no survey; expected at least three lines side by side, or two with photos along them",

@@ -214,7 +214,7 @@ def _print_plan(plan: "Plan") -> None:
     length = plan.objectives.length_ratio
     print(f"{state}: {len(plan.waypoints)} waypoints, {length:.3f} times the straight line, algorithm {plan.algorithm}")
     conditions = conditions_of_plan(plan)
-    print("\n".join([*condition_lines(conditions), autopilot_line(conditions, flown=False)]))
+    print("\n".join([*condition_lines(conditions), autopilot_line(conditions, is_flown=False)]))
     if plan.ended != "completed":
         reason = "at its budget" if plan.ended == "budget" else "by Ctrl-C"
         print(f"  note    the search was ended {reason}, after {plan.evaluations:,} evaluations: the best plan so far")

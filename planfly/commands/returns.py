@@ -133,17 +133,17 @@ def _json_answer(source: str, result: "ReturnsFound", code: int) -> object:
         headline=result.headline,
         safe=result.safe,
         conditions=setup_conditions(result.setup),
-        every_s=returns.every,
+        every_s=returns.interval,
         least_clearance_m=returns.limit,
         causes=[
             CauseEntry(name=cause.name, does=cause.does, parameter=cause.parameter, value=cause.value)
             for cause in returns.causes
         ],
         rtl_autoland=returns.autoland,
-        not_judged=list(returns.open),
+        not_judged=list(returns.unjudged_parts),
         ranges=[return_entry(result, return_range) for return_range in returns.ranges],
         by_program=program_entry(result),
-        left_out=returns.left_out,
+        left_out=returns.omitted_count,
         no_return=no_return.kind,
         no_return_s=None if math.isnan(no_return.time) else round(no_return.time, 2),
         engine_out=glides_entry(result),

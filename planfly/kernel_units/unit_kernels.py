@@ -7,8 +7,8 @@ actual calls.
 # Kernels of terrain and map projection.
 _FIELD = (
     "world.least_squares._least_squares",
-    "world.frames._polymap_many",
-    "world.terrain._heights_many",
+    "world.frames._evaluate_polymap",
+    "world.terrain._ground_heights",
 )
 # Kernel of the tracking error.
 _TRACKING_KERNELS = ("flight.autopilots.arduplane.tracking_error._fill_corners",)
@@ -102,11 +102,11 @@ UNIT_KERNELS: dict[str, tuple[str, ...]] = {
         "flight.guidance.equivalent_airspeed.true_by_equivalent",
         "flight.guidance.path.profile",
         "flight.simulation.track._round_to_steps",
-        _LAYOUT + "_fill",
-        _LAYOUT + "_index",
-        _LAYOUT + "_order",
-        _LAYOUT + "_put_head",
-        _LAYOUT + "_stamped",
+        _LAYOUT + "_copy_messages",
+        _LAYOUT + "_index_messages",
+        _LAYOUT + "_merge_by_time",
+        _LAYOUT + "_write_message_header",
+        _LAYOUT + "_stamp_messages",
         _LAYOUT + "last_log_time",
         "logs.verdict.measures.path_sweeps._segment_clearances",
         "logs.verdict.measures.path_sweeps._sphere_visits",
@@ -121,8 +121,8 @@ UNIT_KERNELS: dict[str, tuple[str, ...]] = {
         "aircraft.envelope.ground_speed",
         "flight.autopilots.arduplane.rtl_point_mass.fly_stages",
         _GLIDES_MODULE + "glide_map._fill_slopes",
-        _GLIDES_MODULE + "glide_map._search",
-        _GLIDES_MODULE + "glide_reach._look_ahead",
+        _GLIDES_MODULE + "glide_map._settle_cells",
+        _GLIDES_MODULE + "glide_reach._fill_reach",
         "world.highest_ground._fill_cells",
     ),
 }

@@ -14,7 +14,7 @@ import numpy as np
 from PIL import Image, ImageColor
 
 from logs.recording.reader import FlightLog
-from logs.theme import drawn_colours
+from logs.theme import palette_colours
 from logs.views.replay.movie_frames import RATE, MovieFrames
 from planfly.runtime.stages import stage
 from planfly.workflow.output_paths import check_output_file, check_output_folder
@@ -86,7 +86,7 @@ def _make_palette(frame: Image.Image) -> Image.Image:
 
     If colors were chosen only by area, thin lines and small marks would get the colors of the ground.
     """
-    drawing_colours = [ImageColor.getrgb(colour)[:3] for colour in drawn_colours()]
+    drawing_colours = [ImageColor.getrgb(colour)[:3] for colour in palette_colours()]
     blended_palette = frame.quantize(_TRANSPARENT - len(drawing_colours), dither=Image.Dither.NONE).getpalette() or []
     palette = [component for colour in drawing_colours for component in colour] + blended_palette[
         : 3 * (_TRANSPARENT - len(drawing_colours))

@@ -63,7 +63,7 @@ def return_summary(setup: FlightSetup, track: Track | None) -> ReturnSummary:
         returns = judge_returns(world, starts, interval)
     except PlanflyError as error:
         return ReturnSummary(f"not judged: {error}")
-    names_stand_in = world.stands_in and not world.other_law
+    names_stand_in = world.stands_in and not world.has_other_law
     stands_in = f" (by the simulated ArduPlane in place of {setup.autopilot.title})" if names_stand_in else ""
     return ReturnSummary(headline(returns) + stands_in, world, starts, returns)
 

@@ -25,13 +25,13 @@ from flight.mission.return_path import ReturnTarget
 from flight.simulation.track import Track
 from logs.verdict.returns.judge_returns import (
     KINDS,
-    ReturnFlown,
     Returns,
     ReturnWorld,
+    SimulatedReturn,
     badness,
+    classify_return,
     distance_to_limit,
     is_steady,
-    kind_of,
     most_violated_zone,
 )
 from logs.verdict.returns.return_starts import ReturnStarts
@@ -64,8 +64,8 @@ class ProgramReturn:
     log: the log of the flight, or None if it was not kept.
     """
 
-    law: ReturnFlown
-    flown: ReturnFlown | None = None
+    law: SimulatedReturn
+    flown: SimulatedReturn | None = None
     reason: str = ""
     log: Path | None = None
 
@@ -159,7 +159,7 @@ def check_is_arduplane(program: Path) -> None:
 
 def worst_separated_returns(
     world: ReturnWorld, starts: ReturnStarts, returns: Returns, points: int
-) -> list[tuple[ReturnFlown, int]]:
+) -> list[tuple[SimulatedReturn, int]]:
     """Choose at most `points` of the worst returns that can be flown, the worst first, with the index of each start.
 
     Starts closer together than half the path length divided by `points` are skipped, because neighbouring returns are
@@ -169,7 +169,7 @@ def worst_separated_returns(
     positions = np.column_stack([start_rows["east"], start_rows["north"]])
     min_distance = 0.5 * float(np.hypot(*np.diff(positions, axis=0).T).sum()) / points if len(starts) > 1 else 0.0
     numbers = {float(time): start_index for start_index, time in enumerate(starts.time)}
-    chosen_returns: list[tuple[ReturnFlown, int]] = []
+    chosen_returns: list[tuple[SimulatedReturn, int]] = []
     for candidate in sorted(returns.each, key=_worst_first_key):
         start_index = numbers[candidate.time]
         is_near = any(
@@ -178,7 +178,7 @@ def worst_separated_returns(
         )
         if (
             is_near
-            or starts.low[start_index]
+            or starts.is_low[start_index]
             or not is_steady(world, start_rows[start_index])
             or not _is_lead_in_clear(world, start_rows[start_index])
         ):
@@ -189,8 +189,8 @@ def worst_separated_returns(
     return chosen_returns
 
 
-def _worst_first_key(candidate: ReturnFlown) -> tuple[int, float]:
-    """Return the sort key of a return: `badness`, or for a safe return its distance to a limit."""
+def _worst_first_key(candidate: SimulatedReturn) -> tuple[int, float]:
+    """Return the sort key of a return: `badness`, or for a safe return how near it is to a limit."""
     return (KINDS.index("safe"), distance_to_limit(candidate)) if candidate.safe else badness(candidate)
 
 
@@ -235,8 +235,8 @@ def fly_by_program(
 
 
 def _judge_flown_return(
-    world: ReturnWorld, simulated_return: ReturnFlown, start: Record, track: Track, end_reason: str
-) -> ReturnFlown | None:
+    world: ReturnWorld, simulated_return: SimulatedReturn, start: Record, track: Track, end_reason: str
+) -> SimulatedReturn | None:
     """Judge a return flown by the program; return None if the flight did not reach the start of the return."""
     path = positions_from_start(track, start)
     if path is None:
@@ -258,19 +258,19 @@ def _judge_flown_return(
         record["ended"] = RETURN_OFF_TERRAIN
     record["clearance"], record["outside"], record["threat"] = clearance, approach.outside, approach.threat
     used_energy = float(track.energy[start_row + len(position) - 1] - track.energy[start_row])
-    remaining_energy = simulated_return.left + simulated_return.energy - used_energy
+    remaining_energy = simulated_return.energy_left + simulated_return.energy - used_energy
     zone = most_violated_zone(world, position[::_ROWS_PER_SECOND]) if world.airspace.zones else -1
     return replace(
         simulated_return,
         target=target,
-        kind=kind_of(world, record, zone, remaining_energy, simulated_return.floor),
+        kind=classify_return(world, record, zone, remaining_energy, simulated_return.required_height),
         clearance=clearance,
-        clearance_at=approach.lowest_position,
-        outside=approach.outside,
+        lowest_position=approach.lowest_position,
+        sphere_distance=approach.outside,
         threat=approach.threat,
         zone=zone,
         energy=used_energy,
-        left=remaining_energy,
+        energy_left=remaining_energy,
     )
 
 

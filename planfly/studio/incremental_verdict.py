@@ -141,7 +141,7 @@ def _speed_factor(context: EditContext, altitude: float) -> float:
 
 
 def _judge_window(setup: FlightSetup, first: int, last: int, start: int) -> Window:
-    requirements = replace(route_requirements(setup), zones_on=(first - start, last - start - 1))
+    requirements = replace(route_requirements(setup), zone_check_legs=(first - start, last - start - 1))
     findings = tuple(
         finding for finding in place_findings(requirements) if _is_in_window(finding, first - start, last - start)
     )

@@ -6,7 +6,7 @@ from typing import Any
 
 from flight.mission.items import Mission
 from logs.verdict.returns.judge_returns import judge_returns, return_world
-from logs.verdict.returns.returns_text import headline, no_return_text, range_text
+from logs.verdict.returns.returns_text import headline, point_of_no_return_text, range_text
 from planfly.campaigns.campaign_base import CampaignBase
 from planfly.campaigns.dispersions import default_dispersions
 from planfly.campaigns.flight_row import fly_one
@@ -48,7 +48,7 @@ def returns(payload: tuple[EditContext, Mission], advance: Advance) -> dict[str,
     return {
         "state": "ok" if returns.safe else "open" if returns.undecided else "fail",
         "headline": headline(returns),
-        "lines": [*lines, *filter(None, [no_return_text(returns)])],
+        "lines": [*lines, *filter(None, [point_of_no_return_text(returns)])],
     }
 
 

@@ -12,13 +12,13 @@ from flight.mission.items import AMSL, OVER_HOME, Mission, command_name
 from flight.mission.route import Route
 from flight.simulation.setup import FlightSetup
 from logs.verdict.findings import Finding
-from logs.verdict.measures.route_requirements import airspace_of
+from logs.verdict.measures.route_requirements import judged_airspace
 from logs.verdict.rule_words import RULE_WORDS
 from logs.verdict.verdict import Verdict
 from logs.verdict.wording import suggestion_text
 from logs.views.failures import route_distance, route_samples
 from logs.views.map import map_extent
-from logs.views.profile import ground_under
+from logs.views.profile import terrain_altitudes
 from logs.views.threats_and_zones import PathPlane, threat_cuts, zone_cuts, zone_label
 from planfly.studio.edit_context import EditContext
 from planfly.studio.incremental_verdict import Window
@@ -109,8 +109,8 @@ def _threats_json(threats: Threats) -> list[Json]:
 
 
 def _zones_json(scenario: Scenario, mission: Mission, setup: FlightSetup) -> list[Json]:
-    """Return page data of the scenario's zones, then of the fence zones; findings number them in this order."""
-    zones = airspace_of(setup).zones if mission.fences else scenario.zones
+    """Return page data of the scenario's zones, then of the mission's fence zones, in the order that findings use."""
+    zones = judged_airspace(setup).zones if mission.fences else scenario.zones
     return [
         {
             "name": zone_label(zone),
@@ -258,7 +258,7 @@ def profile_json(scenario: Scenario, setup: FlightSetup) -> Json:
     route = setup.route.waypoints
     waypoint_distance = route_distance(route)
     distance, points = route_samples(route, max(float(waypoint_distance[-1]) / _PROFILE_SAMPLES, 1.0))
-    ground = ground_under(scenario, points)
+    ground = terrain_altitudes(scenario, points)
     bottom = float(min(points[:, 2].min(), np.nanmin(ground) if ground is not None else np.inf)) - 50.0
     top = float(points[:, 2].max()) + 300.0
     view = PathPlane(distance, points, ground, bottom, top)

@@ -12,7 +12,7 @@ from flight.mission.items import Command, Mission, MissionItem
 from flight.mission.placing import place_stops
 from flight.mission.survey_layout import SurveyLayout, kept_layout, turn_around_of, with_layout
 from flight.simulation.setup import FlightSetup
-from logs.verdict.measures.route_requirements import surveys_of
+from logs.verdict.measures.route_requirements import judged_surveys
 from logs.verdict.rule_words import RULE_WORDS
 from logs.verdict.trials import least_change
 from logs.verdict.verdict import Verdict
@@ -102,7 +102,7 @@ def survey_remedies(
     verdict: verdict on the flight of the setup.  on_trial: called before each flight with a description of the change.
     A change passes if no photo line fails, and no other rule fails that did not fail before.
     """
-    if _all_lines_usable(verdict) or not surveys_of(setup):
+    if _all_lines_usable(verdict) or not judged_surveys(setup):
         return TriedRemedies()
     trials = _Trials(setup, airframe, verdict, on_trial)
     longer_turn_around = trials.find_turn_around()
@@ -162,7 +162,7 @@ class _Trials:
         lost_legs = {
             finding.place.index for finding in verdict.findings if finding.rule == "survey" and finding.ok is not True
         }
-        all_surveys = surveys_of(setup)
+        all_surveys = judged_surveys(setup)
         self._numbers = [
             number
             for number, survey in enumerate(all_surveys)
@@ -205,7 +205,7 @@ class _Trials:
         mission, setup = self._setup.mission, self._setup
         # Start with the last survey, because a changed survey may be detected as two, which renumbers later surveys.
         for number in reversed(self._numbers):
-            survey = surveys_of(setup)[number]
+            survey = judged_surveys(setup)[number]
             changed_mission = with_layout(mission, setup.route, survey, layout, self._setup.scenario.origin)
             if changed_mission is None:
                 return None

@@ -16,7 +16,7 @@ def is_line_usable(measure: LineMeasure | None) -> bool:
     >>> is_line_usable(None)
     False
     """
-    return measure is not None and measure.good >= PHOTO_COVERAGE_FRACTION
+    return measure is not None and measure.usable >= PHOTO_COVERAGE_FRACTION
 
 
 def lines_headline(measures: list[LineMeasure | None]) -> str:
@@ -29,12 +29,12 @@ def lines_headline(measures: list[LineMeasure | None]) -> str:
     summary = f"{usable_count} of {len(measures)} photo lines can be used"
     if usable_count == len(measures):
         return summary
-    fractions = [-1.0 if measure is None else measure.good for measure in measures]
+    fractions = [-1.0 if measure is None else measure.usable for measure in measures]
     worst_index = min(range(len(fractions)), key=lambda k: fractions[k])
     measure = measures[worst_index]
     return (
         f"{summary}; line {worst_index + 1} is the worst:"
-        f" {'not flown' if measure is None else f'{100.0 * measure.good:.0f} %'}"
+        f" {'not flown' if measure is None else f'{100.0 * measure.usable:.0f} %'}"
     )
 
 
@@ -42,9 +42,9 @@ def line_text(number: int, measure: LineMeasure | None) -> str:
     """Describe the length of a photo line, its usable fraction, and the causes of the loss."""
     if measure is None:
         return f"line {number:<3} not flown"
-    text = f"line {number:<3} {measure.length:6.0f} m  {100.0 * measure.good:5.1f} % can be used"
+    text = f"line {number:<3} {measure.length:6.0f} m  {100.0 * measure.usable:5.1f} % can be used"
     loss_text = lost_text(measure)
-    photos_text = f"; {measure.missed} of {measure.photos} photos missed" if measure.missed else ""
+    photos_text = f"; {measure.missed_photos} of {measure.photos} photos missed" if measure.missed_photos else ""
     return f"{text}{': ' if loss_text else ''}{loss_text}{photos_text}"
 
 
@@ -86,15 +86,15 @@ def has_required_overlap(measure: OverlapMeasure | None) -> bool:
 
 
 def usable_segments_text(survey: Survey, lines: Sequence[LineMeasure | None]) -> str:
-    """Describe how far behind their start the lines become usable, as a hint on the necessary turn-arounds."""
-    usable_lines = [measure for measure in lines if measure is not None and measure.good > 0.0]
+    """Describe the places from which lines are usable, which shows the turn-arounds that would be needed."""
+    usable_lines = [measure for measure in lines if measure is not None and measure.usable > 0.0]
     if not usable_lines:
         return (
             f"no place of its {len(lines)} lines, {survey.spacing:.0f} m apart, can be used, as there is no "
             "room to turn"
         )
     latest_start, max_length = (
-        max(measure.late for measure in usable_lines),
+        max(measure.lost_at_start for measure in usable_lines),
         max(measure.length for measure in usable_lines),
     )
     text = (

@@ -126,7 +126,7 @@ def front_lines(front: "Front", folder: Path) -> list[str]:
     lines = [
         "front of 1 safe plan" if len(front.plans) == 1 else f"front of {len(front.plans)} safe plans{comparison}",
         *condition_lines(conditions),
-        autopilot_line(conditions, flown=False),
+        autopilot_line(conditions, is_flown=False),
         "  plan   length km  exposure s  above ground m  energy Wh   time s",
     ]
     for number, front_plan in enumerate(front.plans, 1):

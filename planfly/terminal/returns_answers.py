@@ -8,7 +8,7 @@ from pydantic.dataclasses import dataclass
 from logs.verdict.conditions import Conditions
 from logs.verdict.returns.glides_text import glide_range_text, glides_headline
 from logs.verdict.returns.judge_glides import MARGIN
-from logs.verdict.returns.judge_returns import ReturnFlown, ReturnRange
+from logs.verdict.returns.judge_returns import ReturnRange, SimulatedReturn
 from logs.verdict.returns.returns_text import headline, range_text
 from planfly.api.returning import RemedyTrial, ReturnsFound
 from planfly.terminal.verdict_answers import STRICT
@@ -250,12 +250,12 @@ def program_entry(result: ReturnsFound) -> ByProgram | None:
     return ByProgram(version=result.by_program.program, returns=entries)
 
 
-def _measured_return(simulated_return: ReturnFlown) -> MeasuredReturn:
+def _measured_return(simulated_return: SimulatedReturn) -> MeasuredReturn:
     return MeasuredReturn(
         kind=simulated_return.kind,
         target=simulated_return.target.name,
         clearance_m=_round_to_tenths(simulated_return.clearance),
-        outside_m=_round_to_tenths(simulated_return.outside),
+        outside_m=_round_to_tenths(simulated_return.sphere_distance),
     )
 
 
@@ -269,7 +269,7 @@ def glides_entry(result: ReturnsFound) -> GlidesEntry:
     glides = result.glides
     entries = []
     for glide_range in glides.ranges:
-        glide = glide_range.least
+        glide = glide_range.lowest_glide
         entries.append(
             GlideEntry(
                 first_s=round(glide_range.first, 2),
@@ -278,13 +278,13 @@ def glides_entry(result: ReturnsFound) -> GlidesEntry:
                 reach=glide.reach,
                 site=glide_range.site if glide_range.site >= 0 else None,
                 least_at_s=round(glide.time, 2),
-                left_m=_round_to_tenths(glides.spare(glide)),
-                flat_east_m=_round_to_tenths(glide.flat_at[0]),
-                flat_north_m=_round_to_tenths(glide.flat_at[1]),
+                left_m=_round_to_tenths(glides.altitude_left(glide)),
+                flat_east_m=_round_to_tenths(glide.flat_position[0]),
+                flat_north_m=_round_to_tenths(glide.flat_position[1]),
                 own=glide.own.end,
                 own_target=glide.own.target.name,
-                own_over_m=_round_to_tenths(glide.own.over),
-                own_short_m=_round_to_tenths(glide.own.short),
+                own_over_m=_round_to_tenths(glide.own.arrival_height),
+                own_short_m=_round_to_tenths(glide.own.shortfall),
                 text=glide_range_text(glide_range, glides),
             )
         )
@@ -321,12 +321,12 @@ def return_entry(result: ReturnsFound, return_range: ReturnRange) -> ReturnEntry
         reason=worst_return.target.reason,
         worst_at_s=round(worst_return.time, 2),
         clearance_m=tenths(worst_return.clearance),
-        clearance_east_m=tenths(worst_return.clearance_at[0]),
-        clearance_north_m=tenths(worst_return.clearance_at[1]),
-        outside_m=tenths(worst_return.outside),
+        clearance_east_m=tenths(worst_return.lowest_position[0]),
+        clearance_north_m=tenths(worst_return.lowest_position[1]),
+        outside_m=tenths(worst_return.sphere_distance),
         threat=scenario.threats.names[worst_return.threat] if worst_return.kind == "threat" else None,
         zone=result.returns.airspace.zones[worst_return.zone].name if worst_return.zone >= 0 else None,
         energy_wh=tenths(worst_return.energy),
-        left_wh=tenths(worst_return.left),
+        left_wh=tenths(worst_return.energy_left),
         text=range_text(return_range, result.returns, scenario),
     )

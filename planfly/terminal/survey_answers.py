@@ -109,20 +109,20 @@ def photo_line_entry(setup: FlightSetup, line: PhotoLine, measure: LineMeasure |
         first_item=first,
         last_item=last,
         length_m=None if measure is None else round(measure.length, 1),
-        usable=round_to_1e4(None if measure is None else measure.good),
-        away=round_to_1e4(None if measure is None else measure.away),
+        usable=round_to_1e4(None if measure is None else measure.usable),
+        away=round_to_1e4(None if measure is None else measure.off_line),
         banked=round_to_1e4(None if measure is None else measure.banked),
-        high=round_to_1e4(None if measure is None else measure.high),
-        dark=round_to_1e4(None if measure is None else measure.dark),
-        lost_m=[] if measure is None else [(round(start, 1), round(end, 1)) for start, end in measure.lost],
+        high=round_to_1e4(None if measure is None else measure.off_height),
+        dark=round_to_1e4(None if measure is None else measure.camera_off),
+        lost_m=[] if measure is None else [(round(start, 1), round(end, 1)) for start, end in measure.lost_spans],
         photos=None if measure is None else measure.photos,
-        missed=None if measure is None else measure.missed,
+        missed=None if measure is None else measure.missed_photos,
     )
 
 
 def overlap_entry(overlap: OverlapMeasure) -> OverlapEntry:
     """Return the entry of the overlap of a survey."""
-    first_line, second_line = sorted(overlap.pair)
+    first_line, second_line = sorted(overlap.line_pair)
     return OverlapEntry(
         front=None if overlap.front is None else round(overlap.front, 4),
         front_asked=overlap.camera.front,

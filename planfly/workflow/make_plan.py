@@ -4,7 +4,7 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from aircraft.path_limits import Limits
-from logs.verdict.conditions import Conditions, conditions_of
+from logs.verdict.conditions import Conditions, plan_conditions
 from logs.verdict.measures.circle_reach import end_loiter_hazards
 from logs.verdict.measures.route_requirements import route_requirements
 from planfly.planning.gust_altitude_margin import ensure_altitude_margin
@@ -24,7 +24,7 @@ Advance = Callable[[float, float, str], None]
 
 def planning_conditions(scenario: Scenario, airframe: Airframe) -> Conditions:
     """Return the conditions for which a scenario is planned."""
-    return conditions_of(scenario, airframe.aircraft.name, airframe.airspeed, airframe.autopilot)
+    return plan_conditions(scenario, airframe.aircraft.name, airframe.airspeed, airframe.autopilot)
 
 
 def make_plan(

@@ -15,7 +15,7 @@ from logs.verdict.findings import Finding
 from logs.verdict.judge_flight import judge_flight
 from logs.verdict.measures.route_requirements import RouteRequirements, true_route
 from logs.verdict.places import FLIGHT, AirframeAnswer, DecidingParameter, ReferenceFlights
-from logs.verdict.summary import first_failed
+from logs.verdict.summary import most_urgent_failure
 from logs.verdict.trials import least_change
 from logs.verdict.verdict import Verdict
 from planfly.workflow.mission_context import JudgedMission, MissionContext
@@ -54,7 +54,7 @@ def find_passing_parameter(
     >>> found.name, found.current, found.passing
     ('TECS_HDEM_TCONST', 3.0, 1.2)
     """
-    failed_finding = first_failed(findings)
+    failed_finding = most_urgent_failure(findings)
     if failed_finding is None or autopilot.parameters is None or failed_finding.rule == "mission":
         # No flight parameter changes the rejection of a mission.
         return None

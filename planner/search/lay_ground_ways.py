@@ -33,7 +33,7 @@ from planner.search.pose_chains import (
     descent_altitudes,
     measure_path,
 )
-from world.airfield import STEEPEST_STRIP, LandingStrip, Launch, strip_slopes
+from world.airfield import STEEPEST_STRIP_SLOPE, LandingStrip, Launch, strip_slopes
 from world.arrays import Floats
 from world.geometry import leg_courses, leg_runs
 from world.scenario import Scenario
@@ -512,11 +512,11 @@ def _describe_strip_fault(terrain: Terrain, strip: LandingStrip, course: float) 
     for direction, slope in zip(("along", "across"), strip_slopes(terrain, strip, course), strict=True):
         if math.isnan(slope):
             return "the ground of the strip is not known to its ends"
-        if abs(slope) > STEEPEST_STRIP:
+        if abs(slope) > STEEPEST_STRIP_SLOPE:
             course_text = f"on {round(math.degrees(course)) % 360}°"
             return (
                 f"the strip slopes by {abs(slope):.0%} {direction} it {course_text};"
-                f" at most {STEEPEST_STRIP:.0%} can be landed on"
+                f" at most {STEEPEST_STRIP_SLOPE:.0%} can be landed on"
             )
     return ""
 

@@ -22,9 +22,9 @@ def same(a: Any, b: Any, where: str = "setup") -> None:
     assert type(a) is type(b), where
     # What is written states who flies, where a scenario leaves it to the default.
     if isinstance(a, ScenarioFile):
-        a, b = (item.model_copy(update={"flight": item.flight.stated()}) for item in (a, b))
+        a, b = (item.model_copy(update={"flight": item.flight.with_stated_defaults()}) for item in (a, b))
     elif isinstance(a, FlightTable):
-        a, b = a.stated(), b.stated()
+        a, b = a.with_stated_defaults(), b.with_stated_defaults()
     if dataclasses.is_dataclass(a):
         for item in (item for item in dataclasses.fields(a) if item.compare):
             same(getattr(a, item.name), getattr(b, item.name), f"{where}.{item.name}")

@@ -95,7 +95,7 @@ def test_words_can_be_read_and_limits_are_no_threats(dark: bool) -> None:
 
 
 def test_every_role_reaches_page_and_script() -> None:
-    style, looks = theme.css_variables(), theme.page_looks()
+    style, looks = theme.css_variables(), theme.page_styles()
     for role in theme.LOOKS:
         assert style.count(f"--{role}: ") == 2
         assert set(looks[role]) == {"width", "dash", "fill", "size", "face", "edge", "symbol"}

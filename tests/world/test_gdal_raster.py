@@ -118,7 +118,7 @@ def test_a_turned_grid_and_its_inverse_lead_back(tmp_path: Path) -> None:
     found = open_raster(str(write_raster(tmp_path / "t.tif", np.zeros((9, 9), np.float32), "EPSG:32632", turned)))
     assert found.grid == tuple(turned)[:6]
     col, row = np.array([0.0, 3.0, 8.0]), np.array([1.0, 5.0, 8.0])
-    back = found.to_source(*found.to_place(col, row))
+    back = found.to_pixels(*found.to_lon_lat(col, row))
     assert np.stack(back) == pytest.approx(np.stack([col, row]), abs=1e-6)
 
 

@@ -65,7 +65,7 @@ def without_grids(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
 
     monkeypatch.setattr(height_datum, "GEOIDS", {"EGM96": 5773})
     monkeypatch.setattr("pyproj.transformer.TransformerGroup.best_available", property(lambda _: False))
-    height_datum._geoid.cache_clear()
+    height_datum._find_geoid.cache_clear()
     monkeypatch.chdir(tmp_path)
 
 

@@ -92,7 +92,7 @@ def test_sources_of_another_time_are_not_loaded(files: CheckedCacheFiles, tmp_pa
 
 def test_kernels_are_kept_in_files_with_digests(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(kernels._settings, "CACHE_DIR", str(tmp_path))
-    compile_again = kernels._compiled
+    compile_again = kernels._make_dispatcher
 
     def hits() -> int:
         kernel = compile_again(_divide.py_func)  # type: ignore[attr-defined]  # numba states no types

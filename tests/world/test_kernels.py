@@ -16,7 +16,7 @@ import pytest
 from numba.core.registry import cpu_target
 
 from planfly.kernel_units.unit_kernels import UNIT_KERNELS
-from world.by_reference import _layout, by_reference
+from world.by_reference import _get_layout, by_reference
 from world.kernel_cache import PACKAGES, kernel_sources, sources_digest
 from world.kernels import Record, compiled, field_names, inlined, inner, read_only, record_dtype
 
@@ -232,7 +232,7 @@ def test_what_stands_behind_a_pointer_lies_as_compiled_code_has_it() -> None:
     context = cpu_target.target_context
     reference = numba.typeof(_sites())
     laid_out = context.get_abi_sizeof(context.get_data_type(reference.tuple_type))
-    assert ctypes.sizeof(_layout(_sites()).memory) == laid_out
+    assert ctypes.sizeof(_get_layout(_sites()).memory) == laid_out
 
 
 def test_arrays_that_can_be_written_make_no_other_kernel_behind_a_pointer() -> None:

@@ -202,7 +202,7 @@ NORRIS_DAM = 36.2242, -84.0917
 
 def _tile_pixel(lat: float, lon: float) -> tuple[float, float]:
     """Row and column of the tile, as our reading places it."""
-    col, row = open_raster("jacksboro").to_source(np.array(lon), np.array(lat))
+    col, row = open_raster("jacksboro").to_pixels(np.array(lon), np.array(lat))
     return float(row), float(col)
 
 

@@ -56,7 +56,7 @@ def test_a_body_that_drips(tmp_path: Path) -> None:
             file.fetch(0, SIZE)
     assert time.monotonic() - begun < 10.0
     # What has come is kept.
-    assert file.missing(0, SIZE)[0][0] > 0
+    assert file.missing_parts(0, SIZE)[0][0] > 0
 
 
 @pytest.mark.parametrize("head", [b"", b"HTTP/1.1 200 OK\r\nX-Long: "])

@@ -167,7 +167,7 @@ def test_who_flies(stated: dict[str, Any], flown_by: tuple[str, str, str]) -> No
     table = FlightTable(**stated)
     assert table.steering == flown_by
     # As it is written down, it says the same whatever the default becomes.
-    again = table.stated()
+    again = table.with_stated_defaults()
     assert again.steering == flown_by
     assert (again.autopilot == "ardupilot") == (flown_by[0] == "ardupilot")
     assert (again.guidance is None) == (flown_by[0] == "ardupilot")

@@ -22,7 +22,7 @@ _WGS84_CODE = 4326
 
 
 def geopackage_features(path: Path, source: str) -> Iterator[tuple[str, dict[str, Any]]]:
-    """Yield each feature's place in the file, and the feature as GeoJSON in longitude and latitude.
+    """Yield each feature's location in the file, and the feature as GeoJSON in longitude and latitude.
 
     Raises ScenarioError for a file that cannot be read as a GeoPackage, and for an invalid geometry.
     """

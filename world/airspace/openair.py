@@ -29,7 +29,7 @@ _FREE_CLASSES = ("E", "F", "G", "UNC", "W", "GSEC", "FIR", "UIR", "FIS")
 # Types of airspace that require no clearance either.
 _FREE_TYPES = ("", "NONE", "FIR", "UIR", "FIS", "GSEC", "ACCSEC", "TRZ", "VFRSEC", "VFRR")
 
-_Place = tuple[float, float]
+_Position = tuple[float, float]
 _COORDINATE = re.compile(r"(?P<lat>[\d:.]+)\s*(?P<ns>[NS])[\s,]*(?P<lon>[\d:.]+)\s*(?P<ew>[EW])", re.IGNORECASE)
 _ALTITUDE = re.compile(r"(\d+(?:\.\d+)?)\s*(FT|FEET|F|M|)\s*(AMSL|MSL|ALT|AGL|AAGL|ASFC|GND|SFC|STD|)", re.IGNORECASE)
 _LEVEL = re.compile(r"FL\s*(\d+(?:\.\d+)?)", re.IGNORECASE)
@@ -46,11 +46,11 @@ class _Block:
     kind: str = ""
     limits: dict[str, dict[str, Any]] = field(default_factory=dict)
     times: list[str] = field(default_factory=list)
-    corners: list[_Place] = field(default_factory=list)
-    airway: list[_Place] = field(default_factory=list)
+    corners: list[_Position] = field(default_factory=list)
+    airway: list[_Position] = field(default_factory=list)
     width: float = 0.0
-    circle: tuple[_Place, float] | None = None
-    centre: _Place | None = None
+    circle: tuple[_Position, float] | None = None
+    centre: _Position | None = None
     clockwise: bool = True
 
 
@@ -65,7 +65,7 @@ def is_openair(text: str) -> bool:
 
 
 def openair_zones(text: str, source: str) -> Iterator[tuple[str, dict[str, Any] | str]]:
-    r"""Yield for each zone its place in the file and its [[zones]] entries, or the reason why it restricts no flight.
+    r"""Yield each zone's location in the file and its [[zones]] entries, or the reason why it restricts no flight.
 
     Every airspace is an exclusion, except classes E, F, G and unclassified without a type that requires more.  An arc
     is drawn with chords within `ARC_BEND` of it.  Raises ScenarioError for a line that cannot be read.
@@ -126,10 +126,10 @@ def _finish_block(block: _Block, source: str) -> tuple[str, dict[str, Any] | str
     entries |= published_entries(block.limits, f"{source}: {location}")
     if block.times:
         entries["times"] = block.times
-    shapes = [bool(block.corners), bool(block.airway), block.circle is not None]
-    if not any((*shapes, block.name, block.limits)):
+    has_shape = [bool(block.corners), bool(block.airway), block.circle is not None]
+    if not any((*has_shape, block.name, block.limits)):
         return location, "without name, limits and shape"
-    if sum(shapes) != 1:
+    if sum(has_shape) != 1:
         allowed = "expected one shape: corners and arcs, a circle, or an airway"
         raise ScenarioError(f"{source}: {location}: {allowed}", file=source, allowed=allowed)
     if block.circle is not None:
@@ -139,8 +139,8 @@ def _finish_block(block: _Block, source: str) -> tuple[str, dict[str, Any] | str
     return location, entries | {"rings_deg": [[list(corner) for corner in ring] for ring in rings]}
 
 
-def _airway_rings(block: _Block, source: str) -> list[list[_Place]]:
-    """Return the outline of an airway: its segments, widened by half its width to both sides and beyond its ends."""
+def _airway_rings(block: _Block, source: str) -> list[list[_Position]]:
+    """Return the outline of an airway: its segments, extended by half its width to both sides and beyond its ends."""
     if len(block.airway) < 2 or not block.width > 0.0:
         raise ScenarioError(f"{source}: DY: an airway has at least two points, and a width before (V W=)", file=source)
     origin = GeoOrigin(*block.airway[0])
@@ -188,14 +188,14 @@ def _parse_limit(text: str, key: str) -> dict[str, Any] | None:
     if match is None:
         raise ValueError("expected a height: 2500ft AMSL, 300m AGL, FL95, GND, UNL")
     value, unit, datum = float(match[1]), match[2].upper(), match[3].upper()
-    reference = "GND" if datum in _ABOVE_GROUND else "STD" if datum == "STD" else "MSL"
-    return {"value": value, "unit": "M" if unit == "M" else "FT", "referenceDatum": reference}
+    reference_datum = "GND" if datum in _ABOVE_GROUND else "STD" if datum == "STD" else "MSL"
+    return {"value": value, "unit": "M" if unit == "M" else "FT", "referenceDatum": reference_datum}
 
 
 def _read_variable(block: _Block, text: str) -> None:
     name, _, value = (part.strip() for part in text.partition("="))
     if name.upper() == "X":
-        block.centre = _parse_place(value)
+        block.centre = _parse_position(value)
     elif name.upper() == "D":
         if value not in ("+", "-"):
             raise ValueError("allowed D=+ (clockwise) or D=-")
@@ -205,7 +205,7 @@ def _read_variable(block: _Block, text: str) -> None:
 
 
 def _read_corner(block: _Block, text: str) -> None:
-    _add_corners(block.corners, [_parse_place(text)])
+    _add_corners(block.corners, [_parse_position(text)])
 
 
 def _read_circle(block: _Block, text: str) -> None:
@@ -221,12 +221,12 @@ def _read_arc_by_bearings(block: _Block, text: str) -> None:
     radius, first_bearing, last_bearing = _parse_length(parts[0]), _parse_number(parts[1]), _parse_number(parts[2])
     _add_corners(
         block.corners,
-        _arc_places(_required_centre(block), (radius, radius), first_bearing, last_bearing, block.clockwise),
+        _arc_positions(_required_centre(block), (radius, radius), first_bearing, last_bearing, block.clockwise),
     )
 
 
 def _read_arc_by_points(block: _Block, text: str) -> None:
-    ends = [_parse_place(match[0]) for match in _COORDINATE.finditer(text)]
+    ends = [_parse_position(match[0]) for match in _COORDINATE.finditer(text)]
     if len(ends) != 2:
         raise ValueError("expected two points: 39:36:40N 119:46:10W, 39:29:09N 119:36:10W")
     centre = _required_centre(block)
@@ -234,15 +234,15 @@ def _read_arc_by_points(block: _Block, text: str) -> None:
         _bearing_and_distance(centre, place) for place in ends
     )
     # The end points are kept as stated, even if they do not agree with the centre.
-    arc = _arc_places(centre, (first_radius, last_radius), first_bearing, last_bearing, block.clockwise)
+    arc = _arc_positions(centre, (first_radius, last_radius), first_bearing, last_bearing, block.clockwise)
     _add_corners(block.corners, [ends[0], *arc[1:-1], ends[1]])
 
 
 def _read_airway(block: _Block, text: str) -> None:
-    _add_corners(block.airway, [_parse_place(text)])
+    _add_corners(block.airway, [_parse_position(text)])
 
 
-def _add_corners(corners: list[_Place], added_corners: list[_Place]) -> None:
+def _add_corners(corners: list[_Position], added_corners: list[_Position]) -> None:
     if len(corners) + len(added_corners) > MAX_CORNERS:
         raise ValueError(f"more corners than a zone may have: at most {MAX_CORNERS:,}")
     corners += added_corners
@@ -271,7 +271,7 @@ _COMMANDS: dict[str, Callable[[_Block, str], None]] = {
 
 
 # ----------------------------------------------------------------------
-# Numbers, places and arcs.
+# Numbers, positions and arcs.
 
 
 def _parse_number(text: str) -> float:
@@ -292,7 +292,7 @@ def _parse_length(text: str) -> float:
     return length * NAUTICAL_MILE
 
 
-def _parse_place(text: str) -> _Place:
+def _parse_position(text: str) -> _Position:
     """Parse a latitude and longitude, degrees."""
     match = _COORDINATE.fullmatch(text.strip())
     if match is None:
@@ -312,33 +312,33 @@ def _parse_degrees(text: str, max_degrees: float) -> float:
     return angle
 
 
-def _required_centre(block: _Block) -> _Place:
+def _required_centre(block: _Block) -> _Position:
     if block.centre is None:
         raise ValueError("no centre before it (V X=)")
     return block.centre
 
 
-def _bearing_and_distance(centre: _Place, place: _Place) -> tuple[float, float]:
-    """Return the bearing, degrees, and distance, m, of a place from a centre."""
-    east, north = to_map(GeoOrigin(*centre), *place)
+def _bearing_and_distance(centre: _Position, position: _Position) -> tuple[float, float]:
+    """Return the bearing, degrees, and distance, m, of a position from a centre."""
+    east, north = to_map(GeoOrigin(*centre), *position)
     return math.degrees(math.atan2(east, north)), math.hypot(east, north)
 
 
-def _arc_places(
-    centre: _Place, radii: Sequence[float], first_bearing: float, last_bearing: float, clockwise: bool
-) -> list[_Place]:
-    """Return places along an arc, including its ends.
+def _arc_positions(
+    centre: _Position, radii: Sequence[float], first_bearing: float, last_bearing: float, clockwise: bool
+) -> list[_Position]:
+    """Return positions along an arc, including its ends.
 
-    The radius changes linearly from the first to the second, m.
+    radii: radius at the first and at the last bearing, m; it changes linearly between them.
     """
-    turn = (last_bearing - first_bearing) % 360.0 if clockwise else -((first_bearing - last_bearing) % 360.0)
-    turn = turn or (360.0 if clockwise else -360.0)
+    turn_angle = (last_bearing - first_bearing) % 360.0 if clockwise else -((first_bearing - last_bearing) % 360.0)
+    turn_angle = turn_angle or (360.0 if clockwise else -360.0)
     max_radius = max(*radii, ARC_BEND)
     chord_angle = math.degrees(2.0 * math.acos(1.0 - min(0.3, ARC_BEND / max_radius)))
-    count = max(1, math.ceil(abs(turn) / chord_angle))
-    fractions = [k / count for k in range(count + 1)]
+    chord_count = max(1, math.ceil(abs(turn_angle) / chord_angle))
+    fractions = [k / chord_count for k in range(chord_count + 1)]
     # Distances and bearings from the centre are measured on a map with its origin there.
-    bearings = [math.radians(first_bearing + fraction * turn) for fraction in fractions]
+    bearings = [math.radians(first_bearing + fraction * turn_angle) for fraction in fractions]
     distances = [radii[0] + fraction * (radii[1] - radii[0]) for fraction in fractions]
     east = [distance * math.sin(bearing) for distance, bearing in zip(distances, bearings, strict=True)]
     north = [distance * math.cos(bearing) for distance, bearing in zip(distances, bearings, strict=True)]

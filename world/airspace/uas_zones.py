@@ -36,7 +36,7 @@ def is_ed269(data: Mapping[str, Any]) -> bool:
     >>> is_ed269({"features": [{"geometry": [{"horizontalProjection": {}}]}]}), is_ed269({"features": []})
     (True, False)
     """
-    features = _features(data)
+    features = _feature_list(data)
     first = features[0] if isinstance(features, list) and features else None
     return isinstance(first, dict) and isinstance(first.get("geometry"), list)
 
@@ -58,12 +58,12 @@ def _zone_properties(properties: Mapping[str, Any]) -> Mapping[str, Any]:
 
 
 def ed269_zones(data: Mapping[str, Any], source: str) -> Iterator[_FoundZone]:
-    """Yield each volume's place in the file and its [[zones]] entries, or the reason why it restricts no flight.
+    """Yield each volume's location in the file and its [[zones]] entries, or the reason why it restricts no flight.
 
     Raises ScenarioError for an invalid volume.
     """
     key = "features" if "features" in data else "UASZoneList"
-    for k, feature in enumerate(_features(data)):
+    for k, feature in enumerate(_feature_list(data)):
         location = f"{key}[{k}]"
         volumes = feature.get("geometry") if isinstance(feature, dict) else None
         if not isinstance(volumes, list) or not volumes:
@@ -74,14 +74,14 @@ def ed269_zones(data: Mapping[str, Any], source: str) -> Iterator[_FoundZone]:
             yield location, restriction
             continue
         time_entries = (
-            {"times": times} if (times := _times(feature.get("applicability"), f"{source}: {location}")) else {}
+            {"times": times} if (times := _period_texts(feature.get("applicability"), f"{source}: {location}")) else {}
         )
         for number, volume in enumerate(volumes, 1):
             label = f"{name} {number}/{len(volumes)}" if len(volumes) > 1 else name
             yield location, {**_ed269_volume(volume, f"{source}: {location}"), "name": label, **time_entries}
 
 
-def _features(data: Mapping[str, Any]) -> Any:
+def _feature_list(data: Mapping[str, Any]) -> Any:
     return data.get("features") if "features" in data else data.get("UASZoneList")
 
 
@@ -97,18 +97,18 @@ def _ed269_volume(volume: Any, source: str) -> dict[str, Any]:
         for side in ("lower", "upper")
     }
     entries = published_entries(limits, source)
-    kind = _upper_word(shape.get("type"))
-    if kind == "POLYGON":
-        return entries | {"rings_deg": _rings(shape.get("coordinates"), source)}
-    if kind == "CIRCLE":
-        return entries | _circle(shape.get("center"), shape.get("radius"), source)
+    shape_type = _upper_word(shape.get("type"))
+    if shape_type == "POLYGON":
+        return entries | {"rings_deg": _parse_rings(shape.get("coordinates"), source)}
+    if shape_type == "CIRCLE":
+        return entries | _circle_entries(shape.get("center"), shape.get("radius"), source)
     raise _value_error(source, "", "horizontalProjection.type", "allowed Polygon, Circle")
 
 
 def ed318_zones(feature: Mapping[str, Any], location: str, index: int, source: str) -> Iterator[_FoundZone]:
     """Yield the entries of each layer of an ED-318 feature, in the form of `ed269_zones`.
 
-    location: place of the feature in the file, for messages.  index: index of the feature, from 0.
+    location: location of the feature in the file, for messages.  index: index of the feature, from 0.
     """
     properties = _zone_properties(feature["properties"])
     name = _one_line_name(properties.get("name")) or _one_line_name(properties.get("identifier")) or f"zone {index + 1}"
@@ -119,10 +119,10 @@ def ed318_zones(feature: Mapping[str, Any], location: str, index: int, source: s
     applicability = properties.get("limitedApplicability")
     if applicability is None and any(properties.get(key) for key in _PERIOD_KEYS):
         applicability = [{**properties, "schedule": [properties]}]
-    times = _times(applicability, f"{source}: {location}")
+    times = _period_texts(applicability, f"{source}: {location}")
     time_entries = {"times": times} if times else {}
     vertical_layer = properties.get("verticalLayer")
-    geometries = list(_geometries(feature.get("geometry")))
+    geometries = list(_flatten_geometries(feature.get("geometry")))
     for k, geometry in enumerate(geometries, 1):
         label = f"{name} {k}/{len(geometries)}" if len(geometries) > 1 else name
         for entries in _ed318_layer(
@@ -131,12 +131,12 @@ def ed318_zones(feature: Mapping[str, Any], location: str, index: int, source: s
             yield location, {**entries, "name": label, **time_entries}
 
 
-def _geometries(geometry: Any) -> Iterator[Any]:
+def _flatten_geometries(geometry: Any) -> Iterator[Any]:
     """Yield a geometry, or the geometries of a collection."""
     parts = geometry.get("geometries") if isinstance(geometry, dict) else None
     if isinstance(parts, list):
         for part in parts:
-            yield from _geometries(part)
+            yield from _flatten_geometries(part)
     else:
         yield geometry
 
@@ -155,18 +155,18 @@ def _ed318_layer(geometry: Any, default_layer: Mapping[str, Any], source: str) -
         for side in ("lower", "upper")
     }
     entries = published_entries(limits, source)
-    kind, coordinates = geometry.get("type"), geometry.get("coordinates")
-    if kind == "Polygon":
-        yield entries | {"rings_deg": _rings(coordinates, source)}
-    elif kind == "MultiPolygon" and isinstance(coordinates, list):
+    geometry_type, coordinates = geometry.get("type"), geometry.get("coordinates")
+    if geometry_type == "Polygon":
+        yield entries | {"rings_deg": _parse_rings(coordinates, source)}
+    elif geometry_type == "MultiPolygon" and isinstance(coordinates, list):
         for part in coordinates:
-            yield entries | {"rings_deg": _rings(part, source)}
-    elif kind == "Point":
+            yield entries | {"rings_deg": _parse_rings(part, source)}
+    elif geometry_type == "Point":
         extent = geometry.get("extent")
         extent = extent if isinstance(extent, dict) else {}
         if _upper_word(extent.get("subType")) != "CIRCLE":
             raise _value_error(source, "", "geometry.extent", "a point is the centre of a Circle")
-        yield entries | _circle(coordinates, extent.get("radius"), source)
+        yield entries | _circle_entries(coordinates, extent.get("radius"), source)
     else:
         raise _value_error(source, "", "geometry.type", "allowed Polygon, MultiPolygon, Point, GeometryCollection")
 
@@ -195,7 +195,7 @@ def _parse_limit(value: Any, unit: Any, datum: Any, side: str, source: str) -> d
     return {"value": height, "unit": _UNITS[_upper_word(unit)], "referenceDatum": _upper_word(datum)}
 
 
-def _rings(coordinates: Any, source: str) -> list[list[list[float]]]:
+def _parse_rings(coordinates: Any, source: str) -> list[list[list[float]]]:
     """Convert a polygon's coordinates to rings of [latitude, longitude]."""
     try:
         rings = [[[float(corner[1]), float(corner[0])] for corner in ring] for ring in coordinates]
@@ -206,7 +206,7 @@ def _rings(coordinates: Any, source: str) -> list[list[list[float]]]:
     return rings
 
 
-def _circle(centre: Any, radius: Any, source: str) -> dict[str, float]:
+def _circle_entries(centre: Any, radius: Any, source: str) -> dict[str, float]:
     try:
         return {"lat_deg": float(centre[1]), "lon_deg": float(centre[0]), "radius_m": float(radius)}
     except (TypeError, ValueError, IndexError, KeyError, OverflowError) as error:
@@ -214,7 +214,7 @@ def _circle(centre: Any, radius: Any, source: str) -> dict[str, float]:
 
 
 def _one_line_name(value: Any) -> str:
-    """Return a name in one line; of several texts, the first English text, or else the first text."""
+    """Return a name in one line: of several texts the first English one, or the first one without an English one."""
     if isinstance(value, list):
         texts = [
             text_entry
@@ -232,8 +232,8 @@ def _upper_word(value: Any) -> str:
     return value.strip().upper() if isinstance(value, str) else ""
 
 
-def _times(applicability: Any, source: str) -> list[str]:
-    """Return the periods in which a zone applies, in the form of a [[zones]] table; empty for always."""
+def _period_texts(applicability: Any, source: str) -> list[str]:
+    """Return the periods in which a zone applies, as in a [[zones]] table; empty for a zone that always applies."""
     if applicability is None:
         return []
     if not isinstance(applicability, list) or not all(isinstance(entry, dict) for entry in applicability):
@@ -263,20 +263,20 @@ def _parse_moment(value: Any, extreme_offset: timedelta) -> datetime | None:
     return moment.replace(tzinfo=UTC) + extreme_offset if moment.tzinfo is None else parse_time(value)
 
 
-def _daily_period(start: datetime | None, end: datetime | None, daily: Mapping[str, Any]) -> Period:
-    """Convert one entry of a schedule.
+def _daily_period(start: datetime | None, end: datetime | None, schedule_entry: Mapping[str, Any]) -> Period:
+    """Convert one entry of a schedule to a period.
 
-    Sunrise and sunset, and hours without a UTC offset, give the whole day.
+    Sunrise, sunset and hours without a UTC offset are replaced by the whole day.
     """
-    stated_days = daily.get("day") or []
+    stated_days = schedule_entry.get("day") or []
     day_names = [_upper_word(day) for day in ([stated_days] if isinstance(stated_days, str) else stated_days)]
     days = frozenset() if "ANY" in day_names else frozenset(WEEKDAYS.index(day) for day in day_names)
-    times = [daily.get(key) for key in ("startTime", "endTime")]
+    times = [schedule_entry.get(key) for key in ("startTime", "endTime")]
     first_minute, last_minute = _minute_of_day(times[0]), _minute_of_day(times[1], rounds_up=True)
     if first_minute is None or last_minute is None:
         # A day in another time zone overlaps the previous and the next day in UTC.
-        steps = (-1, 0, 1) if any(times) else (0,)
-        return Period(start, end, frozenset((day + day_step) % 7 for day in days for day_step in steps))
+        day_steps = (-1, 0, 1) if any(times) else (0,)
+        return Period(start, end, frozenset((day + day_step) % 7 for day in days for day_step in day_steps))
     day_shift, first_minute = divmod(first_minute, 24 * 60)
     last_minute -= day_shift * 24 * 60
     if not 0 <= last_minute <= 24 * 60:
@@ -285,9 +285,9 @@ def _daily_period(start: datetime | None, end: datetime | None, daily: Mapping[s
 
 
 def _minute_of_day(value: Any, *, rounds_up: bool = False) -> int | None:
-    """Return the UTC minute of the named day, negative on the day before it, or None if unknown.
+    """Return the minutes from 00:00 UTC of the stated day, negative on the day before, or None if unknown.
 
-    rounds_up: round a part of a minute up.
+    rounds_up: True to round a part of a minute up.
     """
     if value is None or value == "":
         return None

@@ -155,17 +155,17 @@ def _limit_entry(value: Any, key: str, kind: Any, source: str) -> dict[str, floa
     if not isinstance(datum, int | str) or datum not in _DATUMS:
         allowed = f"allowed {', '.join(map(str, _DATUMS))}"
         raise ScenarioError.at(source, f"{key}.referenceDatum", datum, allowed, shown="")
-    side, metres, datum_name = _LIMITS[key], round(height * _UNITS[unit], 3), _DATUMS[datum]
-    if datum_name == "agl" and metres <= 0.0:
+    side, height_m, datum_name = _LIMITS[key], round(height * _UNITS[unit], 3), _DATUMS[datum]
+    if datum_name == "agl" and height_m <= 0.0:
         if side == "floor":
             return {}
         raise ScenarioError.at(source, key, value, "expected a value above 0: nothing lies below the ground", shown="")
     if _UNITS[unit] == _UNITS["FL"]:
         datum_name = "standard"
     if datum_name in _INEXACT_DATUMS:
-        datum_text, below, above = _INEXACT_DATUMS[datum_name]
+        datum_text, max_below, max_above = _INEXACT_DATUMS[datum_name]
         if kind == "inclusion":
             allowed = f"{datum_text} bounds no inclusion; give a height in metres above mean sea level"
             raise ScenarioError.at(source, key, value, allowed, shown="")
-        datum_name, metres = "amsl", metres + (above if side == "ceiling" else -below)
-    return {f"{side}_{datum_name}_m": min(_HIGHEST_AMSL_M, max(_LOWEST_AMSL_M, metres))}
+        datum_name, height_m = "amsl", height_m + (max_above if side == "ceiling" else -max_below)
+    return {f"{side}_{datum_name}_m": min(_HIGHEST_AMSL_M, max(_LOWEST_AMSL_M, height_m))}

@@ -15,7 +15,7 @@ from world.airspace.openair import is_openair, openair_zones
 from world.airspace.uas_zones import ed269_zones, ed318_zones, is_ed269, is_ed318
 from world.airspace.zone_entries import NO_BAND, PUBLISHED, UPSIDE_DOWN, zone_entries
 from world.airspace.zone_suffixes import GEOPACKAGE, SUFFIXES
-from world.airspace.zones import holes_lie_inside, repair_rings
+from world.airspace.zones import are_holes_inside, repair_rings
 from world.errors import ScenarioError
 from world.scenario_file import checked_table
 from world.scenario_tables import MAX_ZONES, ZoneTable
@@ -25,7 +25,7 @@ from world.scenario_tables import MAX_ZONES, ZoneTable
 
 # Endings of the CRS names in GeoJSON of 2008 that mean longitude and latitude on WGS84.
 _WGS84_CRS_SUFFIXES = ("CRS84", "4326")
-# Place of a zone in its file, and its [[zones]] entries, or the reason why it restricts no flight.
+# Location of a zone in its file, and its [[zones]] entries, or the reason why it restricts no flight.
 Found = tuple[str, dict[str, Any] | str]
 
 
@@ -49,17 +49,17 @@ def geojson_zones(text: str, source: str) -> Iterator[Found]:
         yield from ed269_zones(data, source)
         return
     _check_crs(data, source)
-    kind = data.get("type")
-    if kind == "FeatureCollection":
+    geojson_type = data.get("type")
+    if geojson_type == "FeatureCollection":
         features = data.get("features")
         if not isinstance(features, list):
             raise ScenarioError(f"{source}: features: expected a list", file=source, field="features")
-        features_by_place = [(f"features[{k}]", feature) for k, feature in enumerate(features)]
-    elif kind == "Feature":
-        features_by_place = [("feature", data)]
+        located_features = [(f"features[{k}]", feature) for k, feature in enumerate(features)]
+    elif geojson_type == "Feature":
+        located_features = [("feature", data)]
     else:
-        features_by_place = [("geometry", {"type": "Feature", "geometry": data})]
-    for k, (location, feature) in enumerate(features_by_place):
+        located_features = [("geometry", {"type": "Feature", "geometry": data})]
+    for k, (location, feature) in enumerate(located_features):
         if is_ed318(feature):
             yield from ed318_zones(feature, location, k, source)
         else:
@@ -94,20 +94,20 @@ def _geojson_zone(feature: Any, location: str, index: int, source: str) -> tuple
         name = " ".join(name.split())
     label = f"{location} ({name})" if isinstance(name, str) and name.isprintable() else location
     geometry = geometry if isinstance(geometry, dict) else {}
-    kind = geometry.get("type")
+    geometry_type = geometry.get("type")
     coordinates: Any = geometry.get("coordinates")
     entries: dict[str, Any] = {"name": name, **zone_entries(properties, f"{source}: {label}")}
     try:
-        if kind == "Point":
+        if geometry_type == "Point":
             lat, lon = _corner(coordinates)
             if "radius_m" not in entries:
                 message = f"{source}: {label}: radius_m: missing; a point is the centre of a cylinder"
                 raise ScenarioError(message, file=source, field="radius_m")
             return label, entries | {"lat_deg": lat, "lon_deg": lon}
-        if kind == "Polygon":
-            coordinates, kind = [coordinates], "MultiPolygon"
-        if kind == "MultiPolygon":
-            parts = [_rings(part) for part in coordinates]
+        if geometry_type == "Polygon":
+            coordinates, geometry_type = [coordinates], "MultiPolygon"
+        if geometry_type == "MultiPolygon":
+            parts = [_parse_rings(part) for part in coordinates]
             _check_holes(parts, f"{source}: {label}")
             rings = [[list(corner) for corner in ring] for part in parts for ring in part]
             return label, entries | {"rings_deg": rings}
@@ -116,14 +116,14 @@ def _geojson_zone(feature: Any, location: str, index: int, source: str) -> tuple
         message = f"{source}: {label}: coordinates: {allowed}"
         raise ScenarioError(message, file=source, field="coordinates", allowed=allowed) from error
     allowed = "expected a Polygon, MultiPolygon or Point"
-    message = f"{source}: {label}: geometry {json.dumps(kind)[:40]}: {allowed}"
-    raise ScenarioError(message, file=source, field="geometry", value=kind, allowed=allowed)
+    message = f"{source}: {label}: geometry {json.dumps(geometry_type)[:40]}: {allowed}"
+    raise ScenarioError(message, file=source, field="geometry", value=geometry_type, allowed=allowed)
 
 
 def _check_holes(parts: list[list[list[tuple[float, float]]]], source: str) -> None:
     """Raise ScenarioError if a hole of a polygon lies outside its outline."""
     try:
-        is_inside = all(holes_lie_inside(part) for part in parts if part)
+        is_inside = all(are_holes_inside(part) for part in parts if part)
     except ValueError as error:
         raise ScenarioError(f"{source}: coordinates: {error}", file=source, field="coordinates") from error
     if not is_inside:
@@ -131,13 +131,13 @@ def _check_holes(parts: list[list[list[tuple[float, float]]]], source: str) -> N
         raise ScenarioError(message, file=source, field="coordinates")
 
 
-def _rings(coordinates: Any) -> list[list[tuple[float, float]]]:
+def _parse_rings(coordinates: Any) -> list[list[tuple[float, float]]]:
     """Convert a polygon's coordinates to rings of (latitude, longitude)."""
     return [[_corner(corner) for corner in ring] for ring in coordinates]
 
 
 def _corner(coordinates: Any) -> tuple[float, float]:
-    """Return latitude and longitude of a position; its height, if any, is ignored."""
+    """Return latitude and longitude of a position, without its height."""
     if not isinstance(coordinates, list) or not all(type(value) in (int, float) for value in coordinates):
         raise TypeError("no position")
     lon, lat = coordinates[0], coordinates[1]
@@ -155,7 +155,7 @@ _NUMERIC_KEYS = ("floor_amsl_m", "floor_agl_m", "ceiling_amsl_m", "ceiling_agl_m
 
 
 def kml_zones(text: str, source: str) -> Iterator[Found]:
-    """Yield each zone's place in a KML file and its [[zones]] entries.
+    """Yield each zone's location in a KML file and its [[zones]] entries.
 
     An extruded polygon is a zone up to its height, with the datum of `altitudeMode`; a polygon clamped to the ground
     has no ceiling.  ExtendedData states kind, floors, ceilings and radii by the keys of a scenario file.  Raises
@@ -186,7 +186,7 @@ def _tag_name(element: _Element) -> str:
     return element.tag.rpartition("}")[2]
 
 
-def _descendants(element: _Element, tag: str) -> list[_Element]:
+def _find_descendants(element: _Element, tag: str) -> list[_Element]:
     return [child for child in element.iter() if _tag_name(child) == tag]
 
 
@@ -197,32 +197,35 @@ def _kml_text(element: _Element, tag: str) -> str:
 
 def _kml_zone(placemark: _Element, source: str) -> dict[str, Any]:
     entries = zone_entries(_extended_data(placemark, source), source)
-    polygons, points = _descendants(placemark, "Polygon"), _descendants(placemark, "Point")
+    polygons, points = _find_descendants(placemark, "Polygon"), _find_descendants(placemark, "Point")
     if not polygons:
         if len(points) != 1 or "radius_m" not in entries:
             raise ScenarioError(
                 f"{source}: expected a Polygon, or a Point with radius_m in its ExtendedData", file=source
             )
-        ((lon, lat, _),) = _positions(points[0], source)[:1] or [(math.nan, math.nan, 0.0)]
+        ((lon, lat, _),) = _parse_positions(points[0], source)[:1] or [(math.nan, math.nan, 0.0)]
         return entries | {"lat_deg": lat, "lon_deg": lon}
     rings, ceilings = [], set()
     for polygon in polygons:
         corners = []
-        for boundary in (*_descendants(polygon, "outerBoundaryIs"), *_descendants(polygon, "innerBoundaryIs")):
-            ring = _positions(boundary, source)
+        for boundary in (
+            *_find_descendants(polygon, "outerBoundaryIs"),
+            *_find_descendants(polygon, "innerBoundaryIs"),
+        ):
+            ring = _parse_positions(boundary, source)
             rings.append([[lat, lon] for lon, lat, _ in ring])
             corners += ring
-        ceilings.add(_ceiling(polygon, [up for _, _, up in corners], source))
+        ceilings.add(_ceiling_entry(polygon, [up for _, _, up in corners], source))
     if len(ceilings) > 1:
         raise ScenarioError(
             f"{source}: its polygons have different heights: give each a placemark of its own", file=source
         )
     key, height = ceilings.pop()
-    states_ceiling = any(side in entries for side in ("ceiling_amsl_m", "ceiling_agl_m"))
+    states_ceiling = any(ceiling_key in entries for ceiling_key in ("ceiling_amsl_m", "ceiling_agl_m"))
     return {"rings_deg": rings, **({key: height} if key and not states_ceiling else {}), **entries}
 
 
-def _ceiling(polygon: _Element, heights: list[float], source: str) -> tuple[str, float]:
+def _ceiling_entry(polygon: _Element, heights: list[float], source: str) -> tuple[str, float]:
     """Return the key of a polygon's ceiling and its height, m; ("", 0) without a ceiling."""
     mode = _kml_text(polygon, "altitudeMode") or "clampToGround"
     if mode == "clampToGround":
@@ -240,10 +243,10 @@ def _ceiling(polygon: _Element, heights: list[float], source: str) -> tuple[str,
     return key, heights[0]
 
 
-def _positions(element: _Element, source: str) -> list[tuple[float, float, float]]:
+def _parse_positions(element: _Element, source: str) -> list[tuple[float, float, float]]:
     """Return longitude, latitude and height of an element's positions."""
-    out = []
-    for coordinates in _descendants(element, "coordinates"):
+    positions = []
+    for coordinates in _find_descendants(element, "coordinates"):
         for position in (coordinates.text or "").split():
             try:
                 lon, lat, *altitudes = (float(part) for part in position.split(","))
@@ -253,15 +256,15 @@ def _positions(element: _Element, source: str) -> list[tuple[float, float, float
                 raise ScenarioError(
                     message, file=source, field="coordinates", value=position, allowed=allowed
                 ) from error
-            out.append((lon, lat, altitudes[0] if altitudes else 0.0))
-    return out
+            positions.append((lon, lat, altitudes[0] if altitudes else 0.0))
+    return positions
 
 
 def _extended_data(placemark: _Element, source: str) -> dict[str, Any]:
     """Return the entries of a placemark's ExtendedData: Data with a value, and SimpleData."""
-    texts = {str(element.get("name")): _kml_text(element, "value") for element in _descendants(placemark, "Data")}
+    texts = {str(element.get("name")): _kml_text(element, "value") for element in _find_descendants(placemark, "Data")}
     texts |= {
-        str(element.get("name")): (element.text or "").strip() for element in _descendants(placemark, "SimpleData")
+        str(element.get("name")): (element.text or "").strip() for element in _find_descendants(placemark, "SimpleData")
     }
     entries: dict[str, Any] = {}
     for key, value in texts.items():
@@ -322,7 +325,7 @@ def is_zone_file(path: Path) -> bool:
 
 
 def read_zone_files(files: str | Sequence[str], source: str, base: Path | None) -> FileZones:
-    """Read the zones of a scenario's files, one or several.
+    """Read the zones of one or more files of a scenario.
 
     source: name of the scenario in messages.  base: folder of relative paths.  Raises ScenarioError as
     `read_zone_file` does, and for more zones than a scenario may have.
@@ -357,22 +360,24 @@ def read_zone_file(path: Path, source: str, max_zones: int = MAX_ZONES) -> FileZ
         allowed = f"a file of zones is {', '.join(SUFFIXES[:-1])} or {SUFFIXES[-1]}"
         message = f"{source}: suffix {path.suffix!r}: {allowed}"
         raise ScenarioError(message, file=source, field="suffix", value=path.suffix, allowed=allowed)
-    file_zones, unrestricted = FileZones(), Counter[str]()
+    file_zones, unrestricted_counts = FileZones(), Counter[str]()
     repaired_names: dict[str, list[str]] = {_SELF_CROSSING: [], _SWAPPED: [], _NO_BAND: [], _EMPTY: []}
-    corners = crossings = 0
+    corner_count = total_crossings = 0
     for location, entries in _read_format(path, suffix, source):
         if isinstance(entries, str):
-            unrestricted[entries] += 1
+            unrestricted_counts[entries] += 1
             continue
         if len(file_zones.zones) >= max_zones:
             message = f"{source}: too many zones: at most {MAX_ZONES:,} in all files"
             raise ScenarioError(message, file=source, field="zones", allowed=f"at most {MAX_ZONES:,}")
-        corners += sum(map(len, entries.get("rings_deg", ())))
-        if corners > MAX_FILE_CORNERS:
+        corner_count += sum(map(len, entries.get("rings_deg", ())))
+        if corner_count > MAX_FILE_CORNERS:
             allowed = f"at most {MAX_FILE_CORNERS:,}"
             raise ScenarioError(f"{source}: too many corners: {allowed}", file=source, allowed=allowed)
-        outline_notes, crossing_count = _repair_outline(entries, MAX_CROSSINGS - crossings, f"{source}: {location}")
-        crossings += crossing_count
+        outline_notes, crossing_count = _repair_outline(
+            entries, MAX_CROSSINGS - total_crossings, f"{source}: {location}"
+        )
+        total_crossings += crossing_count
         for note in outline_notes:
             repaired_names[note].append(str(entries["name"]))
         if _EMPTY in outline_notes:
@@ -380,9 +385,9 @@ def read_zone_file(path: Path, source: str, max_zones: int = MAX_ZONES) -> FileZ
         if entries.get("rings_deg") == []:
             raise ScenarioError(f"{source}: {location}: its outline encloses no area", file=source, field="rings_deg")
         file_zones.zones.append(_zone_table(entries, f"{source}: {location}"))
-    if not file_zones.zones and not unrestricted and not repaired_names[_EMPTY]:
+    if not file_zones.zones and not unrestricted_counts and not repaired_names[_EMPTY]:
         raise ScenarioError(f"{source}: contains no zone", file=source)
-    for reason, count in unrestricted.items():
+    for reason, count in unrestricted_counts.items():
         subject = "1 zone keeps" if count == 1 else f"{count:,} zones keep"
         file_zones.notes.append(f"{source}: {subject} nobody out: {reason}")
     for note_text, names in repaired_names.items():
@@ -397,9 +402,9 @@ def _repair_outline(entries: dict[str, Any], max_crossings: int, source: str) ->
 
     Leave other zones as they are.  Raises ScenarioError for more crossings than ``max_crossings``.
     """
-    published = entries.pop(PUBLISHED, False)
+    is_published = entries.pop(PUBLISHED, False)
     notes = [note for flag, note in ((UPSIDE_DOWN, _SWAPPED), (NO_BAND, _NO_BAND)) if entries.pop(flag, False)]
-    if not published or "rings_deg" not in entries:
+    if not is_published or "rings_deg" not in entries:
         return notes, 0
     try:
         repaired = repair_rings(entries["rings_deg"], max_crossings)
@@ -412,7 +417,7 @@ def _repair_outline(entries: dict[str, Any], max_crossings: int, source: str) ->
 
 
 def _read_format(path: Path, suffix: str, source: str) -> Iterator[Found]:
-    """Yield the zones of a file in the format of its suffix."""
+    """Yield the zones of a file, read in the format of its suffix."""
     if suffix == GEOPACKAGE:
         _check_size(path, source)
         for k, (location, feature) in enumerate(geopackage_features(path, source)):
@@ -431,7 +436,7 @@ def _check_size(path: Path, source: str) -> None:
 
 
 def _read_text(path: Path, source: str, *, openair: bool) -> str:
-    """Return the text of a file; an OpenAir file that is not UTF-8 is read as Latin-1."""
+    """Return the text of a file; decode an OpenAir file that is not UTF-8 as Latin-1."""
     try:
         _check_size(path, source)
         data = path.read_bytes()

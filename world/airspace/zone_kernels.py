@@ -57,8 +57,8 @@ def zone_records(zones: Sequence[Zone]) -> ZoneRecords:
     rings: list[Ring] = []
     for record, zone in zip(records, zones, strict=True):
         record.exclusion = zone.kind == "exclusion"
-        record.floor, record.floor_above_ground = _level(zone.floor, -math.inf)
-        record.ceiling, record.ceiling_above_ground = _level(zone.ceiling, math.inf)
+        record.floor, record.floor_above_ground = _level_record(zone.floor, -math.inf)
+        record.ceiling, record.ceiling_above_ground = _level_record(zone.ceiling, math.inf)
         record.first_edge = edge_count
         shape = zone.shape
         if isinstance(shape, Cylinder):
@@ -70,7 +70,7 @@ def zone_records(zones: Sequence[Zone]) -> ZoneRecords:
             rings += shape.rings
             edge_count += sum(map(len, shape.rings))
         record.last_edge = edge_count
-    edges = _edges(rings)
+    edges = _make_edges(rings)
     _set_boxes(records, edges)
     for array in (records, edges):
         array.setflags(write=False)
@@ -88,8 +88,8 @@ def _set_boxes(zones: Records, edges: Records) -> None:
             zones[max_name][polygons] = np.maximum.reduceat(edges[coordinate], starts)
 
 
-def _edges(rings: list[Ring]) -> Records:
-    """Return (e,) of `EDGE` from every corner of the rings to the next corner of its ring."""
+def _make_edges(rings: list[Ring]) -> Records:
+    """Make (e,) of `EDGE` from every corner of the rings to the next corner of its ring."""
     corners = np.array([corner for ring in rings for corner in ring], dtype=np.float64).reshape(-1, 2)
     next_corners = np.roll(corners, -1, axis=0)
     sizes = np.array([len(ring) for ring in rings], dtype=np.int64)
@@ -101,7 +101,7 @@ def _edges(rings: list[Ring]) -> Records:
     return edges
 
 
-def _level(level: ZoneLevel | None, absent: float) -> tuple[float, bool]:
+def _level_record(level: ZoneLevel | None, absent: float) -> tuple[float, bool]:
     return (absent, False) if level is None else (level.height, level.datum == "ground")
 
 
@@ -109,14 +109,14 @@ def _level(level: ZoneLevel | None, absent: float) -> tuple[float, bool]:
 def box_distance(records: ZoneRecords, z: int, west: float, east: float, south: float, north: float) -> float:
     """Return the horizontal distance between the box of zone z and another box, m; 0 if they meet."""
     zone = records.zones[z]
-    across = max(0.0, zone.west - east, west - zone.east)
-    along = max(0.0, zone.south - north, south - zone.north)
-    return math.sqrt(across * across + along * along)
+    east_gap = max(0.0, zone.west - east, west - zone.east)
+    north_gap = max(0.0, zone.south - north, south - zone.north)
+    return math.sqrt(east_gap * east_gap + north_gap * north_gap)
 
 
 @inlined
 def distance_to_edge(edge: Record, east: float, north: float) -> float:
-    """Return the horizontal distance from a place to one edge, m."""
+    """Return the horizontal distance from a position to one edge, m."""
     step_e, step_n = edge.to_east - edge.east, edge.to_north - edge.north
     east_offset, north_offset = east - edge.east, north - edge.north
     fraction = (east_offset * step_e + north_offset * step_n) / (step_e * step_e + step_n * step_n)
@@ -128,15 +128,15 @@ def distance_to_edge(edge: Record, east: float, north: float) -> float:
 
 @inner
 def nearest_edge(records: ZoneRecords, z: int, east: float, north: float) -> tuple[float, int]:
-    """Return the horizontal distance from a place to the outline of zone z, m, negative inside, and the nearest edge.
+    """Return the horizontal distance from a position to the outline of zone z, and the index of the nearest edge.
 
-    The edge number is -1 for a cylinder, which has no edges.
+    The distance is in m, and negative inside.  The index is -1 for a cylinder, which has no edges.
     """
     zone = records.zones[z]
     if zone.round:
         centre_distance = math.sqrt((east - zone.centre_east) ** 2 + (north - zone.centre_north) ** 2)
         return float(centre_distance - zone.radius), -1
-    min_distance2, nearest = math.inf, zone.first_edge
+    min_distance2, nearest_index = math.inf, zone.first_edge
     is_inside = False
     for k in range(zone.first_edge, zone.last_edge):
         edge = records.edges[k]
@@ -148,18 +148,18 @@ def nearest_edge(records: ZoneRecords, z: int, east: float, north: float) -> tup
         north_offset -= fraction * step_n
         distance2 = east_offset * east_offset + north_offset * north_offset
         if distance2 < min_distance2:
-            min_distance2, nearest = distance2, k
+            min_distance2, nearest_index = distance2, k
         # Ray casting to the east: an edge includes its lower end and excludes its upper end.
         if (edge.north > north) != (edge.to_north > north) and edge.east + step_e * (
             north - edge.north
         ) / step_n > east:
             is_inside = not is_inside
-    return (-math.sqrt(min_distance2) if is_inside else math.sqrt(min_distance2)), nearest
+    return (-math.sqrt(min_distance2) if is_inside else math.sqrt(min_distance2)), nearest_index
 
 
 @compiled
 def edge_distance(records: ZoneRecords, z: int, east: float, north: float) -> float:
-    """Return the horizontal distance from a place to the outline of zone z, m; negative inside its shape."""
+    """Return the horizontal distance from a position to the outline of zone z, m; negative inside its shape."""
     distance, _ = nearest_edge(records, z, east, north)
     return distance
 
@@ -168,22 +168,23 @@ def edge_distance(records: ZoneRecords, z: int, east: float, north: float) -> fl
 def outside_band(zone: Record, up: float, ground: float) -> float:
     """Return the height below a zone's floor or above its ceiling, m.
 
-    It is negative between them: minus the distance to the nearer one.
+    Between floor and ceiling it is negative: minus the distance to the nearer one.
+
     zone: a record of `ZONE`.  up: m above mean sea level.  ground: height of the ground there, NaN if not known; the
     result is then NaN for a zone with levels above ground.
     """
     floor: float = zone.floor + ground if zone.floor_above_ground else zone.floor
     ceiling: float = zone.ceiling + ground if zone.ceiling_above_ground else zone.ceiling
-    below, above = floor - up, up - ceiling
+    height_below, height_above = floor - up, up - ceiling
     # The comparison is written so that NaN is kept.
-    return below if below > above or below != below else above
+    return height_below if height_below > height_above or height_below != height_below else height_above
 
 
 @inner
 def inside_fraction(
     records: ZoneRecords, z: int, ax: float, ay: float, bx: float, by: float, begin_fraction: float, end_fraction: float
 ) -> float:
-    """Return the fraction of the segment a-b inside the shape of zone z, within a part of the segment.
+    """Return the fraction of the segment a-b that is inside the shape of zone z and in a part of the segment.
 
     begin_fraction, end_fraction: the part of the segment, 0 and 1 for all of it.  Exact: entries and exits alternate,
     so that the sum of the exit fractions minus the sum of the entry fractions, each clipped to the part, is the
@@ -194,34 +195,34 @@ def inside_fraction(
     dx, dy = bx - ax, by - ay
     if zone.round:
         east_offset, north_offset = ax - zone.centre_east, ay - zone.centre_north
-        run2, dot = dx * dx + dy * dy, dx * east_offset + dy * north_offset
+        run2, dot_product = dx * dx + dy * dy, dx * east_offset + dy * north_offset
         power = east_offset * east_offset + north_offset * north_offset - zone.radius * zone.radius
         if run2 == 0.0:
             return end_fraction - begin_fraction if power <= 0.0 else 0.0
-        discriminant = dot * dot - run2 * power
+        discriminant = dot_product * dot_product - run2 * power
         if discriminant <= 0.0:
             return 0.0
         half_fraction = math.sqrt(discriminant) / run2
-        entry = min(end_fraction, max(begin_fraction, -dot / run2 - half_fraction))
-        leave = min(end_fraction, max(begin_fraction, -dot / run2 + half_fraction))
-        return float(leave - entry)
+        entry_fraction = min(end_fraction, max(begin_fraction, -dot_product / run2 - half_fraction))
+        exit_fraction = min(end_fraction, max(begin_fraction, -dot_product / run2 + half_fraction))
+        return float(exit_fraction - entry_fraction)
     if dx == 0.0 and dy == 0.0:
         return end_fraction - begin_fraction if edge_distance(records, z, ax, ay) <= 0.0 else 0.0
-    inside = 0.0
+    fraction_inside = 0.0
     for k in range(zone.first_edge, zone.last_edge):
         edge = records.edges[k]
         # Signed distances of the two ends of the edge to the left of the segment's line, times the segment's length.
-        begin_side = dx * (edge.north - ay) - dy * (edge.east - ax)
+        start_side = dx * (edge.north - ay) - dy * (edge.east - ax)
         end_side = dx * (edge.to_north - ay) - dy * (edge.to_east - ax)
-        if (begin_side > 0.0) == (end_side > 0.0):
+        if (start_side > 0.0) == (end_side > 0.0):
             continue
         step_e, step_n = edge.to_east - edge.east, edge.to_north - edge.north
         # The inside is to the left of the edge: the segment enters where the edge crosses its line from left to right,
         # and leaves where the edge crosses from right to left.
         fraction = ((edge.east - ax) * step_n - (edge.north - ay) * step_e) / (dx * step_n - dy * step_e)
         fraction = min(end_fraction, max(begin_fraction, fraction))
-        inside += -fraction if begin_side > 0.0 else fraction
-    return max(0.0, inside)
+        fraction_inside += -fraction if start_side > 0.0 else fraction
+    return max(0.0, fraction_inside)
 
 
 @inlined
@@ -235,10 +236,10 @@ def _corner_distance2(edge: Record, ax: float, ay: float, dx: float, dy: float, 
 
 @inner
 def segment_distance(records: ZoneRecords, z: int, ax: float, ay: float, bx: float, by: float) -> tuple[float, float]:
-    """Return the smallest horizontal distance from the segment a-b to the shape of zone z, m, and its fraction of a-b.
+    """Return the smallest horizontal distance from the segment a-b to the shape of zone z, and its fraction of a-b.
 
-    The distance is 0 if the segment meets the shape, at a fraction inside it or on its outline; `edge_distance` gives
-    the depth.  Exact: two straight pieces that do not cross are nearest at an end of one of them.
+    The distance is in m, and 0 if the segment meets the shape, at a fraction inside it or on its outline;
+    `edge_distance` gives the depth.  Exact: two straight pieces that do not cross are nearest at an end of one of them.
     """
     zone = records.zones[z]
     dx, dy = bx - ax, by - ay
@@ -247,20 +248,20 @@ def segment_distance(records: ZoneRecords, z: int, ax: float, ay: float, bx: flo
         fraction = ((zone.centre_east - ax) * dx + (zone.centre_north - ay) * dy) / run2 if run2 > 0.0 else 0.0
         fraction = min(1.0, max(0.0, fraction))
         return max(0.0, edge_distance(records, z, ax + fraction * dx, ay + fraction * dy)), fraction
-    from_a, from_b = edge_distance(records, z, ax, ay), edge_distance(records, z, bx, by)
-    if from_a <= 0.0:
+    distance_at_a, distance_at_b = edge_distance(records, z, ax, ay), edge_distance(records, z, bx, by)
+    if distance_at_a <= 0.0:
         return 0.0, 0.0
-    if from_b <= 0.0:
+    if distance_at_b <= 0.0:
         return 0.0, 1.0
-    min_distance, min_fraction = (from_a, 0.0) if from_a <= from_b else (from_b, 1.0)
+    min_distance, min_fraction = (distance_at_a, 0.0) if distance_at_a <= distance_at_b else (distance_at_b, 1.0)
     for k in range(zone.first_edge, zone.last_edge):
         edge = records.edges[k]
         distance2, fraction = _corner_distance2(edge, ax, ay, dx, dy, run2)
         if distance2 < min_distance * min_distance:
             min_distance, min_fraction = math.sqrt(distance2), fraction
-        begin_side = dx * (edge.north - ay) - dy * (edge.east - ax)
+        start_side = dx * (edge.north - ay) - dy * (edge.east - ax)
         end_side = dx * (edge.to_north - ay) - dy * (edge.to_east - ax)
-        if (begin_side > 0.0) != (end_side > 0.0):
+        if (start_side > 0.0) != (end_side > 0.0):
             step_e, step_n = edge.to_east - edge.east, edge.to_north - edge.north
             fraction = ((edge.east - ax) * step_n - (edge.north - ay) * step_e) / (dx * step_n - dy * step_e)
             if 0.0 <= fraction <= 1.0:

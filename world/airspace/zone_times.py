@@ -1,7 +1,7 @@
 """Parse the periods in which a zone is active, and decide if it may be active during a flight.
 
 A period is one line of text, in universal time (UTC): ``START/END``, then days of the week and hours of the day if it
-is not active throughout.  ``..`` is an unknown end, and BY NOTAM a zone that a notice activates.
+is not active throughout.  ``..`` is an unknown start or end, and BY NOTAM means a zone that a notice activates.
 
     2026-05-01T00:00Z/2026-10-01T00:00Z
     2026-05-01T00:00Z/.. SAT,SUN 07:00/20:00
@@ -118,48 +118,48 @@ def _parse_part(text: str) -> datetime:
 
 
 def parse_span(text: str) -> tuple[datetime, datetime]:
-    """Parse the time span of a flight, ``START`` or ``START/END`` with UTC offsets, to its begin and finish.
+    """Parse the time span of a flight, ``START`` or ``START/END`` with UTC offsets; return its start and end.
 
     A span without an end lasts `DEFAULT_SPAN`.  Raises ValueError for any other text, for an end before the start, and
     for more than `LONGEST_SPAN`.
 
-    >>> [f"{one:%H:%M}" for one in parse_span("2026-05-01T10:00+02:00")]
+    >>> [f"{time:%H:%M}" for time in parse_span("2026-05-01T10:00+02:00")]
     ['08:00', '09:00']
     """
-    start, slash, end = text.partition("/")
-    begin = _parse_part(start) if slash else parse_time(start)
-    finish = _parse_part(end) if slash else begin + DEFAULT_SPAN
-    if not begin <= finish <= begin + LONGEST_SPAN:
+    start_text, separator, end_text = text.partition("/")
+    start_time = _parse_part(start_text) if separator else parse_time(start_text)
+    end_time = _parse_part(end_text) if separator else start_time + DEFAULT_SPAN
+    if not start_time <= end_time <= start_time + LONGEST_SPAN:
         raise ValueError(f"allowed an end from the start on, at most {LONGEST_SPAN.days} days later")
-    return begin, finish
+    return start_time, end_time
 
 
-def is_active(times: Sequence[str], begin: datetime, finish: datetime) -> bool:
-    """Return True if a zone may be active at any time from `begin` to `finish`, both included.
+def is_active(times: Sequence[str], start: datetime, end: datetime) -> bool:
+    """Return True if a zone may be active at any time from `start` to `end`, both included.
 
     times: periods as `parse_period` reads them; without any, or with BY NOTAM, a zone is always active.
 
-    >>> begin, finish = parse_span("2026-05-02T06:30Z")  # a Saturday
-    >>> is_active(["../.. SAT 07:00/20:00"], begin, finish), is_active(["../.. SUN"], begin, finish)
+    >>> start, end = parse_span("2026-05-02T06:30Z")  # a Saturday
+    >>> is_active(["../.. SAT 07:00/20:00"], start, end), is_active(["../.. SUN"], start, end)
     (True, False)
     """
     periods = [parse_period(text) for text in times]
-    return not periods or any(period is None or _overlaps(period, begin, finish) for period in periods)
+    return not periods or any(period is None or _may_overlap(period, start, end) for period in periods)
 
 
-def _overlaps(period: Period, begin: datetime, finish: datetime) -> bool:
-    begin = begin if period.start is None else max(begin, period.start)
-    finish = finish if period.end is None else min(finish, period.end)
-    if begin > finish:
+def _may_overlap(period: Period, start: datetime, end: datetime) -> bool:
+    start = start if period.start is None else max(start, period.start)
+    end = end if period.end is None else min(end, period.end)
+    if start > end:
         return False
     first_minute, last_minute = (
         (0, 24 * 60) if period.first is None or period.last is None else (period.first, period.last)
     )
     last_minute += 24 * 60 if last_minute <= first_minute else 0
     # Start two days earlier, because evening hours may continue past midnight.
-    day = datetime.combine(begin.date(), time(), UTC) - 2 * _DAY
-    while day <= finish:
-        is_within = day + timedelta(minutes=first_minute) <= finish and day + timedelta(minutes=last_minute) >= begin
+    day = datetime.combine(start.date(), time(), UTC) - 2 * _DAY
+    while day <= end:
+        is_within = day + timedelta(minutes=first_minute) <= end and day + timedelta(minutes=last_minute) >= start
         if is_within and (not period.days or day.weekday() in period.days):
             return True
         day += _DAY

@@ -76,15 +76,15 @@ class Zone:
 
     @property
     def above_ground(self) -> bool:
-        """True if the floor or the ceiling is a height above ground."""
+        """Whether the floor or the ceiling is a height above ground."""
         return any(level is not None and level.datum == "ground" for level in (self.floor, self.ceiling))
 
 
 def make_polygon(rings: Sequence[Sequence[tuple[float, float]]]) -> Polygon:
     """Make a polygon from its outlines and holes, in any order and direction, with corners (east, north) m.
 
-    A place is inside if an odd number of rings contain it.  A corner that repeats the previous corner, or closes a
-    ring, is left out.  Raises ValueError for a ring of fewer than three corners, for a ring that crosses itself, for
+    A point is inside if an odd number of rings contain it.  A corner that repeats the previous corner, or closes a
+    ring, is omitted.  Raises ValueError for a ring of fewer than three corners, for a ring that crosses itself, for
     rings that cross each other, for a polygon of no area, and for too many corners or edges (`check_edges`).
 
     >>> make_polygon([[(0.0, 0.0), (0.0, 90.0), (90.0, 90.0), (90.0, 0.0), (0.0, 0.0)]]).rings
@@ -92,23 +92,23 @@ def make_polygon(rings: Sequence[Sequence[tuple[float, float]]]) -> Polygon:
     """
     if not rings:
         raise ValueError("no corners: at least three are needed")
-    cleaned = [_clean_ring(ring) for ring in rings]
-    check_edges(cleaned)
-    shapes = [shapely.Polygon(ring) for ring in cleaned]
+    clean_rings = [_clean_ring(ring) for ring in rings]
+    check_edges(clean_rings)
+    shapes = [shapely.Polygon(ring) for ring in clean_rings]
     for shape in shapes:
         if not shape.is_valid:
             raise ValueError(f"crosses or touches itself ({shapely.is_valid_reason(shape)})")
     if len(shapes) == 1:
         _check_area(shapes[0].area)
-        return Polygon((cleaned[0] if shapes[0].exterior.is_ccw else cleaned[0][::-1],))
+        return Polygon((clean_rings[0] if shapes[0].exterior.is_ccw else clean_rings[0][::-1],))
     tree = shapely.STRtree(shapes)
     for first, second in tree.query(shapes, predicate="intersects").T:
-        if first < second and _rings_cross(shapes[first], shapes[second]):
+        if first < second and _do_rings_cross(shapes[first], shapes[second]):
             raise ValueError("its rings cross each other, or share an edge")
     # Minus 1, as a ring is within itself.
     depths = [len(tree.query(shape, predicate="within")) - 1 for shape in shapes]
     _check_area(sum(shape.area * (1 if depth % 2 == 0 else -1) for shape, depth in zip(shapes, depths, strict=True)))
-    return Polygon(tuple(_orient_ring(ring, depth) for ring, depth in zip(cleaned, depths, strict=True)))
+    return Polygon(tuple(_orient_ring(ring, depth) for ring, depth in zip(clean_rings, depths, strict=True)))
 
 
 def _check_area(area: float) -> None:
@@ -116,8 +116,8 @@ def _check_area(area: float) -> None:
         raise ValueError(f"nothing inside: {area:.3g} m2; at least {MIN_AREA:g} m2 are needed")
 
 
-def _rings_cross(first: shapely.Polygon, second: shapely.Polygon) -> bool:
-    """Return True if two rings cross or share a stretch of an edge; touching at a corner is allowed."""
+def _do_rings_cross(first: shapely.Polygon, second: shapely.Polygon) -> bool:
+    """Return True if two rings cross or share a part of an edge; touching at a corner is allowed."""
     return bool(first.overlaps(second)) or float(first.exterior.intersection(second.exterior).length) > 0.0
 
 
@@ -189,8 +189,7 @@ def repair_rings(
 ) -> tuple[list[list[list[float]]], int] | None:
     """Repair rings that cross; return the rings of the enclosed area and the number of edge crossings.
 
-    The rings are empty for an outline of no area.
-
+    Returns no rings for an outline that encloses no area.
     rings: rings of [latitude, longitude], the outline first.  A ring that is not inside another one is a part of the
     area, not a hole; a ring of fewer than three different corners is dropped.  The area grows by `REPAIR_MARGIN_DEG` on
     all sides.  Returns None if there is nothing to repair.  Raises ValueError for more crossings than
@@ -227,7 +226,7 @@ def repair_rings(
 
 
 def _enclosed_area(rings: Sequence[shapely.Polygon]) -> shapely.Geometry:
-    """Return the area of rings, each repaired separately.
+    """Return the area that rings enclose, each repaired separately.
 
     A ring inside an odd number of others is a hole in them.
     A ring inside another one may extend beyond it by `REPAIR_MARGIN_DEG`; of two identical rings neither is inside the
@@ -256,15 +255,17 @@ def _enclosed_area(rings: Sequence[shapely.Polygon]) -> shapely.Geometry:
     return shapely.union_all(parts)
 
 
-def holes_lie_inside(rings: Sequence[Sequence[tuple[float, float]]]) -> bool:
-    """Return True if all rings but the first are within the first, or if a ring is invalid (see `make_polygon`).
+def are_holes_inside(rings: Sequence[Sequence[tuple[float, float]]]) -> bool:
+    """Return True if all holes are within the outline, or if a ring is invalid (see `make_polygon`).
+
+    rings: the outline first, then its holes.
 
     Raises ValueError for too many corners or edges (`check_edges`).
 
     >>> square = [(0.0, 0.0), (9.0, 0.0), (9.0, 9.0), (0.0, 9.0)]
-    >>> holes_lie_inside([square, [(1.0, 1.0), (2.0, 1.0), (2.0, 2.0)]])
+    >>> are_holes_inside([square, [(1.0, 1.0), (2.0, 1.0), (2.0, 2.0)]])
     True
-    >>> holes_lie_inside([square, [(11.0, 1.0), (12.0, 1.0), (12.0, 2.0)]])
+    >>> are_holes_inside([square, [(11.0, 1.0), (12.0, 1.0), (12.0, 2.0)]])
     False
     """
     if any(len(ring) < 3 for ring in rings):

@@ -1,4 +1,4 @@
-"""Place the zones of a scenario on its map, check start and destination against them, and make outlines to draw."""
+"""Convert the zones of a scenario file to its map, check start and destination, and make outlines to draw."""
 
 import math
 from collections.abc import Sequence
@@ -47,11 +47,13 @@ def ring_on_map(origin: GeoOrigin, corners: Sequence[Sequence[float]]) -> list[t
     midpoints = to_map(origin, lat + 0.5 * step_lat, lon + 0.5 * step_lon)
     bends = np.hypot(midpoints[0] - 0.5 * (east + np.roll(east, -1)), midpoints[1] - 0.5 * (north + np.roll(north, -1)))
     # The bend of a piece is proportional to the square of its length.
-    pieces = np.clip(np.ceil(np.sqrt(bends / EDGE_BEND)), 1, _MAX_PIECES).astype(int)
-    if pieces.sum() > MAX_CORNERS:
-        raise ValueError(f"edges too long: {pieces.sum():,} corners on the map; at most {MAX_CORNERS:,} are allowed")
+    piece_counts = np.clip(np.ceil(np.sqrt(bends / EDGE_BEND)), 1, _MAX_PIECES).astype(int)
+    if piece_counts.sum() > MAX_CORNERS:
+        raise ValueError(
+            f"edges too long: {piece_counts.sum():,} corners on the map; at most {MAX_CORNERS:,} are allowed"
+        )
     lats, lons = [], []
-    for k, count in enumerate(pieces.tolist()):
+    for k, count in enumerate(piece_counts.tolist()):
         fractions = np.arange(count) / count
         lats.append(lat[k] + fractions * step_lat[k])
         lons.append(lon[k] + fractions * step_lon[k])
@@ -60,7 +62,7 @@ def ring_on_map(origin: GeoOrigin, corners: Sequence[Sequence[float]]) -> list[t
 
 
 def add_corners(count: int, shape: Polygon | Cylinder) -> int:
-    """Return a number of corners increased by the corners of a shape; raise ValueError above `MAX_MAP_CORNERS`.
+    """Add the corners of a shape to a count and return it; raise ValueError above `MAX_MAP_CORNERS`.
 
     >>> add_corners(4, make_polygon([[(0.0, 0.0), (90.0, 0.0), (90.0, 90.0)]])), add_corners(4, Cylinder(0.0, 0.0, 9.0))
     (7, 4)
@@ -72,7 +74,7 @@ def add_corners(count: int, shape: Polygon | Cylinder) -> int:
 
 
 def make_zones(tables: Sequence[ZoneTable], source: str, origin: GeoOrigin, ground: Terrain | None) -> tuple[Zone, ...]:
-    """Place the zones of a scenario file on its map.
+    """Convert the zones of a scenario file to zones on its map.
 
     source: name of the file in messages.  Raises ScenarioError for an invalid shape, and for a level above ground
     without terrain.
@@ -85,8 +87,8 @@ def make_zones(tables: Sequence[ZoneTable], source: str, origin: GeoOrigin, grou
             corners = add_corners(corners, shape)
         except ValueError as error:
             raise ScenarioError(f"{label}: {error}", file=source, field=f"zones[{k}]") from error
-        floor = _level(table.floor_amsl_m, table.floor_agl_m)
-        ceiling = _level(table.ceiling_amsl_m, table.ceiling_agl_m)
+        floor = _make_level(table.floor_amsl_m, table.floor_agl_m)
+        ceiling = _make_level(table.ceiling_amsl_m, table.ceiling_agl_m)
         zone = Zone(table.name, table.kind, shape, floor, ceiling)
         if zone.above_ground and ground is None:
             key = "floor_agl_m" if table.floor_agl_m is not None else "ceiling_agl_m"
@@ -96,21 +98,21 @@ def make_zones(tables: Sequence[ZoneTable], source: str, origin: GeoOrigin, grou
     return tuple(zones)
 
 
-# Distance from the area beyond which zones are left out, m; a flight within its area comes nowhere near them.
+# Distance from the area beyond which zones are omitted, m; a flight within the area does not come near them.
 MAX_ZONE_DISTANCE = 20_000.0
 # Length of a degree of latitude, m.
 _DEGREE_LENGTH_M = 111_000.0
 
 
-def near_zones(tables: Sequence[ZoneTable], source: str, origin: GeoOrigin, bounds: Floats) -> list[ZoneTable]:
-    """Return zones of a file that a flight may meet: inclusions, and exclusions within `MAX_ZONE_DISTANCE` of the area.
+def select_near_zones(tables: Sequence[ZoneTable], source: str, origin: GeoOrigin, bounds: Floats) -> list[ZoneTable]:
+    """Return the inclusions of a file, and its exclusions within `MAX_ZONE_DISTANCE` of the area.
 
     source: name of the file in messages.  bounds: (2, 2) m, west and east, south and north of the area.
     Raises ScenarioError for an invalid shape among the omitted zones; `make_zones` checks the others.
     """
     zones_nearby = []
     for k, table in enumerate(tables):
-        if table.kind == "inclusion" or _is_near(table, origin, bounds):
+        if table.kind == "inclusion" or _is_near_area(table, origin, bounds):
             zones_nearby.append(table)
             continue
         try:
@@ -133,16 +135,16 @@ def _check_rings(table: ZoneTable) -> None:
         )
 
 
-def _is_near(table: ZoneTable, origin: GeoOrigin, bounds: Floats) -> bool:
-    reach, corners = MAX_ZONE_DISTANCE, table.rings_deg if table.polygon_deg is None else [table.polygon_deg]
+def _is_near_area(table: ZoneTable, origin: GeoOrigin, bounds: Floats) -> bool:
+    max_distance, corners = MAX_ZONE_DISTANCE, table.rings_deg if table.polygon_deg is None else [table.polygon_deg]
     if table.lat_deg is not None and table.lon_deg is not None:
-        reach, corners = MAX_ZONE_DISTANCE + (table.radius_m or 0.0), [[[table.lat_deg, table.lon_deg]]]
+        max_distance, corners = MAX_ZONE_DISTANCE + (table.radius_m or 0.0), [[[table.lat_deg, table.lon_deg]]]
     positions = np.array([corner for ring in corners or [] for corner in ring], dtype=np.float64)
     if not len(positions):
         return True
     spans = zip(to_map(origin, positions[:, 0], positions[:, 1]), bounds, strict=True)
     return all(
-        coordinates.min() <= max_coordinate + reach and coordinates.max() >= min_coordinate - reach
+        coordinates.min() <= max_coordinate + max_distance and coordinates.max() >= min_coordinate - max_distance
         for coordinates, (min_coordinate, max_coordinate) in spans
     )
 
@@ -151,30 +153,30 @@ def _make_shape(table: ZoneTable, origin: GeoOrigin) -> Polygon | Cylinder:
     if table.radius_m is not None:
         east, north = table.east_m, table.north_m
         if east is None or north is None:
-            place = to_map(origin, float(table.lat_deg or 0.0), float(table.lon_deg or 0.0))
-            east, north = float(place[0]), float(place[1])
+            center = to_map(origin, float(table.lat_deg or 0.0), float(table.lon_deg or 0.0))
+            east, north = float(center[0]), float(center[1])
         return make_cylinder(east, north, table.radius_m)
-    metres = table.rings_m if table.polygon_m is None else [table.polygon_m]
-    if metres is not None:
-        return make_polygon([[(east, north) for east, north in ring] for ring in metres])
-    degrees = (table.rings_deg or []) if table.polygon_deg is None else [table.polygon_deg]
-    return make_polygon([ring_on_map(origin, ring) for ring in degrees])
+    rings_on_map = table.rings_m if table.polygon_m is None else [table.polygon_m]
+    if rings_on_map is not None:
+        return make_polygon([[(east, north) for east, north in ring] for ring in rings_on_map])
+    rings_in_degrees = (table.rings_deg or []) if table.polygon_deg is None else [table.polygon_deg]
+    return make_polygon([ring_on_map(origin, ring) for ring in rings_in_degrees])
 
 
-def _level(amsl: float | None, above_ground: float | None) -> ZoneLevel | None:
+def _make_level(amsl: float | None, above_ground: float | None) -> ZoneLevel | None:
     if amsl is not None:
         return ZoneLevel(amsl, "amsl")
     return None if above_ground is None else ZoneLevel(above_ground, "ground")
 
 
 def check_ends(zones: Sequence[Zone], source: str, ends: Sequence[tuple[str, Floats]], ground: Terrain | None) -> None:
-    """Raise ScenarioError for an end inside an exclusion, or outside an inclusion.
+    """Raise ScenarioError for a start or destination inside an exclusion or outside an inclusion.
 
     ends: key in the file and position (3,) m of each end.
     """
     records = zone_records(zones)
     for key, point in ends:
-        zone = _first_violated(zones, records, point, ground)
+        zone = _first_violated_by_records(zones, records, point, ground)
         if zone is not None:
             side = "inside the exclusion" if zone.kind == "exclusion" else "outside the inclusion"
             raise ScenarioError.at(source, "zones", zone.name, f"{key} lies {side}")
@@ -183,17 +185,19 @@ def check_ends(zones: Sequence[Zone], source: str, ends: Sequence[tuple[str, Flo
 def first_violated_zone(zones: Sequence[Zone], point: Floats, ground: Terrain | None) -> Zone | None:
     """Return the first zone that a position (3,) m violates, or None.
 
-    Unknown ground is treated as within the band.
+    If the ground height is not known, the position counts as between a floor and ceiling above ground.
 
     >>> from world.airspace.zones import Cylinder
     >>> mast = Zone("mast", "exclusion", Cylinder(0.0, 0.0, 200.0), ceiling=ZoneLevel(300.0, "amsl"))
     >>> [first_violated_zone([mast], np.array([0.0, 0.0, up]), None) is mast for up in (290.0, 310.0)]
     [True, False]
     """
-    return _first_violated(zones, zone_records(zones), point, ground)
+    return _first_violated_by_records(zones, zone_records(zones), point, ground)
 
 
-def _first_violated(zones: Sequence[Zone], records: ZoneRecords, point: Floats, ground: Terrain | None) -> Zone | None:
+def _first_violated_by_records(
+    zones: Sequence[Zone], records: ZoneRecords, point: Floats, ground: Terrain | None
+) -> Zone | None:
     east, north, up = (float(value) for value in point)
     ground_height = math.nan if ground is None else float(ground.height(east, north))
     for k, zone in enumerate(zones):
@@ -244,8 +248,8 @@ def zone_parts(zone: Zone) -> list[tuple[Floats, ...]]:
     parts: list[list[Floats]] = [[ring] for ring in outlines]
     for ring, is_ring_hole in rings:
         if is_ring_hole:
-            outer = (k for k in range(len(outlines)) if edge_distance(shapes, k, *ring[0]) <= 0.0)
-            parts[next(outer)].append(ring)
+            enclosing_outlines = (k for k in range(len(outlines)) if edge_distance(shapes, k, *ring[0]) <= 0.0)
+            parts[next(enclosing_outlines)].append(ring)
     return [tuple(part) for part in parts]
 
 

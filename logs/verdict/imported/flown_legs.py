@@ -1,4 +1,4 @@
-"""Find the legs of a route that each stretch of a flight flew; an imported log may hold only some."""
+"""Find the legs of a route that were flown in each stretch of an imported log, which may contain only some."""
 
 from dataclasses import dataclass, replace
 
@@ -42,11 +42,11 @@ class FlownLegs:
 
 
 def flown_legs(setup: FlightSetup, track: Track, stretch: MissionStretch) -> FlownLegs | None:
-    """Find the legs that a stretch flew, or return None if it flew none.
+    """Find the legs flown in a stretch; return None if there are none.
 
-    A stretch has no legs if it reached at most one waypoint, or has fewer than two rows.  A flight begins at the first
-    waypoint that it passed, because the path to that waypoint is not a leg.  It ends at the last waypoint that it
-    passed, or on the next leg, which was then flown in part.
+    A stretch has no legs if it reached at most one waypoint, or has fewer than two rows.  Its legs begin at the first
+    waypoint that was passed, because the path to that waypoint is not a leg.  They end at the last waypoint that was
+    passed, or with the next leg, which was then flown in part.
 
     >>> from logs.recording.example_log import example_log
     >>> log = example_log()
@@ -54,16 +54,16 @@ def flown_legs(setup: FlightSetup, track: Track, stretch: MissionStretch) -> Flo
     >>> found.first, found.last, found.partial
     (0, 2, True)
     """
-    rows = between(track, stretch.start, stretch.end)
+    rows = rows_between(track, stretch.start, stretch.end)
     whole_requirements = route_requirements(setup)
     aligned = align_track(whole_requirements, rows)
     if aligned is None:
         return None
-    met_waypoint_indices = met_waypoints(whole_requirements, aligned)
-    if not met_waypoint_indices.size:
+    waypoint_indices = identified_waypoints(whole_requirements, aligned)
+    if not waypoint_indices.size:
         return None
-    aligned, met_waypoint_indices = _earliest_lap(setup, rows, aligned, met_waypoint_indices)
-    first, last = int(met_waypoint_indices[0]), int(met_waypoint_indices[-1])
+    aligned, waypoint_indices = _earliest_lap(setup, rows, aligned, waypoint_indices)
+    first, last = int(waypoint_indices[0]), int(waypoint_indices[-1])
     route_end = len(setup.route.waypoints) - 1
     time_after_last = float(aligned.track.time[-1] - aligned.track.time[aligned.rows[last]])
     is_partial = last < route_end and time_after_last > PARTIAL_LEG_MIN_S
@@ -72,9 +72,9 @@ def flown_legs(setup: FlightSetup, track: Track, stretch: MissionStretch) -> Flo
         return None
     # Rows before the first waypoint, and rows after the route's end, belong to no leg.
     end_row = None if is_partial or last < route_end else int(aligned.rows[last]) + 2
-    flown = aligned.track.rows(int(aligned.rows[first]), end_row if end_row is not None else len(aligned.track))
+    leg_track = aligned.track.rows(int(aligned.rows[first]), end_row if end_row is not None else len(aligned.track))
     part_requirements = route_requirements(replace(setup, route=part_of_route(setup.route, first, end)))
-    part_aligned = align_track(part_requirements, flown)
+    part_aligned = align_track(part_requirements, leg_track)
     if part_aligned is None:
         return None
     # A log or a stretch that ends a few metres before the waypoint does not show that it was passed.
@@ -99,41 +99,41 @@ def stretch_end_text(stretch: MissionStretch) -> str:
 
 
 def _earliest_lap(
-    setup: FlightSetup, rows: Track, aligned: AlignedTrack, met_indices: NDArray[np.intp]
+    setup: FlightSetup, rows: Track, aligned: AlignedTrack, waypoint_indices: NDArray[np.intp]
 ) -> tuple[AlignedTrack, NDArray[np.intp]]:
     """Align a track with only the first laps of a route that repeats its items, if these laps explain the flight.
 
     A flight that ended within a lap was equally near to the waypoints of any later lap.
     """
-    items, last = setup.route.items, int(met_indices[-1])
-    if len(met_indices) == last - met_indices[0] + 1:
-        return aligned, met_indices
+    items, last = setup.route.items, int(waypoint_indices[-1])
+    if len(waypoint_indices) == last - waypoint_indices[0] + 1:
+        return aligned, waypoint_indices
     for end in np.flatnonzero(items[:last] == items[last]).tolist():
         if end < 1:
             continue
         requirements = route_requirements(replace(setup, route=part_of_route(setup.route, 0, end)))
         lap_aligned = align_track(requirements, rows)
-        lap_met = met_indices if lap_aligned is None else met_waypoints(requirements, lap_aligned)
+        lap_indices = waypoint_indices if lap_aligned is None else identified_waypoints(requirements, lap_aligned)
         # Include each item once: a place that was passed once is near its waypoints in all laps.
-        if lap_aligned is not None and len(np.unique(items[lap_met])) >= len(np.unique(items[met_indices])):
-            return lap_aligned, lap_met
-    return aligned, met_indices
+        if lap_aligned is not None and len(np.unique(items[lap_indices])) >= len(np.unique(items[waypoint_indices])):
+            return lap_aligned, lap_indices
+    return aligned, waypoint_indices
 
 
-def between(track: Track, start: float, end: float) -> Track:
+def rows_between(track: Track, start: float, end: float) -> Track:
     """Return the rows of a track between two times, s."""
     first_row, end_row = np.searchsorted(track.time, [start, end + 1e-6])
     return track.rows(int(first_row), int(end_row))
 
 
-def met_waypoints(requirements: RouteRequirements, aligned: AlignedTrack) -> NDArray[np.intp]:
-    """Return the waypoints that the track passes closely enough to identify, in order.
+def identified_waypoints(requirements: RouteRequirements, aligned: AlignedTrack) -> NDArray[np.intp]:
+    """Return the waypoints that the track passes closely enough to identify them, in order.
 
     Waypoints at the very start or end of the track are not included.
     """
     edge_distance = np.maximum(requirements.fly_by_offset + FINAL_WAYPOINT_TOLERANCE_M, requirements.setup.corridor)
     is_inner = (aligned.rows > 0) & (aligned.rows < len(aligned.track) - 1)
-    is_near = np.where(is_inner, aligned.distance < CAPTURE_RADIUS_M, aligned.distance <= edge_distance)
+    is_near = np.where(is_inner, aligned.apex_distance < CAPTURE_RADIUS_M, aligned.apex_distance <= edge_distance)
     return np.flatnonzero(is_near)
 
 
@@ -161,13 +161,13 @@ class PlanMismatch:
     def text(self) -> str:
         """Text of the reason."""
         if self.kind == "place":
-            far = f"{self.distance / 1000.0:.1f} km" if self.distance >= 1000.0 else f"{self.distance:.0f} m"
-            return f"the mission lies elsewhere: the flight never comes within {far} of its waypoints"
+            distance_text = f"{self.distance / 1000.0:.1f} km" if self.distance >= 1000.0 else f"{self.distance:.0f} m"
+            return f"the mission lies elsewhere: the flight never comes within {distance_text} of its waypoints"
         return f"the order differs: the flight passed the items as {', '.join(map(str, self.order))}, ..."
 
 
 def plan_mismatch(setup: FlightSetup, track: Track) -> PlanMismatch | None:
-    """Return why the mission stretches of a flight did not follow the setup's mission, or None if they did.
+    """Find the reason why a flight did not follow the setup's mission; None if its mission stretches followed it.
 
     >>> from dataclasses import replace
     >>> from flight.simulation.setup import ImportedLog, MissionStretch
@@ -181,21 +181,21 @@ def plan_mismatch(setup: FlightSetup, track: Track) -> PlanMismatch | None:
     """
     source = setup.source
     stretches = () if source is None else source.stretches
-    flown = [between(track, stretch.start, stretch.end) for stretch in stretches]
-    flown = [rows for rows in flown if len(rows) > 1]
+    stretch_tracks = [rows_between(track, stretch.start, stretch.end) for stretch in stretches]
+    stretch_tracks = [rows for rows in stretch_tracks if len(rows) > 1]
     points = setup.route.waypoints
-    if not flown:
+    if not stretch_tracks:
         return None
-    nearest, times = _closest_distances(points, flown)
-    if nearest.min() > PLAN_MISMATCH_DISTANCE_M:
-        return PlanMismatch("place", distance=float(nearest.min()))
+    min_distances, times = _closest_distances(points, stretch_tracks)
+    if min_distances.min() > PLAN_MISMATCH_DISTANCE_M:
+        return PlanMismatch("place", distance=float(min_distances.min()))
     near_distance = min(MAX_NEAR_WAYPOINT_M, max(MIN_NEAR_WAYPOINT_M, setup.corridor))
-    is_passed = nearest <= near_distance
+    is_passed = min_distances <= near_distance
     if is_passed.sum() < 3:
         return None
     requirements = route_requirements(setup)
     is_in_order = np.zeros(len(points), bool)
-    for rows in flown:
+    for rows in stretch_tracks:
         aligned = align_track(requirements, rows)
         if aligned is not None:
             previous_rows = np.maximum(0, aligned.rows - 1)
@@ -209,13 +209,13 @@ def plan_mismatch(setup: FlightSetup, track: Track) -> PlanMismatch | None:
     return PlanMismatch("order", order=tuple(int(setup.route.items[k]) for k in order[:_MAX_NAMED]))
 
 
-def _closest_distances(points: Floats, flown: list[Track]) -> tuple[Floats, Floats]:
+def _closest_distances(points: Floats, tracks: list[Track]) -> tuple[Floats, Floats]:
     """Return each waypoint's minimum horizontal distance from the flight, m, (w,), and its time, s, (w,)."""
-    nearest, times = np.full(len(points), np.inf), np.zeros(len(points))
-    for rows in flown:
+    min_distances, times = np.full(len(points), np.inf), np.zeros(len(points))
+    for rows in tracks:
         for k, point in enumerate(points):
             distance, _ = approaches(rows.position, point)
             row = int(np.argmin(distance))
-            if distance[row] < nearest[k]:
-                nearest[k], times[k] = float(distance[row]), float(rows.time[row])
-    return nearest, times
+            if distance[row] < min_distances[k]:
+                min_distances[k], times[k] = float(distance[row]), float(rows.time[row])
+    return min_distances, times

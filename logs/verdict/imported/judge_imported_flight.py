@@ -50,7 +50,7 @@ def imported_lines(
     findings: Sequence[Finding],
     setup: FlightSetup,
     own_answer: LevelAnswer,
-    flown: Sequence[FlownLegs],
+    flown_stretches: Sequence[FlownLegs],
     conditions: Conditions,
 ) -> tuple[str, ...]:
     """Return the lines of the summary, the headline first."""
@@ -58,8 +58,10 @@ def imported_lines(
     if source is None:
         return (own_answer.headline,)
     lines = [own_answer.headline, *condition_lines(conditions)]
-    lines.append(f"{autopilot_line(conditions, flown=True)} ({source.format} {source.file}{_start_time_text(source)})")
-    lines += [*_judged_lines(source, flown, setup.route.leg_numbers.tolist()), *_unjudged_lines(findings)]
+    lines.append(
+        f"{autopilot_line(conditions, is_flown=True)} ({source.format} {source.file}{_start_time_text(source)})"
+    )
+    lines += [*_judged_lines(source, flown_stretches, setup.route.leg_numbers.tolist()), *_unjudged_lines(findings)]
     lines += [line] if (line := corridor_line(setup)) else []
     if source.mission:
         lines.append(f"Mission: {source.mission}")
@@ -76,14 +78,14 @@ def imported_lines(
     return tuple(lines)
 
 
-def _judged_lines(source: ImportedLog, flown: Sequence[FlownLegs], numbers: Sequence[int]) -> list[str]:
-    """Return a line for each stretch that is judged, with its time and the numbers of its legs.
+def _judged_lines(source: ImportedLog, flown_stretches: Sequence[FlownLegs], leg_numbers: Sequence[int]) -> list[str]:
+    """Return a line for each stretch, with its time and the numbers of its judged legs.
 
-    numbers: number of each leg of the route, as in `flight.mission.route.Route.leg_numbers`.
+    leg_numbers: number of each leg of the route, as in `flight.mission.route.Route.leg_numbers`.
     """
     if not source.stretches:
         return ["Judged: nothing, as no stretch of the flight followed the mission"]
-    by_start = {legs.stretch.start: legs for legs in flown}
+    by_start = {legs.stretch.start: legs for legs in flown_stretches}
     lines = []
     for stretch in source.stretches:
         name = stretch.mode or "the flight (the log knows no modes)"
@@ -92,23 +94,23 @@ def _judged_lines(source: ImportedLog, flown: Sequence[FlownLegs], numbers: Sequ
         if legs is None:
             lines.append(f"Judged: nothing of {times}: it passed no two waypoints in order")
             continue
-        first, last = numbers[legs.first], numbers[legs.last - 1]
-        part = f", leg {last} in part" if legs.partial else ""
-        begins = float(legs.aligned.track.time[0])
-        lines.append(f"Judged: {times}, legs {first} to {last}{part}, from {begins:.1f} s on")
+        first, last = leg_numbers[legs.first], leg_numbers[legs.last - 1]
+        partial_text = f", leg {last} in part" if legs.partial else ""
+        start_time = float(legs.aligned.track.time[0])
+        lines.append(f"Judged: {times}, legs {first} to {last}{partial_text}, from {start_time:.1f} s on")
     return lines
 
 
 def _unjudged_lines(findings: Sequence[Finding]) -> list[str]:
-    """Return a line for each rule that was not judged, with the reason and, if partial, the numbers."""
+    """Return a line for each rule with unjudged findings: the reason, and their number if others were judged."""
     lines = []
     for rule in RULE_WORDS.values():
         rule_findings = [finding for finding in findings if finding.rule == rule.name]
         unjudged = [finding for finding in rule_findings if finding.ok is None]
         if not unjudged:
             continue
-        where = "" if len(unjudged) == len(rule_findings) else f" on {len(unjudged)} of {len(rule_findings)}"
-        lines.append(f"Not judged: {rule.title}{where} ({unjudged[0].brief})")
+        count_text = "" if len(unjudged) == len(rule_findings) else f" on {len(unjudged)} of {len(rule_findings)}"
+        lines.append(f"Not judged: {rule.title}{count_text} ({unjudged[0].brief})")
     return lines
 
 
@@ -152,7 +154,7 @@ _MAX_RUNS = 6
 
 
 def missing_text(missing: MissingItems) -> str:
-    """Describe which part of a mission is not judged, and which of its items the log lacks.
+    """Describe the unjudged part of a mission, and the items that the log lacks.
 
     >>> missing_text(MissingItems(tuple(range(7, 14)), total=14, first=1, last=6, end=13))
     'not judged beyond item 6: items 7 to 13 of 14 are not in the log or left out'
@@ -167,20 +169,22 @@ def missing_text(missing: MissingItems) -> str:
             runs[-1] = [runs[-1][0], number]
         else:
             runs.append([number])
-    run_texts = [" to ".join(map(str, run)) for run in runs[:_MAX_RUNS]]
+    run_texts = [" to ".join(map(str, number_run)) for number_run in runs[:_MAX_RUNS]]
     if len(runs) > _MAX_RUNS:
-        run_texts.append(f"{len(missing.numbers) - sum(run[-1] - run[0] + 1 for run in runs[:_MAX_RUNS])} more")
-    listed = " and ".join(filter(None, [", ".join(run_texts[:-1]), run_texts[-1]]))
+        run_texts.append(
+            f"{len(missing.numbers) - sum(number_run[-1] - number_run[0] + 1 for number_run in runs[:_MAX_RUNS])} more"
+        )
+    numbers_text = " and ".join(filter(None, [", ".join(run_texts[:-1]), run_texts[-1]]))
     before_text = f"before item {missing.first}" if missing.first > 1 else ""
     after_text = f"beyond item {missing.last}" if missing.last and missing.beyond else ""
-    where = " and ".join(filter(None, [before_text, after_text]))
+    range_text = " and ".join(filter(None, [before_text, after_text]))
     is_several = len(missing.numbers) > 1
     total_text = f" of {missing.total}" if missing.total else ""
-    items = (
-        f"{'items' if is_several else 'item'} {listed}{total_text} {'are' if is_several else 'is'}"
+    items_text = (
+        f"{'items' if is_several else 'item'} {numbers_text}{total_text} {'are' if is_several else 'is'}"
         " not in the log or left out"
     )
-    return f"not judged{' ' if where else ''}{where}: {items}"
+    return f"not judged{' ' if range_text else ''}{range_text}: {items_text}"
 
 
 def damage_text(damage: Damage) -> str:
@@ -207,7 +211,7 @@ def _start_time_text(source: ImportedLog) -> str:
 
 
 # Name of each quantity in a message about a log without it.
-_LABELS: dict[Quantity, str] = {
+_QUANTITY_LABELS: dict[Quantity, str] = {
     "heights": "height",
     "airspeed": "airspeed",
     "attitude": "attitude",
@@ -217,8 +221,8 @@ _LABELS: dict[Quantity, str] = {
     "velocity": "velocity",
 }
 # Track columns of quantities.
-_COLUMNS: dict[Quantity, str] = {"airspeed": "airspeed", "attitude": "attitude", "battery": "energy"}
-_DATUMS = {
+_TRACK_COLUMNS: dict[Quantity, str] = {"airspeed": "airspeed", "attitude": "attitude", "battery": "energy"}
+_DATUM_REASONS = {
     "ellipsoid": "the log's heights are above the ellipsoid, the plan's above mean sea level",
     "pressure": "the log's heights are by pressure, above the level of 1013.25 hPa",
     "unstated": "the log does not say what its heights are above (--datum says it)",
@@ -235,21 +239,26 @@ def judge_imported_flight(setup: FlightSetup, track: Track, *, log_complete: boo
     source = setup.source
     if source is None:
         raise ValueError("a flight without a source was not imported")
-    flown = [legs for stretch in source.stretches if (legs := flown_legs(setup, track, stretch)) is not None]
-    findings = _merge_findings([_stretch_findings(setup, legs) for legs in flown])
+    flown_stretches = [legs for stretch in source.stretches if (legs := flown_legs(setup, track, stretch)) is not None]
+    findings = _merge_findings([_stretch_findings(setup, legs) for legs in flown_stretches])
     end_judges = [rule.judge_imported_end for rule in RULES.values() if rule.judge_imported_end is not None]
-    findings = (*findings, *(judge(setup, flown, log_complete) for judge in end_judges))
-    failed = any(finding.ok is False for finding in findings)
+    findings = (*findings, *(judge(setup, flown_stretches, log_complete) for judge in end_judges))
+    has_failed = any(finding.ok is False for finding in findings)
     unjudged = "; ".join(
-        filter(None, [_missing_part_text(findings, source.missing), _unseen_text(flown), _uncertainty_text(findings)])
+        filter(
+            None,
+            [_missing_part_text(findings, source.missing), _unseen_text(flown_stretches), _uncertainty_text(findings)],
+        )
     )
-    flyable = bool(flown) and not failed and not unjudged
+    flyable = bool(flown_stretches) and not has_failed and not unjudged
     complete = not unjudged and all(finding.ok is True for finding in findings if finding.rule == "completion")
-    answer = [headline(findings, flyable).replace("flyable", "flown as planned", 1)] if failed or not unjudged else []
-    answer_text = "; ".join([*answer, *filter(None, [unjudged])])
-    own_answer = LevelAnswer(setup.autopilot.level, flyable, answer_text, undecided=bool(unjudged) and not failed)
+    answer_texts = (
+        [headline(findings, flyable).replace("flyable", "flown as planned", 1)] if has_failed or not unjudged else []
+    )
+    answer_text = "; ".join([*answer_texts, *filter(None, [unjudged])])
+    own_answer = LevelAnswer(setup.autopilot.level, flyable, answer_text, undecided=bool(unjudged) and not has_failed)
     conditions = setup_conditions(setup)
-    lines = imported_lines(findings, setup, own_answer, flown, conditions)
+    lines = imported_lines(findings, setup, own_answer, flown_stretches, conditions)
     return Verdict(
         findings,
         flyable,
@@ -258,7 +267,7 @@ def judge_imported_flight(setup: FlightSetup, track: Track, *, log_complete: boo
         "flown",
         levels=(own_answer,),
         notes=setup.route.notes,
-        leg_ends=_leg_ends(setup, flown),
+        leg_ends=_leg_ends(setup, flown_stretches),
         parameters=setup.autopilot.parameters,
         unjudged=unjudged,
         imported=True,
@@ -267,17 +276,17 @@ def judge_imported_flight(setup: FlightSetup, track: Track, *, log_complete: boo
 
 
 def _missing_part_text(findings: Sequence[Finding], missing: MissingItems | None) -> str:
-    """Describe which items or which part of the flight the log lacks; return "" if it lacks none."""
+    """Describe the items, or the part of the flight, that the log lacks; return "" if it lacks none."""
     if missing is not None:
         return missing_text(missing)
     parts = [finding.reason for finding in findings if finding.rule == "completion" and finding.ok is None]
     return f"not judged from end to end: {parts[0]}" if parts else ""
 
 
-def _unseen_text(flown: Sequence[FlownLegs]) -> str:
-    """Describe the pauses of the log that are too long to judge the flight in them; return "" if there are none."""
+def _unseen_text(flown_stretches: Sequence[FlownLegs]) -> str:
+    """Describe the pauses of the log that are too long to be judged; return "" if there are none."""
     pauses = []
-    for legs in flown:
+    for legs in flown_stretches:
         time = legs.aligned.track.time
         pauses += [(float(time[k]), float(time[k + 1])) for k in np.flatnonzero(np.diff(time) > MAX_UNSEEN_TIME_S)]
     if not pauses:
@@ -287,7 +296,7 @@ def _unseen_text(flown: Sequence[FlownLegs]) -> str:
     return f"not judged from {start:.1f} s to {end:.1f} s{others_text}: the log has no rows"
 
 
-def _judged_times(legs: FlownLegs) -> tuple[float, float]:
+def _stretch_times(legs: FlownLegs) -> tuple[float, float]:
     """Return start and end of a stretch's flight on its legs, s."""
     time = legs.aligned.track.time
     return float(time[0]), float(time[-1])
@@ -300,7 +309,7 @@ def _uncertainty_text(findings: Sequence[Finding]) -> str:
 
 
 def _stretch_findings(setup: FlightSetup, legs: FlownLegs) -> list[Finding]:
-    """Return the findings of one stretch, at the places of the whole route."""
+    """Judge one stretch, and number its legs and waypoints as in the whole route."""
     findings = []
     for finding in track_findings(legs.requirements, legs.aligned):
         checked = _check_gaps(_check_data(setup, legs, finding), legs)
@@ -314,14 +323,14 @@ def _findings_without_data(setup: FlightSetup, judged_rules: set[str]) -> list[F
     """Return findings for rules with `LogNeeds.listed` that found nothing because the log lacks their data."""
     findings = []
     for rule in RULES.values():
-        missing = [
+        missing_quantities = [
             quantity
             for quantity in rule.log.quantities
             if setup.source is not None and quantity not in setup.source.holds
         ]
         margin = RULE_WORDS[rule.name].margin
-        if rule.log.listed and margin is not None and missing and rule.name not in judged_rules:
-            reason = f"the log holds no {_LABELS[missing[0]]}"
+        if rule.log.listed and margin is not None and missing_quantities and rule.name not in judged_rules:
+            reason = f"the log holds no {_QUANTITY_LABELS[missing_quantities[0]]}"
             findings.append(
                 make_finding(rule.name, FLIGHT, ok=None, reason=reason, source="aircraft", unit=margin.unit)
             )
@@ -336,11 +345,11 @@ def _check_data(setup: FlightSetup, legs: FlownLegs, finding: Finding) -> Findin
     reason, needs = "", RULES[finding.rule].log
     for quantity in needs.quantities:
         if quantity not in source.holds:
-            reason = f"the log holds no {_LABELS[quantity]}"
+            reason = f"the log holds no {_QUANTITY_LABELS[quantity]}"
             break
         if quantity == "heights":
             has_plan_heights = source.plan_heights or not needs.planned_heights
-            reason = _DATUMS.get(source.heights.datum, "") if has_plan_heights else "the plan states no heights"
+            reason = _DATUM_REASONS.get(source.heights.datum, "") if has_plan_heights else "the plan states no heights"
         else:
             reason = _missing_values_text(legs, quantity)
         if reason:
@@ -354,13 +363,14 @@ def _check_data(setup: FlightSetup, legs: FlownLegs, finding: Finding) -> Findin
 
 def _missing_values_text(legs: FlownLegs, quantity: Quantity) -> str:
     """Describe when a stretch lacks values of a quantity that the log has elsewhere; return "" if it lacks none."""
-    values = getattr(legs.aligned.track, _COLUMNS[quantity])
+    values = getattr(legs.aligned.track, _TRACK_COLUMNS[quantity])
     is_missing = ~np.isfinite(values.reshape(len(values), -1)).all(axis=1)
     if not is_missing.any():
         return ""
     time = legs.aligned.track.time[is_missing]
     return (
-        f"the log holds no {_LABELS[quantity]} at {int(is_missing.sum())} rows from {time[0]:.1f} s to {time[-1]:.1f} s"
+        f"the log holds no {_QUANTITY_LABELS[quantity]} at {int(is_missing.sum())} rows from {time[0]:.1f} s to"
+        f" {time[-1]:.1f} s"
     )
 
 
@@ -403,7 +413,10 @@ def _check_unreached(finding: Finding, legs: FlownLegs) -> Finding:
 
 
 def _at_route_place(finding: Finding, first: int, setup: FlightSetup) -> Finding:
-    """Return a finding at its place on the whole route."""
+    """Return a finding of a stretch with its place numbered in the whole route.
+
+    first: number of the stretch's first waypoint in the route.
+    """
     place = finding.place
     if not first or place.index is None or place.kind not in ("leg", "waypoint"):
         return finding
@@ -411,34 +424,34 @@ def _at_route_place(finding: Finding, first: int, setup: FlightSetup) -> Finding
     return replace(finding, place=replace(place, index=index))
 
 
-def _merge_findings(stretches: Sequence[Sequence[Finding]]) -> tuple[Finding, ...]:
-    """Merge the findings of all stretches: one per rule, place and check, a failure before a pass."""
+def _merge_findings(findings_by_stretch: Sequence[Sequence[Finding]]) -> tuple[Finding, ...]:
+    """Merge the findings of all stretches: keep one for each rule, place and check, a failure rather than a pass."""
     merged: dict[tuple[str, Place, str], Finding] = {}
-    for findings in stretches:
+    for findings in findings_by_stretch:
         for finding in findings:
             key = (finding.rule, finding.place, finding.check)
             previous = merged.get(key)
-            if previous is None or _precedence(finding) > _precedence(previous):
+            if previous is None or _merge_precedence(finding) > _merge_precedence(previous):
                 merged[key] = finding
     rules = list(dict.fromkeys(finding.rule for finding in merged.values()))
     return tuple(finding for rule in rules for finding in merged.values() if finding.rule == rule)
 
 
-def _precedence(finding: Finding) -> int:
+def _merge_precedence(finding: Finding) -> int:
     return {False: 2, True: 1, None: 0}[finding.ok]
 
 
-def _leg_ends(setup: FlightSetup, flown: Sequence[FlownLegs]) -> tuple[float, ...]:
-    """Return the time (s) at which each leg but the last ended, in rising order; inf from the first unreached leg."""
-    ends = np.full(len(setup.route.waypoints), np.inf)
-    for legs in flown:
+def _leg_ends(setup: FlightSetup, flown_stretches: Sequence[FlownLegs]) -> tuple[float, ...]:
+    """Return the end time of each leg but the last, s, never decreasing; inf from the first unreached leg on."""
+    end_times = np.full(len(setup.route.waypoints), np.inf)
+    for legs in flown_stretches:
         times = legs.aligned.track.time[legs.aligned.rows]
         end_waypoint = legs.last if legs.partial else legs.last + 1
-        ends[legs.first : end_waypoint] = np.minimum(
-            ends[legs.first : end_waypoint], times[: end_waypoint - legs.first]
+        end_times[legs.first : end_waypoint] = np.minimum(
+            end_times[legs.first : end_waypoint], times[: end_waypoint - legs.first]
         )
-    if flown:
-        # The aircraft was past all waypoints before the first one that was met.
-        ends[: flown[0].first] = ends[flown[0].first]
-    sorted_ends = np.maximum.accumulate(ends)
+    if flown_stretches:
+        # The aircraft was past all waypoints before the first identified one.
+        end_times[: flown_stretches[0].first] = end_times[flown_stretches[0].first]
+    sorted_ends = np.maximum.accumulate(end_times)
     return tuple(sorted_ends[1:-1].tolist())

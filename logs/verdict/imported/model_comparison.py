@@ -15,19 +15,19 @@ from logs.verdict.measures.turns import CornerPass, corner_passes, measure_turn
 from world.arrays import Floats
 from world.errors import LogError
 
-# Spacing of the places along a leg at which the flights are compared, m.
-STEP = 10.0
+# Spacing along a leg of the points at which the flights are compared, m.
+COMPARISON_STEP_M = 10.0
 
 
 @dataclass(frozen=True, slots=True)
 class Profile:
-    """Measurements of a flight at n places along its route; NaN where the route was not flown.
+    """Measurements of a flight at n points along its route; NaN where the route was not flown.
 
     cross_track: distance to the right of the legs, m.
     height_error: height above the legs, m.
     ground_speed: m/s.
     bank: rad.
-    energy: energy used since the first place, Wh.
+    energy: energy used since the first point, Wh.
     """
 
     cross_track: Floats
@@ -106,9 +106,9 @@ class Reflight:
 
 
 def compare_with_model(
-    setup: FlightSetup, flown: FlownLegs, simulated: Track, ended: str, *, stands_in: bool = False
+    setup: FlightSetup, stretch_legs: FlownLegs, simulated: Track, end_reason: str, *, stands_in: bool = False
 ) -> Reflight:
-    """Compare a model's flight of a route with the imported flight on it.
+    """Compare an imported flight with a model's flight of the same route.
 
     setup: setup of the model's flight.  Raises LogError if the model's flight has too few rows.
 
@@ -125,30 +125,32 @@ def compare_with_model(
     aligned = align_track(requirements, simulated)
     if aligned is None:
         raise LogError(f"{setup.scenario.name}: the model's flight has too few rows", file=setup.scenario.name)
-    pairs = (flown.requirements, flown.aligned), (requirements, aligned)
+    pairs = (stretch_legs.requirements, stretch_legs.aligned), (requirements, aligned)
     ends = np.cumsum(requirements.runs)
-    places = [np.arange(0.0, run, STEP) for run in requirements.runs]
-    profiles = [_profile(flight_requirements, track, places) for flight_requirements, track in pairs]
-    begins = np.concatenate([[0.0], ends[:-1]])
-    distance = np.concatenate([begin + along for begin, along in zip(begins, places, strict=True)])
-    counts = np.concatenate([[0], np.cumsum([len(along) for along in places])])
+    distances_on_legs = [np.arange(0.0, leg_length, COMPARISON_STEP_M) for leg_length in requirements.runs]
+    profiles = [_flight_profile(flight_requirements, track, distances_on_legs) for flight_requirements, track in pairs]
+    leg_starts = np.concatenate([[0.0], ends[:-1]])
+    distance = np.concatenate(
+        [leg_start + along for leg_start, along in zip(leg_starts, distances_on_legs, strict=True)]
+    )
+    counts = np.concatenate([[0], np.cumsum([len(along) for along in distances_on_legs])])
     legs = tuple(
-        _leg_pair(flown.first + k, slice(int(counts[k]), int(counts[k + 1])), profiles)
+        _leg_pair(stretch_legs.first + k, slice(int(counts[k]), int(counts[k + 1])), profiles)
         for k in range(requirements.legs)
     )
     corners = [corner_passes(flight_requirements, track) for flight_requirements, track in pairs]
-    turns = tuple(_turn_pair(flown.first, k, pairs, corners) for k in range(1, requirements.legs))
+    turns = tuple(_turn_pair(stretch_legs.first, k, pairs, corners) for k in range(1, requirements.legs))
     flown_profile, model_profile = profiles
     return Reflight(
-        stretch=flown.stretch,
+        stretch=stretch_legs.stretch,
         setup=setup,
         simulated=simulated,
-        ended=ended,
+        ended=end_reason,
         distance=distance,
         ends=ends,
         flown=flown_profile,
         model=model_profile,
-        first=flown.first,
+        first=stretch_legs.first,
         legs=legs,
         turns=turns,
         spreads=_spreads(flown_profile, model_profile),
@@ -156,13 +158,15 @@ def compare_with_model(
     )
 
 
-def _profile(requirements: RouteRequirements, aligned: AlignedTrack, places: Sequence[Floats]) -> Profile:
+def _flight_profile(
+    requirements: RouteRequirements, aligned: AlignedTrack, distances_on_legs: Sequence[Floats]
+) -> Profile:
     parts: list[Floats] = []
     track = aligned.track
     speed = np.hypot(track.velocity[:, 0], track.velocity[:, 1]).astype(np.float64)
     bank, energy = track.attitude[:, ROLL].astype(np.float64), track.energy.astype(np.float64)
-    for leg, along_leg in enumerate(places):
-        if not aligned.flew(leg):
+    for leg, along_leg in enumerate(distances_on_legs):
+        if not aligned.has_flown(leg):
             parts.append(np.full((5, len(along_leg)), math.nan))
             continue
         rows = aligned.leg_rows(leg)
@@ -180,10 +184,10 @@ def _profile(requirements: RouteRequirements, aligned: AlignedTrack, places: Seq
                 ]
             )
         )
-    table = np.concatenate(parts, axis=1)
-    known_energy = table[4][np.isfinite(table[4])]
-    table[4] -= known_energy[0] if known_energy.size else 0.0
-    return Profile(*table)
+    values = np.concatenate(parts, axis=1)
+    known_energy = values[4][np.isfinite(values[4])]
+    values[4] -= known_energy[0] if known_energy.size else 0.0
+    return Profile(*values)
 
 
 def _leg_pair(leg: int, rows: slice, profiles: Sequence[Profile]) -> LegPair:
@@ -225,30 +229,33 @@ def _turn_pair(
     flown_turn, model_turn = (measure_turn(requirements, aligned, k) for requirements, aligned in pairs)
     flown_pass, model_pass = (passes[k] for passes in corners)
 
-    def both(flown: float | None, model: float | None, factor: float = 1.0) -> tuple[float, float]:
-        return (math.nan if flown is None else flown * factor, math.nan if model is None else model * factor)
+    def value_pair(flown_value: float | None, model_value: float | None, factor: float = 1.0) -> tuple[float, float]:
+        return (
+            math.nan if flown_value is None else flown_value * factor,
+            math.nan if model_value is None else model_value * factor,
+        )
 
     return TurnPair(
         first + k,
         math.degrees(float(pairs[0][0].turns[k])),
-        overshoot=both(flown_pass.overshoot, model_pass.overshoot),
-        bank=both(flown_turn.peak_bank, model_turn.peak_bank, 180.0 / math.pi),
-        passed=both(flown_pass.nearest, model_pass.nearest),
+        overshoot=value_pair(flown_pass.overshoot, model_pass.overshoot),
+        bank=value_pair(flown_turn.peak_bank, model_turn.peak_bank, 180.0 / math.pi),
+        passed=value_pair(flown_pass.distance, model_pass.distance),
     )
 
 
-def _spreads(flown: Profile, model: Profile) -> tuple[Spread, ...]:
-    out = []
+def _spreads(flown_profile: Profile, model_profile: Profile) -> tuple[Spread, ...]:
+    spreads = []
     for name, unit, factor in (
         ("cross_track", "m", 1.0),
         ("height_error", "m", 1.0),
         ("ground_speed", "m/s", 1.0),
         ("bank", "deg", 180.0 / math.pi),
     ):
-        difference = factor * np.abs(getattr(flown, name) - getattr(model, name))
+        difference = factor * np.abs(getattr(flown_profile, name) - getattr(model_profile, name))
         known_differences = difference[np.isfinite(difference)]
         if known_differences.size:
-            out.append(
+            spreads.append(
                 Spread(name, unit, float(np.median(known_differences)), float(np.percentile(known_differences, 95.0)))
             )
-    return tuple(out)
+    return tuple(spreads)

@@ -1,4 +1,4 @@
-"""Judge when a waypoint is reached, and how far from the legs a flight may go."""
+"""Decide when a waypoint is reached, and how far from the legs a flight may be."""
 
 import math
 from dataclasses import dataclass, replace
@@ -31,8 +31,8 @@ from world.arrays import Floats
 
 
 @dataclass(frozen=True, slots=True)
-class Reach:
-    """Condition under which a waypoint counts as reached.
+class AcceptanceCondition:
+    """Distance within which a waypoint is reached.
 
     radius: m.
     source: "mission" for a stated acceptance radius, "autopilot" for the autopilot's acceptance radius, "fly-over", or
@@ -45,8 +45,8 @@ class Reach:
     tolerance: float
 
 
-def reach(requirements: RouteRequirements, i: int) -> Reach:
-    """Return the condition under which waypoint i counts as reached.
+def acceptance_condition(requirements: RouteRequirements, i: int) -> AcceptanceCondition:
+    """Return the distance within which waypoint i is reached, and its source.
 
     The mission's own radius applies, or else the autopilot's radius.  ArduPlane turns to the next leg at WP_RADIUS for
     a right angle or a sharper corner, and at a fraction of WP_RADIUS for a gentler corner.  At the mission's end, and
@@ -56,12 +56,14 @@ def reach(requirements: RouteRequirements, i: int) -> Reach:
     mission_radius = float(setup.route.acceptance[i])
     tolerance = position_error(setup) + CORNER_CUT_TOLERANCE_M[setup.scenario.wind.turbulence]
     if mission_radius > 0.0:
-        return Reach(mission_radius, "mission", tolerance)
+        return AcceptanceCondition(mission_radius, "mission", tolerance)
     if not setup.autopilot.follows_path:
         is_inner = 0 < i < requirements.legs and i != setup.route.return_from
         turn = abs(float(requirements.turns[i])) if is_inner else math.pi
-        return Reach(setup.autopilot.turn_distance(turn, float(requirements.points[i, 2])), "autopilot", tolerance)
-    return Reach(path_radius, "fly-over" if setup.route.fly_over[i] else "fly-by path", 0.0)
+        return AcceptanceCondition(
+            setup.autopilot.turn_distance(turn, float(requirements.points[i, 2])), "autopilot", tolerance
+        )
+    return AcceptanceCondition(path_radius, "fly-over" if setup.route.fly_over[i] else "fly-by path", 0.0)
 
 
 def position_error(setup: FlightSetup) -> float:
@@ -101,7 +103,7 @@ def corridor_limit(requirements: RouteRequirements, leg: int) -> tuple[float, st
         depths = np.maximum(depths, FLY_OVER_SWING_RATIO * swings)
     turn_width = float(depths.max()) + WAYPOINT_PASS_MARGIN_M
     if requirements.setup.autopilot.loiter_rules.at_middle:
-        arcs, tightest = requirements.setup.route.arcs[ends], requirements.tightest[ends]
+        arcs, tightest = requirements.setup.route.arcs[ends], requirements.min_radius[ends]
         turn_radius = float(np.where(np.isfinite(tightest), tightest, 0.0).max())
         # A loiter too tight for the bank is as wide as the bank limit makes the aircraft swing, whatever its radius.
         loiter_radius = float(arcs.max())
@@ -192,18 +194,21 @@ def _reduced_route(route: Route, waypoints: NDArray[np.int64]) -> Route:
 
 
 def step_height(requirements: RouteRequirements, leg: int) -> float | None:
-    """Return the height (m, positive) of the step that a leg belongs to, or None above `NEGLIGIBLE_STEP_M`.
+    """Return the height of a leg's step, m, positive, or None if it exceeds `NEGLIGIBLE_STEP_M`.
 
     The leg exceeds its slope limit.  A sequence of legs that is too steep overall and includes this leg is one step:
     the height of a staircase is the total height of its stairs.
     """
     limit, _ = slope_limit(requirements, leg)
     sign = 1.0 if requirements.slopes[leg] >= 0.0 else -1.0
-    rises = sign * np.diff(requirements.points[:, 2])
-    highest = float(rises[leg])
+    height_changes = sign * np.diff(requirements.points[:, 2])
+    max_step = float(height_changes[leg])
     for first in range(leg, max(-1, leg - KINK_WAYPOINT_COUNT), -1):
         for last in range(leg, min(requirements.legs, leg + KINK_WAYPOINT_COUNT)):
-            rise, run = float(rises[first : last + 1].sum()), float(requirements.runs[first : last + 1].sum())
-            if math.atan2(rise, run) > limit + PLAN_TOLERANCE_RAD:
-                highest = max(highest, rise)
-    return highest if highest <= NEGLIGIBLE_STEP_M else None
+            height_change, distance = (
+                float(height_changes[first : last + 1].sum()),
+                float(requirements.runs[first : last + 1].sum()),
+            )
+            if math.atan2(height_change, distance) > limit + PLAN_TOLERANCE_RAD:
+                max_step = max(max_step, height_change)
+    return max_step if max_step <= NEGLIGIBLE_STEP_M else None

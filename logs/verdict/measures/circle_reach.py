@@ -31,12 +31,12 @@ _STEP_M = 20.0
 _MAX_LEVELS = 12
 
 
-def hazards_within(
+def find_hazards(
     requirements: RouteRequirements, center: Floats, min_altitude: float, max_altitude: float, reach: float
 ) -> list[str]:
-    """Describe the hazards that are too close to a flight anywhere within a radius of a place.
+    """Describe the hazards that are too close to a flight anywhere within a radius of a point.
 
-    center: east and north of the place, m, (2,).
+    center: east and north of the point, m, (2,).
     min_altitude, max_altitude: minimum and maximum altitude of the flight, m AMSL.
     reach: the radius, m.
     """
@@ -63,17 +63,17 @@ def end_loiter_hazards(requirements: RouteRequirements) -> tuple[float, list[str
     reach = LOITER_SWING_RADII * max(abs(rules.radius), min_radius)
     if not math.isfinite(reach):
         return reach, ["the wind is too strong to fly this circle"]
-    return reach, hazards_within(requirements, requirements.points[-1, :2], altitude, altitude, reach)
+    return reach, find_hazards(requirements, requirements.points[-1, :2], altitude, altitude, reach)
 
 
 def _ground_hazards(
     requirements: RouteRequirements, center: Floats, min_altitude: float, max_altitude: float, reach: float
 ) -> list[str]:
-    ground, limits = requirements.setup.scenario.terrain, requirements.setup.scenario.limits
-    if ground is None:
+    terrain, limits = requirements.setup.scenario.terrain, requirements.setup.scenario.limits
+    if terrain is None:
         return []
-    rings = _ring_points(center, reach, ground.spacing)
-    clearances, _ = path_clearance(ground.heights, ground.to_pixel.record, _points_at(rings, min_altitude))
+    rings = _ring_points(center, reach, terrain.spacing)
+    clearances, _ = path_clearance(terrain.heights, terrain.to_pixel.record, _points_at_altitude(rings, min_altitude))
     hazards = []
     # Points outside the known terrain are NaN.
     if np.isnan(clearances).any():
@@ -84,7 +84,7 @@ def _ground_hazards(
     if limits.max_height_m is not None:
         # The greatest height above ground is the least height above ground of the same world upside down.
         inverted_clearances, _ = path_clearance(
-            -ground.heights, ground.to_pixel.record, _points_at(rings, -max_altitude)
+            -terrain.heights, terrain.to_pixel.record, _points_at_altitude(rings, -max_altitude)
         )
         max_height = -float(np.nanmin(inverted_clearances, initial=math.inf))
         if max_height > limits.max_height_m + HEIGHT_TOLERANCE_M:
@@ -99,11 +99,11 @@ def _missile_hazards(
     if scenario.external:
         return []
     threats, hazards = scenario.threats, []
-    for number, table in enumerate(scenario.spec.threats):
+    for number, threat in enumerate(scenario.spec.threats):
         radius, (east, north, up) = float(threats.kill_radius[number]), threats.position[number]
         horizontal_distance = max(0.0, math.hypot(east - center[0], north - center[1]) - reach)
         if radius > 0.0 and math.hypot(horizontal_distance, max(0.0, min_altitude - up, up - max_altitude)) <= radius:
-            hazards.append(f"the missile {threat_label(table.name or '', number)} reaches it")
+            hazards.append(f"the missile {threat_label(threat.name or '', number)} reaches it")
     return hazards
 
 
@@ -121,7 +121,7 @@ def _zone_hazards(
         else min(_MAX_LEVELS, 2 + int((max_altitude - min_altitude) / _STEP_M))
     )
     for up in np.linspace(min_altitude, max_altitude, levels):
-        visits = path_zones(_straight_moves(_points_at(rings, float(up))), airspace.records, terrain)
+        visits = path_zones(_straight_moves(_points_at_altitude(rings, float(up))), airspace.records, terrain)
         zone_numbers |= {
             number
             for number in range(len(airspace.zones))
@@ -152,20 +152,20 @@ def _ring_points(center: Floats, reach: float, spacing: float) -> Floats:
     return np.linspace(center, zone_rings(Zone("", "exclusion", last_ring))[0], count + 1).reshape(-1, 2)
 
 
-def _points_at(places: Floats, altitude: float) -> Floats:
-    """Return places (n, 2) at one altitude as points (n, 3) m."""
-    return np.column_stack([places, np.full(len(places), altitude)])
+def _points_at_altitude(positions: Floats, altitude: float) -> Floats:
+    """Return positions (n, 2) as points (n, 3) at one altitude, m."""
+    return np.column_stack([positions, np.full(len(positions), altitude)])
 
 
 def _straight_moves(points: Floats) -> Records:
-    """Return straight moves of one second each from each of n points to the next, (n - 1,) of `MOVE`."""
+    """Return the straight moves between n consecutive points, one second each, (n - 1,) of `MOVE`."""
     steps = np.diff(points, axis=0)
-    run = np.hypot(steps[:, 0], steps[:, 1])
+    lengths = np.hypot(steps[:, 0], steps[:, 1])
     moves: Records = np.zeros(len(steps), MOVE)
     for axis, name in enumerate(("east", "north", "up")):
         moves[name] = points[:-1, axis]
     for axis, name in enumerate(("course_east", "course_north")):
-        moves[name] = np.divide(steps[:, axis], run, out=np.zeros_like(run), where=run > 0.0)
-    moves["length"], moves["climb"] = run, steps[:, 2]
+        moves[name] = np.divide(steps[:, axis], lengths, out=np.zeros_like(lengths), where=lengths > 0.0)
+    moves["length"], moves["climb"] = lengths, steps[:, 2]
     moves["time"], moves["lasts"] = np.arange(len(steps)), 1.0
     return moves

@@ -23,49 +23,52 @@ def flown_phases(whole_requirements: RouteRequirements, track: Track) -> tuple[R
 
     whole_requirements: requirements of the whole route, returned unchanged for a flight without ground phases.
     """
-    ways = whole_requirements.setup.ground_ways
-    if not ways:
+    procedures = whole_requirements.setup.ground_ways
+    if not procedures:
         return whole_requirements, align_track(whole_requirements, track)
-    start = _takeoff_end_row(track, ways)
-    start_point = np.asarray(track.position[start], dtype=np.float64) if ways.take_off is not None else None
+    start = _takeoff_end_row(track, procedures)
+    start_point = np.asarray(track.position[start], dtype=np.float64) if procedures.take_off is not None else None
     setup = whole_requirements.setup
-    airborne_setup = replace(setup, route=airborne_route(setup.route, ways, start_point))
+    airborne_setup = replace(setup, route=airborne_route(setup.route, procedures, start_point))
     requirements = route_requirements(airborne_setup, envelope=whole_requirements.envelope)
     airborne_track = track.rows(start, len(track))
     aligned, landing_row = align_track(requirements, airborne_track), len(track) - 1
-    if ways.approach is not None and aligned is not None and aligned.passed[-1]:
+    if procedures.approach is not None and aligned is not None and aligned.passed[-1]:
         passed_time = float(aligned.track.time[aligned.rows[-1]])
         landing_row = min(landing_row, int(np.searchsorted(track.time, passed_time)))
         end_row = int(np.searchsorted(track.time, passed_time + _END_DELAY_S, side="right"))
         aligned = align_track(requirements, track.rows(start, end_row))
-    ground = FlownGround(ways, whole_requirements, track, start, landing_row)
-    return replace(requirements, ground=ground), aligned
+    ground_phases = FlownGround(procedures, whole_requirements, track, start, landing_row)
+    return replace(requirements, ground_phases=ground_phases), aligned
 
 
-def _takeoff_end_row(track: Track, ways: GroundWays) -> int:
+def _takeoff_end_row(track: Track, procedures: GroundWays) -> int:
     """Return the row where the take-off ended; 0 without a take-off, the last row if the take-off did not end."""
-    if ways.take_off is None:
+    if procedures.take_off is None:
         return 0
-    is_above = track.position[:, 2] > ways.take_off.top
+    is_above = track.position[:, 2] > procedures.take_off.top
     return int(np.argmax(is_above)) if is_above.any() else len(track) - 1
 
 
-def by_the_ground(track: Track, ways: GroundWays) -> Flags:
-    """Return a mask of the rows that belong to a flown take-off or to the leg of a flown landing, (t,).
+def ground_phase_rows(track: Track, procedures: GroundWays) -> Flags:
+    """Return a mask of the rows of a flown take-off or landing leg, (t,).
 
     >>> from logs.recording.example_log import example_log
-    >>> bool(by_the_ground(example_log().track, GroundWays()).any())
+    >>> bool(ground_phase_rows(example_log().track, GroundWays()).any())
     False
     """
-    is_ground_phase = np.arange(len(track)) < _takeoff_end_row(track, ways)
-    if ways.approach is not None:
-        is_ground_phase |= track.leg >= ways.approach.leg
+    is_ground_phase = np.arange(len(track)) < _takeoff_end_row(track, procedures)
+    if procedures.approach is not None:
+        is_ground_phase |= track.leg >= procedures.approach.leg
     return np.asarray(is_ground_phase)
 
 
 def leg_ends(requirements: RouteRequirements, aligned: AlignedTrack) -> tuple[float, ...]:
-    """Return the end time of each leg of the whole route except the last, s, including the start of the landing."""
-    ground, ends = requirements.ground, aligned.leg_ends()
-    if ground is None or ground.ways.approach is None:
-        return ends
-    return (*ends, float(ground.track.time[ground.left]) if aligned.passed[-1] else float("inf"))
+    """Return the end time of each leg but the last, s, for the whole route including its landing."""
+    ground_phases, end_times = requirements.ground_phases, aligned.leg_ends()
+    if ground_phases is None or ground_phases.procedures.approach is None:
+        return end_times
+    return (
+        *end_times,
+        float(ground_phases.track.time[ground_phases.landing_start_row]) if aligned.passed[-1] else float("inf"),
+    )

@@ -39,10 +39,10 @@ MOVE = record_dtype(
 @inner
 def move_point(move: Record, fraction: float) -> tuple[float, float, float]:
     """Return east, north and up (m) at a fraction of a move."""
-    run = fraction * move.length
-    ahead, lateral_offset = run, 0.0
+    distance = fraction * move.length
+    ahead, lateral_offset = distance, 0.0
     if move.curvature != 0.0:
-        course_change = move.curvature * run
+        course_change = move.curvature * distance
         ahead, lateral_offset = (
             math.sin(course_change) / move.curvature,
             (1.0 - math.cos(course_change)) / move.curvature,
@@ -119,10 +119,10 @@ def flown_moves(aligned: AlignedTrack, first: int = 0, last: int | None = None) 
     """
     legs = len(aligned.rows) - 1
     last = legs - 1 if last is None else last
-    begin = 0 if first <= 0 else int(aligned.rows[first])
+    start = 0 if first <= 0 else int(aligned.rows[first])
     end = len(aligned.track) if last >= legs - 1 else int(aligned.rows[last + 1]) + 1
-    moves = straight_moves(aligned.track.position[begin:end], aligned.track.time[begin:end])
-    moves["leg"] = np.searchsorted(aligned.rows[1:-1], np.arange(begin, begin + len(moves)), side="right")
+    moves = straight_moves(aligned.track.position[start:end], aligned.track.time[start:end])
+    moves["leg"] = np.searchsorted(aligned.rows[1:-1], np.arange(start, start + len(moves)), side="right")
     return moves
 
 
@@ -137,10 +137,10 @@ def straight_moves(points: Floats, time: Floats) -> Records:
     moves: Records = np.zeros(len(steps), MOVE)
     for axis, name in enumerate(("east", "north", "up")):
         moves[name] = points[:-1, axis]
-    run = np.hypot(steps[:, 0], steps[:, 1])
-    moves["course_east"] = np.divide(steps[:, 0], run, out=np.zeros_like(run), where=run > 0.0)
-    moves["course_north"] = np.divide(steps[:, 1], run, out=np.zeros_like(run), where=run > 0.0)
-    moves["length"], moves["climb"] = run, steps[:, 2]
+    lengths = np.hypot(steps[:, 0], steps[:, 1])
+    moves["course_east"] = np.divide(steps[:, 0], lengths, out=np.zeros_like(lengths), where=lengths > 0.0)
+    moves["course_north"] = np.divide(steps[:, 1], lengths, out=np.zeros_like(lengths), where=lengths > 0.0)
+    moves["length"], moves["climb"] = lengths, steps[:, 2]
     moves["time"], moves["lasts"] = time[:-1], np.diff(time)
     return moves
 
@@ -157,7 +157,7 @@ BLOCK_MOVES = 64
 
 @inner
 def move_blocks(
-    moves: Records, heights: Heights, to_pixel: PolyMapRecord, spacing: float, above_ground: bool
+    moves: Records, heights: Heights, to_pixel: PolyMapRecord, spacing: float, reads_ground: bool
 ) -> Records:
     """Group moves into blocks of dtype `BLOCK`, (b,); read the ground only if a zone limit is given above ground."""
     blocks = np.zeros((moves.shape[0] + BLOCK_MOVES - 1) // BLOCK_MOVES, BLOCK)
@@ -174,7 +174,7 @@ def move_blocks(
             block.west, block.east = min(block.west, east - half_length), max(block.east, east + half_length)
             block.south, block.north = min(block.south, north - half_length), max(block.north, north + half_length)
             block.low, block.high = min(block.low, up - half_height), max(block.high, up + half_height)
-        if above_ground:
+        if reads_ground:
             block.steepest = _steepest_ground(block, heights, to_pixel, spacing)
     return blocks
 

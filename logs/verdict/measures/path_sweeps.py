@@ -126,11 +126,14 @@ def _block_boxes(points: Floats) -> _Boxes:
         first, last = block * _BLOCK_SEGMENTS, min(segments, (block + 1) * _BLOCK_SEGMENTS)
         diagonal2 = 0.0
         for axis in range(3):
-            low, high = math.inf, -math.inf
+            min_coordinate, max_coordinate = math.inf, -math.inf
             for row in range(first, last + 1):
-                low, high = min(low, points[row, axis]), max(high, points[row, axis])
-            boxes.low[block, axis], boxes.high[block, axis] = low, high
-            diagonal2 += (high - low) ** 2
+                min_coordinate, max_coordinate = (
+                    min(min_coordinate, points[row, axis]),
+                    max(max_coordinate, points[row, axis]),
+                )
+            boxes.low[block, axis], boxes.high[block, axis] = min_coordinate, max_coordinate
+            diagonal2 += (max_coordinate - min_coordinate) ** 2
         boxes.diagonal[block] = math.sqrt(diagonal2)
     return boxes
 
@@ -144,8 +147,8 @@ def _box_distances(boxes: _Boxes, block: int, centre: Floats) -> tuple[float, fl
         below, above = boxes.low[block, axis] - centre[axis], centre[axis] - boxes.high[block, axis]
         outside = max(0.0, below, above)
         min_square += outside * outside
-        farthest = max(abs(below), abs(above))
-        max_square += farthest * farthest
+        max_offset = max(abs(below), abs(above))
+        max_square += max_offset * max_offset
     return math.sqrt(min_square), math.sqrt(max_square)
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from flight.mission.items import Camera
 from flight.mission.surveys import LineAxis, PhotoLine, Survey, survey_plan
 from flight.simulation.track import ROLL
-from logs.verdict.measures.acceptance import position_error, reach
+from logs.verdict.measures.acceptance import acceptance_condition, position_error
 from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.tolerances import (
@@ -29,36 +29,37 @@ class LineMeasure:
     """One photo line as flown.
 
     length: m.
-    good, away, banked, high, dark: fractions of the length, which add up to 1.  good is usable; the others are unusable
-        by the first condition that fails.  away: not flown along, or too far to the side.  banked: too much bank.
-        high: too large a height error.  dark: camera off.
-    late, early: distance from the line's start to the first usable place, and from the last usable place to its end, m.
-    aside: greatest distance to the side where the line was flown along, m.  off: greatest height error, m, positive
-        above.
-    photos, missed: number of planned photos, and of those not taken; 0 if the distance between photos is not stated.
-    allowed_aside: tolerance of aside, m.  allowed_off: smallest height tolerance anywhere along the line, m.
-    lost: start and end of each unusable stretch, m from the line's start.
+    usable, off_line, banked, off_height, camera_off: fractions of the length, which add up to 1.  An unusable part
+        belongs to the first condition that it fails.  off_line: not flown along, or too far to the side.  banked: too
+        much bank.  off_height: too large a height error.
+    lost_at_start, lost_at_end: unusable length at either end of the line, m.
+    max_lateral_offset: maximum distance to the side of the line, m.
+    max_height_error: maximum height error, m, positive above.
+    photos, missed_photos: number of planned photos, and of those not taken; 0 if no distance between photos is stated.
+    lateral_tolerance: tolerance of the lateral offset, m.
+    min_height_tolerance: smallest height tolerance anywhere along the line, m.
+    lost_spans: start and end of each unusable stretch, m from the line's start.
     """
 
     length: float
-    good: float
-    away: float
+    usable: float
+    off_line: float
     banked: float
-    high: float
-    dark: float
-    late: float
-    early: float
-    aside: float
-    off: float
+    off_height: float
+    camera_off: float
+    lost_at_start: float
+    lost_at_end: float
+    max_lateral_offset: float
+    max_height_error: float
     photos: int
-    missed: int
-    allowed_aside: float
-    allowed_off: float
-    lost: tuple[tuple[float, float], ...] = ()
+    missed_photos: int
+    lateral_tolerance: float
+    min_height_tolerance: float
+    lost_spans: tuple[tuple[float, float], ...] = ()
 
 
-def allowed_aside(requirements: RouteRequirements, survey: Survey) -> float:
-    """Return the distance to the side of its line at which a photo may still be taken, m."""
+def lateral_tolerance(requirements: RouteRequirements, survey: Survey) -> float:
+    """Return the maximum distance from a survey's line at which a photo may be taken, m."""
     return PHOTO_OFFSET_FRACTION * survey.spacing + position_error(requirements.setup)
 
 
@@ -66,19 +67,19 @@ def allowed_aside(requirements: RouteRequirements, survey: Survey) -> float:
 class _LineRows:
     """Rows on which a line may have been flown.
 
-    position: (n, 3) m.  along, across: relative to the line, m.  ahead: True for each row that flies along it.
-    off, allowed: error from the planned height above ground, and its tolerance, m.
-    conditions: True for each row that meets a condition of a photo, by the name of the loss if it is not met.
+    position: (n, 3) m.  along, across: relative to the line, m.  is_ahead: True for each row that flies along it.
+    height_error, height_tolerance: error from the planned height above ground, and its tolerance, m.
+    conditions: for each cause of loss, True for each row that is free of it.
     """
 
     axis: LineAxis
-    window: slice
+    track_rows: slice
     position: Floats
     along: Floats
     across: Floats
-    ahead: Flags
-    off: Floats
-    allowed: Floats
+    is_ahead: Flags
+    height_error: Floats
+    height_tolerance: Floats
     conditions: dict[str, Flags]
 
 
@@ -95,10 +96,10 @@ def _line_rows(
     is_ahead = course_error <= MAX_PHOTO_COURSE_ERROR_RAD
     height_error, height_tolerance = _height_errors(requirements, axis, position, along)
     conditions = {
-        "away": np.abs(across) <= allowed_aside(requirements, survey),
+        "off_line": np.abs(across) <= lateral_tolerance(requirements, survey),
         "banked": np.abs(aligned.track.attitude[window, ROLL]) <= MAX_PHOTO_BANK_RAD,
-        "high": np.abs(height_error) <= height_tolerance,
-        "dark": _camera_on(requirements, line, position, along, is_ahead, axis.length),
+        "off_height": np.abs(height_error) <= height_tolerance,
+        "camera_off": _camera_on_rows(requirements, line, position, along, is_ahead, axis.length),
     }
     return _LineRows(axis, window, position, along, across, is_ahead, height_error, height_tolerance, conditions)
 
@@ -110,7 +111,7 @@ def measure_line(
     rows = _line_rows(requirements, aligned, survey, line)
     if rows is None:
         return None
-    length, along, is_ahead = rows.axis.length, rows.along, rows.ahead
+    length, along, is_ahead = rows.axis.length, rows.along, rows.is_ahead
     is_good, meets_conditions, lost_fractions = np.ones(0, dtype=np.bool_), is_ahead, {}
     for name, is_met in rows.conditions.items():
         meets_conditions = meets_conditions & is_met
@@ -121,21 +122,21 @@ def measure_line(
     step = length / len(is_good)
     is_on_line = is_ahead & (along >= 0.0) & (along <= length)
     photos, missed = _count_photos(
-        line, _line_steps(along, is_ahead & rows.conditions["away"] & rows.conditions["dark"], length), length
+        line, _line_steps(along, is_ahead & rows.conditions["off_line"] & rows.conditions["camera_off"], length), length
     )
     return LineMeasure(
         length=length,
-        good=float(is_good.mean()),
+        usable=float(is_good.mean()),
         **lost_fractions,
-        late=float(good_steps[0] * step) if good_steps.size else length,
-        early=float((len(is_good) - 1 - good_steps[-1]) * step) if good_steps.size else length,
-        aside=float(np.abs(rows.across[is_on_line]).max(initial=0.0)),
-        off=float(max(rows.off[is_on_line], key=abs, default=0.0)),
+        lost_at_start=float(good_steps[0] * step) if good_steps.size else length,
+        lost_at_end=float((len(is_good) - 1 - good_steps[-1]) * step) if good_steps.size else length,
+        max_lateral_offset=float(np.abs(rows.across[is_on_line]).max(initial=0.0)),
+        max_height_error=float(max(rows.height_error[is_on_line], key=abs, default=0.0)),
         photos=photos,
-        missed=missed,
-        allowed_aside=allowed_aside(requirements, survey),
-        allowed_off=float(rows.allowed.min(initial=math.inf)),
-        lost=_set_runs(~is_good, step),
+        missed_photos=missed,
+        lateral_tolerance=lateral_tolerance(requirements, survey),
+        min_height_tolerance=float(rows.height_tolerance.min(initial=math.inf)),
+        lost_spans=_set_runs(~is_good, step),
     )
 
 
@@ -155,13 +156,13 @@ def _height_errors(
     requirements: RouteRequirements, axis: LineAxis, position: Floats, along: Floats
 ) -> tuple[Floats, Floats]:
     """Return each row's error from the planned height above ground, and its tolerance, m."""
-    planned = over_ground(requirements, axis.at(along))
-    tolerance = np.maximum(MIN_PHOTO_HEIGHT_ERROR_M, PHOTO_HEIGHT_FRACTION * planned)
-    return over_ground(requirements, position) - planned, tolerance
+    planned_height = heights_over_ground(requirements, axis.at(along))
+    tolerance = np.maximum(MIN_PHOTO_HEIGHT_ERROR_M, PHOTO_HEIGHT_FRACTION * planned_height)
+    return heights_over_ground(requirements, position) - planned_height, tolerance
 
 
-def over_ground(requirements: RouteRequirements, positions: Floats) -> Floats:
-    """Return the heights of places (n, 3) above ground, m, (n,).
+def heights_over_ground(requirements: RouteRequirements, positions: Floats) -> Floats:
+    """Return the heights of positions (n, 3) above ground, m, (n,).
 
     Without terrain, heights are above home, or above the route's lowest waypoint if there is no home.
     """
@@ -171,32 +172,32 @@ def over_ground(requirements: RouteRequirements, positions: Floats) -> Floats:
     return positions[:, 2] - (float(requirements.points[:, 2].min()) if home is None else home.alt)
 
 
-def _camera_on(
-    requirements: RouteRequirements, line: PhotoLine, position: Floats, along: Floats, ahead: Flags, length: float
+def _camera_on_rows(
+    requirements: RouteRequirements, line: PhotoLine, position: Floats, along: Floats, is_ahead: Flags, length: float
 ) -> Flags:
     """Return True for each row at which the camera is on.
 
-    ahead: True for each row that flies along the line.
+    is_ahead: True for each row that flies along the line.
 
     The camera is on from reaching the line's first waypoint to reaching its last waypoint.  It is always on if the
     mission does not switch it on this line.
     """
     follows_path, rows = requirements.setup.autopilot.follows_path, np.arange(len(along))
 
-    def reached(waypoint: int, min_along: float, first_row: int = 0) -> int:
+    def first_row_at(waypoint: int, min_along: float, first_row: int = 0) -> int:
         distances = np.hypot(*(position[:, :2] - requirements.points[waypoint, :2]).T)
         # An autopilot that follows a path is at a waypoint where the path passes it.
-        radius = 0.0 if follows_path else reach(requirements, waypoint).radius
-        indices = np.flatnonzero(((distances <= radius) | (along >= min_along)) & ahead & (rows >= first_row))
+        radius = 0.0 if follows_path else acceptance_condition(requirements, waypoint).radius
+        indices = np.flatnonzero(((distances <= radius) | (along >= min_along)) & is_ahead & (rows >= first_row))
         return int(indices[0]) if indices.size else len(along)
 
-    on_row = reached(line.first, 0.0) if line.switched_on else 0
-    off_row = reached(line.last, length, on_row) if line.switched_off else len(along)
+    on_row = first_row_at(line.first, 0.0) if line.switched_on else 0
+    off_row = first_row_at(line.last, length, on_row) if line.switched_off else len(along)
     return (rows >= on_row) & (rows <= off_row)
 
 
 def _line_steps(along: Floats, is_set: Flags, length: float) -> Flags:
-    """Return True for each step of a line that lies between two consecutive rows at which `is_set` is True."""
+    """Return True for each step of a line between two consecutive rows with `is_set`."""
     count = max(1, math.ceil(length / PHOTO_STEP_M))
     in_both = is_set[:-1] & is_set[1:] & (np.diff(along) > 0.0)
     edges = np.clip(along / length * count, 0.0, count)
@@ -207,13 +208,13 @@ def _line_steps(along: Floats, is_set: Flags, length: float) -> Flags:
     return np.cumsum(marks[:-1]) > 0
 
 
-def _count_photos(line: PhotoLine, taken: Flags, length: float) -> tuple[int, int]:
-    """Return the number of planned photos on a line, and the number of photos that were missed."""
+def _count_photos(line: PhotoLine, is_taken: Flags, length: float) -> tuple[int, int]:
+    """Return the number of planned photos on a line, and the number of missed photos."""
     if line.photo <= 0.0:
         return 0, 0
     count = int(length / line.photo) + 1
-    steps = np.minimum((np.arange(count) * line.photo / length * len(taken)).astype(int), len(taken) - 1)
-    return count, int(np.count_nonzero(~taken[steps]))
+    steps = np.minimum((np.arange(count) * line.photo / length * len(is_taken)).astype(int), len(is_taken) - 1)
+    return count, int(np.count_nonzero(~is_taken[steps]))
 
 
 # ----------------------------------------------------------------------
@@ -228,35 +229,35 @@ class OverlapMeasure:
     camera: the camera that takes them.
     front: overlap with the next photo on the line; None if the distance between photos is not stated, or none is
         usable.
-    line, apart, height, slow: of the minimum front overlap: the line's number from 0, the distance between photos, m,
-        the height above ground, m, and True if the camera cannot take photos any sooner.
+    line, photo_spacing, height, is_camera_limited: for the minimum front overlap: number of the line from 0, distance
+        between photos, m, height above ground, m, and True if the camera cannot take photos at shorter intervals.
     side: overlap with the photos of the neighbouring line; None if no two usable lines are next to each other.
-    pair, between, heights: of the minimum side overlap: both lines' numbers, the distance between them, m, and the
-        height above ground, m.
+    line_pair, line_spacing, side_height: for the minimum side overlap: numbers of both lines, distance between them, m,
+        and height above ground, m.
     """
 
     camera: Camera
     front: float | None = None
     line: int = -1
-    apart: float = math.nan
+    photo_spacing: float = math.nan
     height: float = math.nan
-    slow: bool = False
+    is_camera_limited: bool = False
     side: float | None = None
-    pair: tuple[int, int] = (-1, -1)
-    between: float = math.nan
-    heights: float = math.nan
+    line_pair: tuple[int, int] = (-1, -1)
+    line_spacing: float = math.nan
+    side_height: float = math.nan
 
 
 class _Strip(NamedTuple):
     """Points of a photo line, with a flag for usable points.
 
-    places: (n, 3) m.  heights: above ground, (n,) m.  speeds: over ground, (n,) m/s.
+    positions: (n, 3) m.  heights: above ground, (n,) m.  speeds: over ground, (n,) m/s.
     """
 
-    places: Floats
+    positions: Floats
     heights: Floats
     speeds: Floats
-    usable: Flags
+    is_usable: Flags
 
 
 def measure_overlap(
@@ -283,37 +284,39 @@ def _line_strip(
         axis = LineAxis(requirements.points[line.first : line.last + 1])
         along = np.linspace(0.0, axis.length, max(2, math.ceil(axis.length / PHOTO_STEP_M) + 1))
         legs = np.clip(np.searchsorted(axis.along, along, "right") - 1, 0, len(axis.along) - 2) + line.first
-        places, speeds = axis.at(along), requirements.ground_speed[legs]
-        return _Strip(places, over_ground(requirements, places), speeds, np.ones(len(along), dtype=np.bool_))
+        positions, speeds = axis.at(along), requirements.ground_speed[legs]
+        return _Strip(
+            positions, heights_over_ground(requirements, positions), speeds, np.ones(len(along), dtype=np.bool_)
+        )
     rows = _line_rows(requirements, aligned, survey, line)
     if rows is None:
         return None
-    usable = rows.ahead & (rows.along >= 0.0) & (rows.along <= rows.axis.length)
+    is_usable = rows.is_ahead & (rows.along >= 0.0) & (rows.along <= rows.axis.length)
     for is_met in rows.conditions.values():
-        usable = usable & is_met
-    speeds = np.hypot(*aligned.track.velocity[rows.window, :2].T)
-    return _Strip(rows.position, over_ground(requirements, rows.position), speeds, usable)
+        is_usable = is_usable & is_met
+    speeds = np.hypot(*aligned.track.velocity[rows.track_rows, :2].T)
+    return _Strip(rows.position, heights_over_ground(requirements, rows.position), speeds, is_usable)
 
 
 def _with_front_overlap(measure: OverlapMeasure, survey: Survey, strips: Sequence[_Strip | None]) -> OverlapMeasure:
     """Return the measure with the minimum overlap along the lines."""
     camera = measure.camera
     for number, (line, strip) in enumerate(zip(survey.lines, strips, strict=True)):
-        if strip is None or line.photo <= 0.0 or not strip.usable.any():
+        if strip is None or line.photo <= 0.0 or not strip.is_usable.any():
             continue
-        spacing = np.maximum(line.photo, camera.interval * strip.speeds)[strip.usable]
-        heights = strip.heights[strip.usable]
+        spacing = np.maximum(line.photo, camera.interval * strip.speeds)[strip.is_usable]
+        heights = strip.heights[strip.is_usable]
         overlaps = 1.0 - spacing / (camera.along * np.maximum(heights, 1e-9))
-        worst = int(np.argmin(overlaps))
-        if measure.front is None or overlaps[worst] < measure.front:
-            metres, is_slow = float(spacing[worst]), bool(spacing[worst] > line.photo)
+        lowest = int(np.argmin(overlaps))
+        if measure.front is None or overlaps[lowest] < measure.front:
+            metres, is_slow = float(spacing[lowest]), bool(spacing[lowest] > line.photo)
             measure = replace(
                 measure,
-                front=float(overlaps[worst]),
+                front=float(overlaps[lowest]),
                 line=number,
-                apart=metres,
-                height=float(heights[worst]),
-                slow=is_slow,
+                photo_spacing=metres,
+                height=float(heights[lowest]),
+                is_camera_limited=is_slow,
             )
     return measure
 
@@ -324,42 +327,42 @@ def _with_side_overlap(
     """Return the measure with the minimum overlap between neighbouring lines."""
     corners = [requirements.points[line.first : line.last + 1] for line in survey.lines]
     axis = LineAxis(corners[0])
-    ends = [axis.of(places)[0] for places in corners]
-    min_along = min(float(along.min()) for along in ends)
-    length = max(float(along.max()) for along in ends) - min_along
+    end_distances = [axis.of(corner_points)[0] for corner_points in corners]
+    min_along = min(float(along.min()) for along in end_distances)
+    length = max(float(along.max()) for along in end_distances) - min_along
     count = max(1, math.ceil(length / PHOTO_STEP_M))
     step_middles = (np.arange(count) + 0.5) * length / count
     previous_line = np.full((4, count), np.nan)
     for number in np.argsort(survey.offsets).tolist():
-        strip, along = strips[number], ends[number] - min_along
+        strip, along = strips[number], end_distances[number] - min_along
         on_line = (step_middles >= along.min()) & (step_middles <= along.max())
         this_line = np.full((4, count), np.nan)
         this_line[3, on_line] = number
-        if strip is not None and strip.usable.any():
-            point_along, across, _ = axis.of(strip.places)
+        if strip is not None and strip.is_usable.any():
+            point_along, across, _ = axis.of(strip.positions)
             is_forward = along[-1] >= along[0]
             cells = _line_steps(
-                (point_along - min_along) if is_forward else length - (point_along - min_along), strip.usable, length
+                (point_along - min_along) if is_forward else length - (point_along - min_along), strip.is_usable, length
             )
             is_used = on_line & (cells if is_forward else cells[::-1])
-            order = np.argsort(point_along[strip.usable])
+            order = np.argsort(point_along[strip.is_usable])
             for row, values in enumerate((across, strip.heights)):
                 line_values = np.interp(
-                    step_middles, (point_along[strip.usable] - min_along)[order], values[strip.usable][order]
+                    step_middles, (point_along[strip.is_usable] - min_along)[order], values[strip.is_usable][order]
                 )
                 this_line[row] = np.where(is_used, line_values, np.nan)
         gaps, heights = np.abs(this_line[0] - previous_line[0]), 0.5 * (this_line[1] + previous_line[1])
         overlaps = 1.0 - gaps / (measure.camera.across * np.maximum(heights, 1e-9))
         if np.isfinite(overlaps).any():
-            worst = int(np.nanargmin(overlaps))
-            if measure.side is None or overlaps[worst] < measure.side:
-                pair = (int(previous_line[3, worst]), number)
+            lowest = int(np.nanargmin(overlaps))
+            if measure.side is None or overlaps[lowest] < measure.side:
+                pair = (int(previous_line[3, lowest]), number)
                 measure = replace(
                     measure,
-                    side=float(overlaps[worst]),
-                    pair=pair,
-                    between=float(gaps[worst]),
-                    heights=float(heights[worst]),
+                    side=float(overlaps[lowest]),
+                    line_pair=pair,
+                    line_spacing=float(gaps[lowest]),
+                    side_height=float(heights[lowest]),
                 )
         previous_line[:, on_line] = this_line[:, on_line]
     return measure

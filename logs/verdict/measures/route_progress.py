@@ -42,29 +42,29 @@ class RouteProgress:
 
     first, last: (w,) rows between which each waypoint may have been passed; first > last for a waypoint that the flight
         did not set out for.
-    target: the waypoint that the flight was flying to, or was at, when it ended.
-    left: m of the route from the end of the track to each waypoint, (w,), negative for waypoints behind it.
+    target: waypoint to which the flight was flying when it ended, or at which it was.
+    remaining_distance: distance along the route from the track's end to each waypoint, (w,), m; negative behind it.
     """
 
     first: Numbers
     last: Numbers
     target: int
-    left: Floats
+    remaining_distance: Floats
 
 
 @dataclass(frozen=True, slots=True)
 class _Samples:
-    """Places along a route, in flying order.
+    """Sampled positions along a route, in flying order.
 
-    places: (m, 2) m.  radii: (m,) m within which each place is reached; 0 on a line, the radius of a loiter.
+    positions: (m, 2) m.  radii: (m,) m within which each place is reached; 0 on a line, the radius of a loiter.
     along: (m,) m from the route's start.
-    of_waypoint: (w,) the sample of each waypoint; corners of one loiter share a sample.
+    sample_of_waypoint: (w,) number of each waypoint's sample; the corners of a loiter share one.
     """
 
-    places: Floats
+    positions: Floats
     radii: Floats
     along: Floats
-    of_waypoint: Numbers
+    sample_of_waypoint: Numbers
 
 
 def route_progress(route: Route, position: Floats, *, anywhere: bool) -> RouteProgress:
@@ -80,14 +80,16 @@ def route_progress(route: Route, position: Floats, *, anywhere: bool) -> RoutePr
     2
     """
     steps = np.hypot(*np.diff(position[:, :2], axis=0).T)
-    run = np.concatenate([[0.0], np.cumsum(steps)])
+    distance_run = np.concatenate([[0.0], np.cumsum(steps)])
     length = float(np.hypot(*np.diff(route.waypoints[:, :2], axis=0).T).sum())
-    spacing = max(_SAMPLE_SPACING_M, math.sqrt(max(1.0, length) * max(1.0, float(run[-1])) / _MAX_CELLS))
+    spacing = max(_SAMPLE_SPACING_M, math.sqrt(max(1.0, length) * max(1.0, float(distance_run[-1])) / _MAX_CELLS))
     samples = _sample_route(route, spacing)
-    rows = np.unique(np.searchsorted(run, np.append(np.arange(0.0, run[-1], spacing), run[-1])))
+    rows = np.unique(
+        np.searchsorted(distance_run, np.append(np.arange(0.0, distance_run[-1], spacing), distance_run[-1]))
+    )
     ends = _match_rows(
         read_only(np.ascontiguousarray(position[rows, :2])),
-        read_only(samples.places),
+        read_only(samples.positions),
         read_only(samples.radii),
         CAPTURE_RADIUS_M,
         anywhere,
@@ -95,46 +97,51 @@ def route_progress(route: Route, position: Floats, *, anywhere: bool) -> RoutePr
     begin_rows, end_rows = rows[ends[:, 0]], rows[ends[:, 1]]
     final_sample = int(np.flatnonzero(ends[:, 0] >= 0)[-1])
     count = len(route.waypoints)
-    target = min(count - 1, int(np.searchsorted(samples.of_waypoint, final_sample, side="right")))
-    while target + 1 < count and samples.of_waypoint[target + 1] == samples.of_waypoint[target]:
+    target = min(count - 1, int(np.searchsorted(samples.sample_of_waypoint, final_sample, side="right")))
+    while target + 1 < count and samples.sample_of_waypoint[target + 1] == samples.sample_of_waypoint[target]:
         target += 1
-    first, last = np.full(count, len(run)), np.full(count, -1)
+    first, last = np.full(count, len(distance_run)), np.full(count, -1)
     for i in range(target + 1):
-        sample = int(samples.of_waypoint[i])
-        earlier_samples = samples.of_waypoint[samples.of_waypoint < sample]
-        later_samples = samples.of_waypoint[samples.of_waypoint > sample]
+        sample = int(samples.sample_of_waypoint[i])
+        earlier_samples = samples.sample_of_waypoint[samples.sample_of_waypoint < sample]
+        later_samples = samples.sample_of_waypoint[samples.sample_of_waypoint > sample]
         first_sample = int(earlier_samples[-1]) if earlier_samples.size else 0
         last_sample = min(final_sample, int(later_samples[0]) if later_samples.size else len(samples.along) - 1)
-        matched = np.flatnonzero(ends[first_sample : last_sample + 1, 0] >= 0) + first_sample
-        if matched.size:
-            first[i] = np.searchsorted(run, run[begin_rows[matched[0]]] - _WINDOW_MARGIN_M)
-            last[i] = np.searchsorted(run, run[end_rows[matched[-1]]] + _WINDOW_MARGIN_M, side="right") - 1
-    return RouteProgress(first, last, target, samples.along[samples.of_waypoint] - samples.along[final_sample])
+        matched_samples = np.flatnonzero(ends[first_sample : last_sample + 1, 0] >= 0) + first_sample
+        if matched_samples.size:
+            first[i] = np.searchsorted(distance_run, distance_run[begin_rows[matched_samples[0]]] - _WINDOW_MARGIN_M)
+            last[i] = (
+                np.searchsorted(
+                    distance_run, distance_run[end_rows[matched_samples[-1]]] + _WINDOW_MARGIN_M, side="right"
+                )
+                - 1
+            )
+    return RouteProgress(first, last, target, samples.along[samples.sample_of_waypoint] - samples.along[final_sample])
 
 
 def _sample_route(route: Route, spacing: float) -> _Samples:
     """Sample the legs of a route; a loiter is one sample, however many laps it has."""
     points = route.waypoints[:, :2]
-    places, radii, along = [points[0]], [0.0], [0.0]
-    of_waypoint = np.zeros(len(points), dtype=np.int64)
+    positions, radii, along = [points[0]], [0.0], [0.0]
+    sample_of_waypoint = np.zeros(len(points), dtype=np.int64)
     for i in range(1, len(points)):
         start, end = points[i - 1], points[i]
         if route.arcs[i] > 0.0 and route.arcs[i - 1] > 0.0 and route.stops[i] == route.stops[i - 1]:
-            of_waypoint[i] = of_waypoint[i - 1]
+            sample_of_waypoint[i] = sample_of_waypoint[i - 1]
             continue
         length = math.dist(start, end)
         count = max(1, math.ceil(length / spacing))
         for k in range(1, count + 1):
-            places.append(start + (end - start) * (k / count))
+            positions.append(start + (end - start) * (k / count))
             radii.append(0.0)
             along.append(along[-1] + length / count)
-        of_waypoint[i] = len(places) - 1
+        sample_of_waypoint[i] = len(positions) - 1
         if route.arcs[i] > 0.0:
             corners = [
                 k for k in range(i, len(points)) if route.stops[k] == route.stops[i] and route.arcs[i : k + 1].all()
             ]
-            places[-1], radii[-1] = _loiter_center(route, points[corners], float(route.arcs[i]), i)
-    return _Samples(np.array(places), np.array(radii), np.array(along), of_waypoint)
+            positions[-1], radii[-1] = _loiter_center(route, points[corners], float(route.arcs[i]), i)
+    return _Samples(np.array(positions), np.array(radii), np.array(along), sample_of_waypoint)
 
 
 def _loiter_center(route: Route, corners: Floats, radius: float, first: int) -> tuple[Floats, float]:
@@ -147,20 +154,20 @@ def _loiter_center(route: Route, corners: Floats, radius: float, first: int) -> 
 
 
 @compiled
-def _match_rows(track: Floats, places: Floats, radii: Floats, capture: float, anywhere: bool) -> Numbers:
-    """Match a track (n, 2) to places (m, 2), both only forward, with the minimum sum of costs.
+def _match_rows(track: Floats, samples: Floats, radii: Floats, capture: float, anywhere: bool) -> Numbers:
+    """Match a track (n, 2) to route samples (m, 2), both only forward, with the minimum sum of costs.
 
-    The cost of a row is min(distance, capture)^2; a skipped place costs `_SKIP_FRACTION` of that, and
-    `_SKIP_DISTANCE_M`^2.  Return the first and the last row at each place, (m, 2); -1 for places before the track's
+    The cost of a row is min(distance, capture)^2; a skipped sample costs `_SKIP_FRACTION` of that, and
+    `_SKIP_DISTANCE_M`^2.  Return the first and the last row at each sample, (m, 2); -1 for samples before the track's
     start and after its end.  Of equal ends take the earliest.
     """
-    rows, count = track.shape[0], places.shape[0]
+    rows, count = track.shape[0], samples.shape[0]
     moves = np.zeros((rows, count), dtype=np.uint8)
     total = np.zeros(count)
     for i in range(rows):
         advancing_cost = math.inf
         for j in range(count):
-            distance = math.hypot(track[i, 0] - places[j, 0], track[i, 1] - places[j, 1]) - radii[j]
+            distance = math.hypot(track[i, 0] - samples[j, 0], track[i, 1] - samples[j, 1]) - radii[j]
             cost = min(max(0.0, distance), capture) ** 2
             waiting_cost = total[j]
             if i == 0:

@@ -49,27 +49,27 @@ class Airspace:
 
     zones: the scenario's, then the fence's.
     records: the same, for compiled code.
-    of_scenario: number of zones from the scenario.
-    fault: why the mission's fence gives no zones; "" if it does, or if there is no fence.
+    scenario_zone_count: number of zones from the scenario.
+    fence_fault: reason why the mission's fence gives no zones; "" if it does, or if there is no fence.
     """
 
     zones: tuple[Zone, ...]
     records: ZoneRecords
-    fault: str = ""
-    of_scenario: int = 0
+    fence_fault: str = ""
+    scenario_zone_count: int = 0
 
     def place(self, index: int) -> Place:
         """Return a zone as the place of a finding."""
         zone = self.zones[index]
         return Place(zone.kind, index, name=zone.name)
 
-    def about(self, points: Floats) -> NDArray[np.int64]:
-        """Return the numbers of zones that a path (n, 3), m, may violate: inclusions, and exclusions near a segment.
+    def zones_near(self, points: Floats) -> NDArray[np.int64]:
+        """Return the numbers of all inclusions, and of exclusions near any segment of a path (n, 3) m.
 
         >>> from world.airspace.zones import Cylinder
         >>> zones = tuple(Zone(str(k), "exclusion", Cylinder(1000.0 * k, 0.0, 50.0)) for k in range(4))
         >>> way = np.array([[1900.0, 900.0, 80.0], [2100.0, -900.0, 80.0]])
-        >>> Airspace(zones, zone_records(zones)).about(way).tolist()
+        >>> Airspace(zones, zone_records(zones)).zones_near(way).tolist()
         [2]
         """
         boxes = self.records.zones
@@ -82,22 +82,22 @@ class Airspace:
         return np.flatnonzero(~boxes["exclusion"] | (east & north).any(axis=1))
 
 
-def airspace_of(setup: FlightSetup) -> Airspace:
+def judged_airspace(setup: FlightSetup) -> Airspace:
     """Return the exclusion and inclusion zones that apply to a setup's flight.
 
     A fence that gives no zones, as in logs from before fences were judged, is omitted and reported.
 
     >>> from logs.recording.example_log import example_log
-    >>> airspace_of(example_log().setup).zones
+    >>> judged_airspace(example_log().setup).zones
     ()
     """
-    fault, fence = "", tuple[Zone, ...]()
+    fence_fault, mission_zones = "", tuple[Zone, ...]()
     try:
-        fence = fence_zones(setup.mission.fences, setup.scenario.origin, "the mission")
+        mission_zones = fence_zones(setup.mission.fences, setup.scenario.origin, "the mission")
     except MissionError as error:
-        fault = str(error)
-    zones = (*setup.scenario.zones, *fence) if fence else setup.scenario.zones
-    return Airspace(zones, _cached_records(zones), fault, len(setup.scenario.zones))
+        fence_fault = str(error)
+    zones = (*setup.scenario.zones, *mission_zones) if mission_zones else setup.scenario.zones
+    return Airspace(zones, _cached_records(zones), fence_fault, len(setup.scenario.zones))
 
 
 # The zones that were used last, because converting a thousand zones takes longer than judging them.
@@ -123,7 +123,7 @@ def with_fence_zones(setup: FlightSetup) -> FlightSetup:
     """
     if not setup.mission.fences:
         return setup
-    return setup.in_scenario(replace(setup.scenario, zones=airspace_of(setup).zones))
+    return setup.in_scenario(replace(setup.scenario, zones=judged_airspace(setup).zones))
 
 
 # ----------------------------------------------------------------------
@@ -135,18 +135,18 @@ class TurnRequirements:
     """Turns of a route with w waypoints.
 
     turns: (w,) rad, positive to the right, 0 at the ends.
-    tightest: (w,) m, radius of the arc at the bank limit.
+    min_radius: (w,) m, radius of the arc at the bank limit.
     radius: (w,) m, radius of the arc that is flown: the same, or the radius of a loiter.
-    before, after: (w,) m of leg that the turn uses on either side, inf for a U-turn.
+    length_before, length_after: (w,) m of leg that the turn uses on either side, inf for a U-turn.
     reversal: (w - 1,) m of leg that the roll from a turn into one to the other side uses.
     limit: (w,) rad, the sharpest turn there that fits both legs next to the neighbouring turns.
     """
 
     turns: Floats
-    tightest: Floats
+    min_radius: Floats
     radius: Floats
-    before: Floats
-    after: Floats
+    length_before: Floats
+    length_after: Floats
     reversal: Floats
     limit: Floats
 
@@ -163,15 +163,17 @@ def turn_requirements(route: Route, tables: dict[float, PerformanceTable]) -> Tu
     turns = np.zeros(count)
     if count > 2:
         turns[1:-1] = signed_turns(points)
-    tightest, radius, before, after = (np.zeros(count) for _ in range(4))
+    min_radius, radius, length_before, length_after = (np.zeros(count) for _ in range(4))
     for i in range(1, count - 1):
         speed = float(max(route.airspeed[i - 1], route.airspeed[i]))
-        tightest[i] = turn_radius_between(tables[speed], courses[i - 1], courses[i], points[i, 2])
-        radius[i] = route.arcs[i] or tightest[i]
-        before[i], after[i] = turn_lengths(abs(float(turns[i])), float(radius[i]), bool(route.fly_over[i]))
+        min_radius[i] = turn_radius_between(tables[speed], courses[i - 1], courses[i], points[i, 2])
+        radius[i] = route.arcs[i] or min_radius[i]
+        length_before[i], length_after[i] = turn_lengths(
+            abs(float(turns[i])), float(radius[i]), bool(route.fly_over[i])
+        )
     reversal = _reversal_lengths(route, tables, courses, turns, radius, points[:, 2])
-    limit = _sharpest_turns(route, runs, tightest, before, after, reversal)
-    return TurnRequirements(turns, tightest, radius, before, after, reversal, limit)
+    limit = _sharpest_turns(route, runs, min_radius, length_before, length_after, reversal)
+    return TurnRequirements(turns, min_radius, radius, length_before, length_after, reversal, limit)
 
 
 def turn_lengths(turn: float, radius: float, fly_over: bool) -> tuple[float, float]:
@@ -192,7 +194,7 @@ def turn_lengths(turn: float, radius: float, fly_over: bool) -> tuple[float, flo
 def _reversal_lengths(
     route: Route, tables: dict[float, PerformanceTable], courses: Floats, turns: Floats, radius: Floats, up: Floats
 ) -> Floats:
-    """Return the length of each leg used by the roll between opposite banks, m, (w - 1,).
+    """Return the length of each leg that the roll between opposite banks uses, m, (w - 1,).
 
     The length is 0 between turns to the same side.
     """
@@ -209,37 +211,42 @@ def _reversal_lengths(
     return lengths
 
 
-def available_lengths(runs: Floats, before: Floats, after: Floats, reversal: Floats, i: int) -> tuple[float, float]:
+def available_lengths(
+    runs: Floats, length_before: Floats, length_after: Floats, reversal: Floats, i: int
+) -> tuple[float, float]:
     """Return the lengths (m) of the legs before and after waypoint i that its turn may use.
 
-    If a leg is too short for its two turns, the turn that uses more than half of it is at fault, or both are: each turn
-    may use half of the leg in any case.
+    Each turn may use at least half of a leg.  If the leg is too short for its two turns, the turns that use more than
+    half of it are at fault.
     """
     return (
-        max(runs[i - 1] - after[i - 1], 0.5 * runs[i - 1]) - reversal[i - 1],
-        max(runs[i] - before[i + 1], 0.5 * runs[i]) - reversal[i],
+        max(runs[i - 1] - length_after[i - 1], 0.5 * runs[i - 1]) - reversal[i - 1],
+        max(runs[i] - length_before[i + 1], 0.5 * runs[i]) - reversal[i],
     )
 
 
 def _sharpest_turns(
-    route: Route, runs: Floats, tightest: Floats, before: Floats, after: Floats, reversal: Floats
+    route: Route, runs: Floats, min_radius: Floats, lengths_before: Floats, lengths_after: Floats, reversal: Floats
 ) -> Floats:
     """Return the sharpest turn at each waypoint that fits between the neighbouring turns, (w,) rad."""
-    limits = np.full(len(tightest), math.pi)
-    for i in range(1, len(tightest) - 1):
-        if not math.isfinite(tightest[i]):
+    limits = np.full(len(min_radius), math.pi)
+    for i in range(1, len(min_radius) - 1):
+        if not math.isfinite(min_radius[i]):
             limits[i] = 0.0
             continue
-        length_before, length_after = available_lengths(runs, before, after, reversal, i)
+        length_before, length_after = available_lengths(runs, lengths_before, lengths_after, reversal, i)
         if route.fly_over[i]:
-            limits[i] = _sharpest_fly_over(length_after / tightest[i])
+            limits[i] = _sharpest_fly_over_turn(length_after / min_radius[i])
         else:
-            limits[i] = 2.0 * math.atan(min(length_before, length_after) / tightest[i])
+            limits[i] = 2.0 * math.atan(min(length_before, length_after) / min_radius[i])
     return limits
 
 
-def _sharpest_fly_over(radii: float) -> float:
-    """Return the sharpest fly-over turn (rad) that needs at most this many radii of leg, by bisection."""
+def _sharpest_fly_over_turn(radii: float) -> float:
+    """Find the sharpest fly-over turn (rad) that uses at most a length of leg, by bisection.
+
+    radii: the length in turn radii.
+    """
     fitting, too_sharp = 0.0, math.pi
     if fly_over_run(too_sharp) <= radii:
         return too_sharp
@@ -267,28 +274,28 @@ class PlannedPath:
 class FlownGround:
     """Ground phases of a flight: its take-off and its landing.
 
-    ways: the planned ground phases.
+    procedures: the planned ground phases.
     whole: requirements of the whole route, with take-off and landing.
     track: track of the whole flight.
-    begun, left: its row where the take-off ended, and its row where the landing began; the first and the last row if
-        there is none.
+    takeoff_end_row: row of the track at which the take-off ended; 0 without a take-off.
+    landing_start_row: row of the track at which the landing began; the last row without a landing.
     """
 
-    ways: GroundWays
+    procedures: GroundWays
     whole: "RouteRequirements"
     track: Track
-    begun: int
-    left: int
+    takeoff_end_row: int
+    landing_start_row: int
 
     @property
     def launch(self) -> Track:
         """Track of the take-off."""
-        return self.track.rows(0, self.begun + 1)
+        return self.track.rows(0, self.takeoff_end_row + 1)
 
     @property
     def landing(self) -> Track:
         """Track of the landing."""
-        return self.track.rows(self.left, len(self.track))
+        return self.track.rows(self.landing_start_row, len(self.track))
 
 
 @dataclass(frozen=True, slots=True)
@@ -300,22 +307,21 @@ class RouteRequirements:
     For w waypoints:
 
     points: (w, 3) m.
-    runs: (w - 1,) m, horizontal.
+    runs: (w - 1,) horizontal lengths of the legs, m.
     courses, slopes: (w - 1,) rad.
-    turns, tightest, radius, before, after, reversal: as in `TurnRequirements`.
+    turns, min_radius, radius, length_before, length_after, reversal: as in `TurnRequirements`.
     blend: (w,) m of leg beyond each turn on which the slope still changes.
     fly_by_offset: (w,) m by which the fly-by passes the waypoint.
     turn_limit: (w,) rad, as `TurnRequirements.limit`; inf if the envelope is left out.
     climb, dive: (w - 1,) rad over the ground, the least along the leg, inf if the envelope is left out.
-    sure_climb, sure_dive: (w - 1,) the certain part of those limits for an uncertain aircraft model; otherwise the
-    same.
+    certain_climb, certain_dive: (w - 1,) the certain part of these limits if the aircraft model is uncertain.
     ground_speed: (w - 1,) m/s, NaN if the wind leaves no ground speed.
     envelope: True if the aircraft's limits apply; otherwise only the ability shown by the flight applies.
     airspace: the zones of scenario and mission.
     surveys: surveys of a user's mission, if the scenario judges surveys by their lines.
-    zones_on: first and last leg if, for a quick answer, zones are checked on only these legs, and only zones that the
-        planned path violates there.
-    ground: for a flight that took off or landed, to whose airborne part the other fields belong; None for any other.
+    zone_check_legs: for a quick answer, the first and last leg on which zones are checked; None to check all legs and
+        all zones.
+    ground_phases: take-off and landing of the flight, to whose airborne part the other fields belong; None without.
     """
 
     setup: FlightSetup
@@ -325,25 +331,25 @@ class RouteRequirements:
     courses: Floats
     slopes: Floats
     turns: Floats
-    tightest: Floats
+    min_radius: Floats
     radius: Floats
-    before: Floats
-    after: Floats
+    length_before: Floats
+    length_after: Floats
     reversal: Floats
     blend: Floats
     fly_by_offset: Floats
     turn_limit: Floats
     climb: Floats
     dive: Floats
-    sure_climb: Floats
-    sure_dive: Floats
+    certain_climb: Floats
+    certain_dive: Floats
     ground_speed: Floats
     path: PlannedPath
     envelope: bool
     airspace: Airspace
     surveys: tuple[Survey, ...]
-    ground: FlownGround | None = None
-    zones_on: tuple[int, int] | None = None
+    ground_phases: FlownGround | None = None
+    zone_check_legs: tuple[int, int] | None = None
 
     @property
     def limits(self) -> Limits:
@@ -362,25 +368,25 @@ class RouteRequirements:
 
     def waypoint(self, index: int) -> Place:
         """Return a waypoint as the place of a finding."""
-        return Place("waypoint", index, self._item(index), number=int(self.setup.route.stops[index]))
+        return Place("waypoint", index, self._item_number(index), number=int(self.setup.route.stops[index]))
 
     def leg(self, index: int) -> Place:
         """Return a leg as the place of a finding, with the item to which it leads."""
         number = int(self.setup.route.leg_numbers[index])
-        return Place("leg", index, to_item=self._item(index + 1), number=number)
+        return Place("leg", index, to_item=self._item_number(index + 1), number=number)
 
-    def _item(self, waypoint: int) -> int | None:
+    def _item_number(self, waypoint: int) -> int | None:
         item = int(self.setup.route.items[waypoint])
         return None if item < 0 else item
 
-    def turns_around(self, waypoint: int) -> bool:
+    def is_in_turnaround(self, waypoint: int) -> bool:
         """Return True if a waypoint is part of a survey's turn-around, ends included.
 
-        The autopilot decides its path.
+        The autopilot decides the path of a turn-around.
         """
         return waypoint in _turnaround_parts(self.surveys)[0]
 
-    def leads_around(self, leg: int) -> bool:
+    def is_turnaround_leg(self, leg: int) -> bool:
         """Return True if a leg is part of a survey's turn-around."""
         return leg in _turnaround_parts(self.surveys)[1]
 
@@ -396,7 +402,7 @@ class RouteRequirements:
                 inward = self.leg_unit(i) - self.leg_unit(i - 1)
                 apexes[i, :2] += self.fly_by_offset[i] * inward / math.hypot(*inward)
                 # Halfway between the altitudes at the arc's ends.
-                tangent = min(self.before[i], self.runs[i - 1], self.runs[i])
+                tangent = min(self.length_before[i], self.runs[i - 1], self.runs[i])
                 apexes[i, 2] += 0.5 * tangent * (math.tan(self.slopes[i]) - math.tan(self.slopes[i - 1]))
         return apexes
 
@@ -412,10 +418,10 @@ def route_requirements(setup: FlightSetup, *, envelope: bool = True) -> RouteReq
     turns = turn_requirements(route, tables)
     courses, runs = leg_courses(points), leg_runs(points)
     climb, dive, speeds = _leg_limits(route, tables, points, courses)
-    certain = limits.surely()
-    sure_climb, sure_dive = climb, dive
-    if certain.envelope is not limits.envelope:
-        sure_climb, sure_dive, _ = _leg_limits(route, performance_tables(route, certain), points, courses)
+    certain_limits = limits.surely()
+    certain_climb, certain_dive = climb, dive
+    if certain_limits.envelope is not limits.envelope:
+        certain_climb, certain_dive, _ = _leg_limits(route, performance_tables(route, certain_limits), points, courses)
     if not envelope:
         climb, dive = np.full_like(climb, math.inf), np.full_like(dive, math.inf)
     return RouteRequirements(
@@ -426,27 +432,27 @@ def route_requirements(setup: FlightSetup, *, envelope: bool = True) -> RouteReq
         courses=courses,
         slopes=leg_slopes(points),
         turns=turns.turns,
-        tightest=turns.tightest,
+        min_radius=turns.min_radius,
         radius=turns.radius,
-        before=turns.before,
-        after=turns.after,
+        length_before=turns.length_before,
+        length_after=turns.length_after,
         reversal=turns.reversal,
         blend=_blend_lengths(setup, route, points, runs, turns),
         fly_by_offset=_fly_by_offsets(route, turns),
         turn_limit=turns.limit if envelope else np.full(len(points), math.inf),
         climb=climb,
         dive=dive,
-        sure_climb=sure_climb,
-        sure_dive=sure_dive,
+        certain_climb=certain_climb,
+        certain_dive=certain_dive,
         ground_speed=speeds,
         path=_planned_path(setup.path, route, speeds),
         envelope=envelope,
-        airspace=airspace_of(setup),
-        surveys=surveys_of(setup),
+        airspace=judged_airspace(setup),
+        surveys=judged_surveys(setup),
     )
 
 
-def surveys_of(setup: FlightSetup) -> tuple[Survey, ...]:
+def judged_surveys(setup: FlightSetup) -> tuple[Survey, ...]:
     """Return the surveys of a setup's mission that are judged by their lines.
 
     A plan made by planfly has none.  Other missions have the surveys whose camera is switched, or, if the scenario
@@ -537,17 +543,17 @@ def _blend_lengths(setup: FlightSetup, route: Route, points: Floats, runs: Float
 
     The altitude follows a parabola about each end of the arc, or about the waypoint if there is no arc.
     """
-    rise = np.diff(points[:, 2]) / np.maximum(runs, 1.0)
+    slopes = np.diff(points[:, 2]) / np.maximum(runs, 1.0)
     blend = np.zeros(len(points))
     speed = float(route.airspeed.max()) + setup.scenario.wind.strongest(points[:, 2])
     for i in range(1, len(points) - 1):
-        slope_changes = [abs(rise[i] - rise[i - 1])]
+        slope_changes = [abs(slopes[i] - slopes[i - 1])]
         turn = abs(float(turns.turns[i]))
         arc = float(turns.radius[i]) * turn if turn > 0.0 else 0.0
-        if 0.0 < arc < math.inf and math.isfinite(turns.after[i]) and not setup.route.fly_over[i]:
+        if 0.0 < arc < math.inf and math.isfinite(turns.length_after[i]) and not setup.route.fly_over[i]:
             # The arc is shorter than its two tangents, so that its slope is steeper than the slopes of the legs.
-            arc_slope_ = (rise[i - 1] + rise[i]) * turns.after[i] / arc
-            slope_changes = [abs(arc_slope_ - rise[i - 1]), abs(arc_slope_ - rise[i])]
+            arc_slope_ = (slopes[i - 1] + slopes[i]) * turns.length_after[i] / arc
+            slope_changes = [abs(arc_slope_ - slopes[i - 1]), abs(arc_slope_ - slopes[i])]
         blend[i] = max(slope_changes) * speed**2 / (2.0 * BLEND_ACCELERATION)
     return blend
 
@@ -604,11 +610,14 @@ def steep_arc(requirements: RouteRequirements, leg: int) -> SteepArc | None:
     i = leg + 1
     if i == requirements.legs or requirements.setup.route.fly_over[i] or requirements.setup.route.arcs[i] > 0.0:
         return None
-    before, length = float(requirements.before[i]), float(requirements.radius[i]) * abs(float(requirements.turns[i]))
-    if not 0.0 < before < min(requirements.runs[leg : leg + 2]):
+    turn_length, length = (
+        float(requirements.length_before[i]),
+        float(requirements.radius[i]) * abs(float(requirements.turns[i])),
+    )
+    if not 0.0 < turn_length < min(requirements.runs[leg : leg + 2]):
         return None
     slope_before, slope_after = math.tan(requirements.slopes[leg]), math.tan(requirements.slopes[i])
-    tangent = arc_slope(slope_before, slope_after, before, float(requirements.radius[i]))
+    tangent = arc_slope(slope_before, slope_after, turn_length, float(requirements.radius[i]))
     limits = (requirements.climb if tangent > 0.0 else requirements.dive)[leg : leg + 2]
     if not np.isfinite(limits).all() or not (limits > 0.0).all():
         return None

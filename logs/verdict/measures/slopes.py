@@ -50,45 +50,45 @@ class LegFit:
     """A measured course or slope of a leg.
 
     value, tolerance: rad.
-    run: distance over which it was measured, m.
-    fitted: True if fitted by least squares over a long enough piece; the value of a short leg is rough.
+    length: distance over which it was measured, m.
+    is_fitted: True if fitted by least squares over a long enough piece; the value of a short leg is rough.
     """
 
     value: float
     tolerance: float
-    run: float
-    fitted: bool
+    length: float
+    is_fitted: bool
 
 
 def fit_line(x: Floats, y: Floats) -> tuple[float, float]:
-    """Return the slope of the least-squares line of y on x, and the RMS of its residuals.  x must vary."""
+    """Fit a line y(x) by least squares; return its slope and the RMS residual.  x must vary."""
     dx, dy = x - x.mean(), y - y.mean()
     slope = float((dx * dy).sum() / (dx * dx).sum())
     return slope, float(np.sqrt(np.mean((dy - slope * dx) ** 2)))
 
 
 def straight_span(
-    requirements: RouteRequirements, leg: int, clear: float, *, level: bool = False
+    requirements: RouteRequirements, leg: int, clearance: float, *, excludes_blends: bool = False
 ) -> tuple[float, float]:
     """Return the span of a leg (m from its start) that lies clear of the turns at its ends.
 
-    clear: distance kept from the turns, m.
-    level: True to exclude the slope blends as well.
+    clearance: distance kept from the turns, m.
+    excludes_blends: True to exclude the slope blends as well.
     """
-    start_clear, end_clear = clear, clear
-    if level:
-        start_clear, end_clear = (
-            max(clear, float(blend) + BLEND_EXCLUSION_M) for blend in requirements.blend[leg : leg + 2]
+    start_clearance, end_clearance = clearance, clearance
+    if excludes_blends:
+        start_clearance, end_clearance = (
+            max(clearance, float(blend) + BLEND_EXCLUSION_M) for blend in requirements.blend[leg : leg + 2]
         )
-    span_start = requirements.after[leg] + (start_clear if leg > 0 else min(clear, BLEND_EXCLUSION_M))
-    return span_start, requirements.runs[leg] - requirements.before[leg + 1] - (
-        end_clear if leg + 1 < requirements.legs else 0.0
+    span_start = requirements.length_after[leg] + (start_clearance if leg > 0 else min(clearance, BLEND_EXCLUSION_M))
+    return span_start, requirements.runs[leg] - requirements.length_before[leg + 1] - (
+        end_clearance if leg + 1 < requirements.legs else 0.0
     )
 
 
 def leg_course(requirements: RouteRequirements, aligned: AlignedTrack, leg: int) -> LegFit | None:
-    """Return the course on which a leg was flown, or None if too little of it was flown."""
-    if not aligned.flew(leg):
+    """Return a leg's flown course, or None if too little of the leg was flown."""
+    if not aligned.has_flown(leg):
         return None
     rows = aligned.leg_rows(leg)
     along, across = along_across(requirements, leg, aligned.track.position[rows])
@@ -96,11 +96,11 @@ def leg_course(requirements: RouteRequirements, aligned: AlignedTrack, leg: int)
     is_inside = (along >= span_start) & (along <= span_end)
     if is_inside.sum() >= 20 and np.ptp(along[is_inside]) >= MIN_COURSE_STRETCH_M:
         cross_slope, residual = fit_line(along[is_inside], across[is_inside])
-        run = float(np.ptp(along[is_inside]))
+        distance = float(np.ptp(along[is_inside]))
         return LegFit(
             requirements.courses[leg] + math.atan(cross_slope),
-            _angle_tolerance(COURSE_ERROR_FLOOR_RAD, residual, run),
-            run,
+            _angle_tolerance(COURSE_ERROR_FLOOR_RAD, residual, distance),
+            distance,
             True,
         )
     # A short leg: the mean course between its turns, over at least a second.
@@ -115,25 +115,25 @@ def leg_course(requirements: RouteRequirements, aligned: AlignedTrack, leg: int)
         indices = np.array([np.argmin(np.abs(along - midpoint))])
     first, last = rows.start + int(indices[0]), rows.start + int(indices[-1])
     if aligned.track.time[last] - aligned.track.time[first] < 1.0:
-        rows_around = aligned.around(first, last, 0.5)
+        rows_around = aligned.rows_around(first, last, 0.5)
         first, last = rows_around.start, rows_around.stop - 1
     # In the frame of the course column, which is unwrapped, so that a full circle shows.
     return LegFit(float(aligned.course[first : last + 1].mean()), ROUGH_COURSE_ERROR_RAD, float(np.ptp(along)), False)
 
 
 def leg_slope(requirements: RouteRequirements, aligned: AlignedTrack, leg: int) -> LegFit | None:
-    """Return the slope at which a leg was flown, or None if less than a second of it was flown."""
-    if not aligned.flew(leg):
+    """Return a leg's flown slope, or None if less than a second of the leg was flown."""
+    if not aligned.has_flown(leg):
         return None
     rows = aligned.leg_rows(leg)
     position = aligned.track.position[rows]
     along, _ = along_across(requirements, leg, position)
-    span_start, span_end = straight_span(requirements, leg, TURN_EXCLUSION_M, level=True)
+    span_start, span_end = straight_span(requirements, leg, TURN_EXCLUSION_M, excludes_blends=True)
     is_inside = (along >= span_start) & (along <= span_end)
     if is_inside.sum() >= 20 and np.ptp(along[is_inside]) >= MIN_SLOPE_STRETCH_M:
-        rise, residual = fit_line(along[is_inside], position[is_inside, 2])
-        run = float(np.ptp(along[is_inside]))
-        return LegFit(math.atan(rise), _angle_tolerance(SLOPE_ERROR_FLOOR_RAD, residual, run), run, True)
+        slope, residual = fit_line(along[is_inside], position[is_inside, 2])
+        distance = float(np.ptp(along[is_inside]))
+        return LegFit(math.atan(slope), _angle_tolerance(SLOPE_ERROR_FLOOR_RAD, residual, distance), distance, True)
     time = aligned.track.time[rows]
     if time[-1] - time[0] < 1.0:
         return None
@@ -147,13 +147,13 @@ def leg_slope(requirements: RouteRequirements, aligned: AlignedTrack, leg: int) 
     distance_run = aligned.distance_run[rows][in_window]
     if distance_run.size < 2 or np.ptp(distance_run) < 1.0:
         return None
-    rise, _ = fit_line(distance_run, position[in_window, 2])
-    return LegFit(math.atan(rise), ROUGH_SLOPE_ERROR_RAD, float(np.ptp(distance_run)), False)
+    slope, _ = fit_line(distance_run, position[in_window, 2])
+    return LegFit(math.atan(slope), ROUGH_SLOPE_ERROR_RAD, float(np.ptp(distance_run)), False)
 
 
-def _angle_tolerance(floor: float, residual: float, run: float) -> float:
+def _angle_tolerance(floor: float, residual: float, distance: float) -> float:
     """Return the tolerance of a fitted angle: residuals at the ends of the run rotate the line."""
-    return min(floor + math.atan2(2.0 * residual, run), MAX_UNSTEADINESS_RAD)
+    return min(floor + math.atan2(2.0 * residual, distance), MAX_UNSTEADINESS_RAD)
 
 
 @dataclass(frozen=True, slots=True)
@@ -162,16 +162,16 @@ class Ability:
 
     slope: over the ground, at the leg's commanded airspeed in the mean wind, rad, positive in the direction of the leg.
     error: standard error of the slope, rad.
-    seconds: duration over which it was seen.
+    duration: duration over which it was seen.
     """
 
     slope: float
     error: float
-    seconds: float
+    duration: float
 
-    def covers(self, planned: float) -> bool:
+    def exceeds(self, leg_slope: float) -> bool:
         """Return True if the ability exceeds a leg's slope (rad) by more than its own error."""
-        return self.slope - ABILITY_SIGMAS * self.error > abs(planned)
+        return self.slope - ABILITY_SIGMAS * self.error > abs(leg_slope)
 
 
 @dataclass(frozen=True, slots=True)
@@ -180,28 +180,28 @@ class SlopeMeasure:
 
     slope: as fitted.
     height_error: m, largest distance above (negative: below) the leg's line.
-    short: True if no part of the leg is clear of the blends.
-    at_full, at_idle: time with the throttle at its limits, s.
-    slow, fast: largest mean airspeed error below and above the command over `SATURATED_TIME_S` seconds at those limits,
-        m/s, without the part that a gust explains; 0 for none.
+    is_short: True if no part of the leg is clear of the blends.
+    full_throttle_time, idle_throttle_time: time with the throttle at its limits, s.
+    speed_loss, speed_gain: largest mean airspeed error below and above the command over `SATURATED_TIME_S` seconds at
+        these limits, m/s, without the part that a gust explains.
     ability: the aircraft's ability at the throttle limit that the leg needs, if the flight reached that limit.
-    finished: the leg was flown to its end.
+    is_finished: the leg was flown to its end.
     """
 
     slope: LegFit | None = None
     height_error: float | None = None
-    short: bool = False
-    at_full: float = 0.0
-    at_idle: float = 0.0
-    slow: float = 0.0
-    fast: float = 0.0
+    is_short: bool = False
+    full_throttle_time: float = 0.0
+    idle_throttle_time: float = 0.0
+    speed_loss: float = 0.0
+    speed_gain: float = 0.0
     ability: Ability | None = None
-    finished: bool = False
+    is_finished: bool = False
 
 
 def measure_slope(requirements: RouteRequirements, aligned: AlignedTrack, leg: int) -> SlopeMeasure:
     """Measure the slope of a leg as flown."""
-    if not aligned.flew(leg):
+    if not aligned.has_flown(leg):
         return SlopeMeasure()
     rows = aligned.leg_rows(leg)
     height_error, is_short = _height_error(requirements, leg, aligned.track.position[rows])
@@ -209,20 +209,20 @@ def measure_slope(requirements: RouteRequirements, aligned: AlignedTrack, leg: i
     return SlopeMeasure(
         slope=leg_slope(requirements, aligned, leg),
         height_error=height_error,
-        short=is_short,
-        at_full=full_time,
-        at_idle=idle_time,
-        slow=speed_loss,
-        fast=speed_gain,
+        is_short=is_short,
+        full_throttle_time=full_time,
+        idle_throttle_time=idle_time,
+        speed_loss=speed_loss,
+        speed_gain=speed_gain,
         ability=measure_ability(requirements, aligned, leg),
-        finished=bool(aligned.passed[leg + 1]),
+        is_finished=bool(aligned.passed[leg + 1]),
     )
 
 
 def _height_error(requirements: RouteRequirements, leg: int, position: Floats) -> tuple[float | None, bool]:
     """Return the largest signed height error from the leg's line, m, and True if no part is clear of blends."""
     along, _ = along_across(requirements, leg, position)
-    span_start, span_end = straight_span(requirements, leg, TURN_EXCLUSION_M, level=True)
+    span_start, span_end = straight_span(requirements, leg, TURN_EXCLUSION_M, excludes_blends=True)
     is_inside = (along >= span_start) & (along <= span_end)
     is_short = not is_inside.any()
     if is_short:
@@ -297,22 +297,22 @@ def measure_ability(requirements: RouteRequirements, aligned: AlignedTrack, leg:
     at_full &= track.controls[rows, THROTTLE] >= SATURATED_THROTTLE_FRACTION
     along, _ = along_across(requirements, leg, track.position[rows])
     span_start, span_end = straight_span(requirements, leg, 0.0)
-    is_used = _rows_after(at_full if sign > 0.0 else at_idle, round(ABILITY_SETTLING_S / aligned.tick))
-    is_used &= (along >= span_start) & (along <= span_end)
+    is_measured = _rows_after_run(at_full if sign > 0.0 else at_idle, round(ABILITY_SETTLING_S / aligned.tick))
+    is_measured &= (along >= span_start) & (along <= span_end)
     velocity = track.velocity[rows].astype(np.float64)
     air_velocity = velocity - track.wind[rows]
     # A log may lack the wind at some rows.
-    is_used &= np.isfinite(air_velocity).all(axis=1)
-    seconds = float(is_used.sum() * aligned.tick)
-    if seconds < ABILITY_WINDOW_S:
+    is_measured &= np.isfinite(air_velocity).all(axis=1)
+    duration = float(is_measured.sum() * aligned.tick)
+    if duration < ABILITY_WINDOW_S:
         return None
     acceleration = np.gradient(velocity, track.time[rows], axis=0)
-    climb_rate = (air_velocity[:, 2] + (air_velocity * acceleration).sum(axis=1) / GRAVITY)[is_used]
-    commanded, altitude = float(requirements.route.airspeed[leg]), track.position[rows, 2][is_used]
+    climb_rate = (air_velocity[:, 2] + (air_velocity * acceleration).sum(axis=1) / GRAVITY)[is_measured]
+    commanded, altitude = float(requirements.route.airspeed[leg]), track.position[rows, 2][is_measured]
     top_altitude = float(altitude.max())
-    excess_speed = np.sqrt((air_velocity[is_used] ** 2).sum(axis=1)) - commanded
+    excess_speed = np.sqrt((air_velocity[is_measured] ** 2).sum(axis=1)) - commanded
     fit = _plane_at_origin(
-        climb_rate, excess_speed, 0.01 * (altitude - top_altitude), seconds / ABILITY_SAMPLE_INTERVAL_S
+        climb_rate, excess_speed, 0.01 * (altitude - top_altitude), duration / ABILITY_SAMPLE_INTERVAL_S
     )
     if fit is None:
         return None
@@ -323,27 +323,27 @@ def measure_ability(requirements: RouteRequirements, aligned: AlignedTrack, leg:
     ]
     error = abs(slopes[1] - slopes[0])
     # Written so that NaN gives None.
-    return Ability(sign * slopes[0], error, seconds) if error <= MAX_ABILITY_STD_ERROR_RAD else None
+    return Ability(sign * slopes[0], error, duration) if error <= MAX_ABILITY_STD_ERROR_RAD else None
 
 
-def _rows_after(mask: Flags, count: int) -> Flags:
-    """Return the rows of ``mask`` that follow at least ``count`` rows of the mask in a row."""
+def _rows_after_run(mask: Flags, count: int) -> Flags:
+    """Return the rows of ``mask`` that follow ``count`` consecutive rows of the mask."""
     rows = np.arange(mask.size)
     return np.asarray(rows - np.maximum.accumulate(np.where(mask, -1, rows)) > count)
 
 
-def _plane_at_origin(value: Floats, x: Floats, y: Floats, independent: float) -> tuple[float, float] | None:
+def _plane_at_origin(value: Floats, x: Floats, y: Floats, sample_count: float) -> tuple[float, float] | None:
     """Return the least-squares plane's value at x = y = 0 and its standard error, or None if singular."""
     columns = [np.ones_like(x), x] + ([y] if np.ptp(y) > 1e-3 else [])
-    table = np.column_stack(columns)
-    moments = table.T @ table / len(x)
+    design_matrix = np.column_stack(columns)
+    moments = design_matrix.T @ design_matrix / len(x)
     if np.linalg.cond(moments) > MAX_CONDITION_NUMBER:
         return None
     inverse = np.linalg.inv(moments)
-    coefficients = inverse @ (table.T @ value) / len(x)
-    residuals = value - table @ coefficients
+    coefficients = inverse @ (design_matrix.T @ value) / len(x)
+    residuals = value - design_matrix @ coefficients
     return float(coefficients[0]), math.sqrt(
-        float((residuals.var() + CLIMB_RATE_RESOLUTION_MPS**2) * inverse[0, 0]) / independent
+        float((residuals.var() + CLIMB_RATE_RESOLUTION_MPS**2) * inverse[0, 0]) / sample_count
     )
 
 
@@ -356,23 +356,23 @@ def _speed_in_mean_wind(requirements: RouteRequirements, aligned: AlignedTrack, 
 
 
 @compiled
-def lifted_speed(time: Floats, airspeed: Singles, rising: Singles, stop: int) -> Floats:
-    """Return the airspeed gained from rising air in rows 0..stop by an aircraft that holds its path, m/s.
+def lifted_speed(time: Floats, airspeed: Singles, vertical_wind: Singles, stop: int) -> Floats:
+    """Return the airspeed that an aircraft on a fixed path gains from rising air, m/s, (stop,).
 
-    The gain fades with time.
+    The gain fades with the time constant `SPEED_MEMORY_S`.
     """
     speed = np.zeros(stop)
     for k in range(1, stop):
         step = time[k] - time[k - 1]
-        gain = GRAVITY * rising[k] / max(MIN_AIRBORNE_AIRSPEED_MPS, airspeed[k])
+        rate = GRAVITY * vertical_wind[k] / max(MIN_AIRBORNE_AIRSPEED_MPS, airspeed[k])
         # A log may lack the airspeed or the wind at some rows.
-        gain = gain if math.isfinite(gain) else 0.0
-        speed[k] = (speed[k - 1] + gain * step) / (1.0 + step / SPEED_MEMORY_S)
+        rate = rate if math.isfinite(rate) else 0.0
+        speed[k] = (speed[k - 1] + rate * step) / (1.0 + step / SPEED_MEMORY_S)
     return speed
 
 
 def _max_mean_within(mask: NDArray[np.bool_], value: Floats, width: int) -> float:
-    """Return the largest mean of ``value`` over ``width`` rows that are mostly in ``mask``; 0 if there are none."""
+    """Return the largest mean of ``value`` over ``width`` rows mostly in ``mask``; 0 if there are none."""
     if mask.size < width:
         return 0.0
     sums = np.concatenate([[0.0], np.cumsum(value)])

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from flight.simulation.setup import FlightSetup
 from flight.simulation.tick import RTL_ARRIVAL_RADIUS_M
 from flight.simulation.track import Track
-from logs.verdict.measures.acceptance import reach
+from logs.verdict.measures.acceptance import acceptance_condition
 from logs.verdict.measures.path_sweeps import path_clearance
 from logs.verdict.measures.route_progress import RouteProgress, route_progress
 from logs.verdict.measures.route_requirements import RouteRequirements, route_requirements
@@ -48,7 +48,7 @@ class AlignedTrack:
     first_bad: time of the first of them, s; NaN without any.
     rows: (w,) the row nearest to each waypoint's apex, never decreasing; the last row for a waypoint that the flight
         did not reach.
-    distance: (w,) m from there to the apex.
+    apex_distance: (w,) m from there to the apex.
     passed: (w,) bool, the flight passed the waypoint.
     course: (t,) rad over the ground, unwrapped.
     distance_run: (t,) m along the ground track.
@@ -61,7 +61,7 @@ class AlignedTrack:
     bad_rows: int
     first_bad: float
     rows: RowNumbers
-    distance: Floats
+    apex_distance: Floats
     passed: NDArray[np.bool_]
     course: Floats
     distance_run: Floats
@@ -78,21 +78,21 @@ class AlignedTrack:
         ends = np.where(self.passed, self.track.time[self.rows], math.inf)[1:-1]
         return tuple(ends.tolist())
 
-    def flew(self, leg: int) -> bool:
+    def has_flown(self, leg: int) -> bool:
         """Return True if any part of a leg was flown."""
         return bool(self.passed[leg]) and self.rows[leg + 1] > self.rows[leg]
 
     def leg_at(self, row: int) -> int:
-        """Return the leg on which a row was flown; the last row is on the leg that the flight ended on."""
+        """Return the leg of a row; the last row belongs to the leg before it."""
         return int(np.searchsorted(self.rows[1:-1], min(row, len(self.track) - 2), side="right"))
 
-    def where(self, row: int, fraction: float = 0.0) -> str:
-        """Describe the place of a row, or of a fraction of the segment to the next row, on the map."""
+    def position_text(self, row: int, fraction: float = 0.0) -> str:
+        """Describe the position at a row, or at a fraction of the segment to the next row."""
         position = self.track.position
         east, north = (position[row] + fraction * (position[min(row + 1, len(position) - 1)] - position[row]))[:2]
         return f"east {east:.0f} m, north {north:.0f} m"
 
-    def around(self, first: int, last: int, seconds: float) -> slice:
+    def rows_around(self, first: int, last: int, seconds: float) -> slice:
         """Return rows first..last and the rows within ``seconds`` of them."""
         time = self.track.time
         start = int(np.searchsorted(time, time[first] - seconds))
@@ -105,51 +105,53 @@ def align_track(requirements: RouteRequirements, track: Track) -> AlignedTrack |
     if int(is_usable.sum()) < 2:
         return None
     if is_usable.all():
-        clean, first_bad = track, math.nan
+        usable_track, first_bad = track, math.nan
     else:
         first_bad = float(track.time[int(np.argmin(is_usable))])
-        clean = Track(*(getattr(track, column.name)[is_usable] for column in fields(track)))
-    apexes, last_row = requirements.apexes(), len(clean) - 1
-    progress = route_progress(requirements.setup.route, clean.position, anywhere=requirements.setup.source is not None)
+        usable_track = Track(*(getattr(track, column.name)[is_usable] for column in fields(track)))
+    apexes, last_row = requirements.apexes(), len(usable_track) - 1
+    progress = route_progress(
+        requirements.setup.route, usable_track.position, anywhere=requirements.setup.source is not None
+    )
     arrival_radius = _arrival_radii(requirements)
-    progress = _count_end_as_arrival(requirements, clean, progress, arrival_radius)
-    rows, distance = _find_passage_rows(clean, apexes, progress)
-    distances = np.hypot(*(clean.position[rows, :2] - requirements.points[:, :2]).T)
+    progress = _advance_target_to_arrival(requirements, usable_track, progress, arrival_radius)
+    rows, distance = _find_passage_rows(usable_track, apexes, progress)
+    distances = np.hypot(*(usable_track.position[rows, :2] - requirements.points[:, :2]).T)
     # The flight is past a waypoint that it passed, or at the waypoint where it ended; it did not pass one far ahead.
-    is_far_ahead = progress.left > arrival_radius + _MISSED_MARGIN_M
+    is_far_ahead = progress.remaining_distance > arrival_radius + _MISSED_MARGIN_M
     is_far_ahead[-1] = False
     passed = ((rows < last_row) & ~is_far_ahead) | (distances <= arrival_radius)
     passed &= np.arange(len(rows)) <= progress.target
     passed = np.logical_and.accumulate(passed)
     rows[~passed] = last_row
-    _advance_last_leg(requirements, clean, rows, passed, arrival_radius)
-    steps = np.diff(clean.position[:, :2], axis=0)
+    _advance_last_leg(requirements, usable_track, rows, passed, arrival_radius)
+    steps = np.diff(usable_track.position[:, :2], axis=0)
     course = np.unwrap(np.arctan2(steps[:, 0], steps[:, 1]))
     terrain = requirements.setup.scenario.terrain
     clearance, clearance_fraction = np.full(last_row, math.nan), np.zeros(last_row)
     if terrain is not None:
-        clearance, clearance_fraction = path_clearance(terrain.heights, terrain.to_pixel.record, clean.position)
+        clearance, clearance_fraction = path_clearance(terrain.heights, terrain.to_pixel.record, usable_track.position)
     return AlignedTrack(
-        track=clean,
+        track=usable_track,
         bad_rows=int(is_usable.size - is_usable.sum()),
         first_bad=first_bad,
         rows=rows,
-        distance=distance,
+        apex_distance=distance,
         passed=passed,
         course=np.append(course, course[-1]),
         distance_run=np.concatenate([[0.0], np.cumsum(np.hypot(steps[:, 0], steps[:, 1]))]),
         clearance=clearance,
         clearance_fraction=clearance_fraction,
-        tick=float(np.median(np.diff(clean.time))),
+        tick=float(np.median(np.diff(usable_track.time))),
     )
 
 
 def _arrival_radii(requirements: RouteRequirements) -> Floats:
-    """Return the radius of each waypoint within which the end of a track counts as its arrival, m, (w,)."""
+    """Return the radius within which a track that ends has arrived at each waypoint, m, (w,)."""
     route, follows_path = requirements.setup.route, requirements.setup.autopilot.follows_path
     offsets = requirements.fly_by_offset if follows_path else np.zeros(len(route.waypoints))
     radii = [
-        max(float(offset) + FINAL_WAYPOINT_TOLERANCE_M, reach(requirements, i).radius)
+        max(float(offset) + FINAL_WAYPOINT_TOLERANCE_M, acceptance_condition(requirements, i).radius)
         for i, offset in enumerate(offsets)
     ]
     first_return = route.return_from
@@ -168,7 +170,7 @@ def _arrival_radii(requirements: RouteRequirements) -> Floats:
     return np.array(radii)
 
 
-def _count_end_as_arrival(
+def _advance_target_to_arrival(
     requirements: RouteRequirements, track: Track, progress: RouteProgress, arrival_radius: Floats
 ) -> RouteProgress:
     """Advance the target past every waypoint whose arrival radius the track has entered for good.
@@ -190,10 +192,10 @@ def _count_end_as_arrival(
 def _advance_last_leg(
     requirements: RouteRequirements, track: Track, rows: RowNumbers, passed: NDArray[np.bool_], arrival_radius: Floats
 ) -> None:
-    """Begin the track's last leg, in ``rows``, where the track entered the arrival radius of the leg's first waypoint.
+    """Move the start of the track's last leg to where the track entered the arrival radius of its first waypoint.
 
-    Change ``rows`` only if the track ends inside that radius, before the waypoint: the autopilot is then already on the
-    next leg.
+    ``rows`` changes only if the track ends inside that radius, before the waypoint: the autopilot is then already on
+    the next leg.
     """
     last_passed = int(np.flatnonzero(passed)[-1]) if passed.any() else 0
     if (
@@ -203,9 +205,9 @@ def _advance_last_leg(
     ):
         return
     distances = np.hypot(*(track.position[:, :2] - requirements.points[last_passed, :2]).T)
-    outside = np.flatnonzero(distances[rows[last_passed - 1] :] > arrival_radius[last_passed])
+    rows_outside = np.flatnonzero(distances[rows[last_passed - 1] :] > arrival_radius[last_passed])
     rows[last_passed] = min(
-        rows[last_passed] - 1, rows[last_passed - 1] + (int(outside[-1]) + 1 if outside.size else 0)
+        rows[last_passed] - 1, rows[last_passed - 1] + (int(rows_outside[-1]) + 1 if rows_outside.size else 0)
     )
 
 
@@ -289,8 +291,8 @@ def _find_passage_rows(track: Track, apexes: Floats, progress: RouteProgress) ->
         start, end = min(start, last_row), max(min(start, last_row), end)
         offsets = position[start : end + 1] - apexes[i]
         distances = np.sqrt((offsets * offsets).sum(axis=1))
-        nearest = int(np.argmin(distances))
-        rows[i], distance[i] = start + nearest, distances[nearest]
+        nearest_row = int(np.argmin(distances))
+        rows[i], distance[i] = start + nearest_row, distances[nearest_row]
         previous_row = int(rows[i])
     return rows, distance
 
@@ -310,7 +312,7 @@ def _match_chords(
     cost = np.zeros(chords)
     starts_here = np.zeros((count, chords), dtype=np.uint8)
     for i in range(count):
-        lowest = math.inf
+        min_total = math.inf
         for j in range(chords):
             start_row, end_row = j * step, min(last_row, (j + 1) * step)
             length_square = 0.0
@@ -327,17 +329,17 @@ def _match_chords(
             if not first[i] <= j <= last[i]:
                 distance_square = math.inf
             total = cost[j] + min(distance_square, capture * capture)
-            if total < lowest:
-                lowest = total
+            if total < min_total:
+                min_total = total
                 starts_here[i, j] = 1
-            cost[j] = lowest
-    chosen = np.zeros(count, dtype=np.int64)
+            cost[j] = min_total
+    chord_of_mark = np.zeros(count, dtype=np.int64)
     is_missed = np.zeros(count, dtype=np.bool_)
     j = chords - 1
     for i in range(count - 1, -1, -1):
         while starts_here[i, j] == 0:
             j -= 1
-        chosen[i] = j
+        chord_of_mark[i] = j
         nearest_square = math.inf
         for row in range(j * step, min(last_row, (j + 1) * step) + 1):
             distance_square = 0.0
@@ -345,7 +347,7 @@ def _match_chords(
                 distance_square += (marks[i, k] - position[row, k]) ** 2
             nearest_square = min(nearest_square, distance_square)
         is_missed[i] = nearest_square >= capture * capture or not first[i] <= j <= last[i]
-    return chosen, is_missed
+    return chord_of_mark, is_missed
 
 
 # ----------------------------------------------------------------------

@@ -20,23 +20,23 @@ from world.arrays import Floats
 # So its corners are measured against known quantities: the waypoint and the next leg.
 
 # Fraction of the next leg over which a corner is examined: by its end the next corner has begun.
-OF_NEXT_LEG = 0.7
+NEXT_LEG_FRACTION = 0.7
 
 
 @dataclass(frozen=True, slots=True)
 class CornerPass:
     """Measured pass of one waypoint.
 
-    time: time of the nearest pass, s.  nearest: horizontal distance from the waypoint at that time, m.
-    overshoot: distance past the next leg, m, on the outside of the turn, up to `OF_NEXT_LEG` of that leg or the next
-        waypoint's pass, whichever is sooner; None if the next leg was not joined.
-    beyond: distance past the next leg's end at the nearest pass, m, if the leg was not joined.
+    time: time of the nearest pass, s.  distance: horizontal distance from the waypoint at that time, m.
+    overshoot: distance past the next leg, m, on the outside of the turn, up to `NEXT_LEG_FRACTION` of that leg or the
+        next waypoint's pass, whichever is sooner; None if the next leg was not joined.
+    overrun: distance past the next leg's end at the nearest pass, m, if the leg was not joined.
     """
 
     time: float
-    nearest: float
+    distance: float
     overshoot: float | None
-    beyond: float = 0.0
+    overrun: float = 0.0
 
 
 def corner_passes(requirements: RouteRequirements, aligned: AlignedTrack) -> tuple[CornerPass, ...]:
@@ -48,36 +48,38 @@ def corner_passes(requirements: RouteRequirements, aligned: AlignedTrack) -> tup
     >>> log = example_log()
     >>> requirements = route_requirements(log.setup)
     >>> passes = corner_passes(requirements, align_track(requirements, log.track))
-    >>> len(passes) == requirements.legs + 1, passes[1].nearest < 60.0
+    >>> len(passes) == requirements.legs + 1, passes[1].distance < 60.0
     (True, True)
     """
     nearest_passes = _nearest_passes(requirements, aligned)
     times, tick = [time for time, _ in nearest_passes], aligned.tick
     passes = []
-    for k, (time, nearest) in enumerate(nearest_passes):
-        overshoot, beyond = None, 0.0
+    for k, (time, distance) in enumerate(nearest_passes):
+        overshoot, overrun = None, 0.0
         if 0 < k < requirements.legs:
             next_time = next(
                 (other_time for other_time in times[k + 1 :] if other_time > time + tick), float(aligned.track.time[-1])
             )
-            overshoot, beyond = _corner_overshoot(requirements, aligned, k, time, next_time)
-        passes.append(CornerPass(time, nearest, overshoot, beyond))
+            overshoot, overrun = _corner_overshoot(requirements, aligned, k, time, next_time)
+        passes.append(CornerPass(time, distance, overshoot, overrun))
     return tuple(passes)
 
 
 def _nearest_passes(requirements: RouteRequirements, aligned: AlignedTrack) -> list[tuple[float, float]]:
-    """Return the time (s) and distance (m) of each waypoint's nearest pass, in order of time."""
+    """Return the time (s) and distance (m) of each waypoint's closest pass, in order of time."""
     time, rows = aligned.track.time, aligned.rows
     passes: list[tuple[float, float]] = []
-    begin = float(time[0])
+    start_time = float(time[0])
     for k in range(len(rows)):
         # Waypoints that share a row do not bound each other.
-        later_rows = rows[k + 1 :][time[rows[k + 1 :]] > max(float(time[rows[k]]), begin)]
-        times, positions = _track_between(aligned, begin, float(time[later_rows[0]] if later_rows.size else time[-1]))
+        later_rows = rows[k + 1 :][time[rows[k + 1 :]] > max(float(time[rows[k]]), start_time)]
+        times, positions = _track_between(
+            aligned, start_time, float(time[later_rows[0]] if later_rows.size else time[-1])
+        )
         distances, fraction = approaches(positions, requirements.points[k])
-        nearest = int(np.argmin(distances))
-        begin = float(times[nearest] + fraction[nearest] * (times[nearest + 1] - times[nearest]))
-        passes.append((begin, float(distances[nearest])))
+        closest_row = int(np.argmin(distances))
+        start_time = float(times[closest_row] + fraction[closest_row] * (times[closest_row + 1] - times[closest_row]))
+        passes.append((start_time, float(distances[closest_row])))
     return passes
 
 
@@ -92,16 +94,16 @@ def _corner_overshoot(
     requirements: RouteRequirements, aligned: AlignedTrack, k: int, start: float, end: float
 ) -> tuple[float | None, float]:
     """Return the overshoot at a waypoint (or None), and the distance past the next leg's end, m."""
-    run = float(requirements.runs[k])
+    leg_length = float(requirements.runs[k])
     along, across = along_across(requirements, k, _track_between(aligned, start, end)[1])
-    if along[0] > run:
-        return None, float(along[0]) - run
+    if along[0] > leg_length:
+        return None, float(along[0]) - leg_length
     outside_offset = -math.copysign(1.0, float(requirements.turns[k])) * across
-    rows_past = np.flatnonzero(along >= OF_NEXT_LEG * run)
+    rows_past = np.flatnonzero(along >= NEXT_LEG_FRACTION * leg_length)
     end_row = int(rows_past[0]) if rows_past.size else len(along)
     if 0 < end_row < len(along):
         # Interpolate to the exact end: rows may be a second apart.
-        fraction = (OF_NEXT_LEG * run - along[end_row - 1]) / (along[end_row] - along[end_row - 1])
+        fraction = (NEXT_LEG_FRACTION * leg_length - along[end_row - 1]) / (along[end_row] - along[end_row - 1])
         end_offset = outside_offset[end_row - 1] + fraction * (outside_offset[end_row] - outside_offset[end_row - 1])
         return max(0.0, float(end_offset), float(outside_offset[:end_row].max())), 0.0
     return max(0.0, float(outside_offset[: max(1, end_row)].max())), 0.0
@@ -112,30 +114,30 @@ class TurnMeasure:
     """Measured turn; None in a field if the turn was not flown, or there is nothing to measure.
 
     angle, tolerance: rad, of the course change.
-    fitted: the courses of both legs are fits.
+    is_fitted: the courses of both legs are fits.
     peak_bank: rad.
     held_bank: rad, the largest mean over a second.
     radius: m, the least over a second.
     overshoot: m past the arc, on its outside.
-    settled: mean distance from the next leg in the last second before its end, m.
-    passed: minimum distance from the waypoint, m.
+    settled_distance: mean distance from the next leg in the last second before its end, m.
+    min_distance: minimum distance from the waypoint, m.
     full_circles: number of full circles flown in addition to the corner's turn.
-    over: True if the flight got past the turn.
-    corner: for an imported flight, the measured pass of the waypoint; ``overshoot`` and ``passed`` are then taken from
-    it.
+    is_complete: True if the flight got past the turn.
+    corner: for an imported flight, the measured pass of the waypoint, from which ``overshoot`` and ``min_distance`` are
+        then taken.
     """
 
     angle: float | None = None
     tolerance: float | None = None
-    fitted: bool = False
+    is_fitted: bool = False
     peak_bank: float | None = None
     held_bank: float | None = None
     radius: float | None = None
     overshoot: float | None = None
-    settled: float | None = None
-    passed: float | None = None
+    settled_distance: float | None = None
+    min_distance: float | None = None
     full_circles: int = 0
-    over: bool = False
+    is_complete: bool = False
     corner: CornerPass | None = None
 
 
@@ -146,29 +148,30 @@ def measure_turns(requirements: RouteRequirements, aligned: AlignedTrack) -> lis
         return measures
     corners = corner_passes(requirements, aligned)[1:-1]
     return [
-        replace(measure, overshoot=corner.overshoot, passed=corner.nearest, corner=corner)
+        replace(measure, overshoot=corner.overshoot, min_distance=corner.distance, corner=corner)
         for measure, corner in zip(measures, corners, strict=True)
     ]
 
 
 def measure_turn(requirements: RouteRequirements, aligned: AlignedTrack, i: int) -> TurnMeasure:
     """Measure the turn at inner waypoint i."""
-    if not aligned.flew(i - 1) or not aligned.flew(i):
+    if not aligned.has_flown(i - 1) or not aligned.has_flown(i):
         return TurnMeasure()
     track = aligned.track
     first, middle, last = (int(aligned.rows[k]) for k in (i - 1, i, i + 1))
     position = track.position[first : last + 1]
     along_before, _ = along_across(requirements, i - 1, position)
     along, across = along_across(requirements, i, position)
-    entry_row = _first_row(along_before >= requirements.runs[i - 1] - requirements.before[i], middle - first)
+    entry_row = _first_row(along_before >= requirements.runs[i - 1] - requirements.length_before[i], middle - first)
     is_after_waypoint = np.arange(first, last + 1) >= middle
-    exit_row = _first_row(is_after_waypoint & (along >= requirements.after[i]), last - first)
+    exit_row = _first_row(is_after_waypoint & (along >= requirements.length_after[i]), last - first)
     # A next turn that needs more than the rest of the leg gets half of the leg: it is at fault, not this turn.
     next_turn_length = min(
-        float(requirements.before[i + 1]), max(0.5 * requirements.runs[i], requirements.runs[i] - requirements.after[i])
+        float(requirements.length_before[i + 1]),
+        max(0.5 * requirements.runs[i], requirements.runs[i] - requirements.length_after[i]),
     )
     end_row = _first_row(is_after_waypoint & (along >= requirements.runs[i] - next_turn_length), last - first)
-    rows_around = aligned.around(first + entry_row, first + max(entry_row, exit_row), 1.0)
+    rows_around = aligned.rows_around(first + entry_row, first + max(entry_row, exit_row), 1.0)
     held_bank, radius = _bank_and_radius(aligned, rows_around)
     angle, tolerance, fitted = _course_change(requirements, aligned, i)
     is_watched = np.arange(position.shape[0]) <= max(exit_row, end_row)
@@ -177,17 +180,17 @@ def measure_turn(requirements: RouteRequirements, aligned: AlignedTrack, i: int)
     return TurnMeasure(
         angle=angle,
         tolerance=tolerance,
-        fitted=fitted,
+        is_fitted=fitted,
         peak_bank=None if math.isnan(held_bank) else float(np.abs(track.attitude[rows_around, ROLL]).max()),
         held_bank=None if math.isnan(held_bank) else held_bank,
         radius=radius,
         overshoot=_arc_overshoot(
             requirements, i, position[is_watched], along_before[is_watched], along[is_watched], across[is_watched]
         ),
-        settled=_settled_distance(requirements, aligned, i, first, end_row, along, across),
-        passed=float(approaches(position, requirements.points[i])[0].min()),
+        settled_distance=_settled_distance(requirements, aligned, i, first, end_row, along, across),
+        min_distance=float(approaches(position, requirements.points[i])[0].min()),
         full_circles=max(0, round((course_change - abs(float(requirements.turns[i]))) / (2.0 * math.pi))),
-        over=bool(aligned.passed[i + 1] or end_row < last - first or exit_row < last - first),
+        is_complete=bool(aligned.passed[i + 1] or end_row < last - first or exit_row < last - first),
     )
 
 
@@ -203,11 +206,11 @@ def _course_change(
     if course_before is None or course_after is None:
         return None, None, False
     change = abs(math.remainder(course_after.value - course_before.value, 2.0 * math.pi))
-    return change, course_before.tolerance + course_after.tolerance, course_before.fitted and course_after.fitted
+    return change, course_before.tolerance + course_after.tolerance, course_before.is_fitted and course_after.is_fitted
 
 
 def _bank_and_radius(aligned: AlignedTrack, rows: slice) -> tuple[float, float]:
-    """Return the largest mean bank (rad) and the smallest radius (m; inf without a turn), each over a second."""
+    """Return the maximum mean bank, rad, and the minimum radius, m (inf without a turn), over one second."""
     time = aligned.track.time[rows]
     bank = np.abs(aligned.track.attitude[rows, ROLL].astype(np.float64))
     ticks = int(np.searchsorted(time, time[0] + 1.0))
@@ -215,8 +218,10 @@ def _bank_and_radius(aligned: AlignedTrack, rows: slice) -> tuple[float, float]:
         return float(bank.mean()), math.inf
     bank_sums = np.concatenate([[0.0], np.cumsum(bank)])
     held_bank = float(((bank_sums[ticks:] - bank_sums[:-ticks]) / ticks).max())
-    course, run = aligned.course[rows], aligned.distance_run[rows]
-    curvature = np.abs(course[ticks:] - course[:-ticks]) / np.maximum(run[ticks:] - run[:-ticks], 1e-6)
+    course, distance_run = aligned.course[rows], aligned.distance_run[rows]
+    curvature = np.abs(course[ticks:] - course[:-ticks]) / np.maximum(
+        distance_run[ticks:] - distance_run[:-ticks], 1e-6
+    )
     max_curvature = float(curvature.max())
     return held_bank, 1.0 / max_curvature if max_curvature > 1e-9 else math.inf
 
@@ -224,22 +229,22 @@ def _bank_and_radius(aligned: AlignedTrack, rows: slice) -> tuple[float, float]:
 def _arc_overshoot(
     requirements: RouteRequirements, i: int, position: Floats, along_before: Floats, along: Floats, across: Floats
 ) -> float | None:
-    """Return the largest distance outside the arc and then outside the next leg, m; 0 if it was never outside."""
-    if requirements.setup.route.fly_over[i] or not math.isfinite(requirements.before[i]):
+    """Return the maximum distance outside the arc, and then outside the next leg, m; 0 if never outside."""
+    if requirements.setup.route.fly_over[i] or not math.isfinite(requirements.length_before[i]):
         return None
-    side = math.copysign(1.0, requirements.turns[i])
+    turn_sign = math.copysign(1.0, requirements.turns[i])
     ux, uy = requirements.leg_unit(i - 1)
     center = (
         requirements.points[i, :2]
-        - requirements.before[i] * np.array([ux, uy])
-        + side * requirements.radius[i] * np.array([uy, -ux])
+        - requirements.length_before[i] * np.array([ux, uy])
+        + turn_sign * requirements.radius[i] * np.array([uy, -ux])
     )
-    has_started = np.maximum.accumulate(along_before >= requirements.runs[i - 1] - requirements.before[i])
-    is_in_arc = has_started & (along < requirements.after[i])
-    outside = np.where(has_started & ~is_in_arc, -side * across, 0.0)
+    has_started = np.maximum.accumulate(along_before >= requirements.runs[i - 1] - requirements.length_before[i])
+    is_in_arc = has_started & (along < requirements.length_after[i])
+    distance_outside = np.where(has_started & ~is_in_arc, -turn_sign * across, 0.0)
     center_offset = position[is_in_arc, :2] - center
-    outside[is_in_arc] = np.hypot(center_offset[:, 0], center_offset[:, 1]) - requirements.radius[i]
-    return max(0.0, float(outside.max())) if outside.size else 0.0
+    distance_outside[is_in_arc] = np.hypot(center_offset[:, 0], center_offset[:, 1]) - requirements.radius[i]
+    return max(0.0, float(distance_outside.max())) if distance_outside.size else 0.0
 
 
 def _settled_distance(
@@ -258,7 +263,7 @@ def _settled_distance(
     time = aligned.track.time[first_row : first_row + end_row + 1]
     start = int(np.searchsorted(time, time[-1] - 1.0))
     rows = np.arange(start, end_row + 1)
-    rows = rows[along[rows] >= requirements.after[i]]
+    rows = rows[along[rows] >= requirements.length_after[i]]
     if rows.size:
         return float(np.abs(across[rows]).mean())
     return float(abs(across[end_row]))

@@ -11,11 +11,11 @@ from world.threats import Threats
 
 
 def violated_legs(requirements: RouteRequirements, finding: Finding) -> tuple[int, ...]:
-    """Return the legs of the planned path on which a failed finding of a threat, zone or area applies."""
+    """Return the legs of the planned path that violate the threat, zone or area of a failed finding."""
     path, place = requirements.path, finding.place
     scenario = requirements.setup.scenario
     if place.kind in ("missile", "radar") and place.index is not None:
-        is_inside = _sphere_segments(path.points, scenario.threats, place.index, missile=place.kind == "missile")
+        is_inside = _sphere_segments(path.points, scenario.threats, place.index, is_missile=place.kind == "missile")
         return tuple(np.unique(path.legs[is_inside]).tolist())
     facts = {fact.what: fact.value for fact in finding.facts}
     if "entry leg" in facts and "exit leg" in facts:
@@ -30,9 +30,9 @@ def violated_legs(requirements: RouteRequirements, finding: Finding) -> tuple[in
     return ()
 
 
-def _sphere_segments(points: Floats, threats: Threats, number: int, *, missile: bool) -> NDArray[np.bool_]:
+def _sphere_segments(points: Floats, threats: Threats, number: int, *, is_missile: bool) -> NDArray[np.bool_]:
     """Return True for each segment of a path that enters the sphere of a threat, (n - 1,).  points: (n, 3) m."""
-    radius = float((threats.kill_radius if missile else threats.detection_radius)[number])
+    radius = float((threats.kill_radius if is_missile else threats.detection_radius)[number])
     start, step = points[:-1] - threats.position[number], np.diff(points, axis=0)
     length_square = (step**2).sum(axis=1)
     fraction = np.clip(

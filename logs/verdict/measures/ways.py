@@ -19,7 +19,7 @@ from world.airspace.zone_kernels import zone_records
 from world.arrays import Floats
 from world.terrain import Terrain
 
-# Altitudes (m AMSL) at increasing runs (m from the path's start).
+# Pairs of a distance (m from the path's start, increasing) and the altitude there (m AMSL).
 Profile = list[tuple[float, float]]
 
 # Length of the pieces in which a path's clearance is computed, m.  Pieces before a gap in the elevation data keep their
@@ -27,50 +27,52 @@ Profile = list[tuple[float, float]]
 _PIECE_LENGTH_M = 100.0
 
 
-class Way(NamedTuple):
-    """Path of n points, m, (n, 3), and the run to each point, m, (n,)."""
+class GroundPath(NamedTuple):
+    """Path of n points, m, (n, 3), and the horizontal distance to each point along the path, m, (n,)."""
 
     points: Floats
-    run: Floats
+    distance: Floats
 
-    def between(self, first: float, last: float) -> "Way":
-        """Return the part between two runs, m."""
-        inner_runs = self.run[(self.run > first) & (self.run < last)]
-        runs = np.concatenate([[first], inner_runs, [max(first, last)]])
-        return Way(np.stack([np.interp(runs, self.run, self.points[:, k]) for k in range(3)], axis=1), runs)
+    def between(self, first: float, last: float) -> "GroundPath":
+        """Return the part between two distances, m."""
+        inner_distances = self.distance[(self.distance > first) & (self.distance < last)]
+        distances = np.concatenate([[first], inner_distances, [max(first, last)]])
+        return GroundPath(
+            np.stack([np.interp(distances, self.distance, self.points[:, k]) for k in range(3)], axis=1), distances
+        )
 
 
-def track_way(track: Track) -> Way:
+def track_path(track: Track) -> GroundPath:
     """Return the horizontal path of a flown track."""
     position = np.asarray(track.position, dtype=np.float64)
     step = np.diff(position[:, :2], axis=0)
-    return Way(position, np.concatenate([[0.0], np.cumsum(np.hypot(step[:, 0], step[:, 1]))]))
+    return GroundPath(position, np.concatenate([[0.0], np.cumsum(np.hypot(step[:, 0], step[:, 1]))]))
 
 
-def straight_way(begin: Sequence[float] | Floats, course: float, profile: Profile) -> Way:
+def straight_path(start: Sequence[float] | Floats, course: float, profile: Profile) -> GroundPath:
     """Return a path on one course (rad) from a start (east, north, m)."""
-    run, up = np.array(profile, dtype=np.float64).T
-    east, north = begin[0] + run * math.sin(course), begin[1] + run * math.cos(course)
-    return Way(np.stack([east, north, up], axis=1), run)
+    distance, up = np.array(profile, dtype=np.float64).T
+    east, north = start[0] + distance * math.sin(course), start[1] + distance * math.cos(course)
+    return GroundPath(np.stack([east, north, up], axis=1), distance)
 
 
-def way_clearance(ground: Terrain, way: Way) -> tuple[float, float]:
-    """Return the minimum height above ground on a path and the run at which it occurs, m.
+def min_path_clearance(terrain: Terrain, path: GroundPath) -> tuple[float, float]:
+    """Return a path's minimum height above ground and its distance along the path, m.
 
     The height is NaN if part of the ground is not known, unless the path hits known ground.
     """
-    first, last = float(way.run[0]), float(way.run[-1])
+    first, last = float(path.distance[0]), float(path.distance[-1])
     cuts = np.linspace(first, last, max(2, math.ceil((last - first) / _PIECE_LENGTH_M) + 1))
-    run = np.union1d(cuts, way.run)
-    points = np.stack([np.interp(run, way.run, way.points[:, lowest]) for lowest in range(3)], axis=1)
-    clearances = [ground.clearance(*points[lowest : lowest + 2]) for lowest in range(len(run) - 1)]
+    distances = np.union1d(cuts, path.distance)
+    points = np.stack([np.interp(distances, path.distance, path.points[:, k]) for k in range(3)], axis=1)
+    clearances = [terrain.clearance(*points[k : k + 2]) for k in range(len(distances) - 1)]
     heights = np.array([clearance for clearance, _ in clearances])
     # A NaN takes precedence, unless the path hits known ground.
-    lowest = int(np.nanargmin(heights)) if (heights < 0.0).any() else int(np.argmin(heights))
-    return float(heights[lowest]), float(run[lowest] + clearances[lowest][1] * (run[lowest + 1] - run[lowest]))
+    k = int(np.nanargmin(heights)) if (heights < 0.0).any() else int(np.argmin(heights))
+    return float(heights[k]), float(distances[k] + clearances[k][1] * (distances[k + 1] - distances[k]))
 
 
-def first_obstacle_on(requirements: RouteRequirements, way: Way) -> str:
+def first_hazard_on_path(requirements: RouteRequirements, path: GroundPath) -> str:
     """Return the name of the first missile sphere or zone that a path enters, or "" if it enters none.
 
     Ignore zones that contain the path's start, and inclusion zones with a floor.
@@ -78,7 +80,9 @@ def first_obstacle_on(requirements: RouteRequirements, way: Way) -> str:
     scenario, airspace = requirements.setup.scenario, requirements.airspace
     if not scenario.external:
         threats = scenario.threats
-        sphere_visits = path_spheres(way.points, way.run, threats.position, threats.kill_radius, threats.kill_scale)
+        sphere_visits = path_spheres(
+            path.points, path.distance, threats.position, threats.kill_radius, threats.kill_scale
+        )
         for missile in np.flatnonzero(sphere_visits.inside > 0.0).tolist():
             return place_text(Place("missile", missile, name=scenario.spec.threats[missile].name or ""))
     zone_numbers = [
@@ -86,7 +90,7 @@ def first_obstacle_on(requirements: RouteRequirements, way: Way) -> str:
     ]
     if zone_numbers:
         records = zone_records([airspace.zones[zone_number] for zone_number in zone_numbers])
-        zone_visits = path_zones(straight_moves(way.points, way.run), records, scenario.terrain)
+        zone_visits = path_zones(straight_moves(path.points, path.distance), records, scenario.terrain)
         for zone_number, visit in zip(zone_numbers, zone_visits, strict=True):
             if visit.depth > ROUNDING_M and visit.entry_time > 0.0:
                 return place_text(airspace.place(zone_number))
@@ -97,7 +101,7 @@ def first_obstacle_on(requirements: RouteRequirements, way: Way) -> str:
 # The mission items at which such paths begin and end.
 
 
-def is_laid_out(requirements: RouteRequirements) -> bool:
+def has_ground_paths(requirements: RouteRequirements) -> bool:
     """Return True if ground paths apply: known terrain, not an imported flight or an airborne plan."""
     setup = requirements.setup
     has_ground_phases = setup.plan is None or setup.plan.ways is not None

@@ -47,7 +47,7 @@ PART = record_dtype(
 def distances_outside_zone(
     records: ZoneRecords, z: int, heights: Heights, to_pixel: PolyMapRecord, east: float, north: float, up: float
 ) -> tuple[float, float, int]:
-    """Return a place's distances outside zone z's outline and altitude band, m, and its nearest edge.
+    """Return a position's distances outside zone z's outline and altitude band, m, and its nearest edge.
 
     A distance is negative inside, and NaN for a band above ground if the ground there is not known.
     """
@@ -61,9 +61,9 @@ def distances_outside_zone(
 
 @inlined
 def beyond_limit(exclusion: bool, outline_distance: float, band_distance: float) -> float:
-    """Return the distance of a place beyond a zone's limit, m; negative if the place complies.
+    """Return a position's distance beyond a zone's limit, m; negative if it complies.
 
-    This is the shortest level or vertical move to the limit, or NaN if it depends on ground that is not known.
+    This is the shortest level or vertical move to the limit, or NaN if it depends on unknown ground.
     outline_distance, band_distance: from `distances_outside_zone`.
     """
     if band_distance != band_distance:
@@ -85,27 +85,29 @@ def copy_move_part(source: Record, target: Record) -> None:
 
 
 @inlined
-def depth_bounds(exclusion: bool, part: Record, run: float, rise: float, farthest: float) -> tuple[float, float]:
+def depth_bounds(
+    exclusion: bool, part: Record, length: float, height_change: float, max_distance: float
+) -> tuple[float, float]:
     """Return lower and upper bounds of the distance beyond a zone's limit within a part, m.
 
-    run: length of the part, m.  rise: largest change of its height in the band, m.  farthest: upper bound of its
+    length: length of the part, m.  rise: largest change of its height in the band, m.  farthest: upper bound of its
     distance beyond the zone's outline, m.
     """
     sign = -1.0 if exclusion else 1.0
     outline_sum, band_sum = sign * (part.away + part.to_away), sign * (part.off + part.to_off)
-    outline_min, outline_max = 0.5 * (outline_sum - run), min(farthest, 0.5 * (outline_sum + run))
+    outline_min, outline_max = 0.5 * (outline_sum - length), min(max_distance, 0.5 * (outline_sum + length))
     if band_sum != band_sum:
         # Over unknown ground at one end only the outline can decide: it can show that the part is not inside an
         # exclusion.
         return (-math.inf, outline_max) if exclusion else (outline_min, math.inf)
-    band_min, band_max = 0.5 * (band_sum - rise), 0.5 * (band_sum + rise)
+    band_min, band_max = 0.5 * (band_sum - height_change), 0.5 * (band_sum + height_change)
     if exclusion:
         return min(outline_min, band_min), min(outline_max, band_max)
     return max(outline_min, band_min), max(outline_max, band_max)
 
 
 @inner
-def farthest_from_outline(records: ZoneRecords, z: int, move: Record, part: Record, run: float) -> float:
+def farthest_from_outline(records: ZoneRecords, z: int, move: Record, part: Record, length: float) -> float:
     """Return an upper bound of a part's distance beyond zone z's outline, m.
 
     The bound uses the edges nearest to the part's ends.  The distance from an edge, or from a center, is greatest at an
@@ -113,8 +115,8 @@ def farthest_from_outline(records: ZoneRecords, z: int, move: Record, part: Reco
     its length squared.
     """
     zone = records.zones[z]
-    bow: float = 0.125 * abs(move.curvature) * run * run
-    if abs(move.curvature) * run > 1.0:
+    bow: float = 0.125 * abs(move.curvature) * length * length
+    if abs(move.curvature) * length > 1.0:
         return math.inf
     if not zone.round:
         min_distance = math.inf
@@ -246,7 +248,7 @@ def _fill_visit(
     for round_number in range(3):
         for b in range(blocks.shape[0]):
             block = blocks[b]
-            steepest = block.steepest if above_ground else 0.0
+            ground_slope = block.steepest if above_ground else 0.0
             half_width, half_length = 0.5 * (block.east - block.west), 0.5 * (block.north - block.south)
             half_diagonal, half_height = (
                 math.sqrt(half_width * half_width + half_length * half_length),
@@ -262,7 +264,7 @@ def _fill_visit(
                 block.low + half_height,
             )
             max_depth = beyond_limit(zone.exclusion, outline_distance, band_distance) + max(
-                half_diagonal, half_height + steepest * half_diagonal
+                half_diagonal, half_height + ground_slope * half_diagonal
             )
             # The ground may be unknown near a center point whose ground is known: look for it.
             if max_depth <= (0.0 if round_number == 2 else max(known_depth, visit.depth)) and not (
@@ -271,7 +273,7 @@ def _fill_visit(
                 continue
             first, last = b * BLOCK_MOVES, min(moves.shape[0], (b + 1) * BLOCK_MOVES)
             _add_block(
-                moves[first:last], round_number, records, z, heights, to_pixel, steepest, known_depth, parts, visit
+                moves[first:last], round_number, records, z, heights, to_pixel, ground_slope, known_depth, parts, visit
             )
         if round_number == 1 and not visit.depth > 0.0:
             break
@@ -285,7 +287,7 @@ def _add_block(
     z: int,
     heights: Heights,
     to_pixel: PolyMapRecord,
-    steepest: float,
+    ground_slope: float,
     known_depth: float,
     parts: Records,
     visit: Record,
@@ -308,49 +310,49 @@ def _add_block(
             _update_depth(moves[k], part, records.zones[z].exclusion, visit)
         else:
             _bisect_move(
-                moves[k], round_number == 2, records, z, heights, to_pixel, steepest, known_depth, parts, visit
+                moves[k], round_number == 2, records, z, heights, to_pixel, ground_slope, known_depth, parts, visit
             )
 
 
 @inner
 def _bisect_move(
     move: Record,
-    ordered: bool,
+    in_order: bool,
     records: ZoneRecords,
     z: int,
     heights: Heights,
     to_pixel: PolyMapRecord,
-    steepest: float,
+    ground_slope: float,
     known_depth: float,
     parts: Records,
     visit: Record,
 ) -> None:
     """Bisect a move, the first of the parts, until each part is certain, and add the parts to a visit.
 
-    ordered: if True, bisect until each part is on one side of the limit, and add the parts in order of time; otherwise
+    in_order: if True, bisect until each part is on one side of the limit, and add the parts in order of time; otherwise
     bisect until no part can be deeper than the known depth.  The first part's end is left unchanged, because the next
     move begins there.
     """
     exclusion = records.zones[z].exclusion
     # The largest change of the height in a band over the whole move.
-    climb = max(abs(move.climb), abs(move.climb + 2.0 * move.bend)) + steepest * move.length
+    climb = max(abs(move.climb), abs(move.climb + 2.0 * move.bend)) + ground_slope * move.length
     copy_move_part(parts[0], parts[1])
     top = 1
     while top > 0:
         part = parts[top]
         fraction = part.last - part.first
-        run, rise = fraction * move.length, fraction * climb
-        sufficient_depth = 0.0 if ordered else max(visit.depth, known_depth) + DEPTH_PRECISION
-        min_depth, max_depth = depth_bounds(exclusion, part, run, rise, math.inf)
-        is_certain = max_depth <= sufficient_depth or (ordered and min_depth > 0.0) or max(run, rise) <= EDGE_PRECISION
+        span, change = fraction * move.length, fraction * climb
+        target_depth = 0.0 if in_order else max(visit.depth, known_depth) + DEPTH_PRECISION
+        min_depth, max_depth = depth_bounds(exclusion, part, span, change, math.inf)
+        is_certain = max_depth <= target_depth or (in_order and min_depth > 0.0) or max(span, change) <= EDGE_PRECISION
         is_certain = is_certain or _is_unknown(exclusion, part)
         if not is_certain:
             # Bound again with the nearest edges, which takes longer.
-            farthest = farthest_from_outline(records, z, move, part, run)
-            min_depth, max_depth = depth_bounds(exclusion, part, run, rise, farthest)
-            is_certain = max_depth <= sufficient_depth
+            max_distance = farthest_from_outline(records, z, move, part, span)
+            min_depth, max_depth = depth_bounds(exclusion, part, span, change, max_distance)
+            is_certain = max_depth <= target_depth
         if is_certain:
-            if ordered:
+            if in_order:
                 _add_part(move, part, exclusion, visit)
             else:
                 _update_depth(move, part, exclusion, visit)
@@ -365,7 +367,7 @@ def _bisect_move(
         part.east, part.north, part.away, part.off, part.edge = east, north, outline_distance, band_distance, edge
         earlier.to_east, earlier.to_north, earlier.to_away = east, north, outline_distance
         earlier.to_off, earlier.to_edge = band_distance, edge
-        if not ordered and beyond_limit(exclusion, part.to_away, part.to_off) > beyond_limit(
+        if not in_order and beyond_limit(exclusion, part.to_away, part.to_off) > beyond_limit(
             exclusion, earlier.away, earlier.off
         ):
             # Put the half that may be deeper on top: its result may make the other half unnecessary.
@@ -387,7 +389,7 @@ def _is_unknown(exclusion: bool, part: Record) -> bool:
 
 @inner
 def _update_depth(move: Record, part: Record, exclusion: bool, visit: Record) -> None:
-    """Update the deepest place of a visit with a part's ends, and note unknown ground."""
+    """Update the deepest point of a visit with a part's ends, and note unknown ground."""
     for end in range(2):
         depth = beyond_limit(exclusion, part.away, part.off)
         if end:

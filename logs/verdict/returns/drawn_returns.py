@@ -11,13 +11,13 @@ from typing import TypeVar
 
 import numpy as np
 
-from logs.verdict.returns.judge_glides import NOT_ASKED, Glide, Glides, Reach
+from logs.verdict.returns.judge_glides import NO_GLIDES, Glide, Glides, Reach
 from logs.verdict.returns.judge_returns import (
     Kind,
-    ReturnFlown,
     ReturnRange,
     Returns,
     ReturnWorld,
+    SimulatedReturn,
     badness,
     fly_home,
     heights_above_ground,
@@ -27,7 +27,7 @@ from logs.verdict.returns.suggest_returns import meets_return_limits
 from world.arrays import Flags, Floats
 
 # Largest number of return paths that are drawn.
-MAX_WAYS = 3
+MAX_DRAWN_PATHS = 3
 # Largest number of places at which the least safe altitude is searched.
 _MAX_PLACES = 40
 # Step of that search above or below the flight, m.
@@ -42,32 +42,33 @@ _HALVINGS = 3
 class WorstReturn:
     """Return that is drawn, the worst of its time range.
 
-    found: the time range.  way: (t, 3) positions a second apart, m.  at: (3,) place where it fails, or is lowest, m.
+    return_range: the time range.  path: (t, 3) positions a second apart, m.
+    marked_position: position at which it fails, or is lowest, (3,) m.
     """
 
-    found: ReturnRange
-    way: Floats
-    at: Floats
+    return_range: ReturnRange
+    path: Floats
+    marked_position: Floats
 
     @property
-    def flown(self) -> ReturnFlown:
+    def simulated(self) -> SimulatedReturn:
         """The return itself."""
-        return self.found.worst
+        return self.return_range.worst
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class LeastHeights:
+class MinSafeAltitudes:
     """Least altitude from which a return by RTL is safe, at places on the path.
 
     time: (n,) s.
-    height: (n,) m AMSL: if the return from the flight's own altitude is unsafe, the nearest higher altitude from which
-        it is safe; otherwise the lowest altitude at which it stays safe.  NaN if no altitude was found.
-    searched: range of the search above the flight, m.
+    altitude: (n,) m AMSL: if the return from the flight's own altitude is unsafe, the nearest higher altitude from
+        which it is safe; otherwise the lowest altitude at which it stays safe.  NaN if no altitude was found.
+    search_range: range of the search above the flight, m.
     """
 
     time: Floats
-    height: Floats
-    searched: float = _STEP_M * _STEPS
+    altitude: Floats
+    search_range: float = _STEP_M * _STEPS
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -79,81 +80,83 @@ class DrawnReturns:
 
     returns: Returns
     worst: tuple[WorstReturn, ...]
-    least: LeastHeights
-    glides: Glides = NOT_ASKED
+    min_safe_altitudes: MinSafeAltitudes
+    glides: Glides = NO_GLIDES
 
     @property
-    def by_kind(self) -> list[tuple[Kind, list[ReturnFlown]]]:
-        """Segments of the path by the outcome of their returns; of two return paths the worse one applies."""
+    def segments_by_outcome(self) -> list[tuple[Kind, list[SimulatedReturn]]]:
+        """Segments of the path with the same outcome of their returns; of two returns the worse one applies."""
         by_time = sorted(self.returns.each, key=lambda ret: ret.time)
-        worst = [min(group, key=badness) for _, group in groupby(by_time, lambda ret: ret.time)]
-        return stretches(worst, lambda ret: ret.kind)
+        worst_by_time = [min(group, key=badness) for _, group in groupby(by_time, lambda ret: ret.time)]
+        return group_segments(worst_by_time, lambda ret: ret.kind)
 
     @property
-    def by_reach(self) -> list[tuple[Reach, list[Glide]]]:
+    def segments_by_reach(self) -> list[tuple[Reach, list[Glide]]]:
         """Segments of the track with the same best glide destination."""
-        return stretches(self.glides.each, lambda glide: glide.reach)
+        return group_segments(self.glides.each, lambda glide: glide.reach)
 
 
-One = TypeVar("One")
+Element = TypeVar("Element")
 Key = TypeVar("Key")
 
 
-def stretches(elements: Sequence[One], key: Callable[[One], Key]) -> list[tuple[Key, list[One]]]:
-    """Group consecutive elements by their key; each group but the last includes the first element of the next.
+def group_segments(elements: Sequence[Element], key: Callable[[Element], Key]) -> list[tuple[Key, list[Element]]]:
+    """Group consecutive elements by key; each group but the last also has the next group's first element.
 
-    >>> stretches([1, 3, 2, 5], lambda one: one % 2)
+    >>> group_segments([1, 3, 2, 5], lambda one: one % 2)
     [(1, [1, 3, 2]), (0, [2, 5]), (1, [5])]
     """
     groups = [(key, list(group)) for key, group in groupby(elements, key)]
-    for (_, group), (_, after) in pairwise(groups):
-        group.append(after[0])
+    for (_, group), (_, next_group) in pairwise(groups):
+        group.append(next_group[0])
     return groups
 
 
 def drawn_returns(
-    world: ReturnWorld, starts: ReturnStarts, returns: Returns, glides: Glides = NOT_ASKED
+    world: ReturnWorld, starts: ReturnStarts, returns: Returns, glides: Glides = NO_GLIDES
 ) -> DrawnReturns:
     """Add all data for drawing to judged returns.
 
     starts: the places from which they were judged.
     """
-    least_altitudes = least_heights(world, starts if returns.each else starts.at(np.zeros(0, dtype=np.intp)))
+    least_altitudes = min_safe_altitudes(world, starts if returns.each else starts.subset(np.zeros(0, dtype=np.intp)))
     return DrawnReturns(returns, worst_returns(world, starts, returns), least_altitudes, glides)
 
 
 def draw_returns_without_glides(world: ReturnWorld, starts: ReturnStarts, returns: Returns) -> DrawnReturns:
     """Add the data for drawing to judged returns, except glides and minimum altitudes, which take longest."""
-    return DrawnReturns(returns, worst_returns(world, starts, returns), LeastHeights(np.zeros(0), np.zeros(0)))
+    return DrawnReturns(returns, worst_returns(world, starts, returns), MinSafeAltitudes(np.zeros(0), np.zeros(0)))
 
 
 def worst_returns(world: ReturnWorld, starts: ReturnStarts, returns: Returns) -> tuple[WorstReturn, ...]:
-    """Return the worst return of each kind of failure, then the next worst, or the lowest return if all are safe."""
+    """Select the returns to draw: the worst of each failure, then the next worst; or the lowest if all are safe."""
     unsafe = [return_range for return_range in returns.ranges if not return_range.worst.safe]
     worst_of_kind = {return_range.worst.kind: return_range for return_range in reversed(unsafe)}
-    order = [return_range for return_range in unsafe if worst_of_kind[return_range.worst.kind] is return_range]
-    order += [return_range for return_range in unsafe if worst_of_kind[return_range.worst.kind] is not return_range]
-    drawn = order[:MAX_WAYS] or list(returns.ranges[:1])
+    ranked_ranges = [return_range for return_range in unsafe if worst_of_kind[return_range.worst.kind] is return_range]
+    ranked_ranges += [
+        return_range for return_range in unsafe if worst_of_kind[return_range.worst.kind] is not return_range
+    ]
+    drawn_ranges = ranked_ranges[:MAX_DRAWN_PATHS] or list(returns.ranges[:1])
     rows = np.array(
-        [int(np.argmin(np.abs(starts.time - return_range.worst.time))) for return_range in drawn], dtype=np.intp
+        [int(np.argmin(np.abs(starts.time - return_range.worst.time))) for return_range in drawn_ranges], dtype=np.intp
     )
-    if not drawn:
+    if not drawn_ranges:
         return ()
-    targets = [return_range.worst.target for return_range in drawn]
-    _, paths = fly_home(world, starts.at(rows), targets, keep_paths=True)
+    targets = [return_range.worst.target for return_range in drawn_ranges]
+    _, paths = fly_home(world, starts.subset(rows), targets, keep_paths=True)
     return tuple(
-        WorstReturn(drawn_range, path, _failure_place(world, drawn_range.worst, path))
-        for drawn_range, path in zip(drawn, paths, strict=True)
+        WorstReturn(drawn_range, path, _marked_position(world, drawn_range.worst, path))
+        for drawn_range, path in zip(drawn_ranges, paths, strict=True)
     )
 
 
-def _failure_place(world: ReturnWorld, ret: ReturnFlown, path: Floats) -> Floats:
-    """Return the place where a return fails, or where it is lowest, m, (3,)."""
+def _marked_position(world: ReturnWorld, ret: SimulatedReturn, path: Floats) -> Floats:
+    """Return the position at which a return fails or, if it is safe, is lowest, m, (3,)."""
     if ret.kind == "threat":
-        distances = np.linalg.norm(path - world.around.spheres[ret.threat], axis=1)
+        distances = np.linalg.norm(path - world.environment.spheres[ret.threat], axis=1)
         return np.asarray(path[int(np.argmin(distances))])
-    if ret.kind in ("ground", "low", "safe", "unsure") and not math.isnan(ret.clearance_at[0]):
-        return np.array(ret.clearance_at)
+    if ret.kind in ("ground", "low", "safe", "unsure") and not math.isnan(ret.lowest_position[0]):
+        return np.array(ret.lowest_position)
     return np.asarray(path[-1])
 
 
@@ -161,36 +164,38 @@ def _failure_place(world: ReturnWorld, ret: ReturnFlown, path: Floats) -> Floats
 # The minimum altitude from which a return to launch is safe.
 
 
-def least_heights(world: ReturnWorld, starts: ReturnStarts) -> LeastHeights:
-    """Return the least altitudes at up to `_MAX_PLACES` of the starts; NaN if the ground is unknown."""
+def min_safe_altitudes(world: ReturnWorld, starts: ReturnStarts) -> MinSafeAltitudes:
+    """Find the minimum safe altitude at up to `_MAX_PLACES` of the starts; NaN if the ground is unknown."""
     if not len(starts):
-        return LeastHeights(np.zeros(0), np.zeros(0))
+        return MinSafeAltitudes(np.zeros(0), np.zeros(0))
     rows = np.unique(np.linspace(0, len(starts) - 1, _MAX_PLACES).round().astype(np.intp))
-    chosen = starts.at(rows)
-    start_heights = heights_above_ground(world, chosen)
-    lowest = np.where(np.isfinite(start_heights), np.minimum(0.0, world.limit - start_heights), math.nan)
-    is_safe = meets_return_limits(world, chosen)
+    selected_starts = starts.subset(rows)
+    start_heights = heights_above_ground(world, selected_starts)
+    min_offset = np.where(np.isfinite(start_heights), np.minimum(0.0, world.limit - start_heights), math.nan)
+    is_safe = meets_return_limits(world, selected_starts)
     # Altitudes relative to the flight, m: the last one that was safe, and the last one that was not.
     last_safe, last_unsafe = np.where(is_safe, 0.0, math.nan), np.where(is_safe, math.nan, 0.0)
     direction = np.where(is_safe, -1.0, 1.0)
-    is_searching = np.isfinite(lowest)
+    is_searching = np.isfinite(min_offset)
     for step in range(1, _STEPS + 1):
-        offsets = np.maximum(direction * step * _STEP_M, lowest)
-        is_offset_safe = _safe_at_offset(world, chosen, offsets, is_searching)
+        offsets = np.maximum(direction * step * _STEP_M, min_offset)
+        is_offset_safe = _safe_at_offset(world, selected_starts, offsets, is_searching)
         last_safe, last_unsafe = (
             np.where(is_searching & is_offset_safe, offsets, last_safe),
             np.where(is_searching & ~is_offset_safe, offsets, last_unsafe),
         )
-        is_searching &= (is_offset_safe == is_safe) & (offsets > lowest)
+        is_searching &= (is_offset_safe == is_safe) & (offsets > min_offset)
     for _ in range(_HALVINGS):
         is_bracketed = np.isfinite(last_safe) & np.isfinite(last_unsafe)
         midpoints = np.where(is_bracketed, 0.5 * (last_safe + last_unsafe), 0.0)
-        is_offset_safe = _safe_at_offset(world, chosen, midpoints, is_bracketed)
+        is_offset_safe = _safe_at_offset(world, selected_starts, midpoints, is_bracketed)
         last_safe, last_unsafe = (
             np.where(is_bracketed & is_offset_safe, midpoints, last_safe),
             np.where(is_bracketed & ~is_offset_safe, midpoints, last_unsafe),
         )
-    return LeastHeights(chosen.time, np.where(np.isfinite(lowest), chosen.rows["up"] + last_safe, math.nan))
+    return MinSafeAltitudes(
+        selected_starts.time, np.where(np.isfinite(min_offset), selected_starts.rows["up"] + last_safe, math.nan)
+    )
 
 
 def _safe_at_offset(world: ReturnWorld, starts: ReturnStarts, offsets: Floats, is_flown: Flags) -> Flags:
@@ -199,5 +204,5 @@ def _safe_at_offset(world: ReturnWorld, starts: ReturnStarts, offsets: Floats, i
     if is_flown.any():
         rows = starts.rows[is_flown].copy()
         rows["up"] += offsets[is_flown]
-        is_safe[is_flown] = meets_return_limits(world, replace(starts.at(np.flatnonzero(is_flown)), rows=rows))
+        is_safe[is_flown] = meets_return_limits(world, replace(starts.subset(np.flatnonzero(is_flown)), rows=rows))
     return is_safe

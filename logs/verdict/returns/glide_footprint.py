@@ -88,7 +88,7 @@ class _Cells(NamedTuple):
         sides = ((north, grid.south, rows), (east, grid.west, columns))
         first = [math.floor(max(0.0, (edge[0] - origin) / grid.cell)) for edge, origin, _ in sides]
         end = [math.ceil(min(count - 1.0, (edge[1] - origin) / grid.cell)) + 1 for edge, origin, count in sides]
-        counts = [max(0, end - begin) for begin, end in zip(first, end, strict=True)]
+        counts = [max(0, end - start) for start, end in zip(first, end, strict=True)]
         block = max(1, math.ceil(max(counts) / _MAX_CELLS))
         west, south = grid.west + (first[1] - 0.5) * grid.cell, grid.south + (first[0] - 0.5) * grid.cell
         return cls(

@@ -55,7 +55,7 @@ class GlideMap:
     west, south: m, center of the first cell.  cell: its side, m.
     ground: (n, e) ground altitude at the centers, m, NaN if unknown.
     floor: (n, e) least altitude in a cell: its highest ground plus the margin, m; NaN if unknown.
-    low, high: (n, e) altitudes between which a cell lies in kill spheres, m; inf and -inf if in none.
+    sphere_bottoms, sphere_tops: (n, e) altitudes between which a cell lies in kill spheres, m; inf and -inf if in none.
     """
 
     west: float
@@ -63,45 +63,45 @@ class GlideMap:
     cell: float
     ground: Floats
     floor: Floats
-    low: Floats
-    high: Floats
+    sphere_bottoms: Floats
+    sphere_tops: Floats
 
-    def cell_of(self, east: float, north: float) -> tuple[int, int]:
-        """Return row and column of the cell that contains a place on the map."""
+    def cell_at(self, east: float, north: float) -> tuple[int, int]:
+        """Return row and column of the cell that contains a position."""
         row, column = round((north - self.south) / self.cell), round((east - self.west) / self.cell)
         return row, column
 
-    def middle(self, row: int, column: int) -> tuple[float, float]:
+    def cell_center(self, row: int, column: int) -> tuple[float, float]:
         """Return east and north of a cell's center, m."""
         return self.west + column * self.cell, self.south + row * self.cell
 
 
 def glide_map(
-    terrain: Terrain, places: Floats, margin: float, spheres: Floats, radii: Floats, map_margin: float = AROUND
+    terrain: Terrain, positions: Floats, margin: float, spheres: Floats, radii: Floats, map_margin: float = AROUND
 ) -> GlideMap | None:
-    """Return the map around places (p, 2), m, or None if its cells would be too coarse for its extent.
+    """Make the map around positions (p, 2), m; return None if its cells would be too coarse for its extent.
 
     margin: height above ground that a glide keeps, m.
     spheres, radii: centers (m, 3) and radii (m,) of kill spheres, m.
-    map_margin: margin of the map around the places, m.
+    map_margin: margin of the map around the positions, m.
 
     >>> from world.terrain import flat_terrain
     >>> ground = flat_terrain(np.array([[-5000.0, 5000.0], [-5000.0, 5000.0]]), 100.0, 0.0)
     >>> made = glide_map(ground, np.zeros((1, 2)), 30.0, np.array([[0.0, 0.0, 100.0]]), np.array([500.0]))
-    >>> row, column = made.cell_of(0.0, 0.0)
-    >>> float(made.floor[row, column]), bool(made.high[row, column] > 590.0), made.cell
+    >>> row, column = made.cell_at(0.0, 0.0)
+    >>> float(made.floor[row, column]), bool(made.sphere_tops[row, column] > 590.0), made.cell
     (130.0, True, 100.0)
     """
-    (west, south), (east, north) = places.min(axis=0) - map_margin, places.max(axis=0) + map_margin
+    (west, south), (east, north) = positions.min(axis=0) - map_margin, positions.max(axis=0) + map_margin
     spacing = max(1.0, terrain.spacing)
     cell = max(_MIN_CELL_M, min(0.5 * spacing, 100.0), math.sqrt((east - west) * (north - south) / MAX_CELLS))
     if cell > max(_MAX_CELL_M, _MAX_CELL_PIXELS * spacing):
         return None
     columns, rows = math.ceil((east - west) / cell) + 1, math.ceil((north - south) / cell) + 1
-    highest = highest_in_cells(terrain, west - 0.5 * cell, south - 0.5 * cell, cell, rows, columns)
+    max_ground = highest_in_cells(terrain, west - 0.5 * cell, south - 0.5 * cell, cell, rows, columns)
     center_heights = terrain.height(west + cell * np.arange(columns)[None, :], south + cell * np.arange(rows)[:, None])
-    sphere_bottoms, sphere_tops = np.full(highest.shape, math.inf), np.full(highest.shape, -math.inf)
-    result = GlideMap(west, south, cell, center_heights, highest + margin, sphere_bottoms, sphere_tops)
+    sphere_bottoms, sphere_tops = np.full(max_ground.shape, math.inf), np.full(max_ground.shape, -math.inf)
+    result = GlideMap(west, south, cell, center_heights, max_ground + margin, sphere_bottoms, sphere_tops)
     for center, radius in zip(spheres, radii, strict=True):
         if radius > 0.0:
             _add_sphere(result, center, float(radius))
@@ -113,7 +113,7 @@ def _add_sphere(grid: GlideMap, center: Floats, radius: float) -> None:
 
     Each cell is checked at its point nearest to the sphere's center.
     """
-    row, column = grid.cell_of(float(center[0]), float(center[1]))
+    row, column = grid.cell_at(float(center[0]), float(center[1]))
     steps = math.ceil(radius / grid.cell) + 1
     rows = slice(max(0, row - steps), max(0, row + steps + 1))
     columns = slice(max(0, column - steps), max(0, column + steps + 1))
@@ -125,7 +125,7 @@ def _add_sphere(grid: GlideMap, center: Floats, radius: float) -> None:
     distances = np.hypot(east_distance, north_distance)
     half_heights = np.sqrt(np.maximum(0.0, radius * radius - distances**2))
     is_inside = distances < radius
-    bottoms, tops = grid.low[rows, columns], grid.high[rows, columns]
+    bottoms, tops = grid.sphere_bottoms[rows, columns], grid.sphere_tops[rows, columns]
     bottoms[is_inside] = np.minimum(bottoms, center[2] - half_heights)[is_inside]
     tops[is_inside] = np.maximum(tops, center[2] + half_heights)[is_inside]
 
@@ -138,7 +138,7 @@ STEEPEST = 0.05
 ROUGHEST = 1.5
 
 
-def landable(grid: GlideMap) -> Flags:
+def landable_cells(grid: GlideMap) -> Flags:
     """Return a mask of the cells outside kill spheres with flat ground around them, (n, e).
 
     The ground comes from the elevation file, which has no trees, houses or water.
@@ -149,15 +149,15 @@ def landable(grid: GlideMap) -> Flags:
     ground = grid.ground
     # Heights relative to a mean, so that their squares keep their digits.
     z = ground - (np.nanmean(ground) if np.isfinite(ground).any() else 0.0)
-    ones = np.ones(offsets.size)
-    sums, squares = _patch_sums(z, ones, ones), _patch_sums(z * z, ones, ones)
+    unit_weights = np.ones(offsets.size)
+    sums, squares = _patch_sums(z, unit_weights, unit_weights), _patch_sums(z * z, unit_weights, unit_weights)
     distances = np.asarray(offsets * grid.cell, dtype=np.float64)
-    east_moments, north_moments = _patch_sums(z, ones, distances), _patch_sums(z, distances, ones)
+    east_moments, north_moments = _patch_sums(z, unit_weights, distances), _patch_sums(z, distances, unit_weights)
     spread = offsets.size * float((offsets**2).sum()) * grid.cell**2
     residuals = squares - sums**2 / count - (east_moments**2 + north_moments**2) / spread
     is_flat = np.hypot(east_moments, north_moments) / spread <= STEEPEST
     is_flat &= np.sqrt(np.maximum(0.0, residuals) / count) <= ROUGHEST
-    return np.asarray(is_flat & ~((grid.low < grid.floor) & (grid.floor < grid.high)))
+    return np.asarray(is_flat & ~((grid.sphere_bottoms < grid.floor) & (grid.floor < grid.sphere_tops)))
 
 
 def _patch_sums(values: Floats, by_row: Floats, by_column: Floats) -> Floats:
@@ -174,14 +174,14 @@ def _patch_sums(values: Floats, by_row: Floats, by_column: Floats) -> Floats:
     return np.asarray(sums)
 
 
-def bar_zones(grid: GlideMap, is_flat: Flags, zones: ZoneRecords, height: float) -> None:
+def exclude_zones(grid: GlideMap, is_flat: Flags, zones: ZoneRecords, height: float) -> None:
     """Clear the mask ``is_flat``, (n, e), in exclusion zones that reach down to a height above ground, m."""
     for z in np.flatnonzero(zones.zones["exclusion"]):
-        _bar_zone(is_flat, grid.ground, zones, int(z), grid.west, grid.south, grid.cell, height)
+        _exclude_zone(is_flat, grid.ground, zones, int(z), grid.west, grid.south, grid.cell, height)
 
 
 @compiled
-def _bar_zone(
+def _exclude_zone(
     is_flat: Flags, ground: Floats, zones: ZoneRecords, z: int, west: float, south: float, cell: float, height: float
 ) -> None:
     zone = zones.zones[z]
@@ -212,7 +212,7 @@ _BETWEEN = record_dtype(("east", np.int64), ("north", np.int64), "share")
 
 
 def steps() -> tuple[Records, Records]:
-    """Return the 32 steps, (32,) of `STEP`, and the cells that lie between the ends of each.
+    """Return the 32 steps, (32,) of `STEP`, and the cells between the ends of each step.
 
     >>> made, between = steps()
     >>> len(made), len({round(float(one.course), 6) for one in made})
@@ -226,14 +226,14 @@ def steps() -> tuple[Records, Records]:
     for step, (east, north) in zip(records, sorted(offsets), strict=True):
         step.east, step.north = east, north
         step.course, step.length, step.first = math.atan2(east, north), math.hypot(east, north), len(between)
-        nearest: dict[tuple[int, int], float] = {}
+        fraction_of_cell: dict[tuple[int, int], float] = {}
         for k in range(1, 64):
             fraction = k / 64.0
             # From the end backwards; corners, which are touched and not crossed, are assigned to either side.
             cell = (-round(fraction * east), -round(fraction * north))
-            nearest.setdefault(cell, fraction)
+            fraction_of_cell.setdefault(cell, fraction)
         ends = ((0, 0), (-east, -north))
-        between += [(cell[0], cell[1], fraction) for cell, fraction in nearest.items() if cell not in ends]
+        between += [(cell[0], cell[1], fraction) for cell, fraction in fraction_of_cell.items() if cell not in ends]
         step.last = len(between)
     cells: Records = np.zeros(len(between), _BETWEEN)
     for cell, row in zip(cells, between, strict=True):
@@ -262,16 +262,16 @@ _MIN_GROUND_SPEED_MPS = 1.0
 def glide_slopes(aircraft: PointMass, airspeed: float, min_altitude: float, max_altitude: float) -> GlideSlopes:
     """Return the slopes between two altitudes (m AMSL) at an equivalent airspeed, m/s."""
     courses = np.array(steps()[0]["course"])
-    table = np.empty((courses.size, max(2, math.ceil((max_altitude - min_altitude) / _ALTITUDE_STEP_M) + 1)))
-    _fill_slopes(aircraft.record, aircraft.excess, airspeed, courses, min_altitude, table)
-    return GlideSlopes(min_altitude, _ALTITUDE_STEP_M, table)
+    slopes = np.empty((courses.size, max(2, math.ceil((max_altitude - min_altitude) / _ALTITUDE_STEP_M) + 1)))
+    _fill_slopes(aircraft.record, aircraft.excess, airspeed, courses, min_altitude, slopes)
+    return GlideSlopes(min_altitude, _ALTITUDE_STEP_M, slopes)
 
 
 @compiled
 def _fill_slopes(
-    aircraft: Record, excess: Floats, airspeed: float, courses: Floats, min_altitude: float, table: Floats
+    aircraft: Record, excess: Floats, airspeed: float, courses: Floats, min_altitude: float, slopes: Floats
 ) -> None:
-    for h in range(table.shape[1]):
+    for h in range(slopes.shape[1]):
         altitude = min_altitude + h * _ALTITUDE_STEP_M
         true_airspeed = airspeed * true_by_equivalent(altitude)
         sink = max(0.0, -excess_power(excess, 0.0, true_airspeed, altitude, aircraft))
@@ -282,7 +282,7 @@ def _fill_slopes(
             tailwind = wind * (aircraft.wind_east * east + aircraft.wind_north * north)
             crosswind = wind * (aircraft.wind_east * north - aircraft.wind_north * east)
             speed_over_ground = ground_speed(horizontal_speed, tailwind, crosswind)
-            table[c, h] = sink / speed_over_ground if speed_over_ground > _MIN_GROUND_SPEED_MPS else math.inf
+            slopes[c, h] = sink / speed_over_ground if speed_over_ground > _MIN_GROUND_SPEED_MPS else math.inf
 
 
 # ----------------------------------------------------------------------
@@ -290,84 +290,84 @@ def _fill_slopes(
 
 
 @dataclass(frozen=True, slots=True)
-class Needs:
+class GlideAltitudes:
     """Result of the search for one set of places.
 
-    made: the map.
-    need: (n, e) minimum altitude from which a glide reaches one of them, m AMSL; inf if none.
+    grid: the map.
+    min_altitude: (n, e) minimum altitude from which a glide reaches one of them, m AMSL; inf if none.
     origin: (n, e) cell of the place that is reached, numbered through all rows; -1 if none.
-    onward: (n, e) the next step of the glide, an index of `steps`; -1 at the place itself.
+    next_step: (n, e) the next step of the glide, an index of `steps`; -1 at the place itself.
     """
 
-    made: GlideMap
-    need: Floats
+    grid: GlideMap
+    min_altitude: Floats
     origin: Codes
-    onward: Codes
+    next_step: Codes
 
 
-def least_heights(grid: GlideMap, cells: Cells, slopes: GlideSlopes, max_altitude: float) -> Needs:
+def search_glide_altitudes(grid: GlideMap, cells: Cells, slopes: GlideSlopes, max_altitude: float) -> GlideAltitudes:
     """Search backwards from cells up to ``max_altitude``, m AMSL; higher labels are not computed.
 
     Cells off the map, and cells with unknown ground, reach nothing.
     """
-    need: Floats = np.full_like(grid.floor, math.inf)
-    origin: Codes = np.full(need.shape, -1, dtype=np.int32)
-    onward: Codes = np.full(need.shape, -1, dtype=np.int32)
+    min_altitude: Floats = np.full_like(grid.floor, math.inf)
+    origin: Codes = np.full(min_altitude.shape, -1, dtype=np.int32)
+    next_step: Codes = np.full(min_altitude.shape, -1, dtype=np.int32)
     rows, columns = grid.floor.shape
     row, column = cells[:, 0], cells[:, 1]
     is_on_map = (row >= 0) & (row < rows) & (column >= 0) & (column < columns)
     row, column = row[is_on_map], column[is_on_map]
     floor_altitudes = grid.floor[row, column]
-    sphere_bottoms, sphere_tops = grid.low[row, column], grid.high[row, column]
-    need[row, column] = np.where(
+    sphere_bottoms, sphere_tops = grid.sphere_bottoms[row, column], grid.sphere_tops[row, column]
+    min_altitude[row, column] = np.where(
         (sphere_bottoms < floor_altitudes) & (floor_altitudes < sphere_tops), sphere_tops, floor_altitudes
     )
-    need[~(need <= max_altitude)] = math.inf
+    min_altitude[~(min_altitude <= max_altitude)] = math.inf
     origin[row, column] = row * columns + column
-    origin[np.isinf(need)] = -1
+    origin[np.isinf(min_altitude)] = -1
     step_records, between = steps()
     finite = slopes.table[np.isfinite(slopes.table) & (slopes.table > 0.0)]
-    if np.isfinite(need).any() and finite.size:
+    if np.isfinite(min_altitude).any() and finite.size:
         band = float(finite.min()) * grid.cell
-        lowest = float(need.min())
-        heads: Codes = np.full(max(1, math.ceil((max_altitude - lowest) / band) + 2), -1, dtype=np.int32)
-        _search(
+        first_altitude = float(min_altitude.min())
+        heads: Codes = np.full(max(1, math.ceil((max_altitude - first_altitude) / band) + 2), -1, dtype=np.int32)
+        _settle_cells(
             grid.floor,
-            grid.low,
-            grid.high,
-            need,
+            grid.sphere_bottoms,
+            grid.sphere_tops,
+            min_altitude,
             origin,
-            onward,
+            next_step,
             step_records,
             between,
             slopes.table,
             slopes.low,
             slopes.pitch,
             grid.cell,
-            lowest,
+            first_altitude,
             band,
             max_altitude,
             heads,
-            np.full((need.size, 2), -1, dtype=np.int32),
+            np.full((min_altitude.size, 2), -1, dtype=np.int32),
         )
-    return Needs(grid, need, origin, onward)
+    return GlideAltitudes(grid, min_altitude, origin, next_step)
 
 
 @compiled
-def _search(
+def _settle_cells(
     floor: Floats,
-    low: Floats,
-    high: Floats,
-    need: Floats,
+    sphere_bottoms: Floats,
+    sphere_tops: Floats,
+    min_altitude: Floats,
     origin: Codes,
-    onward: Codes,
+    next_step: Codes,
     moves: Records,
     between: Records,
     slopes: Floats,
     slopes_low: float,
     altitude_step: float,
     cell: float,
-    lowest: float,
+    first_altitude: float,
     band: float,
     max_altitude: float,
     heads: Codes,
@@ -377,11 +377,11 @@ def _search(
 
     heads: (b,) the first cell of each band, -1 for none.  links: (cells, 2) a cell's neighbours in its band.
     """
-    rows, columns = need.shape
-    flat = need.ravel()
+    rows, columns = min_altitude.shape
+    flat = min_altitude.ravel()
     for k in range(flat.size):
         if flat[k] <= max_altitude:
-            _insert(k, int((flat[k] - lowest) / band), heads, links)
+            _insert(k, int((flat[k] - first_altitude) / band), heads, links)
     for b in range(heads.size):
         while heads[b] >= 0:
             k = heads[b]
@@ -396,23 +396,25 @@ def _search(
                 if not (0 <= i < rows and 0 <= j < columns):
                     continue
                 loss = cell * move.length * (slopes[m, h] + (x - h) * (slopes[m, h + 1] - slopes[m, h]))
-                if not altitude + loss < need[i, j]:
+                if not altitude + loss < min_altitude[i, j]:
                     continue
-                start_altitude = _step_start_altitude(floor, low, high, between, move, row, column, altitude, loss)
-                if not (start_altitude < need[i, j] and start_altitude <= max_altitude):
+                start_altitude = _step_start_altitude(
+                    floor, sphere_bottoms, sphere_tops, between, move, row, column, altitude, loss
+                )
+                if not (start_altitude < min_altitude[i, j] and start_altitude <= max_altitude):
                     continue
                 neighbour = i * columns + j
-                if need[i, j] <= max_altitude:
-                    _remove(neighbour, int((need[i, j] - lowest) / band), heads, links)
-                need[i, j], origin[i, j], onward[i, j] = start_altitude, origin[row, column], m
-                _insert(neighbour, int((start_altitude - lowest) / band), heads, links)
+                if min_altitude[i, j] <= max_altitude:
+                    _remove(neighbour, int((min_altitude[i, j] - first_altitude) / band), heads, links)
+                min_altitude[i, j], origin[i, j], next_step[i, j] = start_altitude, origin[row, column], m
+                _insert(neighbour, int((start_altitude - first_altitude) / band), heads, links)
 
 
 @inner
 def _step_start_altitude(
     floor: Floats,
-    low: Floats,
-    high: Floats,
+    sphere_bottoms: Floats,
+    sphere_tops: Floats,
     between: Records,
     move: Record,
     row: int,
@@ -420,14 +422,16 @@ def _step_start_altitude(
     end_altitude: float,
     loss: float,
 ) -> float:
-    """Return the minimum start altitude of a step that ends in a cell and stays above all cells between, m, or NaN."""
+    """Return the minimum start altitude with which a step into a cell clears all cells between, m, or NaN."""
     start_altitude = end_altitude + loss
     for k in range(move.first, move.last):
         cell = between[k]
         i, j = row + cell.north, column + cell.east
         # Height lost from the step's start to this cell.
         altitude_lost = (1.0 - cell.share) * loss
-        altitude = _raise_above_spheres(max(start_altitude - altitude_lost, floor[i, j]), low[i, j], high[i, j])
+        altitude = _raise_above_spheres(
+            max(start_altitude - altitude_lost, floor[i, j]), sphere_bottoms[i, j], sphere_tops[i, j]
+        )
         # NaN, for unknown ground, fails the comparison.
         if not floor[i, j] <= altitude:
             return math.nan
@@ -435,7 +439,7 @@ def _step_start_altitude(
     i, j = row - move.north, column - move.east
     if not floor[i, j] <= math.inf:
         return math.nan
-    start_altitude = _raise_above_spheres(max(start_altitude, floor[i, j]), low[i, j], high[i, j])
+    start_altitude = _raise_above_spheres(max(start_altitude, floor[i, j]), sphere_bottoms[i, j], sphere_tops[i, j])
     return start_altitude
 
 

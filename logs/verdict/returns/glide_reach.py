@@ -16,7 +16,7 @@ from flight.autopilots.arduplane.law import stall_bank
 from flight.autopilots.arduplane.point_mass import PointMass, excess_power
 from flight.autopilots.arduplane.rtl_point_mass import ENGINE_FAILURE_REACTION_S, ReturnEnvironment
 from flight.guidance.equivalent_airspeed import true_by_equivalent
-from logs.verdict.returns.glide_map import GlideMap, Needs, steps
+from logs.verdict.returns.glide_map import GlideAltitudes, GlideMap, steps
 from world.arrays import Codes, Floats
 from world.geometry import wrap
 from world.kernels import Record, Records, compiled, inner, record_dtype
@@ -34,86 +34,91 @@ _TURNING = record_dtype("east", "north", "up", "course")
 _GLIDER = record_dtype("airspeed", "bank", "west", "south", "cell")
 
 
-def heights_left(
-    starts: Records, needs: Needs, aircraft: PointMass, environment: ReturnEnvironment, airspeed: float, bank: float
+def glide_altitudes_left(
+    starts: Records,
+    needs: GlideAltitudes,
+    aircraft: PointMass,
+    environment: ReturnEnvironment,
+    airspeed: float,
+    bank: float,
 ) -> tuple[Floats, Codes]:
-    """Return each start's altitude above the minimum from which a place can be reached, m, (n,), and that place.
+    """Return the altitude left on arrival at the best place from each start, m, (n,), and that place's cell.
 
     starts: (n,) of `flight.autopilots.arduplane.rtl_point_mass.RETURN_START`.  airspeed: equivalent airspeed of the
     glide, m/s.  bank: bank of the turn, rad; limited to the bank that the airspeed allows.
 
     The altitude is negative if the place is out of reach, and -inf if no path leads there.  The place is a cell of the
-    map, numbered through all rows, as in `logs.verdict.returns.glide_map.Needs`.
+    map, numbered through all rows, as in `logs.verdict.returns.glide_map.GlideAltitudes`.
     """
-    left, reached = np.full(len(starts), -math.inf), np.full(len(starts), -1, dtype=np.int32)
-    grid = needs.made
+    altitude_left, reached_cells = np.full(len(starts), -math.inf), np.full(len(starts), -1, dtype=np.int32)
+    grid = needs.grid
     glider: Record = np.zeros(1, _GLIDER)[0]
     glider.airspeed, glider.bank = airspeed, bank
     glider.west, glider.south, glider.cell = grid.west, grid.south, grid.cell
-    _look_ahead(
+    _fill_reach(
         starts,
         environment.spheres,
         environment.radii,
         grid.floor,
-        needs.need,
+        needs.min_altitude,
         needs.origin,
-        needs.onward,
+        needs.next_step,
         steps()[0],
         glider,
         aircraft.record,
         aircraft.excess,
-        left,
-        reached,
+        altitude_left,
+        reached_cells,
     )
-    return left, reached
+    return altitude_left, reached_cells
 
 
-def place_of(grid: GlideMap, cell: int) -> tuple[float, float, float]:
+def cell_position(grid: GlideMap, cell: int) -> tuple[float, float, float]:
     """Return east, north and ground altitude of a cell that is numbered through all rows, m."""
     row, column = divmod(cell, grid.floor.shape[1])
-    return (*grid.middle(row, column), float(grid.ground[row, column]))
+    return (*grid.cell_center(row, column), float(grid.ground[row, column]))
 
 
 @compiled
-def _look_ahead(
+def _fill_reach(
     starts: Records,
     spheres: Floats,
     radii: Floats,
     floor: Floats,
-    need: Floats,
+    min_altitude: Floats,
     origin: Codes,
-    onward: Codes,
+    next_step: Codes,
     moves: Records,
     glider: Record,
     aircraft: Record,
     excess: Floats,
-    left: Floats,
-    reached: Codes,
+    altitude_left: Floats,
+    reached_cells: Codes,
 ) -> None:
     """Fill `left` and `reached` for each start, with the better of a left and a right turn."""
     turnings = np.zeros(1, _TURNING)
     state = turnings[0]
-    fastest = aircraft.slowest + (excess.shape[1] - 1) * aircraft.speed_step
+    max_speed = aircraft.slowest + (excess.shape[1] - 1) * aircraft.speed_step
     for n in range(starts.shape[0]):
         start = starts[n]
         wind = mean_wind_speed(aircraft.wind_speed, aircraft.wind_gradient, aircraft.wind_reference, start.up)
         wind_east, wind_north = wind * aircraft.wind_east, wind * aircraft.wind_north
         air_east, air_north = start.velocity_east - wind_east, start.velocity_north - wind_north
-        slowest = glider.airspeed * true_by_equivalent(start.up)
-        speed = max(slowest, math.hypot(air_east, air_north))
-        bank = min(glider.bank, stall_bank(speed, slowest))
+        min_speed = glider.airspeed * true_by_equivalent(start.up)
+        speed = max(min_speed, math.hypot(air_east, air_north))
+        bank = min(glider.bank, stall_bank(speed, min_speed))
         tilt = math.tan(bank)
         level_sink = -excess_power(excess, 0.0, speed, start.up, aircraft)
         # The turn is flown at the same angle of attack: the load makes it faster, but no faster than the airspeed
         # limit.
-        turn_speed = max(speed, min(speed / math.sqrt(math.cos(bank)), fastest))
+        turn_speed = max(speed, min(speed / math.sqrt(math.cos(bank)), max_speed))
         turn_sink = aircraft.induced / turn_speed * tilt * tilt - excess_power(
             excess, 0.0, turn_speed, start.up, aircraft
         )
         step_duration = _TURN_STEP_RAD * turn_speed / (GRAVITY * tilt)
         # Height loss to the center of a neighbouring cell, whatever the course.
-        center_slope = -excess_power(excess, 0.0, slowest, start.up, aircraft) / max(1.0, 0.95 * slowest - wind)
-        for side in (-1.0, 1.0):
+        center_slope = -excess_power(excess, 0.0, min_speed, start.up, aircraft) / max(1.0, 0.95 * min_speed - wind)
+        for turn_sign in (-1.0, 1.0):
             yaw = math.atan2(air_east, air_north)
             state.east = start.east + ENGINE_FAILURE_REACTION_S * start.velocity_east
             state.north = start.north + ENGINE_FAILURE_REACTION_S * start.velocity_north
@@ -127,10 +132,10 @@ def _look_ahead(
                 state.course = math.atan2(ground_east, ground_north)
                 if not _is_clear(state, floor, spheres, radii, glider):
                     break
-                altitude_left, i, j = _best_cell(state, need, center_slope, glider)
+                cell_altitude_left, i, j = _best_cell(state, min_altitude, center_slope, glider)
                 remaining_turn = (
-                    _remaining_turn(state, i, j, side, onward, moves, glider)
-                    if altitude_left > -math.inf
+                    _remaining_turn(state, i, j, turn_sign, next_step, moves, glider)
+                    if cell_altitude_left > -math.inf
                     else previous_turn
                 )
                 # The path ahead changes during a turn, so that one step may overshoot its course by more than that
@@ -139,25 +144,25 @@ def _look_ahead(
                     0.0 < previous_turn <= 2.0 * _TURN_STEP_RAD and -2.0 * _TURN_STEP_RAD <= remaining_turn < 0.0
                 )
                 if step + 1 == _MAX_TURN_STEPS or (
-                    altitude_left > -math.inf
+                    cell_altitude_left > -math.inf
                     and (has_passed or -_TURN_STEP_RAD <= remaining_turn <= 0.5 * _TURN_STEP_RAD)
                 ):
-                    if altitude_left > left[n]:
-                        left[n], reached[n] = altitude_left, origin[i, j]
+                    if cell_altitude_left > altitude_left[n]:
+                        altitude_left[n], reached_cells[n] = cell_altitude_left, origin[i, j]
                     break
                 previous_turn = remaining_turn
                 state.east += step_duration * ground_east
                 state.north += step_duration * ground_north
                 state.up -= step_duration * turn_sink
-                yaw += side * _TURN_STEP_RAD
+                yaw += turn_sign * _TURN_STEP_RAD
     # Compiled code frees an array after its last use, and use of a record of it does not keep it alive.
     if turnings.size != 1:
-        left[:] = math.nan
+        altitude_left[:] = math.nan
 
 
 @inner
 def _is_clear(state: Record, floor: Floats, spheres: Floats, radii: Floats, glider: Record) -> bool:
-    """Return True if a place is on the map, above the ground's margin, and outside every kill sphere."""
+    """Return True if the aircraft is on the map, above the ground's margin, and outside every kill sphere."""
     i, j = round((state.north - glider.south) / glider.cell), round((state.east - glider.west) / glider.cell)
     if not (0 <= i < floor.shape[0] and 0 <= j < floor.shape[1]) or not state.up >= floor[i, j]:
         return False
@@ -173,28 +178,30 @@ def _is_clear(state: Record, floor: Floats, spheres: Floats, radii: Floats, glid
 
 
 @inner
-def _best_cell(state: Record, need: Floats, slope: float, glider: Record) -> tuple[float, int, int]:
-    """Return the remaining altitude, row and column of the best cell among a place's cell and its neighbours.
+def _best_cell(state: Record, min_altitude: Floats, slope: float, glider: Record) -> tuple[float, int, int]:
+    """Return altitude left, row and column of the best cell among the aircraft's cell and its neighbours.
 
-    A cell's center may lie in a sphere even if the place itself does not.  slope: height lost per metre to a center.
+    A cell's center may lie in a sphere even if the aircraft does not.  slope: height lost per metre to a center.
     """
     row, column = round((state.north - glider.south) / glider.cell), round((state.east - glider.west) / glider.cell)
-    best_left, best_row, best_column = -math.inf, row, column
-    for i in range(max(0, row - 1), min(need.shape[0], row + 2)):
-        for j in range(max(0, column - 1), min(need.shape[1], column + 2)):
-            away_east = glider.west + j * glider.cell - state.east
-            away_north = glider.south + i * glider.cell - state.north
-            altitude_left = state.up - need[i, j] - slope * math.hypot(away_east, away_north)
-            if altitude_left > best_left:
-                best_left, best_row, best_column = altitude_left, i, j
-    return best_left, best_row, best_column
+    best_altitude_left, best_row, best_column = -math.inf, row, column
+    for i in range(max(0, row - 1), min(min_altitude.shape[0], row + 2)):
+        for j in range(max(0, column - 1), min(min_altitude.shape[1], column + 2)):
+            east_offset = glider.west + j * glider.cell - state.east
+            north_offset = glider.south + i * glider.cell - state.north
+            altitude_left = state.up - min_altitude[i, j] - slope * math.hypot(east_offset, north_offset)
+            if altitude_left > best_altitude_left:
+                best_altitude_left, best_row, best_column = altitude_left, i, j
+    return best_altitude_left, best_row, best_column
 
 
 @inner
-def _remaining_turn(state: Record, i: int, j: int, side: float, onward: Codes, moves: Records, glider: Record) -> float:
-    """Return the remaining turn to the path's course at a cell, rad; negative if overshot, 0 at the path's end."""
+def _remaining_turn(
+    state: Record, i: int, j: int, turn_sign: float, next_step: Codes, moves: Records, glider: Record
+) -> float:
+    """Return the turn that remains to the path's course at a cell, rad; negative if overshot, 0 at its end."""
     for _ in range(_LOOKAHEAD_STEPS):
-        m = onward[i, j]
+        m = next_step[i, j]
         if m < 0:
             break
         i += moves[m].north
@@ -203,4 +210,4 @@ def _remaining_turn(state: Record, i: int, j: int, side: float, onward: Codes, m
     away_north = glider.south + i * glider.cell - state.north
     if math.hypot(away_east, away_north) < 2.0 * glider.cell:
         return 0.0
-    return side * wrap(math.atan2(away_east, away_north) - state.course)
+    return turn_sign * wrap(math.atan2(away_east, away_north) - state.course)

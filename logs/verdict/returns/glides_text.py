@@ -27,7 +27,7 @@ _REACH_TEXTS: dict[Reach, str] = {
 
 
 def reached_text(reach: Reach) -> str:
-    """Return the text for the best place in reach without an engine.
+    """Describe the best destination in reach without an engine.
 
     >>> reached_text("home")
     'home is in reach'
@@ -36,7 +36,7 @@ def reached_text(reach: Reach) -> str:
 
 
 def glides_headline(glides: Glides) -> str:
-    """Return a one-line summary of the places that can be reached.
+    """Summarise in one line what can be reached without an engine.
 
     >>> glides_headline(Glides((), (), 18.0, not_judged="terrain"))
     'not judged: there is no elevation file'
@@ -58,7 +58,7 @@ def glides_headline(glides: Glides) -> str:
 
 
 def site_text(site: GlideSite) -> str:
-    """Return the name of a chosen place.
+    """Return the name of a glide site.
 
     >>> site_text(GlideSite("rally", 2, 0.0, 0.0)), site_text(GlideSite("landing", 9, 0.0, 0.0))
     ('rally point 2', 'the landing at item 9')
@@ -73,29 +73,29 @@ def site_text(site: GlideSite) -> str:
 
 
 def glide_range_text(glide_range: GlideRange, glides: Glides) -> str:
-    """Return the text of a time range: what is in reach, the height left over, and ArduPlane's own return."""
-    when = (
+    """Describe a time range: what is in reach, the altitude left over, and ArduPlane's own return."""
+    time_text = (
         f"{glide_range.first:.0f} s"
         if glide_range.count == 1
         else f"{glide_range.first:.0f} to {glide_range.last:.0f} s"
     )
-    return f"{when}: {_reach_text(glide_range, glides)}{_own_return_text(glide_range.least)}"
+    return f"{time_text}: {_reach_text(glide_range, glides)}{_own_return_text(glide_range.lowest_glide)}"
 
 
 def _reach_text(glide_range: GlideRange, glides: Glides) -> str:
-    glide = glide_range.least
-    spare = glides.spare(glide)
-    when = "" if glide_range.count == 1 else f" at worst, from {glide.time:.0f} s"
+    glide = glide_range.lowest_glide
+    spare = glides.altitude_left(glide)
+    time_text = "" if glide_range.count == 1 else f" at worst, from {glide.time:.0f} s"
     match glide.reach:
         case "home" | "site":
-            return f"{site_text(glides.sites[glide_range.site])}, {spare:.0f} m left over{when}"
+            return f"{site_text(glides.sites[glide_range.site])}, {spare:.0f} m left over{time_text}"
         case "flat":
-            east, north, up = glide.flat_at
-            where = f"such as at {east:.0f} m east, {north:.0f} m north, {up:.0f} m AMSL"
-            return f"only flat ground, {where}, {spare:.0f} m left over{when}"
+            east, north, up = glide.flat_position
+            position_text = f"such as at {east:.0f} m east, {north:.0f} m north, {up:.0f} m AMSL"
+            return f"only flat ground, {position_text}, {spare:.0f} m left over{time_text}"
         case "nothing":
-            missing = "no path leads anywhere" if math.isinf(spare) else f"{-spare:.0f} m are missing at most"
-            return f"nothing, {missing}"
+            shortfall_text = "no path leads anywhere" if math.isinf(spare) else f"{-spare:.0f} m are missing at most"
+            return f"nothing, {shortfall_text}"
         case "unknown":
             return "not known, as it lies beyond the elevation data"
 
@@ -106,12 +106,13 @@ def _own_return_text(glide: Glide) -> str:
         case "arrives":
             return f"; ArduPlane's own return arrives over {name}"
         case "low":
-            lowest = min(glide.own.over, glide.own.clearance)
+            min_height = min(glide.own.arrival_height, glide.own.clearance)
             return (
-                f"; ArduPlane's own return comes down to {lowest:.0f} m above ground, below the required {MARGIN:.0f} m"
+                f"; ArduPlane's own return comes down to {min_height:.0f} m above ground, below the required"
+                f" {MARGIN:.0f} m"
             )
         case "ground":
-            return f"; ArduPlane's own return comes down {glide.own.short / 1000.0:.1f} km from {name}"
+            return f"; ArduPlane's own return comes down {glide.own.shortfall / 1000.0:.1f} km from {name}"
         case "threat":
             return "; ArduPlane's own return enters a missile's sphere"
         case "unknown":

@@ -1,4 +1,4 @@
-"""Judge which places are in reach after an engine failure, by ArduPlane's own return and by the best path.
+"""Judge which places are in reach after an engine failure, by ArduPlane's own RTL and by the best path.
 
 ArduPlane does not know that its engine has stopped: its return to launch is simulated without thrust by its control law
 (`flight.autopilots.arduplane.rtl_point_mass`), straight at its target and onto its slope.  What can be reached at all
@@ -20,8 +20,16 @@ from flight.autopilots.arduplane.rtl_point_mass import RETURN_ARRIVED, RETURN_GR
 from flight.mission.placing import landing_places
 from flight.mission.return_path import ReturnCircle, ReturnTarget
 from logs.verdict.returns.glide_footprint import GlideFootprint
-from logs.verdict.returns.glide_map import Cells, GlideMap, bar_zones, glide_map, glide_slopes, landable, least_heights
-from logs.verdict.returns.glide_reach import heights_left, place_of
+from logs.verdict.returns.glide_map import (
+    Cells,
+    GlideMap,
+    exclude_zones,
+    glide_map,
+    glide_slopes,
+    landable_cells,
+    search_glide_altitudes,
+)
+from logs.verdict.returns.glide_reach import cell_position, glide_altitudes_left
 from logs.verdict.returns.judge_returns import ReturnWorld
 from logs.verdict.returns.return_starts import ReturnStarts
 from world.arrays import Flags, Floats
@@ -64,18 +72,18 @@ class EngineOutReturn:
     """ArduPlane's return without thrust.
 
     target: its destination.  end: its outcome.
-    over: height above ground on arrival over its target, m; NaN if it does not arrive.
+    arrival_height: height above ground on arrival over its target, m; NaN if it does not arrive.
     clearance: minimum height above ground on the path, m.
-    at: east, north, up of the ground impact, m; NaN without one.
-    short: distance from the ground impact to its target, m; NaN without one.
+    impact: east, north, up of the ground impact, m; NaN without one.
+    shortfall: distance from the ground impact to its target, m; NaN without one.
     """
 
     target: ReturnTarget
     end: EngineOutEnd
-    over: float
+    arrival_height: float
     clearance: float
-    at: tuple[float, float, float]
-    short: float
+    impact: tuple[float, float, float]
+    shortfall: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,18 +92,19 @@ class Glide:
 
     time: s of the flight.  start: (3,) m.
     own: outcome of ArduPlane's return.
-    left: for each of `Glides.sites` the altitude left over after the path there, m: negative if the altitude is too
-        low, -inf if no path leads there.
-    flat: the same for flat ground.  flat_at: east, north and altitude of that ground, m, NaN if none.
+    altitudes_left: for each of `Glides.sites`, the altitude left on arrival, m; negative if the altitude is too low,
+        -inf without a path.
+    flat_altitude_left: the same for flat ground.
+    flat_position: east, north and altitude of that ground, m; NaN if there is none.
     reach: the best destination.
     """
 
     time: float
     start: tuple[float, float, float]
     own: EngineOutReturn
-    left: tuple[float, ...]
-    flat: float
-    flat_at: tuple[float, float, float]
+    altitudes_left: tuple[float, ...]
+    flat_altitude_left: float
+    flat_position: tuple[float, float, float]
     reach: Reach
 
 
@@ -104,14 +113,14 @@ class GlideRange:
     """Time range with the same destination in reach and the same outcome of ArduPlane's return.
 
     first, last: s.  count: number of glides.  site: index of the site in `Glides.sites` with most altitude left, or -1.
-    least: the glide with the least altitude left over at its best destination.
+    lowest_glide: the glide with the least altitude left over at its best destination.
     """
 
     first: float
     last: float
     count: int
     site: int
-    least: Glide
+    lowest_glide: Glide
 
 
 @dataclass(frozen=True, slots=True)
@@ -136,7 +145,7 @@ class Glides:
     footprint: GlideFootprint | None = field(default=None, repr=False, compare=False)
 
     def count(self, reach: Reach) -> int:
-        """Return the number of places whose best destination is this one."""
+        """Count the starts with this best destination."""
         return sum(glide.reach == reach for glide in self.each)
 
     @property
@@ -145,17 +154,17 @@ class Glides:
         return sum(glide.own.end == "arrives" for glide in self.each)
 
     @property
-    def somewhere(self) -> bool | None:
-        """True if something is in reach from all places; None if unknown."""
+    def always_reaches_ground(self) -> bool | None:
+        """True if a glide from every start reaches ground where it can land; None if unknown."""
         if self.count("nothing"):
             return False
         return None if not self.each or self.count("unknown") else True
 
     def best_site(self, glide: Glide) -> int:
-        """Return the index of home if in reach, otherwise of the site with most altitude left; -1 if there is none."""
+        """Return the index of the best site: home if in reach, or else the one with most altitude left; -1 if none."""
         if glide.reach == "home":
             return 0
-        return int(np.argmax(glide.left)) if glide.reach == "site" else -1
+        return int(np.argmax(glide.altitudes_left)) if glide.reach == "site" else -1
 
     @property
     def ranges(self) -> tuple[GlideRange, ...]:
@@ -169,23 +178,27 @@ class Glides:
                     group_glides[-1].time,
                     len(group_glides),
                     site,
-                    min(group_glides, key=lambda glide: self.spare(glide)),
+                    min(group_glides, key=lambda glide: self.altitude_left(glide)),
                 )
             )
         return tuple(ranges)
 
-    def spare(self, glide: Glide) -> float:
+    def altitude_left(self, glide: Glide) -> float:
         """Return the altitude left at the best destination, m.
 
         Below 0 if none is in reach, -inf without a path.
         """
         if glide.reach in ("home", "site"):
-            return glide.left[self.best_site(glide)]
-        return glide.flat if glide.reach == "flat" else max((*glide.left, glide.flat))
+            return glide.altitudes_left[self.best_site(glide)]
+        return (
+            glide.flat_altitude_left
+            if glide.reach == "flat"
+            else max((*glide.altitudes_left, glide.flat_altitude_left))
+        )
 
 
 # Placeholder for a flight without judged glides.
-NOT_ASKED = Glides((), (), math.nan)
+NO_GLIDES = Glides((), (), math.nan)
 
 
 def judge_glides(world: ReturnWorld, starts: ReturnStarts) -> Glides:
@@ -193,32 +206,32 @@ def judge_glides(world: ReturnWorld, starts: ReturnStarts) -> Glides:
 
     Low starts in take-offs and landings are omitted: from them the aircraft descends straight ahead.
     """
-    starts = starts.at(np.flatnonzero(~starts.low))
+    starts = starts.subset(np.flatnonzero(~starts.is_low))
     parameters = world.parameters
     sites, airspeed = _glide_sites(world), float(parameters.airspeed_min)
-    fuel = world.setup.envelope.volts <= 0.0
-    terrain, environment = world.scenario.terrain, world.around
+    burns_fuel = world.setup.envelope.volts <= 0.0
+    terrain, environment = world.scenario.terrain, world.environment
     if terrain is None:
-        return Glides((), sites, airspeed, fuel=fuel, not_judged="terrain")
+        return Glides((), sites, airspeed, fuel=burns_fuel, not_judged="terrain")
     if not world.aircraft.glides:
-        return Glides((), sites, airspeed, fuel=fuel, not_judged="trim")
+        return Glides((), sites, airspeed, fuel=burns_fuel, not_judged="trim")
     if not len(starts):
-        return Glides((), sites, airspeed, fuel=fuel)
+        return Glides((), sites, airspeed, fuel=burns_fuel)
     rows = starts.rows
-    places = np.concatenate([np.stack([rows["east"], rows["north"]], axis=1), [site[2:] for site in sites]])
-    grid = glide_map(terrain, places, MARGIN, environment.spheres, environment.radii)
+    positions = np.concatenate([np.stack([rows["east"], rows["north"]], axis=1), [site[2:] for site in sites]])
+    grid = glide_map(terrain, positions, MARGIN, environment.spheres, environment.radii)
     if grid is None:
-        return Glides((), sites, airspeed, fuel=fuel, not_judged="far")
+        return Glides((), sites, airspeed, fuel=burns_fuel, not_judged="far")
     own_returns = _simulate_engine_out_returns(world, starts)
     bank, max_altitude = float(parameters.roll_limit), float(rows["up"].max())
-    lowest_ground = float(np.nanmin(grid.ground)) if np.isfinite(grid.ground).any() else 0.0
-    slopes = glide_slopes(world.aircraft, airspeed, lowest_ground, max(max_altitude, lowest_ground + 1.0))
+    min_ground_altitude = float(np.nanmin(grid.ground)) if np.isfinite(grid.ground).any() else 0.0
+    slopes = glide_slopes(world.aircraft, airspeed, min_ground_altitude, max(max_altitude, min_ground_altitude + 1.0))
 
     def search_from(cells: Cells) -> tuple[Floats, NDArray[np.int32], Floats]:
-        needs = least_heights(grid, cells, slopes, max_altitude)
-        return *heights_left(rows, needs, world.aircraft, environment, airspeed, bank), needs.need
+        needs = search_glide_altitudes(grid, cells, slopes, max_altitude)
+        return *glide_altitudes_left(rows, needs, world.aircraft, environment, airspeed, bank), needs.min_altitude
 
-    site_results = [search_from(np.array([grid.cell_of(site.east, site.north)])) for site in sites]
+    site_results = [search_from(np.array([grid.cell_at(site.east, site.north)])) for site in sites]
     altitudes_left = [result[0] for result in site_results]
     landable_cells = _flat_ground(world, grid)
     flat_altitudes_left, flat_cells, _ = search_from(np.argwhere(landable_cells))
@@ -226,7 +239,7 @@ def judge_glides(world: ReturnWorld, starts: ReturnStarts) -> Glides:
     each = []
     for k, row in enumerate(rows):
         site_altitudes_left = tuple(float(altitudes[k]) for altitudes in altitudes_left)
-        flat_place = place_of(grid, int(flat_cells[k])) if flat_cells[k] >= 0 else _NOWHERE
+        flat_place = cell_position(grid, int(flat_cells[k])) if flat_cells[k] >= 0 else _NOWHERE
         start = (float(row["east"]), float(row["north"]), float(row["up"]))
         reach = _best_reach(site_altitudes_left, float(flat_altitudes_left[k])) if is_known[k] else "unknown"
         each.append(
@@ -242,16 +255,16 @@ def judge_glides(world: ReturnWorld, starts: ReturnStarts) -> Glides:
         )
     site_needs = np.minimum.reduce([result[2] for result in site_results])
     return Glides(
-        tuple(each), sites, airspeed, grid.cell, fuel, footprint=GlideFootprint(grid, site_needs, landable_cells)
+        tuple(each), sites, airspeed, grid.cell, burns_fuel, footprint=GlideFootprint(grid, site_needs, landable_cells)
     )
 
 
-def _best_reach(left: tuple[float, ...], flat: float) -> Reach:
-    if left[0] >= 0.0:
+def _best_reach(altitudes_left: tuple[float, ...], flat_altitude_left: float) -> Reach:
+    if altitudes_left[0] >= 0.0:
         return "home"
-    if any(altitude >= 0.0 for altitude in left):
+    if any(altitude >= 0.0 for altitude in altitudes_left):
         return "site"
-    return "flat" if flat >= 0.0 else "nothing"
+    return "flat" if flat_altitude_left >= 0.0 else "nothing"
 
 
 def _glide_sites(world: ReturnWorld) -> tuple[GlideSite, ...]:
@@ -266,8 +279,8 @@ def _glide_sites(world: ReturnWorld) -> tuple[GlideSite, ...]:
 
 def _flat_ground(world: ReturnWorld, grid: GlideMap) -> Flags:
     """Return a mask of the cells for landing, (n, e): flat, and in no exclusion zone that reaches the ground."""
-    is_flat = landable(grid)
-    bar_zones(grid, is_flat, world.airspace.records, MARGIN)
+    is_flat = landable_cells(grid)
+    exclude_zones(grid, is_flat, world.airspace.records, MARGIN)
     return is_flat
 
 
@@ -281,7 +294,7 @@ def _simulate_engine_out_returns(world: ReturnWorld, starts: ReturnStarts) -> li
     A return that continues with a landing is simulated only up to its loiter.
     """
     targets = [world.target(row) for row in starts.rows]
-    if "terrain" in world.open:
+    if "terrain" in world.unjudged_parts:
         return [EngineOutReturn(target, "not flown", math.nan, math.nan, _NOWHERE, math.nan) for target in targets]
     radius = ArduPlane(world.parameters).return_rules.radius
     return_circles = [
@@ -295,31 +308,31 @@ def _simulate_engine_out_returns(world: ReturnWorld, starts: ReturnStarts) -> li
         return_circles,
         world.parameters,
         world.aircraft,
-        world.around,
+        world.environment,
         landings=landing_sequences,
         engine_out=True,
     ).flown
     return [_engine_out_return(world, target, row) for target, row in zip(targets, outcomes, strict=True)]
 
 
-def _engine_out_return(world: ReturnWorld, target: ReturnTarget, flown: Record) -> EngineOutReturn:
-    clearance = float(flown["clearance_before"])
+def _engine_out_return(world: ReturnWorld, target: ReturnTarget, result: Record) -> EngineOutReturn:
+    clearance = float(result["clearance_before"])
     arrival_height, shortfall, impact = math.nan, math.nan, _NOWHERE
-    if flown["ended"] == RETURN_ARRIVED and world.scenario.terrain is not None:
-        arrival_height = float(flown["circle_up"] - world.scenario.terrain.height(*target.position[:2]))
-    if flown["ended"] == RETURN_GROUND_IMPACT:
-        impact = (float(flown["clearance_east"]), float(flown["clearance_north"]), float(flown["clearance_up"]))
+    if result["ended"] == RETURN_ARRIVED and world.scenario.terrain is not None:
+        arrival_height = float(result["circle_up"] - world.scenario.terrain.height(*target.position[:2]))
+    if result["ended"] == RETURN_GROUND_IMPACT:
+        impact = (float(result["clearance_east"]), float(result["clearance_north"]), float(result["clearance_up"]))
         shortfall = math.dist(impact[:2], target.position[:2])
     return EngineOutReturn(
-        target, _engine_out_end(flown, clearance, arrival_height), arrival_height, clearance, impact, shortfall
+        target, _engine_out_end(result, clearance, arrival_height), arrival_height, clearance, impact, shortfall
     )
 
 
-def _engine_out_end(flown: Record, clearance: float, arrival_height: float) -> EngineOutEnd:
-    if flown["ended"] == RETURN_GROUND_IMPACT:
+def _engine_out_end(result: Record, clearance: float, arrival_height: float) -> EngineOutEnd:
+    if result["ended"] == RETURN_GROUND_IMPACT:
         return "ground"
-    if flown["outside"] <= 0.0:
+    if result["outside"] <= 0.0:
         return "threat"
-    if flown["ended"] != RETURN_ARRIVED:
+    if result["ended"] != RETURN_ARRIVED:
         return "unknown"
     return "arrives" if min(clearance, arrival_height) >= MARGIN else "low"

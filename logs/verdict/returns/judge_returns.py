@@ -1,4 +1,4 @@
-"""Judge whether every return to launch is safe: simulate ArduPlane's RTL from each start.
+"""Judge whether every return to launch (RTL) is safe: simulate ArduPlane's RTL from each start.
 
 If RTL_AUTOLAND, or a battery failsafe, leads to a landing sequence of the mission, the path to it is judged.
 
@@ -41,7 +41,7 @@ from flight.mission.return_path import (
 )
 from flight.simulation.setup import FlightSetup
 from logs.verdict.measures.path_moves import MOVE
-from logs.verdict.measures.route_requirements import Airspace, airspace_of
+from logs.verdict.measures.route_requirements import Airspace, judged_airspace
 from logs.verdict.measures.zone_visits import path_zones
 from logs.verdict.returns.return_starts import ReturnStarts
 from logs.verdict.tolerances import CLEARANCE_TOLERANCE_M, ENERGY_RESERVE_FRACTION
@@ -61,19 +61,19 @@ UNSAFE = frozenset(KINDS[:5])
 
 # End of a return: it stays in a loiter there; it goes on from the loiter to a landing sequence (RTL_AUTOLAND 1); or it
 # flies straight to a landing sequence (RTL_AUTOLAND 2, and "land" as a battery failsafe action).
-Way = Literal["circle", "on to land", "straight to land"]
+Ending = Literal["circle", "on to land", "straight to land"]
 # Reasons that leave returns undecided, whatever their simulation shows: they follow the terrain; the autopilot has
 # another control law; mode AUTOLAND lands by a pattern of its own; they follow the mission's return path (RTL_AUTOLAND
 # 4); or the landing sequence begins with the landing itself.
 Open = Literal["terrain", "law", "autoland", "return path", "landing"]
 
 # Distance to a limit within which the point mass could be wrong, m: it is within 7 m of 38 flights of ArduPlane.
-UNSURE = 10.0
+POINT_MASS_ERROR_M = 10.0
 # Distance to a limit within which the difference between point mass and JSBSim matters, m.
 _DECISIVE_MARGIN_M = 50.0
 # Height that the turn of a return costs, m.  A return that begins below the least height above ground, as after a
 # take-off, has to keep its starting height less this.
-TURN = 2.0
+TURN_HEIGHT_LOSS_M = 2.0
 # Fraction of its starting height that a return from a flown take-off or landing has to keep: it may be sinking.
 _LOW_START_FRACTION = 0.5
 # Least height above ground from which returns in a take-off or a landing are judged, m: nothing turns below it.
@@ -86,19 +86,22 @@ _MAX_START_BANK_RAD = math.radians(10.0)
 
 
 @dataclass(frozen=True, slots=True)
-class ReturnFlown:
+class SimulatedReturn:
     """One simulated return.
 
-    time: time in the flight at which it begins, s.  start: (3,) m.
+    time: flight time at its start, s.  start: position of its start, (3,) m.
     target: its destination, and the reason for it.
     kind: its outcome.
-    clearance: minimum height above ground, m; NaN if unknown.  clearance_at: place of that minimum, (3,) m.
-    outside: minimum distance outside a kill sphere, m; inf for none.  threat: index of that sphere; -1 for none.
-    zone: the zone that it violates, an index of `Returns.airspace`, -1 for none.
-    energy: energy that it uses, Wh; left: energy left at its end, Wh; NaN if unknown.
-    seconds: time to its loiter, NaN if it does not get there.
-    floor: required height above ground, m: the least height, or the starting height if that is less.
-    used: energy that was used before it begins, Wh; NaN if unknown.
+    clearance: minimum height above ground, m; NaN if unknown.
+    lowest_position: position of that minimum, (3,) m.
+    sphere_distance: minimum distance outside a kill sphere, m; inf without spheres.
+    threat: index of that sphere; -1 for none.
+    zone: index in `Returns.airspace` of the zone that it violates; -1 for none.
+    energy: energy that it uses, Wh.
+    energy_left: energy left at its end, Wh; NaN if unknown.
+    time_to_loiter: time until it reaches its loiter, s; NaN if it does not.
+    required_height: required height above ground, m: the minimum height, or the starting height if that is less.
+    energy_used: energy used before it begins, Wh; NaN if unknown.
     """
 
     time: float
@@ -106,15 +109,15 @@ class ReturnFlown:
     target: ReturnTarget
     kind: Kind
     clearance: float
-    clearance_at: tuple[float, float, float]
-    outside: float
+    lowest_position: tuple[float, float, float]
+    sphere_distance: float
     threat: int
     zone: int
     energy: float
-    left: float
-    seconds: float
-    floor: float = math.nan
-    used: float = math.nan
+    energy_left: float
+    time_to_loiter: float
+    required_height: float = math.nan
+    energy_used: float = math.nan
 
     @property
     def safe(self) -> bool:
@@ -132,7 +135,7 @@ class ReturnRange:
     first: float
     last: float
     count: int
-    worst: ReturnFlown
+    worst: SimulatedReturn
 
 
 # Point of no return by energy: none; after some place; before the first place; or unknown, because the battery or the
@@ -157,47 +160,47 @@ class PointOfNoReturn(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Returns:
-    """Returns from all places on the path.
+    """Returns from all starts on the path.
 
-    each: in order of time.  every: time between two, s.
+    each: in order of time.  interval: time between two, s.
     causes: events that can take the aircraft off its mission, and the action on each.
     limit: least height above ground that is required, m.
     airspace: the zones.
     reserve: energy that has to be left, Wh.
     flown: True if they begin on a flown track, False for the planned path.
-    again: for each return flown again in JSBSim, its clearance minus the clearance of the point mass, m.
+    jsbsim_differences: for each return flown again in JSBSim, its clearance minus the clearance of the point mass, m.
     stands_in: True if ArduPlane's law stands in for an autopilot without a return law.
-    open: parts that are not judged.
+    unjudged_parts: parts that are not judged.
     autoland: RTL_AUTOLAND; None for the mission of another autopilot.
     landings: the mission's landing sequences.
-    left_out: number of further returns while the aircraft is on the ground, or so low in a take-off or a landing that
-        it sinks to the ground before it can return.
+    omitted_count: number of further returns while the aircraft is on the ground, or so low in a take-off or a landing
+        that it sinks to the ground before it can return.
     """
 
-    each: tuple[ReturnFlown, ...]
-    every: float
+    each: tuple[SimulatedReturn, ...]
+    interval: float
     causes: tuple[Cause, ...]
     limit: float
     airspace: Airspace
     reserve: float
     flown: bool
-    again: tuple[float, ...] = ()
+    jsbsim_differences: tuple[float, ...] = ()
     stands_in: bool = False
-    open: tuple[Open, ...] = ()
+    unjudged_parts: tuple[Open, ...] = ()
     autoland: int | None = None
     landings: tuple[LandingStart, ...] = ()
-    left_out: int = 0
+    omitted_count: int = 0
 
     @property
     def safe(self) -> bool:
         """True if every return is safe and nothing is left undecided; a landing at the end is not judged."""
-        return bool(self.each) and not self.open and all(ret.safe for ret in self.each)
+        return bool(self.each) and not self.unjudged_parts and all(ret.safe for ret in self.each)
 
     @property
     def undecided(self) -> bool:
         """True if no return is known to be unsafe, but some are unknown."""
         has_failures = bool(self.unsafe) or self.count("low") > 0
-        return not has_failures and (bool(self.open) or self.count("unknown") > 0 or self.count("unsure") > 0)
+        return not has_failures and (bool(self.unjudged_parts) or self.count("unknown") > 0 or self.count("unsure") > 0)
 
     @property
     def lands(self) -> bool:
@@ -205,34 +208,34 @@ class Returns:
         return any(ret.target.landing is not None for ret in self.each)
 
     @property
-    def unsafe(self) -> tuple[ReturnFlown, ...]:
+    def unsafe(self) -> tuple[SimulatedReturn, ...]:
         """Returns whose outcome is in `UNSAFE`."""
         return tuple(ret for ret in self.each if ret.kind in UNSAFE)
 
     def count(self, kind: Kind) -> int:
-        """Return the number of returns with this outcome."""
+        """Count the returns with this outcome."""
         return sum(ret.kind == kind for ret in self.each)
 
     @property
     def point_of_no_return(self) -> PointOfNoReturn:
-        """Point of no return by energy, for RTL returns; returns that do not arrive are left out."""
+        """Point of no return by energy, for RTL; returns that do not arrive are ignored."""
         last_time, least_left, skipped_count = math.nan, math.inf, 0
-        if not self.each or all(math.isnan(ret.left) for ret in self.each):
+        if not self.each or all(math.isnan(ret.energy_left) for ret in self.each):
             return PointOfNoReturn("battery")
         for k, ret in enumerate(self.each):
             if k and ret.time <= self.each[k - 1].time:
                 # From here on the returns end differently.
                 break
-            if math.isnan(ret.used):
+            if math.isnan(ret.energy_used):
                 return PointOfNoReturn("used")
-            if math.isnan(ret.seconds) or math.isnan(ret.left):
+            if math.isnan(ret.time_to_loiter) or math.isnan(ret.energy_left):
                 skipped_count += 1
-            elif ret.left < self.reserve:
+            elif ret.energy_left < self.reserve:
                 return PointOfNoReturn(
                     "at once" if math.isnan(last_time) else "later", last_time, least_left, skipped_count
                 )
             else:
-                last_time, least_left = ret.time, min(least_left, ret.left)
+                last_time, least_left = ret.time, min(least_left, ret.energy_left)
         return PointOfNoReturn("arrives" if math.isnan(last_time) else "never", math.nan, least_left, skipped_count)
 
     @property
@@ -249,15 +252,17 @@ class Returns:
         return tuple(sorted(ranges, key=lambda return_range: (*badness(return_range.worst), return_range.first)))
 
 
-def _report_key(ret: ReturnFlown) -> tuple[object, ...]:
-    """Return a key that is equal for returns that are reported together."""
+def _report_key(ret: SimulatedReturn) -> tuple[object, ...]:
+    """Return the key by which returns are grouped for the report."""
     key = (ret.kind, ret.target.name)
     return (*key, ret.threat, ret.zone) if ret.kind in ("threat", "zone") else key
 
 
-def badness(ret: ReturnFlown) -> tuple[int, float]:
-    """Return a sort key that puts the worst return first."""
-    measure = ret.outside if ret.kind == "threat" else ret.left if ret.kind == "energy" else ret.clearance
+def badness(ret: SimulatedReturn) -> tuple[int, float]:
+    """Return a sort key that sorts the worst return first."""
+    measure = (
+        ret.sphere_distance if ret.kind == "threat" else ret.energy_left if ret.kind == "energy" else ret.clearance
+    )
     return KINDS.index(ret.kind), math.inf if math.isnan(measure) else measure
 
 
@@ -266,8 +271,8 @@ class ReturnWorld:
     """Data on which the result of returns depends, except their starts.
 
     parameters: ArduPlane's parameters.  home, rally: places on the map.
-    aircraft: point-mass model.  around: ground and spheres.
-    stands_in: as in `Returns`.  other_law: True if ArduPlane replaces an autopilot with its own return law.
+    aircraft: point-mass model.  environment: ground and spheres.
+    stands_in: as in `Returns`.  has_other_law: True if ArduPlane replaces an autopilot with its own return law.
     landings: the mission's landing sequences.
     """
 
@@ -276,10 +281,10 @@ class ReturnWorld:
     home: ReturnPlace
     rally: tuple[ReturnPlace, ...]
     aircraft: PointMass
-    around: ReturnEnvironment
+    environment: ReturnEnvironment
     airspace: Airspace
     stands_in: bool = False
-    other_law: bool = False
+    has_other_law: bool = False
     landings: tuple[LandingStart, ...] = ()
 
     @property
@@ -293,14 +298,14 @@ class ReturnWorld:
         return self.setup.limits.min_clearance
 
     @property
-    def battery_known(self) -> bool:
+    def is_battery_known(self) -> bool:
         """True if the battery's energy is stated; otherwise energy is not judged."""
         return not self.setup.envelope.battery_guessed or self.scenario.flight.battery_wh is not None
 
     @property
     def causes(self) -> tuple[Cause, ...]:
         """Events that can take the aircraft off its mission; unknown, thus empty, for another autopilot."""
-        if self.other_law:
+        if self.has_other_law:
             return ()
         mission = self.setup.mission
         return failsafe_causes(
@@ -311,44 +316,45 @@ class ReturnWorld:
         )
 
     @property
-    def way(self) -> Way:
-        """End of a return by RTL."""
-        ways: dict[int, Way] = {1: "on to land", 2: "straight to land"}
-        return ways.get(int(self.parameters.rtl_autoland), "circle") if self.landings else "circle"
+    def ending(self) -> Ending:
+        """How an RTL ends, by RTL_AUTOLAND."""
+        ending_of_setting: dict[int, Ending] = {1: "on to land", 2: "straight to land"}
+        return ending_of_setting.get(int(self.parameters.rtl_autoland), "circle") if self.landings else "circle"
 
     @property
-    def ways(self) -> tuple[Way, ...]:
-        """All kinds of ends of returns, RTL's first."""
-        has_landing = any(cause.does == "land" for cause in self.causes) and self.way != "straight to land"
-        return (self.way, "straight to land") if has_landing else (self.way,)
+    def endings(self) -> tuple[Ending, ...]:
+        """All ways in which returns end, RTL's first."""
+        has_landing = any(cause.does == "land" for cause in self.causes) and self.ending != "straight to land"
+        return (self.ending, "straight to land") if has_landing else (self.ending,)
 
     @property
-    def open(self) -> tuple[Open, ...]:
-        """Parts of its returns that cannot be judged."""
+    def unjudged_parts(self) -> tuple[Open, ...]:
+        """Parts of the returns that cannot be judged."""
         reasons: dict[Open, bool] = {
             "terrain": self.parameters.follows_terrain_home,
-            "law": self.other_law,
+            "law": self.has_other_law,
             "autoland": any(cause.does == "autoland" for cause in self.causes),
             "return path": int(self.parameters.rtl_autoland) == 4 and _has_return_path(self.setup),
-            "landing": any(way != "circle" for way in self.ways) and any(landing.lands for landing in self.landings),
+            "landing": any(ending != "circle" for ending in self.endings)
+            and any(landing.lands for landing in self.landings),
         }
         return tuple(name for name, applies in reasons.items() if applies)
 
-    def target(self, row: Record, way: Way | None = None) -> ReturnTarget:
-        """Return the destination of a return from a start.  way: end of the return, RTL's by default."""
+    def target(self, row: Record, ending: Ending | None = None) -> ReturnTarget:
+        """Return the destination of an RTL from a start.  ending: how the RTL ends; by default by RTL_AUTOLAND."""
         rules = ArduPlane(self.parameters).return_rules
         position = (float(row["east"]), float(row["north"]), float(row["up"]))
-        way = way or self.way
-        if way == "straight to land" and (landing := nearest_landing(position, self.landings)) is not None:
+        ending = ending or self.ending
+        if ending == "straight to land" and (landing := nearest_landing(position, self.landings)) is not None:
             distance = math.dist(position[:2], landing.place[:2])
             name, reason = f"the landing sequence at item {landing.item}", self._choice_reason(landing)
             return ReturnTarget(landing.place, name, reason, distance, landing=landing, straight=True)
         target = choose_target(rules, position, self.home, self.rally)
-        return self.going_on(target) if way == "on to land" else target
+        return self.with_landing(target) if ending == "on to land" else target
 
-    def going_on(self, target: ReturnTarget) -> ReturnTarget:
-        """Return the target of a return to a loiter, with the landing sequence that RTL flies after the loiter."""
-        landing = nearest_landing(target.position, self.landings) if self.way == "on to land" else None
+    def with_landing(self, target: ReturnTarget) -> ReturnTarget:
+        """Add the landing sequence that follows the loiter of an RTL to its target, if there is one."""
+        landing = nearest_landing(target.position, self.landings) if self.ending == "on to land" else None
         if landing is None:
             return target
         reasons = [reason for reason in (target.reason, self._choice_reason(landing)) if reason]
@@ -369,7 +375,7 @@ class ReturnWorld:
 
 
 def _has_return_path(setup: FlightSetup) -> bool:
-    """Return True if a mission has a landing sequence or a return path, which RTL_AUTOLAND 4 follows."""
+    """Return True if a mission has a landing sequence or a return path (followed by RTL_AUTOLAND 4)."""
     return any(item.command in (Command.DO_RETURN_PATH_START, Command.DO_LAND_START) for item in setup.mission.items)
 
 
@@ -379,8 +385,8 @@ def return_world(setup: FlightSetup) -> ReturnWorld:
     The control law is ArduPlane's, with the setup's parameters if it has any, otherwise with the aircraft's parameters.
     Raises MissionError for a mission without a home, and FlightError for an aircraft that cannot be loaded.
     """
-    places = return_places(setup.mission, setup.scenario.origin, setup.scenario.terrain)
-    if not places:
+    return_positions = return_places(setup.mission, setup.scenario.origin, setup.scenario.terrain)
+    if not return_positions:
         source = setup.mission.source
         message = f"{source}: home: not stated, so there is nowhere to return to"
         raise MissionError(message, file=source, field="home")
@@ -392,11 +398,11 @@ def return_world(setup: FlightSetup) -> ReturnWorld:
     return ReturnWorld(
         setup,
         parameters,
-        places[0],
-        places[1:],
+        return_positions[0],
+        return_positions[1:],
         point_mass(aircraft, setup.envelope, setup.airspeed, setup.scenario.wind),
         surroundings(setup.scenario),
-        airspace_of(setup),
+        judged_airspace(setup),
         setup_parameters is not parameters,
         setup_parameters is not None and setup_parameters is not parameters,
         landing_starts(setup.mission, setup.scenario.origin, setup.scenario.terrain),
@@ -425,54 +431,56 @@ def judge_returns(
     max_flights: maximum number of JSBSim flights.
     advance: called with the number judged and the total; an exception that it raises ends the work.
     """
-    returns: list[ReturnFlown] = []
+    returns: list[SimulatedReturn] = []
     differences: list[float] = []
-    left_out, total_count = 0, len(world.ways) * len(starts)
-    for number, way in enumerate(world.ways):
+    omitted_count, total_count = 0, len(world.endings) * len(starts)
+    for number, ending in enumerate(world.endings):
         advance(number * len(starts), total_count)
-        if "terrain" in world.open or ("landing" in world.open and way == "straight to land"):
+        if "terrain" in world.unjudged_parts or ("landing" in world.unjudged_parts and ending == "straight to land"):
             continue
-        targets = [world.target(row, way) for row in starts.rows]
-        flown, paths = fly_home(world, starts, targets)
-        floor_heights = floors(world, starts)
-        way_returns = []
-        for k, row in enumerate(flown):
+        targets = [world.target(row, ending) for row in starts.rows]
+        results, paths = fly_home(world, starts, targets)
+        min_heights = required_heights(world, starts)
+        judged_returns = []
+        for k, row in enumerate(results):
             advance(number * len(starts) + k, total_count)
-            way_returns.append(
-                _judge_return(
-                    world, starts, k, targets[k], row, paths[k] if paths else _NO_PATH, float(floor_heights[k])
-                )
+            judged_returns.append(
+                _judge_return(world, starts, k, targets[k], row, paths[k] if paths else _NO_PATH, float(min_heights[k]))
             )
-        if fly_again is not None and way == "circle":
-            way_returns, way_differences = _recheck_in_jsbsim(world, starts, way_returns, flown, fly_again, max_flights)
-            differences += way_differences
+        if fly_again is not None and ending == "circle":
+            judged_returns, new_differences = _recheck_in_jsbsim(
+                world, starts, judged_returns, results, fly_again, max_flights
+            )
+            differences += new_differences
         start_heights = heights_above_ground(world, starts)
-        kept_returns = [
-            ret for k, ret in enumerate(way_returns) if not (starts.low[k] and sinks_down(ret, float(start_heights[k])))
+        reported_returns = [
+            ret
+            for k, ret in enumerate(judged_returns)
+            if not (starts.is_low[k] and sinks_to_ground(ret, float(start_heights[k])))
         ]
-        left_out += starts.grounded + len(way_returns) - len(kept_returns)
-        returns += kept_returns
+        omitted_count += starts.grounded_count + len(judged_returns) - len(reported_returns)
+        returns += reported_returns
     return Returns(
         each=tuple(returns),
-        every=interval,
+        interval=interval,
         causes=world.causes,
         limit=world.limit,
         airspace=world.airspace,
         reserve=ENERGY_RESERVE_FRACTION * world.setup.battery,
-        flown=starts.flown,
-        again=tuple(differences),
+        flown=starts.is_flown,
+        jsbsim_differences=tuple(differences),
         stands_in=world.stands_in,
-        open=world.open,
-        autoland=None if world.other_law else int(world.parameters.rtl_autoland),
+        unjudged_parts=world.unjudged_parts,
+        autoland=None if world.has_other_law else int(world.parameters.rtl_autoland),
         landings=world.landings,
-        left_out=left_out,
+        omitted_count=omitted_count,
     )
 
 
-def sinks_down(ret: ReturnFlown, height: float) -> bool:
-    """Return True if a return from a low start in a take-off or landing only sinks to the ground.
+def sinks_to_ground(ret: SimulatedReturn, height: float) -> bool:
+    """Return True if an RTL from a low start in a take-off or landing only sinks to the ground.
 
-    That is no fault of its path.
+    Its path is then not at fault.
 
     height: its starting height above ground, m.
 
@@ -480,9 +488,9 @@ def sinks_down(ret: ReturnFlown, height: float) -> bool:
     to one that loses half of its height by then.  A return that flies into rising ground, or hits a hill later, is
     judged.
     """
-    distance = math.dist(ret.start[:2], ret.clearance_at[:2])
+    distance = math.dist(ret.start[:2], ret.lowest_position[:2])
     is_sinking = (
-        height < MIN_JUDGED_HEIGHT_M or ret.start[2] - ret.clearance_at[2] >= (1.0 - _LOW_START_FRACTION) * height
+        height < MIN_JUDGED_HEIGHT_M or ret.start[2] - ret.lowest_position[2] >= (1.0 - _LOW_START_FRACTION) * height
     )
     return ret.kind in ("ground", "low", "unsure") and is_sinking and distance <= _SINK_RUN_M
 
@@ -515,7 +523,7 @@ def fly_home(
         circles,
         world.parameters,
         world.aircraft,
-        world.around,
+        world.environment,
         landings=landings,
         keep=keep_paths,
         least=limits,
@@ -523,11 +531,11 @@ def fly_home(
     return result.flown, result.ways
 
 
-def floors(world: ReturnWorld, starts: ReturnStarts) -> Floats:
-    """Return the required height above ground of the return from each start, m, (n,)."""
+def required_heights(world: ReturnWorld, starts: ReturnStarts) -> Floats:
+    """Return the required height above ground of the RTL from each start, m, (n,)."""
     start_heights = heights_above_ground(world, starts)
-    required_heights = np.where(start_heights < world.limit, start_heights - TURN, world.limit)
-    return np.where(starts.low, np.minimum(_LOW_START_FRACTION * start_heights, world.limit), required_heights)
+    air_heights = np.where(start_heights < world.limit, start_heights - TURN_HEIGHT_LOSS_M, world.limit)
+    return np.where(starts.is_low, np.minimum(_LOW_START_FRACTION * start_heights, world.limit), air_heights)
 
 
 def heights_above_ground(world: ReturnWorld, starts: ReturnStarts) -> Floats:
@@ -538,50 +546,60 @@ def heights_above_ground(world: ReturnWorld, starts: ReturnStarts) -> Floats:
     return np.asarray(rows["up"] - world.scenario.terrain.height(rows["east"], rows["north"]), dtype=np.float64)
 
 
-def kind_of(world: ReturnWorld, flown: Record, zone: int, energy_left: float, floor: float) -> Kind:
-    """Classify a simulated return.
+def classify_return(world: ReturnWorld, result: Record, zone: int, energy_left: float, required_height: float) -> Kind:
+    """Classify the outcome of a simulated return.
 
     zone: the zone that it violates, -1 for none.  energy_left: energy left at the end, Wh; NaN if unknown.
-    floor: required height above ground, m.
+    required_height: required height above ground, m.
     """
-    if flown["ended"] == RETURN_GROUND_IMPACT:
+    if result["ended"] == RETURN_GROUND_IMPACT:
         return "ground"
-    if flown["threat"] >= 0 and flown["outside"] <= 0.0:
+    if result["threat"] >= 0 and result["outside"] <= 0.0:
         return "threat"
     if zone >= 0:
         return "zone"
-    if flown["ended"] == RETURN_TIMEOUT:
+    if result["ended"] == RETURN_TIMEOUT:
         return "lost"
     if energy_left < ENERGY_RESERVE_FRACTION * world.setup.battery:
         return "energy"
-    if flown["clearance"] < floor - CLEARANCE_TOLERANCE_M:
+    if result["clearance"] < required_height - CLEARANCE_TOLERANCE_M:
         # Applies wherever the return goes after that.
         return "low"
-    return "unknown" if flown["ended"] == RETURN_OFF_TERRAIN or math.isnan(flown["clearance"]) else "safe"
+    return "unknown" if result["ended"] == RETURN_OFF_TERRAIN or math.isnan(result["clearance"]) else "safe"
 
 
 def _judge_return(
-    world: ReturnWorld, starts: ReturnStarts, k: int, target: ReturnTarget, flown: Record, path: Floats, floor: float
-) -> ReturnFlown:
+    world: ReturnWorld,
+    starts: ReturnStarts,
+    k: int,
+    target: ReturnTarget,
+    result: Record,
+    path: Floats,
+    required_height: float,
+) -> SimulatedReturn:
     zone = most_violated_zone(world, path) if len(path) > 1 else -1
-    energy_used = 0.0 if math.isnan(starts.used[k]) else float(starts.used[k])
-    energy_left = float(world.setup.battery - energy_used - flown["energy"]) if world.battery_known else math.nan
+    energy_used = 0.0 if math.isnan(starts.energy_used[k]) else float(starts.energy_used[k])
+    energy_left = float(world.setup.battery - energy_used - result["energy"]) if world.is_battery_known else math.nan
     row = starts.rows[k]
-    return ReturnFlown(
+    return SimulatedReturn(
         time=float(starts.time[k]),
         start=(float(row["east"]), float(row["north"]), float(row["up"])),
         target=target,
-        kind=kind_of(world, flown, zone, energy_left, floor),
-        clearance=float(flown["clearance"]),
-        clearance_at=(float(flown["clearance_east"]), float(flown["clearance_north"]), float(flown["clearance_up"])),
-        outside=float(flown["outside"]),
-        threat=int(flown["threat"]),
+        kind=classify_return(world, result, zone, energy_left, required_height),
+        clearance=float(result["clearance"]),
+        lowest_position=(
+            float(result["clearance_east"]),
+            float(result["clearance_north"]),
+            float(result["clearance_up"]),
+        ),
+        sphere_distance=float(result["outside"]),
+        threat=int(result["threat"]),
         zone=zone,
-        energy=float(flown["energy"]),
-        left=energy_left,
-        seconds=float(flown["to_circle"]),
-        floor=floor,
-        used=float(starts.used[k]),
+        energy=float(result["energy"]),
+        energy_left=energy_left,
+        time_to_loiter=float(result["to_circle"]),
+        required_height=required_height,
+        energy_used=float(starts.energy_used[k]),
     )
 
 
@@ -589,16 +607,16 @@ def most_violated_zone(world: ReturnWorld, path: Floats) -> int:
     """Return the index of the zone that a path (t, 3) violates most, or -1 if it violates none."""
     steps = np.diff(path, axis=0)
     moves: Records = np.zeros(len(steps), MOVE)
-    run = np.hypot(steps[:, 0], steps[:, 1])
+    lengths = np.hypot(steps[:, 0], steps[:, 1])
     for axis, name in enumerate(("east", "north", "up")):
         moves[name] = path[:-1, axis]
-    moves["course_east"] = np.divide(steps[:, 0], run, out=np.zeros_like(run), where=run > 0.0)
-    moves["course_north"] = np.divide(steps[:, 1], run, out=np.zeros_like(run), where=run > 0.0)
-    moves["length"], moves["climb"], moves["lasts"] = run, steps[:, 2], 1.0
+    moves["course_east"] = np.divide(steps[:, 0], lengths, out=np.zeros_like(lengths), where=lengths > 0.0)
+    moves["course_north"] = np.divide(steps[:, 1], lengths, out=np.zeros_like(lengths), where=lengths > 0.0)
+    moves["length"], moves["climb"], moves["lasts"] = lengths, steps[:, 2], 1.0
     moves["time"] = np.arange(len(steps))
     visits = path_zones(moves, world.airspace.records, world.scenario.terrain)
-    worst = int(np.argmax(visits["depth"]))
-    return worst if visits[worst]["depth"] > 0.0 else -1
+    deepest = int(np.argmax(visits["depth"]))
+    return deepest if visits[deepest]["depth"] > 0.0 else -1
 
 
 # ----------------------------------------------------------------------
@@ -608,15 +626,17 @@ def most_violated_zone(world: ReturnWorld, path: Floats) -> int:
 def _recheck_in_jsbsim(
     world: ReturnWorld,
     starts: ReturnStarts,
-    returns: list[ReturnFlown],
-    flown: Records,
+    returns: list[SimulatedReturn],
+    results: Records,
     fly_again: FlyAgain,
     max_flights: int,
-) -> tuple[list[ReturnFlown], list[float]]:
-    """Fly the most doubtful return of each run of doubtful returns in JSBSim, and correct the run by the result."""
+) -> tuple[list[SimulatedReturn], list[float]]:
+    """Fly the most doubtful return of each group of successive doubtful returns in JSBSim, and correct the group."""
     corrected, differences = list(returns), []
-    runs = groupby(range(len(returns)), lambda k: distance_to_limit(returns[k]) < UNSURE)
-    groups = [[k for k in group if is_steady(world, starts.rows[k])] for is_unsure, group in runs if is_unsure]
+    doubtful_groups = groupby(range(len(returns)), lambda k: distance_to_limit(returns[k]) < POINT_MASS_ERROR_M)
+    groups = [
+        [k for k in group if is_steady(world, starts.rows[k])] for is_unsure, group in doubtful_groups if is_unsure
+    ]
     ranked_groups = sorted((min(distance_to_limit(returns[k]) for k in group), group) for group in groups if group)
     for _, group in ranked_groups[:max_flights]:
         k = min(group, key=lambda k: distance_to_limit(returns[k]))
@@ -626,15 +646,20 @@ def _recheck_in_jsbsim(
         # Differences in clearance and in distance outside spheres, m; 0 if there is nothing to compare.
         offsets = [
             new_value - old_value
-            for new_value, old_value in zip(result, (returns[k].clearance, returns[k].outside), strict=True)
+            for new_value, old_value in zip(result, (returns[k].clearance, returns[k].sphere_distance), strict=True)
         ]
         height_offset, distance_offset = (offset if math.isfinite(offset) else 0.0 for offset in offsets)
         if math.isfinite(offsets[0]):
             differences.append(height_offset)
-        is_low = min(returns[k].clearance, returns[k].clearance + height_offset) < returns[k].floor + _DECISIVE_MARGIN_M
-        is_close = min(returns[k].outside, returns[k].outside + distance_offset) < _DECISIVE_MARGIN_M
-        disagrees = (is_low and abs(height_offset) > UNSURE) or (is_close and abs(distance_offset) > UNSURE)
-        corrected[k] = _with_offsets(world, returns[k], flown[k], height_offset, distance_offset)
+        is_low = (
+            min(returns[k].clearance, returns[k].clearance + height_offset)
+            < returns[k].required_height + _DECISIVE_MARGIN_M
+        )
+        is_close = min(returns[k].sphere_distance, returns[k].sphere_distance + distance_offset) < _DECISIVE_MARGIN_M
+        disagrees = (is_low and abs(height_offset) > POINT_MASS_ERROR_M) or (
+            is_close and abs(distance_offset) > POINT_MASS_ERROR_M
+        )
+        corrected[k] = _with_offsets(world, returns[k], results[k], height_offset, distance_offset)
         if disagrees and corrected[k].kind not in ("ground", "threat"):
             corrected[k] = replace(corrected[k], kind="unsure")
         for j in group:
@@ -643,25 +668,25 @@ def _recheck_in_jsbsim(
             elif j != k and not disagrees:
                 # The flight of one return never improves another one.
                 corrected[j] = _with_offsets(
-                    world, returns[j], flown[j], min(0.0, height_offset), min(0.0, distance_offset)
+                    world, returns[j], results[j], min(0.0, height_offset), min(0.0, distance_offset)
                 )
     return corrected, differences
 
 
 def _with_offsets(
-    world: ReturnWorld, ret: ReturnFlown, flown: Record, height_offset: float, distance_offset: float
-) -> ReturnFlown:
-    """Return a copy of a return that is higher and farther outside spheres by the given differences, m."""
-    corrected = flown.copy()
+    world: ReturnWorld, ret: SimulatedReturn, result: Record, height_offset: float, distance_offset: float
+) -> SimulatedReturn:
+    """Return a copy of a return with offsets added to its clearance and its distance outside spheres, m."""
+    corrected = result.copy()
     corrected["clearance"] += height_offset
     corrected["outside"] += distance_offset
     if corrected["clearance"] <= 0.0:
         corrected["ended"] = RETURN_GROUND_IMPACT
     elif corrected["ended"] == RETURN_GROUND_IMPACT:
         # It was simulated on from where it grazed the ground: energy and zones cover the whole path.
-        corrected["ended"] = RETURN_TIMEOUT if math.isnan(ret.seconds) else RETURN_ARRIVED
-    kind = kind_of(world, corrected, ret.zone, ret.left, ret.floor)
-    return replace(ret, clearance=float(corrected["clearance"]), outside=float(corrected["outside"]), kind=kind)
+        corrected["ended"] = RETURN_TIMEOUT if math.isnan(ret.time_to_loiter) else RETURN_ARRIVED
+    kind = classify_return(world, corrected, ret.zone, ret.energy_left, ret.required_height)
+    return replace(ret, clearance=float(corrected["clearance"]), sphere_distance=float(corrected["outside"]), kind=kind)
 
 
 def is_steady(world: ReturnWorld, row: Record) -> bool:
@@ -674,12 +699,12 @@ def is_steady(world: ReturnWorld, row: Record) -> bool:
     return abs(float(row["roll"])) <= _MAX_START_BANK_RAD and airspeed >= float(world.aircraft.record.slowest)
 
 
-def distance_to_limit(ret: ReturnFlown) -> float:
-    """Return the distance of a return to the nearest deciding limit (ground, required height or kill sphere), m."""
+def distance_to_limit(ret: SimulatedReturn) -> float:
+    """Return a return's distance to the nearest limit (ground, required height or kill sphere), m."""
     if ret.kind in ("zone", "unknown"):
         # Neither depends on a distance.
         return math.inf
     distances = [abs(ret.clearance)]
     if ret.kind != "ground":
-        distances += [abs(ret.clearance - ret.floor), abs(ret.outside)]
+        distances += [abs(ret.clearance - ret.required_height), abs(ret.sphere_distance)]
     return min((value for value in distances if not math.isnan(value)), default=math.inf)

@@ -9,7 +9,7 @@ from aircraft.envelope import GRAVITY, ground_speed
 from flight.autopilots.arduplane.rtl_point_mass import RETURN_START
 from flight.simulation.setup import FlightSetup
 from flight.simulation.track import ROLL, Track
-from logs.verdict.measures.flown_phases import by_the_ground
+from logs.verdict.measures.flown_phases import ground_phase_rows
 from logs.verdict.measures.path_moves import path_moves
 from world.arrays import Flags, Floats
 from world.geometry import leg_courses
@@ -23,31 +23,31 @@ SINKING = 10.0
 
 @dataclass(frozen=True, slots=True)
 class ReturnStarts:
-    """Places where returns begin.
+    """Positions and velocities at which returns begin.
 
     time: (n,) s.  rows: (n,) of `flight.autopilots.arduplane.rtl_point_mass.RETURN_START`.
-    used: (n,) energy used before the return, Wh; NaN if unknown.
-    flown: True for a flown track, False for the planned path.
-    low: (n,) True for a place in a flown take-off or landing that is lower above ground than the required clearance
+    energy_used: (n,) energy used before the return, Wh; NaN if unknown.
+    is_flown: True for a flown track, False for the planned path.
+    is_low: (n,) True for a place in a flown take-off or landing that is lower above ground than the required clearance
         plus `SINKING`.
-    grounded: number of further places where the aircraft is too slow to fly: on its launch, or landed.
+    grounded_count: number of further places where the aircraft is too slow to fly: on its launch, or landed.
     """
 
     time: Floats
     rows: Records
-    used: Floats
-    flown: bool
-    low: Flags
-    grounded: int = 0
+    energy_used: Floats
+    is_flown: bool
+    is_low: Flags
+    grounded_count: int = 0
 
     def __len__(self) -> int:
-        """Return the number of places."""
+        """Return the number of starts."""
         return len(self.time)
 
-    def at(self, chosen: NDArray[np.intp]) -> "ReturnStarts":
-        """Return the chosen places."""
-        arrays = (self.time[chosen], self.rows[chosen], self.used[chosen])
-        return ReturnStarts(*arrays, self.flown, self.low[chosen], self.grounded)
+    def subset(self, indices: NDArray[np.intp]) -> "ReturnStarts":
+        """Return the starts with these indices."""
+        arrays = (self.time[indices], self.rows[indices], self.energy_used[indices])
+        return ReturnStarts(*arrays, self.is_flown, self.is_low[indices], self.grounded_count)
 
 
 def flown_starts(setup: FlightSetup, track: Track, interval: float) -> ReturnStarts:
@@ -58,7 +58,7 @@ def flown_starts(setup: FlightSetup, track: Track, interval: float) -> ReturnSta
     >>> from logs.recording.example_log import example_log
     >>> log = example_log()
     >>> starts = flown_starts(log.setup, log.track, 0.5)
-    >>> starts.flown, float(starts.time[0]), bool((np.diff(starts.time) > 0.4).all())
+    >>> starts.is_flown, float(starts.time[0]), bool((np.diff(starts.time) > 0.4).all())
     (True, 0.0, True)
     """
     is_usable = np.isfinite(track.position).all(axis=1) & np.isfinite(track.time)
@@ -66,39 +66,39 @@ def flown_starts(setup: FlightSetup, track: Track, interval: float) -> ReturnSta
         is_usable &= track.leg < setup.route.return_from
     usable_rows = np.flatnonzero(is_usable)
     if not usable_rows.size:
-        return _no_starts(flown=True)
+        return _empty_starts(flown=True)
     time = track.time[usable_rows]
     sample_times = np.arange(time[0], time[-1] + 1e-9, interval)
     # Take the nearest row, except in a pause of the log.
     sampled_rows = usable_rows[np.unique(np.searchsorted(time, sample_times - 1e-9).clip(0, len(usable_rows) - 1))]
     is_low, is_slow = _low_and_slow_rows(setup, track, sampled_rows)
     rows, is_low_start = sampled_rows[~is_slow], is_low[~is_slow]
-    velocity = _velocities(track, rows)
+    velocity = _ground_velocities(track, rows)
     roll = track.attitude[rows, ROLL].astype(np.float64)
     energy = track.energy[rows].astype(np.float64)
     records = _start_records(track.position[rows], velocity, np.nan_to_num(roll))
     return ReturnStarts(track.time[rows], records, energy, True, is_low_start, int(is_slow.sum()))
 
 
-def _no_starts(*, flown: bool) -> ReturnStarts:
-    return ReturnStarts(np.zeros(0), np.zeros(0, RETURN_START), np.zeros(0), flown, np.zeros(0, dtype=np.bool_))
+def _empty_starts(*, is_flown: bool) -> ReturnStarts:
+    return ReturnStarts(np.zeros(0), np.zeros(0, RETURN_START), np.zeros(0), is_flown, np.zeros(0, dtype=np.bool_))
 
 
 def _low_and_slow_rows(setup: FlightSetup, track: Track, rows: NDArray[np.intp]) -> tuple[Flags, Flags]:
     """Flag the rows that are low in a flown take-off or landing, and those also too slow to fly, (n,) each."""
-    ways, terrain = setup.ground_ways, setup.scenario.terrain
-    is_ground_phase = by_the_ground(track, ways)[rows]
+    procedures, terrain = setup.ground_ways, setup.scenario.terrain
+    is_ground_phase = ground_phase_rows(track, procedures)[rows]
     position = np.asarray(track.position[rows], dtype=np.float64)
-    if terrain is None or not ways:
+    if terrain is None or not procedures:
         return is_ground_phase, is_ground_phase.copy()
-    above_ground = position[:, 2] - terrain.height(position[:, 0], position[:, 1])
-    is_low = is_ground_phase & (above_ground < setup.limits.min_clearance + SINKING)
+    height_above_ground = position[:, 2] - terrain.height(position[:, 0], position[:, 1])
+    is_low = is_ground_phase & (height_above_ground < setup.limits.min_clearance + SINKING)
     min_airspeed = setup.envelope.level_speeds(float(setup.route.waypoints[0, 2]))[0]
     return is_low, is_low & (track.airspeed[rows] < min_airspeed)
 
 
-def _velocities(track: Track, rows: NDArray[np.intp]) -> Floats:
-    """Return velocities over the ground at some rows, m/s, (n, 3), from nearby positions if the track has none."""
+def _ground_velocities(track: Track, rows: NDArray[np.intp]) -> Floats:
+    """Return ground velocities at some rows, m/s, (n, 3), computed from positions where the track has none."""
     velocity = track.velocity[rows].astype(np.float64)
     for k in np.flatnonzero(~np.isfinite(velocity).all(axis=1)):
         rows_near = np.flatnonzero(np.abs(track.time - track.time[rows[k]]) <= _VELOCITY_WINDOW_S)
@@ -115,23 +115,23 @@ def planned_starts(setup: FlightSetup, interval: float) -> ReturnStarts:
 
     >>> from logs.recording.example_log import example_log
     >>> starts = planned_starts(example_log().setup, 1.0)
-    >>> bool(starts.rows["velocity_north"][0] > 0.0), starts.flown
+    >>> bool(starts.rows["velocity_north"][0] > 0.0), starts.is_flown
     (True, False)
     """
     route = setup.route
-    last = route.return_from - 1 if route.return_from >= 0 else route.legs - 1
-    moves = path_moves(setup.path, _ground_speeds(setup), 0, last)
-    moves = moves[moves["leg"] <= last]
+    last_leg = route.return_from - 1 if route.return_from >= 0 else route.legs - 1
+    moves = path_moves(setup.path, _ground_speeds(setup), 0, last_leg)
+    moves = moves[moves["leg"] <= last_leg]
     if not len(moves):
-        return _no_starts(flown=False)
+        return _empty_starts(flown=False)
     times = np.arange(0.0, float(moves["time"][-1] + moves["lasts"][-1]), interval)
     move_numbers = np.searchsorted(moves["time"], times, side="right") - 1
     move = moves[move_numbers]
     fraction = np.clip((times - move["time"]) / np.maximum(1e-9, move["lasts"]), 0.0, 1.0)
-    run, course_change = fraction * move["length"], fraction * move["length"] * move["curvature"]
+    distance, course_change = fraction * move["length"], fraction * move["length"] * move["curvature"]
     is_curved = move["curvature"] != 0.0
     curvature = np.where(is_curved, move["curvature"], 1.0)
-    ahead = np.where(is_curved, np.sin(course_change) / curvature, run)
+    ahead = np.where(is_curved, np.sin(course_change) / curvature, distance)
     lateral_offset = np.where(is_curved, (1.0 - np.cos(course_change)) / curvature, 0.0)
     course_east, course_north = move["course_east"], move["course_north"]
     position = np.stack(

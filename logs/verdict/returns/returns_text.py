@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 from flight.autopilots.arduplane.failsafes import Cause
 from flight.mission.return_path import ReturnPlace
-from logs.verdict.returns.judge_returns import KINDS, Kind, Open, ReturnFlown, ReturnRange, Returns
+from logs.verdict.returns.judge_returns import KINDS, Kind, Open, ReturnRange, Returns, SimulatedReturn
 from logs.verdict.returns.suggest_returns import Remedy
 from world.frames import to_geo
 from world.scenario import Scenario
@@ -66,41 +66,41 @@ _OPEN_TEXTS: dict[Open, str] = {
 }
 
 
-def way_text(kind: Kind) -> str:
-    """Return the name of the path segment from which returns have this outcome.
+def segment_text(kind: Kind) -> str:
+    """Return the legend text of a path segment: the outcome of returns that start on it.
 
-    >>> way_text("ground")
+    >>> segment_text("ground")
     'a return hits the ground'
     """
     return _SEGMENT_NAMES[kind]
 
 
-def outcome_text(ret: ReturnFlown, limit: float) -> str:
-    """Return the outcome of one return.  limit: required least height above ground, m."""
+def outcome_text(ret: SimulatedReturn, limit: float) -> str:
+    """Describe the outcome of one return.  limit: required minimum height above ground, m."""
     return "is safe" if ret.safe else _SINGULAR_TEXTS[ret.kind].format(limit=limit)
 
 
-def measured_text(ret: ReturnFlown, limit: float, scenario: Scenario) -> str:
-    """Return the destination of one return, its outcome, and its distances from ground and spheres.
+def measured_text(ret: SimulatedReturn, limit: float, scenario: Scenario) -> str:
+    """Describe one return: destination, outcome, and distances from ground and spheres.
 
-    limit: required least height above ground, m.
+    limit: required minimum height above ground, m.
     """
-    east, north, _ = ret.clearance_at
-    where = f"{east:.0f} m east, {north:.0f} m north"
+    east, north, _ = ret.lowest_position
+    position_text = f"{east:.0f} m east, {north:.0f} m north"
     parts = [f"to {ret.target.name}", outcome_text(ret, limit)]
     if ret.kind == "ground":
-        parts[-1] += f" at {where}"
+        parts[-1] += f" at {position_text}"
     elif not math.isnan(ret.clearance):
-        parts.append(f"{ret.clearance:.0f} m above ground at the lowest, at {where}")
-    if ret.threat >= 0 and ret.outside <= 0.0:
-        parts.append(f"{-ret.outside:.0f} m inside the sphere of {scenario.threats.names[ret.threat]}")
-    elif math.isfinite(ret.outside):
-        parts.append(f"{ret.outside:.0f} m outside every missile's sphere")
+        parts.append(f"{ret.clearance:.0f} m above ground at the lowest, at {position_text}")
+    if ret.threat >= 0 and ret.sphere_distance <= 0.0:
+        parts.append(f"{-ret.sphere_distance:.0f} m inside the sphere of {scenario.threats.names[ret.threat]}")
+    elif math.isfinite(ret.sphere_distance):
+        parts.append(f"{ret.sphere_distance:.0f} m outside every missile's sphere")
     return ", ".join(parts)
 
 
 def counts_text(returns: Returns) -> str:
-    """Return the number of returns per outcome, the worst first; "" if all are safe."""
+    """State the number of returns with each outcome, the worst first; "" if all are safe."""
     counts = {kind: returns.count(kind) for kind in KINDS if kind != "safe"}
     texts = {
         kind: (_SINGULAR_TEXTS if count == 1 else _PLURAL_TEXTS)[kind].format(limit=returns.limit)
@@ -110,20 +110,22 @@ def counts_text(returns: Returns) -> str:
 
 
 def headline(returns: Returns) -> str:
-    """Return a one-line summary of all returns.
+    """Summarise all returns in one line.
 
     >>> from logs.verdict.measures.route_requirements import Airspace
     >>> headline(Returns((), 1.0, (), 60.0, None, 0.0, True))
     'no place to return from'
-    >>> headline(Returns((), 1.0, (), 60.0, None, 0.0, True, open=("terrain",)))
+    >>> headline(Returns((), 1.0, (), 60.0, None, 0.0, True, unjudged_parts=("terrain",)))
     'not judged: with TERRAIN_FOLLOW returns follow the terrain, which is not flown here'
     """
-    reasons = "; ".join(_OPEN_TEXTS[reason] for reason in returns.open)
+    reasons = "; ".join(_OPEN_TEXTS[reason] for reason in returns.unjudged_parts)
     if not returns.each:
         return f"not judged: {reasons}" if reasons else "no place to return from"
     landing = "; the landing is not judged" if returns.lands else ""
     left_out_text = (
-        f"; {returns.left_out} on or near the ground in take-off and landing left out" if returns.left_out else ""
+        f"; {returns.omitted_count} on or near the ground in take-off and landing left out"
+        if returns.omitted_count
+        else ""
     )
     return (f"not judged in full ({reasons}): " if reasons else "") + _judged_text(returns) + left_out_text + landing
 
@@ -131,21 +133,24 @@ def headline(returns: Returns) -> str:
 def _judged_text(returns: Returns) -> str:
     total, failures = len(returns.each), counts_text(returns)
     if failures:
-        safe = returns.count("safe")
-        return f"of {total} returns {failures}; {safe} {'is' if safe == 1 else 'are'} safe"
+        safe_count = returns.count("safe")
+        return f"of {total} returns {failures}; {safe_count} {'is' if safe_count == 1 else 'are'} safe"
     # Returns that begin below the limit, as after a take-off, say nothing about the path home.
-    high_returns = [ret for ret in returns.each if not ret.floor < returns.limit] or returns.each
-    lowest = min(high_returns, key=lambda ret: ret.clearance)
-    least_left = min((ret.left for ret in returns.each if not math.isnan(ret.left)), default=math.nan)
-    energy = "" if math.isnan(least_left) else f", and at least {least_left:.0f} Wh are left"
+    high_returns = [ret for ret in returns.each if not ret.required_height < returns.limit] or returns.each
+    lowest_return = min(high_returns, key=lambda ret: ret.clearance)
+    least_left = min((ret.energy_left for ret in returns.each if not math.isnan(ret.energy_left)), default=math.nan)
+    energy_text = "" if math.isnan(least_left) else f", and at least {least_left:.0f} Wh are left"
     until_text = " up to their landing" if returns.lands else ""
-    return f"all {total} returns are safe{until_text}: never lower than {lowest.clearance:.0f} m above ground{energy}"
+    return (
+        f"all {total} returns are safe{until_text}: never lower than {lowest_return.clearance:.0f} m above"
+        f" ground{energy_text}"
+    )
 
 
-def no_return_text(returns: Returns) -> str:
-    """Describe the place from which the battery no longer permits a return with reserve.
+def point_of_no_return_text(returns: Returns) -> str:
+    """Describe the point after which the battery no longer permits a return with its reserve.
 
-    >>> no_return_text(Returns((), 1.0, (), 60.0, None, 0.0, True))
+    >>> point_of_no_return_text(Returns((), 1.0, (), 60.0, None, 0.0, True))
     'point of no return: not judged, as the energy in the battery is not known'
     """
     point, name = returns.point_of_no_return, "point of no return"
@@ -168,7 +173,7 @@ def no_return_text(returns: Returns) -> str:
 
 
 def causes_text(causes: tuple[Cause, ...]) -> list[str]:
-    """Describe, in two lines, which events make the aircraft return and which do not.
+    """List the events that make the aircraft return, and those that do not, in one line each.
 
     >>> from flight.autopilots.arduplane.failsafes import failsafe_causes
     >>> from flight.autopilots.arduplane.parameters import ArduPilotParameters
@@ -195,7 +200,7 @@ def causes_text(causes: tuple[Cause, ...]) -> list[str]:
 
 
 def landing_text(returns: Returns) -> list[str]:
-    """Describe, in lines, how RTL_AUTOLAND ends a return, and the landing sequence.
+    """Describe the effect of RTL_AUTOLAND and the landing sequence, in lines.
 
     Return [] for another autopilot.
 
@@ -231,49 +236,54 @@ def landing_text(returns: Returns) -> list[str]:
 
 def range_text(return_range: ReturnRange, returns: Returns, scenario: Scenario) -> str:
     """Describe a time range: destination and outcome of its returns, and its worst return."""
-    worst = return_range.worst
-    when = (
+    worst_return = return_range.worst
+    time_text = (
         f"{return_range.first:.0f} s"
         if return_range.count == 1
         else f"{return_range.first:.0f} to {return_range.last:.0f} s"
     )
-    reason = f" ({worst.target.reason})" if worst.target.reason else ""
-    return f"{when}: to {worst.target.name}{reason}: {_range_outcome_text(worst, return_range, returns, scenario)}"
+    reason = f" ({worst_return.target.reason})" if worst_return.target.reason else ""
+    return (
+        f"{time_text}: to {worst_return.target.name}{reason}:"
+        f" {_range_outcome_text(worst_return, return_range, returns, scenario)}"
+    )
 
 
 def _range_outcome_text(
-    worst_return: ReturnFlown, return_range: ReturnRange, returns: Returns, scenario: Scenario
+    worst_return: SimulatedReturn, return_range: ReturnRange, returns: Returns, scenario: Scenario
 ) -> str:
     prefix = "" if return_range.count == 1 else f"at worst from {worst_return.time:.0f} s, "
-    east, north, up = worst_return.clearance_at
-    where = f"{east:.0f} m east, {north:.0f} m north"
+    east, north, up = worst_return.lowest_position
+    position_text = f"{east:.0f} m east, {north:.0f} m north"
     digits = 1 if abs(worst_return.clearance - returns.limit) < 1.0 else 0
-    height_text = f"{worst_return.clearance:.{digits}f} m above ground at {where}"
+    height_text = f"{worst_return.clearance:.{digits}f} m above ground at {position_text}"
     match worst_return.kind:
         case "ground":
-            return f"{prefix}hits the ground at {where}, {up:.0f} m AMSL"
+            return f"{prefix}hits the ground at {position_text}, {up:.0f} m AMSL"
         case "threat":
             return (
-                f"{prefix}{-worst_return.outside:.0f} m inside the sphere of"
+                f"{prefix}{-worst_return.sphere_distance:.0f} m inside the sphere of"
                 f" {scenario.threats.names[worst_return.threat]}"
             )
         case "zone":
             return f"{prefix}violates zone {returns.airspace.zones[worst_return.zone].name}"
         case "lost":
-            end = "landing sequence" if worst_return.target.landing is not None else "circle"
-            return f"{prefix}does not reach its {end} at {worst_return.target.position[2]:.0f} m AMSL"
+            end_text = "landing sequence" if worst_return.target.landing is not None else "circle"
+            return f"{prefix}does not reach its {end_text} at {worst_return.target.position[2]:.0f} m AMSL"
         case "energy":
-            leaves = f"leaves {worst_return.left:.0f} Wh of the required {returns.reserve:.0f} Wh"
-            return f"{prefix}takes {worst_return.energy:.0f} Wh and {leaves}"
+            left_text = f"leaves {worst_return.energy_left:.0f} Wh of the required {returns.reserve:.0f} Wh"
+            return f"{prefix}takes {worst_return.energy:.0f} Wh and {left_text}"
         case "unknown":
             return f"{prefix}flies where the elevation is not known"
         case "unsure":
             return f"{prefix}{height_text} by the point mass, but JSBSim flies it or one near it too far from there"
-    if worst_return.floor < returns.limit:
+    if worst_return.required_height < returns.limit:
         height_text += " (taking off or landing: it begins below the required height)"
-    energy_text = "" if math.isnan(worst_return.left) else f", {worst_return.left:.0f} Wh left"
+    energy_text = "" if math.isnan(worst_return.energy_left) else f", {worst_return.energy_left:.0f} Wh left"
     sphere_text = (
-        "" if math.isinf(worst_return.outside) else f", {worst_return.outside:.0f} m outside every missile's sphere"
+        ""
+        if math.isinf(worst_return.sphere_distance)
+        else f", {worst_return.sphere_distance:.0f} m outside every missile's sphere"
     )
     return f"{prefix}{height_text} at the lowest{sphere_text}{energy_text}"
 

@@ -17,13 +17,13 @@ from flight.autopilots.arduplane.rtl_point_mass import RETURN_ARRIVED
 from flight.mission.return_path import ReturnPlace, ReturnTarget
 from logs.verdict.returns.judge_returns import (
     KINDS,
-    TURN,
+    TURN_HEIGHT_LOSS_M,
     Returns,
     ReturnWorld,
-    floors,
     fly_home,
     heights_above_ground,
     most_violated_zone,
+    required_heights,
 )
 from logs.verdict.returns.return_starts import ReturnStarts
 from logs.verdict.tolerances import ENERGY_RESERVE_FRACTION
@@ -50,14 +50,14 @@ class Remedy:
     parameters: dict[str, float] = field(default_factory=dict)
     rally: tuple[ReturnPlace, ...] | None = None
 
-    def on(self, world: ReturnWorld) -> ReturnWorld:
-        """Return a world with the change."""
-        changed = world.with_parameters(**self.parameters) if self.parameters else world
-        return changed if self.rally is None else changed.with_rally(self.rally)
+    def apply_to(self, world: ReturnWorld) -> ReturnWorld:
+        """Return the world with the change applied."""
+        changed_world = world.with_parameters(**self.parameters) if self.parameters else world
+        return changed_world if self.rally is None else changed_world.with_rally(self.rally)
 
 
-def helps(before: Returns, after: Returns) -> bool:
-    """Return True if fewer returns fail with a suggestion, and no kind of failure becomes more frequent.
+def is_improvement(before: Returns, after: Returns) -> bool:
+    """Return True if fewer returns fail after a change, and no kind of failure becomes more frequent.
 
     Only "low" and "safe" returns may become more frequent.
     """
@@ -71,72 +71,76 @@ def helps(before: Returns, after: Returns) -> bool:
 
 
 @dataclass(frozen=True, slots=True)
-class _Needs:
+class _ReturnLimits:
     """Requirements on the return from each start: clearance and distance outside spheres (n,), m."""
 
     clearance: Floats
-    outside: Floats
+    sphere_distance: Floats
 
-    def at(self, chosen: NDArray[np.intp]) -> "_Needs":
-        return _Needs(self.clearance[chosen], self.outside[chosen])
+    def subset(self, indices: NDArray[np.intp]) -> "_ReturnLimits":
+        return _ReturnLimits(self.clearance[indices], self.sphere_distance[indices])
 
 
-def _requirements(world: ReturnWorld, starts: ReturnStarts, margin: float = MARGIN) -> _Needs:
-    """Return the limits plus a margin, or the start's own values less the height lost in the turn, if smaller."""
+def _return_limits(world: ReturnWorld, starts: ReturnStarts, margin: float = MARGIN) -> _ReturnLimits:
+    """Return the limits plus a margin, or each start's own values less the turn's height loss if they are smaller."""
     rows = starts.rows
     outside = np.full(len(starts), math.inf)
     start_heights = np.nan_to_num(heights_above_ground(world, starts), nan=math.inf)
     positions = np.stack([rows["east"], rows["north"], rows["up"]], axis=1)
-    for center, radius in zip(world.around.spheres, world.around.radii, strict=True):
+    for center, radius in zip(world.environment.spheres, world.environment.radii, strict=True):
         if radius > 0.0:
             outside = np.minimum(outside, np.linalg.norm(positions - center, axis=1) - radius)
-    required_heights = floors(world, starts)
-    return _Needs(
+    min_heights = required_heights(world, starts)
+    return _ReturnLimits(
         np.where(
-            starts.low,
-            required_heights,
-            np.minimum(world.limit + margin, np.maximum(required_heights, start_heights - TURN)),
+            starts.is_low,
+            min_heights,
+            np.minimum(world.limit + margin, np.maximum(min_heights, start_heights - TURN_HEIGHT_LOSS_M)),
         ),
-        np.minimum(margin, np.maximum(0.0, outside - TURN)),
+        np.minimum(margin, np.maximum(0.0, outside - TURN_HEIGHT_LOSS_M)),
     )
 
 
 def meets_return_limits(world: ReturnWorld, starts: ReturnStarts) -> Flags:
     """Flag each RTL return that keeps within the limits, without margin, by only the point-mass simulation, (n,)."""
-    return _returns_meeting(world, starts, _requirements(world, starts, 0.0), _meets_all)
+    return _returns_meeting(world, starts, _return_limits(world, starts, 0.0), _meets_all)
 
 
-def _meets_height(_world: ReturnWorld, flown: Records, needs: _Needs) -> Flags:
+def _clears_ground(_world: ReturnWorld, results: Records, needs: _ReturnLimits) -> Flags:
     """Flag each return that stays above its required height above ground, and arrives, (n,)."""
-    return np.asarray((flown["ended"] == RETURN_ARRIVED) & (flown["clearance"] >= needs.clearance))
+    return np.asarray((results["ended"] == RETURN_ARRIVED) & (results["clearance"] >= needs.clearance))
 
 
-def _meets_all(world: ReturnWorld, flown: Records, needs: _Needs) -> Flags:
+def _meets_all(world: ReturnWorld, results: Records, needs: _ReturnLimits) -> Flags:
     """Flag each return that stays above its required height, arrives, and stays outside spheres, (n,).
 
     `_targets_meeting` checks zones and energy.
     """
-    return np.asarray(_meets_height(world, flown, needs) & (flown["outside"] >= needs.outside))
+    return np.asarray(_clears_ground(world, results, needs) & (results["outside"] >= needs.sphere_distance))
 
 
-Criterion = Callable[[ReturnWorld, Records, _Needs], Flags]
+Criterion = Callable[[ReturnWorld, Records, _ReturnLimits], Flags]
 
 
-def _returns_meeting(world: ReturnWorld, starts: ReturnStarts, needs: _Needs, criterion: Criterion) -> Flags:
+def _returns_meeting(world: ReturnWorld, starts: ReturnStarts, needs: _ReturnLimits, criterion: Criterion) -> Flags:
     """Flag each return that meets the requirements, (n,); with `_meets_all`, check zones and energy too."""
     return _targets_meeting(world, starts, [world.target(row) for row in starts.rows], needs, criterion)
 
 
 def _targets_meeting(
-    world: ReturnWorld, starts: ReturnStarts, targets: Sequence[ReturnTarget], needs: _Needs, criterion: Criterion
+    world: ReturnWorld,
+    starts: ReturnStarts,
+    targets: Sequence[ReturnTarget],
+    needs: _ReturnLimits,
+    criterion: Criterion,
 ) -> Flags:
-    outside = needs.outside if criterion is _meets_all else np.full(len(starts), -math.inf)
-    flown, paths = fly_home(world, starts, targets, (needs.clearance, outside))
-    is_met = criterion(world, flown, needs)
+    outside = needs.sphere_distance if criterion is _meets_all else np.full(len(starts), -math.inf)
+    results, paths = fly_home(world, starts, targets, (needs.clearance, outside))
+    is_met = criterion(world, results, needs)
     if criterion is not _meets_all:
         return is_met
-    if world.setup.envelope.power_level.size and world.battery_known:
-        energy_left = world.setup.battery - np.nan_to_num(starts.used) - flown["energy"]
+    if world.setup.envelope.power_level.size and world.is_battery_known:
+        energy_left = world.setup.battery - np.nan_to_num(starts.energy_used) - results["energy"]
         is_met &= ~(energy_left < ENERGY_RESERVE_FRACTION * world.setup.battery)
     for k, path in enumerate(paths):
         is_met[k] = is_met[k] and (len(path) < 2 or most_violated_zone(world, path) < 0)
@@ -146,15 +150,15 @@ def _targets_meeting(
 class _ReturnTrial:
     """Trial of a world from all starts, beginning with the starts that failed before."""
 
-    def __init__(self, starts: ReturnStarts, needs: _Needs) -> None:
+    def __init__(self, starts: ReturnStarts, needs: _ReturnLimits) -> None:
         self._starts, self._needs = starts, needs
         self._order = list(range(len(starts)))[::-1]
 
     def passes(self, world: ReturnWorld, criterion: Criterion) -> bool:
         """Return True if every return meets the requirements."""
         for position, k in enumerate(self._order):
-            only = np.array([k])
-            if not _returns_meeting(world, self._starts.at(only), self._needs.at(only), criterion)[0]:
+            index = np.array([k])
+            if not _returns_meeting(world, self._starts.subset(index), self._needs.subset(index), criterion)[0]:
                 self._order.insert(0, self._order.pop(position))
                 return False
         return True
@@ -165,16 +169,16 @@ def suggest_parameters(world: ReturnWorld, starts: ReturnStarts) -> list[Remedy]
 
     Altitudes are tried one by one, because a higher altitude may lead through a sphere and so be less safe.
     """
-    needs = _requirements(world, starts)
+    needs = _return_limits(world, starts)
     trial = _ReturnTrial(starts, needs)
     if trial.passes(world, _meets_all):
         return []
     remedies = []
     current_altitude = max(0.0, world.parameters.rtl_altitude)
-    ground_heights = world.around.heights[np.isfinite(world.around.heights)]
+    ground_heights = world.environment.heights[np.isfinite(world.environment.heights)]
     max_altitude = (
         float(ground_heights.max()) - world.home.up + world.limit + 2.0 * MARGIN
-        if world.around.known
+        if world.environment.known
         else current_altitude + 500.0
     )
     altitude_grid = np.arange(
@@ -184,17 +188,17 @@ def suggest_parameters(world: ReturnWorld, starts: ReturnStarts) -> list[Remedy]
     )
     altitude_candidates = [float(altitude) for altitude in altitude_grid]
 
-    def least_altitude(min_altitude: float, criterion: Criterion) -> float | None:
-        """Return the lowest altitude, at least ``min_altitude``, with which all returns meet them, or None."""
+    def min_passing_altitude(min_altitude: float, criterion: Criterion) -> float | None:
+        """Return the lowest RTL_ALTITUDE, at least ``min_altitude``, with which all returns pass, or None."""
         return first_that_passes(
             (altitude for altitude in altitude_candidates if altitude >= min_altitude),
             lambda altitude: trial.passes(world.with_parameters(RTL_ALTITUDE=altitude), criterion),
         )
 
-    ground_altitude = least_altitude(0.0, _meets_height)
+    ground_altitude = min_passing_altitude(0.0, _clears_ground)
     if ground_altitude is not None and ground_altitude > current_altitude:
         remedies.append(Remedy({"RTL_ALTITUDE": ground_altitude}))
-    safe_altitude = least_altitude(ground_altitude or 0.0, _meets_all)
+    safe_altitude = min_passing_altitude(ground_altitude or 0.0, _meets_all)
     if safe_altitude is not None and safe_altitude not in (ground_altitude, current_altitude):
         remedies.append(Remedy({"RTL_ALTITUDE": safe_altitude}))
     if safe_altitude is None:
@@ -241,44 +245,44 @@ _GRIDS = 3
 _PAIR_SEEDS = 30
 
 
-def suggest_rally(world: ReturnWorld, starts: ReturnStarts) -> Remedy | None:
-    """Suggest the fewest rally points that make as many returns safe as possible, or None if no point helps.
+def suggest_rally_points(world: ReturnWorld, starts: ReturnStarts) -> Remedy | None:
+    """Suggest the fewest rally points that make as many returns safe as possible, or None if no point is_improvement.
 
     Add points greedily, given the autopilot's own choice between them, then swap points, then remove superfluous ones.
     """
-    needs, start_count = _requirements(world, starts), len(starts)
+    needs, start_count = _return_limits(world, starts), len(starts)
     # Without the mission's own rally points, all returns go home.
     home_is_good = _returns_meeting(world.with_rally(()), starts, needs, _meets_all)
-    if home_is_good.all() or not start_count or world.way == "straight to land":
+    if home_is_good.all() or not start_count or world.ending == "straight to land":
         return None
     searched_starts = np.unique(np.linspace(0, start_count - 1, min(start_count, _MAX_STARTS)).round().astype(int))
-    best: tuple[int, tuple[ReturnPlace, ...]] = (int(home_is_good.sum()), ())
-    candidates = _candidates(world, starts, _GRID_SPACING_M, _MAX_PATH_DISTANCE_M)
+    best_set: tuple[int, tuple[ReturnPlace, ...]] = (int(home_is_good.sum()), ())
+    candidates = _rally_candidates(world, starts, _GRID_SPACING_M, _MAX_PATH_DISTANCE_M)
     for _ in range(_GRIDS):
         if not candidates:
             break
-        search = _Search(world, starts, needs, candidates, home_is_good)
+        search = _RallySearch(world, starts, needs, candidates, home_is_good)
         good_count, points, unsafe_starts = _search_in_rounds(
-            search, world, starts, needs, searched_starts, len(best[1])
+            search, world, starts, needs, searched_starts, len(best_set[1])
         )
-        best = max(best, (good_count, points), key=lambda result: (result[0], -len(result[1])))
+        best_set = max(best_set, (good_count, points), key=lambda result: (result[0], -len(result[1])))
         if not unsafe_starts.size:
             break
         # Keep the points found, and add a finer grid around the starts that remain unsafe.
         searched_starts = np.union1d(searched_starts, unsafe_starts[:: max(1, len(unsafe_starts) // 20)])
         candidates = [
-            *best[1],
-            *_candidates(world, starts.at(unsafe_starts), _GRID_SPACING_M / 3.0, 0.6 * _MAX_PATH_DISTANCE_M),
+            *best_set[1],
+            *_rally_candidates(world, starts.subset(unsafe_starts), _GRID_SPACING_M / 3.0, 0.6 * _MAX_PATH_DISTANCE_M),
         ]
-    points = tuple(point._replace(number=k) for k, point in enumerate(best[1], 1))
+    points = tuple(point._replace(number=k) for k, point in enumerate(best_set[1], 1))
     return Remedy(rally=points) if points else None
 
 
 def _search_in_rounds(
-    search: "_Search",
+    search: "_RallySearch",
     world: ReturnWorld,
     starts: ReturnStarts,
-    needs: _Needs,
+    needs: _ReturnLimits,
     searched_starts: NDArray[np.intp],
     initial_count: int,
 ) -> tuple[int, tuple[ReturnPlace, ...], NDArray[np.intp]]:
@@ -287,25 +291,27 @@ def _search_in_rounds(
     initial_count: number of first candidates that form the initial set.
     Returns the number of good returns, the points, and the starts that remain unsafe.
     """
-    best: tuple[int, tuple[ReturnPlace, ...], NDArray[np.intp]] = (-1, (), np.zeros(0, dtype=np.intp))
+    best_result: tuple[int, tuple[ReturnPlace, ...], NDArray[np.intp]] = (-1, (), np.zeros(0, dtype=np.intp))
     for _ in range(_ROUNDS):
         points = tuple(
             search.places[candidate] for candidate in search.find(searched_starts, list(range(initial_count)))
         )
         is_good = _returns_meeting(world.with_rally(points), starts, needs, _meets_all)
         unsafe_starts = np.flatnonzero(~is_good)
-        if int(is_good.sum()) > best[0]:
-            best = int(is_good.sum()), points, unsafe_starts
+        if int(is_good.sum()) > best_result[0]:
+            best_result = int(is_good.sum()), points, unsafe_starts
         unsearched = np.setdiff1d(unsafe_starts, searched_starts)
         if not unsearched.size:
             break
         # A few of each run are enough.
         searched_starts = np.union1d(searched_starts, unsearched[:: max(1, len(unsearched) // 20)])
-    return best
+    return best_result
 
 
-def _candidates(world: ReturnWorld, starts: ReturnStarts, spacing: float, max_distance: float) -> list[ReturnPlace]:
-    """Return candidate rally points near the path whose loiters are clear of ground and spheres, low and 200 m higher.
+def _rally_candidates(
+    world: ReturnWorld, starts: ReturnStarts, spacing: float, max_distance: float
+) -> list[ReturnPlace]:
+    """Return candidate rally points near the path, at two altitudes, with loiters clear of ground and spheres.
 
     spacing: grid spacing, m, increased if there are too many candidates.
     max_distance: maximum distance from the path, m.
@@ -324,7 +330,7 @@ def _candidates(world: ReturnWorld, starts: ReturnStarts, spacing: float, max_di
         if 2 * len(grid) <= _MAX_CANDIDATES or spacing > 20_000.0:
             break
         spacing *= 1.2
-    places = []
+    candidates = []
     for grid_east, grid_north in grid.tolist():
         min_altitude = _highest_ground(world, grid_east, grid_north) + world.limit + MARGIN
         for altitude in (min_altitude, min_altitude + 200.0):
@@ -333,12 +339,12 @@ def _candidates(world: ReturnWorld, starts: ReturnStarts, spacing: float, max_di
                 and _sphere_clearance(world, (grid_east, grid_north, altitude)) > _LOITER_RADIUS_M + MARGIN
             ):
                 height = math.ceil(altitude - world.home.up)
-                places.append(ReturnPlace(grid_east, grid_north, world.home.up + height, world.home.up))
-    return [place._replace(number=k) for k, place in enumerate(places, 1)]
+                candidates.append(ReturnPlace(grid_east, grid_north, world.home.up + height, world.home.up))
+    return [place._replace(number=k) for k, place in enumerate(candidates, 1)]
 
 
 def _highest_ground(world: ReturnWorld, east: float, north: float) -> float:
-    """Return the highest ground within the loiter around a place, m AMSL; NaN if part of the ground is unknown."""
+    """Return the highest ground within the loiter around a point, m AMSL; NaN if part of the ground is unknown."""
     if world.scenario.terrain is None:
         return world.home.up
     angles = np.arange(16) * (math.pi / 8.0)
@@ -348,20 +354,20 @@ def _highest_ground(world: ReturnWorld, east: float, north: float) -> float:
     return float(np.max(heights))
 
 
-def _sphere_clearance(world: ReturnWorld, place: tuple[float, float, float]) -> float:
-    """Return a place's distance outside the nearest kill sphere, m."""
-    distances = np.linalg.norm(world.around.spheres - np.array(place), axis=1) - world.around.radii
-    return float(np.min(distances[world.around.radii > 0.0], initial=math.inf))
+def _sphere_clearance(world: ReturnWorld, position: tuple[float, float, float]) -> float:
+    """Return a position's distance outside the nearest kill sphere, m."""
+    distances = np.linalg.norm(world.environment.spheres - np.array(position), axis=1) - world.environment.radii
+    return float(np.min(distances[world.environment.radii > 0.0], initial=math.inf))
 
 
-class _Search:
+class _RallySearch:
     """Search for rally points, based on which returns to each candidate meet the requirements.
 
     Returns to the candidates are simulated when first needed.
     """
 
     def __init__(
-        self, world: ReturnWorld, starts: ReturnStarts, needs: _Needs, places: list[ReturnPlace], home: Flags
+        self, world: ReturnWorld, starts: ReturnStarts, needs: _ReturnLimits, places: list[ReturnPlace], home: Flags
     ) -> None:
         self._world, self._starts, self._needs, self.places, self._home = world, starts, needs, places, home
         positions = np.array([(place.east, place.north) for place in places])
@@ -375,26 +381,26 @@ class _Search:
         self._is_good = np.zeros(self._distances.shape, dtype=np.bool_)
         self._is_simulated = np.zeros(len(starts), dtype=np.bool_)
 
-    def find(self, searched: NDArray[np.intp], chosen: list[int]) -> list[int]:
-        """Return candidates that are good for as many searched starts as possible.  chosen: the initial set."""
+    def find(self, searched: NDArray[np.intp], point_set: list[int]) -> list[int]:
+        """Find the set of candidates that is good for most searched starts.  point_set: the initial set."""
         self._simulate_candidates(searched[~self._is_simulated[searched]])
-        while len(chosen) < _MAX_POINTS and self._count(searched, chosen) < len(searched):
-            extended = self._with_best_addition(searched, chosen)
-            if self._count(searched, extended) <= self._count(searched, chosen):
+        while len(point_set) < _MAX_POINTS and self._count_good(searched, point_set) < len(searched):
+            extended = self._with_best_addition(searched, point_set)
+            if self._count_good(searched, extended) <= self._count_good(searched, point_set):
                 break
-            chosen = self._with_swaps(searched, extended)
-        return self._without_superfluous(searched, chosen)
+            point_set = self._with_swaps(searched, extended)
+        return self._without_superfluous(searched, point_set)
 
-    def _with_best_addition(self, searched: NDArray[np.intp], chosen: list[int]) -> list[int]:
-        """Return the set with the best point added, or with the best pair if no single point is an improvement."""
+    def _with_best_addition(self, searched: NDArray[np.intp], point_set: list[int]) -> list[int]:
+        """Add the best point to a set, or the best pair if no single point is an improvement."""
         candidates = range(len(self.places))
-        counts = [self._count(searched, [*chosen, candidate]) for candidate in candidates]
-        if max(counts) > self._count(searched, chosen):
-            return [*chosen, int(np.argmax(counts))]
+        counts = [self._count_good(searched, [*point_set, candidate]) for candidate in candidates]
+        if max(counts) > self._count_good(searched, point_set):
+            return [*point_set, int(np.argmax(counts))]
         best_singles = np.argsort(counts, kind="stable")[::-1][:_PAIR_SEEDS].tolist()
         return max(
-            ([*chosen, single, candidate] for single in best_singles for candidate in candidates),
-            key=lambda extended: self._count(searched, extended),
+            ([*point_set, single, candidate] for single in best_singles for candidate in candidates),
+            key=lambda extended: self._count_good(searched, extended),
         )
 
     def _simulate_candidates(self, searched: NDArray[np.intp]) -> None:
@@ -409,43 +415,47 @@ class _Search:
         if not pairs:
             return
         start_indices, candidate_indices = (np.array(column) for column in zip(*pairs, strict=True))
-        places = (self.places[candidate] for candidate in candidate_indices.tolist())
-        targets = [self._world.going_on(ReturnTarget(place[:3], "", "", 0.0, place.base)) for place in places]
-        starts, needs = self._starts.at(start_indices), self._needs.at(start_indices)
+        candidate_places = (self.places[candidate] for candidate in candidate_indices.tolist())
+        targets = [
+            self._world.with_landing(ReturnTarget(place[:3], "", "", 0.0, place.base)) for place in candidate_places
+        ]
+        starts, needs = self._starts.subset(start_indices), self._needs.subset(start_indices)
         self._is_good[start_indices, candidate_indices] = _targets_meeting(
             self._world, starts, targets, needs, _meets_all
         )
 
-    def _count(self, searched: NDArray[np.intp], chosen: list[int]) -> int:
-        """Return the number of good returns with these rally points, by the autopilot's choice."""
-        if not chosen:
+    def _count_good(self, searched: NDArray[np.intp], point_set: list[int]) -> int:
+        """Count the good returns with these rally points, each to the point that the autopilot chooses."""
+        if not point_set:
             return int(self._home[searched].sum())
-        distances = self._distances[np.ix_(searched, np.array(chosen))]
-        nearest = np.argmin(distances, axis=1)
-        min_distances = distances[np.arange(len(searched)), nearest]
+        distances = self._distances[np.ix_(searched, np.array(point_set))]
+        nearest_indices = np.argmin(distances, axis=1)
+        min_distances = distances[np.arange(len(searched)), nearest_indices]
         goes_home = min_distances > self._limit
         if self._world.parameters.rally_includes_home > 0.0:
             goes_home |= self._to_home[searched] <= min_distances
-        is_good = np.where(goes_home, self._home[searched], self._is_good[searched, np.array(chosen)[nearest]])
+        is_good = np.where(
+            goes_home, self._home[searched], self._is_good[searched, np.array(point_set)[nearest_indices]]
+        )
         return int(is_good.sum())
 
-    def _with_swaps(self, searched: NDArray[np.intp], chosen: list[int]) -> list[int]:
-        """Return a set of the same size, after swapping points for better ones until no swap is an improvement."""
-        best_count, has_improved = self._count(searched, chosen), True
+    def _with_swaps(self, searched: NDArray[np.intp], point_set: list[int]) -> list[int]:
+        """Swap points for better ones until no swap is an improvement."""
+        best_count, has_improved = self._count_good(searched, point_set), True
         while has_improved:
             has_improved = False
-            for position in range(len(chosen)):
+            for position in range(len(point_set)):
                 for candidate in range(len(self.places)):
-                    swapped = [*chosen[:position], candidate, *chosen[position + 1 :]]
-                    count = self._count(searched, swapped)
+                    swapped_set = [*point_set[:position], candidate, *point_set[position + 1 :]]
+                    count = self._count_good(searched, swapped_set)
                     if count > best_count:
-                        best_count, chosen, has_improved = count, swapped, True
-        return chosen
+                        best_count, point_set, has_improved = count, swapped_set, True
+        return point_set
 
-    def _without_superfluous(self, searched: NDArray[np.intp], chosen: list[int]) -> list[int]:
-        """Return the set without superfluous points."""
-        for candidate in list(chosen):
-            remaining = [other for other in chosen if other != candidate]
-            if self._count(searched, remaining) >= self._count(searched, chosen):
-                chosen = remaining
-        return chosen
+    def _without_superfluous(self, searched: NDArray[np.intp], point_set: list[int]) -> list[int]:
+        """Remove superfluous points from a set."""
+        for candidate in list(point_set):
+            smaller_set = [other for other in point_set if other != candidate]
+            if self._count_good(searched, smaller_set) >= self._count_good(searched, point_set):
+                point_set = smaller_set
+        return point_set

@@ -18,35 +18,35 @@ from world.arrays import Floats
 def bounds_findings(
     requirements: RouteRequirements, aligned: AlignedTrack | None, *, geometric: bool = False
 ) -> list[Finding]:
-    """Judge the minimum distance inside the area's box, its floor and its ceiling, with one finding."""
+    """Judge the minimum distance inside the area's edges, floor and ceiling, with one finding."""
     scenario = requirements.setup.scenario
     if scenario.external:
         reason = "the mission came without a scenario, so there is no area to stay in"
         return [make_finding("bounds", FLIGHT, ok=None, reason=reason, unit="m")]
-    planned, side, k = _min_distance_inside(requirements, requirements.points)
-    distance, where_text = planned, f"at {place_text(requirements.waypoint(k))}"
-    ok: bool | None = planned >= -ROUNDING_M
+    planned_margin, edge, k = _min_distance_inside(requirements, requirements.points)
+    margin, where_text = planned_margin, f"at {place_text(requirements.waypoint(k))}"
+    ok: bool | None = planned_margin >= -ROUNDING_M
     flown_margin = math.nan
     if not geometric and aligned is None:
         ok, where_text = None, "nothing was flown"
     elif aligned is not None:
-        distance, side, k = _min_distance_inside(requirements, aligned.track.position)
-        flown_margin, ok = distance, distance >= -ROUNDING_M
+        margin, edge, k = _min_distance_inside(requirements, aligned.track.position)
+        flown_margin, ok = margin, margin >= -ROUNDING_M
         where_text = f"at {aligned.track.time[k]:.1f} s"
-    where = f"{abs(distance):.0f} m {'inside' if distance >= 0.0 else 'beyond'} the {side} {where_text}"
+    margin_text = f"{abs(margin):.0f} m {'inside' if margin >= 0.0 else 'beyond'} the {edge} {where_text}"
     return [
         make_finding(
             "bounds",
             FLIGHT,
             ok=ok,
-            reason=where if ok is not None else where_text,
-            planned=planned,
+            reason=margin_text if ok is not None else where_text,
+            planned=planned_margin,
             flown=flown_margin,
             limit=0.0,
             at_least=True,
             source="scenario",
             tolerance=ROUNDING_M,
-            margin=distance if ok is not None else None,
+            margin=margin if ok is not None else None,
             unit="m",
             method="least distance inside the box",
         )
@@ -54,7 +54,7 @@ def bounds_findings(
 
 
 def _min_distance_inside(requirements: RouteRequirements, points: Floats) -> tuple[float, str, int]:
-    """Return the minimum distance inside the box, m (negative if outside), its side's name, and the row of `points`."""
+    """Return the minimum distance inside the box, m (negative if outside), the edge's name, and the row of `points`."""
     scenario = requirements.setup.scenario
     (west, east), (south, north) = scenario.bounds
     distances = {
@@ -65,9 +65,9 @@ def _min_distance_inside(requirements: RouteRequirements, points: Floats) -> tup
         "floor": points[:, 2] - scenario.floor,
         "ceiling": scenario.ceiling - points[:, 2],
     }
-    side = min(distances, key=lambda name: float(distances[name].min()))
-    k = int(np.argmin(distances[side]))
-    return float(distances[side][k]), side, k
+    edge = min(distances, key=lambda name: float(distances[name].min()))
+    k = int(np.argmin(distances[edge]))
+    return float(distances[edge][k]), edge, k
 
 
 RULE = Rule(

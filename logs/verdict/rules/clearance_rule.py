@@ -44,19 +44,23 @@ def clearance_findings(
             at_least=True,
         )
         return [unknown, *_below_home_findings(requirements)]
-    fields = _fields_by_leg(requirements)
+    fields_by_leg = _fields_by_leg(requirements)
     legs, points = requirements.path.legs, requirements.path.points
     heights, _ = path_clearance(terrain.heights, terrain.to_pixel.record, points)
     findings = []
     for leg in range(requirements.legs):
-        requirement = _Requirement(limit, fields.get(leg, ()))
+        requirement = _Requirement(limit, fields_by_leg.get(leg, ()))
         segments = np.flatnonzero(legs == leg)
-        planned, required = requirement.worst(heights[segments], points[segments])
+        planned_height, required_height = requirement.worst_height(heights[segments], points[segments])
         if geometric:
-            findings.append(_planned_clearance(requirements, leg, planned, required, terrain.vertical_error))
+            findings.append(
+                _planned_clearance(requirements, leg, planned_height, required_height, terrain.vertical_error)
+            )
         else:
-            is_short = planned < required - CLEARANCE_TOLERANCE_M
-            findings.append(_flown_clearance(requirements, aligned, leg, planned, requirement, planned_short=is_short))
+            is_short = planned_height < required_height - CLEARANCE_TOLERANCE_M
+            findings.append(
+                _flown_clearance(requirements, aligned, leg, planned_height, requirement, is_planned_short=is_short)
+            )
     return [*_home_above_ground_findings(requirements, terrain, findings), *findings]
 
 
@@ -74,18 +78,18 @@ def _below_home_findings(requirements: RouteRequirements) -> list[Finding]:
         return []
     brief = f"waypoint {k} is {float(depths[k]):.0f} m below home ({home.alt:.0f} m AMSL)"
     fault = message(brief, ", and no terrain says that the ground there is as low: --terrain names an elevation file")
-    place = requirements.waypoint(k)
-    return [make_finding("clearance", place, ok=None, reason=fault.text, faults=[fault], check=GROUND_WAY)]
+    lowest_waypoint = requirements.waypoint(k)
+    return [make_finding("clearance", lowest_waypoint, ok=None, reason=fault.text, faults=[fault], check=GROUND_WAY)]
 
 
 def _home_above_ground_findings(
-    requirements: RouteRequirements, terrain: Terrain, legs: list[Finding]
+    requirements: RouteRequirements, terrain: Terrain, leg_findings: list[Finding]
 ) -> list[Finding]:
-    """Report a route with heights above home as undecided if it becomes too low once home is on the ground.
+    """Report a route with heights above home as undecided if it would be too low with home on the ground.
 
     An autopilot sets home on the ground when it is armed there.
 
-    legs: the findings of the legs.
+    leg_findings: the findings of the legs.
     """
     setup = requirements.setup
     home = setup.mission.home
@@ -95,29 +99,31 @@ def _home_above_ground_findings(
     height = home.alt - float(terrain.height(float(east), float(north)))
     # NaN, where the terrain does not reach, decides nothing.
     if not height > HOME_ERROR_M or not any(
-        finding.margin is not None and 0.0 <= finding.margin < height for finding in legs
+        finding.margin is not None and 0.0 <= finding.margin < height for finding in leg_findings
     ):
         return []
-    min_height = min(finding.margin + (finding.limit or 0.0) for finding in legs if finding.margin is not None) - height
+    min_height = (
+        min(finding.margin + (finding.limit or 0.0) for finding in leg_findings if finding.margin is not None) - height
+    )
     brief = f"the mission's home is {height:.0f} m above the ground there"
-    rest = (
+    explanation = (
         f": an autopilot that is armed on that ground flies lower by as much, down to {min_height:.0f} m above ground"
     )
-    fault = message(brief, rest)
+    fault = message(brief, explanation)
     return [make_finding("clearance", FLIGHT, ok=None, reason=fault.text, faults=[fault], check=GROUND_WAY)]
 
 
 class _Requirement(NamedTuple):
     """Required height above ground on a leg, which is reduced near a flown take-off or landing.
 
-    limit: required height away from these places, m.
+    limit: required height outside these fields, m.
     fields: east and north of nearby homes and landing points, m.
     """
 
     limit: float
     fields: tuple[tuple[float, float], ...]
 
-    def of(self, points: Floats) -> Floats:
+    def required_heights(self, points: Floats) -> Floats:
         """Return the required height above ground at points (n, 3), (n,) m."""
         requirement = np.full(len(points), self.limit)
         for east, north in self.fields:
@@ -125,7 +131,7 @@ class _Requirement(NamedTuple):
             requirement[distances <= FIELD_RADIUS_M] = min(self.limit, GROUND_LEG_CLEARANCE_M)
         return requirement
 
-    def worst(self, heights: Floats, points: Floats) -> tuple[float, float]:
+    def worst_height(self, heights: Floats, points: Floats) -> tuple[float, float]:
         """Return the height above ground with the smallest margin, and the required height there, m.
 
         heights: heights above ground at `points` (n, 3), m, (n,).
@@ -141,38 +147,42 @@ class _Requirement(NamedTuple):
         """Return the index of the known height with the smallest margin, and the required height there, m."""
         if not self.fields:
             return int(np.nanargmin(heights)), self.limit
-        requirement = self.of(points)
+        requirement = self.required_heights(points)
         k = int(np.nanargmin(heights - requirement))
         return k, float(requirement[k])
 
 
 def _fields_by_leg(requirements: RouteRequirements) -> dict[int, tuple[tuple[float, float], ...]]:
-    """Return the places (east, north), m, near which each leg needs less height above ground, by leg number.
+    """Return the fields (east, north), m, near which each leg needs less height above ground, by leg number.
 
-    The leg after a flown take-off has the home, and the legs before a flown landing have the landing point.  The legs
-    before a landing begin at DO_LAND_START, or are the last two legs if the mission has none.  Of these, only the final
-    and the legs after the last waypoint that meets the limit on height above ground are included.
+    The field of the leg after a flown take-off is the home; that of the legs before a flown landing is the landing
+    point.  The legs before a landing begin at DO_LAND_START, or are the last two legs if the mission has no such item.
+    Of these, only the final and the legs after the last waypoint that meets the limit on height above ground count.
     """
-    setup, ground = requirements.setup, requirements.ground
-    ways = setup.ground_ways if ground is None else ground.ways
-    fields: dict[int, tuple[tuple[float, float], ...]] = {}
-    if ways.take_off is not None:
-        fields[ways.take_off.waypoint] = ((float(ways.take_off.home[0]), float(ways.take_off.home[1])),)
-    if ways.approach is not None:
-        starts = [item.seq for item in setup.mission.items if item.command == Command.DO_LAND_START]
-        sequence_start = max((seq for seq in starts if seq < ways.approach.item), default=None)
-        first = max(0, ways.approach.leg - 1)
+    setup, ground = requirements.setup, requirements.ground_phases
+    procedures = setup.ground_ways if ground is None else ground.procedures
+    fields_of_leg: dict[int, tuple[tuple[float, float], ...]] = {}
+    if procedures.take_off is not None:
+        fields_of_leg[procedures.take_off.waypoint] = (
+            (float(procedures.take_off.home[0]), float(procedures.take_off.home[1])),
+        )
+    if procedures.approach is not None:
+        landing_starts = [item.seq for item in setup.mission.items if item.command == Command.DO_LAND_START]
+        sequence_start = max((seq for seq in landing_starts if seq < procedures.approach.item), default=None)
+        first_leg = max(0, procedures.approach.leg - 1)
         if sequence_start is not None:
             later_waypoints = np.flatnonzero(setup.route.items > sequence_start)
-            first = max(0, int(later_waypoints[0]) - 1) if later_waypoints.size else first
-        point = (float(ways.approach.point[0]), float(ways.approach.point[1]))
-        for leg in range(max(first, _last_clear_waypoint(requirements, ways.approach.leg)), ways.approach.leg + 1):
-            fields[leg] = (*fields.get(leg, ()), point)
-    return fields
+            first_leg = max(0, int(later_waypoints[0]) - 1) if later_waypoints.size else first_leg
+        point = (float(procedures.approach.point[0]), float(procedures.approach.point[1]))
+        for leg in range(
+            max(first_leg, _last_clear_waypoint(requirements, procedures.approach.leg)), procedures.approach.leg + 1
+        ):
+            fields_of_leg[leg] = (*fields_of_leg.get(leg, ()), point)
+    return fields_of_leg
 
 
 def _last_clear_waypoint(requirements: RouteRequirements, final: int) -> int:
-    """Return the last waypoint up to the start of the final that meets the limit on height above ground.
+    """Return the last waypoint before the final that meets the limit on height above ground.
 
     Return the start of the final if no waypoint meets the limit.
     """
@@ -184,7 +194,7 @@ def _last_clear_waypoint(requirements: RouteRequirements, final: int) -> int:
     return int(clear_waypoints[-1]) if clear_waypoints.size else final
 
 
-def _source(requirements: RouteRequirements, limit: float) -> str:
+def _limit_source(requirements: RouteRequirements, limit: float) -> str:
     """Return the name of the source of a limit (m) on height above ground."""
     return "near the field" if limit < requirements.limits.min_clearance else requirements.limits_source
 
@@ -200,24 +210,24 @@ def _terrain_error_text(clearance: float, limit: float, error: float | None) -> 
 
 
 def _planned_clearance(
-    requirements: RouteRequirements, leg: int, planned: float, limit: float, error: float | None
+    requirements: RouteRequirements, leg: int, planned_height: float, limit: float, error: float | None
 ) -> Finding:
-    reason = f"{planned:.1f} m above ground at the lowest"
-    if math.isnan(planned):
+    reason = f"{planned_height:.1f} m above ground at the lowest"
+    if math.isnan(planned_height):
         reason = "the leg leaves the known terrain"
-    elif planned < limit - CLEARANCE_TOLERANCE_M:
+    elif planned_height < limit - CLEARANCE_TOLERANCE_M:
         reason += f"; {limit:.0f} m are required"
     return make_finding(
         "clearance",
         requirements.leg(leg),
-        ok=None if math.isnan(planned) else planned >= limit - CLEARANCE_TOLERANCE_M,
-        reason=reason + _terrain_error_text(planned, limit, error),
-        planned=planned,
+        ok=None if math.isnan(planned_height) else planned_height >= limit - CLEARANCE_TOLERANCE_M,
+        reason=reason + _terrain_error_text(planned_height, limit, error),
+        planned=planned_height,
         limit=limit,
         at_least=True,
-        source=_source(requirements, limit),
+        source=_limit_source(requirements, limit),
         tolerance=CLEARANCE_TOLERANCE_M,
-        margin=planned - limit,
+        margin=planned_height - limit,
         unit="m",
         method="exact along the fly-by path",
     )
@@ -227,13 +237,13 @@ def _flown_clearance(
     requirements: RouteRequirements,
     aligned: AlignedTrack | None,
     leg: int,
-    planned: float,
+    planned_height: float,
     requirement: _Requirement,
     *,
-    planned_short: bool,
+    is_planned_short: bool,
 ) -> Finding:
     min_clearance, ok, reason, limit = math.nan, None, "the leg was not flown", requirement.limit
-    if aligned is not None and aligned.flew(leg):
+    if aligned is not None and aligned.has_flown(leg):
         # The first leg includes what came before it, the last leg what came after.
         first = 0 if leg == 0 else int(aligned.rows[leg])
         last = len(aligned.track) - 1 if leg + 1 == requirements.legs else int(aligned.rows[leg + 1])
@@ -257,20 +267,20 @@ def _flown_clearance(
             ok = None if ok is not False else False
         if ok is False:
             reason += f"; {limit:.0f} m are required"
-        ground = requirements.setup.scenario.terrain
-        reason += _terrain_error_text(min_clearance, limit, None if ground is None else ground.vertical_error)
-    if planned_short:
-        reason += f"; the planned path comes down to {planned:.1f} m"
+        terrain = requirements.setup.scenario.terrain
+        reason += _terrain_error_text(min_clearance, limit, None if terrain is None else terrain.vertical_error)
+    if is_planned_short:
+        reason += f"; the planned path comes down to {planned_height:.1f} m"
     return make_finding(
         "clearance",
         requirements.leg(leg),
         ok=ok,
         reason=reason,
-        planned=planned,
+        planned=planned_height,
         flown=min_clearance,
         limit=limit,
         at_least=True,
-        source=_source(requirements, limit),
+        source=_limit_source(requirements, limit),
         tolerance=CLEARANCE_TOLERANCE_M,
         margin=min_clearance - limit,
         unit="m",
@@ -281,7 +291,7 @@ def _flown_clearance(
 def _time_and_place_text(aligned: AlignedTrack, k: int, fraction: float) -> str:
     """Describe when and where the aircraft was at a fraction of track segment `k`."""
     time = aligned.track.time
-    return f"at {time[k] + fraction * (time[k + 1] - time[k]):.1f} s, {aligned.where(k, fraction)}"
+    return f"at {time[k] + fraction * (time[k + 1] - time[k]):.1f} s, {aligned.position_text(k, fraction)}"
 
 
 RULE = Rule(

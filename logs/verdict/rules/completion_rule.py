@@ -1,4 +1,4 @@
-"""The completion rule: judge if a feasible plan was flown to its end and recorded completely."""
+"""The completion rule: judge whether a feasible plan was flown to its end and recorded completely."""
 
 from collections.abc import Iterable, Sequence
 
@@ -6,7 +6,7 @@ import numpy as np
 
 from flight.mission.items import Command
 from flight.simulation.setup import FlightSetup, MissingItems
-from logs.verdict.findings import Finding, Message, make_finding, message, reason_of
+from logs.verdict.findings import Finding, Message, finding_reason, make_finding, message
 from logs.verdict.imported.flown_legs import FlownLegs, gaps_between, stretch_end_text
 from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.track_alignment import AlignedTrack
@@ -17,29 +17,29 @@ from logs.verdict.wording import place_text_within
 
 
 def completion_findings(
-    requirements: RouteRequirements, aligned: AlignedTrack | None, ended: str, log_complete: bool
+    requirements: RouteRequirements, aligned: AlignedTrack | None, end_reason: str, log_complete: bool
 ) -> list[Finding]:
-    """Judge if a feasible plan was flown to its last waypoint, and recorded completely and consistently."""
+    """Judge whether a feasible plan was flown to its last waypoint and recorded completely and consistently."""
     plan = requirements.setup.plan
     faults = []
     if plan is not None and not plan.feasible:
         faults.append(message("the plan is not feasible"))
-    if ended != "completed":
-        faults.append(message(f"the flight ended early: {ended}", _ending_place_text(requirements, aligned)))
+    if end_reason != "completed":
+        faults.append(message(f"the flight ended early: {end_reason}", _ending_place_text(requirements, aligned)))
     if not log_complete:
         faults.append(message("the log is damaged or unfinished"))
-    flown_count, numbers = 0, requirements.setup.route.leg_numbers
-    leg_count = len(set(numbers.tolist()))
+    flown_count, leg_numbers = 0, requirements.setup.route.leg_numbers
+    leg_count = len(set(leg_numbers.tolist()))
     if aligned is None:
         faults.append(message("the track has fewer than two usable rows"))
     else:
-        # A leg whose loiter was not flown to its end was not flown.
-        flown_count = leg_count - len(set(numbers[~aligned.passed[1:]].tolist()))
+        # A leg counts as flown only once its loiter is complete.
+        flown_count = leg_count - len(set(leg_numbers[~aligned.passed[1:]].tolist()))
         if flown_count < leg_count:
             faults.append(message(f"{flown_count} of {leg_count} legs flown"))
         faults += _record_faults(aligned)
     notes = "; ".join(requirements.setup.route.notes)
-    reason = reason_of(faults) if faults else f"all {leg_count} legs flown"
+    reason = finding_reason(faults) if faults else f"all {leg_count} legs flown"
     return [
         make_finding(
             "completion",
@@ -65,7 +65,7 @@ def _ending_place_text(requirements: RouteRequirements, aligned: AlignedTrack | 
     if aligned is None or aligned.passed[-1]:
         return ""
     row = len(aligned.track) - 1
-    return f" on {place_text_within(requirements.leg(aligned.leg_at(row)))} {aligned.where(row)}"
+    return f" on {place_text_within(requirements.leg(aligned.leg_at(row)))} {aligned.position_text(row)}"
 
 
 def _record_faults(aligned: AlignedTrack) -> list[Message]:
@@ -90,44 +90,42 @@ def _record_faults(aligned: AlignedTrack) -> list[Message]:
 _RETURN_MODE = "RTL"
 
 
-def imported_completion(setup: FlightSetup, flown: Sequence[FlownLegs], log_complete: bool) -> Finding:
+def imported_completion_finding(setup: FlightSetup, stretches: Sequence[FlownLegs], log_complete: bool) -> Finding:
     """Judge the part of the mission that the log shows; a log that ends en route leaves the other legs undecided."""
     last_leg, faults, unknown_texts, notes = setup.route.legs - 1, [], [], []
     flown_legs = {
-        leg for stretch_legs in flown for leg in range(stretch_legs.first, stretch_legs.last - stretch_legs.partial)
+        leg for stretch_legs in stretches for leg in range(stretch_legs.first, stretch_legs.last - stretch_legs.partial)
     }
     leg_count = len(set(setup.route.leg_numbers.tolist()))
     finished_count = leg_count - len(_leg_numbers(setup, set(range(setup.route.legs)) - flown_legs))
-    missing = None if setup.source is None else setup.source.missing
+    missing_items = None if setup.source is None else setup.source.missing
     if not log_complete:
         faults.append(message("the log is damaged or unfinished"))
-    if not flown:
-        stretches = () if setup.source is None else setup.source.stretches
-        reason = (
-            "none of the mission's legs was flown" if stretches else "no stretch of the flight followed the mission"
-        )
-        # The flight may have included legs that the log does not hold.
-        if missing is not None and stretches:
-            unknown_texts.append(f"none of the legs that the log holds was flown: {_absent_text(missing)}")
+    if not stretches:
+        followed = () if setup.source is None else setup.source.stretches
+        reason = "none of the mission's legs was flown" if followed else "no stretch of the flight followed the mission"
+        # The flight may have included legs that the log does not contain.
+        if missing_items is not None and followed:
+            unknown_texts.append(f"none of the legs that the log holds was flown: {_missing_items_text(missing_items)}")
         else:
             faults.append(message(reason))
-    elif last_leg in flown_legs and missing is not None and missing.beyond:
+    elif last_leg in flown_legs and missing_items is not None and missing_items.beyond:
         unknown_texts.append(
             f"{finished_count} of {leg_count} legs flown that the log holds, the last of them to its end:"
-            f" {_absent_text(missing)}"
+            f" {_missing_items_text(missing_items)}"
         )
     elif last_leg in flown_legs:
         last_leg_text = f"{finished_count} of {leg_count} legs flown, the last of them to its end"
-        unflown, doubt_texts = _unflown_legs(setup, flown, flown_legs)
+        unflown_legs, doubt_texts = _unflown_legs(setup, stretches, flown_legs)
         faults += (
-            [message(f"{_legs_text(setup, unflown)} not flown along the mission", f": {last_leg_text}")]
-            if unflown
+            [message(f"{_legs_text(setup, unflown_legs)} not flown along the mission", f": {last_leg_text}")]
+            if unflown_legs
             else []
         )
         unknown_texts += [f"{'; '.join(doubt_texts)}: {last_leg_text}"] if doubt_texts else []
-        notes += [] if unflown or doubt_texts else [last_leg_text]
+        notes += [] if unflown_legs or doubt_texts else [last_leg_text]
     else:
-        last_stretch = flown[-1]
+        last_stretch = stretches[-1]
         count_text = f"{finished_count} of {leg_count} legs flown"
         ending = f"{stretch_end_text(last_stretch.stretch)}, on the way to {_next_waypoint_text(setup, last_stretch)}"
         if _ends_in_return(setup, last_stretch):
@@ -139,12 +137,12 @@ def imported_completion(setup: FlightSetup, flown: Sequence[FlownLegs], log_comp
     unknown_texts += [
         f"the path to item {stop.item} is not judged, as it is not laid out" for stop in setup.route.unjoined
     ]
-    notes += _gaps_text(flown)
+    notes += _gaps_text(stretches)
     return make_finding(
         "completion",
         FLIGHT,
         ok=False if faults else None if unknown_texts else True,
-        reason=reason_of(faults, [*unknown_texts, *notes]),
+        reason=finding_reason(faults, [*unknown_texts, *notes]),
         faults=faults,
         planned=leg_count,
         flown=finished_count,
@@ -158,30 +156,36 @@ def imported_completion(setup: FlightSetup, flown: Sequence[FlownLegs], log_comp
     )
 
 
-def _unflown_legs(setup: FlightSetup, flown: Sequence[FlownLegs], flown_legs: set[int]) -> tuple[list[int], list[str]]:
-    """Return the legs that no stretch flew, and a text for each group of legs that the log may not show completely."""
-    unflown = [leg for leg in range(setup.route.legs) if leg not in flown_legs]
+def _unflown_legs(
+    setup: FlightSetup, flown_stretches: Sequence[FlownLegs], flown_legs: set[int]
+) -> tuple[list[int], list[str]]:
+    """Return the unflown legs, and a text for each group of legs that the log may show only in part."""
+    unflown_legs = [leg for leg in range(setup.route.legs) if leg not in flown_legs]
     begins_in_flight = setup.source is not None and setup.source.begins_in_flight
-    unseen = [leg for leg in unflown if begins_in_flight and leg < flown[0].first]
-    partly_flown = [
+    unseen_legs = [leg for leg in unflown_legs if begins_in_flight and leg < flown_stretches[0].first]
+    partly_flown_legs = [
         leg
-        for leg in unflown
-        if leg not in unseen and any(stretch_legs.partial and stretch_legs.last - 1 == leg for stretch_legs in flown)
+        for leg in unflown_legs
+        if leg not in unseen_legs
+        and any(stretch_legs.partial and stretch_legs.last - 1 == leg for stretch_legs in flown_stretches)
     ]
-    doubts = [f"the log begins in flight, and {_legs_text(setup, unseen)} not in it"] if unseen else []
-    doubts += [f"{_legs_text(setup, partly_flown)} flown along the mission in part"] if partly_flown else []
-    return [leg for leg in unflown if leg not in unseen and leg not in partly_flown], doubts
+    doubt_texts = [f"the log begins in flight, and {_legs_text(setup, unseen_legs)} not in it"] if unseen_legs else []
+    doubt_texts += (
+        [f"{_legs_text(setup, partly_flown_legs)} flown along the mission in part"] if partly_flown_legs else []
+    )
+    return [leg for leg in unflown_legs if leg not in unseen_legs and leg not in partly_flown_legs], doubt_texts
 
 
-def _gaps_text(flown: Sequence[FlownLegs]) -> list[str]:
+def _gaps_text(flown_stretches: Sequence[FlownLegs]) -> list[str]:
     """Describe the gaps between the rows of the judged stretches in one line; return [] without gaps."""
-    gaps = [gap for legs in flown for gap in gaps_between(legs, legs.stretch.start, legs.stretch.end)]
+    gaps = [gap for legs in flown_stretches for gap in gaps_between(legs, legs.stretch.start, legs.stretch.end)]
     if not gaps:
         return []
-    longest = max(gaps, key=lambda gap: gap.end - gap.start)
-    seconds = sum(gap.end - gap.start for gap in gaps)
+    longest_gap = max(gaps, key=lambda gap: gap.end - gap.start)
+    gap_time = sum(gap.end - gap.start for gap in gaps)
     return [
-        f"{len(gaps)} gaps of {seconds:.1f} s in all, the longest from {longest.start:.1f} s to {longest.end:.1f} s"
+        f"{len(gaps)} gaps of {gap_time:.1f} s in all,"
+        f" the longest from {longest_gap.start:.1f} s to {longest_gap.end:.1f} s"
     ]
 
 
@@ -201,7 +205,7 @@ def _legs_text(setup: FlightSetup, legs: Iterable[int]) -> str:
     return f"{plural_text} are"
 
 
-def _absent_text(missing: MissingItems) -> str:
+def _missing_items_text(missing: MissingItems) -> str:
     return (
         f"{len(missing.numbers)} {'item' if len(missing.numbers) == 1 else 'items'} of the mission are not in the log"
     )
@@ -238,5 +242,5 @@ RULE = Rule(
         "PLAN_MISMATCH_DISTANCE_M",
     ),
     judge_end=completion_findings,
-    judge_imported_end=imported_completion,
+    judge_imported_end=imported_completion_finding,
 )

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from logs.verdict.findings import Finding, make_finding, message, reason_of
+from logs.verdict.findings import Finding, finding_reason, make_finding, message
 from logs.verdict.measures.acceptance import corner_depths, corridor_limit, farthest_from_legs
 from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.track_alignment import AlignedTrack, along_across
@@ -15,17 +15,16 @@ from logs.verdict.tolerances import ROUNDING_M, RUNWAY_COURSE_TOLERANCE_RAD
 def corridor_findings(
     requirements: RouteRequirements, aligned: AlignedTrack | None, *, geometric: bool = False
 ) -> list[Finding]:
-    """Judge the distance from the legs of each leg's flight, or of its planned turns (``geometric``).
+    """Judge the cross-track distance of each flown leg; with ``geometric``, of each leg's planned turns.
 
-    In a survey, and on the legs that lead to the survey and away from it, only an explicitly stated corridor applies,
-    because the survey rule judges the distance from the photo lines, and the autopilot chooses its turns onto the first
-    line and off the last line.
+    A survey and the legs to and from it are judged only against a corridor that is stated explicitly: the survey rule
+    judges the photo lines, and the autopilot chooses its turns onto the first line and off the last.
     """
-    is_stated = requirements.setup.scenario.limits.corridor_m is not None
+    has_stated_corridor = requirements.setup.scenario.limits.corridor_m is not None
     return [
         _leg_finding(requirements, aligned, leg, geometric)
         for leg in range(requirements.legs)
-        if is_stated or not any(survey.has_leg(leg) for survey in requirements.surveys)
+        if has_stated_corridor or not any(survey.has_leg(leg) for survey in requirements.surveys)
     ]
 
 
@@ -38,22 +37,22 @@ def _leg_finding(requirements: RouteRequirements, aligned: AlignedTrack | None, 
         facts.append(f"its turns are planned within {planned:.1f} m of the legs")
         if not ok:
             faults.append(message(f"its turns lead {planned:.0f} m off the legs", f"; the corridor is {limit:.0f} m"))
-    elif aligned is None or not aligned.flew(leg):
+    elif aligned is None or not aligned.has_flown(leg):
         facts.append("the leg was not flown")
     else:
         rows = _rows_after_takeoff(requirements, aligned, leg, limit)
         nearby_legs = slice(max(0, leg - 1), min(requirements.legs, leg + 2) + 1)
         flown, row = farthest_from_legs(aligned.track.position[rows], requirements.points[nearby_legs])
         ok = flown <= limit
-        where = _time_and_place_text(aligned, rows.start + row)
-        facts.append(f"within {flown:.1f} m of the legs, the farthest {where}")
+        time_and_place = _time_and_place_text(aligned, rows.start + row)
+        facts.append(f"within {flown:.1f} m of the legs, the farthest {time_and_place}")
         if not ok:
-            faults.append(message(f"{flown:.0f} m off the legs {where}", f"; the corridor is {limit:.0f} m"))
+            faults.append(message(f"{flown:.0f} m off the legs {time_and_place}", f"; the corridor is {limit:.0f} m"))
     return make_finding(
         "corridor",
         requirements.leg(leg),
         ok=ok,
-        reason=reason_of(faults) if faults else reason_of([], facts),
+        reason=finding_reason(faults) if faults else finding_reason([], facts),
         faults=faults,
         planned=planned,
         flown=flown,
@@ -67,13 +66,13 @@ def _leg_finding(requirements: RouteRequirements, aligned: AlignedTrack | None, 
 
 
 def _rows_after_takeoff(requirements: RouteRequirements, aligned: AlignedTrack, leg: int, limit: float) -> slice:
-    """Return the rows of a leg; for the leg after a take-off, only the rows since the aircraft joined the leg.
+    """Return the rows of a leg; for the leg after a take-off, only the rows after the aircraft joined the leg.
 
     The aircraft has joined the leg once it flies on the leg's course and within the limit (m) of its line.  A take-off
     ends on the launch course, which may differ from the course of the leg.
     """
-    rows, ground = aligned.leg_rows(leg), requirements.ground
-    if ground is None or ground.ways.take_off is None or ground.ways.take_off.waypoint != leg:
+    rows, ground = aligned.leg_rows(leg), requirements.ground_phases
+    if ground is None or ground.procedures.take_off is None or ground.procedures.take_off.waypoint != leg:
         return rows
     course_error = np.abs(np.sin(0.5 * (aligned.course[rows] - requirements.courses[leg])))
     lateral_offset = along_across(requirements, leg, np.asarray(aligned.track.position[rows], dtype=np.float64))[1]

@@ -2,7 +2,7 @@
 
 import math
 
-from logs.verdict.findings import UNKNOWN_AIRCRAFT, Finding, Message, make_finding, message, reason_of
+from logs.verdict.findings import UNKNOWN_AIRCRAFT, Finding, Message, finding_reason, make_finding, message
 from logs.verdict.measures.energy import leg_energies, predicted_energy
 from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.track_alignment import AlignedTrack
@@ -21,52 +21,52 @@ def energy_findings(
     that may exceed the limit is undecided, except in an imported log, which contains measured energy.
     """
     setup = requirements.setup
-    usable = (1.0 - ENERGY_RESERVE_FRACTION) * setup.battery
-    predicted, peak = predicted_energy(requirements)
-    faults = [_endless_jump_message(requirements, usable)] if setup.route.endless >= 0 else []
+    limit = (1.0 - ENERGY_RESERVE_FRACTION) * setup.battery
+    planned_energy, peak_current = predicted_energy(requirements)
+    faults = [_endless_jump_message(requirements, limit)] if setup.route.endless >= 0 else []
     is_guessed = setup.envelope.battery_guessed and setup.scenario.flight.battery_wh is None
-    used, current = predicted, peak
+    energy, max_current = planned_energy, peak_current
     if not geometric:
         # The energy of a flown take-off and landing is included.
         track = None if aligned is None else aligned.track
-        if requirements.ground is not None:
-            track = requirements.ground.track
-        used = math.nan if track is None else float(track.energy.max())
-        current = math.nan if track is None else float(track.current.max())
+        if requirements.ground_phases is not None:
+            track = requirements.ground_phases.track
+        energy = math.nan if track is None else float(track.energy.max())
+        max_current = math.nan if track is None else float(track.current.max())
     is_measured = setup.source is not None and not geometric
-    max_used = used * (1.0 + (0.0 if is_measured else UNDECIDED_FRACTION * setup.envelope.power_sd))
-    is_uncertain = not faults and not is_guessed and used <= usable < max_used
-    if used == 0.0 and predicted == 0.0:
+    max_energy = energy * (1.0 + (0.0 if is_measured else UNDECIDED_FRACTION * setup.envelope.power_sd))
+    is_uncertain = not faults and not is_guessed and energy <= limit < max_energy
+    if energy == 0.0 and planned_energy == 0.0:
         # A model without a reading of power reads as 0 W.
-        used, predicted = math.nan, math.nan
+        energy, planned_energy = math.nan, math.nan
         reason = "the aircraft's model states no power, so the energy is not known"
-    elif math.isnan(used):
+    elif math.isnan(energy):
         reason = "the aircraft's power is not known at these speeds" if geometric else "nothing was flown"
     else:
-        reason = _used_text(requirements, used, current) + (" by prediction" if geometric else "")
-        if not geometric and math.isfinite(predicted):
-            reason += f"; {predicted:.1f} Wh by prediction"
+        reason = _used_text(requirements, energy, max_current) + (" by prediction" if geometric else "")
+        if not geometric and math.isfinite(planned_energy):
+            reason += f"; {planned_energy:.1f} Wh by prediction"
         if is_guessed:
             reason = (
                 f"the battery is guessed: state --battery with the aircraft, or the scenario's battery_wh; {reason}"
             )
         elif is_uncertain:
             reason += f"; the power according to {setup.envelope.source} is known to {setup.envelope.power_sd:.0%}"
-        elif used > usable:
+        elif energy > limit:
             reason += f"; {ENERGY_RESERVE_FRACTION:.0%} must be left"
     return [
         make_finding(
             "energy",
             FLIGHT,
-            ok=False if faults else None if is_guessed or is_uncertain or math.isnan(used) else used <= usable,
-            reason=reason_of(faults, [reason]),
+            ok=False if faults else None if is_guessed or is_uncertain or math.isnan(energy) else energy <= limit,
+            reason=finding_reason(faults, [reason]),
             faults=faults,
-            planned=predicted,
-            flown=None if geometric else used,
-            limit=usable,
+            planned=planned_energy,
+            flown=None if geometric else energy,
+            limit=limit,
             source="aircraft" if setup.scenario.flight.battery_wh is None else "scenario",
             tolerance=0.0,
-            margin=math.nan if is_guessed else usable - used,
+            margin=math.nan if is_guessed else limit - energy,
             unit="Wh",
             check=UNKNOWN_AIRCRAFT if is_uncertain else "",
             method="power of steady flight on each leg over its time" if geometric else "power over time",
@@ -74,32 +74,34 @@ def energy_findings(
     ]
 
 
-def _endless_jump_message(requirements: RouteRequirements, usable: float) -> Message:
-    """Report an endless jump, and the number of rounds after which the usable energy (Wh) is used up."""
+def _endless_jump_message(requirements: RouteRequirements, usable_energy: float) -> Message:
+    """Report an endless jump and the number of rounds for which the usable energy (Wh) lasts."""
     route = requirements.setup.route
-    last = len(route.items) - 1
-    begin = last
-    while begin > 0 and route.items[begin] == route.items[last]:
-        begin -= 1
-    # Find where the round that ends the route began: at the item where the route ends.
-    while begin > 0 and route.items[begin] != route.items[last]:
-        begin -= 1
-    round_energy = sum(leg_energies(requirements)[0][begin:]) if route.items[begin] == route.items[last] else math.nan
-    duration_text = f": the energy lasts for {usable / round_energy:.0f} rounds" if round_energy > 0.0 else ""
+    last_waypoint = len(route.items) - 1
+    start = last_waypoint
+    while start > 0 and route.items[start] == route.items[last_waypoint]:
+        start -= 1
+    # Find the start of the last round, at the item with which the route ends.
+    while start > 0 and route.items[start] != route.items[last_waypoint]:
+        start -= 1
+    round_energy = (
+        sum(leg_energies(requirements)[0][start:]) if route.items[start] == route.items[last_waypoint] else math.nan
+    )
+    duration_text = f": the energy lasts for {usable_energy / round_energy:.0f} rounds" if round_energy > 0.0 else ""
     return message(f"the jump of item {route.endless} has no end{duration_text}")
 
 
-def _used_text(requirements: RouteRequirements, used: float, current: float) -> str:
+def _used_text(requirements: RouteRequirements, energy_used: float, max_current: float) -> str:
     """Describe the energy used (Wh) and the peak current (A), or the fuel used by an aircraft without a battery."""
     capacity = requirements.setup.battery
     if requirements.setup.envelope.power_level.size and not requirements.setup.envelope.volts:
-        fraction = used / capacity
+        fraction = energy_used / capacity
         return (
-            f"{used:.0f} Wh of {capacity:.0f} Wh of fuel heat used, {fraction:.1%} of the fuel;"
+            f"{energy_used:.0f} Wh of {capacity:.0f} Wh of fuel heat used, {fraction:.1%} of the fuel;"
             " no battery, so no current"
         )
-    peak = f", peak current {current:.1f} A" if math.isfinite(current) else ""
-    return f"{used:.1f} Wh of {capacity:.0f} Wh used{peak}"
+    current_text = f", peak current {max_current:.1f} A" if math.isfinite(max_current) else ""
+    return f"{energy_used:.1f} Wh of {capacity:.0f} Wh used{current_text}"
 
 
 RULE = Rule(

@@ -1,4 +1,4 @@
-"""The fence rule: judge the depth of planned path and flight in exclusion zones, or outside inclusion zones.
+"""The fence rule: judge how deep planned path and flight are inside exclusion zones or outside inclusion zones.
 
 The zones are those of the scenario and of the mission's own fence.  The rule judges the path's line, including arcs,
 loiters and jumps; it only reports a corridor that reaches into a zone.
@@ -10,7 +10,7 @@ from collections.abc import Callable
 import numpy as np
 
 from flight.simulation.setup import FlightSetup
-from logs.verdict.findings import Fact, Finding, make_finding, message, reason_of
+from logs.verdict.findings import Fact, Finding, finding_reason, make_finding, message
 from logs.verdict.measures.path_moves import flown_moves, planned_moves
 from logs.verdict.measures.route_requirements import RouteRequirements, route_requirements
 from logs.verdict.measures.track_alignment import AlignedTrack
@@ -27,12 +27,12 @@ from world.kernels import Record, Records
 _METHOD = "every point of each piece, arc and row"
 
 
-def zone_test(setup: FlightSetup) -> Callable[[Zone], bool]:
-    """Return a function that returns True if the setup's planned path violates a zone by more than rounding.
+def make_zone_test(setup: FlightSetup) -> Callable[[Zone], bool]:
+    """Make a function that returns True if the setup's planned path violates a zone by more than rounding.
 
     >>> from logs.recording.example_log import example_log
     >>> from world.airspace.zones import Cylinder
-    >>> is_entered = zone_test(example_log().setup)  # passes 0, 0
+    >>> is_entered = make_zone_test(example_log().setup)  # passes 0, 0
     >>> [is_entered(Zone("mast", "exclusion", Cylinder(0.0, y, 50.0))) for y in (40.0, -60.0)]
     [True, False]
     """
@@ -47,54 +47,63 @@ def zone_test(setup: FlightSetup) -> Callable[[Zone], bool]:
 def fence_findings(
     requirements: RouteRequirements, aligned: AlignedTrack | None, *, geometric: bool = False
 ) -> list[Finding]:
-    """Judge each zone that plan or flight touches, or report that no zone is violated; return [] without zones."""
+    """Judge each zone that plan or flight touches; if no zone is violated, report it.  Return [] without zones."""
     airspace = requirements.airspace
     findings = []
-    if airspace.fault:
-        findings.append(make_finding("fence", MISSION, ok=None, reason=f"its fence is not judged: {airspace.fault}"))
+    if airspace.fence_fault:
+        findings.append(
+            make_finding("fence", MISSION, ok=None, reason=f"its fence is not judged: {airspace.fence_fault}")
+        )
     if not airspace.zones:
         return findings
     if not geometric and aligned is None:
         return [*findings, make_finding("fence", FLIGHT, ok=None, reason="nothing was flown", unit="m", method=_METHOD)]
     terrain = requirements.setup.scenario.terrain
-    if geometric and requirements.zones_on is not None:
-        return findings + _findings_on_legs(requirements, *requirements.zones_on)
-    planned = path_zones(planned_moves(requirements), airspace.records, terrain)
-    flown = None if aligned is None else path_zones(flown_moves(aligned), airspace.records, terrain)
-    visits = [planned] if flown is None else [planned, flown]
+    if geometric and requirements.zone_check_legs is not None:
+        return findings + _findings_on_legs(requirements, *requirements.zone_check_legs)
+    planned_visits = path_zones(planned_moves(requirements), airspace.records, terrain)
+    flown_visits = None if aligned is None else path_zones(flown_moves(aligned), airspace.records, terrain)
+    visits = [planned_visits] if flown_visits is None else [planned_visits, flown_visits]
     is_touched = np.any([(visit["depth"] > 0.0) | visit["unknown"] for visit in visits], axis=0)
     zone_findings = [
-        _zone_finding(requirements, zone_number, planned[zone_number], None if flown is None else flown[zone_number])
+        _zone_finding(
+            requirements,
+            zone_number,
+            planned_visits[zone_number],
+            None if flown_visits is None else flown_visits[zone_number],
+        )
         for zone_number in np.flatnonzero(is_touched).tolist()
     ]
     if not any(finding.ok is False for finding in zone_findings):
-        zone_findings.insert(0, _compliance_finding(requirements, planned, flown))
+        zone_findings.insert(0, _compliance_finding(requirements, planned_visits, flown_visits))
     return findings + zone_findings
 
 
 def _findings_on_legs(requirements: RouteRequirements, first: int, last: int) -> list[Finding]:
-    """Return findings for the zones that the planned path violates or touches on legs `first` to `last`."""
+    """Judge the zones that the planned path touches on legs `first` to `last`."""
     airspace, path = requirements.airspace, requirements.path
-    begin, end = np.searchsorted(path.legs, [first, last + 1]).tolist()
-    numbers = airspace.about(path.points[begin : end + 1])
+    start, end = np.searchsorted(path.legs, [first, last + 1]).tolist()
+    numbers = airspace.zones_near(path.points[start : end + 1])
     records = ZoneRecords(airspace.records.zones[numbers], airspace.records.edges)
     planned = path_zones(planned_moves(requirements, first, last), records, requirements.setup.scenario.terrain)
-    touched = np.flatnonzero((planned["depth"] > 0.0) | planned["unknown"])
-    return [_zone_finding(requirements, int(numbers[k]), planned[k], None) for k in touched.tolist()]
+    touched_indices = np.flatnonzero((planned["depth"] > 0.0) | planned["unknown"])
+    return [_zone_finding(requirements, int(numbers[k]), planned[k], None) for k in touched_indices.tolist()]
 
 
 def _compliance_finding(requirements: RouteRequirements, planned: Records, flown: Records | None) -> Finding:
-    """Report that no zone that could be judged is violated."""
+    """Report that no judged zone is violated."""
     airspace, corridor = requirements.airspace, requirements.setup.corridor
     count, visits = len(airspace.zones), planned if flown is None else flown
-    nearest = int(visits["depth"].argmax())
-    margin = -float(visits[nearest].depth)
+    nearest_zone = int(visits["depth"].argmax())
+    margin = -float(visits[nearest_zone].depth)
     reason = f"none of {count} zones is violated" if count > 1 else "the zone is not violated"
     facts = []
-    if math.isfinite(margin) and not visits[nearest].unknown:
+    if math.isfinite(margin) and not visits[nearest_zone].unknown:
         facts = [Fact("nearest", margin, "m"), Fact("less the corridor", margin - corridor, "m")]
-        name = place_text(airspace.place(nearest))
-        reason += f"; the nearest, {name}, is {margin:.1f} m away at {_event_text(requirements, visits[nearest], 'at')}"
+        name = place_text(airspace.place(nearest_zone))
+        reason += (
+            f"; the nearest, {name}, is {margin:.1f} m away at {_event_text(requirements, visits[nearest_zone], 'at')}"
+        )
         if margin < corridor:
             reason += f", within the corridor of {corridor:.0f} m about the legs"
     return make_finding(
@@ -114,10 +123,12 @@ def _compliance_finding(requirements: RouteRequirements, planned: Records, flown
     )
 
 
-def _zone_finding(requirements: RouteRequirements, zone_number: int, planned: Record, flown: Record | None) -> Finding:
+def _zone_finding(
+    requirements: RouteRequirements, zone_number: int, planned_visit: Record, flown_visit: Record | None
+) -> Finding:
     airspace = requirements.airspace
     zone = airspace.zones[zone_number]
-    visit = planned if flown is None else flown
+    visit = planned_visit if flown_visit is None else flown_visit
     ok: bool | None = visit.depth <= ROUNDING_M
     if ok and visit.unknown:
         ok = None
@@ -137,20 +148,21 @@ def _zone_finding(requirements: RouteRequirements, zone_number: int, planned: Re
         notes.append("touches it")
     if visit.unknown:
         notes.append("the ground from which its height counts is not known everywhere")
-    if flown is not None and planned.depth > ROUNDING_M:
+    if flown_visit is not None and planned_visit.depth > ROUNDING_M:
         notes.append(
-            f"the planned path is {planned.depth:.1f} m {side_text} at {_event_text(requirements, planned, 'at')}"
+            f"the planned path is {planned_visit.depth:.1f} m {side_text}"
+            f" at {_event_text(requirements, planned_visit, 'at')}"
         )
     return make_finding(
         "fence",
         airspace.place(zone_number),
         ok=ok,
-        reason=reason_of(faults, notes),
+        reason=finding_reason(faults, notes),
         faults=faults,
-        planned=max(0.0, planned.depth),
-        flown=None if flown is None else max(0.0, flown.depth),
+        planned=max(0.0, planned_visit.depth),
+        flown=None if flown_visit is None else max(0.0, flown_visit.depth),
         limit=0.0,
-        source=_source(requirements, zone_number),
+        source=_zone_source(requirements, zone_number),
         tolerance=ROUNDING_M,
         margin=-visit.depth,
         unit="m",
@@ -160,26 +172,26 @@ def _zone_finding(requirements: RouteRequirements, zone_number: int, planned: Re
 
 
 def _visit_facts(visit: Record) -> list[Fact]:
-    """Return the time, place and leg at which a path first violates a zone and complies again."""
+    """Return time, position and leg of the path's first entry into a violation and of its exit."""
     facts = [Fact("time beyond", visit.beyond, "s"), Fact("entries", float(visit.entries), "1")]
     for event in ("entry", "exit"):
-        for what, unit in (("time", "s"), ("east", "m"), ("north", "m"), ("up", "m"), ("leg", "1")):
-            facts.append(Fact(f"{event} {what}", float(visit[f"{event}_{what}"]), unit))
+        for coordinate, unit in (("time", "s"), ("east", "m"), ("north", "m"), ("up", "m"), ("leg", "1")):
+            facts.append(Fact(f"{event} {coordinate}", float(visit[f"{event}_{coordinate}"]), unit))
     return facts
 
 
-def _source(requirements: RouteRequirements, zone_number: int) -> str:
+def _zone_source(requirements: RouteRequirements, zone_number: int) -> str:
     """Return the name of the source of a zone: "mission", "scenario" or "fence".
 
     Without a scenario, a zone given on the command line has the source "fence".
     """
-    if zone_number >= requirements.airspace.of_scenario:
+    if zone_number >= requirements.airspace.scenario_zone_count:
         return "mission"
     return "fence" if requirements.setup.scenario.external else "scenario"
 
 
 def _event_text(requirements: RouteRequirements, visit: Record, event: str) -> str:
-    """Describe the time, place and leg of an event ("entry", "exit" or "at") of a visit to a zone."""
+    """Describe the time, position and leg of an event ("entry", "exit" or "at") of a visit to a zone."""
     leg = place_text(requirements.leg(int(visit[f"{event}_leg"])))
     time, east, north, up = (visit[f"{event}_{name}"] for name in ("time", "east", "north", "up"))
     return f"{time:.1f} s, east {east:.0f} m, north {north:.0f} m, {up:.0f} m AMSL ({leg})"

@@ -2,8 +2,8 @@
 
 A go-around is not an item of the mission; it can be commanded anywhere on the glide.  The rule therefore simulates it
 from several places on the glide that the autopilot lays out, with ArduPlane's law on a point mass
-(`flight.autopilots.arduplane.go_around_point_mass`), back to the last place before the glide, and judges the simulated
-path.  A go-around that never gets back fails, and one whose path is not fully known is undecided.  A go-around climbs
+(`flight.autopilots.arduplane.go_around_point_mass`), back to the last waypoint before the glide, and judges the
+simulated path.  A go-around that never gets back fails; one whose path is not fully known is undecided.  It climbs
 on the landing course to a height above home, regardless of the altitude of the field, and only then turns.  From a
 field higher than home it may therefore turn into a hill at once.
 """
@@ -26,7 +26,7 @@ from logs.verdict.findings import GROUND_WAY, Fact, Finding, make_finding, messa
 from logs.verdict.measures.path_sweeps import path_clearance
 from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.track_alignment import AlignedTrack
-from logs.verdict.measures.ways import Way, first_item, first_obstacle_on, is_laid_out, landing_item
+from logs.verdict.measures.ways import GroundPath, first_hazard_on_path, first_item, has_ground_paths, landing_item
 from logs.verdict.places import FLIGHT
 from logs.verdict.returns.judge_returns import ReturnWorld, return_world
 from logs.verdict.rule import Rule
@@ -58,101 +58,114 @@ _CLIMB_PITCH_RAD = math.radians(10.0)
 class _Landing:
     """Landing that may be aborted.
 
-    at: waypoint of the landing.
+    waypoint: waypoint of the landing.
     glide: glide to the landing point.
     point: landing point at the mission's altitude, m, (3,).
-    ground: altitude of the ground at the landing point, m AMSL.
+    ground_altitude: altitude of the ground at the landing point, m AMSL.
     course: landing course, rad.
-    run: length of the last leg, m.
-    high: altitude where the glide begins, m AMSL.
+    leg_length: length of the last leg, m.
+    glide_start_altitude: altitude where the glide begins, m AMSL.
     airspeed: true airspeed on the glide, m/s.
     pitch: pitch angle of the climb, rad.
-    home: altitude of home, m AMSL.
-    height: height above home at which the climb ends, m.
-    landings: landing sequences to one of which the go-around flies, or else the place before the landing.
+    home_altitude: altitude of home, m AMSL.
+    climb_height: height above home at which the climb ends, m.
+    destinations: landing sequences from which the autopilot chooses, or else the waypoint before the landing.
     item: mission item of the landing.
-    open: reason why the path of the go-around is unknown, "" if it is known.
+    unknown_path_text: reason why the path of the go-around is unknown, "" if it is known.
     """
 
-    at: int
+    waypoint: int
     glide: LandingGlide
     point: Floats
-    ground: float
+    ground_altitude: float
     course: float
-    run: float
-    high: float
+    leg_length: float
+    glide_start_altitude: float
     airspeed: float
     pitch: float
-    home: float
-    height: float
-    landings: tuple[LandingStart, ...]
+    home_altitude: float
+    climb_height: float
+    destinations: tuple[LandingStart, ...]
     item: MissionItem
-    open: str
+    unknown_path_text: str
 
-    def place(self, distance: float) -> tuple[float, float, float]:
-        """Return the glide's east, north and up at a distance (m) before the landing point, m."""
+    def position(self, distance: float) -> tuple[float, float, float]:
+        """Return the position on the glide at a distance (m) before the landing point: east, north and up, m."""
         point_altitude = float(self.point[2])
         altitude = point_altitude + self.glide.flare_height + self.glide.slope * (distance - self.glide.flare_distance)
         east = float(self.point[0]) - distance * math.sin(self.course)
         north = float(self.point[1]) - distance * math.cos(self.course)
-        return east, north, max(point_altitude, min(self.high, altitude))
+        return east, north, max(point_altitude, min(self.glide_start_altitude, altitude))
 
 
-class _Aborted(NamedTuple):
+class _GoAround(NamedTuple):
     """Aborted landing and its go-around.
 
-    before: distance of the abort before the landing point, m.
-    over: height above ground at the abort, m.
-    at_once: True if the aircraft is already above the end of the climb.
-    room: height above ground where its margin after the climb is smallest, or the minimum height anywhere if the
-        go-around hits the ground, m; inf if unknown.
-    needed: required height at that place, m.
-    climb: minimum height above ground in the climb beyond the landing point, m; inf without a climb.
-    after: time from the abort to ground impact, s; NaN without impact.
-    entered: sphere or zone that the go-around enters, "" if it enters none.
-    lost: True if the go-around does not return to the line-up.
-    open: text on the unknown part of the path, "" if all is known.
+    abort_distance: distance of the abort before the landing point, m.
+    abort_height: height above ground at the abort, m.
+    turns_at_once: True if the aircraft is already above the end of the climb.
+    lowest_height: height above ground at the point after the climb with the smallest margin, or the minimum height
+        anywhere if the go-around hits the ground, m; inf if unknown.
+    required_height: required height at that point, m.
+    min_climb_height: minimum height above ground in the climb beyond the landing point, m; inf without a climb.
+    impact_time: time from the abort to ground impact, s; NaN without impact.
+    entered_hazard: sphere or zone that the go-around enters, "" if it enters none.
+    is_lost: True if the go-around does not return to the line-up.
+    unknown_part_text: text on the unknown part of the path, "" if all is known.
     """
 
-    before: float
-    over: float
-    at_once: bool
-    room: float = math.inf
-    needed: float = GO_AROUND_CLEARANCE_M
-    climb: float = math.inf
-    after: float = math.nan
-    entered: str = ""
-    lost: bool = False
-    open: str = ""
+    abort_distance: float
+    abort_height: float
+    turns_at_once: bool
+    lowest_height: float = math.inf
+    required_height: float = GO_AROUND_CLEARANCE_M
+    min_climb_height: float = math.inf
+    impact_time: float = math.nan
+    entered_hazard: str = ""
+    is_lost: bool = False
+    unknown_part_text: str = ""
 
     @property
     def is_free(self) -> bool:
         """True if no fault is known."""
-        return math.isnan(self.after) and not self.entered and not self.lost and self.room >= self.needed
+        return (
+            math.isnan(self.impact_time)
+            and not self.entered_hazard
+            and not self.is_lost
+            and self.lowest_height >= self.required_height
+        )
 
     @property
     def badness(self) -> tuple[bool, bool, bool, float]:
         """Sort key that puts the worst go-around last."""
-        return not math.isnan(self.after), bool(self.entered), self.lost, self.needed - self.room
+        return (
+            not math.isnan(self.impact_time),
+            bool(self.entered_hazard),
+            self.is_lost,
+            self.required_height - self.lowest_height,
+        )
 
 
 def go_around_findings(
     requirements: RouteRequirements, _aligned: AlignedTrack | None = None, *, geometric: bool = False
 ) -> list[Finding]:
-    """Judge the go-around of a mission that lands and has a home; warn if it is too low.
+    """Judge the go-around of a mission that lands and has a home.
 
-    If the scenario requires that a landing may be aborted, a low go-around fails, and an unjudged one is undecided.
+    A go-around that is too low is a warning.  If the scenario requires go-arounds, it fails, and an unjudged go-around
+    leaves the verdict undecided.
     """
-    requirements = requirements if requirements.ground is None else requirements.ground.whole
+    requirements = requirements if requirements.ground_phases is None else requirements.ground_phases.whole
     setup = requirements.setup
     returns, terrain, home = setup.scenario.returns, setup.scenario.terrain, setup.mission.home
     is_required = returns is not None and "go_around" in returns.require
     landing_place = (
-        landing_item(requirements) if is_laid_out(requirements) and terrain is not None and home is not None else None
+        landing_item(requirements)
+        if has_ground_paths(requirements) and terrain is not None and home is not None
+        else None
     )
-    landing = None if landing_place is None or terrain is None else _landing(requirements, terrain, *landing_place)
+    landing = None if landing_place is None or terrain is None else _find_landing(requirements, terrain, *landing_place)
     if landing is not None and terrain is not None:
-        return [_finding(requirements, terrain, landing, is_required=is_required)]
+        return [_go_around_finding(requirements, terrain, landing, is_required=is_required)]
     if not is_required or setup.source is not None:
         return []
     reason = message(
@@ -162,11 +175,13 @@ def go_around_findings(
     return [make_finding("go_around", FLIGHT, ok=None, reason=reason.text, faults=[reason], check=GROUND_WAY)]
 
 
-def _landing(requirements: RouteRequirements, terrain: Terrain, waypoint: int, item: MissionItem) -> _Landing | None:
-    """Return the landing at waypoint `waypoint`, or None if its glide or the height of its go-around is not known."""
+def _find_landing(
+    requirements: RouteRequirements, terrain: Terrain, waypoint: int, item: MissionItem
+) -> _Landing | None:
+    """Return the landing at a waypoint, or None if its glide or the height of its go-around is not known."""
     setup, leg = requirements.setup, waypoint - 1
     glide_start, landing_point = requirements.points[leg], requirements.points[waypoint]
-    run, course = float(requirements.runs[leg]), float(requirements.courses[leg])
+    leg_length, course = float(requirements.runs[leg]), float(requirements.courses[leg])
     home_position = home_place(setup.mission, setup.scenario.origin, terrain)
     home_altitude = math.nan if home_position is None else home_position.up
     first, takeoff = first_item(requirements)
@@ -180,32 +195,32 @@ def _landing(requirements: RouteRequirements, terrain: Terrain, waypoint: int, i
     if (
         height is None
         or math.isnan(home_altitude + ground_altitude + terrain_altitude)
-        or run < MIN_LEG_LENGTH_M
+        or leg_length < MIN_LEG_LENGTH_M
         or glide_start[2] <= ground_altitude
     ):
         return None
     wind = setup.scenario.wind.along(course, ground_altitude)[0]
     point = np.array([landing_point[0], landing_point[1], ground_altitude])
     return _Landing(
-        glide=setup.autopilot.landing_glide(float(glide_start[2]) - ground_altitude, run, wind, ground_altitude),
-        at=waypoint,
+        glide=setup.autopilot.landing_glide(float(glide_start[2]) - ground_altitude, leg_length, wind, ground_altitude),
+        waypoint=waypoint,
         point=point,
-        ground=terrain_altitude,
+        ground_altitude=terrain_altitude,
         course=course,
-        run=run,
-        high=float(glide_start[2]),
+        leg_length=leg_length,
+        glide_start_altitude=float(glide_start[2]),
         airspeed=setup.autopilot.landing_airspeed(setup.airspeed, wind, ground_altitude),
         pitch=_CLIMB_PITCH_RAD if takeoff is None else climb_pitch(takeoff),
-        home=home_altitude,
-        height=height,
-        landings=landings,
+        home_altitude=home_altitude,
+        climb_height=height,
+        destinations=landings,
         item=item,
-        open=_unknown_path_text(requirements, item, landings),
+        unknown_path_text=_unknown_path_text(requirements, item, landings),
     )
 
 
 def _go_around_destinations(requirements: RouteRequirements, waypoint: int) -> tuple[LandingStart, ...]:
-    """Return the landing sequences to which a go-around may fly, or else the place before the landing."""
+    """Return the landing sequences to which a go-around may fly, or else the waypoint before the landing."""
     setup = requirements.setup
     mission, origin, terrain = setup.mission, setup.scenario.origin, setup.scenario.terrain
     previous_item = int(setup.route.items[waypoint - 1])
@@ -228,21 +243,27 @@ def _unknown_path_text(requirements: RouteRequirements, item: MissionItem, landi
     return "" if landings else "no place before the landing is known to fly back to"
 
 
-def _finding(requirements: RouteRequirements, terrain: Terrain, landing: _Landing, *, is_required: bool) -> Finding:
-    place, height = requirements.waypoint(landing.at), landing.height
+def _go_around_finding(
+    requirements: RouteRequirements, terrain: Terrain, landing: _Landing, *, is_required: bool
+) -> Finding:
+    place, height = requirements.waypoint(landing.waypoint), landing.climb_height
     climb_text = f"it climbs to {height:.0f} m over home"
-    climb_text += f", which is {landing.home + height - landing.ground:.0f} m over the landing point"
+    climb_text += f", which is {landing.home_altitude + height - landing.ground_altitude:.0f} m over the landing point"
     # A go-around flies to no rally point.
     setup = requirements.setup
     world = return_world(replace(setup, mission=replace(setup.mission, rally=())))
-    aborted_landings = (
+    go_arounds = (
         []
-        if landing.open
+        if landing.unknown_path_text
         else _simulate_go_arounds(requirements, terrain, world, landing, height, _abort_places(landing))
     )
-    worst = max(aborted_landings, key=lambda aborted: aborted.badness, default=None)
-    unknown_text = landing.open or next((aborted.open for aborted in aborted_landings if aborted.open), "")
-    climb = Fact("climb above ground", min((aborted.climb for aborted in aborted_landings), default=math.inf), "m")
+    worst = max(go_arounds, key=lambda go_around: go_around.badness, default=None)
+    unknown_text = landing.unknown_path_text or next(
+        (go_around.unknown_part_text for go_around in go_arounds if go_around.unknown_part_text), ""
+    )
+    climb = Fact(
+        "climb above ground", min((go_around.min_climb_height for go_around in go_arounds), default=math.inf), "m"
+    )
     if worst is None or (unknown_text and worst.is_free):
         unknown_text = unknown_text or "its glide is in the ground, or the ground below is not known"
         unjudged = message("a go-around is not judged", f": {climb_text}; {unknown_text}")
@@ -251,9 +272,9 @@ def _finding(requirements: RouteRequirements, terrain: Terrain, landing: _Landin
             "go_around", place, ok=None, reason=unjudged.text, faults=[unjudged], unit="m", check=check, facts=[climb]
         )
     if worst.is_free:
-        fault = message(f"{climb_text}; {worst.room:.0f} m above ground or more on the way back")
+        fault = message(f"{climb_text}; {worst.lowest_height:.0f} m above ground or more on the way back")
     else:
-        sufficient_height = _next_sufficient_height(requirements, terrain, world, landing, worst.before)
+        sufficient_height = _next_sufficient_height(requirements, terrain, world, landing, worst.abort_distance)
         remedy_text = f"{sufficient_height:.0f} m would do (the first number of item {landing.item.seq})"
         fault = message(
             _brief_outcome(worst),
@@ -267,23 +288,23 @@ def _finding(requirements: RouteRequirements, terrain: Terrain, landing: _Landin
         ok=ok,
         reason=fault.text,
         faults=[] if ok else [fault],
-        planned=worst.room,
-        limit=worst.needed,
+        planned=worst.lowest_height,
+        limit=worst.required_height,
         at_least=True,
         source="check",
         tolerance=0.0,
-        margin=None if worst.entered or worst.lost else worst.room - worst.needed,
+        margin=None if worst.entered_hazard or worst.is_lost else worst.lowest_height - worst.required_height,
         unit="m",
-        method=f"flown by the simulated ArduPlane on a point mass from {len(aborted_landings)} places of the glide",
+        method=f"flown by the simulated ArduPlane on a point mass from {len(go_arounds)} places of the glide",
         facts=[climb],
     )
 
 
 def _abort_places(landing: _Landing) -> Floats:
-    """Return the simulated abort places up to flare or touchdown, as distances before the landing point, m, (n,)."""
-    last = min(landing.run, max(landing.glide.flare_distance, EARLY_TOUCHDOWN_DISTANCE_M))
-    count = min(_MAX_ABORT_PLACES, max(2, math.ceil((landing.run - last) / _ABORT_SPACING_M) + 1))
-    return np.linspace(landing.run, last, count)
+    """Return the distances before the landing point at which aborts are simulated, m, (n,), down to the flare."""
+    last_distance = min(landing.leg_length, max(landing.glide.flare_distance, EARLY_TOUCHDOWN_DISTANCE_M))
+    place_count = min(_MAX_ABORT_PLACES, max(2, math.ceil((landing.leg_length - last_distance) / _ABORT_SPACING_M) + 1))
+    return np.linspace(landing.leg_length, last_distance, place_count)
 
 
 def _simulate_go_arounds(
@@ -291,16 +312,16 @@ def _simulate_go_arounds(
     terrain: Terrain,
     world: ReturnWorld,
     landing: _Landing,
-    height: float,
-    places: Sequence[float] | Floats,
-) -> list[_Aborted]:
-    """Simulate and judge go-arounds from the places on the glide that are above the ground.
+    climb_height: float,
+    abort_distances: Sequence[float] | Floats,
+) -> list[_GoAround]:
+    """Simulate and judge go-arounds from the abort points that are above the ground.
 
-    height: height above home at which the climb ends, m.
-    places: distances before the landing point, m.
+    climb_height: height above home at which the climb ends, m.
+    abort_distances: distances of the abort points before the landing point, m.
     """
-    top_altitude = landing.home + height
-    starts_on_glide = [(float(distance), landing.place(float(distance))) for distance in places]
+    top_altitude = landing.home_altitude + climb_height
+    starts_on_glide = [(float(distance), landing.position(float(distance))) for distance in abort_distances]
     heights = [altitude - float(terrain.height(east, north)) for _, (east, north, altitude) in starts_on_glide]
     airborne = [
         (*start, height_above_ground)
@@ -315,22 +336,28 @@ def _simulate_go_arounds(
             for _, place, _ in airborne
         ]
     )
-    flown = fly_go_arounds(
-        start_records, top_altitude, landing.pitch, landing.landings, world.parameters, world.aircraft, world.around
+    results = fly_go_arounds(
+        start_records,
+        top_altitude,
+        landing.pitch,
+        landing.destinations,
+        world.parameters,
+        world.aircraft,
+        world.environment,
     )
     return [
         _judge_go_around(
             requirements,
             terrain,
             landing,
-            _Aborted(distance, height_above_ground, at_once=place[2] > top_altitude),
+            _GoAround(distance, height_above_ground, turns_at_once=place[2] > top_altitude),
             row,
             path,
             destination,
             top_altitude,
         )
         for (distance, place, height_above_ground), row, path, destination in zip(
-            airborne, flown.flown, flown.ways, flown.landings, strict=True
+            airborne, results.flown, results.ways, results.landings, strict=True
         )
     ]
 
@@ -339,56 +366,61 @@ def _judge_go_around(
     requirements: RouteRequirements,
     terrain: Terrain,
     landing: _Landing,
-    aborted: _Aborted,
-    flown: Record,
+    go_around: _GoAround,
+    result: Record,
     positions: Floats,
     destination: LandingStart,
     top_altitude: float,
-) -> _Aborted:
-    """Return `aborted` completed with the judgement of its simulated go-around.
+) -> _GoAround:
+    """Fill in the outcome of a go-around from its simulated path.
 
-    flown: record with dtype `flight.autopilots.arduplane.rtl_point_mass.RETURN_RESULT`.
+    result: record of dtype `flight.autopilots.arduplane.rtl_point_mass.RETURN_RESULT`.
     positions: one point a second, m, (n, 3).
     destination: destination of the go-around.
     top_altitude: altitude above which the climb is over, m AMSL.
     """
-    rows, end_status = climb_rows(positions, top_altitude), int(flown["ended"])
-    aborted = aborted._replace(
-        lost=end_status == RETURN_TIMEOUT, open=_unknown_part_text(end_status, has_climbed=rows < len(positions))
+    rows, end_status = climb_rows(positions, top_altitude), int(result["ended"])
+    go_around = go_around._replace(
+        is_lost=end_status == RETURN_TIMEOUT,
+        unknown_part_text=_unknown_part_text(end_status, has_climbed=rows < len(positions)),
     )
     if destination.lands and rows < len(positions):
         # Its path on a glide that may begin anywhere is unknown; the path before the glide is known.
         positions, end_status = positions[: rows + 1], 0
-        aborted = aborted._replace(
-            lost=False, open=f"its landing sequence begins with the landing (item {destination.item})"
+        go_around = go_around._replace(
+            is_lost=False, unknown_part_text=f"its landing sequence begins with the landing (item {destination.item})"
         )
     if len(positions) < 2:
         # It was aborted at its destination, or above the end of its climb.
-        return aborted._replace(room=aborted.over)
+        return go_around._replace(lowest_height=go_around.abort_height)
     steps = np.diff(positions[:, :2], axis=0)
-    path = Way(positions, np.concatenate([[0.0], np.cumsum(np.hypot(steps[:, 0], steps[:, 1]))]))
+    path = GroundPath(positions, np.concatenate([[0.0], np.cumsum(np.hypot(steps[:, 0], steps[:, 1]))]))
     heights = path_clearance(terrain.heights, terrain.to_pixel.record, positions)[0]
     min_height = float(np.nanmin(heights, initial=math.inf))
-    aborted = aborted._replace(entered=first_obstacle_on(requirements, path))
+    go_around = go_around._replace(entered_hazard=first_hazard_on_path(requirements, path))
     if end_status == RETURN_GROUND_IMPACT or min_height <= 0.0:
-        return aborted._replace(room=min(min_height, 0.0), after=float(flown["clearance_time"]))
+        return go_around._replace(lowest_height=min(min_height, 0.0), impact_time=float(result["clearance_time"]))
     is_beyond_point = (positions[:-1, :2] - landing.point[:2]) @ (
         math.sin(landing.course),
         math.cos(landing.course),
     ) > 0.0
     climb = float(np.nanmin(heights[:rows][is_beyond_point[:rows]], initial=math.inf))
-    if climb < GO_AROUND_MODEL_ERROR_M and not aborted.open:
+    if climb < GO_AROUND_MODEL_ERROR_M and not go_around.unknown_part_text:
         passing_text = (
-            f"aborted {aborted.before:.0f} m before the landing point, it passes the ground in its climb by"
+            f"aborted {go_around.abort_distance:.0f} m before the landing point, it passes the ground in its climb by"
             f" {climb:.0f} m"
         )
-        aborted = aborted._replace(open=f"{passing_text}, and may be flown {GO_AROUND_MODEL_ERROR_M:.0f} m lower")
+        go_around = go_around._replace(
+            unknown_part_text=f"{passing_text}, and may be flown {GO_AROUND_MODEL_ERROR_M:.0f} m lower"
+        )
     required = _required_heights(terrain, destination, 0.5 * (positions[:-1] + positions[1:]))[rows:]
     return_heights = np.where(np.isnan(heights[rows:]), math.inf, heights[rows:])
     if not return_heights.size:
-        return aborted._replace(climb=climb)
-    worst = int(np.argmin(return_heights - required))
-    return aborted._replace(climb=climb, room=float(return_heights[worst]), needed=float(required[worst]))
+        return go_around._replace(min_climb_height=climb)
+    lowest = int(np.argmin(return_heights - required))
+    return go_around._replace(
+        min_climb_height=climb, lowest_height=float(return_heights[lowest]), required_height=float(required[lowest])
+    )
 
 
 def _unknown_part_text(end_status: int, *, has_climbed: bool) -> str:
@@ -421,19 +453,19 @@ def _required_heights(terrain: Terrain, destination: LandingStart, points: Float
 def _next_sufficient_height(
     requirements: RouteRequirements, terrain: Terrain, world: ReturnWorld, landing: _Landing, worst_distance: float
 ) -> float:
-    """Return the next climb height above home at which all go-arounds are free, m; NaN if no height is sufficient.
+    """Return the next greater climb height above home with which all go-arounds are free, m; NaN if there is none.
 
-    worst_distance: distance before the landing point of the abort place to try first, m.
+    worst_distance: distance before the landing point of the abort to try first, m.
 
     Heights are tried in steps of `_HEIGHT_STEP_M` up to `_MAX_HEIGHT_M`.
     """
-    first = _HEIGHT_STEP_M * math.ceil(landing.height / _HEIGHT_STEP_M + 1e-9)
+    first = _HEIGHT_STEP_M * math.ceil(landing.climb_height / _HEIGHT_STEP_M + 1e-9)
     distances = [worst_distance, *_abort_places(landing).tolist()]
     for height in np.arange(first, _MAX_HEIGHT_M + 1.0, _HEIGHT_STEP_M).tolist():
         for distance in distances:
-            aborted_landings = _simulate_go_arounds(requirements, terrain, world, landing, height, [distance])
-            if not all(aborted.is_free and not aborted.open for aborted in aborted_landings):
-                # Try the next height first at the place where this one was not enough.
+            go_arounds = _simulate_go_arounds(requirements, terrain, world, landing, height, [distance])
+            if not all(go_around.is_free and not go_around.unknown_part_text for go_around in go_arounds):
+                # Try the next height first at the distance at which this height was not enough.
                 distances[0] = distance
                 break
         else:
@@ -441,27 +473,29 @@ def _next_sufficient_height(
     return math.nan
 
 
-def _brief_outcome(worst: _Aborted) -> str:
+def _brief_outcome(worst: _GoAround) -> str:
     """Describe the outcome of the worst go-around in a few words."""
-    if not math.isnan(worst.after):
+    if not math.isnan(worst.impact_time):
         return "a go-around meets the ground"
-    if worst.entered:
-        return f"a go-around enters {worst.entered}"
-    return "a go-around does not return to the line-up" if worst.lost else "a go-around comes too near to the ground"
+    if worst.entered_hazard:
+        return f"a go-around enters {worst.entered_hazard}"
+    return "a go-around does not return to the line-up" if worst.is_lost else "a go-around comes too near to the ground"
 
 
-def _outcome_text(worst: _Aborted) -> str:
+def _outcome_text(worst: _GoAround) -> str:
     """Describe the abort and the outcome of the worst go-around."""
-    abort_text = f"aborted {worst.before:.0f} m before the landing point, {worst.over:.0f} m above ground,"
-    turn_text = " is so high already, turns at once" if worst.at_once else ""
-    if not math.isnan(worst.after):
-        outcome = f"meets the ground {worst.after:.0f} s later"
-    elif worst.entered:
-        outcome = f"enters {worst.entered}"
-    elif worst.lost:
+    abort_text = (
+        f"aborted {worst.abort_distance:.0f} m before the landing point, {worst.abort_height:.0f} m above ground,"
+    )
+    turn_text = " is so high already, turns at once" if worst.turns_at_once else ""
+    if not math.isnan(worst.impact_time):
+        outcome = f"meets the ground {worst.impact_time:.0f} s later"
+    elif worst.entered_hazard:
+        outcome = f"enters {worst.entered_hazard}"
+    elif worst.is_lost:
         outcome = "does not return to the line-up"
     else:
-        outcome = f"comes down to {worst.room:.0f} m above ground on the way back"
+        outcome = f"comes down to {worst.lowest_height:.0f} m above ground on the way back"
     return f"{abort_text}{turn_text} and {outcome}" if turn_text else f"{abort_text} {outcome}"
 
 

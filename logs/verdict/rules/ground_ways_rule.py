@@ -22,14 +22,14 @@ from logs.verdict.findings import GROUND_WAY, Finding, Message, make_finding, me
 from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.measures.ways import (
+    GroundPath,
     Profile,
-    Way,
+    first_hazard_on_path,
     first_item,
-    first_obstacle_on,
-    is_laid_out,
+    has_ground_paths,
     landing_item,
-    straight_way,
-    way_clearance,
+    min_path_clearance,
+    straight_path,
 )
 from logs.verdict.places import Place
 from logs.verdict.rule import Rule
@@ -60,31 +60,33 @@ class _Obstacles(NamedTuple):
     """Obstacles on a path.
 
     clearance: minimum height above ground, m; NaN if unknown.
-    at: distance along the path at which the minimum occurs, m.
-    entered: sphere or zone that the path enters, "" if it enters none.
+    distance: distance along the path to the minimum height, m.
+    entered_hazard: sphere or zone that the path enters, "" if it enters none.
     """
 
     clearance: float
-    at: float
-    entered: str
+    distance: float
+    entered_hazard: str
 
     @property
-    def free(self) -> bool:
+    def is_free(self) -> bool:
         """True if the path hits neither ground nor sphere nor zone; False if the ground is unknown."""
-        return self.clearance >= 0.0 and not self.entered
+        return self.clearance >= 0.0 and not self.entered_hazard
 
-    def obstacle_message(self, subject: str, where: str) -> Message:
-        """Describe the obstacle.  where: text that names the origin of the distance `at`."""
-        if self.entered:
-            return message(f"{subject} enters {self.entered}")
-        return message(f"{subject} meets the ground", f", {-self.clearance:.0f} m into it {self.at:.0f} m {where}")
+    def obstacle_message(self, subject: str, origin: str) -> Message:
+        """Describe the obstacle.  origin: text that names the origin of `distance`."""
+        if self.entered_hazard:
+            return message(f"{subject} enters {self.entered_hazard}")
+        return message(
+            f"{subject} meets the ground", f", {-self.clearance:.0f} m into it {self.distance:.0f} m {origin}"
+        )
 
 
 def _climb_slopes(requirements: RouteRequirements, leg: int, course: float, amsl: float) -> tuple[float, float]:
     """Return the nominal and the certain maximum climb slope on a course (rad) at an altitude (m AMSL), m per m."""
     speed, limits = float(requirements.route.airspeed[leg]), requirements.limits
-    steepest, certain = (limit_set.slopes(course, amsl, speed)[0] for limit_set in (limits, limits.surely()))
-    return math.tan(steepest), math.tan(certain)
+    max_slope, certain_slope = (limit_set.slopes(course, amsl, speed)[0] for limit_set in (limits, limits.surely()))
+    return math.tan(max_slope), math.tan(certain_slope)
 
 
 # ----------------------------------------------------------------------
@@ -94,44 +96,42 @@ def _climb_slopes(requirements: RouteRequirements, leg: int, course: float, amsl
 def climbout_findings(
     requirements: RouteRequirements, _aligned: AlignedTrack | None = None, *, geometric: bool = False
 ) -> list[Finding]:
-    """Judge the path from the ground at home to the first place with one finding, if the mission has a home.
+    """Judge the climb from home to the first waypoint.
 
-    Return [] if the first place is over home, or if the aircraft takes off vertically.
+    Return [] if that waypoint is over home, if the mission has no home, or if the aircraft takes off vertically.
     """
     home, terrain = requirements.setup.mission.home, requirements.setup.scenario.terrain
-    if not is_laid_out(requirements) or home is None or terrain is None:
+    if not has_ground_paths(requirements) or home is None or terrain is None:
         return []
-    if requirements.ground is not None and requirements.ground.ways.take_off is not None:
+    if requirements.ground_phases is not None and requirements.ground_phases.procedures.take_off is not None:
         return []
     east, north = to_map(requirements.setup.scenario.origin, home.lat_deg, home.lon_deg)
-    home_place = (float(east), float(north))
+    start = (float(east), float(north))
     first_waypoint, takeoff = first_item(requirements)
-    first_point, ground_altitude = requirements.points[first_waypoint], float(terrain.height(*home_place))
+    first_point, ground_altitude = requirements.points[first_waypoint], float(terrain.height(*start))
     place = requirements.waypoint(first_waypoint)
     if takeoff is not None:
         if takeoff.command == Command.NAV_VTOL_TAKEOFF:
             return []
-        launch = _launch(requirements)
-        course, run, slope = launch.course, launch.run, launch.slope
+        launch = _find_launch(requirements)
+        course, distance, slope = launch.course, launch.leg_length, launch.slope
     else:
-        course, run = (
-            math.atan2(first_point[0] - home_place[0], first_point[1] - home_place[1]),
-            math.dist(first_point[:2], home_place),
+        course, distance = (
+            math.atan2(first_point[0] - start[0], first_point[1] - start[1]),
+            math.dist(first_point[:2], start),
         )
-        if run < SAME_PLACE:
+        if distance < SAME_PLACE:
             return []
     if math.isnan(ground_altitude):
         return [
             _unjudged_finding("climbout", place, "the ground at home is not known", is_undecided=takeoff is not None)
         ]
-    steepest_slope, certain_slope = _climb_slopes(requirements, max(0, first_waypoint - 1), course, ground_altitude)
-    if not steepest_slope > 0.0:
+    max_slope, certain_slope = _climb_slopes(requirements, max(0, first_waypoint - 1), course, ground_altitude)
+    if not max_slope > 0.0:
         reason = "the aircraft cannot climb there at this speed and in this wind"
         return [_unjudged_finding("climbout", place, reason, is_undecided=takeoff is not None)]
     if takeoff is None:
-        path = straight_way(
-            home_place, course, _climb_profile(ground_altitude, float(first_point[2]), run, steepest_slope)
-        )
+        path = straight_path(start, course, _climb_profile(ground_altitude, float(first_point[2]), distance, max_slope))
         return [_air_start_finding(place, _find_obstacles(requirements, path))]
     takeoff_altitude = float(requirements.points[0, 2])
     if takeoff_altitude <= ground_altitude:
@@ -140,25 +140,25 @@ def climbout_findings(
     obstacles, obstacles_at_min_climb = (
         _find_obstacles(
             requirements,
-            straight_way(home_place, course, _takeoff_profile(ground_altitude, takeoff_altitude, run, slope, climb)),
+            straight_path(start, course, _takeoff_profile(ground_altitude, takeoff_altitude, distance, slope, climb)),
         )
-        for climb in (steepest_slope, max(1e-3, MIN_CLIMB_FRACTION * certain_slope))
+        for climb in (max_slope, max(1e-3, MIN_CLIMB_FRACTION * certain_slope))
     )
     return [
         _launch_finding(
             requirements,
-            launch.way,
+            launch.course_text,
             place,
             obstacles,
             obstacles_at_min_climb,
-            (home_place, ground_altitude, takeoff_altitude),
-            certain_slope == steepest_slope,
+            (start, ground_altitude, takeoff_altitude),
+            certain_slope == max_slope,
         )
     ]
 
 
 def _unjudged_finding(rule: str, place: Place, reason: str, *, is_undecided: bool) -> Finding:
-    """Return a finding on a path that is not judged.  opens: True if it leaves the verdict undecided."""
+    """Return a finding on an unjudged path.  is_undecided: True if it leaves the verdict undecided."""
     title = "climb-out" if rule == "climbout" else rule
     fault = message(f"the {title} at {place_text(place)} is not judged: {reason}")
     return make_finding(
@@ -167,21 +167,21 @@ def _unjudged_finding(rule: str, place: Place, reason: str, *, is_undecided: boo
 
 
 class _Launch(NamedTuple):
-    """Launch course and the leg flown on it.
+    """Launch course, and the leg on that course.
 
     course: rad.
-    run: distance flown on the course, m.
+    leg_length: length of the leg on the course, m.
     slope: slope of the leg, m per m.
-    way: description of the course, "" along the first leg.
+    course_text: description of the course, "" along the first leg.
     """
 
     course: float
-    run: float
+    leg_length: float
     slope: float
-    way: str = ""
+    course_text: str = ""
 
 
-def _launch(requirements: RouteRequirements) -> _Launch:
+def _find_launch(requirements: RouteRequirements) -> _Launch:
     """Return the launch on the scenario's course, or along the first leg if the scenario states no course.
 
     The first leg's run and slope apply if the leg is on the launch course.
@@ -194,56 +194,58 @@ def _launch(requirements: RouteRequirements) -> _Launch:
         return first_leg
     course_text = f"on the launch course {round(math.degrees(stated_launch.course)) % 360}°"
     if abs(float(wrap(stated_launch.course - first_leg.course))) <= PLAN_TOLERANCE_RAD:
-        return first_leg._replace(way=course_text)
+        return first_leg._replace(course_text=course_text)
     return _Launch(stated_launch.course, math.inf, 0.0, course_text)
 
 
-def _climb_profile(ground_altitude: float, place_altitude: float, run: float, climb: float) -> Profile:
-    """Return the profile of a climb from the ground and then a straight line to a place.
+def _climb_profile(ground_altitude: float, waypoint_altitude: float, distance: float, climb: float) -> Profile:
+    """Return the profile of a climb from the ground, followed by a straight line to the first waypoint.
 
     ground_altitude: altitude of the ground, m AMSL.
-    place_altitude: altitude of the place, m AMSL.
-    run: distance of the place, m.
+    waypoint_altitude: altitude of the waypoint, m AMSL.
+    distance: horizontal distance of the waypoint, m.
     climb: climb slope, m per m.
     """
-    top_altitude = max(place_altitude, ground_altitude + FIRST_CLIMB_HEIGHT_M)
-    climb_run = (top_altitude - ground_altitude) / climb
-    if climb_run >= run:
-        return [(0.0, ground_altitude), (run, ground_altitude + climb * run)]
-    return [(0.0, ground_altitude), (climb_run, top_altitude), (run, place_altitude)]
+    top_altitude = max(waypoint_altitude, ground_altitude + FIRST_CLIMB_HEIGHT_M)
+    climb_distance = (top_altitude - ground_altitude) / climb
+    if climb_distance >= distance:
+        return [(0.0, ground_altitude), (distance, ground_altitude + climb * distance)]
+    return [(0.0, ground_altitude), (climb_distance, top_altitude), (distance, waypoint_altitude)]
 
 
-def _takeoff_profile(ground_altitude: float, leg_altitude: float, run: float, slope: float, climb: float) -> Profile:
+def _takeoff_profile(
+    ground_altitude: float, leg_altitude: float, leg_length: float, slope: float, climb: float
+) -> Profile:
     """Return the climb profile from the ground until the aircraft is on the first leg.
 
     ground_altitude: altitude of the ground, m AMSL.
-    leg_altitude: altitude at which the leg begins over home and to which the take-off climbs, m AMSL.
-    run: length of the leg, m.
+    leg_altitude: altitude of the leg's start over home, to which the take-off climbs, m AMSL.
+    leg_length: length of the leg, m.
     slope: slope of the leg, m per m.
     climb: climb slope, m per m.
     """
-    climb_run = (leg_altitude - ground_altitude) / climb
-    if climb_run < run:
-        joining_run = (leg_altitude - ground_altitude) / (climb - slope) if climb > slope else math.inf
-        climb_run = min(run, max(climb_run, joining_run))
-    return [(0.0, ground_altitude), (climb_run, ground_altitude + climb * climb_run)]
+    climb_distance = (leg_altitude - ground_altitude) / climb
+    if climb_distance < leg_length:
+        joining_distance = (leg_altitude - ground_altitude) / (climb - slope) if climb > slope else math.inf
+        climb_distance = min(leg_length, max(climb_distance, joining_distance))
+    return [(0.0, ground_altitude), (climb_distance, ground_altitude + climb * climb_distance)]
 
 
-def _find_obstacles(requirements: RouteRequirements, path: Way) -> _Obstacles:
+def _find_obstacles(requirements: RouteRequirements, path: GroundPath) -> _Obstacles:
     """Return the obstacles on a path from home; the first `LAUNCH_RUN_M` of the path may be close to the ground."""
-    terrain, end = requirements.setup.scenario.terrain, float(path.run[-1])
-    entered = first_obstacle_on(requirements, path)
+    terrain, end = requirements.setup.scenario.terrain, float(path.distance[-1])
+    entered_hazard = first_hazard_on_path(requirements, path)
     if terrain is None or end <= LAUNCH_RUN_M:
-        return _Obstacles(math.inf, 0.0, entered)
-    return _Obstacles(*way_clearance(terrain, path.between(LAUNCH_RUN_M, end)), entered)
+        return _Obstacles(math.inf, 0.0, entered_hazard)
+    return _Obstacles(*min_path_clearance(terrain, path.between(LAUNCH_RUN_M, end)), entered_hazard)
 
 
 def _air_start_finding(place: Place, obstacles: _Obstacles) -> Finding:
-    """Judge the direct climb from home to the first waypoint, not simulated, of a mission that starts in the air."""
+    """Judge the straight climb from home to the first waypoint of a mission that starts in the air."""
     subject = f"the climb from home to {_item_text(place)}"
-    if math.isnan(obstacles.clearance) and not obstacles.entered:
+    if math.isnan(obstacles.clearance) and not obstacles.entered_hazard:
         reason, check, ok = f"the ground below {subject} is not known", "", None
-    elif obstacles.free:
+    elif obstacles.is_free:
         reason, check, ok = (
             f"straight from home: {_clearance_text(obstacles)}; not flown, as the flight begins in the air",
             "",
@@ -251,8 +253,8 @@ def _air_start_finding(place: Place, obstacles: _Obstacles) -> Finding:
         )
     else:
         fault = obstacles.obstacle_message(subject, "from home, at the steepest climb")
-        return _finding("climbout", place, obstacles, None, fault, GROUND_WAY)
-    return _finding("climbout", place, obstacles, ok, message(reason), check)
+        return _path_finding("climbout", place, obstacles, None, fault, GROUND_WAY)
+    return _path_finding("climbout", place, obstacles, ok, message(reason), check)
 
 
 def _launch_finding(
@@ -264,34 +266,34 @@ def _launch_finding(
     launch: tuple[tuple[float, float], float, float],
     is_known: bool,
 ) -> Finding:
-    """Judge the climb of a mission that takes off, towards its next place or on a launch course.
+    """Judge the climb of a mission that takes off, towards its next waypoint or on a launch course.
 
     course_text: description of the launch course, "" along the first leg.
     obstacles: obstacles at the steepest climb.
     obstacles_at_min_climb: obstacles at the minimum climb.
-    launch: launch place (east, north, m), altitude of the ground there and altitude at the end of the climb (m AMSL).
+    launch: launch position (east, north, m), ground altitude there and altitude at the end of the climb (m AMSL).
     is_known: True if the aircraft's climb is certain.
     """
     to_item = requirements.leg(0).to_item
     direction_text = f"towards {'the next place' if to_item is None else f'item {to_item}'}"
     subject = f"the climb from home {course_text or direction_text}"
-    if math.isnan(obstacles.clearance) and not obstacles.entered:
+    if math.isnan(obstacles.clearance) and not obstacles.entered_hazard:
         reason = message(f"the ground below {subject} is not known")
-        return _finding("climbout", place, obstacles, None, reason)
-    if not obstacles.free:
+        return _path_finding("climbout", place, obstacles, None, reason)
+    if not obstacles.is_free:
         fault = obstacles.obstacle_message(subject, "from home, at the steepest climb")
         other_courses_text = _free_courses_text(requirements, *launch)
         fault = message(fault.brief, fault.text[len(fault.brief) :] + other_courses_text)
-        return _finding(
+        return _path_finding(
             "climbout", place, obstacles, False if is_known else None, fault, "" if is_known else GROUND_WAY
         )
     min_climb_text = f"{subject}, at {100.0 * MIN_CLIMB_FRACTION:.0f} % of the steepest,"
-    if math.isnan(obstacles_at_min_climb.clearance) and not obstacles_at_min_climb.entered:
-        return _finding(
+    if math.isnan(obstacles_at_min_climb.clearance) and not obstacles_at_min_climb.entered_hazard:
+        return _path_finding(
             "climbout", place, obstacles, None, message(f"{min_climb_text} leads to where the ground is not known")
         )
-    if not obstacles_at_min_climb.free:
-        return _finding(
+    if not obstacles_at_min_climb.is_free:
+        return _path_finding(
             "climbout",
             place,
             obstacles,
@@ -299,7 +301,7 @@ def _launch_finding(
             obstacles_at_min_climb.obstacle_message(min_climb_text, "from home"),
             GROUND_WAY,
         )
-    return _finding(
+    return _path_finding(
         "climbout",
         place,
         obstacles,
@@ -309,7 +311,7 @@ def _launch_finding(
 
 
 def _free_courses_text(
-    requirements: RouteRequirements, home_place: tuple[float, float], ground_altitude: float, top_altitude: float
+    requirements: RouteRequirements, home_position: tuple[float, float], ground_altitude: float, top_altitude: float
 ) -> str:
     """Describe the widest range of courses on which a launch climbs to the take-off's altitude without obstacles."""
 
@@ -319,29 +321,31 @@ def _free_courses_text(
             return False
         return _find_obstacles(
             requirements,
-            straight_way(
-                home_place, course, [(0.0, ground_altitude), ((top_altitude - ground_altitude) / climb, top_altitude)]
+            straight_path(
+                home_position,
+                course,
+                [(0.0, ground_altitude), ((top_altitude - ground_altitude) / climb, top_altitude)],
             ),
-        ).free
+        ).is_free
 
     courses = list(range(0, 360, _COURSE_STEP_DEG))
-    free = [is_free(math.radians(course)) for course in courses]
-    if not any(free):
+    is_course_free = [is_free(math.radians(course)) for course in courses]
+    if not any(is_course_free):
         return "; no launch course climbs clear"
     # Begin after a course with obstacles, so that no range is cut at north.
-    start = free.index(False) if False in free else 0
+    start = is_course_free.index(False) if False in is_course_free else 0
     courses_from_start = [
-        (courses[k % len(courses)], free[k % len(courses)]) for k in range(start, start + len(courses))
+        (courses[k % len(courses)], is_course_free[k % len(courses)]) for k in range(start, start + len(courses))
     ]
     ranges = [
         [course for course, _ in group]
         for is_free_range, group in groupby(courses_from_start, key=lambda entry: entry[1])
         if is_free_range
     ]
-    widest = max(ranges, key=len)
-    if len(widest) == 1:
-        return f"; launched on {widest[0]:03d}° it would climb clear"
-    return f"; launched on {widest[0]:03d}° to {widest[-1]:03d}° it would climb clear"
+    widest_range = max(ranges, key=len)
+    if len(widest_range) == 1:
+        return f"; launched on {widest_range[0]:03d}° it would climb clear"
+    return f"; launched on {widest_range[0]:03d}° to {widest_range[-1]:03d}° it would climb clear"
 
 
 # ----------------------------------------------------------------------
@@ -351,16 +355,16 @@ def _free_courses_text(
 def approach_findings(
     requirements: RouteRequirements, _aligned: AlignedTrack | None = None, *, geometric: bool = False
 ) -> list[Finding]:
-    """Judge the glide from the last waypoint to the landing point with one finding, if the mission lands."""
+    """Judge the glide from the last waypoint to the landing point; return [] if the mission does not land."""
     landing, terrain, setup = landing_item(requirements), requirements.setup.scenario.terrain, requirements.setup
-    if landing is None or terrain is None or not is_laid_out(requirements):
+    if landing is None or terrain is None or not has_ground_paths(requirements):
         return []
-    if requirements.ground is not None and requirements.ground.ways.approach is not None:
+    if requirements.ground_phases is not None and requirements.ground_phases.procedures.approach is not None:
         return []
     waypoint, leg = landing[0], landing[0] - 1
     place, item_text = requirements.waypoint(waypoint), _item_text(requirements.waypoint(waypoint))
     glide_start, landing_point = requirements.points[leg], requirements.points[waypoint]
-    run, course, point_altitude = (
+    length, course, point_altitude = (
         float(requirements.runs[leg]),
         float(requirements.courses[leg]),
         setup.route.landing_ground,
@@ -369,54 +373,54 @@ def approach_findings(
         float(glide_start[2]),
         float(terrain.height(float(landing_point[0]), float(landing_point[1]))),
     )
-    if math.isnan(point_altitude) or math.isnan(ground_altitude) or run < MIN_LEG_LENGTH_M:
+    if math.isnan(point_altitude) or math.isnan(ground_altitude) or length < MIN_LEG_LENGTH_M:
         reason = "the height of the ground at the landing point is not known"
         return [_unjudged_finding("approach", place, reason, is_undecided=True)]
     if start_altitude <= point_altitude:
         reason = "it begins no higher than the landing point"
         return [_unjudged_finding("approach", place, reason, is_undecided=True)]
     glide = setup.autopilot.landing_glide(
-        start_altitude - point_altitude, run, setup.scenario.wind.along(course, point_altitude)[0], point_altitude
+        start_altitude - point_altitude, length, setup.scenario.wind.along(course, point_altitude)[0], point_altitude
     )
-    flare = (run - glide.flare_distance, point_altitude + glide.flare_height)
-    path = straight_way(
+    flare = (length - glide.flare_distance, point_altitude + glide.flare_height)
+    path = straight_path(
         glide_start,
         course,
-        [(0.0, start_altitude), *([flare] if glide.flare_distance > 0.0 else []), (run, point_altitude)],
+        [(0.0, start_altitude), *([flare] if glide.flare_distance > 0.0 else []), (length, point_altitude)],
     )
-    last_run, clearance, at_run = run - EARLY_TOUCHDOWN_DISTANCE_M, math.inf, 0.0
-    if last_run > 0.0:
-        clearance, at_run = way_clearance(terrain, path.between(0.0, last_run))
-    obstacles = _Obstacles(clearance, run - at_run, first_obstacle_on(requirements, path))
+    end, clearance, position = length - EARLY_TOUCHDOWN_DISTANCE_M, math.inf, 0.0
+    if end > 0.0:
+        clearance, position = min_path_clearance(terrain, path.between(0.0, end))
+    obstacles = _Obstacles(clearance, length - position, first_hazard_on_path(requirements, path))
     subject = f"the glide to {item_text}"
-    if math.isnan(obstacles.clearance) and not obstacles.entered:
-        return [_finding("approach", place, obstacles, None, message(f"the ground below {subject} is not known"))]
+    if math.isnan(obstacles.clearance) and not obstacles.entered_hazard:
+        return [_path_finding("approach", place, obstacles, None, message(f"the ground below {subject} is not known"))]
     obstacle_message = obstacles.obstacle_message(subject, "before the landing point")
     # With a landing point below the ground the glide hits the ground early: the elevation file may be some metres off.
     if (
-        obstacles.entered
+        obstacles.entered_hazard
         or obstacles.clearance + min(LANDING_POINT_ERROR_M, max(0.0, ground_altitude - point_altitude)) < 0.0
     ):
-        return [_finding("approach", place, obstacles, False, obstacle_message)]
+        return [_path_finding("approach", place, obstacles, False, obstacle_message)]
     if obstacles.clearance < 0.0:
         fault = message(
             f"the landing point of {item_text} is {ground_altitude - point_altitude:.0f} m below the ground",
             f": {obstacle_message.text}",
         )
-        return [_finding("approach", place, obstacles, None, fault, GROUND_WAY)]
+        return [_path_finding("approach", place, obstacles, None, fault, GROUND_WAY)]
     if point_altitude - ground_altitude > LANDING_POINT_ERROR_M:
         fault = message(
             f"the landing point of {item_text} is {point_altitude - ground_altitude:.0f} m above the ground"
         )
-        return [_finding("approach", place, obstacles, None, fault, GROUND_WAY)]
-    judged_run = run - glide.flare_distance - max(0.0, FLARE_HEIGHT_MARGIN_M - glide.flare_height) / glide.slope
-    clearance = way_clearance(terrain, path.between(0.0, judged_run))[0] if judged_run > 0.0 else math.inf
+        return [_path_finding("approach", place, obstacles, None, fault, GROUND_WAY)]
+    judged_end = length - glide.flare_distance - max(0.0, FLARE_HEIGHT_MARGIN_M - glide.flare_height) / glide.slope
+    clearance = min_path_clearance(terrain, path.between(0.0, judged_end))[0] if judged_end > 0.0 else math.inf
     if clearance < GLIDE_PATH_TOLERANCE_M:
         fault = message(
             f"{subject} passes the ground by {clearance:.1f} m",
             f", and may be flown {GLIDE_PATH_TOLERANCE_M:.0f} m lower than laid out",
         )
-        return [_finding("approach", place, obstacles, None, fault, GROUND_WAY)]
+        return [_path_finding("approach", place, obstacles, None, fault, GROUND_WAY)]
     reason = f"glides down at {math.degrees(math.atan(glide.slope)):.1f}°"
     if glide.flare_distance > 0.0:
         reason += (
@@ -424,7 +428,7 @@ def approach_findings(
         )
     reason += f"; {_clearance_text(obstacles)} until {EARLY_TOUCHDOWN_DISTANCE_M:.0f} m before it"
     reason += "" if setup.ground_ways.approach is not None else "; not flown, as the flight ends in the air"
-    return [_finding("approach", place, obstacles, True, message(reason))]
+    return [_path_finding("approach", place, obstacles, True, message(reason))]
 
 
 # ----------------------------------------------------------------------
@@ -443,7 +447,7 @@ def _clearance_text(obstacles: _Obstacles) -> str:
     )
 
 
-def _finding(
+def _path_finding(
     rule: str, place: Place, obstacles: _Obstacles, ok: bool | None, outcome: Message, check: str = ""
 ) -> Finding:
     return make_finding(
@@ -457,7 +461,7 @@ def _finding(
         at_least=True,
         source="terrain",
         tolerance=0.0,
-        margin=None if obstacles.entered else obstacles.clearance,
+        margin=None if obstacles.entered_hazard else obstacles.clearance,
         unit="m",
         method="laid out from the mission's items, exact over the elevation file",
         check=check,

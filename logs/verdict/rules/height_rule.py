@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from logs.verdict.findings import Finding, make_finding, message, reason_of
+from logs.verdict.findings import Finding, finding_reason, make_finding, message
 from logs.verdict.measures.path_sweeps import path_clearance
 from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.track_alignment import AlignedTrack
@@ -37,28 +37,29 @@ def height_findings(
             )
         ]
     path = requirements.path
-    path_heights = _Path(path.points, path.times, *greatest_heights(terrain, path.points))
-    planned = [_max_heights(path_heights, np.flatnonzero(path.legs == leg)) for leg in range(requirements.legs)]
+    path_heights = _Path(path.points, path.times, *max_segment_heights(terrain, path.points))
+    planned_maxima = [_max_heights(path_heights, np.flatnonzero(path.legs == leg)) for leg in range(requirements.legs)]
     if geometric:
         return [
-            _finding(requirements, leg, limit, planned[leg], planned[leg], "fly-by path")
+            _leg_finding(requirements, leg, limit, planned_maxima[leg], planned_maxima[leg], "fly-by path")
             for leg in range(requirements.legs)
         ]
-    flown: list[_Highest | None] = [None] * requirements.legs
+    flown_maxima: list[_LegMaxima | None] = [None] * requirements.legs
     if aligned is not None:
         track = aligned.track
-        path_heights = _Path(track.position, track.time, *greatest_heights(terrain, track.position))
-        flown = [
-            _max_heights(path_heights, _leg_segments(requirements, aligned, leg)) if aligned.flew(leg) else None
+        path_heights = _Path(track.position, track.time, *max_segment_heights(terrain, track.position))
+        flown_maxima = [
+            _max_heights(path_heights, _leg_segments(requirements, aligned, leg)) if aligned.has_flown(leg) else None
             for leg in range(requirements.legs)
         ]
     return [
-        _finding(requirements, leg, limit, planned[leg], flown[leg], "flown track") for leg in range(requirements.legs)
+        _leg_finding(requirements, leg, limit, planned_maxima[leg], flown_maxima[leg], "flown track")
+        for leg in range(requirements.legs)
     ]
 
 
-def greatest_heights(terrain: Terrain, points: Floats) -> tuple[Floats, Floats]:
-    """Return the maximum height above ground on each segment, m, and its place as a fraction of the segment, (n - 1,).
+def max_segment_heights(terrain: Terrain, points: Floats) -> tuple[Floats, Floats]:
+    """Return each segment's maximum height above ground, m, and its fraction of the segment, (n - 1,).
 
     points: east, north and up, m, (n, 3).
 
@@ -76,39 +77,39 @@ class _Path:
 
     points: Floats
     times: Floats
-    greatest: Floats
+    max_heights: Floats
     fraction: Floats
 
 
 @dataclass(frozen=True, slots=True)
-class _Highest:
+class _LegMaxima:
     """Maximum height of a leg above ground, NaN if unknown, and maximum altitude AMSL, m.
 
-    where: text with the time and place of the maximum height.
-    known: True if the ground is known along the whole leg.
+    time_and_place: text with the time and place of the maximum height.
+    is_ground_known: True if the ground is known along the whole leg.
     """
 
     height: float
     amsl: float
-    where: str
-    known: bool
+    time_and_place: str
+    is_ground_known: bool
 
 
-def _max_heights(path: _Path, segments: NDArray[np.intp]) -> _Highest | None:
+def _max_heights(path: _Path, segments: NDArray[np.intp]) -> _LegMaxima | None:
     """Return the maximum heights on some segments of a path, or None without segments."""
     if not segments.size:
         return None
     amsl = float(max(path.points[segments, 2].max(), path.points[segments + 1, 2].max()))
-    heights = path.greatest[segments]
+    heights = path.max_heights[segments]
     is_known = np.isfinite(heights)
     if not is_known.any():
-        return _Highest(math.nan, amsl, "", False)
+        return _LegMaxima(math.nan, amsl, "", False)
     k = int(segments[np.nanargmax(heights)])
-    time, place = (
+    time, position = (
         (1.0 - path.fraction[k]) * values[k] + path.fraction[k] * values[k + 1] for values in (path.times, path.points)
     )
-    where = f"at {time:.1f} s, east {place[0]:.0f} m, north {place[1]:.0f} m"
-    return _Highest(float(path.greatest[k]), amsl, where, bool(is_known.all()))
+    time_and_place = f"at {time:.1f} s, east {position[0]:.0f} m, north {position[1]:.0f} m"
+    return _LegMaxima(float(path.max_heights[k]), amsl, time_and_place, bool(is_known.all()))
 
 
 def _leg_segments(requirements: RouteRequirements, aligned: AlignedTrack, leg: int) -> NDArray[np.intp]:
@@ -118,43 +119,49 @@ def _leg_segments(requirements: RouteRequirements, aligned: AlignedTrack, leg: i
     return np.arange(first, last)
 
 
-def _finding(
+def _leg_finding(
     requirements: RouteRequirements,
     leg: int,
     limit: float,
-    planned: _Highest | None,
-    judged: _Highest | None,
+    planned_maximum: _LegMaxima | None,
+    judged_maximum: _LegMaxima | None,
     path_name: str,
 ) -> Finding:
     faults, facts, ok = [], [], None
-    if judged is None:
+    if judged_maximum is None:
         facts.append("the leg was not flown")
     else:
         ceiling = requirements.setup.scenario.ceiling
-        height_text = f"{judged.height:.1f} m above ground {judged.where}"
-        if judged.height > limit + HEIGHT_TOLERANCE_M:
+        height_text = f"{judged_maximum.height:.1f} m above ground {judged_maximum.time_and_place}"
+        if judged_maximum.height > limit + HEIGHT_TOLERANCE_M:
             faults.append(message(height_text, f"; {limit:g} m are allowed"))
-        elif math.isfinite(judged.height):
+        elif math.isfinite(judged_maximum.height):
             facts.append(f"{height_text} at the highest")
-        if judged.amsl > ceiling + HEIGHT_TOLERANCE_M:
-            faults.append(message(f"{judged.amsl:.1f} m AMSL", f", above the scenario's ceiling of {ceiling:.0f} m"))
-        if not judged.known:
+        if judged_maximum.amsl > ceiling + HEIGHT_TOLERANCE_M:
+            faults.append(
+                message(f"{judged_maximum.amsl:.1f} m AMSL", f", above the scenario's ceiling of {ceiling:.0f} m")
+            )
+        if not judged_maximum.is_ground_known:
             facts.append("part of the ground below it is not known")
-        ok = False if faults else True if judged.known else None
-    if planned is not None and planned is not judged and planned.height > limit + HEIGHT_TOLERANCE_M:
-        facts.append(f"the planned path comes up to {planned.height:.1f} m")
+        ok = False if faults else True if judged_maximum.is_ground_known else None
+    if (
+        planned_maximum is not None
+        and planned_maximum is not judged_maximum
+        and planned_maximum.height > limit + HEIGHT_TOLERANCE_M
+    ):
+        facts.append(f"the planned path comes up to {planned_maximum.height:.1f} m")
     return make_finding(
         "height",
         requirements.leg(leg),
         ok=ok,
-        reason=reason_of(faults, facts),
+        reason=finding_reason(faults, facts),
         faults=faults,
-        planned=None if planned is None else planned.height,
-        flown=None if judged is None or judged is planned else judged.height,
+        planned=None if planned_maximum is None else planned_maximum.height,
+        flown=None if judged_maximum is None or judged_maximum is planned_maximum else judged_maximum.height,
         limit=limit,
         source=requirements.limits_source,
         tolerance=HEIGHT_TOLERANCE_M,
-        margin=None if judged is None else limit - judged.height,
+        margin=None if judged_maximum is None else limit - judged_maximum.height,
         unit="m",
         method=f"exact along the {path_name}",
     )

@@ -12,10 +12,10 @@ import numpy as np
 
 from flight.mission.ground_ways import TakeOff
 from flight.simulation.track import Track
-from logs.verdict.findings import GROUND_WAY, Fact, Finding, make_finding, message, reason_of
+from logs.verdict.findings import GROUND_WAY, Fact, Finding, finding_reason, make_finding, message
 from logs.verdict.measures.route_requirements import FlownGround, RouteRequirements
 from logs.verdict.measures.track_alignment import AlignedTrack
-from logs.verdict.measures.ways import Way, first_obstacle_on, track_way, way_clearance
+from logs.verdict.measures.ways import GroundPath, first_hazard_on_path, min_path_clearance, track_path
 from logs.verdict.rule import Rule
 from logs.verdict.tolerances import (
     CLIMB_MODEL_ERROR_M,
@@ -33,16 +33,16 @@ def launch_findings(
     requirements: RouteRequirements, _aligned: AlignedTrack | None, *, geometric: bool = False
 ) -> list[Finding]:
     """Judge a flown take-off with one finding."""
-    ground = requirements.ground
-    if ground is None or ground.ways.take_off is None:
+    ground = requirements.ground_phases
+    if ground is None or ground.procedures.take_off is None:
         return []
-    return [_launch_finding(requirements, ground, ground.ways.take_off)]
+    return [_launch_finding(requirements, ground, ground.procedures.take_off)]
 
 
 def _launch_finding(requirements: RouteRequirements, ground: FlownGround, take_off: TakeOff) -> Finding:
     track = ground.launch
-    path = track_way(track)
-    position, run = path
+    path = track_path(track)
+    position, distances = path
     height_lost = float(position[0, 2] - position[:, 2].min())
     clearance, distance = _climb_clearance(requirements, path)
     trigger = requirements.setup.autopilot.launch_trigger
@@ -66,22 +66,22 @@ def _launch_finding(requirements: RouteRequirements, ground: FlownGround, take_o
         faults.append(
             message(f"{clearance:.1f} m above ground", f" {distance:.0f} m from home, on the course that is held")
         )
-    entered = first_obstacle_on(requirements, path)
-    if entered:
-        faults.append(message(f"the climb enters {entered}"))
-    notes = _describe_take_off(take_off, track, run, clearance)
-    undecided = []
+    entered_hazard = first_hazard_on_path(requirements, path)
+    if entered_hazard:
+        faults.append(message(f"the climb enters {entered_hazard}"))
+    notes = _describe_take_off(take_off, track, distances, clearance)
+    undecided_messages = []
     if not faults and LAUNCH_CLEARANCE_M <= clearance < LAUNCH_CLEARANCE_M + CLIMB_MODEL_ERROR_M:
         brief = f"the launch passes {clearance:.1f} m above ground {distance:.0f} m from home"
-        undecided.append(message(brief, ", less than the error of the simulated climb"))
+        undecided_messages.append(message(brief, ", less than the error of the simulated climb"))
     elif not faults and math.isnan(clearance):
-        undecided.append(message("the ground below the launch's climb is not known"))
+        undecided_messages.append(message("the ground below the launch's climb is not known"))
     return make_finding(
         "launch",
         requirements.waypoint(take_off.waypoint),
-        ok=False if faults else None if undecided else True,
-        reason=reason_of(faults or undecided, notes),
-        faults=faults or undecided,
+        ok=False if faults else None if undecided_messages else True,
+        reason=finding_reason(faults or undecided_messages, notes),
+        faults=faults or undecided_messages,
         flown=clearance,
         limit=LAUNCH_CLEARANCE_M,
         at_least=True,
@@ -90,30 +90,32 @@ def _launch_finding(requirements: RouteRequirements, ground: FlownGround, take_o
         margin=clearance - LAUNCH_CLEARANCE_M,
         unit="m",
         method="exact along the flown track",
-        check=GROUND_WAY if undecided else "",
+        check=GROUND_WAY if undecided_messages else "",
         facts=(Fact("height lost", height_lost, "m"), Fact("runway left", runway_left, "m")),
     )
 
 
-def _climb_clearance(requirements: RouteRequirements, path: Way) -> tuple[float, float]:
-    """Return the minimum height above ground after the launch run, m, and its distance from home along the path, m.
+def _climb_clearance(requirements: RouteRequirements, path: GroundPath) -> tuple[float, float]:
+    """Return the minimum height above ground after the launch run and its distance along the path, m.
 
     The height is inf if the take-off ends within the launch run, NaN if the ground is unknown.
     """
-    terrain, (position, run) = requirements.setup.scenario.terrain, path
+    terrain, (position, distances) = requirements.setup.scenario.terrain, path
     if terrain is None:
         return math.nan, math.nan
     # On a runway the aircraft is on the ground: heights apply from lift-off on.
-    first_run = LAUNCH_RUN_M
-    take_off = None if requirements.ground is None else requirements.ground.ways.take_off
+    first_distance = LAUNCH_RUN_M
+    take_off = None if requirements.ground_phases is None else requirements.ground_phases.procedures.take_off
     if take_off is not None and take_off.launch.method == "runway":
         standing_height = float(position[0, 2] - take_off.home[2])
         heights = position[:, 2] - terrain.height(position[:, 0], position[:, 1])
         is_airborne = heights > standing_height + LAUNCH_CLEARANCE_M + CLIMB_MODEL_ERROR_M
-        first_run = max(first_run, float(run[int(np.argmax(is_airborne))]) if is_airborne.any() else float(run[-1]))
-    if run[-1] <= first_run:
+        first_distance = max(
+            first_distance, float(distances[int(np.argmax(is_airborne))]) if is_airborne.any() else float(distances[-1])
+        )
+    if distances[-1] <= first_distance:
         return math.inf, math.nan
-    return way_clearance(terrain, path.between(first_run, float(run[-1])))
+    return min_path_clearance(terrain, path.between(first_distance, float(distances[-1])))
 
 
 def _remaining_runway(requirements: RouteRequirements, take_off: TakeOff, position: Floats) -> float:
@@ -129,17 +131,17 @@ def _remaining_runway(requirements: RouteRequirements, take_off: TakeOff, positi
     return take_off.launch.run - math.dist(last[:2], take_off.home[:2])
 
 
-def _describe_take_off(take_off: TakeOff, track: Track, run: Floats, clearance: float) -> list[str]:
+def _describe_take_off(take_off: TakeOff, track: Track, distances: Floats, clearance: float) -> list[str]:
     """Describe the take-off in a list of phrases."""
     course, method = round(math.degrees(take_off.course)) % 360, take_off.launch.method
     notes = [f"launched on a runway on {course}°"]
     if method != "runway":
         method_text = "from a catapult" if method == "catapult" else "by hand"
         notes = [f"launched {method_text} on {course}° at {take_off.speed:.1f} m/s, {take_off.acceleration:.1f} m/s²"]
-    if run[-1] > 1.0:
-        rise = float(track.position[-1, 2] - track.position[0, 2])
+    if distances[-1] > 1.0:
+        altitude_gain = float(track.position[-1, 2] - track.position[0, 2])
         course = round(math.degrees(math.atan2(*track.velocity[-1, :2].tolist()))) % 360
-        notes.append(f"climbs at {rise / run[-1]:.2f}, at last on {course}°")
+        notes.append(f"climbs at {altitude_gain / distances[-1]:.2f}, at last on {course}°")
     if math.isfinite(clearance):
         notes.append(f"{clearance:.0f} m above ground or more beyond {LAUNCH_RUN_M:.0f} m")
     return notes

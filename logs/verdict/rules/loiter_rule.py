@@ -1,7 +1,7 @@
-"""The loiter rule: judge if a loiter can be held with this bank in this wind, and was flown to its end.
+"""The loiter rule: judge whether a loiter can be held with this bank in this wind, and was flown to its end.
 
-A loiter is flown as corners around its circle, each judged like any turn.  The findings on its corners are merged into
-one for each loiter, and of the findings on the legs between the corners, only the worst of each rule is kept.
+A loiter is flown as corners around its circle, each judged like any turn.  The findings on the corners of a loiter are
+merged into one, and each rule keeps only its worst finding on the legs between the corners.
 """
 
 import math
@@ -11,8 +11,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from flight.mission.itinerary import loiter_of
-from logs.verdict.findings import UNKNOWN_WAY, Finding, Message, badness, make_finding, message, reason_of
-from logs.verdict.measures.circle_reach import end_loiter_hazards, hazards_within
+from logs.verdict.findings import UNKNOWN_WAY, Finding, Message, badness, finding_reason, make_finding, message
+from logs.verdict.measures.circle_reach import end_loiter_hazards, find_hazards
 from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.track_alignment import AlignedTrack, approaches
 from logs.verdict.places import Place
@@ -30,26 +30,26 @@ from world.geometry import tangent_length
 
 
 @dataclass(frozen=True, slots=True)
-class Circle:
+class LoiterCircle:
     """One loiter of a route.
 
     first, last: waypoints of the first and last corner; neither is an end of the route.
-    middle: center, m, (2,).
+    center: center, m, (2,).
     radius: m.
     turns: number of laps.
     """
 
     first: int
     last: int
-    middle: Floats
+    center: Floats
     radius: float
     turns: float
 
 
-def circles(requirements: RouteRequirements) -> list[Circle]:
+def loiter_circles(requirements: RouteRequirements) -> list[LoiterCircle]:
     """Return the loiters of a route, in flying order."""
     arcs, items = requirements.setup.route.arcs, requirements.setup.route.items
-    loiters: list[Circle] = []
+    loiters: list[LoiterCircle] = []
     i = 0
     while i < len(arcs):
         last = i
@@ -57,7 +57,7 @@ def circles(requirements: RouteRequirements) -> list[Circle]:
             last += 1
         if arcs[i] > 0.0:
             angle = float(np.abs(requirements.turns[i : last + 1]).sum())
-            loiters.append(Circle(i, last, _center(requirements, i), float(arcs[i]), angle / (2.0 * math.pi)))
+            loiters.append(LoiterCircle(i, last, _center(requirements, i), float(arcs[i]), angle / (2.0 * math.pi)))
             i = last
         i += 1
     return loiters
@@ -66,14 +66,16 @@ def circles(requirements: RouteRequirements) -> list[Circle]:
 def _center(requirements: RouteRequirements, i: int) -> Floats:
     """Return the center of the circle to which the arc of corner `i` belongs, m, (2,)."""
     ux, uy = requirements.leg_unit(i - 1)
-    side = math.copysign(1.0, requirements.turns[i])
+    turn_sign = math.copysign(1.0, requirements.turns[i])
     tangent = tangent_length(abs(float(requirements.turns[i])), float(requirements.radius[i]))
     return np.array(
-        requirements.points[i, :2] - tangent * np.array([ux, uy]) + side * requirements.radius[i] * np.array([uy, -ux])
+        requirements.points[i, :2]
+        - tangent * np.array([ux, uy])
+        + turn_sign * requirements.radius[i] * np.array([uy, -ux])
     )
 
 
-def fold_loiters(
+def merge_loiter_findings(
     requirements: RouteRequirements, aligned: AlignedTrack | None, findings: Sequence[Finding]
 ) -> tuple[Finding, ...]:
     """Merge the findings at each loiter's corners into one, and keep only each rule's worst finding on its legs."""
@@ -84,12 +86,12 @@ def fold_loiters(
     for k, finding in enumerate(findings):
         positions.setdefault((finding.rule, finding.place), []).append(k)
 
-    def remaining(rules: Sequence[str], places: Sequence[Place]) -> list[tuple[int, Finding]]:
-        """Return positions and findings of these rules at these places, in order, without replaced findings."""
+    def remaining_findings(rules: Sequence[str], places: Sequence[Place]) -> list[tuple[int, Finding]]:
+        """Return indices and findings of these rules at these places, in order, without replaced findings."""
         indices = sorted(k for rule in rules for place in places for k in positions.get((rule, place), ()))
         return [(k, finding) for k in indices if (finding := merged[k]) is not None and finding.rule in rules]
 
-    for circle in circles(requirements):
+    for circle in loiter_circles(requirements):
         # If the mission ends on its loiter, that end is on it too.
         last_items = requirements.setup.route.items[circle.last : circle.last + 2]
         last = (
@@ -97,7 +99,7 @@ def fold_loiters(
             if joins_at_center and len(last_items) == 2 and last_items[0] == last_items[1]
             else circle.last
         )
-        corner_findings = remaining(
+        corner_findings = remaining_findings(
             ("turn", "waypoint"), [requirements.waypoint(i) for i in range(circle.first, last + 1)]
         )
         for k, _ in corner_findings:
@@ -108,7 +110,7 @@ def fold_loiters(
             )
         legs = [requirements.leg(leg) for leg in range(circle.first, circle.last)]
         for rule in ("slope", "speed", "clearance", "corridor"):
-            rule_findings = remaining((rule,), legs)
+            rule_findings = remaining_findings((rule,), legs)
             if joins_at_center and any(finding.ok is not None for _, finding in rule_findings):
                 # The loiter was left before the other legs: only the flown ones are judged.
                 for k, finding in rule_findings:
@@ -126,7 +128,7 @@ def fold_loiters(
 def end_findings(
     requirements: RouteRequirements, aligned: AlignedTrack | None, *, geometric: bool = False
 ) -> list[Finding]:
-    """Before a flight, judge the hazards near the end of a mission, where the autopilot loiters.
+    """Before a flight, judge the hazards around the loiter at the end of a mission.
 
     aligned: not used.
     """
@@ -150,16 +152,16 @@ def end_findings(
 
 
 def _loiter_finding(
-    requirements: RouteRequirements, aligned: AlignedTrack | None, circle: Circle, corner_findings: list[Finding]
+    requirements: RouteRequirements, aligned: AlignedTrack | None, circle: LoiterCircle, corner_findings: list[Finding]
 ) -> Finding:
     inner = slice(circle.first, circle.last + 1)
     is_known = bool(np.isfinite(requirements.turn_limit[inner]).all())
-    min_radius = float(requirements.tightest[inner].max()) if is_known else math.nan
-    failed = [finding for finding in corner_findings if finding.ok is False]
+    min_radius = float(requirements.min_radius[inner].max()) if is_known else math.nan
+    failed_corners = [finding for finding in corner_findings if finding.ok is False]
     joins_at_center = requirements.setup.autopilot.loiter_rules.at_middle
     uses_parameter = _uses_parameter_radius(requirements, circle)
     if joins_at_center and (uses_parameter if aligned is None else _has_reached(requirements, aligned, circle)):
-        failed = []
+        failed_corners = []
     faults = _small_radius_faults(requirements, circle, min_radius) if is_known else []
     facts = [f"{circle.turns:.2f} turns with {circle.radius:.0f} m"]
     open_text, name = "", requirements.setup.autopilot.loiter_rules.radius_name
@@ -172,10 +174,10 @@ def _loiter_finding(
             open_text = "" if aligned is not None else _hazards_text(requirements, circle, min_radius)
         else:
             facts.append(f"{name}, held with {math.degrees(bank):.0f}° of bank")
-    if aligned is not None and failed:
-        faults.append(_unheld_corners_message(circle, failed))
-    elif failed and not faults:
-        first = failed[0]
+    if aligned is not None and failed_corners:
+        faults.append(_unheld_corners_message(circle, failed_corners))
+    elif failed_corners and not faults:
+        first = failed_corners[0]
         text, placed = f"{place_text(first.place)}: {first.reason}", first.place == requirements.waypoint(circle.first)
         faults.append(Message(text, _corner_text(first.place), placed))
     radii = np.zeros(0) if aligned is None else _flown_radii(aligned, circle)
@@ -189,7 +191,7 @@ def _loiter_finding(
             and mean_radius > circle.radius * (1.0 + LOITER_WIDENING_FRACTION) + WAYPOINT_PASS_MARGIN_M
         ):
             faults.append(message(f"flown with {mean_radius:.0f} m where {circle.radius:.0f} m is required"))
-    ok: bool | None = not (faults or failed)
+    ok: bool | None = not (faults or failed_corners)
     if ok and any(finding.ok is None for finding in corner_findings):
         ok = None
         facts.append("the flight did not get to its end")
@@ -200,7 +202,7 @@ def _loiter_finding(
         "loiter",
         requirements.waypoint(circle.first),
         ok=ok,
-        reason=reason_of(faults, facts),
+        reason=finding_reason(faults, facts),
         faults=faults,
         planned=circle.radius,
         flown=mean_radius,
@@ -215,7 +217,7 @@ def _loiter_finding(
     )
 
 
-def _flown_radii(aligned: AlignedTrack, circle: Circle) -> Floats:
+def _flown_radii(aligned: AlignedTrack, circle: LoiterCircle) -> Floats:
     """Return the distances from a loiter's center, flown from the first to the last corner, m, (n,).
 
     The array is empty if the loiter was not flown to its end.
@@ -223,11 +225,11 @@ def _flown_radii(aligned: AlignedTrack, circle: Circle) -> Floats:
     first, last = int(aligned.rows[circle.first]), int(aligned.rows[circle.last])
     if not aligned.passed[circle.last] or last <= first:
         return np.zeros(0)
-    offsets = aligned.track.position[first : last + 1, :2] - circle.middle
+    offsets = aligned.track.position[first : last + 1, :2] - circle.center
     return np.asarray(np.hypot(offsets[:, 0], offsets[:, 1]))
 
 
-def _uses_parameter_radius(requirements: RouteRequirements, circle: Circle) -> bool:
+def _uses_parameter_radius(requirements: RouteRequirements, circle: LoiterCircle) -> bool:
     """Return True if the autopilot takes a loiter's radius from its parameter.
 
     The mission item then has no radius that the autopilot reads.
@@ -238,44 +240,44 @@ def _uses_parameter_radius(requirements: RouteRequirements, circle: Circle) -> b
 
 
 def _held_bank(
-    requirements: RouteRequirements, circle: Circle, min_radius: float, corner_findings: list[Finding]
+    requirements: RouteRequirements, circle: LoiterCircle, min_radius: float, corner_findings: list[Finding]
 ) -> float:
-    """Return the bank with which a loiter was held that is tighter than the bank limit allows, rad.
+    """Return the bank in a loiter that is tighter than the bank limit allows, rad.
 
     min_radius: radius at the bank limit, m.
 
-    The bank is the largest mean over a second.  Without a flight or a measurement, it is the bank needed to hold the
-    loiter, up to the autopilot's limit.
+    The bank is the largest mean over a second.  Without a measurement, it is the bank needed to hold the loiter, up to
+    the autopilot's limit.
     """
-    measured = [fact.value for finding in corner_findings for fact in finding.facts if fact.what == "bank"]
-    if measured:
-        return math.radians(max(measured))
-    needed = math.atan(math.tan(requirements.limits.max_bank) * min_radius / circle.radius)
-    return min(requirements.setup.autopilot.bank_limit, needed)
+    measured_banks = [fact.value for finding in corner_findings for fact in finding.facts if fact.what == "bank"]
+    if measured_banks:
+        return math.radians(max(measured_banks))
+    needed_bank = math.atan(math.tan(requirements.limits.max_bank) * min_radius / circle.radius)
+    return min(requirements.setup.autopilot.bank_limit, needed_bank)
 
 
-def _hazards_text(requirements: RouteRequirements, circle: Circle, min_radius: float) -> str:
+def _hazards_text(requirements: RouteRequirements, circle: LoiterCircle, min_radius: float) -> str:
     """Describe the hazards too close to a loiter that is flown wider than drawn; return "" if there are none."""
     heights = requirements.points[circle.first : circle.last + 1, 2]
     reach = LOITER_SWING_RADII * min_radius
-    hazards = hazards_within(requirements, circle.middle, float(heights.min()), float(heights.max()), reach)
+    hazards = find_hazards(requirements, circle.center, float(heights.min()), float(heights.max()), reach)
     if not hazards:
         return ""
     reach_text = f"it may get {reach:.0f} m from its center, and there"
     return f"{reach_text}, {', '.join(hazards)}; only a flight tells where it circles"
 
 
-def _has_reached(requirements: RouteRequirements, aligned: AlignedTrack, circle: Circle) -> bool:
-    """Return True if the flight came close enough to a loiter to count as having reached it.
+def _has_reached(requirements: RouteRequirements, aligned: AlignedTrack, circle: LoiterCircle) -> bool:
+    """Return True if the flight reached a loiter.
 
     The corners do not show this, because a flight that leaves the loiter when its time is over may miss all of them.
     """
-    distances, _ = approaches(aligned.track.position, circle.middle)
+    distances, _ = approaches(aligned.track.position, circle.center)
     turn_distance = requirements.setup.autopilot.turn_distance(math.pi, float(requirements.points[circle.first, 2]))
     return bool(distances.min() <= circle.radius + turn_distance + WAYPOINT_PASS_MARGIN_M)
 
 
-def _small_radius_faults(requirements: RouteRequirements, circle: Circle, min_radius: float) -> list[Message]:
+def _small_radius_faults(requirements: RouteRequirements, circle: LoiterCircle, min_radius: float) -> list[Message]:
     """Return a fault if a loiter is smaller than the radius at the bank limit (m)."""
     if circle.radius >= min_radius - RADIUS_TOLERANCE_FRACTION:
         return []
@@ -286,12 +288,15 @@ def _small_radius_faults(requirements: RouteRequirements, circle: Circle, min_ra
     return [message(f"radius {circle.radius:.0f} m; {need_text} in this wind")]
 
 
-def _unheld_corners_message(circle: Circle, failed: list[Finding]) -> Message:
-    """State the number of corners that were not held, and the worst corner."""
-    worst = min(failed, key=badness)
-    corners = len({finding.place for finding in failed})
-    count = f"{corners} of {circle.last - circle.first + 1} corners not held, as "
-    return Message(f"{count}{place_text(worst.place)}: {worst.reason}", f"{count}{_corner_text(worst.place)}")
+def _unheld_corners_message(circle: LoiterCircle, failed_corners: list[Finding]) -> Message:
+    """State the number of corners not held, and the worst one."""
+    worst_corner = min(failed_corners, key=badness)
+    corner_count = len({finding.place for finding in failed_corners})
+    count_text = f"{corner_count} of {circle.last - circle.first + 1} corners not held, as "
+    return Message(
+        f"{count_text}{place_text(worst_corner.place)}: {worst_corner.reason}",
+        f"{count_text}{_corner_text(worst_corner.place)}",
+    )
 
 
 def _corner_text(place: Place) -> str:
@@ -309,6 +314,6 @@ RULE = Rule(
         "LOITER_WIDENING_FRACTION",
     ),
     judge=end_findings,
-    merge=fold_loiters,
+    merge=merge_loiter_findings,
     log=LogNeeds(aircraft=True),
 )

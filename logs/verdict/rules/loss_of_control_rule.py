@@ -1,11 +1,11 @@
-"""The `departure` rule: judge loss of control by bad numbers, extreme bank, low airspeed and ground contact."""
+"""The `departure` rule: judge loss of control by unusable rows, extreme bank, low airspeed and ground contact."""
 
 import math
 
 import numpy as np
 
 from flight.simulation.track import ROLL
-from logs.verdict.findings import Finding, Message, make_finding, message, reason_of
+from logs.verdict.findings import Finding, Message, finding_reason, make_finding, message
 from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.places import FLIGHT
@@ -18,7 +18,7 @@ from world.arrays import Floats
 def departure_findings(
     requirements: RouteRequirements, aligned: AlignedTrack | None, *, geometric: bool = False
 ) -> list[Finding]:
-    """Judge if a flight has bad numbers, extreme bank, too low an airspeed, or ground contact."""
+    """Judge whether a flight has unusable rows, extreme bank, too low an airspeed, or ground contact."""
     if geometric:
         return []
     if aligned is None:
@@ -41,7 +41,7 @@ def departure_findings(
         faults.append(
             message(
                 f"ground contact at {time:.1f} s on {place_text(requirements.leg(aligned.leg_at(k)))}",
-                f", {aligned.where(k, float(aligned.clearance_fraction[k]))}",
+                f", {aligned.position_text(k, float(aligned.clearance_fraction[k]))}",
             )
         )
     min_airspeed = -_max_finite(-track.airspeed.astype(np.float64))
@@ -53,7 +53,7 @@ def departure_findings(
             "departure",
             FLIGHT,
             ok=not faults,
-            reason=reason_of(faults) if faults else notes_text,
+            reason=finding_reason(faults) if faults else notes_text,
             faults=faults,
             flown=math.degrees(max_bank),
             limit=math.degrees(MAX_CONTROLLED_BANK_RAD),
@@ -82,8 +82,12 @@ def _low_airspeed_faults(requirements: RouteRequirements, aligned: AlignedTrack)
     slow_rows = np.flatnonzero(track.airspeed < min_airspeeds)
     if not slow_rows.size:
         return []
-    k = int(slow_rows[0])
-    return [message(f"airspeed {track.airspeed[k]:.1f} m/s at {track.time[k]:.1f} s, below {min_airspeeds[k]:.1f} m/s")]
+    row = int(slow_rows[0])
+    return [
+        message(
+            f"airspeed {track.airspeed[row]:.1f} m/s at {track.time[row]:.1f} s, below {min_airspeeds[row]:.1f} m/s"
+        )
+    ]
 
 
 def _time_text(time: float) -> str:
@@ -91,7 +95,7 @@ def _time_text(time: float) -> str:
 
 
 def _min_flying_airspeed(requirements: RouteRequirements, altitude: Floats) -> Floats:
-    """Return the airspeed below which the aircraft no longer counts as flying at each altitude (m AMSL), m/s."""
+    """Return the minimum airspeed of controlled flight at each altitude (m AMSL), m/s."""
     if requirements.setup.aircraft == "aerosonde":
         return np.full(altitude.shape, MIN_CONTROLLED_AIRSPEED_MPS)
     envelope = requirements.setup.envelope

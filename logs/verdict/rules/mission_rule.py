@@ -42,14 +42,14 @@ from logs.verdict.tolerances import (
     PX4_LANDING_BUFFER_RAD,
     PX4_WAYPOINT_SPACING_M,
 )
-from world.airfield import STEEPEST_STRIP
+from world.airfield import STEEPEST_STRIP_SLOPE
 from world.frames import GeoOrigin, to_map
 
 C = Command
 
 
 def mission_findings(setup: FlightSetup) -> list[Finding]:
-    """Run each check, and return one finding for each, with the first item at fault if there is one."""
+    """Run each check and return its finding, with the first item at fault."""
     mission, origin, limits = setup.mission, setup.scenario.origin, setup.autopilot.mission_checks
     checks = (
         ("checkMissionItemValidity", _check_validity(mission)),
@@ -63,7 +63,7 @@ def mission_findings(setup: FlightSetup) -> list[Finding]:
         ("checkGeofence", _check_fence(setup)),
     )
     refuses = setup.autopilot.refuses
-    findings = [_finding(name, list(remarks), refuses) for name, remarks in checks]
+    findings = [_check_finding(name, list(remarks), refuses) for name, remarks in checks]
     # No autopilot has a name for the last checks, which report the parts of a mission that are not judged.
     return [
         *findings,
@@ -79,7 +79,7 @@ REFUSED: Literal["refused"] = "refused"
 _Remark = tuple[bool | Literal["refused"] | None, int | None, str | Message]
 
 
-def _finding(check: str, remarks: list[_Remark], refuses: bool) -> Finding:
+def _check_finding(check: str, remarks: list[_Remark], refuses: bool) -> Finding:
     """Merge the remarks of a check into one finding.  refuses: True if the autopilot refuses what PX4 refuses."""
     verdict = False if refuses else None
     sorted_remarks = [(verdict if ok == REFUSED else ok, item, reason) for ok, item, reason in remarks]
@@ -102,19 +102,19 @@ def _finding(check: str, remarks: list[_Remark], refuses: bool) -> Finding:
 
 def _arduplane_refusals(setup: FlightSetup) -> list[Finding]:
     """Return a finding on the items that ArduPlane refuses at upload but PX4 does not, if ArduPlane flies."""
-    refused = [
+    refused_items = [
         item
         for item in setup.mission.items
         if support_of(item.command).arduplane == Treatment.REFUSED != support_of(item.command).px4
     ]
-    if not refused or not setup.autopilot.refuses_as_arduplane:
+    if not refused_items or not setup.autopilot.refuses_as_arduplane:
         return []
-    more_text = f" (+{len(refused) - 1} more)" if len(refused) > 1 else ""
-    fault = message(f"unsupported command {command_name(refused[0].command)}", f"; PX4 takes it{more_text}")
+    more_text = f" (+{len(refused_items) - 1} more)" if len(refused_items) > 1 else ""
+    fault = message(f"unsupported command {command_name(refused_items[0].command)}", f"; PX4 takes it{more_text}")
     return [
         make_finding(
             "mission",
-            Place("mission", item=refused[0].seq),
+            Place("mission", item=refused_items[0].seq),
             ok=False,
             reason=f"{fault.text} (ArduPlane mavlink_int_to_mission_cmd)",
             faults=[fault],
@@ -126,24 +126,25 @@ def _arduplane_refusals(setup: FlightSetup) -> list[Finding]:
 
 
 def _unjoined_finding(setup: FlightSetup) -> Finding:
-    """Report that an autopilot leaves the route for a place inside a loiter, or a loiter about another center.
+    """Report that an autopilot leaves the route for a waypoint inside a loiter, or for a loiter about another center.
 
     For an imported flight this is undecided, not a fault; see
-    `logs.verdict.rules.completion_rule.imported_completion`.
+    `logs.verdict.rules.completion_rule.imported_completion_finding`.
     """
-    first, *others = setup.route.unjoined
+    first_stop, *other_stops = setup.route.unjoined
     autopilot = setup.autopilot.title
-    if first.is_circle:
-        reason = f"no tangent joins its circle to that of item {first.circle}"
+    if first_stop.is_circle:
+        reason = f"no tangent joins its circle to that of item {first_stop.circle}"
     else:
-        reason = f"lies inside the circle of item {first.circle}"
-    more_text = f" (+{len(others)} more)" if others else ""
+        reason = f"lies inside the circle of item {first_stop.circle}"
+    more_text = f" (+{len(other_stops)} more)" if other_stops else ""
     fault = message(
-        reason, f": {autopilot} flies {'it as it is' if first.is_circle else 'there'}, which is not judged{more_text}"
+        reason,
+        f": {autopilot} flies {'it as it is' if first_stop.is_circle else 'there'}, which is not judged{more_text}",
     )
     return make_finding(
         "mission",
-        Place("mission", item=first.item if first.item >= 0 else None),
+        Place("mission", item=first_stop.item if first_stop.item >= 0 else None),
         ok=False if setup.source is None else None,
         reason=fault.text,
         faults=[fault],
@@ -155,20 +156,20 @@ def _unjoined_finding(setup: FlightSetup) -> Finding:
 
 def _unflown_findings(setup: FlightSetup) -> Iterator[Finding]:
     """Yield a finding for each item or setting that changes the flight path but is not simulated."""
-    unflown = [(open_item.item, open_item.text) for open_item in setup.route.open_items]
+    remarks = [(open_item.item, open_item.text) for open_item in setup.route.open_items]
     if not setup.autopilot.follows_ground:
         items_above_terrain = sorted(set(setup.route.items[np.isfinite(setup.route.above_ground)].tolist()))
         reason = f"the simulated {setup.autopilot.title} does not follow its height above terrain along the leg"
-        unflown += [(seq, reason) for seq in items_above_terrain]
+        remarks += [(seq, reason) for seq in items_above_terrain]
     if setup.scenario.returns is not None:
         # Returns from anywhere on the route are judged only to the mission's home.
-        unflown += [
+        remarks += [
             (item.seq, f"{command_name(item.command)}: returns are judged only to the mission's home")
             for item in setup.mission.items
             if item.command == C.DO_SET_HOME
         ]
         if not setup.autopilot.reads_as_px4:
-            unflown += [
+            remarks += [
                 (
                     item.seq,
                     "DO_CHANGE_SPEED of ground speed: returns are judged with the autopilot's own MIN_GROUNDSPEED",
@@ -177,14 +178,14 @@ def _unflown_findings(setup: FlightSetup) -> Iterator[Finding]:
                 if item.command == C.DO_CHANGE_SPEED and item.params[0] == 1.0
             ]
     slopes = landing_slopes(setup.mission, setup.route, setup.scenario)
-    if setup.source is None and slopes is not None and max(map(abs, slopes)) > STEEPEST_STRIP:
-        steepest = f"{max(map(abs, slopes)):.1%}, and at most {STEEPEST_STRIP:.0%} can be landed on"
-        reason = f"NAV_LAND: the ground there slopes by {steepest}: the touchdown is not judged"
-        unflown.append((int(setup.route.items[-1]), reason))
+    if setup.source is None and slopes is not None and max(map(abs, slopes)) > STEEPEST_STRIP_SLOPE:
+        steepest_text = f"{max(map(abs, slopes)):.1%}, and at most {STEEPEST_STRIP_SLOPE:.0%} can be landed on"
+        reason = f"NAV_LAND: the ground there slopes by {steepest_text}: the touchdown is not judged"
+        remarks.append((int(setup.route.items[-1]), reason))
     # An imported flight was flown with its settings.
     texts = setup.autopilot.settings_not_flown(_mission_parts(setup)) if setup.source is None else []
     settings = [(None, text) for text in texts]
-    for seq, text in [*unflown, *settings]:
+    for seq, text in [*remarks, *settings]:
         yield make_finding(
             "mission",
             Place("mission", item=seq),
@@ -198,15 +199,15 @@ def _unflown_findings(setup: FlightSetup) -> Iterator[Finding]:
 
 
 def _mission_parts(setup: FlightSetup) -> MissionParts:
-    """Return the parts of a mission that decide which settings change its flight."""
-    items, ways = setup.mission.items, setup.ground_ways
+    """Collect the properties of a mission on which the effect of settings depends."""
+    items, procedures = setup.mission.items, setup.ground_ways
     commands = {item.command for item in items}
     pairs = itertools.pairwise(_flown_items(setup.mission))
     return MissionParts(
         returns=C.NAV_RETURN_TO_LAUNCH in commands,
         has_return_path=C.DO_RETURN_PATH_START in commands,
-        takes_off=ways.take_off is not None,
-        lands=ways.approach is not None,
+        takes_off=procedures.take_off is not None,
+        lands=procedures.approach is not None,
         loiters_to_land=any(a.command == C.NAV_LOITER_TO_ALT and b.command in LANDINGS for a, b in pairs),
         enables_fence=any(item.command == C.DO_FENCE_ENABLE and item.params[0] == 1.0 for item in items),
         moves_payload=not commands.isdisjoint((C.DO_GRIPPER, C.DO_WINCH, C.DO_GIMBAL_MANAGER_PITCHYAW)),
@@ -238,7 +239,7 @@ def _check_validity(mission: Mission) -> Iterator[_Remark]:
 
 
 def _height_above_home(mission: Mission, item: MissionItem) -> float:
-    """Return an item's height above home, m; NaN if unknown.  A height above terrain counts as above home."""
+    """Return an item's height above home, m; NaN if unknown.  Treat heights above terrain as above home."""
     if item.frame in OVER_HOME | OVER_TERRAIN:
         return item.alt
     return item.alt - mission.home.alt if mission.home is not None else math.nan
@@ -277,24 +278,24 @@ def _check_approach(mission: Mission, origin: GeoOrigin, limits: MissionChecks) 
     for previous, item in zip(mission.items, mission.items[1:], strict=False):
         if item.command != C.NAV_LAND or previous.command not in PLACES | TAKEOFFS or not previous.has_position:
             continue
-        rise = _height_above_home(mission, previous) - _height_above_home(mission, item)
-        if math.isnan(rise):
+        altitude_difference = _height_above_home(mission, previous) - _height_above_home(mission, item)
+        if math.isnan(altitude_difference):
             yield None, item.seq, "the heights of landing and approach are not known over one another"
             continue
-        if rise <= 0.0:
+        if altitude_difference <= 0.0:
             yield REFUSED, item.seq, "the approach waypoint must be above the landing point"
             continue
-        run = _distance_between(previous, item, origin)
+        distance = _distance_between(previous, item, origin)
         if previous.command == C.NAV_LOITER_TO_ALT:
             radius = 0.0 if math.isnan(previous.params[1]) else abs(previous.params[1])
-            if run <= radius:
+            if distance <= radius:
                 yield REFUSED, item.seq, "the landing point must be outside the orbit radius"
                 continue
-            run = math.sqrt(run * run - radius * radius)
+            distance = math.sqrt(distance * distance - radius * radius)
         elif previous.command != C.NAV_WAYPOINT:
             yield REFUSED, item.seq, "unsupported landing approach entrance: only LOITER_TO_ALT or WAYPOINT"
             continue
-        angle = math.atan2(rise, run)
+        angle = math.atan2(altitude_difference, distance)
         if angle > limits.landing_angle + PX4_LANDING_BUFFER_RAD:
             reason = f"the landing glide slope {math.degrees(angle):.1f}° is steeper than {max_angle:.1f}°"
             yield REFUSED, item.seq, reason
@@ -317,29 +318,29 @@ def _distance_between(first: MissionItem, second: MissionItem, origin: GeoOrigin
 
 
 def _check_first_distance(mission: Mission, origin: GeoOrigin) -> Iterator[_Remark]:
-    places = _flown_items(mission)
-    if mission.home is None or not places:
+    flown_items = _flown_items(mission)
+    if mission.home is None or not flown_items:
         yield True, None, "no home, so no distance to the first waypoint"
         return
     home = MissionItem(0, int(C.NAV_WAYPOINT), 0, (0.0,) * 4, mission.home.lat_deg, mission.home.lon_deg, 0.0)
-    distance = _distance_between(home, places[0], origin)
+    distance = _distance_between(home, flown_items[0], origin)
     if not distance < PX4_FIRST_WAYPOINT_DISTANCE_M:
         # This is only a warning in the releases whose control law is simulated here.
         yield (
             None,
-            places[0].seq,
+            flown_items[0].seq,
             f"first waypoint too far away: {distance:.0f} m from home, maximum {PX4_FIRST_WAYPOINT_DISTANCE_M:.0f} m",
         )
 
 
 def _check_gates(mission: Mission, origin: GeoOrigin) -> Iterator[_Remark]:
     """Yield a remark on each condition gate that is too close to the waypoint before or after the gate."""
-    places = [
+    flown_items = [
         item
         for item in mission.items
         if item.has_position and (item.command in PLACES | TAKEOFFS | LANDINGS or item.command == C.CONDITION_GATE)
     ]
-    for previous, following in itertools.pairwise(places):
+    for previous, following in itertools.pairwise(flown_items):
         has_gate = C.CONDITION_GATE in (previous.command, following.command)
         if has_gate and _distance_between(previous, following, origin) < PX4_GATE_SPACING_M:
             yield REFUSED, following.seq, "distance between waypoint and gate too close"
@@ -347,15 +348,15 @@ def _check_gates(mission: Mission, origin: GeoOrigin) -> Iterator[_Remark]:
 
 def _check_distances(mission: Mission, origin: GeoOrigin) -> Iterator[_Remark]:
     yield from _check_gates(mission, origin)
-    places = _flown_items(mission)
-    if len(places) < 2:
+    flown_items = _flown_items(mission)
+    if len(flown_items) < 2:
         return
-    east, north = to_map(origin, [item.lat_deg for item in places], [item.lon_deg for item in places])
-    runs = np.hypot(np.diff(east), np.diff(north))
-    k = int(np.argmax(runs))
-    if runs[k] > PX4_WAYPOINT_SPACING_M:
-        reason = f"{runs[k]:.0f} m between waypoints; PX4 releases with MIS_DIST_WPS refuse more than"
-        yield True, places[k + 1].seq, f"{reason} {PX4_WAYPOINT_SPACING_M:.0f} m by default, today's have no limit"
+    east, north = to_map(origin, [item.lat_deg for item in flown_items], [item.lon_deg for item in flown_items])
+    distances = np.hypot(np.diff(east), np.diff(north))
+    k = int(np.argmax(distances))
+    if distances[k] > PX4_WAYPOINT_SPACING_M:
+        reason = f"{distances[k]:.0f} m between waypoints; PX4 releases with MIS_DIST_WPS refuse more than"
+        yield True, flown_items[k + 1].seq, f"{reason} {PX4_WAYPOINT_SPACING_M:.0f} m by default, today's have no limit"
 
 
 def _check_home_altitude(mission: Mission) -> Iterator[_Remark]:

@@ -1,8 +1,8 @@
-"""The return rule: judge the destination of a return to launch, and how far it was flown.
+"""The return rule: judge the destination of a return to launch (RTL), and how far the RTL was flown.
 
 A mission only states that the aircraft is to return.  The autopilot chooses the path back, so the path has no required
 corridor, waypoint or slope, and is not judged against its stand-in in the route.  Ground, threats, zones, area, speed,
-stall and energy are judged on the return as on every other leg.
+stall and energy are judged on the RTL as on every other leg.
 """
 
 import math
@@ -42,43 +42,45 @@ _LEG_RULES = frozenset({"turn", "waypoint", "corridor", "slope", "loiter"})
 def return_findings(
     requirements: RouteRequirements, aligned: AlignedTrack | None, *, geometric: bool = False
 ) -> list[Finding]:
-    """Judge the destination of a planned return to launch, and whether an imported flight completed its return.
+    """Judge the destination of a planned RTL, and whether an imported flight completed its RTL.
 
     `flown_return_findings` judges planfly's own flights, because their track does not show how they ended.
     """
     if geometric:
         required_findings = _requirement_findings(requirements, partial(planned_starts, requirements.setup))
-        return _finding(requirements, None, "not flown yet") + required_findings
+        return _rtl_findings(requirements, None, "not flown yet") + required_findings
     if requirements.setup.source is None:
         return []
     has_passed_end = aligned is not None and bool(aligned.passed[-1])
     goes_on_to_land = requirements.setup.route.return_until <= requirements.legs
-    return _flown_finding(
-        requirements, has_passed_end and (goes_on_to_land or (aligned is not None and circled(requirements, aligned)))
+    return _flown_rtl_findings(
+        requirements,
+        has_passed_end
+        and (goes_on_to_land or (aligned is not None and has_completed_return_loiter(requirements, aligned))),
     )
 
 
 def flown_return_findings(
-    requirements: RouteRequirements, aligned: AlignedTrack | None, ended: str, log_complete: bool
+    requirements: RouteRequirements, aligned: AlignedTrack | None, end_reason: str, log_complete: bool
 ) -> list[Finding]:
-    """Judge the path of a flown return to launch, and whether it arrived.
+    """Judge the path of a flown RTL, and whether the aircraft arrived.
 
-    ended: "completed" if the flight ended after its loiter, otherwise the reason for its end.
+    end_reason: "completed" if the flight ended after its loiter, otherwise the reason for its end.
     log_complete: not used, because the completion rule reports it.
     """
-    has_arrived = aligned is not None and bool(aligned.passed[-1]) and ended == "completed"
-    reason = "" if ended == "completed" else f": {ended}"
+    has_arrived = aligned is not None and bool(aligned.passed[-1]) and end_reason == "completed"
+    reason = "" if end_reason == "completed" else f": {end_reason}"
     track = None if aligned is None else aligned.track
     starts = partial(planned_starts, requirements.setup)
     if track is not None:
         starts = partial(flown_starts, requirements.setup, track)
-    return _flown_finding(requirements, has_arrived, reason) + _requirement_findings(requirements, starts)
+    return _flown_rtl_findings(requirements, has_arrived, reason) + _requirement_findings(requirements, starts)
 
 
 def _requirement_findings(requirements: RouteRequirements, starts: Callable[[float], ReturnStarts]) -> list[Finding]:
-    """Judge the scenario's requirements on returns and glides from the whole path; return [] without requirements.
+    """Judge the scenario's requirements on RTLs and glides from the whole path; return [] without requirements.
 
-    starts: function that samples the starts of returns at an interval, s.
+    starts: function that samples the starts of RTLs at an interval, s.
     """
     setup = requirements.setup
     requirement = setup.scenario.returns
@@ -120,22 +122,22 @@ class _Answer(NamedTuple):
 
 
 def _judge_rtl(world: ReturnWorld, starts: ReturnStarts, interval: float) -> _Answer:
-    """Judge whether every return to launch is safe."""
-    returns = judge_returns(world, starts, interval)
-    return _Answer(None if returns.undecided else returns.safe, headline(returns), _METHOD)
+    """Judge whether every RTL is safe."""
+    judged_returns = judge_returns(world, starts, interval)
+    return _Answer(None if judged_returns.undecided else judged_returns.safe, headline(judged_returns), _METHOD)
 
 
 def _judge_glides(world: ReturnWorld, starts: ReturnStarts, _: float) -> _Answer:
-    """Judge whether a glide from every start reaches home, a rally point, a landing place or flat ground.
+    """Judge whether a glide from every start reaches home, a rally point, a landing site or flat ground.
 
     Starts below the minimum height above ground are omitted: there the aircraft takes off or lands, and would descend
     straight ahead.
     """
     is_low = heights_above_ground(world, starts) < world.limit
-    glides = judge_glides(world, starts.at(np.flatnonzero(~is_low)))
+    glides = judge_glides(world, starts.subset(np.flatnonzero(~is_low)))
     left_out = f"; {is_low.sum()} lower than {world.limit:.0f} m above ground are left out" if is_low.any() else ""
     reason = f"without the engine: {glides_headline(glides)}{left_out}"
-    return _Answer(glides.somewhere, reason, f"glides that keep {MARGIN:.0f} m above ground")
+    return _Answer(glides.always_reaches_ground, reason, f"glides that keep {MARGIN:.0f} m above ground")
 
 
 # The go-around has its own rule.
@@ -145,8 +147,8 @@ _DEMANDS: dict[ReturnDemand, Callable[[ReturnWorld, ReturnStarts, float], _Answe
 }
 
 
-def circled(requirements: RouteRequirements, aligned: AlignedTrack) -> bool:
-    """Return True if a track flew its return loiter for at least one lap and for the loiter's full duration.
+def has_completed_return_loiter(requirements: RouteRequirements, aligned: AlignedTrack) -> bool:
+    """Return True if a track contains at least one lap of the RTL loiter and the loiter's full duration.
 
     The time starts when the aircraft is near the center and at the loiter's altitude, as for a simulated flight
     (`flight.simulation.tick.end_return`).
@@ -169,13 +171,13 @@ def circled(requirements: RouteRequirements, aligned: AlignedTrack) -> bool:
     return has_circled and float(track.time[-1] - track.time[first]) >= UNLIMITED
 
 
-def _flown_finding(requirements: RouteRequirements, has_arrived: bool, reason: str = "") -> list[Finding]:
+def _flown_rtl_findings(requirements: RouteRequirements, has_arrived: bool, reason: str = "") -> list[Finding]:
     outcome = "flown to its end" if has_arrived else f"the flight did not get to its end{reason}"
-    return _finding(requirements, True if has_arrived else None, outcome)
+    return _rtl_findings(requirements, True if has_arrived else None, outcome)
 
 
-def _finding(requirements: RouteRequirements, ok: bool | None, outcome: str) -> list[Finding]:
-    """Return one finding if the mission ends with a return to launch, otherwise []."""
+def _rtl_findings(requirements: RouteRequirements, ok: bool | None, outcome: str) -> list[Finding]:
+    """Return one finding if the mission ends with an RTL, otherwise []."""
     route = requirements.setup.route
     if route.return_from < 0:
         return []
@@ -201,28 +203,28 @@ def _finding(requirements: RouteRequirements, ok: bool | None, outcome: str) -> 
     ]
 
 
-def without_style(
+def without_path_following_findings(
     requirements: RouteRequirements, aligned: AlignedTrack | None, findings: Sequence[Finding]
 ) -> tuple[Finding, ...]:
-    """Remove the findings on how well the return follows its drawn path.
+    """Remove the findings on how well the RTL follows its drawn path.
 
-    findings: all findings, including the finding on the return itself.
+    findings: all findings, including the finding on the RTL itself.
     """
-    first = requirements.setup.route.return_from
-    if first < 0:
+    first_leg = requirements.setup.route.return_from
+    if first_leg < 0:
         return tuple(findings)
     # The corner where the return begins belongs to the return; the waypoint there belongs to the mission.
     end_waypoint = requirements.setup.route.return_until
-    legs = range(first, min(end_waypoint, requirements.legs))
-    places = {requirements.waypoint(i) for i in range(first + 1, min(end_waypoint, requirements.legs + 1))}
-    places |= {requirements.leg(i) for i in legs}
-    corner = requirements.waypoint(first)
+    legs = range(first_leg, min(end_waypoint, requirements.legs))
+    return_places = {requirements.waypoint(i) for i in range(first_leg + 1, min(end_waypoint, requirements.legs + 1))}
+    return_places |= {requirements.leg(i) for i in legs}
+    first_corner = requirements.waypoint(first_leg)
     kept_findings = [
         finding
         for finding in findings
         if not (
-            (finding.rule in _LEG_RULES and finding.place in places)
-            or (finding.rule == "turn" and finding.place == corner)
+            (finding.rule in _LEG_RULES and finding.place in return_places)
+            or (finding.rule == "turn" and finding.place == first_corner)
         )
     ]
     if aligned is None or not any(
@@ -230,7 +232,7 @@ def without_style(
     ):
         return tuple(kept_findings)
     # Every part of the return is on some leg; a drawn leg without any part was not flown.
-    unflown = {requirements.leg(i) for i in legs if not aligned.flew(i)}
+    unflown = {requirements.leg(i) for i in legs if not aligned.has_flown(i)}
     return tuple(finding for finding in kept_findings if finding.ok is not None or finding.place not in unflown)
 
 
@@ -238,5 +240,5 @@ RULE = Rule(
     name="return",
     judge=return_findings,
     judge_end=flown_return_findings,
-    merge=without_style,
+    merge=without_path_following_findings,
 )

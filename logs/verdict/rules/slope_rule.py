@@ -1,8 +1,8 @@
-"""The slope rule: judge if each leg can be climbed or descended at its speed, and how it was flown."""
+"""The slope rule: judge whether each leg can be climbed or descended at its speed, and how it was flown."""
 
 import math
 
-from logs.verdict.findings import UNKNOWN_AIRCRAFT, Fact, Finding, Message, make_finding, message, reason_of
+from logs.verdict.findings import UNKNOWN_AIRCRAFT, Fact, Finding, Message, finding_reason, make_finding, message
 from logs.verdict.measures.acceptance import step_height
 from logs.verdict.measures.route_requirements import RouteRequirements, slope_limit, steep_arc
 from logs.verdict.measures.slopes import LegFit, SlopeMeasure, measure_slope
@@ -35,24 +35,24 @@ def slope_findings(
     findings = []
     for leg in range(requirements.legs):
         # Without a flight the path of a climb that cannot be flown is unknown.
-        if requirements.leads_around(leg) and not geometric:
+        if requirements.is_turnaround_leg(leg) and not geometric:
             continue
         measure = None if geometric else SlopeMeasure()
         if aligned is not None:
             measure = measure_slope(requirements, aligned, leg)
-        findings.append(_finding(requirements, leg, measure))
+        findings.append(_leg_finding(requirements, leg, measure))
     return findings
 
 
-def _finding(requirements: RouteRequirements, leg: int, measure: SlopeMeasure | None) -> Finding:
-    planned = float(requirements.slopes[leg])
+def _leg_finding(requirements: RouteRequirements, leg: int, measure: SlopeMeasure | None) -> Finding:
+    planned_slope = float(requirements.slopes[leg])
     limit, source = slope_limit(requirements, leg)
-    sign = 1.0 if planned >= 0.0 else -1.0
-    if abs(planned) <= LEVEL_SLOPE_RAD and not _is_in_envelope(requirements, leg):
+    sign = 1.0 if planned_slope >= 0.0 else -1.0
+    if abs(planned_slope) <= LEVEL_SLOPE_RAD and not _is_in_envelope(requirements, leg):
         # A level leg at a speed that the aircraft cannot fly fails by its speed, not by its slope.
         limit = max(limit, LEVEL_SLOPE_RAD)
-    faults, facts = [], [f"slope {math.degrees(planned):+.2f}°"]
-    if abs(planned) > limit + PLAN_TOLERANCE_RAD:
+    faults, facts = [], [f"slope {math.degrees(planned_slope):+.2f}°"]
+    if abs(planned_slope) > limit + PLAN_TOLERANCE_RAD:
         rise = step_height(requirements, leg)
         if rise is None:
             faults.append(_steep_leg_message(requirements, leg, limit, source))
@@ -72,24 +72,24 @@ def _finding(requirements: RouteRequirements, leg: int, measure: SlopeMeasure | 
         fit = measure.slope
         method = "not flown"
         if fit is not None:
-            method_text = "least squares" if fit.fitted else "least squares, short leg,"
-            method = f"{method_text} over {fit.run:.0f} m"
+            method_text = "least squares" if fit.is_fitted else "least squares, short leg,"
+            method = f"{method_text} over {fit.length:.0f} m"
     ok: bool | None = not faults
     check = ""
     if not faults and (uncertainty := _uncertainty_text(requirements, leg)):
         ok, check = None, UNKNOWN_AIRCRAFT
         facts.insert(0, uncertainty)
-    if measure is not None and not measure.finished:
+    if measure is not None and not measure.is_finished:
         facts.append("the flight did not get to its end")
         ok = None if ok else False
-    judged = planned if fit is None else fit.value
+    judged = planned_slope if fit is None else fit.value
     return make_finding(
         "slope",
         requirements.leg(leg),
         ok=ok,
-        reason=reason_of(faults, facts if measure is not None or not faults else ()),
+        reason=finding_reason(faults, facts if measure is not None or not faults else ()),
         faults=faults,
-        planned=math.degrees(planned),
+        planned=math.degrees(planned_slope),
         flown=None if fit is None else math.degrees(fit.value),
         limit=math.degrees(sign * limit),
         at_least=sign < 0.0,
@@ -104,21 +104,21 @@ def _finding(requirements: RouteRequirements, leg: int, measure: SlopeMeasure | 
 
 
 def _uncertainty_text(requirements: RouteRequirements, leg: int) -> str:
-    """Explain why an uncertain aircraft model leaves a slope within its limits undecided; return "" if it is decided.
+    """Explain why an uncertain aircraft model leaves a slope undecided; return "" if it is decided.
 
     Only the aircraft's own limits are considered: a tighter limit of the scenario says nothing about its ability.
     """
-    planned, envelope = float(requirements.slopes[leg]), requirements.setup.envelope
+    planned_slope, envelope = float(requirements.slopes[leg]), requirements.setup.envelope
     limits, certain_limits, verb, deviation = (
-        (requirements.climb, requirements.sure_climb, "climbs", envelope.climb_sd)
-        if planned >= 0.0
-        else (requirements.dive, requirements.sure_dive, "falls", envelope.descent_sd)
+        (requirements.climb, requirements.certain_climb, "climbs", envelope.climb_sd)
+        if planned_slope >= 0.0
+        else (requirements.dive, requirements.certain_dive, "falls", envelope.descent_sd)
     )
     limit, certain_limit = float(limits[leg]), float(certain_limits[leg])
     # Without the aircraft's limits there is no uncertain limit.
-    if abs(planned) <= max(LEVEL_SLOPE_RAD, certain_limit) or not certain_limit < limit < math.inf:
+    if abs(planned_slope) <= max(LEVEL_SLOPE_RAD, certain_limit) or not certain_limit < limit < math.inf:
         return ""
-    slope, limit_deg, deviation_deg = (math.degrees(angle) for angle in (abs(planned), limit, deviation))
+    slope, limit_deg, deviation_deg = (math.degrees(angle) for angle in (abs(planned_slope), limit, deviation))
     return (
         f"{verb} {slope:.1f}°; the limit according to {envelope.source} is {limit_deg:.1f}°,"
         f" give or take {deviation_deg:.1f}°"
@@ -138,7 +138,7 @@ def _steep_arc_faults(requirements: RouteRequirements, leg: int) -> list[Message
     slope, missing_height = math.degrees(math.atan(abs(arc.tangent))), (abs(arc.tangent) - arc.limit) * length
     arc_text = (
         f"the arc at {place_text(place)} {verb} {slope:.1f}° for {length:.0f} m, where legs {leg} and {corner} have"
-        f" {legs}: flown by, it is shorter than the {2.0 * float(requirements.before[corner]):.0f} m of leg"
+        f" {legs}: flown by, it is shorter than the {2.0 * float(requirements.length_before[corner]):.0f} m of leg"
         " that it replaces"
     )
     limit = (
@@ -158,13 +158,13 @@ def _is_in_envelope(requirements: RouteRequirements, leg: int) -> bool:
 
 
 def _steep_leg_message(requirements: RouteRequirements, leg: int, limit: float, source: str) -> Message:
-    """Describe a planned slope beyond its limit, with the slope that the leg needs and the limit."""
-    planned = float(requirements.slopes[leg])
-    verb = "climbs" if planned >= 0.0 else "falls"
-    slope_text = f"{math.degrees(abs(planned)):.1f}° for {_distance_text(float(requirements.runs[leg]))}"
+    """Describe a planned slope beyond its limit, and the limit."""
+    planned_slope = float(requirements.slopes[leg])
+    verb = "climbs" if planned_slope >= 0.0 else "falls"
+    slope_text = f"{math.degrees(abs(planned_slope)):.1f}° for {_distance_text(float(requirements.runs[leg]))}"
     if requirements.runs[leg] < MIN_LEG_LENGTH_M:
-        rise = abs(float(requirements.points[leg + 1, 2] - requirements.points[leg, 2]))
-        slope_text = f"{round(rise, 1):g} m on the spot, {math.degrees(abs(planned)):.1f}°"
+        height = abs(float(requirements.points[leg + 1, 2] - requirements.points[leg, 2]))
+        slope_text = f"{round(height, 1):g} m on the spot, {math.degrees(abs(planned_slope)):.1f}°"
     return message(f"leg {leg} {verb} {slope_text}", f"; {_limit_text(requirements, leg, limit, source)}", placed=True)
 
 
@@ -196,8 +196,11 @@ def _distance_text(metres: float) -> str:
 
 
 def _throttle_times(measure: SlopeMeasure) -> tuple[tuple[str, float, float, str], ...]:
-    """Return each throttle limit's name, its duration, s, and the speed error at the limit, m/s, with its direction."""
-    return (("full", measure.at_full, measure.slow, "slow"), ("idle", measure.at_idle, measure.fast, "fast"))
+    """Return name, duration (s), speed error (m/s) and direction of the error for each throttle limit."""
+    return (
+        ("full", measure.full_throttle_time, measure.speed_loss, "slow"),
+        ("idle", measure.idle_throttle_time, measure.speed_gain, "fast"),
+    )
 
 
 def _flown_facts(measure: SlopeMeasure) -> list[str]:
@@ -235,57 +238,58 @@ def _measured_facts(requirements: RouteRequirements, leg: int, measure: SlopeMea
 def _flown_faults(
     requirements: RouteRequirements, leg: int, measure: SlopeMeasure, limit: float, performance_faults: list[Message]
 ) -> list[Message]:
-    """Return faults in which the flown leg differs from the planned leg.
+    """Return the faults of the flown leg compared with the planned leg.
 
     performance_faults: faults that show a lack of performance.
     """
     faults = []
-    planned = float(requirements.slopes[leg])
-    sign = 1.0 if planned >= 0.0 else -1.0
+    planned_slope = float(requirements.slopes[leg])
+    sign = 1.0 if planned_slope >= 0.0 else -1.0
     fit = measure.slope
     if fit is not None:
-        flown = math.degrees(fit.value)
+        flown_slope = math.degrees(fit.value)
         if sign * fit.value > limit + fit.tolerance:
-            faults.append(message(f"flown {flown:+.1f}°, beyond {math.degrees(limit):.1f}°"))
-        if fit.fitted and abs(fit.value - planned) > SLOPE_TOLERANCE_RAD + fit.tolerance:
-            faults.append(message(f"flown at {flown:+.1f}° instead of {math.degrees(planned):+.1f}°"))
+            faults.append(message(f"flown {flown_slope:+.1f}°, beyond {math.degrees(limit):.1f}°"))
+        if fit.is_fitted and abs(fit.value - planned_slope) > SLOPE_TOLERANCE_RAD + fit.tolerance:
+            faults.append(message(f"flown at {flown_slope:+.1f}° instead of {math.degrees(planned_slope):+.1f}°"))
     if measure.height_error is not None:
         error = abs(measure.height_error)
-        if error > (SHORT_LEG_HEIGHT_ERROR_LIMIT_M if measure.short else HEIGHT_ERROR_LIMIT_M):
+        if error > (SHORT_LEG_HEIGHT_ERROR_LIMIT_M if measure.is_short else HEIGHT_ERROR_LIMIT_M):
             side = "above" if measure.height_error > 0.0 else "below"
             faults.append(message(f"{error:.0f} m {side} the leg"))
-    has_ability = not performance_faults and measure.ability is not None and measure.ability.covers(planned)
+    has_ability = not performance_faults and measure.ability is not None and measure.ability.exceeds(planned_slope)
     max_error = SPEED_TOLERANCE_MPS + GUST_SPEED_FRACTION * W20[requirements.setup.scenario.wind.turbulence]
     for name, duration, error, direction in _throttle_times(measure):
         # If the aircraft showed more ability than the leg needs, the air caused the speed error.
         if (
             duration >= SATURATED_TIME_S
             and error > max_error
-            and not (has_ability and name == _throttle_limit(planned))
+            and not (has_ability and name == _throttle_limit(planned_slope))
         ):
             faults.append(message(f"throttle at {name} for {duration:.0f} s and {error:.1f} m/s too {direction}"))
     return faults
 
 
-def _throttle_limit(planned: float) -> str:
-    """Return the name of the throttle limit, "full" or "idle", that a slope may reach."""
-    return "full" if planned >= 0.0 else "idle"
+def _throttle_limit(planned_slope: float) -> str:
+    """Return the throttle limit that a slope may reach: "full" for a climb, "idle" for a descent."""
+    return "full" if planned_slope >= 0.0 else "idle"
 
 
 def _performance_faults(requirements: RouteRequirements, leg: int, measure: SlopeMeasure) -> list[Message]:
     """Return a fault if the aircraft showed less climb or sink ability than the leg needs."""
-    ability, planned = measure.ability, float(requirements.slopes[leg])
-    if ability is None or abs(planned) <= LEVEL_SLOPE_RAD:
+    ability, planned_slope = measure.ability, float(requirements.slopes[leg])
+    if ability is None or abs(planned_slope) <= LEVEL_SLOPE_RAD:
         return []
-    if ability.slope - abs(planned) >= -ABILITY_TOLERANCE_RAD - ABILITY_SIGMAS * ability.error:
+    if ability.slope - abs(planned_slope) >= -ABILITY_TOLERANCE_RAD - ABILITY_SIGMAS * ability.error:
         return []
-    verb = "climb" if planned >= 0.0 else "sink"
+    verb = "climb" if planned_slope >= 0.0 else "sink"
     speed = float(requirements.route.airspeed[leg])
     return [
         message(
-            f"in {ability.seconds:.0f} s at {_throttle_limit(planned)} throttle the aircraft showed that it can {verb}"
+            f"in {ability.duration:.0f} s at {_throttle_limit(planned_slope)} throttle the aircraft showed that"
+            f" it can {verb}"
             f" {math.degrees(ability.slope):.1f}° at {speed:.0f} m/s here",
-            f"; the leg needs {math.degrees(abs(planned)):.1f}°",
+            f"; the leg needs {math.degrees(abs(planned_slope)):.1f}°",
         )
     ]
 

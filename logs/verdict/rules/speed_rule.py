@@ -5,7 +5,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from logs.verdict.findings import NOT_FLOWN, UNKNOWN_AIRCRAFT, Fact, Finding, Message, make_finding, message, reason_of
+from logs.verdict.findings import (
+    NOT_FLOWN,
+    UNKNOWN_AIRCRAFT,
+    Fact,
+    Finding,
+    Message,
+    finding_reason,
+    make_finding,
+    message,
+)
 from logs.verdict.measures.route_requirements import RouteRequirements, slope_limit
 from logs.verdict.measures.slopes import measure_ability, steady_rows
 from logs.verdict.measures.track_alignment import AlignedTrack
@@ -51,15 +60,15 @@ def _parameter_findings(requirements: RouteRequirements) -> list[Finding]:
 
 def _speed_finding(requirements: RouteRequirements, aligned: AlignedTrack | None, leg: int, geometric: bool) -> Finding:
     commanded = float(requirements.route.airspeed[leg])
-    slowest, fastest, faults = _level_speed_range(requirements, leg, commanded)
+    min_speed, max_speed, faults = _level_speed_range(requirements, leg, commanded)
     command = float(requirements.setup.route.airspeed[leg])
-    notes = [_command_text(command, commanded, slowest, fastest)]
+    notes = [_command_text(command, commanded, min_speed, max_speed)]
     notes += [*_speed_range_notes(requirements, command), *_short_leg_notes(requirements, leg, commanded)]
-    margin = min(commanded - slowest, fastest - commanded)
-    at_least = commanded - slowest <= fastest - commanded
-    limit = slowest if at_least else fastest
+    margin = min(commanded - min_speed, max_speed - commanded)
+    at_least = commanded - min_speed <= max_speed - commanded
+    limit = min_speed if at_least else max_speed
     mean, tolerance, facts, source = math.nan, 0.0, [], "aircraft"
-    is_unflown = not geometric and (aligned is None or not aligned.flew(leg))
+    is_unflown = not geometric and (aligned is None or not aligned.has_flown(leg))
     if is_unflown:
         notes.append("the leg was not flown")
     elif aligned is not None:
@@ -80,7 +89,7 @@ def _speed_finding(requirements: RouteRequirements, aligned: AlignedTrack | None
             flown_command = _flown_command(requirements, leg)
             if not faults and (held_speed := _find_held_speed(requirements, aligned, leg, flown_command)):
                 # From here on the flown speed is judged by the command, instead of the command by the envelope.
-                mean, allowed_error, source = held_speed.speed, held_speed.allowed, "mission"
+                mean, allowed_error, source = held_speed.speed, held_speed.allowed_error, "mission"
                 limit, at_least = (
                     flown_command + math.copysign(allowed_error, mean - flown_command),
                     mean < flown_command,
@@ -90,14 +99,14 @@ def _speed_finding(requirements: RouteRequirements, aligned: AlignedTrack | None
         facts.append(Fact("speed error", mean - commanded, "m/s"))
     ok: bool | None = not faults
     check = ""
-    if not faults and (uncertainty := _uncertainty_text(requirements, leg, commanded, fastest)):
+    if not faults and (uncertainty := _uncertainty_text(requirements, leg, commanded, max_speed)):
         ok, check = None, UNKNOWN_AIRCRAFT
         notes.insert(0, uncertainty)
     return make_finding(
         "speed",
         requirements.leg(leg),
         ok=None if ok and is_unflown else ok,
-        reason=reason_of(faults, notes),
+        reason=finding_reason(faults, notes),
         faults=faults,
         planned=commanded,
         flown=mean,
@@ -113,12 +122,12 @@ def _speed_finding(requirements: RouteRequirements, aligned: AlignedTrack | None
     )
 
 
-def _command_text(command: float, commanded: float, slowest: float, fastest: float) -> str:
+def _command_text(command: float, commanded: float, min_speed: float, max_speed: float) -> str:
     """Describe a commanded airspeed, equivalent and true, and the range of airspeeds in level flight, m/s."""
     true_speed_text = "" if command == commanded else f" of equivalent airspeed, {commanded:.1f} m/s of true airspeed,"
-    if not (math.isfinite(slowest) and math.isfinite(fastest)):
+    if not (math.isfinite(min_speed) and math.isfinite(max_speed)):
         return f"{command:.1f} m/s{true_speed_text} is commanded, and no level flight is known"
-    level_text = f"level flight is possible from {slowest:.1f} to {fastest:.1f} m/s"
+    level_text = f"level flight is possible from {min_speed:.1f} to {max_speed:.1f} m/s"
     return f"{command:.1f} m/s{true_speed_text} is commanded; {level_text}"
 
 
@@ -133,23 +142,23 @@ def _flown_command(requirements: RouteRequirements, leg: int) -> float:
 class _HeldSpeed(NamedTuple):
     """Airspeed that was held instead of the commanded airspeed, m/s.
 
-    allowed: tolerated difference from the command, m/s.
+    allowed_error: tolerated difference from the command, m/s.
     tolerance: further difference that gusts may cause, m/s.
     """
 
     speed: float
-    allowed: float
+    allowed_error: float
     tolerance: float
 
 
 def _find_held_speed(
     requirements: RouteRequirements, aligned: AlignedTrack, leg: int, commanded: float
 ) -> _HeldSpeed | None:
-    """Return the airspeed at which a flight settled on a leg if it is far from the command, or None.
+    """Return the airspeed held on a leg if it is far from the command, otherwise None.
 
     The airspeed is the mean over the second half of the leg's steady rows, because in the first half the autopilot may
-    still change its speed.  Return None if the leg is too steep for the aircraft, because the slope rule then names the
-    cause, and for an imported flight, because its airspeed sensor may have the same error.
+    still change its speed.  Return None also if the leg is too steep for the aircraft, because the slope rule then
+    names the cause, and for an imported flight, because its airspeed sensor may have the same error.
     """
     if abs(float(requirements.slopes[leg])) > slope_limit(requirements, leg)[0] + PLAN_TOLERANCE_RAD:
         return None
@@ -171,7 +180,7 @@ def _find_held_speed(
     return _HeldSpeed(speed, allowed_error, tolerance)
 
 
-def _uncertainty_text(requirements: RouteRequirements, leg: int, commanded: float, fastest: float) -> str:
+def _uncertainty_text(requirements: RouteRequirements, leg: int, commanded: float, max_speed: float) -> str:
     """Explain why an uncertain maximum airspeed leaves a commanded speed undecided; return "" if decided."""
     envelope = requirements.setup.envelope
     if not envelope.fastest_sd:
@@ -180,7 +189,7 @@ def _uncertainty_text(requirements: RouteRequirements, leg: int, commanded: floa
     altitudes = requirements.points[leg : leg + 2, 2].tolist()
     if commanded <= min(certain_envelope.level_speeds(altitude)[1] for altitude in altitudes):
         return ""
-    limit_text = f"the fastest level flight according to {envelope.source} is {fastest:.1f} m/s"
+    limit_text = f"the fastest level flight according to {envelope.source} is {max_speed:.1f} m/s"
     return f"{commanded:.1f} m/s is commanded; {limit_text}, give or take {envelope.fastest_sd:.1f} m/s"
 
 
@@ -198,23 +207,23 @@ def _speed_range_notes(requirements: RouteRequirements, command: float) -> list[
 def _short_leg_notes(requirements: RouteRequirements, leg: int, commanded: float) -> list[str]:
     """Return a note if a leg is too short to reach its speed at `MAX_STEADY_ACCELERATION_MPS2`."""
     previous_speed = float(requirements.route.airspeed[leg - 1]) if leg else commanded
-    change, run = commanded - previous_speed, float(requirements.runs[leg])
+    change, leg_length = commanded - previous_speed, float(requirements.runs[leg])
     duration = abs(change) / MAX_STEADY_ACCELERATION_MPS2
     # Distance at the mean of both speeds over ground, in the wind along the leg.
     start_ground_speed = float(requirements.ground_speed[leg]) - change
     needed_length = duration * (start_ground_speed + 0.5 * change)
-    if not needed_length > run or not start_ground_speed > 0.0:
+    if not needed_length > leg_length or not start_ground_speed > 0.0:
         return []
     # start t + a t^2 / 2 = run
     acceleration = math.copysign(MAX_STEADY_ACCELERATION_MPS2, change)
     end_speed = (
-        math.sqrt(max(0.0, start_ground_speed * start_ground_speed + 2.0 * acceleration * run))
+        math.sqrt(max(0.0, start_ground_speed * start_ground_speed + 2.0 * acceleration * leg_length))
         - start_ground_speed
         + previous_speed
     )
     return [
         f"from {previous_speed:.1f} to {commanded:.1f} m/s takes about {duration:.0f} s and {needed_length:.0f} m,"
-        f" but the leg has {run:.0f} m, so about {end_speed:.1f} m/s are reached"
+        f" but the leg has {leg_length:.0f} m, so about {end_speed:.1f} m/s are reached"
     ]
 
 
@@ -233,43 +242,47 @@ def _second_means(aligned: AlignedTrack, rows: slice) -> Floats:
 
 
 def _is_caused_by_air(requirements: RouteRequirements, aligned: AlignedTrack, leg: int, error: float) -> bool:
-    """Return True if vertical air motion caused the speed error `error`, because the aircraft showed enough ability."""
+    """Return True if vertical air motion caused a speed error: the aircraft showed enough ability for the slope."""
     if error * requirements.slopes[leg] >= 0.0:
         return False
     ability = measure_ability(requirements, aligned, leg)
-    return ability is not None and ability.covers(float(requirements.slopes[leg]))
+    return ability is not None and ability.exceeds(float(requirements.slopes[leg]))
 
 
 def _level_speed_range(
     requirements: RouteRequirements, leg: int, commanded: float
 ) -> tuple[float, float, list[Message]]:
-    """Return the airspeeds at which level flight is possible along the whole leg, and faults of the commanded speed."""
+    """Return the airspeed range of level flight along the whole leg, and faults of the commanded speed."""
     altitudes = (float(requirements.points[leg, 2]), float(requirements.points[leg + 1, 2]))
     speeds = [requirements.setup.envelope.level_speeds(altitude) for altitude in altitudes]
     # If level flight is impossible at one altitude, NaN remains for the whole leg.
-    slowest, fastest = (
-        float(np.max([min_speed for min_speed, _ in speeds])),
-        float(np.min([max_speed for _, max_speed in speeds])),
+    min_speed, max_speed = (
+        float(np.max([lower for lower, _ in speeds])),
+        float(np.min([upper for _, upper in speeds])),
     )
     faults = []
     if math.isnan(requirements.ground_speed[leg]):
         faults.append(message(f"the wind is too strong to hold the course of leg {leg} at {commanded:.0f} m/s"))
     max_altitude = max(altitudes)
-    if math.isnan(slowest) or math.isnan(fastest):
+    if math.isnan(min_speed) or math.isnan(max_speed):
         faults.append(message(f"no level flight at {max_altitude:.0f} m"))
-    if commanded < slowest:
-        slow_text = f"{commanded:.1f} m/s is below the slowest level flight, {slowest:.1f} m/s at {max_altitude:.0f} m"
+    if commanded < min_speed:
+        slow_text = (
+            f"{commanded:.1f} m/s is below the slowest level flight, {min_speed:.1f} m/s at {max_altitude:.0f} m"
+        )
         faults.append(message(slow_text))
-    if commanded > fastest:
-        fast_text = f"{commanded:.1f} m/s is above the fastest level flight, {fastest:.1f} m/s at {max_altitude:.0f} m"
+    if commanded > max_speed:
+        fast_text = (
+            f"{commanded:.1f} m/s is above the fastest level flight, {max_speed:.1f} m/s at {max_altitude:.0f} m"
+        )
         faults.append(message(fast_text))
-    return slowest, fastest, faults
+    return min_speed, max_speed, faults
 
 
 def _measure_airspeed(
     requirements: RouteRequirements, aligned: AlignedTrack, leg: int
 ) -> tuple[float, float, float] | None:
-    """Return a leg's mean airspeed, its tolerance, and its minimum mean over a second, m/s; None if too short.
+    """Return a leg's mean airspeed, its tolerance, and the minimum one-second mean, m/s; None if the leg is too short.
 
     The tolerance allows for gusts and for a change of slope at the start of the leg.
     """
@@ -288,7 +301,7 @@ def _measure_airspeed(
 
 
 def _gust_spread(requirements: RouteRequirements, seconds: float) -> float:
-    """Return the change of the mean airspeed over a duration that gusts may cause, m/s."""
+    """Return the error of a mean airspeed over a duration that gusts may cause, m/s."""
     gust = GUST_SPEED_FRACTION * W20[requirements.setup.scenario.wind.turbulence]
     return GUST_SIGMAS * gust * math.sqrt(min(1.0, 2.0 * GUST_DURATION_S / max(seconds, 1e-3)))
 

@@ -31,14 +31,14 @@ class _Margin:
     """True airspeed and the stall speeds in this bank (rad) and in level flight, m/s."""
 
     speed: float
-    stall: float
-    level: float
+    stall_speed: float
+    level_stall_speed: float
     bank: float
 
     @property
-    def left(self) -> float:
+    def above_stall(self) -> float:
         """Margin above the stall, m/s."""
-        return self.speed - self.stall
+        return self.speed - self.stall_speed
 
 
 def stall_findings(
@@ -59,7 +59,7 @@ def stall_findings(
 
 
 def _planned_findings(requirements: RouteRequirements) -> list[Finding]:
-    worst: tuple[float, int, _Margin] | None = None
+    worst_margin: tuple[float, int, _Margin] | None = None
     for corner in range(1, requirements.legs):
         for speed in requirements.route.airspeed[corner - 1 : corner + 1].tolist():
             bank, stall_speed = (
@@ -67,12 +67,16 @@ def _planned_findings(requirements: RouteRequirements) -> list[Finding]:
                 level_stall(requirements, float(requirements.points[corner, 2])),
             )
             margin = _Margin(speed, stall_speed / math.sqrt(math.cos(bank)), stall_speed, bank)
-            if bank > 0.0 and math.isfinite(stall_speed) and (worst is None or margin.left < worst[0]):
-                worst = margin.left, corner, margin
-    if worst is None:
+            if (
+                bank > 0.0
+                and math.isfinite(stall_speed)
+                and (worst_margin is None or margin.above_stall < worst_margin[0])
+            ):
+                worst_margin = margin.above_stall, corner, margin
+    if worst_margin is None:
         return []
-    _, corner, margin = worst
-    return [_finding(margin, f"at waypoint {corner}", 0.0, geometric=True)]
+    _, corner, margin = worst_margin
+    return [_stall_finding(margin, f"at waypoint {corner}", 0.0, geometric=True)]
 
 
 def planned_bank(requirements: RouteRequirements, i: int, speed: float) -> float:
@@ -85,9 +89,9 @@ def planned_bank(requirements: RouteRequirements, i: int, speed: float) -> float
     if turn <= 0.0 or not math.isfinite(radius):
         return 0.0
     # The bank limit's radius belongs to the ground speed of the faster leg.
-    fastest_ground_speed = math.sqrt(float(requirements.tightest[i]) * GRAVITY * math.tan(limit))
+    max_ground_speed = math.sqrt(float(requirements.min_radius[i]) * GRAVITY * math.tan(limit))
     speed_deficit = max(requirements.route.airspeed[i - 1 : i + 1]) - speed
-    bank = math.atan(max(0.0, fastest_ground_speed - speed_deficit) ** 2 / (GRAVITY * radius))
+    bank = math.atan(max(0.0, max_ground_speed - speed_deficit) ** 2 / (GRAVITY * radius))
     # Rolling in and out again at 1 / ROLL_TIME turns by (g / v) ROLL_TIME bank^2.
     reachable_bank = math.sqrt(turn * speed / (GRAVITY * ROLL_TIME))
     return min(bank, reachable_bank, limit)
@@ -118,8 +122,8 @@ def _flown_findings(requirements: RouteRequirements, aligned: AlignedTrack) -> l
         return []
     k = int(np.nanargmin(margins))
     tolerance = STALL_TOLERANCE_MPS + GUST_SPEED_FRACTION * W20[requirements.setup.scenario.wind.turbulence]
-    worst = _Margin(float(speed[k]), float(stall_speed[k]), float(level_stall_speed[k]), float(bank[k]))
-    return [_finding(worst, f"at {track.time[k + width // 2]:.1f} s", tolerance, geometric=False)]
+    worst_margin = _Margin(float(speed[k]), float(stall_speed[k]), float(level_stall_speed[k]), float(bank[k]))
+    return [_stall_finding(worst_margin, f"at {track.time[k + width // 2]:.1f} s", tolerance, geometric=False)]
 
 
 def _window_means(values: NDArray[np.floating], width: int) -> Floats:
@@ -128,22 +132,25 @@ def _window_means(values: NDArray[np.floating], width: int) -> Floats:
     return np.asarray((sums[width:] - sums[:-width]) / width)
 
 
-def _finding(margin: _Margin, where: str, tolerance: float, *, geometric: bool) -> Finding:
-    stall = f"{margin.speed:.1f} m/s {where}, stall {margin.stall:.1f} m/s in {math.degrees(margin.bank):.0f}° of bank"
-    fault = message(stall, f" (level {margin.level:.1f} m/s; true airspeeds)")
+def _stall_finding(margin: _Margin, where: str, tolerance: float, *, geometric: bool) -> Finding:
+    stall = (
+        f"{margin.speed:.1f} m/s {where}, stall {margin.stall_speed:.1f} m/s in"
+        f" {math.degrees(margin.bank):.0f}° of bank"
+    )
+    fault = message(stall, f" (level {margin.level_stall_speed:.1f} m/s; true airspeeds)")
     return make_finding(
         "stall",
         FLIGHT,
-        ok=margin.left >= -tolerance,
+        ok=margin.above_stall >= -tolerance,
         reason=fault.text,
         faults=[fault],
         planned=margin.speed if geometric else None,
         flown=None if geometric else margin.speed,
-        limit=margin.stall,
+        limit=margin.stall_speed,
         at_least=True,
         source="aircraft",
         tolerance=tolerance,
-        margin=margin.left,
+        margin=margin.above_stall,
         unit="m/s",
         method="slowest level flight times the root of the load factor",
     )

@@ -9,8 +9,8 @@ import math
 import numpy as np
 
 from flight.mission.surveys import PhotoLine, Survey
-from logs.verdict.findings import UNKNOWN_WAY, Fact, Finding, Message, make_finding, message, reason_of
-from logs.verdict.measures.circle_reach import hazards_within
+from logs.verdict.findings import UNKNOWN_WAY, Fact, Finding, Message, finding_reason, make_finding, message
+from logs.verdict.measures.circle_reach import find_hazards
 from logs.verdict.measures.photo_lines import LineMeasure, OverlapMeasure, measure_line, measure_overlap
 from logs.verdict.measures.route_requirements import RouteRequirements, turn_limit
 from logs.verdict.measures.track_alignment import AlignedTrack
@@ -58,7 +58,7 @@ def _overlap_findings(requirements: RouteRequirements, aligned: AlignedTrack | N
         return []
     sides = (
         (FRONT, measure.front, measure.camera.front, survey.line(measure.line)),
-        (SIDE, measure.side, measure.camera.side, survey.line(measure.pair[1])),
+        (SIDE, measure.side, measure.camera.side, survey.line(measure.line_pair[1])),
     )
     findings = []
     for check, overlap, required, line in sides:
@@ -73,7 +73,7 @@ def _overlap_findings(requirements: RouteRequirements, aligned: AlignedTrack | N
                 "survey",
                 _line_place(requirements, line),
                 ok=ok,
-                reason=reason_of(faults, [] if faults else [text]),
+                reason=finding_reason(faults, [] if faults else [text]),
                 faults=faults,
                 planned=100.0 * overlap if aligned is None else 100.0 * required,
                 flown=None if aligned is None else 100.0 * overlap,
@@ -90,22 +90,24 @@ def _overlap_findings(requirements: RouteRequirements, aligned: AlignedTrack | N
 
 
 def overlap_text(measure: OverlapMeasure, check: str) -> str:
-    """Describe the minimum overlap of photos along or across lines, its place, and the required overlap."""
+    """Describe the minimum overlap of photos along or across lines, its line, and the required overlap."""
     if check == FRONT:
         overlap, required = measure.front, measure.camera.front
-        spacing_text = f" apart, one each {measure.camera.interval:g} s" if measure.slow else " apart"
-        where = (
-            f"line {measure.line + 1}: photos {measure.apart:.0f} m{spacing_text}, {measure.height:.0f} m above ground"
+        spacing_text = f" apart, one each {measure.camera.interval:g} s" if measure.is_camera_limited else " apart"
+        lines_text = (
+            f"line {measure.line + 1}: photos {measure.photo_spacing:.0f} m{spacing_text},"
+            f" {measure.height:.0f} m above ground"
         )
     else:
         overlap, required = measure.side, measure.camera.side
-        first, second = sorted(measure.pair)
-        where = (
-            f"lines {first + 1} and {second + 1}: {measure.between:.0f} m apart, {measure.heights:.0f} m above ground"
+        first, second = sorted(measure.line_pair)
+        lines_text = (
+            f"lines {first + 1} and {second + 1}: {measure.line_spacing:.0f} m apart,"
+            f" {measure.side_height:.0f} m above ground"
         )
     if overlap is None:
         return ""
-    text = f"{check} {100.0 * overlap:.0f} % at the lowest ({where})"
+    text = f"{check} {100.0 * overlap:.0f} % at the lowest ({lines_text})"
     return text if required is None else f"{text}, {100.0 * required:.0f} % required"
 
 
@@ -120,12 +122,12 @@ def _tight_turnaround_findings(requirements: RouteRequirements, survey: Survey) 
     for number, (first, last) in enumerate(turnarounds):
         if not any(_is_too_tight(requirements, i) for i in range(first, last + 1)):
             continue
-        points, radii = requirements.points[first : last + 1], requirements.tightest[first : last + 1]
+        points, radii = requirements.points[first : last + 1], requirements.min_radius[first : last + 1]
         center = points[:, :2].mean(axis=0)
         radius = float(radii[np.isfinite(radii)].max(initial=0.0))
         reach = float(np.hypot(*(points[:, :2] - center).T).max()) + TURN_AROUND_RADII * radius
         min_altitude, max_altitude = float(points[:, 2].min()), float(points[:, 2].max())
-        if hazards := hazards_within(requirements, center, min_altitude, max_altitude, reach):
+        if hazards := find_hazards(requirements, center, min_altitude, max_altitude, reach):
             end_names = {0: "the turn onto the first line", len(turnarounds) - 1: "the turn off the last line"}
             reason = (
                 f"{end_names.get(number, f'turn-around {number}')} is too tight to be flown as drawn, and within"
@@ -157,7 +159,7 @@ def _planned_finding(requirements: RouteRequirements, survey: Survey, line: Phot
     # The turns may use the leads before and after the line.
     lead_in = float(requirements.runs[line.begins : line.first].sum())
     lead_out = float(requirements.runs[line.last : line.ends].sum())
-    cut_in = _clip_length(float(requirements.after[line.begins]) - lead_in, length)
+    cut_in = _clip_length(float(requirements.length_after[line.begins]) - lead_in, length)
     cut_out = _clip_length(_turn_lead(requirements, line) - lead_out, length)
     straight_fraction = max(0.0, length - cut_in - cut_out) / length
     ok = straight_fraction >= PHOTO_COVERAGE_FRACTION
@@ -171,14 +173,14 @@ def _planned_finding(requirements: RouteRequirements, survey: Survey, line: Phot
                 f" (they take {cut_in:.0f} m at the start and {cut_out:.0f} m at the end)",
             )
         )
-    return _finding(requirements, line, ok, faults, facts, straight_fraction, geometric=True)
+    return _line_finding(requirements, line, ok, faults, facts, straight_fraction, geometric=True)
 
 
 def _turn_lead(requirements: RouteRequirements, line: PhotoLine) -> float:
     """Return the distance before the end of a line's straight run at which the turn begins, m."""
     setup, last = requirements.setup, line.ends
     if setup.autopilot.follows_path or not 0 < last < requirements.legs:
-        return float(requirements.before[last])
+        return float(requirements.length_before[last])
     turn = abs(float(requirements.turns[last]))
     mission_radius = float(setup.route.acceptance[last]) if setup.autopilot.reads_acceptance else 0.0
     return mission_radius or setup.autopilot.turn_distance(turn, float(requirements.points[last, 2]))
@@ -194,22 +196,22 @@ def _flown_finding(
     name = _line_text(requirements, survey, line, number)
     measure = None if aligned is None else measure_line(requirements, aligned, survey, line)
     if measure is None:
-        return _finding(requirements, line, None, [], [f"{name}: not flown"], math.nan, geometric=False)
-    ok = measure.good >= PHOTO_COVERAGE_FRACTION
+        return _line_finding(requirements, line, None, [], [f"{name}: not flown"], math.nan, geometric=False)
+    ok = measure.usable >= PHOTO_COVERAGE_FRACTION
     faults = [] if ok else [_coverage_fault(measure, name)]
-    facts = [] if not ok else [f"{name}: {100.0 * measure.good:.0f} % of its {measure.length:.0f} m can be used"]
-    if measure.missed:
-        facts.append(f"{measure.missed} of {measure.photos} photos missed")
-    return _finding(requirements, line, ok, faults, facts, measure.good, geometric=False, measure=measure)
+    facts = [] if not ok else [f"{name}: {100.0 * measure.usable:.0f} % of its {measure.length:.0f} m can be used"]
+    if measure.missed_photos:
+        facts.append(f"{measure.missed_photos} of {measure.photos} photos missed")
+    return _line_finding(requirements, line, ok, faults, facts, measure.usable, geometric=False, measure=measure)
 
 
 def lost_text(measure: LineMeasure) -> str:
     """Describe the defects of a line's unusable parts, the largest first; return "" if almost nothing is lost."""
     fractions = {
-        f"not along it within {measure.allowed_aside:.0f} m": measure.away,
+        f"not along it within {measure.lateral_tolerance:.0f} m": measure.off_line,
         f"banked beyond {math.degrees(MAX_PHOTO_BANK_RAD):.0f}°": measure.banked,
-        f"more than {measure.allowed_off:.0f} m off its height over ground": measure.high,
-        "with the camera off": measure.dark,
+        f"more than {measure.min_height_tolerance:.0f} m off its height over ground": measure.off_height,
+        "with the camera off": measure.camera_off,
     }
     parts = sorted(((fraction, defect) for defect, fraction in fractions.items() if fraction >= 0.005), reverse=True)
     return ", ".join(f"{100.0 * fraction:.0f} % {defect}" for fraction, defect in parts)
@@ -217,14 +219,14 @@ def lost_text(measure: LineMeasure) -> str:
 
 def _coverage_fault(measure: LineMeasure, name: str) -> Message:
     """Describe a line's usable part, the defects of its other parts, and the length lost at its ends."""
-    ends_text = f"; its first {measure.late:.0f} m and last {measure.early:.0f} m are lost"
+    ends_text = f"; its first {measure.lost_at_start:.0f} m and last {measure.lost_at_end:.0f} m are lost"
     return message(
-        f"{name}: {100.0 * measure.good:.0f} % of its {measure.length:.0f} m can be used",
-        f": {lost_text(measure)}{ends_text if max(measure.late, measure.early) >= 1.0 else ''}",
+        f"{name}: {100.0 * measure.usable:.0f} % of its {measure.length:.0f} m can be used",
+        f": {lost_text(measure)}{ends_text if max(measure.lost_at_start, measure.lost_at_end) >= 1.0 else ''}",
     )
 
 
-def _finding(
+def _line_finding(
     requirements: RouteRequirements,
     line: PhotoLine,
     ok: bool | None,
@@ -238,17 +240,17 @@ def _finding(
     measurements = []
     if measure is not None:
         measurements = [
-            Fact("distance from the line", measure.aside, "m"),
-            Fact("height error", measure.off, "m"),
-            Fact("lost at its begin", measure.late, "m"),
-            Fact("lost at its end", measure.early, "m"),
-            Fact("photos missed", float(measure.missed), ""),
+            Fact("distance from the line", measure.max_lateral_offset, "m"),
+            Fact("height error", measure.max_height_error, "m"),
+            Fact("lost at its begin", measure.lost_at_start, "m"),
+            Fact("lost at its end", measure.lost_at_end, "m"),
+            Fact("photos missed", float(measure.missed_photos), ""),
         ]
     return make_finding(
         "survey",
         _line_place(requirements, line),
         ok=ok,
-        reason=reason_of(faults, facts),
+        reason=finding_reason(faults, facts),
         faults=faults,
         planned=100.0 * usable_fraction if geometric else 100.0,
         flown=None if geometric else 100.0 * usable_fraction,

@@ -21,8 +21,8 @@ from logs.verdict.wording import gentle_launch_text, place_text
 from world.airfield import Launch
 
 # Verb that says which end of the flight, in the air, replaces the phase.
-_VERBS = {"takeoff": "begins", "landing": "ends"}
-_TITLES = {"takeoff": "take-off", "landing": "landing"}
+_PHASE_VERBS = {"takeoff": "begins", "landing": "ends"}
+_PHASE_TITLES = {"takeoff": "take-off", "landing": "landing"}
 # Result for a slope beyond the limit.
 _RESULT_BEYOND_LIMIT = {"takeoff": None, "landing": False}
 
@@ -30,15 +30,15 @@ _RESULT_BEYOND_LIMIT = {"takeoff": None, "landing": False}
 def takeoff_findings(
     requirements: RouteRequirements, _aligned: AlignedTrack | None = None, *, geometric: bool = False
 ) -> list[Finding]:
-    """Judge the climb from the ground at home to the place of the take-off item, with one finding.
+    """Judge the climb from the ground at home to the take-off item's waypoint.
 
     A flown take-off has no finding here: the launch rule judges it.
     """
-    if requirements.ground is not None and requirements.ground.ways.take_off is not None:
+    if requirements.ground_phases is not None and requirements.ground_phases.procedures.take_off is not None:
         return []
     route, mission = requirements.setup.route, requirements.setup.mission
     items = [item for item in mission.items if item.command in TAKEOFFS]
-    waypoint = _waypoint_of(requirements, items[0].seq) if items else -1
+    waypoint = _last_waypoint_of_item(requirements, items[0].seq) if items else -1
     # A take-off item in the air is a waypoint like any other.
     if waypoint < 0 or (route.items[:waypoint] >= 0).any():
         return []
@@ -48,13 +48,13 @@ def takeoff_findings(
     if launch is not None and (launch_findings := _gentle_launch_findings(requirements, launch)):
         return launch_findings
     if launch is not None and (waypoint == 0 or not has_own_place):
-        # From the ground at home to the next place, on the launch course.
+        # From the ground at home to the next waypoint, on the launch course.
         next_altitude = float(requirements.points[waypoint + 1, 2])
         return [_slope_finding(requirements, "takeoff", waypoint, waypoint + 1, route.takeoff_ground, next_altitude)]
     if waypoint == 0 or not has_own_place:
         reason = f"to {altitude:.0f} m AMSL over home, on a course that is the autopilot's to choose"
         return [_unjudged_finding("takeoff", requirements.waypoint(waypoint), reason)]
-    # From home, over which the flight starts: `at` is the take-off item's own place.
+    # The flight starts over home, and climbs to the take-off item's own waypoint.
     return [_slope_finding(requirements, "takeoff", 0, waypoint, route.takeoff_ground, altitude)]
 
 
@@ -89,14 +89,14 @@ def _gentle_launch_findings(requirements: RouteRequirements, launch: Launch) -> 
 def landing_findings(
     requirements: RouteRequirements, _aligned: AlignedTrack | None = None, *, geometric: bool = False
 ) -> list[Finding]:
-    """Judge the descent from the last place before a landing to the landing, with one finding.
+    """Judge the descent from the last waypoint to the landing.
 
     A flown landing has no finding here: the touchdown rule judges it.
     """
-    if requirements.ground is not None and requirements.ground.ways.approach is not None:
+    if requirements.ground_phases is not None and requirements.ground_phases.procedures.approach is not None:
         return []
     items = [item for item in requirements.setup.mission.items if item.command in LANDINGS]
-    landing_waypoints = [waypoint for item in items if (waypoint := _waypoint_of(requirements, item.seq)) > 0]
+    landing_waypoints = [waypoint for item in items if (waypoint := _last_waypoint_of_item(requirements, item.seq)) > 0]
     if not landing_waypoints:
         if not items:
             return []
@@ -104,20 +104,28 @@ def landing_findings(
         route = requirements.setup.route
         if route.return_from >= 0:
             reason = RETURN_NOT_FLOWN_ON
-        end_place, flown_on = requirements.waypoint(requirements.legs), RETURN_NOT_FLOWN_ON in " ".join(route.notes)
-        if route.return_from >= 0 and not flown_on:
+        end_waypoint, return_flown_on = (
+            requirements.waypoint(requirements.legs),
+            RETURN_NOT_FLOWN_ON in " ".join(route.notes),
+        )
+        if route.return_from >= 0 and not return_flown_on:
             # The return ends the mission; the landing after it is not flown.
-            return [make_finding("landing", end_place, ok=None, reason=reason, unit="deg")]
-        return [_unjudged_finding("landing", end_place, reason)]
-    waypoint, ground = landing_waypoints[-1], requirements.setup.route.landing_ground
+            return [make_finding("landing", end_waypoint, ok=None, reason=reason, unit="deg")]
+        return [_unjudged_finding("landing", end_waypoint, reason)]
+    waypoint, ground_altitude = landing_waypoints[-1], requirements.setup.route.landing_ground
     return [
         _slope_finding(
-            requirements, "landing", waypoint - 1, waypoint, float(requirements.points[waypoint - 1, 2]), ground
+            requirements,
+            "landing",
+            waypoint - 1,
+            waypoint,
+            float(requirements.points[waypoint - 1, 2]),
+            ground_altitude,
         )
     ]
 
 
-def _waypoint_of(requirements: RouteRequirements, seq: int) -> int:
+def _last_waypoint_of_item(requirements: RouteRequirements, seq: int) -> int:
     """Return the last waypoint that belongs to a mission item, or -1 if there is none."""
     waypoints = [k for k, item in enumerate(requirements.setup.route.items) if int(item) == seq]
     return waypoints[-1] if waypoints else -1
@@ -127,29 +135,29 @@ def _slope_finding(
     requirements: RouteRequirements, rule: str, first: int, last: int, first_altitude: float, last_altitude: float
 ) -> Finding:
     """Judge the slope from waypoint `first` to waypoint `last`, at their altitudes, m AMSL."""
-    place = requirements.waypoint(last)
-    run = float(requirements.runs[first:last].sum())
+    waypoint_place = requirements.waypoint(last)
+    distance = float(requirements.runs[first:last].sum())
     if math.isnan(first_altitude) or math.isnan(last_altitude):
-        return _unjudged_finding(rule, place, "the height of the ground there is not known")
-    slope = math.atan2(last_altitude - first_altitude, run)
+        return _unjudged_finding(rule, waypoint_place, "the height of the ground there is not known")
+    slope = math.atan2(last_altitude - first_altitude, distance)
     limit, source = _slope_limit(requirements, first, first_altitude, last_altitude, slope)
     verb = "climbs" if slope >= 0.0 else "sinks"
-    text = f"{verb} {abs(last_altitude - first_altitude):.0f} m in {run:.0f} m, {math.degrees(abs(slope)):.1f}°"
+    text = f"{verb} {abs(last_altitude - first_altitude):.0f} m in {distance:.0f} m, {math.degrees(abs(slope)):.1f}°"
     is_within = abs(slope) <= limit + PLAN_TOLERANCE_RAD
     ground_phases = requirements.setup.ground_ways
     is_flown = (ground_phases.take_off if rule == "takeoff" else ground_phases.approach) is not None
     reason = f"{text} of {math.degrees(limit):.1f}°"
-    reason += "" if is_flown else f"; not flown, as the flight {_VERBS[rule]} in the air"
+    reason += "" if is_flown else f"; not flown, as the flight {_PHASE_VERBS[rule]} in the air"
     fault = message(
-        f"the {_TITLES[rule]} {text}",
+        f"the {_PHASE_TITLES[rule]} {text}",
         f"; at most {math.degrees(limit):.1f}° can be flown at this speed and in this wind",
     )
     ok = True if is_within else _RESULT_BEYOND_LIMIT[rule]
     return make_finding(
         rule,
-        place,
+        waypoint_place,
         ok=ok,
-        reason=reason if is_within else fault.text.removeprefix(f"the {_TITLES[rule]} "),
+        reason=reason if is_within else fault.text.removeprefix(f"the {_PHASE_TITLES[rule]} "),
         faults=[] if is_within else [fault],
         planned=math.degrees(abs(slope)),
         limit=math.degrees(limit),
@@ -163,8 +171,8 @@ def _slope_finding(
 
 
 def _unjudged_finding(rule: str, place: Place, reason: str) -> Finding:
-    """Return a finding on a take-off or landing that is not judged, which leaves the verdict undecided."""
-    fault = message(f"the {_TITLES[rule]} at {place_text(place)} is not judged")
+    """Return a finding on an unjudged take-off or landing, which leaves the verdict undecided."""
+    fault = message(f"the {_PHASE_TITLES[rule]} at {place_text(place)} is not judged")
     return make_finding(rule, place, ok=None, reason=reason, faults=[fault], unit="deg", check=GROUND_WAY)
 
 

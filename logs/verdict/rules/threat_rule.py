@@ -18,7 +18,7 @@ from logs.verdict.wording import place_text_within
 from world.arrays import Floats
 from world.threats import Threats, threat_label
 
-Side = Literal["missile", "radar"]
+SphereKind = Literal["missile", "radar"]
 
 _METHOD = "time inside, exact on each segment"
 
@@ -26,44 +26,48 @@ _METHOD = "time inside, exact on each segment"
 def threat_findings(
     requirements: RouteRequirements, aligned: AlignedTrack | None, *, geometric: bool = False
 ) -> list[Finding]:
-    """Judge each missile or radar sphere that plan or flight touches, or report that no missile sphere is entered."""
+    """Judge each missile or radar sphere that plan or flight touches; if no missile sphere is entered, report it."""
     scenario = requirements.setup.scenario
     if scenario.external:
         reason = "the mission came without a scenario, so threats are not known"
         return [make_finding("threat", FLIGHT, ok=None, reason=reason, unit="s")]
     threats = scenario.threats
     findings: list[Finding] = []
-    nearest, name = math.inf, ""
-    for side in ("missile", "radar"):
-        radii, scales = _spheres(threats, side)
+    nearest_distance, nearest_name = math.inf, ""
+    for kind in ("missile", "radar"):
+        radii, scales = _sphere_sizes(threats, kind)
         plan = path_spheres(requirements.path.points, requirements.path.times, threats.position, radii, scales)
         track = None
         if aligned is not None:
             track = path_spheres(aligned.track.position, aligned.track.time, threats.position, radii, scales)
-        for number, table in enumerate(scenario.spec.threats):
+        for number, threat in enumerate(scenario.spec.threats):
             if radii[number] <= 0.0:
                 continue
-            if side == "missile":
+            if kind == "missile":
                 judged = plan if geometric or track is None else track
                 distance = float(judged.closest[number] - radii[number])
-                if distance < nearest:
-                    nearest, name = distance, threat_label(table.name or "", number)
+                if distance < nearest_distance:
+                    nearest_distance, nearest_name = distance, threat_label(threat.name or "", number)
             if plan.closest[number] <= radii[number] or (track is not None and track.closest[number] <= radii[number]):
                 visit = None if geometric else _sphere_visit(track, number)
-                place = Place(side, number, name=table.name or "")
-                where = (
-                    "" if side == "radar" else _nearest_place_text(requirements, aligned, visit, float(radii[number]))
+                place = Place(kind, number, name=threat.name or "")
+                time_and_place = (
+                    "" if kind == "radar" else _nearest_place_text(requirements, aligned, visit, float(radii[number]))
                 )
-                findings.append(_sphere_finding(place, _sphere_visit(plan, number), visit, float(radii[number]), where))
+                findings.append(
+                    _sphere_finding(place, _sphere_visit(plan, number), visit, float(radii[number]), time_and_place)
+                )
     if not any(finding.place.kind == "missile" for finding in findings):
         error = position_error(requirements.setup)
-        findings.insert(0, _no_entry_finding(len(threats), nearest, name, error, aligned is not None or geometric))
+        findings.insert(
+            0, _no_entry_finding(len(threats), nearest_distance, nearest_name, error, aligned is not None or geometric)
+        )
     return findings
 
 
-def _spheres(threats: Threats, side: Side) -> tuple[Floats, Floats]:
+def _sphere_sizes(threats: Threats, kind: SphereKind) -> tuple[Floats, Floats]:
     """Return the radius and the scale of each threat's missile or radar sphere, m, (m,) each."""
-    if side == "missile":
+    if kind == "missile":
         return threats.kill_radius, threats.kill_scale
     return threats.detection_radius, threats.detection_scale
 
@@ -92,7 +96,7 @@ def _sphere_visit(visits: SphereVisits | None, m: int) -> _Visit:
 def _nearest_place_text(
     requirements: RouteRequirements, aligned: AlignedTrack | None, visit: _Visit | None, radius: float
 ) -> str:
-    """Describe the place inside a sphere nearest to its center; return "" if the flight was never inside.
+    """Describe the flight's point nearest to a sphere's center; return "" if the flight was never inside.
 
     radius: radius of the sphere, m.
     """
@@ -101,23 +105,32 @@ def _nearest_place_text(
     time = aligned.track.time
     k = max(0, min(len(time) - 2, int(np.searchsorted(time, visit.closest_time, side="right")) - 1))
     fraction = float((visit.closest_time - time[k]) / (time[k + 1] - time[k]))
-    return f" on {place_text_within(requirements.leg(aligned.leg_at(k)))} {aligned.where(k, fraction)}"
+    return f" on {place_text_within(requirements.leg(aligned.leg_at(k)))} {aligned.position_text(k, fraction)}"
 
 
-def _no_entry_finding(count: int, nearest: float, name: str, error: float, is_judged: bool) -> Finding:
+def _no_entry_finding(
+    threat_count: int, nearest_distance: float, nearest_name: str, navigation_error: float, is_judged: bool
+) -> Finding:
     """Report that no missile sphere is entered.
 
-    nearest: distance outside the sphere of the threat called `name`, m.
-    error: navigation error, m.
+    nearest_distance: distance outside the sphere of the threat called `name`, m.
+    navigation_error: navigation error, m.
     """
-    reason = f"no missile sphere of {count} threats is entered" if count else "the scenario has no threats"
+    reason = (
+        f"no missile sphere of {threat_count} threats is entered" if threat_count else "the scenario has no threats"
+    )
     facts = []
-    if math.isfinite(nearest):
-        facts.append(Fact("nearest", nearest, "m"))
-        reason += f"; the nearest, {name}, stays {nearest:.{0 if nearest >= 100.0 else 1}f} m away"
-        if error > 0.0:
-            facts.append(Fact("navigation error", error, "m"))
-            reason += f", {nearest - error:.1f} m less the {error:.1f} m that navigation may be off"
+    if math.isfinite(nearest_distance):
+        facts.append(Fact("nearest", nearest_distance, "m"))
+        reason += (
+            f"; the nearest, {nearest_name}, stays {nearest_distance:.{0 if nearest_distance >= 100.0 else 1}f} m away"
+        )
+        if navigation_error > 0.0:
+            facts.append(Fact("navigation error", navigation_error, "m"))
+            reason += (
+                f", {nearest_distance - navigation_error:.1f} m less the {navigation_error:.1f} m that"
+                " navigation may be off"
+            )
     return make_finding(
         "threat",
         FLIGHT,
@@ -135,40 +148,45 @@ def _no_entry_finding(count: int, nearest: float, name: str, error: float, is_ju
     )
 
 
-def _sphere_finding(place: Place, plan: _Visit, track: _Visit | None, radius: float, where: str) -> Finding:
-    judged = plan if track is None else track
-    is_missing = math.isnan(judged.closest)
-    facts = f"planned {plan.inside:.1f} s inside {radius:.0f} m, exposure {plan.exposure:.3g} s"
-    if track is not None and not is_missing:
-        facts += f"; flown {track.inside:.1f} s, exposure {track.exposure:.3g} s, nearest {track.closest:.0f} m"
-        facts += f" at {track.closest_time:.1f} s{where}"
-    flown = None if track is None else track.inside
+def _sphere_finding(
+    place: Place, planned_visit: _Visit, flown_visit: _Visit | None, radius: float, where: str
+) -> Finding:
+    judged_visit = planned_visit if flown_visit is None else flown_visit
+    is_missing = math.isnan(judged_visit.closest)
+    facts = f"planned {planned_visit.inside:.1f} s inside {radius:.0f} m, exposure {planned_visit.exposure:.3g} s"
+    if flown_visit is not None and not is_missing:
+        facts += (
+            f"; flown {flown_visit.inside:.1f} s, exposure {flown_visit.exposure:.3g} s, nearest"
+            f" {flown_visit.closest:.0f} m"
+        )
+        facts += f" at {flown_visit.closest_time:.1f} s{where}"
+    flown_time = None if flown_visit is None else flown_visit.inside
     if place.kind == "radar":
         return make_finding(
             "threat",
             place,
             ok=True,
             reason=f"for information only, detection is not limited: {facts}",
-            planned=plan.inside,
-            flown=flown,
+            planned=planned_visit.inside,
+            flown=flown_time,
             unit="s",
             method=_METHOD,
         )
-    ok = None if is_missing else judged.closest > radius
+    ok = None if is_missing else judged_visit.closest > radius
     return make_finding(
         "threat",
         place,
         ok=ok,
         reason=facts if ok is not False else f"inside the missile's reach: {facts}",
-        planned=plan.inside,
-        flown=flown,
+        planned=planned_visit.inside,
+        flown=flown_time,
         limit=0.0,
         source="scenario",
         tolerance=0.0,
-        margin=-judged.inside,
+        margin=-judged_visit.inside,
         unit="s",
         method=_METHOD,
-        facts=[Fact("nearest", judged.closest - radius, "m")] if ok is False else (),
+        facts=[Fact("nearest", judged_visit.closest - radius, "m")] if ok is False else (),
     )
 
 

@@ -1,10 +1,10 @@
-"""The touchdown rule: judge a flown landing, from the last waypoint to where the aircraft stops.
+"""The touchdown rule: judge a flown landing, from the last waypoint to the stop.
 
-The rule judges the height of the final above ground, the hazards that the final enters, and the places on the
+The rule judges the height of the final above ground, the hazards that the final enters, and the points on the
 scenario's strip where the aircraft touches down and stops.  It only reports the sink rate towards the ground, which may
-slope upwards, because the simulation of ArduPlane's law is accurate down to the flare but less accurate in the last
-metres (`docs/measured.md`).  A sink rate beyond all measured ones therefore leaves the landing undecided, and no sink
-rate passes or fails it.  The landing and approach rules judge a landing that is not flown, from the mission's items.
+slope upwards, because the simulated ArduPlane is accurate down to the flare but less accurate in the last metres
+(`docs/measured.md`).  A sink rate beyond all measured ones therefore leaves the landing undecided, and no sink rate
+passes or fails it.  The landing and approach rules judge a landing that is not flown, from the mission's items.
 """
 
 import math
@@ -14,11 +14,11 @@ import numpy as np
 
 from flight.mission.ground_ways import Approach
 from flight.simulation.track import Track
-from logs.verdict.findings import GROUND_WAY, Fact, Finding, Message, make_finding, message, reason_of
+from logs.verdict.findings import GROUND_WAY, Fact, Finding, Message, finding_reason, make_finding, message
 from logs.verdict.measures.path_sweeps import path_clearance
 from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.track_alignment import AlignedTrack
-from logs.verdict.measures.ways import first_obstacle_on, track_way
+from logs.verdict.measures.ways import first_hazard_on_path, track_path
 from logs.verdict.places import Place
 from logs.verdict.rule import Rule
 from logs.verdict.tolerances import (
@@ -42,37 +42,41 @@ _SLOPE_RUN_M = 10.0
 class _Landing(NamedTuple):
     """Measurements of a landing.
 
-    along, aside: position of the touch-down beyond the landing point and to the right of the landing course, m.
-    touch, stop: touch-down and stop, each as distance beyond the strip's center and distance to the side, m.
-    left: length of strip remaining beyond the stop, m.
-    sink, towards: sink rate at the touch-down, vertical and relative to the sloping ground, m/s.
-    room: minimum height of the final above ground, m; inf without a final, NaN if unknown.
-    over: height of the landing point above the ground, m.
+    along, lateral_offset: touch-down beyond the landing point and to the right of the landing course, m.
+    touchdown, stop: positions on the strip, each as distance beyond the strip's center and distance to the side, m.
+    strip_left: length of strip remaining beyond the stop, m.
+    sink, ground_sink: sink rate at the touch-down, vertical and relative to the sloping ground, m/s.
+    final_clearance: minimum height of the final above ground, m; inf without a final, NaN if unknown.
+    point_height: height of the landing point above the ground, m.
     """
 
     along: float
-    aside: float
-    touch: tuple[float, float]
+    lateral_offset: float
+    touchdown: tuple[float, float]
     stop: tuple[float, float]
-    left: float
+    strip_left: float
     sink: float
-    towards: float
-    room: float
-    over: float = math.nan
+    ground_sink: float
+    final_clearance: float
+    point_height: float = math.nan
 
 
 def touchdown_findings(
     requirements: RouteRequirements, _aligned: AlignedTrack | None, *, geometric: bool = False
 ) -> list[Finding]:
     """Judge a flown landing; before a flight, only report a strip that is too short."""
-    ground = requirements.ground
-    if ground is None or ground.ways.approach is None:
-        planned = requirements.setup.ground_ways.approach if geometric else None
-        return [] if planned is None else _planned_findings(requirements.waypoint(planned.leg + 1), planned)
-    approach = ground.ways.approach
-    place = ground.whole.waypoint(approach.leg + 1)
-    track, terrain = ground.landing, requirements.setup.scenario.terrain
-    if ground.left >= len(ground.track) - 1:
+    ground_phases = requirements.ground_phases
+    if ground_phases is None or ground_phases.procedures.approach is None:
+        planned_approach = requirements.setup.ground_ways.approach if geometric else None
+        return (
+            []
+            if planned_approach is None
+            else _planned_findings(requirements.waypoint(planned_approach.leg + 1), planned_approach)
+        )
+    approach = ground_phases.procedures.approach
+    place = ground_phases.whole.waypoint(approach.leg + 1)
+    track, terrain = ground_phases.landing, requirements.setup.scenario.terrain
+    if ground_phases.landing_start_row >= len(ground_phases.track) - 1:
         reason = "the flight did not get to its landing"
         fault = message(f"the touchdown at {place_text(place)} is not judged: {reason}")
         return [make_finding("touchdown", place, ok=None, reason=reason, faults=[fault], unit="m", check=GROUND_WAY)]
@@ -85,18 +89,20 @@ def touchdown_findings(
     if touchdown_row is None:
         fault = message("the aircraft did not touch down", f" at {_landing_point_text(approach)}")
         return [make_finding("touchdown", place, ok=False, reason=fault.text, faults=[fault], unit="m")]
-    landing = _measure_landing(requirements, track, terrain, approach, touchdown_row)._replace(over=point_height)
+    landing = _measure_landing(requirements, track, terrain, approach, touchdown_row)._replace(
+        point_height=point_height
+    )
     faults = _detect_faults(approach, landing)
-    if entered := first_obstacle_on(requirements, track_way(track)):
-        faults.append(message(f"the final enters {entered}"))
+    if entered_hazard := first_hazard_on_path(requirements, track_path(track)):
+        faults.append(message(f"the final enters {entered_hazard}"))
     has_gusts = requirements.setup.scenario.wind.turbulence != "none"
-    return [_finding(place, approach, landing, faults, has_gusts=has_gusts)]
+    return [_landing_finding(place, approach, landing, faults, has_gusts=has_gusts)]
 
 
 def _planned_findings(place: Place, approach: Approach) -> list[Finding]:
     """Before a flight, return a finding if the strip is too short to judge the touch-down."""
     messages = _short_strip_messages(approach)
-    reason = reason_of(messages)
+    reason = finding_reason(messages)
     return (
         [make_finding("touchdown", place, ok=None, reason=reason, faults=messages, check=GROUND_WAY)]
         if messages
@@ -107,55 +113,57 @@ def _planned_findings(place: Place, approach: Approach) -> list[Finding]:
 def _measure_landing(
     requirements: RouteRequirements, track: Track, terrain: Terrain, approach: Approach, touchdown_row: int
 ) -> _Landing:
-    """Measure a landing that touches down at row `touchdown_row`; the field `over` stays unset."""
+    """Measure a landing that touches down at row `touchdown_row`; the field `point_height` stays unset."""
     position = np.asarray(track.position, dtype=np.float64)
     along, lateral_offset = _as_floats(approach.place(position[touchdown_row]))
     touch, stop = (_as_floats(approach.on_strip(position[row])) for row in (touchdown_row, -1))
     sink, ground_sink = _sink_rates(track, terrain, approach, touchdown_row)
     return _Landing(
         along=along,
-        aside=lateral_offset,
-        touch=touch,
+        lateral_offset=lateral_offset,
+        touchdown=touch,
         stop=stop,
-        left=0.5 * approach.strip.length - stop[0],
+        strip_left=0.5 * approach.strip.length - stop[0],
         sink=sink,
-        towards=ground_sink,
-        room=_final_clearance(requirements, position, terrain, approach),
+        ground_sink=ground_sink,
+        final_clearance=_final_clearance(requirements, position, terrain, approach),
     )
 
 
-def _finding(place: Place, approach: Approach, landing: _Landing, faults: list[Message], *, has_gusts: bool) -> Finding:
-    """Return the finding on a landing, with its faults, otherwise its undecided parts, otherwise unknown ground.
+def _landing_finding(
+    place: Place, approach: Approach, landing: _Landing, faults: list[Message], *, has_gusts: bool
+) -> Finding:
+    """Return the finding on a landing: its faults, or else its undecided parts.
 
     has_gusts: True if the air is turbulent.
     """
-    undecided = [] if faults else _undecided_messages(approach, landing, has_gusts=has_gusts)
-    if not faults and not undecided and math.isnan(landing.room):
-        undecided = [message("the ground below the final is not known")]
-    messages = faults or undecided
+    undecided_messages = [] if faults else _undecided_messages(approach, landing, has_gusts=has_gusts)
+    if not faults and not undecided_messages and math.isnan(landing.final_clearance):
+        undecided_messages = [message("the ground below the final is not known")]
+    messages = faults or undecided_messages
     limit = 0.5 * approach.strip.length - TOUCHDOWN_ERROR_M
-    farthest = max(landing.stop[0], abs(landing.touch[0]))
+    max_distance = max(landing.stop[0], abs(landing.touchdown[0]))
     return make_finding(
         "touchdown",
         place,
-        ok=False if faults else None if undecided else True,
-        reason=reason_of(messages, _describe_landing(approach, landing)),
+        ok=False if faults else None if undecided_messages else True,
+        reason=finding_reason(messages, _describe_landing(approach, landing)),
         faults=messages,
-        flown=farthest,
+        flown=max_distance,
         limit=limit,
         source="scenario",
         tolerance=0.0,
-        margin=limit - farthest,
+        margin=limit - max_distance,
         unit="m",
         method="contact of skids or wheels with the ground, from the flown track",
-        check=GROUND_WAY if undecided else "",
+        check=GROUND_WAY if undecided_messages else "",
         facts=(
             Fact("along", landing.along, "m"),
-            Fact("aside", landing.aside, "m"),
+            Fact("aside", landing.lateral_offset, "m"),
             Fact("sink", landing.sink, "m/s"),
-            Fact("sink towards the ground", landing.towards, "m/s"),
-            Fact("strip left", landing.left, "m"),
-            Fact("final above ground", landing.room, "m"),
+            Fact("sink towards the ground", landing.ground_sink, "m/s"),
+            Fact("strip left", landing.strip_left, "m"),
+            Fact("final above ground", landing.final_clearance, "m"),
         ),
     )
 
@@ -188,10 +196,12 @@ def _sink_rates(track: Track, terrain: Terrain, approach: Approach, row: int) ->
     row = max(0, row - 2)
     east, north, vertical_speed = (float(value) for value in track.velocity[row])
     position = np.asarray(track.position[row, :2], dtype=np.float64)
-    half_run = 0.5 * _SLOPE_RUN_M * np.array([math.sin(approach.course), math.cos(approach.course)])
-    rise = float(terrain.height(*(position + half_run)) - terrain.height(*(position - half_run))) / _SLOPE_RUN_M
+    half_base = 0.5 * _SLOPE_RUN_M * np.array([math.sin(approach.course), math.cos(approach.course)])
+    ground_slope = (
+        float(terrain.height(*(position + half_base)) - terrain.height(*(position - half_base))) / _SLOPE_RUN_M
+    )
     course_speed = east * math.sin(approach.course) + north * math.cos(approach.course)
-    return -vertical_speed, -vertical_speed + rise * course_speed
+    return -vertical_speed, -vertical_speed + ground_slope * course_speed
 
 
 def _final_clearance(requirements: RouteRequirements, position: Floats, terrain: Terrain, approach: Approach) -> float:
@@ -210,20 +220,22 @@ def _final_clearance(requirements: RouteRequirements, position: Floats, terrain:
 
 
 def _detect_faults(approach: Approach, landing: _Landing) -> list[Message]:
-    """Return a fault for each part of the landing off the strip, and for a landing point below the ground."""
+    """Return faults of a touch-down or stop off the strip, and of a landing point below the ground."""
     half_length, half_width = 0.5 * approach.strip.length, 0.5 * approach.strip.width
     # On a strip shorter than the error, only a distance beyond the strip by more than the error is known.
     allowed_distance = (
         half_length - TOUCHDOWN_ERROR_M if half_length > TOUCHDOWN_ERROR_M else half_length + TOUCHDOWN_ERROR_M
     )
-    touch, stop = landing.touch, landing.stop
+    touch, stop = landing.touchdown, landing.stop
     faults = []
-    if -landing.over > LANDING_POINT_ERROR_M:
-        brief = f"the landing point of {_landing_point_text(approach)} is {-landing.over:.0f} m below the ground"
+    if -landing.point_height > LANDING_POINT_ERROR_M:
+        brief = (
+            f"the landing point of {_landing_point_text(approach)} is {-landing.point_height:.0f} m below the ground"
+        )
         faults.append(message(brief, ": the aircraft meets it before it flares"))
     if abs(touch[0]) > allowed_distance:
-        where = "before" if touch[0] < 0.0 else "beyond"
-        brief = f"touches down {abs(touch[0]):.0f} m {where} the strip's center"
+        direction = "before" if touch[0] < 0.0 else "beyond"
+        brief = f"touches down {abs(touch[0]):.0f} m {direction} the strip's center"
         faults.append(message(brief, f"; {max(0.0, half_length - TOUCHDOWN_ERROR_M):.0f} m are allowed on this strip"))
     if stop[0] > allowed_distance:
         brief = f"comes to rest {half_length - stop[0]:.0f} m before the strip's end"
@@ -239,7 +251,7 @@ def _detect_faults(approach: Approach, landing: _Landing) -> list[Message]:
 
 
 def _short_strip_messages(approach: Approach) -> list[Message]:
-    """Return a message if a strip is shorter than the simulated law's error in the touch-down."""
+    """Return a message if a strip is shorter than the error of the simulated touch-down."""
     if approach.strip.length > 2.0 * TOUCHDOWN_ERROR_M:
         return []
     brief = f"the strip is {approach.strip.length:.0f} m long"
@@ -249,22 +261,22 @@ def _short_strip_messages(approach: Approach) -> list[Message]:
 
 
 def _undecided_messages(approach: Approach, landing: _Landing, *, has_gusts: bool) -> list[Message]:
-    """Return messages on parts of a landing that the limited accuracy of the simulated law leaves undecided."""
+    """Return messages on the parts of a landing that the simulation is too inaccurate to decide."""
     messages = _short_strip_messages(approach)
-    strip_left = 0.5 * approach.strip.length - max(landing.touch[0], landing.stop[0])
+    strip_left = 0.5 * approach.strip.length - max(landing.touchdown[0], landing.stop[0])
     if has_gusts and strip_left < GUST_TOUCHDOWN_ERROR_M and not messages:
         brief = f"comes down or to rest {strip_left:.0f} m before the strip's end"
         messages.append(
             message(brief, f"; in turbulence the place is known only within {GUST_TOUCHDOWN_ERROR_M:.0f} m")
         )
-    if landing.over > LANDING_POINT_ERROR_M:
-        brief = f"the landing point of {_landing_point_text(approach)} is {landing.over:.0f} m above the ground"
+    if landing.point_height > LANDING_POINT_ERROR_M:
+        brief = f"the landing point of {_landing_point_text(approach)} is {landing.point_height:.0f} m above the ground"
         messages.append(message(brief, ": the aircraft flares too early, and falls"))
-    if landing.room < FINAL_APPROACH_CLEARANCE_M:
-        brief = f"the final passes the ground by {landing.room:.1f} m"
+    if landing.final_clearance < FINAL_APPROACH_CLEARANCE_M:
+        brief = f"the final passes the ground by {landing.final_clearance:.1f} m"
         messages.append(message(brief, f", and may be flown {FINAL_APPROACH_CLEARANCE_M:.0f} m lower than simulated"))
-    if landing.towards > MAX_TOUCHDOWN_SINK_MPS:
-        brief = f"sinks at {landing.towards:.1f} m/s towards the ground at its touch-down"
+    if landing.ground_sink > MAX_TOUCHDOWN_SINK_MPS:
+        brief = f"sinks at {landing.ground_sink:.1f} m/s towards the ground at its touch-down"
         messages.append(message(brief, f"; ArduPlane's landings are known with up to {MAX_TOUCHDOWN_SINK_MPS:g} m/s"))
     return messages
 
@@ -272,14 +284,17 @@ def _undecided_messages(approach: Approach, landing: _Landing, *, has_gusts: boo
 def _describe_landing(approach: Approach, landing: _Landing) -> list[str]:
     """Describe the landing in a list of phrases."""
     direction = "before" if landing.along < 0.0 else "beyond"
-    notes = [f"touches down {abs(landing.along):.0f} m {direction} the landing point, {abs(landing.aside):.1f} m aside"]
-    notes.append(f"comes to rest with {landing.left:.0f} m of the strip left")
+    notes = [
+        f"touches down {abs(landing.along):.0f} m {direction} the landing point,"
+        f" {abs(landing.lateral_offset):.1f} m aside"
+    ]
+    notes.append(f"comes to rest with {landing.strip_left:.0f} m of the strip left")
     sink_text = (
-        f"sinks at {landing.sink:.1f} m/s at touch-down, {landing.towards:.1f} m/s relative to the sloping ground"
+        f"sinks at {landing.sink:.1f} m/s at touch-down, {landing.ground_sink:.1f} m/s relative to the sloping ground"
     )
     notes.append(f"{sink_text}; the flare itself is not judged")
-    if math.isfinite(landing.room):
-        notes.append(f"the final stays {landing.room:.0f} m above ground or more")
+    if math.isfinite(landing.final_clearance):
+        notes.append(f"the final stays {landing.final_clearance:.0f} m above ground or more")
     if approach.tail_wind > 0.1:
         notes.append(f"with {approach.tail_wind:.1f} m/s of tail wind")
     return notes

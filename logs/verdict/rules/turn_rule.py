@@ -1,4 +1,4 @@
-"""The turn rule: judge if each corner can be flown on its legs, and how it was flown."""
+"""The turn rule: judge whether each corner can be flown on its legs, and how it was flown."""
 
 import math
 
@@ -6,8 +6,8 @@ import numpy as np
 
 from flight.guidance.navigation_error import ERRORS
 from flight.mission.route import SHARPEST_FLY_BY_RAD
-from logs.verdict.findings import Fact, Finding, Message, make_finding, message, reason_of
-from logs.verdict.measures.acceptance import negligible_kink, reach
+from logs.verdict.findings import Fact, Finding, Message, finding_reason, make_finding, message
+from logs.verdict.measures.acceptance import acceptance_condition, negligible_kink
 from logs.verdict.measures.route_requirements import RouteRequirements, turn_limit
 from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.measures.turns import TurnMeasure, measure_turns
@@ -38,16 +38,16 @@ def turn_findings(
     if aligned is not None:
         measures = [*measure_turns(requirements, aligned)]
     return [
-        _finding(requirements, i, measure, aligned)
+        _turn_finding(requirements, i, measure, aligned)
         for i, measure in enumerate(measures, 1)
-        if not requirements.turns_around(i)
+        if not requirements.is_in_turnaround(i)
     ]
 
 
-def _finding(
+def _turn_finding(
     requirements: RouteRequirements, i: int, measure: TurnMeasure | None, aligned: AlignedTrack | None
 ) -> Finding:
-    planned = abs(float(requirements.turns[i]))
+    planned_turn = abs(float(requirements.turns[i]))
     limit, source = turn_limit(requirements, i)
     # A neighbouring turn that needs more than the whole leg is itself at fault: going straight on needs no length.
     limit = max(limit, 0.0)
@@ -56,17 +56,20 @@ def _finding(
         return make_finding("turn", requirements.waypoint(i), ok=None, reason=reason, unit="deg")
     faults, facts = (
         [],
-        [f"turns {math.degrees(planned):.1f}°" + (f" of {math.degrees(limit):.1f}°" if math.isfinite(limit) else "")],
+        [
+            f"turns {math.degrees(planned_turn):.1f}°"
+            + (f" of {math.degrees(limit):.1f}°" if math.isfinite(limit) else "")
+        ],
     )
-    if planned > limit + PLAN_TOLERANCE_RAD:
+    if planned_turn > limit + PLAN_TOLERANCE_RAD:
         lateral = negligible_kink(requirements, i)
         if lateral is None:
-            faults.append(_sharp_turn_message(requirements, i, planned, limit, source))
+            faults.append(_sharp_turn_message(requirements, i, planned_turn, limit, source))
         else:
             facts.append(
                 f"a negligible kink: the path without this waypoint passes it at {lateral:.1f} m and can be flown"
             )
-    facts += _fly_over_notes(requirements, i, planned)
+    facts += _fly_over_notes(requirements, i, planned_turn)
     method, angle, tolerance = "route", None, PLAN_TOLERANCE_RAD
     if measure is not None:
         angle, tolerance = measure.angle, measure.tolerance or PLAN_TOLERANCE_RAD
@@ -75,25 +78,25 @@ def _finding(
         # If the aircraft's limits apply, the turn is judged by them; faults of the flown turn are only reported.
         facts += [fault.brief for fault in flown_faults] if requirements.envelope else []
         faults += [] if requirements.envelope else flown_faults
-        method = "least-squares courses of both legs" if measure.fitted else "course change over the turn"
+        method = "least-squares courses of both legs" if measure.is_fitted else "course change over the turn"
         if angle is None:
             method = "not flown"
     ok: bool | None = not faults
-    if measure is not None and not measure.over:
+    if measure is not None and not measure.is_complete:
         facts.append(_unflown_turn_text(requirements, i, measure, aligned))
         ok = None if ok else False
     return make_finding(
         "turn",
         requirements.waypoint(i),
         ok=ok,
-        reason=reason_of(faults, facts if measure is not None or not faults else ()),
+        reason=finding_reason(faults, facts if measure is not None or not faults else ()),
         faults=faults,
-        planned=math.degrees(planned),
+        planned=math.degrees(planned_turn),
         flown=None if angle is None else math.degrees(angle),
         limit=math.degrees(limit),
         source=source,
         tolerance=math.degrees(tolerance),
-        margin=math.degrees(limit - (planned if angle is None else angle)),
+        margin=math.degrees(limit - (planned_turn if angle is None else angle)),
         unit="deg",
         method=method,
         facts=_measured_facts(measure),
@@ -113,10 +116,11 @@ def _unflown_turn_text(
         return "the flight did not get past it"
     active_times = [float(np.count_nonzero(aligned.track.leg == leg)) * aligned.tick for leg in (i - 1, i)]
     leg = i if active_times[1] <= active_times[0] else i - 1
-    active_time, run = min(active_times), float(requirements.runs[leg])
-    radius = reach(requirements, leg + 1).radius
+    active_time, leg_length = min(active_times), float(requirements.runs[leg])
+    radius = acceptance_condition(requirements, leg + 1).radius
     return (
-        f"{requirements.setup.autopilot.title} was on {place_text_within(requirements.leg(leg))} of {run:.0f} m for"
+        f"{requirements.setup.autopilot.title} was on {place_text_within(requirements.leg(leg))} of"
+        f" {leg_length:.0f} m for"
         f" {active_time:.1f} s, because it counts a waypoint as reached from {radius:.0f} m"
     )
 
@@ -136,8 +140,10 @@ def _fly_over_notes(requirements: RouteRequirements, i: int, turn: float) -> lis
     ]
 
 
-def _sharp_turn_message(requirements: RouteRequirements, i: int, planned: float, limit: float, source: str) -> Message:
-    turn_text = f"turns {math.degrees(planned):.1f}°"
+def _sharp_turn_message(
+    requirements: RouteRequirements, i: int, planned_turn: float, limit: float, source: str
+) -> Message:
+    turn_text = f"turns {math.degrees(planned_turn):.1f}°"
     if source == "scenario":
         return message(f"{turn_text}, beyond the scenario's {math.degrees(limit):.1f}°")
     speed, bank = float(max(requirements.route.airspeed[i - 1 : i + 1])), math.degrees(requirements.limits.max_bank)
@@ -148,17 +154,17 @@ def _sharp_turn_message(requirements: RouteRequirements, i: int, planned: float,
         return message(
             f"circles with radius {radius:.0f} m",
             f"; at {speed:.0f} m/s and {bank:.0f}° bank the smallest turn radius on these courses"
-            f" in this wind is {requirements.tightest[i]:.0f} m",
+            f" in this wind is {requirements.min_radius[i]:.0f} m",
         )
     length_text = "no length of leg is enough"
-    if requirements.after[i] < MAX_FLY_BY_OFFSET_RADII * radius:
-        length_text = f"that takes {requirements.after[i]:.0f} m of each leg"
+    if requirements.length_after[i] < MAX_FLY_BY_OFFSET_RADII * radius:
+        length_text = f"that takes {requirements.length_after[i]:.0f} m of each leg"
         if requirements.setup.route.fly_over[i]:
-            length_text = f"flying over it takes {requirements.after[i]:.0f} m of the next leg"
-    run_before, run_after = requirements.runs[i - 1], requirements.runs[i]
+            length_text = f"flying over it takes {requirements.length_after[i]:.0f} m of the next leg"
+    length_before, length_after = requirements.runs[i - 1], requirements.runs[i]
     room_text = f"its neighbours leave room for {math.degrees(limit):.1f}°" if limit > 0.0 else "no turn fits"
     return message(
-        f"{turn_text} between legs of {run_before:.0f} m and {run_after:.0f} m:"
+        f"{turn_text} between legs of {length_before:.0f} m and {length_after:.0f} m:"
         f" at {speed:.0f} m/s and {bank:.0f}° bank",
         f" (radius {radius:.0f} m) {length_text}, and {room_text}",
     )
@@ -174,13 +180,13 @@ def _flown_facts(requirements: RouteRequirements, i: int, measure: TurnMeasure) 
     if measure.radius is not None and measure.radius < STRAIGHT_RADIUS_RATIO * requirements.radius[i]:
         facts.append(f"radius {measure.radius:.0f} m")
     if measure.corner is not None:
-        facts.append(f"nearest pass {measure.corner.nearest:.1f} m, at {measure.corner.time:.1f} s")
+        facts.append(f"nearest pass {measure.corner.distance:.1f} m, at {measure.corner.time:.1f} s")
     if measure.overshoot is not None:
         facts.append(f"overshoot {measure.overshoot:.1f} m")
-    if measure.corner is not None and measure.corner.beyond:
-        facts.append(f"that is {measure.corner.beyond:.0f} m past the end of the next leg, which was not joined")
-    if measure.settled is not None and measure.over:
-        facts.append(f"settled to {measure.settled:.2f} m")
+    if measure.corner is not None and measure.corner.overrun:
+        facts.append(f"that is {measure.corner.overrun:.0f} m past the end of the next leg, which was not joined")
+    if measure.settled_distance is not None and measure.is_complete:
+        facts.append(f"settled to {measure.settled_distance:.2f} m")
     return facts
 
 
@@ -191,20 +197,20 @@ def _measured_facts(measure: TurnMeasure | None) -> list[Fact]:
     bank = None if measure.held_bank is None else math.degrees(measure.held_bank)
     numbers = (
         ("overshoot", measure.overshoot, "m"),
-        ("settled", measure.settled if measure.over else None, "m"),
+        ("settled", measure.settled_distance if measure.is_complete else None, "m"),
         ("bank", bank, "deg"),
         ("radius", measure.radius, "m"),
-        ("nearest pass", None if measure.corner is None else measure.corner.nearest, "m"),
+        ("nearest pass", None if measure.corner is None else measure.corner.distance, "m"),
     )
-    return [Fact(what, value, unit) for what, value, unit in numbers if value is not None]
+    return [Fact(quantity, value, unit) for quantity, value, unit in numbers if value is not None]
 
 
 def _flown_faults(requirements: RouteRequirements, i: int, measure: TurnMeasure, limit: float) -> list[Message]:
-    """Return faults of the flown turn, such as an angle or bank beyond its limit, a tighter arc, or overshoot."""
+    """Return the faults of the flown turn: angle or bank beyond the limit, a tight arc, overshoot."""
     faults = []
     if measure.angle is not None and measure.tolerance is not None and measure.angle > limit + measure.tolerance:
-        flown, max_value = math.degrees(measure.angle), math.degrees(limit)
-        faults.append(message(f"flown course change {flown:.1f}° beyond {max_value:.1f}°"))
+        flown_angle, max_value = math.degrees(measure.angle), math.degrees(limit)
+        faults.append(message(f"flown course change {flown_angle:.1f}° beyond {max_value:.1f}°"))
     max_bank = requirements.limits.max_bank + BANK_TOLERANCE_RAD
     # Roll in a gust, or into a turn, is not the bank of the turn: the mean over a second applies.
     if measure.held_bank is not None and measure.held_bank > max_bank:
@@ -219,8 +225,8 @@ def _flown_faults(requirements: RouteRequirements, i: int, measure: TurnMeasure,
             )
         )
     max_value = SETTLED_CROSS_TRACK_M + GUST_OFFSET_M[requirements.setup.scenario.wind.turbulence]
-    if measure.settled is not None and measure.over and measure.settled > max_value:
-        offset_text = f"still {measure.settled:.1f} m off the next leg at its end"
+    if measure.settled_distance is not None and measure.is_complete and measure.settled_distance > max_value:
+        offset_text = f"still {measure.settled_distance:.1f} m off the next leg at its end"
         faults.append(message(offset_text, f" (at most {max_value:.1f} m)"))
     if measure.full_circles:
         faults.append(message(f"{measure.full_circles} full circle(s) flown at the corner"))
@@ -234,21 +240,21 @@ def _tight_turn_faults(requirements: RouteRequirements, i: int, measure: TurnMea
     limit or slowed down.
     """
     turn, setup = abs(float(requirements.turns[i])), requirements.setup
-    min_radius = float(requirements.tightest[i])
+    min_radius = float(requirements.min_radius[i])
     # Guidance's own limit: a sharper corner has no arc to follow if its legs are short.
     min_distance = fly_by_offset(turn, min_radius) if turn < SHARPEST_FLY_BY_RAD else math.inf
     # An autopilot that does not follow the arc may pass the waypoint at any distance.
     follows_arc = setup.autopilot.keeps_to_arcs and setup.source is None and not setup.route.fly_over[i]
-    if measure.passed is None or not math.isfinite(min_distance) or not follows_arc:
+    if measure.min_distance is None or not math.isfinite(min_distance) or not follows_arc:
         return []
     tolerance = CORNER_CUT_FRACTION * min_distance + CORNER_CUT_TOLERANCE_M[setup.scenario.wind.turbulence]
     tolerance += NAVIGATION_SIGMAS * ERRORS[setup.nav][0]
-    if measure.passed >= min_distance - tolerance:
+    if measure.min_distance >= min_distance - tolerance:
         return []
-    radius = measure.passed / min_distance * min_radius
+    radius = measure.min_distance / min_distance * min_radius
     return [
         message(
-            f"flown with a radius of {radius:.0f} m, {measure.passed:.1f} m from its waypoint",
+            f"flown with a radius of {radius:.0f} m, {measure.min_distance:.1f} m from its waypoint",
             f"; at {math.degrees(requirements.limits.max_bank):.0f}° bank in this wind it is {min_radius:.0f} m, and"
             f" {min_distance:.1f} m from it",
         )

@@ -1,4 +1,4 @@
-"""The waypoint rule: judge if each waypoint was reached within the mission's or the autopilot's radius.
+"""The waypoint rule: judge whether each waypoint was reached within the mission's or the autopilot's radius.
 
 ArduPlane also considers a waypoint reached, and turns to the next leg, once the aircraft has crossed the line across
 the leg at its end, however far to the side.  For ArduPlane's simulated law, crossing within the corridor is accepted.
@@ -9,8 +9,8 @@ import math
 
 import numpy as np
 
-from logs.verdict.findings import Fact, Finding, Message, make_finding, message, reason_of
-from logs.verdict.measures.acceptance import Reach, reach
+from logs.verdict.findings import Fact, Finding, Message, finding_reason, make_finding, message
+from logs.verdict.measures.acceptance import AcceptanceCondition, acceptance_condition
 from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.track_alignment import AlignedTrack, along_across, approaches
 from logs.verdict.rule import Rule
@@ -22,8 +22,8 @@ from world.arrays import Floats
 def waypoint_findings(
     requirements: RouteRequirements, aligned: AlignedTrack | None, *, geometric: bool = False
 ) -> list[Finding]:
-    """Judge the distance at which the track, or the planned path (``geometric``), passes each waypoint."""
-    judged_waypoints = [i for i in range(len(requirements.points)) if not requirements.turns_around(i)]
+    """Judge the distance of the track, or of the planned path (``geometric``), from each waypoint."""
+    judged_waypoints = [i for i in range(len(requirements.points)) if not requirements.is_in_turnaround(i)]
     if geometric:
         return [_planned_finding(requirements, i) for i in judged_waypoints]
     apexes = requirements.apexes()
@@ -31,8 +31,8 @@ def waypoint_findings(
 
 
 def _planned_finding(requirements: RouteRequirements, i: int) -> Finding:
-    """Judge whether the fly-by arc at a waypoint passes it within its acceptance distance."""
-    condition, offset = reach(requirements, i), float(requirements.fly_by_offset[i])
+    """Judge whether the fly-by arc passes within the acceptance distance of its waypoint."""
+    condition, offset = acceptance_condition(requirements, i), float(requirements.fly_by_offset[i])
     faults, fact = [], f"the fly-by path passes at {offset:.0f} m"
     if requirements.setup.route.fly_over[i]:
         fact = "flown over"
@@ -50,7 +50,7 @@ def _planned_finding(requirements: RouteRequirements, i: int) -> Finding:
         "waypoint",
         requirements.waypoint(i),
         ok=not faults,
-        reason=reason_of(faults) if faults else fact,
+        reason=finding_reason(faults) if faults else fact,
         faults=faults,
         planned=offset,
         limit=condition.radius,
@@ -62,8 +62,8 @@ def _planned_finding(requirements: RouteRequirements, i: int) -> Finding:
     )
 
 
-def _turn_text(requirements: RouteRequirements, i: int, condition: Reach) -> str:
-    """Describe where an autopilot that flies from leg to leg turns at a waypoint."""
+def _turn_text(requirements: RouteRequirements, i: int, condition: AcceptanceCondition) -> str:
+    """Describe where an autopilot without fly-by arcs turns at a waypoint."""
     autopilot, turn_distance, unread_text = requirements.setup.autopilot, condition.radius, ""
     if condition.source == "mission" and not autopilot.reads_acceptance:
         turn = abs(float(requirements.turns[i])) if 0 < i < requirements.legs else math.pi
@@ -75,7 +75,7 @@ def _turn_text(requirements: RouteRequirements, i: int, condition: Reach) -> str
 
 
 def _flown_finding(requirements: RouteRequirements, aligned: AlignedTrack | None, i: int, apexes: Floats) -> Finding:
-    condition, setup = reach(requirements, i), requirements.setup
+    condition, setup = acceptance_condition(requirements, i), requirements.setup
     offset, max_distance = float(requirements.fly_by_offset[i]), condition.radius + condition.tolerance
     distance, reason = math.nan, "missed: nothing was flown"
     ok: bool | None = False
@@ -99,7 +99,7 @@ def _flown_finding(requirements: RouteRequirements, aligned: AlignedTrack | None
                 f": the flight ended on {place_text_within(last_leg)} {math.hypot(distance, height_error):.0f} m away"
             )
             faults = [message("not reached", text)]
-            ok, reason = False, reason_of(faults)
+            ok, reason = False, finding_reason(faults)
             if not aligned.passed[i - 1]:
                 # The flight was not flying to this waypoint: its distance says nothing.
                 distance, ok, facts = math.nan, None, ()
@@ -126,7 +126,7 @@ def _flown_finding(requirements: RouteRequirements, aligned: AlignedTrack | None
 
 
 def _crossing_offset(requirements: RouteRequirements, aligned: AlignedTrack, i: int) -> float:
-    """Return the distance from a waypoint at which the track crossed the line across its leg's end, m, or inf."""
+    """Return the lateral offset at which the track crossed the line across a leg's end, m; inf if it did not."""
     if i == 0:
         return math.inf
     last = int(aligned.rows[i + 1]) if i + 1 < len(requirements.points) else len(aligned.track) - 1
@@ -135,7 +135,7 @@ def _crossing_offset(requirements: RouteRequirements, aligned: AlignedTrack, i: 
     return abs(float(across[rows_past[0]])) if rows_past.size else math.inf
 
 
-def _acceptance_text(condition: Reach) -> str:
+def _acceptance_text(condition: AcceptanceCondition) -> str:
     """Describe the acceptance distance and its source."""
     owner = {"mission": "the mission's", "autopilot": "the autopilot's"}.get(condition.source, "the path's")
     error_text = f", and {condition.tolerance:.1f} m for navigation and gusts," if condition.tolerance else ""

@@ -37,7 +37,7 @@ def flight_columns(log: FlightLog) -> dict[str, NDArray[Any]]:
     lat, lon = to_geo(log.setup.scenario.origin, track.position[:, 0], track.position[:, 1])
     columns: dict[str, NDArray[Any]] = {}
     for field in FIELDS:
-        columns[field.name] = field.of(getattr(track, field.source))
+        columns[field.name] = field.select(getattr(track, field.source))
         if field.name == "time_s":
             columns["latitude_deg"], columns["longitude_deg"] = np.asarray(lat), np.asarray(lon)
     return columns
@@ -138,38 +138,38 @@ def px4_log_bytes(log: FlightLog) -> bytes:
     b'ULog\x01\x125'
     """
     is_finite = np.isfinite(log.track.position).all(axis=1) & np.isfinite(log.track.attitude).all(axis=1)
-    topics = [topic for topic in _topics(log, np.flatnonzero(is_finite)) if len(topic.values["timestamp"])]
-    head = bytearray(_MAGIC + struct.pack("<Q", 0) + _message(b"B", bytes(_FLAG_BITS_SIZE_BYTES)))
+    topics = [topic for topic in _make_topics(log, np.flatnonzero(is_finite)) if len(topic.values["timestamp"])]
+    head = bytearray(_MAGIC + struct.pack("<Q", 0) + _encode_message(b"B", bytes(_FLAG_BITS_SIZE_BYTES)))
     for topic in topics:
-        head += _message(b"F", f"{topic.name}:{_format(topic)}".encode())
+        head += _encode_message(b"F", f"{topic.name}:{_format_text(topic)}".encode())
     for key, value in (("sys_name", "planfly"), ("ver_hw", "SITL"), ("sys_uuid", "planfly")):
         name = f"char[{len(value)}] {key}".encode()
-        head += _message(b"I", bytes([len(name)]) + name + value.encode())
+        head += _encode_message(b"I", bytes([len(name)]) + name + value.encode())
     parameters = log.setup.autopilot.parameters
     for parameter in () if parameters is None else parameters.values:
         name = f"float {parameter.name}".encode()
-        head += _message(b"P", bytes([len(name)]) + name + struct.pack("<f", parameter.value))
+        head += _encode_message(b"P", bytes([len(name)]) + name + struct.pack("<f", parameter.value))
     for number, topic in enumerate(topics):
-        head += _message(b"A", struct.pack("<BH", 0, number) + topic.name.encode())
+        head += _encode_message(b"A", struct.pack("<BH", 0, number) + topic.name.encode())
     stamps, pieces = [], []
     for number, topic in enumerate(topics):
-        times, records = _records(number, topic)
+        times, records = _topic_records(number, topic)
         stamps += times
         pieces += records
     for event in log.events:
         stamp = round(event.time * 1e6)
         body = _LEVELS.get(event.level, b"6") + struct.pack("<Q", stamp) + event.text.encode()
         stamps.append(stamp)
-        pieces.append(_message(b"L", body))
+        pieces.append(_encode_message(b"L", body))
     order = np.argsort(np.array(stamps, dtype=np.int64), kind="stable")
     return bytes(head) + b"".join(pieces[k] for k in order.tolist())
 
 
-def _message(letter: bytes, body: bytes) -> bytes:
+def _encode_message(letter: bytes, body: bytes) -> bytes:
     return struct.pack("<H", len(body)) + letter + body
 
 
-def _format(topic: _Topic) -> str:
+def _format_text(topic: _Topic) -> str:
     """Return the format of the fields in ULog syntax."""
     return "".join(
         f"{_TYPES[kind]}{f'[{shape[0]}]' if shape else ''} {name};"
@@ -177,7 +177,7 @@ def _format(topic: _Topic) -> str:
     )
 
 
-def _records(number: int, topic: _Topic) -> tuple[list[int], list[bytes]]:
+def _topic_records(number: int, topic: _Topic) -> tuple[list[int], list[bytes]]:
     """Return timestamps and data messages of a topic at its rate."""
     stamps = topic.values["timestamp"]
     if topic.period:
@@ -197,7 +197,7 @@ def _records(number: int, topic: _Topic) -> tuple[list[int], list[bytes]]:
     return stamps[recorded_rows].tolist(), [data[start : start + size] for start in range(0, len(data), size)]
 
 
-def _topics(log: FlightLog, rows: NDArray[np.int64]) -> list[_Topic]:
+def _make_topics(log: FlightLog, rows: NDArray[np.int64]) -> list[_Topic]:
     track, origin = log.track, log.setup.scenario.origin
     stamp = np.rint(track.time[rows] * 1e6).astype(np.uint64)
     east, north, up = track.position[rows].T
@@ -206,7 +206,7 @@ def _topics(log: FlightLog, rows: NDArray[np.int64]) -> list[_Topic]:
     ones, ground = np.ones(len(rows), dtype=bool), up[0] if len(rows) else 0.0
     true, height = track.airspeed[rows].astype(np.float64), track.clearance[rows]
     calibrated = true * np.sqrt(np.maximum(1.0 - _DENSITY_LAPSE_PER_M * up, 0.0) ** _DENSITY_EXPONENT)
-    wind, battery = track.wind[rows], _battery(log, rows)
+    wind, battery = track.wind[rows], _battery_values(log, rows)
 
     def topic(name: str, period: float, fields: list[tuple[Any, ...]], **values: Any) -> _Topic:
         return _Topic(name, period, fields, {"timestamp": stamp, **values})
@@ -296,10 +296,10 @@ def _topics(log: FlightLog, rows: NDArray[np.int64]) -> list[_Topic]:
             vehicle_type=_FIXED_WING * ones,
         ),
     ]
-    return [*topics, _items(log, rows)]
+    return [*topics, _mission_item_topic(log, rows)]
 
 
-def _battery(log: FlightLog, rows: NDArray[np.int64]) -> dict[str, Columns]:
+def _battery_values(log: FlightLog, rows: NDArray[np.int64]) -> dict[str, Columns]:
     """Return the values of battery_status by field.
 
     The voltage is the mean from logged energy and current.
@@ -317,7 +317,7 @@ def _battery(log: FlightLog, rows: NDArray[np.int64]) -> dict[str, Columns]:
     }
 
 
-def _items(log: FlightLog, rows: NDArray[np.int64]) -> _Topic:
+def _mission_item_topic(log: FlightLog, rows: NDArray[np.int64]) -> _Topic:
     """Return the topic navigator_mission_item, with each item from the time at which it becomes active.
 
     Items without a position get the time of the next item with one, and the position 0, 0: a gap in the numbers would

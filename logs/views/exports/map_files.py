@@ -22,14 +22,14 @@ from logs.verdict.measures.route_requirements import with_fence_zones
 from logs.verdict.returns.drawn_returns import DrawnReturns
 from logs.verdict.returns.glide_footprint import BAND_ROLES, Part
 from logs.verdict.returns.glides_text import reached_text
-from logs.verdict.returns.returns_text import outcome_text, way_text
+from logs.verdict.returns.returns_text import outcome_text, segment_text
 from world.airspace.zones_on_map import zone_parts
 from world.arrays import Floats
 from world.frames import to_geo
 
 KML = "http://www.opengis.net/kml/2.2"
 # Interval between points of a track in a map file, s.
-EVERY = 0.5
+POINT_INTERVAL_S = 0.5
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,7 +68,7 @@ def plan_line(setup: FlightSetup) -> MapLine:
 
 
 def track_line(setup: FlightSetup, track: Track) -> MapLine:
-    """Return the flown track, thinned to a known position each `EVERY` seconds and the last.
+    """Return the flown track, thinned to a known position each `POINT_INTERVAL_S` seconds and the last.
 
     >>> from logs.recording.example_log import example_log
     >>> log = example_log()
@@ -77,7 +77,7 @@ def track_line(setup: FlightSetup, track: Track) -> MapLine:
     ('example flown', 74, 200.0)
     """
     finite_rows = np.flatnonzero(np.isfinite(track.position).all(axis=1) & np.isfinite(track.time))
-    slots = np.floor(track.time[finite_rows] / EVERY + 1e-9)
+    slots = np.floor(track.time[finite_rows] / POINT_INTERVAL_S + 1e-9)
     is_kept = np.concatenate([[True], np.diff(slots) > 0.0])[: finite_rows.size]
     is_kept[-1:] = True
     position = track.position[finite_rows[is_kept]]
@@ -113,7 +113,7 @@ def map_zones(setup: FlightSetup) -> list[MapZone]:
     """
     zones = []
     for zone in with_fence_zones(setup).scenario.zones:
-        parts = tuple(tuple(_geographic(setup, ring) for ring in part) for part in zone_parts(zone))
+        parts = tuple(tuple(_to_geographic(setup, ring) for ring in part) for part in zone_parts(zone))
         top = zone.ceiling
         name = f"{zone.name} ({'keep out' if zone.kind == 'exclusion' else 'stay in'})"
         height = None if top is None else top.height
@@ -127,20 +127,20 @@ def map_zones(setup: FlightSetup) -> list[MapZone]:
 def return_lines(setup: FlightSetup, drawn: DrawnReturns) -> list[MapLine]:
     """Return the path by outcome of returns, the worst returns, and the path by glide destination."""
     limit, lines = drawn.returns.limit, []
-    for kind, segment in drawn.by_kind:
-        name = f"{segment[0].time:.0f} to {segment[-1].time:.0f} s: {way_text(kind)}"
-        lines.append(_line(setup, name, [ret.start for ret in segment], "returns to launch", f"return-{kind}"))
+    for kind, segment in drawn.segments_by_outcome:
+        name = f"{segment[0].time:.0f} to {segment[-1].time:.0f} s: {segment_text(kind)}"
+        lines.append(_make_line(setup, name, [ret.start for ret in segment], "returns to launch", f"return-{kind}"))
     for number, worst in enumerate(drawn.worst, 1):
-        ret = worst.flown
+        ret = worst.simulated
         name = f"{number}: from {ret.time:.0f} s to {ret.target.name}: {outcome_text(ret, limit)}"
-        lines.append(_line(setup, name, worst.way, "the worst returns", "return-way"))
-    for reach, glides in drawn.by_reach:
+        lines.append(_make_line(setup, name, worst.path, "the worst returns", "return-way"))
+    for reach, glides in drawn.segments_by_reach:
         name = f"{glides[0].time:.0f} to {glides[-1].time:.0f} s: {reached_text(reach)}"
-        lines.append(_line(setup, name, [ret.start for ret in glides], "without its engine", f"reach-{reach}"))
+        lines.append(_make_line(setup, name, [ret.start for ret in glides], "without its engine", f"reach-{reach}"))
     return lines
 
 
-def _line(setup: FlightSetup, name: str, places: ArrayLike, folder: str, role: str) -> MapLine:
+def _make_line(setup: FlightSetup, name: str, places: ArrayLike, folder: str, role: str) -> MapLine:
     position = np.asarray(places, dtype=np.float64)
     lat, lon = to_geo(setup.scenario.origin, position[:, 0], position[:, 1])
     return MapLine(name, np.asarray(lat), np.asarray(lon), position[:, 2], folder=folder, role=role)
@@ -153,7 +153,7 @@ def glide_shapes(setup: FlightSetup, drawn: DrawnReturns) -> list[MapZone]:
         return []
 
     def shape(name: str, role: str, parts: tuple[Part, ...]) -> MapZone:
-        placed = tuple(tuple(_geographic(setup, ring) for ring in part) for part in parts)
+        placed = tuple(tuple(_to_geographic(setup, ring) for ring in part) for part in parts)
         return MapZone(name, placed, folder="the glide's footprint", role=role)
 
     shapes = [
@@ -165,7 +165,7 @@ def glide_shapes(setup: FlightSetup, drawn: DrawnReturns) -> list[MapZone]:
     return [*shapes, *([shape("flat ground according to the elevation file", "landable", flat)] if flat else [])]
 
 
-def _geographic(setup: FlightSetup, ring: Floats) -> Floats:
+def _to_geographic(setup: FlightSetup, ring: Floats) -> Floats:
     return np.stack(to_geo(setup.scenario.origin, ring[:, 0], ring[:, 1]), axis=-1)
 
 
@@ -181,23 +181,23 @@ def kml_text(title: str, lines: list[MapLine], zones: Sequence[MapZone] = ()) ->
     """
     ElementTree.register_namespace("", KML)
     root = ElementTree.Element(f"{{{KML}}}kml")
-    document = _add(root, "Document")
-    _add(document, "name", title)
+    document = _add_element(root, "Document")
+    _add_element(document, "name", title)
     folders = _Folders(document)
     for line in lines:
         folder = folders.named(line.folder) if line.folder else folders.new(line.name)
-        mark = _add(folder, "Placemark")
-        _add(mark, "name", line.name)
+        mark = _add_element(folder, "Placemark")
+        _add_element(mark, "name", line.name)
         _add_style(mark, line.role)
-        string = _add(mark, "LineString")
-        _add(string, "altitudeMode", "absolute")
-        _add(string, "coordinates", " ".join(_coordinates(line, k) for k in range(len(line.lat_deg))))
+        string = _add_element(mark, "LineString")
+        _add_element(string, "altitudeMode", "absolute")
+        _add_element(string, "coordinates", " ".join(_coordinates_text(line, k) for k in range(len(line.lat_deg))))
         for k, name in enumerate(line.marks):
-            mark = _add(folder, "Placemark")
-            _add(mark, "name", name)
-            point = _add(mark, "Point")
-            _add(point, "altitudeMode", "absolute")
-            _add(point, "coordinates", _coordinates(line, k))
+            mark = _add_element(folder, "Placemark")
+            _add_element(mark, "name", name)
+            point = _add_element(mark, "Point")
+            _add_element(point, "altitudeMode", "absolute")
+            _add_element(point, "coordinates", _coordinates_text(line, k))
     _add_zones(folders, zones)
     ElementTree.indent(root)
     return '<?xml version="1.0" encoding="UTF-8"?>\n' + ElementTree.tostring(root, encoding="unicode") + "\n"
@@ -212,8 +212,8 @@ class _Folders:
 
     def new(self, name: str) -> ElementTree.Element:
         """Add a folder to the document."""
-        folder = _add(self._document, "Folder")
-        _add(folder, "name", name)
+        folder = _add_element(self._document, "Folder")
+        _add_element(folder, "name", name)
         return folder
 
     def named(self, name: str) -> ElementTree.Element:
@@ -227,44 +227,44 @@ def _add_style(mark: ElementTree.Element, role: str) -> None:
     """Set colour and width of a role, for the dark background of aerial pictures."""
     if not role:
         return
-    look, style = LOOKS[role], _add(mark, "Style")
+    look, style = LOOKS[role], _add_element(mark, "Style")
     # KML colours are opacity, blue, green, red.
     colour = "".join(look.dark[k : k + 2] for k in (5, 3, 1))
-    line = _add(style, "LineStyle")
-    _add(line, "color", f"ff{colour}")
-    _add(line, "width", f"{max(1.0, look.width):g}")
-    _add(_add(style, "PolyStyle"), "color", f"{round(255.0 * look.fill):02x}{colour}")
+    line = _add_element(style, "LineStyle")
+    _add_element(line, "color", f"ff{colour}")
+    _add_element(line, "width", f"{max(1.0, look.width):g}")
+    _add_element(_add_element(style, "PolyStyle"), "color", f"{round(255.0 * look.fill):02x}{colour}")
 
 
 def _add_zones(folders: _Folders, zones: Sequence[MapZone]) -> None:
     for zone in zones:
-        mark = _add(folders.named(zone.folder), "Placemark")
-        _add(mark, "name", zone.name)
+        mark = _add_element(folders.named(zone.folder), "Placemark")
+        _add_element(mark, "name", zone.name)
         _add_style(mark, zone.role)
-        several = _add(mark, "MultiGeometry")
+        several = _add_element(mark, "MultiGeometry")
         for outline, *holes in zone.parts:
-            polygon = _add(several, "Polygon")
+            polygon = _add_element(several, "Polygon")
             if zone.height is not None:
-                _add(polygon, "extrude", "1")
-                _add(polygon, "altitudeMode", "relativeToGround" if zone.above_ground else "absolute")
+                _add_element(polygon, "extrude", "1")
+                _add_element(polygon, "altitudeMode", "relativeToGround" if zone.above_ground else "absolute")
             _add_ring(polygon, "outerBoundaryIs", outline, zone)
             for hole in holes:
                 _add_ring(polygon, "innerBoundaryIs", hole, zone)
 
 
 def _add_ring(polygon: ElementTree.Element, kind: str, ring: Floats, zone: MapZone) -> None:
-    line = _add(_add(polygon, kind), "LinearRing")
+    line = _add_element(_add_element(polygon, kind), "LinearRing")
     up = 0.0 if zone.height is None else zone.height
-    _add(line, "coordinates", " ".join(f"{lon:.8f},{lat:.8f},{up:.3f}" for lat, lon in ring))
+    _add_element(line, "coordinates", " ".join(f"{lon:.8f},{lat:.8f},{up:.3f}" for lat, lon in ring))
 
 
-def _add(parent: ElementTree.Element, name: str, text: str = "") -> ElementTree.Element:
+def _add_element(parent: ElementTree.Element, name: str, text: str = "") -> ElementTree.Element:
     element = ElementTree.SubElement(parent, f"{{{KML}}}{name}")
     element.text = "".join(ch for ch in text if ch.isprintable() or ch == " ") if text else None
     return element
 
 
-def _coordinates(line: MapLine, k: int) -> str:
+def _coordinates_text(line: MapLine, k: int) -> str:
     return f"{line.lon_deg[k]:.8f},{line.lat_deg[k]:.8f},{line.amsl[k]:.3f}"
 
 

@@ -54,22 +54,22 @@ def telemetry_bytes(log: FlightLog) -> bytes:
     """
     senders = {sender_ids: mavlink.MAVLink(None, *sender_ids) for sender_ids in (_VEHICLE, _STATION)}
     out = bytearray()
-    for time, sender_ids, message in _frames(log):
+    for time, sender_ids, message in _timed_messages(log):
         sender = senders[sender_ids]
         out += _STAMP.pack(EPOCH_NS // 1000 + round(time * 1e6)) + message.pack(sender)
         sender.seq = (sender.seq + 1) % 256
     return bytes(out)
 
 
-def _frames(log: FlightLog) -> Iterator[tuple[float, tuple[int, int], Any]]:
+def _timed_messages(log: FlightLog) -> Iterator[tuple[float, tuple[int, int], Any]]:
     """Yield time in flight (s), sender and message, in order of time."""
-    for message in _upload(log):
+    for message in _upload_messages(log):
         yield 0.0, _STATION, message
-    for time, message in _messages_of(log):
+    for time, message in _flight_messages(log):
         yield time, _VEHICLE, message
 
 
-def _upload(log: FlightLog) -> Iterator[Any]:
+def _upload_messages(log: FlightLog) -> Iterator[Any]:
     items, _, _ = mission_lists(log.setup.mission)
     yield mavlink.MAVLink_heartbeat_message(mavlink.MAV_TYPE_GCS, mavlink.MAV_AUTOPILOT_INVALID, 0, 0, 4, 3)
     yield mavlink.MAVLink_mission_count_message(1, 1, len(items), 0)
@@ -77,7 +77,7 @@ def _upload(log: FlightLog) -> Iterator[Any]:
         yield to_message(item)
 
 
-def _messages_of(log: FlightLog) -> Iterator[tuple[float, Any]]:
+def _flight_messages(log: FlightLog) -> Iterator[tuple[float, Any]]:
     setup, track = log.setup, log.track
     snapshots = SnapshotMaker(setup, LocalMap.around(setup))
     start = snapshots.before_start(setup)

@@ -58,16 +58,21 @@ class Instruments:
         log = self.log
         k = max(0, int(np.searchsorted(log.track.time, time, side="right")) - 1)
         size = _WIDE if columns >= _WIDE.columns else _NARROW
-        left, right = self._horizon(k, size.horizon), self._readout_lines(k)
+        left, right = self._horizon_lines(k, size.horizon), self._readout_lines(k)
         rows = max(len(left), len(right))
         left += [" " * (size.horizon + 2)] * (rows - len(left))
         right += [""] * (rows - len(right))
-        lines = self._head(k, columns)
+        lines = self._head_lines(k, columns)
         lines += [f"{a}  {b}" for a, b in zip(left, right, strict=True)]
-        lines += ["", *self._controls(k, size.bar), self._threats(k), *self._latest_entries(float(log.track.time[k]))]
+        lines += [
+            "",
+            *self._control_lines(k, size.bar),
+            self._threat_text(k),
+            *self._latest_entries(float(log.track.time[k])),
+        ]
         return [shorten(line, columns).rstrip() for line in lines]
 
-    def _head(self, k: int, columns: int) -> list[str]:
+    def _head_lines(self, k: int, columns: int) -> list[str]:
         log, track = self.log, self.log.track
         now, end = float(track.time[k]), log.end_time
         title = f"{log.setup.scenario.name}: {log.setup.aircraft}"
@@ -78,14 +83,15 @@ class Instruments:
         route = log.setup.route
         step = route.waypoints[leg + 1, :2] - track.position[k, :2] if leg < route.legs else np.zeros(2)
         ahead = (
-            f"leg {leg} of {route.legs}, to {waypoint_name(route, leg + 1)}, {_metres(float(np.hypot(*step)))} to go"
+            f"leg {leg} of {route.legs}, to {waypoint_name(route, leg + 1)},"
+            f" {_metres_text(float(np.hypot(*step)))} to go"
         )
         if leg >= route.legs:
             ahead = "behind the last waypoint"
         free = max(1, columns - len(clock))
-        return [_printable(title)[: free - 1].ljust(free) + clock, bar, ahead]
+        return [_without_control_characters(title)[: free - 1].ljust(free) + clock, bar, ahead]
 
-    def _horizon(self, k: int, columns: int) -> list[str]:
+    def _horizon_lines(self, k: int, columns: int) -> list[str]:
         """Draw the artificial horizon: sky above, ground (:) below, the aircraft's wings in the center."""
         roll, pitch, _ = (float(angle) for angle in self.log.track.attitude[k])
         rows = []
@@ -111,25 +117,26 @@ class Instruments:
         _, _, amsl = track.position[k].tolist()
         above = amsl - float(self.ground[k])
         wind_east, wind_north, _ = (float(value) for value in track.wind[k])
-        height = _metres(above) if math.isfinite(above) else "not known"
+        height = _metres_text(above) if math.isfinite(above) else "not known"
         airspeed, commanded, load, used, current = (
             float(column[k])
             for column in (track.airspeed, track.speed_command, track.load_factor, track.energy, track.current)
         )
         return [
-            f"airspeed     {_number(airspeed, 1)} m/s, wanted {_number(commanded, 1)}",
-            f"ground speed {_number(math.hypot(east, north), 1)} m/s, climb {_number(up, 1, '+')} m/s",
-            f"height       {_metres(amsl)} AMSL, {height} above ground",
-            f"course       {_course(math.degrees(math.atan2(east, north)))}, heading {_course(yaw)}",
-            f"roll, pitch  {_number(roll, 1, '+')}°, {_number(pitch, 1, '+')}°, {_number(load, 2)} g",
-            f"off the path {_number(float(track.cross_track[k]), 1, '+')} m right, "
-            f"{_number(float(track.height_error[k]), 1, '+')} m high",
-            f"wind         {_number(math.hypot(wind_east, wind_north), 1)} m/s from "
-            f"{_course(math.degrees(math.atan2(-wind_east, -wind_north)))}",
-            f"battery      {_number(used, 1)} of {_number(setup.battery, 0)} Wh used, {_number(current, 1)} A",
+            f"airspeed     {_number_text(airspeed, 1)} m/s, wanted {_number_text(commanded, 1)}",
+            f"ground speed {_number_text(math.hypot(east, north), 1)} m/s, climb {_number_text(up, 1, '+')} m/s",
+            f"height       {_metres_text(amsl)} AMSL, {height} above ground",
+            f"course       {_course_text(math.degrees(math.atan2(east, north)))}, heading {_course_text(yaw)}",
+            f"roll, pitch  {_number_text(roll, 1, '+')}°, {_number_text(pitch, 1, '+')}°, {_number_text(load, 2)} g",
+            f"off the path {_number_text(float(track.cross_track[k]), 1, '+')} m right, "
+            f"{_number_text(float(track.height_error[k]), 1, '+')} m high",
+            f"wind         {_number_text(math.hypot(wind_east, wind_north), 1)} m/s from "
+            f"{_course_text(math.degrees(math.atan2(-wind_east, -wind_north)))}",
+            f"battery      {_number_text(used, 1)} of {_number_text(setup.battery, 0)} Wh used,"
+            f" {_number_text(current, 1)} A",
         ]
 
-    def _controls(self, k: int, bar: int) -> list[str]:
+    def _control_lines(self, k: int, bar: int) -> list[str]:
         """Draw one bar for each control, with its position (O) between its limits, and its command (|)."""
         lines = []
         controls, commands = self.log.track.controls[k].tolist(), self.log.track.commands[k].tolist()
@@ -143,20 +150,24 @@ class Instruments:
                 if math.isfinite(value):
                     position = value if throttle else 0.5 + 0.5 * value / full
                     cells[round((bar - 1) * min(max(position, 0.0), 1.0))] = mark
-            state = f"{_number(100.0 * stands, 0)} %" if throttle else f"{_number(math.degrees(stands), 1, '+')}°"
+            state = (
+                f"{_number_text(100.0 * stands, 0)} %" if throttle else f"{_number_text(math.degrees(stands), 1, '+')}°"
+            )
             limit_text = "  AT ITS LIMIT" if (command >= 1.0 if throttle else abs(command) >= full) else ""
             lines.append(f"{name:<9} [{''.join(cells)}] {state}{limit_text}")
         return lines
 
-    def _threats(self, k: int) -> str:
+    def _threat_text(self, k: int) -> str:
         threats, position = self.log.setup.scenario.threats, self.log.track.position[k]
         distances = np.sqrt(((threats.position - position) ** 2).sum(axis=1))
         within = [
-            f"{unit} {threats.names[m]} at {_metres(float(distances[m]))}"
+            f"{unit} {threats.names[m]} at {_metres_text(float(distances[m]))}"
             for unit, radii in (("MISSILE", threats.kill_radius), ("radar", threats.detection_radius))
             for m in np.flatnonzero((radii > 0.0) & (distances <= radii)).tolist()
         ]
-        return _printable("within reach of: " + "; ".join(within) if within else "within no unit's reach")
+        return _without_control_characters(
+            "within reach of: " + "; ".join(within) if within else "within no unit's reach"
+        )
 
     def _latest_entries(self, now: float) -> list[str]:
         newest = bisect.bisect_right([entry.time for entry in self.entries], now + 1e-9)
@@ -184,18 +195,18 @@ def make_instruments(log: FlightLog) -> Instruments:
     return Instruments(log, tuple(timeline_of_legs(log)), ground, tuple(control_limits(log.setup.aircraft)))
 
 
-def _printable(text: str) -> str:
+def _without_control_characters(text: str) -> str:
     return "".join(letter if letter.isprintable() else " " for letter in text)
 
 
-def _number(value: float, digits: int, sign: str = "") -> str:
+def _number_text(value: float, digits: int, sign: str = "") -> str:
     # Zero has no unwanted sign: "+0.0" or "0", never "-0".
     return f"{round(value, digits) + 0.0:{sign}.{digits}f}" if math.isfinite(value) else "?"
 
 
-def _metres(value: float) -> str:
-    return f"{_number(value, 0)} m"
+def _metres_text(value: float) -> str:
+    return f"{_number_text(value, 0)} m"
 
 
-def _course(degrees: float) -> str:
+def _course_text(degrees: float) -> str:
     return f"{round(degrees) % 360:03d}°" if math.isfinite(degrees) else "?"

@@ -68,18 +68,18 @@ def log_with_legs(log: FlightLog) -> FlightLog:
 def timeline_of_legs(log: FlightLog) -> list[TimelineEntry]:
     """List the entries as `timeline` does, for a log from `log_with_legs`."""
     parts = _leg_rows(log.track, log.setup.route)
-    entries = [_start(log)]
-    entries += _legs(log, parts)
-    entries += _turns(log, parts)
-    entries += _clearances(log, parts)
-    entries += _threats(log)
-    entries += _throttle(log.track)
+    entries = [_start_entry(log)]
+    entries += _leg_entries(log, parts)
+    entries += _turn_entries(log, parts)
+    entries += _clearance_entries(log, parts)
+    entries += _threat_entries(log)
+    entries += _throttle_entries(log.track)
     entries += [
         TimelineEntry(event.time, "event", event.text if event.level == "info" else f"{event.level}: {event.text}")
         for event in log.events
     ]
-    entries += _end(log)
-    clean = [TimelineEntry(entry.time, entry.kind, _printable(entry.text)) for entry in entries]
+    entries += _end_entries(log)
+    clean = [TimelineEntry(entry.time, entry.kind, _without_control_characters(entry.text)) for entry in entries]
     return sorted(clean, key=lambda entry: (entry.time, _ORDER.index(entry.kind)))
 
 
@@ -95,7 +95,7 @@ def entry_lines(entry: TimelineEntry) -> list[str]:
     )
 
 
-def _printable(text: str) -> str:
+def _without_control_characters(text: str) -> str:
     """Replace control characters of a file's text, so that they cannot control the terminal."""
     return "".join(letter if letter.isprintable() else " " for letter in text)
 
@@ -126,7 +126,7 @@ def waypoint_name(route: Route, index: int) -> str:
     return f"waypoint {number}" if item < 0 else f"waypoint {number} (item {item})"
 
 
-def _start(log: FlightLog) -> TimelineEntry:
+def _start_entry(log: FlightLog) -> TimelineEntry:
     setup, track = log.setup, log.track
     east, north, up = track.position[0].tolist()
     lat, lon = to_geo(setup.scenario.origin, east, north)
@@ -140,7 +140,7 @@ def _start(log: FlightLog) -> TimelineEntry:
     return TimelineEntry(float(track.time[0]), "start", text.strip())
 
 
-def _legs(log: FlightLog, parts: list[_LegRows]) -> list[TimelineEntry]:
+def _leg_entries(log: FlightLog, parts: list[_LegRows]) -> list[TimelineEntry]:
     route = log.setup.route
     points = log.setup.shown_waypoints
     courses, runs, slopes = leg_courses(points), leg_runs(points), leg_slopes(points)
@@ -167,7 +167,7 @@ def _legs(log: FlightLog, parts: list[_LegRows]) -> list[TimelineEntry]:
     return entries
 
 
-def _turns(log: FlightLog, parts: list[_LegRows]) -> list[TimelineEntry]:
+def _turn_entries(log: FlightLog, parts: list[_LegRows]) -> list[TimelineEntry]:
     """List each change to the next leg, with the turn of the route and the peak bank from mid-leg to mid-leg."""
     route, track = log.setup.route, log.track
     turns = signed_turns(route.waypoints)
@@ -188,7 +188,7 @@ def _turns(log: FlightLog, parts: list[_LegRows]) -> list[TimelineEntry]:
     return entries
 
 
-def _clearances(log: FlightLog, parts: list[_LegRows]) -> list[TimelineEntry]:
+def _clearance_entries(log: FlightLog, parts: list[_LegRows]) -> list[TimelineEntry]:
     terrain, track = log.setup.scenario.terrain, log.track
     if terrain is None:
         return [TimelineEntry(float(track.time[0]), "ground", "no terrain in the log: clearance is not known")]
@@ -213,7 +213,7 @@ def _clearances(log: FlightLog, parts: list[_LegRows]) -> list[TimelineEntry]:
     return entries
 
 
-def _threats(log: FlightLog) -> list[TimelineEntry]:
+def _threat_entries(log: FlightLog) -> list[TimelineEntry]:
     threats, track = log.setup.scenario.threats, log.track
     entries = []
     for k, name in enumerate(threats.names):
@@ -231,7 +231,7 @@ def _stay_entries(name: str, unit: str, radius: float, stay: Passage) -> list[Ti
     return [entered, TimelineEntry(stay.end, "threat", f"outside the {unit} range of {name}: {inside}")]
 
 
-def _throttle(track: Track) -> list[TimelineEntry]:
+def _throttle_entries(track: Track) -> list[TimelineEntry]:
     _, _, _, throttle = track.commands.T
     entries = []
     for name, is_held in (
@@ -249,7 +249,7 @@ def _throttle(track: Track) -> list[TimelineEntry]:
     return entries
 
 
-def _end(log: FlightLog) -> list[TimelineEntry]:
+def _end_entries(log: FlightLog) -> list[TimelineEntry]:
     track = log.track
     steps = np.diff(track.position, axis=0)
     flown = float(np.nansum(np.sqrt((steps**2).sum(axis=1))))

@@ -34,7 +34,7 @@ from logs.views.report.page import (
     script_text,
     style_text,
 )
-from logs.views.report.text import NOTHING, badge_of, number
+from logs.views.report.text import NOTHING, number, verdict_badge
 from logs.views.scene import SceneView, script_json
 from world.arrays import Floats
 from world.files import write_whole
@@ -90,27 +90,29 @@ def compare_logs(first: FlightLog, second: FlightLog, *, names: tuple[str, str])
     """
     if names[0] == names[1]:
         names = (f"{names[0]} (first)", f"{names[1]} (second)")
-    verdicts = (_judge(first), _judge(second))
+    verdicts = (_judge_log(first), _judge_log(second))
     measures = [
-        _measure(log.setup, log.track) | _margins(verdict)
+        _measure_flight(log.setup, log.track) | _verdict_margins(verdict)
         for log, verdict in zip((first, second), verdicts, strict=True)
     ]
     keys = list(dict.fromkeys([*measures[0], *measures[1]]))
-    found = [Difference(*key, *(measure.get(key, math.nan) for measure in measures)) for key in keys]
-    return Comparison((first, second), names, verdicts, tuple(found), tuple(_notes(first, second, names)))
+    differences = [Difference(*key, *(measure.get(key, math.nan) for measure in measures)) for key in keys]
+    return Comparison(
+        (first, second), names, verdicts, tuple(differences), tuple(_difference_notes(first, second, names))
+    )
 
 
-def _judge(log: FlightLog) -> Verdict:
-    ended = log.ended or "the log ends before the flight does"
-    return judge_flight(log.setup, log.track, ended, log_complete=log.complete, reference=log.reference)
+def _judge_log(log: FlightLog) -> Verdict:
+    end_reason = log.ended or "the log ends before the flight does"
+    return judge_flight(log.setup, log.track, end_reason, log_complete=log.complete, reference=log.reference)
 
 
-def _measure(setup: FlightSetup, track: Track) -> dict[tuple[str, str], float]:
+def _measure_flight(setup: FlightSetup, track: Track) -> dict[tuple[str, str], float]:
     """Measure a flight: values by (name, unit)."""
-    good = np.isfinite(track.position).all(axis=1)
-    position, time = np.ascontiguousarray(track.position[good]), np.ascontiguousarray(track.time[good])
+    has_position = np.isfinite(track.position).all(axis=1)
+    position, time = np.ascontiguousarray(track.position[has_position]), np.ascontiguousarray(track.time[has_position])
     roll, _, _ = track.attitude.T
-    found = {
+    values = {
         ("time in the air", "s"): float(track.time[-1] - track.time[0]),
         ("distance flown", "m"): float(path_length(position)) if len(position) > 1 else math.nan,
         ("energy used", "Wh"): float(track.energy[-1]),
@@ -125,7 +127,7 @@ def _measure(setup: FlightSetup, track: Track) -> dict[tuple[str, str], float]:
         ("largest height error", "m"): _reduce_finite(np.max, np.abs(track.height_error)),
     }
     if setup.scenario.terrain is not None and len(position) > 1:
-        found["lowest height above ground", "m"] = _reduce_finite(
+        values["lowest height above ground", "m"] = _reduce_finite(
             np.min, segment_clearances(setup.scenario.terrain, position)[0]
         )
     threats = setup.scenario.threats
@@ -134,15 +136,15 @@ def _measure(setup: FlightSetup, track: Track) -> dict[tuple[str, str], float]:
             ("all missiles", threats.kill_radius, threats.kill_scale),
             ("all radars", threats.detection_radius, threats.detection_scale),
         ):
-            met = path_spheres(position, time, threats.position, radii, scales)
-            found[f"time within reach, sum over {name}", "s"] = float(met.inside.sum())
-            found[f"exposure, sum over {name}", "s"] = float(met.exposure.sum())
-    lasts = np.append(np.diff(track.time), 0.0)
+            visits = path_spheres(position, time, threats.position, radii, scales)
+            values[f"time within reach, sum over {name}", "s"] = float(visits.inside.sum())
+            values[f"exposure, sum over {name}", "s"] = float(visits.exposure.sum())
+    durations = np.append(np.diff(track.time), 0.0)
     for k, (name, limit) in enumerate(control_limits(setup.aircraft)):
         if math.isfinite(limit):
-            held = held_at_limit(track, k, 0.0 if name == "throttle" else -limit, limit)
-            found[f"{name} at its limit", "s"] = float(lasts[held].sum())
-    return found
+            is_at_limit = held_at_limit(track, k, 0.0 if name == "throttle" else -limit, limit)
+            values[f"{name} at its limit", "s"] = float(durations[is_at_limit].sum())
+    return values
 
 
 def _reduce_finite(reduce: Callable[[Floats], Any], values: NDArray[np.floating[Any]]) -> float:
@@ -151,18 +153,18 @@ def _reduce_finite(reduce: Callable[[Floats], Any], values: NDArray[np.floating[
     return float(reduce(finite)) if finite.size else math.nan
 
 
-def _margins(verdict: Verdict) -> dict[tuple[str, str], float]:
+def _verdict_margins(verdict: Verdict) -> dict[tuple[str, str], float]:
     """Return the number of failed findings, and the smallest margin of each rule; NaN if unknown."""
-    found = {("findings that fail", ""): float(sum(item.ok is False for item in verdict.findings))}
+    values = {("findings that fail", ""): float(sum(item.ok is False for item in verdict.findings))}
     for name, rule in RULE_WORDS.items():
-        closest = closest_to_limit(one for one in verdict.findings if one.rule == name)
+        closest = closest_to_limit(finding for finding in verdict.findings if finding.rule == name)
         if closest is not None:
             margin = math.nan if closest.margin is None else closest.margin
-            found[f"smallest margin: {rule.word}", closest.unit] = margin
-    return found
+            values[f"smallest margin: {rule.word}", closest.unit] = margin
+    return values
 
 
-def _notes(first: FlightLog, second: FlightLog, names: tuple[str, str]) -> list[str]:
+def _difference_notes(first: FlightLog, second: FlightLog, names: tuple[str, str]) -> list[str]:
     """List the differences of the setups, and the distance between the tracks."""
     a, b = first.setup, second.setup
     notes = []
@@ -171,7 +173,7 @@ def _notes(first: FlightLog, second: FlightLog, names: tuple[str, str]) -> list[
         ("aircraft", a.aircraft, b.aircraft),
         ("seed", str(a.seed), str(b.seed)),
         ("mission", *(mission_text(setup.mission, "waypoints") for setup in (a, b))),
-        ("wind", _wind(a), _wind(b)),
+        ("wind", _wind_text(a), _wind_text(b)),
         ("guidance", a.autopilot.store().guidance, b.autopilot.store().guidance),
         ("navigation", a.nav, b.nav),
     ):
@@ -184,11 +186,14 @@ def _notes(first: FlightLog, second: FlightLog, names: tuple[str, str]) -> list[
                 " planfly refly measures an imported flight against its legs"
             )
     if a.scenario.origin == b.scenario.origin:
-        there, here = (log.track.position[np.isfinite(log.track.position).all(axis=1)] for log in (first, second))
-        if len(there) and len(here):
-            away = nearest_distances(here, there)
+        first_positions, second_positions = (
+            log.track.position[np.isfinite(log.track.position).all(axis=1)] for log in (first, second)
+        )
+        if len(first_positions) and len(second_positions):
+            distances = nearest_distances(second_positions, first_positions)
             notes.append(
-                f"tracks: {number(float(away.mean()))} m apart on average, {number(float(away.max()))} m at most"
+                f"tracks: {number(float(distances.mean()))} m apart on average,"
+                f" {number(float(distances.max()))} m at most"
             )
     else:
         notes.append("map origins differ: the tracks are not laid over each other")
@@ -207,21 +212,23 @@ def nearest_distances(points: Floats, track: Floats) -> Floats:
     >>> nearest_distances(np.array([[0.0, 3.0, 4.0], [9.0, 0.0, 0.0]]), np.array([[0.0, 0.0, 0.0], [10.0, 0.0, 0.0]]))
     array([5., 1.])
     """
-    begins = np.arange(0, len(track), _BLOCK_POINTS)
-    low, high = np.minimum.reduceat(track, begins), np.maximum.reduceat(track, begins)
-    parts = np.array_split(track, begins[1:])
-    out = []
+    block_starts = np.arange(0, len(track), _BLOCK_POINTS)
+    block_min, block_max = np.minimum.reduceat(track, block_starts), np.maximum.reduceat(track, block_starts)
+    parts = np.array_split(track, block_starts[1:])
+    results = []
     for first in range(0, len(points), _BLOCK_POINTS):
-        some = points[first : first + _BLOCK_POINTS]
-        least, most = some.min(axis=0), some.max(axis=0)
-        nearest = np.linalg.norm(np.maximum(0.0, np.maximum(low - most, least - high)), axis=1)
-        farthest = np.linalg.norm(np.maximum(high - least, most - low), axis=1)
-        near = np.concatenate([parts[k] for k in np.flatnonzero(nearest <= farthest.min())])
-        out.append(np.sqrt(((some[:, None] - near[None]) ** 2).sum(axis=2).min(axis=1)))
-    return np.concatenate(out)
+        block = points[first : first + _BLOCK_POINTS]
+        min_corner, max_corner = block.min(axis=0), block.max(axis=0)
+        min_distances = np.linalg.norm(
+            np.maximum(0.0, np.maximum(block_min - max_corner, min_corner - block_max)), axis=1
+        )
+        max_distances = np.linalg.norm(np.maximum(block_max - min_corner, max_corner - block_min), axis=1)
+        candidates = np.concatenate([parts[k] for k in np.flatnonzero(min_distances <= max_distances.min())])
+        results.append(np.sqrt(((block[:, None] - candidates[None]) ** 2).sum(axis=2).min(axis=1)))
+    return np.concatenate(results)
 
 
-def _wind(setup: FlightSetup) -> str:
+def _wind_text(setup: FlightSetup) -> str:
     wind = setup.scenario.wind
     source = f" from {round(math.degrees(wind.from_course)) % 360:03d}°" if wind.speed else ""
     return f"{wind.speed:g} m/s{source}, turbulence {wind.turbulence}"
@@ -254,10 +261,10 @@ def difference_lines(comparison: Comparison) -> list[str]:
     head = ("", "", *(name[-24:] for name in comparison.names), "difference")
     rows = [head, *difference_rows(comparison)]
     rows = [(f"{name} ({unit})" if unit else name, *rest) for name, unit, *rest in rows]
-    wide = [max(len(row[k]) for row in rows) for k in range(4)]
+    widths = [max(len(row[k]) for row in rows) for k in range(4)]
     lines = [
         "  ".join(
-            [row[0].ljust(wide[0]), *(cell.rjust(size) for cell, size in zip(row[1:], wide[1:], strict=True))]
+            [row[0].ljust(widths[0]), *(cell.rjust(size) for cell, size in zip(row[1:], widths[1:], strict=True))]
         ).rstrip()
         for row in rows
     ]
@@ -300,7 +307,7 @@ def write_comparison(out_dir: Path, comparison: Comparison, *, svg: bool = False
     views = comparison_views((first, second))
     figures = {name: draw(view) for name, view in views.items()}
     files = {f"{name}.png": png_bytes(figure) for name, figure in figures.items()}
-    page = _page(comparison, (first, second), views, files)
+    page = _page_html(comparison, (first, second), views, files)
     if svg:
         files |= {f"{name}.svg": svg_bytes(figure) for name, figure in figures.items()}
     files["compare.html"] = page.encode("utf-8")
@@ -319,8 +326,8 @@ def comparison_views(flights: tuple[NamedFlight, NamedFlight]) -> dict[str, View
     ['compare-map', 'compare-profile']
     """
     first, second = flights
-    same = first.setup.scenario.origin == second.setup.scenario.origin
-    views: dict[str, View] = {"compare-map": both_on_map(flights)} if same else {}
+    has_same_origin = first.setup.scenario.origin == second.setup.scenario.origin
+    views: dict[str, View] = {"compare-map": both_on_map(flights)} if has_same_origin else {}
     return views | {"compare-profile": both_along(flights)}
 
 
@@ -338,14 +345,14 @@ def comparison_data(flights: tuple[NamedFlight, NamedFlight], views: Mapping[str
     return {"scene": scene, "flight": {"flights": moments}, "charts": charts}
 
 
-def _page(
+def _page_html(
     comparison: Comparison, flights: tuple[NamedFlight, NamedFlight], views: Mapping[str, View], files: dict[str, bytes]
 ) -> str:
     """Return the page with its pictures, charts and scripts."""
     pictures = [(*_PICTURES[name.removesuffix(".png")], picture_address(data)) for name, data in files.items()]
     data, script = comparison_data(flights, views), script_text(CHART_SCRIPTS)
     verdicts = [
-        (name, badge_of(verdict), verdict.headline)
+        (name, verdict_badge(verdict), verdict.headline)
         for name, verdict in zip(comparison.names, comparison.verdicts, strict=True)
     ]
     return page_template("compare.html").render(

@@ -118,7 +118,7 @@ def identification_page(facts: IdentificationFacts) -> str:
     return page_template("identification.html").render(
         facts=facts,
         minutes=f"{facts.estimate.seconds / 60.0:.1f}",
-        fits=_fits(facts.estimate, charts, pictures),
+        fits=_fit_charts(facts.estimate, charts, pictures),
         parameters=parameter_rows(facts.estimate),
         silent=facts.estimate.silent(),
         shifts=shift_rows(facts.estimate),
@@ -133,7 +133,7 @@ def identification_page(facts: IdentificationFacts) -> str:
     )
 
 
-def _fits(
+def _fit_charts(
     estimate: Estimate, charts: Mapping[str, Chart], pictures: Mapping[str, bytes]
 ) -> Sequence[tuple[str, str, str, str]]:
     """Return name, description and picture of each chart, and the quality of its fit."""

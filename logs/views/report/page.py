@@ -31,7 +31,14 @@ from logs.views.failures import failures
 from logs.views.figures import FIGURES, Subject, View, figure_views, subject_of, view_json
 from logs.views.moments import aircraft_model, flight_moments
 from logs.views.report import tables
-from logs.views.report.text import badge_of, count_sentence, failed_groups, finding_rows, headline_after, rule_rows
+from logs.views.report.text import (
+    count_sentence,
+    failed_groups,
+    finding_rows,
+    headline_without_answer,
+    rule_rows,
+    verdict_badge,
+)
 from logs.views.scene import script_json
 from world.files import write_whole
 
@@ -88,9 +95,9 @@ def picture_address(png: bytes) -> str:
     'data:image/png;base64,UE5H'
     """
     # Imported here, so that matplotlib is not loaded before a drawing.
-    from logs.views.drawing import few_colours
+    from logs.views.drawing import reduce_colours
 
-    small = png if len(png) <= _LARGE_PICTURE_BYTES else few_colours(png)
+    small = png if len(png) <= _LARGE_PICTURE_BYTES else reduce_colours(png)
     return "data:image/png;base64," + base64.b64encode(small).decode("ascii")
 
 
@@ -138,7 +145,7 @@ class PageLibrary:
 
 
 @cache
-def _templates(package: str) -> Environment:
+def _load_templates(package: str) -> Environment:
     return Environment(
         loader=PackageLoader(package),
         autoescape=True,
@@ -153,7 +160,7 @@ def page_template(name: str, package: str = "logs.views.report") -> Template:
 
     Rendered values are escaped, and a missing name is an error.
     """
-    return _templates(package).get_template(name)
+    return _load_templates(package).get_template(name)
 
 
 def script_text(names: tuple[str, ...]) -> str:
@@ -163,7 +170,7 @@ def script_text(names: tuple[str, ...]) -> str:
     """
     files = resources.files("logs.views.report").joinpath("templates", "scripts")
     parts = [files.joinpath(f"{name}.js").read_text(encoding="utf-8") for name in (*names, "start")]
-    looks = f"const LOOKS = {json.dumps(theme.page_looks(), separators=(',', ':'))};"
+    looks = f"const LOOKS = {json.dumps(theme.page_styles(), separators=(',', ':'))};"
     return "\n".join(['\n(function () {\n"use strict";', looks, *parts]) + "})();\n"
 
 
@@ -240,7 +247,7 @@ def write_report(
     views = figure_views(subject)
     drawn = {entry.name for entry in FIGURES if every_picture or entry.still}
     pictures = figures.draw_pictures({name: view for name, view in views.items() if name in drawn}, svg=svg)
-    page = _page(setup, subject, views, pictures, ended=ended, versions=versions, command=command, events=events)
+    page = _page_html(setup, subject, views, pictures, ended=ended, versions=versions, command=command, events=events)
     out_dir.mkdir(parents=True, exist_ok=True)
     files = {**pictures, "report.html": page.encode("utf-8")}
     for name, data in files.items():
@@ -248,7 +255,7 @@ def write_report(
     return [out_dir / name for name in files]
 
 
-def _page(
+def _page_html(
     setup: FlightSetup,
     subject: Subject,
     views: Mapping[str, View],
@@ -263,11 +270,11 @@ def _page(
     failed = failures(verdict, len(setup.route.waypoints))
     rows = finding_rows(verdict.findings, verdict.deciding)
     shown = report_pictures(subject, page_charts(views), pictures)
-    failing, lines, badge = failed_groups(verdict), verdict.lines or ("",), badge_of(verdict)
+    failing, lines, badge = failed_groups(verdict), verdict.lines or ("",), verdict_badge(verdict)
     return page_template("report.html").render(
         name=setup.scenario.name,
         badge=badge,
-        headline=headline_after(badge, lines[0]),
+        headline=headline_without_answer(badge, lines[0]),
         lines=lines[1:],
         flown=track is not None,
         failing=failing,

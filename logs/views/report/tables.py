@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from flight.mission_files.formats import mission_text
 from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track, control_limits, held_at_limit
-from logs.verdict.measures.flown_phases import by_the_ground
+from logs.verdict.measures.flown_phases import ground_phase_rows
 from logs.verdict.measures.path_sweeps import passages
 from logs.views.report.text import NOTHING, number, quantity
 from world.arrays import Floats
@@ -111,7 +111,7 @@ def flight_sentence(setup: FlightSetup, track: Track | None) -> str:
         return ""
     seconds, distance = float(track.time[-1] - track.time[0]), float(path_length(track.position)) / 1000.0
     above = ground_clearance(setup, track)
-    landed = by_the_ground(track, setup.ground_ways)
+    landed = ground_phase_rows(track, setup.ground_ways)
     low = NOTHING if above is None else number(_min_finite(above[~landed]), digits=0)
     between = " between take-off and landing" if landed.any() else ""
     height = f", never less than {low} m above ground{between}" if low != NOTHING else ""
@@ -139,7 +139,7 @@ def scenario_facts(setup: FlightSetup) -> Facts:
     if scenario.spec.description:
         facts.append(("About", scenario.spec.description))
     east, north = (float(np.ptp(side)) / 1000.0 for side in scenario.bounds)
-    facts.append(("Map origin", _position(scenario.origin.lat_deg, scenario.origin.lon_deg)))
+    facts.append(("Map origin", _position_text(scenario.origin.lat_deg, scenario.origin.lon_deg)))
     area = scenario.spec.area
     floor = f"from {number(scenario.floor)} " if area is not None and area.floor_amsl_m is not None else ""
     if not scenario.external:
@@ -149,7 +149,7 @@ def scenario_facts(setup: FlightSetup) -> Facts:
         ]
     for name, point in (("Start", scenario.start), ("Destination", scenario.destination)):
         lat, lon = geographic(scenario, point)
-        facts.append((name, f"{_position(float(lat), float(lon))}, {quantity(float(point[2]), 'm')} AMSL"))
+        facts.append((name, f"{_position_text(float(lat), float(lon))}, {quantity(float(point[2]), 'm')} AMSL"))
     if terrain is None:
         facts.append(("Terrain", "none was given, so the ground is not judged"))
     else:
@@ -162,7 +162,7 @@ def scenario_facts(setup: FlightSetup) -> Facts:
     return facts
 
 
-def _position(lat_deg: float, lon_deg: float) -> str:
+def _position_text(lat_deg: float, lon_deg: float) -> str:
     ns, ew = "N" if lat_deg >= 0.0 else "S", "E" if lon_deg >= 0.0 else "W"
     return f"{abs(lat_deg):.6f}° {ns}, {abs(lon_deg):.6f}° {ew}"
 
@@ -219,7 +219,7 @@ def event_rows(events: Sequence["LogEvent"]) -> list[tuple[str, str, str]]:
     return [(number(event.time, digits=2), event.text, event.level) for event in events[:MAX_EVENTS]]
 
 
-def notes_of(setup: FlightSetup) -> list[str]:
+def mission_notes(setup: FlightSetup) -> list[str]:
     """List warnings on the mission file, notes on the scenario, and items that cannot be flown as written."""
     return [*setup.mission.warnings, *setup.scenario.notes, *setup.notes]
 

@@ -94,8 +94,8 @@ def number(value: float | None, *, signed: bool = False, digits: int | None = No
 
 def quantity(value: float | None, unit: str) -> str:
     """Write a number and its unit, with radians shown as degrees."""
-    shown, name = in_unit(value, unit)
-    text = number(shown)
+    shown_value, name = in_unit(value, unit)
+    text = number(shown_value)
     if text == NOTHING or not name:
         return text
     return f"{text}{name}" if name in ("°", "%") else f"{text}\u00a0{name}"
@@ -108,13 +108,13 @@ def in_unit(value: float | None, unit: str) -> tuple[float | None, str]:
     return value, _UNITS.get(unit, unit)
 
 
-def state_of(ok: bool | None, *, is_open: bool = False) -> str:
-    """Name the state of a finding by its answer.  is_open: True if an unjudged one leaves the verdict open."""
+def finding_state(ok: bool | None, *, is_open: bool = False) -> str:
+    """Name the state of a finding.  is_open: True if the finding, unjudged, leaves the verdict open."""
     return ("open" if is_open else "unjudged") if ok is None else "pass" if ok else "fail"
 
 
-def badge_of(verdict: Verdict) -> Badge:
-    """Summarize the verdict in one word: incomplete if nothing but the completion failed."""
+def verdict_badge(verdict: Verdict) -> Badge:
+    """Summarize the verdict in one word; a verdict whose only failure is completion is incomplete."""
     if verdict.flyable:
         word = verdict.answer.capitalize() + ("" if verdict.level == "flown" else " on paper, not flown")
         return Badge("pass", _SIGNS["pass"], word)
@@ -129,14 +129,14 @@ def badge_of(verdict: Verdict) -> Badge:
     return Badge("fail", _SIGNS["fail"], word.capitalize() + ("" if verdict.complete else ", and incomplete"))
 
 
-def headline_after(badge: Badge, headline: str) -> str:
-    """Return the headline without the answer that the badge gives.
+def headline_without_answer(badge: Badge, headline: str) -> str:
+    """Remove the answer that the badge already gives from the headline.
 
-    >>> headline_after(Badge("fail", "✗", "Not flyable"), "not flyable: slope on leg 1")
+    >>> headline_without_answer(Badge("fail", "✗", "Not flyable"), "not flyable: slope on leg 1")
     'slope on leg 1'
     """
-    same = headline.lower().startswith(badge.word.lower())
-    return headline[len(badge.word) :].lstrip(":; ") if same else headline
+    starts_with_answer = headline.lower().startswith(badge.word.lower())
+    return headline[len(badge.word) :].lstrip(":; ") if starts_with_answer else headline
 
 
 def finding_rows(findings: Iterable[Finding], deciding: DecidingParameter | None = None) -> list[FindingRow]:
@@ -147,7 +147,7 @@ def finding_rows(findings: Iterable[Finding], deciding: DecidingParameter | None
     deciding: deciding parameter of the verdict, for the remedies.
     """
     order = {"fail": 0, "open": 1, "pass": 2, "unjudged": 3}
-    return sorted((_row(finding, deciding) for finding in findings), key=lambda row: order[row.state])
+    return sorted((_finding_row(finding, deciding) for finding in findings), key=lambda row: order[row.state])
 
 
 @dataclass(frozen=True, slots=True)
@@ -167,12 +167,12 @@ def failed_groups(verdict: Verdict) -> list[FailedGroup]:
     """List the failed rules, in the order of the first line of the verdict."""
     groups = []
     for rule in verdict.present().failed_rules:
-        worst, *others = (_row(finding, verdict.deciding) for finding in rule.failed)
-        groups.append(FailedGroup(rule.words.word, rule.judged, worst, tuple(map(_in_short, others))))
+        worst, *others = (_finding_row(finding, verdict.deciding) for finding in rule.failed)
+        groups.append(FailedGroup(rule.words.word, rule.judged, worst, tuple(map(_place_and_value, others))))
     return groups
 
 
-def _in_short(row: FindingRow) -> str:
+def _place_and_value(row: FindingRow) -> str:
     """Describe the place and value of a failed finding."""
     value = row.planned if row.flown == NOTHING else row.flown
     unit = row.unit if row.unit in ("°", "%") else f" {row.unit}"
@@ -202,23 +202,23 @@ def remedy_text(finding: Finding, deciding: DecidingParameter | None) -> str:
 def count_sentence(rows: list[FindingRow]) -> str:
     """State the numbers of findings that pass, fail, and were not judged."""
     counts = {state: sum(row.state == state for row in rows) for state in _SIGNS}
-    held = f"{counts['pass']} of {counts['pass'] + counts['fail']} judged findings hold"
-    failed = f", {counts['fail']} {'fails' if counts['fail'] == 1 else 'fail'}" if counts["fail"] else ""
+    passed_text = f"{counts['pass']} of {counts['pass'] + counts['fail']} judged findings hold"
+    failed_text = f", {counts['fail']} {'fails' if counts['fail'] == 1 else 'fail'}" if counts["fail"] else ""
     unjudged = counts["open"] + counts["unjudged"]
-    left = f"; {unjudged} could not be judged" if unjudged else ""
-    return f"{held}{failed}{left}."
+    unjudged_text = f"; {unjudged} could not be judged" if unjudged else ""
+    return f"{passed_text}{failed_text}{unjudged_text}."
 
 
-def _row(finding: Finding, deciding: DecidingParameter | None = None) -> FindingRow:
-    state = state_of(finding.ok, is_open=bool(undecided_findings([finding])))
+def _finding_row(finding: Finding, deciding: DecidingParameter | None = None) -> FindingRow:
+    state = finding_state(finding.ok, is_open=bool(undecided_findings([finding])))
     planned, flown, margin = (
         in_unit(value, finding.unit)[0] for value in (finding.planned, finding.flown, finding.margin)
     )
-    left = None if margin is None else margin + (in_unit(finding.tolerance, finding.unit)[0] or 0.0)
-    method, digits = finding.method, _digits_of(finding)
+    margin_with_tolerance = None if margin is None else margin + (in_unit(finding.tolerance, finding.unit)[0] or 0.0)
+    method, digits = finding.method, _needed_decimals(finding)
     if finding.tolerance and method and finding.limit is not None:
-        stated, tolerance = (quantity(value, finding.unit) for value in (finding.limit, finding.tolerance))
-        method = f"{method}; limit {stated} with a tolerance of {tolerance}"
+        limit_text, tolerance = (quantity(value, finding.unit) for value in (finding.limit, finding.tolerance))
+        method = f"{method}; limit {limit_text} with a tolerance of {tolerance}"
     return FindingRow(
         state=state,
         sign=f"{_SIGNS[state]} {_WORDS[state]}",
@@ -228,7 +228,7 @@ def _row(finding: Finding, deciding: DecidingParameter | None = None) -> Finding
         flown=number(flown, digits=digits),
         limit=_limit_text(finding, digits),
         limit_source=finding.limit_source,
-        margin=number(left, signed=True),
+        margin=number(margin_with_tolerance, signed=True),
         unit=in_unit(None, finding.unit)[1],
         method=method,
         reason=finding.reason,
@@ -242,13 +242,17 @@ def _row(finding: Finding, deciding: DecidingParameter | None = None) -> Finding
 _MOST_DECIMALS = 6
 
 
-def _digits_of(finding: Finding) -> int | None:
-    """Return the number of decimals needed to tell a value from its limit, or None if the usual number suffices."""
-    value, limit = (in_unit(one, finding.unit)[0] for one in (finding.value, finding.effective_limit))
+def _needed_decimals(finding: Finding) -> int | None:
+    """Return the decimals needed to distinguish a value from its limit; None if the usual number suffices."""
+    value, limit = (
+        in_unit(quantity_value, finding.unit)[0] for quantity_value in (finding.value, finding.effective_limit)
+    )
     if value is None or limit is None or value == limit or number(value) != number(limit):
         return None
-    apart = (digits for digits in range(_MOST_DECIMALS) if number(value, digits=digits) != number(limit, digits=digits))
-    return next(apart, _MOST_DECIMALS)
+    sufficient_decimals = (
+        digits for digits in range(_MOST_DECIMALS) if number(value, digits=digits) != number(limit, digits=digits)
+    )
+    return next(sufficient_decimals, _MOST_DECIMALS)
 
 
 def _limit_text(finding: Finding, digits: int | None) -> str:
@@ -267,7 +271,7 @@ def _missed_text(finding: Finding) -> str:
 def _sentence(finding: Finding) -> str:
     """Describe a finding in words: the flown or planned value, its limit, and the reason."""
     parts: list[str] = []
-    digits, unit = _digits_of(finding), in_unit(None, finding.unit)[1]
+    digits, unit = _needed_decimals(finding), in_unit(None, finding.unit)[1]
     space = "" if unit in ("", "°", "%") else "\u00a0"
     if (value := finding.value) is not None:
         word = "planned" if finding.flown is None or value != finding.flown else "flown"
@@ -285,18 +289,20 @@ def rule_rows(findings: Sequence[Finding]) -> list[RuleRow]:
 
 
 def _rule_row(rule: RuleFindings) -> RuleRow:
-    failed, judged = len(rule.failed), rule.judged
+    failed_count, judged_count = len(rule.failed), rule.judged
     is_open = bool(undecided_findings(rule.findings))
-    state = "fail" if failed else "open" if is_open else "pass" if judged else "unjudged"
-    parts: list[str] = [f"{failed} of {judged} fail" if failed else f"{judged} ok"] if judged else []
-    if judged < len(rule.findings):
-        parts.append(f"{len(rule.findings) - judged} not judged")
-    sign, word, counts = f"{_SIGNS[state]} {_WORDS[state]}", rule.words.word, ", ".join(parts)
+    state = "fail" if failed_count else "open" if is_open else "pass" if judged_count else "unjudged"
+    parts: list[str] = (
+        [f"{failed_count} of {judged_count} fail" if failed_count else f"{judged_count} ok"] if judged_count else []
+    )
+    if judged_count < len(rule.findings):
+        parts.append(f"{len(rule.findings) - judged_count} not judged")
+    sign, rule_name, counts = f"{_SIGNS[state]} {_WORDS[state]}", rule.words.word, ", ".join(parts)
     if rule.closest is None:
-        why = "" if judged else rule.findings[0].reason
-        return RuleRow(state, sign, word, counts, why, NOTHING, NOTHING, NOTHING, NOTHING, "")
-    row = _row(rule.closest)
-    return RuleRow(state, sign, word, counts, row.where, row.planned, row.flown, row.limit, row.margin, row.unit)
+        reason = "" if judged_count else rule.findings[0].reason
+        return RuleRow(state, sign, rule_name, counts, reason, NOTHING, NOTHING, NOTHING, NOTHING, "")
+    row = _finding_row(rule.closest)
+    return RuleRow(state, sign, rule_name, counts, row.where, row.planned, row.flown, row.limit, row.margin, row.unit)
 
 
 # ----------------------------------------------------------------------
@@ -320,55 +326,56 @@ def refly_lines(again: Reflight) -> list[str]:
     'AUTO from 0.0 s to 36.5 s, legs 0 to 1: flown / simulated'
     """
     legs: list[tuple[str, ...]] = [_HEAD]
-    for one in again.legs:
-        numbers = (one.cross_track, one.height_error, one.ground_speed, one.bank, one.energy)
-        legs.append((f"leg {one.leg}", *map(_pair_text, numbers)))
+    for pair in again.legs:
+        numbers = (pair.cross_track, pair.height_error, pair.ground_speed, pair.bank, pair.energy)
+        legs.append((f"leg {pair.leg}", *map(_pair_text, numbers)))
     turns: list[tuple[str, ...]] = [("", "overshoot (m)", "bank (deg)", "nearest pass (m)")]
     for turn in again.turns:
         name = f"waypoint {turn.waypoint} ({turn.turn:+.1f}°)"
         turns.append((name, *map(_pair_text, (turn.overshoot, turn.bank, turn.passed))))
     stretch = again.stretch
-    named = f"{stretch.mode or 'the flight'} from {stretch.start:.1f} s to {stretch.end:.1f} s"
-    of = f", legs {again.first} to {again.first + len(again.legs) - 1}"
-    lines = [f"{named}{of}: flown / simulated", *_in_columns(legs)]
+    stretch_text = f"{stretch.mode or 'the flight'} from {stretch.start:.1f} s to {stretch.end:.1f} s"
+    legs_text = f", legs {again.first} to {again.first + len(again.legs) - 1}"
+    lines = [f"{stretch_text}{legs_text}: flown / simulated", *_format_columns(legs)]
     if again.turns:
-        lines += ["", *_in_columns(turns)]
+        lines += ["", *_format_columns(turns)]
     return [*lines, "", trust_line(again)]
 
 
 def trust_line(again: Reflight) -> str:
     """Describe in one line how well the model represents this aircraft."""
     model = again.setup.aircraft
-    whose = f"{model}, which stands in for an aircraft that is not named," if again.stands_in else model
+    model_text = f"{model}, which stands in for an aircraft that is not named," if again.stands_in else model
     if not again.spreads:
-        return f"Model and flight have no place in common: nothing is known of how far {whose} can be trusted"
-    words = [
-        f"{_CALLED[one.name]} {number(one.median)} {one.unit} ({number(one.most)} {one.unit})" for one in again.spreads
+        return f"Model and flight have no place in common: nothing is known of how far {model_text} can be trusted"
+    spread_texts = [
+        f"{_CALLED[spread.name]} {number(spread.median)} {spread.unit} ({number(spread.most)} {spread.unit})"
+        for spread in again.spreads
     ]
-    ended = "" if again.ended == "completed" else f"; the simulated flight ended early: {again.ended}"
+    end_text = "" if again.ended == "completed" else f"; the simulated flight ended early: {again.ended}"
     wind = again.setup.scenario.wind
     gusts = "no gusts" if wind.turbulence == "none" else f"{wind.turbulence} turbulence"
-    blown = f" in {wind.speed:.1f} m/s of wind, {gusts}"
-    return f"Model {whose}{blown}, against the flight, median (95 %): {', '.join(words)}{ended}"
+    wind_text = f" in {wind.speed:.1f} m/s of wind, {gusts}"
+    return f"Model {model_text}{wind_text}, against the flight, median (95 %): {', '.join(spread_texts)}{end_text}"
 
 
-def left_lines(agains: Sequence[Reflight], stretches: Sequence[MissionStretch], flown_again: int) -> list[str]:
+def not_reflown_lines(agains: Sequence[Reflight], stretches: Sequence[MissionStretch], flown_again: int) -> list[str]:
     """List the stretches that were not flown again, with the reasons.
 
     stretches: stretches of the imported flight.  flown_again: largest number of stretches to fly again.
 
-    >>> left_lines((), (MissionStretch(50.0, 60.0, "AUTO", "log"),), 9)
+    >>> not_reflown_lines((), (MissionStretch(50.0, 60.0, "AUTO", "log"),), 9)
     ['Not flown again: AUTO from 50.0 s to 60.0 s: it passed no two waypoints in order']
     """
     compared = {again.stretch.start for again in agains}
     lines = []
     for stretch in stretches:
         if stretch.start not in compared:
-            why = "it passed no two waypoints in order"
+            reason = "it passed no two waypoints in order"
             if len(agains) >= flown_again:
-                why += f", or {flown_again} longer ones were"
+                reason += f", or {flown_again} longer ones were"
             name = stretch.mode or "the flight"
-            lines.append(f"Not flown again: {name} from {stretch.start:.1f} s to {stretch.end:.1f} s: {why}")
+            lines.append(f"Not flown again: {name} from {stretch.start:.1f} s to {stretch.end:.1f} s: {reason}")
     return lines
 
 
@@ -376,9 +383,11 @@ def _pair_text(pair: tuple[float, float]) -> str:
     return " / ".join("-" if math.isnan(value) else f"{value:.1f}" for value in pair)
 
 
-def _in_columns(rows: Sequence[tuple[str, ...]]) -> list[str]:
-    wide = [max(len(row[k]) for row in rows) for k in range(len(rows[0]))]
+def _format_columns(rows: Sequence[tuple[str, ...]]) -> list[str]:
+    widths = [max(len(row[k]) for row in rows) for k in range(len(rows[0]))]
     return [
-        "  ".join([row[0].ljust(wide[0]), *(cell.rjust(size) for cell, size in zip(row[1:], wide[1:], strict=True))])
+        "  ".join(
+            [row[0].ljust(widths[0]), *(cell.rjust(size) for cell, size in zip(row[1:], widths[1:], strict=True))]
+        )
         for row in rows
     ]

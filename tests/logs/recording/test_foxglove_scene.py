@@ -17,8 +17,8 @@ from mcap.reader import make_reader
 
 from logs import theme
 from logs.recording.foxglove_scene import (
-    AIRCRAFT,
-    SPAN,
+    AIRCRAFT_FRAME,
+    MODEL_SPAN_M,
     aircraft_glb,
     aircraft_scene,
     body_rotation,
@@ -32,7 +32,7 @@ from logs.recording.foxglove_scene import (
 from logs.recording.reader import read_log
 from logs.recording.recorder import _CHANNELS, RETURNS_TOPIC, ZONES_TOPIC, Recorder
 from logs.recording.state_channel import EPOCH_NS, FIELDS, STATE_TOPIC
-from logs.verdict.returns.judge_glides import NOT_ASKED
+from logs.verdict.returns.judge_glides import NO_GLIDES
 from tests.clients import need
 from tests.logs.made_flight import make_setup, make_track
 from tests.logs.verdict.returns.hill import hill_drawn, hill_setup
@@ -65,8 +65,8 @@ def test_the_model_has_the_right_sides() -> None:
 def test_the_scene_carries_it_in_the_aircrafts_frame() -> None:
     (entity,) = SceneUpdate.FromString(aircraft_scene(EPOCH_NS)).entities
     (model,) = entity.models
-    assert (entity.frame_id, entity.frame_locked, model.media_type) == (AIRCRAFT, True, "model/gltf-binary")
-    assert (model.scale.x, model.scale.y, model.scale.z) == (SPAN,) * 3
+    assert (entity.frame_id, entity.frame_locked, model.media_type) == (AIRCRAFT_FRAME, True, "model/gltf-binary")
+    assert (model.scale.x, model.scale.y, model.scale.z) == (MODEL_SPAN_M,) * 3
     assert np.ptp(seen(model.data).bounds[:, 2]) * model.scale.y == pytest.approx(100.0)
     assert model.pose.orientation.w == 1.0
 
@@ -138,12 +138,12 @@ def test_the_start_is_in_view() -> None:
     """Wherever on the map that is: the camera keeps to the aircraft, some ten of its drawn spans away."""
     panel = json.loads(layout_text())["configById"]["3D!planfly"]
     assert (panel["followTf"], panel["followMode"], panel["cameraState"]["target"]) == (
-        AIRCRAFT,
+        AIRCRAFT_FRAME,
         "follow-position",
         [0, 0, 0],
     )
-    assert 8.0 < panel["cameraState"]["distance"] / SPAN < 20.0
-    assert panel["scene"]["transforms"]["axisScale"] < SPAN
+    assert 8.0 < panel["cameraState"]["distance"] / MODEL_SPAN_M < 20.0
+    assert panel["scene"]["transforms"]["axisScale"] < MODEL_SPAN_M
     assert panel["topics"]["/scene/aircraft"]["visible"]
 
 
@@ -220,8 +220,8 @@ def test_returns_are_lines_in_the_colours_of_what_they_come_to(tmp_path: Path) -
     update = SceneUpdate()
     update.ParseFromString(returns_scene(0, drawn, setup.scenario.terrain))
     (entity,) = update.entities
-    ways = list(entity.lines)[: len(drawn.by_kind)]
-    for line, (kind, ones) in zip(ways, drawn.by_kind, strict=True):
+    ways = list(entity.lines)[: len(drawn.segments_by_outcome)]
+    for line, (kind, ones) in zip(ways, drawn.segments_by_outcome, strict=True):
         colour = (line.color.r, line.color.g, line.color.b, line.color.a)
         assert colour == pytest.approx(theme.rgba(f"return-{kind}", dark=True))
         assert len(line.points) == len(ones)
@@ -232,13 +232,13 @@ def test_returns_are_lines_in_the_colours_of_what_they_come_to(tmp_path: Path) -
     assert [text.text for text in entity.texts] == [f"return {k}" for k in range(1, len(drawn.worst) + 1)]
     terrain = setup.scenario.terrain
     assert terrain is not None
-    ground = list(entity.lines)[len(drawn.by_kind) + len(drawn.worst) :]
+    ground = list(entity.lines)[len(drawn.segments_by_outcome) + len(drawn.worst) :]
     assert ground
     for point in (line.points[0] for line in ground):
         assert 0.0 < point.z - float(terrain.height(point.x, point.y)) < 10.0
     plain = SceneUpdate()
-    plain.ParseFromString(returns_scene(0, replace(drawn, glides=NOT_ASKED), terrain))
-    assert len(plain.entities[0].lines) == len(drawn.by_kind) + len(drawn.worst)
+    plain.ParseFromString(returns_scene(0, replace(drawn, glides=NO_GLIDES), terrain))
+    assert len(plain.entities[0].lines) == len(drawn.segments_by_outcome) + len(drawn.worst)
 
 
 def test_a_log_shows_returns_from_its_start_though_they_were_judged_at_its_end(tmp_path: Path) -> None:

@@ -16,7 +16,14 @@ from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track
 from logs import theme
 from logs.recording.foxglove_scene import body_rotation
-from logs.recording.foxglove_updates import EVERY, MAX_POINTS, THINNED, TrackSoFar, along, thin_line
+from logs.recording.foxglove_updates import (
+    MAX_POINTS,
+    THINNED_POINT_COUNT,
+    TRACK_INTERVAL_S,
+    TrackSoFar,
+    points_along_legs,
+    thin_line,
+)
 from logs.recording.mcap_writer import SECOND_NS
 from logs.recording.reader import read_log
 from logs.recording.state_channel import EPOCH_NS
@@ -29,7 +36,7 @@ from world.frames import to_geo
 def test_a_long_winding_flight_keeps_its_shape() -> None:
     """Two hours along a wide zigzag of 40 corners: within 60 m of every corner, in at most 96 points."""
     corners = np.array([[3000.0 * k, 4000.0 * (k % 2), 100.0] for k in range(41)])
-    along = np.linspace(0.0, 40.0, 7200 // EVERY)
+    along = np.linspace(0.0, 40.0, 7200 // TRACK_INTERVAL_S)
     flown = np.stack([np.interp(along, range(41), corners[:, k]) for k in range(3)], axis=1)
     track, longest = TrackSoFar(), 0
     for k, position in enumerate(flown):
@@ -40,7 +47,7 @@ def test_a_long_winding_flight_keeps_its_shape() -> None:
         assert (points[-1] == position).all()
     line = LineString(points[:, :2])
     assert max(line.distance(Point(*corner[:2])) for corner in corners) < 60.0
-    assert (longest, THINNED) == (96, 64)
+    assert (longest, THINNED_POINT_COUNT) == (96, 64)
 
 
 @pytest.mark.parametrize("wanted", [2, 5, 30])
@@ -195,13 +202,13 @@ def test_the_track_of_points_grows_to_the_whole(shown: dict[str, list[dict[str, 
 
 def test_the_legs_points_are_close_and_even() -> None:
     corners = np.array([[0.0, 0.0, 100.0], [1000.0, 0.0, 150.0], [1000.0, 400.0, 150.0]])
-    found = along(corners)
+    found = points_along_legs(corners)
     gaps = np.sqrt((np.diff(found, axis=0) ** 2).sum(axis=1))
     assert gaps.max() <= 30.0
     assert gaps.sum() == pytest.approx(math.hypot(1000.0, 50.0) + 400.0)
     for corner in corners:
         assert np.abs(found - corner).sum(axis=1).min() == 0.0
-    far = along(np.array([[0.0, 0.0, 0.0], [1e6, 0.0, 0.0]]))
+    far = points_along_legs(np.array([[0.0, 0.0, 0.0], [1e6, 0.0, 0.0]]))
     assert len(far) <= 4002
 
 

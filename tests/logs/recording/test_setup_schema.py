@@ -29,7 +29,10 @@ def through_json(table: SetupModel) -> Any:
     return json.loads(json.dumps(table.model_dump(by_alias=True)))
 
 
-ROUTE, ENVELOPE = through_json(RouteTable.of(SETUP.route)), through_json(EnvelopeTable.of(SETUP.envelope))
+ROUTE, ENVELOPE = (
+    through_json(RouteTable.from_dataclass(SETUP.route)),
+    through_json(EnvelopeTable.from_dataclass(SETUP.envelope)),
+)
 
 
 # Of a return: the circle at its end.
@@ -37,7 +40,7 @@ RETURN = {"return_to_east_north_amsl_radius_slope_base_m": [0.0] * 5}
 
 
 def test_each_table_comes_back_through_json_to_the_last_bit() -> None:
-    same(MissionTable.model_validate(through_json(MissionTable.of(SETUP.mission))).mission(), SETUP.mission)
+    same(MissionTable.model_validate(through_json(MissionTable.from_dataclass(SETUP.mission))).mission(), SETUP.mission)
     same(RouteTable.model_validate(ROUTE).route("x"), SETUP.route)
     same(EnvelopeTable.model_validate(ENVELOPE).envelope("x"), SETUP.envelope)
 
@@ -45,7 +48,7 @@ def test_each_table_comes_back_through_json_to_the_last_bit() -> None:
 def test_what_is_kept_of_surveys_comes_back() -> None:
     plans = (SurveyPlan(25.5, 30.0, Camera(1.5, 1.0, 0.7, None, 2.0)), SurveyPlan(None), SurveyPlan(0.0, 10.0))
     with_surveys = replace(SETUP.mission, survey_plans=plans)
-    table = through_json(MissionTable.of(with_surveys))
+    table = through_json(MissionTable.from_dataclass(with_surveys))
     assert table["survey_plans"][0] == {
         "photo_m": 25.5,
         "turn_around_m": 30.0,
@@ -61,14 +64,14 @@ def test_what_is_kept_of_surveys_comes_back() -> None:
 def test_an_unknown_height_is_null() -> None:
     assert (ROUTE["takeoff_ground_m"], ROUTE["landing_ground_m"]) == (None, None)
     known = replace(SETUP.route, takeoff_ground=12.5)
-    assert through_json(RouteTable.of(known))["takeoff_ground_m"] == 12.5
-    same(RouteTable.of(known).route("x"), known)
+    assert through_json(RouteTable.from_dataclass(known))["takeoff_ground_m"] == 12.5
+    same(RouteTable.from_dataclass(known).route("x"), known)
 
 
 def test_a_return_comes_back_with_its_circle() -> None:
     circle = ReturnCircle(1.5, -2.0, 435.1, -80.0, 335.0)
     back = replace(SETUP.route, return_from=2, return_to=circle)
-    table = through_json(RouteTable.of(back))
+    table = through_json(RouteTable.from_dataclass(back))
     assert table["return_from_waypoint"] == 2
     assert table["return_to_east_north_amsl_radius_slope_base_m"] == [1.5, -2.0, 435.1, -80.0, 335.0]
     made = RouteTable.model_validate(table).route("x")
@@ -87,7 +90,7 @@ def test_numbers_stand_under_the_unit_that_they_have() -> None:
     assert route["fly_over"] == [False, True, False, False]
     assert (envelope["airspeed_mps"], envelope["amsl_m"]) == ([18.0, 25.0, 33.3], [0.0, 1500.1])
     assert envelope["descent_rad"][2][0] == 0.3
-    item = through_json(MissionTable.of(SETUP.mission))["items"][2]
+    item = through_json(MissionTable.from_dataclass(SETUP.mission))["items"][2]
     assert (item["seq"], item["command"], item["alt_m"], item["autocontinue"]) == (3, 16, 460.0, False)
 
 

@@ -11,7 +11,7 @@ from flight.autopilots.arduplane.autopilot import ArduPlane
 from flight.autopilots.arduplane.parameters import ArduPilotParameters
 from flight.autopilots.px4.autopilot import Px4
 from flight.simulation.setup import FlightSetup, ImportedLog
-from logs.verdict.conditions import condition_lines, corridor_line, least_gap, setup_conditions
+from logs.verdict.conditions import condition_lines, corridor_line, min_leg_spacing, setup_conditions
 from logs.verdict.judge_flight import judge_flight, judge_geometry, judge_plan_only
 from logs.verdict.verdict import verdict_json
 from tests.logs.made_flight import make_setup, make_track
@@ -149,7 +149,7 @@ def lines(gap: float, *, overlap: float = 1.0) -> np.ndarray:
     ],
 )
 def test_the_gap_between_lines_of_a_survey(waypoints: np.ndarray, gap: float | None) -> None:
-    found = least_gap(waypoints)
+    found = min_leg_spacing(waypoints)
     assert (None if found is None else found[0]) == pytest.approx(gap)
 
 

@@ -89,7 +89,7 @@ def muted(monkeypatch: pytest.MonkeyPatch) -> Callable[[], None]:
             return replace(make(*arguments, **named), reason=MUTE, brief=MUTE)
 
         everywhere("make_finding", make, mute_finding)
-        everywhere("shortened", wording.shortened, lambda _: MUTE)
+        everywhere("shorten_statement", wording.shorten_statement, lambda _: MUTE)
 
     return mute
 

@@ -14,7 +14,7 @@ from logs.verdict.judge_flight import judge_geometry
 from logs.verdict.places import FLIGHT, MISSION, PLAN, Change, Place
 from logs.verdict.rule_words import RULE_WORDS
 from logs.verdict.verdict import Verdict
-from logs.verdict.wording import change_text, place_text, shortened, suggestion_text, suggestions_text
+from logs.verdict.wording import change_text, place_text, shorten_statement, suggestion_text, suggestions_text
 from logs.views.report.text import finding_rows
 from planfly.terminal.verdict_lines import verdict_lines
 from tests.logs.verdict.judging import leg, missile, of, suggested, waypoint
@@ -145,8 +145,8 @@ def test_changes_together_and_alternatives() -> None:
 
 
 def test_a_headline_takes_eighty_characters_of_a_statement() -> None:
-    assert shortened("m" * 80) == "m" * 80
-    assert shortened("m" * 81) == "m" * 77 + "..."
+    assert shorten_statement("m" * 80) == "m" * 80
+    assert shorten_statement("m" * 81) == "m" * 77 + "..."
 
 
 STEEP = [[0, 0, 300], [0, 2000, 300], [0, 3000, 600], [0, 6000, 600]]

@@ -17,8 +17,8 @@ from logs.views.failures import (
     failures,
     inside_threats,
     paths_differ,
-    radius_of,
     route_distance,
+    threat_radius,
     track_distance,
 )
 from logs.views.labels import LabelPlacer
@@ -223,8 +223,8 @@ def test_a_plan_that_was_not_flown_shows_its_own_entry() -> None:
 
 def test_a_sphere_is_the_one_that_the_place_names() -> None:
     both = make_scenario(threats=[{**UNIT, "detection_radius_m": 700, "detection_scale_m": 90}]).threats
-    assert radius_of(both, MISSILE) == 250.0
-    assert radius_of(both, Place("radar", 0)) == 700.0
+    assert threat_radius(both, MISSILE) == 250.0
+    assert threat_radius(both, Place("radar", 0)) == 700.0
     track, inside = inside_rows()
     assert inside_threats(failures(ENTERED, 4), both, track).tolist() == inside.tolist()
     assert not inside_threats(Failures({}, {}), both, track).any()

@@ -13,7 +13,7 @@ from logs.verdict.returns.drawn_returns import DrawnReturns
 from logs.verdict.returns.glides_text import reached_text
 from logs.verdict.returns.judge_glides import REACHES
 from logs.verdict.returns.judge_returns import KINDS
-from logs.verdict.returns.returns_text import way_text
+from logs.verdict.returns.returns_text import segment_text
 from logs.views.charts import Layer, legend_entries
 from logs.views.figures import return_views, view_json
 from logs.views.glides import glide_chart
@@ -36,7 +36,7 @@ def by_role(layers: tuple[Layer, ...], role: str) -> list[Layer]:
 
 def test_every_kind_has_a_look_and_a_name_of_its_own() -> None:
     assert {f"return-{kind}" for kind in KINDS} | {f"reach-{reach}" for reach in REACHES} <= set(theme.LOOKS)
-    assert len({way_text(kind) for kind in KINDS}) == len(KINDS)
+    assert len({segment_text(kind) for kind in KINDS}) == len(KINDS)
     assert len({reached_text(reach) for reach in REACHES}) == len(REACHES)
     looks = [theme.LOOKS[f"return-{kind}"] for kind in KINDS]
     assert len({(look.light, look.dash) for look in looks}) == len(looks)
@@ -48,16 +48,16 @@ def test_the_way_is_coloured_where_returns_begin(shown: tuple[FlightSetup, Drawn
     setup, drawn = shown
     layers = returns_map(setup, drawn).panel.layers
     for kind in KINDS:
-        ones = [one for found, group in drawn.by_kind for one in group if found == kind]
+        ones = [one for found, group in drawn.segments_by_outcome for one in group if found == kind]
         found = by_role(layers, f"return-{kind}")
         assert len(found) == bool(ones)
         for layer in found:
             known = np.isfinite(layer.x)
             assert layer.x[known].tolist() == [one.start[0] for one in ones]
             assert layer.y[known].tolist() == [one.start[1] for one in ones]
-            assert len(layer.words) == len(layer.x)
-            assert layer.words[0].startswith(f"{ones[0].time:.0f} s: to home: ")
-    kinds = {kind for kind, _ in drawn.by_kind}
+            assert len(layer.hover_texts) == len(layer.x)
+            assert layer.hover_texts[0].startswith(f"{ones[0].time:.0f} s: to home: ")
+    kinds = {kind for kind, _ in drawn.segments_by_outcome}
     assert {"safe", "ground", "threat"} <= kinds
 
 
@@ -66,9 +66,11 @@ def test_the_worst_are_numbered_where_they_go_wrong(shown: tuple[FlightSetup, Dr
     panel = returns_map(setup, drawn).panel
     assert len(by_role(panel.layers, "return-way")) == len(drawn.worst) == 2
     numbers = [(label.text, label.x, label.y) for label in panel.labels if label.rank == "number"]
-    assert numbers == [(str(k), float(one.at[0]), float(one.at[1])) for k, one in enumerate(drawn.worst, 1)]
+    assert numbers == [
+        (str(k), float(one.marked_position[0]), float(one.marked_position[1])) for k, one in enumerate(drawn.worst, 1)
+    ]
     (ring,) = [layer for layer in panel.layers if layer.kind == "rings"]
-    assert ring.x.tolist() == [one.at[0] for one in drawn.worst if not one.flown.safe]
+    assert ring.x.tolist() == [one.marked_position[0] for one in drawn.worst if not one.simulated.safe]
     assert ("home", 0.0, 0.0) in [(label.text, round(label.x, 3), round(label.y, 3)) for label in panel.labels]
 
 
@@ -80,19 +82,19 @@ def test_the_worst_in_profile_stand_over_their_ground(shown: tuple[FlightSetup, 
     assert len({panel.span for panel in chart.panels}) == 1
     for panel, worst in zip(chart.panels, drawn.worst, strict=True):
         (way,) = by_role(panel.layers, "return-way")
-        assert way.y.tolist() == worst.way[:, 2].tolist()
-        run = sum(math.dist(a[:2], b[:2]) for a, b in zip(worst.way[:-1], worst.way[1:], strict=True))
+        assert way.y.tolist() == worst.path[:, 2].tolist()
+        run = sum(math.dist(a[:2], b[:2]) for a, b in zip(worst.path[:-1], worst.path[1:], strict=True))
         assert way.x[-1] == pytest.approx(run / 1000.0)
         (ground,) = by_role(panel.layers, "terrain")
         terrain = setup.scenario.terrain
         assert terrain is not None
-        assert ground.y == pytest.approx(terrain.height(worst.way[:, 0], worst.way[:, 1]))
+        assert ground.y == pytest.approx(terrain.height(worst.path[:, 0], worst.path[:, 1]))
         (ring,) = [layer for layer in panel.layers if layer.kind == "rings"]
-        assert ring.y.tolist() == [worst.at[2]]
+        assert ring.y.tolist() == [worst.marked_position[2]]
     # From the worst's begin to the hill's top.
-    hits = next(k for k, one in enumerate(drawn.worst) if one.flown.kind == "ground")
+    hits = next(k for k, one in enumerate(drawn.worst) if one.simulated.kind == "ground")
     ring = next(layer for layer in chart.panels[hits].layers if layer.kind == "rings")
-    assert ring.x[0] == pytest.approx((drawn.worst[hits].flown.start[0] - 3000.0) / 1000.0, abs=0.7)
+    assert ring.x[0] == pytest.approx((drawn.worst[hits].simulated.start[0] - 3000.0) / 1000.0, abs=0.7)
 
 
 def test_heights_and_what_is_left_over_stand_at_their_times(shown: tuple[FlightSetup, DrawnReturns]) -> None:
@@ -102,14 +104,14 @@ def test_heights_and_what_is_left_over_stand_at_their_times(shown: tuple[FlightS
     assert chart.timed
     heights, left = chart.panels
     (least,) = by_role(heights.layers, "limit")
-    assert (least.x is drawn.least.time, least.y is drawn.least.height) == (True, True)
+    assert (least.x is drawn.min_safe_altitudes.time, least.y is drawn.min_safe_altitudes.altitude) == (True, True)
     coloured = [layer for layer in heights.layers if layer.role.startswith("return-")]
     at = np.vstack([np.column_stack([layer.x, layer.y]) for layer in coloured])
     at = at[np.isfinite(at[:, 0])]
     assert set(at[:, 0].tolist()) == {one.time for one in drawn.returns.each}
     assert at[:, 1] == pytest.approx(600.0)
     (home,), (flat,) = by_role(left.layers, "left-home"), by_role(left.layers, "left-flat")
-    lefts = [one.left[0] if math.isfinite(one.left[0]) else math.nan for one in drawn.glides.each]
+    lefts = [one.altitudes_left[0] if math.isfinite(one.altitudes_left[0]) else math.nan for one in drawn.glides.each]
     assert home.y == pytest.approx(lefts, nan_ok=True)
     assert flat.x.tolist() == [one.time for one in drawn.glides.each]
     assert left.limits == (("nothing left over", 0.0),)
@@ -136,5 +138,5 @@ def test_figures_that_have_no_data_are_left_out(shown: tuple[FlightSetup, DrawnR
     assert list(views) == ["returns", "worst-returns", "return-heights", "glide"]
     for view in views.values():
         assert len(json.dumps(view_json(view))) > 500
-    none = DrawnReturns(drawn.returns, drawn.worst, drawn.least)
+    none = DrawnReturns(drawn.returns, drawn.worst, drawn.min_safe_altitudes)
     assert list(return_views(setup, none, None)) == ["returns", "worst-returns", "return-heights"]

@@ -43,7 +43,7 @@ def outside(scenario: Scenario, points: Floats) -> float:
     return min((float(a - r) for a, r in zip(away, threats.kill_radius, strict=True)), default=math.inf)
 
 
-def over_ground(
+def heights_over_ground(
     scenario: Scenario, airframe: Airframe, course: float, amsl: float, speed: float
 ) -> tuple[float, float]:
     """Steepest climb and descent over the ground on a course, m per m: the wind's triangle, by hand."""
@@ -77,12 +77,14 @@ def check_climb(scenario: Scenario, airframe: Airframe, points: Floats, until: i
     for k, (a, b) in enumerate(pairwise(points[: until + 1])):
         # ArduPlane commands equivalent airspeeds: the true one is higher up here.
         speed = airframe.airspeed * airframe.autopilot.airspeed_factor(float(b[2]))
-        steepest, _ = over_ground(scenario, airframe, course_of(a, b), float(b[2]), speed)
+        steepest, _ = heights_over_ground(scenario, airframe, course_of(a, b), float(b[2]), speed)
         up = min(up + least * steepest * math.dist(a[:2], b[:2]), max(float(b[2]), points[0, 2]))
         assert up >= b[2] - 0.5, f"leg {k} is not climbed at {least} of the steepest"
     # The straight climb itself, from the ground: it passes over the ground, and outside every missile.
     first, run = points[1], math.dist(points[0, :2], points[1, :2])
-    steepest, _ = over_ground(scenario, airframe, course_of(points[0], first), float(first[2]), airframe.airspeed)
+    steepest, _ = heights_over_ground(
+        scenario, airframe, course_of(points[0], first), float(first[2]), airframe.airspeed
+    )
     line = metres(np.array([*points[0, :2], ground]), np.array([*first[:2], ground + 0.7 * steepest * run]))
     assert above(scenario, line)[60:].min() > 0.0
     assert outside(scenario, line) > 0.0
@@ -100,10 +102,10 @@ def check_landing(scenario: Scenario, airframe: Airframe, points: Floats, land: 
     assert begin[2] == pytest.approx(last[2], abs=1e-3)
     tail = scenario.wind.along(course, float(point[2]))[0]
     speed = airframe.autopilot.landing_airspeed(airframe.airspeed, tail, float(point[2]))
-    _, steepest = over_ground(scenario, airframe, course, float(point[2]), speed)
+    _, steepest = heights_over_ground(scenario, airframe, course, float(point[2]), speed)
     assert height / run < steepest
     assert above(scenario, metres(last, point))[: int(run) - 60].min() > 0.0
-    climb, _ = over_ground(scenario, airframe, course, home + land.params[0], airframe.airspeed)
+    climb, _ = heights_over_ground(scenario, airframe, course, home + land.params[0], airframe.airspeed)
     top = home + land.params[0]
     ahead = (top - point[2]) / (0.7 * climb)
     turned = np.array([point[0] + ahead * math.sin(course), point[1] + ahead * math.cos(course), top])

@@ -12,7 +12,7 @@ from pathlib import Path
 from PIL import Image, ImageColor
 
 from benchmarks.studio import drawn, running, write_missions
-from logs.theme import drawn_colours
+from logs.theme import palette_colours
 from tests.browser import Browser
 
 # The waypoint that is dragged, and by how much, pixels.
@@ -41,7 +41,7 @@ def draw(target: Path) -> None:
 
 def _few_colours(picture: Image.Image) -> Image.Image:
     """A picture in 256 colours, those of the roles as they are."""
-    kept = [channel for colour in drawn_colours() for channel in ImageColor.getrgb(colour)[:3]]
+    kept = [channel for colour in palette_colours() for channel in ImageColor.getrgb(colour)[:3]]
     others = picture.quantize(256 - len(kept) // 3).getpalette() or []
     palette = Image.new("P", (1, 1))
     palette.putpalette([*kept, *others][: 3 * 256])

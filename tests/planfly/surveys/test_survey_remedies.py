@@ -13,7 +13,7 @@ from flight.mission.items import Command, Mission
 from flight.mission.survey_layout import turn_around_of
 from flight.simulation.setup import FlightSetup
 from logs.verdict.findings import Finding, make_finding
-from logs.verdict.measures.route_requirements import surveys_of
+from logs.verdict.measures.route_requirements import judged_surveys
 from logs.verdict.places import FLIGHT, Place
 from logs.verdict.verdict import Verdict
 from planfly.surveys import survey_remedies as remedies
@@ -28,7 +28,7 @@ Answer = Callable[[float], tuple[bool, dict[str, float]]]
 
 
 def verdict_of(setup: FlightSetup, answer: Answer) -> Verdict:
-    [survey] = surveys_of(setup)
+    [survey] = judged_surveys(setup)
     usable, failed = answer(turn_around_of(setup.route, survey))
     findings: list[Finding] = [
         make_finding("survey", Place("leg", line.first), ok=usable, reason="", flown=90.0, limit=95.0, margin=-5.0)
@@ -49,7 +49,7 @@ class Flights:
     flown: list[float] = field(default_factory=list)
 
     def __call__(self, setup: FlightSetup, *_: Any) -> Any:
-        self.flown.append(round(turn_around_of(setup.route, surveys_of(setup)[0])))
+        self.flown.append(round(turn_around_of(setup.route, judged_surveys(setup)[0])))
         return SimpleNamespace(setup=setup, flight_verdict=verdict_of(setup, self.answer))
 
 
@@ -82,7 +82,7 @@ def test_every_second_line_is_come_to_as_all_are(monkeypatch: pytest.MonkeyPatch
     flights, mission = Flights(answer), opened(FIELD)
 
     def fly(setup: FlightSetup, *rest: Any) -> Any:
-        [survey] = surveys_of(setup)
+        [survey] = judged_surveys(setup)
         first = survey.lines[0]
         lead_in = math.dist(setup.route.waypoints[first.begins], setup.route.waypoints[first.first])
         if abs(survey.offsets[1]) > 100.0 and lead_in >= 130.0:

@@ -34,7 +34,17 @@ def made_spec(**changes: Any) -> dict[str, Any]:
 def same_scenario(a: Scenario, b: Scenario) -> bool:
     """Whether two scenarios agree in their data and, bit for bit, in their arrays."""
     # JSON states who flies where a file may leave it to the default.
-    same = (a.name, a.origin, a.floor, a.ceiling, a.start_course, a.limits, a.planner, a.flight.stated(), a.wind) == (
+    same = (
+        a.name,
+        a.origin,
+        a.floor,
+        a.ceiling,
+        a.start_course,
+        a.limits,
+        a.planner,
+        a.flight.with_stated_defaults(),
+        a.wind,
+    ) == (
         b.name,
         b.origin,
         b.floor,
@@ -42,7 +52,7 @@ def same_scenario(a: Scenario, b: Scenario) -> bool:
         b.start_course,
         b.limits,
         b.planner,
-        b.flight.stated(),
+        b.flight.with_stated_defaults(),
         b.wind,
     ) and a.to_json() == b.to_json()
     arrays = [(getattr(a, name), getattr(b, name)) for name in ("bounds", "start", "destination")]

@@ -67,7 +67,7 @@ def variants(content: Content) -> Iterator[tuple[str, ...]]:
 
 
 @dataclass
-class _File:
+class _TerrainFile:
     """The bytes so far.  padded: whether records have more bytes than they need."""
 
     padded: bool
@@ -80,28 +80,28 @@ class _File:
         return at, len(self.data) - at
 
 
-def _text(value: str) -> bytes:
+def _decode_text(value: str) -> bytes:
     return struct.pack("<I", len(value)) + value.encode()
 
 
 def _map(values: dict[str, str]) -> bytes:
-    inside = b"".join(_text(key) + _text(value) for key, value in values.items())
+    inside = b"".join(_decode_text(key) + _decode_text(value) for key, value in values.items())
     return struct.pack("<I", len(inside)) + inside
 
 
 def _schema(content: Content) -> bytes:
     assert content.schema is not None
     name, encoding, data = content.schema
-    return struct.pack("<H", 1) + _text(name) + _text(encoding) + struct.pack("<I", len(data)) + data
+    return struct.pack("<H", 1) + _decode_text(name) + _decode_text(encoding) + struct.pack("<I", len(data)) + data
 
 
 def _channel(content: Content) -> bytes:
     assert content.channel is not None
     schema, topic, encoding, metadata = content.channel
-    return struct.pack("<HH", 1, schema) + _text(topic) + _text(encoding) + _map(metadata)
+    return struct.pack("<HH", 1, schema) + _decode_text(topic) + _decode_text(encoding) + _map(metadata)
 
 
-def _put_messages(out: _File, content: Content) -> list[tuple[int, int]]:
+def _put_messages(out: _TerrainFile, content: Content) -> list[tuple[int, int]]:
     """Write schema, channel and messages: log time and place of each message."""
     if content.schema is not None:
         out.put(SCHEMA, _schema(content))
@@ -113,13 +113,13 @@ def _put_messages(out: _File, content: Content) -> list[tuple[int, int]]:
     ]
 
 
-def _put_chunk(out: _File, content: Content, indexed: bool) -> bytes:
+def _put_chunk(out: _TerrainFile, content: Content, indexed: bool) -> bytes:
     """Write a chunk and its message index: the content of its chunk index."""
-    inside = _File(padded=False, data=bytearray())
+    inside = _TerrainFile(padded=False, data=bytearray())
     pairs = _put_messages(inside, content)
     times = [at for at, _ in pairs]
     span, size = (min(times), max(times)), len(inside.data)
-    head = struct.pack("<QQQI", *span, size, zlib.crc32(inside.data)) + _text("") + struct.pack("<Q", size)
+    head = struct.pack("<QQQI", *span, size, zlib.crc32(inside.data)) + _decode_text("") + struct.pack("<Q", size)
     at, length = out.put(CHUNK, head + bytes(inside.data), fixed=True)
     offsets, index_length = b"", 0
     if indexed:
@@ -127,13 +127,13 @@ def _put_chunk(out: _File, content: Content, indexed: bool) -> bytes:
         index_at, index_length = out.put(MESSAGE_INDEX, struct.pack("<HI", 1, len(listed)) + listed)
         offsets = struct.pack("<HQ", 1, index_at)
     start = struct.pack("<QQQQI", *span, at, length, len(offsets)) + offsets
-    return start + struct.pack("<Q", index_length) + _text("") + struct.pack("<QQ", size, size)
+    return start + struct.pack("<Q", index_length) + _decode_text("") + struct.pack("<QQ", size, size)
 
 
 def vector(content: Content, features: tuple[str, ...]) -> bytes:
     """A content as a file with these features."""
-    out = _File("pad" in features)
-    out.put(HEADER, _text("") + _text(""))
+    out = _TerrainFile("pad" in features)
+    out.put(HEADER, _decode_text("") + _decode_text(""))
     indexes: dict[int, bytes] = {}
     if "ch" in features:
         chunk_index = _put_chunk(out, content, "mx" in features)
@@ -141,21 +141,21 @@ def vector(content: Content, features: tuple[str, ...]) -> bytes:
     else:
         _put_messages(out, content)
     if content.attachment:
-        name, kind = _text("myFile"), _text("application/octet-stream")
+        name, kind = _decode_text("myFile"), _decode_text("application/octet-stream")
         body = struct.pack("<QQ", 2, 1) + name + kind + struct.pack("<Q", len(DATA)) + DATA
         at, length = out.put(ATTACHMENT, body + struct.pack("<I", zlib.crc32(body)))
         if "ax" in features:
             indexes[ATTACHMENT_INDEX] = struct.pack("<QQQQQ", at, length, 2, 1, len(DATA)) + name + kind
     if content.metadata:
-        at, length = out.put(METADATA, _text("myMetadata") + _map({"foo": "bar"}))
+        at, length = out.put(METADATA, _decode_text("myMetadata") + _map({"foo": "bar"}))
         if "mdx" in features:
-            indexes[METADATA_INDEX] = struct.pack("<QQ", at, length) + _text("myMetadata")
+            indexes[METADATA_INDEX] = struct.pack("<QQ", at, length) + _decode_text("myMetadata")
     out.put(DATA_END, struct.pack("<I", zlib.crc32(out.data)), fixed=True)
     _put_summary(out, content, features, indexes)
     return bytes(out.data) + MAGIC
 
 
-def _put_summary(out: _File, content: Content, features: tuple[str, ...], indexes: dict[int, bytes]) -> None:
+def _put_summary(out: _TerrainFile, content: Content, features: tuple[str, ...], indexes: dict[int, bytes]) -> None:
     begin = len(out.data)
     groups = {
         **({SCHEMA: _schema(content)} if "rsh" in features else {}),

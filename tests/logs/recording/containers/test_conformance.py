@@ -113,6 +113,6 @@ def test_what_our_writer_can_write_is_the_vector_byte_for_byte(
         file = io.BytesIO(vector(content, ("ch",)))
         file.seek(len(MAGIC))
         (chunk,) = read_chunks(file, Container())
-        writer.copy(chunk)
-    writer.finish()
+        writer.copy_chunk(chunk)
+    writer.write_end()
     assert out.getvalue() == vector(content, features)

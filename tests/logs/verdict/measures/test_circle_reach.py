@@ -8,7 +8,7 @@ import pytest
 
 from flight.autopilots.px4.autopilot import Px4
 from flight.autopilots.px4.parameters import Px4Parameters
-from logs.verdict.measures.circle_reach import _ring_points, end_loiter_hazards, hazards_within
+from logs.verdict.measures.circle_reach import _ring_points, end_loiter_hazards, find_hazards
 from logs.verdict.measures.route_requirements import RouteRequirements, route_requirements
 from tests.logs.verdict.rules.test_loiter_rule_own_radius import TIME, loiter, radius_at, sphere
 
@@ -18,7 +18,7 @@ REACH = 261.0
 def found(low: float, high: float, requirements: RouteRequirements | None = None, **tables: Any) -> list[str]:
     """Within 261 m of home, over flat ground at 0 m."""
     known = requirements or route_requirements(loiter(TIME, {}, **tables))
-    return hazards_within(known, np.zeros(2), low, high, REACH)
+    return find_hazards(known, np.zeros(2), low, high, REACH)
 
 
 def with_ground(away: float, up: float) -> RouteRequirements:

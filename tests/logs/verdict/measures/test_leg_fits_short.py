@@ -29,7 +29,7 @@ def test_a_short_legs_slope_is_that_about_its_middle(off: float) -> None:
     found = slope(180.0, up=lambda s: 0.001 * (s - 1090.0 + off) ** 2)
     assert found is not None
     assert math.tan(found.value) == pytest.approx(0.002 * off, abs=5e-4)
-    assert found.run == pytest.approx(100.0, abs=1.0)
+    assert found.length == pytest.approx(100.0, abs=1.0)
 
 
 @pytest.mark.parametrize(("first", "second"), [(15.0, 34.0), (34.0, 15.0)])
@@ -37,13 +37,13 @@ def test_four_seconds_begin_and_end_within_the_leg(first: float, second: float) 
     """Half of 120 m takes 4 s at 15 m/s or 1.76 s at 34: of the fast half all, of the slow one what is left of 4 s."""
     found = slope(120.0, airspeed=lambda s: np.where(s < 1060.0, first, second) - 25.0)
     assert found is not None
-    assert found.run == pytest.approx(60.0 + 15.0 * (4.0 - 60.0 / 34.0), abs=1.2)
+    assert found.length == pytest.approx(60.0 + 15.0 * (4.0 - 60.0 / 34.0), abs=1.2)
 
 
 def test_less_than_four_seconds_are_all_that_there_is() -> None:
     found = slope(80.0)
     assert found is not None
-    assert found.run == pytest.approx(80.0, abs=1.0)
+    assert found.length == pytest.approx(80.0, abs=1.0)
 
 
 @pytest.mark.parametrize(("run", "known"), [(24.0, False), (26.5, True)])
@@ -75,7 +75,7 @@ def test_a_short_legs_course_is_that_between_its_turns(turn: float) -> None:
     assert aligned is not None
     found = leg_course(requirements, aligned, 1)
     assert found is not None
-    assert not found.fitted
+    assert not found.is_fitted
     assert math.degrees(found.value) == pytest.approx(turn, abs=0.2)
 
 
@@ -84,7 +84,7 @@ def test_where_the_turns_leave_nothing_it_is_that_where_they_meet() -> None:
     turn = math.radians(60.0)
     setup = make_setup(zigzag(60.0, bank_radius() * math.tan(0.5 * turn) + 1.0))
     requirements = route_requirements(setup)
-    assert requirements.after[1] + requirements.before[2] > requirements.runs[1]
+    assert requirements.length_after[1] + requirements.length_before[2] > requirements.runs[1]
     aligned = align_track(requirements, fly_path(setup, radius=0.5 * bank_radius()))
     assert aligned is not None
     found = leg_course(requirements, aligned, 1)

@@ -12,8 +12,8 @@ from flight.mission.items import Command, Frame, MissionItem
 from flight.simulation.setup import FlightSetup
 from logs.verdict.judge_flight import judge_geometry
 from logs.verdict.measures.route_requirements import (
-    airspace_of,
     available_lengths,
+    judged_airspace,
     route_requirements,
     slope_limit,
     steep_arc,
@@ -45,8 +45,8 @@ def test_the_scenarios_zones_come_before_the_fences() -> None:
     mast = Zone("mast", "exclusion", Cylinder(0.0, 0.0, 9.0))
     setup = replace(setup, scenario=replace(setup.scenario, zones=(mast,)))
     setup = replace(setup, mission=replace(setup.mission, fences=(circle(0, 500.0),)))
-    airspace = airspace_of(setup)
-    assert (len(airspace.zones), airspace.of_scenario, airspace.fault) == (2, 1, "")
+    airspace = judged_airspace(setup)
+    assert (len(airspace.zones), airspace.scenario_zone_count, airspace.fence_fault) == (2, 1, "")
     assert airspace.place(0) == Place("exclusion", 0, name="mast")
     assert airspace.place(1) == Place("inclusion", 1, name="fence item 0")
     assert float(airspace.records.zones[1].radius) == 500.0
@@ -55,9 +55,9 @@ def test_the_scenarios_zones_come_before_the_fences() -> None:
 def test_a_fence_that_is_none_is_named_and_left_out() -> None:
     setup = make_setup(ROUTE)
     setup = replace(setup, mission=replace(setup.mission, fences=(circle(3, -1.0),)))
-    airspace = airspace_of(setup)
+    airspace = judged_airspace(setup)
     assert airspace.zones == ()
-    assert airspace.fault == "the mission: fence item 3: radius -1 m: must be above 0"
+    assert airspace.fence_fault == "the mission: fence item 3: radius -1 m: must be above 0"
 
 
 def test_what_draws_zones_has_the_fence_among_them() -> None:
@@ -103,7 +103,7 @@ def test_planner_and_check_need_the_same(turn: float, wind: float, same_way: boo
         setup = make_setup(points, scenario=scenario)
         requirements = route_requirements(setup)
         needs, rolls = turn_and_roll_lengths(make_problem(scenario, setup.limits).certified, points)
-        np.testing.assert_allclose(needs, requirements.after[:-1] + requirements.before[1:], atol=1e-6)
+        np.testing.assert_allclose(needs, requirements.length_after[:-1] + requirements.length_before[1:], atol=1e-6)
         np.testing.assert_allclose(rolls, requirements.reversal, atol=1e-6)
         assert (rolls.max() == 0.0) or not same_way
 
@@ -186,8 +186,8 @@ def test_a_right_angle_in_calm_air_has_the_bank_limits_arc() -> None:
     requirements = route_requirements(make_setup(RIGHT_ANGLE))
     radius = bank_radius()
     assert requirements.turns[1] == pytest.approx(math.pi / 2)
-    assert requirements.radius[1] == requirements.tightest[1] == pytest.approx(radius)
-    assert requirements.before[1] == requirements.after[1] == pytest.approx(radius)
+    assert requirements.radius[1] == requirements.min_radius[1] == pytest.approx(radius)
+    assert requirements.length_before[1] == requirements.length_after[1] == pytest.approx(radius)
     assert requirements.fly_by_offset[1] == pytest.approx((math.sqrt(2.0) - 1.0) * radius)
     apex = requirements.apexes()[1]
     assert math.hypot(apex[0] - 0.0, apex[1] - 2000.0) == pytest.approx(float(requirements.fly_by_offset[1]))

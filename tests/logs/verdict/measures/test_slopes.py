@@ -43,8 +43,8 @@ def test_long_legs_have_the_planned_course_and_slope(setup: FlightSetup, track: 
         course, slope = leg_course(requirements, aligned, leg), leg_slope(requirements, aligned, leg)
         assert course is not None
         assert slope is not None
-        assert course.fitted
-        assert slope.fitted
+        assert course.is_fitted
+        assert slope.is_fitted
         assert np.cos(course.value - requirements.courses[leg]) == pytest.approx(1.0, abs=1e-8)
         assert slope.value == pytest.approx(requirements.slopes[leg], abs=1e-3)
         assert slope.tolerance >= SLOPE_ERROR_FLOOR_RAD
@@ -54,7 +54,7 @@ def test_a_short_leg_is_rough() -> None:
     setup = make_setup([[0, 0, 300], [0, 1000, 300], [100, 1150, 300], [100, 2500, 300]])
     course = leg_course(route_requirements(setup), aligned_with(setup, fly_path(setup)), 1)
     assert course is not None
-    assert not course.fitted
+    assert not course.is_fitted
     assert course.tolerance == ROUGH_COURSE_ERROR_RAD
 
 
@@ -67,8 +67,8 @@ def test_a_leg_that_was_not_flown_has_neither(setup: FlightSetup) -> None:
 def test_the_straight_span_lies_between_the_turns(setup: FlightSetup) -> None:
     requirements = route_requirements(setup)
     low, high = straight_span(requirements, 1, 0.0)
-    assert (low, high) == (requirements.after[1], requirements.runs[1] - requirements.before[2])
-    inner = straight_span(requirements, 1, 100.0, level=True)
+    assert (low, high) == (requirements.length_after[1], requirements.runs[1] - requirements.length_before[2])
+    inner = straight_span(requirements, 1, 100.0, excludes_blends=True)
     assert inner[0] >= low + 100.0
     assert inner[1] <= high - 100.0
 
@@ -91,11 +91,16 @@ def measured(
 
 def test_a_clean_climb_has_its_slope_and_no_time_at_a_limit() -> None:
     measure = measured()
-    assert measure.finished
+    assert measure.is_finished
     assert measure.slope is not None
     assert measure.slope.value == pytest.approx(math.atan(0.105), abs=1e-3)
     assert measure.height_error == pytest.approx(0.0, abs=0.5)
-    assert (measure.at_full, measure.at_idle, measure.slow, measure.fast) == (0.0, 0.0, 0.0, 0.0)
+    assert (measure.full_throttle_time, measure.idle_throttle_time, measure.speed_loss, measure.speed_gain) == (
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+    )
     assert measure.ability is None
 
 
@@ -106,13 +111,13 @@ def test_height_off_the_leg_has_its_sign() -> None:
 
 def test_throttle_at_its_limit_is_timed_with_the_speed_that_was_lost_meanwhile() -> None:
     measure = measured(throttle=lambda s: 0.0 * s + 0.5, airspeed=lambda s: -2.0 * (s > 1000.0))
-    assert measure.at_full > 60.0
-    assert measure.slow == pytest.approx(2.0, abs=0.1)
+    assert measure.full_throttle_time > 60.0
+    assert measure.speed_loss == pytest.approx(2.0, abs=0.1)
 
 
 def test_an_ability_covers_what_it_exceeds_beyond_its_error() -> None:
-    ability = Ability(slope=0.10, error=0.01, seconds=20.0)
-    assert [ability.covers(slope) for slope in (0.06, -0.06, 0.08)] == [True, True, False]
+    ability = Ability(slope=0.10, error=0.01, duration=20.0)
+    assert [ability.exceeds(slope) for slope in (0.06, -0.06, 0.08)] == [True, True, False]
 
 
 def test_rising_air_lends_speed_that_fades() -> None:
@@ -132,7 +137,7 @@ def test_a_leg_within_a_hundred_metres_of_both_its_turns_is_short(run: float, sh
     aligned = align_track(requirements, fly_path(setup, up=lambda s: 0.0 * s + 4.0))
     assert aligned is not None
     measure = measure_slope(requirements, aligned, 1)
-    assert measure.short is short
+    assert measure.is_short is short
     assert measure.height_error == pytest.approx(4.0, abs=0.01)
 
 
@@ -150,8 +155,8 @@ def test_speed_that_a_gust_along_the_track_took_is_not_lost(throttle: float, off
 
     for airspeed, ground, lost in ((off, off / 3.0, 1.0), (off / 3.0, off, 1.0), (off, 0.0, 0.0), (off, off, 3.0)):
         found = measure(airspeed, ground)
-        assert (found.slow if off < 0.0 else found.fast) == pytest.approx(lost, abs=0.02)
-        assert (found.fast if off < 0.0 else found.slow) == 0.0
+        assert (found.speed_loss if off < 0.0 else found.speed_gain) == pytest.approx(lost, abs=0.02)
+        assert (found.speed_gain if off < 0.0 else found.speed_loss) == 0.0
 
 
 @pytest.mark.parametrize(("span", "value"), [(0.9e-3, 2.0 - 0.5 * 0.09), (1.15e-3, 2.0)])

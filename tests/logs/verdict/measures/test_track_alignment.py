@@ -21,4 +21,4 @@ def test_routes_that_come_back_are_laid_leg_by_leg() -> None:
     flown = align_track(route_requirements(setup), track)
     assert flown is not None
     assert (np.diff(flown.rows) > 800).all()
-    assert flown.distance.max() < 3.0
+    assert flown.apex_distance.max() < 3.0

@@ -85,7 +85,7 @@ def test_a_waypoint_that_was_missed_lies_between_its_neighbours() -> None:
     aligned = align_track(route_requirements(setup), fly_path(flown))
     assert aligned is not None
     assert aligned.track.time[aligned.rows[1:4]] == pytest.approx([160.0, 200.0, 240.0], abs=0.5)
-    assert aligned.distance[2] == pytest.approx(2000.0, rel=0.1)
+    assert aligned.apex_distance[2] == pytest.approx(2000.0, rel=0.1)
     assert aligned.passed.all()
 
 

@@ -10,7 +10,7 @@ from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track, join_tracks
 from logs.verdict.measures.route_requirements import route_requirements
 from logs.verdict.measures.track_alignment import align_track
-from logs.verdict.measures.turns import OF_NEXT_LEG, CornerPass, TurnMeasure, corner_passes, measure_turn
+from logs.verdict.measures.turns import NEXT_LEG_FRACTION, CornerPass, TurnMeasure, corner_passes, measure_turn
 from tests.soak import some
 from tests.synthetic import bank_radius, bump, copied, edited, fly_path, make_setup, waypoint_stations
 
@@ -46,8 +46,8 @@ def test_what_lies_outside_the_arc_or_the_next_leg_is_overshoot(
     at = float(waypoint_stations(setup)[1]) + after
     measure = measured(setup, fly_path(setup, across=bump(at, -side * outside, 20.0)))
     assert measure.overshoot == pytest.approx(seen, abs=0.05)
-    assert (measure.over, measure.full_circles) == (True, 0)
-    assert measure.settled == pytest.approx(0.0, abs=0.01)
+    assert (measure.is_complete, measure.full_circles) == (True, 0)
+    assert measure.settled_distance == pytest.approx(0.0, abs=0.01)
 
 
 def test_an_overshoot_is_watched_for_ten_seconds_after_the_arc() -> None:
@@ -96,13 +96,13 @@ def test_whole_circles_at_a_corner_are_counted(course: float, rounds: int) -> No
 def test_a_turn_is_over_at_the_end_of_its_arc(beyond: float, over: bool) -> None:
     setup = corner(200.0)
     stop = float(waypoint_stations(setup)[1]) + HALF + beyond
-    assert measured(setup, fly_path(setup, stop=stop)).over is over
+    assert measured(setup, fly_path(setup, stop=stop)).is_complete is over
 
 
 def test_a_flight_that_ended_before_a_waypoint_has_not_flown_its_turn() -> None:
     setup = make_setup([[0, 0, 300], [0, 2000, 300], [2000, 2000, 300], [2000, 4000, 300]])
     track = fly_path(setup, stop=3000.0)
-    assert measured(setup, track, 1).over
+    assert measured(setup, track, 1).is_complete
     assert measured(setup, track, 2) == TurnMeasure()
 
 
@@ -122,7 +122,7 @@ def test_a_turn_is_settled_over_the_last_second_before_the_next(early: float, se
     setup = make_setup([[0, 0, 300], [0, 2000, 300], [2000, 2000, 300], [2000, 4000, 300]])
     begin = float(waypoint_stations(setup)[2]) - 0.25 * math.pi * bank_radius()
     track = fly_path(setup, across=lambda s: 0.5 * ((s > begin - 300.0) & (s < begin - early)), rate=120.0)
-    assert measured(setup, track).settled == pytest.approx(seen, abs=0.015)
+    assert measured(setup, track).settled_distance == pytest.approx(seen, abs=0.015)
 
 
 def test_a_clean_turn_is_measured_as_it_was_flown(setup: FlightSetup, track: Track) -> None:
@@ -131,13 +131,13 @@ def test_a_clean_turn_is_measured_as_it_was_flown(setup: FlightSetup, track: Tra
     assert aligned is not None
     for i in (1, 2, 3):
         measure = measure_turn(requirements, aligned, i)
-        assert measure.fitted
-        assert measure.over
+        assert measure.is_fitted
+        assert measure.is_complete
         assert measure.full_circles == 0
         assert measure.angle == pytest.approx(abs(requirements.turns[i]), abs=1e-4)
         assert measure.radius == pytest.approx(bank_radius(), rel=0.02)
         assert measure.held_bank == pytest.approx(math.radians(30.0), abs=0.01)
-        assert measure.passed == pytest.approx(requirements.fly_by_offset[i], abs=0.1)
+        assert measure.min_distance == pytest.approx(requirements.fly_by_offset[i], abs=0.1)
 
 
 def test_a_turn_that_was_not_reached_has_no_numbers(setup: FlightSetup) -> None:
@@ -172,7 +172,7 @@ def passes(flown: Sequence[Place], route: Sequence[Place] = ROUTE) -> tuple[Corn
 
 def test_a_flight_over_the_corners_overshoots_none() -> None:
     found = passes(ROUTE)
-    assert [one.nearest for one in found] == pytest.approx([0.0] * 4, abs=0.3)
+    assert [one.distance for one in found] == pytest.approx([0.0] * 4, abs=0.3)
     assert [one.overshoot for one in found[1:-1]] == pytest.approx([0.0, 0.0], abs=0.3)
     assert (found[0].overshoot, found[-1].overshoot) == (None, None)
 
@@ -181,14 +181,14 @@ def test_how_far_past_the_new_leg_a_flight_went() -> None:
     """80 m too far north, back on the leg 400 m along it."""
     found = passes([(0.0, 0.0), (0.0, 2080.0), (400.0, 2000.0), *ROUTE[2:]])
     assert found[1].overshoot == pytest.approx(80.0, abs=0.5)
-    assert found[1].nearest == pytest.approx(0.0, abs=0.3)
+    assert found[1].distance == pytest.approx(0.0, abs=0.3)
     # Cut inside, the other side is none.
     inside = passes([(0.0, 0.0), (0.0, 1900.0), (400.0, 1920.0), (600.0, 2000.0), *ROUTE[2:]])
     assert inside[1].overshoot == 0.0
-    assert inside[1].nearest == pytest.approx(100.0, abs=0.5)
+    assert inside[1].distance == pytest.approx(100.0, abs=0.5)
 
 
-@pytest.mark.parametrize(("peak", "counts"), [(OF_NEXT_LEG - 0.03, True), (OF_NEXT_LEG + 0.15, False)])
+@pytest.mark.parametrize(("peak", "counts"), [(NEXT_LEG_FRACTION - 0.03, True), (NEXT_LEG_FRACTION + 0.15, False)])
 def test_only_the_first_part_of_the_next_leg_is_looked_at(peak: float, counts: bool) -> None:
     """A bulge of 50 m whose foot is 50 m before it, and 100 m after."""
     top = 1000.0 * peak
@@ -199,7 +199,7 @@ def test_only_the_first_part_of_the_next_leg_is_looked_at(peak: float, counts: b
 def test_the_look_ends_at_the_very_place_between_rows() -> None:
     """On a way that leaves the next leg by 0.1 m a metre that is 70 m at seven tenths of it."""
     found = passes([*ROUTE[:2], (1000.0, 2100.0), ROUTE[3]])
-    assert found[1].overshoot == pytest.approx(0.1 * OF_NEXT_LEG * 1000.0, abs=1e-6)
+    assert found[1].overshoot == pytest.approx(0.1 * NEXT_LEG_FRACTION * 1000.0, abs=1e-6)
 
 
 def test_each_pass_comes_after_the_one_before() -> None:
@@ -208,7 +208,7 @@ def test_each_pass_comes_after_the_one_before() -> None:
     found = passes([(0.0, 0.0), (100.0, 2000.0), (300.0, 2000.0), (300.0, 0.0)], back)
     times = [one.time for one in found]
     assert times == sorted(times)
-    assert [one.nearest for one in found] == pytest.approx([0.0, 99.9, 0.0, 0.0], abs=0.3)
+    assert [one.distance for one in found] == pytest.approx([0.0, 99.9, 0.0, 0.0], abs=0.3)
 
 
 def test_a_leg_that_was_cut_off_is_not_joined() -> None:
@@ -217,5 +217,5 @@ def test_a_leg_that_was_cut_off_is_not_joined() -> None:
     found = passes([(0.0, 0.0), (250.0, 1800.0), (250.0, 2000.0), (2000.0, 2000.0)], short)
     assert found[1].overshoot is None
     # The nearest place of the first straight to (0, 2000) is its end, or on the next.
-    assert found[1].nearest == pytest.approx(250.0, abs=1.0)
-    assert found[1].beyond == pytest.approx(200.0, abs=1.0)
+    assert found[1].distance == pytest.approx(250.0, abs=1.0)
+    assert found[1].overrun == pytest.approx(200.0, abs=1.0)

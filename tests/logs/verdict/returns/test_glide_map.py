@@ -5,7 +5,15 @@ import math
 import numpy as np
 import pytest
 
-from logs.verdict.returns.glide_map import GlideMap, Needs, glide_map, glide_slopes, landable, least_heights, steps
+from logs.verdict.returns.glide_map import (
+    GlideAltitudes,
+    GlideMap,
+    glide_map,
+    glide_slopes,
+    landable_cells,
+    search_glide_altitudes,
+    steps,
+)
 from tests.logs.verdict.returns.gliders import (
     AIRSPEED,
     NO_RADII,
@@ -26,16 +34,16 @@ TOP = 2500.0
 MIDDLE = np.zeros((1, 2))
 
 
-def searched(terrain: Terrain, made: GlideMap | None = None, margin: float = MARGIN, **wind: float) -> Needs:
+def searched(terrain: Terrain, made: GlideMap | None = None, margin: float = MARGIN, **wind: float) -> GlideAltitudes:
     """What it takes to get to the middle of a ground."""
     made = made or map_of(terrain, margin)
-    return least_heights(
-        made, np.array([made.cell_of(0.0, 0.0)]), glide_slopes(glider(**wind), AIRSPEED, 0.0, TOP), TOP
+    return search_glide_altitudes(
+        made, np.array([made.cell_at(0.0, 0.0)]), glide_slopes(glider(**wind), AIRSPEED, 0.0, TOP), TOP
     )
 
 
-def need_at(found: Needs, east: float, north: float) -> float:
-    return float(found.need[found.made.cell_of(east, north)])
+def need_at(found: GlideAltitudes, east: float, north: float) -> float:
+    return float(found.min_altitude[found.grid.cell_at(east, north)])
 
 
 @pytest.mark.parametrize(
@@ -44,14 +52,14 @@ def need_at(found: Needs, east: float, north: float) -> float:
 def test_on_a_plane_it_is_the_straight_way(wind: float, blows_to: float) -> None:
     """In every direction and at 20 to 115 cells: by 2 % at the most too high, and never too low (issue 35)."""
     found = searched(plane(), wind=wind, blows_to=blows_to)
-    middle, compared = found.made.middle(*found.made.cell_of(0.0, 0.0)), 0
+    middle, compared = found.grid.cell_center(*found.grid.cell_at(0.0, 0.0)), 0
     for bearing in range(0, 360, 4):
         for distance in (1000.0, 2500.0, 5700.0):
-            cell = found.made.cell_of(*(distance * f(math.radians(bearing)) for f in (math.sin, math.cos)))
-            east, north = (a - b for a, b in zip(found.made.middle(*cell), middle, strict=True))
+            cell = found.grid.cell_at(*(distance * f(math.radians(bearing)) for f in (math.sin, math.cos)))
+            east, north = (a - b for a, b in zip(found.grid.cell_center(*cell), middle, strict=True))
             true = height_needed(east, north, MARGIN, wind, blows_to)
             if true < 0.95 * TOP:
-                assert 0.9985 <= (found.need[cell] - MARGIN) / (true - MARGIN) <= 1.02, (bearing, distance)
+                assert 0.9985 <= (found.min_altitude[cell] - MARGIN) / (true - MARGIN) <= 1.02, (bearing, distance)
                 compared += 1
     assert compared > 250
 
@@ -90,7 +98,7 @@ def test_a_long_step_does_not_fly_through_a_wall() -> None:
     """A wall one cell wide, however thin: nobody gets through below its top."""
     terrain = ground(lambda east, _north: np.where(np.abs(east - 1000.0) < 1.0, 700.0, 0.0))
     found = searched(terrain)
-    beyond = found.need[:, found.made.cell_of(1200.0, 0.0)[1] :]
+    beyond = found.min_altitude[:, found.grid.cell_at(1200.0, 0.0)[1] :]
     assert float(beyond.min()) > 700.0
     assert math.isfinite(need_at(found, 3000.0, 0.0))
 
@@ -107,9 +115,9 @@ def test_more_margin_or_a_higher_wall_never_makes_it_lower() -> None:
     plain = searched(ground(wall))
     higher = searched(ground(lambda east, north: wall(east, north, 650.0)))
     wider = searched(ground(wall), margin=60.0)
-    known = np.isfinite(higher.need) & np.isfinite(wider.need)
-    assert (higher.need[known] >= plain.need[known] - 1e-9).all()
-    assert (wider.need[known] >= plain.need[known] + 30.0 - 5.0).all()
+    known = np.isfinite(higher.min_altitude) & np.isfinite(wider.min_altitude)
+    assert (higher.min_altitude[known] >= plain.min_altitude[known] - 1e-9).all()
+    assert (wider.min_altitude[known] >= plain.min_altitude[known] + 30.0 - 5.0).all()
 
 
 def test_a_sphere_is_flown_over_or_around() -> None:
@@ -140,23 +148,26 @@ def test_beyond_the_data_and_above_the_top_it_leads_nowhere() -> None:
     assert math.isfinite(need_at(found, 2800.0, 0.0))
     assert math.isinf(need_at(found, 3500.0, 0.0))
     low = searched(plane())
-    made = low.made
-    capped = least_heights(
-        made, np.array([made.cell_of(0.0, 0.0)]), glide_slopes(glider(), AIRSPEED, 0.0, 200.0), 200.0
+    made = low.grid
+    capped = search_glide_altitudes(
+        made, np.array([made.cell_at(0.0, 0.0)]), glide_slopes(glider(), AIRSPEED, 0.0, 200.0), 200.0
     )
     assert math.isfinite(need_at(capped, 1500.0, 0.0))
     assert math.isinf(need_at(capped, 2500.0, 0.0))
-    assert least_heights(made, np.array([(-5, 3)]), glide_slopes(glider(), AIRSPEED, 0.0, TOP), TOP).origin.max() == -1
+    assert (
+        search_glide_altitudes(made, np.array([(-5, 3)]), glide_slopes(glider(), AIRSPEED, 0.0, TOP), TOP).origin.max()
+        == -1
+    )
 
 
 def test_each_cell_knows_its_nearest_place() -> None:
     made = map_of(plane())
-    ends = [made.cell_of(-2000.0, 0.0), made.cell_of(2000.0, 0.0)]
-    found = least_heights(made, np.array(ends), glide_slopes(glider(), AIRSPEED, 0.0, TOP), TOP)
+    ends = [made.cell_at(-2000.0, 0.0), made.cell_at(2000.0, 0.0)]
+    found = search_glide_altitudes(made, np.array(ends), glide_slopes(glider(), AIRSPEED, 0.0, TOP), TOP)
     columns = made.floor.shape[1]
     for east, end in ((-2500.0, 0), (-200.0, 0), (200.0, 1), (4000.0, 1)):
-        assert found.origin[made.cell_of(east, 300.0)] == ends[end][0] * columns + ends[end][1]
-    assert found.onward[ends[0]] == -1
+        assert found.origin[made.cell_at(east, 300.0)] == ends[end][0] * columns + ends[end][1]
+    assert found.next_step[ends[0]] == -1
 
 
 @pytest.mark.parametrize(
@@ -175,7 +186,7 @@ def test_ground_is_flat_by_its_slope_and_its_roughness(heights: object, flat: bo
     made = glide_map(ground(heights, 1500.0), MIDDLE, MARGIN, NO_SPHERES, NO_RADII, 800.0)
     assert made is not None
     assert made.cell == 25.0
-    inside = landable(made)[5:-5, 5:-5]
+    inside = landable_cells(made)[5:-5, 5:-5]
     assert inside.all() if flat else not inside.any()
 
 
@@ -183,9 +194,9 @@ def test_ground_in_a_sphere_or_beyond_the_data_is_none_to_land_on() -> None:
     terrain = ground(lambda east, _north: np.where(east > 600.0, np.nan, 0.0), 1500.0)
     made = glide_map(terrain, MIDDLE, MARGIN, np.array([[0.0, 0.0, 0.0]]), np.array([200.0]), 800.0)
     assert made is not None
-    found = landable(made)
+    found = landable_cells(made)
     places = {(0.0, 0.0): False, (300.0, 0.0): True, (0.0, -150.0): False, (590.0, 300.0): False, (450.0, 300.0): True}
-    assert {place: bool(found[made.cell_of(*place)]) for place in places} == places
+    assert {place: bool(found[made.cell_at(*place)]) for place in places} == places
 
 
 def test_a_map_that_would_hide_what_lies_in_its_cells_is_none() -> None:
@@ -202,10 +213,10 @@ def test_over_a_crest_of_one_row_of_pixels_it_is_the_crest(shift: float) -> None
     made = glide_map(terrain, MIDDLE, MARGIN, NO_SPHERES, NO_RADII, 17_900.0)
     assert made is not None
     assert 40.0 < made.cell < 50.0
-    column = made.cell_of(1500.0 + shift, 0.0)[1]
+    column = made.cell_at(1500.0 + shift, 0.0)[1]
     assert made.floor[50:-50, column] == pytest.approx(560.0 + MARGIN, abs=1e-3)
     found = searched(terrain, made)
-    assert float(found.need[:, column + 1 :].min()) >= 560.0 + MARGIN - 1e-3
+    assert float(found.min_altitude[:, column + 1 :].min()) >= 560.0 + MARGIN - 1e-3
 
 
 def test_a_fine_elevation_file_gives_a_map_that_knows_each_pixel() -> None:
@@ -214,16 +225,16 @@ def test_a_fine_elevation_file_gives_a_map_that_knows_each_pixel() -> None:
     made = glide_map(terrain, MIDDLE, MARGIN, NO_SPHERES, NO_RADII, 580.0)
     assert made is not None
     assert made.cell == 20.0
-    assert made.floor[made.cell_of(203.0, -118.0)] == 90.0 + MARGIN
+    assert made.floor[made.cell_at(203.0, -118.0)] == 90.0 + MARGIN
     assert float(np.median(made.floor)) == MARGIN
 
 
-def flown(found: Needs, row: int, column: int) -> np.ndarray:
+def flown(found: GlideAltitudes, row: int, column: int) -> np.ndarray:
     """The way (k, 3) of a glide from a cell's least height, m: straight from step to step, and looked at every 5 m."""
-    moves, made, places = steps()[0], found.made, []
-    while (m := found.onward[row, column]) >= 0:
+    moves, made, places = steps()[0], found.grid, []
+    while (m := found.next_step[row, column]) >= 0:
         i, j = row + int(moves[m].north), column + int(moves[m].east)
-        begin, end = ((*made.middle(*at), float(found.need[at])) for at in ((row, column), (i, j)))
+        begin, end = ((*made.cell_center(*at), float(found.min_altitude[at])) for at in ((row, column), (i, j)))
         # It begins where it has to, and what it loses ends at the next place or above it.
         loss = made.cell * moves[m].length * SINK / math.sqrt(true_airspeed(end[2]) ** 2 - SINK**2)
         share = np.linspace(0.0, 1.0, 2 + int(made.cell * moves[m].length / 5.0))[:, None]
@@ -243,7 +254,7 @@ def test_no_way_cuts_into_a_sphere(far: float, radius: float) -> None:
     terrain = ground(lambda east, _north: 0.0 * east, 18_000.0)
     bare = glide_map(terrain, MIDDLE, MARGIN, NO_SPHERES, NO_RADII, far)
     assert bare is not None
-    corner = np.array(bare.middle(*bare.cell_of(1510.0, 7.0))) + 0.5 * bare.cell
+    corner = np.array(bare.cell_center(*bare.cell_at(1510.0, 7.0))) + 0.5 * bare.cell
     middle = np.array([*corner, height_needed(*corner, MARGIN)])
     made = glide_map(terrain, MIDDLE, MARGIN, middle[None, :], np.array([radius]), far)
     assert made is not None
@@ -251,7 +262,7 @@ def test_no_way_cuts_into_a_sphere(far: float, radius: float) -> None:
     deepest, near = -math.inf, 0
     for bearing in range(0, 360, 3):
         away = (radius + 300.0) * np.array([math.sin(math.radians(bearing)), math.cos(math.radians(bearing))])
-        way = flown(found, *made.cell_of(*(corner + away)))
+        way = flown(found, *made.cell_at(*(corner + away)))
         depth = radius - float(np.linalg.norm(way - middle, axis=1).min())
         deepest, near = max(deepest, depth), near + (depth > -50.0)
     assert near > 5
@@ -266,8 +277,8 @@ def test_no_step_flies_lower_than_what_it_crosses_or_than_what_comes_next() -> N
     found = searched(hills, made)
     moves = steps()[0]
     for row, column in np.random.default_rng(5).integers(60, 160, (scaled(3000, 600), 2)):
-        move = moves[found.onward[row, column]]
-        begin, end = found.need[row, column], found.need[row + move.north, column + move.east]
+        move = moves[found.next_step[row, column]]
+        begin, end = found.min_altitude[row, column], found.min_altitude[row + move.north, column + move.east]
         loss = made.cell * move.length * SINK / math.sqrt(true_airspeed(end) ** 2 - SINK**2)
         assert begin - loss >= end - 0.1
         for share in np.linspace(0.01, 0.99, 50):

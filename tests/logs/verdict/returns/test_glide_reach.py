@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from flight.autopilots.arduplane.rtl_point_mass import RETURN_START, ReturnEnvironment
-from logs.verdict.returns.glide_map import glide_map, glide_slopes, least_heights
-from logs.verdict.returns.glide_reach import heights_left, place_of
+from logs.verdict.returns.glide_map import glide_map, glide_slopes, search_glide_altitudes
+from logs.verdict.returns.glide_reach import cell_position, glide_altitudes_left
 from tests.flight.autopilots.arduplane.kept_flights import FOLDER, HOME, WIND, jacksboro
 from tests.flight.autopilots.arduplane.test_rtl_point_mass import aerosonde
 from tests.logs.verdict.returns.gliders import (
@@ -54,15 +54,17 @@ def left_of(
     made = glide_map(terrain, np.zeros((1, 2)), MARGIN, spheres, radii, 5900.0) if sphere else map_of(terrain)
     assert made is not None
     aircraft = glider(wind, blows_to, fast_sink, induced, growth)
-    needs = least_heights(made, np.array([made.cell_of(0.0, 3000.0)]), glide_slopes(aircraft, AIRSPEED, 0.0, TOP), TOP)
+    needs = search_glide_altitudes(
+        made, np.array([made.cell_at(0.0, 3000.0)]), glide_slopes(aircraft, AIRSPEED, 0.0, TOP), TOP
+    )
     start: Records = np.zeros(1, RETURN_START)
     to = math.radians(blows_to)
     start["east"], start["north"], start["up"] = east, north, up
     start["velocity_east"] = speed * math.sin(math.radians(course)) + wind * math.sin(to)
     start["velocity_north"] = speed * math.cos(math.radians(course)) + wind * math.cos(to)
     around = ReturnEnvironment(terrain.heights, terrain.to_pixel.record, spheres, radii, True)
-    left, reached = heights_left(start, needs, aircraft, around, AIRSPEED, bank)
-    return float(left[0]), place_of(made, int(reached[0])) if reached[0] >= 0 else (math.nan,) * 3
+    left, reached = glide_altitudes_left(start, needs, aircraft, around, AIRSPEED, bank)
+    return float(left[0]), cell_position(made, int(reached[0])) if reached[0] >= 0 else (math.nan,) * 3
 
 
 def test_straight_ahead_it_costs_the_way_alone() -> None:
@@ -212,9 +214,9 @@ def test_home_is_in_reach_from_where_arduplane_glided_to_it() -> None:
     assert made is not None
     aircraft, top = aerosonde(WIND), float(starts["up"].max())
     slopes = glide_slopes(aircraft, AIRSPEED, float(np.nanmin(made.ground)), top)
-    needs = least_heights(made, np.array([made.cell_of(*HOME[:2])]), slopes, top)
+    needs = search_glide_altitudes(made, np.array([made.cell_at(*HOME[:2])]), slopes, top)
     around = ReturnEnvironment(terrain.heights, terrain.to_pixel.record, NO_SPHERES, NO_RADII, True)
-    left, _ = heights_left(starts, needs, aircraft, around, AIRSPEED, BANK)
+    left, _ = glide_altitudes_left(starts, needs, aircraft, around, AIRSPEED, BANK)
     assert (left >= 0.0).tolist() == [row["reaches_home"] == "1" for row in rows]
     # ArduPlane dives onto its slope, and comes over home lower than the best glide would, or as high.
     assert all(0.0 <= one < 300.0 for one in left[left >= 0.0])

@@ -15,7 +15,7 @@ from logs.verdict.returns.glides_text import glide_notes, glide_range_text, glid
 from logs.verdict.returns.judge_glides import Glides, judge_glides
 from logs.verdict.returns.judge_returns import PointOfNoReturn, judge_returns, return_world
 from logs.verdict.returns.return_starts import planned_starts
-from logs.verdict.returns.returns_text import no_return_text
+from logs.verdict.returns.returns_text import point_of_no_return_text
 from tests.logs.verdict.returns.hill import DEGREE, HEAD, hill_setup, mission_text
 
 # Nobody may land within 20 km: without it, all but the hill is flat.
@@ -43,9 +43,9 @@ def test_home_is_in_reach_as_far_as_the_height_lasts(tmp_path: Path) -> None:
     assert farthest == pytest.approx((600.0 - 8.0 - 60.0 - 30.0) * RATIO - 78.0, abs=350.0)
     assert {one.reach for one in found.each if one.start[0] > farthest} == {"nothing"}
     near = min(found.each, key=lambda one: abs(one.start[0] - 1500.0))
-    assert near.left[0] == pytest.approx(600.0 - 8.0 - 60.0 - 30.0 - 1578.0 / RATIO, abs=30.0)
+    assert near.altitudes_left[0] == pytest.approx(600.0 - 8.0 - 60.0 - 30.0 - 1578.0 / RATIO, abs=30.0)
     # 50 m further on 5 m less are left, and no start has a turn of its own.
-    left = [one.left[0] for one in home if one.start[0] > 500.0]
+    left = [one.altitudes_left[0] for one in home if one.start[0] > 500.0]
     assert np.diff(left) == pytest.approx(-50.0 / RATIO, abs=10.0)
     assert [one.kind for one in found.sites] == ["home"]
     assert found.airspeed == 18.0
@@ -55,12 +55,12 @@ def test_what_is_reached_falls_from_home_to_flat_ground_to_nothing(tmp_path: Pat
     open_ground = judged(hill_setup(tmp_path), 4.0)
     assert {one.reach for one in open_ground.each} == {"home", "flat"}
     flat = [one for one in open_ground.each if one.reach == "flat"]
-    assert all(0.0 <= one.flat <= 600.0 - 8.0 - 30.0 for one in flat)
+    assert all(0.0 <= one.flat_altitude_left <= 600.0 - 8.0 - 30.0 for one in flat)
     # The hill is no flat ground: 400 m high with a deviation of 300 m it is steeper than 5 % within 850 m.
-    assert all(math.dist(one.flat_at[:2], (3000.0, 0.0)) > 800.0 for one in flat)
+    assert all(math.dist(one.flat_position[:2], (3000.0, 0.0)) > 800.0 for one in flat)
     barred = judged(hill_setup(tmp_path, BARRED), 4.0)
     assert {one.reach for one in barred.each} == {"home", "nothing"}
-    assert all(one.flat == -math.inf and math.isnan(one.flat_at[0]) for one in barred.each)
+    assert all(one.flat_altitude_left == -math.inf and math.isnan(one.flat_position[0]) for one in barred.each)
 
 
 def test_a_rally_point_and_a_landing_of_the_mission_are_reached(tmp_path: Path) -> None:
@@ -74,7 +74,7 @@ def test_a_rally_point_and_a_landing_of_the_mission_are_reached(tmp_path: Path) 
     assert site
     late = min(site, key=lambda one: one.start[0])
     # Ahead of it, with no turn: the rally point is 500 m nearer than the landing.
-    assert late.left[1] - late.left[2] == pytest.approx(500.0 / RATIO, abs=8.0)
+    assert late.altitudes_left[1] - late.altitudes_left[2] == pytest.approx(500.0 / RATIO, abs=8.0)
     assert found.best_site(late) == 1
     assert any(": rally point 1, " in glide_range_text(group, found) for group in found.ranges)
     assert ": the landing at item 3, " in glide_range_text(found.ranges[-1], found)
@@ -86,20 +86,20 @@ def test_arduplanes_own_return_ends_where_its_law_says(tmp_path: Path) -> None:
     found = judged(hill_setup(tmp_path), 4.0)
     before = [one for one in found.each if 500.0 < one.start[0] < 2500.0]
     assert {one.own.end for one in before} == {"arrives"}
-    assert all(one.own.over > 100.0 for one in before)
+    assert all(one.own.arrival_height > 100.0 for one in before)
     behind = [one for one in found.each if one.start[0] > 5600.0]
     assert {one.own.end for one in behind} == {"ground"}
     for one in behind:
-        assert one.own.short == pytest.approx(math.dist(one.own.at[:2], (0.0, 0.0)), abs=1.0)
-        assert one.own.short > 600.0
-        assert math.isnan(one.own.over)
+        assert one.own.shortfall == pytest.approx(math.dist(one.own.impact[:2], (0.0, 0.0)), abs=1.0)
+        assert one.own.shortfall > 600.0
+        assert math.isnan(one.own.arrival_height)
     # Over the hill, and not by 30 m.
     low = [one.own for one in judged(hill_setup(tmp_path), 1.0).each if one.own.end == "low"]
     assert low
     assert all(0.0 < one.clearance < 30.0 for one in low)
     assert found.arrivals == sum(one.own.end == "arrives" for one in found.each) > len(before)
     # It is never better than the best there is, but for what the turn gives back of its speed.
-    assert all(one.left[0] > -25.0 for one in found.each if one.own.end == "arrives")
+    assert all(one.altitudes_left[0] > -25.0 for one in found.each if one.own.end == "arrives")
 
 
 def test_a_sphere_on_the_way_home_stops_its_own_return_and_is_flown_around(tmp_path: Path) -> None:
@@ -155,7 +155,7 @@ def test_a_scenario_that_requires_it_fails_where_nothing_is_in_reach(tmp_path: P
 
 def test_just_enough_height_is_enough(tmp_path: Path) -> None:
     setup = hill_setup(tmp_path, BARRED)
-    world, starts = return_world(setup), planned_starts(setup, 1.0).at(np.array([60]))
+    world, starts = return_world(setup), planned_starts(setup, 1.0).subset(np.array([60]))
 
     def lowered(metres: float) -> Glides:
         rows = starts.rows.copy()
@@ -165,12 +165,12 @@ def test_just_enough_height_is_enough(tmp_path: Path) -> None:
     spare = 0.0
     for _ in range(3):
         # What is lost on the way changes with the height by hundredths of it.
-        spare += lowered(spare).each[0].left[0]
+        spare += lowered(spare).each[0].altitudes_left[0]
     assert spare > 200.0
     just, hardly = lowered(spare - 0.5), lowered(spare + 0.5)
-    assert 0.0 <= just.each[0].left[0] < 1.0
-    assert -1.0 < hardly.each[0].left[0] < 0.0
-    assert (just.somewhere, hardly.somewhere) == (True, False)
+    assert 0.0 <= just.each[0].altitudes_left[0] < 1.0
+    assert -1.0 < hardly.each[0].altitudes_left[0] < 0.0
+    assert (just.always_reaches_ground, hardly.always_reaches_ground) == (True, False)
 
 
 def test_both_may_be_required_and_the_worse_counts(tmp_path: Path) -> None:
@@ -211,8 +211,8 @@ def test_ranges_hold_every_place_in_order(tmp_path: Path) -> None:
     assert [one.first for one in found.ranges] == sorted(one.first for one in found.ranges)
     for group in found.ranges:
         inside = [one for one in found.each if group.first <= one.time <= group.last]
-        assert {one.reach for one in inside} == {group.least.reach}
-        assert found.spare(group.least) == min(found.spare(one) for one in inside)
+        assert {one.reach for one in inside} == {group.lowest_glide.reach}
+        assert found.altitude_left(group.lowest_glide) == min(found.altitude_left(one) for one in inside)
     assert sum(found.count(one) for one in ("home", "flat")) == len(found.each)
     assert "which knows no trees, houses or water" in " ".join(glide_notes(found))
 
@@ -231,7 +231,7 @@ def test_an_engine_that_burns_fuel_has_a_note(tmp_path: Path) -> None:
 def no_return(setup: FlightSetup, used: float = 0.0, flown: float = 0.0, **parameters: float) -> PointOfNoReturn:
     """Of a flight that had used so many Wh at first, and uses so many in each second."""
     starts = planned_starts(setup, 4.0)
-    starts.used[:] = used + flown * starts.time
+    starts.energy_used[:] = used + flown * starts.time
     return judge_returns(return_world(setup).with_parameters(**parameters), starts, 4.0).point_of_no_return
 
 
@@ -240,7 +240,7 @@ def test_the_point_of_no_return_is_the_last_with_the_reserve(tmp_path: Path) -> 
     setup = hill_setup(tmp_path, "[flight]\nbattery_wh = 10\n")
     each = judge_returns(return_world(setup).with_parameters(RTL_ALTITUDE=600.0), planned_starts(setup, 4.0), 4.0).each
     point = no_return(setup, flown=0.02, RTL_ALTITUDE=600.0)
-    leaves = [one.left - 0.02 * one.time for one in each]
+    leaves = [one.energy_left - 0.02 * one.time for one in each]
     last = max(one.time for one, left in zip(each, leaves, strict=True) if left >= 2.0)
     assert (point.kind, point.time) == ("later", last)
     assert 0.0 < point.time < each[-1].time
@@ -249,7 +249,7 @@ def test_the_point_of_no_return_is_the_last_with_the_reserve(tmp_path: Path) -> 
     never = no_return(plenty, RTL_ALTITUDE=600.0)
     assert never.kind == "never"
     assert math.isnan(never.time)
-    assert never.left == pytest.approx(100.0 - 10.0 + min(one.left for one in each))
+    assert never.left == pytest.approx(100.0 - 10.0 + min(one.energy_left for one in each))
 
 
 def test_more_wind_against_the_way_back_brings_it_nearer(tmp_path: Path) -> None:
@@ -268,7 +268,7 @@ def test_what_is_not_known_of_energy_is_said(tmp_path: Path) -> None:
     setup = hill_setup(tmp_path)
     returns = judge_returns(return_world(setup), planned_starts(setup, 20.0), 20.0)
     assert returns.point_of_no_return.kind == "used"
-    assert "the energy used before is not known" in no_return_text(returns)
+    assert "the energy used before is not known" in point_of_no_return_text(returns)
     guessed = replace(setup, limits=replace(setup.limits, envelope=replace(setup.envelope, battery_guessed=True)))
     assert no_return(guessed).kind == "battery"
     # From behind the hill, into it: what does not arrive is left out.
@@ -276,8 +276,8 @@ def test_what_is_not_known_of_energy_is_said(tmp_path: Path) -> None:
     assert found.kind == "never"
     assert found.skipped > 0
     starts = planned_starts(setup, 20.0)
-    starts.used[:] = 0.0
-    deep = starts.at(np.flatnonzero(starts.rows["east"] > 6000.0))
+    starts.energy_used[:] = 0.0
+    deep = starts.subset(np.flatnonzero(starts.rows["east"] > 6000.0))
     none = judge_returns(return_world(setup), deep, 20.0)
     assert none.point_of_no_return.kind == "arrives"
-    assert no_return_text(none).endswith("as no return arrives")
+    assert point_of_no_return_text(none).endswith("as no return arrives")

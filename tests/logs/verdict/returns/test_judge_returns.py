@@ -13,9 +13,9 @@ from flight.simulation.setup import FlightSetup
 from logs.verdict.judge_flight import judge_geometry
 from logs.verdict.returns.judge_returns import (
     KINDS,
-    ReturnFlown,
     Returns,
     ReturnWorld,
+    SimulatedReturn,
     badness,
     judge_returns,
     return_world,
@@ -47,7 +47,7 @@ def test_it_hits_the_hill_from_where_the_slope_meets_it(tmp_path: Path) -> None:
     assert {one.kind for one in found.each if one.start[0] < 2000.0} == {"safe"}
     hit = min(found.each, key=badness)
     assert hit.kind == "ground"
-    assert hit.clearance_at[0] == pytest.approx(3300.0, abs=350.0)
+    assert hit.lowest_position[0] == pytest.approx(3300.0, abs=350.0)
     assert hit.target.name == "home"
 
 
@@ -76,7 +76,7 @@ def test_a_sphere_and_a_zone_beside_the_way_are_met_and_named(tmp_path: Path) ->
     found = judged(hill_setup(tmp_path, threat), RTL_ALTITUDE=200.0)
     assert first_of(found, "threat") >= 1200.0
     worst = next(one for one in found.ranges if one.worst.kind == "threat")
-    assert worst.worst.outside == pytest.approx(-70.0, abs=15.0)
+    assert worst.worst.sphere_distance == pytest.approx(-70.0, abs=15.0)
     assert "inside the sphere of post" in range_text(worst, found, hill_setup(tmp_path, threat).scenario)
     zone = (
         '[[zones]]\nname = "town"\nkind = "exclusion"\nradius_m = 300\neast_m = 1200\nnorth_m = 0\n'
@@ -109,8 +109,8 @@ def test_energy_that_is_not_there_is_told(tmp_path: Path) -> None:
     assert found.each[0].kind == "safe"
     assert found.reserve == pytest.approx(2.0)
     ends = [one for one in found.each if one.kind == "energy"]
-    assert all(one.left < 2.0 for one in ends)
-    assert all(one.left == pytest.approx(10.0 - one.energy) for one in found.each)
+    assert all(one.energy_left < 2.0 for one in ends)
+    assert all(one.energy_left == pytest.approx(10.0 - one.energy) for one in found.each)
 
 
 def test_a_mission_that_returns_is_asked_up_to_there(tmp_path: Path) -> None:
@@ -124,12 +124,12 @@ class Stub:
 
     def __init__(self, before: Returns, higher: float, farther: float = 0.0) -> None:
         self.before, self.higher, self.farther = before, higher, farther
-        self.asked: list[ReturnFlown] = []
+        self.asked: list[SimulatedReturn] = []
 
     def __call__(self, _world: object, row: np.record) -> tuple[float, float]:
         one = min(self.before.each, key=lambda one: abs(one.start[0] - float(row["east"])))
         self.asked.append(one)
-        return one.clearance + self.higher, one.outside + self.farther
+        return one.clearance + self.higher, one.sphere_distance + self.farther
 
 
 # So often, s, that many graze the hill, or come within 10 m of the least height over it.
@@ -152,7 +152,7 @@ def test_a_flight_that_finds_it_higher_makes_that_one_better_alone(
     after = judge_returns(world, starts, OFTEN, stub)
     asked = {one.time for one in stub.asked}
     assert 0 < len(asked) <= 4
-    assert after.again == pytest.approx([higher] * len(asked))
+    assert after.jsbsim_differences == pytest.approx([higher] * len(asked))
     for old, new in zip(before.each, after.each, strict=True):
         if old.kind == "ground" and old.time not in asked:
             assert new.kind == "ground"
@@ -214,7 +214,7 @@ def test_one_that_begins_low_is_held_to_what_it_has(tmp_path: Path) -> None:
     found = judged(hill_setup(tmp_path, mission=way), 2.0)
     low = [one for one in found.each if one.start[2] < 30.0]
     assert len(low) > 2
-    assert all(one.floor == pytest.approx(one.start[2] - 2.0, abs=0.2) for one in low)
+    assert all(one.required_height == pytest.approx(one.start[2] - 2.0, abs=0.2) for one in low)
     assert {one.kind for one in found.each} == {"safe"}
     assert "taking off" in range_text(found.ranges[0], found, hill_setup(tmp_path, mission=way).scenario)
     # Down to 15 m over home it is lower than those that begin higher, and than the least height where they begin above.
@@ -234,7 +234,7 @@ def test_what_was_low_before_it_left_the_elevation_file_is_low(tmp_path: Path) -
     assert {one.kind for one in found.each} == {"ground", "low", "unknown"}
     assert first_of(found, "low") == pytest.approx(9960.0 - 6000.0, abs=150.0)
     assert first_of(found, "ground") == pytest.approx(11290.0 - 6000.0, abs=150.0)
-    assert all(math.isnan(one.seconds) for one in found.each)
+    assert all(math.isnan(one.time_to_loiter) for one in found.each)
     assert all((one.kind == "unknown") == (one.clearance > 29.9) for one in found.each)
 
 
@@ -279,7 +279,7 @@ def test_a_guessed_battery_is_not_judged_and_a_note_says_so(tmp_path: Path) -> N
     guess = guessed(setup)
     world, starts = return_world(guess), planned_starts(guess, 20.0)
     found = ReturnsFound(guess, judge_returns(world, starts, 20.0))
-    assert all(math.isnan(one.left) for one in found.returns.each)
+    assert all(math.isnan(one.energy_left) for one in found.returns.each)
     assert not found.returns.count("energy")
     assert any("the battery is guessed: energy is not judged" in note for note in found.notes)
     stated = hill_setup(tmp_path, "[flight]\nbattery_wh = 10\n")

@@ -29,7 +29,7 @@ def judged(folder: Path, mission: str = LANDING, more: str = "", **parameters: f
     setup = hill_setup(folder, more, mission)
     world = return_world(setup).with_parameters(**parameters)
     starts = planned_starts(setup, EVERY)
-    return judge_returns(world, starts.at(np.flatnonzero(starts.rows["east"] < 4900.0)), EVERY)
+    return judge_returns(world, starts.subset(np.flatnonzero(starts.rows["east"] < 4900.0)), EVERY)
 
 
 def reaches(found: Returns, kind: str) -> float:
@@ -57,7 +57,7 @@ def test_it_goes_on_from_its_circle_to_the_landing_sequence(tmp_path: Path) -> N
     found = judged(tmp_path, RTL_AUTOLAND=1)
     assert {one.kind for one in found.each} == {"ground"}
     assert found.each[0].target.name == "home, and on to the landing sequence at item 4"
-    assert found.each[0].clearance_at[0] == pytest.approx(2600.0, abs=200.0)
+    assert found.each[0].lowest_position[0] == pytest.approx(2600.0, abs=200.0)
     # From 600 m over home it is over the hill at 100 + 500 * 3000 / 6000 m, and hits it; from 900 m at 500 m.
     assert {one.kind for one in judged(tmp_path, RTL_AUTOLAND=1, RTL_ALTITUDE=600).each} == {"ground"}
     high = judged(tmp_path, RTL_AUTOLAND=1, RTL_ALTITUDE=900)
@@ -73,7 +73,7 @@ def test_without_a_landing_sequence_a_return_stays_in_its_circle(tmp_path: Path,
     alone, found = judged(tmp_path, WAY), judged(tmp_path, WAY, RTL_AUTOLAND=value)
     assert [(one.kind, one.target) for one in found.each] == [(one.kind, one.target) for one in alone.each]
     assert landing_text(found)[0].startswith(f"RTL_AUTOLAND {value}: ")
-    assert not found.open
+    assert not found.unjudged_parts
 
 
 def test_what_each_value_says(tmp_path: Path) -> None:
@@ -83,7 +83,7 @@ def test_what_each_value_says(tmp_path: Path) -> None:
     assert "for go-arounds only" in said[3]
     assert judged(tmp_path, RTL_AUTOLAND=3).each[0].target.name == "home"
     by_path = judged(tmp_path, RTL_AUTOLAND=4)
-    assert by_path.open == ("return path",)
+    assert by_path.unjudged_parts == ("return path",)
     assert not by_path.safe
 
 
@@ -103,7 +103,7 @@ def test_it_goes_to_the_nearest_of_two(tmp_path: Path) -> None:
 def test_a_landing_itself_is_not_judged(tmp_path: Path) -> None:
     mission = WAY + row(3, 189) + row(4, 21, 6000.0, 1.0)
     found = judged(tmp_path, mission, RTL_AUTOLAND=2)
-    assert (found.each, found.open) == ((), ("landing",))
+    assert (found.each, found.unjudged_parts) == ((), ("landing",))
     assert headline(found) == "not judged: the landing sequence begins with the landing itself"
     assert found.undecided
     # The way to the circle is.
@@ -130,7 +130,7 @@ def test_a_battery_that_lands_goes_another_way_than_rtl(tmp_path: Path) -> None:
 
 def test_mode_autoland_is_not_judged(tmp_path: Path) -> None:
     found = judged(tmp_path, WAY, FS_LONG_ACTN=5, RTL_ALTITUDE=600)
-    assert found.open == ("autoland",)
+    assert found.unjudged_parts == ("autoland",)
     assert {one.kind for one in found.each} == {"safe"}
     assert (found.safe, found.undecided) == (False, True)
 
@@ -138,9 +138,9 @@ def test_mode_autoland_is_not_judged(tmp_path: Path) -> None:
 def test_returns_that_follow_the_terrain_are_not_judged(tmp_path: Path) -> None:
     for bits in (1, 16):
         found = judged(tmp_path, TERRAIN_FOLLOW=bits)
-        assert (found.each, found.open, found.safe, found.undecided) == ((), ("terrain",), False, True)
+        assert (found.each, found.unjudged_parts, found.safe, found.undecided) == ((), ("terrain",), False, True)
     # Bits of other modes change nothing.
-    assert judged(tmp_path, WAY, TERRAIN_FOLLOW=2 + 8).open == ()
+    assert judged(tmp_path, WAY, TERRAIN_FOLLOW=2 + 8).unjudged_parts == ()
 
 
 def test_what_is_not_judged_is_neither_kept_nor_failed_where_it_is_required(tmp_path: Path) -> None:

@@ -8,7 +8,7 @@ import pytest
 
 from flight.mission.return_path import ReturnTarget
 from logs.verdict.returns.judge_glides import judge_glides
-from logs.verdict.returns.judge_returns import Kind, ReturnFlown, judge_returns, return_world, sinks_down
+from logs.verdict.returns.judge_returns import Kind, SimulatedReturn, judge_returns, return_world, sinks_to_ground
 from logs.verdict.returns.return_starts import SINKING, flown_starts
 from logs.verdict.returns.returns_text import headline
 from logs.views.report.tables import flight_sentence
@@ -16,11 +16,11 @@ from tests.logs.verdict.rules.flown_circuits import flown_circuit
 from world.scenario import from_spec
 
 
-def a_return(kind: Kind, sunk: float, run: float) -> ReturnFlown:
+def a_return(kind: Kind, sunk: float, run: float) -> SimulatedReturn:
     """One that comes to its least clearance so much lower than it begins, and so far from there, m."""
     start, at = (100.0, 0.0, 340.0), (100.0, run, 340.0 - sunk)
     target = ReturnTarget((0.0, 0.0, 400.0), "home", "", 0.0)
-    return ReturnFlown(0.0, start, target, kind, 0.0, at, 99.0, -1, -1, 1.0, 9.0, 1.0)
+    return SimulatedReturn(0.0, start, target, kind, 0.0, at, 99.0, -1, -1, 1.0, 9.0, 1.0)
 
 
 @pytest.mark.parametrize(
@@ -43,7 +43,7 @@ def a_return(kind: Kind, sunk: float, run: float) -> ReturnFlown:
 def test_what_sinks_to_the_ground_beside_what_flies_into_it(
     kind: Kind, sunk: float, run: float, height: float, left_out: bool
 ) -> None:
-    assert sinks_down(a_return(kind, sunk, run), height) is left_out
+    assert sinks_to_ground(a_return(kind, sunk, run), height) is left_out
 
 
 def test_nothing_of_a_good_flight_from_the_ground_to_the_ground_hits_it() -> None:
@@ -53,19 +53,19 @@ def test_nothing_of_a_good_flight_from_the_ground_to_the_ground_hits_it() -> Non
     found = judge_returns(world, starts, 1.0)
     assert found.count("ground") == 0
     # It takes off in a second or two, and slides and stands for a quarter of a minute.
-    assert starts.grounded >= 5
-    assert found.left_out >= starts.grounded
-    assert len(found.each) + found.left_out == pytest.approx(track.time[-1] - track.time[0], abs=2.0)
-    assert f"; {found.left_out} on or near the ground in take-off and landing left out" in headline(found)
+    assert starts.grounded_count >= 5
+    assert found.omitted_count >= starts.grounded_count
+    assert len(found.each) + found.omitted_count == pytest.approx(track.time[-1] - track.time[0], abs=2.0)
+    assert f"; {found.omitted_count} on or near the ground in take-off and landing left out" in headline(found)
     # Low are the climb to the take-off's height and the final, none between them.
-    low = starts.time[starts.low]
+    low = starts.time[starts.is_low]
     # The ground is level, at 0 m.
-    assert (starts.rows["up"][starts.low] < flown.setup.limits.min_clearance + SINKING).all()
+    assert (starts.rows["up"][starts.is_low] < flown.setup.limits.min_clearance + SINKING).all()
     between = (starts.time > 20.0) & (track.leg[np.searchsorted(track.time, starts.time)] < flown.approach.leg)
-    assert not starts.low[between].any()
+    assert not starts.is_low[between].any()
     assert low[0] < 5.0
     # Without its engine it comes down straight ahead from there.
-    assert {one.time for one in judge_glides(world, starts).each} == set(starts.time[~starts.low].tolist())
+    assert {one.time for one in judge_glides(world, starts).each} == set(starts.time[~starts.is_low].tolist())
 
 
 def test_a_report_states_the_least_height_between_take_off_and_landing() -> None:
@@ -86,5 +86,5 @@ def test_a_return_from_the_climb_into_a_hill_counts() -> None:
     setup = flown.setup.in_scenario(replace(flown.setup.scenario, terrain=walled.terrain))
     starts = flown_starts(setup, flown.track, 1.0)
     found = judge_returns(return_world(setup), starts, 1.0)
-    low = set(starts.time[starts.low].tolist())
+    low = set(starts.time[starts.is_low].tolist())
     assert [one for one in found.each if one.time in low and one.kind == "ground"]

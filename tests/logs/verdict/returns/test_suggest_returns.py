@@ -9,16 +9,16 @@ import numpy as np
 import pytest
 
 from flight.mission.return_path import ReturnPlace, ReturnTarget
-from logs.verdict.returns.judge_returns import Kind, ReturnFlown, Returns, ReturnWorld, judge_returns, return_world
+from logs.verdict.returns.judge_returns import Kind, Returns, ReturnWorld, SimulatedReturn, judge_returns, return_world
 from logs.verdict.returns.return_starts import ReturnStarts, planned_starts
 from logs.verdict.returns.suggest_returns import (
     MARGIN,
     Remedy,
-    _Needs,
-    _Search,
-    helps,
+    _RallySearch,
+    _ReturnLimits,
+    is_improvement,
     suggest_parameters,
-    suggest_rally,
+    suggest_rally_points,
 )
 from tests.logs.verdict.returns.hill import DEGREE, HEAD, hill_setup
 
@@ -35,7 +35,7 @@ def test_the_least_altitude_clears_the_hill_with_its_margin(tmp_path: Path) -> N
     # be 370 + 30 + 15 m: h = 251 m; the next step of 25 m.
     assert found == Remedy({"RTL_ALTITUDE": 250.0}) or found == Remedy({"RTL_ALTITUDE": 275.0})
     shares: list[float] = []
-    good = judge_returns(found.on(world), starts, 8.0, advance=lambda done, total: shares.append(done / total))
+    good = judge_returns(found.apply_to(world), starts, 8.0, advance=lambda done, total: shares.append(done / total))
     # Whoever waits for it is asked before each.
     assert shares == sorted(shares)
     assert len(shares) > len(good.each)
@@ -49,17 +49,17 @@ def test_nothing_is_suggested_where_all_is_safe(tmp_path: Path) -> None:
     world, starts = asked(tmp_path)
     high = world.with_parameters(RTL_ALTITUDE=600.0)
     assert suggest_parameters(high, starts) == []
-    assert suggest_rally(high, starts) is None
+    assert suggest_rally_points(high, starts) is None
 
 
 def test_rally_points_behind_the_hill_are_enough(tmp_path: Path) -> None:
     world, starts = asked(tmp_path, 26.0)
-    found = suggest_rally(world, starts)
+    found = suggest_rally_points(world, starts)
     assert found is not None
     assert found.rally is not None
     assert len(found.rally) <= 2
     assert max(point.east for point in found.rally) > 3500.0
-    assert all(one.safe for one in judge_returns(found.on(world), starts, 26.0).each)
+    assert all(one.safe for one in judge_returns(found.apply_to(world), starts, 26.0).each)
     assert [point.number for point in found.rally] == list(range(1, len(found.rally) + 1))
 
 
@@ -68,7 +68,7 @@ def test_a_sphere_that_nothing_goes_around_leaves_no_altitude(tmp_path: Path) ->
     post = '[[threats]]\nname = "post"\neast_m = 0\nnorth_m = 0\namsl_m = 100\nkill_radius_m = 450\nkill_scale_m = 50\n'
     world, starts = asked(tmp_path, more=post)
     for remedy in suggest_parameters(world, starts):
-        judged = judge_returns(remedy.on(world), starts, 8.0)
+        judged = judge_returns(remedy.apply_to(world), starts, 8.0)
         assert judged.count("ground") == judged.count("low") == 0
 
 
@@ -80,16 +80,16 @@ def test_a_take_off_below_the_least_height_leaves_the_altitude_to_be_found(tmp_p
     )
     setup = hill_setup(tmp_path, mission=way)
     world, starts = return_world(setup), planned_starts(setup, 4.0)
-    assert judge_returns(world, starts, 4.0).each[0].floor == pytest.approx(23.0, abs=0.1)
+    assert judge_returns(world, starts, 4.0).each[0].required_height == pytest.approx(23.0, abs=0.1)
     (found,) = suggest_parameters(world, starts)
     # As without the take-off.
     assert found.parameters["RTL_ALTITUDE"] in (250.0, 275.0)
-    assert all(one.safe for one in judge_returns(found.on(world), starts, 4.0).each)
+    assert all(one.safe for one in judge_returns(found.apply_to(world), starts, 4.0).each)
 
 
 def kinds(counts: dict[Kind, int]) -> Returns:
     """Returns that come to so many of each kind."""
-    flown = ReturnFlown(
+    flown = SimulatedReturn(
         0.0,
         (0.0,) * 3,
         ReturnTarget((0.0,) * 3, "home", "", 0.0),
@@ -122,7 +122,7 @@ def kinds(counts: dict[Kind, int]) -> Returns:
     ],
 )
 def test_only_what_makes_nothing_worse_is_suggested(after: dict[Kind, int], good: bool) -> None:
-    assert helps(kinds({"ground": 34, "threat": 59, "safe": 10}), kinds(after)) is good
+    assert is_improvement(kinds({"ground": 34, "threat": 59, "safe": 10}), kinds(after)) is good
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -132,8 +132,8 @@ def test_the_search_finds_as_few_points_as_all_sets_tried(tmp_path: Path, seed: 
     rng = np.random.default_rng(seed)
     places = [ReturnPlace(*rng.uniform(0.0, 6500.0, 2), 300.0) for _ in range(8)]
     count = len(starts)
-    needs = _Needs(np.zeros(count), np.zeros(count))
-    search = _Search(world, starts, needs, places, rng.random(count) < 0.2)
+    needs = _ReturnLimits(np.zeros(count), np.zeros(count))
+    search = _RallySearch(world, starts, needs, places, rng.random(count) < 0.2)
     search._is_good[:] = rng.random((count, 8)) < 0.6
     search._is_simulated[:] = True
     every = np.arange(count)

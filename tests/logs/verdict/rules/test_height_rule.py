@@ -11,7 +11,7 @@ from flight.simulation.track import Track
 from logs.verdict.findings import Finding
 from logs.verdict.judge_flight import judge_geometry
 from logs.verdict.places import FLIGHT
-from logs.verdict.rules.height_rule import greatest_heights
+from logs.verdict.rules.height_rule import max_segment_heights
 from tests.logs.verdict.judging import ROUTE, judge, leg, of, suggested
 from tests.synthetic import edited, fly_path, make_setup
 from world.terrain import Terrain, gridded
@@ -88,7 +88,7 @@ def valley() -> Terrain:
 
 def test_the_height_over_a_valley_is_found_between_two_points() -> None:
     points = np.array([[0.0, 0.0, 200.0], [0.0, 900.0, 200.0], [0.0, 900.0, 260.0], [0.0, 5000.0, 260.0]])
-    most, at = greatest_heights(valley(), points)
+    most, at = max_segment_heights(valley(), points)
     assert most[:2] == pytest.approx([140.0, 160.0])
     assert at[0] == pytest.approx(500.0 / 900.0)
     assert np.isnan(most[2])
@@ -101,7 +101,7 @@ def test_the_height_over_a_valley_across_the_map() -> None:
     turned = gridded(ground.heights.T.copy(), axis, axis, source="", sha256="", datum="")
     points = np.array([[-900.0, 0.0, 200.0], [900.0, 0.0, 200.0]])
     for terrain in (turned, valley()):
-        most, at = greatest_heights(terrain, points if terrain is turned else points[:, [1, 0, 2]])
+        most, at = max_segment_heights(terrain, points if terrain is turned else points[:, [1, 0, 2]])
         # As the raster's rows may run to the south, the trench is at 500 m or at -500 m.
         assert most[0] == pytest.approx(140.0)
         assert abs(-900.0 + 1800.0 * at[0]) == pytest.approx(500.0)

@@ -13,7 +13,7 @@ from logs.verdict.findings import Finding, make_finding
 from logs.verdict.measures.route_requirements import RouteRequirements, route_requirements
 from logs.verdict.measures.track_alignment import AlignedTrack, align_track
 from logs.verdict.places import Place
-from logs.verdict.rules.loiter_rule import Circle, circles, fold_loiters
+from logs.verdict.rules.loiter_rule import LoiterCircle, loiter_circles, merge_loiter_findings
 from tests.logs.verdict.judging import judge, of
 from tests.mission_lines import setup_of, wp
 from tests.synthetic import fly_path
@@ -30,7 +30,7 @@ def loiter(radius: float = 200.0, turns: int = 2) -> FlightSetup:
 
 def laid(
     setup: FlightSetup, wider: float = 0.0, stop: float | None = None, begins: float = WIDER_FROM
-) -> tuple[RouteRequirements, AlignedTrack, Circle]:
+) -> tuple[RouteRequirements, AlignedTrack, LoiterCircle]:
     """The setup's route and its flight, this much to the outside (m) from a distance along the path on (m)."""
     requirements = route_requirements(setup)
     side = math.copysign(1.0, requirements.turns[1])
@@ -43,29 +43,29 @@ def laid(
     )
     aligned = align_track(requirements, track)
     assert aligned is not None
-    (circle,) = circles(requirements)
+    (circle,) = loiter_circles(requirements)
     return requirements, aligned, circle
 
 
 @pytest.mark.parametrize("radius", [200.0, -200.0, 120.0])
 def test_a_circle_is_joined_and_left_on_tangents(radius: float) -> None:
     """Whole turns, and what the tangents from 2 km before and to 2.5 km beside it are apart."""
-    (circle,) = circles(route_requirements(loiter(radius)))
+    (circle,) = loiter_circles(route_requirements(loiter(radius)))
     joined, left = math.asin(abs(radius) / 2000.0), math.asin(abs(radius) / 2500.0)
     # Clockwise it is left towards the east after a quarter of a turn more, the other way round after three.
     quarter = 0.25 if radius > 0.0 else 0.75
     assert circle.turns == pytest.approx(2.0 + quarter + (joined + left) / (2.0 * math.pi), abs=1e-4)
-    assert circle.middle == pytest.approx(MIDDLE, abs=0.01)
+    assert circle.center == pytest.approx(MIDDLE, abs=0.01)
     assert circle.radius == abs(radius)
 
 
 def test_two_circles_are_two() -> None:
     lines = (wp(0, 500), wp(0, 2500, command=18, p="1 0 200 0"), wp(1500, 2500, command=18, p="1 0 -150 0"))
     requirements = route_requirements(setup_of(*lines, wp(2500, 4500)))
-    first, second = circles(requirements)
+    first, second = loiter_circles(requirements)
     assert (first.radius, second.radius, second.first) == (200.0, 150.0, first.last + 1)
-    assert first.middle == pytest.approx(MIDDLE, abs=0.02)
-    assert second.middle == pytest.approx([1500.0, 2500.0], abs=0.02)
+    assert first.center == pytest.approx(MIDDLE, abs=0.02)
+    assert second.center == pytest.approx([1500.0, 2500.0], abs=0.02)
 
 
 @pytest.mark.parametrize("wider", [0.0, 5.0, -4.0])
@@ -82,7 +82,7 @@ def test_the_radius_as_flown_is_told(wider: float) -> None:
     assert low == pytest.approx(200.0 + min(wider, 0.0), abs=0.06)
     assert high == pytest.approx(200.0 + max(wider, 0.0), abs=0.06)
     assert f"{circle.turns:.2f} turns with 200 m" in item.reason
-    assert item.margin == pytest.approx(200.0 - float(requirements.tightest[circle.first : circle.last + 1].max()))
+    assert item.margin == pytest.approx(200.0 - float(requirements.min_radius[circle.first : circle.last + 1].max()))
 
 
 @pytest.mark.parametrize(("mean", "told"), [(259.0, False), (261.0, True)])
@@ -115,16 +115,16 @@ def test_the_worst_of_a_circles_legs_is_told(
 ) -> None:
     """A failed one before one that was not judged before a passed one; of these the least margin."""
     requirements = route_requirements(loiter())
-    (circle,) = circles(requirements)
+    (circle,) = loiter_circles(requirements)
     legs = [Place("leg", circle.first + k) for k in (0, 2, circle.last - circle.first - 1)]
     mine = [finding(rule, place, *outcome) for place, outcome in zip(legs, outcomes, strict=True)]
     beside = [finding(rule, Place("leg", k), True, 0.0) for k in (circle.first - 1, circle.last)]
     other = finding("energy", Place("leg", circle.first), True, 0.0)
-    folded = fold_loiters(requirements, None, [*mine, *beside, other])
+    folded = merge_loiter_findings(requirements, None, [*mine, *beside, other])
     reason = f"{mine[told].reason}; the worst of the circle's 3 legs"
     assert folded == (replace(mine[told], reason=reason), *beside, other)
     # One alone is as it was.
-    assert fold_loiters(requirements, None, [mine[0], *beside]) == (mine[0], *beside)
+    assert merge_loiter_findings(requirements, None, [mine[0], *beside]) == (mine[0], *beside)
 
 
 @pytest.mark.parametrize(
@@ -136,7 +136,7 @@ def test_a_loiters_corners_are_one_finding(outcomes: tuple[bool | None, bool | N
     corners = [requirements.waypoint(circle.first), requirements.waypoint(circle.last)]
     at = [finding("turn", corners[0], outcomes[0], 1.0), finding("waypoint", corners[1], outcomes[1], 1.0)]
     outside = finding("waypoint", requirements.waypoint(circle.last + 1), True, 1.0)
-    (one, rest) = fold_loiters(requirements, aligned, [at[0], outside, at[1]])
+    (one, rest) = merge_loiter_findings(requirements, aligned, [at[0], outside, at[1]])
     assert rest is outside
     assert (one.rule, one.place, one.ok) == ("loiter", corners[0], ok)
     assert ("did not get to its end" in one.reason) is (ok is None)
@@ -147,19 +147,19 @@ def test_corners_that_were_not_held_are_counted_and_the_worst_is_named() -> None
     corners = [requirements.waypoint(k) for k in (circle.first, circle.first + 1, circle.last)]
     at = [finding("turn", corners[0], False, -1.0), finding("turn", corners[1], False, -3.0)]
     at += [finding("waypoint", corners[1], False, -2.0), finding("turn", corners[2], True, 5.0)]
-    (one,) = fold_loiters(requirements, aligned, at)
+    (one,) = merge_loiter_findings(requirements, aligned, at)
     count = circle.last - circle.first + 1
     assert one.ok is False
     assert one.reason.startswith(f"2 of {count} corners not held, as waypoint 1 (item 2): turn -3.0")
     # Of the route alone the first is told.
-    (planned,) = fold_loiters(requirements, None, at)
+    (planned,) = merge_loiter_findings(requirements, None, at)
     assert planned.reason.startswith(f"waypoint {circle.first} (item 2): turn -1.0")
 
 
 def test_a_circle_that_was_left_early_has_no_radius() -> None:
     requirements, aligned, circle = laid(loiter(), stop=3000.0)
     corner = requirements.waypoint(circle.first)
-    (one,) = fold_loiters(requirements, aligned, [finding("turn", corner, None, None)])
+    (one,) = merge_loiter_findings(requirements, aligned, [finding("turn", corner, None, None)])
     assert one.flown is None
     assert "flown with" not in one.reason
 
@@ -170,7 +170,9 @@ def test_a_circle_where_the_wind_leaves_no_way_around_says_so() -> None:
     requirements = route_requirements(
         replace(setup, scenario=scenario, limits=replace(setup.limits, wind=scenario.wind))
     )
-    (circle,) = circles(requirements)
-    (one,) = fold_loiters(requirements, None, [finding("turn", requirements.waypoint(circle.first), True, 1.0)])
+    (circle,) = loiter_circles(requirements)
+    (one,) = merge_loiter_findings(
+        requirements, None, [finding("turn", requirements.waypoint(circle.first), True, 1.0)]
+    )
     assert one.ok is False
     assert "at 25 m/s the circle cannot be flown" in one.reason

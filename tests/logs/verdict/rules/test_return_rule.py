@@ -20,7 +20,7 @@ from logs.verdict.findings import make_finding
 from logs.verdict.judge_flight import judge_flight, judge_geometry
 from logs.verdict.measures.route_requirements import route_requirements
 from logs.verdict.measures.track_alignment import align_track
-from logs.verdict.rules.return_rule import circled, without_style
+from logs.verdict.rules.return_rule import has_completed_return_loiter, without_path_following_findings
 from logs.verdict.verdict import Verdict
 from logs.views.replay.timeline import timeline
 from tests.logs.verdict.judging import of
@@ -91,10 +91,10 @@ def test_a_drawn_leg_that_holds_nothing_of_the_way_says_nothing_once_the_way_was
         make_finding("clearance", requirements.leg(leg), ok=None, reason="the leg was not flown") for leg in (0, 3, 4)
     ]
     # Beside its target it may have ended in the ground.
-    aligned: Any = SimpleNamespace(passed=np.array([True, True]), flew=lambda leg: leg == 4)
+    aligned: Any = SimpleNamespace(passed=np.array([True, True]), has_flown=lambda leg: leg == 4)
     for arrived, left in ((True, [0, 4]), (None, [0, 3, 4]), (False, [0, 3, 4])):
         end = make_finding("return", requirements.waypoint(2), ok=arrived, reason="")
-        kept = without_style(requirements, aligned, [*unflown, end])
+        kept = without_path_following_findings(requirements, aligned, [*unflown, end])
         assert [item.place.index for item in kept if item.rule == "clearance"] == left
 
 
@@ -205,4 +205,4 @@ def test_an_imported_return_has_circled_at_its_height(seconds: float, radius: fl
     requirements = route_requirements(setup)
     aligned = align_track(requirements, rows)
     assert aligned is not None
-    assert circled(requirements, aligned) is arrived
+    assert has_completed_return_loiter(requirements, aligned) is arrived

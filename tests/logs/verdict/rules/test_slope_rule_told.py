@@ -40,7 +40,7 @@ def judged(
 def test_throttle_at_a_limit_is_told_from_a_second_on(
     limit: str, seconds: float, told: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    measure = SlopeMeasure(**{f"at_{limit}": seconds}, finished=True)
+    measure = SlopeMeasure(**{f"at_{limit}": seconds}, is_finished=True)
     item = judged(measure, monkeypatch, 5.0, envelope=True)
     assert (f"throttle at {limit} for 1 s" in item.reason) is told
     assert {fact.what: fact.value for fact in item.facts}[f"throttle at {limit}"] == seconds
@@ -53,9 +53,9 @@ def test_a_slope_as_flown_is_within_the_limit_of_its_own_direction(
 ) -> None:
     """And a tenth of a degree that its fit may be off."""
     flown = math.copysign(limit + beyond, planned)
-    fit = LegFit(math.radians(flown), math.radians(0.1), 1500.0, fitted=True)
+    fit = LegFit(math.radians(flown), math.radians(0.1), 1500.0, is_fitted=True)
     limits = {"max_climb_deg": 8.0, "max_dive_deg": 5.0}
-    item = judged(SlopeMeasure(slope=fit, finished=True), monkeypatch, planned, limits=limits)
+    item = judged(SlopeMeasure(slope=fit, is_finished=True), monkeypatch, planned, limits=limits)
     assert item.ok is ok
     assert (item.flown, item.limit) == (pytest.approx(flown), math.copysign(limit, planned))
     if not ok:
@@ -80,7 +80,7 @@ def test_air_takes_speed_where_the_aircraft_showed_more_than_the_leg_asks(
     """By more than three standard errors of a tenth of a degree, at the throttle limit of that direction."""
     ability = Ability(math.radians(shown), math.radians(0.1), 20.0)
     off = {"slow": 2.0} if at == "full" else {"fast": 2.0}
-    measure = SlopeMeasure(**{f"at_{at}": 8.0}, **off, ability=ability, finished=True)
+    measure = SlopeMeasure(**{f"at_{at}": 8.0}, **off, ability=ability, is_finished=True)
     item = judged(measure, monkeypatch, slope)
     assert item.ok is ok
     if not ok:
@@ -94,7 +94,7 @@ def test_an_ability_too_small_is_told_with_its_direction(
 ) -> None:
     shown = Ability(math.radians(4.0), math.radians(0.05), 20.0)
     for envelope in (True, False):
-        item = judged(SlopeMeasure(ability=shown, finished=True), monkeypatch, slope, envelope=envelope)
+        item = judged(SlopeMeasure(ability=shown, is_finished=True), monkeypatch, slope, envelope=envelope)
         assert item.ok is False
         wanted = what or "idle throttle the aircraft showed that it can sink"
         assert f"in 20 s at {wanted} 4.0° at 25 m/s here; the leg needs 6.0°" in item.reason
@@ -102,7 +102,7 @@ def test_an_ability_too_small_is_told_with_its_direction(
 
 def test_height_above_and_below_the_leg(monkeypatch: pytest.MonkeyPatch) -> None:
     for error, side in ((12.0, "above"), (-12.0, "below")):
-        item = judged(SlopeMeasure(height_error=error, finished=True), monkeypatch, 3.0)
+        item = judged(SlopeMeasure(height_error=error, is_finished=True), monkeypatch, 3.0)
         assert f"12 m {side} the leg" in item.reason
         assert item.ok is False
 

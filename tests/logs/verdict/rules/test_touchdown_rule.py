@@ -39,8 +39,8 @@ def test_where_it_touches_down_is_measured_along_and_across_the_landing() -> Non
 def test_the_sink_towards_rising_ground_counts_its_slope() -> None:
     """The field of flight a rises by 5 to 8 % along its landing."""
     known = facts("a")
-    over_ground = 19.0
-    assert 0.05 < (known["sink towards the ground"] - known["sink"]) / over_ground < 0.08
+    heights_over_ground = 19.0
+    assert 0.05 < (known["sink towards the ground"] - known["sink"]) / heights_over_ground < 0.08
 
 
 def test_a_flight_that_ends_before_it_is_down_did_not_touch_down() -> None:

@@ -144,8 +144,8 @@ def test_returns_have_the_colours_of_what_they_come_to(tmp_path: Path) -> None:
     }
     assert list(folders) == ["returns to launch", "the worst returns", "without its engine", "the glide's footprint"]
     way = folders["returns to launch"]
-    assert len(way) == len(drawn.by_kind)
-    for mark, (kind, ones) in zip(way, drawn.by_kind, strict=True):
+    assert len(way) == len(drawn.segments_by_outcome)
+    for mark, (kind, ones) in zip(way, drawn.segments_by_outcome, strict=True):
         red, green, blue = (round(255.0 * part) for part in theme.rgb(theme.colour(f"return-{kind}", dark=True)))
         assert mark.findtext(f"{KML}Style/{KML}LineStyle/{KML}color") == f"ff{blue:02x}{green:02x}{red:02x}"
         assert f"{ones[0].time:.0f} to " in (mark.findtext(f"{KML}name") or "")

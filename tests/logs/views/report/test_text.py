@@ -16,16 +16,16 @@ from logs.verdict.places import FLIGHT, Change, DecidingParameter, LevelAnswer, 
 from logs.verdict.verdict import Verdict
 from logs.verdict.wording import place_text, suggestions_text
 from logs.views.report.text import (
-    badge_of,
     failed_groups,
     finding_rows,
-    left_lines,
+    not_reflown_lines,
     number,
     quantity,
     refly_lines,
     remedy_text,
     rule_rows,
     trust_line,
+    verdict_badge,
 )
 from tests.logs.views.report.report_data import FINDINGS, finding
 from world.scenario import with_wind
@@ -96,7 +96,7 @@ def test_the_parameter_stands_at_the_finding_that_it_decides_alone() -> None:
 def test_badge_states_the_verdict(
     flyable: bool, complete: bool, level: str, findings: tuple[Finding, ...], label: str
 ) -> None:
-    badge = badge_of(Verdict(findings, flyable, complete, (), level))
+    badge = verdict_badge(Verdict(findings, flyable, complete, (), level))
     assert badge.word == label
     assert badge.state == ("pass" if flyable else "fail")
 
@@ -172,10 +172,10 @@ def test_the_trust_is_a_line_with_medians() -> None:
 
 def test_what_was_not_flown_again_is_named_with_its_reason() -> None:
     other = MissionStretch(50.0, 60.0, "AUTO", "log")
-    assert left_lines((AGAIN,), (AGAIN.stretch,), 9) == []
-    (line,) = left_lines((AGAIN,), (AGAIN.stretch, other), 9)
+    assert not_reflown_lines((AGAIN,), (AGAIN.stretch,), 9) == []
+    (line,) = not_reflown_lines((AGAIN,), (AGAIN.stretch, other), 9)
     assert line == "Not flown again: AUTO from 50.0 s to 60.0 s: it passed no two waypoints in order"
-    (line,) = left_lines((AGAIN,), (AGAIN.stretch, other), 1)
+    (line,) = not_reflown_lines((AGAIN,), (AGAIN.stretch, other), 1)
     assert line.endswith("in order, or 1 longer ones were")
 
 
@@ -185,4 +185,4 @@ def test_a_verdict_that_leaves_something_open_neither_passes_nor_fails() -> None
     )
     levels = (LevelAnswer("geometry", False, lines[0], undecided=True),)
     verdict = Verdict((), False, True, lines, "geometric", levels, unjudged="slope on leg 1")
-    assert (badge_of(verdict).state, badge_of(verdict).word) == ("open", "Not judged in full")
+    assert (verdict_badge(verdict).state, verdict_badge(verdict).word) == ("open", "Not judged in full")

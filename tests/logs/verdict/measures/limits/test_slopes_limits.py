@@ -57,8 +57,8 @@ def slope_of(points: list[list[float]], leg: int, **how: float) -> LegFit:
 @pytest.mark.parametrize(("leg", "left_out"), [(0, 20.0 + 100.0), (1, 100.0 + 100.0), (2, 100.0)])
 def test_a_fit_leaves_out_what_is_near_a_turn_and_near_the_start(leg: int, left_out: float) -> None:
     points = straight(2000.0, 2000.0, 2000.0)
-    assert course_of(points, leg).run == pytest.approx(2000.0 - left_out, abs=2 * ROW)
-    assert slope_of(points, leg).run == pytest.approx(2000.0 - left_out, abs=2 * ROW)
+    assert course_of(points, leg).length == pytest.approx(2000.0 - left_out, abs=2 * ROW)
+    assert slope_of(points, leg).length == pytest.approx(2000.0 - left_out, abs=2 * ROW)
 
 
 def test_a_slopes_fit_leaves_out_the_blend_and_twenty_metres_more() -> None:
@@ -66,23 +66,23 @@ def test_a_slopes_fit_leaves_out_the_blend_and_twenty_metres_more() -> None:
     blend = 0.2 * 35.0**2 / (2.0 * BLEND_ACCELERATION)
     assert blend > 90.0
     found = slope_of([[0, 0, 300], [0, 3000, 300], [0, 6000, 900]], 0, airspeed=35.0)
-    assert found.run == pytest.approx(3000.0 - 20.0 - (blend + 20.0), abs=2.0)
+    assert found.length == pytest.approx(3000.0 - 20.0 - (blend + 20.0), abs=2.0)
 
 
 @pytest.mark.parametrize(("run", "fitted"), [(258.0, False), (262.0, True)])
 def test_a_course_is_fitted_to_sixty_metres(run: float, fitted: bool) -> None:
     """Between two turns, a hundred metres from each."""
-    assert course_of(straight(1000.0, run, 1000.0), 1).fitted is fitted
+    assert course_of(straight(1000.0, run, 1000.0), 1).is_fitted is fitted
 
 
 @pytest.mark.parametrize(("run", "fitted"), [(298.0, False), (302.0, True)])
 def test_a_slope_is_fitted_to_a_hundred_metres(run: float, fitted: bool) -> None:
-    assert slope_of(straight(1000.0, run, 1000.0), 1).fitted is fitted
+    assert slope_of(straight(1000.0, run, 1000.0), 1).is_fitted is fitted
 
 
 def test_a_shorter_slope_is_measured_over_four_seconds() -> None:
     found = slope_of(straight(1000.0, 180.0, 1000.0), 1)
-    assert found.run == pytest.approx(4.0 * 25.0, abs=2 * ROW)
+    assert found.length == pytest.approx(4.0 * 25.0, abs=2 * ROW)
     assert math.degrees(found.tolerance) == pytest.approx(0.5)
 
 
@@ -103,7 +103,7 @@ def test_what_swings_about_the_line_widens_its_tolerance_up_to_half_a_degree() -
         return np.sin(2.0 * math.pi * s / 20.0)
 
     long = course_of(straight(2000.0, 2000.0), 1, swing)
-    added = math.degrees(math.atan2(2.0 * math.sqrt(0.5), long.run))
+    added = math.degrees(math.atan2(2.0 * math.sqrt(0.5), long.length))
     assert math.degrees(long.tolerance) == pytest.approx(0.02 + added, abs=0.003)
     # Over 102 m it would be 0.8 degrees.
     assert math.degrees(course_of(straight(1000.0, 302.0, 1000.0), 1, swing).tolerance) == pytest.approx(0.5)
@@ -138,17 +138,17 @@ def held(points: list[list[float]], throttle: float, power: float = 300.0) -> Sl
 
 @pytest.mark.parametrize(("throttle", "seconds"), [(0.988, 0.0), (0.992, 20.0)])
 def test_the_throttle_is_full_from_ninety_nine_hundredths_on(throttle: float, seconds: float) -> None:
-    assert held(LEVEL, throttle).at_full == pytest.approx(seconds, abs=0.1)
+    assert held(LEVEL, throttle).full_throttle_time == pytest.approx(seconds, abs=0.1)
 
 
 @pytest.mark.parametrize(("throttle", "seconds"), [(0.012, 0.0), (0.009, 20.0)])
 def test_the_throttle_is_idle_up_to_a_hundredth(throttle: float, seconds: float) -> None:
-    assert held(FALLING, throttle).at_idle == pytest.approx(seconds, abs=0.1)
+    assert held(FALLING, throttle).idle_throttle_time == pytest.approx(seconds, abs=0.1)
 
 
 @pytest.mark.parametrize(("amperes", "idle"), [(0.022, False), (0.018, True)])
 def test_a_motor_without_current_is_idle(amperes: float, idle: bool) -> None:
-    assert (held(FALLING, 0.6, power=44.4 * amperes).at_idle > 10.0) is idle
+    assert (held(FALLING, 0.6, power=44.4 * amperes).idle_throttle_time > 10.0) is idle
 
 
 def ability(
@@ -190,7 +190,7 @@ def test_an_ability_has_the_standard_error_of_independent_half_seconds() -> None
     """Its rate lies on a line over airspeed, so that all it is unsure of is the 0.02 m/s that rates are known to."""
     found, push = ability(10.0)
     assert found is not None
-    assert found.seconds == pytest.approx(9.5, abs=0.06)
+    assert found.duration == pytest.approx(9.5, abs=0.06)
     # The command is a twentieth off the middle of the speeds seen, whose variance is a third: 1 + 0.05^2 / 0.3.
     error = 0.02 * math.sqrt((1.0 + 0.05**2 / 0.3) / (9.5 / 0.5)) / 25.0
     assert found.error == pytest.approx(error, rel=0.06)
@@ -215,7 +215,7 @@ def test_a_speed_that_hardly_changes_says_nothing_of_other_speeds(swing: float, 
 
 @pytest.mark.parametrize(("asked", "covered"), [(0.069, True), (0.071, False)])
 def test_an_ability_covers_a_slope_beyond_three_standard_errors(asked: float, covered: bool) -> None:
-    assert Ability(slope=0.10, error=0.01, seconds=20.0).covers(asked) is covered
+    assert Ability(slope=0.10, error=0.01, duration=20.0).exceeds(asked) is covered
 
 
 def test_a_leg_has_time_to_take_up_its_speed() -> None:
@@ -237,7 +237,7 @@ def test_a_window_with_four_fifths_at_the_limit_counts(share: float, counts: boo
         airspeed=lambda s: 0.0 * s - 2.0,
     )
     measure = measure_slope(*laid(setup, track), 1)
-    assert measure.slow == pytest.approx(2.0 if counts else 0.0, abs=0.05)
+    assert measure.speed_loss == pytest.approx(2.0 if counts else 0.0, abs=0.05)
 
 
 @pytest.mark.parametrize(("seconds", "counts"), [(3.8, False), (4.2, True)])
@@ -249,7 +249,7 @@ def test_the_window_is_five_seconds_long(seconds: float, counts: bool) -> None:
         throttle=lambda s: 0.4 * ((s > THERE) & (s < THERE + 23.0 * seconds)),
         airspeed=lambda s: 0.0 * s - 2.0,
     )
-    assert measure_slope(*laid(setup, track), 1).slow == pytest.approx(2.0 if counts else 0.0, abs=0.05)
+    assert measure_slope(*laid(setup, track), 1).speed_loss == pytest.approx(2.0 if counts else 0.0, abs=0.05)
 
 
 def test_speed_from_rising_air_fades_within_twelve_seconds() -> None:
@@ -302,7 +302,7 @@ def test_a_speed_that_is_lost_is_seen_although_a_quantity_was_missing_before(col
     )
     values = np.array(getattr(track, column))
     values[int(np.argmin(np.abs(track.position[:, 1] - (THERE - 200.0))))] = math.nan
-    assert measure_slope(*laid(setup, edited(track, **{column: values})), 1).slow == pytest.approx(2.0, abs=0.05)
+    assert measure_slope(*laid(setup, edited(track, **{column: values})), 1).speed_loss == pytest.approx(2.0, abs=0.05)
 
 
 @pytest.mark.parametrize(("from_deg", "ground"), [(180.0, 33.0), (0.0, 17.0)])

@@ -60,17 +60,17 @@ def judged(measure: SlopeMeasure, monkeypatch: pytest.MonkeyPatch, slope: float 
 def test_a_height_is_ten_metres_off_or_fifteen_on_a_short_leg(
     error: float, short: bool, ok: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    assert judged(SlopeMeasure(height_error=error, short=short, finished=True), monkeypatch).ok is ok
+    assert judged(SlopeMeasure(height_error=error, is_short=short, is_finished=True), monkeypatch).ok is ok
 
 
 @pytest.mark.parametrize(("off", "ok"), [(0.58, True), (0.62, False), (-0.58, True), (-0.62, False)])
 def test_a_fitted_slope_is_half_a_degree_off_beside_its_tolerance(
     off: float, ok: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    fit = LegFit(math.radians(6.0 + off), math.radians(0.1), 1500.0, fitted=True)
-    assert judged(SlopeMeasure(slope=fit, finished=True), monkeypatch).ok is ok
-    rough = LegFit(math.radians(6.0 + off), math.radians(0.1), 80.0, fitted=False)
-    assert judged(SlopeMeasure(slope=rough, finished=True), monkeypatch).ok is True
+    fit = LegFit(math.radians(6.0 + off), math.radians(0.1), 1500.0, is_fitted=True)
+    assert judged(SlopeMeasure(slope=fit, is_finished=True), monkeypatch).ok is ok
+    rough = LegFit(math.radians(6.0 + off), math.radians(0.1), 80.0, is_fitted=False)
+    assert judged(SlopeMeasure(slope=rough, is_finished=True), monkeypatch).ok is True
 
 
 @pytest.mark.parametrize(
@@ -81,8 +81,8 @@ def test_speed_lost_at_full_throttle_is_a_metre_a_second_and_a_gust(
 ) -> None:
     """W20 is 7.7 and 15.4 m/s (MIL-F-8785C); the gust along the track 0.15 of it."""
     for off, ok in ((most - 0.05, True), (most + 0.05, False)):
-        slow = SlopeMeasure(at_full=6.0, slow=off, finished=True)
-        fast = SlopeMeasure(at_idle=6.0, fast=off, finished=True)
+        slow = SlopeMeasure(full_throttle_time=6.0, speed_loss=off, is_finished=True)
+        fast = SlopeMeasure(idle_throttle_time=6.0, speed_gain=off, is_finished=True)
         for measure in (slow, fast):
             assert judged(measure, monkeypatch, wind={"turbulence": turbulence}).ok is ok
 
@@ -91,7 +91,7 @@ def test_speed_lost_at_full_throttle_is_a_metre_a_second_and_a_gust(
 def test_throttle_at_a_limit_counts_after_five_seconds(
     seconds: float, ok: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    assert judged(SlopeMeasure(at_full=seconds, slow=2.0, finished=True), monkeypatch).ok is ok
+    assert judged(SlopeMeasure(full_throttle_time=seconds, speed_loss=2.0, is_finished=True), monkeypatch).ok is ok
 
 
 @pytest.mark.parametrize(("short", "ok"), [(0.23, True), (0.27, False)])
@@ -99,12 +99,12 @@ def test_an_ability_may_fall_short_by_a_tenth_of_a_degree_and_three_standard_err
     short: float, ok: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     shown = Ability(math.radians(6.0 - short), math.radians(0.05), 20.0)
-    assert judged(SlopeMeasure(ability=shown, finished=True), monkeypatch).ok is ok
+    assert judged(SlopeMeasure(ability=shown, is_finished=True), monkeypatch).ok is ok
 
 
 @pytest.mark.parametrize(("slope", "ok"), [(0.48, True), (0.52, False)])
 def test_a_level_leg_asks_for_no_ability(slope: float, ok: bool, monkeypatch: pytest.MonkeyPatch) -> None:
-    weak = SlopeMeasure(ability=Ability(math.radians(-1.0), math.radians(0.05), 20.0), finished=True)
+    weak = SlopeMeasure(ability=Ability(math.radians(-1.0), math.radians(0.05), 20.0), is_finished=True)
     assert judged(weak, monkeypatch, slope=slope).ok is ok
 
 

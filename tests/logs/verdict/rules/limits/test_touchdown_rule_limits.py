@@ -7,7 +7,7 @@ import pytest
 
 from logs.verdict.findings import GROUND_WAY, Finding
 from logs.verdict.judge_geometry import judge_geometry
-from logs.verdict.rules.touchdown_rule import _detect_faults, _finding, _Landing, _undecided_messages
+from logs.verdict.rules.touchdown_rule import _detect_faults, _Landing, _landing_finding, _undecided_messages
 from tests.flight.autopilots.arduplane.flown_grounds import circuit
 from tests.logs.verdict.judging import leg
 from tests.logs.verdict.rules.flown_circuits import RAIL, STRIP, flown_circuit, found, moved
@@ -73,7 +73,7 @@ def test_in_turbulence_fifty_metres_of_the_strip_are_left(
     assert approach is not None
     strip = replace(approach, strip=replace(approach.strip, length=200.0))
     at = _Landing(0.0, 0.0, (touch, 0.0), (stop, 0.0), 100.0 - stop, 1.0, 1.0, 10.0, 0.0)
-    assert _finding(leg(0), strip, at, _detect_faults(strip, at), has_gusts=gusts).ok is ok
+    assert _landing_finding(leg(0), strip, at, _detect_faults(strip, at), has_gusts=gusts).ok is ok
 
 
 @pytest.mark.parametrize(("turbulence", "ok"), [("none", True), ("light", None)])

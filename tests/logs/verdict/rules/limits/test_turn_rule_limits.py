@@ -89,7 +89,7 @@ def test_a_turn_may_pass_its_waypoint_a_little_closer_than_the_bank_limits_arc(
     radius = bank_radius(25.0 + off)
     least = radius - 0.01 * radius - tolerance
     for spare, ok in ((0.1, True), (-0.1, False)):
-        measure = TurnMeasure(passed=least + spare, over=True)
+        measure = TurnMeasure(min_distance=least + spare, is_complete=True)
         assert judged(setup, measure, monkeypatch).ok is ok
 
 
@@ -97,7 +97,7 @@ def test_a_turn_may_pass_its_waypoint_a_little_closer_than_the_bank_limits_arc(
 def test_a_nearly_straight_flight_has_no_radius_to_tell(
     radii: float, said: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    measure = TurnMeasure(radius=radii * bank_radius(), over=True)
+    measure = TurnMeasure(radius=radii * bank_radius(), is_complete=True)
     assert ("radius" in judged(make_setup(corner(60.0)), measure, monkeypatch).reason) is said
 
 
@@ -106,13 +106,13 @@ def test_a_flown_angle_is_beyond_the_limit_where_it_is_beyond_its_tolerance(
     degrees: float, ok: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     setup = make_setup(corner(50.0), limits={"max_turn_deg": 60.0})
-    measure = TurnMeasure(angle=math.radians(degrees), tolerance=math.radians(0.2), over=True)
+    measure = TurnMeasure(angle=math.radians(degrees), tolerance=math.radians(0.2), is_complete=True)
     assert judged(setup, measure, monkeypatch).ok is ok
 
 
 @pytest.mark.parametrize(("circles", "ok"), [(0, True), (1, False)])
 def test_no_full_circle_is_flown_at_a_corner(circles: int, ok: bool, monkeypatch: pytest.MonkeyPatch) -> None:
-    assert judged(make_setup(corner(60.0)), TurnMeasure(full_circles=circles, over=True), monkeypatch).ok is ok
+    assert judged(make_setup(corner(60.0)), TurnMeasure(full_circles=circles, is_complete=True), monkeypatch).ok is ok
 
 
 @pytest.mark.parametrize(("seconds", "seen"), [(9.0, True), (11.0, False)])
