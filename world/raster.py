@@ -333,7 +333,7 @@ def _convert_to_sea_level(heights: NDArray[np.float32], raster: RasterFile, top:
     if not np.isfinite(level).all():
         bad_index = int(np.argmin(np.isfinite(level)))
         place = f"longitude {lon[bad_index]:.4f}, latitude {lat[bad_index]:.4f}"
-        raise TerrainError(f"{raster.name}: {place}: the geoid's height is not known there", file=raster.name)
+        raise TerrainError(f"{raster.name}: {place}: the geoid height there is unknown", file=raster.name)
     sea_levels = np.stack([np.interp(cols, col, level_row) for level_row in level.reshape(across.shape)])
     sample_row = np.interp(rows, row, np.arange(row.size))
     upper_row = np.minimum(sample_row.astype(np.intp), row.size - 2)

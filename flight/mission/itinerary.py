@@ -627,7 +627,7 @@ class _ItineraryBuilder:
             return
         altitude = item.alt + self.home.alt if item.frame in OVER_HOME else item.alt if item.frame in AMSL else math.nan
         if math.isnan(altitude):
-            self.leave_open(f"{name} to an altitude that is not known: not flown", item.seq, by_value=False)
+            self.leave_open(f"{name} to an unknown altitude: not flown", item.seq, by_value=False)
             return
         self.home = Home(item.lat_deg, item.lon_deg, altitude)
 

@@ -180,7 +180,7 @@ def _note_landing_ground(mission: Mission, route: Route, scenario: Scenario) -> 
         tail_wind = scenario.wind.along(course, route.landing_ground)[0]
         wind = f", with {tail_wind:.1f} m/s of wind from behind" if tail_wind > CALM else wind
         wind = f", against {-tail_wind:.1f} m/s of wind" if tail_wind < -CALM else wind
-    ground = "the ground there is not known"
+    ground = "the terrain there is unknown"
     length = LandingStrip(0.0, 0.0).length
     if not any(math.isnan(slope) for slope in slopes):
         along, across = (_slope_text(slope) for slope in slopes)

@@ -382,7 +382,7 @@ def _result(attachments: dict[str, bytes], rows: int) -> tuple[str | None, str]:
 def _loss(recovery: bytes) -> str:
     """Return the loss before the log was recovered, according to its recovery note."""
     lost = _object(recovery).get("lost")
-    return lost if isinstance(lost, str) and lost else "what was lost is not known"
+    return lost if isinstance(lost, str) and lost else "the extent of the loss is unknown"
 
 
 def _verdict(attachments: dict[str, bytes]) -> tuple[dict[str, Any] | None, str]:

@@ -432,4 +432,4 @@ def _check_terrain_is_stored(spec: Any, terrain: Terrain | None, where: str) -> 
     table = spec.get("terrain") if isinstance(spec, dict) else None
     kind = table.get("kind") if isinstance(table, dict) else None
     if terrain is None and kind != "none":
-        raise LogError.at(where, "terrain.kind", kind, f"the log holds no {TERRAIN_FILE}", shown=repr(kind))
+        raise LogError.at(where, "terrain.kind", kind, f"the log contains no {TERRAIN_FILE}", shown=repr(kind))

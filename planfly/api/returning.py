@@ -158,7 +158,7 @@ class ReturnsFound:
         if self.setup.scenario.terrain is None:
             notes.append("no terrain was given: --terrain names an elevation file")
         if self.setup.scenario.external:
-            notes.append("the mission came without a scenario: threats are not known")
+            notes.append("the mission came without a scenario: threats are unknown")
         if not self.returns.flown:
             notes.append("returns begin on the planned path: nothing was flown, and no energy was used before")
         return (*notes, *glide_notes(self.glides))

@@ -58,10 +58,10 @@ def overlap_lines(measure: OverlapMeasure | None) -> tuple[str, ...]:
     """Describe the overlap of photos along and across the lines, or state that it is unknown.
 
     >>> overlap_lines(None)
-    ('overlap not judged: the camera is not known (--camera)',)
+    ('overlap not judged: the camera is unknown (--camera)',)
     """
     if measure is None:
-        return ("overlap not judged: the camera is not known (--camera)",)
+        return ("overlap not judged: the camera is unknown (--camera)",)
     texts = [overlap_text(measure, check) for check in (FRONT, SIDE)]
     if measure.front is None:
         texts[0] = "front overlap not judged: the distance between photos is not stated, or no photo can be used"

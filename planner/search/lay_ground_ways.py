@@ -490,7 +490,7 @@ def _find_descent(site: _Site, strip: LandingStrip, final_law: FinalLaw) -> tupl
             continue
         go_around = _min_go_around_height(site, candidate)
         if go_around is None:
-            reason = f"no height would do for a go-around on {round(math.degrees(candidate.course)) % 360}°"
+            reason = f"no height would be sufficient for a go-around on {round(math.degrees(candidate.course)) % 360}°"
             continue
         return Descent(
             corners, candidate.line_up, point, candidate.course, candidate.height / candidate.length, go_around
@@ -502,7 +502,7 @@ def _describe_strip_fault(terrain: Terrain, strip: LandingStrip, course: float) 
     """Describe the fault of a strip's ground; "" if it is suitable."""
     for direction, slope in zip(("along", "across"), strip_slopes(terrain, strip, course), strict=True):
         if math.isnan(slope):
-            return "the ground of the strip is not known to its ends"
+            return "the terrain of the strip is unknown towards its ends"
         if abs(slope) > STEEPEST_STRIP:
             course_text = f"on {round(math.degrees(course)) % 360}°"
             return (
@@ -563,7 +563,7 @@ def _check_final(site: _Site, final: _Final) -> tuple[float, str]:
     )
     judged_margins = margins[distances <= final.length - _GROUND_CONTACT_ZONE_M]
     if np.isnan(judged_margins).any():
-        return -math.inf, "leads over ground that is not known"
+        return -math.inf, "leads over unknown terrain"
     if judged_margins.min(initial=0.0) < 0.0:
         return float(judged_margins.min()), f"is {-float(judged_margins.min()):.0f} m too low over the ground"
     obstacle = site.describe_obstacle([begin.tolist(), [float(point[0]), float(point[1]), float(begin[2])]])

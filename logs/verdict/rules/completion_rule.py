@@ -103,17 +103,15 @@ def imported_completion(setup: FlightSetup, flown: Sequence[FlownLegs], log_comp
         faults.append(message("the log is damaged or unfinished"))
     if not flown:
         stretches = () if setup.source is None else setup.source.stretches
-        reason = (
-            "none of the mission's legs was flown" if stretches else "no stretch of the flight followed the mission"
-        )
+        reason = "none of the mission's legs was flown" if stretches else "no part of the flight followed the mission"
         # The flight may have included legs that the log does not hold.
         if missing is not None and stretches:
-            unknown_texts.append(f"none of the legs that the log holds was flown: {_absent_text(missing)}")
+            unknown_texts.append(f"none of the legs in the log was flown: {_absent_text(missing)}")
         else:
             faults.append(message(reason))
     elif last_leg in flown_legs and missing is not None and missing.beyond:
         unknown_texts.append(
-            f"{finished_count} of {leg_count} legs flown that the log holds, the last of them to its end:"
+            f"{finished_count} of {leg_count} of the legs in the log flown, the last of them to its end:"
             f" {_absent_text(missing)}"
         )
     elif last_leg in flown_legs:
@@ -154,7 +152,7 @@ def imported_completion(setup: FlightSetup, flown: Sequence[FlownLegs], log_comp
         tolerance=0.0,
         margin=finished_count - leg_count,
         unit="legs",
-        method="waypoints passed in order, in the stretches that followed the mission",
+        method="waypoints passed in order, in the parts of the flight that followed the mission",
     )
 
 

@@ -39,9 +39,9 @@ def energy_findings(
     if used == 0.0 and predicted == 0.0:
         # A model without a reading of power reads as 0 W.
         used, predicted = math.nan, math.nan
-        reason = "the aircraft's model states no power, so the energy is not known"
+        reason = "the aircraft's model states no power, so the energy is unknown"
     elif math.isnan(used):
-        reason = "the aircraft's power is not known at these speeds" if geometric else "nothing was flown"
+        reason = "the aircraft's power is unknown at these speeds" if geometric else "nothing was flown"
     else:
         reason = _used_text(requirements, used, current) + (" by prediction" if geometric else "")
         if not geometric and math.isfinite(predicted):

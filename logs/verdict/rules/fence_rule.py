@@ -136,7 +136,7 @@ def _zone_finding(requirements: RouteRequirements, zone_number: int, planned: Re
     elif visit.depth > 0.0:
         notes.append("touches it")
     if visit.unknown:
-        notes.append("the ground from which its height counts is not known everywhere")
+        notes.append("the terrain from which its height is measured is unknown in places")
     if flown is not None and planned.depth > ROUNDING_M:
         notes.append(
             f"the planned path is {planned.depth:.1f} m {side_text} at {_event_text(requirements, planned, 'at')}"

@@ -77,7 +77,9 @@ class _Obstacles(NamedTuple):
         """Describe the obstacle.  where: text that names the origin of the distance `at`."""
         if self.entered:
             return message(f"{subject} enters {self.entered}")
-        return message(f"{subject} meets the ground", f", {-self.clearance:.0f} m into it {self.at:.0f} m {where}")
+        return message(
+            f"{subject} hits the ground", f", {-self.clearance:.0f} m below its surface, {self.at:.0f} m {where}"
+        )
 
 
 def _climb_slopes(requirements: RouteRequirements, leg: int, course: float, amsl: float) -> tuple[float, float]:
@@ -122,7 +124,7 @@ def climbout_findings(
             return []
     if math.isnan(ground_altitude):
         return [
-            _unjudged_finding("climbout", place, "the ground at home is not known", is_undecided=takeoff is not None)
+            _unjudged_finding("climbout", place, "the terrain at home is unknown", is_undecided=takeoff is not None)
         ]
     steepest_slope, certain_slope = _climb_slopes(requirements, max(0, first_waypoint - 1), course, ground_altitude)
     if not steepest_slope > 0.0:
@@ -242,7 +244,7 @@ def _air_start_finding(place: Place, obstacles: _Obstacles) -> Finding:
     """Judge the direct climb from home to the first waypoint, not simulated, of a mission that starts in the air."""
     subject = f"the climb from home to {_item_text(place)}"
     if math.isnan(obstacles.clearance) and not obstacles.entered:
-        reason, check, ok = f"the ground below {subject} is not known", "", None
+        reason, check, ok = f"the terrain below {subject} is unknown", "", None
     elif obstacles.free:
         reason, check, ok = (
             f"straight from home: {_clearance_text(obstacles)}; not flown, as the flight begins in the air",
@@ -273,10 +275,10 @@ def _launch_finding(
     is_known: True if the aircraft's climb is certain.
     """
     to_item = requirements.leg(0).to_item
-    direction_text = f"towards {'the next place' if to_item is None else f'item {to_item}'}"
+    direction_text = f"towards {'the next waypoint' if to_item is None else f'item {to_item}'}"
     subject = f"the climb from home {course_text or direction_text}"
     if math.isnan(obstacles.clearance) and not obstacles.entered:
-        reason = message(f"the ground below {subject} is not known")
+        reason = message(f"the terrain below {subject} is unknown")
         return _finding("climbout", place, obstacles, None, reason)
     if not obstacles.free:
         fault = obstacles.obstacle_message(subject, "from home, at the steepest climb")
@@ -288,7 +290,7 @@ def _launch_finding(
     min_climb_text = f"{subject}, at {100.0 * MIN_CLIMB_FRACTION:.0f} % of the steepest,"
     if math.isnan(obstacles_at_min_climb.clearance) and not obstacles_at_min_climb.entered:
         return _finding(
-            "climbout", place, obstacles, None, message(f"{min_climb_text} leads to where the ground is not known")
+            "climbout", place, obstacles, None, message(f"{min_climb_text} leads to where the terrain is unknown")
         )
     if not obstacles_at_min_climb.free:
         return _finding(
@@ -370,7 +372,7 @@ def approach_findings(
         float(terrain.height(float(landing_point[0]), float(landing_point[1]))),
     )
     if math.isnan(point_altitude) or math.isnan(ground_altitude) or run < MIN_LEG_LENGTH_M:
-        reason = "the height of the ground at the landing point is not known"
+        reason = "the terrain height at the landing point is unknown"
         return [_unjudged_finding("approach", place, reason, is_undecided=True)]
     if start_altitude <= point_altitude:
         reason = "it begins no higher than the landing point"
@@ -390,7 +392,7 @@ def approach_findings(
     obstacles = _Obstacles(clearance, run - at_run, first_obstacle_on(requirements, path))
     subject = f"the glide to {item_text}"
     if math.isnan(obstacles.clearance) and not obstacles.entered:
-        return [_finding("approach", place, obstacles, None, message(f"the ground below {subject} is not known"))]
+        return [_finding("approach", place, obstacles, None, message(f"the terrain below {subject} is unknown"))]
     obstacle_message = obstacles.obstacle_message(subject, "before the landing point")
     # With a landing point below the ground the glide hits the ground early: the elevation file may be some metres off.
     if (
@@ -413,7 +415,7 @@ def approach_findings(
     clearance = way_clearance(terrain, path.between(0.0, judged_run))[0] if judged_run > 0.0 else math.inf
     if clearance < GLIDE_PATH_TOLERANCE_M:
         fault = message(
-            f"{subject} passes the ground by {clearance:.1f} m",
+            f"{subject} clears the ground by only {clearance:.1f} m",
             f", and may be flown {GLIDE_PATH_TOLERANCE_M:.0f} m lower than laid out",
         )
         return [_finding("approach", place, obstacles, None, fault, GROUND_WAY)]
@@ -432,14 +434,14 @@ def approach_findings(
 
 def _item_text(place: Place) -> str:
     """Name the item of a waypoint."""
-    return "the first place" if place.item is None else f"item {place.item}"
+    return "the first waypoint" if place.item is None else f"item {place.item}"
 
 
 def _clearance_text(obstacles: _Obstacles) -> str:
     return (
         "nothing is in the way"
         if math.isinf(obstacles.clearance)
-        else f"{obstacles.clearance:.0f} m above ground or more"
+        else f"{obstacles.clearance:.0f} m above ground at the lowest"
     )
 
 

@@ -30,7 +30,7 @@ def height_findings(
     if limit is None:
         return []
     if terrain is None:
-        reason = "no terrain was given, so heights above ground are not known"
+        reason = "no terrain was given, so heights above ground are unknown"
         return [
             make_finding(
                 "height", FLIGHT, ok=None, reason=reason, limit=limit, source=requirements.limits_source, unit="m"
@@ -139,7 +139,7 @@ def _finding(
         if judged.amsl > ceiling + HEIGHT_TOLERANCE_M:
             faults.append(message(f"{judged.amsl:.1f} m AMSL", f", above the scenario's ceiling of {ceiling:.0f} m"))
         if not judged.known:
-            facts.append("part of the ground below it is not known")
+            facts.append("part of the terrain below it is unknown")
         ok = False if faults else True if judged.known else None
     if planned is not None and planned is not judged and planned.height > limit + HEIGHT_TOLERANCE_M:
         facts.append(f"the planned path comes up to {planned.height:.1f} m")

@@ -75,7 +75,7 @@ def _launch_finding(requirements: RouteRequirements, ground: FlownGround, take_o
         brief = f"the launch passes {clearance:.1f} m above ground {distance:.0f} m from home"
         undecided.append(message(brief, ", less than the error of the simulated climb"))
     elif not faults and math.isnan(clearance):
-        undecided.append(message("the ground below the launch's climb is not known"))
+        undecided.append(message("the terrain below the launch's climb is unknown"))
     return make_finding(
         "launch",
         requirements.waypoint(take_off.waypoint),
@@ -139,9 +139,9 @@ def _describe_take_off(take_off: TakeOff, track: Track, run: Floats, clearance: 
     if run[-1] > 1.0:
         rise = float(track.position[-1, 2] - track.position[0, 2])
         course = round(math.degrees(math.atan2(*track.velocity[-1, :2].tolist()))) % 360
-        notes.append(f"climbs at {rise / run[-1]:.2f}, at last on {course}°")
+        notes.append(f"climbs at {rise / run[-1]:.2f}, finally on {course}°")
     if math.isfinite(clearance):
-        notes.append(f"{clearance:.0f} m above ground or more beyond {LAUNCH_RUN_M:.0f} m")
+        notes.append(f"{clearance:.0f} m above ground at the lowest, once {LAUNCH_RUN_M:.0f} m from the launch")
     return notes
 
 

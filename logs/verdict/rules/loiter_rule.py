@@ -136,14 +136,14 @@ def end_findings(
     reach, descriptions = hazards
     reason = f"after it {requirements.setup.autopilot.title} circles, up to {reach:.0f} m from it"
     if descriptions:
-        reason += f": {', '.join(descriptions)}; only a flight tells how near it comes"
+        reason += f": {', '.join(descriptions)}; only a simulated flight shows how close it comes"
     return [
         make_finding(
             "loiter",
             requirements.waypoint(requirements.legs),
             ok=None if descriptions else True,
             reason=reason,
-            method="all that its circles may reach, at the height of the last waypoint",
+            method="the area that its circles may reach, at the height of the last waypoint",
             check=UNKNOWN_WAY if descriptions else "",
         )
     ]
@@ -192,7 +192,7 @@ def _loiter_finding(
     ok: bool | None = not (faults or failed)
     if ok and any(finding.ok is None for finding in corner_findings):
         ok = None
-        facts.append("the flight did not get to its end")
+        facts.append("the flight did not reach its end")
     if ok and open_text:
         ok = None
         facts.append(open_text)
@@ -262,7 +262,7 @@ def _hazards_text(requirements: RouteRequirements, circle: Circle, min_radius: f
     if not hazards:
         return ""
     reach_text = f"it may get {reach:.0f} m from its center, and there"
-    return f"{reach_text}, {', '.join(hazards)}; only a flight tells where it circles"
+    return f"{reach_text}, {', '.join(hazards)}; only a simulated flight shows where it circles"
 
 
 def _has_reached(requirements: RouteRequirements, aligned: AlignedTrack, circle: Circle) -> bool:

@@ -57,7 +57,7 @@ def _finding(requirements: RouteRequirements, leg: int, measure: SlopeMeasure | 
         if rise is None:
             faults.append(_steep_leg_message(requirements, leg, limit, source))
         else:
-            facts.append(f"a step of {rise:.1f} m, beyond {math.degrees(limit):.1f}°, flown within its own height")
+            facts.append(f"a step of {rise:.1f} m, steeper than {math.degrees(limit):.1f}°, but negligible")
     faults += _steep_arc_faults(requirements, leg)
     fit: LegFit | None = None
     method = "route"
@@ -80,7 +80,7 @@ def _finding(requirements: RouteRequirements, leg: int, measure: SlopeMeasure | 
         ok, check = None, UNKNOWN_AIRCRAFT
         facts.insert(0, uncertainty)
     if measure is not None and not measure.finished:
-        facts.append("the flight did not get to its end")
+        facts.append("the flight did not reach its end")
         ok = None if ok else False
     judged = planned if fit is None else fit.value
     return make_finding(

@@ -93,7 +93,7 @@ def overlap_text(measure: OverlapMeasure, check: str) -> str:
     """Describe the minimum overlap of photos along or across lines, its place, and the required overlap."""
     if check == FRONT:
         overlap, required = measure.front, measure.camera.front
-        spacing_text = f" apart, one each {measure.camera.interval:g} s" if measure.slow else " apart"
+        spacing_text = f" apart, one every {measure.camera.interval:g} s" if measure.slow else " apart"
         where = (
             f"line {measure.line + 1}: photos {measure.apart:.0f} m{spacing_text}, {measure.height:.0f} m above ground"
         )
@@ -129,7 +129,7 @@ def _tight_turnaround_findings(requirements: RouteRequirements, survey: Survey) 
             end_names = {0: "the turn onto the first line", len(turnarounds) - 1: "the turn off the last line"}
             reason = (
                 f"{end_names.get(number, f'turn-around {number}')} is too tight to be flown as drawn, and within"
-                f" {reach:.0f} m of it {'; '.join(hazards)}: only a flight tells whether it is safe"
+                f" {reach:.0f} m of it {'; '.join(hazards)}: only a simulated flight shows whether it is safe"
             )
             place, method = requirements.leg(first), "its surroundings"
             findings.append(make_finding("survey", place, ok=None, reason=reason, check=UNKNOWN_WAY, method=method))
@@ -206,9 +206,9 @@ def _flown_finding(
 def lost_text(measure: LineMeasure) -> str:
     """Describe the defects of a line's unusable parts, the largest first; return "" if almost nothing is lost."""
     fractions = {
-        f"not along it within {measure.allowed_aside:.0f} m": measure.away,
+        f"not flown along it within {measure.allowed_aside:.0f} m": measure.away,
         f"banked beyond {math.degrees(MAX_PHOTO_BANK_RAD):.0f}°": measure.banked,
-        f"more than {measure.allowed_off:.0f} m off its height over ground": measure.high,
+        f"more than {measure.allowed_off:.0f} m off its height above ground": measure.high,
         "with the camera off": measure.dark,
     }
     parts = sorted(((fraction, defect) for defect, fraction in fractions.items() if fraction >= 0.005), reverse=True)

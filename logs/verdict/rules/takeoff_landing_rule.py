@@ -52,7 +52,7 @@ def takeoff_findings(
         next_altitude = float(requirements.points[waypoint + 1, 2])
         return [_slope_finding(requirements, "takeoff", waypoint, waypoint + 1, route.takeoff_ground, next_altitude)]
     if waypoint == 0 or not has_own_place:
-        reason = f"to {altitude:.0f} m AMSL over home, on a course that is the autopilot's to choose"
+        reason = f"to {altitude:.0f} m AMSL over home, on a course that the autopilot chooses"
         return [_unjudged_finding("takeoff", requirements.waypoint(waypoint), reason)]
     # From home, over which the flight starts: `at` is the take-off item's own place.
     return [_slope_finding(requirements, "takeoff", 0, waypoint, route.takeoff_ground, altitude)]
@@ -100,7 +100,7 @@ def landing_findings(
     if not landing_waypoints:
         if not items:
             return []
-        reason = f"{command_name(items[-1].command)} has no place of its own on the route"
+        reason = f"{command_name(items[-1].command)} has no position of its own on the route"
         route = requirements.setup.route
         if route.return_from >= 0:
             reason = RETURN_NOT_FLOWN_ON
@@ -130,7 +130,7 @@ def _slope_finding(
     place = requirements.waypoint(last)
     run = float(requirements.runs[first:last].sum())
     if math.isnan(first_altitude) or math.isnan(last_altitude):
-        return _unjudged_finding(rule, place, "the height of the ground there is not known")
+        return _unjudged_finding(rule, place, "the height of the terrain there is unknown")
     slope = math.atan2(last_altitude - first_altitude, run)
     limit, source = _slope_limit(requirements, first, first_altitude, last_altitude, slope)
     verb = "climbs" if slope >= 0.0 else "sinks"

@@ -150,7 +150,7 @@ def _sharp_turn_message(requirements: RouteRequirements, i: int, planned: float,
             f"; at {speed:.0f} m/s and {bank:.0f}° bank the smallest turn radius on these courses"
             f" in this wind is {requirements.tightest[i]:.0f} m",
         )
-    length_text = "no length of leg is enough"
+    length_text = "no leg would be long enough"
     if requirements.after[i] < MAX_FLY_BY_OFFSET_RADII * radius:
         length_text = f"that takes {requirements.after[i]:.0f} m of each leg"
         if requirements.setup.route.fly_over[i]:

@@ -265,7 +265,7 @@ def test_where_the_ground_is_not_known_it_is_undecided_where_it_is_required(tmp_
     found = judge_geometry(hill_setup(tmp_path, '[returns]\nrequire = ["rtl"]\n', way))
     (one,) = [one for one in found.findings if one.rule == "return"]
     assert one.ok is None
-    assert "fly where the ground is not known" in one.reason
+    assert "fly where the terrain is unknown" in one.reason
 
 
 def guessed(setup: FlightSetup) -> FlightSetup:

@@ -51,7 +51,7 @@ REFUSED = {
         "checkMissionItemValidity",
         (*GOOD, "2 183 5 1500 0 0 0 0 0"),
         4,
-        "unsupported command DO_SET_SERVO; ArduPlane takes it",
+        "unsupported command DO_SET_SERVO; ArduPlane accepts it",
     ),
     "takeoff-low": (
         "checkTakeoff",
