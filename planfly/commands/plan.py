@@ -80,7 +80,7 @@ def plan_options(line: LineParser) -> None:
         metavar="EAST,NORTH,KILL,DETECTION",
         type=threat,
         action="append",
-        help="a threat that has appeared, in m; repeatable",
+        help="a new threat: east, north, kill radius and detection radius, m; repeatable",
     )
     aircraft_and_wind_options(parser)
     autopilot_options(parser)

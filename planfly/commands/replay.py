@@ -79,8 +79,8 @@ def replay_options(line: LineParser) -> None:
     other.add_argument(
         "--foxglove",
         action="store_true",
-        help="play it to Foxglove on this machine over WebSocket; needs the extra planfly[foxglove], and a viewer that"
-        " speaks foxglove.sdk.v1 (Foxglove since 2025, Lichtblick after 1.21)",
+        help="play it to Foxglove on this machine over WebSocket; requires the extra planfly[foxglove], and a viewer"
+        " that speaks foxglove.sdk.v1 (Foxglove since 2025, Lichtblick after 1.21)",
     )
     other.add_argument(
         "--port",

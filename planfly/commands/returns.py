@@ -99,7 +99,7 @@ def returns(args: argparse.Namespace) -> int:
     for text in found.suggestion_lines:
         print(coloured("  would help: ", "hint") + text)
     if args.suggest and not found.safe and not found.suggested:
-        print("  no RTL_ALTITUDE, climb or rally points were found that would help")
+        print("  no RTL_ALTITUDE, climb or set of rally points that would help was found")
     print(f"engine out: {found.glide_headline}")
     for text in found.glide_lines[:_MAX_LISTED]:
         print(f"  {text}")

@@ -59,7 +59,7 @@ def changed_world(scenario: Scenario, asked: Settings) -> Scenario:
         from_deg = float(np.degrees(scenario.wind.from_course)) if asked.wind_from is None else asked.wind_from
         wind = (float(speed), from_deg)
     if asked.aircraft is not None and ("/" in asked.aircraft or "\\" in asked.aircraft):
-        raise PlanflyError("aircraft: expected a name that planfly aircraft lists", field="aircraft")
+        raise PlanflyError("aircraft: expected an aircraft listed by 'planfly aircraft'", field="aircraft")
     options: FlightOptions = {
         "wind": wind,
         "turbulence": asked.turbulence,

@@ -124,7 +124,7 @@ def time_option(group: OptionTaker) -> None:
         "--at",
         metavar="TIME",
         help="time of the flight, START or START/END by ISO 8601, as in 2026-05-01T10:00+02:00: "
-        "zones that are not active then are left out (default: all zones are active)",
+        "zones that are not active then are ignored (default: all zones are active)",
     )
 
 
@@ -135,7 +135,7 @@ def aircraft_and_wind_options(parser: CommandParser) -> None:
         group.add_argument(
             "--aircraft",
             metavar="AIRCRAFT",
-            help="a name that planfly aircraft lists, or a folder (default: aerosonde)",
+            help="an aircraft listed by 'planfly aircraft', or the folder of one (default: aerosonde)",
         ),
         complete_aircraft,
     )
@@ -169,15 +169,15 @@ def autopilot_options(parser: CommandParser) -> OptionTaker:
     option = group.add_argument(
         "--params",
         metavar="FILE",
-        help="parameters of the simulated autopilot, in a file that a ground station saved; the file also decides the "
-        "autopilot if none is named",
+        help="parameter file of the simulated autopilot, as saved by a ground station; it also selects the autopilot "
+        "if none is named",
     )
     with_completer(option, files("param", "parm", "params"))
     group.add_argument(
         "--autopilot",
         choices=CHOICES["autopilot"],
-        help="simulated autopilot: ArduPlane (ardupilot, the default), PX4 for fixed wing (px4, the newest release "
-        "that planfly knows, px4-1.16 or px4-1.17), or planfly's own guidance (planfly)",
+        help="simulated autopilot: ArduPlane (ardupilot, the default), PX4 for fixed wing (px4 for the newest "
+        "supported release, px4-1.16 or px4-1.17), or planfly's own guidance (planfly)",
     )
     group.add_argument(
         "--guidance",
@@ -218,7 +218,8 @@ def flight_options(parser: CommandParser) -> None:
         "--engine",
         choices=CHOICES["engine"],
         default="auto",
-        help="flight model: auto flies the compiled model if it equals JSBSim in every bit (default), jsbsim JSBSim",
+        help="flight model: auto (default) uses the compiled model if it is bit-identical to JSBSim, jsbsim always "
+        "uses JSBSim",
     )
     group.add_argument(
         "--levels",

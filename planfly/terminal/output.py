@@ -241,9 +241,9 @@ class _TimeLeft:
         """Return an estimate as text before any progress is measured.  to_do: units of work, 0 if unknown."""
         last = _last_durations().get(self._kind)
         if last is not None and to_do > 0.0 and last.each > 0.0:
-            return f"about {_duration_text(last.each * to_do)}, at the pace of the last time here"
+            return f"about {_duration_text(last.each * to_do)}, at the pace of the last run here"
         if last is not None:
-            return f"the last one here took {_duration_text(last.whole)}"
+            return f"the last run here took {_duration_text(last.whole)}"
         return "no estimate yet" if to_do > 0.0 else "no estimate"
 
     def is_due(self) -> bool:
@@ -536,4 +536,4 @@ def _check_not_input(target: Path, args: argparse.Namespace) -> None:
     for name in file_names:
         with contextlib.suppress(OSError):
             if target.exists() and target.samefile(name):
-                raise PlanflyError(f"{target}: is the input itself; name another file to write", file=target)
+                raise PlanflyError(f"{target}: is the input file; name another output file", file=target)

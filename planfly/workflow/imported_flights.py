@@ -162,7 +162,7 @@ def _planned_mission(path: Path, flight: LoggedFlight, options: LogOptions) -> t
         mission = mission_of_plan(plan, load_airframe(scenario), str(plan_path))
         return mission, f"of {plan_path.name}", scenario
     if flight.mission is None:
-        raise LogError(f"{path}: holds no mission; `plan` names the one that was to be flown", file=path)
+        raise LogError(f"{path}: contains no mission; `plan` names the mission that was planned", file=path)
     logged = flight.mission
     if logged.missing is not None and len(logged.mission.items) < _MIN_ITEMS:
         problems = [missing_text(logged.missing), *logged.mission.warnings[:1]]

@@ -253,7 +253,7 @@ def test_options_that_do_not_go_together_are_refused(tmp_path: Path, capsys: Out
     assert main(["check", str(example_plan(tmp_path)), "--flight", "1"]) == 2
     assert "--flight: only with an imported log" in capsys.readouterr().err
     assert main(["import", str(log), str(log)]) == 2
-    assert "is the input itself" in capsys.readouterr().err
+    assert "is the input file" in capsys.readouterr().err
 
 
 def test_the_other_commands_take_an_imported_flight(tmp_path: Path, capsys: Output) -> None:
