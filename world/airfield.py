@@ -234,7 +234,7 @@ def _place_on_ground(
     ground_height = float(ground.height(*place)) if ground is not None else math.nan
     if math.isnan(ground_height):
         message = (
-            f"{source}: {key}: east {place[0]:.0f} m, north {place[1]:.0f} m: the elevation file knows no ground there"
+            f"{source}: {key}: east {place[0]:.0f} m, north {place[1]:.0f} m: the elevation file has no data there"
         )
         raise ScenarioError(message, file=source, field=key)
     return np.array([*place, ground_height])

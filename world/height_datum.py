@@ -75,7 +75,7 @@ def height_datum(crs: str | None, stated: StatedDatum | None) -> HeightDatum:
         name, transformer = _geoid()
         return HeightDatum(f"{_MEAN_SEA_LEVEL}, converted from the ellipsoid by {name}", _undulation(transformer))
     if crs is not None and _is_depth(crs):
-        raise ValueError("heights count downwards, as depths")
+        raise ValueError("heights are positive downwards, as depths")
     name = "" if crs is None else _vertical_name(crs)
     return HeightDatum(f"{_MEAN_SEA_LEVEL} ({name}, as the file states)" if name else UNSTATED)
 
@@ -107,7 +107,7 @@ def _geoid() -> tuple[str, Any]:
             warnings.simplefilter("ignore", UserWarning)
             if TransformerGroup("EPSG:4979", target, always_xy=True).best_available:
                 return name, Transformer.from_crs("EPSG:4979", target, always_xy=True, only_best=True)
-    raise ValueError("heights count from the ellipsoid, and no geoid grid is available")
+    raise ValueError("heights are above the ellipsoid, and no geoid grid is available")
 
 
 def _is_depth(crs: str) -> bool:

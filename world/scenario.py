@@ -120,7 +120,7 @@ class Scenario:
             verb = "is" if inactive_count == 1 else "are"
             notes.append(
                 f"{inactive_count:,} of {len(timed_tables):,} zones with times of activity {verb} not active {span}"
-                " UTC: left out"
+                " UTC: ignored"
             )
         return tuple(notes)
 
@@ -291,7 +291,7 @@ def _with_file_zones(
         notes.append(
             f"{source}: {far_count:,} of {len(file_zones.zones):,} zones lie more than"
             f" {MAX_ZONE_DISTANCE / 1000.0:g} km from the"
-            " area: left out"
+            " area: ignored"
         )
     changes = {"zones": [*(spec.zones or ()), *zones_nearby] or None, "zone_notes": notes or None}
     return spec.model_copy(update=changes)

@@ -181,7 +181,7 @@ def draft_text(draft: Draft) -> str:
     lon_deg = 8.02499
     <BLANKLINE>
     [terrain]
-    kind = "flat"                 # no elevation file was named: flat ground says nothing of hills
+    kind = "flat"                 # no elevation file was named, so the ground is flat, without hills
     amsl_m = 0                    # height of the ground above mean sea level
     # For measured ground take these lines in place of the two above:
     # kind = "dem"
@@ -233,18 +233,18 @@ def _terrain_text(draft: Draft) -> str:
     if draft.terrain is None:
         return f"""\
 [terrain]
-{_line("kind", '"flat"', "no elevation file was named: flat ground says nothing of hills")}
+{_line("kind", '"flat"', "no elevation file was named, so the ground is flat, without hills")}
 {_line("amsl_m", "0", "height of the ground above mean sea level")}
 # For measured ground take these lines in place of the two above:
 # kind = "dem"
 {_line("# path", '"dem.tif"', "an elevation file, a folder of tiles, or a .vrt")}
 """
-    comment = "the tile that planfly ships" if draft.terrain in EMBEDDED else "counted from this file's folder"
+    comment = "the tile that planfly ships" if draft.terrain in EMBEDDED else "relative to this file's folder"
     return f"""\
 [terrain]
 kind = "dem"
 {_line("path", _toml(draft.terrain), comment)}
-{_line("# vertical_error_m", "5", "as its source states it: clearance is then also shown minus this")}
+{_line("# vertical_error_m", "5", "as stated by its source; clearance is then also shown minus this")}
 """
 
 
@@ -277,7 +277,7 @@ def _limits_text(draft: Draft) -> str:
 {_line("min_clearance_m", _number_text(draft.clearance), "above ground")}
 {_line("# max_height_m", _number_text(max(400.0, 2.0 * draft.height)), "above ground")}
 {_line("# max_turn_deg", "60", "at a waypoint")}
-{_line("# corridor_m", "60", "half width about the legs; by default what the autopilot needs")}
+{_line("# corridor_m", "60", "half width about the legs; by default as wide as the autopilot requires")}
 """
 
 
@@ -285,14 +285,14 @@ def _flight_text(draft: Draft) -> str:
     version = "" if draft.px4_version is None else f"\npx4_version = {_toml(draft.px4_version)}"
     return f"""\
 [flight]
-{_line("aircraft", _toml(draft.aircraft), "planfly aircraft lists them; a folder of your own")}
+{_line("aircraft", _toml(draft.aircraft), "an aircraft listed by 'planfly aircraft', or a folder of your own")}
 {_line("autopilot", _toml(draft.autopilot), '"ardupilot", "px4", or "planfly": planfly' + "'s own guidance")}{version}
-{_line("# params", '"mine.param"', "its parameters, as a ground station saves them")}
-{_line("# airspeed_mps", _number_text(draft.airspeed), "equivalent, by planfly's guidance true; by default this")}
+{_line("# params", '"mine.param"', "parameter file of the autopilot, as saved by a ground station")}
+{_line("# airspeed_mps", _number_text(draft.airspeed), "equivalent, for planfly's guidance true; the default is this")}
 
 [wind]
 {_line("speed_mps", "0", "your forecast, 0 to 40")}
-{_line("from_deg", "0", "that it blows from: 270 is a west wind")}
+{_line("from_deg", "0", "direction the wind comes from; 270 is a west wind")}
 {_line("turbulence", '"none"', '"light" or "moderate"')}
 
 [planner]
@@ -326,9 +326,9 @@ def _examples_text(draft: Draft) -> str:
 {_line("# radius_m", _number_text(radius))}
 {_line("# ceiling_agl_m", "300", "it may be flown over above this height above ground")}
 
-# What the way home is judged by.
+# Requirements on the way home.
 # [returns]
-# require = ["rtl", "glide"]  # from anywhere on the way a return to launch has to be safe, an engine may stop
+# require = ["rtl", "glide"]  # from anywhere on the route a return to launch must be safe, and the engine may fail
 """
 
 

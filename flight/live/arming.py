@@ -145,7 +145,7 @@ class ArmingState:
     def _divert(self, mode: int) -> CommandResult:
         """Continue the flight in another mode; nothing changes if it is the current mode."""
         if mode == MANUAL:
-            return CommandResult(DENIED, "MANUAL denied: nobody has the sticks; a forced disarm ends the flight")
+            return CommandResult(DENIED, "MANUAL denied: no pilot has the sticks; a forced disarm ends the flight")
         if mode != self.mode:
             self.diverted(mode)
             self.place = Place()
@@ -188,7 +188,7 @@ class ArmingState:
         if not self.judged.possible:
             return "the mission cannot be flown"
         if not (self.judged.flyable or self.force or is_forced):
-            return "the mission is judged not flyable; set PFLY_FORCE 1 to fly it all the same"
+            return "the mission is judged not flyable; set PFLY_FORCE 1 to fly it anyway"
         return ""
 
 

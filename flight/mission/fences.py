@@ -73,7 +73,7 @@ def zone_fences(zones: Sequence[Zone], origin: GeoOrigin) -> tuple[list[MissionI
         notes.append(f"an excluded area of a fence has no holes: {_joined_names(closed)} in the fence without them")
     if left_out:
         notes.append(
-            f"a flight must be inside every inclusion of a fence: {_joined_names(left_out)} left out for having"
+            f"a flight must be inside every inclusion of a fence: {_joined_names(left_out)} omitted because of"
             " several parts"
         )
     return items, notes
@@ -210,13 +210,13 @@ def with_fences(mission: Mission, scenario: Scenario, passes: PassTest) -> tuple
             f" and {len(left_out) - _MAX_NAMES} more" if len(left_out) > _MAX_NAMES else ""
         )
         notes.append(
-            f"left out of the fence, as the mission passes above or below: {names}; a fence has no height, and an"
+            f"omitted from the fence, because the mission passes above or below: {names}; a fence has no height, and an"
             " autopilot with it in its fence refuses the mission or breaks it off"
         )
     notes += zone_notes
     if scenario.limits.max_height_m is not None:
         limit_text = f"{scenario.limits.max_height_m:g} m above ground"
-        notes.append(f"a fence does not follow the ground: the greatest height of {limit_text} is not in it")
+        notes.append(f"a fence does not follow the ground: the maximum height of {limit_text} is not part of it")
     all_fences = numbered([*fences, *mission.fences])
     # A mission that begins or ends on the ground keeps its rally points: its last position is where it lands.
     keeps_rally = bool(mission.rally) or scenario.launch is not None or scenario.landing is not None

@@ -219,7 +219,7 @@ FIGURES = (
     ),
     FigureEntry(
         "return-heights",
-        "Called home, or without an engine",
+        "Return to launch, or engine failure",
         _of_returns("return-heights"),
         alternative=_text(
             "Over time: the flight's height by what comes of a return, the least height from which one is safe, and "
@@ -288,7 +288,7 @@ FIGURES = (
         "Controls",
         _of_flight(control_chart),
         alternative=_text(
-            "Plots over time: elevator, aileron, rudder and throttle, commanded and as they stood, with their limits."
+            "Plots over time: elevator, aileron, rudder and throttle, commanded and as measured, with their limits."
         ),
         caption=_text("Shaded: the command stands at the control's limit, and the aircraft can give no more."),
     ),

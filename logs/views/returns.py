@@ -66,7 +66,7 @@ def returns_map(setup: FlightSetup, drawn: DrawnReturns) -> MapChart:
     if unsafe:
         positions = np.array([worst.at for worst in unsafe])
         texts = tuple(return_text(worst.flown) for worst in unsafe)
-        layers.append(Layer("rings", "where it goes wrong", "fail", positions[:, 0], positions[:, 1], words=texts))
+        layers.append(Layer("rings", "where it fails", "fail", positions[:, 0], positions[:, 1], words=texts))
     targets = {ret.target.name: ret.target.position for ret in drawn.returns.each}
     layers += _targets(targets)
     labels = [
@@ -93,7 +93,7 @@ def _targets(targets: dict[str, tuple[float, float, float]]) -> list[Layer]:
     if not targets:
         return []
     east, north, _ = np.array(list(targets.values())).T
-    return [Layer("dots", "where it returns to", "waypoint", east, north, words=tuple(targets))]
+    return [Layer("dots", "return targets", "waypoint", east, north, words=tuple(targets))]
 
 
 # ----------------------------------------------------------------------
@@ -142,7 +142,7 @@ def _profile(scenario: Scenario, worst: WorstReturn, number: int, span: tuple[fl
     layers.append(Layer("line", "path of the return", "return-way", along, path[:, 2]))
     if not worst.flown.safe:
         nearest = int(np.argmin(np.linalg.norm(path - worst.at, axis=1)))
-        layers.append(Layer("rings", "where it goes wrong", "fail", along[[nearest]], worst.at[[2]], quiet=True))
+        layers.append(Layer("rings", "where it fails", "fail", along[[nearest]], worst.at[[2]], quiet=True))
     title = f"{number}: from {worst.flown.time:.0f} s"
     note = way_text(worst.flown.kind).removeprefix("a return ")
     return Panel(title, "m AMSL", tuple(layers), span=span, note=note, labels=(*cut_names, *zone_names))
@@ -166,7 +166,7 @@ def return_heights_chart(setup: FlightSetup, drawn: DrawnReturns, track: Track |
     min_altitude, max_altitude = float(np.nanmin(altitudes)), float(np.nanmax(altitudes))
     margin = 0.06 * max(max_altitude - min_altitude, _MIN_SPAN)
     span = (min_altitude - margin, max_altitude + margin)
-    name = f"least height for a safe return (no line: none up to {least_altitudes.searched:.0f} m more)"
+    name = f"lowest height for a safe return (no line: none up to {least_altitudes.searched:.0f} m more)"
     layers = [
         *ground_bands(scenario, PathPlane(time, places, ground, *span)),
         *way_layers(drawn.by_kind, _LOOKS, lambda ret: (ret.time, ret.start[2]), lambda ret: outcome_text(ret, limit)),
@@ -176,7 +176,7 @@ def return_heights_chart(setup: FlightSetup, drawn: DrawnReturns, track: Track |
     if drawn.glides.each:
         panels.append(_glide_margin_panel(drawn.glides))
     return Chart(
-        f"{shorten(scenario.name, 60)}: called home, or without its engine",
+        f"{shorten(scenario.name, 60)}: return to launch, or engine failure",
         "time since the start",
         "s",
         tuple(panels),

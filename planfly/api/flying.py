@@ -375,7 +375,7 @@ def refuse_keywords(source: str, keywords: Mapping[str, Any], reason: str) -> No
 # Reason why a log cannot be judged in another world, in messages.
 _JUDGED_AS_FLOWN_TEXT = "a log is judged with the aircraft, the speeds, the wind and the autopilot it was flown with"
 # Reason why a log cannot be judged in another scenario, in messages.
-_JUDGED_IN_SCENARIO_TEXT = "a log is judged in the scenario it carries; only `terrain` replaces its ground"
+_JUDGED_IN_SCENARIO_TEXT = "a log is judged in the scenario stored in it; only `terrain` can replace its ground"
 
 
 def check_judging_options(source: str, options: MissionOptions) -> None:

@@ -115,7 +115,7 @@ def _with_new_threats(scenario: Scenario, old: Plan, threats: Sequence[Threat]) 
     """
     for east, north, _, _ in threats:
         if scenario.terrain is not None and math.isnan(scenario.terrain.height(east, north)):
-            place = f"east {east:g} m, north {north:g} m: outside the terrain that is known"
+            place = f"east {east:g} m, north {north:g} m: outside the terrain data"
             raise ScenarioError.of_argument("threats", (east, north), place, shown="")
     old_threats = [table for table in old.scenario.spec.threats if table not in scenario.spec.threats]
     return with_threats(scenario, threats, "threats", old_threats)

@@ -434,8 +434,9 @@ def _unsettled_lines(winds: WindsFound) -> list[str]:
     if not unsettled:
         return []
     return [
-        f"not settled: {len(unsettled)} of {len(winds.boundaries)} directions, for lack of flights: each needs"
-        f" at least {FEWEST}, and an interval of {2.0 * ACCURACY:g} m/s; with fewer, the interval is mostly assumption"
+        f"not settled: {len(unsettled)} of {len(winds.boundaries)} directions, for lack of flights: each requires"
+        f" at least {FEWEST}, and an interval of at most {2.0 * ACCURACY:g} m/s;"
+        " with fewer, the interval rests mostly on assumptions"
     ]
 
 

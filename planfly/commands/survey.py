@@ -34,8 +34,8 @@ def survey_options(line: LineParser) -> None:
         metavar="WxH,FOCAL",
         type=camera,
         help="width and height of the camera's sensor (across and along the track) and its focal length, mm, "
-        "optionally followed by the required overlaps along and across the lines, percent: 23.5x15.6,16 or 23.5x15.6,16,75,60; "
-        "the camera looks straight down "
+        "optionally followed by the required overlaps along and across the lines, percent: 23.5x15.6,16 or "
+        "23.5x15.6,16,75,60; the camera looks straight down "
         "(default: the camera of a .plan)",
     )
     group.add_argument(

@@ -103,10 +103,10 @@ class ProgramReturns:
         """Return a one-line summary.
 
         >>> ProgramReturns("", ()).headline()
-        'by the program: no return could be flown'
+        'the program could fly no return'
         """
         if not self.flown:
-            return "by the program: no return could be flown"
+            return "the program could fly no return"
         agreeing_count = sum(pair.agrees for pair in self.flown)
         worse_count = sum(pair.worse for pair in self.flown)
         comparison = (
@@ -130,9 +130,9 @@ class ProgramReturns:
             agreement = (
                 "they agree"
                 if pair.agrees
-                else "the program's outcome counts, as it is worse"
+                else "the program's outcome applies, because it is worse"
                 if pair.worse
-                else "the simulated outcome counts, as it is worse"
+                else "the simulated outcome applies, because it is worse"
             )
             program_text = measured_text(pair.flown, returns.limit, scenario)
             texts.append(f"{start_text}: simulated {simulated_text}; by the program {program_text}: {agreement}")
@@ -219,7 +219,7 @@ def fly_by_program(
             judged = fly_and_judge(setup, airframe, log, advance, autopilot=program, reference="never")
         version = judged.setup.autopilot.version
         judged_return = _judge_flown_return(world, ret, starts.rows[k], judged.track, judged.ended)
-        reason = "" if judged_return else f"it does not come to where the return begins ({judged.ended})"
+        reason = "" if judged_return else f"it does not reach the start of the return ({judged.ended})"
         program_returns.append(ProgramReturn(ret, judged_return, reason, log))
     return ProgramReturns(version, tuple(program_returns))
 

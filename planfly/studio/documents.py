@@ -161,7 +161,7 @@ def _read_imported_log(path: Path, options: MissionOptions) -> ImportedFlight:
     try:
         return read_imported(path, **world)
     except LogError as error:
-        if "holds no mission" not in str(error):
+        if "contains no mission" not in str(error):
             raise
         alone = "a flight's track without a mission: open the file of its mission"
         raise MissionError(f"{path}: {alone}", file=path) from None
@@ -243,7 +243,7 @@ def _format_losses(desk: EditContext, mission: Mission, text: str, name: str, ki
         "rally points": (len(mission.rally) - len(kept.rally), ".plan holds them"),
         "survey plans": (
             len(mission.survey_plans),
-            "their items stay; what the ground station keeps next to them is lost",
+            "their items stay; other data of the ground station is lost",
         ),
     }
     found += [f"{count} {what}: {how}" for what, (count, how) in apart.items() if count > 0]
@@ -272,7 +272,7 @@ def _lost_settings(before: Scenario, desk: EditContext) -> tuple[str, ...]:
 def _lost_parameters(desk: EditContext) -> tuple[str, ...]:
     """Return a line on the autopilot parameters set in the studio, which only a parameter file stores, or nothing."""
     count = len(desk.parameters.values)
-    return (f"{count} parameter{'s' if count != 1 else ''} set here: .parm holds them",) if count else ()
+    return (f"{count} parameter{'s' if count != 1 else ''} set here: a .parm contains them",) if count else ()
 
 
 def _saved_parameters(name: str, desk: EditContext) -> Saved:
@@ -289,7 +289,7 @@ def _saved_plan(name: str, desk: EditContext, judged: JudgedMission) -> Saved:
         return Saved(name, plan_json(plan).encode())
     made = certified_plan(desk, judged)
     changed = not desk.planned or planned_mission(made, desk.airframe).items != judged.mission.items
-    losses = ["the items: a plan holds only places, from which its mission is made again"] if changed else []
+    losses = ["the items: a plan contains only positions, from which its mission is made again"] if changed else []
     if not made.feasible:
         problem = (made.certificate.problems or ("violations are counted",))[0]
         losses.append(f"it is a plan that is not feasible: {problem}")
@@ -304,7 +304,9 @@ def _require_plain_waypoints(mission: Mission) -> None:
         if item.command == Command.DO_CHANGE_SPEED and k > first:
             lost = "a change of speed along its way"
         if lost:
-            why = f"a plan.json of edited waypoints does not hold {lost} (item {item.seq}): save a .plan, or plan again"
+            why = (
+                f"a plan.json of edited waypoints cannot contain {lost} (item {item.seq}): save a .plan, or plan again"
+            )
             raise MissionError(f"{mission.source}: {why}", file=mission.source, field=f"item {item.seq}")
 
 
@@ -326,7 +328,9 @@ def certified_plan(desk: EditContext, judged: JudgedMission) -> Plan:
         or route.return_to is not None
         or any(one.frame not in AMSL and one.has_position for one in mission.items)
     ):
-        raise MissionError(f"{name}: a plan holds plain waypoints above mean sea level, once each", file=name)
+        raise MissionError(
+            f"{name}: a plan contains only plain waypoints with altitudes above mean sea level, each once", file=name
+        )
     if (made := _plan_with_ground_phases(desk, mission)) is not None:
         return made
     _require_plain_waypoints(mission)

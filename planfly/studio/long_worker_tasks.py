@@ -72,5 +72,5 @@ def campaign(payload: tuple[EditContext, Mission], advance: Advance) -> dict[str
     return {
         "state": "ok" if flyable == FLIGHTS else "open" if flyable else "fail",
         "headline": f"{flyable} of {FLIGHTS} flights are flyable: {low:.0%} to {high:.0%} at 95 %",
-        "lines": [*common, f"planfly campaign flies more: {FLIGHTS} say little about rare failures"],
+        "lines": [*common, f"planfly campaign flies more: {FLIGHTS} flights show little about rare failures"],
     }

@@ -70,10 +70,12 @@ def open_studio(
         kept = Path(keep) / f"{_stem(target)}.json"
         session, restored = open_session(target, options, kept)
         if restored:
-            back = "; undo takes it back" if session.undo_text else ""
-            on_message(f"earlier edits are restored (kept in {kept}){back}")
+            back = "; undo reverts this" if session.undo_text else ""
+            on_message(f"earlier edits are restored (from {kept}){back}")
         for file in session.unreadable:
-            on_message(f"{file}: cannot be read as a kept session; it stays as it is, and nothing is kept meanwhile")
+            on_message(
+                f"{file}: not a readable autosave file; it is left unchanged, and edits are not saved automatically"
+            )
         # Imported here: only serving needs the extra.
         from planfly.studio.server import Server
 

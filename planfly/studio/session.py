@@ -291,7 +291,7 @@ class Session:
             # A suggestion that moves no item has a reason of its own.
             apply_suggestion(self.desk, self.judged, item, item.suggestions[message.which])
             raise MissionError(
-                f"{self.document.name}: applied, this suggestion would leave its finding, or more findings than now",
+                f"{self.document.name}: this suggestion would not remove its finding, or would add findings",
                 field="suggestion",
             )
         mission = replace(passed.setup.mission, autopilot=self.mission.autopilot)
@@ -302,7 +302,7 @@ class Session:
         rev, missions = self.flown_trials
         found = missions.get((message.finding, message.which)) if rev == self.rev else None
         if found is None:
-            raise MissionError(f"{self.document.name}: that suggestion is not there any more", field="suggestion")
+            raise MissionError(f"{self.document.name}: that suggestion no longer exists", field="suggestion")
         return replace(found, autopilot=self.mission.autopilot), "apply a suggestion of the flight"
 
     def _with_part_replaced(self, plan: Plan, first: int, last: int) -> Mission:
@@ -386,7 +386,7 @@ class Session:
         if path is None or not self.document.kind:
             raise PlanflyError("no mission file was named: save it as a new one", field="over")
         if path.exists() and path.read_bytes() != self.document.on_disk:
-            changed = f"{path.name} was changed by something else since it was opened: save under another name"
+            changed = f"{path.name} was changed by another program since it was opened: save it under another name"
             raise PlanflyError(changed, file=path)
         saved = self.save(self.document.kind)
         write_whole(path, saved.data)

@@ -90,16 +90,16 @@ def needed_text(survey: Survey, lines: Sequence[LineMeasure | None]) -> str:
     usable_lines = [measure for measure in lines if measure is not None and measure.good > 0.0]
     if not usable_lines:
         return (
-            f"no place of its {len(lines)} lines, {survey.spacing:.0f} m apart, can be used, as there is no "
+            f"no part of its {len(lines)} lines, {survey.spacing:.0f} m apart, can be used, because there is no "
             "room to turn"
         )
     latest_start, longest = (
         max(measure.late for measure in usable_lines),
         max(measure.length for measure in usable_lines),
     )
-    text = f"lines can be used from up to {latest_start:.0f} m behind their begin on; the longest has {longest:.0f} m"
+    text = f"lines can be used from at most {latest_start:.0f} m behind their start; the longest has {longest:.0f} m"
     return (
-        f"{text}, and {len(lines) - len(usable_lines)} of {len(lines)} none that can"
+        f"{text}, and {len(lines) - len(usable_lines)} of {len(lines)} have no usable part"
         if len(usable_lines) < len(lines)
         else text
     )

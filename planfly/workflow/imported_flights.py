@@ -166,7 +166,7 @@ def _planned_mission(path: Path, flight: LoggedFlight, options: LogOptions) -> t
     logged = flight.mission
     if logged.missing is not None and len(logged.mission.items) < _MIN_ITEMS:
         problems = [missing_text(logged.missing), *logged.mission.warnings[:1]]
-        problems.append("`plan` names the mission that was to be flown")
+        problems.append("`plan` names the mission that was planned")
         raise LogError(f"{path}: {'; '.join(problems)}", file=path)
     time_text = f", at {logged.time:.1f} s" if logged.time > 0.0 else ""
     return logged.mission, f"{logged.origin} of the log{time_text}, {len(logged.mission.items)} items", None

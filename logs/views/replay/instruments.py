@@ -117,7 +117,7 @@ class Instruments:
             for column in (track.airspeed, track.speed_command, track.load_factor, track.energy, track.current)
         )
         return [
-            f"airspeed     {_number(airspeed, 1)} m/s, wanted {_number(commanded, 1)}",
+            f"airspeed     {_number(airspeed, 1)} m/s, commanded {_number(commanded, 1)}",
             f"ground speed {_number(math.hypot(east, north), 1)} m/s, climb {_number(up, 1, '+')} m/s",
             f"height       {_metres(amsl)} AMSL, {height} above ground",
             f"course       {_course(math.degrees(math.atan2(east, north)))}, heading {_course(yaw)}",

@@ -180,7 +180,7 @@ def _notes(first: FlightLog, second: FlightLog, names: tuple[str, str]) -> list[
     for log, name in zip((first, second), names, strict=True):
         if not np.isfinite(log.track.cross_track).any():
             notes.append(
-                f"cross-track and height error: guidance's own, which the log of {name} does not hold;"
+                f"cross-track and height error: guidance's own, which the log of {name} does not contain;"
                 " planfly refly measures an imported flight against its legs"
             )
     if a.scenario.origin == b.scenario.origin:

@@ -202,7 +202,7 @@ def remedy_text(finding: Finding, deciding: DecidingParameter | None) -> str:
 def count_sentence(rows: list[FindingRow]) -> str:
     """State the numbers of findings that pass, fail, and were not judged."""
     counts = {state: sum(row.state == state for row in rows) for state in _SIGNS}
-    held = f"{counts['pass']} of {counts['pass'] + counts['fail']} judged findings hold"
+    held = f"{counts['pass']} of {counts['pass'] + counts['fail']} judged findings pass"
     failed = f", {counts['fail']} {'fails' if counts['fail'] == 1 else 'fail'}" if counts["fail"] else ""
     unjudged = counts["open"] + counts["unjudged"]
     left = f"; {unjudged} could not be judged" if unjudged else ""
@@ -341,7 +341,7 @@ def trust_line(again: Reflight) -> str:
     model = again.setup.aircraft
     whose = f"{model}, which stands in for an aircraft that is not named," if again.stands_in else model
     if not again.spreads:
-        return f"Model and flight have no place in common: nothing is known of how far {whose} can be trusted"
+        return f"Model and flight have no part in common: it is unknown how far {whose} can be trusted"
     words = [
         f"{_CALLED[one.name]} {number(one.median)} {one.unit} ({number(one.most)} {one.unit})" for one in again.spreads
     ]

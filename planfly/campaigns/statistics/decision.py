@@ -233,7 +233,10 @@ class Goal:
         if self.stops:
             return "beta-binomial mixture, valid at every number of flights"
         if self.changed:
-            return "Clopper-Pearson, one-sided, but the number of flights was changed after some: it holds less often"
+            return (
+                "Clopper-Pearson, one-sided, but the number of flights was changed after some had been flown:"
+                " the true confidence is lower"
+            )
         return "Clopper-Pearson, one-sided, for the number of flights fixed beforehand"
 
 

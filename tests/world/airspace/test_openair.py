@@ -264,7 +264,7 @@ def test_an_outline_of_no_area_is_left_out_and_said(way: str, tmp_path: Path) ->
         path.write_text(f"AC Q\nAN RUN\n{way}{more}", encoding="utf-8")
         found = read_zone_file(path, "z.openair")
         assert len(found.zones) == count
-        assert found.notes == ["z.openair: outlines that enclose no area are left out: RUN (Q)"]
+        assert found.notes == ["z.openair: outlines that enclose no area are ignored: RUN (Q)"]
 
 
 def test_what_a_file_does_not_hold_as_it_stands_is_said(tmp_path: Path) -> None:

@@ -185,7 +185,7 @@ def test_verdict_comes_first_then_what_fails() -> None:
         "Not flyable",
         "slope on leg 1",
         "No remedy was found.",
-        "2 of 3 judged findings hold, 1 fails; 1 could not be judged",
+        "2 of 3 judged findings pass, 1 fails; 1 could not be judged",
         "Start: in the air",
         "The broad line is the plan",
         "What fails",
