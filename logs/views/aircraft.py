@@ -44,8 +44,8 @@ def draw_envelope(aircraft: Aircraft, envelope: Envelope) -> Figure:
     >>> from logs.recording.example_log import example_log
     >>> figure = draw_envelope(load_aircraft("aerosonde"), example_log().setup.envelope)
     >>> [axes.get_title(loc="left") for axes in figure.axes]
-    ['steepest climb and descent relative to the air', 'level flight', 'steepest climb and descent over the ground, at 500 m',
-     'turn radius']
+    ['steepest climb and descent relative to the air', 'level flight',
+     'steepest climb and descent over the ground, at 500 m', 'turn radius']
     """
     with clean_style():
         figure = new_figure(8.0)

@@ -18,7 +18,7 @@ from world.errors import PlanflyError
 from world.interruption import Interrupted
 
 # Exit code by the answer of a campaign.
-_EXIT_CODES = {"reached": FLYABLE, "missed": NOT_FLYABLE, "undecided": LOSS, "none asked": FLYABLE}
+_EXIT_CODES = {"reached": FLYABLE, "missed": NOT_FLYABLE, "undecided": LOSS, "no target": FLYABLE}
 
 
 def campaign_options(line: LineParser) -> None:

@@ -205,7 +205,7 @@ def _log_mixture(parts: tuple[tuple[float, float, float], ...], successes: int, 
     return float(np.logaddexp.reduce(terms))
 
 
-Answer = Literal["reached", "missed", "undecided", "none asked"]
+Answer = Literal["reached", "missed", "undecided", "no target"]
 
 # Default confidence of a bound.
 USUAL_CONFIDENCE = 0.95
@@ -291,7 +291,7 @@ class Estimator:
     def _answer(self, lower: float, upper: float) -> Answer:
         target = self._goal.target
         if target is None:
-            return "none asked"
+            return "no target"
         if lower >= target:
             return "reached"
         return "missed" if upper < target else "undecided"
