@@ -72,7 +72,7 @@ def _note_tail_winds(route: Route, scenario: Scenario) -> Iterator[str]:
     for name, course, altitude in ends:
         tail_wind = scenario.wind.along(course, altitude)[0]
         if tail_wind > CALM:
-            yield f"{name}: {tail_wind:.1f} m/s of wind from behind on {round(math.degrees(course)) % 360}°"
+            yield f"{name}: {tail_wind:.1f} m/s of tailwind on {round(math.degrees(course)) % 360}°"
 
 
 def _note_distant_home(mission: Mission, scenario: Scenario) -> Iterator[str]:
@@ -178,7 +178,7 @@ def _note_landing_ground(mission: Mission, route: Route, scenario: Scenario) -> 
     wind = ""
     if not math.isnan(route.landing_ground):
         tail_wind = scenario.wind.along(course, route.landing_ground)[0]
-        wind = f", with {tail_wind:.1f} m/s of wind from behind" if tail_wind > CALM else wind
+        wind = f", with {tail_wind:.1f} m/s of tailwind" if tail_wind > CALM else wind
         wind = f", against {-tail_wind:.1f} m/s of wind" if tail_wind < -CALM else wind
     ground = "the terrain there is unknown"
     length = LandingStrip(0.0, 0.0).length

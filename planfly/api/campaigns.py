@@ -215,7 +215,7 @@ def _flight_row(base: CampaignBase, goal: Goal, folder: Path, index: int) -> Fli
 
 
 # ----------------------------------------------------------------------
-# Find the strongest wind from each direction in which a mission flies.
+# Find, for each direction, the strongest wind in which a mission is flyable.
 
 
 @needs_extra("campaigns")
@@ -232,7 +232,7 @@ def winds(
     overwrite: bool = False,
     **options: Unpack[WindsOptions],
 ) -> WindsFound:
-    """Find the strongest wind from each direction in which a mission flies with a given probability.
+    """Find, for each wind direction, the strongest wind in which a mission is flyable with a given probability.
 
     target: an embedded scenario's name, a scenario's TOML file, a `Plan`, or a plan.json, .waypoints or .plan file.
     prove: the probability.

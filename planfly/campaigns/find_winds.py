@@ -1,4 +1,4 @@
-"""Find the strongest wind from each direction in which a mission flies, by rounds of the most informative flights."""
+"""Find, for each direction, the strongest wind in which a mission is flyable, by rounds of the most informative flights."""
 
 import math
 from collections.abc import Callable, Hashable

@@ -353,7 +353,7 @@ def _panel_half_size(crossings: Floats) -> float:
 
 
 # ----------------------------------------------------------------------
-# Draw the go/no-go chart of the strongest wind from each direction in which a mission flies.
+# Draw the go/no-go chart: for each direction, the strongest wind in which a mission is flyable.
 
 
 @dataclass(frozen=True)

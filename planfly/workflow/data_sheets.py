@@ -571,7 +571,7 @@ def _readme_text(
         f"full throttle and sinks {sink:.1f} degrees without (at {AMSL:g} m). Its elevator comes to its stop at"
         f" {performance.slowest.airspeed:.1f} m/s.",
         "",
-        "## What is not known",
+        "## Uncertainties",
         "",
         f"Standard deviations; the steepest climb's is {math.degrees(uncertainty.climb):.1f} degrees, the steepest"
         f" descent's {math.degrees(uncertainty.descent):.1f} degrees, the fastest level flight's"

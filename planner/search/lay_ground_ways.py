@@ -393,7 +393,7 @@ def _find_launches(site: _Site, launch: Launch, takeoff_height: float, altitude:
                 k = int(np.argmin(np.where(np.isnan(margins), math.inf, margins)))
                 distance = float(distances[distances > _LAUNCH_RUN_M][k])
                 reason = (
-                    f"the nearest, {direction}, is {-worst_margin:.0f} m too low over the ground"
+                    f"the nearest, {direction}, is {-worst_margin:.0f} m too low above the ground"
                     f" {distance:.0f} m from home"
                 )
                 best = max(best, (worst_margin, reason))
@@ -565,7 +565,7 @@ def _check_final(site: _Site, final: _Final) -> tuple[float, str]:
     if np.isnan(judged_margins).any():
         return -math.inf, "leads over unknown terrain"
     if judged_margins.min(initial=0.0) < 0.0:
-        return float(judged_margins.min()), f"is {-float(judged_margins.min()):.0f} m too low over the ground"
+        return float(judged_margins.min()), f"is {-float(judged_margins.min()):.0f} m too low above the ground"
     obstacle = site.describe_obstacle([begin.tolist(), [float(point[0]), float(point[1]), float(begin[2])]])
     obstacle = obstacle or site.describe_obstacle([[*begin[:2].tolist(), float(point[2])], point.tolist()])
     if obstacle:

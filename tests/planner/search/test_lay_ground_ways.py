@@ -152,7 +152,7 @@ def test_out_of_a_ring_the_launch_leads_through_its_gap_and_without_one_the_plan
     assert said.startswith(
         "climb-out: none of 36 launch courses leads free of ground, missiles and zones at 70% of the"
     )
-    assert "m too low over the ground" in said
+    assert "m too low above the ground" in said
     # A stated course is the only one that is tried.
     assert (
         laid(ring(200.0, gap=120.0), launch={"method": "hand", "course_deg": 300.0})

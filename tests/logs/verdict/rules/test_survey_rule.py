@@ -78,7 +78,7 @@ def test_a_quarter_of_the_spacing_beside_its_line_is_lost(aside: float, lost: fl
     assert all(item.ok for item in others)
     if lost:
         assert "photo line 1 of 3 (items 1 to 2)" in first.reason
-        assert "30 % not along it within 50 m" in first.reason
+        assert "30 % not flown along it within 50 m" in first.reason
 
 
 @pytest.mark.parametrize(("off", "lost"), [(9.0, 0.0), (-9.0, 0.0), (11.0, 20.0), (-11.0, 20.0)])

@@ -67,7 +67,7 @@ def test_a_final_through_a_zone_fails() -> None:
     setup = circuit(RAIL, STRIP, TKOFF_THR_MINACC=15.0, world={"zones": [zone]})
     one = found(setup, flown.track, "touchdown")
     assert one.ok is False
-    assert "the final enters town" in one.reason
+    assert "the final approach enters town" in one.reason
 
 
 @pytest.mark.parametrize(("course", "ok"), [(270.0, True), (90.0, True), (0.0, False), (180.0, False)])
