@@ -1,4 +1,4 @@
-"""Find, for each direction, the strongest wind in which a mission is flyable, by rounds of the most informative flights."""
+"""Find, for each direction, the strongest flyable wind, by rounds of the most informative flights."""
 
 import math
 from collections.abc import Callable, Hashable

@@ -250,7 +250,7 @@ def _print_sheet(aircraft: "Aircraft") -> None:
     if uncertainty is not None:
         climb_sd, descent_sd = math.degrees(uncertainty.climb), math.degrees(uncertainty.descent)
         print(
-            f"  slopes   climb {climb:.1f} degrees, ± {climb_sd:.1f}; descent {descent:.1f}, ±"
+            f"  slopes   climb {climb:.1f} degrees ± {climb_sd:.1f}; descent {descent:.1f} ±"
             f" {descent_sd:.1f} (at cruise and 500 m; one standard deviation)"
         )
     print("  guessed  README.md lists the guessed values and their possible error")

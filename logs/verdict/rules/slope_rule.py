@@ -119,7 +119,7 @@ def _uncertainty_text(requirements: RouteRequirements, leg: int) -> str:
     if abs(planned) <= max(LEVEL_SLOPE_RAD, certain_limit) or not certain_limit < limit < math.inf:
         return ""
     slope, limit_deg, deviation_deg = (math.degrees(angle) for angle in (abs(planned), limit, deviation))
-    return f"{verb} {slope:.1f}°; the limit according to {envelope.source} is {limit_deg:.1f}°, ± {deviation_deg:.1f}°"
+    return f"{verb} {slope:.1f}°; the limit according to {envelope.source} is {limit_deg:.1f}° ± {deviation_deg:.1f}°"
 
 
 def _steep_arc_faults(requirements: RouteRequirements, leg: int) -> list[Message]:

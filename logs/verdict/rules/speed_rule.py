@@ -181,7 +181,7 @@ def _uncertainty_text(requirements: RouteRequirements, leg: int, commanded: floa
     if commanded <= min(certain_envelope.level_speeds(altitude)[1] for altitude in altitudes):
         return ""
     limit_text = f"the fastest level flight according to {envelope.source} is {fastest:.1f} m/s"
-    return f"{commanded:.1f} m/s is commanded; {limit_text}, ± {envelope.fastest_sd:.1f} m/s"
+    return f"{commanded:.1f} m/s is commanded; {limit_text} ± {envelope.fastest_sd:.1f} m/s"
 
 
 def _speed_range_notes(requirements: RouteRequirements, command: float) -> list[str]:

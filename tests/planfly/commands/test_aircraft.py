@@ -268,7 +268,7 @@ def test_a_data_sheet_makes_a_folder_that_is_described(
     assert main(["aircraft", "--new", "./foam", *SIX, *more]) == 0
     text = capsys.readouterr().out
     assert "uncertainty.toml), from a data sheet" in text
-    said = re.search(r"climb ([0-9.]+) degrees, ± ([0-9.]+);", text)
+    said = re.search(r"climb ([0-9.]+) degrees ± ([0-9.]+);", text)
     assert said is not None
     assert [float(number) for number in said.groups()] == pytest.approx([climb, sd], abs=0.2)
     made = planfly.aircraft(Path("foam"))
