@@ -85,7 +85,7 @@ def _note_distant_home(mission: Mission, scenario: Scenario) -> Iterator[str]:
     if distance > HOME_APART:
         yield (
             f"the mission's home is {distance:.0f} m from the scenario's:"
-            " after a launch there, heights count from there"
+            " after a launch there, heights are relative to it"
         )
 
 

@@ -682,7 +682,7 @@ def _note_cruise_speed(mission: Mission, airspeed: float, first_stop: ItineraryS
     """Note a cruiseSpeed other than the default airspeed (m/s), if the default is flown to the first stop."""
     if mission.cruise_speed is not None and mission.cruise_speed != airspeed and first_stop.airspeed == airspeed:
         text = (
-            f"cruiseSpeed {mission.cruise_speed:g} m/s is the ground station's estimate and no command:"
+            f"cruiseSpeed {mission.cruise_speed:g} m/s is the ground station's estimate and not a command:"
             f" started at {airspeed:g} m/s"
         )
         if abs(mission.cruise_speed - airspeed) > FAR_SPEED * airspeed:

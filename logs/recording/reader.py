@@ -279,7 +279,7 @@ def read_log(path: Path | str) -> FlightLog:
     """Read a flight log; return a damaged or unfinished log up to its damage, with ``complete`` False.
 
     Raises LogError, in one line, for a file that is missing, empty, not an MCAP file or not a planfly log, or that
-    holds no complete second of flight.
+    contains no complete second of flight.
 
     >>> import tempfile
     >>> from logs.recording.example_log import write_example_log
@@ -300,19 +300,19 @@ def read_log(path: Path | str) -> FlightLog:
                 try:
                     messages.add(data)
                 except (*PARSE_ERRORS, DecodeError):
-                    container.problem = f"chunk {messages.chunks} holds records that cannot be read"
+                    container.problem = f"chunk {messages.chunks} contains records that cannot be read"
                     break
     except OSError as error:
         raise LogError(f"{path}: cannot be read: {error.strerror}", file=path) from error
     if not messages.chunks and (container.problem or SETUP_FILE in container.attachments):
-        raise LogError(f"{path}: holds no complete chunk: {container.problem or 'an empty log'}", file=path)
+        raise LogError(f"{path}: contains no complete chunk: {container.problem or 'an empty log'}", file=path)
     if SETUP_FILE not in container.attachments and container.problem:
-        raise LogError(f"{path}: holds no setup: {container.problem}", file=path)
+        raise LogError(f"{path}: contains no setup: {container.problem}", file=path)
     stored_setup = unpack_setup(container.attachments, str(path))
     rows, fault = _usable_rows(messages.rows(), len(stored_setup.setup.route.waypoints))
     if not len(rows):
         raise LogError(
-            f"{path}: holds no complete second of flight: {fault or container.problem or 'an empty log'}", file=path
+            f"{path}: contains no complete second of flight: {fault or container.problem or 'an empty log'}", file=path
         )
     ended, wrong = _result(container.attachments, len(rows))
     verdict, garbled = _verdict(container.attachments)

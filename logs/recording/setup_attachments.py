@@ -396,7 +396,7 @@ def _text(attachments: dict[str, bytes], name: str, source: str) -> str:
     except KeyError:
         raise LogError(f"{source}: {name}: missing", file=source, field=name) from None
     except UnicodeDecodeError as error:
-        message = f"{source}: {name}: not a text in UTF-8 (byte {error.start})"
+        message = f"{source}: {name}: not UTF-8 text (byte {error.start})"
         raise LogError(message, file=source, field=name) from error
 
 

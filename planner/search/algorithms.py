@@ -157,7 +157,7 @@ def find_algorithm(name: str | None, source: str) -> Algorithm:
     """
     algorithm = ALGORITHMS.get(DEFAULT if name is None else name)
     if algorithm is None:
-        problem = f"not known; allowed: {', '.join(ALGORITHMS)}{did_you_mean(str(name), ALGORITHMS)}"
+        problem = f"unknown; allowed: {', '.join(ALGORITHMS)}{did_you_mean(str(name), ALGORITHMS)}"
         raise ScenarioError.at(source, "planner.algorithm", name, problem, shown=f"{name!r}")
     return algorithm
 

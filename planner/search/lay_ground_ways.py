@@ -541,7 +541,7 @@ def _find_finals(
         final = _Final(course, length, height, _line_up_points(site, point, course, length, height), point)
         margin, obstacle = _check_final(site, final)
         if obstacle:
-            best = max(best, (margin, f"a final of {length:.0f} m at {math.degrees(slope):.1f}° {obstacle}"))
+            best = max(best, (margin, f"a final approach of {length:.0f} m at {math.degrees(slope):.1f}° {obstacle}"))
         else:
             finals.append(final)
     return finals, f"on {round(math.degrees(course)) % 360}° {best[1]}"
@@ -574,7 +574,7 @@ def _check_final(site: _Site, final: _Final) -> tuple[float, str]:
     chain = np.concatenate([final.line_up, point_above[None]])
     certificate = site.certify_chain(chain, (chain[0], chain[0]))
     if not certificate.ok:
-        return min(certificate.clearance, 0.0) - 1.0, f"is not free: {certificate.problems[0]}"
+        return min(certificate.clearance, 0.0) - 1.0, f"is not clear: {certificate.problems[0]}"
     return 0.0, "" if certificate.kill_distance > 0.0 else "is inside a missile's reach"
 
 
