@@ -259,9 +259,7 @@ def log_rate_option(group: OptionTaker) -> None:
 def imported_log_options(parser: CommandParser) -> None:
     """Add the options for facts that a log of another program does not state."""
     group = parser.group("an autopilot's log")
-    option = group.add_argument(
-        "--plan", metavar="MISSION", help="mission that was to be flown (default: the mission in the log)"
-    )
+    option = group.add_argument("--plan", metavar="MISSION", help="planned mission (default: the mission in the log)")
     with_completer(option, files(*MISSIONS))
     group.add_argument(
         "--flight",

@@ -550,7 +550,7 @@ def _readme_text(
         f"# {name}",
         "",
         f"{sized.numbers.title}, made by `planfly aircraft --new` from a data sheet. It {drive}.",
-        "Values that the sheet does not state are scaled from aircraft of its class, listed in `aircraft/data_sheet.py` of",
+        "Values that the sheet does not state are scaled from aircraft of its class; see `aircraft/data_sheet.py` of",
         "planfly. A slope close to the model's limit is left undecided.",
         "",
         "| | | |",

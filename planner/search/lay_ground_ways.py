@@ -409,11 +409,11 @@ def _find_launches(site: _Site, launch: Launch, takeoff_height: float, altitude:
             launches.append(
                 _Start(course, (home[0] + takeoff_distance * east, home[1] + takeoff_distance * north), end)
             )
-    subject = "the launch course leads" if launch.course is not None else f"none of {len(courses)} launch courses leads"
+    subject = "the launch course is" if launch.course is not None else f"none of {len(courses)} launch courses is"
     negation = "" if launch.course is None else "not "
     return (
         launches,
-        f"{subject} {negation}free of ground, missiles and zones at {SHARE:.0%} of the steepest climb: {best[1]}",
+        f"{subject} {negation}clear of ground, missiles and zones at {SHARE:.0%} of the steepest climb: {best[1]}",
     )
 
 
