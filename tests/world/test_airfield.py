@@ -131,7 +131,7 @@ LAND = HOME + "[landing]\neast_m = 0\nnorth_m = 0\n"
 CASES = {
     "a launch without home": ('[launch]\nmethod = "hand"', "home: missing; [launch] needs it"),
     "an empty home": ("[home]", 'home: position: missing; give place = "start"'),
-    "a home in the air": (HOME + "amsl_m = 9", "home: amsl_m: home stands on the scenario's ground"),
+    "a home in the air": (HOME + "amsl_m = 9", "home: amsl_m: home is on the scenario's ground"),
     "two landings": (HOME + "[[landing]]\neast_m = 0\nnorth_m = 0", "landing: expected a table"),
     "a landing without home": ("[landing]\neast_m = 0\nnorth_m = 0", "home: missing; [landing] needs it"),
     "home nowhere": ("[home]\neast_m = 0", "home: position: give east_m and north_m, or lat_deg and lon_deg"),

@@ -191,10 +191,10 @@ def test_verdict_comes_first_then_what_fails() -> None:
         "What fails",
         "leg 1, slope: flown 11.2°, limit ≤ 7.90° (aircraft); why leg 1. Missed by 3.35°.",
         "What else was judged",
-        "By rule",
+        "One row per rule",
         "item 9: no loiter",
         "Leg by leg",
-        "The failing first",
+        "Findings that fail come first",
         "planfly run small",
     ]
     positions = [text.index(part) for part in order]
