@@ -234,7 +234,7 @@ export class Panel {
     box.append(element("p", { class: "more" }, "The planner searches for a path that the aircraft can fly, clear of ground, threats and zones."),
       field("From", this.first), field("To", this.last), field("Seed", this.seed), field("Algorithm", this.algorithm),
       element("p", {}, element("button", { type: "button", class: "main", "data-job": "plan", onclick: () => plan(1) }, "Plan from here"), " ",
-        element("button", { type: "button", "data-job": "plan", id: "other-ways", title: "Several plans from one search with the default algorithm; none is better than another in every respect", onclick: () => plan(WAYS) }, "Other ways")), this.wayBox);
+        element("button", { type: "button", "data-job": "plan", id: "other-ways", title: "Several plans from one search with the default algorithm; none is better than another in every respect", onclick: () => plan(WAYS) }, "Other paths")), this.wayBox);
     this.drawPlanEnds();
   }
 
