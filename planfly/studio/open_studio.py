@@ -49,7 +49,7 @@ def open_studio(
     on_message: Callable[[str], None] = print,
     **options: Unpack[MissionOptions],
 ) -> None:
-    """Serve a page on which a mission is dragged, judged and flown; needs ``planfly[studio]``.
+    """Serve a page on which a mission is dragged, judged and flown; requires ``planfly[studio]``.
 
     what: a scenario, by name or file, in which a path is planned; or a plan, a mission or a log, see `planfly.judge`.
     options: see `planfly.fly`; the page can change most of them.
