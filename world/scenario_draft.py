@@ -172,7 +172,7 @@ def draft_text(draft: Draft) -> str:
 
     >>> place, there = Place(46.5, 8.0), Place(46.55, 8.05)
     >>> print(draft_text(make_draft("site", place, there, 120.0)).split("[area]")[0])
-    # From 46.5, 8 to 46.55, 8.05.  Lines that begin with "# " and a key are examples: take the "# " away.
+    # From 46.5, 8 to 46.55, 8.05.  Lines that begin with "# " and a key are examples; remove the "# " to use them.
     # All keys: docs/scenario-file.md of planfly.
     name = "site"
     <BLANKLINE>
@@ -183,7 +183,7 @@ def draft_text(draft: Draft) -> str:
     [terrain]
     kind = "flat"                 # no elevation file was named, so the ground is flat, without hills
     amsl_m = 0                    # height of the ground above mean sea level
-    # For measured ground take these lines in place of the two above:
+    # For measured ground use these lines instead of the two above:
     # kind = "dem"
     # path = "dem.tif"            # an elevation file, a folder of tiles, or a .vrt
     <BLANKLINE>
@@ -219,7 +219,7 @@ def _head_text(draft: Draft) -> str:
         f"{_number_text(place.lat)}, {_number_text(place.lon)}" for place in (draft.start, draft.destination)
     )
     return f"""\
-# From {start} to {destination}.  Lines that begin with "# " and a key are examples: take the "# " away.
+# From {start} to {destination}.  Lines that begin with "# " and a key are examples; remove the "# " to use them.
 # All keys: docs/scenario-file.md of planfly.
 name = {_toml(draft.name)}
 
@@ -235,7 +235,7 @@ def _terrain_text(draft: Draft) -> str:
 [terrain]
 {_line("kind", '"flat"', "no elevation file was named, so the ground is flat, without hills")}
 {_line("amsl_m", "0", "height of the ground above mean sea level")}
-# For measured ground take these lines in place of the two above:
+# For measured ground use these lines instead of the two above:
 # kind = "dem"
 {_line("# path", '"dem.tif"', "an elevation file, a folder of tiles, or a .vrt")}
 """
@@ -259,7 +259,7 @@ def _area_and_ends_text(draft: Draft) -> str:
 [{key}]
 lat_deg = {_number_text(place.lat)}
 lon_deg = {_number_text(place.lon)}
-{_line("height_m", _number_text(draft.height), "above ground; amsl_m counts from mean sea level")}
+{_line("height_m", _number_text(draft.height), "above ground; amsl_m is above mean sea level")}
 {_line("# course_deg", "0", course)}
 """)
     return f"""\

@@ -677,6 +677,6 @@ class ScenarioFile(ScenarioTable):
             for key in ("launch", "landing"):
                 if getattr(self, key) is not None:
                     raise ValueError(
-                        f"home: missing; [{key}] requires it, because take-off and landing heights are above home"
+                        f"home: missing; [{key}] requires it, because take-off and landing heights are relative to home"
                     )
         return self

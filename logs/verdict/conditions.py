@@ -95,7 +95,7 @@ def _autopilot_source(table: FlightTable) -> str:
     """Return a clause that names the file from which a non-default autopilot was taken; "" if there is none."""
     if table.autopilot_from is None or table.steering.autopilot == DEFAULT_AUTOPILOT:
         return ""
-    return f"; taken from {table.autopilot_from}, as no autopilot was named"
+    return f"; taken from {table.autopilot_from}, because no autopilot was named"
 
 
 def _airspeed_source(scenario: Scenario, autopilot: Autopilot) -> AirspeedSource:

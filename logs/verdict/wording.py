@@ -112,7 +112,7 @@ def _other_change_text(change: Change) -> str:
                 else f"a glide of {wanted:.0f} s without throttle"
             )
             return f"fly {what} and give its log to planfly aircraft --identify"
-    return f"take a {change.what} {wanted:.2f} times as large"
+    return f"use a {change.what} {wanted:.2f} times as large"
 
 
 def _rise_text(change: Change) -> str:

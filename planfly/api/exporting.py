@@ -268,7 +268,7 @@ def judged_parameters(mission: str, autopilot: Autopilot) -> tuple[str, str]:
     if not values:
         reason = f"{autopilot.title} has no parameters of take-off, landing and returns"
         raise MissionError(f"{mission}: {reason}", file=mission, field="autopilot")
-    title = f"{autopilot.title}: take-off, landing and returns as planfly judged the mission with"
+    title = f"{autopilot.title}: take-off, landing and returns with which planfly judged the mission"
     return parameters_text(values, title), f"{len(values)} parameters of {autopilot.title}"
 
 

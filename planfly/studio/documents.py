@@ -302,7 +302,7 @@ def _require_plain_waypoints(mission: Mission) -> None:
     for k, item in enumerate(mission.items):
         lost = "its take-off" if item.command in TAKEOFFS else "its landing" if item.command in LANDINGS else ""
         if item.command == Command.DO_CHANGE_SPEED and k > first:
-            lost = "a change of speed along its way"
+            lost = "a change of speed along its path"
         if lost:
             why = (
                 f"a plan.json of edited waypoints cannot contain {lost} (item {item.seq}): save a .plan, or plan again"

@@ -195,7 +195,7 @@ def _with_wind_of_log(scenario: Scenario, flight: LoggedFlight, options: LogOpti
         return scenario, "as given"
     wind = mean_wind(flight)
     if wind is None:
-        source_text = "from the scenario, as the log contains no wind" if options.get("scenario") else ""
+        source_text = "from the scenario, because the log contains no wind" if options.get("scenario") else ""
         return scenario, source_text
     windy_scenario = with_wind(scenario, wind.speed, wind.from_course, None)
     return windy_scenario, f"from {round(math.degrees(wind.from_course)) % 360:03d}°, by {wind.source} of the log"
@@ -258,7 +258,7 @@ def _describe_gaps(flight: LoggedFlight) -> tuple[str, ...]:
         notes.append(f"the log ends in flight, at {flight.time[-1]:.1f} s")
     usual_step = float(np.median(np.diff(flight.time)))
     if usual_step > LONGEST_STEP:
-        notes.append(f"the log has a place every {usual_step:.1f} s: the flight between them is unknown")
+        notes.append(f"the log has a position every {usual_step:.1f} s: the flight between them is unknown")
     return tuple(notes)
 
 

@@ -136,7 +136,7 @@ def rows_text(faults: RowFaults, gaps: int) -> str:
         (gaps, "gap" if gaps == 1 else "gaps"),
         (faults.doubled, "doubled"),
         (faults.unordered, "out of order"),
-        (faults.unusable, "without a place or a time"),
+        (faults.unusable, "without a position or a time"),
         (faults.glitches, "position glitches"),
     )
     texts = [f"{count} {name}" for count, name in counts if count]

@@ -54,7 +54,7 @@ def glides_headline(glides: Glides) -> str:
         own_text = "ArduPlane's own return, which would follow the terrain, is not flown"
     else:
         own_text = f"ArduPlane's own return arrives from {glides.arrivals}"
-    return f"of {len(glides.each)} places {reach_text}; {own_text}"
+    return f"of {len(glides.each)} places, {reach_text}; {own_text}"
 
 
 def site_text(site: GlideSite) -> str:

@@ -158,11 +158,11 @@ def no_return_text(returns: Returns) -> str:
         case "arrives":
             return f"{name}: not judged, because no return arrives"
         case "at once":
-            text = f"{name}: before the start, as no return leaves {reserve}"
+            text = f"{name}: before the start, because no return leaves {reserve}"
         case "later":
             text = f"{name}: {point.time:.0f} s; a return that starts later does not leave {reserve}"
         case "never":
-            text = f"{name}: none, as every return leaves {reserve} (at least {point.left:.0f} Wh)"
+            text = f"{name}: none, because every return leaves {reserve} (at least {point.left:.0f} Wh)"
     verb = "does" if point.skipped == 1 else "do"
     return text + (f"; {point.skipped} that {verb} not arrive are ignored" if point.skipped else "")
 

@@ -135,7 +135,7 @@ def imported_completion(setup: FlightSetup, flown: Sequence[FlownLegs], log_comp
         else:
             faults.append(message(ending, f": {count_text}"))
     unknown_texts += [
-        f"the path to item {stop.item} is not judged, as it is not laid out" for stop in setup.route.unjoined
+        f"the path to item {stop.item} is not judged, because it is not laid out" for stop in setup.route.unjoined
     ]
     notes += _gaps_text(flown)
     return make_finding(

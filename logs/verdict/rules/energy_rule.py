@@ -51,7 +51,10 @@ def energy_findings(
                 f"the battery is guessed: state --battery with the aircraft, or the scenario's battery_wh; {reason}"
             )
         elif is_uncertain:
-            reason += f"; the power according to {setup.envelope.source} is known to {setup.envelope.power_sd:.0%}"
+            reason += (
+                f"; the power according to {setup.envelope.source} has a standard deviation of"
+                f" {setup.envelope.power_sd:.0%}"
+            )
         elif used > usable:
             reason += f"; {ENERGY_RESERVE_FRACTION:.0%} must be left"
     return [

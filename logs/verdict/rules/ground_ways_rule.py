@@ -247,7 +247,7 @@ def _air_start_finding(place: Place, obstacles: _Obstacles) -> Finding:
         reason, check, ok = f"the terrain below {subject} is unknown", "", None
     elif obstacles.free:
         reason, check, ok = (
-            f"straight from home: {_clearance_text(obstacles)}; not flown, as the flight begins in the air",
+            f"straight from home: {_clearance_text(obstacles)}; not flown, because the flight begins in the air",
             "",
             True,
         )
@@ -425,7 +425,7 @@ def approach_findings(
             f", flares {glide.flare_height:.1f} m over the landing point and {glide.flare_distance:.0f} m before it"
         )
     reason += f"; {_clearance_text(obstacles)} until {EARLY_TOUCHDOWN_DISTANCE_M:.0f} m before it"
-    reason += "" if setup.ground_ways.approach is not None else "; not flown, as the flight ends in the air"
+    reason += "" if setup.ground_ways.approach is not None else "; not flown, because the flight ends in the air"
     return [_finding("approach", place, obstacles, True, message(reason))]
 
 
@@ -439,9 +439,7 @@ def _item_text(place: Place) -> str:
 
 def _clearance_text(obstacles: _Obstacles) -> str:
     return (
-        "nothing is in the way"
-        if math.isinf(obstacles.clearance)
-        else f"{obstacles.clearance:.0f} m above ground at the lowest"
+        "no obstacle" if math.isinf(obstacles.clearance) else f"{obstacles.clearance:.0f} m above ground at the lowest"
     )
 
 

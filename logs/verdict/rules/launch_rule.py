@@ -63,9 +63,7 @@ def _launch_finding(requirements: RouteRequirements, ground: FlownGround, take_o
         runway_text = f"; the runway is {take_off.launch.run:.0f} m long, of which {RUNWAY_MARGIN_M:.0f} m must be left"
         faults.append(message(brief, runway_text))
     if clearance < LAUNCH_CLEARANCE_M:
-        faults.append(
-            message(f"{clearance:.1f} m above ground", f" {distance:.0f} m from home, on the course that is held")
-        )
+        faults.append(message(f"{clearance:.1f} m above ground", f" {distance:.0f} m from home, on the course flown"))
     entered = first_obstacle_on(requirements, path)
     if entered:
         faults.append(message(f"the climb enters {entered}"))

@@ -139,7 +139,7 @@ def _unjoined_finding(setup: FlightSetup) -> Finding:
         reason = f"lies inside the circle of item {first.circle}"
     more_text = f" (+{len(others)} more)" if others else ""
     fault = message(
-        reason, f": {autopilot} flies {'it as it is' if first.is_circle else 'there'}, which is not judged{more_text}"
+        reason, f": {autopilot} flies {'it anyway' if first.is_circle else 'there'}, which is not judged{more_text}"
     )
     return make_finding(
         "mission",

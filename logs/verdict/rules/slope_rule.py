@@ -135,7 +135,7 @@ def _steep_arc_faults(requirements: RouteRequirements, leg: int) -> list[Message
     slope, missing_height = math.degrees(math.atan(abs(arc.tangent))), (abs(arc.tangent) - arc.limit) * length
     arc_text = (
         f"the arc at {place_text(place)} {verb} {slope:.1f}° for {length:.0f} m, where legs {leg} and {corner} have"
-        f" {legs}: flown by, it is shorter than the {2.0 * float(requirements.before[corner]):.0f} m of leg"
+        f" {legs}: the fly-by arc is shorter than the {2.0 * float(requirements.before[corner]):.0f} m of leg"
         " that it replaces"
     )
     limit = (

@@ -117,7 +117,7 @@ def _command_text(command: float, commanded: float, slowest: float, fastest: flo
     """Describe a commanded airspeed, equivalent and true, and the range of airspeeds in level flight, m/s."""
     true_speed_text = "" if command == commanded else f" of equivalent airspeed, {commanded:.1f} m/s of true airspeed,"
     if not (math.isfinite(slowest) and math.isfinite(fastest)):
-        return f"{command:.1f} m/s{true_speed_text} is commanded, and no level flight is known"
+        return f"{command:.1f} m/s{true_speed_text} is commanded, but no level flight is known"
     level_text = f"level flight is possible from {slowest:.1f} to {fastest:.1f} m/s"
     return f"{command:.1f} m/s{true_speed_text} is commanded; {level_text}"
 

@@ -139,7 +139,7 @@ def _slope_finding(
     ground_phases = requirements.setup.ground_ways
     is_flown = (ground_phases.take_off if rule == "takeoff" else ground_phases.approach) is not None
     reason = f"{text} of {math.degrees(limit):.1f}°"
-    reason += "" if is_flown else f"; not flown, as the flight {_VERBS[rule]} in the air"
+    reason += "" if is_flown else f"; not flown, because the flight {_VERBS[rule]} in the air"
     fault = message(
         f"the {_TITLES[rule]} {text}",
         f"; at most {math.degrees(limit):.1f}° can be flown at this speed and in this wind",

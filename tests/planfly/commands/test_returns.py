@@ -47,8 +47,8 @@ def test_a_mission_and_its_log_say_the_same(hill: Path, log: bytes, capsys: pyte
     answer = json.loads((hill / "mission.json").read_text(encoding="utf-8"))
     assert answer["conditions"]["aircraft"] == "aerosonde"
     assert answer["ranges"][0]["kind"] == "ground"
-    assert "engine out: of 13 places home can be reached from" in out
-    assert "point of no return: none, as every return leaves the reserve of" in out
+    assert "engine out: of 13 places, home can be reached from" in out
+    assert "point of no return: none, because every return leaves the reserve of" in out
     assert "which contains no trees, houses or water" in out
     glides = answer["engine_out"]
     assert sum(glides[kind] for kind in ("home", "site", "flat", "nothing", "unknown")) == 13

@@ -232,7 +232,7 @@ def test_a_return_that_the_mission_ends_with_completes_it(tmp_path: Path, mode: 
 def test_each_fault_of_rows_is_counted_by_name() -> None:
     faults = RowFaults(doubled=1, unordered=2, unusable=3, glitches=4, clock_jumps=(5.0, 6.0))
     assert rows_text(faults, 2) == (
-        "2 gaps, 1 doubled, 2 out of order, 3 without a place or a time, 4 position glitches,"
+        "2 gaps, 1 doubled, 2 out of order, 3 without a position or a time, 4 position glitches,"
         " 2 jumps of the clock (at 5.0 s, 6.0 s)"
     )
 

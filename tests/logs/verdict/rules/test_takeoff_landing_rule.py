@@ -46,7 +46,7 @@ def test_a_slope_just_within_and_just_beyond_the_aircrafts(rule: str, make: obje
     assert beyond.planned == pytest.approx(able + 0.05, abs=2e-3)
     assert beyond.limit == pytest.approx(able, abs=1e-6)
     assert beyond.limit_source == "aircraft"
-    assert "not flown, as the flight" in inside.reason
+    assert "not flown, because the flight" in inside.reason
 
 
 @pytest.mark.parametrize(
