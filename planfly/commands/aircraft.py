@@ -51,7 +51,7 @@ def aircraft_options(line: LineParser) -> None:
     )
     parser.add_argument("--motor-braking", action="store_true", help="let the motor brake in descents")
     own = parser.group("an aircraft of your own")
-    own.add_argument("--new", dest="folder", metavar="FOLDER", help="make its folder, which must not exist yet")
+    own.add_argument("--new", dest="folder", metavar="FOLDER", help="folder to make; it must not exist yet")
     with_completer(
         own.add_argument(
             "--from", dest="source", metavar="NAME", help="with --new: the aircraft to start from (default: aerosonde)"
@@ -95,12 +95,12 @@ def _data_sheet_options(parser: CommandParser) -> None:
         "mass": ("KG", "mass, 0.5 to 25 kg"),
         "span": ("M", "wing span, m"),
         "area": ("M2", "wing area, m2 (default: the area that carries the mass at the stall speed)"),
-        "cruise": ("M/S", "usual airspeed"),
+        "cruise": ("M/S", "cruise airspeed"),
         "stall": ("M/S", "minimum airspeed of level flight"),
         "top": ("M/S", "maximum airspeed of level flight (default: 1.4 times the cruise speed)"),
         "bank": ("DEG", "steepest bank in turns (default: 35)"),
         "climb": ("DEG", "steepest climb at cruise (default: 12, or the climb that fits the top speed)"),
-        "motor": ("KV", "rpm a volt"),
+        "motor": ("KV", "rpm per volt"),
         "fuel": ("KG", "fuel carried, for an aircraft without a battery"),
     }
     for name, (unit, text) in numbers.items():

@@ -113,7 +113,7 @@ def _shared_options(parser: CommandParser) -> None:
     aircraft_and_wind_options(parser)
     steering_options(parser)
     with_completer(
-        parser.add_argument("--spread", metavar="FILE", help="what varies, as TOML (default: planfly's own)"),
+        parser.add_argument("--spread", metavar="FILE", help="dispersions, as TOML (default: planfly's own)"),
         files("toml"),
     )
     parser.add_argument(

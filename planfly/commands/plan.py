@@ -60,7 +60,7 @@ def plan_options(line: LineParser) -> None:
         "--front",
         metavar="N",
         type=number("front"),
-        help="plan a choice of up to N plans (2 to 100); none is better than another in length, exposure to "
+        help="plan up to N alternatives (2 to 100); none is better than another in length, exposure to "
         "radars, height "
         'above ground and energy at once (time for energy with [planner] objective = "time"); --out is then a folder '
         "of plan-1.json ..., front.csv, front.json and pictures (default: runs/<name>-seed<N>-front; an"

@@ -67,7 +67,8 @@ def replay_options(line: LineParser) -> None:
         "--speed",
         metavar="X",
         type=number("speed"),
-        help="at X times real time (default: 1 on a terminal and to Foxglove; a film of 20 s; otherwise at once)",
+        help="at X times real time (default: 1 on a terminal and to Foxglove; for a film, so that it takes 20 s; "
+        "otherwise at once)",
     )
     part.add_argument("--at-once", action="store_true", help="print the timeline at once, also on a terminal")
     other = parser.group("other ways to see it")

@@ -39,8 +39,8 @@ def studio_options(line: LineParser) -> None:
             "what",
             metavar="SCENARIO|MISSION|PLAN",
             nargs="?",
-            help="a scenario, by name or .toml, whose path is planned; plan.json, .waypoints, .plan; or a "
-            "log's mission (default: jacksboro)",
+            help="a scenario (name or .toml), for which a path is planned; a plan.json, .waypoints or .plan; or a log, "
+            "whose mission is opened (default: jacksboro)",
         ),
         files("toml", "mcap", *MISSIONS, *IMPORTED_LOGS),
     )

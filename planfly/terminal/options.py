@@ -252,7 +252,7 @@ def log_rate_option(group: OptionTaker) -> None:
         type=int,
         choices=CHOICES["log_hz"],
         default=60,
-        help="rows per second in the log: 60 (default), 30, 20 or 10; the verdict is on these rows",
+        help="rows per second in the log: 60 (default), 30, 20 or 10; the verdict uses these rows",
     )
 
 
