@@ -345,7 +345,7 @@ def _max_height_shortfall(problem: Problem, parts: _Parts) -> Shortfall | None:
     data, max_height = problem.certified, problem.certified.airspace.max_height
     if max_height == math.inf:
         return None
-    hazard = f"above the {max_height:.0f} m above ground that are allowed"
+    hazard = f"above the allowed {max_height:.0f} m above ground"
     for name, height, k in _heights_at_ends(problem, parts):
         if (depth := height + float(parts.after[k]) - max_height) > _ROUNDING_TOLERANCE_M:
             return Shortfall(parts.gust, depth, hazard, f"at its {name}", at_end=name)

@@ -127,7 +127,7 @@ def glide_notes(glides: Glides) -> list[str]:
     notes = [
         f"without the engine the aircraft flies on for {ENGINE_FAILURE_REACTION_S:.0f} s, then glides at"
         f" AIRSPEED_MIN {glides.airspeed:g} m/s,"
-        f" {MARGIN:.0f} m above ground, outside missiles' spheres, but also through zones",
+        f" at least {MARGIN:.0f} m above ground, outside missiles' spheres, but also through zones",
         "ground is flat according to the elevation file, which contains no trees, houses or water",
     ]
     if glides.fuel:
