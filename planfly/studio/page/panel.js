@@ -127,10 +127,10 @@ export class Panel {
       box.append(part);
     }
     const failed = this.listed(now.findings, false), flownFailed = flight && !stale ? this.listed(flight.findings, true) : [];
-    if (failed.length) box.append(element("h2", {}, "To mend"), element("ul", { class: "findings" }, ...failed));
+    if (failed.length) box.append(element("h2", {}, "What fails"), element("ul", { class: "findings" }, ...failed));
     if (flownFailed.length) {
       const trying = this.app.now.work.trials ? element("p", { class: "more" }, "Changes that would help are being flown \u2026") : null;
-      box.append(element("h2", {}, "Changes that would help, as flown"), ...(trying ? [trying] : []), element("ul", { class: "findings" }, ...flownFailed));
+      box.append(element("h2", {}, "What fails in flight"), ...(trying ? [trying] : []), element("ul", { class: "findings" }, ...flownFailed));
     }
     const passed = now.findings.filter((one) => one.ok);
     if (passed.length) box.append(element("h2", {}, "Closest to its limit, by rule"), element("ul", { class: "findings passed" }, ...passed.map((one) => this.finding(one, false))));
