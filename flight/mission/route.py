@@ -634,7 +634,7 @@ def _with_gates(placed: PlacedMission, notes: Notes) -> list[PlacedStop]:
             if gate.airspeed == next_airspeed or (math.isnan(gate.airspeed) and math.isnan(next_airspeed)):
                 continue
             if not all(end.stop.loiter is None and end.stop.command in PLACES for end in (previous, next_place)):
-                text = "CONDITION_GATE not between waypoints: the speed after it holds from the leg's start"
+                text = "CONDITION_GATE not between waypoints: the speed after it applies from the leg's start"
                 notes.add(text, gate.item)
                 continue
             fraction = _gate_fraction(

@@ -67,7 +67,7 @@ def _panel(
             labels.append(Label(str(number), float(corners[0, 0]), float(corners[0, 1]), "number"))
     thin = laid(position[:: max(1, len(position) // _POINTS)])
     layers = (
-        Layer("line", "photo line, flown as photos need it", "planned", *parted(used), quiet=True),
+        Layer("line", "usable part of a photo line", "planned", *parted(used), quiet=True),
         Layer("line", "photo line, lost", "fail", *parted(lost), quiet=True),
         Layer("line", "flown track", "flown", thin[:, 0], thin[:, 1], quiet=True),
     )

@@ -229,10 +229,10 @@ class OutputDirectory:
             return
         if (folder / self.table).exists():
             raise PlanflyError(
-                f"{folder}: holds a campaign; resume=True continues it, overwrite=True replaces it", file=folder
+                f"{folder}: contains a campaign; resume=True continues it, overwrite=True replaces it", file=folder
             )
         if any((folder / name).exists() for name in CAMPAIGN_FILES):
-            raise PlanflyError(f"{folder}: holds another campaign; overwrite=True replaces it", file=folder)
+            raise PlanflyError(f"{folder}: contains another campaign; overwrite=True replaces it", file=folder)
         raise PlanflyError(f"{folder}: exists and is not empty; overwrite=True replaces its results", file=folder)
 
     def open(self, open_base: Callable[[Path | None], CampaignBase]) -> CampaignBase:

@@ -239,8 +239,8 @@ def _format_losses(desk: EditContext, mission: Mission, text: str, name: str, ki
     """List the contents of a mission and its world that a ground station's file cannot store."""
     kept, found = parse_mission(text, name), []
     apart: Mapping[str, tuple[int, str]] = {
-        "fence items": (len(mission.fences) - len(kept.fences), ".plan holds them"),
-        "rally points": (len(mission.rally) - len(kept.rally), ".plan holds them"),
+        "fence items": (len(mission.fences) - len(kept.fences), "a .plan contains them"),
+        "rally points": (len(mission.rally) - len(kept.rally), "a .plan contains them"),
         "survey plans": (
             len(mission.survey_plans),
             "their items stay; other data of the ground station is lost",

@@ -333,7 +333,7 @@ def _check_required_numbers(sheet: DataSheet) -> None:
     for name in ("mass", "span", "cruise", "stall"):
         if not getattr(sheet, name):
             min_value, max_value, unit = RANGES[name][2], RANGES[name][3], RANGES[name][1]
-            allowed = f"a data sheet needs it: {min_value:g}..{max_value:g} {unit}"
+            allowed = f"required for a data sheet: {min_value:g}..{max_value:g} {unit}"
             raise FlightError.of_argument(name, None, allowed, shown="")
 
 

@@ -111,7 +111,7 @@ class Instruments:
         _, _, amsl = track.position[k].tolist()
         above = amsl - float(self.ground[k])
         wind_east, wind_north, _ = (float(value) for value in track.wind[k])
-        height = _metres(above) if math.isfinite(above) else "not known"
+        height = _metres(above) if math.isfinite(above) else "unknown"
         airspeed, commanded, load, used, current = (
             float(column[k])
             for column in (track.airspeed, track.speed_command, track.load_factor, track.energy, track.current)

@@ -261,7 +261,7 @@ def difference_lines(comparison: Comparison) -> list[str]:
         ).rstrip()
         for row in rows
     ]
-    return [*lines, *comparison.notes, *([] if NOTHING not in "".join(lines) else [f"{NOTHING}: not known"])]
+    return [*lines, *comparison.notes, *([] if NOTHING not in "".join(lines) else [f"{NOTHING}: unknown"])]
 
 
 # ----------------------------------------------------------------------

@@ -105,7 +105,7 @@ def test_a_gate_changes_the_speed_where_its_plane_cuts_the_leg() -> None:
         (
             (wp(0, 0), wp(0, 900, command=4501), "2 178 0 20 -1 0 0 0 0", wp(0, 1800, command=17, p="0 0 100 0")),
             None,
-            ["item 2: CONDITION_GATE not between waypoints: the speed after it holds from the leg's start"],
+            ["item 2: CONDITION_GATE not between waypoints: the speed after it applies from the leg's start"],
         ),
     ],
 )

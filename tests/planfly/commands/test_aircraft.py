@@ -278,7 +278,7 @@ def test_a_data_sheet_makes_a_folder_that_is_described(
 @pytest.mark.parametrize(
     ("argv", "told"),
     [
-        (("--mass", "2.1"), "--span: a data sheet needs it: 0.5..6 m"),
+        (("--mass", "2.1"), "--span: required for a data sheet: 0.5..6 m"),
         ((*SIX, "--mass", "60"), "--mass 60.0 kg: allowed 0.5..25 kg"),
         ((*SIX, "--stall", "14"), "--stall 14 m/s: allowed 5.25..13.05 m/s at a cruise speed of 15 m/s"),
         ((*SIX, "--battery", "12"), "--battery 12: expected volts and capacity, such as 14.8V,5Ah"),
