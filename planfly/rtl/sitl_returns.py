@@ -148,7 +148,7 @@ def check_is_arduplane(program: Path) -> None:
     """Raise ArgumentError for a program other than ArduPlane, whose returns planfly does not simulate."""
     kind = program_autopilot(program)
     if not issubclass(kind, ArduPlaneSitl):
-        allowed = f"expected ArduPlane's program; returns of {kind.title} are not flown here"
+        allowed = f"expected ArduPlane's program; returns of {kind.title} are not supported"
         raise ArgumentError.of_argument("autopilot", str(program), allowed)
 
 

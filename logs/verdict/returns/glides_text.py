@@ -51,7 +51,7 @@ def glides_headline(glides: Glides) -> str:
         _COUNT_TEXTS[reach].format(count=count) for reach, count in counts if count or reach == "home"
     )
     if any(glide.own.end == "not flown" for glide in glides.each):
-        own_text = "ArduPlane's own return, which would follow the terrain, is not flown"
+        own_text = "ArduPlane's own return, which would follow the terrain, is not simulated"
     else:
         own_text = f"ArduPlane's own return arrives from {glides.arrivals}"
     return f"of {len(glides.each)} places, {reach_text}; {own_text}"

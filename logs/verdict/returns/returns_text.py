@@ -58,7 +58,7 @@ _ACTION_TEXTS = {
     "never": "set, but no threshold triggers it",
 }
 _OPEN_TEXTS: dict[Open, str] = {
-    "terrain": "with TERRAIN_FOLLOW returns follow the terrain, which is not flown here",
+    "terrain": "with TERRAIN_FOLLOW returns follow the terrain, which is not simulated",
     "law": "the autopilot's own return is not simulated; ArduPlane's return stands in",
     "autoland": "mode AUTOLAND lands by a pattern of its own",
     "return path": "RTL_AUTOLAND 4 returns along the mission's return path",
@@ -116,7 +116,7 @@ def headline(returns: Returns) -> str:
     >>> headline(Returns((), 1.0, (), 60.0, None, 0.0, True))
     'no place to return from'
     >>> headline(Returns((), 1.0, (), 60.0, None, 0.0, True, open=("terrain",)))
-    'not judged: with TERRAIN_FOLLOW returns follow the terrain, which is not flown here'
+    'not judged: with TERRAIN_FOLLOW returns follow the terrain, which is not simulated'
     """
     reasons = "; ".join(_OPEN_TEXTS[reason] for reason in returns.open)
     if not returns.each:

@@ -125,7 +125,7 @@ def test_returns_that_follow_the_terrain_end_with_3(hill: Path, capsys: pytest.C
     out = capsys.readouterr().out
     assert out.startswith("returns   not judged: with TERRAIN_FOLLOW returns follow the terrain")
     assert "safe" not in out
-    assert "ArduPlane's own return, which would follow the terrain, is not flown" in out
+    assert "ArduPlane's own return, which would follow the terrain, is not simulated" in out
 
 
 def test_by_px4s_law_returns_are_not_judged(hill: Path, capsys: pytest.CaptureFixture[str]) -> None:

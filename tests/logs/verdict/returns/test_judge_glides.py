@@ -127,7 +127,7 @@ def test_what_is_not_known_is_said(tmp_path: Path) -> None:
     follows = judged(setup, 20.0, TERRAIN_FOLLOW=1)
     assert {one.own.end for one in follows.each} == {"not flown"}
     assert {one.reach for one in follows.each} == {"home", "flat"}
-    assert "is not flown" in glides_headline(follows)
+    assert "is not simulated" in glides_headline(follows)
     starts = planned_starts(setup, 20.0)
     starts.rows["east"] += 50_000.0
     away = judge_glides(return_world(setup), starts)
