@@ -608,7 +608,8 @@ def _lay_return(
     notes.add(described_return(target, rules, start[2], next_text), stop.item)
     if rules.landing_counts and any(item.command in LANDINGS for item in placed.mission.items):
         notes.add(
-            f"the mission's landing is also a place to return to, which is not simulated: the return is to {target.name}",
+            "the mission's landing is also a place to return to, which is not simulated:"
+            f" the return is to {target.name}",
             stop.item,
         )
     if rules.instead:
