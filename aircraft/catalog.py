@@ -189,7 +189,7 @@ def read_aircraft(folder: Path) -> Aircraft:
         raise FlightError(f"{file}: {' '.join(str(error).split())}", file=file) from None
     title = table.pop("title", folder.name)
     if not isinstance(title, str):
-        raise FlightError(f"{file}: title = {title!r} is not a text", file=file, field="title", value=title)
+        raise FlightError(f"{file}: title = {title!r} is not a string", file=file, field="title", value=title)
     try:
         model = read_model(table.pop("model"), folder.name) if "model" in table else DEFAULT_MODEL
         values = _numeric_fields(table)

@@ -234,8 +234,8 @@ def _position_on_ground(
     ground_height = float(ground.height(*position)) if ground is not None else math.nan
     if math.isnan(ground_height):
         message = (
-            f"{source}: {key}: east {position[0]:.0f} m, north {position[1]:.0f} m: the elevation file"
-            " knows no ground there"
+            f"{source}: {key}: east {position[0]:.0f} m, north {position[1]:.0f} m: the elevation "
+            "file has no data there"
         )
         raise ScenarioError(message, file=source, field=key)
     return np.array([*position, ground_height])

@@ -24,7 +24,7 @@ MAX_SEA_LEVEL = 200.0
 # satellite receivers and autopilots.
 GEOIDS = {"EGM96": 5773, "EGM2008": 3855}
 _MEAN_SEA_LEVEL = "mean sea level"
-UNSTATED = f"{_MEAN_SEA_LEVEL}, as the file's heights are taken"
+UNSTATED = f"{_MEAN_SEA_LEVEL}, as assumed for the file's heights"
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,7 +78,7 @@ def height_datum(crs: str | None, stated_datum: StatedDatum | None) -> HeightDat
             f"{_MEAN_SEA_LEVEL}, converted from the ellipsoid by {name}", _make_sea_level_function(transformer)
         )
     if crs is not None and _is_depth(crs):
-        raise ValueError("heights count downwards, as depths")
+        raise ValueError("heights are positive downwards, as depths")
     name = "" if crs is None else _vertical_name(crs)
     return HeightDatum(f"{_MEAN_SEA_LEVEL} ({name}, as the file states)" if name else UNSTATED)
 
@@ -110,7 +110,7 @@ def _find_geoid() -> tuple[str, Any]:
             warnings.simplefilter("ignore", UserWarning)
             if TransformerGroup("EPSG:4979", target, always_xy=True).best_available:
                 return name, Transformer.from_crs("EPSG:4979", target, always_xy=True, only_best=True)
-    raise ValueError("heights count from the ellipsoid, and no geoid grid is available")
+    raise ValueError("heights are above the ellipsoid, and no geoid grid is available")
 
 
 def _is_depth(crs: str) -> bool:

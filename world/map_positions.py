@@ -32,8 +32,8 @@ def map_position(table: PointTable, key: str, source: str, origin: GeoOrigin, gr
     ground_height = float(ground.height(east, north)) if ground is not None else math.nan
     if math.isnan(ground_height):
         raise ScenarioError(
-            f"{source}: {key}: east {east:.0f} m, north {north:.0f} m:"
-            " no terrain there to count a height from; give amsl_m",
+            f"{source}: {key}: east {east:.0f} m, north {north:.0f} m: no terrain there to "
+            "measure a height from; give amsl_m",
             file=source,
             field=key,
         )

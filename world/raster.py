@@ -335,7 +335,7 @@ def _convert_to_sea_level(heights: NDArray[np.float32], raster: RasterFile, top:
     if not np.isfinite(sea_level).all():
         bad_index = int(np.argmin(np.isfinite(sea_level)))
         position_text = f"longitude {lon[bad_index]:.4f}, latitude {lat[bad_index]:.4f}"
-        raise TerrainError(f"{raster.name}: {position_text}: the geoid's height is not known there", file=raster.name)
+        raise TerrainError(f"{raster.name}: {position_text}: the geoid height there is unknown", file=raster.name)
     sea_levels = np.stack([np.interp(cols, col, level_row) for level_row in sea_level.reshape(sample_cols.shape)])
     sample_row = np.interp(rows, sample_row_numbers, np.arange(sample_row_numbers.size))
     upper_row = np.minimum(sample_row.astype(np.intp), sample_row_numbers.size - 2)

@@ -127,8 +127,8 @@ class Scenario:
             inactive_count = len(self.spec.zones or ()) - len(self.zones)
             verb = "is" if inactive_count == 1 else "are"
             notes.append(
-                f"{inactive_count:,} of {len(timed_tables):,} zones with times of activity {verb} not active {span}"
-                " UTC: left out"
+                f"{inactive_count:,} of {len(timed_tables):,} zones with times of activity {verb} "
+                f"not active {span} UTC: ignored"
             )
         return tuple(notes)
 
@@ -297,9 +297,8 @@ def _with_file_zones(
     notes = [*(spec.zone_notes or ()), *file_zones.notes]
     if far_count := len(file_zones.zones) - len(zones_nearby):
         notes.append(
-            f"{source}: {far_count:,} of {len(file_zones.zones):,} zones lie more than"
-            f" {MAX_ZONE_DISTANCE / 1000.0:g} km from the"
-            " area: left out"
+            f"{source}: {far_count:,} of {len(file_zones.zones):,} zones lie more than "
+            f"{MAX_ZONE_DISTANCE / 1000.0:g} km from the area: ignored"
         )
     changes = {"zones": [*(spec.zones or ()), *zones_nearby] or None, "zone_notes": notes or None}
     return spec.model_copy(update=changes)

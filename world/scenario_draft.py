@@ -174,7 +174,7 @@ def draft_text(draft: Draft) -> str:
 
     >>> place, there = Place(46.5, 8.0), Place(46.55, 8.05)
     >>> print(draft_text(make_draft("site", place, there, 120.0)).split("[area]")[0])
-    # From 46.5, 8 to 46.55, 8.05.  Lines that begin with "# " and a key are examples: take the "# " away.
+    # From 46.5, 8 to 46.55, 8.05.  Lines that begin with "# " and a key are examples; remove the "# " to use them.
     # All keys: docs/scenario-file.md of planfly.
     name = "site"
     <BLANKLINE>
@@ -183,9 +183,9 @@ def draft_text(draft: Draft) -> str:
     lon_deg = 8.02499
     <BLANKLINE>
     [terrain]
-    kind = "flat"                 # no elevation file was named: flat ground says nothing of hills
+    kind = "flat"                 # no elevation file was named, so the ground is flat, without hills
     amsl_m = 0                    # height of the ground above mean sea level
-    # For measured ground take these lines in place of the two above:
+    # For measured ground use these lines instead of the two above:
     # kind = "dem"
     # path = "dem.tif"            # an elevation file, a folder of tiles, or a .vrt
     <BLANKLINE>
@@ -221,7 +221,7 @@ def _head_text(draft: Draft) -> str:
         f"{_number_text(place.lat)}, {_number_text(place.lon)}" for place in (draft.start, draft.destination)
     )
     return f"""\
-# From {start} to {destination}.  Lines that begin with "# " and a key are examples: take the "# " away.
+# From {start} to {destination}.  Lines that begin with "# " and a key are examples; remove the "# " to use them.
 # All keys: docs/scenario-file.md of planfly.
 name = {_quote(draft.name)}
 
@@ -235,18 +235,18 @@ def _terrain_text(draft: Draft) -> str:
     if draft.terrain is None:
         return f"""\
 [terrain]
-{_toml_line("kind", '"flat"', "no elevation file was named: flat ground says nothing of hills")}
+{_toml_line("kind", '"flat"', "no elevation file was named, so the ground is flat, without hills")}
 {_toml_line("amsl_m", "0", "height of the ground above mean sea level")}
-# For measured ground take these lines in place of the two above:
+# For measured ground use these lines instead of the two above:
 # kind = "dem"
 {_toml_line("# path", '"dem.tif"', "an elevation file, a folder of tiles, or a .vrt")}
 """
-    comment = "the tile that planfly ships" if draft.terrain in EMBEDDED else "counted from this file's folder"
+    comment = "the tile that planfly ships" if draft.terrain in EMBEDDED else "relative to this file's folder"
     return f"""\
 [terrain]
 kind = "dem"
 {_toml_line("path", _quote(draft.terrain), comment)}
-{_toml_line("# vertical_error_m", "5", "as its source states it: clearance is then also shown minus this")}
+{_toml_line("# vertical_error_m", "5", "as stated by its source; clearance is then also shown minus this")}
 """
 
 
@@ -261,7 +261,7 @@ def _area_and_ends_text(draft: Draft) -> str:
 [{key}]
 lat_deg = {_number_text(place.lat)}
 lon_deg = {_number_text(place.lon)}
-{_toml_line("height_m", _number_text(draft.height), "above ground; amsl_m counts from mean sea level")}
+{_toml_line("height_m", _number_text(draft.height), "above ground; amsl_m is above mean sea level")}
 {_toml_line("# course_deg", "0", course)}
 """)
     return f"""\
@@ -279,7 +279,7 @@ def _limits_text(draft: Draft) -> str:
 {_toml_line("min_clearance_m", _number_text(draft.clearance), "above ground")}
 {_toml_line("# max_height_m", _number_text(max(400.0, 2.0 * draft.height)), "above ground")}
 {_toml_line("# max_turn_deg", "60", "at a waypoint")}
-{_toml_line("# corridor_m", "60", "half width about the legs; by default what the autopilot needs")}
+{_toml_line("# corridor_m", "60", "half width about the legs; by default as wide as the autopilot requires")}
 """
 
 
@@ -288,14 +288,14 @@ def _flight_text(draft: Draft) -> str:
     version = "" if draft.px4_version is None else f"\npx4_version = {_quote(draft.px4_version)}"
     return f"""\
 [flight]
-{_toml_line("aircraft", _quote(draft.aircraft), "planfly aircraft lists them; a folder of your own")}
+{_toml_line("aircraft", _quote(draft.aircraft), "an aircraft listed by 'planfly aircraft', or a folder of your own")}
 {_toml_line("autopilot", _quote(draft.autopilot), autopilots)}{version}
-{_toml_line("# params", '"mine.param"', "its parameters, as a ground station saves them")}
-{_toml_line("# airspeed_mps", _number_text(draft.airspeed), "equivalent, by planfly's guidance true; by default this")}
+{_toml_line("# params", '"mine.param"', "parameter file of the autopilot, as saved by a ground station")}
+{_toml_line("# airspeed_mps", _number_text(draft.airspeed), "equivalent, for planfly's guidance true; the default is this")}
 
 [wind]
 {_toml_line("speed_mps", "0", "your forecast, 0 to 40")}
-{_toml_line("from_deg", "0", "that it blows from: 270 is a west wind")}
+{_toml_line("from_deg", "0", "direction the wind comes from; 270 is a west wind")}
 {_toml_line("turbulence", '"none"', '"light" or "moderate"')}
 
 [planner]
@@ -329,9 +329,9 @@ def _examples_text(draft: Draft) -> str:
 {_toml_line("# radius_m", _number_text(radius))}
 {_toml_line("# ceiling_agl_m", "300", "it may be flown over above this height above ground")}
 
-# What the way home is judged by.
+# Requirements on the way home.
 # [returns]
-# require = ["rtl", "glide"]  # from anywhere on the way a return to launch has to be safe, an engine may stop
+# require = ["rtl", "glide"]  # from anywhere on the route a return to launch must be safe, and the engine may fail
 """
 
 

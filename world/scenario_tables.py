@@ -227,7 +227,7 @@ class TerrainTable(ScenarioTable):
         for key in ("path", "peak", "amsl_m"):
             is_given = getattr(self, key) is not None
             if key == needed_key and not is_given:
-                raise ValueError(f'{key}: missing; kind = "{self.kind}" needs it')
+                raise ValueError(f'{key}: missing; kind = "{self.kind}" requires it')
             if key != needed_key and is_given:
                 raise ValueError(f'{key}: not a key of kind = "{self.kind}"')
         if self.height_datum is not None and self.kind != "dem":
@@ -441,7 +441,9 @@ class FlightTable(ScenarioTable):
         if self.guidance is not None and autopilot != OWN_GUIDANCE:
             raise ValueError(f'guidance: not a key of autopilot = "{autopilot}"')
         if self.params is not None and autopilot == OWN_GUIDANCE:
-            raise ValueError('params: not a key of autopilot = "planfly", which a guidance without autopilot selects')
+            raise ValueError(
+                'params: not a key of autopilot = "planfly", which guidance selects if no autopilot is named'
+            )
         if self.px4_version is not None and autopilot != _PX4:
             raise ValueError(f'px4_version: only a key of autopilot = "px4", not of "{autopilot}"')
         return self
@@ -492,7 +494,7 @@ class HomeTable(PositionTable):
     def _check_on_ground(cls, data: Any) -> Any:
         for key in ("amsl_m", "height_m"):
             if isinstance(data, dict) and key in data:
-                raise ValueError(f"{key}: home stands on the scenario's ground: its position is enough")
+                raise ValueError(f"{key}: home is on the scenario's ground: give only its position")
         return data
 
     @model_validator(mode="after")
@@ -538,7 +540,7 @@ class LaunchTable(ScenarioTable):
     def _check_launch_values(self) -> "LaunchTable":
         if self.method == "runway" and self.speed_mps is not None:
             raise ValueError(
-                f"speed_mps: {self.speed_mps:g}: not allowed for a runway, where the aircraft's own motor pulls"
+                f"speed_mps: {self.speed_mps:g}: not allowed for a runway, where the motor accelerates the aircraft"
             )
         if self.method == "runway" and (self.incline_deg or 0.0) > STEEPEST_RUNWAY:
             raise ValueError(f"incline_deg: {self.incline_deg:g}: allowed 0..{STEEPEST_RUNWAY:g} of a runway")
@@ -669,6 +671,6 @@ class ScenarioFile(ScenarioTable):
             for key in ("launch", "landing"):
                 if getattr(self, key) is not None:
                     raise ValueError(
-                        f"home: missing; [{key}] needs it: heights of take-off and landing count from home"
+                        f"home: missing; [{key}] requires it, because take-off and landing heights are relative to home"
                     )
         return self

@@ -127,7 +127,7 @@ class ParameterTable:
                 )
                 del values[minimum], values[maximum]
         if not values:
-            notes.append(f"the log holds no parameters: {self.title}'s defaults are used")
+            notes.append(f"the log contains no parameters: {self.title}'s defaults are used")
         return values, notes
 
 

@@ -341,7 +341,7 @@ class Fdm:
         if found is None:
             raise FlightError(
                 f"{self.aircraft.name} cannot hold steady flight at {airspeed:.1f} m/s,"
-                f" {math.degrees(climb):+.1f} degrees to the air and {amsl:.0f} m above sea level",
+                f" {math.degrees(climb):+.1f} degrees relative to the air and {amsl:.0f} m above sea level",
                 file=self.aircraft.name,
                 field="airspeed",
                 value=airspeed,

@@ -158,7 +158,7 @@ def check_model(
         for name, where in reader.brings.items():
             found = _find_file(name, folders)
             if found is None:
-                message = f"{reader.file}:{where} brings in another file, which is not in the aircraft's folder"
+                message = f"{reader.file}:{where} includes another file, which is not in the aircraft's folder"
                 raise FlightError(message, file=reader.file, field="file", value=name)
             if found.name not in readers:
                 readers[found.name] = _read(found, main=False, remove_channels=shipped)
@@ -198,7 +198,7 @@ def _check_names(readers: Sequence[_Reader], provided: Callable[[str], bool]) ->
         for name, line in reader.read_names.items():
             if name in made or (parts and _PART_PROPERTIES.match(name)) or provided(name):
                 continue
-            message = f"{reader.file}:{line}: property {name} is read, and neither JSBSim nor the model makes it"
+            message = f"{reader.file}:{line}: property {name} is read, and neither JSBSim nor the model defines it"
             raise FlightError(message, file=reader.file, field=name)
 
 

@@ -153,7 +153,7 @@ class ArmingState:
     def _divert(self, mode: int) -> CommandResult:
         """Continue the flight in another mode; the current mode changes nothing."""
         if mode == MANUAL:
-            return CommandResult(DENIED, "MANUAL denied: nobody has the sticks; a forced disarm ends the flight")
+            return CommandResult(DENIED, "MANUAL denied: no pilot has the sticks; a forced disarm ends the flight")
         if mode != self.mode:
             self.set_flight_mode(mode)
             self.place = Place()
@@ -196,7 +196,7 @@ class ArmingState:
         if not self.last_verdict.possible:
             return "the mission cannot be flown"
         if not (self.last_verdict.flyable or self.force or is_forced):
-            return "the mission is judged not flyable; set PFLY_FORCE 1 to fly it all the same"
+            return "the mission is judged not flyable; set PFLY_FORCE 1 to fly it anyway"
         return ""
 
 

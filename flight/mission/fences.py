@@ -75,8 +75,8 @@ def zone_fences(zones: Sequence[Zone], origin: GeoOrigin) -> tuple[list[MissionI
         )
     if omitted_names:
         notes.append(
-            f"a flight must be inside every inclusion of a fence: {_joined_names(omitted_names)} left out for having"
-            " several parts"
+            f"a flight must be inside every inclusion of a fence: {_joined_names(omitted_names)} "
+            "omitted because of several parts"
         )
     return items, notes
 
@@ -212,13 +212,14 @@ def with_fences(mission: Mission, scenario: Scenario, passes: PassTest) -> tuple
             f" and {len(omitted_names) - _MAX_NAMES} more" if len(omitted_names) > _MAX_NAMES else ""
         )
         notes.append(
-            f"left out of the fence, as the mission passes above or below: {names}; a fence has no height, and an"
-            " autopilot with it in its fence refuses the mission or breaks it off"
+            f"omitted from the fence, because the mission passes above or below: {names}; a fence "
+            "has no height, and an autopilot with it in its fence refuses the mission or breaks "
+            "it off"
         )
     notes += zone_notes
     if scenario.limits.max_height_m is not None:
         limit_text = f"{scenario.limits.max_height_m:g} m above ground"
-        notes.append(f"a fence does not follow the ground: the greatest height of {limit_text} is not in it")
+        notes.append(f"a fence does not follow the ground: the maximum height of {limit_text} is not part of it")
     all_fences = numbered([*fences, *mission.fences])
     # A mission that starts or ends on the ground keeps its rally points: its last position is the landing point.
     keeps_rally = bool(mission.rally) or scenario.launch is not None or scenario.landing is not None

@@ -166,15 +166,15 @@ def _find_take_off(scenario: Scenario, mission: Mission, route: Route, slowest: 
     route_items = route.items.tolist()
     index = next((k for k, seq in enumerate(route_items) if seq >= 0), 0)
     if launch is None or not items or route_items[index] not in items:
-        return None, "[launch]: the mission does not begin with a NAV_TAKEOFF: its flight begins in the air"
+        return None, "[launch]: the mission does not begin with a NAV_TAKEOFF, so its flight begins in the air"
     if base is None:
-        return None, "[launch]: the mission has no home to take off from: its flight begins in the air"
+        return None, "[launch]: the mission has no home to take off from, so its flight begins in the air"
     if index + 1 >= len(route_items):
-        return None, "[launch]: nothing comes after the take-off: it is not flown"
+        return None, "[launch]: nothing follows the take-off, so it is not flown"
     item, home_position = items[route_items[index]], np.array([base.east, base.north])
     ground = scenario.terrain.height(*home_position) if scenario.terrain is not None else base.up
     if math.isnan(ground):
-        return None, "[launch]: the ground at home is not known: the flight begins in the air"
+        return None, "[launch]: the terrain at home is unknown, so the flight begins in the air"
     # ArduPlane does not fly to the position of a take-off item: the next item is the first one.
     first_leg = route.waypoints[index + 1, :2] - home_position
     course = launch.course if launch.course is not None else math.atan2(first_leg[0], first_leg[1])
@@ -200,9 +200,9 @@ def _find_approach(scenario: Scenario, mission: Mission, route: Route) -> tuple[
     ground = route.landing_ground
     leg_start, leg_end = route.waypoints[last_leg - 1], route.waypoints[last_leg]
     if math.isnan(ground):
-        return None, "[landing]: the height of the landing point is not known: the flight ends in the air"
+        return None, "[landing]: the height of the landing point is unknown, so the flight ends in the air"
     if leg_start[2] <= ground:
-        return None, "[landing]: the approach begins no higher than the landing point: the flight ends in the air"
+        return None, ("[landing]: the approach begins no higher than the landing point, so the flight ends in the air")
     final_leg = leg_end[:2] - leg_start[:2]
     course, length = math.atan2(final_leg[0], final_leg[1]), float(np.hypot(*final_leg))
     point = np.array([leg_end[0], leg_end[1], ground])

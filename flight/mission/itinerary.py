@@ -230,7 +230,7 @@ def make_itinerary(mission: Mission) -> Itinerary:
         name = command_name(mission.items[steps.index[steps.endless]].command)
         builder.notes.add(f"{name} has no end: it is flown once, and the flight ends there", steps.endless)
     for gate in builder.gates:
-        builder.notes.px4.add("CONDITION_GATE: nothing to fly to comes after it, so it is passed at once", gate.item)
+        builder.notes.px4.add("CONDITION_GATE: no waypoint follows it, so it is passed at once", gate.item)
     for item in mission.items:
         if item.seq not in steps.reached and not (builder.ended and item.command in JUMPS):
             builder.notes.add(NEVER_REACHED, item.seq)
@@ -412,7 +412,7 @@ class _ItineraryBuilder:
             self._fly_item(step.to)
         else:
             for item in step.between[1:]:
-                text = f"{command_name(item.command)}: not run, as nothing to fly to comes after it"
+                text = f"{command_name(item.command)}: not run, as no waypoint follows it"
                 self.notes.arduplane.add(text, item.seq)
         for item in arduplane_commands[1:]:
             if item.command == Command.DO_SET_HOME:
@@ -546,7 +546,7 @@ class _ItineraryBuilder:
         if has_own_position and is_vertical:
             # ArduPlane climbs vertically and continues at that altitude (QuadPlane::takeoff_controller and
             # verify_vtol_takeoff); its fixed wings skip the item.
-            self.notes.add(f"{name}: its place is not flown to, as in ArduPlane; PX4 would", item.seq)
+            self.notes.add(f"{name}: its position is not flown to, as in ArduPlane; PX4 would fly to it", item.seq)
         if has_own_position and not is_vertical:
             self.stops += [replace(over_home, item=-1), self._make_stop(item)]
         else:
@@ -555,7 +555,7 @@ class _ItineraryBuilder:
     def _add_stop(self, item: MissionItem) -> None:
         name = command_name(item.command)
         if not item.has_position and loiter_of(item) is not None and self.stops:
-            text = f"{name} without a position: flown about the place before"
+            text = f"{name} without a position: flown around the previous position"
             self.notes.arduplane.add(text, item.seq)
             # PX4 reads 0, 0 as a position.
             self.add_open_item(text, item.seq, arduplane=False)
@@ -616,7 +616,9 @@ class _ItineraryBuilder:
             self.landing = self._make_stop(item)
             self.stops.append(replace(self.landing, alt=math.nan))
         else:
-            self.add_open_item(f"{name} without a position: not flown; the flight ends at the place before", item.seq)
+            self.add_open_item(
+                f"{name} without a position: not flown; the flight ends at the previous position", item.seq
+            )
         if item.command == Command.NAV_VTOL_LAND:
             self.add_open_item(f"{name}: not flown straight down", item.seq)
 
@@ -634,7 +636,7 @@ class _ItineraryBuilder:
             return
         altitude = item.alt + self.home.alt if item.frame in OVER_HOME else item.alt if item.frame in AMSL else math.nan
         if math.isnan(altitude):
-            self.add_open_item(f"{name} to an altitude that is not known: not flown", item.seq, px4=False)
+            self.add_open_item(f"{name} to an unknown altitude: not flown", item.seq, px4=False)
             return
         self.home = Home(item.lat_deg, item.lon_deg, altitude)
 

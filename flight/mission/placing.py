@@ -468,12 +468,14 @@ class _Heights:
             if abs(home.alt - ground) > _HOME_ALTITUDE_TOLERANCE_M:
                 hint = "" if home.alt else "; ground stations write 0 where no home was set"
                 self.notes.add(
-                    f"home is at {home.alt:.1f} m AMSL, and the ground there at {ground:.1f} m:"
-                    f" heights over home count from the former{hint}"
+                    f"home is at {home.alt:.1f} m AMSL, and the ground there at {ground:.1f} m: "
+                    f"heights above home are taken from the former{hint}"
                 )
             return home.alt
         if math.isnan(ground):
-            self.notes.add("no home height, and no terrain to take one from: heights over home count from 0 m AMSL")
+            self.notes.add(
+                "no home height, and no terrain to take one from: heights above home are taken from 0 m AMSL"
+            )
             return 0.0
         self.notes.add(
             f"no home height: taken as the ground at {home.lat_deg:.7f}, {home.lon_deg:.7f}, {ground:.1f} m AMSL"

@@ -71,7 +71,7 @@ def _note_tail_winds(route: Route, scenario: Scenario) -> Iterator[str]:
     for name, course, altitude in ends:
         tail_wind = scenario.wind.along(course, altitude)[0]
         if tail_wind > CALM:
-            yield f"{name}: {tail_wind:.1f} m/s of wind from behind on {round(math.degrees(course)) % 360}°"
+            yield f"{name}: {tail_wind:.1f} m/s of tailwind on {round(math.degrees(course)) % 360}°"
 
 
 def _note_distant_home(mission: Mission, scenario: Scenario) -> Iterator[str]:
@@ -83,8 +83,8 @@ def _note_distant_home(mission: Mission, scenario: Scenario) -> Iterator[str]:
     distance = math.dist((float(east), float(north)), scenario_home[:2])
     if distance > HOME_APART:
         yield (
-            f"the mission's home is {distance:.0f} m from the scenario's:"
-            " after a launch there, heights count from there"
+            f"the mission's home is {distance:.0f} m from the scenario's: after a launch there, "
+            "heights are relative to it"
         )
 
 
@@ -177,9 +177,9 @@ def _note_landing_ground(mission: Mission, route: Route, scenario: Scenario) -> 
     wind = ""
     if not math.isnan(route.landing_ground):
         tail_wind = scenario.wind.along(course, route.landing_ground)[0]
-        wind = f", with {tail_wind:.1f} m/s of wind from behind" if tail_wind > CALM else wind
+        wind = f", with {tail_wind:.1f} m/s of tailwind" if tail_wind > CALM else wind
         wind = f", against {-tail_wind:.1f} m/s of wind" if tail_wind < -CALM else wind
-    ground = "the ground there is not known"
+    ground = "the terrain there is unknown"
     length = LandingStrip(0.0, 0.0).length
     if not any(math.isnan(slope) for slope in slopes):
         along, across = (_slope_text(slope) for slope in slopes)

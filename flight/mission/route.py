@@ -611,7 +611,8 @@ def _append_return(
     notes.add(described_return(target, rules, start[2], next_text), stop.item)
     if rules.landing_counts and any(item.command in LANDINGS for item in placed.mission.items):
         notes.add(
-            f"the mission's landing is also a place to return to, which is not flown: the return is to {target.name}",
+            "the mission's landing is also a place to return to, which is not simulated: the "
+            f"return is to {target.name}",
             stop.item,
         )
     if rules.instead:
@@ -639,7 +640,7 @@ def _insert_gates(placed: PlacedMission, notes: Notes) -> list[PlacedStop]:
             if not all(
                 leg_end.stop.loiter is None and leg_end.stop.command in PLACES for leg_end in (previous, next_stop)
             ):
-                text = "CONDITION_GATE not between waypoints: the speed after it holds from the leg's start"
+                text = "CONDITION_GATE not between waypoints: the speed after it applies from the leg's start"
                 notes.add(text, gate.item)
                 continue
             fraction = _gate_fraction(
@@ -688,8 +689,8 @@ def _note_cruise_speed(mission: Mission, airspeed: float, first_stop: ItineraryS
     """Note a cruiseSpeed other than the airspeed (m/s), if that is the airspeed to the first stop."""
     if mission.cruise_speed is not None and mission.cruise_speed != airspeed and first_stop.airspeed == airspeed:
         text = (
-            f"cruiseSpeed {mission.cruise_speed:g} m/s is the ground station's estimate and no command:"
-            f" started at {airspeed:g} m/s"
+            f"cruiseSpeed {mission.cruise_speed:g} m/s is the ground station's estimate and not a "
+            f"command: started at {airspeed:g} m/s"
         )
         if abs(mission.cruise_speed - airspeed) > FAR_SPEED * airspeed:
             text += f" (--aircraft names yours, --airspeed {mission.cruise_speed:g} flies it so)"

@@ -87,11 +87,11 @@ def kept_layout(mission: Mission, route: Route, survey: Survey) -> str:
     for first, end in items.lines:
         for item in mission.items[first:end]:
             if is_navigation(item.command) and item.command != Command.NAV_WAYPOINT:
-                return f"item {item.seq}, {command_name(item.command)}, stands on a line"
+                return f"item {item.seq}, {command_name(item.command)}, lies on a line"
     for (_, end), (first, _) in zip(items.lines[:-1], items.lines[1:], strict=True):
         for item in mission.items[end:first]:
             if item.command != Command.NAV_WAYPOINT:
-                return f"item {item.seq}, {command_name(item.command)}, stands between two lines"
+                return f"item {item.seq}, {command_name(item.command)}, lies between two lines"
     return ""
 
 

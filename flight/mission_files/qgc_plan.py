@@ -78,7 +78,7 @@ def expand_items(items: list[Any], source: str, warnings: list[str], plans: list
             shown = f"{json.dumps(kind)[:40]} {name!r}"
             raise MissionError.at(source, f"{place}.type", name or kind, allowed, shown=shown)
         warnings.append(
-            f"{source}: {place}: {name} replaced by the {len(replacements)} simple items that it stands for"
+            f"{source}: {place}: {name} replaced by the {len(replacements)} simple items that it represents"
         )
         simple_items += replacements
     return simple_items
@@ -162,7 +162,7 @@ def _survey_plan(settings: dict[str, Any], items: list[Any], place: str, warning
             fault = error.errors()[0]
             field = ".".join(map(str, fault["loc"]))
             shown = "missing" if fault["type"] == "missing" else json.dumps(fault["input"])[:40]
-            warnings.append(f"{place}: CameraCalc.{field}: {shown}: its camera is left out, and no overlap is judged")
+            warnings.append(f"{place}: CameraCalc.{field}: {shown}: its camera is ignored, and no overlap is judged")
     return SurveyPlan(_trigger_distance(items), float(turn_around), camera)
 
 
@@ -376,7 +376,7 @@ def parse_plan_file(text: str, source: str) -> Mission:
         warnings.append(f"{source}: item {number}: {name} has no position ({len(unplaced)} such items in all)")
     home = _read_home(file.mission.plannedHomePosition, source)
     if home is None and file.mission.plannedHomePosition is not None:
-        warnings.append(f"{source}: plannedHomePosition is not a position: left out; the mission has no home")
+        warnings.append(f"{source}: plannedHomePosition is not a position: ignored; the mission has no home")
     if [item.seq for item in items] != list(range(1, len(items) + 1)):
         warnings.append(f"{source}: doJumpId is not 1 to {len(items)}: items are counted by their order")
     mission = Mission(

@@ -212,19 +212,18 @@ def _collect_warnings(rows: list[_Row], home: Home | None, body: list[_Row]) -> 
     first = rows[0].item
     if len(body) == len(rows):
         warnings.append(
-            f"{rows[0].where}: no home line (seq 0): the mission has no home and begins with this item, as in Mission"
-            " Planner; QGroundControl and MAVProxy take it for home and leave it out"
+            f"{rows[0].where}: no home line (seq 0): the mission has no home and begins with this "
+            "item, as in Mission Planner; QGroundControl and MAVProxy treat it as home and do "
+            "not fly it"
         )
     elif first.command != Command.NAV_WAYPOINT:
         warnings.append(
-            f"{rows[0].where}: {command_name(first.command)} in the line of home (seq 0): left out, as ground stations"
-            " take that line for home and do not fly it"
+            f"{rows[0].where}: {command_name(first.command)} in the line of home (seq 0): "
+            "ignored, because ground stations treat that line as home and do not fly it"
         )
     if len(body) < len(rows):
         if home is None:
-            warnings.append(
-                f"{rows[0].where}: home at 0, 0, which is not a position: left out; the mission has no home"
-            )
+            warnings.append(f"{rows[0].where}: home at 0, 0, which is not a position: ignored; the mission has no home")
         elif first.frame not in (Frame.GLOBAL, Frame.GLOBAL_INT):
             warnings.append(
                 f"{rows[0].where}: home in frame {first.frame}: its height is taken as above mean sea level"

@@ -56,7 +56,7 @@ class LocalMap:
         lon = origin_longitude + (lon - origin_longitude + math.pi) % (2.0 * math.pi) - math.pi
         bounds = np.array([[lat.min(), lat.max()], [lon.min(), lon.max()]])
         if not (np.isfinite(bounds).all() and np.ptp(bounds[1]) < math.pi):
-            raise FlightError(f"{setup.mission.source}: the area lies about a pole", file=setup.mission.source)
+            raise FlightError(f"{setup.mission.source}: the area contains a pole", file=setup.mission.source)
 
         def position(latitude: Floats, longitude: Floats) -> tuple[Floats, Floats]:
             return to_map(origin, np.degrees(latitude), np.degrees(longitude))
@@ -71,8 +71,8 @@ class LocalMap:
         local = LocalMap(fit_polymap(position, bounds, 1e-4), fit_polymap(angle, bounds, 1e-9), middle)
         if not (local.position.residual <= MAX_MAP_ERRORS[0] and local.angle.residual <= MAX_MAP_ERRORS[1]):
             raise FlightError(
-                f"{setup.mission.source}: the area is too large to fly in: its map is out by"
-                f" {local.position.residual:.2g} m; {MAX_MAP_ERRORS[0]:g} m is allowed",
+                f"{setup.mission.source}: the area is too large to fly in: its map has an error "
+                f"of {local.position.residual:.2g} m; {MAX_MAP_ERRORS[0]:g} m is allowed",
                 file=setup.mission.source,
             )
         return local

@@ -342,7 +342,7 @@ class Flight(Airborne):
             self.fdm = self._new_fdm()
             self._start_fdm()
             return None, f"JSBSim, since the compiled model differs from it in {differences[0]}"
-        return model, f"compiled model, equal to JSBSim {JSBSIM_VERSION} in every bit of {PROOF_STEPS} steps"
+        return model, f"compiled model, bit-identical to JSBSim {JSBSIM_VERSION} in {PROOF_STEPS} steps"
 
     def _make_loop(self, autopilot: Autopilot) -> Callable[[int], int]:
         """Return a function that flies a number of ticks, fills the workspace's rows, and returns the last status."""

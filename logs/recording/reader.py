@@ -300,19 +300,20 @@ def read_log(path: Path | str) -> FlightLog:
                 try:
                     messages.add(data)
                 except (*PARSE_ERRORS, DecodeError):
-                    container.problem = f"chunk {messages.chunks} holds records that cannot be read"
+                    container.problem = f"chunk {messages.chunks} contains records that cannot be read"
                     break
     except OSError as error:
         raise LogError(f"{path}: cannot be read: {error.strerror}", file=path) from error
     if not messages.chunks and (container.problem or SETUP_FILE in container.attachments):
-        raise LogError(f"{path}: holds no complete chunk: {container.problem or 'an empty log'}", file=path)
+        raise LogError(f"{path}: contains no complete chunk: {container.problem or 'an empty log'}", file=path)
     if SETUP_FILE not in container.attachments and container.problem:
-        raise LogError(f"{path}: holds no setup: {container.problem}", file=path)
+        raise LogError(f"{path}: contains no setup: {container.problem}", file=path)
     stored_setup = unpack_setup(container.attachments, str(path))
     rows, row_fault = _usable_rows(messages.rows(), len(stored_setup.setup.route.waypoints))
     if not len(rows):
         raise LogError(
-            f"{path}: holds no complete second of flight: {row_fault or container.problem or 'an empty log'}", file=path
+            f"{path}: contains no complete second of flight: {row_fault or container.problem or 'an empty log'}",
+            file=path,
         )
     end_reason, result_fault = _read_result(container.attachments, len(rows))
     verdict, verdict_fault = _read_verdict(container.attachments)
@@ -386,7 +387,7 @@ def _read_result(attachments: dict[str, bytes], row_count: int) -> tuple[str | N
 def _recorded_loss(recovery: bytes) -> str:
     """Return the loss that the log's recovery note states."""
     lost = _parse_object(recovery).get("lost")
-    return lost if isinstance(lost, str) and lost else "what was lost is not known"
+    return lost if isinstance(lost, str) and lost else "the extent of the loss is unknown"
 
 
 def _read_verdict(attachments: dict[str, bytes]) -> tuple[dict[str, Any] | None, str]:

@@ -396,7 +396,7 @@ def _decode_text(attachments: dict[str, bytes], name: str, source: str) -> str:
     except KeyError:
         raise LogError(f"{source}: {name}: missing", file=source, field=name) from None
     except UnicodeDecodeError as error:
-        message = f"{source}: {name}: not a text in UTF-8 (byte {error.start})"
+        message = f"{source}: {name}: not UTF-8 text (byte {error.start})"
         raise LogError(message, file=source, field=name) from error
 
 
@@ -432,4 +432,4 @@ def _check_terrain_is_stored(spec: Any, terrain: Terrain | None, file_name: str)
     terrain_table = spec.get("terrain") if isinstance(spec, dict) else None
     kind = terrain_table.get("kind") if isinstance(terrain_table, dict) else None
     if terrain is None and kind != "none":
-        raise LogError.at(file_name, "terrain.kind", kind, f"the log holds no {TERRAIN_FILE}", shown=repr(kind))
+        raise LogError.at(file_name, "terrain.kind", kind, f"the log contains no {TERRAIN_FILE}", shown=repr(kind))

@@ -95,7 +95,7 @@ def _autopilot_source(flight_table: FlightTable) -> str:
     """Return a clause with the file that chose a non-default autopilot; "" if no file chose it."""
     if flight_table.autopilot_from is None or flight_table.steering.autopilot == DEFAULT_AUTOPILOT:
         return ""
-    return f"; taken from {flight_table.autopilot_from}, as no autopilot was named"
+    return f"; taken from {flight_table.autopilot_from}, because no autopilot was named"
 
 
 def _airspeed_source(scenario: Scenario, autopilot: Autopilot) -> AirspeedSource:

@@ -318,7 +318,7 @@ def judge_plan_only(plan: Plan, conditions: Conditions | None = None) -> Verdict
     >>> way, none = np.zeros((2, 3)), np.zeros((0, 3))
     >>> plan = Plan(load_scenario("tight"), way, np.array([0, 2, 0, 0]), np.zeros(4), certificate, 1, "umda", 1, none)
     >>> print(judge_plan_only(plan).headline)
-    not flyable: no feasible plan was found: slope (the plan's slope limit is exceeded, least margin -2.86 deg, ...)
+    not flyable: no feasible plan was found: slope (the plan's slope limit is exceeded, smallest margin -2.86 deg, ...)
     """
     margins = (
         ("turn", plan.certificate.turn, Violation.TURN, "deg", 180.0 / math.pi),
@@ -333,7 +333,7 @@ def judge_plan_only(plan: Plan, conditions: Conditions | None = None) -> Verdict
         if rule == "turn":
             is_exceeded = is_exceeded or plan.certificate.available_length < 0.0
         is_known = math.isfinite(margin)
-        reason = f"least margin {margin * factor:.2f} {unit}" if is_known else "no margin is known"
+        reason = f"smallest margin {margin * factor:.2f} {unit}" if is_known else "no margin is known"
         if is_exceeded:
             reason = f"the plan's {rule} limit is exceeded, {reason}" + (f", {count} violations" if count else "")
         findings.append(
@@ -354,7 +354,7 @@ def judge_plan_only(plan: Plan, conditions: Conditions | None = None) -> Verdict
 
 
 def _infeasible_finding(plan: Plan) -> Finding:
-    problems = plan.certificate.problems or ("the search still counts violations",)
+    problems = plan.certificate.problems or ("the best path still has violations",)
     first_problem, *other_problems = problems
     fault = message(
         f"no feasible plan was found: {first_problem}", "".join(f"; {problem}" for problem in other_problems)

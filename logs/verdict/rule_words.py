@@ -90,20 +90,20 @@ RULE_WORDS: dict[str, RuleWords] = {
         RuleWords(
             name="mission",
             title="mission",
-            asks="Would an autopilot take the mission's items, and does its route keep to its own fence?",
+            asks="Would the autopilot accept the mission, and does the route stay inside the mission's fence?",
             margin=None,
             urgency=2,
         ),
         RuleWords(
             name="turn",
             title="turns",
-            asks="Can each corner be turned, and was it?",
+            asks="Can the aircraft turn at each corner, and did it?",
             margin=Margin("course change", "deg"),
         ),
         RuleWords(
             name="loiter",
             title="loiters",
-            asks="Can each circle be held at the bank limit in this wind, and was it flown to its end?",
+            asks="Can each loiter circle be held within the bank limit in this wind, and was it completed?",
             margin=Margin("radius", "m", 10.0),
             phrase=name_circle,
         ),
@@ -126,7 +126,7 @@ RULE_WORDS: dict[str, RuleWords] = {
         RuleWords(
             name="height",
             title="heights",
-            asks="Does each leg stay below the largest height above ground and the ceiling?",
+            asks="Does each leg stay below the maximum height above ground and the ceiling?",
             margin=Margin("height above ground", "m", 10.0),
             unjudged="heights above ground",
             explained=True,
@@ -134,7 +134,7 @@ RULE_WORDS: dict[str, RuleWords] = {
         RuleWords(
             name="fence",
             title="zones",
-            asks="Do path and flight keep out of exclusions and within inclusions?",
+            asks="Do the path and the flight stay outside exclusion zones and inside inclusion zones?",
             margin=Margin("depth", "m", 10.0),
             phrase=name_zone,
             unjudged="airspace",
@@ -144,7 +144,7 @@ RULE_WORDS: dict[str, RuleWords] = {
         RuleWords(
             name="threat",
             title="threats",
-            asks="Do path and flight stay outside each missile's sphere?",
+            asks="Do the path and the flight stay outside each missile's sphere?",
             margin=Margin("time inside", "s"),
             phrase=name_missile,
             explained=True,
@@ -167,7 +167,7 @@ RULE_WORDS: dict[str, RuleWords] = {
         RuleWords(
             name="corridor",
             title="corridor",
-            asks="How far from the legs did the flight get, its turns included?",
+            asks="How far did the flight deviate from the legs, including its turns?",
             margin=Margin("distance from the legs", "m", 10.0),
         ),
         RuleWords(
@@ -181,7 +181,7 @@ RULE_WORDS: dict[str, RuleWords] = {
         RuleWords(
             name="speed",
             title="airspeed",
-            asks="Is each leg's commanded airspeed one of level flight, and can the leg's course be held in this wind?",
+            asks="Can the aircraft fly level at each leg's commanded airspeed, and hold the leg's course in this wind?",
             margin=Margin("airspeed", "m/s", 1.0),
             phrase=name_reason,
             unjudged="airspeed",
@@ -189,14 +189,14 @@ RULE_WORDS: dict[str, RuleWords] = {
         RuleWords(
             name="stall",
             title="stall",
-            asks="Is the airspeed above the stall in the bank that is flown?",
+            asks="Is the airspeed above the stall speed at the bank angle that is flown?",
             margin=Margin("airspeed", "m/s", 1.0),
         ),
         RuleWords(
             name="takeoff",
             title="take-off",
             noun="take-off",
-            asks="Can the aircraft climb from the ground at home to the take-off item's place?",
+            asks="Can the aircraft climb from the ground at home to the position of the take-off item?",
             margin=Margin("slope", "deg"),
             unjudged="take-off",
             explained=True,
@@ -205,7 +205,7 @@ RULE_WORDS: dict[str, RuleWords] = {
             name="climbout",
             title="climb-out",
             noun="climb-out",
-            asks="Is the climb from home to the mission's first place clear of ground, missiles and zones?",
+            asks="Is the climb from home to the mission's first waypoint clear of ground, missiles and zones?",
             margin=Margin("height above ground", "m", 10.0),
             phrase=name_reason,
             unjudged="climb-out",
@@ -224,7 +224,7 @@ RULE_WORDS: dict[str, RuleWords] = {
         RuleWords(
             name="landing",
             title="landing",
-            asks="Can the aircraft descend from the last waypoint to the landing place?",
+            asks="Can the aircraft descend from the last waypoint to the landing point?",
             margin=Margin("slope", "deg"),
             unjudged="landing",
             explained=True,
@@ -260,13 +260,13 @@ RULE_WORDS: dict[str, RuleWords] = {
         RuleWords(
             name="return",
             title="return",
-            asks="Where does the return to launch go, how, and did the flight get there?",
+            asks="Where does the return to launch lead, by which path, and did the flight arrive there?",
             margin=None,
         ),
         RuleWords(
             name="energy",
             title="energy",
-            asks="Does the flight leave the battery's or the tank's reserve?",
+            asks="Does the flight leave the required reserve in the battery or the tank?",
             margin=Margin("energy", "Wh", 50.0),
             explained=True,
         ),
@@ -274,7 +274,7 @@ RULE_WORDS: dict[str, RuleWords] = {
             name="departure",
             title="loss of control",
             noun="loss of control",
-            asks="Are all numbers finite, bank and airspeed those of a flight, and the ground never touched?",
+            asks="Are all values finite, are bank and airspeed plausible, and is the ground never touched?",
             margin=Margin("largest bank", "deg", 10.0),
             urgency=4,
             phrase=name_event,
@@ -282,7 +282,7 @@ RULE_WORDS: dict[str, RuleWords] = {
         RuleWords(
             name="completion",
             title="completion",
-            asks="Was the plan feasible, flown to its last waypoint, and recorded in full without contradiction?",
+            asks="Was the plan feasible, flown to its last waypoint, and recorded completely and consistently?",
             margin=Margin("flown", "legs"),
             urgency=3,
             phrase=name_event,

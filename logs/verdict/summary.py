@@ -67,7 +67,9 @@ def undecided_text(findings: Sequence[Finding]) -> str:
         for finding in open_findings
         if finding.check == UNKNOWN_WAY
     ]
-    path_text = f"only a flight tells where {' and '.join(paths[:_MAX_NAMED_FINDINGS])} is flown" if paths else ""
+    path_text = (
+        f"only a simulated flight shows how {' and '.join(paths[:_MAX_NAMED_FINDINGS])} is flown" if paths else ""
+    )
     aircraft_text = _unknown_aircraft_text([finding for finding in open_findings if finding.check == UNKNOWN_AIRCRAFT])
     other_briefs = [finding.brief for finding in open_findings if finding.check in APART_FROM_FLIGHT]
     item_briefs = [finding.brief for finding in open_findings if finding.check == NOT_FLOWN]
@@ -242,7 +244,7 @@ def _airframe_or_autopilot_lines(
     parameters_note = "" if setup.autopilot.parameters is None else " with these parameters"
     # Other parameters are flown by the law, whoever flew.
     by_law = setup.autopilot.program is not None
-    reason = "" if by_law or not parameters_note else ": with none of the parameters that were tried would it pass"
+    reason = "" if by_law or not parameters_note else ": it would pass with none of the parameter values tried"
     if deciding is not None:
         reason = f": {deciding_text(deciding)}{', by the simulated flight' if by_law else ''}"
     return [f"The aircraft can fly this, but {setup.autopilot.title}{parameters_note} cannot{reason}"]

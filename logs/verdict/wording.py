@@ -112,7 +112,7 @@ def _other_change_text(change: Change) -> str:
                 else f"a glide of {requested_value:.0f} s without throttle"
             )
             return f"fly {flight_text} and give its log to planfly aircraft --identify"
-    return f"take a {change.what} {requested_value:.2f} times as large"
+    return f"use a {change.what} {requested_value:.2f} times as large"
 
 
 def _rise_text(change: Change) -> str:

@@ -44,8 +44,8 @@ def draw_envelope(aircraft: Aircraft, envelope: Envelope) -> Figure:
     >>> from logs.recording.example_log import example_log
     >>> figure = draw_envelope(load_aircraft("aerosonde"), example_log().setup.envelope)
     >>> [axes.get_title(loc="left") for axes in figure.axes]
-    ['steepest climb and descent to the air', 'level flight', 'steepest climb and dive over the ground, at 500 m',
-     'turn radius']
+    ['steepest climb and descent relative to the air', 'level flight',
+     'steepest climb and descent over the ground, at 500 m', 'turn radius']
     """
     with clean_style():
         figure = new_figure(8.0)
@@ -56,7 +56,7 @@ def draw_envelope(aircraft: Aircraft, envelope: Envelope) -> Figure:
         else:
             idle = "the motor brakes" if envelope.motor_braking else "without current (the motor does not brake)"
         subtitle = f"JSBSim trims; climbs at full throttle, descents: {idle}; shaded: the speeds that guidance uses"
-        _write_title(figure, f"{aircraft.title}: what it can do in steady flight", subtitle)
+        _write_title(figure, f"{aircraft.title}: steady flight envelope", subtitle)
         _draw_slopes(axes[0, 0], aircraft, envelope)
         _level_speeds(axes[0, 1], aircraft, envelope)
         _draw_slopes_in_wind(axes[1, 0], aircraft, envelope)
@@ -72,7 +72,7 @@ def _draw_slopes(axes: Any, aircraft: Aircraft, envelope: Envelope) -> None:
         axes.plot(envelope.airspeed, -np.degrees(envelope.descent[:, j]), **look)
     axes.axhline(0.0, color=theme.colour("area"), linewidth=0.8)
     _shade_guidance_speeds(axes, aircraft)
-    _set_up_axes(axes, "steepest climb and descent to the air", "airspeed (m/s)", "flight path (°)")
+    _set_up_axes(axes, "steepest climb and descent relative to the air", "airspeed (m/s)", "flight path (°)")
     _legend_above(axes, "height AMSL", 3)
 
 
@@ -104,7 +104,9 @@ def _draw_slopes_in_wind(axes: Any, aircraft: Aircraft, envelope: Envelope) -> N
         axes.plot(speeds, climb, label=name, **look)
         axes.plot(speeds, -dive, **look)
     axes.axhline(0.0, color=theme.colour("area"), linewidth=0.8)
-    _set_up_axes(axes, f"steepest climb and dive over the ground, at {TRIM_AMSL:.0f} m", "airspeed (m/s)", "slope (°)")
+    _set_up_axes(
+        axes, f"steepest climb and descent over the ground, at {TRIM_AMSL:.0f} m", "airspeed (m/s)", "slope (°)"
+    )
     _legend_above(axes, "", 3)
 
 
@@ -206,7 +208,7 @@ def _draw_roots(axes: Any, modes: Mapping[float, Sequence[Mode]], *, all_modes: 
             labelled.add(mode.name)
     axes.axvline(0.0, color=theme.colour("area"), linewidth=0.8)
     slow_or_fast = f"from {min(modes):g} m/s (hollow) to {max(modes):g} m/s (filled)" if modes else ""
-    title = f"modes {slow_or_fast}" if all_modes else "the slow ones, nearer"
+    title = f"modes {slow_or_fast}" if all_modes else "the slow modes, enlarged"
     _set_up_axes(axes, title, "real part (1/s): right of 0 is unstable", "imaginary part (rad/s)")
     min_x, max_x = axes.get_xlim()
     axes.set_xlim(min_x - 0.05 * (max_x - min_x), max_x + 0.05 * (max_x - min_x))
@@ -234,7 +236,7 @@ def draw_steps(aircraft: Aircraft, steps: Sequence[StepResponse]) -> Figure:
         figure.subplots_adjust(left=0.05, right=0.985, top=0.865, bottom=0.065, wspace=0.24, hspace=0.28)
         level = f"level flight at {aircraft.airspeed:g} m/s and {TRIM_AMSL:.0f} m"
         _write_title(
-            figure, f"{aircraft.title}: how it answers", f"from {level}, one control moved at 1 s, no guidance"
+            figure, f"{aircraft.title}: step responses", f"from {level}, one control moved at 1 s, no guidance"
         )
         for column, step in enumerate(steps):
             for row in range(deep):

@@ -138,7 +138,7 @@ def _sentence(line: str) -> str:
 
 
 def _map_caption(subject: Subject) -> str:
-    arcs = " At corners they part: the aircraft flies an arc inside the waypoint."
+    arcs = " At corners the two differ: the aircraft flies an arc inside the waypoint."
     flown = "The broad line is the plan, and the thin line on it is the flight." + (
         arcs if subject.setup.source is None else ""
     )
@@ -166,9 +166,11 @@ FIGURES = (
             "heights, the ceiling, and the missile and radar spheres that stand over the path."
         ),
         caption=lambda subject: (
-            subject.flown("Flown heights stand at the flight's progress along the planned path. ")
-            + "A sphere is cut where the path runs through its column of air; the path is within reach only where its "
-            "line lies inside the cut."
+            subject.flown("Flown heights are plotted at the flight's progress along the planned path. ")
+            + (
+                "A sphere appears where the path passes above or below it, or through it; the path "
+                "is within reach only where its line is inside the sphere."
+            )
         ),
         still=True,
     ),
@@ -176,10 +178,10 @@ FIGURES = (
         "scene",
         "3-D view",
         _make_scene,
-        alternative=lambda subject: f"View from aside: {subject.things}",
+        alternative=lambda subject: f"View from the side: {subject.things}",
         caption=_fixed_caption(
-            "Domes are the missiles' reach, dashed the radars'; thin poles stand from the ground to the waypoints. "
-            "What a ridge hides shows faintly."
+            "Domes are the missiles' reach, dashed domes the radars' reach; thin poles join the "
+            "ground and the waypoints. Parts behind a ridge are faint."
         ),
     ),
     FigureEntry(
@@ -187,12 +189,12 @@ FIGURES = (
         "Turn by turn, leg by leg",
         lambda subject: turn_chart(subject.setup.scenario.name, subject.verdict),
         alternative=_fixed_caption(
-            "Bars, dots and dashes: planned, flown and limit of each turn, slope, height above ground, waypoint, and "
-            "of the distance from the legs."
+            "Bars, dots and dashes: planned value, flown value and limit of each turn, slope, "
+            "height above ground, waypoint distance, and distance from the legs."
         ),
         caption=_fixed_caption(
-            "Bar: planned. Dot: flown. Dash: limit (the tighter of the scenario's and the aircraft's; for a "
-            "waypoint the distance that counts as reached). Ringed: fails."
+            "Bar: planned. Dot: flown. Dash: limit (the tighter one of scenario and aircraft; "
+            "for a waypoint, the distance within which it counts as reached). Ringed: fails."
         ),
     ),
     FigureEntry(
@@ -213,23 +215,24 @@ FIGURES = (
         _of_returns("worst-returns"),
         alternative=_fixed_caption("Heights along the worst returns: terrain, required clearance and spheres."),
         caption=_fixed_caption(
-            "Simulated with ArduPlane's laws on a point mass, in the mean wind, from the place where each "
-            "return begins."
+            "Simulated with the ArduPlane model on a point mass, in the mean wind, from the "
+            "point where each return begins."
         ),
     ),
     FigureEntry(
         "return-heights",
-        "Called home, or without an engine",
+        "Return to launch, or engine failure",
         _of_returns("return-heights"),
         alternative=_fixed_caption(
-            "Over time: the flight's height by what comes of a return, the least height from which one is safe, and "
-            "the height that a glide without the engine has left over."
+            "Over time: the flight's height coloured by the outcome of a return, the lowest "
+            "height from which a return is safe, and the height that a glide without the engine "
+            "has left over."
         ),
         caption=_fixed_caption(
-            "Lowest safe height: where a return from the flight's height is not safe, the nearest height above "
-            "it from which "
-            "a return is safe; elsewhere, how low the flight may come before it is not. Left over: the flight's "
-            "height less the height that a glide needs; below zero the glide does not arrive."
+            "Lowest safe height: the lowest height from which a return is safe. Where a return "
+            "from the flight's height is not safe, it is the nearest safe height above the "
+            "flight. Left over: the flight's height minus the height that a glide needs; below "
+            "zero the glide does not arrive."
         ),
     ),
     FigureEntry(
@@ -242,9 +245,11 @@ FIGURES = (
         ),
         caption=lambda subject: (
             ("" if subject.returns is None else _sentence(glides_headline(subject.returns.glides)))
-            + "Blue: the lowest height above ground from which home or another chosen place is in reach, up to 3 km "
-            "from the route. Flat ground is flat according to the elevation file, which knows no trees, houses "
-            "or water."
+            + (
+                "Blue: the lowest height above ground from which home or another chosen place is in "
+                "reach, up to 3 km from the route. Flat ground is flat according to the elevation "
+                "file, which contains no trees, houses or water."
+            )
         ),
     ),
     FigureEntry(
@@ -252,11 +257,11 @@ FIGURES = (
         "Photo lines",
         _of_flight(survey_chart),
         alternative=_fixed_caption(
-            "Each survey's photo lines from above, laid level: what can be used, what is lost, and the flown track."
+            "Each survey's photo lines from above: the usable parts, the lost parts, and the flown track."
         ),
         caption=_fixed_caption(
-            "Broad: flown on the line, level, at its height over ground and with the camera on. Marked: lost. The axes "
-            "have different scales."
+            "Broad: flown on the line, level, at its height above ground and with the camera on. "
+            "Marked: lost. The axes have different scales."
         ),
     ),
     FigureEntry(
@@ -267,8 +272,8 @@ FIGURES = (
             "Plots over time: airspeed, bank, load factor, cross-track error, height error, height above ground."
         ),
         caption=_fixed_caption(
-            "Cross-track and height error are what guidance saw, against the path with its corners rounded. Height "
-            "above ground is computed from track and terrain."
+            "Cross-track and height error are those of the guidance, relative to the path with "
+            "its corners rounded. Height above ground is computed from track and terrain."
         ),
     ),
     FigureEntry(
@@ -279,8 +284,9 @@ FIGURES = (
             "Plots along the flown distance: strength and sum of the exposure to missiles and to radars."
         ),
         caption=_fixed_caption(
-            "Strength is the sum over all units of (scale/distance)⁴ inside their reach: 1 at one scale's distance "
-            "(Yang, Tang and Lozano 2014, eq. 9 and 10, as a density). So far: its sum over time."
+            "Strength is the sum over all units of (scale/distance)⁴ inside their reach: 1 where "
+            "distance equals scale (Yang, Tang and Lozano 2014, eq. 9 and 10, as a density). So "
+            "far: its integral over time."
         ),
     ),
     FigureEntry(
@@ -288,9 +294,9 @@ FIGURES = (
         "Controls",
         _of_flight(control_chart),
         alternative=_fixed_caption(
-            "Plots over time: elevator, aileron, rudder and throttle, commanded and as they stood, with their limits."
+            "Plots over time: elevator, aileron, rudder and throttle, commanded and actual, with their limits."
         ),
-        caption=_fixed_caption("Shaded: the command stands at the control's limit, and the aircraft can give no more."),
+        caption=_fixed_caption("Shaded: the command is at the control's limit (saturated)."),
     ),
     FigureEntry(
         "energy",
@@ -300,7 +306,7 @@ FIGURES = (
             "Plots over time: battery energy used, power, current, and the aircraft's energy as a height."
         ),
         caption=_fixed_caption(
-            "Energy as height: height and airspeed²/2g. Its slope is climb that the motor pays for."
+            "Energy height: height plus airspeed²/2g. Its slope is the climb that the motor provides."
         ),
     ),
     FigureEntry(
@@ -311,8 +317,8 @@ FIGURES = (
             "Path angle over airspeed with the steepest climbs and descents, and bank over airspeed with its limit."
         ),
         caption=_fixed_caption(
-            "Lines: the steepest steady climb and descent of the aircraft, from trims of its model. A dot may stand "
-            "outside for a moment, in a gust or a pull-up; a leg may not."
+            "Lines: the steepest steady climb and descent of the aircraft, from trims of its "
+            "model. A dot may be outside for a moment, in a gust or a pull-up; a leg may not."
         ),
     ),
 )

@@ -179,13 +179,13 @@ def draw_convergence(histories: Mapping[int, Mapping[str, Sequence[Floats]]]) ->
                 lower.text(
                     0.5,
                     0.5,
-                    "no run holds\na safe path",
+                    "no run has\na safe path",
                     transform=lower.transAxes,
                     ha="center",
                     color=theme.colour("quiet"),
                 )
             if column == 0:
-                upper.set_ylabel("runs that hold a safe path")
+                upper.set_ylabel("runs with a safe path")
                 lower.set_ylabel("length ratio of the safe ones")
         figure.text(0.012, 0.965, "Convergence over generations", fontsize=11, fontweight="bold")
         handles: list[Any] = [

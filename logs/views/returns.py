@@ -74,9 +74,7 @@ def returns_map(setup: FlightSetup, drawn: DrawnReturns) -> MapChart:
     if unsafe:
         positions = np.array([worst.marked_position for worst in unsafe])
         texts = tuple(return_text(worst.simulated) for worst in unsafe)
-        layers.append(
-            Layer("rings", "where it goes wrong", "fail", positions[:, 0], positions[:, 1], hover_texts=texts)
-        )
+        layers.append(Layer("rings", "where it fails", "fail", positions[:, 0], positions[:, 1], hover_texts=texts))
     targets = {ret.target.name: ret.target.position for ret in drawn.returns.each}
     layers += _target_layers(targets)
     labels = [
@@ -104,7 +102,7 @@ def _target_layers(targets: dict[str, tuple[float, float, float]]) -> list[Layer
     if not targets:
         return []
     east, north, _ = np.array(list(targets.values())).T
-    return [Layer("dots", "where it returns to", "waypoint", east, north, hover_texts=tuple(targets))]
+    return [Layer("dots", "return targets", "waypoint", east, north, hover_texts=tuple(targets))]
 
 
 # ----------------------------------------------------------------------
@@ -154,7 +152,7 @@ def _profile_panel(scenario: Scenario, worst: WorstReturn, number: int, span: tu
     if not worst.simulated.safe:
         nearest_row = int(np.argmin(np.linalg.norm(path - worst.marked_position, axis=1)))
         layers.append(
-            Layer("rings", "where it goes wrong", "fail", along[[nearest_row]], worst.marked_position[[2]], quiet=True)
+            Layer("rings", "where it fails", "fail", along[[nearest_row]], worst.marked_position[[2]], quiet=True)
         )
     title = f"{number}: from {worst.simulated.time:.0f} s"
     note = segment_text(worst.simulated.kind).removeprefix("a return ")
@@ -179,7 +177,7 @@ def return_heights_chart(setup: FlightSetup, drawn: DrawnReturns, track: Track |
     min_altitude, max_altitude = float(np.nanmin(altitudes)), float(np.nanmax(altitudes))
     margin = 0.06 * max(max_altitude - min_altitude, _MIN_SPAN)
     span = (min_altitude - margin, max_altitude + margin)
-    name = f"least height for a safe return (no line: none up to {least_altitudes.search_range:.0f} m more)"
+    name = f"lowest height for a safe return (no line: none up to {least_altitudes.search_range:.0f} m more)"
     layers = [
         *ground_bands(scenario, PathPlane(time, positions, ground, *span)),
         *path_layers(
@@ -194,7 +192,7 @@ def return_heights_chart(setup: FlightSetup, drawn: DrawnReturns, track: Track |
     if drawn.glides.each:
         panels.append(_glide_margin_panel(drawn.glides))
     return Chart(
-        f"{shorten(scenario.name, 60)}: called home, or without its engine",
+        f"{shorten(scenario.name, 60)}: return to launch, or engine failure",
         "time since the start",
         "s",
         tuple(panels),

@@ -71,7 +71,7 @@ def _survey_panel(
             labels.append(Label(str(number), float(corners[0, 0]), float(corners[0, 1]), "number"))
     track_points = to_panel(position[:: max(1, len(position) // _POINTS)])
     layers = (
-        Layer("line", "photo line, flown as photos need it", "planned", *parted(usable_parts), quiet=True),
+        Layer("line", "usable part of a photo line", "planned", *parted(usable_parts), quiet=True),
         Layer("line", "photo line, lost", "fail", *parted(lost_parts), quiet=True),
         Layer("line", "flown track", "flown", track_points[:, 0], track_points[:, 1], quiet=True),
     )

@@ -270,7 +270,7 @@ def judging_parameters_text(mission: str, autopilot: Autopilot) -> tuple[str, st
     if not values:
         reason = f"{autopilot.title} has no parameters of take-off, landing and returns"
         raise MissionError(f"{mission}: {reason}", file=mission, field="autopilot")
-    title = f"{autopilot.title}: take-off, landing and returns as planfly judged the mission with"
+    title = f"{autopilot.title}: take-off, landing and returns with which planfly judged the mission"
     return parameters_text(values, title), f"{len(values)} parameters of {autopilot.title}"
 
 

@@ -377,7 +377,7 @@ def check_keywords_not_given(source: str, keywords: Mapping[str, Any], reason: s
 # Reason why a log cannot be judged in another world, in messages.
 _FIXED_OPTIONS_TEXT = "a log is judged with the aircraft, the speeds, the wind and the autopilot it was flown with"
 # Reason why a log cannot be judged in another scenario, in messages.
-_FIXED_SCENARIO_TEXT = "a log is judged in the scenario it carries; only `terrain` replaces its ground"
+_FIXED_SCENARIO_TEXT = "a log is judged in the scenario stored in it; only `terrain` can replace its ground"
 
 
 def check_judging_options(source: str, options: MissionOptions) -> None:

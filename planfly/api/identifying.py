@@ -158,7 +158,7 @@ def _load_base(base: str | Path) -> Aircraft:
     text = str(base.absolute()) if isinstance(base, Path) else base
     aircraft = find_aircraft(whole_path(Path(text)) if names_folder(text) else text)
     if (aircraft.folder / "posterior.toml").is_file():
-        allowed = "identified from flight logs itself: name the base that it came from, as its posterior.toml has it"
+        allowed = "identified from flight logs itself: name its base, which its posterior.toml states"
         raise FlightError.of_argument("base", str(base), allowed)
     return aircraft
 

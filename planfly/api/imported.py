@@ -164,7 +164,7 @@ def refly(
     check_arguments(turbulence=turbulence)
     flight_log = log if isinstance(log, FlightLog) else read_log(log)
     if flight_log.setup.source is None:
-        message = f"{flight_log.source}: flown by planfly itself: refly takes a log that `planfly import` wrote"
+        message = f"{flight_log.source}: flown by planfly itself; refly expects a log written by `planfly import`"
         raise LogError(message, file=flight_log.source)
     if out is not None:
         check_output_folder(Path(out), overwrite)

@@ -115,7 +115,7 @@ def _with_new_threats(scenario: Scenario, old_plan: Plan, threats: Sequence[Thre
     """
     for east, north, _, _ in threats:
         if scenario.terrain is not None and math.isnan(scenario.terrain.height(east, north)):
-            reason = f"east {east:g} m, north {north:g} m: outside the terrain that is known"
+            reason = f"east {east:g} m, north {north:g} m: outside the terrain data"
             raise ScenarioError.of_argument("threats", (east, north), reason, shown="")
     old_threats = [threat for threat in old_plan.scenario.spec.threats if threat not in scenario.spec.threats]
     return with_threats(scenario, threats, "threats", old_threats)

@@ -170,7 +170,7 @@ def play_to_foxglove(
     stop: Callable[[], bool] = _never_stop,
     on_message: Callable[[str], None] = _ignore_message,
 ) -> None:
-    """Play a flight to Foxglove on this machine over WebSocket; needs the extra ``planfly[foxglove]``.
+    """Play a flight to Foxglove on this machine over WebSocket; requires ``planfly[foxglove]``.
 
     start, end: start and end of the played part in flight time, s; None for the start or end of the flight.
     speed: multiple of real time, 1 if None.
@@ -225,7 +225,7 @@ def play_to_stations(
     stop: Callable[[], bool] = _never_stop,
     on_message: Callable[[str], None] = _ignore_message,
 ) -> None:
-    """Play a flight to MAVLink ground stations as if it were flown now; needs ``planfly[live]``.
+    """Play a flight to MAVLink ground stations as if it were flown now; requires ``planfly[live]``.
 
     to: addresses of the stations, IP:PORT, one or several.
     bind, allow, sign_key: see `planfly.serve`.

@@ -145,18 +145,19 @@ class ReturnsFound:
         if self.returns.stands_in:
             notes.append(f"{self.setup.autopilot.title}'s own return is not simulated: ArduPlane's return stands in")
         if self.setup.envelope.battery_guessed and self.setup.scenario.flight.battery_wh is None:
-            notes.append("the battery is guessed: energy is not judged; battery_wh in the scenario states it")
+            notes.append("the battery is guessed, so energy is not judged; battery_wh in the scenario states it")
         if self.returns.lands:
             notes.append("a return to a landing sequence is judged up to its first item; the landing is not judged")
         parameters = self.setup.autopilot.parameters
         if parameters is None or not parameters.source:
             notes.append(
-                "no parameter file was given: the settings above are not yours; --params names a file with yours"
+                "no parameter file was given: the settings above are not those of your aircraft; "
+                "--params names its parameter file"
             )
         if self.setup.scenario.terrain is None:
             notes.append("no terrain was given: --terrain names an elevation file")
         if self.setup.scenario.external:
-            notes.append("the mission came without a scenario: threats are not known")
+            notes.append("the mission came without a scenario: threats are unknown")
         if not self.returns.flown:
             notes.append("returns begin on the planned path: nothing was flown, and no energy was used before")
         return (*notes, *glide_notes(self.glides))
@@ -166,7 +167,7 @@ class ReturnsFound:
 
 
 # Reason why the returns of a flight cannot be judged in another world, in messages.
-_RETURNS_AS_FLOWN_TEXT = "a flight's returns are flown as it was flown; only `terrain` replaces its ground"
+_RETURNS_AS_FLOWN_TEXT = "returns of a flight are flown in its own conditions; only `terrain` can replace its ground"
 
 
 @with_warm_up(*FLYING, *GLIDING)

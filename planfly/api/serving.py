@@ -40,7 +40,7 @@ def serve(
     on_message: Callable[[str], None] = _ignore_message,
     **options: Unpack[MissionOptions],
 ) -> None:
-    """Serve a MAVLink vehicle in a simulated world until ``stop`` returns True; needs ``planfly[live]``.
+    """Serve a MAVLink vehicle in a simulated world until ``stop`` returns True; requires ``planfly[live]``.
 
     mission: the file of the first mission; None waits for an upload into the scenario that the options name.
     options: options of `planfly.fly`.

@@ -155,7 +155,7 @@ def survey(
         check_keywords_not_given("flight", fixed_options, _LINES_AS_FLOWN_TEXT)
         source = what.setup.source
         if source is not None and "attitude" not in source.holds:
-            raise LogError(f"{source.file}: no attitude, so the bank of photos is not known", file=source.file)
+            raise LogError(f"{source.file}: no attitude, so the bank at the photos is unknown", file=source.file)
         setup = _with_camera(what.setup.in_scenario(_with_parallel_lines_as_survey(what.setup.scenario)), own_camera)
         return _write_results(_judge_flown_survey(setup, what.track, what.ended or ""), out, overwrite)
 

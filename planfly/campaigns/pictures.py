@@ -444,11 +444,11 @@ def draw_go_no_go(
         axes.set_rlabel_position(11.0)  # type: ignore[attr-defined]  # of polar axes
         axes.tick_params(axis="y", labelsize=8)
         axes.grid(color=GRID_COLOUR, linewidth=0.6)
-        figure.text(0.03, 0.955, f"{name}: in which wind it flies", fontsize=14, color=INK_COLOUR)
+        figure.text(0.03, 0.955, f"{name}: wind in which it is flyable", fontsize=14, color=INK_COLOUR)
         figure.text(
             0.03,
             0.922,
-            f"wind from each direction, m/s; flies with a probability of {target:g} or more",
+            f"wind from each direction, m/s; flyable with a probability of {target:g} or more",
             fontsize=9,
             color=QUIET_COLOUR,
         )

@@ -241,10 +241,10 @@ class OutputDirectory:
             return
         if (folder / self.table).exists():
             raise PlanflyError(
-                f"{folder}: holds a campaign; resume=True continues it, overwrite=True replaces it", file=folder
+                f"{folder}: contains a campaign; resume=True continues it, overwrite=True replaces it", file=folder
             )
         if any((folder / name).exists() for name in CAMPAIGN_FILES):
-            raise PlanflyError(f"{folder}: holds another campaign; overwrite=True replaces it", file=folder)
+            raise PlanflyError(f"{folder}: contains another campaign; overwrite=True replaces it", file=folder)
         raise PlanflyError(f"{folder}: exists and is not empty; overwrite=True replaces its results", file=folder)
 
     def open_base_and_clear(self, open_base: Callable[[Path | None], CampaignBase]) -> CampaignBase:
@@ -449,9 +449,10 @@ def _unsettled_lines(winds: WindsFound) -> list[str]:
     if not unsettled:
         return []
     return [
-        f"not settled: {len(unsettled)} of {len(winds.boundaries)} directions, for lack of flights: each needs"
-        f" at least {MIN_FLIGHTS_PER_DIRECTION}, and an interval of {2.0 * BOUNDARY_ACCURACY_MPS:g} m/s; with fewer,"
-        " the interval is mostly assumption"
+        f"not settled: {len(unsettled)} of {len(winds.boundaries)} directions, for lack of "
+        f"flights: each requires at least {MIN_FLIGHTS_PER_DIRECTION}, and an interval of at most "
+        f"{2.0 * BOUNDARY_ACCURACY_MPS:g} m/s; with fewer, the interval rests mostly on "
+        "assumptions"
     ]
 
 

@@ -39,7 +39,7 @@ def aircraft_options(line: LineParser) -> None:
     """Add the parser of ``planfly aircraft``."""
     parser = line.command(
         "aircraft",
-        "show an aircraft: mass, trims, modes, envelope and step responses; without a name, list them",
+        "show an aircraft: mass, trims, modes, envelope and step responses; without a name, list the aircraft",
         "planfly aircraft aerosonde --out aerosonde",
         "planfly aircraft --new ./mine --mass 2.1 --span 1.6 --cruise 15 --stall 10 --layout wing",
         "planfly aircraft --new ./copy --from aerosonde",
@@ -51,7 +51,7 @@ def aircraft_options(line: LineParser) -> None:
     )
     parser.add_argument("--motor-braking", action="store_true", help="let the motor brake in descents")
     new_group = parser.group("an aircraft of your own")
-    new_group.add_argument("--new", dest="folder", metavar="FOLDER", help="make its folder, which must not exist yet")
+    new_group.add_argument("--new", dest="folder", metavar="FOLDER", help="folder to make; it must not exist yet")
     with_completer(
         new_group.add_argument(
             "--from", dest="source", metavar="NAME", help="with --new: the aircraft to start from (default: aerosonde)"
@@ -90,17 +90,17 @@ def aircraft_options(line: LineParser) -> None:
 
 
 def _data_sheet_options(parser: CommandParser) -> None:
-    group = parser.group("a data sheet: with --new; mass, span, cruise and stall are needed, the rest is guessed")
+    group = parser.group("a data sheet: with --new; mass, span, cruise and stall are required, the rest is guessed")
     numbers = {
         "mass": ("KG", "mass, 0.5 to 25 kg"),
         "span": ("M", "wing span, m"),
         "area": ("M2", "wing area, m2 (default: the area that carries the mass at the stall speed)"),
-        "cruise": ("M/S", "usual airspeed"),
-        "stall": ("M/S", "airspeed of slowest level flight"),
-        "top": ("M/S", "airspeed of fastest level flight (default: 1.4 times the cruise's)"),
+        "cruise": ("M/S", "cruise airspeed"),
+        "stall": ("M/S", "minimum airspeed of level flight"),
+        "top": ("M/S", "maximum airspeed of level flight (default: 1.4 times the cruise speed)"),
         "bank": ("DEG", "steepest bank in turns (default: 35)"),
         "climb": ("DEG", "steepest climb at cruise (default: 12, or the climb that fits the top speed)"),
-        "motor": ("KV", "rpm a volt"),
+        "motor": ("KV", "rpm per volt"),
         "fuel": ("KG", "fuel carried, for an aircraft without a battery"),
     }
     for name, (unit, text) in numbers.items():
@@ -109,7 +109,7 @@ def _data_sheet_options(parser: CommandParser) -> None:
     group.add_argument("--prop", metavar="DxP", help="propeller, inches, such as 12x6")
     group.add_argument("--layout", choices=("tail", "wing", "vtail"), help="(default: tail)")
     group.add_argument(
-        "--params", metavar="FILE", help="a parameter file of ArduPlane; facts about the aircraft are taken from it"
+        "--params", metavar="FILE", help="an ArduPlane parameter file, from which facts about the aircraft are taken"
     )
 
 
@@ -191,7 +191,7 @@ def _identify(args: argparse.Namespace) -> int:
     for field, is_given, reason_text in (
         ("--params", args.params is not None, "the parameters come from the logs"),
         ("--from", args.source is not None, "--base names the aircraft to start from"),
-        ("--motor-braking", args.motor_braking, "it is a choice of each flight"),
+        ("--motor-braking", args.motor_braking, "it is chosen for each flight"),
     ):
         if is_given:
             raise PlanflyError(f"--identify cannot be combined with {field}: {reason_text}", field=field)
@@ -207,21 +207,24 @@ def _identify(args: argparse.Namespace) -> int:
         print(f"  {name:<8} {value:.{0 if unit == 'W' else 1}f} {unit} at cruise, {lower:.1f} to {upper:.1f} (95 %)")
     _print_uncertain_properties(result)
     if "identify.waypoints" not in files_made:
-        print("  no mission identify.waypoints: the logs have neither home (ORGN) nor a position on the ground (POS)")
+        print("  identify.waypoints not written: the logs have neither home (ORGN) nor a position on the ground (POS)")
     for replay in result.replays:
         rms_text = ", ".join(f"{name} {value:.2g}" for name, value in replay.rms.items())
         print(f"  replay   {replay.model}: {rms_text} (rms of {replay.windows} windows of 5 s; deg/s, deg, m/s)")
     write_json_if_requested(args, lambda: _json_answer([new_aircraft]))
-    print(f"next      planfly aircraft {shlex.quote(args.out)}; {args.out}/identify.html says how sure each number is")
+    print(
+        f"next      `planfly aircraft {shlex.quote(args.out)}` prints the model; {args.out}/identify.html "
+        "shows each estimate with its uncertainty"
+    )
     return FLYABLE
 
 
 def _print_uncertain_properties(result: "planfly.IdentifiedAircraft") -> None:
     """Print the properties that the logs do not determine, and what would determine them."""
     if not result.estimate.dynamics:
-        print("  performance only: under 10 rows of inertial sensors or outputs a second tell nothing of the moments")
+        print("  performance only: fewer than 10 rows of inertial sensors or outputs a second do not show the moments")
     for log in result.slow:
-        print(f"  rows     {log.source}: {log.hertz:.1f} a second of sensors or outputs: {log.setting} records more")
+        print(f"  rows     {log.source}: {log.hertz:.1f} a second of sensors or outputs; {log.setting} records more")
     for number in result.wide:
         print(f"  wide     {number.text}")
     for line in result.estimate.silent():
@@ -247,10 +250,10 @@ def _print_sheet(aircraft: "Aircraft") -> None:
     if uncertainty is not None:
         climb_sd, descent_sd = math.degrees(uncertainty.climb), math.degrees(uncertainty.descent)
         print(
-            f"  slopes   climb {climb:.1f} degrees, give or take {climb_sd:.1f}; descent {descent:.1f}, give or take"
-            f" {descent_sd:.1f} (at cruise and 500 m; one standard deviation)"
+            f"  slopes   climb {climb:.1f} degrees ± {climb_sd:.1f}; descent {descent:.1f} ± "
+            f"{descent_sd:.1f} (at cruise and 500 m; one standard deviation)"
         )
-    print("  guessed  README.md says what was, and how far off it may be")
+    print("  guessed  README.md lists the guessed values and their possible error")
 
 
 def _print_numbers(numbers: "AircraftNumbers") -> None:
@@ -319,7 +322,7 @@ def _print_modes(modes: "tuple[Mode, ...]", airspeed: float, amsl: float) -> Non
 def _print_envelope(aircraft: "Aircraft", envelope: "Envelope") -> None:
     heights = [float(amsl) for amsl in envelope.amsl[::2]]
     header = "".join(f"{amsl:>13.0f} m" for amsl in heights)
-    print("\nsteepest climb / descent to the air, deg, by airspeed and height AMSL ('-': no steady flight)")
+    print("\nsteepest climb / descent relative to the air, deg, by airspeed and height AMSL ('-': no steady flight)")
     print(f"  m/s  {header}")
     for airspeed in envelope.airspeed.tolist():
         cells = "".join(f"{_angle_pair(*envelope.air_angles(airspeed, amsl)):>15}" for amsl in heights)
@@ -327,7 +330,7 @@ def _print_envelope(aircraft: "Aircraft", envelope: "Envelope") -> None:
     for title, index in (("level, from", 0), ("level, to", 1)):
         cells = "".join(f"{envelope.level_speeds(amsl)[index]:11.1f} m/s" for amsl in heights)
         print(f"  {title:<5}{cells[len(title) - 5 :]}")
-    print(f"\nsteepest climb / dive over the ground at {aircraft.airspeed:g} m/s and 500 m, deg")
+    print(f"\nsteepest climb / descent relative to the ground at {aircraft.airspeed:g} m/s and 500 m, deg")
     for title, tail, cross in (
         ("calm", 0.0, 0.0),
         (f"{_WIND_MPS:g} m/s tailwind", _WIND_MPS, 0.0),

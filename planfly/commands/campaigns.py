@@ -24,7 +24,7 @@ from world.errors import PlanflyError
 from world.interruption import Interrupted
 
 # Exit code by the answer of a campaign.
-_EXIT_CODES = {"reached": FLYABLE, "missed": NOT_FLYABLE, "undecided": LOSS, "none asked": FLYABLE}
+_EXIT_CODES = {"reached": FLYABLE, "missed": NOT_FLYABLE, "undecided": LOSS, "no target": FLYABLE}
 
 
 def campaign_options(line: LineParser) -> None:
@@ -42,7 +42,7 @@ def campaign_options(line: LineParser) -> None:
         "--prove",
         metavar="P",
         type=number("prove"),
-        help="fly until the probability is shown to be at least P, or less",
+        help="fly until it is shown whether the probability is at least P",
     )
     goal.add_argument(
         "--at-least",
@@ -54,7 +54,7 @@ def campaign_options(line: LineParser) -> None:
         "--flights",
         metavar="N",
         type=number("flights"),
-        help="number of flights (default: 300), or with --prove the largest number (default: 5000)",
+        help="number of flights (default: 300); with --prove, the maximum (default: 5000)",
     )
     parser.add_argument(
         "--confidence",
@@ -63,7 +63,7 @@ def campaign_options(line: LineParser) -> None:
         help="confidence of each bound (default: 0.95, or with --resume the previous value)",
     )
     parser.add_argument(
-        "--refly", metavar="K", type=number("index"), help="fly flight K of the campaign in --out again, with a log"
+        "--refly", metavar="K", type=number("index"), help="repeat flight K of the campaign in --out, with a log"
     )
 
 
@@ -71,7 +71,7 @@ def winds_options(line: LineParser) -> None:
     """Add the parser of ``planfly winds``."""
     parser = line.command(
         "winds",
-        "find the largest wind from each direction in which a mission flies",
+        "for each wind direction, find the strongest wind in which a mission is flyable",
         "planfly winds jacksboro-air --prove 0.99 --directions 16",
         extra="campaigns",
     )
@@ -98,13 +98,13 @@ def winds_options(line: LineParser) -> None:
         help="number of directions, 4 to 72 (default: 16)",
     )
     parser.add_argument(
-        "--most", metavar="M/S", type=number("most"), default=20.0, help="largest wind to try, m/s (default: 20)"
+        "--most", metavar="M/S", type=number("most"), default=20.0, help="strongest wind to try, m/s (default: 20)"
     )
     parser.add_argument(
         "--flights",
         metavar="N",
         type=number("flights"),
-        help="largest number of flights, in all directions together (default: 5000)",
+        help="maximum number of flights, all directions together (default: 5000)",
     )
 
 
@@ -119,7 +119,7 @@ def _shared_options(parser: CommandParser) -> None:
     aircraft_and_wind_options(parser)
     steering_options(parser)
     with_completer(
-        parser.add_argument("--spread", metavar="FILE", help="what varies, as TOML (default: planfly's own)"),
+        parser.add_argument("--spread", metavar="FILE", help="dispersions, as TOML (default: planfly's own)"),
         files("toml"),
     )
     parser.add_argument(
@@ -129,7 +129,9 @@ def _shared_options(parser: CommandParser) -> None:
         "--workers", metavar="N", type=number("workers"), help="processes on this machine (default: one per core)"
     )
     parser.add_argument(
-        "--scheduler", metavar="ADDRESS", help="fly on a running dask cluster: tls://HOST:PORT; needs planfly[cluster]"
+        "--scheduler",
+        metavar="ADDRESS",
+        help="fly on a running dask cluster: tls://HOST:PORT; requires planfly[cluster]",
     )
     parser.add_argument("--resume", action="store_true", help="continue the campaign in --out")
     result_options(parser, "folder for the files (default: runs/<name>-<command>; an existing one is kept)")

@@ -15,7 +15,7 @@ def export_options(line: LineParser) -> None:
     """Add the parser of ``planfly export``."""
     parser = line.command(
         "export",
-        "write a plan, mission or log in the format that a suffix names",
+        "convert a plan, mission or log to the formats given by the suffixes of the files",
         "planfly export plan.json mission.waypoints mission.fence mission.plan plan.kml",
     )
     with_completer(

@@ -106,7 +106,8 @@ def refly_options(line: LineParser) -> None:
         "planfly refly flight.mcap --out refly",
     )
     with_completer(
-        parser.add_argument("log", metavar="FLIGHT.mcap", help="a flight log that import wrote"), files("mcap")
+        parser.add_argument("log", metavar="FLIGHT.mcap", help="a flight log written by 'planfly import'"),
+        files("mcap"),
     )
     with_completer(
         parser.add_argument(

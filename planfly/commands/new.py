@@ -40,7 +40,7 @@ def new_options(line: LineParser) -> None:
             "--aircraft",
             metavar="AIRCRAFT",
             default="aerosonde",
-            help="a name that planfly aircraft lists, or a folder (default: aerosonde)",
+            help="an aircraft listed by 'planfly aircraft', or the folder of one (default: aerosonde)",
         ),
         complete_aircraft,
     )

@@ -18,7 +18,7 @@ def paper_options(line: LineParser) -> None:
     """Add the parser of ``planfly paper``."""
     parser = line.command(
         "paper",
-        "plan the paper's section V again: tables and figures of seeded plans in three encodings",
+        "reproduce section V of the paper: tables and figures of seeded plans in three encodings",
         "planfly paper --problems 7,60 --runs 5 --out my-paper",
     )
     parser.add_argument(

@@ -60,11 +60,12 @@ def plan_options(line: LineParser) -> None:
         "--front",
         metavar="N",
         type=number("front"),
-        help="plan a choice of up to N plans (2 to 100); none is better than another in length, exposure to "
-        "radars, height "
-        'above ground and energy at once (time for energy with [planner] objective = "time"); --out is then a folder '
-        "of plan-1.json ..., front.csv, front.json and pictures (default: runs/<name>-seed<N>-front; an"
-        " existing one is replaced)",
+        help=(
+            "plan up to N alternatives (2 to 100); none is better than another in length, exposure "
+            "to radars, height above ground and energy at once (time for energy with [planner] "
+            'objective = "time"); --out is then a folder of plan-1.json ..., front.csv, front.json '
+            "and pictures (default: runs/<name>-seed<N>-front; an existing one is replaced)"
+        ),
     )
     replanning_group = parser.group("planning again in flight")
     with_completer(
@@ -80,7 +81,7 @@ def plan_options(line: LineParser) -> None:
         metavar="EAST,NORTH,KILL,DETECTION",
         type=threat,
         action="append",
-        help="a threat that has appeared, in m; repeatable",
+        help="a new threat: east, north, kill radius and detection radius, m; repeatable",
     )
     aircraft_and_wind_options(parser)
     autopilot_options(parser)

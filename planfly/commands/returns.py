@@ -101,7 +101,7 @@ def returns(args: argparse.Namespace) -> int:
     for text in result.suggestion_lines:
         print(colour_text("  would help: ", "hint") + text)
     if args.suggest and not result.safe and not result.suggested:
-        print("  no RTL_ALTITUDE, climb or rally points were found that would help")
+        print("  no RTL_ALTITUDE, climb or set of rally points that would help was found")
     print(f"engine out: {result.glide_headline}")
     for text in result.glide_lines[:_MAX_LISTED]:
         print(f"  {text}")

@@ -20,20 +20,20 @@ from planfly.terminal.options import (
 _VEHICLE_HELP = """
 It flies the modes AUTO, LOITER, GUIDED (to a place) and RTL, and changes between them in flight.
 Parameters are read, listed and set by name before a flight: those of the simulated autopilot, and PFLY_FORCE,
-which at 1 arms and flies even a mission that is judged not flyable (default: 0)."""
+which at 1 lets the vehicle arm and fly even a mission that is judged not flyable (default: 0)."""
 
 
 def serve_options(line: LineParser) -> None:
     """Add the parser of ``planfly serve``."""
     parser = line.command(
         "serve",
-        "simulate a MAVLink vehicle to which a ground station uploads a mission, and which it arms, starts and watches",
+        "simulate a MAVLink vehicle: a ground station uploads a mission, arms and starts the vehicle, and monitors it",
         "planfly serve mission.waypoints --terrain jacksboro",
         extra="live",
         more=_VEHICLE_HELP,
     )
     with_completer(
-        parser.add_argument("mission", metavar="MISSION", nargs="?", help="a mission file to begin with"),
+        parser.add_argument("mission", metavar="MISSION", nargs="?", help="mission to load at start-up"),
         files(*MISSION_SUFFIXES),
     )
     world_options(parser)

@@ -13,7 +13,7 @@ from world.files import did_you_mean
 
 # Help text on how to install the completion.
 _COMPLETION_HELP = """\
-to complete in this shell, and in those to come:
+to enable completion in this shell and in new ones:
   bash   eval "$(planfly completion bash)", in ~/.bashrc
   zsh    eval "$(planfly completion zsh)", in ~/.zshrc after compinit
   fish   planfly completion fish > ~/.config/fish/completions/planfly.fish"""
@@ -26,7 +26,7 @@ def completion_options(line: LineParser) -> None:
     """Add the parser of ``planfly completion``."""
     parser = line.command(
         "completion",
-        "print the script with which a shell completes planfly's commands, options and names",
+        "print a script that makes a shell complete planfly's commands, options and names",
         "planfly completion bash",
     )
     parser.extra_help = lambda: _COMPLETION_HELP

@@ -17,11 +17,11 @@ from planfly.terminal.options import (
 
 # Help text on mouse and keyboard.
 _CONTROLS_HELP = """
-Waypoints are dragged on the map, heights on the profile below it; a diamond on a leg inserts one.  While it is dragged
-the geometry is judged; when it is let go the simulated autopilot flies the mission.  Keys: arrows move a waypoint by
+Waypoints are dragged on the map, heights on the profile below it; a diamond on a leg inserts one.  During a drag
+the geometry is judged; when it ends, the simulated autopilot flies the mission.  Keys: arrows move a waypoint by
 10 m (with Shift 100 m), Page Up and Page Down by 5 m of height, Delete deletes it, Ctrl+Z and Ctrl+Shift+Z undo and
-redo, Escape takes a drag back.
-Only this machine reaches the page, by the address that is printed."""
+redo, Escape cancels a drag.
+The page can be reached only from this machine, at the printed address."""
 
 
 def studio_options(line: LineParser) -> None:
@@ -39,8 +39,10 @@ def studio_options(line: LineParser) -> None:
             "what",
             metavar="SCENARIO|MISSION|PLAN",
             nargs="?",
-            help="a scenario, by name or .toml, whose path is planned; plan.json, .waypoints, .plan; or a "
-            "log's mission (default: jacksboro)",
+            help=(
+                "a scenario (name or .toml), for which a path is planned; a plan.json, .waypoints or "
+                ".plan; or a log, whose mission is opened (default: jacksboro)"
+            ),
         ),
         files("toml", "mcap", *MISSION_SUFFIXES, *IMPORTED_LOG_SUFFIXES),
     )

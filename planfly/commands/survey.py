@@ -39,10 +39,12 @@ def survey_options(line: LineParser) -> None:
         "--camera",
         metavar="WxH,FOCAL",
         type=camera,
-        help="the camera, which looks straight down: size of its sensor across and along the track, and focal "
-        "length, mm, as in 23.5x15.6,16; then the required overlaps along and across the lines, in percent, as in "
-        "23.5x15.6,16,75,60 "
-        "(default: those of a .plan)",
+        help=(
+            "width and height of the camera's sensor (across and along the track) and its focal "
+            "length, mm, optionally followed by the required overlaps along and across the lines, "
+            "percent: 23.5x15.6,16 or 23.5x15.6,16,75,60; the camera looks straight down (default: "
+            "the camera of a .plan)"
+        ),
     )
     group.add_argument(
         "--suggest",

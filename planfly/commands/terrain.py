@@ -26,7 +26,7 @@ def terrain_options(line: LineParser) -> None:
     area_group = parser.group("the area")
     with_completer(
         area_group.add_argument(
-            "--around", metavar="MISSION", help=".waypoints or .plan file: cover all of its places"
+            "--around", metavar="MISSION", help=".waypoints or .plan file, all of whose positions are covered"
         ),
         files(*MISSION_SUFFIXES),
     )
@@ -44,8 +44,10 @@ def terrain_options(line: LineParser) -> None:
     tile_group.add_argument(
         "--sea",
         action="store_true",
-        help="treat missing 1-degree tiles as sea at 0 m (default: no data, because some countries' tiles are not "
-        "published)",
+        help=(
+            "treat missing 1-degree tiles as sea at 0 m (default: no data, because the tiles of some "
+            "countries are not published)"
+        ),
     )
     result_options(parser, "the file to write (default: dem.tif)", "FILE")
 

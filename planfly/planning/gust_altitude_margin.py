@@ -351,7 +351,7 @@ def _max_height_shortfall(problem: Problem, parts: _Parts) -> Shortfall | None:
     data, max_height = problem.certified, problem.certified.airspace.max_height
     if max_height == math.inf:
         return None
-    hazard_text = f"above the {max_height:.0f} m over ground that are allowed"
+    hazard_text = f"above the allowed {max_height:.0f} m above ground"
     for name, height, index in _heights_at_ends(problem, parts):
         if (depth := height + float(parts.margin_after[index]) - max_height) > _ROUNDING_TOLERANCE_M:
             return Shortfall(parts.gust, depth, hazard_text, f"at its {name}", end_name=name)

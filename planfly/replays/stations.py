@@ -61,7 +61,7 @@ def play_to_stations(
         if log.ended == "completed" and k == len(rows) - 1:
             status.mission_state = COMPLETE
         status.armed = status.flying = False
-        player.announce(f"replay over: {log.ended or CUT_SHORT}")
+        player.announce(f"replay ended: {log.ended or CUT_SHORT}")
         player.continue_sending(1.5, stopped)
     finally:
         link.close()

@@ -103,10 +103,10 @@ class ProgramReturns:
         """Return a one-line summary.
 
         >>> ProgramReturns("", ()).headline()
-        'by the program: no return could be flown'
+        'the program could fly no return'
         """
         if not self.flown_pairs:
-            return "by the program: no return could be flown"
+            return "the program could fly no return"
         agreeing_count = sum(pair.agrees for pair in self.flown_pairs)
         worse_count = sum(pair.worse for pair in self.flown_pairs)
         comparison = (
@@ -130,9 +130,9 @@ class ProgramReturns:
             agreement = (
                 "they agree"
                 if pair.agrees
-                else "the program's outcome counts, as it is worse"
+                else "the program's outcome applies, because it is worse"
                 if pair.worse
-                else "the simulated outcome counts, as it is worse"
+                else "the simulated outcome applies, because it is worse"
             )
             program_text = measured_text(pair.flown, returns.limit, scenario)
             texts.append(f"{start_text}: simulated {simulated_text}; by the program {program_text}: {agreement}")
@@ -153,7 +153,7 @@ def check_is_arduplane(program: Path) -> None:
     """Raise ArgumentError for a program other than ArduPlane, whose returns planfly does not simulate."""
     kind = program_autopilot(program)
     if not issubclass(kind, ArduPlaneSitl):
-        allowed = f"expected ArduPlane's program; returns of {kind.title} are not flown here"
+        allowed = f"expected ArduPlane's program; returns of {kind.title} are not supported"
         raise ArgumentError.of_argument("autopilot", str(program), allowed)
 
 
@@ -229,7 +229,7 @@ def fly_by_program(
         program_return = _judge_flown_return(
             world, simulated_return, starts.rows[start_index], flight.track, flight.ended
         )
-        reason = "" if program_return else f"it does not come to where the return begins ({flight.ended})"
+        reason = "" if program_return else f"it does not reach the start of the return ({flight.ended})"
         program_returns.append(ProgramReturn(simulated_return, program_return, reason, log))
     return ProgramReturns(version, tuple(program_returns))
 

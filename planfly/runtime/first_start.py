@@ -152,7 +152,7 @@ def _report_and_compile(units: list[str]) -> None:
     folder = cache_folder()
     if not can_write(folder):
         report_line(
-            f"compiling the numeric kernels: {folder} cannot be written, and keeps none of them; {_CACHE_DIR_HINT}"
+            f"compiling the numeric kernels: {folder} cannot be written, so they are not stored; {_CACHE_DIR_HINT}"
         )
         return
     if TEMPORARY:

@@ -164,7 +164,7 @@ def _read_imported_log(path: Path, options: MissionOptions) -> ImportedFlight:
     try:
         return read_imported(path, **world)
     except LogError as error:
-        if "holds no mission" not in str(error):
+        if "contains no mission" not in str(error):
             raise
         reason = "a flight's track without a mission: open the file of its mission"
         raise MissionError(f"{path}: {reason}", file=path) from None
@@ -242,11 +242,11 @@ def _format_losses(context: EditContext, mission: Mission, text: str, name: str,
     """Describe the contents of a mission and its scenario that a ground station's file cannot store."""
     parsed, losses = parse_mission(text, name), []
     lost_counts: Mapping[str, tuple[int, str]] = {
-        "fence items": (len(mission.fences) - len(parsed.fences), ".plan holds them"),
-        "rally points": (len(mission.rally) - len(parsed.rally), ".plan holds them"),
+        "fence items": (len(mission.fences) - len(parsed.fences), "a .plan contains them"),
+        "rally points": (len(mission.rally) - len(parsed.rally), "a .plan contains them"),
         "survey plans": (
             len(mission.survey_plans),
-            "their items stay; what the ground station keeps next to them is lost",
+            "their items stay; other data of the ground station is lost",
         ),
     }
     losses += [
@@ -277,7 +277,7 @@ def _lost_settings(opened_scenario: Scenario, context: EditContext) -> tuple[str
 def _lost_parameters(context: EditContext) -> tuple[str, ...]:
     """Describe the autopilot parameters set in the studio, which only a parameter file can store."""
     count = len(context.parameters.values)
-    return (f"{count} parameter{'s' if count != 1 else ''} set here: .parm holds them",) if count else ()
+    return (f"{count} parameter{('s' if count != 1 else '')} set here: a .parm contains them",) if count else ()
 
 
 def _saved_parameters(name: str, context: EditContext) -> Saved:
@@ -296,7 +296,9 @@ def _saved_plan(name: str, context: EditContext, judged: JudgedMission) -> Saved
         return Saved(name, plan_json(plan).encode())
     new_plan = make_certified_plan(context, judged)
     has_changed_items = not context.planned or planned_mission(new_plan, context.airframe).items != judged.mission.items
-    losses = ["the items: a plan holds only places, from which its mission is made again"] if has_changed_items else []
+    losses = (
+        ["the items: a plan contains only positions, from which its mission is made again"] if has_changed_items else []
+    )
     if not new_plan.feasible:
         problem = (new_plan.certificate.problems or ("violations are counted",))[0]
         losses.append(f"it is a plan that is not feasible: {problem}")
@@ -309,10 +311,10 @@ def _check_plain_waypoints(mission: Mission) -> None:
     for index, item in enumerate(mission.items):
         lost = "its take-off" if item.command in TAKEOFFS else "its landing" if item.command in LANDINGS else ""
         if item.command == Command.DO_CHANGE_SPEED and index > first:
-            lost = "a change of speed along its way"
+            lost = "a change of speed along its path"
         if lost:
             reason = (
-                f"a plan.json of edited waypoints does not hold {lost} (item {item.seq}): save a .plan, or plan again"
+                f"a plan.json of edited waypoints cannot contain {lost} (item {item.seq}): save a .plan, or plan again"
             )
             raise MissionError(f"{mission.source}: {reason}", file=mission.source, field=f"item {item.seq}")
 
@@ -336,7 +338,9 @@ def make_certified_plan(context: EditContext, judged: JudgedMission) -> Plan:
         or route.return_to is not None
         or any(item.frame not in AMSL and item.has_position for item in mission.items)
     ):
-        raise MissionError(f"{name}: a plan holds plain waypoints above mean sea level, once each", file=name)
+        raise MissionError(
+            f"{name}: a plan contains only plain waypoints with altitudes above mean sea level, each once", file=name
+        )
     if (plan := _plan_with_ground_phases(context, mission)) is not None:
         return plan
     _check_plain_waypoints(mission)

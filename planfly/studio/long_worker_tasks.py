@@ -82,5 +82,5 @@ def campaign(payload: tuple[EditContext, Mission], advance: Advance) -> dict[str
     return {
         "state": "ok" if flyable == FLIGHT_COUNT else "open" if flyable else "fail",
         "headline": f"{flyable} of {FLIGHT_COUNT} flights are flyable: {lower:.0%} to {upper:.0%} at 95 %",
-        "lines": [*common, f"planfly campaign flies more: {FLIGHT_COUNT} say little about rare failures"],
+        "lines": [*common, f"planfly campaign flies more: {FLIGHT_COUNT} flights show little about rare failures"],
     }

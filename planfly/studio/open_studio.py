@@ -49,7 +49,7 @@ def open_studio(
     on_message: Callable[[str], None] = print,
     **options: Unpack[MissionOptions],
 ) -> None:
-    """Serve a page on which a mission is dragged, judged and flown; needs ``planfly[studio]``.
+    """Serve a page on which a mission is dragged, judged and flown; requires ``planfly[studio]``.
 
     what: a scenario, by name or file, in which a path is planned; or a plan, a mission or a log, see `planfly.judge`.
     options: see `planfly.fly`; the page can change most of them.
@@ -70,10 +70,12 @@ def open_studio(
         autosave_file = Path(keep) / f"{_stem(target)}.json"
         session, restored = open_session(target, options, autosave_file)
         if restored:
-            undo_hint = "; undo takes it back" if session.undo_text else ""
-            on_message(f"earlier edits are restored (kept in {autosave_file}){undo_hint}")
+            undo_hint = "; undo reverts this" if session.undo_text else ""
+            on_message(f"earlier edits are restored (from {autosave_file}){undo_hint}")
         for file in session.unreadable:
-            on_message(f"{file}: cannot be read as a kept session; it stays as it is, and nothing is kept meanwhile")
+            on_message(
+                f"{file}: not a readable autosave file; it is left unchanged, and edits are not saved automatically"
+            )
         # Imported here: only serving needs the extra.
         from planfly.studio.server import Server
 

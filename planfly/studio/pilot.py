@@ -155,7 +155,7 @@ class WorkerProcess:
                 data = b"" if pipe is None else self._pack(work)
             except OSError as error:
                 # Too many open files, or too many processes.
-                self._fail_unsent(work, f"the process for this cannot be started: {error.strerror}: ask again")
+                self._fail_unsent(work, f"the worker process cannot be started: {error.strerror}; try again")
                 continue
             except (CancelledError, *INTERNAL) as error:
                 self._fail_unsent(work, internal_text(error))
@@ -240,7 +240,7 @@ class WorkerProcess:
             if answer.kind != "progress":
                 self._record_answer(pipe, answer)
             self._on_answer(answer)
-        reason = "the process that worked on this has ended: ask again"
+        reason = "the worker process has ended; try again"
         with self._changed:
             if self._closed or self._pipe is not pipe:
                 return

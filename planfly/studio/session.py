@@ -305,7 +305,7 @@ class Session:
             # A suggestion that moves no item has a reason of its own.
             apply_suggestion(self.context, self.judged, finding, finding.suggestions[message.which])
             raise MissionError(
-                f"{self.document.name}: applied, this suggestion would leave its finding, or more findings than now",
+                f"{self.document.name}: this suggestion would not remove its finding, or would add findings",
                 field="suggestion",
             )
         mission = replace(trial.setup.mission, autopilot=self.mission.autopilot)
@@ -316,7 +316,7 @@ class Session:
         rev, missions = self.flown_trials
         flown_mission = missions.get((message.finding, message.which)) if rev == self.rev else None
         if flown_mission is None:
-            raise MissionError(f"{self.document.name}: that suggestion is not there any more", field="suggestion")
+            raise MissionError(f"{self.document.name}: that suggestion no longer exists", field="suggestion")
         return replace(flown_mission, autopilot=self.mission.autopilot), "apply a suggestion of the flight"
 
     def _replace_part(self, plan: Plan, first: int, last: int) -> Mission:
@@ -408,7 +408,7 @@ class Session:
         if path is None or not self.document.kind:
             raise PlanflyError("no mission file was named: save it as a new one", field="over")
         if path.exists() and path.read_bytes() != self.document.on_disk:
-            message = f"{path.name} was changed by something else since it was opened: save under another name"
+            message = f"{path.name} was changed by another program since it was opened: save it under another name"
             raise PlanflyError(message, file=path)
         saved = self.save(self.document.kind)
         write_whole(path, saved.data)

@@ -61,7 +61,7 @@ def apply_scenario_settings(scenario: Scenario, settings: Settings) -> Scenario:
         from_deg = float(np.degrees(scenario.wind.from_course)) if settings.wind_from is None else settings.wind_from
         wind = (float(speed), from_deg)
     if settings.aircraft is not None and ("/" in settings.aircraft or "\\" in settings.aircraft):
-        raise PlanflyError("aircraft: expected a name that planfly aircraft lists", field="aircraft")
+        raise PlanflyError("aircraft: expected an aircraft listed by 'planfly aircraft'", field="aircraft")
     options: FlightOptions = {
         "wind": wind,
         "turbulence": settings.turbulence,

@@ -58,10 +58,10 @@ def overlap_lines(measure: OverlapMeasure | None) -> tuple[str, ...]:
     """Describe the overlap of photos along and across the lines, or state that it is unknown.
 
     >>> overlap_lines(None)
-    ('overlap not judged: the camera is not known (--camera)',)
+    ('overlap not judged: the camera is unknown (--camera)',)
     """
     if measure is None:
-        return ("overlap not judged: the camera is not known (--camera)",)
+        return ("overlap not judged: the camera is unknown (--camera)",)
     texts = [overlap_text(measure, check) for check in (FRONT, SIDE)]
     if measure.front is None:
         texts[0] = "front overlap not judged: the distance between photos is not stated, or no photo can be used"
@@ -90,18 +90,16 @@ def usable_segments_text(survey: Survey, lines: Sequence[LineMeasure | None]) ->
     usable_lines = [measure for measure in lines if measure is not None and measure.usable > 0.0]
     if not usable_lines:
         return (
-            f"no place of its {len(lines)} lines, {survey.spacing:.0f} m apart, can be used, as there is no "
-            "room to turn"
+            f"no part of its {len(lines)} lines, {survey.spacing:.0f} m apart, can be used, "
+            "because there is no room to turn"
         )
     latest_start, max_length = (
         max(measure.lost_at_start for measure in usable_lines),
         max(measure.length for measure in usable_lines),
     )
-    text = (
-        f"lines can be used from up to {latest_start:.0f} m behind their begin on; the longest has {max_length:.0f} m"
-    )
+    text = f"lines can be used from at most {latest_start:.0f} m behind their start; the longest has {max_length:.0f} m"
     return (
-        f"{text}, and {len(lines) - len(usable_lines)} of {len(lines)} none that can"
+        f"{text}, and {len(lines) - len(usable_lines)} of {len(lines)} have no usable part"
         if len(usable_lines) < len(lines)
         else text
     )

@@ -177,7 +177,7 @@ class CampaignDocument:
     target: float | None
     """Requested probability."""
     answer: str
-    """reached, missed, undecided, or none asked if no probability was requested."""
+    """reached, missed, undecided, or "no target" if no probability was requested."""
     flights: int
     flyable: int
     not_flyable: int

@@ -159,7 +159,7 @@ class LineParser(CommandParser):
         extra: the extra of planfly that the command needs, or "".
         more: further sentences of its help.
         """
-        extra_note = f"  It needs the extra planfly[{extra}]." if extra else ""
+        extra_note = f"  It requires the extra planfly[{extra}]." if extra else ""
         example_text = f"\n{' ' * len('example: ')}".join(examples)
         command_parser: CommandParser = self._parsers.add_parser(
             name,

@@ -123,8 +123,10 @@ def time_option(group: OptionGroup) -> None:
     group.add_argument(
         "--at",
         metavar="TIME",
-        help="time of the flight, START or START/END by ISO 8601, as in 2026-05-01T10:00+02:00: "
-        "zones that are not active then are left out (default: all zones are active)",
+        help=(
+            "time of the flight, START or START/END by ISO 8601, as in 2026-05-01T10:00+02:00: zones "
+            "that are not active then are ignored (default: all zones are active)"
+        ),
     )
 
 
@@ -135,7 +137,7 @@ def aircraft_and_wind_options(parser: CommandParser) -> None:
         group.add_argument(
             "--aircraft",
             metavar="AIRCRAFT",
-            help="a name that planfly aircraft lists, or a folder (default: aerosonde)",
+            help="an aircraft listed by 'planfly aircraft', or the folder of one (default: aerosonde)",
         ),
         complete_aircraft,
     )
@@ -169,15 +171,19 @@ def autopilot_options(parser: CommandParser) -> OptionGroup:
     option = group.add_argument(
         "--params",
         metavar="FILE",
-        help="parameters of the simulated autopilot, in a file that a ground station saved; the file also decides the "
-        "autopilot if none is named",
+        help=(
+            "parameter file of the simulated autopilot, as saved by a ground station; it also "
+            "selects the autopilot if none is named"
+        ),
     )
     with_completer(option, files("param", "parm", "params"))
     group.add_argument(
         "--autopilot",
         choices=CHOICES["autopilot"],
-        help="simulated autopilot: ArduPlane (ardupilot, the default), PX4 for fixed wing (px4, the newest release "
-        "that planfly knows, px4-1.16 or px4-1.17), or planfly's own guidance (planfly)",
+        help=(
+            "simulated autopilot: ArduPlane (ardupilot, the default), PX4 for fixed wing (px4 for "
+            "the newest supported release, px4-1.16 or px4-1.17), or planfly's own guidance (planfly)"
+        ),
     )
     group.add_argument(
         "--guidance",
@@ -218,7 +224,10 @@ def flight_options(parser: CommandParser) -> None:
         "--engine",
         choices=CHOICES["engine"],
         default="auto",
-        help="flight model: auto flies the compiled model if it equals JSBSim in every bit (default), jsbsim JSBSim",
+        help=(
+            "flight model: auto (default) uses the compiled model if it is bit-identical to JSBSim, "
+            "jsbsim always uses JSBSim"
+        ),
     )
     group.add_argument(
         "--levels",
@@ -251,16 +260,14 @@ def log_rate_option(group: OptionGroup) -> None:
         type=int,
         choices=CHOICES["log_hz"],
         default=60,
-        help="rows per second in the log: 60 (default), 30, 20 or 10; the verdict is on these rows",
+        help="rows per second in the log: 60 (default), 30, 20 or 10; the verdict uses these rows",
     )
 
 
 def imported_log_options(parser: CommandParser) -> None:
     """Add the options for information that may be missing in a log of another program."""
     group = parser.group("an autopilot's log")
-    option = group.add_argument(
-        "--plan", metavar="MISSION", help="mission that was to be flown (default: the mission in the log)"
-    )
+    option = group.add_argument("--plan", metavar="MISSION", help="planned mission (default: the mission in the log)")
     with_completer(option, files(*MISSION_SUFFIXES))
     group.add_argument(
         "--flight",

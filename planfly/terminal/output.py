@@ -242,11 +242,9 @@ class _TimeLeft:
         """Return an estimate as text before any progress is measured.  remaining_units: units of work, 0 if unknown."""
         last_duration = _last_durations().get(self._kind)
         if last_duration is not None and remaining_units > 0.0 and last_duration.per_unit > 0.0:
-            return (
-                f"about {_duration_text(last_duration.per_unit * remaining_units)}, at the pace of the last time here"
-            )
+            return f"about {_duration_text(last_duration.per_unit * remaining_units)}, at the pace of the last run here"
         if last_duration is not None:
-            return f"the last one here took {_duration_text(last_duration.total)}"
+            return f"the last run here took {_duration_text(last_duration.total)}"
         return "no estimate yet" if remaining_units > 0.0 else "no estimate"
 
     def is_due(self) -> bool:
@@ -541,4 +539,4 @@ def _check_not_input(target: Path, args: argparse.Namespace) -> None:
     for name in file_names:
         with contextlib.suppress(OSError):
             if target.exists() and target.samefile(name):
-                raise PlanflyError(f"{target}: is the input itself; name another file to write", file=target)
+                raise PlanflyError(f"{target}: is the input file; name another output file", file=target)

@@ -104,10 +104,11 @@ def fewer_plans_line(front: "Front") -> str:
     from planner.search.plan_front import NOTICED, NOTICED_CLEARANCE, NOTICED_EXPOSURE
 
     min_fraction, min_exposure, min_height = f"{NOTICED:.1%}", f"{NOTICED_EXPOSURE:.0%}", f"{NOTICED_CLEARANCE:g} m"
-    refused_text = f"{front.refused} that were found are not safe when completed, and " if front.refused else ""
+    refused_text = f"{front.refused} plans that were found are not safe when completed, and " if front.refused else ""
     return (
-        f"{len(front.plans)} of the {front.asked} requested: {refused_text}no other that was found gains more than"
-        f" {min_fraction} in length or {front.fourth}, {min_exposure} in exposure or {min_height} in height"
+        f"{len(front.plans)} of the {front.asked} requested: {refused_text}no other plan that was "
+        f"found gains more than {min_fraction} in length or {front.fourth}, {min_exposure} in "
+        f"exposure or {min_height} in height"
     )
 
 

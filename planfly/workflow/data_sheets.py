@@ -186,9 +186,9 @@ _SPREADS = {
     "induced-drag": (0.20, "span efficiency from published aircraft of the class"),
     "thrust": (0.20, "propeller scaled to the climb"),
     "motor-speed": (0.07, "motor scaled to the climb and the top speed"),
-    "windmill-drag": (0.50, "what an idle propeller brakes depends on hub and controller"),
+    "windmill-drag": (0.50, "drag of an idle propeller depends on hub and controller"),
     "lift-slope": (0.10, "lift curve slope from published aircraft of the class"),
-    "pitch-stiffness": (0.25, "where the centre of gravity is"),
+    "pitch-stiffness": (0.25, "position of the centre of gravity"),
     "pitch-damping": (0.25, "pitch damping from published aircraft of the class"),
     "elevator-power": (0.15, "elevator scaled to the stall"),
     "roll-damping": (0.20, "roll damping from published aircraft of the class"),
@@ -333,7 +333,7 @@ def _check_required_numbers(sheet: DataSheet) -> None:
     for name in ("mass", "span", "cruise", "stall"):
         if not getattr(sheet, name):
             min_value, max_value, unit = RANGES[name][2], RANGES[name][3], RANGES[name][1]
-            allowed = f"a data sheet needs it: {min_value:g}..{max_value:g} {unit}"
+            allowed = f"required for a data sheet: {min_value:g}..{max_value:g} {unit}"
             raise FlightError.of_argument(name, None, allowed, shown="")
 
 
@@ -499,7 +499,7 @@ output = 1
 pulse_us = [1100, 1500, 1900]
 value_deg = [{-aileron:.1f}, 0.0, {aileron:.1f}]
 
-# Rigged as somebody trims an aircraft: in the middle it is where level flight at cruise has it.
+# Rigged as a trimmed aircraft: the middle pulse gives the deflection of level flight at cruise.
 [elevator]
 output = 2
 pulse_us = [1100, 1500, 1900]
@@ -550,8 +550,8 @@ def _readme_text(
         f"# {name}",
         "",
         f"{sized.numbers.title}, made by `planfly aircraft --new` from a data sheet. It {drive}.",
-        "What the sheet does not say was taken from published aircraft of its class, which `aircraft/data_sheet.py` of",
-        "planfly names. A slope close to the model's limit is left undecided.",
+        "Values that the sheet does not state are scaled from aircraft of its class; see `aircraft/data_sheet.py` of",
+        "planfly. A slope close to the model's limit is left undecided.",
         "",
         "| | | |",
         "|---|---|---|",
@@ -568,10 +568,10 @@ def _readme_text(
         "",
         f"The model weighs {sheet.mass * GRAVITY:.1f} N, flies level at {sheet.cruise:g} m/s with"
         f" {100.0 * performance.level.throttle:.0f} % throttle, climbs {climb:.1f} degrees at",
-        f"full throttle and sinks {sink:.1f} degrees without (at {AMSL:g} m). Its elevator comes to its stop at"
+        f"full throttle and sinks {sink:.1f} degrees without (at {AMSL:g} m). Its elevator reaches its stop at"
         f" {performance.slowest.airspeed:.1f} m/s.",
         "",
-        "## What is not known",
+        "## Uncertainties",
         "",
         f"Standard deviations; the steepest climb's is {math.degrees(uncertainty.climb):.1f} degrees, the steepest"
         f" descent's {math.degrees(uncertainty.descent):.1f} degrees, the fastest level flight's"
@@ -585,7 +585,7 @@ def _readme_text(
         lines.append(f"| `{quantity.name}` | {factor_text} | {100.0 * quantity.sd:.0f} % | {quantity.reason} |")
     lines += [
         "",
-        f"`{DRAWS_FILE}` has {DRAWS} aircraft drawn from them; campaigns fly one a flight.",
+        f"`{DRAWS_FILE}` has {DRAWS} aircraft drawn from them; a campaign flies one of them in each flight.",
         "",
         "| file | content |",
         "|---|---|",
@@ -593,6 +593,6 @@ def _readme_text(
         f"| `{name}.toml` | mass, speeds, limits, energy |",
         "| `gains.toml` | guidance gains, from the model's linearisation |",
         "| `ardupilot.parm`, `ardupilot.toml` | ArduPlane's parameters, and its servos |",
-        f"| `uncertainty.toml`, `{DRAWS_FILE}` | what is not known, and draws of it |",
+        f"| `uncertainty.toml`, `{DRAWS_FILE}` | uncertainties, and aircraft drawn from them |",
     ]
     return "\n".join(lines) + "\n"

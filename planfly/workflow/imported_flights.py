@@ -162,11 +162,11 @@ def _planned_mission(path: Path, flight: LoggedFlight, options: LogOptions) -> t
         mission = mission_of_plan(plan, load_airframe(scenario), str(plan_path))
         return mission, f"of {plan_path.name}", scenario
     if flight.mission is None:
-        raise LogError(f"{path}: holds no mission; `plan` names the one that was to be flown", file=path)
+        raise LogError(f"{path}: contains no mission; `plan` names the mission that was planned", file=path)
     logged = flight.mission
     if logged.missing is not None and len(logged.mission.items) < _MIN_ITEMS:
         problems = [missing_text(logged.missing), *logged.mission.warnings[:1]]
-        problems.append("`plan` names the mission that was to be flown")
+        problems.append("`plan` names the mission that was planned")
         raise LogError(f"{path}: {'; '.join(problems)}", file=path)
     time_text = f", at {logged.time:.1f} s" if logged.time > 0.0 else ""
     return logged.mission, f"{logged.origin} of the log{time_text}, {len(logged.mission.items)} items", None
@@ -195,7 +195,7 @@ def _with_wind_of_log(scenario: Scenario, flight: LoggedFlight, options: LogOpti
         return scenario, "as given"
     wind = mean_wind(flight)
     if wind is None:
-        source_text = "from the scenario, as the log holds no wind" if options.get("scenario") else ""
+        source_text = "from the scenario, because the log contains no wind" if options.get("scenario") else ""
         return scenario, source_text
     windy_scenario = with_wind(scenario, wind.speed, wind.from_course, None)
     return windy_scenario, f"from {round(math.degrees(wind.from_course)) % 360:03d}°, by {wind.source} of the log"
@@ -258,7 +258,7 @@ def _describe_gaps(flight: LoggedFlight) -> tuple[str, ...]:
         notes.append(f"the log ends in flight, at {flight.time[-1]:.1f} s")
     usual_step = float(np.median(np.diff(flight.time)))
     if usual_step > LONGEST_STEP:
-        notes.append(f"the log has a place every {usual_step:.1f} s: the flight between them is not known")
+        notes.append(f"the log has a position every {usual_step:.1f} s: the flight between them is unknown")
     return tuple(notes)
 
 

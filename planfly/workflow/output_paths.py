@@ -73,7 +73,7 @@ def check_output_file(path: Path, overwrite: bool, source: Path | None = None) -
     source: the input file, or None.
     """
     if source is not None and path.exists() and source.exists() and path.samefile(source):
-        raise PlanflyError(f"{path}: is the input itself; name another file to write", file=path)
+        raise PlanflyError(f"{path}: is the input file; name another output file", file=path)
     if path.is_dir():
         raise PlanflyError(f"{path}: is a folder; expected a file name", file=path)
     if path.exists() and not overwrite:

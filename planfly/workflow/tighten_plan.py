@@ -244,9 +244,9 @@ def _next_step_remark(verdict: Verdict, was_flown: bool, is_last: bool, changes:
     if verdict.flyable:
         return "done: it flies"
     if verdict.undecided:
-        return "ended: nothing failed, and the aircraft is not known well enough for the rest"
+        return "ended: nothing failed; the aircraft is not known well enough to judge the rest"
     if not was_flown:
         return "ended: within these limits no feasible plan was found"
     if not changes:
-        return "ended: nothing is left to tighten; the planner knows no path that meets what failed"
+        return "ended: nothing is left to tighten; the planner finds no path that meets the failed rules"
     return "ended: no rounds left" if is_last else NEXT_ROUND_REMARK

@@ -187,10 +187,8 @@ def _clearance_margin(data: ProblemArrays, waypoints: Floats, problems: list[str
         name = f"turn at waypoint {piece['number']}" if piece["of_arc"] else f"leg {piece['number']}"
         if math.isnan(margin) or not min_margins.get(name, math.inf) <= margin:
             min_margins[name] = margin
-    required_text = f"{data.clearance:g} m and {data.buffer:.1f} m in reserve required"
-    off_terrain = [
-        (0.0, name, "leaves the terrain that is known") for name, margin in min_margins.items() if math.isnan(margin)
-    ]
+    required_text = f"{data.clearance:g} m and {data.buffer:.1f} m of margin required"
+    off_terrain = [(0.0, name, "leaves the terrain data") for name, margin in min_margins.items() if math.isnan(margin)]
     too_low = [
         (margin, name, f"{margin + data.clearance:.1f} m above ground at its lowest, {required_text}")
         for name, margin in min_margins.items()
@@ -247,7 +245,7 @@ def _airspace_margins(problem: Problem, waypoints: Floats, problems: list[str]) 
                 if z == zone
             ]
         )
-    required_text = f"{space.max_height:g} m allowed, {space.buffer:.1f} m in reserve required"
+    required_text = f"{space.max_height:g} m allowed, {space.buffer:.1f} m of margin required"
     problems += _summarise_faults(
         [
             (
@@ -268,5 +266,5 @@ def _zone_fault_text(problem: Problem, distance: float, z: int) -> str:
     if distance < 0.0:
         return f"{-distance:.1f} m {'inside' if zone.kind == 'exclusion' else 'outside'} {zone.name}"
     relation = "from" if zone.kind == "exclusion" else "inside the edge of"
-    required_text = f"{required['horizontal']:g} m or {required['vertical']:g} m in height required"
+    required_text = f"{required['horizontal']:g} m horizontally or {required['vertical']:g} m vertically required"
     return f"{distance:.1f} m {relation} {zone.name}, {required_text}"

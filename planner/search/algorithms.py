@@ -46,7 +46,7 @@ ALGORITHMS: dict[str, Algorithm] = {
     for algorithm in (
         Algorithm(
             "fda-seeded",
-            "the default: grid routes on all sides of obstacles, shortened; generations only if none is safe",
+            "the default: grid routes on all sides of obstacles, shortened; evolutionary search only if none is safe",
             graded=True,
             seeded=True,
             tightened=True,
@@ -54,7 +54,7 @@ ALGORITHMS: dict[str, Algorithm] = {
         ),
         Algorithm(
             "fda",
-            "generations of waypoints, ranked by the best path through each: needs no seeds and no grids",
+            "evolutionary search of waypoints, each ranked by the best path through it; needs no seeds and no grids",
             graded=True,
             tightened=True,
             optimiser="waypoints",
@@ -119,19 +119,19 @@ ALGORITHMS: dict[str, Algorithm] = {
         ),
         Algorithm(
             "de-paper",
-            "differential evolution in the paper's frame: its encoding, counts and preference",
+            "differential evolution in the paper's frame, with the paper's encoding, violation counts and preference",
             optimiser="differential",
         ),
         Algorithm("umda-graded", "the paper's UMDA with graded violations along the whole path", graded=True),
-        Algorithm("umda", "the paper's UMDA in the rotated frame: counts on six points a leg, no seeds"),
-        Algorithm("umda-cartesian", "the paper's baseline: the same UMDA on absolute waypoints", encoding="cartesian"),
+        Algorithm("umda", "the paper's UMDA in the rotated frame: violations counted at six points per leg, no seeds"),
+        Algorithm("umda-cartesian", "a baseline of the paper: UMDA on Cartesian waypoints", encoding="cartesian"),
         Algorithm(
             "umda-polar",
-            "the paper's baseline: the same UMDA on steps and turning angles of up to 180 degrees",
+            "a baseline of the paper: UMDA on step lengths and turn angles of up to 180 degrees",
             encoding="polar",
         ),
-        Algorithm("umda-polar-45", "the same with turning angles of up to 45 degrees", encoding="polar-45"),
-        Algorithm("umda-bearing", "the same on steps and their angles from the straight line", encoding="bearing"),
+        Algorithm("umda-polar-45", "UMDA on step lengths and turn angles of up to 45 degrees", encoding="polar-45"),
+        Algorithm("umda-bearing", "UMDA on step lengths and angles from the straight line", encoding="bearing"),
     )
 }
 DEFAULT = "fda-seeded"
@@ -157,7 +157,7 @@ def find_algorithm(name: str | None, source: str) -> Algorithm:
     """
     algorithm = ALGORITHMS.get(DEFAULT if name is None else name)
     if algorithm is None:
-        problem = f"not known; allowed: {', '.join(ALGORITHMS)}{did_you_mean(str(name), ALGORITHMS)}"
+        problem = f"unknown; allowed: {', '.join(ALGORITHMS)}{did_you_mean(str(name), ALGORITHMS)}"
         raise ScenarioError.at(source, "planner.algorithm", name, problem, shown=f"{name!r}")
     return algorithm
 

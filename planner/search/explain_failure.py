@@ -185,7 +185,7 @@ def closed_bands(problem: Problem) -> list[str]:
         if bottom_height > ceiling.height - margin:
             lines.append(
                 f"{zone.name} is too narrow a band: above {name} and below its ceiling at {ceiling.height:g} m a plan's"
-                f" margins take {bottom_height + margin - ceiling.height:.1f} m more than available"
+                f" margins require {bottom_height + margin - ceiling.height:.1f} m more than available"
             )
     return lines
 
@@ -288,7 +288,7 @@ def _describe_walls(scenario: Scenario) -> list[str]:
             lines.append(
                 f"terrain blocks every route {distance:.0f} m from the start, across the whole map: its lowest"
                 " point and "
-                f"the clearance take {np.nanmin(min_altitudes):.0f} m, the ceiling is {scenario.ceiling:.0f} m"
+                f"the clearance require {np.nanmin(min_altitudes):.0f} m, the ceiling is {scenario.ceiling:.0f} m"
             )
             break
         if not _has_gap(scenario, points[gaps > 0.0], min_altitudes[gaps > 0.0]):
@@ -326,7 +326,7 @@ def _describe_margin_walls(problem: Problem) -> list[str]:
             return [
                 f"too little height is left {distance:.0f} m from the start, across the whole map: its lowest"
                 " point, the"
-                f" clearance and a margin of {margin:.1f} m take {min_altitude + margin:.0f} m, {name} allows"
+                f" clearance and a margin of {margin:.1f} m require {min_altitude + margin:.0f} m, {name} allows"
                 f" {ceiling:.0f} m"
             ]
     return []
@@ -363,13 +363,13 @@ def _describe_proven_closure(problem: Problem) -> list[str]:
             if end[2] > level_altitude:
                 return [f"no path exists: the {name} is at {end[2]:.0f} m, higher than {ceiling}"]
     if not missiles:
-        return [f"no path exists: the ground closes every way below {ceiling}"]
+        return [f"no path exists: the ground blocks every path below {ceiling}"]
     names = [problem.scenario.threats.names[k] for k in missiles[:MAX_CLOSING]]
     others = f" and {len(missiles) - MAX_CLOSING} more" if len(missiles) > MAX_CLOSING else ""
     return [
-        f"no path exists: {', '.join(names)}{others} close every way between ground, {ceiling} and the edges of the"
+        f"no path exists: {', '.join(names)}{others} block every path between ground, {ceiling} and the edges of the"
         " map;"
-        " without any one of them there may be one"
+        " without any one of them a path may exist"
     ]
 
 

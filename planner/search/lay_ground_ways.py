@@ -399,8 +399,8 @@ def _find_launches(site: _Site, launch: Launch, takeoff_height: float, altitude:
                 worst_index = int(np.argmin(np.where(np.isnan(margins), math.inf, margins)))
                 distance = float(distances[distances > _LAUNCH_RUN_M][worst_index])
                 reason = (
-                    f"the nearest, {direction}, is {-worst_margin:.0f} m too low over the ground"
-                    f" {distance:.0f} m from home"
+                    f"the nearest, {direction}, is {-worst_margin:.0f} m too low above the ground "
+                    f"{distance:.0f} m from home"
                 )
                 best_rejected = max(best_rejected, (worst_margin, reason))
                 break
@@ -415,12 +415,12 @@ def _find_launches(site: _Site, launch: Launch, takeoff_height: float, altitude:
             launches.append(
                 _Launch(course, (home[0] + takeoff_distance * east, home[1] + takeoff_distance * north), end)
             )
-    subject = "the launch course leads" if launch.course is not None else f"none of {len(courses)} launch courses leads"
+    subject = "the launch course is" if launch.course is not None else f"none of {len(courses)} launch courses is"
     negation = "" if launch.course is None else "not "
     return (
         launches,
-        f"{subject} {negation}free of ground, missiles and zones at {SLOPE_FRACTION:.0%} of the steepest climb: "
-        f"{best_rejected[1]}",
+        f"{subject} {negation}clear of ground, missiles and zones at {SLOPE_FRACTION:.0%} of the "
+        f"steepest climb: {best_rejected[1]}",
     )
 
 
@@ -499,7 +499,7 @@ def _find_approach(site: _Site, strip: LandingStrip, final_law: FinalModel) -> t
             continue
         go_around = _min_go_around_height(site, candidate)
         if go_around is None:
-            reason = f"no height would do for a go-around on {round(math.degrees(candidate.course)) % 360}°"
+            reason = f"no height would be sufficient for a go-around on {round(math.degrees(candidate.course)) % 360}°"
             continue
         return Descent(
             corners, candidate.line_up, point, candidate.course, candidate.height / candidate.length, go_around
@@ -511,7 +511,7 @@ def _describe_strip_fault(terrain: Terrain, strip: LandingStrip, course: float) 
     """Describe the fault of a strip's ground; "" if it is suitable."""
     for direction, slope in zip(("along", "across"), strip_slopes(terrain, strip, course), strict=True):
         if math.isnan(slope):
-            return "the ground of the strip is not known to its ends"
+            return "the terrain of the strip is unknown towards its ends"
         if abs(slope) > STEEPEST_STRIP_SLOPE:
             course_text = f"on {round(math.degrees(course)) % 360}°"
             return (
@@ -551,7 +551,7 @@ def _find_finals(
         margin, obstacle = _check_final(site, final)
         if obstacle:
             best_rejected = max(
-                best_rejected, (margin, f"a final of {length:.0f} m at {math.degrees(slope):.1f}° {obstacle}")
+                best_rejected, (margin, f"a final approach of {length:.0f} m at {math.degrees(slope):.1f}° {obstacle}")
             )
         else:
             finals.append(final)
@@ -579,9 +579,9 @@ def _check_final(site: _Site, final: _Final) -> tuple[float, str]:
     )
     judged_margins = margins[distances <= final.length - _GROUND_CONTACT_ZONE_M]
     if np.isnan(judged_margins).any():
-        return -math.inf, "leads over ground that is not known"
+        return -math.inf, "leads over unknown terrain"
     if judged_margins.min(initial=0.0) < 0.0:
-        return float(judged_margins.min()), f"is {-float(judged_margins.min()):.0f} m too low over the ground"
+        return float(judged_margins.min()), f"is {-float(judged_margins.min()):.0f} m too low above the ground"
     obstacle = site.describe_obstacle([glide_start.tolist(), [float(point[0]), float(point[1]), float(glide_start[2])]])
     obstacle = obstacle or site.describe_obstacle([[*glide_start[:2].tolist(), float(point[2])], point.tolist()])
     if obstacle:
@@ -590,7 +590,7 @@ def _check_final(site: _Site, final: _Final) -> tuple[float, str]:
     chain = np.concatenate([final.line_up, point_above[None]])
     certificate = site.certify_chain(chain, (chain[0], chain[0]))
     if not certificate.ok:
-        return min(certificate.clearance, 0.0) - 1.0, f"is not free: {certificate.problems[0]}"
+        return min(certificate.clearance, 0.0) - 1.0, f"is not clear: {certificate.problems[0]}"
     return 0.0, "" if certificate.kill_distance > 0.0 else "is inside a missile's reach"
 
 

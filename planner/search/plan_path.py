@@ -169,8 +169,7 @@ def _check_options(scenario: Scenario, airspeed: float) -> None:
             scenario.name,
             "wind.speed_mps",
             scenario.wind.speed,
-            f"a path is searched for in at most {MAX_WIND:.0%} of the airspeed {airspeed:g}, so that every"
-            " course can be flown",
+            f"allowed at most {MAX_WIND:.0%} of the airspeed {airspeed:g}, so that every course can be flown",
             shown=f"{scenario.wind.speed:g}",
         )
     settings = scenario.planner

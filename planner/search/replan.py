@@ -112,7 +112,7 @@ def check_same_mission(scenario: Scenario, old: Plan) -> None:
     >>> check_same_mission(scenario, plan)
     >>> check_same_mission(load_scenario("tight"), plan)
     Traceback (most recent call last):
-    world.errors.MissionError: tight: start: 742 m from that of the plan; it is another mission's
+    world.errors.MissionError: tight: start: 742 m from that of the plan; the plan belongs to another mission
     """
     for name, planned, required in (
         ("start", old.waypoints[0], scenario.start),
@@ -121,7 +121,7 @@ def check_same_mission(scenario: Scenario, old: Plan) -> None:
         distance = math.dist(planned, required)
         if distance > 1.0:
             raise MissionError(
-                f"{scenario.name}: {name}: {distance:.0f} m from that of the plan; it is another mission's",
+                f"{scenario.name}: {name}: {distance:.0f} m from that of the plan; the plan belongs to another mission",
                 file=scenario.name,
                 field=name,
             )
@@ -143,7 +143,7 @@ def _check_first_waypoint(scenario: Scenario, old: Plan, leg: int) -> None:
     forbidden = violated_zones(scenario, old.waypoints[[leg, leg]])
     if forbidden:
         begin_text = f"waypoint {leg}, where it begins, violates {forbidden[0]}"
-        message = f"{scenario.name}: leg {leg}: {begin_text}: no path from there does"
+        message = f"{scenario.name}: leg {leg}: {begin_text}: every path from there violates it"
         raise MissionError(message, file=scenario.name, field="leg", value=leg)
 
 

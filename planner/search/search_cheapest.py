@@ -59,7 +59,7 @@ def make_objective_cost(scenario: Scenario, limits: Limits, problem: Problem) ->
     objective = scenario.planner.objective or "length"
     travel_cost = make_travel_cost(objective, limits.envelope, problem.search.aircraft)
     if travel_cost is None:
-        allowed = 'the power of this aircraft is not known; "length" and "time" can be planned for'
+        allowed = 'the power of this aircraft is unknown; "length" and "time" can be planned for'
         raise ScenarioError.at(scenario.name, "planner.objective", objective, allowed)
     return travel_cost
 

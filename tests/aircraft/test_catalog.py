@@ -67,7 +67,7 @@ def test_unknown_name_lists_the_known_ones(name: str) -> None:
         ("mass_kg = 11.0", 'mass_kg = "11"', r"mass_kg = '11' is not a positive number$"),
         ("mass_kg = 11.0", "mass_kg = ", r"Invalid value"),
         ("airspeed_mps = 25.0", "airspeed_mps = 50.0", r"<= airspeed_max_mps does not hold"),
-        ("title = ", "title = 1 #", r"title = 1 is not a text$"),
+        ("title = ", "title = 1 #", r"title = 1 is not a string$"),
     ],
 )
 def test_bad_metadata_is_one_line_with_the_file(folder: Path, old: str, new: str, message: str) -> None:

@@ -131,7 +131,7 @@ LAND = HOME + "[landing]\neast_m = 0\nnorth_m = 0\n"
 CASES = {
     "a launch without home": ('[launch]\nmethod = "hand"', "home: missing; [launch] needs it"),
     "an empty home": ("[home]", 'home: position: missing; give place = "start"'),
-    "a home in the air": (HOME + "amsl_m = 9", "home: amsl_m: home stands on the scenario's ground"),
+    "a home in the air": (HOME + "amsl_m = 9", "home: amsl_m: home is on the scenario's ground"),
     "two landings": (HOME + "[[landing]]\neast_m = 0\nnorth_m = 0", "landing: expected a table"),
     "a landing without home": ("[landing]\neast_m = 0\nnorth_m = 0", "home: missing; [landing] needs it"),
     "home nowhere": ("[home]\neast_m = 0", "home: position: give east_m and north_m, or lat_deg and lon_deg"),
@@ -148,7 +148,7 @@ CASES = {
     ),
     "a runway that pushes": (
         HOME + '[launch]\nmethod = "runway"\nspeed_mps = 20',
-        "launch: speed_mps: 20: not allowed for a runway, where the aircraft's own motor pulls",
+        "launch: speed_mps: 20: not allowed for a runway, where the motor accelerates the aircraft",
     ),
     "no rail": (HOME + '[launch]\nmethod = "catapult"\nlength_m = 0', "launch.length_m: 0: allowed 0.1..3000"),
     "a steep launch": (HOME + '[launch]\nmethod = "hand"\nincline_deg = 46', "launch.incline_deg: 46: allowed 0..45"),
@@ -197,7 +197,7 @@ def test_where_the_ground_is_not_known(key: str) -> None:
     assert from_spec(spec, "x", ground=ground).home is not None
     beyond = {key: {"east_m": 500.0, "north_m": 0.0}}
     with pytest.raises(
-        ScenarioError, match=rf"^x: {key}: east 500 m, north 0 m: the elevation file knows no ground there$"
+        ScenarioError, match=rf"^x: {key}: east 500 m, north 0 m: the elevation file has no data there$"
     ):
         from_spec(spec | beyond, "x", ground=ground)
 

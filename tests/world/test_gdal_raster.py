@@ -144,7 +144,7 @@ def test_heights_above_the_ellipsoid_are_refused_in_old_and_new_files(version: s
     """EPSG:4937 is ETRS89 with ellipsoidal heights; of a file of version 1.0 GDAL alone would drop the heights."""
     place = from_origin(8.0, 46.0, 0.001, 0.001)
     path = write_raster(tmp_path / "t.tif", np.zeros((9, 9), np.float32), "EPSG:4937", place, GEOTIFF_VERSION=version)
-    assert_refused(path, "heights count from the ellipsoid")
+    assert_refused(path, "heights are above the ellipsoid")
 
 
 def test_a_mask_of_pixels_counts(tmp_path: Path) -> None:

@@ -92,9 +92,7 @@ def test_ellipsoidal_systems_are_refused_where_no_grid_is_at_hand_and_others_are
     file = tmp_path / "hill.tif"
     write_tile(file, crs)
     if SYSTEMS[crs]:
-        with pytest.raises(
-            TerrainError, match=r"hill\.tif: heights count from the ellipsoid, .*height_datum"
-        ) as caught:
+        with pytest.raises(TerrainError, match=r"hill\.tif: heights are above the ellipsoid, .*height_datum") as caught:
             open_raster(str(file))
         assert "\n" not in str(caught.value)
     else:
@@ -130,7 +128,7 @@ def test_another_datum_is_refused_in_one_line(value: str, tmp_path: Path) -> Non
 def test_depths_are_refused(tmp_path: Path) -> None:
     # EPSG:5715 is depth below mean sea level.
     write_tile(tmp_path / "hill.tif", "EPSG:4326+5715")
-    with pytest.raises(TerrainError, match=r"hill\.tif: heights count downwards"):
+    with pytest.raises(TerrainError, match=r"hill\.tif: heights are positive downwards"):
         open_raster(str(tmp_path / "hill.tif"))
 
 

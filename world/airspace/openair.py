@@ -305,7 +305,7 @@ def _parse_position(text: str) -> _Position:
 def _parse_degrees(text: str, max_degrees: float) -> float:
     parts = [_parse_number(part) for part in text.split(":")]
     if len(parts) > 3 or any(part > 60.0 for part in parts[1:]):
-        raise ValueError("expected degrees, minutes and seconds of at most 60")
+        raise ValueError("expected degrees, and minutes and seconds of at most 60")
     angle = sum(part / 60.0**k for k, part in enumerate(parts))
     if angle > max_degrees:
         raise ValueError(f"allowed 0..{max_degrees:g} degrees")

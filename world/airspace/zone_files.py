@@ -294,7 +294,7 @@ FORMATS: dict[str, Reader] = {
 }
 # Notes about repairs to authorities' files.
 _SELF_CROSSING = "an outline that crosses itself is taken as the area it encloses"
-_EMPTY = "outlines that enclose no area are left out"
+_EMPTY = "outlines that enclose no area are ignored"
 _SWAPPED = "lower and upper limits in the wrong order are swapped"
 _NO_BAND = "upper limits of 0, or equal to the lower one, mean no ceiling"
 # Maximum size of a file, bytes.

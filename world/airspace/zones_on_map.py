@@ -92,7 +92,9 @@ def make_zones(tables: Sequence[ZoneTable], source: str, origin: GeoOrigin, grou
         zone = Zone(table.name, table.kind, shape, floor, ceiling)
         if zone.above_ground and ground is None:
             key = "floor_agl_m" if table.floor_agl_m is not None else "ceiling_agl_m"
-            message = f"{label}: {key}: it needs terrain: name one (--terrain), or give the height as amsl"
+            message = (
+                f"{label}: {key}: requires terrain; name an elevation file (--terrain), or give the height as amsl"
+            )
             raise ScenarioError(message, file=source, field=key, value=getattr(table, key))
         zones.append(zone)
     return tuple(zones)

@@ -94,7 +94,7 @@ def stretch_end_text(stretch: MissionStretch) -> str:
     if stretch.ended == "mode":
         return f"{stretch.mode} was left for {stretch.next_mode} at {stretch.end:.1f} s"
     if stretch.ended == "landed":
-        return f"the flight was over at {stretch.end:.1f} s"
+        return f"the flight ended at {stretch.end:.1f} s"
     return f"the log ends at {stretch.end:.1f} s"
 
 

@@ -37,10 +37,10 @@ from logs.verdict.verdict import Verdict
 # The lines of a verdict on an imported flight: the answer, what was judged and what was not, and facts about the log.
 
 _DATUM_TEXTS: dict[VerticalDatum, str] = {
-    "amsl": "above mean sea level, as the log has it",
+    "amsl": "above mean sea level, according to the log",
     "ellipsoid": "above the WGS 84 ellipsoid",
-    "pressure": "by pressure, above the level of 1013.25 hPa",
-    "unstated": "above what the log does not say",
+    "pressure": "by pressure, above the 1013.25 hPa level",
+    "unstated": "above a datum that the log does not state",
 }
 # Largest number of clock jumps whose times are listed.
 _MAX_LISTED_JUMPS = 4
@@ -84,11 +84,11 @@ def _judged_lines(source: ImportedLog, flown_stretches: Sequence[FlownLegs], leg
     leg_numbers: number of each leg of the route, as in `flight.mission.route.Route.leg_numbers`.
     """
     if not source.stretches:
-        return ["Judged: nothing, as no stretch of the flight followed the mission"]
+        return ["Judged: nothing, because no part of the flight followed the mission"]
     by_start = {legs.stretch.start: legs for legs in flown_stretches}
     lines = []
     for stretch in source.stretches:
-        name = stretch.mode or "the flight (the log knows no modes)"
+        name = stretch.mode or "the flight (the log contains no modes)"
         times = f"{name} from {stretch.start:.1f} s to {stretch.end:.1f} s"
         legs = by_start.get(stretch.start)
         if legs is None:
@@ -119,7 +119,7 @@ def heights_text(source: ImportedLog) -> str:
 
     >>> from flight.simulation.setup import HeightOffset, Heights
     >>> heights_text(ImportedLog("a.BIN", "", "", heights=Heights("POS", "amsl", (HeightOffset("GPS.Alt", -0.1),))))
-    'POS, above mean sea level, as the log has it; at the start GPS.Alt -0.1 m of it'
+    'POS, above mean sea level, according to the log; at the start GPS.Alt -0.1 m of it'
     """
     offsets = ", ".join(f"{height.name} {height.offset:+.1f} m" for height in source.heights.offsets)
     offset_text = f"; at the start {offsets} of it" if offsets else ""
@@ -138,7 +138,7 @@ def rows_text(faults: RowFaults, gaps: int) -> str:
         (gaps, "gap" if gaps == 1 else "gaps"),
         (faults.doubled, "doubled"),
         (faults.unordered, "out of order"),
-        (faults.unusable, "without a place or a time"),
+        (faults.unusable, "without a position or a time"),
         (faults.glitches, "position glitches"),
     )
     texts = [f"{count} {name}" for count, name in counts if count]
@@ -157,11 +157,11 @@ def missing_text(missing: MissingItems) -> str:
     """Describe the unjudged part of a mission, and the items that the log lacks.
 
     >>> missing_text(MissingItems(tuple(range(7, 14)), total=14, first=1, last=6, end=13))
-    'not judged beyond item 6: items 7 to 13 of 14 are not in the log or left out'
+    'not judged beyond item 6: items 7 to 13 of 14 are not in the log or ignored'
     >>> missing_text(MissingItems((1, 5), total=0, first=2, last=4, end=9))
-    'not judged before item 2 and beyond item 4: items 1 and 5 are not in the log or left out'
+    'not judged before item 2 and beyond item 4: items 1 and 5 are not in the log or ignored'
     >>> missing_text(MissingItems((1, 2, 3), total=4, first=0, last=0, end=3))
-    'not judged: items 1 to 3 of 4 are not in the log or left out'
+    'not judged: items 1 to 3 of 4 are not in the log or ignored'
     """
     runs: list[list[int]] = []
     for number in missing.numbers:
@@ -181,8 +181,8 @@ def missing_text(missing: MissingItems) -> str:
     is_several = len(missing.numbers) > 1
     total_text = f" of {missing.total}" if missing.total else ""
     items_text = (
-        f"{'items' if is_several else 'item'} {numbers_text}{total_text} {'are' if is_several else 'is'}"
-        " not in the log or left out"
+        f"{('items' if is_several else 'item')} {numbers_text}{total_text} "
+        f"{('are' if is_several else 'is')} not in the log or ignored"
     )
     return f"not judged{' ' if range_text else ''}{range_text}: {items_text}"
 
@@ -198,7 +198,7 @@ def damage_text(damage: Damage) -> str:
         size = f" ({damage.size:,} bytes)" if damage.size else ""
         texts.append(f"{damage.places} {'place' if damage.places == 1 else 'places'} in the file{size} cannot be read")
     if damage.unreadable:
-        texts.append(f"{damage.unreadable} messages hold nothing that can be used")
+        texts.append(f"{damage.unreadable} messages contain nothing that can be used")
     if damage.cut:
         texts.append("it ends within a message")
     return "; ".join(texts) or "nothing"
@@ -224,8 +224,8 @@ _QUANTITY_LABELS: dict[Quantity, str] = {
 _TRACK_COLUMNS: dict[Quantity, str] = {"airspeed": "airspeed", "attitude": "attitude", "battery": "energy"}
 _DATUM_REASONS = {
     "ellipsoid": "the log's heights are above the ellipsoid, the plan's above mean sea level",
-    "pressure": "the log's heights are by pressure, above the level of 1013.25 hPa",
-    "unstated": "the log does not say what its heights are above (--datum says it)",
+    "pressure": "the log's heights are pressure altitudes, above the 1013.25 hPa level",
+    "unstated": "the log does not state the datum of its heights (--datum names it)",
 }
 _UNNAMED_TEXT = "the aircraft is not named (--aircraft)"
 
@@ -238,7 +238,7 @@ def judge_imported_flight(setup: FlightSetup, track: Track, *, log_complete: boo
     """
     source = setup.source
     if source is None:
-        raise ValueError("a flight without a source was not imported")
+        raise ValueError("setup.source is missing: only imported flights can be judged here")
     flown_stretches = [legs for stretch in source.stretches if (legs := flown_legs(setup, track, stretch)) is not None]
     findings = _merge_findings([_stretch_findings(setup, legs) for legs in flown_stretches])
     end_judges = [rule.judge_imported_end for rule in RULES.values() if rule.judge_imported_end is not None]
@@ -330,7 +330,7 @@ def _findings_without_data(setup: FlightSetup, judged_rules: set[str]) -> list[F
         ]
         margin = RULE_WORDS[rule.name].margin
         if rule.log.listed and margin is not None and missing_quantities and rule.name not in judged_rules:
-            reason = f"the log holds no {_QUANTITY_LABELS[missing_quantities[0]]}"
+            reason = f"the log contains no {_QUANTITY_LABELS[missing_quantities[0]]}"
             findings.append(
                 make_finding(rule.name, FLIGHT, ok=None, reason=reason, source="aircraft", unit=margin.unit)
             )
@@ -345,7 +345,7 @@ def _check_data(setup: FlightSetup, legs: FlownLegs, finding: Finding) -> Findin
     reason, needs = "", RULES[finding.rule].log
     for quantity in needs.quantities:
         if quantity not in source.holds:
-            reason = f"the log holds no {_QUANTITY_LABELS[quantity]}"
+            reason = f"the log contains no {_QUANTITY_LABELS[quantity]}"
             break
         if quantity == "heights":
             has_plan_heights = source.plan_heights or not needs.planned_heights
@@ -369,8 +369,8 @@ def _missing_values_text(legs: FlownLegs, quantity: Quantity) -> str:
         return ""
     time = legs.aligned.track.time[is_missing]
     return (
-        f"the log holds no {_QUANTITY_LABELS[quantity]} at {int(is_missing.sum())} rows from {time[0]:.1f} s to"
-        f" {time[-1]:.1f} s"
+        f"the log contains no {_QUANTITY_LABELS[quantity]} at {int(is_missing.sum())} rows from "
+        f"{time[0]:.1f} s to {time[-1]:.1f} s"
     )
 
 

@@ -77,7 +77,7 @@ def _ground_hazards(
     hazards = []
     # Points outside the known terrain are NaN.
     if np.isnan(clearances).any():
-        hazards.append("the terrain is not known")
+        hazards.append("the terrain is unknown")
     min_clearance = float(np.nanmin(clearances, initial=math.inf))
     if min_clearance < requirements.limits.min_clearance - CLEARANCE_TOLERANCE_M:
         hazards.append(f"the ground is only {min_clearance:.0f} m below")

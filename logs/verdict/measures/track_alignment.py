@@ -53,7 +53,7 @@ class AlignedTrack:
     course: (t,) rad over the ground, unwrapped.
     distance_run: (t,) m along the ground track.
     clearance, clearance_fraction: (t - 1,) minimum height above ground between a row and the next, m, and the fraction
-        of the segment at which it occurs; NaN off the known terrain, and without terrain.
+        of the segment at which it occurs; NaN outside the terrain data, and without terrain.
     tick: usual time between rows, s.
     """
 

@@ -49,7 +49,7 @@ def distances_outside_zone(
 ) -> tuple[float, float, int]:
     """Return a position's distances outside zone z's outline and altitude band, m, and its nearest edge.
 
-    A distance is negative inside, and NaN for a band above ground if the ground there is not known.
+    A distance is negative inside, and NaN for a band above ground if the terrain there is unknown.
     """
     zone = records.zones[z]
     outline_distance, edge = nearest_edge(records, z, east, north)

@@ -15,14 +15,14 @@ _COUNT_TEXTS: dict[Reach, str] = {
     "site": "a rally point or landing place, but not home, from {count}",
     "flat": "only flat ground from {count}",
     "nothing": "nothing from {count}",
-    "unknown": "from {count} the reach is not known",
+    "unknown": "from {count} the reach is unknown",
 }
 _REACH_TEXTS: dict[Reach, str] = {
     "home": "home is in reach",
     "site": "a rally point or landing place is in reach",
     "flat": "only flat ground is in reach",
     "nothing": "nothing is in reach",
-    "unknown": "what is in reach is not known",
+    "unknown": "the reach is unknown",
 }
 
 
@@ -51,10 +51,10 @@ def glides_headline(glides: Glides) -> str:
         _COUNT_TEXTS[reach].format(count=count) for reach, count in counts if count or reach == "home"
     )
     if any(glide.own.end == "not flown" for glide in glides.each):
-        own_text = "ArduPlane's own return, which would follow the terrain, is not flown"
+        own_text = "ArduPlane's own return, which would follow the terrain, is not simulated"
     else:
         own_text = f"ArduPlane's own return arrives from {glides.arrivals}"
-    return f"of {len(glides.each)} places {reach_text}; {own_text}"
+    return f"of {len(glides.each)} places, {reach_text}; {own_text}"
 
 
 def site_text(site: GlideSite) -> str:
@@ -97,7 +97,7 @@ def _reach_text(glide_range: GlideRange, glides: Glides) -> str:
             shortfall_text = "no path leads anywhere" if math.isinf(spare) else f"{-spare:.0f} m are missing at most"
             return f"nothing, {shortfall_text}"
         case "unknown":
-            return "not known, as it lies beyond the elevation data"
+            return "unknown, because it lies outside the elevation data"
 
 
 def _own_return_text(glide: Glide) -> str:
@@ -126,11 +126,11 @@ def glide_notes(glides: Glides) -> list[str]:
     if not glides.each:
         return []
     notes = [
-        f"without the engine the aircraft flies on for {ENGINE_FAILURE_REACTION_S:.0f} s, then glides at"
-        f" AIRSPEED_MIN {glides.airspeed:g} m/s,"
-        f" {MARGIN:.0f} m above ground or higher, outside missiles' spheres, but through zones",
-        "ground is flat according to the elevation file, which knows no trees, houses or water",
+        f"without the engine the aircraft flies on for {ENGINE_FAILURE_REACTION_S:.0f} s, then "
+        f"glides at AIRSPEED_MIN {glides.airspeed:g} m/s, at least {MARGIN:.0f} m above ground, "
+        "outside missiles' spheres, but also through zones",
+        "ground is flat according to the elevation file, which contains no trees, houses or water",
     ]
     if glides.fuel:
-        notes.append("glides are flown with the throttle closed, as the drag of a stopped engine is not known")
+        notes.append("glides are flown with the throttle closed, because the drag of a stopped engine is unknown")
     return notes

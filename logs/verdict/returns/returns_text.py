@@ -17,8 +17,8 @@ _SINGULAR_TEXTS: dict[Kind, str] = {
     "zone": "violates a zone",
     "lost": "does not arrive",
     "energy": "takes more energy than may be used",
-    "unknown": "flies where the ground is not known",
-    "unsure": "is flown too differently by the point mass and in JSBSim to be judged",
+    "unknown": "flies where the terrain is unknown",
+    "unsure": "cannot be judged because the point mass and JSBSim disagree",
     "low": "comes lower than {limit:.0f} m above ground",
 }
 _PLURAL_TEXTS: dict[Kind, str] = {
@@ -27,8 +27,8 @@ _PLURAL_TEXTS: dict[Kind, str] = {
     "zone": "violate a zone",
     "lost": "do not arrive",
     "energy": "take more energy than may be used",
-    "unknown": "fly where the ground is not known",
-    "unsure": "are flown too differently by the point mass and in JSBSim to be judged",
+    "unknown": "fly where the terrain is unknown",
+    "unsure": "cannot be judged because the point mass and JSBSim disagree",
     "low": "come lower than {limit:.0f} m above ground",
 }
 # Name of the path segment from which returns have this outcome.
@@ -38,8 +38,8 @@ _SEGMENT_NAMES: dict[Kind, str] = {
     "zone": "a return violates a zone",
     "lost": "a return does not arrive",
     "energy": "a return takes too much energy",
-    "unknown": "a return is not judged: ground not known",
-    "unsure": "a return is not judged: flown too differently",
+    "unknown": "a return is not judged: terrain unknown",
+    "unsure": "a return is not judged: the point mass and JSBSim disagree",
     "low": "a return comes lower than required",
     "safe": "a return is safe",
 }
@@ -58,7 +58,7 @@ _ACTION_TEXTS = {
     "never": "set, but no threshold triggers it",
 }
 _OPEN_TEXTS: dict[Open, str] = {
-    "terrain": "with TERRAIN_FOLLOW returns follow the terrain, which is not flown here",
+    "terrain": "with TERRAIN_FOLLOW returns follow the terrain, which is not simulated",
     "law": "the autopilot's own return is not simulated; ArduPlane's return stands in",
     "autoland": "mode AUTOLAND lands by a pattern of its own",
     "return path": "RTL_AUTOLAND 4 returns along the mission's return path",
@@ -116,14 +116,14 @@ def headline(returns: Returns) -> str:
     >>> headline(Returns((), 1.0, (), 60.0, None, 0.0, True))
     'no place to return from'
     >>> headline(Returns((), 1.0, (), 60.0, None, 0.0, True, unjudged_parts=("terrain",)))
-    'not judged: with TERRAIN_FOLLOW returns follow the terrain, which is not flown here'
+    'not judged: with TERRAIN_FOLLOW returns follow the terrain, which is not simulated'
     """
     reasons = "; ".join(_OPEN_TEXTS[reason] for reason in returns.unjudged_parts)
     if not returns.each:
         return f"not judged: {reasons}" if reasons else "no place to return from"
     landing = "; the landing is not judged" if returns.lands else ""
     left_out_text = (
-        f"; {returns.omitted_count} on or near the ground in take-off and landing left out"
+        f"; {returns.omitted_count} on or near the ground during take-off and landing omitted"
         if returns.omitted_count
         else ""
     )
@@ -151,25 +151,25 @@ def point_of_no_return_text(returns: Returns) -> str:
     """Describe the point after which the battery no longer permits a return with its reserve.
 
     >>> point_of_no_return_text(Returns((), 1.0, (), 60.0, None, 0.0, True))
-    'point of no return: not judged, as the energy in the battery is not known'
+    'point of no return: not judged, because the battery energy is unknown'
     """
     point, name = returns.point_of_no_return, "point of no return"
     reserve = f"the reserve of {returns.reserve:.0f} Wh"
     match point.kind:
         case "battery":
-            return f"{name}: not judged, as the energy in the battery is not known"
+            return f"{name}: not judged, because the battery energy is unknown"
         case "used":
-            return f"{name}: not judged, as the energy used before is not known"
+            return f"{name}: not judged, because the energy used before is unknown"
         case "arrives":
-            return f"{name}: not judged, as no return arrives"
+            return f"{name}: not judged, because no return arrives"
         case "at once":
-            text = f"{name}: before the start, as no return leaves {reserve}"
+            text = f"{name}: before the start, because no return leaves {reserve}"
         case "later":
             text = f"{name}: {point.time:.0f} s; a return that starts later does not leave {reserve}"
         case "never":
-            text = f"{name}: none, as every return leaves {reserve} (at least {point.left:.0f} Wh)"
+            text = f"{name}: none, because every return leaves {reserve} (at least {point.left:.0f} Wh)"
     verb = "does" if point.skipped == 1 else "do"
-    return text + (f"; {point.skipped} that {verb} not arrive are left out" if point.skipped else "")
+    return text + (f"; {point.skipped} that {verb} not arrive are ignored" if point.skipped else "")
 
 
 def causes_text(causes: tuple[Cause, ...]) -> list[str]:
@@ -274,9 +274,12 @@ def _range_outcome_text(
             left_text = f"leaves {worst_return.energy_left:.0f} Wh of the required {returns.reserve:.0f} Wh"
             return f"{prefix}takes {worst_return.energy:.0f} Wh and {left_text}"
         case "unknown":
-            return f"{prefix}flies where the elevation is not known"
+            return f"{prefix}flies where the terrain is unknown"
         case "unsure":
-            return f"{prefix}{height_text} by the point mass, but JSBSim flies it or one near it too far from there"
+            return (
+                f"{prefix}{height_text} by the point mass, but JSBSim flies this return, or one near "
+                "it, too far from there"
+            )
     if worst_return.required_height < returns.limit:
         height_text += " (taking off or landing: it begins below the required height)"
     energy_text = "" if math.isnan(worst_return.energy_left) else f", {worst_return.energy_left:.0f} Wh left"

@@ -48,7 +48,7 @@ def bounds_findings(
             tolerance=ROUNDING_M,
             margin=margin if ok is not None else None,
             unit="m",
-            method="least distance inside the box",
+            method="minimum distance inside the box",
         )
     ]
 

@@ -32,7 +32,7 @@ def clearance_findings(
     terrain = requirements.setup.scenario.terrain
     limit = requirements.limits.min_clearance
     if terrain is None:
-        reason = "no terrain was given, so heights above ground are not known"
+        reason = "no terrain was given, so heights above ground are unknown"
         unknown = make_finding(
             "clearance",
             FLIGHT,
@@ -77,7 +77,9 @@ def _below_home_findings(requirements: RouteRequirements) -> list[Finding]:
     if not float(depths[k]) > BELOW_HOME_M:
         return []
     brief = f"waypoint {k} is {float(depths[k]):.0f} m below home ({home.alt:.0f} m AMSL)"
-    fault = message(brief, ", and no terrain says that the ground there is as low: --terrain names an elevation file")
+    fault = message(
+        brief, ", and no terrain data confirms that the ground there is so low (--terrain names an elevation file)"
+    )
     lowest_waypoint = requirements.waypoint(k)
     return [make_finding("clearance", lowest_waypoint, ok=None, reason=fault.text, faults=[fault], check=GROUND_WAY)]
 
@@ -214,7 +216,7 @@ def _planned_clearance(
 ) -> Finding:
     reason = f"{planned_height:.1f} m above ground at the lowest"
     if math.isnan(planned_height):
-        reason = "the leg leaves the known terrain"
+        reason = "the leg leaves the terrain data"
     elif planned_height < limit - CLEARANCE_TOLERANCE_M:
         reason += f"; {limit:.0f} m are required"
     return make_finding(
@@ -262,7 +264,7 @@ def _flown_clearance(
             ok = min_clearance >= limit - CLEARANCE_TOLERANCE_M
         if not is_known.all():
             k = first + int(np.argmin(is_known))
-            off_text = f"off the known terrain {_time_and_place_text(aligned, k, 0.0)}"
+            off_text = f"outside the terrain data {_time_and_place_text(aligned, k, 0.0)}"
             reason = off_text if math.isnan(min_clearance) else f"{reason}; {off_text}"
             ok = None if ok is not False else False
         if ok is False:

@@ -103,16 +103,16 @@ def imported_completion_finding(setup: FlightSetup, stretches: Sequence[FlownLeg
         faults.append(message("the log is damaged or unfinished"))
     if not stretches:
         followed = () if setup.source is None else setup.source.stretches
-        reason = "none of the mission's legs was flown" if followed else "no stretch of the flight followed the mission"
+        reason = "none of the mission's legs was flown" if followed else "no part of the flight followed the mission"
         # The flight may have included legs that the log does not contain.
         if missing_items is not None and followed:
-            unknown_texts.append(f"none of the legs that the log holds was flown: {_missing_items_text(missing_items)}")
+            unknown_texts.append(f"none of the legs in the log was flown: {_missing_items_text(missing_items)}")
         else:
             faults.append(message(reason))
     elif last_leg in flown_legs and missing_items is not None and missing_items.beyond:
         unknown_texts.append(
-            f"{finished_count} of {leg_count} legs flown that the log holds, the last of them to its end:"
-            f" {_missing_items_text(missing_items)}"
+            f"{finished_count} of {leg_count} of the legs in the log flown, the last of them to "
+            f"its end: {_missing_items_text(missing_items)}"
         )
     elif last_leg in flown_legs:
         last_leg_text = f"{finished_count} of {leg_count} legs flown, the last of them to its end"
@@ -135,7 +135,7 @@ def imported_completion_finding(setup: FlightSetup, stretches: Sequence[FlownLeg
         else:
             faults.append(message(ending, f": {count_text}"))
     unknown_texts += [
-        f"the path to item {stop.item} is not judged, as it is not laid out" for stop in setup.route.unjoined
+        f"the path to item {stop.item} is not judged, because it is not laid out" for stop in setup.route.unjoined
     ]
     notes += _gaps_text(stretches)
     return make_finding(
@@ -152,7 +152,7 @@ def imported_completion_finding(setup: FlightSetup, stretches: Sequence[FlownLeg
         tolerance=0.0,
         margin=finished_count - leg_count,
         unit="legs",
-        method="waypoints passed in order, in the stretches that followed the mission",
+        method="waypoints passed in order, in the parts of the flight that followed the mission",
     )
 
 

@@ -39,9 +39,9 @@ def energy_findings(
     if energy == 0.0 and planned_energy == 0.0:
         # A model without a reading of power reads as 0 W.
         energy, planned_energy = math.nan, math.nan
-        reason = "the aircraft's model states no power, so the energy is not known"
+        reason = "the aircraft's model states no power, so the energy is unknown"
     elif math.isnan(energy):
-        reason = "the aircraft's power is not known at these speeds" if geometric else "nothing was flown"
+        reason = "the aircraft's power is unknown at these speeds" if geometric else "nothing was flown"
     else:
         reason = _used_text(requirements, energy, max_current) + (" by prediction" if geometric else "")
         if not geometric and math.isfinite(planned_energy):
@@ -51,7 +51,10 @@ def energy_findings(
                 f"the battery is guessed: state --battery with the aircraft, or the scenario's battery_wh; {reason}"
             )
         elif is_uncertain:
-            reason += f"; the power according to {setup.envelope.source} is known to {setup.envelope.power_sd:.0%}"
+            reason += (
+                f"; the power according to {setup.envelope.source} has a standard deviation of "
+                f"{setup.envelope.power_sd:.0%}"
+            )
         elif energy > limit:
             reason += f"; {ENERGY_RESERVE_FRACTION:.0%} must be left"
     return [

@@ -147,7 +147,7 @@ def _zone_finding(
     elif visit.depth > 0.0:
         notes.append("touches it")
     if visit.unknown:
-        notes.append("the ground from which its height counts is not known everywhere")
+        notes.append("the terrain from which its height is measured is unknown in places")
     if flown_visit is not None and planned_visit.depth > ROUNDING_M:
         notes.append(
             f"the planned path is {planned_visit.depth:.1f} m {side_text}"

@@ -49,7 +49,7 @@ _MAX_HEIGHT_M = 1000.0
 _ABORT_SPACING_M = 50.0
 # Maximum number of simulated abort places.
 _MAX_ABORT_PLACES = 12
-_NO_HEIGHT_TEXT = "no height would do"
+_NO_HEIGHT_TEXT = "no height would be sufficient"
 # Pitch of the climb if the mission has no take-off, rad (`Plane::do_land`, ArduPlane/commands_logic.cpp).
 _CLIMB_PITCH_RAD = math.radians(10.0)
 
@@ -170,7 +170,7 @@ def go_around_findings(
         return []
     reason = message(
         "a go-around is not judged",
-        ": it needs the simulated ArduPlane, a home, known ground and a glide to the landing point",
+        ": this requires the simulated ArduPlane, a home, terrain data and a glide to the landing point",
     )
     return [make_finding("go_around", FLIGHT, ok=None, reason=reason.text, faults=[reason], check=GROUND_WAY)]
 
@@ -240,7 +240,7 @@ def _unknown_path_text(requirements: RouteRequirements, item: MissionItem, landi
         and int(next_item.params[0]) in (0, 1)
     ):
         return f"{command_name(next_item.command)} (item {next_item.seq}) follows the landing, and is flown instead"
-    return "" if landings else "no place before the landing is known to fly back to"
+    return "" if landings else "no waypoint before the landing is known to fly back to"
 
 
 def _go_around_finding(
@@ -265,17 +265,17 @@ def _go_around_finding(
         "climb above ground", min((go_around.min_climb_height for go_around in go_arounds), default=math.inf), "m"
     )
     if worst is None or (unknown_text and worst.is_free):
-        unknown_text = unknown_text or "its glide is in the ground, or the ground below is not known"
+        unknown_text = unknown_text or "its glide is below the ground, or the terrain below it is unknown"
         unjudged = message("a go-around is not judged", f": {climb_text}; {unknown_text}")
         check = GROUND_WAY if is_required else ""
         return make_finding(
             "go_around", place, ok=None, reason=unjudged.text, faults=[unjudged], unit="m", check=check, facts=[climb]
         )
     if worst.is_free:
-        fault = message(f"{climb_text}; {worst.lowest_height:.0f} m above ground or more on the way back")
+        fault = message(f"{climb_text}; at least {worst.lowest_height:.0f} m above ground on the way back")
     else:
         sufficient_height = _next_sufficient_height(requirements, terrain, world, landing, worst.abort_distance)
-        remedy_text = f"{sufficient_height:.0f} m would do (the first number of item {landing.item.seq})"
+        remedy_text = f"{sufficient_height:.0f} m would be sufficient (parameter 1 of item {landing.item.seq})"
         fault = message(
             _brief_outcome(worst),
             f": {climb_text}, and {_outcome_text(worst)};"
@@ -407,8 +407,8 @@ def _judge_go_around(
     climb = float(np.nanmin(heights[:rows][is_beyond_point[:rows]], initial=math.inf))
     if climb < GO_AROUND_MODEL_ERROR_M and not go_around.unknown_part_text:
         passing_text = (
-            f"aborted {go_around.abort_distance:.0f} m before the landing point, it passes the ground in its climb by"
-            f" {climb:.0f} m"
+            f"aborted {go_around.abort_distance:.0f} m before the landing point, its climb clears "
+            f"the ground by {climb:.0f} m"
         )
         go_around = go_around._replace(
             unknown_part_text=f"{passing_text}, and may be flown {GO_AROUND_MODEL_ERROR_M:.0f} m lower"
@@ -432,7 +432,9 @@ def _unknown_part_text(end_status: int, *, has_climbed: bool) -> str:
     if end_status != RETURN_OFF_TERRAIN:
         return ""
     return (
-        "it leads to where the ground is not known" if has_climbed else "it does not reach its height on known ground"
+        "it leads to where the terrain is unknown"
+        if has_climbed
+        else "it leaves the terrain data before it reaches its height"
     )
 
 
@@ -476,10 +478,12 @@ def _next_sufficient_height(
 def _brief_outcome(worst: _GoAround) -> str:
     """Describe the outcome of the worst go-around in a few words."""
     if not math.isnan(worst.impact_time):
-        return "a go-around meets the ground"
+        return "a go-around hits the ground"
     if worst.entered_hazard:
         return f"a go-around enters {worst.entered_hazard}"
-    return "a go-around does not return to the line-up" if worst.is_lost else "a go-around comes too near to the ground"
+    return (
+        "a go-around does not return to the line-up" if worst.is_lost else "a go-around comes too close to the ground"
+    )
 
 
 def _outcome_text(worst: _GoAround) -> str:
@@ -487,9 +491,9 @@ def _outcome_text(worst: _GoAround) -> str:
     abort_text = (
         f"aborted {worst.abort_distance:.0f} m before the landing point, {worst.abort_height:.0f} m above ground,"
     )
-    turn_text = " is so high already, turns at once" if worst.turns_at_once else ""
+    turn_text = " is already at this height, turns at once" if worst.turns_at_once else ""
     if not math.isnan(worst.impact_time):
-        outcome = f"meets the ground {worst.impact_time:.0f} s later"
+        outcome = f"hits the ground {worst.impact_time:.0f} s later"
     elif worst.entered_hazard:
         outcome = f"enters {worst.entered_hazard}"
     elif worst.is_lost:

@@ -78,7 +78,7 @@ class _Obstacles(NamedTuple):
         if self.entered_hazard:
             return message(f"{subject} enters {self.entered_hazard}")
         return message(
-            f"{subject} meets the ground", f", {-self.clearance:.0f} m into it {self.distance:.0f} m {origin}"
+            f"{subject} hits the ground", f", {-self.clearance:.0f} m below its surface, {self.distance:.0f} m {origin}"
         )
 
 
@@ -124,7 +124,7 @@ def climbout_findings(
             return []
     if math.isnan(ground_altitude):
         return [
-            _unjudged_finding("climbout", place, "the ground at home is not known", is_undecided=takeoff is not None)
+            _unjudged_finding("climbout", place, "the terrain at home is unknown", is_undecided=takeoff is not None)
         ]
     max_slope, certain_slope = _climb_slopes(requirements, max(0, first_waypoint - 1), course, ground_altitude)
     if not max_slope > 0.0:
@@ -244,10 +244,10 @@ def _air_start_finding(place: Place, obstacles: _Obstacles) -> Finding:
     """Judge the straight climb from home to the first waypoint of a mission that starts in the air."""
     subject = f"the climb from home to {_item_text(place)}"
     if math.isnan(obstacles.clearance) and not obstacles.entered_hazard:
-        reason, check, ok = f"the ground below {subject} is not known", "", None
+        reason, check, ok = f"the terrain below {subject} is unknown", "", None
     elif obstacles.is_free:
         reason, check, ok = (
-            f"straight from home: {_clearance_text(obstacles)}; not flown, as the flight begins in the air",
+            f"straight from home: {_clearance_text(obstacles)}; not flown, because the flight begins in the air",
             "",
             True,
         )
@@ -275,10 +275,10 @@ def _launch_finding(
     is_known: True if the aircraft's climb is certain.
     """
     to_item = requirements.leg(0).to_item
-    direction_text = f"towards {'the next place' if to_item is None else f'item {to_item}'}"
+    direction_text = f"towards {('the next waypoint' if to_item is None else f'item {to_item}')}"
     subject = f"the climb from home {course_text or direction_text}"
     if math.isnan(obstacles.clearance) and not obstacles.entered_hazard:
-        reason = message(f"the ground below {subject} is not known")
+        reason = message(f"the terrain below {subject} is unknown")
         return _path_finding("climbout", place, obstacles, None, reason)
     if not obstacles.is_free:
         fault = obstacles.obstacle_message(subject, "from home, at the steepest climb")
@@ -290,7 +290,7 @@ def _launch_finding(
     min_climb_text = f"{subject}, at {100.0 * MIN_CLIMB_FRACTION:.0f} % of the steepest,"
     if math.isnan(obstacles_at_min_climb.clearance) and not obstacles_at_min_climb.entered_hazard:
         return _path_finding(
-            "climbout", place, obstacles, None, message(f"{min_climb_text} leads to where the ground is not known")
+            "climbout", place, obstacles, None, message(f"{min_climb_text} leads to where the terrain is unknown")
         )
     if not obstacles_at_min_climb.is_free:
         return _path_finding(
@@ -374,7 +374,7 @@ def approach_findings(
         float(terrain.height(float(landing_point[0]), float(landing_point[1]))),
     )
     if math.isnan(point_altitude) or math.isnan(ground_altitude) or length < MIN_LEG_LENGTH_M:
-        reason = "the height of the ground at the landing point is not known"
+        reason = "the terrain height at the landing point is unknown"
         return [_unjudged_finding("approach", place, reason, is_undecided=True)]
     if start_altitude <= point_altitude:
         reason = "it begins no higher than the landing point"
@@ -394,7 +394,7 @@ def approach_findings(
     obstacles = _Obstacles(clearance, length - position, first_hazard_on_path(requirements, path))
     subject = f"the glide to {item_text}"
     if math.isnan(obstacles.clearance) and not obstacles.entered_hazard:
-        return [_path_finding("approach", place, obstacles, None, message(f"the ground below {subject} is not known"))]
+        return [_path_finding("approach", place, obstacles, None, message(f"the terrain below {subject} is unknown"))]
     obstacle_message = obstacles.obstacle_message(subject, "before the landing point")
     # With a landing point below the ground the glide hits the ground early: the elevation file may be some metres off.
     if (
@@ -417,7 +417,7 @@ def approach_findings(
     clearance = min_path_clearance(terrain, path.between(0.0, judged_end))[0] if judged_end > 0.0 else math.inf
     if clearance < GLIDE_PATH_TOLERANCE_M:
         fault = message(
-            f"{subject} passes the ground by {clearance:.1f} m",
+            f"{subject} clears the ground by only {clearance:.1f} m",
             f", and may be flown {GLIDE_PATH_TOLERANCE_M:.0f} m lower than laid out",
         )
         return [_path_finding("approach", place, obstacles, None, fault, GROUND_WAY)]
@@ -427,7 +427,7 @@ def approach_findings(
             f", flares {glide.flare_height:.1f} m over the landing point and {glide.flare_distance:.0f} m before it"
         )
     reason += f"; {_clearance_text(obstacles)} until {EARLY_TOUCHDOWN_DISTANCE_M:.0f} m before it"
-    reason += "" if setup.ground_ways.approach is not None else "; not flown, as the flight ends in the air"
+    reason += "" if setup.ground_ways.approach is not None else "; not flown, because the flight ends in the air"
     return [_path_finding("approach", place, obstacles, True, message(reason))]
 
 
@@ -436,14 +436,12 @@ def approach_findings(
 
 def _item_text(place: Place) -> str:
     """Name the item of a waypoint."""
-    return "the first place" if place.item is None else f"item {place.item}"
+    return "the first waypoint" if place.item is None else f"item {place.item}"
 
 
 def _clearance_text(obstacles: _Obstacles) -> str:
     return (
-        "nothing is in the way"
-        if math.isinf(obstacles.clearance)
-        else f"{obstacles.clearance:.0f} m above ground or more"
+        "no obstacle" if math.isinf(obstacles.clearance) else f"{obstacles.clearance:.0f} m above ground at the lowest"
     )
 
 

@@ -30,7 +30,7 @@ def height_findings(
     if limit is None:
         return []
     if terrain is None:
-        reason = "no terrain was given, so heights above ground are not known"
+        reason = "no terrain was given, so heights above ground are unknown"
         return [
             make_finding(
                 "height", FLIGHT, ok=None, reason=reason, limit=limit, source=requirements.limits_source, unit="m"
@@ -142,7 +142,7 @@ def _leg_finding(
                 message(f"{judged_maximum.amsl:.1f} m AMSL", f", above the scenario's ceiling of {ceiling:.0f} m")
             )
         if not judged_maximum.is_ground_known:
-            facts.append("part of the ground below it is not known")
+            facts.append("part of the terrain below it is unknown")
         ok = False if faults else True if judged_maximum.is_ground_known else None
     if (
         planned_maximum is not None

@@ -63,9 +63,7 @@ def _launch_finding(requirements: RouteRequirements, ground: FlownGround, take_o
         runway_text = f"; the runway is {take_off.launch.run:.0f} m long, of which {RUNWAY_MARGIN_M:.0f} m must be left"
         faults.append(message(brief, runway_text))
     if clearance < LAUNCH_CLEARANCE_M:
-        faults.append(
-            message(f"{clearance:.1f} m above ground", f" {distance:.0f} m from home, on the course that is held")
-        )
+        faults.append(message(f"{clearance:.1f} m above ground", f" {distance:.0f} m from home, on the course flown"))
     entered_hazard = first_hazard_on_path(requirements, path)
     if entered_hazard:
         faults.append(message(f"the climb enters {entered_hazard}"))
@@ -75,7 +73,7 @@ def _launch_finding(requirements: RouteRequirements, ground: FlownGround, take_o
         brief = f"the launch passes {clearance:.1f} m above ground {distance:.0f} m from home"
         undecided_messages.append(message(brief, ", less than the error of the simulated climb"))
     elif not faults and math.isnan(clearance):
-        undecided_messages.append(message("the ground below the launch's climb is not known"))
+        undecided_messages.append(message("the terrain below the launch's climb is unknown"))
     return make_finding(
         "launch",
         requirements.waypoint(take_off.waypoint),
@@ -141,9 +139,9 @@ def _describe_take_off(take_off: TakeOff, track: Track, distances: Floats, clear
     if distances[-1] > 1.0:
         altitude_gain = float(track.position[-1, 2] - track.position[0, 2])
         course = round(math.degrees(math.atan2(*track.velocity[-1, :2].tolist()))) % 360
-        notes.append(f"climbs at {altitude_gain / distances[-1]:.2f}, at last on {course}°")
+        notes.append(f"climbs at {altitude_gain / distances[-1]:.2f}, finally on {course}°")
     if math.isfinite(clearance):
-        notes.append(f"{clearance:.0f} m above ground or more beyond {LAUNCH_RUN_M:.0f} m")
+        notes.append(f"{clearance:.0f} m above ground at the lowest, once {LAUNCH_RUN_M:.0f} m from the launch")
     return notes
 
 

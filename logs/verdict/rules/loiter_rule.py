@@ -138,14 +138,14 @@ def end_findings(
     reach, descriptions = hazards
     reason = f"after it {requirements.setup.autopilot.title} circles, up to {reach:.0f} m from it"
     if descriptions:
-        reason += f": {', '.join(descriptions)}; only a flight tells how near it comes"
+        reason += f": {', '.join(descriptions)}; only a simulated flight shows how close it comes"
     return [
         make_finding(
             "loiter",
             requirements.waypoint(requirements.legs),
             ok=None if descriptions else True,
             reason=reason,
-            method="all that its circles may reach, at the height of the last waypoint",
+            method="the area that its circles may reach, at the height of the last waypoint",
             check=UNKNOWN_WAY if descriptions else "",
         )
     ]
@@ -194,7 +194,7 @@ def _loiter_finding(
     ok: bool | None = not (faults or failed_corners)
     if ok and any(finding.ok is None for finding in corner_findings):
         ok = None
-        facts.append("the flight did not get to its end")
+        facts.append("the flight did not reach its end")
     if ok and open_text:
         ok = None
         facts.append(open_text)
@@ -212,7 +212,9 @@ def _loiter_finding(
         tolerance=RADIUS_TOLERANCE_FRACTION,
         margin=circle.radius - min_radius,
         unit="m",
-        method="radius over the ground against the bank limit's in this wind; each corner as a turn",
+        method=(
+            "radius over the ground compared with the radius at the bank limit in this wind; each corner as a turn"
+        ),
         check=UNKNOWN_WAY if ok is None and open_text else "",
     )
 
@@ -264,7 +266,7 @@ def _hazards_text(requirements: RouteRequirements, circle: LoiterCircle, min_rad
     if not hazards:
         return ""
     reach_text = f"it may get {reach:.0f} m from its center, and there"
-    return f"{reach_text}, {', '.join(hazards)}; only a flight tells where it circles"
+    return f"{reach_text}, {', '.join(hazards)}; only a simulated flight shows where it circles"
 
 
 def _has_reached(requirements: RouteRequirements, aligned: AlignedTrack, circle: LoiterCircle) -> bool:

@@ -85,7 +85,7 @@ def _check_finding(check: str, remarks: list[_Remark], refuses: bool) -> Finding
     sorted_remarks = [(verdict if ok == REFUSED else ok, item, reason) for ok, item, reason in remarks]
     # A failure comes first, then PX4's refusals, then mere remarks.
     sorted_remarks.sort(key=lambda remark: {False: 0, None: 1, True: 2}[remark[0]])
-    ok, item, reason = sorted_remarks[0] if sorted_remarks else (True, None, "nothing to object to")
+    ok, item, reason = sorted_remarks[0] if sorted_remarks else (True, None, "no objections")
     first_message = reason if isinstance(reason, Message) else message(reason)
     more_text = f" (+{len(sorted_remarks) - 1} more)" if len(sorted_remarks) > 1 else ""
     return make_finding(
@@ -110,7 +110,7 @@ def _arduplane_refusals(setup: FlightSetup) -> list[Finding]:
     if not refused_items or not setup.autopilot.refuses_as_arduplane:
         return []
     more_text = f" (+{len(refused_items) - 1} more)" if len(refused_items) > 1 else ""
-    fault = message(f"unsupported command {command_name(refused_items[0].command)}", f"; PX4 takes it{more_text}")
+    fault = message(f"unsupported command {command_name(refused_items[0].command)}", f"; PX4 accepts it{more_text}")
     return [
         make_finding(
             "mission",
@@ -140,7 +140,7 @@ def _unjoined_finding(setup: FlightSetup) -> Finding:
     more_text = f" (+{len(other_stops)} more)" if other_stops else ""
     fault = message(
         reason,
-        f": {autopilot} flies {'it as it is' if first_stop.is_circle else 'there'}, which is not judged{more_text}",
+        f": {autopilot} flies {('it anyway' if first_stop.is_circle else 'there')}, which is not judged{more_text}",
     )
     return make_finding(
         "mission",
@@ -180,7 +180,7 @@ def _unflown_findings(setup: FlightSetup) -> Iterator[Finding]:
     slopes = landing_slopes(setup.mission, setup.route, setup.scenario)
     if setup.source is None and slopes is not None and max(map(abs, slopes)) > STEEPEST_STRIP_SLOPE:
         steepest_text = f"{max(map(abs, slopes)):.1%}, and at most {STEEPEST_STRIP_SLOPE:.0%} can be landed on"
-        reason = f"NAV_LAND: the ground there slopes by {steepest_text}: the touchdown is not judged"
+        reason = f"NAV_LAND: the ground there slopes by {steepest_text}, so the touchdown is not judged"
         remarks.append((int(setup.route.items[-1]), reason))
     # An imported flight was flown with its settings.
     texts = setup.autopilot.settings_not_flown(_mission_parts(setup)) if setup.source is None else []
@@ -225,8 +225,8 @@ def _check_validity(mission: Mission) -> Iterator[_Remark]:
         name, support = command_name(item.command), support_of(item.command)
         if support.px4 == Treatment.REFUSED:
             arduplane_accepts = support.arduplane != Treatment.REFUSED
-            autopilot = "ArduPlane takes it" if arduplane_accepts else "nor does ArduPlane take it"
-            autopilot = "ArduPlane passes it over" if support.reason == PASSED_OVER else autopilot
+            autopilot = "ArduPlane accepts it" if arduplane_accepts else "ArduPlane rejects it, too"
+            autopilot = "ArduPlane skips it" if support.reason == PASSED_OVER else autopilot
             yield REFUSED if arduplane_accepts else False, item.seq, f"unsupported command {name}; {autopilot}"
         elif item.frame in OVER_TERRAIN and item.command in PLACES | TAKEOFFS | LANDINGS:
             yield (
@@ -280,7 +280,7 @@ def _check_approach(mission: Mission, origin: GeoOrigin, limits: MissionChecks) 
             continue
         altitude_difference = _height_above_home(mission, previous) - _height_above_home(mission, item)
         if math.isnan(altitude_difference):
-            yield None, item.seq, "the heights of landing and approach are not known over one another"
+            yield None, item.seq, "the height of the approach above the landing point is unknown"
             continue
         if altitude_difference <= 0.0:
             yield REFUSED, item.seq, "the approach waypoint must be above the landing point"
@@ -362,7 +362,7 @@ def _check_distances(mission: Mission, origin: GeoOrigin) -> Iterator[_Remark]:
 def _check_home_altitude(mission: Mission) -> Iterator[_Remark]:
     for item in _flown_items(mission):
         if item.frame in OVER_HOME and mission.home is None:
-            reason = "the file has no home, and heights over it: PX4 refuses them until the vehicle has one"
+            reason = "the file has heights above home but no home: PX4 refuses them until the vehicle has a home"
             yield None, item.seq, reason
             return
         if _height_above_home(mission, item) < 0.0:

@@ -110,7 +110,7 @@ def _requirement_findings(requirements: RouteRequirements, starts: Callable[[flo
 
 
 _METHOD = "by the simulated ArduPlane on a point mass"
-_NOT_KNOWN = "whether the aircraft gets home as the scenario requires is not known in full"
+_NOT_KNOWN = "it is not fully known whether the aircraft gets home as the scenario requires"
 
 
 class _Answer(NamedTuple):
@@ -135,7 +135,7 @@ def _judge_glides(world: ReturnWorld, starts: ReturnStarts, _: float) -> _Answer
     """
     is_low = heights_above_ground(world, starts) < world.limit
     glides = judge_glides(world, starts.subset(np.flatnonzero(~is_low)))
-    left_out = f"; {is_low.sum()} lower than {world.limit:.0f} m above ground are left out" if is_low.any() else ""
+    left_out = f"; {is_low.sum()} lower than {world.limit:.0f} m above ground are omitted" if is_low.any() else ""
     reason = f"without the engine: {glides_headline(glides)}{left_out}"
     return _Answer(glides.always_reaches_ground, reason, f"glides that keep {MARGIN:.0f} m above ground")
 
@@ -172,7 +172,7 @@ def has_completed_return_loiter(requirements: RouteRequirements, aligned: Aligne
 
 
 def _flown_rtl_findings(requirements: RouteRequirements, has_arrived: bool, reason: str = "") -> list[Finding]:
-    outcome = "flown to its end" if has_arrived else f"the flight did not get to its end{reason}"
+    outcome = "flown to its end" if has_arrived else f"the flight did not reach its end{reason}"
     return _rtl_findings(requirements, True if has_arrived else None, outcome)
 
 
@@ -188,7 +188,7 @@ def _rtl_findings(requirements: RouteRequirements, ok: bool | None, outcome: str
     faults = []
     if unknown_reason and requirements.setup.source is None:
         # What was flown instead does not show where the autopilot goes.
-        faults, ok = [message("where the return leads to is not known", f": {unknown_reason}")], None
+        faults, ok = [message("the destination of the return is unknown", f": {unknown_reason}")], None
         reason = f"{faults[0].text}; {reason}"
     return [
         make_finding(

@@ -57,7 +57,7 @@ def _leg_finding(requirements: RouteRequirements, leg: int, measure: SlopeMeasur
         if rise is None:
             faults.append(_steep_leg_message(requirements, leg, limit, source))
         else:
-            facts.append(f"a step of {rise:.1f} m, beyond {math.degrees(limit):.1f}°, flown within its own height")
+            facts.append(f"a step of {rise:.1f} m, steeper than {math.degrees(limit):.1f}°, but negligible")
     faults += _steep_arc_faults(requirements, leg)
     fit: LegFit | None = None
     method = "route"
@@ -80,7 +80,7 @@ def _leg_finding(requirements: RouteRequirements, leg: int, measure: SlopeMeasur
         ok, check = None, UNKNOWN_AIRCRAFT
         facts.insert(0, uncertainty)
     if measure is not None and not measure.is_finished:
-        facts.append("the flight did not get to its end")
+        facts.append("the flight did not reach its end")
         ok = None if ok else False
     judged = planned_slope if fit is None else fit.value
     return make_finding(
@@ -119,10 +119,7 @@ def _uncertainty_text(requirements: RouteRequirements, leg: int) -> str:
     if abs(planned_slope) <= max(LEVEL_SLOPE_RAD, certain_limit) or not certain_limit < limit < math.inf:
         return ""
     slope, limit_deg, deviation_deg = (math.degrees(angle) for angle in (abs(planned_slope), limit, deviation))
-    return (
-        f"{verb} {slope:.1f}°; the limit according to {envelope.source} is {limit_deg:.1f}°,"
-        f" give or take {deviation_deg:.1f}°"
-    )
+    return f"{verb} {slope:.1f}°; the limit according to {envelope.source} is {limit_deg:.1f}° ± {deviation_deg:.1f}°"
 
 
 def _steep_arc_faults(requirements: RouteRequirements, leg: int) -> list[Message]:
@@ -137,9 +134,9 @@ def _steep_arc_faults(requirements: RouteRequirements, leg: int) -> list[Message
     legs = " and ".join(f"{math.degrees(abs(float(requirements.slopes[k]))):.1f}°" for k in (leg, corner))
     slope, missing_height = math.degrees(math.atan(abs(arc.tangent))), (abs(arc.tangent) - arc.limit) * length
     arc_text = (
-        f"the arc at {place_text(place)} {verb} {slope:.1f}° for {length:.0f} m, where legs {leg} and {corner} have"
-        f" {legs}: flown by, it is shorter than the {2.0 * float(requirements.length_before[corner]):.0f} m of leg"
-        " that it replaces"
+        f"the arc at {place_text(place)} {verb} {slope:.1f}° for {length:.0f} m, where legs {leg} "
+        f"and {corner} have {legs}: the fly-by arc is shorter than the "
+        f"{2.0 * float(requirements.length_before[corner]):.0f} m of leg that it replaces"
     )
     limit = (
         f"; the aircraft can fly at most {math.degrees(math.atan(arc.limit)):.1f}° there, {missing_height:.0f} m less"

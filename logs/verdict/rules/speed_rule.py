@@ -54,7 +54,7 @@ def _parameter_findings(requirements: RouteRequirements) -> list[Finding]:
     if parameters is None or not parameters.misfits or requirements.setup.source is not None:
         return []
     more_text = f" (+{len(parameters.misfits) - 1} more)" if len(parameters.misfits) > 1 else ""
-    fault = message(f"{parameters.misfits[0]}{more_text}", ": only a flight tells which airspeed is held")
+    fault = message(f"{parameters.misfits[0]}{more_text}", ": only a simulated flight shows which airspeed is held")
     return [make_finding("speed", FLIGHT, ok=None, reason=fault.text, faults=[fault], check=NOT_FLOWN)]
 
 
@@ -126,7 +126,7 @@ def _command_text(command: float, commanded: float, min_speed: float, max_speed:
     """Describe a commanded airspeed, equivalent and true, and the range of airspeeds in level flight, m/s."""
     true_speed_text = "" if command == commanded else f" of equivalent airspeed, {commanded:.1f} m/s of true airspeed,"
     if not (math.isfinite(min_speed) and math.isfinite(max_speed)):
-        return f"{command:.1f} m/s{true_speed_text} is commanded, and no level flight is known"
+        return f"{command:.1f} m/s{true_speed_text} is commanded, but no level flight is known"
     level_text = f"level flight is possible from {min_speed:.1f} to {max_speed:.1f} m/s"
     return f"{command:.1f} m/s{true_speed_text} is commanded; {level_text}"
 
@@ -190,7 +190,7 @@ def _uncertainty_text(requirements: RouteRequirements, leg: int, commanded: floa
     if commanded <= min(certain_envelope.level_speeds(altitude)[1] for altitude in altitudes):
         return ""
     limit_text = f"the fastest level flight according to {envelope.source} is {max_speed:.1f} m/s"
-    return f"{commanded:.1f} m/s is commanded; {limit_text}, give or take {envelope.fastest_sd:.1f} m/s"
+    return f"{commanded:.1f} m/s is commanded; {limit_text} ± {envelope.fastest_sd:.1f} m/s"
 
 
 def _speed_range_notes(requirements: RouteRequirements, command: float) -> list[str]:

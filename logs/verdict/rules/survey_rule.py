@@ -93,7 +93,7 @@ def overlap_text(measure: OverlapMeasure, check: str) -> str:
     """Describe the minimum overlap of photos along or across lines, its line, and the required overlap."""
     if check == FRONT:
         overlap, required = measure.front, measure.camera.front
-        spacing_text = f" apart, one each {measure.camera.interval:g} s" if measure.is_camera_limited else " apart"
+        spacing_text = f" apart, one every {measure.camera.interval:g} s" if measure.is_camera_limited else " apart"
         lines_text = (
             f"line {measure.line + 1}: photos {measure.photo_spacing:.0f} m{spacing_text},"
             f" {measure.height:.0f} m above ground"
@@ -130,8 +130,9 @@ def _tight_turnaround_findings(requirements: RouteRequirements, survey: Survey) 
         if hazards := find_hazards(requirements, center, min_altitude, max_altitude, reach):
             end_names = {0: "the turn onto the first line", len(turnarounds) - 1: "the turn off the last line"}
             reason = (
-                f"{end_names.get(number, f'turn-around {number}')} is too tight to be flown as drawn, and within"
-                f" {reach:.0f} m of it {'; '.join(hazards)}: only a flight tells whether it is safe"
+                f"{end_names.get(number, f'turn-around {number}')} is too tight to be flown as "
+                f"drawn, and within {reach:.0f} m of it {'; '.join(hazards)}: only a simulated "
+                "flight shows whether it is safe"
             )
             place, method = requirements.leg(first), "its surroundings"
             findings.append(make_finding("survey", place, ok=None, reason=reason, check=UNKNOWN_WAY, method=method))
@@ -208,9 +209,9 @@ def _flown_finding(
 def lost_text(measure: LineMeasure) -> str:
     """Describe the defects of a line's unusable parts, the largest first; return "" if almost nothing is lost."""
     fractions = {
-        f"not along it within {measure.lateral_tolerance:.0f} m": measure.off_line,
+        f"not flown along it within {measure.lateral_tolerance:.0f} m": measure.off_line,
         f"banked beyond {math.degrees(MAX_PHOTO_BANK_RAD):.0f}°": measure.banked,
-        f"more than {measure.min_height_tolerance:.0f} m off its height over ground": measure.off_height,
+        f"more than {measure.min_height_tolerance:.0f} m off its height above ground": measure.off_height,
         "with the camera off": measure.camera_off,
     }
     parts = sorted(((fraction, defect) for defect, fraction in fractions.items() if fraction >= 0.005), reverse=True)

@@ -52,7 +52,7 @@ def takeoff_findings(
         next_altitude = float(requirements.points[waypoint + 1, 2])
         return [_slope_finding(requirements, "takeoff", waypoint, waypoint + 1, route.takeoff_ground, next_altitude)]
     if waypoint == 0 or not has_own_place:
-        reason = f"to {altitude:.0f} m AMSL over home, on a course that is the autopilot's to choose"
+        reason = f"to {altitude:.0f} m AMSL over home, on a course that the autopilot chooses"
         return [_unjudged_finding("takeoff", requirements.waypoint(waypoint), reason)]
     # The flight starts over home, and climbs to the take-off item's own waypoint.
     return [_slope_finding(requirements, "takeoff", 0, waypoint, route.takeoff_ground, altitude)]
@@ -100,7 +100,7 @@ def landing_findings(
     if not landing_waypoints:
         if not items:
             return []
-        reason = f"{command_name(items[-1].command)} has no place of its own on the route"
+        reason = f"{command_name(items[-1].command)} has no position of its own on the route"
         route = requirements.setup.route
         if route.return_from >= 0:
             reason = RETURN_NOT_FLOWN_ON
@@ -138,7 +138,7 @@ def _slope_finding(
     waypoint_place = requirements.waypoint(last)
     distance = float(requirements.runs[first:last].sum())
     if math.isnan(first_altitude) or math.isnan(last_altitude):
-        return _unjudged_finding(rule, waypoint_place, "the height of the ground there is not known")
+        return _unjudged_finding(rule, waypoint_place, "the height of the terrain there is unknown")
     slope = math.atan2(last_altitude - first_altitude, distance)
     limit, source = _slope_limit(requirements, first, first_altitude, last_altitude, slope)
     verb = "climbs" if slope >= 0.0 else "sinks"
@@ -147,7 +147,7 @@ def _slope_finding(
     ground_phases = requirements.setup.ground_ways
     is_flown = (ground_phases.take_off if rule == "takeoff" else ground_phases.approach) is not None
     reason = f"{text} of {math.degrees(limit):.1f}°"
-    reason += "" if is_flown else f"; not flown, as the flight {_PHASE_VERBS[rule]} in the air"
+    reason += "" if is_flown else f"; not flown, because the flight {_PHASE_VERBS[rule]} in the air"
     fault = message(
         f"the {_PHASE_TITLES[rule]} {text}",
         f"; at most {math.degrees(limit):.1f}° can be flown at this speed and in this wind",

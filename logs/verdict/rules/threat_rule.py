@@ -29,7 +29,7 @@ def threat_findings(
     """Judge each missile or radar sphere that plan or flight touches; if no missile sphere is entered, report it."""
     scenario = requirements.setup.scenario
     if scenario.external:
-        reason = "the mission came without a scenario, so threats are not known"
+        reason = "the mission came without a scenario, so threats are unknown"
         return [make_finding("threat", FLIGHT, ok=None, reason=reason, unit="s")]
     threats = scenario.threats
     findings: list[Finding] = []

@@ -77,12 +77,12 @@ def touchdown_findings(
     place = ground_phases.whole.waypoint(approach.leg + 1)
     track, terrain = ground_phases.landing, requirements.setup.scenario.terrain
     if ground_phases.landing_start_row >= len(ground_phases.track) - 1:
-        reason = "the flight did not get to its landing"
+        reason = "the flight did not reach its landing"
         fault = message(f"the touchdown at {place_text(place)} is not judged: {reason}")
         return [make_finding("touchdown", place, ok=None, reason=reason, faults=[fault], unit="m", check=GROUND_WAY)]
     point_height = math.nan if terrain is None else float(approach.point[2] - terrain.height(*approach.point[:2]))
     if terrain is None or math.isnan(point_height):
-        reason = "the ground at the landing point is not known"
+        reason = "the terrain at the landing point is unknown"
         fault = message(f"the touchdown at {place_text(place)} is not judged: {reason}")
         return [make_finding("touchdown", place, ok=None, reason=reason, faults=[fault], unit="m", check=GROUND_WAY)]
     touchdown_row = _touchdown_row(track, terrain)
@@ -94,7 +94,7 @@ def touchdown_findings(
     )
     faults = _detect_faults(approach, landing)
     if entered_hazard := first_hazard_on_path(requirements, track_path(track)):
-        faults.append(message(f"the final enters {entered_hazard}"))
+        faults.append(message(f"the final approach enters {entered_hazard}"))
     has_gusts = requirements.setup.scenario.wind.turbulence != "none"
     return [_landing_finding(place, approach, landing, faults, has_gusts=has_gusts)]
 
@@ -139,7 +139,7 @@ def _landing_finding(
     """
     undecided_messages = [] if faults else _undecided_messages(approach, landing, has_gusts=has_gusts)
     if not faults and not undecided_messages and math.isnan(landing.final_clearance):
-        undecided_messages = [message("the ground below the final is not known")]
+        undecided_messages = [message("the terrain below the final approach is unknown")]
     messages = faults or undecided_messages
     limit = 0.5 * approach.strip.length - TOUCHDOWN_ERROR_M
     max_distance = max(landing.stop[0], abs(landing.touchdown[0]))
@@ -232,7 +232,7 @@ def _detect_faults(approach: Approach, landing: _Landing) -> list[Message]:
         brief = (
             f"the landing point of {_landing_point_text(approach)} is {-landing.point_height:.0f} m below the ground"
         )
-        faults.append(message(brief, ": the aircraft meets it before it flares"))
+        faults.append(message(brief, ": the aircraft hits the ground before it flares"))
     if abs(touch[0]) > allowed_distance:
         direction = "before" if touch[0] < 0.0 else "beyond"
         brief = f"touches down {abs(touch[0]):.0f} m {direction} the strip's center"
@@ -256,7 +256,11 @@ def _short_strip_messages(approach: Approach) -> list[Message]:
         return []
     brief = f"the strip is {approach.strip.length:.0f} m long"
     return [
-        message(brief, f"; a touch-down is known only within {TOUCHDOWN_ERROR_M:.0f} m either way, which needs more")
+        message(
+            brief,
+            f"; the touchdown point is known only within {TOUCHDOWN_ERROR_M:.0f} m either way, which "
+            "requires a longer strip",
+        )
     ]
 
 
@@ -265,19 +269,21 @@ def _undecided_messages(approach: Approach, landing: _Landing, *, has_gusts: boo
     messages = _short_strip_messages(approach)
     strip_left = 0.5 * approach.strip.length - max(landing.touchdown[0], landing.stop[0])
     if has_gusts and strip_left < GUST_TOUCHDOWN_ERROR_M and not messages:
-        brief = f"comes down or to rest {strip_left:.0f} m before the strip's end"
+        brief = f"touches down or comes to rest {strip_left:.0f} m before the strip's end"
         messages.append(
-            message(brief, f"; in turbulence the place is known only within {GUST_TOUCHDOWN_ERROR_M:.0f} m")
+            message(brief, f"; in turbulence the touchdown point is known only within {GUST_TOUCHDOWN_ERROR_M:.0f} m")
         )
     if landing.point_height > LANDING_POINT_ERROR_M:
         brief = f"the landing point of {_landing_point_text(approach)} is {landing.point_height:.0f} m above the ground"
-        messages.append(message(brief, ": the aircraft flares too early, and falls"))
+        messages.append(message(brief, ": the aircraft flares too early and drops"))
     if landing.final_clearance < FINAL_APPROACH_CLEARANCE_M:
-        brief = f"the final passes the ground by {landing.final_clearance:.1f} m"
+        brief = f"the final approach clears the ground by only {landing.final_clearance:.1f} m"
         messages.append(message(brief, f", and may be flown {FINAL_APPROACH_CLEARANCE_M:.0f} m lower than simulated"))
     if landing.ground_sink > MAX_TOUCHDOWN_SINK_MPS:
-        brief = f"sinks at {landing.ground_sink:.1f} m/s towards the ground at its touch-down"
-        messages.append(message(brief, f"; ArduPlane's landings are known with up to {MAX_TOUCHDOWN_SINK_MPS:g} m/s"))
+        brief = f"sinks at {landing.ground_sink:.1f} m/s towards the ground at touchdown"
+        messages.append(
+            message(brief, f"; ArduPlane's known landings touch down at up to {MAX_TOUCHDOWN_SINK_MPS:g} m/s")
+        )
     return messages
 
 
@@ -285,18 +291,18 @@ def _describe_landing(approach: Approach, landing: _Landing) -> list[str]:
     """Describe the landing in a list of phrases."""
     direction = "before" if landing.along < 0.0 else "beyond"
     notes = [
-        f"touches down {abs(landing.along):.0f} m {direction} the landing point,"
-        f" {abs(landing.lateral_offset):.1f} m aside"
+        f"touches down {abs(landing.along):.0f} m {direction} the landing point, "
+        f"{abs(landing.lateral_offset):.1f} m to the side"
     ]
     notes.append(f"comes to rest with {landing.strip_left:.0f} m of the strip left")
     sink_text = (
-        f"sinks at {landing.sink:.1f} m/s at touch-down, {landing.ground_sink:.1f} m/s relative to the sloping ground"
+        f"sinks at {landing.sink:.1f} m/s at touchdown, {landing.ground_sink:.1f} m/s relative to the sloping ground"
     )
     notes.append(f"{sink_text}; the flare itself is not judged")
     if math.isfinite(landing.final_clearance):
-        notes.append(f"the final stays {landing.final_clearance:.0f} m above ground or more")
+        notes.append(f"the final approach stays at least {landing.final_clearance:.0f} m above ground")
     if approach.tail_wind > 0.1:
-        notes.append(f"with {approach.tail_wind:.1f} m/s of tail wind")
+        notes.append(f"with {approach.tail_wind:.1f} m/s of tailwind")
     return notes
 
 

@@ -156,7 +156,7 @@ def _sharp_turn_message(
             f"; at {speed:.0f} m/s and {bank:.0f}° bank the smallest turn radius on these courses"
             f" in this wind is {requirements.min_radius[i]:.0f} m",
         )
-    length_text = "no length of leg is enough"
+    length_text = "no leg would be long enough"
     if requirements.length_after[i] < MAX_FLY_BY_OFFSET_RADII * radius:
         length_text = f"that takes {requirements.length_after[i]:.0f} m of each leg"
         if requirements.setup.route.fly_over[i]:

@@ -92,7 +92,7 @@ def _flown_finding(requirements: RouteRequirements, aligned: AlignedTrack | None
         if offset >= 1.0:
             reason += f" (the fly-by path passes at {offset:.0f} m)"
         if math.isfinite(crossing):
-            reason += f"; the line across the leg there crossed {crossing:.0f} m to its side"
+            reason += f"; the line across the leg at the waypoint was crossed {crossing:.0f} m to its side"
         if i > 0 and not aligned.passed[i]:
             last_leg = requirements.leg(aligned.leg_at(len(aligned.track) - 1))
             text = (

@@ -117,13 +117,13 @@ class Instruments:
         _, _, amsl = track.position[k].tolist()
         above = amsl - float(self.ground[k])
         wind_east, wind_north, _ = (float(value) for value in track.wind[k])
-        height = _metres_text(above) if math.isfinite(above) else "not known"
+        height = _metres_text(above) if math.isfinite(above) else "unknown"
         airspeed, commanded, load, used, current = (
             float(column[k])
             for column in (track.airspeed, track.speed_command, track.load_factor, track.energy, track.current)
         )
         return [
-            f"airspeed     {_number_text(airspeed, 1)} m/s, wanted {_number_text(commanded, 1)}",
+            f"airspeed     {_number_text(airspeed, 1)} m/s, commanded {_number_text(commanded, 1)}",
             f"ground speed {_number_text(math.hypot(east, north), 1)} m/s, climb {_number_text(up, 1, '+')} m/s",
             f"height       {_metres_text(amsl)} AMSL, {height} above ground",
             f"course       {_course_text(math.degrees(math.atan2(east, north)))}, heading {_course_text(yaw)}",

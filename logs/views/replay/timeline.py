@@ -191,7 +191,7 @@ def _turn_entries(log: FlightLog, parts: list[_LegRows]) -> list[TimelineEntry]:
 def _clearance_entries(log: FlightLog, parts: list[_LegRows]) -> list[TimelineEntry]:
     terrain, track = log.setup.scenario.terrain, log.track
     if terrain is None:
-        return [TimelineEntry(float(track.time[0]), "ground", "no terrain in the log: clearance is not known")]
+        return [TimelineEntry(float(track.time[0]), "ground", "no terrain in the log: clearance is unknown")]
     clearances, fractions = segment_clearances(terrain, track.position)
     required = log.setup.scenario.limits.min_clearance_m
     entries = []

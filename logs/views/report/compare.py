@@ -182,8 +182,8 @@ def _difference_notes(first: FlightLog, second: FlightLog, names: tuple[str, str
     for log, name in zip((first, second), names, strict=True):
         if not np.isfinite(log.track.cross_track).any():
             notes.append(
-                f"cross-track and height error: guidance's own, which the log of {name} does not hold;"
-                " planfly refly measures an imported flight against its legs"
+                f"cross-track and height error: guidance's own, which the log of {name} does not "
+                "contain; planfly refly measures an imported flight against its legs"
             )
     if a.scenario.origin == b.scenario.origin:
         first_positions, second_positions = (
@@ -268,7 +268,7 @@ def difference_lines(comparison: Comparison) -> list[str]:
         ).rstrip()
         for row in rows
     ]
-    return [*lines, *comparison.notes, *([] if NOTHING not in "".join(lines) else [f"{NOTHING}: not known"])]
+    return [*lines, *comparison.notes, *([] if NOTHING not in "".join(lines) else [f"{NOTHING}: unknown"])]
 
 
 # ----------------------------------------------------------------------

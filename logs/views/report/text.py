@@ -202,7 +202,7 @@ def remedy_text(finding: Finding, deciding: DecidingParameter | None) -> str:
 def count_sentence(rows: list[FindingRow]) -> str:
     """State the numbers of findings that pass, fail, and were not judged."""
     counts = {state: sum(row.state == state for row in rows) for state in _SIGNS}
-    passed_text = f"{counts['pass']} of {counts['pass'] + counts['fail']} judged findings hold"
+    passed_text = f"{counts['pass']} of {counts['pass'] + counts['fail']} judged findings pass"
     failed_text = f", {counts['fail']} {'fails' if counts['fail'] == 1 else 'fail'}" if counts["fail"] else ""
     unjudged = counts["open"] + counts["unjudged"]
     unjudged_text = f"; {unjudged} could not be judged" if unjudged else ""
@@ -347,7 +347,7 @@ def trust_line(again: Reflight) -> str:
     model = again.setup.aircraft
     model_text = f"{model}, which stands in for an aircraft that is not named," if again.stands_in else model
     if not again.spreads:
-        return f"Model and flight have no place in common: nothing is known of how far {model_text} can be trusted"
+        return f"Model and flight have no part in common: it is unknown how far {model_text} can be trusted"
     spread_texts = [
         f"{_CALLED[spread.name]} {number(spread.median)} {spread.unit} ({number(spread.most)} {spread.unit})"
         for spread in again.spreads

@@ -207,7 +207,7 @@ def _log_mixture(parts: tuple[tuple[float, float, float], ...], successes: int, 
     return float(np.logaddexp.reduce(terms))
 
 
-Answer = Literal["reached", "missed", "undecided", "none asked"]
+Answer = Literal["reached", "missed", "undecided", "no target"]
 
 # Default confidence of a bound.
 DEFAULT_CONFIDENCE = 0.95
@@ -235,7 +235,10 @@ class Goal:
         if self.stops:
             return "beta-binomial mixture, valid at every number of flights"
         if self.changed:
-            return "Clopper-Pearson, one-sided, but the number of flights was changed after some: it holds less often"
+            return (
+                "Clopper-Pearson, one-sided, but the number of flights was changed after some had "
+                "been flown: the true confidence is lower"
+            )
         return "Clopper-Pearson, one-sided, for the number of flights fixed beforehand"
 
 
@@ -290,7 +293,7 @@ class Estimator:
     def _goal_status(self, lower: float, upper: float) -> Answer:
         target = self._goal.target
         if target is None:
-            return "none asked"
+            return "no target"
         if lower >= target:
             return "reached"
         return "missed" if upper < target else "undecided"

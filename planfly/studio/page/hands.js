@@ -108,7 +108,7 @@ export class Hands {
     if (same) for (const one of held) one.rev = rev;
     else if (held.length) {
       this.stopDrag();
-      this.app.complain("The mission has changed meanwhile: what was dragged is as it was.");
+      this.app.complain("The mission has changed in the meantime, so the drag was not applied.");
     }
     return same && held.some((one) => one.moved);
   }
@@ -269,7 +269,7 @@ export class Hands {
     if (event.key === "PageUp" || event.key === "PageDown") {
       event.preventDefault();
       const by = (event.key === "PageUp" ? 1 : -1) * (event.shiftKey ? 50 : UP);
-      if (item.at[2] === null) return app.complain(`Item ${item.seq} is not flown: it has no height here.`);
+      if (item.at[2] === null) return app.complain(`Item ${item.seq} is not flown, so it has no height here.`);
       return app.nudge(k, { up: Math.max(-500, Math.min(9000, item.at[2] + by)) });
     }
     if (event.key === "Delete" || event.key === "Backspace") {

@@ -40,7 +40,7 @@ export class Link {
 
   connect() {
     if (!this.token) {
-      this.handlers.lost("Open the address that planfly studio has printed: it holds the key to this page.", true);
+      this.handlers.lost("Open the address that planfly studio printed: it contains the key to this page.", true);
       return;
     }
     const socket = new WebSocket(`ws://${location.host}/session`);
@@ -52,10 +52,10 @@ export class Link {
   }
 
   lost(code) {
-    if (code === 4403) return this.handlers.lost("This key is of another start of the studio: open the address that it has printed.", true);
-    if (code === 4429) return this.handlers.lost("Four pages are open already: close one, then reload this one.", true);
+    if (code === 4403) return this.handlers.lost("This key belongs to another run of the studio: open the address that this run printed.", true);
+    if (code === 4429) return this.handlers.lost("Four pages are already open: close one, then reload this one.", true);
     this.tries += 1;
-    this.handlers.lost("The studio does not answer. What was done is kept: start it again with the same file.", false);
+    this.handlers.lost("The studio does not answer. Your edits are saved: start it again with the same file.", false);
     setTimeout(() => this.connect(), Math.min(5000, 300 * this.tries));
   }
 

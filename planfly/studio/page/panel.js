@@ -127,17 +127,17 @@ export class Panel {
       box.append(part);
     }
     const failed = this.listed(now.findings, false), flownFailed = flight && !stale ? this.listed(flight.findings, true) : [];
-    if (failed.length) box.append(element("h2", {}, "To mend"), element("ul", { class: "findings" }, ...failed));
+    if (failed.length) box.append(element("h2", {}, "What fails"), element("ul", { class: "findings" }, ...failed));
     if (flownFailed.length) {
       const trying = this.app.now.work.trials ? element("p", { class: "more" }, "Changes that would help are being flown \u2026") : null;
-      box.append(element("h2", {}, "To mend, as flown"), ...(trying ? [trying] : []), element("ul", { class: "findings" }, ...flownFailed));
+      box.append(element("h2", {}, "What fails in flight"), ...(trying ? [trying] : []), element("ul", { class: "findings" }, ...flownFailed));
     }
     const passed = now.findings.filter((one) => one.ok);
     if (passed.length) box.append(element("h2", {}, "Closest to its limit, by rule"), element("ul", { class: "findings passed" }, ...passed.map((one) => this.finding(one, false))));
     if (now.notes.length) box.append(element("h2", {}, "Notes"), element("ul", { class: "notes" }, ...now.notes.slice(0, 20).map((text) => element("li", {}, text))));
     const long = element("div", { class: "asks" },
       element("h2", {}, "Ask more"),
-      this.ask("returns", "Does it come home?", "a return to launch from everywhere on the way"),
+      this.ask("returns", "Can it return home?", "a return to launch from every point of the route"),
       this.ask("campaign", "How likely in this weather?", "24 flights, each somewhat different"));
     box.append(long);
     if (this.home) box.append(this.result("Return to launch", this.home));
@@ -231,10 +231,10 @@ export class Panel {
       return app.send(asked);
     };
     this.wayBox = element("div", { class: "ways" });
-    box.append(element("p", { class: "more" }, "The planner searches a path that the aircraft can fly, clear of ground, threats and zones."),
+    box.append(element("p", { class: "more" }, "The planner searches for a path that the aircraft can fly, clear of ground, threats and zones."),
       field("From", this.first), field("To", this.last), field("Seed", this.seed), field("Algorithm", this.algorithm),
       element("p", {}, element("button", { type: "button", class: "main", "data-job": "plan", onclick: () => plan(1) }, "Plan from here"), " ",
-        element("button", { type: "button", "data-job": "plan", id: "other-ways", title: "Several in one search, by the default algorithm: none is better than another in all", onclick: () => plan(WAYS) }, "Other ways")), this.wayBox);
+        element("button", { type: "button", "data-job": "plan", id: "other-ways", title: "Several plans from one search with the default algorithm; none is better than another in every respect", onclick: () => plan(WAYS) }, "Other paths")), this.wayBox);
     this.drawPlanEnds();
   }
 
@@ -256,13 +256,13 @@ export class Panel {
     app.ways(ways, 0);
     if (!ways.length) return;
     const of = this.waysOf = rev ?? this.now.rev;
-    box.append(element("h2", {}, ways.length === 1 ? "Found" : `${ways.length} ways found`));
+    box.append(element("h2", {}, ways.length === 1 ? "Found" : `${ways.length} paths found`));
     ways.forEach((way, k) => {
       const figures = [["Length", way.length / 1000, 2, "km"], ["Seen by radars", way.exposure, 0, "s"], ["Above ground at least", way.clearance, 0, "m"], ["Time", way.seconds, 0, "s"], ["Energy", way.energy, 0, "Wh"]];
       const rows = figures.filter((one) => one[1] !== null).map(([name, value, digits, unit]) => [name, `${plain(value, digits)} ${unit}`]);
-      const take = element("button", { type: "button", onclick: () => { app.ways([]); app.commit({ kind: "choose", rev: of, which: k }); } }, "Take this way");
+      const take = element("button", { type: "button", onclick: () => { app.ways([]); app.commit({ kind: "choose", rev: of, which: k }); } }, "Use this path");
       const card = element("section", { class: "card", "data-state": way.state === "safe" ? "ok" : "fail", onpointerenter: () => app.ways(ways, k) },
-        element("h3", {}, `Way ${k + 1}: ${[way.state, ...way.best].join(", ")}`), element("dl", {}, ...rows.flatMap(([name, value]) => [element("dt", {}, name), element("dd", {}, value)])),
+        element("h3", {}, `Path ${k + 1}: ${[way.state, ...way.best].join(", ")}`), element("dl", {}, ...rows.flatMap(([name, value]) => [element("dt", {}, name), element("dd", {}, value)])),
         ...way.problems.map((text) => element("p", {}, text)), take);
       box.append(card);
     });
@@ -296,7 +296,7 @@ export class Panel {
     const { app } = this, path = element("input", { id: "open-path", placeholder: "survey/mission.plan", autocomplete: "off", spellcheck: "false", onkeydown: (event) => event.key === "Enter" && open() });
     const open = () => path.value.trim() && app.send({ kind: "open", name: path.value.trim() });
     const found = this.files.map((name) => element("li", {}, element("button", { type: "button", class: "place", onclick: () => app.send({ kind: "open", name }) }, name)));
-    return [element("p", { class: "more" }, `Or by its path in ${this.folder}:`), element("p", {}, element("label", { for: "open-path", class: "hidden" }, "Path of a file to open"), path, element("button", { type: "button", onclick: open }, "Open")), element("ul", { class: "files" }, ...found)];
+    return [element("p", { class: "more" }, `Or enter its path in ${this.folder}:`), element("p", {}, element("label", { for: "open-path", class: "hidden" }, "Path of a file to open"), path, element("button", { type: "button", onclick: open }, "Open")), element("ul", { class: "files" }, ...found)];
   }
 
   save() {
@@ -312,7 +312,7 @@ export class Panel {
       setTimeout(() => URL.revokeObjectURL(url), 10000);
     }
     const lost = losses.length ? element("ul", {}, ...losses.map((text) => element("li", {}, text))) : null;
-    clear(this.lossBox).append(element("p", {}, element("b", {}, `${name} is saved`), ` ${where ? `in ${where}` : "among your browser's downloads"}. `, losses.length ? "It does not hold:" : "It holds all of the mission."), ...(lost ? [lost] : []));
+    clear(this.lossBox).append(element("p", {}, element("b", {}, `${name} is saved`), ` ${where ? `in ${where}` : "among your browser's downloads"}. `, losses.length ? "It does not contain:" : "It contains the whole mission."), ...(lost ? [lost] : []));
     this.reveal("files");
   }
 
@@ -321,7 +321,7 @@ export class Panel {
       this.show("settings");
       return sendParameters(file, this.app);
     }
-    if (file.size > 16 * 2 ** 20) return this.app.complain(`${file.name}: larger than 16 MB: open it with planfly studio ${file.name}`);
+    if (file.size > 16 * 2 ** 20) return this.app.complain(`${file.name}: larger than 16 MB; open it with planfly studio ${file.name}`);
     const bytes = new Uint8Array(await file.arrayBuffer()), parts = [];
     for (let i = 0; i < bytes.length; i += 32768) parts.push(String.fromCharCode(...bytes.subarray(i, i + 32768)));
     return this.app.send({ kind: "open", name: file.name.slice(-200), data: btoa(parts.join("")) });

@@ -3,7 +3,7 @@
 import { clear, element } from "/axes.js";
 
 // Entries of a scenario's [limits]: words, and what counts where there is none.
-const LIMITS = [["min_clearance_m", "Least clearance, m", ""], ["max_height_m", "Most over ground, m", "no limit"], ["corridor_m", "Corridor each side, m", "the autopilot's"], ["max_turn_deg", "Sharpest turn, °", "the aircraft's"], ["max_climb_deg", "Steepest climb, °", "the aircraft's"], ["max_dive_deg", "Steepest descent, °", "the aircraft's"]];
+const LIMITS = [["min_clearance_m", "Minimum clearance, m", ""], ["max_height_m", "Maximum above ground, m", "no limit"], ["corridor_m", "Corridor each side, m", "the autopilot's"], ["max_turn_deg", "Sharpest turn, °", "the aircraft's"], ["max_climb_deg", "Steepest climb, °", "the aircraft's"], ["max_dive_deg", "Steepest descent, °", "the aircraft's"]];
 const SURVEYS = [["", "as the mission says"], ["lines", "judged as lines"], ["path", "judged as any path"]];
 const PARAMETERS = /\.(parm|param|params)$/i;
 const MOST = 240 * 1024;
@@ -18,13 +18,13 @@ export function isParameters(name) {
 }
 
 export async function sendParameters(file, app) {
-  if (file.size > MOST) return app.complain(`${file.name}: larger than ${MOST / 1024} kB: no file of parameters is`);
+  if (file.size > MOST) return app.complain(`${file.name}: larger than ${MOST / 1024} kB, which is too large for a parameter file`);
   return app.send({ kind: "settings", parameter_file: file.name.slice(-100), parameter_text: await file.text() });
 }
 
 export function buildSettings(box, settings, offered, app) {
   const send = (change) => app.send({ kind: "settings", ...change });
-  clear(box).append(element("p", { class: "more" }, "What is changed here is judged and flown at once."), ...flown(settings, offered, send),
+  clear(box).append(element("p", { class: "more" }, "Changes here are judged and flown immediately."), ...flown(settings, offered, send),
     element("h2", {}, "Limits"), ...limits(settings, send), element("h2", {}, "Parameters of the autopilot"), ...parameters(settings, app, send));
 }
 
@@ -63,7 +63,7 @@ function limits(settings, send) {
 
 function parameters(settings, app, send) {
   const known = Object.keys(settings.known);
-  if (!known.length) return [element("p", { class: "more" }, "planfly's own guidance has none: choose another autopilot.")];
+  if (!known.length) return [element("p", { class: "more" }, "planfly's own guidance has no parameters: choose another autopilot.")];
   const one = element("input", { id: "set-parameter", list: "known-parameters", placeholder: "NAME=VALUE", autocomplete: "off", spellcheck: "false" });
   const enter = () => one.value.trim() && send({ parameter: one.value.trim() });
   one.addEventListener("keydown", (event) => event.key === "Enter" && enter());
@@ -75,8 +75,8 @@ function parameters(settings, app, send) {
     field("Set one", element("span", { class: "with-button" }, one, element("button", { type: "button", onclick: enter }, "Set")), one.id),
     element("datalist", { id: "known-parameters" }, ...known.map((name) => element("option", { value: `${name}=${settings.known[name]}` }))),
     field("From a file", file),
-    element("p", { class: "more" }, set.length ? from : `None is set here: ${settings.autopilot_title} flies with those of the aircraft and of the scenario. A file takes the place of all.`),
+    element("p", { class: "more" }, set.length ? from : `No parameter is set here: ${settings.autopilot_title} flies with the parameters of the aircraft and of the scenario. A file replaces all of them.`),
     ...(settings.unused ? [element("p", { class: "more" }, `The simulated autopilot does not use ${settings.unused}.`)] : []),
-    ...(set.length ? [element("ul", { class: "parameters" }, ...rows), element("p", {}, element("button", { type: "button", onclick: () => send({ without: set.map(([name]) => name) }) }, "Set none of them"), " ", element("button", { type: "button", onclick: () => app.send({ kind: "save", form: "parm" }) }, "Save as .parm"))] : []),
+    ...(set.length ? [element("ul", { class: "parameters" }, ...rows), element("p", {}, element("button", { type: "button", onclick: () => send({ without: set.map(([name]) => name) }) }, "Clear all"), " ", element("button", { type: "button", onclick: () => app.send({ kind: "save", form: "parm" }) }, "Save as .parm"))] : []),
   ];
 }

@@ -123,7 +123,7 @@ function catchUp(before, sheet, same) {
     now.nudged = null;
     left = true;
   }
-  if (left) complain("The mission has changed meanwhile: the last edit was not made.");
+  if (left) complain("The mission has changed in the meantime, so the last edit was not made.");
 }
 
 // A model with an item elsewhere.
@@ -491,7 +491,7 @@ const link = new Link({
   returns: (message) => { now.work.returns = null; progress(); panel.returns(message); },
   campaign: (message) => { now.work.campaign = null; progress(); panel.campaign(message); },
   fault: onFault,
-  stale: () => { app.refused(); complain("Another page has changed the mission: this is how it is now."); },
+  stale: () => { app.refused(); complain("Another page has changed the mission; this is its current state."); },
   picture: (picture) => { now.picture = picture; setGround(); },
   heights: (heights) => { now.heights = heights; setGround(); },
 });

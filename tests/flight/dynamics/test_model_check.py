@@ -35,7 +35,7 @@ def test_copied_model_flies(model: Aircraft) -> None:
         ("</fdm_config>", "<input><property>a/b</property></input></fdm_config>", "<input> opens a port"),
         ("</fdm_config>", '<output name="f.csv" type="CSV" rate="9"/></fdm_config>', "<output> opens a port or writes"),
         ("</fdm_config>", '<output file="unitest"/></fdm_config>', "<output> opens a port"),
-        ("<propulsion/>", '<propulsion><engine file="electric"/></propulsion>', "brings in another file"),
+        ("<propulsion/>", '<propulsion><engine file="electric"/></propulsion>', "includes another file"),
         ("<input> command/elevator-rad", '<input port="1"> command/elevator-rad', "<input> opens a port"),
         ("</flight_control>", '<output type="SOCKET"/></flight_control>', "<output> opens a port"),
         ("<p> aero/beta-rad </p>", "<p> aero/side-angle </p>", "property aero/side-angle is read, and neither"),

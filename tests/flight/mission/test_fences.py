@@ -61,7 +61,7 @@ def test_what_the_mission_passes_is_left_out_and_named() -> None:
     mission, notes = with_fences(plan_mission(plan, 25.0, math.radians(30.0)), plan.scenario, over_the_first)
     assert [item.x for item in mission.fences] == [item.x for k, item in enumerate(whole.fences) if k != 4]
     assert [item.seq for item in mission.fences] == list(range(len(whole.fences) - 1))
-    (said,) = (note for note in notes if note.startswith("left out of the fence"))
+    (said,) = (note for note in notes if note.startswith("omitted from the fence"))
     assert f": {threats.names[first]};" in said
 
 
@@ -199,7 +199,7 @@ def test_parts_of_an_exclusion_are_polygons_and_an_inclusion_of_parts_is_left_ou
     assert [inside([Zone("it", "exclusion", both)], *p) for p in ((450.0, 450.0), (2400.0, 100.0))] == [False, False]
     items, notes = zone_fences([Zone("it", "inclusion", both)], ORIGIN)
     assert items == []
-    assert notes == ["a flight must be inside every inclusion of a fence: it is left out for having several parts"]
+    assert notes == ["a flight must be inside every inclusion of a fence: it is omitted because of several parts"]
 
 
 def test_floors_and_ceilings_are_said() -> None:
@@ -243,7 +243,7 @@ def test_a_scenarios_zones_come_back_from_every_form(kind: Any) -> None:
     assert len(again) == len(mission.fences)
     assert notes == (
         "a fence has no floor and no ceiling: mast is in the fence at every height",
-        "a fence does not follow the ground: the greatest height of 400 m above ground is not in it",
+        "a fence does not follow the ground: the maximum height of 400 m above ground is not part of it",
     )
 
 

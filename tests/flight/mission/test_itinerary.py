@@ -100,12 +100,12 @@ def test_a_gate_changes_the_speed_where_its_plane_cuts_the_leg() -> None:
         (
             (wp(0, 0), wp(0, 1800), wp(0, 2000, command=4501)),
             [25.0],
-            ["item 3: CONDITION_GATE: nothing to fly to comes after it, so it is passed at once"],
+            ["item 3: CONDITION_GATE: no waypoint follows it, so it is passed at once"],
         ),
         (
             (wp(0, 0), wp(0, 900, command=4501), "2 178 0 20 -1 0 0 0 0", wp(0, 1800, command=17, p="0 0 100 0")),
             None,
-            ["item 2: CONDITION_GATE not between waypoints: the speed after it holds from the leg's start"],
+            ["item 2: CONDITION_GATE not between waypoints: the speed after it applies from the leg's start"],
         ),
     ],
 )
@@ -208,7 +208,7 @@ def test_a_vertical_take_off_is_over_home_and_its_place_is_not_flown_to() -> Non
     assert flown.waypoints == pytest.approx(np.array([[0, 0, 380], [900, 700, 400]]), abs=0.01)
     assert flown.notes[:2] == (
         "item 1: NAV_VTOL_TAKEOFF: not flown straight up",
-        "item 1: NAV_VTOL_TAKEOFF: its place is not flown to, as in ArduPlane; PX4 would",
+        "item 1: NAV_VTOL_TAKEOFF: its position is not flown to, as in ArduPlane; PX4 would fly to it",
     )
     later = route(wp(0, 0), wp(700, 700, command=84), wp(0, 900))
     assert later.items.tolist() == [1, 3]

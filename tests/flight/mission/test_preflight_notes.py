@@ -75,7 +75,7 @@ def test_a_landing_without_a_strip_tells_its_course_wind_and_ground() -> None:
         in landed_on(sloped(0.03, 0.0), Wind(0.0, 0.0))[0]
     )
     (said,) = landed_on(None, Wind(4.0, math.radians(270.0)))
-    assert "with 4.0 m/s of wind from behind; the ground there is not known; no [landing]" in said
+    assert "with 4.0 m/s of tailwind; the terrain there is unknown; no [landing]" in said
     assert landed_on(sloped(0.0, 0.0), Wind(0.0, 0.0), LandingStrip(2500.0, 2000.0)) == []
 
 
@@ -88,7 +88,7 @@ def test_ground_that_no_plan_would_land_on_is_told(east: float, north: float, to
     setup = replace(setup, scenario=replace(setup.scenario, terrain=sloped(east, north)))
     left = [one.reason for one in mission_findings(setup) if one.check == NOT_FLOWN]
     assert left == (
-        ["NAV_LAND: the ground there slopes by 10.1%, and at most 10% can be landed on: the touchdown is not judged"]
+        ["NAV_LAND: the ground there slopes by 10.1%, and at most 10% can be landed on, so the touchdown is not judged"]
         if told
         else []
     )
@@ -98,17 +98,15 @@ def test_ground_that_no_plan_would_land_on_is_told(east: float, north: float, to
 def test_wind_from_behind_at_a_launch(from_deg: float, tail: float) -> None:
     found = notes(*WAY, launch=Launch("hand"), wind=Wind(4.0, math.radians(from_deg)))
     assert len(found) == (tail > 0.0)
-    assert all(one.startswith("launch: 4.0 m/s of wind from behind on 0°") for one in found)
+    assert all(one.startswith("launch: 4.0 m/s of tailwind on 0°") for one in found)
 
 
 def test_wind_from_behind_at_a_stated_course_and_at_a_landing() -> None:
     wind = Wind(4.0, math.radians(270.0))
     assert notes(*WAY, launch=Launch("hand", course=math.radians(60.0)), wind=wind) == [
-        f"launch: {4.0 * math.cos(math.radians(30.0)):.1f} m/s of wind from behind on 60°"
+        f"launch: {4.0 * math.cos(math.radians(30.0)):.1f} m/s of tailwind on 60°"
     ]
-    assert notes(*WAY, landing=LandingStrip(2500.0, 2000.0), wind=wind) == [
-        "landing: 4.0 m/s of wind from behind on 90°"
-    ]
+    assert notes(*WAY, landing=LandingStrip(2500.0, 2000.0), wind=wind) == ["landing: 4.0 m/s of tailwind on 90°"]
     assert notes(*WAY, landing=LandingStrip(2500.0, 2000.0), wind=Wind(4.0, math.radians(90.0))) == []
 
 

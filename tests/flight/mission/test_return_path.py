@@ -298,7 +298,7 @@ def test_a_return_that_holds_its_height_comes_down_over_its_target() -> None:
 
 def test_a_landing_that_counts_as_a_place_to_return_to_is_noted() -> None:
     lines = wp(0, 3000), wp(2000, 3000), RTL, wp(0, 0, 0, command=21)
-    told = "item 3: the mission's landing is also a place to return to, which is not flown: the return is to home"
+    told = "item 3: the mission's landing is also a place to return to, which is not simulated: the return is to home"
 
     def notes(rules: ReturnRules, *items: str) -> tuple[str, ...]:
         return make_route(mission(*items), ORIGIN, None, 25.0, False, rules=RouteRules(rules)).notes

@@ -194,7 +194,7 @@ def test_heights_over_an_unknown_home_count_from_sea_level() -> None:
     scenario = implied_scenario(mission, None).scenario
     route = make_route(mission, scenario.origin, None, 25.0, False)
     assert route.waypoints[0, 2] == mission.items[0].alt
-    assert any("count from 0 m AMSL" in note for note in route.notes)
+    assert any("taken from 0 m AMSL" in note for note in route.notes)
 
 
 def test_a_route_starts_at_the_first_position_or_over_home() -> None:

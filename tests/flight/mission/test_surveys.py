@@ -450,8 +450,8 @@ def test_nothing_but_waypoints_is_laid_out() -> None:
     ("place", "line", "why"),
     [
         (2, "2 178 0 15 -1 0 0 0 0", ""),
-        (4, "2 178 0 15 -1 0 0 0 0", "item 5, DO_CHANGE_SPEED, stands between two lines"),
-        (4, wp(30, 900, command=17), "item 5, NAV_LOITER_UNLIM, stands between two lines"),
+        (4, "2 178 0 15 -1 0 0 0 0", "item 5, DO_CHANGE_SPEED, lies between two lines"),
+        (4, wp(30, 900, command=17), "item 5, NAV_LOITER_UNLIM, lies between two lines"),
     ],
 )
 def test_why_a_layout_is_kept(place: int, line: str, why: str) -> None:
@@ -473,7 +473,7 @@ def test_a_line_with_a_waypoint_of_another_kind_on_it_is_kept() -> None:
     read = mission(*items, home="36.5 -84.2 0")
     route = make_route(read, ORIGIN, None, 15.0, False)
     [found] = find_surveys(route, camera_spacing(read, route))
-    assert kept_layout(read, route, found) == "item 5, NAV_SPLINE_WAYPOINT, stands on a line"
+    assert kept_layout(read, route, found) == "item 5, NAV_SPLINE_WAYPOINT, lies on a line"
 
 
 def test_a_take_off_where_the_first_line_begins_stays_before_it() -> None:

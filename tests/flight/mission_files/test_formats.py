@@ -197,7 +197,7 @@ def test_a_file_without_home_keeps_its_first_item() -> None:
     assert [item.seq for item in mission.items] == [1, 2, 3]
     assert mission.warnings[0] == (
         "a.waypoints:2: no home line (seq 0): the mission has no home and begins with this item, as in Mission Planner;"
-        " QGroundControl and MAVProxy take it for home and leave it out"
+        " QGroundControl and MAVProxy treat it as home and do not fly it"
     )
     for kind in ("waypoints", "plan"):
         again = parse_mission(mission_text(mission, kind), f"a.{kind}")

@@ -36,7 +36,7 @@ def test_a_survey_is_its_items(name: str) -> None:
     mission = parse_mission(plan_with(simple(1, 36.4), survey, simple(5, 36.6)), "a.plan")
     assert [item.seq for item in mission.items] == [1, 2, 3, 4, 5]
     assert [item.x for item in mission.items] == [364_000_000, 365_000_000, 365_100_000, 365_200_000, 366_000_000]
-    assert mission.warnings == (f"a.plan: mission.items.1: {name} replaced by the 3 simple items that it stands for",)
+    assert mission.warnings == (f"a.plan: mission.items.1: {name} replaced by the 3 simple items that it represents",)
 
 
 # QGroundControl's custom camera of 6.17 mm by 4.55 mm, 4,000 by 3,000 pixels, behind 4.5 mm.  From 50 m it writes
@@ -110,7 +110,7 @@ def test_a_camera_that_is_none_is_left_out_and_said_to_be(calc: dict[str, Any], 
     assert (plan.camera is None, plan.turn_around) == (bool(text), 30.0 if text else 0.0)
     said = [one for one in mission.warnings if "CameraCalc" in one]
     assert said == (
-        [f"a.plan: mission.items.0: {text}: its camera is left out, and no overlap is judged"] if text else []
+        [f"a.plan: mission.items.0: {text}: its camera is ignored, and no overlap is judged"] if text else []
     )
 
 

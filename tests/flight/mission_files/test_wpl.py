@@ -136,7 +136,7 @@ def test_a_home_at_0_0_is_left_out_and_said(kind: str) -> None:
     assert mission.home is None
     assert [item.seq for item in mission.items] == [1, 2, 3, 4]
     (said,) = mission.warnings
-    assert "not a position: left out; the mission has no home" in said
+    assert "not a position: ignored; the mission has no home" in said
 
 
 @pytest.mark.parametrize(
@@ -164,8 +164,8 @@ def test_whatever_stands_in_the_line_of_home_is_home_as_in_pymavlink(
     assert mission.home == home
     name = "NAV_TAKEOFF" if " 22 15" in line else "DO_CHANGE_SPEED"
     assert mission.warnings[0] == (
-        f"a.waypoints:2: {name} in the line of home (seq 0): left out, as ground stations take that line for home and"
-        " do not fly it"
+        f"a.waypoints:2: {name} in the line of home (seq 0): ignored, because ground stations treat that line as home"
+        " and do not fly it"
     )
     for found, wanted in zip(mission.warnings[1:], said, strict=True):
         assert wanted in found

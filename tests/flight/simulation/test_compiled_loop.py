@@ -56,7 +56,7 @@ def test_each_law_flies_the_same_in_both(
     }
     setup = replace(setup_with(make_setup, autopilots[name]), fdm_hz=fdm_hz)
     engine, *compiled = flown(setup, aerosonde)
-    assert engine.startswith("compiled model, equal to JSBSim ")
+    assert engine.startswith("compiled model, bit-identical to JSBSim ")
     chosen, *jsbsim = flown(replace(setup, engine="jsbsim"), aerosonde)
     assert chosen == "JSBSim, as chosen"
     assert compiled == jsbsim

@@ -204,7 +204,7 @@ def altered(setup: FlightSetup, change: Callable[[dict[str, Any]], None]) -> Att
         (lambda data: data["route"]["waypoints_east_north_amsl_m"][0].__setitem__(0, "inf"), "waypoints"),
         (lambda data: data["sha256"].update({"plan.json": "0"}), r"plan\.json: altered"),
         (lambda data: data["sha256"].pop("scenario.json"), r"scenario\.json: missing"),
-        (lambda data: data["sha256"].pop("terrain.json"), r"terrain\.kind: 'peaks': the log holds no terrain\.json"),
+        (lambda data: data["sha256"].pop("terrain.json"), r"terrain\.kind: 'peaks': the log contains no terrain\.json"),
         (lambda data: data["sha256"].pop("terrain-000.heights"), r"terrain\.json: parts"),
     ],
 )

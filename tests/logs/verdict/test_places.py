@@ -108,7 +108,7 @@ def test_where_only_the_autopilot_fails_the_second_line_says_so(autopilot: Fligh
     assert written["deciding_parameter"]["name"] == "NAVL1_PERIOD"
     assert written["deciding_parameter"]["text"] == deciding_text(DECIDING)
     undecided = aside(autopilot, 70.0, ReferenceFlights(PASSED))
-    assert undecided.lines[1].endswith("cannot: with none of the parameters that were tried would it pass")
+    assert undecided.lines[1].endswith("cannot: it would pass with none of the parameter values tried")
 
 
 def test_what_decides_a_real_autopilots_flight_is_what_its_law_shows(autopilot: FlightSetup) -> None:

@@ -127,8 +127,8 @@ def test_places(place: Place, text: str) -> None:
         (Change("distance", missile("Alfa"), None, 41.0, "m"), "pass Alfa 41 m further away"),
         (Change("distance", Place("missile", 1), None, 41.0, "m"), "pass threat 2 41 m further away"),
         (Change("duration", FLIGHT, None, 12.0, "%"), "shorten the flight by 12 %"),
-        (Change("battery", FLIGHT, None, 1.13, "1"), "take a battery 1.13 times as large"),
-        (Change("tank", FLIGHT, None, 2.0, "1"), "take a tank 2.00 times as large"),
+        (Change("battery", FLIGHT, None, 1.13, "1"), "use a battery 1.13 times as large"),
+        (Change("tank", FLIGHT, None, 2.0, "1"), "use a tank 2.00 times as large"),
     ],
 )
 def test_changes(change: Change, text: str) -> None:
@@ -211,8 +211,8 @@ SUGGESTED = {
         0,
     ),
     "duration": (lambda: powered(44.4), "energy", None, r"shorten the flight by ([\d.]+) %", 0),
-    "battery": (lambda: powered(44.4), "energy", None, r"take a battery ([\d.]+) times as large", 2),
-    "tank": (lambda: powered(0.0), "energy", None, r"take a tank ([\d.]+) times as large", 2),
+    "battery": (lambda: powered(44.4), "energy", None, r"use a battery ([\d.]+) times as large", 2),
+    "tank": (lambda: powered(0.0), "energy", None, r"use a tank ([\d.]+) times as large", 2),
 }
 
 

@@ -41,5 +41,5 @@ def test_convergence_counts_the_searches_that_hold_a_safe_path() -> None:
     np.testing.assert_array_equal(upper.lines[0].get_xydata(), [[0, 0], [1, 1], [2, 2], [3, 2]])
     assert lower.lines[0].get_xdata().tolist() == [1, 2, 3]
     assert lower.lines[0].get_ydata() == pytest.approx([1.4, 1.3, 1.25])
-    assert [text.get_text() for text in empty.texts] == ["no run holds\na safe path"]
+    assert [text.get_text() for text in empty.texts] == ["no run has\na safe path"]
     assert [axes.get_title(loc="left") for axes in (upper, figure.axes[2])] == ["7 threats", "60 threats"]

@@ -67,8 +67,8 @@ def asked(folder: Path, *, resume: bool = False, overwrite: bool = False) -> Out
 @pytest.mark.parametrize(
     ("lies_there", "words"),
     [
-        (CAMPAIGN_DATABASE, "holds a campaign; resume=True continues it, overwrite=True replaces it"),
-        ("winds.sqlite", "holds another campaign; overwrite=True replaces it"),
+        (CAMPAIGN_DATABASE, "contains a campaign; resume=True continues it, overwrite=True replaces it"),
+        ("winds.sqlite", "contains another campaign; overwrite=True replaces it"),
         ("mine.txt", "exists and is not empty; overwrite=True replaces its results"),
     ],
 )

@@ -40,7 +40,7 @@ def test_a_campaign_without_a_target_says_so_in_its_answer(base: CampaignBase, t
         untargeted = replace(
             summary,
             goal=replace(summary.goal, target=None),
-            estimate=replace(summary.estimate, answer="none asked"),
+            estimate=replace(summary.estimate, answer="no target"),
         )
         assert campaign_lines(untargeted)[0].startswith("no target is set (--prove P or --at-least P): ")
 

@@ -120,7 +120,7 @@ def test_the_aerosonde_is_printed_as_it_is_and_has_its_pictures(
     modes = {line.split("  ")[1].strip(): line for line in text.splitlines() if "to half" in line or "DOUBLE" in line}
     assert sorted(modes) == ["Dutch roll", "phugoid", "roll", "short period", "spiral"]
     assert "DOUBLE" in modes["spiral"]
-    envelope = {float(row[0]): row for row in _rows(text, "steepest climb / descent to the air")}
+    envelope = {float(row[0]): row for row in _rows(text, "steepest climb / descent relative to the air")}
     # At 24 m/s and sea level: climb 16.0, descent 7.5.
     assert [float(envelope[24.0][k]) for k in (1, 3)] == pytest.approx([16.0, 7.5], abs=0.2)
     turns = {float(row[0]): row for row in _rows(text, "turn radius")}
@@ -134,7 +134,7 @@ def test_the_aerosonde_is_printed_as_it_is_and_has_its_pictures(
 @pytest.mark.usefixtures("undrawn")
 def test_braking_is_steeper(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["aircraft", "aerosonde", "--motor-braking"]) == 0
-    rows = _rows(capsys.readouterr().out, "steepest climb / descent to the air")
+    rows = _rows(capsys.readouterr().out, "steepest climb / descent relative to the air")
     # Without, it is 7.5 degrees.
     assert float(next(row for row in rows if float(row[0]) == 24.0)[3]) > 12.5
     assert sorted(path.name for path in Path("runs/aircraft-aerosonde").iterdir()) == PICTURES
@@ -268,7 +268,7 @@ def test_a_data_sheet_makes_a_folder_that_is_described(
     assert main(["aircraft", "--new", "./foam", *SIX, *more]) == 0
     text = capsys.readouterr().out
     assert "uncertainty.toml), from a data sheet" in text
-    said = re.search(r"climb ([0-9.]+) degrees, give or take ([0-9.]+);", text)
+    said = re.search(r"climb ([0-9.]+) degrees ± ([0-9.]+);", text)
     assert said is not None
     assert [float(number) for number in said.groups()] == pytest.approx([climb, sd], abs=0.2)
     made = planfly.aircraft(Path("foam"))
@@ -278,7 +278,7 @@ def test_a_data_sheet_makes_a_folder_that_is_described(
 @pytest.mark.parametrize(
     ("argv", "told"),
     [
-        (("--mass", "2.1"), "--span: a data sheet needs it: 0.5..6 m"),
+        (("--mass", "2.1"), "--span: required for a data sheet: 0.5..6 m"),
         ((*SIX, "--mass", "60"), "--mass 60.0 kg: allowed 0.5..25 kg"),
         ((*SIX, "--stall", "14"), "--stall 14 m/s: allowed 5.25..13.05 m/s at a cruise speed of 15 m/s"),
         ((*SIX, "--battery", "12"), "--battery 12: expected volts and capacity, such as 14.8V,5Ah"),

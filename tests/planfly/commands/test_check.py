@@ -93,7 +93,7 @@ def test_what_arduplane_passes_over_is_no_other_vehicles(
     assert main(["check", str(mission)]) == 0
     out = capsys.readouterr().out
     assert f"{name}: not flown" in out
-    assert "ArduPlane takes it" not in out
+    assert "ArduPlane accepts it" not in out
 
 
 FENCED = """QGC WPL 110

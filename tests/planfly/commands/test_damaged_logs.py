@@ -45,7 +45,7 @@ def untold(name: str, time: np.ndarray, source: ImportedLog, out: str) -> str:
     if name in TRACKS:
         begin, end = BEGAN.timestamp(), BEGAN.timestamp() + end - begin
         time = time + source.utc_start
-    said = "Lost: " in out or "without a place" in out
+    said = "Lost: " in out or "without a position" in out
     if float(time[0]) > begin + 1.0 and not said and "the log begins in flight" not in out:
         return f"the beginning, to {time[0]} s"
     if float(time[-1]) < end - 1.0 and not said and "the log ends in flight" not in out:

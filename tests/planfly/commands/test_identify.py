@@ -146,7 +146,7 @@ def test_an_identified_aircraft_is_no_base(capsys: pytest.CaptureFixture[str]) -
     Path("known/posterior.toml").write_text('base = "aerosonde"\n', encoding="utf-8")
     write_motion(Path("a.BIN"), short_motion())
     said = refused(["--identify", "a.BIN", *ARGUMENTS, "--base", "./known", "--out", "./mine"], capsys)
-    assert "--base ./known: identified from flight logs itself: name the base that it came from" in said
+    assert "--base ./known: identified from flight logs itself: name its base" in said
 
 
 @pytest.mark.parametrize("again", [["--identify", "a.BIN", "b.BIN"], ["--identify", "a.BIN", "--check", "b.BIN"]])

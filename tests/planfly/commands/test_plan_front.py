@@ -44,7 +44,7 @@ def test_a_front_without_choices_says_so(tmp_path: Path, capsys: pytest.CaptureF
     text = capsys.readouterr().out
     assert text.startswith("front of 1 safe plan\n")
     assert (
-        "  note    1 of the 10 requested: no other that was found gains more than 0.1% in length or energy, 1% in "
+        "  note    1 of the 10 requested: no other plan that was found gains more than 0.1% in length or energy, 1% in "
         "exposure or 1 m in height\n"
     ) in text
     assert [file.name for file in folder.glob("plan-*")] == ["plan-1.json"]

@@ -47,9 +47,9 @@ def test_a_mission_and_its_log_say_the_same(hill: Path, log: bytes, capsys: pyte
     answer = json.loads((hill / "mission.json").read_text(encoding="utf-8"))
     assert answer["conditions"]["aircraft"] == "aerosonde"
     assert answer["ranges"][0]["kind"] == "ground"
-    assert "engine out: of 13 places home can be reached from" in out
-    assert "point of no return: none, as every return leaves the reserve of" in out
-    assert "which knows no trees, houses or water" in out
+    assert "engine out: of 13 places, home can be reached from" in out
+    assert "point of no return: none, because every return leaves the reserve of" in out
+    assert "which contains no trees, houses or water" in out
     glides = answer["engine_out"]
     assert sum(glides[kind] for kind in ("home", "site", "flat", "nothing", "unknown")) == 13
     assert sum(one["count"] for one in glides["ranges"]) == 13
@@ -97,7 +97,7 @@ def test_pictures_map_and_log_go_into_a_folder(hill: Path, log: bytes, capsys: p
 def test_without_terrain_nothing_is_known(hill: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["returns", "hill.waypoints", "--every", "50"]) == 3
     out = capsys.readouterr().out
-    assert "fly where the ground is not known" in out
+    assert "fly where the terrain is unknown" in out
     assert "--terrain names an elevation file" in out
     assert "engine out: not judged: there is no elevation file" in out
 
@@ -125,7 +125,7 @@ def test_returns_that_follow_the_terrain_end_with_3(hill: Path, capsys: pytest.C
     out = capsys.readouterr().out
     assert out.startswith("returns   not judged: with TERRAIN_FOLLOW returns follow the terrain")
     assert "safe" not in out
-    assert "ArduPlane's own return, which would follow the terrain, is not flown" in out
+    assert "ArduPlane's own return, which would follow the terrain, is not simulated" in out
 
 
 def test_by_px4s_law_returns_are_not_judged(hill: Path, capsys: pytest.CaptureFixture[str]) -> None:

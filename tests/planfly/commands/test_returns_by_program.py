@@ -72,7 +72,7 @@ def test_harm_that_a_program_does_counts_where_the_law_does_none(
     assert "returns 1 hits the ground" in out
     program = "by ArduPlane V0.0-fake (0badc0de) itself: 1 of the worst flown"
     assert f"{program}, 0 of them agree with the simulation; 1 worse than simulated" in out
-    assert "the program's outcome counts, as it is worse" in out
+    assert "the program's outcome applies, because it is worse" in out
     answer = json.loads((mound / "a.json").read_text(encoding="utf-8"))
     (one,) = answer["by_program"]["returns"]
     assert (one["law"]["kind"], one["program"]["kind"], one["worse"]) == ("safe", "ground", True)
@@ -85,7 +85,7 @@ def test_harm_that_a_program_does_counts_where_the_law_does_none(
 
 def test_no_program_but_arduplanes_is_flown(mound: Path, capsys: pytest.CaptureFixture[str]) -> None:
     for program, said in (
-        (write_fake_px4(mound), "expected ArduPlane's program; returns of PX4 are not flown here"),
+        (write_fake_px4(mound), "expected ArduPlane's program; returns of PX4 are not supported"),
         (mound / "none", "no such file"),
     ):
         assert main(["returns", "mound.waypoints", "--sitl", str(program)]) == 2
@@ -117,7 +117,7 @@ def test_the_worst_are_far_apart_and_what_is_worse_counts(tmp_path: Path) -> Non
     assert right.count("ground") == returns.count("ground") + 1
     assert right.count("safe") == returns.count("safe") - 1
     assert [one.worse for one in both.pairs] == [True, False]
-    assert "the simulated outcome counts, as it is worse" in both.lines(returns, setup.scenario)[1]
+    assert "the simulated outcome applies, because it is worse" in both.lines(returns, setup.scenario)[1]
 
 
 @pytest.mark.client

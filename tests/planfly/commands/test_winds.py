@@ -96,7 +96,7 @@ def test_an_interruption_says_what_is_kept_and_how_to_go_on(
         (["--resume", "--prove", "0.9"], "target 0.9: the flights there were requested with 0.99"),
         (["--resume", "--most", "30"], "most 30.0: the flights there"),
         (["--resume", "--out", "campaign"], "no campaign there to continue"),
-        (["--out", "campaign"], "holds another campaign; --overwrite replaces it"),
+        (["--out", "campaign"], "contains another campaign; --overwrite replaces it"),
         ([], "--resume continues it"),
         (["--resume"], "held by another process"),
         (["--overwrite"], "held by another process"),

@@ -46,7 +46,7 @@ CASES: dict[str, tuple[Callable[[Path], object], str, str, Any, str]] = {
         lambda _: with_wind(load_scenario("tight"), 50.0, 0.0, None),
         *("tight: wind", "speed_mps", 50.0, "allowed 0..40"),
     ),
-    "an algorithm": (lambda _: find_algorithm("ga", "a.toml"), "a.toml", "planner.algorithm", "ga", "not known"),
+    "an algorithm": (lambda _: find_algorithm("ga", "a.toml"), "a.toml", "planner.algorithm", "ga", "unknown"),
     "a whole number of a mission": (
         lambda _: parse_waypoints(f"{HEADER}\n{_ITEM.replace('16', '1.5', 1)}\n", "a.waypoints"),
         *("a.waypoints", "command", "1.5", "expected a whole number 0..65535"),

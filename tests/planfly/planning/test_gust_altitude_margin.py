@@ -393,7 +393,7 @@ def test_a_leg_that_sinks_leaves_less() -> None:
     sinks = 110.0 / 1500.0 * airframe.limits.performance().airspeed
     assert airframe.limits.rates(190.0)[1] - sinks < 0.6 * GUST
     (shortfall,) = find_shortfalls(plan_along(airframe, scenario, way), airframe)
-    assert shortfall.hazard == "above the 230 m over ground that are allowed"
+    assert shortfall.hazard == "above the allowed 230 m above ground"
     assert shortfall.place in {"on leg 0", "on leg 1"}
     assert shortfall.depth == pytest.approx(60.0 * GUST - 40.0 + airframe.limits.tracking.up, abs=5.0)  # type: ignore[union-attr]
     # Without a limit above it nothing is wrong.
@@ -458,7 +458,7 @@ def test_a_plan_below_a_maximum_height_is_made_anew() -> None:
     assert np.interp(4000.0, plan.waypoints[:, 0], plan.waypoints[:, 2]) < 145.0
     (problem,) = make_plan(band_of(161.0), airframe, SEED).certificate.problems
     assert "in moderate turbulence updrafts may take it" in problem
-    assert "above the 161 m over ground that are allowed at its start" in problem
+    assert "above the allowed 161 m above ground at its start" in problem
     assert "an aircraft that sinks faster or a start that is 2 m lower would help" in problem
     held = band_of(164.0)
     (problem,) = ensure_altitude_margin(

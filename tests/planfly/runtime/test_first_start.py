@@ -88,7 +88,7 @@ def test_a_cache_that_cannot_be_written_is_named(
     monkeypatch.setattr("world.kernels.cache_folder", lambda: folder)
     with send_progress_to(ON_STANDARD_ERROR), warm_up("scores"):
         kernel_is_compiled()
-    said = f"compiling the numeric kernels: {folder} cannot be written, and keeps none of them; {WAY_OUT}\n"
+    said = f"compiling the numeric kernels: {folder} cannot be written, so they are not stored; {WAY_OUT}\n"
     assert (capsys.readouterr().err, shared) == (said, [])
 
 

@@ -110,7 +110,7 @@ def test_what_failed_in_flight_is_offered_with_changes_that_were_flown(jobs: Job
     failing = [(one["rule"], one["where"]) for one in after["findings"] if one["ok"] is False]
     assert (finding["rule"], finding["where"]) not in failing
     # Of another revision nothing is applied.
-    with pytest.raises(MissionError, match="not there any more"):
+    with pytest.raises(MissionError, match="no longer exists"):
         session.edit(apply.model_copy(update={"rev": session.rev}))
 
 

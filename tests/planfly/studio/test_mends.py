@@ -235,7 +235,7 @@ def test_only_the_commands_file_is_written_over_and_not_if_it_was_changed(tmp_pa
         session.edit(messages.Raise(kind="raise", rev=session.rev, by=10.0))
         session.save_over()
     file.write_text(other.read_text(encoding="utf-8"), encoding="utf-8")
-    with pytest.raises(PlanflyError, match="changed by something else"):
+    with pytest.raises(PlanflyError, match="changed by another program"):
         session.save_over()
     assert file.read_bytes() == other.read_bytes()
 

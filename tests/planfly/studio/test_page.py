@@ -323,7 +323,9 @@ def test_a_suggestion_is_applied_by_its_button(page: Browser) -> None:
 
 def test_a_suggestion_of_the_flight_is_offered_once_it_was_flown_and_applied(page: Browser) -> None:
     page.value("document.getElementById('tab-verdict').click()")
-    own = "[...document.querySelectorAll('#panel-verdict h2')].find((one) => one.textContent === 'To mend, as flown')"
+    own = (
+        "[...document.querySelectorAll('#panel-verdict h2')].find((one) => one.textContent === 'What fails in flight')"
+    )
     apply = f"{own}?.nextElementSibling.querySelector('.apply')"
     page.wait_for(f"{apply} && document.getElementById('stop').hidden", 150.0)
     page.value(f"{apply}.click()")
@@ -418,7 +420,7 @@ def test_what_was_done_survives_a_reload_and_a_server_that_dies(page: Browser, s
     studio.kill()
     page.wait_for("!document.getElementById('message').hidden")
     studio.start()
-    page.wait_for("document.getElementById('message').textContent.includes('another start')")
+    page.wait_for("document.getElementById('message').textContent.includes('another run')")
     page.go(studio.address)
     page.wait_for(f"({READY}) && document.getElementById('undo').title.includes('before the studio ended')")
     assert parse_mission(saved(page), "m").items == parse_mission(done, "m").items

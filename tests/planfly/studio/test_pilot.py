@@ -77,7 +77,7 @@ def test_a_process_that_cannot_be_started_is_reported_and_started_later(monkeypa
                 fault = heard.next("fault")
                 assert fault.number == number
                 assert fault.value == (
-                    "the process for this cannot be started: Resource temporarily unavailable: ask again"
+                    "the worker process cannot be started: Resource temporarily unavailable; try again"
                 )
         heard.pilot.ask(Work(3, COUNT, 3))
         assert heard.next("done").number == 3

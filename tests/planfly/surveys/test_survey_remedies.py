@@ -213,5 +213,5 @@ def test_why_no_other_layout_was_tried(monkeypatch: pytest.MonkeyPatch, tmp_path
     path = tmp_path / "a.waypoints"
     path.write_text("\n".join([*rows[:at], lead, speed, *rows[at:]]) + "\n", encoding="ascii")
     found, flown = tried(monkeypatch, lambda metres: (False, {}), path)
-    assert found.kept == "item 7, DO_CHANGE_SPEED, stands between two lines"
+    assert found.kept == "item 7, DO_CHANGE_SPEED, lies between two lines"
     assert set(flown) <= {0.0}

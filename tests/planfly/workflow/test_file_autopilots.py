@@ -80,7 +80,7 @@ def test_the_autopilot_is_taken_from_the_files(mission: str, options: dict[str, 
     assert judged.setup.autopilot.name == flies
     (line,) = [line for line in judged.verdict.lines if line.startswith("Autopilot: ")]
     taken = flies == "px4" and "autopilot" not in options
-    assert line.endswith(", as no autopilot was named") is taken
+    assert line.endswith(", because no autopilot was named") is taken
     if taken:
         file = options.get("params", mission)
         assert line.startswith("Autopilot: the simulated PX4 1.17 with")

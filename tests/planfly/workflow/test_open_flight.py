@@ -225,7 +225,9 @@ def test_the_judge_finds_the_fence_kept() -> None:
     threats = [missile(198.0, 700.0, 200.0), missile(-900.0, 0.0, 150.0)]
     setup = setup_of(*CORNER, threats=threats)
     mission, notes = add_plan_fence(setup)
-    assert any(note.startswith("left out of the fence, as the mission passes above or below: m198;") for note in notes)
+    assert any(
+        note.startswith("omitted from the fence, because the mission passes above or below: m198;") for note in notes
+    )
 
     def failed(fences: Any) -> list[str]:
         judged = judge_geometry(replace(setup, mission=replace(setup.mission, fences=fences)))

@@ -26,7 +26,7 @@ def test_a_named_file_is_refused_where_it_would_destroy(tmp_path: Path) -> None:
     check_output_file(there, overwrite=True)
     for path, overwrite, source, message in (
         (there, False, None, "overwrite=True replaces it"),
-        (link, True, there, "is the input itself"),
+        (link, True, there, "is the input file"),
         (tmp_path, True, None, "is a folder"),
         (tmp_path / "none" / "a.plan", True, None, "does not exist"),
     ):

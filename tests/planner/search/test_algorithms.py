@@ -19,7 +19,7 @@ def test_each_is_found_by_its_own_name_and_the_default_without_one() -> None:
 def test_an_unknown_name_is_refused_with_those_there_are(name: str) -> None:
     with pytest.raises(ScenarioError) as caught:
         find_algorithm(name, "s.toml")
-    assert str(caught.value).startswith(f"s.toml: planner.algorithm: {name!r}: not known; allowed: ")
+    assert str(caught.value).startswith(f"s.toml: planner.algorithm: {name!r}: unknown; allowed: ")
     assert f"allowed: {', '.join(ALGORITHMS)}" in str(caught.value)
 
 

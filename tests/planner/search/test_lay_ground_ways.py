@@ -149,15 +149,13 @@ def test_out_of_a_ring_the_launch_leads_through_its_gap_and_without_one_the_plan
     assert none.ways.climb is None
     assert len(none.certificate.problems) == 1
     said = none.certificate.problems[0]
-    assert said.startswith(
-        "climb-out: none of 36 launch courses leads free of ground, missiles and zones at 70% of the"
-    )
-    assert "m too low over the ground" in said
+    assert said.startswith("climb-out: none of 36 launch courses is clear of ground, missiles and zones at 70% of the")
+    assert "m too low above the ground" in said
     # A stated course is the only one that is tried.
     assert (
         laid(ring(200.0, gap=120.0), launch={"method": "hand", "course_deg": 300.0})
         .certificate.problems[0]
-        .startswith("climb-out: the launch course leads not free")
+        .startswith("climb-out: the launch course is not clear")
     )
 
 
@@ -261,8 +259,8 @@ def test_a_ridge_under_the_final_makes_it_steeper_or_is_named() -> None:
     # 375 m before the point the glide is 10 m over a ridge of 10 m, at 3.1 degrees or more.
     assert low.ways.descent.slope * 375.0 > 20.0
     assert not high.feasible
-    assert high.certificate.problems[0].startswith("landing: on 0° a final of")
-    assert "too low over the ground" in high.certificate.problems[0]
+    assert high.certificate.problems[0].startswith("landing: on 0° a final approach of")
+    assert "too low above the ground" in high.certificate.problems[0]
 
 
 def test_a_strip_that_slopes_too_much_is_named_with_the_side() -> None:

@@ -80,5 +80,5 @@ def test_a_plan_for_energy_takes_less_of_the_envelopes_power_than_the_straight_l
 def test_energy_is_refused_where_the_power_of_the_aircraft_is_not_known(monkeypatch: pytest.MonkeyPatch) -> None:
     scenario = plain("energy", 0.0)
     monkeypatch.setattr("planner.search.search_cheapest.make_travel_cost", lambda *_: None)
-    with pytest.raises(ScenarioError, match="power of this aircraft is not known"):
+    with pytest.raises(ScenarioError, match="power of this aircraft is unknown"):
         plan_path(scenario, load_airframe(scenario).limits, seed=1)

@@ -227,7 +227,7 @@ FAULTS = {
     HEAD + "AH FL95\n": "line 5: AH 'FL95': an airspace has one lower limit (AL) and one upper limit (AH)",
     HEAD + "DP 46:00:00N\n": "line 5: DP '46:00:00N': expected a place",
     HEAD + "DP 91:00:00N 008:00:00E\n": "line 5: DP '91:00:00N 008:00:00E': allowed 0..90 degrees",
-    HEAD + "DP 46:61:00N 008:00:00E\n": "line 5: DP '46:61:00N 008:00:00E': expected degrees, minutes and seconds",
+    HEAD + "DP 46:61:00N 008:00:00E\n": "line 5: DP '46:61:00N 008:00:00E': expected degrees, and minutes and seconds",
     HEAD + "DC 5\n": "line 5: DC '5': no centre before it (V X=)",
     HEAD + "V X=46:00:00N 008:00:00E\nDC five": "line 6: DC 'five': expected a number of at least 0",
     HEAD + "V D=left": "line 5: V 'D=left': allowed D=+ (clockwise) or D=-",
@@ -264,7 +264,7 @@ def test_an_outline_of_no_area_is_left_out_and_said(way: str, tmp_path: Path) ->
         path.write_text(f"AC Q\nAN RUN\n{way}{more}", encoding="utf-8")
         found = read_zone_file(path, "z.openair")
         assert len(found.zones) == count
-        assert found.notes == ["z.openair: outlines that enclose no area are left out: RUN (Q)"]
+        assert found.notes == ["z.openair: outlines that enclose no area are ignored: RUN (Q)"]
 
 
 def test_what_a_file_does_not_hold_as_it_stands_is_said(tmp_path: Path) -> None:

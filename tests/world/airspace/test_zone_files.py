@@ -539,7 +539,7 @@ def test_zones_far_from_the_area_are_left_out(tmp_path: Path) -> None:
     scenario = load_scenario(str(file))
     # The edge of "wide" is 17 km from the origin, its centre 77 km.
     assert [zone.name for zone in scenario.zones] == ["near", "wide", "town"]
-    assert scenario.notes[0].endswith("3 of 6 zones lie more than 20 km from the area: left out")
+    assert scenario.notes[0].endswith("3 of 6 zones lie more than 20 km from the area: ignored")
     # A log of it is as large as what is near.
     assert len(scenario.to_json()["zones"]) == 3
     assert from_spec(scenario.to_json(), "a log").notes == scenario.notes

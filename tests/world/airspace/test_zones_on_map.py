@@ -142,7 +142,7 @@ def test_levels_above_ground_need_a_ground() -> None:
     spec |= {"terrain": {"kind": "none"}, "start": spec["destination"], "threats": []}
     from_spec(spec, "a log", external=True)
     spec["zones"][0]["ceiling_agl_m"] = 50.0
-    with pytest.raises(ScenarioError, match=r"zones\[0\] \(z\): ceiling_agl_m: it needs terrain"):
+    with pytest.raises(ScenarioError, match=r"zones\[0\] \(z\): ceiling_agl_m: requires terrain"):
         from_spec(spec, "a log", external=True)
 
 

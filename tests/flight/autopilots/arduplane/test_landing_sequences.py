@@ -109,7 +109,7 @@ def aborted(pitch: float = math.radians(10.0), height: float = 50.0) -> tuple[Re
 
 
 def test_the_abort_flies_into_the_hill_as_arduplane_did() -> None:
-    """It is so high already, turns at once, and meets the hillside: place within 10 m and height within 6 m."""
+    """It is already at this height, turns at once, and meets the hillside: place within 10 m and height within 6 m."""
     real = kept_sequence("abort")
     flown, way = aborted()
     assert flown["ended"] == RETURN_GROUND_IMPACT

@@ -177,4 +177,4 @@ def test_a_least_beyond_its_most_gives_way() -> None:
 
 def test_a_log_without_parameters_says_that_defaults_are_taken() -> None:
     _, notes = parameters()
-    assert notes == ("the log holds no parameters: ArduPlane's defaults are used",)
+    assert notes == ("the log contains no parameters: ArduPlane's defaults are used",)

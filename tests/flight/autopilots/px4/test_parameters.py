@@ -118,7 +118,7 @@ def test_a_logs_parameters_are_read_to_single_precision() -> None:
     assert (made["NPFG_SW_DST_MLT"], notes) == (0.32, ())
     for logged in ({}, {"FW_AIRSPD_MIN": 9.0, "FW_AIRSPD_MAX": 8.0}):
         _, notes = Px4Parameters.of_log(logged, "a.ulg", "1.16")
-        assert notes[-1] == "the log holds no parameters: PX4's defaults are used"
+        assert notes[-1] == "the log contains no parameters: PX4's defaults are used"
     made, notes = Px4Parameters.of_log({"FW_AIRSPD_MIN": 25.0}, "a.ulg", "1.16")
     assert made == Px4Parameters.defaults("1.16")
     assert "must be below FW_AIRSPD_MAX 20: PX4's defaults are used" in notes[0]

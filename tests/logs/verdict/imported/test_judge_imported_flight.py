@@ -55,10 +55,10 @@ def test_a_flight_along_its_legs_is_flyable_and_complete(tmp_path: Path) -> None
 @pytest.mark.parametrize(
     ("lacks", "rule", "reason"),
     [
-        ("airspeed", "speed", "the log holds no airspeed"),
-        ("airspeed", "stall", "the log holds no airspeed"),
-        ("attitude", "stall", "the log holds no attitude"),
-        ("throttle", "energy", "the log holds no battery current and voltage"),
+        ("airspeed", "speed", "the log contains no airspeed"),
+        ("airspeed", "stall", "the log contains no airspeed"),
+        ("attitude", "stall", "the log contains no attitude"),
+        ("throttle", "energy", "the log contains no battery current and voltage"),
     ],
 )
 def test_a_rule_without_its_quantity_says_so(tmp_path: Path, lacks: str, rule: str, reason: str) -> None:
@@ -73,7 +73,7 @@ def test_a_quantity_that_is_missing_for_a_while_is_told_with_its_times(tmp_path:
     keep = (own.time < 50.0) | (own.time > 60.0)
     holed = replace(raw, series={**raw.series, "airspeed": LogSeries("ARSP", own.time[keep], own.values[keep])})
     (reason,) = reasons(judged(tmp_path, holed, AEROSONDE), "speed")
-    assert reason == "the log holds no airspeed at 51 rows from 50.0 s to 60.0 s"
+    assert reason == "the log contains no airspeed at 51 rows from 50.0 s to 60.0 s"
 
 
 def test_an_aircraft_that_is_not_named_has_no_limits(tmp_path: Path) -> None:
@@ -197,8 +197,8 @@ def test_a_log_that_ends_on_the_way_says_nothing_of_the_rest(tmp_path: Path) -> 
 
 def test_a_flight_without_auto_is_not_judged(tmp_path: Path) -> None:
     flight = judged(tmp_path, with_modes((20.0, "FBWA")))
-    assert flight.verdict.headline == "not flown as planned: completion (no stretch of the flight followed the mission)"
-    assert "Judged: nothing, as no stretch of the flight followed the mission" in flight.verdict.lines
+    assert flight.verdict.headline == "not flown as planned: completion (no part of the flight followed the mission)"
+    assert "Judged: nothing, because no part of the flight followed the mission" in flight.verdict.lines
 
 
 def test_two_stretches_are_judged_together(tmp_path: Path) -> None:
@@ -232,7 +232,7 @@ def test_a_return_that_the_mission_ends_with_completes_it(tmp_path: Path, mode: 
 def test_each_fault_of_rows_is_counted_by_name() -> None:
     faults = RowFaults(doubled=1, unordered=2, unusable=3, glitches=4, clock_jumps=(5.0, 6.0))
     assert rows_text(faults, 2) == (
-        "2 gaps, 1 doubled, 2 out of order, 3 without a place or a time, 4 position glitches,"
+        "2 gaps, 1 doubled, 2 out of order, 3 without a position or a time, 4 position glitches,"
         " 2 jumps of the clock (at 5.0 s, 6.0 s)"
     )
 
@@ -248,5 +248,5 @@ def test_each_datum_is_named() -> None:
 
 def test_what_is_lost_is_told() -> None:
     assert damage_text(Damage(places=1, size=1200, unreadable=2)) == (
-        "1 place in the file (1,200 bytes) cannot be read; 2 messages hold nothing that can be used"
+        "1 place in the file (1,200 bytes) cannot be read; 2 messages contain nothing that can be used"
     )

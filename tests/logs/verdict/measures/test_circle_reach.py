@@ -60,9 +60,7 @@ def test_the_highest_height_counts_against_the_greatest_above_ground() -> None:
     assert found(500.0, 610.0, limits=limits) == ["the ground is 610 m below, more than the 600 m allowed"]
 
 
-@pytest.mark.parametrize(
-    ("up", "what"), [(490.0, "the ground is only 10 m below"), (np.nan, "the terrain is not known")]
-)
+@pytest.mark.parametrize(("up", "what"), [(490.0, "the ground is only 10 m below"), (np.nan, "the terrain is unknown")])
 def test_a_hill_counts_within_its_reach_only(up: float, what: str) -> None:
     ground = route_requirements(loiter(TIME, {})).setup.scenario.terrain
     assert ground is not None

@@ -127,7 +127,7 @@ def test_what_is_not_known_is_said(tmp_path: Path) -> None:
     follows = judged(setup, 20.0, TERRAIN_FOLLOW=1)
     assert {one.own.end for one in follows.each} == {"not flown"}
     assert {one.reach for one in follows.each} == {"home", "flat"}
-    assert "is not flown" in glides_headline(follows)
+    assert "is not simulated" in glides_headline(follows)
     starts = planned_starts(setup, 20.0)
     starts.rows["east"] += 50_000.0
     away = judge_glides(return_world(setup), starts)
@@ -145,7 +145,7 @@ def test_a_scenario_that_requires_it_fails_where_nothing_is_in_reach(tmp_path: P
     # Nobody may land but at home, which a glide from 600 m reaches over 5.2 km, as above.
     near, far = (demanded(tmp_path, BARRED, mission_text(0.0, east)) for east in (4500.0, 6500.0))
     assert (near.ok, far.ok) == (True, False)
-    assert "without the engine: of 181 places home can be reached from 181" in near.reason
+    assert "without the engine: of 181 places, home can be reached from 181" in near.reason
     assert ", nothing from " in far.reason
     assert far.method == "one return every 1 s of the route, glides that keep 30 m above ground"
     # Flat ground counts, for it is somewhere to land.
@@ -177,7 +177,7 @@ def test_both_may_be_required_and_the_worse_counts(tmp_path: Path) -> None:
     both = demanded(tmp_path, demand='["rtl", "glide"]')
     assert both.ok is False
     assert "hit the ground" in both.reason
-    assert "; without the engine: of 261 places home can be reached from " in both.reason
+    assert "; without the engine: of 261 places, home can be reached from " in both.reason
     short = demanded(tmp_path, mission=mission_text(0.0, 2000.0), demand='["glide", "rtl"]')
     assert short.ok is True
 
@@ -187,9 +187,9 @@ def test_taking_off_is_left_out_and_what_is_not_known_is_undecided(tmp_path: Pat
     rows = ((1, 0.0, 10), (2, 2000.0, 210), (3, 3000.0, 500))
     way = HEAD + "".join(f"{k}\t0\t0\t16\t0\t0\t0\t0\t46.0\t{8.0 + x / DEGREE:.7f}\t{up}\t1\n" for k, x, up in rows)
     found = demanded(tmp_path, mission=way)
-    assert "; 9 lower than 30 m above ground are left out" in found.reason
+    assert "; 9 lower than 30 m above ground are omitted" in found.reason
     # 3 km at 25 m/s, and the start.
-    assert f"of {121 - 9} places home" in found.reason
+    assert f"of {121 - 9} places, home" in found.reason
     setup = hill_setup(tmp_path, '[returns]\nrequire = ["glide"]\n')
     bare = replace(setup, scenario=replace(setup.scenario, terrain=None))
     verdict = judge_geometry(bare)
@@ -198,7 +198,7 @@ def test_taking_off_is_left_out_and_what_is_not_known_is_undecided(tmp_path: Pat
     assert unknown.reason == "without the engine: not judged: there is no elevation file"
     # The scenario asks for it: nothing is flyable without.
     assert (verdict.flyable, verdict.undecided, verdict.flies) == (False, True, True)
-    assert verdict.headline.endswith("whether the aircraft gets home as the scenario requires is not known in full")
+    assert verdict.headline.endswith("it is not fully known whether the aircraft gets home as the scenario requires")
     homeless = replace(setup, mission=replace(setup.mission, home=None))
     (nowhere,) = [one for one in judge_geometry(homeless).findings if one.rule == "return"]
     assert nowhere.ok is None
@@ -214,7 +214,7 @@ def test_ranges_hold_every_place_in_order(tmp_path: Path) -> None:
         assert {one.reach for one in inside} == {group.lowest_glide.reach}
         assert found.altitude_left(group.lowest_glide) == min(found.altitude_left(one) for one in inside)
     assert sum(found.count(one) for one in ("home", "flat")) == len(found.each)
-    assert "which knows no trees, houses or water" in " ".join(glide_notes(found))
+    assert "which contains no trees, houses or water" in " ".join(glide_notes(found))
 
 
 def test_an_engine_that_burns_fuel_has_a_note(tmp_path: Path) -> None:
@@ -268,7 +268,7 @@ def test_what_is_not_known_of_energy_is_said(tmp_path: Path) -> None:
     setup = hill_setup(tmp_path)
     returns = judge_returns(return_world(setup), planned_starts(setup, 20.0), 20.0)
     assert returns.point_of_no_return.kind == "used"
-    assert "the energy used before is not known" in point_of_no_return_text(returns)
+    assert "the energy used before is unknown" in point_of_no_return_text(returns)
     guessed = replace(setup, limits=replace(setup.limits, envelope=replace(setup.envelope, battery_guessed=True)))
     assert no_return(guessed).kind == "battery"
     # From behind the hill, into it: what does not arrive is left out.
@@ -280,4 +280,4 @@ def test_what_is_not_known_of_energy_is_said(tmp_path: Path) -> None:
     deep = starts.subset(np.flatnonzero(starts.rows["east"] > 6000.0))
     none = judge_returns(return_world(setup), deep, 20.0)
     assert none.point_of_no_return.kind == "arrives"
-    assert point_of_no_return_text(none).endswith("as no return arrives")
+    assert point_of_no_return_text(none).endswith("because no return arrives")

@@ -179,7 +179,7 @@ def test_a_flight_that_finds_it_lower_makes_all_like_it_worse(
     far = judge_returns(world, starts, OFTEN, stub)
     assert {one.kind for one in far.each if one.time in {asked.time for asked in stub.asked}} == {"ground"}
     assert far.count("unsure") > 5
-    assert "too differently" in headline(far)
+    assert "JSBSim disagree" in headline(far)
     # How far it is from a sphere that is far away decides nothing.
     assert not judge_returns(world, starts, OFTEN, Stub(before, 0.0, 2000.0)).count("unsure")
     # What could not be flown stays as it was.
@@ -265,7 +265,7 @@ def test_where_the_ground_is_not_known_it_is_undecided_where_it_is_required(tmp_
     found = judge_geometry(hill_setup(tmp_path, '[returns]\nrequire = ["rtl"]\n', way))
     (one,) = [one for one in found.findings if one.rule == "return"]
     assert one.ok is None
-    assert "fly where the ground is not known" in one.reason
+    assert "fly where the terrain is unknown" in one.reason
 
 
 def guessed(setup: FlightSetup) -> FlightSetup:
@@ -281,7 +281,7 @@ def test_a_guessed_battery_is_not_judged_and_a_note_says_so(tmp_path: Path) -> N
     found = ReturnsFound(guess, judge_returns(world, starts, 20.0))
     assert all(math.isnan(one.energy_left) for one in found.returns.each)
     assert not found.returns.count("energy")
-    assert any("the battery is guessed: energy is not judged" in note for note in found.notes)
+    assert any("the battery is guessed, so energy is not judged" in note for note in found.notes)
     stated = hill_setup(tmp_path, "[flight]\nbattery_wh = 10\n")
     known = guessed(stated)
     found = ReturnsFound(known, judge_returns(return_world(known), starts, 20.0))

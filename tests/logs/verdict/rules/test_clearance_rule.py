@@ -74,7 +74,7 @@ def test_off_the_known_terrain_is_not_judged() -> None:
     nowhere = replace(cut, scenario=replace(cut.scenario, terrain=replace(holed, heights=heights)))
     item = of(judge(nowhere, far), "clearance", leg(0))
     assert item.ok is None
-    assert "off the known terrain" in item.reason
+    assert "outside the terrain data" in item.reason
 
 
 LEVEL = [[0, 0, 300], [0, 3000, 300]]
@@ -150,7 +150,7 @@ def test_where_a_flight_leaves_the_known_terrain_is_told(high: float, ok: bool |
     assert item.flown == pytest.approx(high, abs=0.1)
     known = replace(ground, heights=heights).height(np.zeros(5000), np.arange(5000.0))
     assert np.isfinite(known[0])
-    north = float(item.reason.split("off the known terrain at ")[1].split("north ")[1].split(" m")[0])
+    north = float(item.reason.split("outside the terrain data at ")[1].split("north ")[1].split(" m")[0])
     assert north == pytest.approx(int(np.flatnonzero(np.isnan(known))[0]), abs=2.0)
     planned = of(judge_geometry(cut), "clearance", leg(0))
     assert (planned.ok, planned.planned) == (None, None)

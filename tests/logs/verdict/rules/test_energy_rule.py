@@ -93,7 +93,7 @@ def test_energy_within_what_is_not_known_is_undecided(share: float, ok: bool | N
     item = of(verdict, "energy")
     assert (item.ok, verdict.undecided) == (ok, ok is None)
     if ok is None:
-        assert "the power according to a data sheet is known to 25%" in item.reason
+        assert "the power according to a data sheet has a standard deviation of 25%" in item.reason
         assert verdict.headline.startswith(
             "not judged in full: energy is too close to the limit to judge with what is known of the aircraft"
         )

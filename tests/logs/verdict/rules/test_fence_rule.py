@@ -138,7 +138,7 @@ def test_unknown_ground_is_not_judged() -> None:
     setup = within_zones(Zone("low", "exclusion", Cylinder(0.0, 1000.0, 200.0), None, ZoneLevel(120.0, "ground")))
     rest, item = findings(replace(setup, scenario=replace(setup.scenario, terrain=None)))
     assert (item.ok, item.place.name) == (None, "low")
-    assert item.reason == "the ground from which its height counts is not known everywhere"
+    assert item.reason == "the terrain from which its height is measured is unknown in places"
     assert rest.ok is True
 
 

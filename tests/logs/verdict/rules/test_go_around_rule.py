@@ -37,7 +37,7 @@ def test_a_go_around_from_a_field_above_home_is_too_low_and_the_height_that_woul
     assert warned.planned == pytest.approx(13.0, abs=2.5)
     assert "which is 13 m over the landing point" in warned.reason
     assert "m above ground on the way back" in warned.reason
-    assert warned.reason.endswith("60 m would do (the first number of item 3)")
+    assert warned.reason.endswith("60 m would be sufficient (parameter 1 of item 3)")
     # It decides no verdict, and is said.
     assert verdict.flyable
     assert f"Go-around: {warned.reason}" in verdict.lines
@@ -49,8 +49,8 @@ def test_a_go_around_from_a_field_above_home_is_too_low_and_the_height_that_woul
 def test_a_hill_ahead_of_the_landing_leaves_no_height_for_a_go_around() -> None:
     found, _ = go_around(wall(POINT + 150.0, 300.0), *landing())
     assert found.ok is None
-    assert "meets the ground" in found.reason
-    assert found.reason.endswith("no height would do")
+    assert "hits the ground" in found.reason
+    assert found.reason.endswith("no height would be sufficient")
 
 
 def test_a_go_around_flies_back_to_where_the_landing_sequence_begins_and_on_to_the_line_up() -> None:
@@ -86,7 +86,7 @@ def test_where_it_is_required_a_go_around_that_is_too_low_fails_and_one_that_is_
         assert (found.ok, verdict.flyable) == (ok, bool(ok))
     assert verdict.headline.startswith("flyable")
     failed = go_around(higher_field, *landing(HEIGHT, p="50 0 0 0"), **asked)[1]
-    assert "go-around at waypoint 2 (item 3) (a go-around comes too near to the ground)" in failed.headline
+    assert "go-around at waypoint 2 (item 3) (a go-around comes too close to the ground)" in failed.headline
     # By planfly's guidance nothing is known of it.
     other = judge_geometry(over(higher_field, *landing(HEIGHT), **asked))
     assert other.headline.startswith("not judged in full: a go-around is not judged")
@@ -127,7 +127,7 @@ def test_a_go_around_goes_to_the_landing_sequence_that_is_nearest_where_its_clim
     for order in ((*behind, *ahead), (*ahead, *behind)):
         assert go_around(LEVEL, wp(0, -3000, 60), *order, **REQUIRED)[0].ok is True
         into, _ = go_around(wall(300.0, 300.0), wp(0, -3000, 60), *order, **REQUIRED)
-        assert "meets the ground" in into.reason
+        assert "hits the ground" in into.reason
     assert go_around(wall(300.0, 300.0), wp(0, -3000, 60), *behind, **REQUIRED)[0].ok is True
 
 
@@ -155,14 +155,14 @@ def test_a_climb_that_passes_the_ground_beyond_the_landing_point_by_too_little_i
         found, least = climbs(top + more)
         assert found.ok is ok
         assert least == pytest.approx(6.0 - more, abs=0.1)
-    assert "in its climb by" in climbs(top + 1.0)[0].reason
+    assert "its climb clears the ground by" in climbs(top + 1.0)[0].reason
     assert level.ok is True
 
 
 def test_a_go_around_that_leaves_the_known_ground_in_its_climb_is_left_open() -> None:
     found, verdict = go_around(LEVEL, *landing(p="3000 0 0 0"), **REQUIRED)
     assert (found.ok, verdict.undecided) == (None, True)
-    assert found.reason.endswith("it does not reach its height on known ground")
+    assert found.reason.endswith("it leaves the terrain data before it reaches its height")
 
 
 def test_a_low_place_of_the_landing_sequence_lowers_what_is_asked_for_only_near_it() -> None:
@@ -217,5 +217,5 @@ def test_fields_above_home_whose_abort_has_to_hit_the_hill_are_named() -> None:
         land = wp(0, POINT, above, command=21, p=f"{asked} 0 0 0")
         found, verdict = go_around(valley, line_up[0], *start, line_up[1], land)
         assert found.ok is None, (above, deep, asked)
-        assert "meets the ground" in found.reason
+        assert "hits the ground" in found.reason
         assert f"Go-around: {found.reason}" in verdict.lines

@@ -80,8 +80,8 @@ def test_the_way_to_the_first_waypoint_is_left_open_where_a_wall_stands_in_it() 
     into_it, verdict = judged("climbout", wall(1000.0, up + 2.0), *FAR)
     assert into_it.ok is None
     assert verdict.undecided
-    assert verdict.headline == "not judged in full: the climb from home to item 1 meets the ground"
-    assert into_it.reason.endswith("2 m into it 1000 m from home, at the steepest climb")
+    assert verdict.headline == "not judged in full: the climb from home to item 1 hits the ground"
+    assert into_it.reason.endswith("2 m below its surface, 1000 m from home, at the steepest climb")
 
 
 def test_beyond_the_climb_the_way_to_the_first_waypoint_is_level() -> None:
@@ -120,9 +120,9 @@ def test_a_take_off_into_a_wall_fails_and_one_that_only_its_steepest_climb_clear
             *(["climbout"] if ok is None else []),
         ]
     failed, verdict = judged("climbout", wall(500.0, steepest + 30.0), *TAKEOFF)
-    assert "the climb from home towards item 2 meets the ground" in verdict.headline
+    assert "the climb from home towards item 2 hits the ground" in verdict.headline
     assert failed.planned == pytest.approx(-30.0, abs=0.5)
-    assert ", 30 m into it 500 m from home, at the steepest climb; launched on " in failed.reason
+    assert ", 30 m below its surface, 500 m from home, at the steepest climb; launched on " in failed.reason
 
 
 def test_courses_are_named_on_which_a_launch_would_climb_free() -> None:
@@ -220,7 +220,7 @@ def test_ground_that_is_met_counts_where_that_beyond_it_is_not_known() -> None:
     assert (left_open.ok, left_open.check) == (None, "ground way")
     unknown, _ = judged("climbout", cut(100.0, 1450.0), *TAKEOFF)
     assert (unknown.ok, unknown.check) == (None, "")
-    assert unknown.reason.endswith("at 70 % of the steepest, leads to where the ground is not known")
+    assert unknown.reason.endswith("at 70 % of the steepest, leads to where the terrain is unknown")
 
 
 def test_where_no_way_up_is_known_there_is_no_finding_or_it_is_not_judged() -> None:
@@ -238,7 +238,7 @@ def test_where_no_way_up_is_known_there_is_no_finding_or_it_is_not_judged() -> N
     assert "climbout" not in rules(setup_of(*(line.replace("3 16", "0 16") for line in FAR), terrain={"kind": "none"}))
     # Home, or a part of the way, off the elevation file: not judged, and said.
     away, verdict = judged("climbout", level, *FAR, home="36.5 -84.1 100")
-    assert (away.ok, away.check, away.reason) == (None, "", "the ground at home is not known")
+    assert (away.ok, away.check, away.reason) == (None, "", "the terrain at home is unknown")
     assert verdict.headline == "flyable; climb-out not judged"
     beside, _ = judged("climbout", lambda east, north: np.where(north == 1000.0, np.nan, 100.0) + 0.0 * east, *TAKEOFF)
     assert (beside.ok, beside.check) == (None, "")
@@ -252,7 +252,7 @@ def test_a_stated_launch_course_replaces_the_guess_towards_the_first_place(cours
     found = of(judge_geometry(stated), "climbout")
     assert found.ok is ok
     way = "towards item 2" if course_deg is None else f"on the launch course {course_deg:.0f}°"
-    assert (way if not ok else way.replace("towards item 2", "towards the next place")) in found.reason
+    assert (way if not ok else way.replace("towards item 2", "towards the next waypoint")) in found.reason
 
 
 # ----------------------------------------------------------------------
@@ -273,10 +273,12 @@ def test_a_glide_into_a_wall_fails_and_one_that_only_just_clears_it_is_left_open
         found, verdict = judged("approach", wall(POINT - 600.0, top), *landing())
         assert (found.ok, verdict.undecided) == (ok, ok is None), top
     failed, verdict = judged("approach", wall(POINT - 600.0, up + 60.0), *landing())
-    assert "approach at waypoint 2 (item 3) (the glide to item 3 meets the ground)" in verdict.headline
-    assert failed.reason == "the glide to item 3 meets the ground, 60 m into it 600 m before the landing point"
+    assert "approach at waypoint 2 (item 3) (the glide to item 3 hits the ground)" in verdict.headline
+    assert failed.reason == (
+        "the glide to item 3 hits the ground, 60 m below its surface, 600 m before the landing point"
+    )
     _, verdict = judged("approach", wall(POINT - 600.0, up - 3.0), *landing())
-    assert verdict.headline == "not judged in full: the glide to item 3 passes the ground by 3.0 m"
+    assert verdict.headline == "not judged in full: the glide to item 3 clears the ground by only 3.0 m"
 
 
 def test_what_is_met_in_the_last_60_metres_is_the_landing() -> None:

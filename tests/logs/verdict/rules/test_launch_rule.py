@@ -42,9 +42,9 @@ def test_a_climb_over_unknown_ground_is_not_judged() -> None:
     setup = with_hole(flown.setup, 150.0, 0.0)
     one = found(setup, flown.track, "launch")
     assert one.ok is None
-    assert "the ground below the launch's climb is not known" in one.reason
+    assert "the terrain below the launch's climb is unknown" in one.reason
     headline = judge_flight(setup, flown.track, "completed").headline
-    assert headline == "not judged in full: the ground below the launch's climb is not known"
+    assert headline == "not judged in full: the terrain below the launch's climb is unknown"
 
 
 def test_a_climb_through_a_zone_fails_and_one_beside_it_does_not() -> None:

@@ -98,10 +98,10 @@ def test_a_missile_where_a_wider_circle_may_lead_leaves_geometry_open(away: floa
     item = of(verdict, "loiter")
     assert (item.ok, verdict.flyable, verdict.undecided) == ((True, True, False) if away > 0 else (None, False, True))
     if away < 0.0:
-        assert "the missile m reaches it; only a flight tells" in item.reason
+        assert "the missile m reaches it; only a simulated flight shows" in item.reason
         assert (
             verdict.headline
-            == "not judged in full: only a flight tells where the circle at waypoint 1 (item 2) is flown"
+            == "not judged in full: only a simulated flight shows how the circle at waypoint 1 (item 2) is flown"
         )
 
 

@@ -51,7 +51,7 @@ REFUSED = {
         "checkMissionItemValidity",
         (*GOOD, "2 183 5 1500 0 0 0 0 0"),
         4,
-        "unsupported command DO_SET_SERVO; ArduPlane takes it",
+        "unsupported command DO_SET_SERVO; ArduPlane accepts it",
     ),
     "takeoff-low": (
         "checkTakeoff",
@@ -268,7 +268,7 @@ UNJOINED = {
     ),
     "inner": (
         (_WIDE, wp(300, 0, 300, command=18, p="1 0 200 0"), wp(5000, 0, 300)),
-        (3, "no tangent joins its circle to that of item 2: ArduPlane flies it as it is"),
+        (3, "no tangent joins its circle to that of item 2: ArduPlane flies it anyway"),
     ),
     "same-middle": (
         (_WIDE, wp(0, 0, 300, command=18, p="1 0 200 0"), wp(5000, 0, 300)),

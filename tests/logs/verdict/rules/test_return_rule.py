@@ -138,7 +138,7 @@ def test_a_return_that_meets_a_ridge_has_not_got_to_its_end() -> None:
     verdict, ended = flown(walled)
     assert ended == "ground contact"
     assert of(verdict, "return").ok is None
-    assert "did not get to its end" in of(verdict, "return").reason
+    assert "did not reach its end" in of(verdict, "return").reason
     assert not verdict.flyable
 
 
@@ -149,7 +149,7 @@ def test_a_return_that_meets_a_hill_at_home_has_not_got_to_its_end(hill: Peak) -
     verdict, ended = flown(setup.in_scenario(replace(setup.scenario, terrain=ground)))
     assert ended == "ground contact"
     assert of(verdict, "return").ok is None
-    assert "did not get to its end: ground contact" in of(verdict, "return").reason
+    assert "did not reach its end: ground contact" in of(verdict, "return").reason
 
 
 def test_a_return_with_an_empty_battery_has_not_got_to_its_end() -> None:
@@ -178,7 +178,7 @@ def test_a_return_that_goes_on_to_what_is_not_flown_is_left_open(autoland: int) 
         verdict = judge_geometry(setup)
         assert verdict.undecided
         assert verdict.headline.startswith("not judged in full: the landing at waypoint 2 (item 3) is not judged; ")
-        assert verdict.headline.endswith("where the return leads to is not known")
+        assert verdict.headline.endswith("the destination of the return is unknown")
         assert "item 5 begins with the landing itself" in of(verdict, "return").reason
         assert of(verdict, "landing").reason == "the return does not continue to it"
     # As without RTL_AUTOLAND, and as to a sequence that can be flown, nothing is open.

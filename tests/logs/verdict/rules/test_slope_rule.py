@@ -247,7 +247,7 @@ def test_a_slope_within_what_is_not_known_is_undecided() -> None:
     for verdict in (judge(setup, fly_path(setup)), judge_geometry(setup)):
         item = of(verdict, "slope", leg(1))
         assert (item.ok, item.check) == (None, "unknown aircraft")
-        assert item.reason.startswith("climbs 10.0°; the limit according to a data sheet is 13.7°, give or take 3.0°")
+        assert item.reason.startswith("climbs 10.0°; the limit according to a data sheet is 13.7° ± 3.0°")
         # Over 20 s the gusts of 15 s average out, and the speed has settled for 15 of them.
         told = [(change.what, change.wanted, change.unit) for one in item.suggestions for change in one]
         assert told == [("full throttle", 20.0, "s")]
@@ -282,7 +282,7 @@ def test_a_scenarios_tighter_limit_does_not_make_the_aircraft_known() -> None:
         assert verdict.undecided is (ok is None)
         if ok is None:
             # What the aircraft can, not what the scenario allows.
-            assert "the limit according to a data sheet is 13.7°, give or take 3.0°" in item.reason
+            assert "the limit according to a data sheet is 13.7° ± 3.0°" in item.reason
 
 
 def test_the_deviation_that_is_told_is_the_aircrafts() -> None:
@@ -290,7 +290,7 @@ def test_the_deviation_that_is_told_is_the_aircrafts() -> None:
     setup = make_setup([[e, n, u + 400] for e, n, u in hill(10.0)], table=unsure(climb_sd=9.0))
     item = of(judge_geometry(setup), "slope", leg(1))
     assert item.ok is None
-    assert "13.7°, give or take 9.0°" in item.reason
+    assert "13.7° ± 9.0°" in item.reason
 
 
 def test_a_glide_would_tell_of_a_descent() -> None:

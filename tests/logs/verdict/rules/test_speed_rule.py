@@ -64,7 +64,7 @@ def test_a_leg_that_climbs_to_where_there_is_no_level_flight_has_none() -> None:
 
 @pytest.mark.parametrize(("speed", "ok"), [(28.0, True), (30.0, None), (32.5, False), (16.5, True)])
 def test_a_speed_within_what_is_not_known_is_undecided(speed: float, ok: bool | None) -> None:
-    """32 m/s at most, give or take 2: 1.645 of those less is 28.7."""
+    """32 m/s at most ± 2: 1.645 of those less is 28.7."""
     unsure = replace(envelope(), source="a data sheet", fastest_sd=2.0)
     setup = make_setup(STRAIGHT, airspeed=speed, table=unsure)
     for verdict in (judge_geometry(setup), judge(setup, fly_path(setup))):
@@ -72,7 +72,7 @@ def test_a_speed_within_what_is_not_known_is_undecided(speed: float, ok: bool | 
         assert (item.ok, item.check) == (ok, "unknown aircraft" if ok is None else "")
         assert verdict.undecided is (ok is None)
         if ok is None:
-            told = "the fastest level flight according to a data sheet is 32.0 m/s, give or take 2.0 m/s"
+            told = "the fastest level flight according to a data sheet is 32.0 m/s ± 2.0 m/s"
             assert item.reason.startswith(f"30.0 m/s is commanded; {told}")
             assert (
                 "airspeeds on 2 legs are too close to the limit to judge with what is known of the aircraft"

@@ -78,7 +78,7 @@ def test_a_quarter_of_the_spacing_beside_its_line_is_lost(aside: float, lost: fl
     assert all(item.ok for item in others)
     if lost:
         assert "photo line 1 of 3 (items 1 to 2)" in first.reason
-        assert "30 % not along it within 50 m" in first.reason
+        assert "30 % not flown along it within 50 m" in first.reason
 
 
 @pytest.mark.parametrize(("off", "lost"), [(9.0, 0.0), (-9.0, 0.0), (11.0, 20.0), (-11.0, 20.0)])
@@ -88,7 +88,7 @@ def test_a_tenth_of_the_height_over_ground_is_lost(off: float, lost: float) -> N
     first = photo_lines(judge(setup, track))[0]
     assert first.flown == pytest.approx(100.0 - lost, abs=1.0)
     if lost:
-        assert "20 % more than 10 m off its height over ground" in first.reason
+        assert "20 % more than 10 m off its height above ground" in first.reason
 
 
 @pytest.mark.parametrize(("bank_deg", "lost"), [(9.0, 0.0), (11.0, 10.0)])
@@ -252,7 +252,7 @@ def test_a_camera_takes_its_time(interval: float, front: float, ok: bool) -> Non
     found = overlaps(judge(setup, fly_path(setup, radius=FITS)))["front overlap"]
     assert found.flown == pytest.approx(front, abs=0.2)
     assert found.ok is ok
-    assert ("apart, one each" in found.reason) is (interval > 2.0)
+    assert ("apart, one every" in found.reason) is (interval > 2.0)
 
 
 def test_only_photos_that_can_be_used_overlap() -> None:
@@ -314,8 +314,8 @@ def test_a_turn_around_too_tight_to_be_drawn_is_left_open_where_something_is_nea
         [found] = [item for item in photo_lines(verdict) if item.ok is None]
         assert found.place.index == 2
         assert "turn-around 1 is too tight to be flown as drawn" in found.reason
-        assert "the missile m reaches it: only a flight tells" in found.reason
-        said = "not judged in full: only a flight tells where the turn-around on leg 2, to item 3 is flown"
+        assert "the missile m reaches it: only a simulated flight shows" in found.reason
+        said = "not judged in full: only a simulated flight shows how the turn-around on leg 2, to item 3 is flown"
         assert verdict.headline.startswith(said)
 
 

@@ -32,7 +32,7 @@ def test_where_it_touches_down_is_measured_along_and_across_the_landing() -> Non
     assert known["aside"] == pytest.approx(track.position[down, 1] - 600.0, abs=0.1)
     assert known["strip left"] == pytest.approx(300.0 - (500.0 - track.position[-1, 0]), abs=0.1)
     assert one.ok is True
-    assert "4.3 m/s of tail wind" in one.reason
+    assert "4.3 m/s of tailwind" in one.reason
     assert "the flare itself is not judged" in one.reason
 
 
@@ -67,7 +67,7 @@ def test_a_final_through_a_zone_fails() -> None:
     setup = circuit(RAIL, STRIP, TKOFF_THR_MINACC=15.0, world={"zones": [zone]})
     one = found(setup, flown.track, "touchdown")
     assert one.ok is False
-    assert "the final enters town" in one.reason
+    assert "the final approach enters town" in one.reason
 
 
 @pytest.mark.parametrize(("course", "ok"), [(270.0, True), (90.0, True), (0.0, False), (180.0, False)])
@@ -100,7 +100,7 @@ def test_a_final_over_unknown_ground_is_not_judged() -> None:
     setup = with_hole(flown.setup, 900.0, 600.0)
     one = found(setup, flown.track, "touchdown")
     assert one.ok is None
-    assert "the ground below the final is not known" in one.reason
+    assert "the terrain below the final approach is unknown" in one.reason
     assert judge_flight(setup, flown.track, "completed").headline == (
-        "not judged in full: the ground below the final is not known"
+        "not judged in full: the terrain below the final approach is unknown"
     )

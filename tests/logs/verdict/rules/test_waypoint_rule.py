@@ -122,7 +122,7 @@ def test_past_the_line_beside_it_counts_for_arduplane_within_the_corridor(aside:
     track = fly_path(setup, across=bump(3000.0, aside, 150.0))
     item = of(judge(setup, track), "waypoint", waypoint(1))
     assert item.ok is ok
-    assert f"the line across the leg there crossed {abs(aside):.0f} m to its side" in item.reason
+    assert f"the line across the leg at the waypoint was crossed {abs(aside):.0f} m to its side" in item.reason
     # Planfly's own guidance has to come near.
     assert not of(judge(accepting(stated, 10.0), track), "waypoint", waypoint(1)).ok
 

@@ -100,7 +100,7 @@ def test_missing_terrain_and_a_missing_end_have_entries(log: FlightLog) -> None:
         problem="the file ends at byte 7",
     )
     entries = timeline(cut)
-    assert texts(entries, "ground") == ["no terrain in the log: clearance is not known"]
+    assert texts(entries, "ground") == ["no terrain in the log: clearance is unknown"]
     assert texts(entries, "end")[0].startswith("not recorded;")
     assert entries[-1].text == "the log is not complete: the file ends at byte 7"
 

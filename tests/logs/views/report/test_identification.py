@@ -48,7 +48,7 @@ def test_the_page_says_what_was_found_and_what_was_not(monkeypatch: pytest.Monke
         "mine, from 10.0 minutes of flight",
         "climb at full throttle",
         "7.7",
-        "not seen in these logs",
+        "these logs do not show",
         "battery current (BAT)",
         "0.041",
         "R² 0.990",

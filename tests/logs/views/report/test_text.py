@@ -167,7 +167,7 @@ def test_the_trust_is_a_line_with_medians() -> None:
     assert "in 4.0 m/s of wind, light turbulence, against" in trust_line(gusty)
     assert "which stands in for an aircraft that is not named" in trust_line(replace(AGAIN, stands_in=True))
     assert "ended early: departure" in trust_line(replace(AGAIN, ended="departure"))
-    assert "no place in common" in trust_line(replace(AGAIN, spreads=()))
+    assert "no part in common" in trust_line(replace(AGAIN, spreads=()))
 
 
 def test_what_was_not_flown_again_is_named_with_its_reason() -> None:

@@ -233,7 +233,7 @@ def test_the_answer_to_95_percent(flyable: int, failed: int, answer: str, stops:
 
 def test_nothing_is_answered_where_nothing_was_asked() -> None:
     found = Estimator(Goal(None, False, 10)).estimate(Tally(10, 0))
-    assert found.answer == "none asked"
+    assert found.answer == "no target"
     # Two-sided: 0.025^(1/10); one-sided: 0.05^(1/10).
     assert found.interval.low == pytest.approx(0.025**0.1)
     assert found.lower == pytest.approx(0.05**0.1)

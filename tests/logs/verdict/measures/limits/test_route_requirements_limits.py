@@ -1,4 +1,4 @@
-"""Which turn is a reversal, that no length of leg is enough for."""
+"""Which turn is a reversal, that no leg would be long enough for."""
 
 import math
 

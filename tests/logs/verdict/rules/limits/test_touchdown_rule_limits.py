@@ -132,7 +132,7 @@ def test_a_final_within_three_metres_of_the_ground_is_left_open(up: float, ok: b
     one = with_low_final(400.0, up)
     assert one.ok is ok, one.reason
     if ok is None:
-        assert (one.check, one.brief) == (GROUND_WAY, "the final passes the ground by 3.0 m")
+        assert (one.check, one.brief) == (GROUND_WAY, "the final approach clears the ground by only 3.0 m")
 
 
 @pytest.mark.parametrize(("more", "ok"), [(2.0, None), (-2.0, True)])
@@ -168,4 +168,4 @@ def test_a_sink_beyond_all_that_was_seen_is_left_open(sink: float, ok: bool | No
     assert one.ok is ok, one.reason
     if ok is None:
         assert one.check == GROUND_WAY
-        assert one.brief == "sinks at 5.0 m/s towards the ground at its touch-down"
+        assert one.brief == "sinks at 5.0 m/s towards the ground at touchdown"
