@@ -212,7 +212,7 @@ def _number_text(value: float) -> str:
     return f"{value:.8g}"
 
 
-def _toml_line(key: str, value: str, comment: str = "") -> str:
+def _entry(key: str, value: str, comment: str = "") -> str:
     return f"{f'{key} = {value}':<30}# {comment}" if comment else f"{key} = {value}"
 
 
@@ -235,18 +235,18 @@ def _terrain_text(draft: Draft) -> str:
     if draft.terrain is None:
         return f"""\
 [terrain]
-{_toml_line("kind", '"flat"', "no elevation file was named, so the ground is flat, without hills")}
-{_toml_line("amsl_m", "0", "height of the ground above mean sea level")}
+{_entry("kind", '"flat"', "no elevation file was named, so the ground is flat, without hills")}
+{_entry("amsl_m", "0", "height of the ground above mean sea level")}
 # For measured ground use these lines instead of the two above:
 # kind = "dem"
-{_toml_line("# path", '"dem.tif"', "an elevation file, a folder of tiles, or a .vrt")}
+{_entry("# path", '"dem.tif"', "an elevation file, a folder of tiles, or a .vrt")}
 """
     comment = "the tile that planfly ships" if draft.terrain in EMBEDDED else "relative to this file's folder"
     return f"""\
 [terrain]
 kind = "dem"
-{_toml_line("path", _quote(draft.terrain), comment)}
-{_toml_line("# vertical_error_m", "5", "as stated by its source; clearance is then also shown minus this")}
+{_entry("path", _quote(draft.terrain), comment)}
+{_entry("# vertical_error_m", "5", "as stated by its source; clearance is then also shown minus this")}
 """
 
 
@@ -261,14 +261,14 @@ def _area_and_ends_text(draft: Draft) -> str:
 [{key}]
 lat_deg = {_number_text(place.lat)}
 lon_deg = {_number_text(place.lon)}
-{_toml_line("height_m", _number_text(draft.height), "above ground; amsl_m is above mean sea level")}
-{_toml_line("# course_deg", "0", course)}
+{_entry("height_m", _number_text(draft.height), "above ground; amsl_m is above mean sea level")}
+{_entry("# course_deg", "0", course)}
 """)
     return f"""\
 [area]                        # where a path may lead, m from [origin]
 east_m = [{east0}, {east1}]
 north_m = [{north0}, {north1}]
-{_toml_line("ceiling_amsl_m", _number_text(draft.ceiling), "above mean sea level")}
+{_entry("ceiling_amsl_m", _number_text(draft.ceiling), "above mean sea level")}
 
 """ + "\n".join(ends)
 
@@ -276,10 +276,10 @@ north_m = [{north0}, {north1}]
 def _limits_text(draft: Draft) -> str:
     return f"""\
 [limits]                      # turns and slopes: what the aircraft can do, unless a number is given
-{_toml_line("min_clearance_m", _number_text(draft.clearance), "above ground")}
-{_toml_line("# max_height_m", _number_text(max(400.0, 2.0 * draft.height)), "above ground")}
-{_toml_line("# max_turn_deg", "60", "at a waypoint")}
-{_toml_line("# corridor_m", "60", "half width about the legs; by default as wide as the autopilot requires")}
+{_entry("min_clearance_m", _number_text(draft.clearance), "above ground")}
+{_entry("# max_height_m", _number_text(max(400.0, 2.0 * draft.height)), "above ground")}
+{_entry("# max_turn_deg", "60", "at a waypoint")}
+{_entry("# corridor_m", "60", "half width about the legs; by default as wide as the autopilot requires")}
 """
 
 
@@ -288,18 +288,18 @@ def _flight_text(draft: Draft) -> str:
     version = "" if draft.px4_version is None else f"\npx4_version = {_quote(draft.px4_version)}"
     return f"""\
 [flight]
-{_toml_line("aircraft", _quote(draft.aircraft), "an aircraft listed by 'planfly aircraft', or a folder of your own")}
-{_toml_line("autopilot", _quote(draft.autopilot), autopilots)}{version}
-{_toml_line("# params", '"mine.param"', "parameter file of the autopilot, as saved by a ground station")}
-{_toml_line("# airspeed_mps", _number_text(draft.airspeed), "equivalent, for planfly's guidance true; the default is this")}
+{_entry("aircraft", _quote(draft.aircraft), "an aircraft listed by 'planfly aircraft', or a folder of your own")}
+{_entry("autopilot", _quote(draft.autopilot), autopilots)}{version}
+{_entry("# params", '"mine.param"', "parameter file of the autopilot, as saved by a ground station")}
+{_entry("# airspeed_mps", _number_text(draft.airspeed), "equivalent, for planfly's guidance true; the default is this")}
 
 [wind]
-{_toml_line("speed_mps", "0", "your forecast, 0 to 40")}
-{_toml_line("from_deg", "0", "direction the wind comes from; 270 is a west wind")}
-{_toml_line("turbulence", '"none"', '"light" or "moderate"')}
+{_entry("speed_mps", "0", "your forecast, 0 to 40")}
+{_entry("from_deg", "0", "direction the wind comes from; 270 is a west wind")}
+{_entry("turbulence", '"none"', '"light" or "moderate"')}
 
 [planner]
-{_toml_line("seed", "1", "the same seed finds the same path")}
+{_entry("seed", "1", "the same seed finds the same path")}
 """
 
 
@@ -315,10 +315,10 @@ def _examples_text(draft: Draft) -> str:
 # name = "battery"
 # lat_deg = {threat.lat:.5f}
 # lon_deg = {threat.lon:.5f}
-{_toml_line("# kill_radius_m", _number_text(radius))}
-{_toml_line("# kill_scale_m", _number_text(round(radius / 4.0)), "how softly its reach ends")}
-{_toml_line("# detection_radius_m", _number_text(2.0 * radius))}
-{_toml_line("# detection_scale_m", _number_text(round(radius / 2.0)))}
+{_entry("# kill_radius_m", _number_text(radius))}
+{_entry("# kill_scale_m", _number_text(round(radius / 4.0)), "how softly its reach ends")}
+{_entry("# detection_radius_m", _number_text(2.0 * radius))}
+{_entry("# detection_scale_m", _number_text(round(radius / 2.0)))}
 
 # A zone to keep out of ("inclusion": to stay in); files of zones: zones_file = "airspace.geojson" above all tables.
 # [[zones]]
@@ -326,8 +326,8 @@ def _examples_text(draft: Draft) -> str:
 # kind = "exclusion"
 # lat_deg = {zone.lat:.5f}
 # lon_deg = {zone.lon:.5f}
-{_toml_line("# radius_m", _number_text(radius))}
-{_toml_line("# ceiling_agl_m", "300", "it may be flown over above this height above ground")}
+{_entry("# radius_m", _number_text(radius))}
+{_entry("# ceiling_agl_m", "300", "it may be flown over above this height above ground")}
 
 # Requirements on the way home.
 # [returns]

@@ -29,7 +29,7 @@ SECONDS = LENGTH_COST._replace(length=0.0, time=1.0)
 class Value(IntEnum):
     """Columns of a path's values."""
 
-    LENGTH_COST = 0
+    LENGTH = 0
     EXPOSURE = 1
     CLEARANCE = 2
     TIME = 3

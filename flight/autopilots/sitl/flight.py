@@ -165,12 +165,12 @@ def launch_rail(release_state: Release, take_off: TakeOff) -> RailEnd:
     """Return the rail of a launch, or a rail of no length on a runway."""
     north, east, _ = release_state.velocity
     roll, pitch, yaw = release_state.attitude
-    lat, lon = (math.radians(value) for value in release_state.place[:2])
+    lat, lon = (math.radians(value) for value in release_state.position[:2])
     return RailEnd(
         *(
             lat,
             lon,
-            release_state.place[2],
+            release_state.position[2],
             roll,
             pitch,
             yaw,

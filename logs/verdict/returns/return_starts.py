@@ -66,7 +66,7 @@ def flown_starts(setup: FlightSetup, track: Track, interval: float) -> ReturnSta
         is_usable &= track.leg < setup.route.return_from
     usable_rows = np.flatnonzero(is_usable)
     if not usable_rows.size:
-        return _empty_starts(flown=True)
+        return _empty_starts(is_flown=True)
     time = track.time[usable_rows]
     sample_times = np.arange(time[0], time[-1] + 1e-9, interval)
     # Take the nearest row, except in a pause of the log.
@@ -123,7 +123,7 @@ def planned_starts(setup: FlightSetup, interval: float) -> ReturnStarts:
     moves = path_moves(setup.path, _ground_speeds(setup), 0, last_leg)
     moves = moves[moves["leg"] <= last_leg]
     if not len(moves):
-        return _empty_starts(flown=False)
+        return _empty_starts(is_flown=False)
     times = np.arange(0.0, float(moves["time"][-1] + moves["lasts"][-1]), interval)
     move_numbers = np.searchsorted(moves["time"], times, side="right") - 1
     move = moves[move_numbers]

@@ -283,7 +283,9 @@ def _page_html(
         flight_line=tables.flight_sentence(setup, track),
         rules=[row for row in rule_rows(verdict.findings) if row.state != "fail"],
         findings=rows,
-        notes=[note for note in tables.notes_of(setup) if not any(note in line for line in (*verdict.notes, *lines))],
+        notes=[
+            note for note in tables.mission_notes(setup) if not any(note in line for line in (*verdict.notes, *lines))
+        ],
         map=next((one for one in shown if one.identifier == "map"), None),
         pictures=[one for one in shown if one.identifier != "map"],
         leg_columns=tables.LEG_COLUMNS,
