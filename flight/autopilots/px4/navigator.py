@@ -14,7 +14,8 @@ start; LOITER_TO_ALT demands the altitude at the start of its leg until the rim 
 
 At a gate (CONDITION_GATE) the aircraft flies to the waypoint after it.  A change of speed that the mission orders
 between them applies from where the aircraft crosses the plane through the gate.  Once the last waypoint is reached, PX4
-circles about it with NAV_LOITER_RAD.
+circles with NAV_LOITER_RAD: about that waypoint, up to 1.16 about the place where the aircraft then is
+(`setEndOfMissionItems`).
 """
 
 import math
@@ -28,8 +29,8 @@ from world.kernels import Record, Records, inner
 # which turn by the same rule, differ from each other by up to 5.9 m at the same waypoints; a law without that delay is
 # never closer than 3 m.
 SWITCH_DELAY = 0.13
-# Course tolerance for leaving a loiter on the course to what follows, rad (MIS_YAW_ERR).
-COURSE_ACCEPTANCE = math.radians(12.0)
+# Course tolerance for leaving a loiter on the course to what follows, rad (`kCosineExitCourseThreshold`).
+EXIT_COURSE_TOLERANCE_RAD = math.radians(5.0)
 # A place closer to the center than this, in radii, cannot be headed for from the loiter: no course is awaited.
 _MIN_EXIT_DISTANCE_RATIO = 1.05
 
@@ -128,9 +129,10 @@ def _follow_plain_leg(
     # A circle is kept once begun, even if the aircraft is wide of it.
     own.circling = own.finished or (is_off_altitude and (own.circling or distance < turn_distance))
     if own.circling:
-        follow_circle(
-            estimated, b.east, b.north, loiter_radius, wind_east, wind_north, airspeed_demand, parameters, own
-        )
+        east, north = b.east, b.north
+        if own.finished and parameters.anticipates:
+            east, north = own.from_east, own.from_north
+        follow_circle(estimated, east, north, loiter_radius, wind_east, wind_north, airspeed_demand, parameters, own)
         own.height_asked = b.up
     else:
         follow_leg(estimated, b.east, b.north, wind_east, wind_north, airspeed_demand, parameters, own)
@@ -143,6 +145,8 @@ def _follow_plain_leg(
     if own.reached_for <= SWITCH_DELAY:
         return
     if is_end:
+        if parameters.anticipates and not own.finished:
+            own.from_east, own.from_north = estimated.east, estimated.north
         own.finished = True
     else:
         begin_leg(estimated, waypoints, target, own)
@@ -218,7 +222,9 @@ def _is_on_exit_course(estimated: Record, next_waypoint: Record, b: Record) -> b
     if math.hypot(east - b.centre_east, north - b.centre_north) <= _MIN_EXIT_DISTANCE_RATIO * abs(b.circle):
         return True
     bearing = math.atan2(east - estimated.east, north - estimated.north)
-    return abs(wrap(bearing - math.atan2(estimated.velocity_east, estimated.velocity_north))) < COURSE_ACCEPTANCE
+    return (
+        abs(wrap(bearing - math.atan2(estimated.velocity_east, estimated.velocity_north))) < EXIT_COURSE_TOLERANCE_RAD
+    )
 
 
 @inner
