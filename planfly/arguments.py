@@ -86,7 +86,7 @@ RANGES: Mapping[str, Range] = {
 CHOICES: Mapping[str, tuple[Any, ...]] = {
     "turbulence": ("none", "light", "moderate"),
     "guidance": ("path", "l1", "vector-field"),
-    "autopilot": ("ardupilot", "px4", "px4-1.16", "px4-1.17", "planfly"),
+    "autopilot": ("ardupilot", "ardupilot-4.6", "ardupilot-4.7", "px4", "px4-1.16", "px4-1.17", "planfly"),
     "nav": ("perfect", "rtk", "gnss"),
     "engine": ("auto", "jsbsim"),
     "log_hz": (60, 30, 20, 10),

@@ -40,8 +40,8 @@ class FlightOptions(TypedDict, total=False):
     time are ignored.  None keeps all zones.
     aircraft: a name, or a folder.  airspeed: m/s.  params: a file of the autopilot's parameters.
     guidance: planfly's own guidance ("path", "l1", "vector-field") instead of the simulated ArduPlane.
-    autopilot: the simulated autopilot: "ardupilot", "px4" (the newest release that planfly knows), "px4-1.16",
-    "px4-1.17" or "planfly".
+    autopilot: the simulated autopilot: "ardupilot" (in the release of the parameter file, or the newest release),
+    "ardupilot-4.6", "ardupilot-4.7", "px4" (the newest release), "px4-1.16", "px4-1.17" or "planfly".
     nav: "perfect", "rtk" or "gnss".
     """
 
@@ -283,6 +283,8 @@ def flight_entries(options: FlightOptions, program: Path | None = None) -> dict[
     >>> entries = flight_entries({"autopilot": "px4-1.16"})
     >>> entries["autopilot"], entries["px4_version"]
     ('px4', '1.16')
+    >>> flight_entries({"autopilot": "ardupilot-4.6"})["arduplane_version"]
+    '4.6'
     """
     aircraft, params, autopilot = options.get("aircraft"), options.get("params"), options.get("autopilot")
     check_arguments(autopilot=autopilot)
@@ -295,7 +297,8 @@ def flight_entries(options: FlightOptions, program: Path | None = None) -> dict[
         "aircraft": str(aircraft.resolve()) if isinstance(aircraft, Path) else aircraft,
         "airspeed_mps": options.get("airspeed"),
         "autopilot": autopilot_name or None if program is None else program_autopilot(program).name,
-        "px4_version": version or None,
+        "arduplane_version": version if autopilot_name == "ardupilot" and version else None,
+        "px4_version": version if autopilot_name == "px4" and version else None,
         "guidance": options.get("guidance"),
         "nav": options.get("nav"),
         # Absolute, so that it does not depend on the folder of the scenario.

@@ -482,7 +482,7 @@ def with_flight(scenario: Scenario, **changes: Any) -> Scenario:
         has_parameters = entries["autopilot_from"] is not None or entries["autopilot"] in (None, OWN_GUIDANCE)
         names_autopilot = bool(set(new_entries) & {"guidance", "autopilot"}) or has_parameters
         entries |= {"guidance": None, "params": None, "autopilot_from": None}
-        entries |= {"autopilot": None, "px4_version": None} if names_autopilot else {}
+        entries |= {"autopilot": None, "arduplane_version": None, "px4_version": None} if names_autopilot else {}
     table = checked_table(lambda: FlightTable(**(entries | new_entries)), f"{scenario.name}: flight")
     return replace(scenario, spec=scenario.spec.model_copy(update={"flight": table}), flight=table)
 

@@ -55,7 +55,8 @@ class Draft:
     terrain: path of the elevation file as the scenario states it; None for flat ground at mean sea level.
     start, destination: places at `height` m above ground.
     box: [[east0, east1], [north0, north1]] m about `origin`.  ceiling: m above mean sea level.
-    aircraft, autopilot, px4_version: see [flight].  airspeed: cruise speed of the aircraft, m/s.
+    aircraft, autopilot: see [flight].  version: release of the autopilot, None for the newest.
+    airspeed: cruise speed of the aircraft, m/s.
     """
 
     name: str
@@ -69,7 +70,7 @@ class Draft:
     aircraft: str
     airspeed: float
     autopilot: str
-    px4_version: str | None
+    version: str | None
 
     @property
     def clearance(self) -> float:
@@ -88,7 +89,7 @@ def make_draft(
     aircraft: str = "aerosonde",
     airspeed: float = 25.0,
     autopilot: str = "ardupilot",
-    px4_version: str | None = None,
+    version: str | None = None,
 ) -> Draft:
     """Make the draft of a scenario from a start to a destination.
 
@@ -119,7 +120,7 @@ def make_draft(
     ceiling = math.ceil((highest_ground + height + _HEADROOM_M) / _CEILING_STEP_M) * _CEILING_STEP_M
     bounds = np.stack([np.ceil(bounds[:, 0] / 10.0), np.floor(bounds[:, 1] / 10.0)], axis=1) * 10.0
     return Draft(
-        name, terrain, start, destination, height, origin, bounds, ceiling, aircraft, airspeed, autopilot, px4_version
+        name, terrain, start, destination, height, origin, bounds, ceiling, aircraft, airspeed, autopilot, version
     )
 
 
@@ -285,7 +286,8 @@ def _limits_text(draft: Draft) -> str:
 
 def _flight_text(draft: Draft) -> str:
     autopilots = """"ardupilot", "px4", or "planfly": planfly's own guidance"""
-    version = "" if draft.px4_version is None else f"\npx4_version = {_quote(draft.px4_version)}"
+    key = "px4_version" if draft.autopilot == "px4" else "arduplane_version"
+    version = "" if draft.version is None else f"\n{key} = {_quote(draft.version)}"
     return f"""\
 [flight]
 {_entry("aircraft", _quote(draft.aircraft), "an aircraft listed by 'planfly aircraft', or a folder of your own")}

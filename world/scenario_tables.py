@@ -55,6 +55,9 @@ Name = Annotated[str, Field(min_length=1, max_length=100), AfterValidator(no_lin
 FilePath = Annotated[str, Field(min_length=1, max_length=4096), AfterValidator(no_line_break)]
 Guidance = Literal["path", "l1", "vector-field"]
 Navigation = Literal["perfect", "rtk", "gnss"]
+# ArduPlane releases with different control laws.
+ArduPlaneVersion = Literal["4.6", "4.7"]
+NEWEST_ARDUPLANE: ArduPlaneVersion = "4.7"
 # PX4 releases with different control laws.
 Px4Version = Literal["1.16", "1.17"]
 NEWEST_PX4: Px4Version = "1.17"
@@ -391,7 +394,8 @@ def names_folder(aircraft: str) -> bool:
 DEFAULT_AUTOPILOT = "ardupilot"
 # Planfly's own guidance: the only one with a choice of laws, and the only one without parameters.
 OWN_GUIDANCE = "planfly"
-# The only autopilot with a choice of release.
+# Autopilots with a choice of release.
+_ARDUPILOT = "ardupilot"
 _PX4 = "px4"
 
 
@@ -415,7 +419,9 @@ class FlightTable(ScenarioTable):
     autopilot: name of the autopilot; if it is not stated, guidance implies "planfly", and params "ardupilot".
     autopilot_from: file that the autopilot was inferred from, see `planfly.workflow.file_autopilots`.
     params: file with the autopilot's parameters.
-    px4_version: release of autopilot = "px4", as releases fly differently; None for the newest.
+    arduplane_version: release of autopilot = "ardupilot", as releases fly differently; None for the release of the
+        parameter file, or otherwise for the newest.
+    px4_version: release of autopilot = "px4"; None for the newest.
     guidance: guidance law of "planfly".
     nav: navigation accuracy, see `flight.guidance.navigation_error`.
     """
@@ -427,6 +433,7 @@ class FlightTable(ScenarioTable):
     autopilot: Name | None = None
     autopilot_from: FilePath | None = None  # set if the autopilot was inferred from a file
     params: FilePath | None = None
+    arduplane_version: ArduPlaneVersion | None = None
     px4_version: Px4Version | None = None
     guidance: Guidance | None = None
     guidance_hz: Literal[30, 60] = 60
@@ -441,9 +448,9 @@ class FlightTable(ScenarioTable):
         if self.guidance is not None and autopilot != OWN_GUIDANCE:
             raise ValueError(f'guidance: not a key of autopilot = "{autopilot}"')
         if self.params is not None and autopilot == OWN_GUIDANCE:
-            raise ValueError(
-                'params: not a key of autopilot = "planfly", which guidance selects if no autopilot is named'
-            )
+            raise ValueError('params: not a key of autopilot = "planfly", which a guidance without autopilot selects')
+        if self.arduplane_version is not None and autopilot != _ARDUPILOT:
+            raise ValueError(f'arduplane_version: only a key of autopilot = "ardupilot", not of "{autopilot}"')
         if self.px4_version is not None and autopilot != _PX4:
             raise ValueError(f'px4_version: only a key of autopilot = "px4", not of "{autopilot}"')
         return self
@@ -469,6 +476,8 @@ class FlightTable(ScenarioTable):
         autopilot_entries: dict[str, str] = (
             {"autopilot": autopilot} if autopilot != OWN_GUIDANCE else {"guidance": guidance}
         )
+        if autopilot == _ARDUPILOT and self.params is None:
+            autopilot_entries["arduplane_version"] = self.arduplane_version or NEWEST_ARDUPLANE
         if autopilot == _PX4:
             autopilot_entries["px4_version"] = self.px4_version or NEWEST_PX4
         return self.model_copy(update={**autopilot_entries, "nav": nav})

@@ -187,6 +187,19 @@ class Candidate(NamedTuple):
     least: float = -math.inf
 
 
+class BatteryFailsafe(NamedTuple):
+    """A failsafe that leaves the mission at a state of the battery.
+
+    parameter: name of the parameter of its threshold.
+    threshold: value of that parameter, mAh that remain or V.
+    used_charge: used charge at which it leaves the mission, mAh; NaN for a threshold of the voltage.
+    """
+
+    parameter: str
+    threshold: float
+    used_charge: float = math.nan
+
+
 class MissionParts(NamedTuple):
     """Parts of a mission that decide which of an autopilot's settings change the flight.
 
@@ -532,6 +545,21 @@ class Autopilot(ABC):
         turn_distance = None if self.follows_path else self.turn_distance
         limit = self.acceptance_limit
         return RouteRules(self.return_rules, self.loiter_rules, self.reads_as_px4, turn_distance, limit)
+
+    @property
+    def parameter_notes(self) -> tuple[str, ...]:
+        """Notes on its parameter file, for the verdict."""
+        return ()
+
+    @property
+    def battery_failsafes(self) -> tuple[BatteryFailsafe, ...]:
+        """Failsafes that leave the mission at a state of the battery."""
+        return ()
+
+    @property
+    def resets_jump_counters(self) -> bool:
+        """True if an exhausted counter of a jump is reset, so that a later pass takes the jump again."""
+        return False
 
     @property
     def mission_checks(self) -> MissionChecks:

@@ -182,17 +182,19 @@ class ParameterSet:
 
     @classmethod
     def restore(cls, stored: StoredParameters, *fields: Any) -> Self:
-        """Return recorded parameters; a parameter that was not yet recorded has its default.
+        """Return recorded parameters, under present or older names; one that was not yet recorded has its default.
 
         Raises ParameterError if a value is not allowed.
         """
         origins: dict[Origin, dict[str, float]] = {"file": {}, "aircraft": {}, "default": {}}
-        for name, value, origin in stored.values:
-            if definition := cls.table.by_name.get(name):
+        for name, recorded, origin in stored.values:
+            if name in cls.table.by_any_name:
+                definition, factor = cls.table.by_any_name[name]
+                value = recorded * factor
                 if not definition.low <= value <= definition.high:
                     allowed = f"allowed {definition.low:g}..{definition.high:g}"
                     raise _value_error(stored.source, name, value, allowed)
-                origins[origin][name] = value
+                origins[origin][definition.name] = value
         return cls._build(list(origins.items()), stored.source, stored.unused, *fields)
 
     @classmethod
@@ -219,11 +221,18 @@ class ParameterSet:
         return True
 
     @classmethod
+    def _known_in_release(cls, sources: list[Stated], *fields: Any) -> tuple[list[Stated], tuple[str, ...]]:
+        """Return the sources without parameters that the release does not have, and the names of those in the file."""
+        return sources, ()
+
+    @classmethod
     def _build(cls, sources: list[Stated], source: str, unused: tuple[str, ...], *fields: Any) -> Self:
         """Take each parameter from the first source that states it, and check each minimum against its maximum."""
+        known_sources, unknown_names = cls._known_in_release(sources, *fields)
+        unused = (*unused, *unknown_names)
 
         def find(definition: Definition) -> ParameterValue:
-            for origin, values in sources:
+            for origin, values in known_sources:
                 value = values.get(definition.name)
                 if value is not None and cls._counts_as_set(definition, value):
                     return ParameterValue(definition.name, value, origin)

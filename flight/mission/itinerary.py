@@ -78,13 +78,24 @@ class Loiter:
         return max(2.0 * math.pi * self.turns, self.seconds * airspeed / radius)
 
 
+def turns_flown(stated: float) -> float:
+    """Return the turns that ArduPlane flies for stated ones: whole turns beyond one, and at most 255.
+
+    `AP_Mission::mavlink_int_to_mission_cmd` stores them in a byte.
+
+    >>> [turns_flown(turns) for turns in (0.5, 1.0, 2.5, 300.0)]
+    [0.5, 1.0, 2.0, 255.0]
+    """
+    return stated if stated <= 1.0 else float(min(_MAX_BYTE_TURNS, math.floor(stated)))
+
+
 def loiter_of(item: MissionItem) -> Loiter | None:
     """Return the loiter that an item states, or None for any other command."""
     param1, param2, param3, param4 = (0.0 if math.isnan(value) else value for value in item.params)
     if item.command == Command.NAV_LOITER_UNLIM:
         return Loiter(param3, seconds=UNLIMITED, endless=True)
     if item.command == Command.NAV_LOITER_TURNS:
-        return Loiter(param3, turns=param1, on_tangent=param4 > 0.0)
+        return Loiter(param3, turns=turns_flown(param1), on_tangent=param4 > 0.0)
     if item.command == Command.NAV_LOITER_TIME:
         return Loiter(param3, seconds=param1, timed=True, on_course=param2 > 0.0, on_tangent=param4 > 0.0)
     if item.command == Command.NAV_LOITER_TO_ALT:
@@ -93,7 +104,10 @@ def loiter_of(item: MissionItem) -> Loiter | None:
     return None
 
 
-# Maximum distance that ArduPlane flies past a waypoint, m: the distance is stored as whole metres in a byte.
+# Largest number of turns in a byte.
+_MAX_BYTE_TURNS = 255
+
+# Longest distance that ArduPlane flies on beyond a waypoint, m: it is stored as whole metres in a byte.
 _MAX_PASS_BY_M = 255
 
 
@@ -185,6 +199,7 @@ class Itinerary:
     px4_notes: the same notes for PX4, which reads only the value of a speed change, and gates.
     open_items, px4_open_items: items that leave the verdict undecided for ArduPlane and for PX4.
     last_home: home at the mission's end, the target of an RTL; it differs from ``home`` after a DO_SET_HOME.
+    passes_exhausted_jump: True if a jump is passed again after its last repeat, where ArduPlane 4.7 takes it again.
     """
 
     stops: tuple[ItineraryStop, ...]
@@ -198,6 +213,7 @@ class Itinerary:
     open_items: tuple[OpenItem, ...] = ()
     px4_open_items: tuple[OpenItem, ...] = ()
     last_home: Home | None = None
+    passes_exhausted_jump: bool = False
 
     @property
     def returns(self) -> bool:
@@ -208,13 +224,15 @@ class Itinerary:
         return self.stops[-1].command == Command.NAV_RETURN_TO_LAUNCH
 
 
-def make_itinerary(mission: Mission) -> Itinerary:
+def make_itinerary(mission: Mission, *, resets_jump_counters: bool = False) -> Itinerary:
     """Unroll a mission as an autopilot would.
+
+    resets_jump_counters: True to take a jump again that is passed after its last repeat, as ArduPlane 4.7 does.
 
     Raises MissionError if no item has a position, if a jump leads to a missing item, or if the mission unrolls to more
     than `MAX_STOPS` stops.
     """
-    builder, steps = _ItineraryBuilder(mission), _Steps(mission)
+    builder, steps = _ItineraryBuilder(mission), _Steps(mission, resets_jump_counters)
     for step in steps:
         builder.process_step(step)
         if len(builder.stops) > MAX_STOPS:
@@ -248,6 +266,7 @@ def make_itinerary(mission: Mission) -> Itinerary:
         open_items=tuple(builder.open_items),
         px4_open_items=tuple(builder.px4_open_items),
         last_home=builder.home,
+        passes_exhausted_jump=steps.passes_exhausted_jump,
     )
 
 
@@ -269,14 +288,18 @@ class _Step(NamedTuple):
 class _Steps:
     """Navigation items of a mission, following jumps.
 
-    Jump counters are never reset, as in ArduPlane 4.6 and PX4.
+    Jump counters are not reset in ArduPlane 4.6 and PX4.  ArduPlane 4.7 resets an exhausted counter
+    (`AP_Mission::get_next_cmd`).
 
+    passes_exhausted_jump: True if a jump is passed again after its last repeat.
     reached: numbers of the items reached, including jumps.
     endless: seq of the jump without end at which the iteration ended, -1 for none; such a jump is taken once.
     """
 
-    def __init__(self, mission: Mission) -> None:
+    def __init__(self, mission: Mission, resets_jump_counters: bool) -> None:
         self.mission, self.items = mission, mission.items
+        self._resets_jump_counters, self._exhausted = resets_jump_counters, set[int]()
+        self.passes_exhausted_jump = False
         self.index = {item.seq: k for k, item in enumerate(mission.items)}
         self.tags: dict[int, int] = {}
         for k, item in enumerate(mission.items):
@@ -339,6 +362,10 @@ class _Steps:
                     self.jump_counts[index] = self.jump_counts.get(index, 0) + 1
                 index = target
             else:
+                if counting and repeats > 0:
+                    self.passes_exhausted_jump |= index in self._exhausted
+                    self._exhausted.add(index)
+                    self.taken[index] = 0 if self._resets_jump_counters else repeats
                 index += 1
         return None
 
@@ -586,6 +613,8 @@ class _ItineraryBuilder:
         elif item.command == Command.NAV_LOITER_UNLIM:
             self.notes.add(f"{name}: flown for {UNLIMITED:.0f} s; the mission ends there", item.seq)
             self.ended = True
+        elif item.command == Command.NAV_LOITER_TURNS and (turns := turns_flown(item.params[0])) != item.params[0]:
+            self.notes.usual.add(f"{name} with {item.params[0]:g} turns: flown as {turns:g}, as in ArduPlane", item.seq)
         elif loiter_of(item) is None:
             self.add_open_item(f"{name}: flown through as a waypoint", item.seq)
         if math.isnan(item.alt):

@@ -101,6 +101,7 @@ def place_stops(
     *,
     itinerary: Itinerary | None = None,
     vertical_legs: bool = False,
+    resets_jump_counters: bool = False,
 ) -> PlacedMission:
     """Place the stops of a mission's itinerary on the map about ``origin``.
 
@@ -108,6 +109,7 @@ def place_stops(
     itinerary: the mission's itinerary; None to make it.
     vertical_legs: True to turn a position straight above or below the previous one into a leg of `VERTICAL_STEP` m,
         which then fails the verdict's slope rule; otherwise such a position is an error.
+    resets_jump_counters: see `flight.mission.itinerary.make_itinerary`.
 
     Successive stops of the result are at least `SAME_PLACE` apart horizontally, or `VERTICAL_STEP` on a vertical leg.
     Raises MissionError, which names the item, if a stop cannot be placed.
@@ -120,7 +122,7 @@ def place_stops(
     """
     notes = Notes()
     if itinerary is None:
-        itinerary = make_itinerary(mission)
+        itinerary = make_itinerary(mission, resets_jump_counters=resets_jump_counters)
     heights = _Heights(mission.source, itinerary.home, origin, terrain, notes)
     stops = _place_stops(mission.source, itinerary, origin, heights, vertical_legs)
     takeoff_ground = math.nan if itinerary.takeoff is None else heights.ground_at_home()

@@ -322,15 +322,15 @@ def fill_tick(work: Record) -> None:
 def end_return(motion: Record, waypoint: Record, memory: Record, dt: float) -> None:
     """Track the progress of an RTL around its loiter, and end the flight after it.
 
-    This is for an autopilot that flies an RTL by its own control law and need not follow the path. The flight ends at
-    the path's end once the aircraft has arrived at the loiter and flown a full circle at its altitude, and after
-    `longest_circling` at the latest.
+    This is for an autopilot that flies an RTL by its own control law or its own program, which follows no line: there
+    is no cross-track error. The flight ends once the aircraft has arrived at the loiter and flown a full circle at its
+    altitude, and after `longest_circling` at the latest.
 
     motion: a record of `flight.guidance.navigation_error.MOTION`.
     waypoint: any waypoint of the RTL, a record of `flight.guidance.lateral_reference_laws.WAYPOINT`.
     memory: a record of `flight.guidance.inner_loops.GUIDANCE_MEMORY`.
     """
-    memory.returning = True
+    memory.returning, memory.cross_track = True, math.nan
     offset_east, offset_north = motion.east - waypoint.centre_east, motion.north - waypoint.centre_north
     airspeed_factor = true_by_equivalent(motion.up)
     radius = abs(waypoint.circle) * airspeed_factor * airspeed_factor
@@ -342,9 +342,7 @@ def end_return(motion: Record, waypoint: Record, memory: Record, dt: float) -> N
     if memory.circled > 0.0 or (is_near and abs(motion.up - waypoint.up) < RTL_ARRIVAL_ALTITUDE_TOLERANCE_M):
         memory.circled += dt
     is_full_circle = abs(memory.turned) >= 2.0 * math.pi
-    memory.done = (memory.done and is_full_circle and memory.circled > UNLIMITED) or memory.circled > longest_circling(
-        radius
-    )
+    memory.done = (is_full_circle and memory.circled > UNLIMITED) or memory.circled > longest_circling(radius)
 
 
 @inner

@@ -74,7 +74,7 @@ KINK_WAYPOINT_COUNT = 8
 # The slope rule
 
 # m.  A leg beyond its limit is a step if everything too steep in a row rises or falls by no more than this: an aircraft
-# that begins it early or late is within this of it.  ArduPlane itself flies altitude changes below GLIDE_SLOPE_MIN, 15
+# that begins it early or late is within this of it.  ArduPlane itself flies altitude changes below ALT_SLOPE_MIN, 15
 # m by default, as a step (ArduPilot's parameter reference).
 NEGLIGIBLE_STEP_M = 10.0
 # rad.  A fitted slope may differ from the plan by this, in addition to the fit's own tolerance.

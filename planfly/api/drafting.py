@@ -71,7 +71,7 @@ def new_scenario(
             aircraft=model_path,
             airspeed=airspeed,
             autopilot=autopilot_name,
-            px4_version=version or None,
+            version=version or None,
         )
         # Parse the text as it will be read from the file, so that a fault is found before anything is written.
         from_spec(parse_scenario(draft_text(draft), str(file)), str(file))

@@ -181,8 +181,9 @@ def autopilot_options(parser: CommandParser) -> OptionGroup:
         "--autopilot",
         choices=CHOICES["autopilot"],
         help=(
-            "simulated autopilot: ArduPlane (ardupilot, the default), PX4 for fixed wing (px4 for "
-            "the newest supported release, px4-1.16 or px4-1.17), or planfly's own guidance (planfly)"
+            "simulated autopilot: ArduPlane (ardupilot, the default: the release of the parameter file or the newest; "
+            "ardupilot-4.6, ardupilot-4.7), PX4 for fixed wing (px4, the newest release; px4-1.16, px4-1.17), or "
+            "planfly's own guidance (planfly)"
         ),
     )
     group.add_argument(

@@ -155,12 +155,18 @@ def make_setup(
     limits, airspeed, fly_over = airframe.limits, airframe.airspeed, scenario.flight.fly_over
     autopilot = airframe.autopilot
     mission = replace(mission, autopilot=autopilot.name)
+    resets = autopilot.resets_jump_counters
     if placed is None:
-        placed = place_stops(mission, scenario.origin, scenario.terrain)
+        placed = place_stops(mission, scenario.origin, scenario.terrain, resets_jump_counters=resets)
+    elif resets and placed.itinerary.passes_exhausted_jump:
+        placed = place_stops(
+            mission, scenario.origin, scenario.terrain, vertical_legs=True, resets_jump_counters=resets
+        )
     route = lay_route(placed, airspeed, fly_over, limits, autopilot.route_rules)
     route = with_end_courses(route, scenario, limits)
     file_parameters = {} if autopilot.parameters is None else autopilot.parameters.by_origin("file")
-    notes = field_notes(mission, route, scenario, autopilot.return_rules, file_parameters)
+    notes = autopilot.parameter_notes
+    notes += field_notes(mission, route, scenario, autopilot.return_rules, file_parameters)
     route = replace(route, notes=(*route.notes, *notes)) if notes else route
     return FlightSetup(
         scenario=scenario,

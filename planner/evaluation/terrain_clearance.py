@@ -23,7 +23,7 @@ from world.terrain import TILE, pixel_height
 # The height follows its demand as a first-order lag of `TrackingError.lag` seconds: on a long climb it is lag x climb
 # rate low, and as much high on a descent; after a change of slope the difference decays over the lag's length and is
 # carried into the next leg. A leg whose change of height is below a step is demanded at its final height from its
-# beginning. ArduPlane's TECS behaves like this (ardupilot.org, Plane, TECS_HDEM_TCONST; GLIDE_SLOPE_MIN).
+# beginning. ArduPlane's TECS behaves like this (ardupilot.org, Plane, TECS_HDEM_TCONST; ALT_SLOPE_MIN).
 
 # Distance of the aircraft below a leg at the fraction f, m: steady + slant (1 - f) + rest E(f x decay), where E is the
 # decay; and the largest and smallest of it, 0 included.

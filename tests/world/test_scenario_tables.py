@@ -135,6 +135,7 @@ def test_every_default() -> None:
             "autopilot": None,
             "autopilot_from": None,
             "params": None,
+            "arduplane_version": None,
             "px4_version": None,
             "guidance": None,
             "guidance_hz": 60,

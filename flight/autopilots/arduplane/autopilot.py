@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import ClassVar, Literal, Self
 
 import numpy as np
@@ -10,6 +10,7 @@ import numpy as np
 from aircraft.catalog import Aircraft
 from aircraft.contacts import Contact
 from aircraft.tracking import TrackingError
+from flight.autopilots.arduplane.failsafes import battery_failsafes
 from flight.autopilots.arduplane.ground_law import (
     ARDUPLANE_GROUND,
     CONTACTS,
@@ -25,14 +26,15 @@ from flight.autopilots.arduplane.navigator import LOITER_ALTITUDE_TOLERANCE_M, M
 from flight.autopilots.arduplane.open_settings import describe_open_settings
 from flight.autopilots.arduplane.parameters import (
     HEIGHT_CANDIDATES,
-    RELEASE,
     SIDE_CANDIDATES,
     ArduPilotParameters,
     speeds_flown,
 )
+from flight.autopilots.arduplane.releases import choose_release, release_note, simulated_release
 from flight.autopilots.arduplane.tracking_error import tracking_error
 from flight.autopilots.autopilot import (
     Autopilot,
+    BatteryFailsafe,
     GroundAutopilot,
     LandingGlide,
     Loop,
@@ -50,13 +52,23 @@ from flight.mission.loiter_circles import LoiterRules
 from flight.mission.return_path import ReturnRules
 from world.arrays import Floats
 from world.kernels import Record
-from world.scenario_tables import FlightTable, Navigation
+from world.scenario_tables import ArduPlaneVersion, FlightTable, Navigation
 from world.wind import Turbulence
 
 # Fields of `flight.autopilots.arduplane.law.ARDUPILOT_MEMORY` that belong to the current leg or mission, not to the
 # aircraft.
 _LEG_FIELDS = (
-    *("leg", "cross_track_sum", "on_circle", "loitering", "stayed", "circled", "bearing", "at_height", "next_look"),
+    *(
+        "leg",
+        "cross_track_integrator",
+        "on_circle",
+        "loitering",
+        "stayed",
+        "circled",
+        "bearing",
+        "at_height",
+        "next_look",
+    ),
     *("up_before", "over", "waited", "left_for", "returning", "climbed", "ground_leg", "sloped_leg"),
 )
 
@@ -95,23 +107,33 @@ class ArduPlane(Autopilot):
 
     @classmethod
     def load(cls, table: FlightTable, aircraft: Aircraft, scenario: str) -> Self:
-        """Return the autopilot with the parameters of the user's file, of the aircraft, and the defaults."""
-        return cls(ArduPilotParameters.load(aircraft, table.params))
+        """Return the autopilot with the parameters of the user's file, of the aircraft, and the defaults.
+
+        Its release is the stated one, or the release that wrote the file, or the newest.
+        """
+        version, notes = choose_release(table.arduplane_version, table.params)
+        return cls(ArduPilotParameters.load(aircraft, table.params, version, notes))
 
     @classmethod
     def restore(cls, stored: StoredAutopilot) -> Self:
-        """Return the autopilot with the parameters that a log stores."""
-        return cls(
-            ArduPilotParameters.defaults()
-            if stored.parameters is None
-            else ArduPilotParameters.restore(stored.parameters)
-        )
+        """Return the autopilot with the parameters and the release that a log stores.
+
+        A log that states no release was flown by the control law of 4.6.
+        """
+        version = stored.version or "4.6"
+        if stored.parameters is None:
+            return cls(ArduPilotParameters.defaults(version))
+        return cls(ArduPilotParameters.restore(stored.parameters, version))
 
     def store(self) -> StoredAutopilot:
-        """Return its parameters for a log."""
+        """Return its parameters and its release for a log."""
         parameters = self.parameters
         stored = StoredParameters(parameters.values, parameters.unused, parameters.source)
-        return StoredAutopilot(parameters=stored, program=self.program)
+        return StoredAutopilot(parameters=stored, program=self.program, version=parameters.version)
+
+    def in_release(self, version: ArduPlaneVersion) -> Self:
+        """Return the same autopilot with the control law of another ArduPlane release."""
+        return replace(self, parameters=self.parameters.in_release(version))
 
     @classmethod
     def of_flight_log(
@@ -120,8 +142,9 @@ class ArduPlane(Autopilot):
         """Return ArduPlane with the log's parameters, for a log of any ArduPlane release."""
         if not program.startswith("ArduP"):
             return None
-        law_parameters, notes = ArduPilotParameters.of_log(parameters, source)
-        return cls(law_parameters), notes
+        law_parameters, notes = ArduPilotParameters.of_log(parameters, source, simulated_release(program))
+        note = release_note(program)
+        return cls(law_parameters), (note, *notes) if note else notes
 
     @classmethod
     def missing_files(cls, aircraft: Aircraft) -> list[str]:
@@ -155,14 +178,29 @@ class ArduPlane(Autopilot):
         parameters = self.parameters
         source_text = f"the parameters of {parameters.source}" if parameters.source else "its default parameters"
         return (
-            f"the simulated ArduPlane {RELEASE} with {source_text} (WP_RADIUS {parameters.wp_radius:g} m,"
+            f"the simulated ArduPlane {parameters.version} with {source_text} (WP_RADIUS {parameters.wp_radius:g} m,"
             f" NAVL1_PERIOD {parameters.navl1_period:g} s, TECS_HDEM_TCONST {parameters.tecs_height_demand_time:g} s)"
         )
 
     @property
     def version(self) -> str:
         """ArduPlane release of the law."""
-        return RELEASE
+        return self.parameters.version
+
+    @property
+    def parameter_notes(self) -> tuple[str, ...]:
+        """Notes on a parameter file of another release."""
+        return self.parameters.notes
+
+    @property
+    def battery_failsafes(self) -> tuple[BatteryFailsafe, ...]:
+        """Failsafes from BATT_FS_LOW_ACT and BATT_FS_CRT_ACT with their thresholds; none in a program's flight."""
+        return () if self.is_program else battery_failsafes(self.parameters)
+
+    @property
+    def resets_jump_counters(self) -> bool:
+        """True in 4.7, unless MIS_OPTIONS keeps the counters."""
+        return self.parameters.resets_jump_counters
 
     @property
     def acceptance_radius(self) -> float | None:
@@ -269,7 +307,7 @@ class ArduPlane(Autopilot):
             climb_first=math.inf if parameters.climbs_before_turn else parameters.rtl_climb_min,
             first_bank=min(parameters.level_roll_limit, parameters.roll_limit),
             sink=parameters.tecs_sink_max or math.inf,
-            least_slope=parameters.glide_slope_min,
+            least_slope=parameters.altitude_slope_min,
             rally_limit=parameters.rally_limit,
             includes_home=parameters.rally_includes_home > 0.0,
             slope_to_stated_height=True,
@@ -406,13 +444,15 @@ class ArduPlaneFromGround(ArduPlane, GroundAutopilot):
     def _begin_take_off(self, take_off: TakeOff, ground: Record) -> None:
         parameters, launch = self.parameters, take_off.launch
         ground.stage, ground.rolls = TAKING_OFF, launch.method == "runway"
-        ground.motor = self.motor_start
+        ground.motor_start = self.motor_start
         ground.slew, ground.full = takeoff_slew(parameters), parameters.takeoff_throttle or parameters.throttle_max
-        ground.base, ground.top, ground.low = take_off.base, take_off.top, take_off.home[2]
+        ground.home_up, ground.top, ground.launch_up = take_off.base, take_off.top, take_off.home[2]
         ground.pitch, ground.leg = self._climb_pitch(take_off), take_off.waypoint
         # Start when it moved at 5 m/s, at which its course over the ground is known.
         acceleration = take_off.acceleration
-        ground.fast = max(0.0, take_off.speed - _COURSE_SPEED_MPS) / acceleration if acceleration else 0.0
+        ground.time_at_course_speed = (
+            max(0.0, take_off.speed - _COURSE_SPEED_MPS) / acceleration if acceleration else 0.0
+        )
 
     def _climb_pitch(self, take_off: TakeOff) -> float:
         """Return the pitch of the climb, rad: the item's, or the highest if the motor runs before the push.
@@ -433,6 +473,8 @@ class ArduPlaneFromGround(ArduPlane, GroundAutopilot):
         ground.lands, ground.landing_leg = True, approach.leg
         ground.east, ground.north, ground.up = approach.point
         ground.begin, ground.slope = approach.begin, glide.slope
+        # `AP_TECS::_update_height_demand`.
+        ground.flares_by_demand = self.parameters.version != "4.6"
         ground.flare_height, ground.flare_distance = glide.flare_height, glide.flare_distance
         ground.airspeed = landing_airspeed(self.parameters, approach.tail_wind)
 

@@ -7,6 +7,7 @@ Read from ArduPlane's sources, not triggered: `Plane::rc_failsafe_short_on_event
 from typing import Literal, NamedTuple
 
 from flight.autopilots.arduplane.parameters import ArduPilotParameters
+from flight.autopilots.autopilot import BatteryFailsafe
 
 # Reaction of ArduPlane.  "return": RTL; "land": the mission's landing sequence; "autoland": mode AUTOLAND, or else RTL;
 # "on": it continues the mission; "landed": it is on the ground; "never": nothing can trigger the cause; the others do
@@ -134,3 +135,27 @@ def _battery_causes(parameters: ArduPilotParameters, *, has_landing: bool) -> li
             action = "never"
         causes.append(Cause(name, action, parameter, int(value)))
     return causes
+
+
+def battery_failsafes(parameters: ArduPilotParameters) -> tuple[BatteryFailsafe, ...]:
+    r"""Return the failsafes that leave a mission at a charge or a voltage (`AP_BattMonitor_Params`).
+
+    >>> from flight.autopilots.arduplane.parameters import ArduPilotParameters
+    >>> made = ArduPilotParameters.of_text("BATT_CAPACITY 8000\nBATT_LOW_MAH 1500\nBATT_FS_LOW_ACT 1\n", "mine.param")
+    >>> battery_failsafes(made)
+    (BatteryFailsafe(parameter='BATT_LOW_MAH', threshold=1500.0, used_charge=6500.0),)
+    """
+    if parameters.battery_monitor <= 0.0 and "BATT_MONITOR" not in parameters.by_origin("default"):
+        return ()
+    found = []
+    for action, level, voltage, charge in (
+        (parameters.low_battery, "LOW", parameters.low_voltage, parameters.low_charge),
+        (parameters.critical_battery, "CRT", parameters.critical_voltage, parameters.critical_charge),
+    ):
+        if _BATTERY_FAILSAFE.get(int(action), "on") == "on":
+            continue
+        if charge > 0.0:
+            found.append(BatteryFailsafe(f"BATT_{level}_MAH", charge, parameters["BATT_CAPACITY"] - charge))
+        if voltage > 0.0:
+            found.append(BatteryFailsafe(f"BATT_{level}_VOLT", voltage))
+    return tuple(found)

@@ -25,7 +25,7 @@ from flight.autopilots.arduplane.rtl_point_mass import (
     ReturnEnvironment,
     fill_stage,
     fly_stages,
-    most_seconds,
+    rtl_timeout,
     straight_on,
     truncate_at_first_loiter,
 )
@@ -121,7 +121,7 @@ def fly_go_arounds(
     def fly(k: int, landing: LandingStart) -> Floats:
         ends = np.concatenate([straight_on(starts[k]), _make_stages((landing, *landing.onward), parameters)])
         ends["airspeed"], ends["min_ground_speed"] = aircraft.record.airspeed, parameters.ground_speed_min
-        most = most_seconds(starts[k], ends[1:], aircraft) + max(0.0, top - float(starts[k]["up"]))
+        most = rtl_timeout(starts[k], ends[1:], aircraft) + max(0.0, top - float(starts[k]["up"]))
         way = np.zeros((int(most) + 2, 3))
         fly_stages(
             starts[k],

@@ -4,17 +4,18 @@ In the air the law is `flight.autopilots.arduplane.law`.  Take-off and landing u
 and demands:
 
 Take-off (ArduPlane/takeoff.cpp, `Plane::verify_takeoff` in commands_logic.cpp): wings level until the ground speed has
-been above 5 m/s for two seconds; then the course over the ground at that time is held as heading, less the yaw since
-the launch.  Full throttle, speed by pitch, never below the pitch of the item; bank limited to LEVEL_ROLL_LIMIT up to
-TKOFF_LVL_ALT, unrestricted from three times that height.  It ends above the item's altitude, and the next leg begins at
-the aircraft.
+been above 5 m/s, in 4.6 for two seconds; then the course over the ground at that time is held as heading, less the yaw
+since the launch.  Full throttle, speed by pitch, never below the pitch of the item; bank limited to LEVEL_ROLL_LIMIT up
+to TKOFF_LVL_ALT, unrestricted from three times that height.  It ends above the item's altitude, and the next leg begins
+at the aircraft.
 
 Landing (libraries/AP_Landing/AP_Landing_Slope.cpp): along the line beyond the landing point, on the glide of
-`flight.autopilots.arduplane.landing`.  The approach stage begins when the aircraft is lined up.  From then on the flare
-may begin: below LAND_FLARE_ALT, or LAND_FLARE_SEC before the ground at the current sink rate on the second half, or
-beyond the point.  In the flare the motor is off, bank is at most LEVEL_ROLL_LIMIT, pitch at least LAND_PITCH_DEG, and
-pitch controls the sink rate to TECS_LAND_SINK, as far as TECS_LAND_SPDWGT weights altitude over airspeed.  ArduPlane's
-real touchdown sink rate is known less well: see `docs/measured.md`.
+`flight.autopilots.arduplane.landing`.  The approach stage begins when the aircraft is lined up, or at once after a
+NAV_LOITER_TO_ALT; until then the airspeed is AIRSPEED_CRUISE.  From then on the flare may begin: below LAND_FLARE_ALT,
+or LAND_FLARE_SEC before the ground at the current sink rate on the second half, or beyond the point.  In the flare the
+motor is off, bank is at most LEVEL_ROLL_LIMIT, pitch at least LAND_PITCH_DEG, and pitch controls the sink rate to
+TECS_LAND_SINK, as far as TECS_LAND_SPDWGT weights altitude over airspeed.  ArduPlane's real touchdown sink rate is
+known less well: see `docs/measured.md`.
 """
 
 import math
@@ -84,22 +85,22 @@ GROUND_STATE = record_dtype(
     ("touches", np.bool_),
     ("tipped", np.bool_),  # True if the lowest touching point is not one on which the aircraft stands
     "turnover",  # m/s, ground speed above which that ends the flight
-    "rest",  # s at rest
+    "rest_time",  # s at rest
     # Take-off.
-    "motor",  # s, time of the motor start
+    "motor_start",  # s, time of the motor start
     "slew",  # fraction of the throttle range, 1/s
     "full",  # 0..1, throttle
-    "base",  # m AMSL, of home
+    "home_up",  # m AMSL, of home
     "top",  # m AMSL, end of the take-off
-    "low",  # m AMSL, of the launch
+    "launch_up",  # m AMSL, of the launch
     "pitch",  # rad, minimum of the climb
     ("leg", np.int64),  # leg after the take-off
-    "fast",  # s since the ground speed was first above `_COURSE_SPEED_MPS`
+    "time_at_course_speed",  # s since the ground speed was first above `_COURSE_SPEED_MPS`
     "yaw",  # rad, at the launch
-    ("held", np.bool_),
+    ("is_heading_held", np.bool_),
     "heading",  # rad, heading that is held
     "leveling",  # m below the end, where leveling off began; 0 before
-    "fastest",  # m/s, maximum equivalent airspeed since the launch
+    "max_airspeed",  # m/s, maximum equivalent airspeed since the launch
     # Landing.
     ("landing_leg", np.int64),
     "east",  # m, of the landing point
@@ -112,6 +113,7 @@ GROUND_STATE = record_dtype(
     "airspeed",  # m/s, equivalent
     "entry_sink",  # m/s, sink rate at the start of the flare
     "entry_height",  # m above the landing point, at the start of the flare
+    ("approaches_at_once", np.bool_),  # True if a loiter to an altitude precedes the landing
     ("flares_by_demand", np.bool_),  # True if the flare begins with the demanded sink rate, False with the flown one
     "flare_adjusted",  # m AMSL, altitude demand of the flare that continues the glide's demand
     "flare_ideal",  # m AMSL, altitude demand of the flare that continues the flown altitude
@@ -126,7 +128,7 @@ GROUND_NUMBERS = ARDUPLANE_GROUND.itemsize // 8
 
 # Ground speed above which the course is known, m/s (GPS_GND_CRS_MIN_SPD).
 _COURSE_SPEED_MPS = 5.0
-# Time above that speed after which the heading is held, s.
+# Time above that speed after which the heading is held, s; 4.7 holds it at once.
 _HEADING_HOLD_DELAY_S = 2.0
 # L1's frequency times its period: sqrt(2) pi.
 _HEADING_GAIN = 4.4428
@@ -188,11 +190,12 @@ def ground_tick(block: Floats, heights: Heights) -> int:
         )
         if ground.lands and memory.leg >= ground.landing_leg:
             ground.stage = ON_GLIDE
+            ground.approaches_at_once = waypoints[memory.leg].to_height
     else:
         find_on_path(work.estimated, pieces, work.memory)
         _tick_landing(work, own, waypoints[memory.leg + 1])
     fill_tick(work)
-    return ended(work, ground)
+    return end_status(work, ground)
 
 
 @compiled
@@ -236,7 +239,7 @@ def update_ground_contact(state: Record, clearance: float, ground: Record) -> No
 
 
 @inner
-def ended(work: Record, ground: Record) -> int:
+def end_status(work: Record, ground: Record) -> int:
     """Return a key of `ENDS` if the flight has ended, or 0 to fly on.
 
     work: a `flight.simulation.tick.WORKSPACE` record.
@@ -253,7 +256,7 @@ def ended(work: Record, ground: Record) -> int:
     if ground.stage == TAKING_OFF:
         if ground.touches and (ground.lifted or not ground.rolls):
             return GROUND
-        if ground.rolls and ground.motor > ground.time and ground.time > _MOTOR_START_TIMEOUT_S:
+        if ground.rolls and ground.motor_start > ground.time and ground.time > _MOTOR_START_TIMEOUT_S:
             return NO_MOTOR
         return END_BATTERY_EMPTY if empty else 0
     if ground.touches and not ground.landed:
@@ -261,9 +264,9 @@ def ended(work: Record, ground: Record) -> int:
             return GROUND
         ground.landed = True
     if ground.touches and speed < _STOPPED_SPEED_MPS:
-        ground.rest += work.timing.dt
-        return COMPLETED if ground.rest >= _STOPPED_TIME_S else 0
-    ground.rest = 0.0
+        ground.rest_time += work.timing.dt
+        return COMPLETED if ground.rest_time >= _STOPPED_TIME_S else 0
+    ground.rest_time = 0.0
     if not ground.touches and ground.stage < FLARING and state.airspeed < work.settings.slowest:
         return STALLED
     return END_BATTERY_EMPTY if empty and not ground.touches else 0
@@ -285,12 +288,12 @@ def _tick_take_off(work: Record, own: Record, waypoints: Records, pieces: Record
     if not memory.begun:
         begin_law(state, estimated, waypoints, work.memory, own.parameters, memory)
         ground.yaw = state.yaw
-    ground.fastest = max(ground.fastest, state.airspeed / factor)
-    ground.lifted = ground.lifted or (ground.rolls and estimated.up > ground.low + 2.0 and not ground.touches)
+    ground.max_airspeed = max(ground.max_airspeed, state.airspeed / factor)
+    ground.lifted = ground.lifted or (ground.rolls and estimated.up > ground.launch_up + 2.0 and not ground.touches)
     memory.clock -= dt
     if memory.clock < 0.5 * dt:
         memory.clock += NAVIGATION_TICK
-        _hold_heading(state, estimated, own.parameters, ground, memory)
+        _demand_heading(state, estimated, own.parameters, ground, memory)
         memory.height_asked, memory.height_limited = estimated.up, estimated.up
         memory.height_demand, memory.height_rate = estimated.up, 0.0
         memory.climb_share, memory.sink_share = 1.0, 1.0
@@ -298,9 +301,9 @@ def _tick_take_off(work: Record, own: Record, waypoints: Records, pieces: Record
         wanted = min(staged.airspeed_max, max(staged.airspeed_min, waypoints[ground.leg].airspeed))
         work.memory.speed_command = wanted * factor
         update_tecs(state, estimated, staged, memory, wanted * factor, factor, NAVIGATION_TICK)
-        if ground.fastest < own.parameters.takeoff_rotation:
+        if ground.max_airspeed < own.parameters.takeoff_rotation:
             memory.pitch_demand = own.parameters.takeoff_ground_pitch
-    wanted_throttle = ground.full if ground.time >= ground.motor else 0.0
+    wanted_throttle = ground.full if ground.time >= ground.motor_start else 0.0
     step = ground.slew * dt
     throttle = min(work.commands.throttle + step, max(work.commands.throttle - step, wanted_throttle))
     memory.throttle_demand = throttle
@@ -318,7 +321,7 @@ def _set_take_off_parameters(estimated: Record, parameters: Record, staged: Reco
     # The minimum pitch is also the maximum: no observed take-off had more, as TECS's integrators are wound up, and stay
     # so for longer.
     staged.pitch_limit_max = staged.pitch_limit_min
-    low, over = parameters.takeoff_level_height, estimated.up - ground.low
+    low, over = parameters.takeoff_level_height, estimated.up - ground.launch_up
     share = min(1.0, max(0.0, (over - low) / (2.0 * low))) if low > 0.0 else 1.0
     least = min(parameters.level_roll_limit, parameters.roll_limit)
     staged.roll_limit = least + share * (parameters.roll_limit - least)
@@ -334,23 +337,24 @@ def _leveling_fraction(estimated: Record, parameters: Record, ground: Record) ->
     if ground.leveling > 0.0:
         return min(1.0, max(0.0, left / ground.leveling))
     soon = left <= parameters.takeoff_leveling * estimated.velocity_up
-    if soon and left > 0.0 and estimated.velocity_up > 0.1 and estimated.up - ground.base >= _MIN_LEVELING_HEIGHT_M:
+    if soon and left > 0.0 and estimated.velocity_up > 0.1 and estimated.up - ground.home_up >= _MIN_LEVELING_HEIGHT_M:
         ground.leveling = left
     return 1.0
 
 
 @inner
-def _hold_heading(state: Record, estimated: Record, parameters: Record, ground: Record, memory: Record) -> None:
+def _demand_heading(state: Record, estimated: Record, parameters: Record, ground: Record, memory: Record) -> None:
     """Demand the side acceleration to the held heading, or zero before it is known."""
     speed = math.hypot(estimated.velocity_east, estimated.velocity_north)
-    if ground.fast > 0.0 or speed > _COURSE_SPEED_MPS:
-        ground.fast += NAVIGATION_TICK
-    if not ground.held and ground.fast >= _HEADING_HOLD_DELAY_S:
-        ground.held = True
+    if ground.time_at_course_speed > 0.0 or speed > _COURSE_SPEED_MPS:
+        ground.time_at_course_speed += NAVIGATION_TICK
+    delay = 0.0 if parameters.is_4_7 else _HEADING_HOLD_DELAY_S
+    if not ground.is_heading_held and ground.time_at_course_speed > 0.0 and ground.time_at_course_speed >= delay:
+        ground.is_heading_held = True
         course = math.atan2(estimated.velocity_east, estimated.velocity_north)
         ground.heading = course - wrap(state.yaw - ground.yaw)
     memory.side_acceleration = 0.0
-    if ground.held:
+    if ground.is_heading_held:
         angle = min(0.5 * math.pi, max(-0.5 * math.pi, wrap(ground.heading - state.yaw)))
         memory.side_acceleration = 2.0 * math.sin(angle) * speed * _HEADING_GAIN / parameters.navl1_period
 
@@ -389,7 +393,8 @@ def _tick_landing(work: Record, own: Record, point: Record) -> None:
         _update_stage(estimated, own.parameters, ground, memory, left)
         _demand_glide(estimated, own.parameters, ground, memory, left[0])
         _set_landing_parameters(estimated, own.parameters, staged, ground, left[1])
-        wanted = airspeed_target(state, estimated, ground.airspeed, point, own.parameters, memory, factor)
+        stated = ground.airspeed if ground.stage > ON_GLIDE else own.parameters.airspeed_cruise
+        wanted = airspeed_target(state, estimated, stated, point, staged, memory, factor)
         work.memory.speed_command = wanted * factor
         if ground.stage == FLARING:
             # Slow and without throttle it must not be in underspeed: the flare ignores it.
@@ -429,9 +434,11 @@ def _follow_line_to_point(
         memory.from_north + far * unit_n,
         length,
     )
-    memory.cross_track_sum = l1_integrate(aim, memory.cross_track_sum, parameters.navl1_xtrack_i, NAVIGATION_TICK)
+    memory.cross_track_integrator = l1_integrate(
+        aim, memory.cross_track_integrator, parameters.navl1_xtrack_i, NAVIGATION_TICK
+    )
     if not math.isnan(aim):
-        angle += aim + memory.cross_track_sum
+        angle += aim + memory.cross_track_integrator
     memory.side_acceleration = l1_acceleration(angle, speed, length, parameters.navl1_damping)
     return run - along, along / run, abs(angle), abs(cross_track)
 
@@ -453,6 +460,7 @@ def _update_stage(
             (share >= 0.0 and lined_up and cross_track < _LINE_UP_CROSS_TRACK_M)
             or below
             or share > _APPROACH_LATEST_FRACTION
+            or ground.approaches_at_once
         ):
             ground.stage = APPROACHING
     if ground.stage == FLARING:
@@ -503,6 +511,7 @@ def _set_landing_parameters(
     share: flown fraction of the line.
     """
     staged.tecs_time = parameters.landing_time
+    staged.airspeed_min, staged.tecs_pitch_damping = parameters.airspeed_min, parameters.tecs_pitch_damping
     weight = parameters.landing_speed_weight
     if weight < 0.0:
         weight = parameters.tecs_speed_weight * (1.0 - min(1.0, max(0.0, share)))
@@ -514,6 +523,10 @@ def _set_landing_parameters(
     staged.tecs_pitch_min = 0.0
     if ground.stage == FLARING:
         staged.roll_limit = min(parameters.roll_limit, parameters.level_roll_limit)
+        staged.tecs_pitch_damping = parameters.flare_damping
+        if parameters.is_4_7 and parameters.airspeed_stall > 0.0:
+            # `AP_TECS::_update_speed`, `Plane::calc_airspeed_errors`.
+            staged.airspeed_min = parameters.airspeed_stall
         down = min(1.0, max(0.0, 1.0 - (estimated.up - ground.up) / max(0.1, ground.entry_height)))
         bottom = (1.0 - down) * bottom + down * max(bottom, parameters.landing_pitch)
         if parameters.landing_pitch_max != 0.0:

@@ -6,7 +6,7 @@ import numpy as np
 
 from aircraft.envelope import GRAVITY
 from flight.autopilots.arduplane.navigator import navigate_legs, target_of
-from flight.autopilots.arduplane.parameters import ARDUPILOT_PARAMETERS, IMMEDIATE_CLIMB
+from flight.autopilots.arduplane.parameters import ARDUPILOT_PARAMETERS, FULL_LOAD_FACTOR_LIMIT, IMMEDIATE_CLIMB
 from flight.dynamics.instructions import Code
 from flight.guidance.equivalent_airspeed import true_by_equivalent
 from flight.guidance.inner_loops import follow_roll, steer_elevator
@@ -39,7 +39,7 @@ ARDUPILOT_MEMORY = record_dtype(
     "from_east",  # m, start of the leg's line
     "from_north",
     "from_up",  # m, start of its altitude slope
-    "cross_track_sum",  # rad, L1's cross-track integrator
+    "cross_track_integrator",  # rad, L1's cross-track integrator
     ("on_circle", np.bool_),  # True while the loiter is followed, not just approached
     ("loitering", np.bool_),  # True once this loiter was captured: its turns and time are measured from then on
     "stayed",  # s since the capture
@@ -58,17 +58,18 @@ ARDUPILOT_MEMORY = record_dtype(
     # Altitude.
     "ground",  # m AMSL, terrain at the aircraft
     "rise_ahead",  # m, added to the altitude of a leg above terrain because of the terrain ahead
-    ("ground_leg", np.int64),  # current leg above terrain, plus one; 0 before the first
+    ("terrain_leg", np.int64),  # current leg above terrain, plus one; 0 before the first
     ("sloped_leg", np.int64),  # current leg with a slope between altitudes, plus one; 0 before the first
-    "from_above_ground",  # m, height above ground at which that leg began
+    "from_above_ground",  # m, height above ground where the line of the leg above terrain begins
+    "lookahead_offset",  # m, height above ground to gain on that leg as it began; a descent reduces the lookahead
     "height_asked",  # m, altitude setpoint of the leg, frozen while the aircraft cannot follow it
     "height_limited",  # m, the same after the rate limit
     "height_demand",  # m, the same after the rate limit and the lag
     "height_rate",  # m/s, rate of the altitude demand
     "climb_share",  # 0..1, fraction of the maximum climb and sink rates that is demanded
     "sink_share",
-    ("held", np.int64),  # saturation: 1 with throttle or pitch at its upper limit, -1 at its lower limit
-    ("under", np.bool_),  # underspeed: speed has priority over altitude until the altitude demand is reached
+    ("saturation", np.int64),  # saturation: 1 with throttle or pitch at its upper limit, -1 at its lower limit
+    ("underspeed", np.bool_),  # underspeed: speed has priority over altitude until the altitude demand is reached
     "since_slow",  # s since the airspeed was last below the underspeed threshold
     # Airspeed.
     ("flown", np.bool_),  # True once there is a previous velocity
@@ -83,11 +84,11 @@ ARDUPILOT_MEMORY = record_dtype(
     "airspeed_demand",  # m/s, within its rate limits
     "ground_speed_rise",  # m/s, equivalent, by which the airspeed was last raised for a minimum ground speed
     # Energy.
-    "energy_rate_error",  # m^2/s^3, STE rate error, smoothed
+    "ste_rate_error",  # m^2/s^3, STE rate error, smoothed
     "throttle_before",  # 0..1, last throttle without its integrator
-    "throttle_sum",  # 0..1, STE integrator
-    "balance_sum",  # m^2/s^3, SEB integrator
-    "speed_sum",  # m^2/s^3, SKE integrator, positive when too fast
+    "ste_integrator",  # 0..1, STE integrator
+    "seb_integrator",  # m^2/s^3, SEB integrator
+    "ske_integrator",  # m^2/s^3, SKE integrator, positive when too fast
     "pitch_demand",  # rad, without the trim
     "throttle_demand",  # 0..1
 )
@@ -100,11 +101,11 @@ ARDUPLANE_NUMBERS = ARDUPLANE.itemsize // 8
 # Bank demand for a lateral acceleration, within the limits of the parameters and the airspeed.
 
 # Lower bound of the bank limit when low airspeed reduces it, rad.
-_MIN_ROLL_LIMIT_RAD = math.radians(25.0)
+MIN_ROLL_LIMIT_RAD = math.radians(25.0)
 
 
 @inner
-def wanted_bank(side_acceleration: float, pitch: float, parameters: Record) -> float:
+def demanded_bank(side_acceleration: float, pitch: float, parameters: Record) -> float:
     """Return the bank for a side acceleration (m/s^2), within ROLL_LIMIT_DEG, rad.
 
     pitch: rad.
@@ -118,20 +119,26 @@ def wanted_bank(side_acceleration: float, pitch: float, parameters: Record) -> f
 def min_airspeed(bank: float, parameters: Record) -> float:
     """Return the minimum equivalent airspeed in a demanded bank (rad), m/s.
 
-    It is AIRSPEED_MIN divided by the root of cos bank, for the load factor of the turn.
+    It is AIRSPEED_MIN divided by the root of cos bank, for the load factor of the turn; or, if AIRSPEED_STALL is
+    stated, AIRSPEED_STALL divided by that root, but at least AIRSPEED_MIN (`AP_TECS::_update_speed`).
     """
-    load = math.sqrt(math.cos(min(math.radians(85.0), abs(bank)))) if parameters.stall_prevention > 0.0 else 1.0
-    return parameters.airspeed_min / load
+    if parameters.stall_prevention <= 0.0:
+        return parameters.airspeed_min
+    load_root = 1.0 / math.sqrt(math.cos(min(math.radians(85.0), abs(bank))))
+    if parameters.airspeed_stall > 0.0:
+        return max(parameters.airspeed_min, parameters.airspeed_stall * load_root)
+    return parameters.airspeed_min * load_root
 
 
 @inner
-def stall_bank(airspeed: float, slowest: float) -> float:
-    """Return the bank that an airspeed allows without a stall, rad; at least 25 degrees.
+def stall_bank(airspeed: float, slowest: float, least: float) -> float:
+    """Return the bank that an airspeed allows without a stall, rad, but at least a given bank.
 
     airspeed, slowest: flown airspeed and minimum airspeed of straight flight, both equivalent or both true, m/s.
+    least: rad.
     """
-    spare = max(1.0, airspeed / slowest)
-    return max(_MIN_ROLL_LIMIT_RAD, math.acos(min(1.0, 1.0 / (spare * spare))))
+    speed_ratio = max(1.0, airspeed / slowest)
+    return max(least, math.acos(min(1.0, 1.0 / (speed_ratio * speed_ratio))))
 
 
 @inner
@@ -140,10 +147,18 @@ def roll_demand(side_acceleration: float, pitch: float, airspeed: float, paramet
 
     pitch: rad.  airspeed: equivalent, m/s.
     """
-    wanted = wanted_bank(side_acceleration, pitch, parameters)
+    wanted = demanded_bank(side_acceleration, pitch, parameters)
     if parameters.stall_prevention <= 0.0:
         return wanted
-    limit = stall_bank(airspeed, parameters.airspeed_min)
+    slowest, least = parameters.airspeed_min, MIN_ROLL_LIMIT_RAD
+    if parameters.is_4_7:
+        # `Plane::apply_load_factor_roll_limits`.
+        if parameters.airspeed_stall > 0.0:
+            slowest = parameters.airspeed_stall
+            if int(parameters.flight_options) & FULL_LOAD_FACTOR_LIMIT:
+                least = 0.0
+        least = max(least, parameters.level_roll_limit)
+    limit = stall_bank(airspeed, slowest, least)
     return min(limit, max(-limit, wanted))
 
 
@@ -213,7 +228,10 @@ def demand_height(estimated: Record, b: Record, parameters: Record, own: Record,
         target = _leg_altitude(estimated, b, parameters, own)
     share = dt / (dt + parameters.tecs_height_demand_time)
     # In saturation the setpoint is frozen, and the rate of the demand fades out.
-    cannot_climb, cannot_sink = own.held > 0 and own.height_rate > 0.0, own.held < 0 and own.height_rate < 0.0
+    cannot_climb, cannot_sink = (
+        own.saturation > 0 and own.height_rate > 0.0,
+        own.saturation < 0 and own.height_rate < 0.0,
+    )
     own.climb_share += share * ((0.0 if cannot_climb else 1.0) - own.climb_share)
     own.sink_share += share * ((0.0 if cannot_sink else 1.0) - own.sink_share)
     if cannot_climb:
@@ -231,22 +249,27 @@ def demand_height(estimated: Record, b: Record, parameters: Record, own: Record,
 
 @inner
 def _climbs_at_once(up: float, rise: float, b: Record, parameters: Record) -> bool:
-    """Return True if a leg that begins at an altitude (m AMSL) is a step, not a slope (`Plane::setup_alt_slope`).
+    """Return True if a leg that begins at an altitude (m AMSL) is a step, not a slope.
 
     rise: height of the leg's end above the aircraft, m.  b: the leg's end.
 
-    It is a step unless it leads down, if it begins low over home or every climb is one.
+    It is a step unless it leads down, if every climb is one, and in 4.6 if it begins low over home
+    (`Plane::setup_glide_slope`, in 4.7 `setup_alt_slope`).
     """
     if rise < 0.0:
         return False
-    return bool(int(parameters.flight_options) & IMMEDIATE_CLIMB) or up - b.home_up <= parameters.climb_slope_height
+    if int(parameters.flight_options) & IMMEDIATE_CLIMB:
+        return True
+    return not parameters.is_4_7 and up - b.home_up <= parameters.climb_slope_height
 
 
 @inner
 def _leg_altitude(estimated: Record, b: Record, parameters: Record, own: Record) -> float:
     """Return the altitude on the leg's slope at the aircraft, or of the leg's end if the leg is a step.
 
-    The slope of a leg to a loiter leads to the loiter's center; on the loiter the loiter's altitude applies.
+    The slope of a leg to a loiter leads to the loiter's center; on the loiter the loiter's altitude applies.  In 4.7
+    the altitude of the leg's end also applies in a climb while the aircraft is low over home
+    (`Plane::set_target_altitude_proportion`).
     """
     end: float = b.up
     if own.sloped_leg != own.leg + 1:
@@ -260,17 +283,19 @@ def _leg_altitude(estimated: Record, b: Record, parameters: Record, own: Record)
     leg_e, leg_n = end_e - own.from_east, end_n - own.from_north
     run = max(1e-6, leg_e * leg_e + leg_n * leg_n)
     progress = ((estimated.east - own.from_east) * leg_e + (estimated.north - own.from_north) * leg_n) / run
-    if abs(altitude_change) < parameters.glide_slope_min or altitude_change == 0.0 or progress >= 1.0:
+    if abs(altitude_change) < parameters.altitude_slope_min or altitude_change == 0.0 or progress >= 1.0:
+        return end
+    if parameters.is_4_7 and altitude_change > 0.0 and estimated.up - b.home_up < parameters.climb_slope_height:
         return end
     remaining = 1.0 - max(0.0, progress)
     altitude: float = end - altitude_change * remaining
     here: float = estimated.up
-    threshold = parameters.glide_slope_threshold
+    threshold = parameters.altitude_slope_threshold
     if threshold <= 0.0 or altitude_change <= 0.0 or here <= altitude + threshold:
         return altitude
     # This far above a slope that climbs, the slope is redrawn from here to its end.
     remaining_change = end - here
-    if remaining_change < parameters.glide_slope_min:
+    if remaining_change < parameters.altitude_slope_min:
         own.from_up = end
         return end
     own.from_up = end - remaining_change / remaining
@@ -281,29 +306,21 @@ def _leg_altitude(estimated: Record, b: Record, parameters: Record, own: Record)
 def _leg_altitude_above_terrain(estimated: Record, b: Record, parameters: Record, own: Record) -> float:
     """Return the altitude setpoint of a leg above terrain at the aircraft, m AMSL.
 
-    The height above ground changes linearly along the leg, or at once if it changes by less than GLIDE_SLOPE_MIN.  Rise
-    of the terrain ahead beyond half of the maximum climb is added (`Plane::set_offset_altitude_location`,
-    `set_target_altitude_proportion`, `relative_target_altitude_cm`, `lookahead_adjustment` in ArduPlane/altitude.cpp).
+    The height above ground changes linearly along the leg, whatever the change, from the height of the leg's start
+    above the ground there (`Plane::set_target_altitude_proportion_terrain`).  Rise of the terrain ahead beyond half of
+    the maximum climb is added, less the leg's descent (`lookahead_adjustment` in ArduPlane/altitude.cpp).
     """
-    end, here = b.above_ground, estimated.up - own.ground
-    if own.ground_leg != own.leg + 1:
-        own.ground_leg, own.from_above_ground = own.leg + 1, here
-        if _climbs_at_once(estimated.up, end - here, b, parameters):
-            own.from_above_ground = end
+    if own.terrain_leg != own.leg + 1:
+        # The leg began in this update: the ground at its start is looked up before the next update.
+        return own.height_asked
+    if own.on_circle:
+        return own.ground + b.above_ground
     end_e, end_n = target_of(b)
     leg_e, leg_n = end_e - own.from_east, end_n - own.from_north
     run = max(1e-6, leg_e * leg_e + leg_n * leg_n)
     progress = ((estimated.east - own.from_east) * leg_e + (estimated.north - own.from_north) * leg_n) / run
-    change = end - own.from_above_ground
-    if own.on_circle or progress >= 1.0 or abs(change) < parameters.glide_slope_min:
-        return own.ground + end + own.rise_ahead
-    remaining = 1.0 - max(0.0, progress)
-    height = end - change * remaining
-    if change > 0.0 and 0.0 < parameters.glide_slope_threshold < here - height:
-        # Above a climb by more than the threshold, the climb is redrawn from here.
-        remaining_change = end - here if end - here >= parameters.glide_slope_min else 0.0
-        own.from_above_ground, height = end - remaining_change / remaining, end - remaining_change
-    return own.ground + height + max(0.0, own.rise_ahead + min(0.0, change))
+    height = own.from_above_ground + min(1.0, max(0.0, progress)) * (b.above_ground - own.from_above_ground)
+    return own.ground + height + max(0.0, own.rise_ahead + min(0.0, own.lookahead_offset))
 
 
 @inner
@@ -312,8 +329,9 @@ def look_ahead(
 ) -> None:  # pragma: no cover
     """Update the ground below the aircraft and the terrain lookahead on a leg above terrain.
 
-    Follows `AP_Terrain::lookahead` with half of TECS_CLMB_MAX as the climb: one sample every TERRAIN_SPACING towards
-    the waypoint, no further than the waypoint or TERRAIN_LOOKAHD.  Samples of unknown ground change nothing.
+    At the first update of a leg, note the height above ground of its begin.  The lookahead follows
+    `AP_Terrain::lookahead` with half of TECS_CLMB_MAX as the climb: one sample every TERRAIN_SPACING towards the
+    waypoint, no further than the waypoint or TERRAIN_LOOKAHD.  Samples of unknown ground change nothing.
     work: a record of `flight.simulation.tick.WORKSPACE`.
     """
     b = waypoints[own.leg + 1]
@@ -321,6 +339,13 @@ def look_ahead(
         return
     here, place = work.estimated, work.place.ground
     own.ground = own.ground if math.isnan(place) else place
+    if own.terrain_leg != own.leg + 1:
+        own.terrain_leg = own.leg + 1
+        column, row = polymap(work.pixel_map, own.from_east, own.from_north)
+        from_ground = pixel_height(heights, column, row)
+        own.from_above_ground = own.from_up - (own.ground if math.isnan(from_ground) else from_ground)
+        gain = b.above_ground - (here.up - own.ground)
+        own.lookahead_offset = gain if abs(gain) >= parameters.altitude_slope_min else 0.0
     own.rise_ahead = 0.0
     speed = math.hypot(here.velocity_east, here.velocity_north)
     end_e, end_n = target_of(b)
@@ -353,7 +378,7 @@ def _return_altitude(estimated: Record, b: Record, parameters: Record, own: Reco
         return max(own.from_up, end) + parameters.rtl_climb_min + _RTL_CLIMB_EXTRA_M
     fall = own.from_up - end
     slope_fall = fall + b.slope_base
-    if own.on_circle or fall <= 0.0 or abs(slope_fall) < parameters.glide_slope_min:
+    if own.on_circle or fall <= 0.0 or abs(slope_fall) < parameters.altitude_slope_min:
         return end
     leg_e, leg_n = b.centre_east - own.from_east, b.centre_north - own.from_north
     run = max(1e-6, leg_e * leg_e + leg_n * leg_n)
@@ -399,11 +424,15 @@ def is_underspeed(estimated: Record, parameters: Record, own: Record, slowest: f
     """
     is_slow = own.airspeed < _UNDERSPEED_RATIO * slowest
     own.since_slow = 0.0 if is_slow else own.since_slow + dt
-    if own.under and own.airspeed >= _UNDERSPEED_EXIT_RATIO * slowest and own.since_slow > _UNDERSPEED_EXIT_DELAY_S:
-        own.under = False
+    if (
+        own.underspeed
+        and own.airspeed >= _UNDERSPEED_EXIT_RATIO * slowest
+        and own.since_slow > _UNDERSPEED_EXIT_DELAY_S
+    ):
+        own.underspeed = False
     is_full_throttle = own.throttle_demand >= _FULL_THROTTLE_FRACTION * parameters.throttle_max
-    own.under = (is_slow and is_full_throttle) or (own.under and estimated.up < own.height_demand)
-    return own.under
+    own.underspeed = (is_slow and is_full_throttle) or (own.underspeed and estimated.up < own.height_demand)
+    return own.underspeed
 
 
 @inner
@@ -440,7 +469,7 @@ def update_tecs(
     """
     _estimate_airspeed(state, estimated, parameters, own, dt)
     speed = own.airspeed
-    slowest = min_airspeed(wanted_bank(own.side_acceleration, state.pitch, parameters), parameters) * factor
+    slowest = min_airspeed(demanded_bank(own.side_acceleration, state.pitch, parameters), parameters) * factor
     # Where the aircraft fails to climb as demanded, full throttle is assumed to give less.
     max_rate = GRAVITY * parameters.tecs_climb_max * own.climb_share
     min_rate = -GRAVITY * parameters.tecs_sink_min
@@ -487,24 +516,24 @@ def _set_throttle(
     lowest, highest = max(0.0, parameters.throttle_min), parameters.throttle_max
     rate_per_throttle = (max_rate - min_rate) / (highest - parameters.throttle_min)
     rate_demand = min(max_rate, max(min_rate, spe_error / parameters.tecs_time))
-    own.energy_rate_error += (rate_demand - ste_rate - own.energy_rate_error) * dt / (dt + _STE_RATE_LAG_S)
+    own.ste_rate_error += (rate_demand - ste_rate - own.ste_rate_error) * dt / (dt + _STE_RATE_LAG_S)
     tilt = math.sin(state.roll) * math.cos(state.pitch)
     roll_drag = parameters.tecs_roll_to_throttle * (1.0 / max(0.1, 1.0 - tilt * tilt) - 1.0)
     throttle = parameters.throttle_cruise + (rate_demand + roll_drag) / rate_per_throttle
     gain = 1.0 / (parameters.tecs_time * rate_per_throttle)
-    throttle += gain * (ste_error + parameters.tecs_throttle_damping * own.energy_rate_error)
+    throttle += gain * (ste_error + parameters.tecs_throttle_damping * own.ste_rate_error)
     limit = _STE_INTEGRATOR_FRACTION * (highest - lowest)
     integrator_max = min(limit, max(-limit, highest - throttle + _THROTTLE_OVERSHOOT_FRACTION))
     integrator_min = min(limit, max(-limit, parameters.throttle_min - throttle - _THROTTLE_OVERSHOOT_FRACTION))
-    own.throttle_sum += gain * parameters.tecs_integral * ste_error * dt
-    own.throttle_sum = min(integrator_max, max(integrator_min, own.throttle_sum))
+    own.ste_integrator += gain * parameters.tecs_integral * ste_error * dt
+    own.ste_integrator = min(integrator_max, max(integrator_min, own.ste_integrator))
     if parameters.throttle_slew > 0.0:
         step = parameters.throttle_slew * (highest - lowest) * dt
         throttle = min(own.throttle_before + step, max(own.throttle_before - step, throttle))
     own.throttle_before = throttle
-    throttle += own.throttle_sum
+    throttle += own.ste_integrator
     own.throttle_demand = min(highest, max(lowest, throttle))
-    own.held = (
+    own.saturation = (
         1 if throttle >= highest - _SATURATION_BAND_FRACTION else (-1 if throttle <= parameters.throttle_min else 0)
     )
 
@@ -518,7 +547,7 @@ def wind_up_throttle(parameters: Record, own: Record) -> None:
     """
     lowest, highest = max(0.0, parameters.throttle_min), parameters.throttle_max
     limit = _STE_INTEGRATOR_FRACTION * (highest - lowest)
-    own.throttle_sum = min(limit, max(-limit, highest - own.throttle_before + _THROTTLE_OVERSHOOT_FRACTION))
+    own.ste_integrator = min(limit, max(-limit, highest - own.throttle_before + _THROTTLE_OVERSHOOT_FRACTION))
 
 
 @inner
@@ -552,18 +581,18 @@ def _set_pitch(
     rate_demand = min(GRAVITY * parameters.tecs_climb_max, max(-GRAVITY * parameters.tecs_sink_max, unlimited))
     seb_rate_error = rate_demand - (spe_weight * spe_rate - ske_weight * ske_rate)
     total_demand = rate_demand + parameters.tecs_pitch_damping * seb_rate_error
-    own.speed_sum -= ske_weight * ske_error / parameters.tecs_time * dt
+    own.ske_integrator -= ske_weight * ske_error / parameters.tecs_time * dt
     limit = _SKE_INTEGRATOR_FRACTION * (pitch_max - pitch_min) * rate_per_pitch
-    own.speed_sum = min(limit, max(-limit, own.speed_sum))
-    own.balance_sum += parameters.tecs_integral * seb_rate_error * dt
-    integrator_max = (pitch_max + _PITCH_OVERSHOOT_RAD) * rate_per_pitch - total_demand - own.speed_sum
-    integrator_min = (pitch_min - _PITCH_OVERSHOOT_RAD) * rate_per_pitch - total_demand - own.speed_sum
-    own.balance_sum = min(integrator_max, max(integrator_min, own.balance_sum))
-    pitch = (total_demand + own.balance_sum + own.speed_sum) / rate_per_pitch
+    own.ske_integrator = min(limit, max(-limit, own.ske_integrator))
+    own.seb_integrator += parameters.tecs_integral * seb_rate_error * dt
+    integrator_max = (pitch_max + _PITCH_OVERSHOOT_RAD) * rate_per_pitch - total_demand - own.ske_integrator
+    integrator_min = (pitch_min - _PITCH_OVERSHOOT_RAD) * rate_per_pitch - total_demand - own.ske_integrator
+    own.seb_integrator = min(integrator_max, max(integrator_min, own.seb_integrator))
+    pitch = (total_demand + own.seb_integrator + own.ske_integrator) / rate_per_pitch
     if pitch > pitch_max or unlimited > rate_demand:
-        own.held = 1
+        own.saturation = 1
     elif pitch < pitch_min or unlimited < rate_demand:
-        own.held = -1
+        own.saturation = -1
     pitch = min(pitch_max, max(pitch_min, pitch))
     step = parameters.tecs_vertical_acceleration / own.airspeed * dt
     own.pitch_demand = min(own.pitch_demand + step, max(own.pitch_demand - step, pitch))
@@ -583,7 +612,7 @@ ROLL_LAG = 0.84
 PITCH_LAG = 1.1
 # Initial value of the SKE integrator, m^2/s^3.  The two pitch integrators balance each other, so steady flight does not
 # determine it; the flight before the first waypoint has left 12 to 39, 27 on average, in 18 flights of ArduPlane.
-SPEED_SUM = 27.0
+INITIAL_SKE_INTEGRATOR = 27.0
 # Limit of the pitch rate, rad/s.
 _MAX_PITCH_RATE_RADPS = math.radians(40.0)
 
@@ -709,11 +738,11 @@ def begin_law(
     own.airspeed_demand = state.airspeed
     # Start with the trim of level flight here, as if the aircraft had flown before.
     own.pitch_demand = state.alpha - parameters.pitch_trim
-    own.speed_sum = SPEED_SUM
-    own.balance_sum = own.pitch_demand * state.airspeed * GRAVITY - SPEED_SUM
+    own.ske_integrator = INITIAL_SKE_INTEGRATOR
+    own.seb_integrator = own.pitch_demand * state.airspeed * GRAVITY - INITIAL_SKE_INTEGRATOR
     own.throttle_demand = memory.trim_throttle
     own.throttle_before = parameters.throttle_cruise
-    own.throttle_sum = memory.trim_throttle - parameters.throttle_cruise
+    own.ste_integrator = memory.trim_throttle - parameters.throttle_cruise
 
 
 @inner

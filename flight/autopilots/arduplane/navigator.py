@@ -40,19 +40,21 @@ _MIN_EXIT_DISTANCE_RATIO = 1.05
 
 
 @compiled
-def turn_distance(acceptance: float, turn: float, radius: float, length: float, air_density_factor: float) -> float:
+def turn_distance(
+    acceptance: float, turn: float, radius: float, l1_distance: float, air_density_factor: float
+) -> float:
     """Return the distance before a waypoint at which ArduPlane turns to the next leg, m; 0 if it flies to the waypoint.
 
     acceptance: acceptance radius that the mission states, in whole metres; 0 if it states none.
     turn: rad, positive.
     radius: WP_RADIUS, m.
-    length: L1 distance, m.
+    l1_distance: m.
     air_density_factor: ratio of true to equivalent airspeed; the distance for a turn grows as its square.
     """
     acceptance_m = math.floor(min(MAX_ACCEPTANCE_M, acceptance))
     if acceptance_m > 0.0:
         return acceptance_m
-    right_angle: float = min(radius * air_density_factor * air_density_factor, length)
+    right_angle: float = min(radius * air_density_factor * air_density_factor, l1_distance)
     return right_angle * min(1.0, turn / (0.5 * math.pi))
 
 
@@ -84,21 +86,21 @@ def navigate_legs(
     """
     b = waypoints[own.leg + 1]
     speed = max(0.1, math.hypot(estimated.velocity_east, estimated.velocity_north))
-    length = l1_length(speed, parameters.navl1_period, parameters.navl1_damping)
+    l1_distance = l1_length(speed, parameters.navl1_period, parameters.navl1_damping)
     if b.returns:
         # An RTL is one leg, which lasts until the flight ends or joins the mission's landing sequence.
         _navigate_rtl(estimated, b, parameters, own, air_density_factor)
         _join_landing(estimated, waypoints, b, own)
         return
     if b.circle != 0.0:
-        _fly_loiter(estimated, waypoints, b, parameters, own, length, speed, air_density_factor, dt)
+        _fly_loiter(estimated, waypoints, b, parameters, own, l1_distance, speed, air_density_factor, dt)
         return
     own.on_circle = False
     end_e, end_n = _end_of_leg(b, own)
-    _follow_line(estimated, end_e, end_n, parameters, own, length, speed, dt, b.straight)
+    _follow_line(estimated, end_e, end_n, parameters, own, l1_distance, speed, dt, b.straight)
     turn = _turn_angle_at(waypoints, b, own)
     if own.leg + 2 < waypoints.shape[0] and _is_leg_over(
-        estimated, b, end_e, end_n, turn, parameters, own, length, air_density_factor
+        estimated, b, end_e, end_n, turn, parameters, own, l1_distance, air_density_factor
     ):
         _begin_leg(estimated, waypoints, own.leg + 1, own)
 
@@ -129,7 +131,7 @@ def _follow_line(
     north: float,
     parameters: Record,
     own: Record,
-    length: float,
+    l1_distance: float,
     speed: float,
     dt: float,
     straight: bool,
@@ -139,11 +141,11 @@ def _follow_line(
     straight: True for a line from the aircraft itself (`Plane::verify_nav_wp` without crosstrack).
     """
     from_e, from_n = (estimated.east, estimated.north) if straight else (own.from_east, own.from_north)
-    angle, aim = l1_angles(estimated, from_e, from_n, east, north, length)
-    own.cross_track_sum = l1_integrate(aim, own.cross_track_sum, parameters.navl1_xtrack_i, dt)
+    angle, aim = l1_angles(estimated, from_e, from_n, east, north, l1_distance)
+    own.cross_track_integrator = l1_integrate(aim, own.cross_track_integrator, parameters.navl1_xtrack_i, dt)
     if not math.isnan(aim):
-        angle += aim + own.cross_track_sum
-    own.side_acceleration = l1_acceleration(angle, speed, length, parameters.navl1_damping)
+        angle += aim + own.cross_track_integrator
+    own.side_acceleration = l1_acceleration(angle, speed, l1_distance, parameters.navl1_damping)
 
 
 @inner
@@ -190,7 +192,7 @@ def _is_leg_over(
     turn: float,
     parameters: Record,
     own: Record,
-    length: float,
+    l1_distance: float,
     air_density_factor: float,
 ) -> bool:
     """Return True if the leg to b is over, because its end is within the turn distance or the line across it is passed.
@@ -210,7 +212,7 @@ def _is_leg_over(
     if b.fly_over or (b.pass_by > 0.0 and b.acceptance < 1.0):
         return passed
     distance = math.hypot(end_e - estimated.east, end_n - estimated.north)
-    reach = turn_distance(b.acceptance, turn, parameters.wp_radius, length, air_density_factor)
+    reach = turn_distance(b.acceptance, turn, parameters.wp_radius, l1_distance, air_density_factor)
     return passed or distance <= reach
 
 
@@ -221,7 +223,7 @@ def _fly_loiter(
     b: Record,
     parameters: Record,
     own: Record,
-    length: float,
+    l1_distance: float,
     speed: float,
     air_density_factor: float,
     dt: float,
@@ -235,9 +237,9 @@ def _fly_loiter(
     distance = math.hypot(b.centre_east - estimated.east, b.centre_north - estimated.north)
     if not own.loitering and distance > _APPROACH_LINE_RADII_RATIO * radius:
         own.on_circle = False
-        _follow_line(estimated, b.centre_east, b.centre_north, parameters, own, length, speed, dt, b.straight)
+        _follow_line(estimated, b.centre_east, b.centre_north, parameters, own, l1_distance, speed, dt, b.straight)
         return
-    own.side_acceleration = _loiter_acceleration(estimated, b, radius, parameters, own, length, speed)
+    own.side_acceleration = _loiter_acceleration(estimated, b, radius, parameters, own, l1_distance, speed)
     _update_loiter_progress(estimated, b, own, dt)
     if not own.over and _is_loiter_done(estimated, b, own):
         own.over, own.waited = True, 0.0
@@ -311,9 +313,9 @@ def _navigate_rtl(estimated: Record, b: Record, parameters: Record, own: Record,
         own.returning = True
         own.from_east, own.from_north, own.from_up = estimated.east, estimated.north, estimated.up
     speed = max(0.1, math.hypot(estimated.velocity_east, estimated.velocity_north))
-    length = l1_length(speed, parameters.navl1_period, parameters.navl1_damping)
+    l1_distance = l1_length(speed, parameters.navl1_period, parameters.navl1_damping)
     radius = abs(b.circle) * air_density_factor * air_density_factor
-    own.side_acceleration = _loiter_acceleration(estimated, b, radius, parameters, own, length, speed)
+    own.side_acceleration = _loiter_acceleration(estimated, b, radius, parameters, own, l1_distance, speed)
     if own.climbed:
         return
     if int(parameters.flight_options) & CLIMB_BEFORE_TURN:
@@ -350,7 +352,7 @@ def _join_landing(estimated: Record, waypoints: Records, b: Record, own: Record)
 
 @inner
 def _loiter_acceleration(
-    estimated: Record, b: Record, radius: float, parameters: Record, own: Record, length: float, speed: float
+    estimated: Record, b: Record, radius: float, parameters: Record, own: Record, l1_distance: float, speed: float
 ) -> float:
     """Return the side acceleration of a loiter, m/s^2 (`AP_L1_Control::update_loiter`).
 
@@ -361,7 +363,7 @@ def _loiter_acceleration(
     distance = max(0.1, math.hypot(out_e, out_n))
     course = math.atan2(estimated.velocity_east, estimated.velocity_north)
     inward = wrap(course - math.atan2(-out_e, -out_n))
-    capture = l1_acceleration(inward, speed, length, parameters.navl1_damping)
+    capture = l1_acceleration(inward, speed, l1_distance, parameters.navl1_damping)
     # Speeds over the ground: outwards, and around the circle in its direction.
     outwards = -speed * math.cos(inward)
     around = -direction * speed * math.sin(inward)

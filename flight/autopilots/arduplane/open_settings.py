@@ -70,7 +70,6 @@ OPEN_SETTINGS = {
     "RNGFND_LANDING": OpenSetting(_LANDING),
     # `AP_TECS` in a landing: sink rate, damping of pitch and throttle, integrator.
     "TECS_APPR_SMAX": OpenSetting(_LANDING, by_program=True),
-    "TECS_LAND_DAMP": OpenSetting(_LANDING, 0.5, 0.5, by_program=True),
     "TECS_LAND_TDAMP": OpenSetting(_LANDING, by_program=True),
     "TECS_LAND_IGAIN": OpenSetting(_LANDING, by_program=True),
     "TECS_LAND_PDAMP": OpenSetting(_LANDING, by_program=True),
@@ -137,9 +136,6 @@ def _describe_others(
         return
     if parameters.throttle_cruise <= _MOTOR_OFF_THROTTLE:
         yield f"TRIM_THROTTLE {values['TRIM_THROTTLE']:g} stops the motor, which is not flown"
-    if values["AIRSPEED_STALL"] > 0.0 and parameters.stall_prevention > 0.0:
-        # `AP_TECS::_update_speed` takes it, by the load factor, for the minimum airspeed in turns.
-        yield f"AIRSPEED_STALL {values['AIRSPEED_STALL']:g} changes the airspeed in turns and is not flown"
     reverse = _REVERSE_IN_FLIGHT | _REVERSE_IN_RETURN * mission.returns | _REVERSE_IN_LANDING * mission.lands
     if parameters.throttle_min < 0.0 and int(values["USE_REV_THRUST"]) & reverse:
         settings_text = f"THR_MIN {values['THR_MIN']:g} and USE_REV_THRUST {values['USE_REV_THRUST']:g}"

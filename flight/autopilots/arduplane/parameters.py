@@ -1,24 +1,26 @@
 """ArduPlane's parameters for a mission, in SI units and radians.
 
-Names, units, ranges and defaults are from ArduPlane's complete parameter list (ardupilot.org, Plane, version 4.6); an
+Names, units, ranges and defaults are from ArduPlane's complete parameter list (ardupilot.org, Plane, version 4.7); an
 older name stands next to the present name, with the factor to the present unit.  A parameter is taken from the first
-source that states it: the user's file, the file `ardupilot.parm` of the aircraft, ArduPlane's defaults.
+source that states it: the user's file, the file `ardupilot.parm` of the aircraft, ArduPlane's defaults.  Parameters
+that 4.6 does not have are not read for 4.6, which flies a fixed value instead.
 """
 
 import math
 from dataclasses import dataclass, field
-from typing import ClassVar
+from typing import Any, ClassVar, Self, get_args
 
 import numpy as np
 
 from flight.autopilots.autopilot import Candidate
 from flight.autopilots.parameter_origin import ARDUPILOT
-from flight.autopilots.parameter_set import Definition, ParameterSet, ParameterTable
+from flight.autopilots.parameter_set import Definition, ParameterSet, ParameterTable, Stated
 from world.arrays import Floats
+from world.errors import ParameterError
 from world.kernels import Record, record_dtype
+from world.scenario_tables import NEWEST_ARDUPLANE, ArduPlaneVersion
 
-# ArduPlane release of this law, its parameters and defaults.
-RELEASE = "4.6"
+_VERSIONS: tuple[ArduPlaneVersion, ...] = get_args(ArduPlaneVersion)
 _RAD_PER_DEG = math.pi / 180.0
 _PER_PERCENT = 0.01
 _PER_CENTI = 0.01
@@ -44,14 +46,15 @@ DEFINITIONS = {
     "airspeed_cruise": Definition("AIRSPEED_CRUISE", 12.0, 1.0, 500.0, 1.0, ("TRIM_ARSPD_CM", _PER_CENTI)),
     "airspeed_min": Definition("AIRSPEED_MIN", 9.0, 1.0, 500.0, 1.0, ("ARSPD_FBW_MIN", 1.0)),
     "airspeed_max": Definition("AIRSPEED_MAX", 22.0, 1.0, 500.0, 1.0, ("ARSPD_FBW_MAX", 1.0)),
+    "airspeed_stall": Definition("AIRSPEED_STALL", 0.0, 0.0, 500.0),
     "stall_prevention": Definition("STALL_PREVENTION", 1.0, 0.0, 1.0),
     "throttle_min": Definition("THR_MIN", 0.0, -100.0, 100.0, _PER_PERCENT),
     "throttle_max": Definition("THR_MAX", 100.0, 1.0, 100.0, _PER_PERCENT),
     "throttle_cruise": Definition("TRIM_THROTTLE", 45.0, 0.0, 100.0, _PER_PERCENT),
     "throttle_slew": Definition("THR_SLEWRATE", 100.0, 0.0, 500.0, _PER_PERCENT),
-    "glide_slope_min": Definition("GLIDE_SLOPE_MIN", 15.0, 0.0, 1000.0),
-    "glide_slope_threshold": Definition("GLIDE_SLOPE_THR", 5.0, 0.0, 100.0),
-    "climb_slope_height": Definition("CLIMB_SLOPE_HGT", 20.0, 0.0, 1000.0),
+    "altitude_slope_min": Definition("ALT_SLOPE_MIN", 15.0, 0.0, 1000.0, 1.0, ("GLIDE_SLOPE_MIN", 1.0)),
+    "altitude_slope_threshold": Definition("ALT_SLOPE_MAXHGT", 5.0, 0.0, 100.0, 1.0, ("GLIDE_SLOPE_THR", 1.0)),
+    "climb_slope_height": Definition("CLIMB_SLOPE_HGT", 25.0, 0.0, 1000.0),
     "tecs_climb_max": Definition("TECS_CLMB_MAX", 5.0, 0.1, 100.0),
     "tecs_sink_min": Definition("TECS_SINK_MIN", 2.0, 0.1, 100.0),
     "tecs_sink_max": Definition("TECS_SINK_MAX", 5.0, 0.0, 100.0),
@@ -93,6 +96,7 @@ DEFINITIONS = {
     "landing_pitch_max": Definition("TECS_LAND_PMAX", 10.0, -5.0, 45.0, _RAD_PER_DEG),
     "landing_speed_weight": Definition("TECS_LAND_SPDWGT", -1.0, -1.0, 2.0),
     "landing_time": Definition("TECS_LAND_TCONST", 2.0, 0.1, 20.0),
+    "flare_damping": Definition("TECS_LAND_DAMP", 0.5, 0.0, 5.0),
     "landing_sink_change": Definition("TECS_LAND_SRC", 0.0, -2.0, 2.0),
     "flare_holdoff": Definition("TECS_FLARE_HGT", 1.0, 0.0, 15.0),
     "throttle_failsafe": Definition("THR_FAILSAFE", 1.0, 0.0, 2.0),
@@ -125,10 +129,16 @@ DEFINITIONS = {
     "pitch_rate_p": Definition("PTCH_RATE_P", 0.04, 0.0, 100.0),
     "pitch_rate_ff": Definition("PTCH_RATE_FF", 0.345, 0.0, 100.0),
 }
+# Parameters that 4.6 does not have, with the values that it flies: heights in m.
+_FIXED_IN_4_6 = {"CLIMB_SLOPE_HGT": 20.0}
+# Bit of MIS_OPTIONS: counters of jumps are not reset when they are exhausted.
+_KEEPS_JUMP_COUNTERS = 1 << 3
 # Bit of FLIGHT_OPTIONS: an RTL climbs to its altitude before it turns.
 CLIMB_BEFORE_TURN = 1 << 4
 # Bit of FLIGHT_OPTIONS: every climb of a mission is a step.
 IMMEDIATE_CLIMB = 1 << 14
+# Bit of FLIGHT_OPTIONS: the load factor may limit the bank to LEVEL_ROLL_LIMIT, below 25 degrees.
+FULL_LOAD_FACTOR_LIMIT = 1 << 16
 # Bit of TERRAIN_FOLLOW: every mode.
 _FOLLOW_ALWAYS_BIT = 1 << 0
 # Bit of TERRAIN_FOLLOW: RTL.
@@ -139,7 +149,7 @@ _OWN_FENCE_BITS = 0b1011
 _DEFAULT_LOITER_RADIUS_M = 60.0
 # Parameters that are read but not flown: an RTL is flown on a slope where this would make it follow the terrain.
 NOT_FLOWN = ("TERRAIN_FOLLOW",)
-ARDUPILOT_PARAMETERS = record_dtype(*DEFINITIONS)
+ARDUPILOT_PARAMETERS = record_dtype(*DEFINITIONS, ("is_4_7", np.bool_))
 # Parameters that should not fall from one to the next; ArduPlane does not compare them.
 _ORDERS = (
     ("THR_MIN", "TRIM_THROTTLE", "THR_MAX"),
@@ -149,7 +159,8 @@ _ORDERS = (
 )
 # Minimum and maximum; the minimum must be lower.
 _PAIRS = (("THR_MIN", "THR_MAX"), ("AIRSPEED_MIN", "AIRSPEED_MAX"))
-# Parameters with which the verdict may be open (`flight.autopilots.arduplane.open_settings`), with their defaults.
+# Parameters without a part in the control law that decide verdicts (`flight.autopilots.arduplane.open_settings` and
+# `flight.autopilots.arduplane.failsafes`), with their defaults.
 _WHEN_STATED = {
     **dict.fromkeys(("KFF_THR2PTCH", "BATT_WATT_MAX", "FWD_BAT_THR_CUT", "TECS_OPTIONS", "AFS_ENABLE"), 0.0),
     **dict.fromkeys(("CHUTE_CRT_SINK", "ICE_IDLE_PCT", "AHRS_WIND_MAX", "ARSPD_WIND_MAX", "MIS_OPTIONS"), 0.0),
@@ -157,11 +168,12 @@ _WHEN_STATED = {
     **dict.fromkeys(("TKOFF_OPTIONS", "TKOFF_TDRAG_ELEV", "TKOFF_FLAP_PCNT", "TKOFF_THR_IDLE"), 0.0),
     **dict.fromkeys(("TECS_TKOFF_IGAIN", "TECS_APPR_SMAX", "TECS_LAND_TDAMP", "TECS_LAND_IGAIN"), 0.0),
     **dict.fromkeys(("LAND_TYPE", "LAND_PF_ARSPD", "LAND_OPTIONS", "LAND_THR_SLEW", "LAND_FLAP_PERCNT"), 0.0),
-    **dict.fromkeys(("RNGFND_LANDING", "TECS_LAND_PDAMP", "AIRSPEED_STALL"), 0.0),
+    **dict.fromkeys(("RNGFND_LANDING", "TECS_LAND_PDAMP"), 0.0),
     "ICE_IDLE_RPM": -1.0,
     "TKOFF_ACCEL_CNT": 1.0,
-    "TECS_LAND_DAMP": 0.5,
     "USE_REV_THRUST": 2.0,
+    # mAh; read for the battery failsafe alone.
+    "BATT_CAPACITY": 3300.0,
 }
 TABLE = ParameterTable(
     ARDUPILOT,
@@ -177,6 +189,9 @@ TABLE = ParameterTable(
 class ArduPilotParameters(ParameterSet):
     r"""Parameters with which ArduPlane flies; the fields of `DEFINITIONS` are computed from ``values``.
 
+    version: release of ArduPlane.
+    notes: notes on a file that another release wrote; not stored in a log.
+
     >>> default = ArduPilotParameters.defaults()
     >>> default.wp_radius, default.tecs_height_demand_time
     (90.0, 3.0)
@@ -184,6 +199,9 @@ class ArduPilotParameters(ParameterSet):
     True
     >>> ArduPilotParameters.of_text("LIM_ROLL_CD 3000\nFOO 1\n", "old.parm").unused
     ('FOO',)
+    >>> made = ArduPilotParameters.of_text("GLIDE_SLOPE_MIN 20\nCLIMB_SLOPE_HGT 30\n", "mine.param", "4.6")
+    >>> made.altitude_slope_min, made.climb_slope_height, made.unused
+    (20.0, 20.0, ('CLIMB_SLOPE_HGT',))
     >>> ArduPilotParameters.of_text("TRIM_THROTTLE 60\nTHR_MAX 50", "mine.param").misfits
     ('THR_MAX 50 of the file is below TRIM_THROTTLE 60 of the file',)
     >>> made, notes = ArduPilotParameters.of_log({"LIM_ROLL_CD": 4500.0, "WP_RADIUS": -5.0}, "a.BIN")
@@ -196,11 +214,14 @@ class ArduPilotParameters(ParameterSet):
     roll_limit, pitch_limit_max, pitch_limit_min, pitch_trim: rad.
     roll_time, pitch_time: s, in which an attitude is to follow its demand.
     airspeed_cruise, airspeed_min, airspeed_max: m/s, equivalent airspeeds.
+    airspeed_stall: m/s, at a load factor of 1; 0 if not stated.
     stall_prevention: 1 if bank is limited, and minimum airspeed raised, for the load factor; 0 if not.
     throttle_min, throttle_max, throttle_cruise: 0..1.  throttle_slew: of the throttle's range, 1/s, 0 for no limit.
-    glide_slope_min: m, a leg that climbs or sinks less is flown as a step; inf, for a parameter of 0, for every leg.
-    glide_slope_threshold: m above a climbing slope at which the slope is redrawn, 0 for never.
-    climb_slope_height: m over home, up to which a climb that begins there is a step.
+    altitude_slope_min: m, a leg that climbs or sinks less is flown as a step; inf, for a parameter of 0, for every
+        leg.
+    altitude_slope_threshold: m above a climbing slope at which the slope is redrawn, 0 for never.
+    climb_slope_height: m over home, below which 4.7 climbs to the leg's end at once; in 4.6 a climb that begins there
+        is a step.
     tecs_climb_max, tecs_sink_min, tecs_sink_max: m/s.
     tecs_time: s.  tecs_vertical_acceleration: m/s^2.  tecs_speed_frequency: rad/s.
     tecs_roll_to_throttle: m/s of climb that a bank of 45 degrees costs.
@@ -232,6 +253,7 @@ class ArduPilotParameters(ParameterSet):
     landing_pitch: rad, minimum in the flare.  landing_pitch_max: rad, maximum; 0 for pitch_limit_max.
     landing_speed_weight: of TECS in a landing, negative for a weight that falls to 0 on the leg.
     landing_time: s, of TECS.
+    flare_damping: gain of the pitch damping in the flare.
     landing_sink_change: m/s of sink rate for each metre beyond the landing point.  flare_holdoff: m, height at which
         the final sink rate is reached.
     fence_type: bits of the limits that its fence has: 1 and 8 altitudes, 2 a circle about home, 4 the mission's fence.
@@ -246,6 +268,8 @@ class ArduPilotParameters(ParameterSet):
 
     table: ClassVar[ParameterTable] = TABLE
     not_flown: ClassVar[tuple[str, ...]] = NOT_FLOWN
+    version: ArduPlaneVersion = NEWEST_ARDUPLANE
+    notes: tuple[str, ...] = field(default=(), compare=False)
     navl1_period: float = field(init=False)
     navl1_damping: float = field(init=False)
     navl1_lim_bank: float = field(init=False)
@@ -263,13 +287,14 @@ class ArduPilotParameters(ParameterSet):
     airspeed_cruise: float = field(init=False)
     airspeed_min: float = field(init=False)
     airspeed_max: float = field(init=False)
+    airspeed_stall: float = field(init=False)
     stall_prevention: float = field(init=False)
     throttle_min: float = field(init=False)
     throttle_max: float = field(init=False)
     throttle_cruise: float = field(init=False)
     throttle_slew: float = field(init=False)
-    glide_slope_min: float = field(init=False)
-    glide_slope_threshold: float = field(init=False)
+    altitude_slope_min: float = field(init=False)
+    altitude_slope_threshold: float = field(init=False)
     climb_slope_height: float = field(init=False)
     tecs_climb_max: float = field(init=False)
     tecs_sink_min: float = field(init=False)
@@ -312,6 +337,7 @@ class ArduPilotParameters(ParameterSet):
     landing_pitch_max: float = field(init=False)
     landing_speed_weight: float = field(init=False)
     landing_time: float = field(init=False)
+    flare_damping: float = field(init=False)
     landing_sink_change: float = field(init=False)
     flare_holdoff: float = field(init=False)
     throttle_failsafe: float = field(init=False)
@@ -345,11 +371,47 @@ class ArduPilotParameters(ParameterSet):
     pitch_rate_ff: float = field(init=False)
 
     def __post_init__(self) -> None:
-        """Convert the values to SI."""
+        """Convert the values to SI, and refuse a release that is not known."""
+        if self.version not in _VERSIONS:
+            allowed = f"expected {' or '.join(_VERSIONS)}"
+            message = f"arduplane_version: {self.version!r}: {allowed}"
+            raise ParameterError(
+                message, file=self.source, field="arduplane_version", value=self.version, allowed=allowed
+            )
         for (name, definition), parameter in zip(DEFINITIONS.items(), self.values, strict=False):
             object.__setattr__(self, name, parameter.value * definition.to_si)
-        # GLIDE_SLOPE_MIN 0 disables slopes (`Plane::set_offset_altitude_location`).
-        object.__setattr__(self, "glide_slope_min", self.glide_slope_min or math.inf)
+        # ALT_SLOPE_MIN 0 disables slopes (`Plane::set_offset_altitude_location`).
+        object.__setattr__(self, "altitude_slope_min", self.altitude_slope_min or math.inf)
+
+    @classmethod
+    def _known_in_release(cls, sources: list[Stated], *fields: Any) -> tuple[list[Stated], tuple[str, ...]]:
+        """Return the sources without parameters that 4.6 does not have, and the names of those in the file."""
+        if not fields or fields[0] != "4.6":
+            return sources, ()
+        stated_names = [name for origin, values in sources for name in values if origin == "file"]
+        known: list[Stated] = [
+            (origin, {name: value for name, value in values.items() if name not in _FIXED_IN_4_6})
+            for origin, values in sources
+        ]
+        return [*known, ("default", _FIXED_IN_4_6)], tuple(name for name in stated_names if name in _FIXED_IN_4_6)
+
+    def in_release(self, version: ArduPlaneVersion) -> Self:
+        """Return the same parameters in another release.
+
+        >>> ArduPilotParameters.defaults().in_release("4.6").climb_slope_height
+        20.0
+        """
+        sources: list[Stated] = [(origin, self.by_origin(origin)) for origin in ("file", "aircraft")]
+        return self._build(sources, self.source, self.unused, version, self.notes)
+
+    @property
+    def resets_jump_counters(self) -> bool:
+        """True if an exhausted counter of a jump is reset: in 4.7, unless bit 3 of MIS_OPTIONS is set.
+
+        >>> [ArduPilotParameters.defaults().changed(MIS_OPTIONS=bits).resets_jump_counters for bits in (0, 8)]
+        [True, False]
+        """
+        return self.version != "4.6" and not int(self["MIS_OPTIONS"]) & _KEEPS_JUMP_COUNTERS
 
     @property
     def climbs_before_turn(self) -> bool:
@@ -403,6 +465,7 @@ class ArduPilotParameters(ParameterSet):
         record: Record = np.zeros(1, ARDUPILOT_PARAMETERS)[0]
         for name in DEFINITIONS:
             setattr(record, name, getattr(self, name))
+        record.is_4_7 = self.version != "4.6"
         return record
 
 

@@ -20,10 +20,10 @@ import numpy as np
 from aircraft.envelope import GRAVITY
 from flight.autopilots.arduplane.law import (
     ARDUPILOT_MEMORY,
+    INITIAL_SKE_INTEGRATOR,
     NAVIGATION_TICK,
     PITCH_LAG,
     ROLL_LAG,
-    SPEED_SUM,
     airspeed_target,
     demand_height,
     roll_demand,
@@ -205,7 +205,7 @@ def fly_returns(
     if engine_out:
         stages = [np.concatenate([straight_on(start), ends]) for start, ends in zip(starts, stages, strict=True)]
     flown = np.zeros(len(starts), RETURN_RESULT)
-    times = [most_seconds(start, ends, aircraft) for start, ends in zip(starts, stages, strict=True)]
+    times = [rtl_timeout(start, ends, aircraft) for start, ends in zip(starts, stages, strict=True)]
     way = np.zeros((int(max(times, default=0.0)) + 2 if keep else 0, 3))
     ways, law = [], parameters.record()
     floor, apart = (np.full(len(starts), -math.inf),) * 2 if least is None else least
@@ -292,7 +292,7 @@ def straight_on(start: Record) -> Records:
     return ahead
 
 
-def most_seconds(start: Record, stages: Records, aircraft: PointMass) -> float:
+def rtl_timeout(start: Record, stages: Records, aircraft: PointMass) -> float:
     """Return the timeout of an RTL, s."""
     slowest = max(5.0, aircraft.record.airspeed - aircraft.record.wind_speed)
     east, north, up, seconds = start["east"], start["north"], start["up"], 0.0
@@ -440,13 +440,13 @@ def _demand_climb(
     own.side_acceleration = 0.0
     own.height_asked, own.height_limited, own.height_demand = motion.up, motion.up, motion.up
     own.height_rate, own.climb_share, own.sink_share = 0.0, 1.0, 1.0
-    before, balance, speed = own.throttle_demand, own.balance_sum, own.speed_sum
+    before, balance, speed = own.throttle_demand, own.seb_integrator, own.ske_integrator
     own.airspeed_demand = wanted * factor
     update_tecs(state, motion, staged, own, wanted * factor, factor, dt)
     wind_up_throttle(staged, own)
     # The pitch integrators stay: `AP_TECS::_update_pitch` starts them from the minimum pitch here, so what the minimum
     # adds does not enter them.
-    own.balance_sum, own.speed_sum = balance, speed
+    own.seb_integrator, own.ske_integrator = balance, speed
     own.throttle_demand = max(before, min(climb.throttle, before + climb.slew * dt))
 
 
@@ -505,7 +505,7 @@ def _load_stage(stages: Records, at: int, waypoints: Records, estimated: Record,
         after, course = stages[at + 1], math.atan2(stage.east - own.from_east, stage.north - own.from_north)
         turn = abs(wrap(math.atan2(after.east - stage.east, after.north - stage.north) - course))
         waypoints[1].turn, waypoints[2].turn = turn, turn
-    own.leg, own.sloped_leg, own.on_circle, own.cross_track_sum = 0, 0, False, 0.0
+    own.leg, own.sloped_leg, own.on_circle, own.cross_track_integrator = 0, 0, False, 0.0
 
 
 @inner
@@ -530,13 +530,13 @@ def _initialise_law(
     own.climb_share, own.sink_share = 1.0, 1.0
     own.airspeed_read = own.airspeed = own.airspeed_demand = state.airspeed
     own.pitch_demand = state.pitch - parameters.pitch_trim
-    own.speed_sum = SPEED_SUM
-    own.balance_sum = own.pitch_demand * state.airspeed * GRAVITY - GRAVITY * climb - SPEED_SUM
+    own.ske_integrator = INITIAL_SKE_INTEGRATOR
+    own.seb_integrator = own.pitch_demand * state.airspeed * GRAVITY - GRAVITY * climb - INITIAL_SKE_INTEGRATOR
     throttle = 1.0
     while throttle > 0.0 and excess_power(excess, throttle, state.airspeed, start.up, aircraft) > climb:
         throttle -= 0.01
     own.throttle_demand, own.throttle_before = throttle, parameters.throttle_cruise
-    own.throttle_sum = throttle - parameters.throttle_cruise
+    own.ste_integrator = throttle - parameters.throttle_cruise
 
 
 @inner
@@ -582,11 +582,11 @@ def _demand_throttle_and_pitch(
     Of eight flights of ArduPlane six turned back so, and lost 55 m in their turn; the other two, which had been sinking
     before, held their altitude and slowed down, which costs half of that.  The worse case stands for both.
     """
-    balance, speed = own.balance_sum, own.speed_sum
+    balance, speed = own.seb_integrator, own.ske_integrator
     update_tecs(state, motion, parameters, own, wanted * factor, factor, dt)
     if not unpowered or abs(state.roll) < _TURN_BANK_RAD:
         return
-    own.balance_sum, own.speed_sum = balance, speed
+    own.seb_integrator, own.ske_integrator = balance, speed
     tilt = math.tan(state.roll)
     drag = aircraft.induced / state.airspeed * tilt * tilt
     sink = drag - excess_power(excess, 0.0, state.airspeed, motion.up, aircraft)

@@ -93,7 +93,7 @@ def tracking_error(
         across=math.hypot(_CROSS_TRACK_M, navigation_error),
         up=math.hypot(_ALTITUDE_ERROR_M, navigation_error),
         lag=parameters.tecs_height_demand_time,
-        step=parameters.glide_slope_min,
+        step=parameters.altitude_slope_min,
         climb_rate=_CLIMB_FRACTIONS[turbulence] * parameters.tecs_climb_max,
         sink_rate=_SINK_FRACTIONS[turbulence] * parameters.tecs_sink_max,
         own_climb_share=_OWN_CLIMB_FRACTIONS[turbulence],

@@ -7,13 +7,14 @@ from dataclasses import replace
 from pathlib import Path
 
 from aircraft.catalog import Aircraft
-from flight.autopilots.arduplane.autopilot import ArduPlaneFromGround
+from flight.autopilots.arduplane.autopilot import ArduPlane, ArduPlaneFromGround
 from flight.autopilots.arduplane.launch import run_up
-from flight.autopilots.arduplane.parameters import ArduPilotParameters
+from flight.autopilots.arduplane.releases import simulated_release
 from flight.autopilots.arduplane_sitl.ground_tick import program_ground_tick
 from flight.autopilots.arduplane_sitl.physics import JsonLockstep, PhysicsPort
 from flight.autopilots.arduplane_sitl.preflight import Preflight, version_text
 from flight.autopilots.arduplane_sitl.process import (
+    RENAMED_IN_4_7,
     AutopilotParameters,
     arduplane_launch,
     autopilot_parameters,
@@ -48,7 +49,7 @@ class AutopilotFlight(SitlFlight):
         autopilot: ProgramAutopilot,
         user_parameters: Mapping[str, float] | None = None,
     ) -> None:
-        if not isinstance(autopilot.parameters, ArduPilotParameters):
+        if not isinstance(autopilot, ArduPlane):
             raise TypeError("ArduPlane's program needs ArduPlane's parameters")
         binary = autopilot.file
         setup = replace(setup, autopilot=autopilot)
@@ -70,7 +71,8 @@ class AutopilotFlight(SitlFlight):
             self._apply_gnss_error()
             self._hold_during(self._preflight.meet(flight_parameters.given))
             program = _program_of_messages(self._link, digest, flight_parameters)
-            self.setup = replace(setup, autopilot=replace(autopilot, program=program))
+            flown_autopilot = autopilot.in_release(simulated_release(program.version))
+            self.setup = replace(setup, autopilot=replace(flown_autopilot, program=program))
             self._stack = stack.pop_all()
 
     @property
@@ -102,7 +104,8 @@ class AutopilotFlight(SitlFlight):
 def _program_of_messages(link: AutopilotLink, digest: str, parameters: AutopilotParameters) -> AutopilotProgram:
     """Return the program that flew, from its messages."""
     news = link.news
-    unknown = parameters.changed.keys() - news.parameters.keys()
+    known = {RENAMED_IN_4_7.get(name, name) for name in news.parameters}
+    unknown = parameters.changed.keys() - known
     return AutopilotProgram(
         version=version_text(news.texts, news.version),
         sha256=digest,

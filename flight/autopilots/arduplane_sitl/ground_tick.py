@@ -13,7 +13,7 @@ from flight.autopilots.arduplane.ground_law import (
     GROUND_NUMBERS,
     IN_AIR,
     TAKING_OFF,
-    ended,
+    end_status,
     update_ground_contact,
 )
 from flight.autopilots.sitl.flight import place_on_path
@@ -57,7 +57,7 @@ def program_ground_tick(block: Floats, heights: Heights) -> int:
     memory.done = False
     find_phase(work.true, ground, settings.on_last_leg)
     fill_tick(work)
-    return ended(work, ground)
+    return end_status(work, ground)
 
 
 @inner
@@ -70,7 +70,7 @@ def find_phase(true: Record, ground: Record, on_last_leg: bool) -> None:
     """
     if ground.stage == TAKING_OFF:
         ground.lifted = ground.lifted or (
-            ground.rolls and true.up > ground.low + _LIFT_OFF_HEIGHT_M and not ground.touches
+            ground.rolls and true.up > ground.launch_up + _LIFT_OFF_HEIGHT_M and not ground.touches
         )
         if true.up > ground.top:
             ground.stage = IN_AIR

@@ -90,11 +90,16 @@ FLYING = (
 )
 
 
+# Present names of parameters of 4.6 that 4.7 renamed.
+RENAMED_IN_4_7 = {"GLIDE_SLOPE_MIN": "ALT_SLOPE_MIN", "GLIDE_SLOPE_THR": "ALT_SLOPE_MAXHGT"}
+
+
 @dataclass(frozen=True, slots=True)
 class AutopilotParameters:
     """Parameters by name.
 
-    given: all parameters that the autopilot gets in addition to its own defaults.
+    given: all parameters that the autopilot gets in addition to its own defaults; a parameter that 4.7 renamed is given
+        under both names, of which a program reads the one that it has.
     changed: parameters of the user among them, if the aircraft has another value or no value.
     unused: the user's parameters that belong to other hardware.
     """
@@ -117,8 +122,17 @@ def autopilot_parameters(
     flight_values = {name: value for name, value in user_parameters.items() if name.startswith(FLYING)}
     changed = {name: value for name, value in flight_values.items() if base.get(name) != value}
     return AutopilotParameters(
-        base | flight_values, changed, tuple(sorted(user_parameters.keys() - flight_values.keys()))
+        with_names_of_4_6(base | flight_values), changed, tuple(sorted(user_parameters.keys() - flight_values.keys()))
     )
+
+
+def with_names_of_4_6(values: Mapping[str, float]) -> dict[str, float]:
+    """Return parameters under their names in 4.7 and, where 4.7 renamed them, in 4.6.
+
+    >>> with_names_of_4_6({"ALT_SLOPE_MIN": 20.0, "WP_RADIUS": 90.0})
+    {'ALT_SLOPE_MIN': 20.0, 'WP_RADIUS': 90.0, 'GLIDE_SLOPE_MIN': 20.0}
+    """
+    return {**values, **{name: values[new_name] for name, new_name in RENAMED_IN_4_7.items() if new_name in values}}
 
 
 def load_aircraft_parameters(aircraft: Aircraft) -> dict[str, float]:

@@ -14,7 +14,8 @@ start; LOITER_TO_ALT demands the altitude at the start of its leg until the rim 
 
 At a gate (CONDITION_GATE) the aircraft flies to the waypoint after it.  A change of speed that the mission orders
 between them applies from where the aircraft crosses the plane through the gate.  Once the last waypoint is reached, PX4
-circles about it with NAV_LOITER_RAD.
+circles with NAV_LOITER_RAD: about that waypoint, up to 1.16 about the place where the aircraft then is
+(`setEndOfMissionItems`).
 """
 
 import math
@@ -28,10 +29,9 @@ from world.kernels import Record, Records, inner
 # which turn by the same rule, differ from each other by up to 5.9 m at the same waypoints; a simulation without that
 # delay is never closer than 3 m.
 SWITCH_DELAY = 0.13
-# Course tolerance for the exit from a loiter to the next item, rad (MIS_YAW_ERR).
-COURSE_ACCEPTANCE = math.radians(12.0)
-# Minimum distance of the next waypoint from the loiter's center for which an exit course is awaited, in radii: from
-# the loiter no course leads to a nearer one.
+# Course tolerance for leaving a loiter on the course to what follows, rad (`kCosineExitCourseThreshold`).
+EXIT_COURSE_TOLERANCE_RAD = math.radians(5.0)
+# A place closer to the center than this, in radii, cannot be headed for from the loiter: no course is awaited.
 _MIN_EXIT_DISTANCE_RATIO = 1.05
 
 
@@ -136,17 +136,10 @@ def _navigate_waypoint(
         is_off_altitude and (memory.is_loitering or distance < turn_distance)
     )
     if memory.is_loitering:
-        follow_loiter(
-            estimated,
-            target.east,
-            target.north,
-            loiter_radius,
-            wind_east,
-            wind_north,
-            target_airspeed,
-            parameters,
-            memory,
-        )
+        east, north = target.east, target.north
+        if memory.mission_finished and parameters.uses_switch_distance:
+            east, north = memory.from_east, memory.from_north
+        follow_loiter(estimated, east, north, loiter_radius, wind_east, wind_north, target_airspeed, parameters, memory)
         memory.altitude_setpoint = target.up
     else:
         follow_leg(estimated, target.east, target.north, wind_east, wind_north, target_airspeed, parameters, memory)
@@ -167,6 +160,8 @@ def _navigate_waypoint(
     if memory.time_since_reached <= SWITCH_DELAY:
         return
     if is_end:
+        if parameters.anticipates and not memory.mission_finished:
+            memory.from_east, memory.from_north = estimated.east, estimated.north
         memory.mission_finished = True
     else:
         begin_leg(estimated, waypoints, target_index, memory)
@@ -256,7 +251,8 @@ def _is_on_exit_course(estimated: Record, next_waypoint: Record, loiter: Record)
     ):
         return True
     bearing = math.atan2(next_east - estimated.east, next_north - estimated.north)
-    return abs(wrap(bearing - math.atan2(estimated.velocity_east, estimated.velocity_north))) < COURSE_ACCEPTANCE
+    course = math.atan2(estimated.velocity_east, estimated.velocity_north)
+    return abs(wrap(bearing - course)) < EXIT_COURSE_TOLERANCE_RAD
 
 
 @inner

@@ -12,8 +12,9 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from flight.guidance.equivalent_airspeed import true_by_equivalent
 from flight.simulation.setup import FlightSetup
-from flight.simulation.tick import RTL_ARRIVAL_RADIUS_M
+from flight.simulation.tick import RTL_ARRIVAL_LOITER_RADII, RTL_ARRIVAL_RADIUS_M
 from flight.simulation.track import Track
 from logs.verdict.measures.acceptance import acceptance_condition
 from logs.verdict.measures.path_sweeps import path_clearance
@@ -156,10 +157,12 @@ def _arrival_radii(requirements: RouteRequirements) -> Floats:
     ]
     first_return = route.return_from
     if first_return >= 0:
-        # A return ends where its autopilot loiters, which is not where the loiter is drawn.
-        end_return = route.return_until
+        # A return ends anywhere on its loiter, which is not where the loiter is drawn, nor where the drawn loiter ends.
+        end_return, loiter = route.return_until, route.return_to
+        loiter_radius = 0.0 if loiter is None else abs(loiter.radius) * true_by_equivalent(loiter.up) ** 2
+        anywhere = max(RTL_ARRIVAL_RADIUS_M, (1.0 + RTL_ARRIVAL_LOITER_RADII) * loiter_radius)
         radii[first_return + 1 : end_return] = [
-            max(RTL_ARRIVAL_RADIUS_M, radius) for radius in radii[first_return + 1 : end_return]
+            max(anywhere, radius) for radius in radii[first_return + 1 : end_return]
         ]
     if requirements.setup.autopilot.loiter_rules.at_middle:
         # A mission that ends on a loiter about a center ends anywhere on it, as wide as it is flown.

@@ -11,6 +11,8 @@ from logs.verdict.rule import LogNeeds, Rule
 from logs.verdict.suggestions import suggest_using_less_energy
 from logs.verdict.tolerances import ENERGY_RESERVE_FRACTION, UNDECIDED_FRACTION
 
+_MAH_PER_AH = 1000.0
+
 
 def energy_findings(
     requirements: RouteRequirements, aligned: AlignedTrack | None, *, geometric: bool = False
@@ -25,15 +27,10 @@ def energy_findings(
     planned_energy, peak_current = predicted_energy(requirements)
     faults = [_endless_jump_message(requirements, limit)] if setup.route.endless >= 0 else []
     is_guessed = setup.envelope.battery_guessed and setup.scenario.flight.battery_wh is None
-    energy, max_current = planned_energy, peak_current
-    if not geometric:
-        # The energy of a flown take-off and landing is included.
-        track = None if aligned is None else aligned.track
-        if requirements.ground_phases is not None:
-            track = requirements.ground_phases.track
-        energy = math.nan if track is None else float(track.energy.max())
-        max_current = math.nan if track is None else float(track.current.max())
+    energy, max_current = (planned_energy, peak_current) if geometric else _flown_energy(requirements, aligned)
     is_measured = setup.source is not None and not geometric
+    failsafe_messages, failsafe_text = _battery_failsafe_messages(requirements, energy)
+    faults += failsafe_messages
     max_energy = energy * (1.0 + (0.0 if is_measured else UNDECIDED_FRACTION * setup.envelope.power_sd))
     is_uncertain = not faults and not is_guessed and energy <= limit < max_energy
     if energy == 0.0 and planned_energy == 0.0:
@@ -57,6 +54,7 @@ def energy_findings(
             )
         elif energy > limit:
             reason += f"; {ENERGY_RESERVE_FRACTION:.0%} must be left"
+        reason += failsafe_text
     return [
         make_finding(
             "energy",
@@ -92,6 +90,39 @@ def _endless_jump_message(requirements: RouteRequirements, usable_energy: float)
     )
     duration_text = f": the energy lasts for {usable_energy / round_energy:.0f} rounds" if round_energy > 0.0 else ""
     return message(f"the jump of item {route.endless} has no end{duration_text}")
+
+
+def _flown_energy(requirements: RouteRequirements, aligned: AlignedTrack | None) -> tuple[float, float]:
+    """Return energy (Wh) and peak current (A) of a flight, its take-off and landing included; NaN without a flight."""
+    track = None if aligned is None else aligned.track
+    if requirements.ground_phases is not None:
+        track = requirements.ground_phases.track
+    if track is None:
+        return math.nan, math.nan
+    return float(track.energy.max()), float(track.current.max())
+
+
+def _battery_failsafe_messages(requirements: RouteRequirements, energy_used: float) -> tuple[list[Message], str]:
+    """Return messages on battery failsafes that leave the mission, and a clause on voltages that are not judged.
+
+    energy_used: energy of the flight, Wh.  A log of an imported flight shows what its failsafes did.
+    """
+    volts = requirements.setup.envelope.volts
+    messages, unjudged = [], []
+    if requirements.setup.source is not None or math.isnan(energy_used):
+        return [], ""
+    for failsafe in requirements.setup.autopilot.battery_failsafes:
+        if math.isnan(failsafe.used_charge):
+            unjudged.append(f"{failsafe.parameter} {failsafe.threshold:g}")
+        elif volts and energy_used / volts * _MAH_PER_AH > failsafe.used_charge:
+            messages.append(
+                message(
+                    f"{failsafe.parameter} {failsafe.threshold:g} leaves the mission after"
+                    f" {max(0.0, failsafe.used_charge):.0f} mAh, and it needs {energy_used / volts * _MAH_PER_AH:.0f} mAh"
+                )
+            )
+    clause = f"; whether the voltage falls below {' or '.join(unjudged)}, which leaves the mission, is not judged"
+    return messages, clause if unjudged else ""
 
 
 def _used_text(requirements: RouteRequirements, energy_used: float, max_current: float) -> str:

@@ -197,6 +197,15 @@ def test_nothing_is_dropped_in_silence(command: int) -> None:
     assert {number for note in flown.notes for number in ("2", "4") if number in note.split(":")[0]} == {"2", "4"}
 
 
+@pytest.mark.parametrize(("stated", "flown"), [(0.5, 0.5), (1.0, 1.0), (1.5, 1.0), (2.9, 2.0), (300.0, 255.0)])
+def test_a_loiter_of_more_than_one_turn_keeps_whole_turns_as_in_arduplane(stated: float, flown: float) -> None:
+    """`AP_Mission::mavlink_int_to_mission_cmd` stores the turns in a byte, a fraction only below one turn."""
+    read = mission(wp(0, 0), wp(0, 1000, command=18, p=f"{stated} 0 0 0"), wp(0, 5000))
+    (loiter,) = (stop.loiter for stop in make_itinerary(read).stops if stop.loiter is not None)
+    assert loiter.turns == flown
+    assert any("flown as" in note for note in make_itinerary(read).notes) is (stated != flown)
+
+
 def test_long_missions_walk_in_linear_time() -> None:
     stops = make_itinerary(mission(*[wp(k, k) for k in range(9000)])).stops
     assert len(stops) == 9000

@@ -1,7 +1,7 @@
 """Jumps and tags, and the commands between them: in ArduPlane's order, and in PX4's.
 
-ArduPlane's order is walked a second time here, as `AP_Mission::update` does it tick by tick (libraries/AP_Mission,
-release 4.6, which never resets a jump's counter).
+ArduPlane's order is walked a second time here, as `AP_Mission::update` does it tick by tick (libraries/AP_Mission); 4.6
+never resets a jump's counter, and 4.7 resets a counter that is used up.
 """
 
 import random
@@ -18,7 +18,7 @@ from world.errors import MissionError
 SPEED = "2 178 0 {} -1 0 0 0 0"
 
 
-def walked(read: Mission) -> tuple[list[int], list[float]]:
+def walked(read: Mission, *, resets: bool = False) -> tuple[list[int], list[float]]:
     """Items flown to and the airspeed that each is flown to with, 25 m/s at first, as ArduPlane's loop would."""
     items = {item.seq: item for item in read.items}
     tags = {int(one.params[0]): one.seq for one in reversed(read.items) if one.command == 600}
@@ -32,6 +32,7 @@ def walked(read: Mission) -> tuple[list[int], list[float]]:
                 run[k] = run.get(k, 0) + count
                 k = target
             else:
+                run[k] = 0 if resets and count else run.get(k, 0)
                 k += 1
         return k
 
@@ -46,9 +47,12 @@ def walked(read: Mission) -> tuple[list[int], list[float]]:
         if k not in items:
             return flown, speeds
         nav = k
+        run_on_leg = {do}
         while do:
             do = get_next(do + 1, False)
-            do = do if do in items and items[do].command > 95 else 0
+            # Commands that jumps lead back to run again and again on the leg.
+            do = do if do in items and items[do].command > 95 and do not in run_on_leg else 0
+            run_on_leg.add(do)
             speed = items[do].params[1] if do and items[do].command == 178 else speed
         flown.append(nav)
         speeds.append(speed)
@@ -73,16 +77,26 @@ def drawn(seed: int) -> Mission:
     return mission(*lines)
 
 
+@pytest.mark.parametrize("resets", [False, True])
 @pytest.mark.parametrize("seed", range(40))
-def test_drawn_missions_are_walked_as_arduplane_walks_them(seed: int) -> None:
+def test_drawn_missions_are_walked_as_arduplane_walks_them(seed: int, resets: bool) -> None:
     read = drawn(seed)
-    flown, speeds = walked(read)
-    stops = make_itinerary(read).stops
+    flown, speeds = walked(read, resets=resets)
+    stops = make_itinerary(read, resets_jump_counters=resets).stops
     assert [stop.item for stop in stops] == flown
     assert [25.0 if stop.airspeed != stop.airspeed else stop.airspeed for stop in stops] == speeds
 
 
 LOOP = (wp(0, 0), wp(0, 1000), wp(1000, 1000), wp(1000, 0))
+
+
+def test_a_loop_in_a_loop_is_flown_again_by_47_and_not_by_46() -> None:
+    nested = mission(wp(0, 0), wp(0, 1000), "2 177 1 1 0 0 0 0 0", wp(1000, 1000), "2 177 1 1 0 0 0 0 0", wp(2000, 0))
+    once, again = (make_itinerary(nested, resets_jump_counters=resets) for resets in (False, True))
+    assert [stop.item for stop in once.stops] == [1, 2, 1, 2, 4, 1, 2, 4, 6]
+    assert [stop.item for stop in again.stops] == [1, 2, 1, 2, 4, 1, 2, 1, 2, 4, 6]
+    assert once.passes_exhausted_jump
+    assert not make_itinerary(mission(*LOOP, "2 177 2 2 0 0 0 0 0", wp(2000, 0))).passes_exhausted_jump
 
 
 def test_commands_behind_a_spent_jump_run_a_round_early_in_arduplane_and_in_their_place_in_px4() -> None:

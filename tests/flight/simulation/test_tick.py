@@ -227,37 +227,31 @@ def ended(memory: Record, away: float, up: float, ticks: int = 1, turning: float
     motion.up, b.up = up, 400.0
     for name, value in target.items():
         setattr(b, name, value)
-    path_over = bool(memory.done)
     for k in range(ticks):
         motion.east = away * math.sin(math.radians(turning * k))
         motion.north = away * math.cos(math.radians(turning * k))
-        memory.done = path_over
         end_return(motion, b, memory, 1.0)
     return bool(memory.done)
 
 
-def fresh(*, done: bool) -> Record:
-    """The memory of a flight whose path is over, or not yet."""
-    memory = np.zeros(1, GUIDANCE_MEMORY)[0]
-    memory.done = done
+def fresh() -> Record:
+    """The memory at the begin of a flight."""
+    memory: Record = np.zeros(1, GUIDANCE_MEMORY)[0]
     return memory
 
 
-def test_a_return_ends_with_its_path_a_minute_after_it_came_to_its_circle_and_height() -> None:
-    assert not ended(fresh(done=True), 299.0, 400.0, 60)
-    assert ended(fresh(done=True), 299.0, 400.0, 61)
-    # With its path not yet over, after five of them.
-    assert not ended(fresh(done=False), 299.0, 400.0, 300)
-    assert ended(fresh(done=False), 299.0, 400.0, 301)
+def test_a_return_ends_a_minute_after_it_came_to_its_circle_and_height() -> None:
+    assert not ended(fresh(), 299.0, 400.0, 60)
+    assert ended(fresh(), 299.0, 400.0, 61)
     # Too far away, too high, too low: it has not begun.  1.3 radii of a wide circle are near enough.
     for away, up in ((301.0, 400.0), (0.0, 420.5), (0.0, 379.5)):
-        assert not ended(fresh(done=True), away, up, 400)
-    assert ended(fresh(done=True), 519.0, 400.0, 61, circle=-400.0)
+        assert not ended(fresh(), away, up, 400)
+    assert ended(fresh(), 519.0, 400.0, 61, circle=-400.0)
 
 
 def test_a_mission_that_ends_in_a_circle_ends_once_its_course_has_turned_once_and_a_quarter() -> None:
     for turning in (10.1, -10.1):
-        motion, memory = np.zeros(1, MOTION)[0], fresh(done=False)
+        motion, memory = np.zeros(1, MOTION)[0], fresh()
         for second in range(46):
             assert not memory.done, second
             motion.velocity_east = 25.0 * math.sin(math.radians(170.0 + turning * second))
@@ -270,16 +264,22 @@ def test_a_mission_that_ends_in_a_circle_ends_once_its_course_has_turned_once_an
 
 def test_a_return_ends_no_sooner_than_it_was_all_around_its_circle() -> None:
     # 2 degrees a second: once around after 180 s, the first of which is the one in which it comes there.
-    assert not ended(fresh(done=True), 500.0, 400.0, 180, 2.0, circle=500.0)
-    assert ended(fresh(done=True), 500.0, 400.0, 182, 2.0, circle=500.0)
-    assert ended(fresh(done=True), 500.0, 400.0, 182, -2.0, circle=-500.0)
-    # A path that is not over yet, as its circle was come to before where it is drawn: once around it goes on, however
-    # long that took, here 450 s, and is given up as late.
-    assert not ended(fresh(done=False), 1500.0, 400.0, 460, 0.8, circle=1500.0)
-    assert ended(fresh(done=True), 1500.0, 400.0, 460, 0.8, circle=1500.0)
+    assert not ended(fresh(), 500.0, 400.0, 180, 2.0, circle=500.0)
+    assert ended(fresh(), 500.0, 400.0, 182, 2.0, circle=500.0)
+    assert ended(fresh(), 500.0, 400.0, 182, -2.0, circle=-500.0)
+    assert not ended(fresh(), 1500.0, 400.0, 450, 0.8, circle=1500.0)
+    assert ended(fresh(), 1500.0, 400.0, 452, 0.8, circle=1500.0)
     # It never gets around: given up after five times 2 pi 500 m at 10 m/s, 1,571 s; 400 m up it is 4 % wider.
-    assert not ended(fresh(done=True), 500.0, 400.0, 1571, 0.0, circle=500.0)
-    assert ended(fresh(done=True), 500.0, 400.0, 1660, 0.0, circle=500.0)
+    assert not ended(fresh(), 500.0, 400.0, 1571, 0.0, circle=500.0)
+    assert ended(fresh(), 500.0, 400.0, 1660, 0.0, circle=500.0)
+
+
+def test_a_return_has_no_cross_track_error_because_it_follows_no_line() -> None:
+    memory = fresh()
+    memory.cross_track = 155.0
+    ended(memory, 5000.0, 400.0, 1)
+    assert math.isnan(memory.cross_track)
+    assert memory.returning
 
 
 def test_a_return_does_not_miss_the_end_of_a_path_that_it_need_not_follow() -> None:

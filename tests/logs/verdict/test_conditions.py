@@ -94,7 +94,7 @@ def test_the_kind_of_an_airspeed_and_who_states_it() -> None:
         "25.2 m/s equivalent airspeed (its cruise speed)",
         "25.2 m/s equivalent airspeed (by the autopilot's parameters)",
     ]
-    assert setup_conditions(replace(unstated, autopilot=ArduPlane(mine))).autopilot_version == "4.6"
+    assert setup_conditions(replace(unstated, autopilot=ArduPlane(mine))).autopilot_version == "4.7"
     px4 = Px4.load(FlightTable(autopilot="px4", px4_version="1.16"), load_aircraft("aerosonde"), "a")
     found = setup_conditions(replace(unstated, autopilot=px4))
     assert (found.autopilot_version, found.airspeed_kind) == ("1.16", "equivalent")

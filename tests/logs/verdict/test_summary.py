@@ -88,7 +88,7 @@ def test_who_flew_is_said_with_the_parameters_that_decide_most() -> None:
 
     lines = lines_by(ArduPilotParameters.defaults())
     assert (
-        "Flown by: the simulated ArduPlane 4.6 with its default parameters (WP_RADIUS 90 m, NAVL1_PERIOD 17 s,"
+        "Flown by: the simulated ArduPlane 4.7 with its default parameters (WP_RADIUS 90 m, NAVL1_PERIOD 17 s,"
         " TECS_HDEM_TCONST 3 s)"
     ) in lines
     assert not [line for line in lines if line.startswith("Parameters")]

@@ -228,7 +228,7 @@ def test_several_autopilots_are_told_in_one_table(tmp_path: Path, capsys: pytest
     assert said[-7].startswith(
         "  Aircraft: aerosonde, 11 kg, 25 m/s equivalent airspeed (its cruise speed); no aircraft was named"
     )
-    assert said[-5].startswith("  Flown by: the simulated ArduPlane 4.6 with its default parameters")
+    assert said[-5].startswith("  Flown by: the simulated ArduPlane 4.7 with its default parameters")
     assert any("px4: not flyable: mission" in line for line in said[-5:])
 
 
@@ -255,4 +255,7 @@ def test_an_autopilot_that_is_none_is_refused(capsys: pytest.CaptureFixture[str]
     with pytest.raises(SystemExit) as ended:
         main(["check", "up.waypoints", "--for", "ardupilot,px5"])
     assert ended.value.code == 2
-    assert "argument --for: 'px5': expected ardupilot, px4, px4-1.16, px4-1.17, planfly" in capsys.readouterr().err
+    assert (
+        "argument --for: 'px5': expected ardupilot, ardupilot-4.6, ardupilot-4.7, px4, px4-1.16, px4-1.17, planfly"
+        in capsys.readouterr().err
+    )

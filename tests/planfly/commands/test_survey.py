@@ -38,7 +38,7 @@ def test_each_line_is_told_and_what_would_help_is_flown(
     aircraft, world, pilot = out.splitlines()[2:5]
     assert aircraft == "  Aircraft: x8, 3.36 kg, 18 m/s equivalent airspeed (its cruise speed)"
     assert world.startswith("  Conditions: no wind, no turbulence; ")
-    assert pilot.startswith("  Flown by: the simulated ArduPlane 4.6")
+    assert pilot.startswith("  Flown by: the simulated ArduPlane 4.7")
     assert "would help: turn-arounds of" in out
     answer = json.loads((tmp_path / "answer.json").read_text(encoding="utf-8"))
     assert (answer["conditions"]["aircraft"], answer["conditions"]["wind_mps"]) == ("x8", 0.0)

@@ -68,8 +68,8 @@ class Flown:
 
 
 def make_ground_setup(scenario: Scenario, mission: Mission, **parameters: float) -> FlightSetup:
-    """A setup by ArduPlane's law with these parameters over the aircraft's, and exact navigation."""
-    exact = {"autopilot": "ardupilot", "nav": "perfect"}
+    """A setup by ArduPlane 4.6's law with these parameters over the aircraft's, and exact navigation."""
+    exact = {"autopilot": "ardupilot", "arduplane_version": "4.6", "nav": "perfect"}
     made = replace(scenario, flight=scenario.flight.model_copy(update=exact))
     return make_setup(made, load_airframe(made, parameters), mission, 1)
 

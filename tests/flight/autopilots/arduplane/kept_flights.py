@@ -114,7 +114,7 @@ def return_setup(flight: str, **parameters: float) -> FlightSetup:
         "RTL_CLIMB_MIN": float(row["rtl_climb_min_m"]),
         "FLIGHT_OPTIONS": float(row["flight_options"]),
     }
-    law = ArduPlane(ArduPilotParameters.load(airframe.aircraft)).with_parameters(**stated | parameters)
+    law = ArduPlane(ArduPilotParameters.load(airframe.aircraft, None, "4.6")).with_parameters(**stated | parameters)
     setup = make_setup(jacksboro(), replace(airframe, autopilot=law), return_mission(flight), 1)
     return replace(setup, nav="perfect")
 

@@ -131,7 +131,7 @@ def setup_by_law(mission: Mission, flight: str = "") -> FlightSetup:
     }
     scenario = from_spec(spec, flight or "circles")
     airframe = load_airframe(scenario)
-    law = ArduPlane(ArduPilotParameters.load(airframe.aircraft))
+    law = ArduPlane(ArduPilotParameters.load(airframe.aircraft, None, "4.6"))
     if flight in _ROLL_LIMITS:
         law = law.with_parameters(ROLL_LIMIT_DEG=_ROLL_LIMITS[flight])
     return replace(make_setup(scenario, replace(airframe, autopilot=law), mission, 1), nav="perfect")

@@ -11,6 +11,7 @@ from flight.dynamics.state import STATE
 from flight.guidance.lateral_reference_laws import waypoint_column
 from flight.guidance.navigation_error import MOTION
 from world.kernels import Record
+from world.scenario_tables import ArduPlaneVersion
 
 
 def record(dtype: np.dtype[np.record], **values: Any) -> Record:
@@ -44,9 +45,9 @@ def waypoints(*points: tuple[float, float, float], **fields: Any) -> np.ndarray:
     return made
 
 
-def parameters(**values: float) -> Record:
+def parameters(version: ArduPlaneVersion = "4.7", /, **values: float) -> Record:
     """Of ArduPlane, but for these, by its names and in its units."""
-    return ArduPilotParameters.defaults().changed(**values).record()
+    return ArduPilotParameters.defaults(version).changed(**values).record()
 
 
 def memory(**values: Any) -> Record:

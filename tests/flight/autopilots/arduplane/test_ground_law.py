@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from flight.autopilots.arduplane.ground_law import APPROACHING, GROUND_STATE, ON_GLIDE, _update_stage
 from flight.simulation.tick import ENDS, GROUND, NO_MOTOR
 from tests.flight.autopilots.arduplane.flown_grounds import (
     FLIGHTS,
@@ -18,6 +19,7 @@ from tests.flight.autopilots.arduplane.flown_grounds import (
     kept,
     make_ground_setup,
 )
+from tests.flight.autopilots.arduplane.laws import flying, memory, parameters, record
 from tests.soak import SOAK
 from world.airfield import LandingStrip, Launch
 
@@ -184,6 +186,16 @@ def test_the_flare_is_the_same_on_a_field_lower_or_higher_than_home() -> None:
     assert flares[0].max() - flares[0][0] < 0.5
     for other in flares[1:]:
         assert np.abs(other - flares[0]).max() < 0.1
+
+
+@pytest.mark.parametrize("after_loiter", [False, True])
+def test_after_a_loiter_to_an_altitude_the_approach_begins_at_once(after_loiter: bool) -> None:
+    """`AP_Landing::type_slope_verify_land`: otherwise lined up, below the waypoint before, or past half of the leg."""
+    ground = record(GROUND_STATE, stage=ON_GLIDE, begin=500.0, approaches_at_once=after_loiter)
+    own = memory()
+    # 900 m before the point, at a tenth of the leg, 40 degrees and 80 m off the line.
+    _update_stage(flying(up=500.0), parameters(), ground, own, (900.0, 0.1, math.radians(40.0), 80.0))
+    assert ground.stage == (APPROACHING if after_loiter else ON_GLIDE)
 
 
 def test_home_is_where_kept_flights_began() -> None:

@@ -20,6 +20,7 @@ from flight.autopilots.arduplane.law import (
     airspeed_target,
     demand_height,
     follow_attitude,
+    min_airspeed,
     roll_demand,
     update_tecs,
 )
@@ -37,6 +38,7 @@ from tests.setups import MakeSetup
 from tests.soak import SOAK
 from world.kernels import Record, field_names
 from world.scenario import from_spec
+from world.scenario_tables import ArduPlaneVersion
 
 
 def test_a_fresh_memory_is_on_the_first_leg_and_has_flown_nothing() -> None:
@@ -47,7 +49,7 @@ def test_a_fresh_memory_is_on_the_first_leg_and_has_flown_nothing() -> None:
 def test_counts_are_whole_and_all_else_are_numbers() -> None:
     kinds = {name: ARDUPILOT_MEMORY[name] for name in field_names(ARDUPILOT_MEMORY)}
     assert {name for name, kind in kinds.items() if kind == np.int64} == {
-        *("leg", "held", "left_for", "ground_leg", "sloped_leg"),
+        *("leg", "saturation", "left_for", "terrain_leg", "sloped_leg"),
     }
     truths = {name for name, kind in kinds.items() if kind == np.bool_}
     assert truths == {
@@ -59,7 +61,7 @@ def test_counts_are_whole_and_all_else_are_numbers() -> None:
         "over",
         "returning",
         "climbed",
-        "under",
+        "underspeed",
     }
     assert all(kind == np.float64 for kind in kinds.values() if kind not in (np.int64, np.bool_))
 
@@ -84,12 +86,12 @@ def test_small_changes_of_height_are_steps_and_others_slopes(rise: float, expect
     assert demanded(memory(), 500.0, 500.0 + rise, up=expected) == pytest.approx(expected)
 
 
-def test_the_least_slope_is_glide_slope_min() -> None:
-    assert demanded(memory(), 500.0, 520.0, GLIDE_SLOPE_MIN=21.0) == 520.0
-    assert demanded(memory(), 500.0, 520.0, GLIDE_SLOPE_MIN=19.0) == pytest.approx(510.0)
+def test_the_least_slope_is_alt_slope_min() -> None:
+    assert demanded(memory(), 500.0, 520.0, ALT_SLOPE_MIN=21.0) == 520.0
+    assert demanded(memory(), 500.0, 520.0, ALT_SLOPE_MIN=19.0) == pytest.approx(510.0)
     # 0 disables slopes (`Plane::set_offset_altitude_location`).
-    assert demanded(memory(), 500.0, 600.0, GLIDE_SLOPE_MIN=0.0) == 600.0
-    assert demanded(memory(), 500.0, 400.0, GLIDE_SLOPE_MIN=0.0) == 400.0
+    assert demanded(memory(), 500.0, 600.0, ALT_SLOPE_MIN=0.0) == 600.0
+    assert demanded(memory(), 500.0, 400.0, ALT_SLOPE_MIN=0.0) == 400.0
 
 
 @pytest.mark.parametrize(
@@ -111,19 +113,42 @@ def test_a_climb_that_begins_low_over_home_is_a_step(
     """`Plane::setup_glide_slope`; what applies at the leg's begin applies to all of it."""
     own = memory()
     (b,) = waypoints((0, 1000, end), home_up=500.0 - over_home)
-    made = parameters(FLIGHT_OPTIONS=float(options), GLIDE_SLOPE_THR=0.0)
+    made = parameters("4.6", FLIGHT_OPTIONS=float(options), ALT_SLOPE_MAXHGT=0.0)
     for north, up in ((0.0, 500.0), (500.0, 540.0)):
         demand_height(flying(0.0, north, up), b, made, own, DT)
     assert own.height_asked == pytest.approx(expected)
 
 
 def test_each_leg_is_a_step_or_a_slope_by_the_height_at_its_own_begin() -> None:
-    own, made = memory(), parameters()
+    own, made = memory(), parameters("4.6")
     for leg, over_home, expected in ((0, 10.0, 600.0), (1, 30.0, 550.0)):
         own.leg, own.from_up = leg, 500.0
         (b,) = waypoints((0, 1000, 600.0), home_up=500.0 - over_home)
         demand_height(flying(0.0, 500.0, 500.0), b, made, own, DT)
         assert own.height_asked == pytest.approx(expected)
+
+
+@pytest.mark.parametrize(
+    ("end", "over_home", "stated", "expected"),
+    [
+        (600.0, 24.9, {}, 600.0),  # below CLIMB_SLOPE_HGT, 25 m, the end of a climb is demanded at once
+        (600.0, 25.0, {}, 550.0),  # from there on its slope
+        (600.0, 25.0, {"CLIMB_SLOPE_HGT": 30.0}, 600.0),
+        (400.0, 24.9, {}, 450.0),  # a descent is a slope at any height
+        (600.0, 100.0, {"FLIGHT_OPTIONS": float(1 << 14)}, 600.0),
+    ],
+)
+def test_in_47_a_climb_is_a_slope_from_a_height_over_home(
+    end: float, over_home: float, stated: dict[str, float], expected: float
+) -> None:
+    """`Plane::set_target_altitude_proportion` decides by the height at each update, not at the leg's begin."""
+    own, made = memory(), parameters("4.7", ALT_SLOPE_MAXHGT=0.0, **stated)
+    (b,) = waypoints((0, 1000, end), home_up=500.0 - over_home)
+    # The leg begins well above home; halfway the aircraft is at a height over home.
+    begin = waypoints((0, 1000, end), home_up=0.0)[0]
+    demand_height(flying(0.0, 0.0, 500.0), begin, made, own, DT)
+    demand_height(flying(0.0, 500.0, 500.0), b, made, own, DT)
+    assert own.height_asked == pytest.approx(expected)
 
 
 def test_before_and_past_a_leg_its_ends_heights_hold() -> None:
@@ -172,13 +197,13 @@ def test_what_cannot_be_followed_waits(held: int) -> None:
         demand_height(flying(0.0, 25.0 * DT * k), b, parameters(), own, DT)
     asked, share = own.height_asked, own.climb_share if held > 0 else own.sink_share
     assert share == pytest.approx(1.0)
-    own.held = held
+    own.saturation = held
     for k in range(100, 130):
         demand_height(flying(0.0, 25.0 * DT * k), b, parameters(), own, DT)
     assert own.height_asked == asked
     # After three seconds of a lag of three, 1 / e of the rate is left.
     assert (own.climb_share if held > 0 else own.sink_share) == pytest.approx((3.0 / 3.1) ** 30)
-    own.held = -held
+    own.saturation = -held
     demand_height(flying(0.0, 25.0 * 13.0), b, parameters(), own, DT)
     assert abs(own.height_asked - 500.0) == pytest.approx(2.5 * 13.0)
 
@@ -201,7 +226,7 @@ def test_in_steady_flight_nothing_changes() -> None:
     weighed(own, reading(), flying())
     assert own.throttle_demand == pytest.approx(0.45)
     assert own.pitch_demand == pytest.approx(0.0)
-    assert own.held == 0
+    assert own.saturation == 0
 
 
 def test_throttle_for_missing_height() -> None:
@@ -212,18 +237,18 @@ def test_throttle_for_missing_height() -> None:
     damped = 0.5 * (missing / 5.0) * DT / (DT + 0.5)
     expected = 0.45 + (missing / 5.0 + (missing + damped) / 5.0) / per_throttle
     assert own.throttle_before == pytest.approx(min(expected, 0.45 + 1.0 * DT))
-    assert own.throttle_sum == pytest.approx(0.3 * missing * DT / (5.0 * per_throttle))
+    assert own.ste_integrator == pytest.approx(0.3 * missing * DT / (5.0 * per_throttle))
 
 
 def test_the_rate_of_energy_that_is_amiss_is_smoothed_over_half_a_second() -> None:
     """A first-order filter of 0.5 s (`AP_TECS`): n turns of 0.1 s leave (0.5 / 0.6)^n of what it has to come to."""
     own = steady()
     for k in range(1, 6):
-        before = own.energy_rate_error
+        before = own.ste_rate_error
         weighed(own, reading(), flying(up=501.0))
         # 1 m too high asks for g / 5 s less.
         wanted = -GRAVITY / 5.0
-        assert own.energy_rate_error - before == pytest.approx((wanted - before) / 6.0, rel=0.05), k
+        assert own.ste_rate_error - before == pytest.approx((wanted - before) / 6.0, rel=0.05), k
 
 
 def test_too_fast_to_sink_height_is_no_reason_to_throttle_back() -> None:
@@ -235,7 +260,7 @@ def test_too_fast_to_sink_height_is_no_reason_to_throttle_back() -> None:
     update_tecs(at, seen, parameters(AIRSPEED_MAX=31.0), own, 30.5, 1.0, DT)
     # The integral's share of 0.3 of the gain: a throttle by 5 s and (5 + 2) m/s of climb.
     gain = 1.0 / (5.0 * 7.0 * GRAVITY)
-    assert own.throttle_sum == pytest.approx(gain * 0.3 * -0.5 * (31.0**2 - 30.5**2) * DT, rel=0.02)
+    assert own.ste_integrator == pytest.approx(gain * 0.3 * -0.5 * (31.0**2 - 30.5**2) * DT, rel=0.02)
 
 
 def test_a_bank_takes_throttle() -> None:
@@ -268,7 +293,7 @@ def test_pitch_and_throttle_keep_their_limits(high: float, degrees: float, throt
         weighed(own, reading(), flying(), THR_MIN=10.0, AIRSPEED_MAX=35.0)
     assert math.degrees(own.pitch_demand) == pytest.approx(degrees)
     assert own.throttle_demand == throttle
-    assert own.held == (1 if high > 0.0 else -1)
+    assert own.saturation == (1 if high > 0.0 else -1)
 
 
 def test_too_fast_it_pitches_up_and_throttles_back() -> None:
@@ -337,6 +362,51 @@ def test_slow_flight_narrows_the_bank() -> None:
         assert math.degrees(roll_demand(100.0, 0.0, airspeed, limits)) == pytest.approx(degrees, abs=1e-3)
 
 
+@pytest.mark.parametrize(
+    ("version", "airspeed", "values", "degrees"),
+    [
+        # 4.6 does not read AIRSPEED_STALL for the bank: 20 m/s are AIRSPEED_MIN.
+        ("4.6", 20.0, {}, 25.0),
+        # 20 m/s are 1.25 times 16 m/s: a load factor of 1.5625.
+        ("4.7", 20.0, {}, math.degrees(math.acos(1 / 1.5625))),
+        ("4.7", 16.0, {}, 25.0),
+        ("4.7", 16.0, {"AIRSPEED_STALL": 0.0}, 25.0),
+        # With bit 16 of FLIGHT_OPTIONS down to LEVEL_ROLL_LIMIT; at 16.5 m/s the load factor is 1.0635.
+        ("4.7", 16.0, {"FLIGHT_OPTIONS": float(1 << 16)}, 5.0),
+        ("4.7", 16.5, {"FLIGHT_OPTIONS": float(1 << 16)}, math.degrees(math.acos(1 / (16.5 / 16.0) ** 2))),
+        ("4.7", 16.0, {"FLIGHT_OPTIONS": float(1 << 16), "AIRSPEED_STALL": 0.0}, 25.0),
+        ("4.6", 16.0, {"FLIGHT_OPTIONS": float(1 << 16)}, 25.0),
+    ],
+)
+def test_a_stall_speed_widens_the_bank_of_47(
+    version: ArduPlaneVersion, airspeed: float, values: dict[str, float], degrees: float
+) -> None:
+    """`Plane::apply_load_factor_roll_limits`."""
+    limits = {"ROLL_LIMIT_DEG": 60.0, "AIRSPEED_MIN": 20.0, "AIRSPEED_STALL": 16.0} | values
+    made = parameters(version, **limits)
+    assert math.degrees(roll_demand(100.0, 0.0, airspeed, made)) == pytest.approx(degrees, abs=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("values", "degrees", "expected"),
+    [
+        ({}, 60.0, 20.0 * math.sqrt(2.0)),
+        # A stall speed counts by the load factor, where that is above AIRSPEED_MIN.
+        ({"AIRSPEED_STALL": 16.0}, 60.0, 16.0 * math.sqrt(2.0)),
+        ({"AIRSPEED_STALL": 16.0}, 40.0, 20.0),
+        ({"AIRSPEED_STALL": 16.0, "STALL_PREVENTION": 0.0}, 60.0, 20.0),
+        ({"STALL_PREVENTION": 0.0}, 60.0, 20.0),
+    ],
+)
+def test_the_least_airspeed_grows_with_the_load_factor(
+    values: dict[str, float], degrees: float, expected: float
+) -> None:
+    """`AP_TECS::_update_speed` of 4.6.3 and of 4.7."""
+    for version in ("4.6", "4.7"):
+        made = parameters(version, AIRSPEED_MIN=20.0, AIRSPEED_MAX=40.0, **values)
+        assert min_airspeed(math.radians(degrees), made) == pytest.approx(expected)
+
+
 # ----------------------------------------------------------------------
 # How attitudes are followed, and what of the rudder is steered.
 
@@ -397,7 +467,7 @@ KEPT: list[dict[str, Any]] = json.loads(
 
 @pytest.fixture(scope="module")
 def usual(aerosonde: Aircraft) -> ArduPilotParameters:
-    return ArduPilotParameters.load(aerosonde)
+    return ArduPilotParameters.load(aerosonde, None, "4.6")
 
 
 @pytest.mark.parametrize(

@@ -14,15 +14,20 @@ from world.kernels import Record
 DT = 0.1
 
 
-def asked(own: Record, north: float, up: float, above: float = 100.0, home: float = math.nan, **values: float) -> float:
+def asked(own: Record, north: float, up: float, above: float = 100.0, **values: float) -> float:
     """Return the altitude that a leg of 1,000 m to a height above ground asks for, m AMSL."""
-    (b,) = waypoints((0, 1000, 0), heights_over_ground=True, above_ground=above, home_up=home)
+    (b,) = waypoints((0, 1000, 0), heights_over_ground=True, above_ground=above)
     demand_height(flying(0.0, north, up), b, parameters(**values), own, DT)
     return float(own.height_asked)
 
 
+def begun(from_above: float, offset: float = 0.0) -> Record:
+    """Return the memory of a leg that began at a height above ground (m), over ground of 400 m."""
+    return memory(ground=400.0, terrain_leg=1, from_above_ground=from_above, lookahead_offset=offset)
+
+
 def test_the_height_above_ground_is_held_wherever_the_ground_is() -> None:
-    own = memory(ground=400.0)
+    own = begun(100.0)
     assert asked(own, 100.0, 500.0) == 500.0
     own.ground = 437.0
     assert asked(own, 500.0, 500.0) == 537.0
@@ -30,23 +35,20 @@ def test_the_height_above_ground_is_held_wherever_the_ground_is() -> None:
     assert asked(own, 600.0, 500.0) == 549.5
 
 
-@pytest.mark.parametrize(("above", "expected"), [(114.9, 514.9), (115.0, 507.5), (85.1, 485.1), (85.0, 492.5)])
-def test_a_change_below_glide_slope_min_is_a_step_and_any_other_a_slope(above: float, expected: float) -> None:
-    own = memory(ground=400.0)
-    asked(own, 0.0, 500.0, above)
-    assert asked(own, 500.0, 500.0, above) == pytest.approx(expected)
-
-
-@pytest.mark.parametrize(("home", "expected"), [(480.0, 600.0), (479.0, 550.0)])
-def test_a_climb_that_begins_low_over_home_is_a_step(home: float, expected: float) -> None:
-    own = memory(ground=400.0)
-    asked(own, 0.0, 500.0, 200.0, home)
-    assert asked(own, 500.0, 500.0, 200.0, home) == pytest.approx(expected)
+@pytest.mark.parametrize(
+    ("from_above", "north", "expected"),
+    # Half of the way from 90 to 100 m, a quarter of the way from 60 to 100 m; before and past the leg its ends'.
+    [(90.0, 500.0, 495.0), (60.0, 250.0, 470.0), (60.0, -50.0, 460.0), (60.0, 1001.0, 500.0)],
+)
+def test_the_height_above_ground_changes_evenly_however_little_it_changes(
+    from_above: float, north: float, expected: float
+) -> None:
+    """`Plane::set_target_altitude_proportion_terrain` reads no ALT_SLOPE_MIN, no CLIMB_SLOPE_HGT and no threshold."""
+    assert asked(begun(from_above), north, 700.0) == pytest.approx(expected)
 
 
 def test_a_descent_leaves_out_what_it_descends_of_the_rise_ahead() -> None:
-    own = memory(ground=400.0)
-    asked(own, 0.0, 500.0, 60.0)
+    own = begun(100.0, -40.0)
     own.rise_ahead = 50.0
     # Halfway down from 100 to 60 m above ground, and 50 - 40 m of the rise.
     assert asked(own, 500.0, 480.0, 60.0) == pytest.approx(400.0 + 80.0 + 10.0)
@@ -54,11 +56,9 @@ def test_a_descent_leaves_out_what_it_descends_of_the_rise_ahead() -> None:
     assert asked(own, 500.0, 480.0, 60.0) == pytest.approx(480.0)
 
 
-def test_a_climb_is_drawn_again_where_the_aircraft_is_above_it_by_the_threshold() -> None:
-    own = memory(ground=400.0)
-    asked(own, 0.0, 500.0, 200.0)
-    assert asked(own, 500.0, 554.9, 200.0) == pytest.approx(550.0)
-    assert asked(own, 500.0, 556.0, 200.0) == pytest.approx(556.0)
+def test_before_the_ground_at_its_begin_is_known_a_leg_keeps_the_demand() -> None:
+    own = memory(ground=400.0, height_asked=512.0)
+    assert asked(own, 0.0, 500.0) == 512.0
 
 
 def looked(heights: np.ndarray, above: float = 100.0, **values: float) -> Record:
@@ -113,3 +113,17 @@ def test_how_far_and_how_often_it_looks_are_parameters() -> None:
 
 def test_ground_that_is_not_known_changes_nothing() -> None:
     assert looked(raster((300.0, math.nan), (400.0, 380.0))).rise_ahead == pytest.approx(40.0, abs=0.01)
+
+
+@pytest.mark.parametrize(
+    ("up", "above", "offset"),
+    # From the aircraft's height, 500 m less 300 m of ground; a change of less than ALT_SLOPE_MIN, 15 m, counts as none.
+    [(500.0, 100.0, -100.0), (500.0, 186.0, 0.0), (500.0, 185.0, -15.0), (500.0, 215.0, 15.0)],
+)
+def test_a_leg_begins_at_the_height_of_its_waypoint_above_the_ground_there(
+    up: float, above: float, offset: float
+) -> None:
+    own = looked(raster(), above)
+    # The waypoint is at 500 m, the ground at 300 m.
+    assert (own.terrain_leg, own.from_above_ground) == (1, 200.0)
+    assert own.lookahead_offset == pytest.approx(offset)

@@ -106,7 +106,7 @@ def test_it_sinks_on_a_straight_slope_in_distance_and_climbs_at_once() -> None:
     here = flying(0.25 * EAST + 100.0 * un, 0.25 * NORTH - 100.0 * ue, 450.0)
     assert asked(navigated(own, here, way), here, way) == pytest.approx(500.0 - 0.25 * 400.0)
     assert asked(navigated(memory(), flying(), back(700.0)), flying(), back(700.0)) == 700.0
-    # A fall of less than GLIDE_SLOPE_MIN, 15 m, is a step.
+    # A fall of less than ALT_SLOPE_MIN, 15 m, is a step.
     assert asked(navigated(memory(), flying(), back(486.0)), flying(), back(486.0)) == 486.0
 
 

@@ -109,13 +109,13 @@ def test_its_side_acceleration_is_l1s() -> None:
     own = memory()
     navigate_legs(flying(10.0, 500.0), way, parameters(NAVL1_XTRACK_I=0.0), own, 1.0, 0.1)
     assert own.side_acceleration == pytest.approx(-4.0 * 0.75**2 * 25.0**2 / LENGTH * 10.0 / LENGTH)
-    assert own.cross_track_sum == 0.0
+    assert own.cross_track_integrator == 0.0
     # Within five degrees its integral grows by gain x angle x time, and not beyond.
     for right, grows in ((8.0, True), (9.0, False)):
         own = memory()
         navigate_legs(flying(right, 500.0), way, parameters(), own, 1.0, 0.1)
         expected = 0.02 * math.asin(right / LENGTH) * 0.1
-        assert own.cross_track_sum == pytest.approx(expected if grows else 0.0)
+        assert own.cross_track_integrator == pytest.approx(expected if grows else 0.0)
 
 
 @pytest.mark.parametrize("side", [1.0, -1.0])

@@ -80,7 +80,6 @@ def test_arduplanes_defaults_leave_nothing_open_stated_or_not() -> None:
         ("LAND_FLAP_PERCNT 40", TO_GROUND),
         ("RNGFND_LANDING 1", TO_GROUND),
         ("TECS_APPR_SMAX 6", TO_GROUND),
-        ("TECS_LAND_DAMP 0.3", TO_GROUND),
         ("TECS_LAND_TDAMP 0.1", TO_GROUND),
         ("TECS_LAND_IGAIN 0.1", TO_GROUND),
         ("TECS_LAND_PDAMP 0.1", TO_GROUND),
@@ -114,8 +113,6 @@ def test_a_setting_leaves_the_verdict_open_where_its_part_is_flown(line: str, mi
         ("MIS_OPTIONS 3", TO_GROUND, ""),
         ("TRIM_THROTTLE 1", IN_THE_AIR, "TRIM_THROTTLE 1 stops the motor"),
         ("TRIM_THROTTLE 2", IN_THE_AIR, ""),
-        ("AIRSPEED_STALL 8", IN_THE_AIR, "AIRSPEED_STALL 8"),
-        ("AIRSPEED_STALL 8\nSTALL_PREVENTION 0", IN_THE_AIR, ""),
         # By default thrust is reversed on a landing's approach alone, and only with a THR_MIN below 0.
         ("THR_MIN -100", TO_GROUND, "THR_MIN -100 and USE_REV_THRUST 2"),
         ("THR_MIN -100", IN_THE_AIR, ""),

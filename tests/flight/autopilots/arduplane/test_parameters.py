@@ -42,12 +42,12 @@ ALT_HOLD_RTL 12000
 
 def test_the_defaults_are_arduplanes() -> None:
     plain = ArduPilotParameters.defaults()
-    # ardupilot.org, Plane, complete parameter list of 4.6.
+    # ardupilot.org, Plane, complete parameter list of 4.7.
     assert (plain.wp_radius, plain.wp_max_radius, plain.wp_loiter_rad) == (90.0, 0.0, 60.0)
     assert (plain.navl1_period, plain.navl1_damping, plain.navl1_xtrack_i) == (17.0, 0.75, 0.02)
     assert (plain.tecs_climb_max, plain.tecs_sink_min, plain.tecs_sink_max) == (5.0, 2.0, 5.0)
     assert (plain.tecs_time, plain.tecs_height_demand_time, plain.tecs_pitch_damping) == (5.0, 3.0, 0.3)
-    assert (plain.glide_slope_min, plain.roll_time) == (15.0, 0.5)
+    assert (plain.altitude_slope_min, plain.roll_time) == (15.0, 0.5)
     assert plain.roll_limit == pytest.approx(math.radians(45.0))
     assert plain.tecs_pitch_max == pytest.approx(math.radians(15.0))
     assert (plain.throttle_min, plain.throttle_cruise) == pytest.approx((0.0, 0.45))
@@ -116,7 +116,7 @@ def test_a_file_comes_before_the_aircraft_and_that_before_the_defaults(tmp_path:
 def test_the_record_holds_every_field() -> None:
     found = ArduPilotParameters.of_text(NEW, "a")
     record = found.record()
-    assert field_names(ARDUPILOT_PARAMETERS) == tuple(DEFINITIONS)
+    assert field_names(ARDUPILOT_PARAMETERS) == (*DEFINITIONS, "is_4_7")
     assert all(record[name] == getattr(found, name) for name in DEFINITIONS)
     assert record.dtype == ARDUPILOT_PARAMETERS
     assert np.isfinite([record[name] for name in DEFINITIONS]).all()

@@ -81,7 +81,7 @@ def test_parameters_decide(parameters: ArduPilotParameters, error: TrackingError
     assert quick.excursion[2, 1] < 0.9 * error.excursion[2, 1]
     shallow = tracking_error(parameters.changed(ROLL_LIMIT_DEG=25.0), 25.0, "gnss")
     assert shallow.excursion[at] > 1.1 * error.excursion[at]
-    late = tracking_error(parameters.changed(TECS_HDEM_TCONST=1.0, GLIDE_SLOPE_MIN=0.0), 25.0, "gnss")
+    late = tracking_error(parameters.changed(TECS_HDEM_TCONST=1.0, ALT_SLOPE_MIN=0.0), 25.0, "gnss")
     # 0 makes a step of every change of altitude.
     assert (late.lag, late.step) == (1.0, math.inf)
     climbs = tracking_error(parameters.changed(TECS_CLMB_MAX=4.0), 25.0, "gnss")

@@ -126,9 +126,13 @@ def test_after_the_last_waypoint_it_goes_once_around(aerosonde: Aircraft, versio
     course = np.degrees(np.unwrap(np.arctan2(result.track.velocity[:, 0], result.track.velocity[:, 1])))
     assert course[-1] - course[turning] == pytest.approx(450.0, abs=6.0)
     # NAV_LOITER_RAD is 80 m, to the right.  At 25.7 m/s a bank of 30 degrees turns with 117 m: a circle of that from
-    # the waypoint leads 233 m away, and a bank that is not all held some metres more.
-    radius = 25.7**2 / (9.80665 * np.tan(np.pi / 6.0))
-    assert radius < np.hypot(east, north)[turning:].max() < 2.1 * radius
+    # its center leads 233 m away, and a bank that is not all held some metres more.  The center is the waypoint, up to
+    # 1.16 the place where it is reached (`setEndOfMissionItems`).
+    radius, center = 25.7**2 / (9.80665 * np.tan(np.pi / 6.0)), -before if version == "1.16" else 0.0
+    assert radius < np.hypot(east, north - center)[turning:].max() < 2.1 * radius
+    # The loops lie evenly about the center.
+    last_loop = slice(-1200, None)
+    assert (north[last_loop].max() + north[last_loop].min()) / 2.0 == pytest.approx(center, abs=28.0)
     assert east[turning + 600] > 20.0
     assert np.abs(up[turning:] - 600.0).max() < 10.0
     assert judge_flight(setup, result.track, result.ended).flyable

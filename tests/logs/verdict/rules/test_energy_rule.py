@@ -8,6 +8,8 @@ import pytest
 
 from aircraft.catalog import load_aircraft
 from aircraft.envelope import Envelope
+from flight.autopilots.arduplane.autopilot import ArduPlane
+from flight.autopilots.arduplane.parameters import ArduPilotParameters
 from flight.dynamics.envelope_tables import load_envelope
 from flight.dynamics.fdm import Fdm
 from flight.dynamics.trim import straight
@@ -51,6 +53,26 @@ def test_prediction_and_flight_agree() -> None:
     assert predicted == pytest.approx(item.flown, rel=0.06)
     assert peak == pytest.approx(float(np.percentile(flown.track.current, 95)), rel=0.1)
     assert "by prediction" in item.reason
+
+
+@pytest.mark.parametrize(("share", "action", "ok"), [(1.01, 1, True), (0.99, 1, False), (0.99, 0, True)])
+def test_a_charge_at_which_arduplane_leaves_the_mission_fails(share: float, action: int, ok: bool) -> None:
+    """BATT_LOW_MAH remains of BATT_CAPACITY (`AP_BattMonitor_Backend::update_failsafes`); 0 does nothing."""
+    setup = replace(real_setup(), autopilot=ArduPlane(ArduPilotParameters.defaults()))
+    needed, _ = predicted_energy(route_requirements(setup))
+    charge = 1000.0 * needed / setup.envelope.volts
+    text = f"BATT_CAPACITY {share * charge + 1500.0:.1f}\nBATT_LOW_MAH 1500\nBATT_FS_LOW_ACT {action}\n"
+    law = ArduPlane(ArduPilotParameters.of_text(text, "mine.param"))
+    item = of(judge_geometry(replace(setup, autopilot=law)), "energy")
+    assert item.ok is ok
+    assert ("BATT_LOW_MAH 1500 leaves the mission after" in item.reason) is not ok
+
+
+def test_a_voltage_at_which_arduplane_leaves_the_mission_is_said_not_to_be_judged() -> None:
+    law = ArduPlane(ArduPilotParameters.of_text("BATT_LOW_VOLT 21\nBATT_FS_LOW_ACT 2\n", "mine.param"))
+    item = of(judge_geometry(replace(real_setup(), autopilot=law)), "energy")
+    assert item.ok
+    assert "whether the voltage falls below BATT_LOW_VOLT 21, which leaves the mission, is not judged" in item.reason
 
 
 def test_a_battery_that_is_too_small_fails_before_the_flight_too() -> None:

@@ -1,0 +1,122 @@
+"""Find the ArduPlane release of a program, of a flight log and of a parameter file.
+
+A ground station may write the release as a comment at the head of a parameter file.  In other files the names show it,
+because 4.7 renamed parameters (`conversion_table` in ArduPlane/Parameters.cpp).
+"""
+
+import re
+from collections.abc import Iterable
+from pathlib import Path
+from typing import NamedTuple, get_args
+
+from flight.autopilots.parameter_files import MAX_BYTES, parse_parameters
+from world.errors import ParameterError
+from world.files import read_small_file, utf8_text
+from world.scenario_tables import NEWEST_ARDUPLANE, ArduPlaneVersion
+
+_VERSIONS: tuple[ArduPlaneVersion, ...] = get_args(ArduPlaneVersion)
+# Release in the name of a program, such as "ArduPlane V4.6.3 (3fc7011a)".
+_PROGRAM_RELEASE = re.compile(r"\bV?(\d{1,2})\.(\d{1,2})")
+# Release in a comment: in the name of the program, or as QGroundControl writes it.
+_COMMENTED_RELEASES = (
+    re.compile(r"^\s*#.*\bArduPlane[ :]+V?(\d{1,2})\.(\d{1,2})", re.IGNORECASE | re.MULTILINE),
+    re.compile(r"^\s*#+\s*version\s*:\s*V?(\d{1,2})\.(\d{1,2})", re.IGNORECASE | re.MULTILINE),
+)
+# Names that exist from 4.7 on.
+_NAMES_SINCE_4_7 = ("ALT_SLOPE_MIN", "ALT_SLOPE_MAXHGT", "CLIMB_SLOPE_HGT")
+# Names that exist up to 4.6: those that 4.5 and 4.6 renamed, too.
+_NAMES_UP_TO_4_6 = (
+    *("GLIDE_SLOPE_MIN", "GLIDE_SLOPE_THR", "LIM_ROLL_CD", "LIM_PITCH_MAX", "LIM_PITCH_MIN", "TRIM_PITCH_CD"),
+    *("TRIM_ARSPD_CM", "ARSPD_FBW_MIN", "ARSPD_FBW_MAX", "ALT_HOLD_RTL", "LAND_PITCH_CD", "MIN_GNDSPD_CM"),
+)
+
+
+class FileRelease(NamedTuple):
+    """ArduPlane release that wrote a parameter file.
+
+    release: such as "4.5".  evidence: the comment or the name that shows it.
+    """
+
+    release: str
+    evidence: str
+
+
+def simulated_release(program: str) -> ArduPlaneVersion:
+    """Return the simulated release that is nearest to a program's; the newest if the program states none.
+
+    >>> programs = ("ArduPlane V4.5.7", "ArduPlane V4.6.3 (3fc7011a)", "ArduPlane V4.7.0-dev", "ArduPilot")
+    >>> [simulated_release(program) for program in programs]
+    ['4.6', '4.6', '4.7', '4.7']
+    """
+    found = _PROGRAM_RELEASE.search(program)
+    return NEWEST_ARDUPLANE if found is None else _nearest((int(found[1]), int(found[2])))
+
+
+def release_note(program: str) -> str:
+    """Return a note that another release is simulated than a program's; "" if it is the same, or if none is stated.
+
+    >>> release_note("ArduPlane V4.5.7"), release_note("ArduPlane V4.7.3")
+    ('ArduPlane 4.5 flew it, and 4.6 is simulated', '')
+    """
+    found = _PROGRAM_RELEASE.search(program)
+    if found is None or f"{int(found[1])}.{int(found[2])}" == simulated_release(program):
+        return ""
+    return f"ArduPlane {int(found[1])}.{int(found[2])} flew it, and {simulated_release(program)} is simulated"
+
+
+def _nearest(release: tuple[int, int]) -> ArduPlaneVersion:
+    known = [tuple(map(int, version.split("."))) for version in _VERSIONS]
+    older = [version for version, numbers in zip(_VERSIONS, known, strict=True) if numbers <= release]
+    return older[-1] if older else _VERSIONS[0]
+
+
+def file_release(text: str, names: Iterable[str]) -> FileRelease | None:
+    r"""Return the release that wrote a parameter file, or None if unknown.
+
+    A comment decides before the names; a file with names of both is of no release.
+
+    >>> file_release("#NOTE: ArduPlane V4.5.7\nALT_SLOPE_MIN 15", ["ALT_SLOPE_MIN"])
+    FileRelease(release='4.5', evidence='ArduPlane V4.5')
+    >>> file_release("", ["WP_RADIUS", "GLIDE_SLOPE_MIN"])
+    FileRelease(release='4.6', evidence='GLIDE_SLOPE_MIN')
+    >>> file_release("", ["ALT_SLOPE_MIN", "GLIDE_SLOPE_MIN"]) is None
+    True
+    """
+    for pattern in _COMMENTED_RELEASES:
+        if found := pattern.search(text):
+            return FileRelease(f"{int(found[1])}.{int(found[2])}", found[0].lstrip("# \t").removeprefix("NOTE: "))
+    stated = list(names)
+    newer = [name for name in stated if name in _NAMES_SINCE_4_7]
+    older = [name for name in stated if name in _NAMES_UP_TO_4_6]
+    if bool(newer) == bool(older):
+        return None
+    return FileRelease("4.7", newer[0]) if newer else FileRelease("4.6", older[0])
+
+
+class ReleaseChoice(NamedTuple):
+    """Release that is simulated, and a note on a parameter file of another release."""
+
+    version: ArduPlaneVersion
+    notes: tuple[str, ...] = ()
+
+
+def choose_release(stated: ArduPlaneVersion | None, params: str | None) -> ReleaseChoice:
+    """Return the release to simulate: the stated one, or the parameter file's, or the newest.
+
+    params: path of the parameter file.  Raises ParameterError if it cannot be read.
+    """
+    if params is None:
+        return ReleaseChoice(stated or NEWEST_ARDUPLANE)
+    file = Path(params)
+    text = utf8_text(read_small_file(file, MAX_BYTES, "parameter", ParameterError), file, ParameterError)
+    found = file_release(text, parse_parameters(text, params))
+    if found is None:
+        return ReleaseChoice(stated or NEWEST_ARDUPLANE)
+    major, minor = map(int, found.release.split("."))
+    version = stated or _nearest((major, minor))
+    if version == found.release:
+        return ReleaseChoice(version)
+    because = ", as named" if stated else ", the nearest release that planfly simulates"
+    return ReleaseChoice(
+        version, (f"{params} is of ArduPlane {found.release} ({found.evidence}): {version} flies it{because}",)
+    )

@@ -1,0 +1,138 @@
+"""Which release of ArduPlane flies: the stated one, a parameter file's, a log's, or the newest."""
+
+from pathlib import Path
+
+import pytest
+
+from aircraft.catalog import load_aircraft
+from flight.autopilots.arduplane.autopilot import ArduPlane
+from flight.autopilots.arduplane.parameters import ArduPilotParameters
+from flight.autopilots.arduplane.releases import choose_release, simulated_release
+from flight.autopilots.autopilot import ParameterValue, StoredAutopilot, StoredParameters
+from flight.autopilots.catalog import autopilot_of_log
+from world.errors import ParameterError
+from world.scenario import load_scenario, with_flight
+from world.scenario_tables import ArduPlaneVersion, FlightTable
+
+
+@pytest.mark.parametrize(
+    ("text", "version"),
+    [
+        ("WP_RADIUS 60", "4.7"),
+        ("GLIDE_SLOPE_THR 10", "4.6"),
+        ("LIM_ROLL_CD 4500", "4.6"),
+        ("ALT_SLOPE_MAXHGT 10", "4.7"),
+        ("CLIMB_SLOPE_HGT 30", "4.7"),
+        ("#NOTE: ArduPlane V4.6.3 (3fc7011a)\nWP_RADIUS 60", "4.6"),
+        ("# Stack: ArduPilot\n# Version: 4.6.3\nWP_RADIUS 60", "4.6"),
+        # A comment decides before the names.
+        ("# ArduPlane V4.7.3\nGLIDE_SLOPE_MIN 15", "4.7"),
+        # Names of both are of no release.
+        ("GLIDE_SLOPE_MIN 15\nALT_SLOPE_MAXHGT 10", "4.7"),
+    ],
+)
+def test_a_parameter_file_selects_its_release(text: str, version: str, tmp_path: Path) -> None:
+    file = tmp_path / "mine.param"
+    file.write_text(text, encoding="utf-8")
+    table = FlightTable(params=str(file))
+    made = ArduPlane.load(table, load_aircraft("aerosonde"), "a")
+    assert (made.version, made.parameter_notes) == (version, ())
+    assert f"the simulated ArduPlane {version} with the parameters of" in made.described("aerosonde")
+
+
+@pytest.mark.parametrize(
+    ("text", "stated", "note"),
+    [
+        ("GLIDE_SLOPE_MIN 20", "4.7", "is of ArduPlane 4.6 (GLIDE_SLOPE_MIN): 4.7 flies it, as named"),
+        ("ALT_SLOPE_MIN 20", "4.6", "is of ArduPlane 4.7 (ALT_SLOPE_MIN): 4.6 flies it, as named"),
+        (
+            "# ArduPlane V4.5.7\nWP_RADIUS 60",
+            None,
+            "is of ArduPlane 4.5 (ArduPlane V4.5): 4.6 flies it, the nearest release that planfly simulates",
+        ),
+        (
+            "# ArduPlane V4.9.0\nWP_RADIUS 60",
+            None,
+            "is of ArduPlane 4.9 (ArduPlane V4.9): 4.7 flies it, the nearest release that planfly simulates",
+        ),
+    ],
+)
+def test_a_file_of_another_release_is_noted_in_one_line(
+    text: str, stated: ArduPlaneVersion | None, note: str, tmp_path: Path
+) -> None:
+    file = tmp_path / "mine.param"
+    file.write_text(text, encoding="utf-8")
+    assert choose_release(stated, str(file)).notes == (f"{file} {note}",)
+
+
+def test_the_newest_release_is_the_default_and_a_scenario_states_it() -> None:
+    scenario = load_scenario("jacksboro-air")
+    assert choose_release(None, None) == ("4.7", ())
+    assert scenario.flight.stated().arduplane_version == "4.7"
+    assert with_flight(scenario, autopilot="px4").flight.stated().arduplane_version is None
+    older = with_flight(scenario, autopilot="ardupilot", arduplane_version="4.6")
+    assert ArduPlane.load(older.flight, load_aircraft("aerosonde"), "a").version == "4.6"
+    # Another autopilot is flown in its own release.
+    assert with_flight(older, autopilot="px4").flight.arduplane_version is None
+
+
+def test_a_release_belongs_to_arduplane_alone() -> None:
+    with pytest.raises(ValueError, match=r'arduplane_version: only a key of autopilot = "ardupilot", not of "px4"'):
+        FlightTable(autopilot="px4", arduplane_version="4.6")
+    with pytest.raises(ParameterError, match=r"^arduplane_version: '4.5': expected 4.6 or 4.7$"):
+        ArduPilotParameters.defaults("4.5")
+
+
+@pytest.mark.parametrize(
+    ("program", "version"), [("ArduPlane V4.6.3 (3fc7011a)", "4.6"), ("ArduPlane V4.7.3", "4.7"), ("ArduPlane", "4.7")]
+)
+def test_a_log_selects_the_release_that_flew_it(program: str, version: str) -> None:
+    assert simulated_release(program) == version
+    flown, notes = autopilot_of_log(program, {"WP_RADIUS": 60.0}, "a.BIN") or (None, ())
+    assert flown is not None
+    assert (flown.version, notes) == (version, ())
+
+
+def test_a_release_comes_back_from_a_log_and_a_log_without_one_is_of_46() -> None:
+    for version in ("4.6", "4.7"):
+        law = ArduPlane(ArduPilotParameters.of_text("ALT_SLOPE_MIN 20", "mine.param", version))
+        assert ArduPlane.restore(law.store()) == law
+    values = (ParameterValue("GLIDE_SLOPE_MIN", 20.0, "file"),)
+    older = ArduPlane.restore(StoredAutopilot(parameters=StoredParameters(values, (), "mine.param")))
+    assert (older.version, older.parameters.altitude_slope_min) == ("4.6", 20.0)
+
+
+def test_a_parameter_of_47_is_not_used_by_46() -> None:
+    text = "ALT_SLOPE_MIN 20\nCLIMB_SLOPE_HGT 30\n"
+    newer, older = (ArduPilotParameters.of_text(text, "mine.param", version) for version in ("4.7", "4.6"))
+    assert (newer.climb_slope_height, newer.unused) == (30.0, ())
+    # 4.6 climbs in one step from 20 m over home and below (`Plane::setup_glide_slope`).
+    assert (older.climb_slope_height, older.unused) == (20.0, ("CLIMB_SLOPE_HGT",))
+    assert older.altitude_slope_min == newer.altitude_slope_min == 20.0
+    assert newer.in_release("4.6").climb_slope_height == 20.0
+    assert [made.record().is_4_7 for made in (newer, older)] == [True, False]
+
+
+# Names in 4.5, 4.6 and 4.7 with the same value, as the conversion tables of ArduPlane/Parameters.cpp relate them.
+RENAMED = [
+    ("GLIDE_SLOPE_MIN 21", "GLIDE_SLOPE_MIN 21", "ALT_SLOPE_MIN 21"),
+    ("GLIDE_SLOPE_THR 7", "GLIDE_SLOPE_THR 7", "ALT_SLOPE_MAXHGT 7"),
+    ("TRIM_ARSPD_CM 1500", "AIRSPEED_CRUISE 15", "AIRSPEED_CRUISE 15"),
+    ("ARSPD_FBW_MIN 11", "AIRSPEED_MIN 11", "AIRSPEED_MIN 11"),
+    ("ARSPD_FBW_MAX 26", "AIRSPEED_MAX 26", "AIRSPEED_MAX 26"),
+    ("MIN_GNDSPD_CM 600", "MIN_GROUNDSPEED 6", "MIN_GROUNDSPEED 6"),
+    ("LIM_ROLL_CD 5500", "ROLL_LIMIT_DEG 55", "ROLL_LIMIT_DEG 55"),
+    ("LIM_PITCH_MAX 2500", "PTCH_LIM_MAX_DEG 25", "PTCH_LIM_MAX_DEG 25"),
+    ("LIM_PITCH_MIN -2000", "PTCH_LIM_MIN_DEG -20", "PTCH_LIM_MIN_DEG -20"),
+    ("TRIM_PITCH_CD 200", "PTCH_TRIM_DEG 2", "PTCH_TRIM_DEG 2"),
+    ("ALT_HOLD_RTL 9000", "RTL_ALTITUDE 90", "RTL_ALTITUDE 90"),
+    ("LAND_PITCH_CD 300", "LAND_PITCH_DEG 3", "LAND_PITCH_DEG 3"),
+]
+
+
+@pytest.mark.parametrize("names", RENAMED)
+def test_a_renamed_parameter_is_read_under_each_of_its_names(names: tuple[str, str, str]) -> None:
+    made = [ArduPilotParameters.of_text(text, "a") for text in names]
+    assert made[0].by_origin("file") == made[1].by_origin("file") == made[2].by_origin("file")
+    assert made[2].by_origin("file") == {names[2].split()[0]: float(names[2].split()[1])}
+    assert [one.unused for one in made] == [(), (), ()]
