@@ -365,7 +365,7 @@ class _Steps:
                 if counting and repeats > 0:
                     self.passes_exhausted_jump |= index in self._exhausted
                     self._exhausted.add(index)
-                    self.taken[index] = 0 if self._resets_jump_counters else repeats
+                    self.jump_counts[index] = 0 if self._resets_jump_counters else repeats
                 index += 1
         return None
 
@@ -614,7 +614,9 @@ class _ItineraryBuilder:
             self.notes.add(f"{name}: flown for {UNLIMITED:.0f} s; the mission ends there", item.seq)
             self.ended = True
         elif item.command == Command.NAV_LOITER_TURNS and (turns := turns_flown(item.params[0])) != item.params[0]:
-            self.notes.usual.add(f"{name} with {item.params[0]:g} turns: flown as {turns:g}, as in ArduPlane", item.seq)
+            self.notes.arduplane.add(
+                f"{name} with {item.params[0]:g} turns: flown as {turns:g}, as in ArduPlane", item.seq
+            )
         elif loiter_of(item) is None:
             self.add_open_item(f"{name}: flown through as a waypoint", item.seq)
         if math.isnan(item.alt):

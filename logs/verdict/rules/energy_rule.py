@@ -118,7 +118,8 @@ def _battery_failsafe_messages(requirements: RouteRequirements, energy_used: flo
             messages.append(
                 message(
                     f"{failsafe.parameter} {failsafe.threshold:g} leaves the mission after"
-                    f" {max(0.0, failsafe.used_charge):.0f} mAh, and it needs {energy_used / volts * _MAH_PER_AH:.0f} mAh"
+                    f" {max(0.0, failsafe.used_charge):.0f} mAh, and it needs"
+                    f" {energy_used / volts * _MAH_PER_AH:.0f} mAh"
                 )
             )
     clause = f"; whether the voltage falls below {' or '.join(unjudged)}, which leaves the mission, is not judged"
