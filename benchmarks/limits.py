@@ -190,7 +190,7 @@ def leg_limit(aircraft: Aircraft, turn: float, same_way: bool, wind: float = 0.0
         return track is not None and _held_bank(track) <= bank and float(np.abs(track.cross_track).max()) <= CROSS_HELD
 
     shape = route_requirements(made_setup(points(FAR), aircraft, wind, wind_from))
-    predicted = float(shape.after[1] + shape.reversal[1] + shape.before[2])
+    predicted = float(shape.length_after[1] + shape.reversal[1] + shape.length_before[2])
     return Limit("leg", wind, wind_from, predicted, bisect(holds, 1.4 * predicted, 0.6 * predicted), same_way)
 
 

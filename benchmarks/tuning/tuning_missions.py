@@ -87,7 +87,9 @@ def _case(aircraft: Aircraft, make: MakeSetup, seed: int, number: int) -> Case:
     if tight:
         # Lengths that the turns need, from level legs that are long enough for any turn.
         shape = route_requirements(made(np.full(LEGS, 4.0 * scale * OPEN_LEGS[1]), np.zeros(LEGS)))
-        runs = np.maximum(shares * (shape.after[:-1] + shape.reversal + shape.before[1:]), scale * SHORTEST)
+        runs = np.maximum(
+            shares * (shape.length_after[:-1] + shape.reversal + shape.length_before[1:]), scale * SHORTEST
+        )
         # Room to settle before the first corner and after the last.
         runs[[0, -1]] += scale * OPEN_LEGS[0]
     setup = replace(made(runs, slopes), guidance_hz=cast("Any", hz))

@@ -264,7 +264,7 @@ def test_a_sleeping_laptop_loses_no_station_and_none_of_its_wishes() -> None:
     real = Clock()
     made = Link(LOCAL, RunningClock(real))
     try:
-        made.take(packed(HEARTBEAT), ("127.0.0.1", 5))
+        made.decode_datagram(packed(HEARTBEAT), ("127.0.0.1", 5))
         made.peers["127.0.0.1", 5].periods["ATTITUDE"] = 0.02
         real.now += 3600.0
         made.forget_silent()
@@ -291,7 +291,7 @@ def test_a_clock_set_back_cuts_no_signed_link() -> None:
     try:
         for n, change in enumerate((0.0, 0.02, -3600.0, -3599.0, 86_400.0, 0.0)):
             wall.now = WALL + change
-            assert len(made.take(HEARTBEAT.pack(theirs), station.getsockname())) == 1
+            assert len(made.decode_datagram(HEARTBEAT.pack(theirs), station.getsockname())) == 1
             made.send_heartbeat(HEARTBEAT)
             message = theirs.decode(bytearray(station.recv(300)))
             assert (message.get_type(), message.get_signed(), message.get_seq()) == ("HEARTBEAT", True, n)
@@ -311,7 +311,7 @@ def test_a_station_gets_one_count_of_frames(link: Link) -> None:
     try:
         for _ in range(3):
             made.send_heartbeat(HEARTBEAT)
-        made.take(packed(HEARTBEAT), ours.getsockname())
+        made.decode_datagram(packed(HEARTBEAT), ours.getsockname())
         made.send_heartbeat(HEARTBEAT)
         made.send(HEARTBEAT, made.peers[ours.getsockname()])
         assert [ours.recv(300)[4] for _ in range(5)] == [0, 1, 2, 3, 4]
@@ -323,9 +323,9 @@ def test_a_station_gets_one_count_of_frames(link: Link) -> None:
 def test_a_key_lets_only_its_owner_in() -> None:
     made = Link(Access(("127.0.0.1", 0), (("127.0.0.1", 9),), key=KEY), Clock(), lambda: WALL)
     try:
-        assert made.take(packed(HEARTBEAT), ("127.0.0.1", 5)) == []
+        assert made.decode_datagram(packed(HEARTBEAT), ("127.0.0.1", 5)) == []
         assert made.peers == {}
-        assert len(made.take(Signing(KEY).sign(packed(HEARTBEAT), WALL), ("127.0.0.1", 5))) == 1
+        assert len(made.decode_datagram(Signing(KEY).sign(packed(HEARTBEAT), WALL), ("127.0.0.1", 5))) == 1
     finally:
         made.close()
 
@@ -334,18 +334,18 @@ def test_an_address_whose_clock_is_far_ahead_is_named_once() -> None:
     made = Link(Access(("127.0.0.1", 0), (("127.0.0.1", 9),), key=KEY), Clock(), lambda: WALL)
     try:
         for stamp in (2**48 - 1, 2**48 - 1, NOW + 2 * DAY):
-            assert made.take(signed_at(stamp), ("127.0.0.1", 5)) == []
+            assert made.decode_datagram(signed_at(stamp), ("127.0.0.1", 5)) == []
         assert (made.dropped.future, made.peers) == (3, {})
         (notice,) = made.notices()
         assert notice.startswith("127.0.0.1 signs with timestamps more than a day ahead")
-        made.take(signed_at(NOW + 2 * DAY), ("127.0.0.1", 6))
+        made.decode_datagram(signed_at(NOW + 2 * DAY), ("127.0.0.1", 6))
         assert made.notices() == []
         # Addresses that are named are bounded, and the vehicle still signs.
         for host in range(1000):
-            made.take(signed_at(2**48 - 1), (f"127.0.{host // 250}.{2 + host % 250}", 5))
+            made.decode_datagram(signed_at(2**48 - 1), (f"127.0.{host // 250}.{2 + host % 250}", 5))
         assert len(made.notices()) < 20
         made.send_heartbeat(HEARTBEAT)
-        assert len(made.take(signed_at(NOW), ("127.0.0.1", 5))) == 1
+        assert len(made.decode_datagram(signed_at(NOW), ("127.0.0.1", 5))) == 1
     finally:
         made.close()
 
@@ -422,8 +422,8 @@ def test_beyond_this_machine_only_with_protection(access: Access, word: str) -> 
 def test_only_addresses_on_the_list_are_let_in() -> None:
     made = Link(Access(("127.0.0.1", 0), (), frozenset({"192.0.2.7"})))
     try:
-        assert made.take(packed(HEARTBEAT), ("192.0.2.8", 5)) == []
+        assert made.decode_datagram(packed(HEARTBEAT), ("192.0.2.8", 5)) == []
         assert made.dropped.address == 1
-        assert len(made.take(packed(HEARTBEAT), ("192.0.2.7", 5))) == 1
+        assert len(made.decode_datagram(packed(HEARTBEAT), ("192.0.2.7", 5))) == 1
     finally:
         made.close()

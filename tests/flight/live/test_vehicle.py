@@ -239,9 +239,9 @@ def test_what_is_not_flyable_is_not_armed_unless_forced(fake: FakeVehicle) -> No
 
 def test_a_mission_taken_back_while_it_is_judged_is_not_flown(fake: FakeVehicle) -> None:
     fake.send(HEARTBEAT, mavlink.MAVLink_mission_count_message(1, 1, 3, 0), *many_items(3)[:2])
-    fake.link.take(b"", ("127.0.0.1", 5))
+    fake.link.decode_datagram(b"", ("127.0.0.1", 5))
     for message in (many_items(3)[2], command(400, 1.0), mavlink.MAVLink_mission_clear_all_message(1, 1, 0)):
-        ((found, peer),) = fake.link.take(packed(message), ("127.0.0.1", 5))
+        ((found, peer),) = fake.link.decode_datagram(packed(message), ("127.0.0.1", 5))
         fake.vehicle._handle_message(found, peer, 0.0)
     fake.turn()
     fake.turn()

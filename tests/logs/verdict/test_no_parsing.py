@@ -17,7 +17,7 @@ from logs.verdict.judge_flight import judge_flight, judge_geometry
 from logs.verdict.rules.registry import RULES
 from logs.verdict.verdict import Verdict, verdict_json
 from logs.views.failures import failures
-from logs.views.report.text import badge_of, rule_rows
+from logs.views.report.text import verdict_badge, rule_rows
 from logs.views.turns import place_values
 from planfly.workflow.tighten_plan import tighten_limits
 from tests.mission_lines import setup_of, wp
@@ -67,7 +67,14 @@ def used(verdict: Verdict, setup: FlightSetup) -> list[Any]:
     ]
     tighter, changes = tighten_limits(setup.scenario, verdict)
     values = [place_values(verdict.findings, rule) for rule in RULES]
-    return [failures(verdict, len(setup.route.waypoints)), values, rows, badge_of(verdict), changes, tighter.to_json()]
+    return [
+        failures(verdict, len(setup.route.waypoints)),
+        values,
+        rows,
+        verdict_badge(verdict),
+        changes,
+        tighter.to_json(),
+    ]
 
 
 @pytest.fixture

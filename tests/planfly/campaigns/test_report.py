@@ -77,9 +77,9 @@ def test_what_lies_there_is_replaced_only_where_that_is_said(
 ) -> None:
     (tmp_path / lies_there).write_bytes(b"")
     with pytest.raises(PlanflyError, match=re.escape(f"{tmp_path}: {words}")):
-        asked(tmp_path).open(lambda _: base)
+        asked(tmp_path).open_base_and_clear(lambda _: base)
     assert [path.name for path in tmp_path.iterdir()] == [lies_there]
-    assert asked(tmp_path, overwrite=True).open(lambda _: base) is base
+    assert asked(tmp_path, overwrite=True).open_base_and_clear(lambda _: base) is base
     assert [path.name for path in tmp_path.iterdir()] == (["mine.txt"] if lies_there == "mine.txt" else [])
 
 
@@ -89,13 +89,13 @@ def test_a_mission_that_cannot_be_opened_leaves_what_lies_there(tmp_path: Path) 
 
     (tmp_path / CAMPAIGN_DATABASE).write_bytes(b"")
     with pytest.raises(MissionError):
-        asked(tmp_path, overwrite=True).open(not_opened)
+        asked(tmp_path, overwrite=True).open_base_and_clear(not_opened)
     assert (tmp_path / CAMPAIGN_DATABASE).exists()
 
 
 def test_only_a_campaign_is_gone_on_with_and_by_its_own_plan(base: CampaignBase, tmp_path: Path) -> None:
     with pytest.raises(PlanflyError, match=r"campaign.sqlite: no campaign there to continue"):
-        asked(tmp_path, resume=True).open(lambda _: base)
+        asked(tmp_path, resume=True).open_base_and_clear(lambda _: base)
     (tmp_path / CAMPAIGN_DATABASE).write_bytes(b"")
     planned: list[Path | None] = []
 
@@ -103,11 +103,11 @@ def test_only_a_campaign_is_gone_on_with_and_by_its_own_plan(base: CampaignBase,
         planned.append(path)
         return base
 
-    asked(tmp_path, resume=True).open(noted)
+    asked(tmp_path, resume=True).open_base_and_clear(noted)
     assert planned == [tmp_path / "plan.json"]
     assert (tmp_path / CAMPAIGN_DATABASE).exists()
     with pytest.raises(PlanflyError, match="is a file; expected a folder"):
-        asked(tmp_path / CAMPAIGN_DATABASE).open(lambda _: base)
+        asked(tmp_path / CAMPAIGN_DATABASE).open_base_and_clear(lambda _: base)
 
 
 # ----------------------------------------------------------------------

@@ -237,14 +237,14 @@ def test_a_checksum_is_of_values_as_sqlite_gives_them_back() -> None:
 
 
 def test_many_damaged_flights_are_counted() -> None:
-    assert Examination([3], [], sound=False).text().startswith("is damaged: 1 flights are intact")
+    assert Examination([3], [], is_sound=False).text().startswith("is damaged: 1 flights are intact")
     assert (
-        Examination([0, 2], [1], sound=False, after=2)
+        Examination([0, 2], [1], is_sound=False, last_known=2)
         .text()
         .startswith(
             "flight 1 is damaged and was taken out, and any after flight 2 were lost: 2 flights are intact and stay;"
         )
     )
-    found = Examination([], [], sound=False, after=-1).text()
+    found = Examination([], [], is_sound=False, last_known=-1).text()
     assert found.startswith("is damaged, and no flight is found: 0 flights are intact and stay;")
     assert Examination([], list(range(20))).text().startswith("flights 0, 1, 2, 3, 4, 5, 6, 7 and 12 more are damaged")

@@ -188,7 +188,7 @@ def test_a_path_that_was_searched_for_an_older_sheet_is_not_taken(monkeypatch: p
     assert not jobs.take_initial_plan(session)
     # What was restored is flown, not planned anew.
     again = Jobs(lambda name, answer: None)
-    again.start(session)
+    again.start_first_work(session)
     assert asked[-1].function == "planfly.studio.worker_tasks.fly"
 
 

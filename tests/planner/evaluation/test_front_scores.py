@@ -22,7 +22,7 @@ def test_the_values_of_a_path_are_plain_sums(problem: Problem) -> None:
     steps = (np.arange(40_000) + 0.5) / 40_000
     points = np.concatenate([a + steps[:, None] * (b - a) for a, b in itertools.pairwise(path)])
     lengths = np.linalg.norm(np.diff(path, axis=0), axis=1)
-    assert values[Value.LENGTH_COST] == pytest.approx(lengths.sum(), rel=1e-12)
+    assert values[Value.LENGTH] == pytest.approx(lengths.sum(), rel=1e-12)
     # Still air, and the airspeed of the limits.
     seconds = lengths / data.aircraft.airspeed
     assert values[Value.TIME] == pytest.approx(seconds.sum(), rel=1e-12)

@@ -7,7 +7,7 @@ import pytest
 from flight.simulation.setup import FlightSetup
 from logs.verdict.judge_flight import judge_geometry
 from logs.verdict.measures.route_requirements import route_requirements
-from logs.verdict.rules.loiter_rule import circles
+from logs.verdict.rules.loiter_rule import loiter_circles
 from tests.logs.verdict.judging import of
 from tests.mission_lines import setup_of, wp
 
@@ -20,7 +20,7 @@ def loiter(radius: float, wind: float = 0.0) -> FlightSetup:
 
 def test_a_circle_has_its_item_radius_and_turns() -> None:
     setup = loiter(200.0)
-    (circle,) = circles(route_requirements(setup))
+    (circle,) = loiter_circles(route_requirements(setup))
     assert set(setup.route.items[circle.first : circle.last + 1].tolist()) == {2}
     assert circle.radius == 200.0
     assert circle.turns == pytest.approx(2.0, abs=0.5)
@@ -46,7 +46,7 @@ def test_a_circle_too_small_for_the_bank_limit_fails_and_says_what_it_needs() ->
 def test_legs_of_a_circle_give_the_worst_of_each_rule() -> None:
     setup = loiter(200.0)
     verdict = judge_geometry(setup)
-    (circle,) = circles(route_requirements(setup))
+    (circle,) = loiter_circles(route_requirements(setup))
     for rule in ("slope", "speed"):
         # One finding of the leg to the loiter and of all legs around it: people count them as one.
         there = [one for one in verdict.findings if one.rule == rule and one.place.number == circle.first - 1]
