@@ -17,7 +17,7 @@ from logs.verdict.judge_flight import judge_flight, judge_geometry
 from logs.verdict.rules.registry import RULES
 from logs.verdict.verdict import Verdict, verdict_json
 from logs.views.failures import failures
-from logs.views.report.text import verdict_badge, rule_rows
+from logs.views.report.text import rule_rows, verdict_badge
 from logs.views.turns import place_values
 from planfly.workflow.tighten_plan import tighten_limits
 from tests.mission_lines import setup_of, wp
