@@ -49,8 +49,8 @@ def _line(shape: RouteRequirements, track: Track, leg: int) -> Floats:
     """Return east, north and up (3,) per metre over the ground, by least squares; NaN for a short stretch."""
     away = track.position - shape.points[leg]
     along = away[:, :2] @ shape.leg_unit(leg)
-    low = shape.after[leg] + shape.blend[leg] + SETTLING
-    high = shape.runs[leg] - shape.before[leg + 1] - shape.blend[leg + 1]
+    low = shape.length_after[leg] + shape.blend[leg] + SETTLING
+    high = shape.runs[leg] - shape.length_before[leg + 1] - shape.blend[leg + 1]
     use = (track.leg == leg) & (along >= low) & (along <= high)
     if not use.any() or np.ptp(along[use]) < STRETCH:
         return np.full(3, np.nan)

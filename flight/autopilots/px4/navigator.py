@@ -160,7 +160,7 @@ def _navigate_waypoint(
     if memory.time_since_reached <= SWITCH_DELAY:
         return
     if is_end:
-        if parameters.anticipates and not memory.mission_finished:
+        if parameters.uses_switch_distance and not memory.mission_finished:
             memory.from_east, memory.from_north = estimated.east, estimated.north
         memory.mission_finished = True
     else:

@@ -45,7 +45,7 @@ class Other(PlanflyGuidance):
 
 @pytest.fixture
 def listed(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(catalog._LAWS, Other.name, Other)
+    monkeypatch.setitem(catalog._SIMULATED, Other.name, Other)
 
 
 def tight(**flight: str) -> Scenario:

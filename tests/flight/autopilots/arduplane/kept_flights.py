@@ -91,8 +91,8 @@ def return_mission(flight: str) -> Mission:
     """
     row = {name: float(value) for name, value in KEPT[flight].items() if value and name.endswith(("_m", "_mps"))}
     east, north = row["east_m"], row["north_m"]
-    heights_over_ground = math.hypot(row["velocity_east_mps"], row["velocity_north_mps"])
-    ue, un, slope = (row[f"velocity_{way}_mps"] / heights_over_ground for way in ("east", "north", "up"))
+    ground_speed = math.hypot(row["velocity_east_mps"], row["velocity_north_mps"])
+    ue, un, slope = (row[f"velocity_{way}_mps"] / ground_speed for way in ("east", "north", "up"))
     up = row["amsl_m"] + _LATE * row["velocity_up_mps"]
     start = (east - _LEAD * ue, north - _LEAD * un, up - _LEAD * slope)
     items = (

@@ -48,7 +48,7 @@ def test_a_rule_that_fails_shows_no_margin_of_what_passes_beside_it(
     failed = make_finding("slope", Place("leg", 2), ok=False, reason="too steep", margin=11.6, unit="deg")
     verdicts = iter([(passed,), (passed, failed)])
     monkeypatch.setattr(
-        "logs.views.report.compare._judge",
+        "logs.views.report.compare._judge_log",
         lambda _: Verdict(next(verdicts), flyable=False, complete=True, lines=("",), level="flown"),
     )
     log = read_log(log_file)
@@ -86,7 +86,7 @@ def test_a_flight_without_guidance_has_its_cross_track_named(log_file: Path) -> 
     found, items = compared(ours, recorded)
     assert math.isnan(items["largest cross-track"].second)
     (note,) = (note for note in found.notes if "cross-track" in note)
-    assert "the log of b.mcap does not hold" in note
+    assert "the log of b.mcap does not contain" in note
 
 
 # ----------------------------------------------------------------------
