@@ -54,6 +54,7 @@ def load_envelope(aircraft: Aircraft, *, motor_braking: bool = False) -> Envelop
         fastest_sd=0.0 if known is None else known.fastest,
         power_sd=0.0 if known is None else known.power,
         battery_guessed=known is not None and known.battery_guessed,
+        climb_guessed=known is not None and known.climb_guessed,
         aircraft=aircraft.name,
         model_hash=model_hash(aircraft),
         motor_braking=motor_braking,

@@ -112,6 +112,8 @@ def _other_change_text(change: Change) -> str:
                 else f"a glide of {wanted:.0f} s without throttle"
             )
             return f"fly {what} and give its log to planfly aircraft --identify"
+        case "stated climb":
+            return "state the climb of the aircraft at full throttle: planfly aircraft --new ... --climb DEGREES"
     return f"take a {change.what} {wanted:.2f} times as large"
 
 

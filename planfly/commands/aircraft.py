@@ -31,6 +31,8 @@ _DATA_SHEET_KEYWORDS = (
     *("mass", "span", "area", "cruise", "stall", "top", "bank", "climb"),
     *("battery", "motor", "prop", "layout", "fuel"),
 )
+# Half width of the interval of 95 % of a normal distribution, in standard deviations.
+_INTERVAL_SIGMAS = 1.96
 # Wind of the printed ground slopes, m/s.
 _WIND_MPS = 10.0
 
@@ -97,7 +99,7 @@ def _data_sheet_options(parser: CommandParser) -> None:
         "area": ("M2", "wing area, m2 (default: the area that carries the mass at the stall speed)"),
         "cruise": ("M/S", "usual airspeed"),
         "stall": ("M/S", "airspeed of slowest level flight"),
-        "top": ("M/S", "airspeed of fastest level flight (default: 1.4 times the cruise's)"),
+        "top": ("M/S", "airspeed of fastest level flight (default: 1.65 times the cruise's)"),
         "bank": ("DEG", "steepest bank in turns (default: 35)"),
         "climb": ("DEG", "steepest climb at cruise (default: 12, or the climb that fits the top speed)"),
         "motor": ("KV", "rpm a volt"),
@@ -250,6 +252,10 @@ def _print_sheet(aircraft: "Aircraft") -> None:
             f"  slopes   climb {climb:.1f} degrees, give or take {climb_sd:.1f}; descent {descent:.1f}, give or take"
             f" {descent_sd:.1f} (at cruise and 500 m; one standard deviation)"
         )
+        power = envelope.power(aircraft.airspeed, 500.0, 0.0)
+        low, high = (power * math.exp(sign * _INTERVAL_SIGMAS * uncertainty.power) for sign in (-1.0, 1.0))
+        kind = "from the battery" if aircraft.battery_voltage else "of fuel heat"
+        print(f"  power    {power:.3g} W {kind} in level flight at cruise, {low:.3g} to {high:.3g} (95 %)")
     print("  guessed  README.md says what was, and how far off it may be")
 
 
@@ -290,7 +296,8 @@ def _print_limits(aircraft: "Aircraft", envelope: "Envelope") -> None:
         climb, descent = math.degrees(envelope.climb_sd), math.degrees(envelope.descent_sd)
         print(
             f"  known    from {envelope.source}: climbs to {climb:.1f} deg, descents to {descent:.1f}, the fastest"
-            f" level flight to {envelope.fastest_sd:.1f} m/s (one deviation)"
+            f" level flight to {envelope.fastest_sd:.1f} m/s, power to a factor of {math.exp(envelope.power_sd):.2f}"
+            " (one deviation)"
         )
 
 

@@ -152,7 +152,7 @@ def _failure_place(world: ReturnWorld, ret: ReturnFlown, path: Floats) -> Floats
     if ret.kind == "threat":
         distances = np.linalg.norm(path - world.around.spheres[ret.threat], axis=1)
         return np.asarray(path[int(np.argmin(distances))])
-    if ret.kind in ("ground", "low", "safe", "unsure") and not math.isnan(ret.clearance_at[0]):
+    if ret.kind in ("ground", "low", "safe", "power", "unsure") and not math.isnan(ret.clearance_at[0]):
         return np.array(ret.clearance_at)
     return np.asarray(path[-1])
 

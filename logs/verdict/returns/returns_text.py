@@ -18,6 +18,7 @@ _SINGULAR_TEXTS: dict[Kind, str] = {
     "lost": "does not arrive",
     "energy": "takes more energy than may be used",
     "unknown": "flies where the ground is not known",
+    "power": "may take more energy than may be used, as the power of the aircraft is uncertain",
     "unsure": "is flown too differently by the point mass and in JSBSim to be judged",
     "low": "comes lower than {limit:.0f} m above ground",
 }
@@ -28,6 +29,7 @@ _PLURAL_TEXTS: dict[Kind, str] = {
     "lost": "do not arrive",
     "energy": "take more energy than may be used",
     "unknown": "fly where the ground is not known",
+    "power": "may take more energy than may be used, as the power of the aircraft is uncertain",
     "unsure": "are flown too differently by the point mass and in JSBSim to be judged",
     "low": "come lower than {limit:.0f} m above ground",
 }
@@ -39,6 +41,7 @@ _SEGMENT_NAMES: dict[Kind, str] = {
     "lost": "a return does not arrive",
     "energy": "a return takes too much energy",
     "unknown": "a return is not judged: ground not known",
+    "power": "a return is not judged: power uncertain",
     "unsure": "a return is not judged: flown too differently",
     "low": "a return comes lower than required",
     "safe": "a return is safe",
@@ -155,6 +158,8 @@ def no_return_text(returns: Returns) -> str:
             return f"{name}: not judged, as the energy in the battery is not known"
         case "used":
             return f"{name}: not judged, as the energy used before is not known"
+        case "power":
+            return f"{name}: not judged, as the power of the aircraft is uncertain"
         case "arrives":
             return f"{name}: not judged, as no return arrives"
         case "at once":
@@ -265,6 +270,9 @@ def _range_outcome_text(
         case "energy":
             leaves = f"leaves {worst_return.left:.0f} Wh of the required {returns.reserve:.0f} Wh"
             return f"{prefix}takes {worst_return.energy:.0f} Wh and {leaves}"
+        case "power":
+            leaves = f"leaves {worst_return.left:.0f} Wh of the required {returns.reserve:.0f} Wh"
+            return f"{prefix}takes {worst_return.energy:.0f} Wh and {leaves}, but the power is uncertain"
         case "unknown":
             return f"{prefix}flies where the elevation is not known"
         case "unsure":

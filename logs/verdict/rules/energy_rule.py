@@ -31,7 +31,8 @@ def energy_findings(
     is_measured = setup.source is not None and not geometric
     failsafe_messages, failsafe_text = _battery_failsafe_messages(requirements, used)
     faults += failsafe_messages
-    max_used = used * (1.0 + (0.0 if is_measured else UNDECIDED_FRACTION * setup.envelope.power_sd))
+    # Power is log-normal; this is the upper end of 95 %.
+    max_used = used * math.exp(0.0 if is_measured else UNDECIDED_FRACTION * setup.envelope.power_sd)
     is_uncertain = not faults and not is_guessed and used <= usable < max_used
     if used == 0.0 and predicted == 0.0:
         # A model without a reading of power reads as 0 W.
@@ -47,10 +48,10 @@ def energy_findings(
             reason = (
                 f"the battery is guessed: state --battery with the aircraft, or the scenario's battery_wh; {reason}"
             )
-        elif is_uncertain:
-            reason += f"; the power according to {setup.envelope.source} is known to {setup.envelope.power_sd:.0%}"
         elif used > usable:
             reason += f"; {ENERGY_RESERVE_FRACTION:.0%} must be left"
+        elif max_used > used:
+            reason += f"; at most {max_used:.1f} Wh with 95 % probability, as the power is from {setup.envelope.source}"
         reason += failsafe_text
     return [
         make_finding(
