@@ -101,6 +101,10 @@ def compute_tables(aircraft: Aircraft, motor_braking: bool) -> dict[str, Floats]
             fast[j] = found.airspeed
         if found := slowest(fdm, amsl):
             slow[j] = found.airspeed
+    if np.isnan(slow).all():
+        # The wing stalls before the elevator reaches its stop: the slowest trim of the grid is the slowest flight.
+        is_level = np.isfinite(powers["power_level"])
+        slow = np.where(is_level.any(axis=0) & np.isfinite(fast), airspeeds[is_level.argmax(axis=0)], math.nan)
     # A trim is accurate to about 1e-11; nine decimals are the same on every machine.
     return {
         "airspeed": airspeeds,

@@ -81,7 +81,7 @@ def aircraft_options(line: LineParser) -> None:
         complete_aircraft,
     )
     with_completer(
-        logs.add_argument("--check", metavar="LOG", help="with --identify: another log, to replay with the model"),
+        logs.add_argument("--check", metavar="LOG", help="with --identify: another log, to predict with the model"),
         files("bin", "BIN", "tlog", "ulg", "toml", "csv", "mat", "parquet", "h5"),
     )
     result_options(
@@ -210,12 +210,28 @@ def _identify(args: argparse.Namespace) -> int:
     _print_unknown(identified)
     if "identify.waypoints" not in files_made:
         print("  no mission identify.waypoints: the logs have neither home (ORGN) nor a position on the ground (POS)")
-    for replay in identified.replays:
-        rms_text = ", ".join(f"{name} {value:.2g}" for name, value in replay.rms.items())
-        print(f"  replay   {replay.model}: {rms_text} (rms of {replay.windows} windows of 5 s; deg/s, deg, m/s)")
+    _print_predictions(identified, args.check)
     give_answer(args, lambda: _json_answer([new_aircraft]))
     print(f"next      planfly aircraft {shlex.quote(args.out)}; {args.out}/identify.html says how sure each number is")
     return FLYABLE
+
+
+def _print_predictions(identified: "planfly.IdentifiedAircraft", check: str | None) -> None:
+    """Print the errors of predictions half a second ahead by each model, and the whiteness of the innovations."""
+    from aircraft.identification.prediction import QUANTITIES
+
+    predicted = identified.predicted
+    print(
+        f"  ahead    rms errors 0.5 s ahead, {predicted.count} predictions"
+        f" {'on the same logs' if check is None else f'on {check}'} (deg/s, deg, m/s)"
+    )
+    for prediction in predicted.predictions:
+        rms_text = ", ".join(f"{name} {rms:.2g}" for name, rms in zip(QUANTITIES, prediction.rms[0.5], strict=True))
+        print(f"  ahead    {prediction.model}: {rms_text}")
+    shares = ", ".join(f"{100.0 * share:.0f}" for share in predicted.predictions[-1].whiteness)
+    print(
+        f"  ahead    innovations of roll, pitch, yaw: white at {shares} % of lags to 0.5 s (95 % in a complete model)"
+    )
 
 
 def _print_unknown(identified: "planfly.IdentifiedAircraft") -> None:
