@@ -1,19 +1,21 @@
 """Build an aircraft from the few numbers of a data sheet, by scaling a model of its class.
 
 The model meets stated values exactly: mass, span, speeds, climb. Missing values are taken from published aircraft of
-the class (`TAIL`, `WING`) and have a standard deviation (`aircraft.uncertainty`).
+the class (`TAIL`, `WING`), drag and power from real aircraft (`aircraft.power_prior`), and have a standard deviation
+(`aircraft.uncertainty`).
 """
 
 import contextlib
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
 from aircraft.envelope import GRAVITY
-from aircraft.model_writer import AeroCoefficients, Layout, ModelNumbers
+from aircraft.model_writer import FACTORS, POWER_FACTORS, AeroCoefficients, Layout, ModelNumbers
+from aircraft.power_prior import POWER_PRIOR, PowerPrior
 from aircraft.propulsion import BOOK_PROPELLER, ElectricMotor, FuelEngine, Propeller
 from world.arrays import Floats
 from world.errors import FlightError
@@ -103,7 +105,6 @@ class AircraftClass:
 
     lift_slope: ratio to the lift slope of an elliptic wing of the same aspect ratio.
     lift_max: largest lift coefficient, if the sheet states no area.
-    drag: least drag at a Reynolds number of `DRAG_REYNOLDS` on the mean chord.
     oswald: span efficiency.
     pitch_alpha, pitch_q: values per unit of aspect ratio if ``by_aspect``, otherwise absolute values.
     gyration: radii of gyration about x, y, z as ratios to the span.
@@ -112,7 +113,6 @@ class AircraftClass:
 
     lift_slope: float
     lift_max: float
-    drag: float
     oswald: float
     by_aspect: bool
     pitch_alpha: float
@@ -137,17 +137,12 @@ class AircraftClass:
     throw: tuple[float, float, float]
 
 
-# Reynolds number of the class's least drag.
-DRAG_REYNOLDS = 3.2e5
-# Power of the Reynolds number in the least drag.
-DRAG_POWER = -0.2
-# The Aerosonde (Beard and McLain, appendix E.2) and the Ultra Stick 25e (University of Minnesota): least drag 0.043 and
-# 0.0434 at Reynolds numbers of 3.2e5 and 2.9e5, Cmq -38 and -13.6 at aspect ratios of 15.2 and 5.2, Cm_alpha -2.74 and
-# -0.72; radii of gyration 0.095, 0.111, 0.138 and 0.150, 0.165, 0.220 of the span; other values lie between the two.
+# The Aerosonde (Beard and McLain, appendix E.2) and the Ultra Stick 25e (University of Minnesota): Cmq -38 and -13.6 at
+# aspect ratios of 15.2 and 5.2, Cm_alpha -2.74 and -0.72; radii of gyration 0.095, 0.111, 0.138 and 0.150, 0.165, 0.220
+# of the span; other values lie between the two.
 TAIL = AircraftClass(
     lift_slope=1.05,
     lift_max=1.25,
-    drag=0.0425,
     oswald=0.82,
     by_aspect=True,
     pitch_alpha=-0.16,
@@ -172,12 +167,11 @@ TAIL = AircraftClass(
     throw=(math.radians(25.0), math.radians(25.0), math.radians(25.0)),
 )
 # The Skywalker X8 (Gryte et al. 2018) and the Zagi (Beard and McLain, first edition, appendix E.1): lift slopes 0.89
-# and 0.72 of the elliptic wing's slope, least drag 0.0182 and 0.0254 at Reynolds numbers of 4.4e5 and 3.4e5; lateral
-# values of the X8 only, since the Zagi's table has no directional stability.
+# and 0.72 of the elliptic wing's slope; lateral values of the X8 only, since the Zagi's table has no directional
+# stability.
 WING = AircraftClass(
     lift_slope=0.80,
     lift_max=1.05,
-    drag=0.0225,
     oswald=0.86,
     by_aspect=False,
     pitch_alpha=-0.51,
@@ -207,7 +201,13 @@ CLASSES: dict[Layout, AircraftClass] = {"tail": TAIL, "vtail": TAIL, "wing": WIN
 # Climb angle if the sheet states none, rad.
 USUAL_CLIMB = math.radians(12.0)
 # Ratio of top speed to cruise speed if the sheet states no top speed.
-USUAL_TOP = 1.4
+USUAL_TOP = 1.65
+# Guesses of that ratio, the nearest first, if no propeller gives the usual one with the climb of the sheet.
+_TOP_GUESSES = (USUAL_TOP, 1.5, 1.8, 1.35, 2.0, 1.2, 2.3, 1.1)
+# Guesses of the climb, degrees, if a top speed alone leads to a climb that is too flat, or in reverse too steep.
+_CLIMB_GUESSES_DEG = (2.0, 4.0, 6.0, 9.0, 12.0, 16.0, 20.0, 25.0, 30.0, 35.0)
+# Number of values that are tried to find an allowed range.
+_RANGE_STEPS = 34
 # Steepest climb angle of a model, rad.
 STEEPEST_CLIMB = math.radians(35.0)
 # Bank limit if the sheet states none, rad.
@@ -220,6 +220,14 @@ _USUAL_VOLTS = ((1.5, 11.1), (5.0, 14.8), (10.0, 22.2), (math.inf, 44.4))
 FUEL_HEAT = 43.5e6
 # Angle of attack at cruise, rad.
 CRUISE_ALPHA = 0.05
+# Least angle of attack at cruise, rad: a wing of low aspect ratio is set such that its stall is within
+# `MAX_STALL_ALPHA`.
+MIN_CRUISE_ALPHA = -0.05
+# Largest angle of attack at the stall, rad. Trims are searched up to 0.4, and with thrust flight is possible below the
+# stall speed.
+MAX_STALL_ALPHA = 0.33
+# Elevator at zero lift, which no level flight reaches, as a ratio to its stop, at most.
+MAX_ZERO_LIFT_ELEVATOR = 0.9
 # Elevator at cruise, rad.
 CRUISE_ELEVATOR = -0.035
 # Sharpness of the stall, the M of Beard and McLain.
@@ -236,6 +244,9 @@ _MIN_DIAMETER_M = 0.06
 _MAX_DIAMETER_RATIO = 0.6
 # Largest diameter of an engine's propeller if none is stated, as a ratio to the span.
 _ENGINE_DIAMETER_RATIO = 0.18
+# Ratio of an engine's shaft work to the fuel's heat. Small engines reach 0.2 at full throttle; the Penguin B's 0.231 kg
+# of fuel per hour (`examples/real/aircraft.csv`) leaves 0.11 for cruise.
+_ENGINE_EFFICIENCY = 0.15
 # Friction torque of an engine, as a ratio to its largest torque.
 _FRICTION_RATIO = 0.08
 
@@ -274,12 +285,11 @@ def check_sheet(sheet: DataSheet) -> DataSheet:
         raise _out_of_range("top", sheet.top, f"allowed {_speed_range_text(low, high, sheet)}", "m/s")
     area = _wing_area(sheet)
     lift = _weight(sheet) / (0.5 * SEA_LEVEL * sheet.stall**2 * area)
-    low, high = (
-        _weight(sheet) / (0.5 * SEA_LEVEL * sheet.stall**2 * lift_limit) for lift_limit in reversed(LIFT_RANGE)
-    )
     if not _is_within(lift, *LIFT_RANGE):
-        allowed = f"allowed {low:.3g}..{high:.3g} m2 for {sheet.mass:g} kg that stall at {sheet.stall:g} m/s"
-        raise _out_of_range("area", area, allowed, "m2")
+        low, high = (math.sqrt(lift / lift_limit) * sheet.stall for lift_limit in reversed(LIFT_RANGE))
+        areas = f"{lift / LIFT_RANGE[1] * area:.3g}..{lift / LIFT_RANGE[0] * area:.3g} m2 at this stall speed"
+        allowed = f"allowed {low:.3g}..{high:.3g} m/s without flaps for {sheet.mass:g} kg on {area:g} m2, or {areas}"
+        raise _out_of_range("stall", sheet.stall, allowed, "m/s")
     aspect = sheet.span**2 / area
     if not _is_within(aspect, *ASPECT_RANGE):
         low, high = (math.sqrt(lift_limit * area) for lift_limit in ASPECT_RANGE)
@@ -336,10 +346,13 @@ class SizedAircraft:
     guessed: tuple[str, ...]
 
 
-def size_aircraft(sheet: DataSheet, title: str = "", kind: AircraftClass | None = None) -> SizedAircraft:
+def size_aircraft(
+    sheet: DataSheet, title: str = "", kind: AircraftClass | None = None, prior: PowerPrior = POWER_PRIOR
+) -> SizedAircraft:
     """Build the model of a data sheet.
 
     kind: class of the aircraft; None takes the layout's class.
+    prior: drag, efficiency and avionics power by size.
 
     Raises FlightError if no propeller gives the stated climb and top speed.
 
@@ -349,12 +362,13 @@ def size_aircraft(sheet: DataSheet, title: str = "", kind: AircraftClass | None 
     """
     kind = CLASSES[sheet.layout] if kind is None else kind
     filled, guessed = _fill_sheet(sheet)
-    aero = _aerodynamics(filled, kind)
+    aero = _aerodynamics(filled, kind, prior)
     drag = _drag_function(filled, aero)
     if sheet.sink:
         aero, drag = _match_sink(filled, aero, sheet.sink)
-    propulsion: ElectricMotor | FuelEngine
-    propulsion, filled = (_size_engine if sheet.fuelled else _size_motor)(sheet, filled, drag)
+    propulsion, filled = _size_propulsion(sheet, filled, drag)
+    if isinstance(propulsion, ElectricMotor):
+        propulsion = _with_battery_power(propulsion, filled, drag, prior)
     chord = filled.area / filled.span
     jx, jy, jz = (filled.mass * (ratio * filled.span) ** 2 for ratio in kind.gyration)
     numbers = ModelNumbers(
@@ -371,6 +385,8 @@ def size_aircraft(sheet: DataSheet, title: str = "", kind: AircraftClass | None 
         throw=kind.throw,
         rate=math.radians(300.0),
         lag=(0.05, 0.1 if not sheet.fuelled else 0.3),
+        # A fuel engine drives its own generator.
+        factors=(*FACTORS, *(name for name in POWER_FACTORS if name != "avionics-power" or not sheet.fuelled)),
     )
     return SizedAircraft(numbers, filled, guessed)
 
@@ -407,7 +423,7 @@ def elliptic_slope(aspect: float) -> float:
     return 2.0 * math.pi * aspect / (2.0 + math.sqrt(4.0 + aspect**2))
 
 
-def _aerodynamics(sheet: DataSheet, aircraft_class: AircraftClass) -> AeroCoefficients:
+def _aerodynamics(sheet: DataSheet, aircraft_class: AircraftClass, prior: PowerPrior) -> AeroCoefficients:
     area, chord = sheet.area, sheet.area / sheet.span
     aspect = sheet.span / chord
     slope = aircraft_class.lift_slope * elliptic_slope(aspect)
@@ -416,20 +432,32 @@ def _aerodynamics(sheet: DataSheet, aircraft_class: AircraftClass) -> AeroCoeffi
     weight = _weight(sheet)
     cruise_lift = weight / (0.5 * SHEET_DENSITY * sheet.cruise**2 * area)
     lift_max = weight / (0.5 * SEA_LEVEL * sheet.stall**2 * area)
-    lift_0 = cruise_lift - slope * CRUISE_ALPHA - aircraft_class.lift_elevator * CRUISE_ELEVATOR
-    stall_alpha = (lift_max - lift_0 - aircraft_class.lift_elevator * aircraft_class.elevator_stall) / slope
     # The elevator reaches its stop at the sheet's stall speed.
     travel = aircraft_class.elevator_stall - CRUISE_ELEVATOR
-    elevator = -stiffness * (stall_alpha - CRUISE_ALPHA) / travel
+    alpha_range = (lift_max - cruise_lift - aircraft_class.lift_elevator * travel) / slope
+    cruise_alpha = min(CRUISE_ALPHA, MAX_STALL_ALPHA - alpha_range)
+    if cruise_alpha < MIN_CRUISE_ALPHA:
+        lift_limit = lift_max - slope * (MIN_CRUISE_ALPHA - cruise_alpha)
+        min_stall = sheet.stall * math.sqrt(lift_max / lift_limit)
+        allowed = (
+            f"allowed {min_stall:.3g}..{STALL_SHARE[1] * sheet.cruise:.4g} m/s for a wing of aspect ratio {aspect:.1f}"
+        )
+        raise _out_of_range("stall", sheet.stall, allowed, "m/s")
+    # An elevator that is enough for the stall only may be too weak for the fastest level flight.
+    fast_travel = MAX_ZERO_LIFT_ELEVATOR * aircraft_class.throw[0] - CRUISE_ELEVATOR
+    elevator = stiffness * max(alpha_range / -travel, cruise_lift / slope / fast_travel)
+    lift_0 = cruise_lift - slope * cruise_alpha - aircraft_class.lift_elevator * CRUISE_ELEVATOR
+    # Lift holds up to the elevator's stop, so that the slowest level flight has a trim.
+    stall_alpha = cruise_alpha - travel * elevator / stiffness
     reynolds = sheet.cruise * chord / VISCOSITY
     return AeroCoefficients(
         lift_0=lift_0,
         lift_alpha=slope,
         lift_q=aircraft_class.lift_q,
         lift_elevator=aircraft_class.lift_elevator,
-        drag_min=aircraft_class.drag * (reynolds / DRAG_REYNOLDS) ** DRAG_POWER,
+        drag_min=prior.least_drag(sheet.layout, aspect, reynolds),
         drag_lift=1.0 / (math.pi * aircraft_class.oswald * aspect),
-        pitch_0=-stiffness * CRUISE_ALPHA - elevator * CRUISE_ELEVATOR,
+        pitch_0=-stiffness * cruise_alpha - elevator * CRUISE_ELEVATOR,
         pitch_alpha=stiffness,
         pitch_q=aircraft_class.pitch_q * aspect_factor,
         pitch_elevator=elevator,
@@ -450,6 +478,8 @@ def _aerodynamics(sheet: DataSheet, aircraft_class: AircraftClass) -> AeroCoeffi
     )
 
 
+# Drives that a sheet can have.
+Drive = ElectricMotor | FuelEngine
 # Drag, N, by airspeed, m/s.
 Drag = Callable[[float], float]
 
@@ -488,6 +518,26 @@ def _match_sink(sheet: DataSheet, aero: AeroCoefficients, sink: float) -> tuple[
 # Motor and propeller that give the stated climb at cruise and the stated top speed.
 
 
+class _NoPropellerError(Exception):
+    """Climb and top speed of a sheet that no propeller gives; `_size_propulsion` adds the reason."""
+
+
+def _size_propulsion(stated_sheet: DataSheet, sheet: DataSheet, drag: Drag) -> tuple[Drive, DataSheet]:
+    """Size motor or engine, and propeller.
+
+    Raises FlightError with an allowed range if there are none for the sheet.
+    """
+    try:
+        return _size_drive(stated_sheet, sheet, drag)
+    except _NoPropellerError:
+        raise _no_propeller(stated_sheet, sheet, drag) from None
+
+
+def _size_drive(stated_sheet: DataSheet, sheet: DataSheet, drag: Drag) -> tuple[Drive, DataSheet]:
+    size = _size_engine if sheet.fuelled else _size_motor
+    return size(stated_sheet, sheet, drag)
+
+
 def _size_motor(stated_sheet: DataSheet, sheet: DataSheet, drag: Drag) -> tuple[ElectricMotor, DataSheet]:
     """Size motor and propeller for a sheet, and return them with the sheet's resulting climb and top speed.
 
@@ -502,23 +552,55 @@ def _size_motor(stated_sheet: DataSheet, sheet: DataSheet, drag: Drag) -> tuple[
             return motor, result
         # Limit the climb of an aircraft with more thrust than that.
         return _solve_motor(stated_sheet, replace(sheet, climb=STEEPEST_CLIMB), drag, ["climb"])
-    if (stated_sheet.climb and stated_sheet.top) or not (stated_sheet.top or stated_sheet.trim_throttle):
-        return _solve_motor(stated_sheet, sheet, drag, ["climb", "top"])
-    if stated_sheet.climb:
-        with contextlib.suppress(FlightError):
-            return _solve_motor(stated_sheet, sheet, drag, ["climb", "trim_throttle"])
+    if stated_sheet.climb and stated_sheet.trim_throttle and not stated_sheet.top:
         # The climb that an autopilot is configured with is often less than the motor gives.
-        return _solve_motor(stated_sheet, sheet, drag, ["climb", "top"])
+        with contextlib.suppress(_NoPropellerError):
+            return _solve_motor(stated_sheet, sheet, drag, ["climb", "trim_throttle"])
+    if stated_sheet.climb or not (stated_sheet.top or stated_sheet.trim_throttle):
+        tops = [sheet.top] if stated_sheet.top else [ratio * sheet.cruise for ratio in _TOP_GUESSES]
+        return _solve_first(stated_sheet, [replace(sheet, top=top) for top in tops], drag)
     # A propeller of the usual size, and the speed per volt from the top speed or the throttle: either determines the
     # climb better than a guess.
     unstated = replace(stated_sheet, top=0.0, trim_throttle=0.0)
-    usual_motor, _ = _solve_motor(unstated, replace(sheet, top=USUAL_TOP * sheet.cruise), drag, ["climb", "top"])
+    usual_motor, _ = _solve_first(unstated, [replace(sheet, top=ratio * sheet.cruise) for ratio in _TOP_GUESSES], drag)
     propeller = stated_sheet.propeller if stated_sheet.propeller[0] else (usual_motor.propeller.diameter, 0.0)
     target_fields = ["top"] if stated_sheet.top else ["trim_throttle"]
-    motor, result = _solve_motor(replace(stated_sheet, propeller=propeller), sheet, drag, target_fields)
-    if result.climb <= STEEPEST_CLIMB:
-        return motor, result
-    return _solve_motor(replace(stated_sheet, trim_throttle=0.0), sheet, drag, ["climb", "top"])
+    sized_sheet = replace(stated_sheet, propeller=propeller)
+    free_sheet = replace(stated_sheet, trim_throttle=0.0)
+    return _limit_climb(
+        lambda: _solve_motor(sized_sheet, sheet, drag, target_fields),
+        lambda climb: _solve_motor(free_sheet, replace(sheet, climb=climb), drag, ["climb", "top"]),
+    )
+
+
+_D = TypeVar("_D", ElectricMotor, FuelEngine)
+
+
+def _limit_climb(
+    solve: Callable[[], tuple[_D, DataSheet]], solve_for: Callable[[float], tuple[_D, DataSheet]]
+) -> tuple[_D, DataSheet]:
+    """Return the drive that follows from a top speed, or the drive for a possible climb if its climb is none.
+
+    solve_for: solves for a climb, rad.
+    """
+    climbs = _CLIMB_GUESSES_DEG
+    with contextlib.suppress(_NoPropellerError):
+        drive, result = solve()
+        if result.climb <= STEEPEST_CLIMB:
+            return drive, result
+        climbs = climbs[::-1]
+    for climb in climbs:
+        with contextlib.suppress(_NoPropellerError):
+            return solve_for(math.radians(climb))
+    raise _NoPropellerError
+
+
+def _solve_first(stated_sheet: DataSheet, sheets: Sequence[DataSheet], drag: Drag) -> tuple[ElectricMotor, DataSheet]:
+    """Return the motor for climb and top speed of the first of these sheets for which there is one."""
+    for sheet in sheets:
+        with contextlib.suppress(_NoPropellerError):
+            return _solve_motor(stated_sheet, sheet, drag, ["climb", "top"])
+    raise _NoPropellerError
 
 
 def _solve_motor(
@@ -553,9 +635,9 @@ def _solve_motor(
         motor = make_motor(free)
         return [_thrust_error(motor, sheet, drag, name) for name in target_fields]
 
-    motor = make_motor(_solve_errors(errors, len(target_fields), sheet))
+    motor = make_motor(_solve_errors(errors, len(target_fields)))
     if not _MIN_DIAMETER_M <= motor.propeller.diameter <= _MAX_DIAMETER_RATIO * sheet.span:
-        raise _no_propeller(sheet)
+        raise _NoPropellerError
     return motor, _with_performance(sheet, motor, drag)
 
 
@@ -571,11 +653,36 @@ def _motor_on_battery(propeller: Propeller, volts: float, emf: float, cruise: fl
     return motor
 
 
+def _with_battery_power(motor: ElectricMotor, sheet: DataSheet, drag: Drag, prior: PowerPrior) -> ElectricMotor:
+    """Return a motor whose battery power in level flight at cruise has the prior's efficiency and avionics."""
+    thrust, low, high = drag(sheet.cruise), 0.0, 1.0
+    for _ in range(60):
+        throttle = 0.5 * (low + high)
+        has_excess = motor.thrust(throttle, sheet.cruise, SHEET_DENSITY) > thrust
+        low, high = (low, throttle) if has_excess else (throttle, high)
+    drive_power = thrust * sheet.cruise / prior.drive_efficiency(sheet.mass)
+    return replace(
+        motor, power_ratio=drive_power / motor.power(high, sheet.cruise, SHEET_DENSITY), avionics=prior.avionics
+    )
+
+
 def _size_engine(stated_sheet: DataSheet, sheet: DataSheet, drag: Drag) -> tuple[FuelEngine, DataSheet]:
     """Return an engine whose torque meets the climb or the top speed.
 
     If both are stated, the propeller's pitch is chosen too.
     """
+    # A stated top speed determines the climb better than a guess.
+    target_fields = [name for name in ("climb", "top") if getattr(stated_sheet, name)] or ["climb"]
+    if target_fields != ["top"]:
+        return _solve_engine(sheet, drag, target_fields)
+    return _limit_climb(
+        lambda: _solve_engine(sheet, drag, target_fields),
+        lambda climb: _solve_engine(replace(sheet, climb=climb), drag, ["climb", "top"]),
+    )
+
+
+def _solve_engine(sheet: DataSheet, drag: Drag, target_fields: list[str]) -> tuple[FuelEngine, DataSheet]:
+    """Return the engine that meets these fields of the sheet by its torque, and for two fields the pitch."""
     needed_thrust = drag(sheet.cruise) + _weight(sheet) * math.sin(sheet.climb)
     diameter, pitch = sheet.propeller
     pitch_ratio = pitch / diameter / BOOK_PROPELLER.zero_thrust_ratio if diameter else 1.0
@@ -584,24 +691,20 @@ def _size_engine(stated_sheet: DataSheet, sheet: DataSheet, drag: Drag) -> tuple
         diameter=diameter / BOOK_PROPELLER.diameter if diameter else usual_size, pitch=pitch_ratio
     )
     initial_torque = 0.12 * needed_thrust * base.diameter
-    # A stated top speed determines the climb better than a guess.
-    target_fields = [name for name in ("climb", "top") if getattr(stated_sheet, name)] or ["climb"]
 
     def make_engine(free: Sequence[float]) -> FuelEngine:
         torque, pitch_factor = (*free, 1.0)[:2]
         torque *= initial_torque
-        return FuelEngine(base.scaled(pitch=pitch_factor), torque, _FRICTION_RATIO * torque, windmill=WINDMILL)
+        return FuelEngine(
+            base.scaled(pitch=pitch_factor), torque, _FRICTION_RATIO * torque, _ENGINE_EFFICIENCY, WINDMILL
+        )
 
     def errors(free: Sequence[float]) -> list[float]:
         engine = make_engine(free)
         return [_thrust_error(engine, sheet, drag, name) for name in target_fields]
 
-    engine = make_engine(_solve_errors(errors, len(target_fields), sheet))
+    engine = make_engine(_solve_errors(errors, len(target_fields)))
     return engine, _with_performance(sheet, engine, drag)
-
-
-# Drives that a sheet can have.
-Drive = ElectricMotor | FuelEngine
 
 
 def _thrust_error(motor: Drive, sheet: DataSheet, drag: Drag, field: str) -> float:
@@ -612,15 +715,15 @@ def _thrust_error(motor: Drive, sheet: DataSheet, drag: Drag, field: str) -> flo
     return motor.thrust(throttle, speed, SHEET_DENSITY) / needed_thrust - 1.0
 
 
-def _solve_errors(errors: Callable[[Sequence[float]], list[float]], count: int, sheet: DataSheet) -> list[float]:
-    """Return positive numbers near 1 that make all errors vanish. Raises FlightError without a solution."""
+def _solve_errors(errors: Callable[[Sequence[float]], list[float]], count: int) -> list[float]:
+    """Return positive numbers near 1 that make all errors vanish."""
     if not count:
         return []
     for size in (1.0, 0.6, 1.7):
         x = _solve_by_newton(lambda x: np.array(errors(np.exp(x).tolist())), np.log([size, 1.0 / size][:count]))
         if x is not None:
             return np.exp(x).tolist()
-    raise _no_propeller(sheet)
+    raise _NoPropellerError
 
 
 # Step of the difference quotients, as a logarithm of a factor.
@@ -659,23 +762,44 @@ def _solve_by_newton(errors: Callable[[Floats], Floats], x: Floats) -> Floats | 
     return x if np.abs(residual).max() < _THRUST_TOLERANCE_RATIO else None
 
 
-def _no_propeller(sheet: DataSheet) -> FlightError:
-    climb = math.degrees(sheet.climb)
-    allowed = "a steeper climb needs a higher top speed, a flatter one a lower"
-    reason = f"no propeller gives it at {sheet.cruise:g} m/s with a top speed of {sheet.top:.3g} m/s"
-    return FlightError.of_argument("climb", climb, f"{reason}; {allowed}", shown=f"{climb:.3g} degrees")
+def _no_propeller(stated_sheet: DataSheet, sheet: DataSheet, drag: Drag) -> FlightError:
+    """Return the error for a sheet whose climb and top speed no propeller gives, with the range of a stated value.
+
+    sheet: the sheet with missing values filled in.
+    """
+    field = next((name for name in ("climb", "top", "motor") if getattr(stated_sheet, name)), "")
+    if not field:
+        reason = "no propeller of this size and pitch" if stated_sheet.propeller[0] else "no propeller"
+        allowed = f"{reason} carries {sheet.mass:g} kg at {sheet.cruise:g} m/s; state the climb, the top speed or both"
+        return FlightError.of_argument("prop" if stated_sheet.propeller[0] else "cruise", None, allowed, shown="")
+    option, unit, low, high, factor = RANGES[field]
+    if field == "top":
+        low, high = (ratio * sheet.cruise for ratio in TOP_SHARE)
+    found = []
+    for value in np.geomspace(low, high, _RANGE_STEPS).tolist():
+        changed = {field: value * factor}
+        with contextlib.suppress(_NoPropellerError):
+            _size_drive(replace(stated_sheet, **changed), replace(sheet, **changed), drag)
+            found.append(value)
+    others = [
+        f"{title} of {getattr(stated_sheet, name) / RANGES[name][4]:.3g} {RANGES[name][1]}"
+        for name, title in (("top", "a top speed"), ("motor", "a motor"))
+        if name != field and getattr(stated_sheet, name)
+    ]
+    condition = " and ".join([f"at {sheet.cruise:g} m/s", *others])
+    allowed = (
+        f"allowed about {min(found):.3g}..{max(found):.3g} {unit} {condition}" if found else f"no propeller {condition}"
+    )
+    value = getattr(stated_sheet, field) / factor
+    return FlightError.of_argument(option, value, allowed, shown=f"{value:.3g} {unit}")
 
 
 def _with_performance(sheet: DataSheet, motor: Drive, drag: Drag) -> DataSheet:
-    """Return the sheet with the climb and top speed of a motor. Raise FlightError if it cannot climb."""
+    """Return the sheet with the climb and top speed of a motor, if it can climb."""
     excess_thrust = motor.thrust(1.0, sheet.cruise, SHEET_DENSITY) - drag(sheet.cruise)
     climb = math.asin(max(-1.0, min(0.95, excess_thrust / _weight(sheet))))
-    min_climb_deg = RANGES["climb"][2]
-    if climb < math.radians(min_climb_deg):
-        result_text = f"with this propeller and {sheet.volts:g} V it climbs {math.degrees(climb):.1f} degrees at cruise"
-        raise _out_of_range(
-            "motor", sheet.motor, f"{result_text}; allowed {min_climb_deg:g} degrees and more", "rpm a volt"
-        )
+    if not climb >= math.radians(RANGES["climb"][2]) * (1.0 - _EDGE_ROUNDING):
+        raise _NoPropellerError
     low, high = sheet.cruise, 4.0 * sheet.cruise
     for _ in range(60):
         airspeed = 0.5 * (low + high)

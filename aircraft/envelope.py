@@ -36,8 +36,8 @@ class Envelope:
     source: source of a model with uncertain slopes: "a data sheet"; "" if the slopes are certain.
     climb_sd, descent_sd: standard deviations of the steepest climb and descent, rad.
     fastest_sd: standard deviation of the fastest level flight, m/s.
-    power_sd: relative standard deviation of power.
-    battery_guessed: True if the battery's energy was not stated.
+    power_sd: standard deviation of the logarithm of power.
+    battery_guessed, climb_guessed: True if the battery's energy, the steepest climb was not stated.
     """
 
     aircraft: str
@@ -60,6 +60,7 @@ class Envelope:
     fastest_sd: float = 0.0
     power_sd: float = 0.0
     battery_guessed: bool = False
+    climb_guessed: bool = False
 
     def __post_init__(self) -> None:
         """Make the tables read-only."""

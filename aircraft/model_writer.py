@@ -30,7 +30,12 @@ FACTORS = {
     "roll-damping": "rolling moment per roll rate",
     "aileron-power": "rolling moment per aileron",
 }
-# Ratio of the travel of elevons and ruddervators to the larger travel of the two commands that they mix.
+# Factors of a model with an electric motor or an engine whose power is guessed.
+POWER_FACTORS = {
+    "drive-power": "battery power or heat of the fuel for a power of the shaft",
+    "avionics-power": "power of autopilot, radios and servos",
+}
+# Ratio of the stops of elevons and ruddervators to the larger stop of the two commands that they mix.
 MIXED_TRAVEL = 1.3
 # kg m^2 in one slug ft^2.
 _KG_M2_PER_SLUG_FT2 = 1.3558179483314004

@@ -6,6 +6,7 @@ aircraft that the coefficients are fitted to; `benchmarks/real_power.py` is the 
 the others.
 """
 
+import math
 from dataclasses import dataclass
 
 from aircraft.model_writer import Layout
@@ -65,3 +66,21 @@ class PowerPrior:
 
 # The fit of `benchmarks/real_power.py` to all aircraft of the table.
 POWER_PRIOR = PowerPrior(tail_drag=0.0315, wing_drag=0.0171, aspect_power=-0.42, loss_mass=1.32, avionics=3.2)
+
+
+def power_log_sd(least_share: float, avionics_share: float, least_drag_sd: float = LEAST_DRAG_LOG_SD) -> float:
+    """Return the standard deviation of the logarithm of the power in level flight.
+
+    least_share: share of the least drag in the drag.
+    avionics_share: share of the avionics in the power.
+
+    >>> round(power_log_sd(1.0, 0.0), 3)  # of 0.35 and 0.29
+    0.455
+    """
+    drive_share = 1.0 - avionics_share
+    return math.hypot(
+        drive_share * least_share * least_drag_sd,
+        drive_share * (1.0 - least_share) * INDUCED_DRAG_LOG_SD,
+        drive_share * EFFICIENCY_LOG_SD,
+        avionics_share * AVIONICS_LOG_SD,
+    )

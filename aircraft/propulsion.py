@@ -108,6 +108,8 @@ class ElectricMotor:
     resistance: ohm.
     idle_current: no-load current, A.
     windmill: fraction of an idle propeller's negative thrust that is applied.
+    power_ratio: ratio of the battery's power for the drive to the power of motor and propeller as computed.
+    avionics: power of autopilot, radios and servos, W.
 
     Beard and McLain, section 4.3, with a current that does not brake (`aircraft/aerosonde/README.md`).
     """
@@ -120,6 +122,8 @@ class ElectricMotor:
     windmill: float = 1.0
     direction: Place = (1.0, 0.0, 0.0)
     place: Place = (0.0, 0.0, 0.0)
+    power_ratio: float = 1.0
+    avionics: float = 0.0
 
     def speed(self, throttle: float, airspeed: float, rho: float) -> float:
         """Return the propeller speed, rad/s."""
@@ -136,7 +140,8 @@ class ElectricMotor:
     def power(self, throttle: float, airspeed: float, rho: float) -> float:
         """Return the power from the battery, W."""
         volts = self.volts * throttle
-        return volts * max(0.0, (volts - self.emf * self.speed(throttle, airspeed, rho)) / self.resistance)
+        current = max(0.0, (volts - self.emf * self.speed(throttle, airspeed, rho)) / self.resistance)
+        return self.power_ratio * volts * current + self.avionics
 
     def functions(self, factors: tuple[str, ...]) -> str:
         """Return the JSBSim functions."""
@@ -147,6 +152,14 @@ class ElectricMotor:
         losses = f"<quotient> <v> {number(k * i0)} </v> {speed_factor} </quotient>"
         drive = f"<quotient> {scaled(-k / r, 'motor/input-v')} {speed_factor} </quotient>"
         back_emf = f"<quotient> {scaled(k, 'motor/propeller-rad_sec')} {speed_factor} </quotient>"
+        drive_power = product(
+            f"<v> {number(self.power_ratio)} </v>",
+            factor("drive-power"),
+            factor("thrust"),
+            "<p> motor/input-v </p>",
+            "<p> motor/current-a </p>",
+        )
+        avionics = product(f"<v> {number(self.avionics)} </v>", factor("avionics-power"))
         return f"""    <property value="{number(self.volts)}"> motor/battery-v </property>
     <function name="motor/input-v"> {product("<p> motor/battery-v </p>", "<p> motor/throttle-norm </p>")} </function>
 {_torque_xml(self.propeller)}
@@ -172,9 +185,10 @@ class ElectricMotor:
         <quotient> <difference> <p> motor/input-v </p> {back_emf} </difference> <v> {number(r)} </v> </quotient>
       </max>
     </function>
-    <function name="motor/battery-power-w"> {product("<p> motor/input-v </p>", "<p> motor/current-a </p>")} </function>
+    <!-- Power of the drive, for more thrust more, and of autopilot, radios and servos. -->
+    <function name="motor/battery-power-w"> {total(drive_power, avionics)} </function>
     <function name="motor/battery-current-a">
-      {product("<p> motor/throttle-norm </p>", "<p> motor/current-a </p>")}
+      <quotient> <p> motor/battery-power-w </p> <p> motor/battery-v </p> </quotient>
     </function>
 {_thrust_and_torque_xml(self.propeller, self.windmill, factor)}"""
 
@@ -219,7 +233,13 @@ class FuelEngine:
         speed_factor = factor("motor-speed")
         factors_xml = (speed_factor, speed_factor, "<p> motor/throttle-norm </p>", "<p> motor/rho-kg_m3 </p>")
         constant = total("<p> motor/q0 </p>", f"<v> {number(self.friction)} </v>", scaled(-1.0, "motor/drive-n_m"))
-        heat = scaled(1.0 / self.efficiency, "motor/drive-n_m", "motor/propeller-rad_sec")
+        heat = product(
+            f"<v> {number(1.0 / self.efficiency)} </v>",
+            factor("drive-power"),
+            factor("thrust"),
+            "<p> motor/drive-n_m </p>",
+            "<p> motor/propeller-rad_sec </p>",
+        )
         return f"""    <!-- The engine's torque at this throttle and density; the air turns an idle one. -->
     <function name="motor/drive-n_m">
       {product(f"<v> {number(self.torque / _SEA_LEVEL_DENSITY)} </v>", *factors_xml)}

@@ -23,8 +23,9 @@ FILES = ("posterior.toml", "uncertainty.toml")
 DRAWS_FILE = "draws.csv"
 # Number of draws.
 DRAWS = 512
-# Relative standard deviation of the power of an aircraft from a data sheet, mostly from its least drag.
-POWER_SD = 0.25
+# Standard deviation of the logarithm of the power of an aircraft from a data sheet whose file states none: the root
+# mean square error of `benchmarks/real_power.py`.
+POWER_SD = 0.35
 # Largest file of draws, bytes.
 MAX_BYTES = 4 * 2**20
 # Prefix of the properties.
@@ -32,7 +33,7 @@ _PREFIX = "ident/"
 # Required keys.
 _REQUIRED_KEYS = frozenset({"climb_sd_deg", "descent_sd_deg"})
 # Optional keys.
-_OPTIONAL_KEYS = frozenset({"source", "quantity", "battery_guessed", "fastest_sd_mps", "power_sd"})
+_OPTIONAL_KEYS = frozenset({"source", "quantity", "battery_guessed", "climb_guessed", "fastest_sd_mps", "power_sd"})
 # Further keys of `posterior.toml`, about the logs.
 _LOG_KEYS = frozenset(
     {
@@ -56,7 +57,7 @@ class UncertainQuantity:
 
     name: name of the property.
     unit: "factor", or the unit of an offset.
-    estimate, sd: mean and standard deviation.
+    estimate, sd: estimate and standard deviation; of a factor, the median and the deviation of the logarithm.
     reason: source of the deviation, for a person.
     """
 
@@ -74,9 +75,9 @@ class Uncertainty:
     source: source of the model: "a data sheet", "flight logs".
     climb, descent: standard deviations of the steepest climb and descent at cruise, rad.
     quantities: uncertain properties of the model.
-    power: relative standard deviation of the power in flight.
+    power: standard deviation of the logarithm of the power in flight.
     fastest: standard deviation of the fastest level flight, m/s.
-    battery_guessed: True if the battery's energy was not stated.
+    battery_guessed, climb_guessed: True if the battery's energy, the steepest climb was not stated.
     """
 
     source: str
@@ -86,6 +87,7 @@ class Uncertainty:
     power: float = 0.0
     battery_guessed: bool = False
     fastest: float = 0.0
+    climb_guessed: bool = False
 
 
 def read_uncertainty(folder: Path) -> Uncertainty | None:
@@ -113,15 +115,10 @@ def read_uncertainty(folder: Path) -> Uncertainty | None:
     climb, descent = (
         math.radians(_read_number(table, key, file, 0.0, 45.0)) for key in ("climb_sd_deg", "descent_sd_deg")
     )
-    is_battery_guessed = table.get("battery_guessed", False)
-    if not isinstance(is_battery_guessed, bool):
-        raise FlightError.at(
-            str(file),
-            "battery_guessed",
-            is_battery_guessed,
-            "expected true or false",
-            shown=repr(is_battery_guessed),
-        )
+    guesses = {name: table.get(name, False) for name in ("battery_guessed", "climb_guessed")}
+    for name, value in guesses.items():
+        if not isinstance(value, bool):
+            raise FlightError.at(str(file), name, value, "expected true or false", shown=repr(value))
     entries = table.get("quantity", [])
     if not isinstance(entries, list) or not all(isinstance(entry, dict) for entry in entries):
         raise FlightError.at(str(file), "quantity", entries, "expected [[quantity]] tables", shown=repr(entries)[:60])
@@ -131,7 +128,7 @@ def read_uncertainty(folder: Path) -> Uncertainty | None:
         power = _read_number(table, "power_sd", file, 0.0, 1.0)
     # Older folders do not state it.
     fastest = _read_number(table, "fastest_sd_mps", file, 0.0, 100.0) if "fastest_sd_mps" in table else 0.0
-    return Uncertainty(source, climb, descent, quantities, power, is_battery_guessed, fastest)
+    return Uncertainty(source, climb, descent, quantities, power, fastest=fastest, **guesses)
 
 
 def _check_keys(table: dict[str, Any], file: Path) -> None:
@@ -178,8 +175,10 @@ def uncertainty_text(uncertainty: Uncertainty) -> str:
         " deviation",
         f"descent_sd_deg = {math.degrees(uncertainty.descent):.2f}  # of the steepest descent",
         f"fastest_sd_mps = {uncertainty.fastest:.2f}  # of the fastest level flight",
-        f"power_sd = {uncertainty.power:.3g}  # of the power that flight takes, as a share",
+        f"power_sd = {uncertainty.power:.3g}  # of the logarithm of the power that flight takes",
     ]
+    if uncertainty.climb_guessed:
+        lines.append("climb_guessed = true  # --climb states it")
     if uncertainty.battery_guessed:
         lines.append("battery_guessed = true  # no energy is judged until battery_wh is stated and this line is gone")
     for quantity in uncertainty.quantities:
@@ -223,19 +222,18 @@ class Draws:
 
 
 def draw_quantities(quantities: tuple[UncertainQuantity, ...], count: int = DRAWS, seed: int = 1) -> Draws:
-    """Draw each quantity independently: a factor log-normally, so that it stays positive, others normally.
+    """Draw each quantity independently: a factor log-normally with the estimate as median, others normally.
 
     >>> one = UncertainQuantity("ident/thrust", "factor", 1.0, 0.2)
     >>> drawn = draw_quantities((one,)).values
-    >>> bool(drawn.min() > 0.0), round(float(drawn.mean()), 1), round(float(drawn.std()), 1)
+    >>> bool(drawn.min() > 0.0), round(float(np.median(drawn)), 1), round(float(np.log(drawn).std()), 1)
     (True, 1.0, 0.2)
     """
     normals = np.random.default_rng(seed).standard_normal((count, len(quantities)))
     values = np.empty_like(normals)
     for k, quantity in enumerate(quantities):
         if quantity.unit == "factor":
-            log_sd = math.sqrt(math.log1p((quantity.sd / quantity.estimate) ** 2))
-            values[:, k] = quantity.estimate * np.exp(log_sd * normals[:, k] - 0.5 * log_sd**2)
+            values[:, k] = quantity.estimate * np.exp(quantity.sd * normals[:, k])
         else:
             values[:, k] = quantity.estimate + quantity.sd * normals[:, k]
     return Draws(tuple(quantity.name for quantity in quantities), values.round(6))

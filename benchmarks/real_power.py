@@ -14,14 +14,7 @@ import numpy as np
 from aircraft.data_sheet import CLASSES, SHEET_DENSITY, VISCOSITY
 from aircraft.envelope import GRAVITY
 from aircraft.model_writer import Layout
-from aircraft.power_prior import (
-    AVIONICS_LOG_SD,
-    EFFICIENCY_LOG_SD,
-    INDUCED_DRAG_LOG_SD,
-    LEAST_DRAG_LOG_SD,
-    POWER_PRIOR,
-    PowerPrior,
-)
+from aircraft.power_prior import LEAST_DRAG_LOG_SD, POWER_PRIOR, PowerPrior, power_log_sd
 from world.arrays import Floats
 
 # Published facts of real aircraft.
@@ -104,16 +97,9 @@ def predict_power(prior: PowerPrior, real: RealAircraft) -> tuple[float, float]:
     lift = real.mass * GRAVITY / (pressure * real.area)
     least = prior.least_drag(real.layout, aspect, real.cruise * real.area / real.span / VISCOSITY)
     induced = lift**2 / (math.pi * CLASSES[real.layout].oswald * aspect)
-    watts_per_drag = pressure * real.area * real.cruise / prior.drive_efficiency(real.mass)
-    drive = (least + induced) * watts_per_drag
-    deviations = (
-        LEAST_DRAG_LOG_SD * least * watts_per_drag,
-        INDUCED_DRAG_LOG_SD * induced * watts_per_drag,
-        EFFICIENCY_LOG_SD * drive,
-        AVIONICS_LOG_SD * prior.avionics,
-    )
-    power = drive + prior.avionics
-    return power, math.hypot(*deviations) / power
+    drag_power = pressure * real.area * (least + induced) * real.cruise
+    power = drag_power / prior.drive_efficiency(real.mass) + prior.avionics
+    return power, power_log_sd(least / (least + induced), prior.avionics / power)
 
 
 # ----------------------------------------------------------------------
@@ -158,6 +144,12 @@ def fit_prior(known: list[RealAircraft], drags: tuple[MeasuredDrag, ...] = DRAGS
     return _from_vector(values)
 
 
+def fit_without(name: str) -> PowerPrior:
+    """Fit the coefficients to all aircraft but one."""
+    others = [other for other in read_table() if other.name != name]
+    return fit_prior(others, tuple(one for one in DRAGS if one.name != name))
+
+
 @dataclass(frozen=True, slots=True)
 class Prediction:
     """Power of an aircraft as predicted, W, with its interval of 95 %."""
@@ -175,13 +167,9 @@ class Prediction:
 
 def predictions(*, leave_out: bool) -> list[Prediction]:
     """Predict all aircraft of the table.  leave_out: fit each prediction's prior to all other aircraft."""
-    table, found = read_table(), []
-    for real in table:
-        prior = POWER_PRIOR
-        if leave_out:
-            others = [other for other in table if other.name != real.name]
-            prior = fit_prior(others, tuple(one for one in DRAGS if one.name != real.name))
-        power, sd = predict_power(prior, real)
+    found = []
+    for real in read_table():
+        power, sd = predict_power(fit_without(real.name) if leave_out else POWER_PRIOR, real)
         ratio = math.exp(INTERVAL_SIGMAS * sd)
         found.append(Prediction(real, power, power / ratio, power * ratio))
     return found

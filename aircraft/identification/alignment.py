@@ -21,11 +21,13 @@ class Clocks:
 
     lag, delay: first-order lag and delay of the accelerometers behind the gyros.
     servo_lag: lag of the servos.
+    servo_delay: time from the logged command to the servo's first motion.
     """
 
     lag: float = 0.0
     delay: float = 0.0
     servo_lag: float = 0.05
+    servo_delay: float = 0.0
 
     @property
     def total_lag(self) -> float:
@@ -159,7 +161,9 @@ def align(records: Sequence[FlightRecord], clocks: Sequence[Clocks], motor_lag: 
             "wind": record.wind,
             "airspeed": delay_signal(low_pass(record.airspeed, _AIRSPEED_CUTOFF_HZ)),
             "density": record.density,
-            "surfaces": delay_signal(apply_lag(record.controls[:, :3], clock.servo_lag)),
+            "surfaces": delay_signal(
+                apply_delay(apply_lag(record.controls[:, :3], clock.servo_lag), clock.servo_delay)
+            ),
             "throttle": delay_signal(apply_lag(record.controls[:, 3], motor_lag)),
             "current": record.current,
             "voltage": record.voltage,
@@ -185,15 +189,15 @@ def invert_first_order_lag(values: Floats, lag: float, hertz: float) -> Floats:
 
 
 # Lags of the accelerometers in the grid at which the search starts, s.
-_GRID_LAGS_S = (0.0, 0.03, 0.06, 0.09)
-# Delay of the accelerometers in that grid, s.
-_GRID_DELAY_S = 0.015
-# Lags of the servos in that grid, s.
-_GRID_SERVO_LAGS_S = (0.02, 0.06, 0.1, 0.15)
-# Limits of lag and delay of the accelerometers, and lag of the servos, s.
-_LIMITS_S = np.array([[0.0, -0.04, 0.0], [0.12, 0.1, 0.25]])
-# Steps of the initial simplex in these three, s.
-_SIMPLEX_STEPS_S = np.diag([0.02, 0.02, 0.03])
+_GRID_LAGS_S = (0.0, 0.05)
+# Delays of the accelerometers in that grid, s.
+_GRID_DELAYS_S = (-0.03, 0.015)
+# Lag and delay of the servos in that grid, s.
+_GRID_SERVOS_S = ((0.03, 0.0), (0.1, 0.0), (0.03, 0.04), (0.0, 0.08))
+# Limits of lag and delay of the accelerometers, and lag and delay of the servos, s.
+_LIMITS_S = np.array([[0.0, -0.08, 0.0, 0.0], [0.12, 0.1, 0.25, 0.15]])
+# Steps of the initial simplex in these four, s.
+_SIMPLEX_STEPS_S = np.diag([0.02, 0.02, 0.03, 0.02])
 
 
 def find_clocks(misfit: Callable[[Clocks], float]) -> Clocks:
@@ -209,9 +213,14 @@ def find_clocks(misfit: Callable[[Clocks], float]) -> Clocks:
         clipped = np.clip(values, *_LIMITS_S)
         return misfit(Clocks(*clipped.tolist())) + 100.0 * float(np.abs(values - clipped).sum())
 
-    grid = [np.array([lag, _GRID_DELAY_S, servo]) for lag in _GRID_LAGS_S for servo in _GRID_SERVO_LAGS_S]
+    grid = [
+        np.array([lag, delay, servo_lag, servo_delay])
+        for lag in _GRID_LAGS_S
+        for delay in _GRID_DELAYS_S
+        for servo_lag, servo_delay in _GRID_SERVOS_S
+    ]
     start = min(grid, key=cost)
     simplex = np.vstack([start, *(start + step for step in _SIMPLEX_STEPS_S)])
-    options = {"initial_simplex": simplex, "xatol": 1e-3, "fatol": 1e-4, "maxfev": 70}
+    options = {"initial_simplex": simplex, "xatol": 1e-3, "fatol": 1e-4, "maxfev": 80}
     result = minimize(cost, start, method="Nelder-Mead", options=options)
     return Clocks(*np.clip(result.x, *_LIMITS_S).tolist())

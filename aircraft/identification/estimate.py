@@ -3,7 +3,7 @@
 The order matters. The wind triangle gives the airspeed its scale. The accelerometer is the vane: lift over the lift
 curve's slope is the angle of attack, gusts included, and side force gives the sideslip likewise. The lift curve itself
 comes from frequencies at which the aircraft heaves with the gusts; drag and thrust come from the forward acceleration,
-the moments from the gyros' rates of change.
+the moments from the gyros' rates of change, and then from the errors of short predictions (`refinement`).
 
 Uncertain quantities that are held fixed (`aircraft.identification.fixed_parameters`) are changed by their standard
 deviation one after the other, and the estimate is repeated: these shifts are part of the covariance.
@@ -25,6 +25,8 @@ from aircraft.identification.level import LEVEL_SD, level_signals
 from aircraft.identification.lift import fit_lift
 from aircraft.identification.moments import AXES, MOMENT_THINNING, fit_moments
 from aircraft.identification.parameters import PARAMETERS, Group, prior_means, prior_sds
+from aircraft.identification.prediction import PredictedLog, predict_log
+from aircraft.identification.refinement import IS_MOMENT, LONGER_HORIZONS_S, Refinement, refine_moments
 from aircraft.identification.regression import Fit, correlation_samples
 from world.arrays import Floats
 
@@ -34,10 +36,8 @@ ALIGNED_SECONDS = 200.0
 _PASSES = 2
 # Fraction of an interval's variance below which the logs hardly inform a parameter.
 SILENT = 0.2
-# Smallest R^2 of an axis; an axis with less keeps its prior.
-MIN_EXPLAINED = 0.6
-# Factor by which the interval of a fast motion is wider than computed.
-FAST_WIDENING = 2.0
+# Name of the shift that shows how much the moments depend on the times ahead of the compared predictions.
+LONGER_PREDICTIONS = "time ahead of the predictions (0.1 to 0.2 s longer)"
 # Title, unit and samples per second of each equation.
 _EQUATIONS: Mapping[Group, tuple[str, str, float]] = {
     "lift": ("angle of attack", "rad", GRID_HZ),
@@ -82,6 +82,7 @@ class Estimate:
     dynamics: True if the moments were estimated; their parameters are the prior's otherwise.
     airspeed: ratio of true to measured airspeed from the wind triangle, and its standard deviation.
     seconds: length of the flight that was used.
+    refinement: refinement of the moments; None if they were not estimated.
     """
 
     values: Floats
@@ -93,6 +94,7 @@ class Estimate:
     dynamics: bool = True
     airspeed: tuple[float, float] = (1.0, SCALE_SD)
     seconds: float = 0.0
+    refinement: Refinement | None = None
 
     @property
     def sds(self) -> Floats:
@@ -103,7 +105,7 @@ class Estimate:
         """Return a line for each parameter that the logs hardly inform, with an informative maneuver."""
         fractions = self.of_log().tolist()
         return tuple(
-            f"{parameter.title}: stays the prior's; fly {parameter.show}"
+            f"{parameter.title}: its interval stays the prior's; fly {parameter.show}"
             for parameter, fraction in zip(PARAMETERS, fractions, strict=True)
             if fraction < SILENT
         )
@@ -125,20 +127,37 @@ def estimate_model(records: Sequence[FlightRecord], base: BaseModel, *, dynamics
     clocks = align_clocks(records, base) if dynamics else tuple(default_clocks for _ in records)
     signals = aligned_signals(records, clocks, base)
     nominal = fit_all(signals, base, dynamics=dynamics)
-    shifts, noise_bias = {}, np.zeros(len(PARAMETERS))
+    shifts = {}
     for fixed in HELD_FIXED:
         if fixed.applies(with_current=nominal.with_current):
             shifted_signals, shifted_base = fixed.change(signals, base)
             shifted_estimate = fit_all(
-                shifted_signals, shifted_base, level=fixed.tilt(shifted_signals), dynamics=dynamics
+                shifted_signals,
+                shifted_base,
+                level=fixed.tilt(shifted_signals),
+                dynamics=dynamics,
+                nominal=nominal.refinement,
             )
             shifts[fixed.name] = shifted_estimate.values - nominal.values
-            noise_bias += _noise_bias(nominal, shifted_estimate) if fixed.name == NOISE else 0.0
     shifts |= _lift_shifts(signals, base, nominal)
+    if nominal.refinement is not None:
+        longer = refine_moments(signals, base, nominal.values, LONGER_HORIZONS_S, steps=2)
+        shift = np.zeros(len(PARAMETERS))
+        shift[IS_MOMENT] = longer.values - nominal.refinement.values
+        shifts[LONGER_PREDICTIONS] = shift
+    # Noise in a regressor flattens its slope; the effect of as much noise again is taken back (Cook and Stefanski 1994,
+    # with the straight line of their extrapolants).
+    noise_bias = np.where(IS_MOMENT, shifts[NOISE], 0.0)
+    covariance = total_covariance(nominal.covariance, shifts)
+    values = nominal.values - noise_bias
+    if dynamics:
+        values, covariance = combine_with_prior(values, covariance)
+    else:
+        covariance[np.ix_(IS_MOMENT, IS_MOMENT)] = np.diag(np.square(prior_sds()[IS_MOMENT]))
     return replace(
         nominal,
-        values=nominal.values - noise_bias,
-        covariance=total_covariance(nominal.covariance, shifts),
+        values=values,
+        covariance=covariance,
         clocks=clocks,
         shifts=shifts,
         airspeed=(signals.airspeed_factor, signals.airspeed_sd),
@@ -146,20 +165,15 @@ def estimate_model(records: Sequence[FlightRecord], base: BaseModel, *, dynamics
     )
 
 
-def _noise_bias(nominal: Estimate, noisier: Estimate) -> Floats:
-    """Return the bias that sensor noise causes in the moments' parameters, (n,).
+def combine_with_prior(values: Floats, covariance: Floats) -> tuple[Floats, Floats]:
+    """Combine each moment's estimate (n,) and its variance, of the covariance (n, n), with its prior by Bayes' rule.
 
-    It equals the effect of adding as much noise again. Noise in a regressor flattens its slope (Cook and Stefanski
-    1994, with the straight line of their extrapolants). An axis that keeps its prior under noise gives no estimate of
-    the bias.
+    The refinement itself has a prior that is wider by `PRIOR_SPREAD`, because its weights do not know the shifts.
     """
-    bias = np.zeros(len(PARAMETERS))
-    explained = {equation.name: equation.explained for equation in noisier.equations}
-    for axis in AXES if nominal.dynamics else ():
-        if explained[_EQUATIONS[axis][0]] >= MIN_EXPLAINED:
-            is_in_axis = np.array([parameter.group == axis for parameter in PARAMETERS])
-            bias[is_in_axis] = noisier.values[is_in_axis] - nominal.values[is_in_axis]
-    return bias
+    prior = np.square(prior_sds())
+    weight = np.where(IS_MOMENT, prior / (prior + np.diag(covariance)), 1.0)
+    combined = covariance * np.outer(weight, weight) + np.diag(np.square(1.0 - weight) * prior)
+    return prior_means() + weight * (values - prior_means()), combined
 
 
 def aligned_signals(records: Sequence[FlightRecord], clocks: Sequence[Clocks], base: BaseModel) -> Signals:
@@ -168,10 +182,19 @@ def aligned_signals(records: Sequence[FlightRecord], clocks: Sequence[Clocks], b
     return with_airspeed_scale(signals, vane(signals, base, prior_means()))
 
 
+def score_predictions(
+    estimate: Estimate, records: Sequence[FlightRecord], base: BaseModel, base_name: str
+) -> PredictedLog:
+    """Predict stretches of flight by constant rates, by the base and by an estimate, on the clocks of its last log."""
+    signals = level_signals(align(records, [estimate.clocks[-1]] * len(records), base.motor_lag))
+    signals = replace(signals, airspeed=signals.airspeed * estimate.airspeed[0])
+    return predict_log(signals, {base_name: (base, prior_means()), "identified": (base, estimate.values)})
+
+
 def total_covariance(fitted: Floats, shifts: Mapping[str, Floats]) -> Floats:
     """Return the covariance (n, n) of fits and shifts (n,).
 
-    It is wider for fast motions, and never wider than the prior.
+    For lift and drag it is never wider than the prior.
 
     >>> side = np.zeros(len(PARAMETERS))
     >>> side[0] = 0.04
@@ -180,10 +203,8 @@ def total_covariance(fitted: Floats, shifts: Mapping[str, Floats]) -> Floats:
     (0.05, 0.03)
     """
     covariance = fitted + sum(np.outer(shift, shift) for shift in shifts.values())
-    widening = np.array([FAST_WIDENING if parameter.fast else 1.0 for parameter in PARAMETERS])
-    sds = np.sqrt(np.diag(covariance)) * widening
     # Correlations stay where an interval is clipped to the prior's interval.
-    factor = widening * np.minimum(1.0, prior_sds() / sds)
+    factor = np.where(IS_MOMENT, 1.0, np.minimum(1.0, prior_sds() / np.sqrt(np.diag(covariance))))
     return np.asarray(covariance * np.outer(factor, factor))
 
 
@@ -219,12 +240,19 @@ def _log_unexplained(fit: Fit, lag: float) -> float:
 
 
 def fit_all(
-    signals: Signals, base: BaseModel, lift: Floats | None = None, level: float = 0.0, *, dynamics: bool = True
+    signals: Signals,
+    base: BaseModel,
+    lift: Floats | None = None,
+    level: float = 0.0,
+    *,
+    dynamics: bool = True,
+    nominal: Refinement | None = None,
 ) -> Estimate:
     """Estimate all parameters from aligned signals, with all else held fixed, without shifts.
 
     lift: (2,) values of slope and offset of the lift curve to hold fixed too.
     level: error of the autopilot's level, rad.
+    nominal: refinement about which the moments are changed to first order; None to refine them.
     """
     values, covariance = prior_means(), np.diag(np.square(prior_sds()))
     fits: dict[Group, Fit] = {}
@@ -247,17 +275,22 @@ def fit_all(
             flow = vane(signals, base, values)
         fits["drag"], drag_values, spread = fit_drag(signals, base, values, flow, uncertainty)
         store("drag", drag_values, spread)
-    moments = fit_moments(signals, base, flow.alpha, flow.beta, motor_of(base, values)) if dynamics else {}
-    for axis, fit in moments.items():
-        fits[axis] = fit
-        if fit.explained < MIN_EXPLAINED:
-            # Sensors are too noisy, or the model lacks a structure: keep the prior.
-            continue
-        count = sum(parameter.group == axis for parameter in PARAMETERS)
-        store(axis, fit.estimate[:count], fit.covariance[:count, :count])
+    refinement = nominal
+    if refinement is not None:
+        values[IS_MOMENT] = refinement.shifted(signals, base, values)
+    elif dynamics:
+        fits |= fit_moments(signals, base, flow.alpha, flow.beta, motor_of(base, values))
+        for axis in AXES:
+            is_in_axis = np.array([parameter.group == axis for parameter in PARAMETERS])
+            values[is_in_axis] = fits[axis].estimate[: is_in_axis.sum()]
+        refinement = refine_moments(signals, base, values)
+        values[IS_MOMENT] = refinement.values
+        covariance[np.ix_(IS_MOMENT, IS_MOMENT)] = refinement.covariance
     equations = tuple(_equation(group, fit) for group, fit in fits.items())
     has_current = bool(np.isfinite(signals.current).all())
-    return Estimate(values, covariance, (), equations, with_current=has_current, dynamics=dynamics)
+    return Estimate(
+        values, covariance, (), equations, with_current=has_current, dynamics=dynamics, refinement=refinement
+    )
 
 
 def alpha_uncertainty(fit: Fit, lift: Floats) -> AlphaUncertainty:
@@ -281,7 +314,8 @@ def _lift_shifts(signals: Signals, base: BaseModel, nominal: Estimate) -> dict[s
     shifts = {}
     for k in range(2):
         lift = nominal.values[:2] + np.sqrt(max(0.0, float(eigenvalues[k]))) * axes[:, k]
-        shift = fit_all(signals, base, lift=lift, dynamics=nominal.dynamics).values - nominal.values
+        shifted = fit_all(signals, base, lift=lift, dynamics=nominal.dynamics, nominal=nominal.refinement)
+        shift = shifted.values - nominal.values
         nominal.covariance[:2, :2] -= np.outer(shift[:2], shift[:2])
         shifts[f"lift curve, axis {k + 1}"] = shift
     return shifts

@@ -58,10 +58,11 @@ def other_lift(signals: Signals, base: BaseModel) -> Floats:
     return np.asarray(c.lift_rate * pitching + c.lift_elevator * signals.surfaces[:, 0])
 
 
-def vane(signals: Signals, base: BaseModel, values: Floats) -> Flow:
+def vane(signals: Signals, base: BaseModel, values: Floats, *, smooth: bool = True) -> Flow:
     """Return the flow angles derived from the accelerometers.
 
     values: (n,) of `aircraft.identification.parameters.PARAMETERS`, of which the parameters of lift and motor are used.
+    smooth: True to smooth them forwards and backwards; False for values that no later sample enters.
     """
     coefficients, (slope, zero) = base.coefficients, lift_curve(base, values)
     pressure, other_coefficient = pressure_of(signals, base), other_lift(signals, base)
@@ -82,7 +83,8 @@ def vane(signals: Signals, base: BaseModel, values: Floats) -> Flow:
     )
     side = base.mass * signals.acceleration[:, 1] / pressure - rate_force
     beta = (side - coefficients.side_aileron * aileron - coefficients.side_rudder * rudder) / coefficients.side_beta
-    return Flow(*(signals.smooth(values, VANE_BAND) for values in (alpha, beta, lift)))
+    flow = Flow(alpha, beta, lift)
+    return Flow(*(signals.smooth(angle, VANE_BAND) for angle in flow)) if smooth else flow
 
 
 def attitude_alpha(signals: Signals, level: float = 0.0) -> Floats:

@@ -1,10 +1,15 @@
-"""Level of the autopilot: forward acceleration in steady flight beyond the gain in speed and altitude."""
+"""Biases of the inertial sensors, and the level of the autopilot, from attitude and ground velocity.
+
+The gyros must turn the aircraft as its attitude turns, and the accelerometers must show the change of its ground
+velocity less gravity. Mean differences are biases; forward, a level error looks the same.
+"""
 
 from dataclasses import replace
 
 import numpy as np
 
 from aircraft.identification.alignment import Signals
+from world.arrays import Floats
 
 # Standard gravity, m/s^2.
 GRAVITY = 9.80665
@@ -14,6 +19,9 @@ GRAVITY = 9.80665
 LEVEL_SD = float(np.radians(0.2))
 # Standard deviation of the forward accelerometer's bias, m/s^2.
 FORWARD_SD = 0.03
+# Largest level error that an excess is taken for, in standard deviations; what exceeds it is the accelerometer's bias,
+# which reaches 0.4 m/s^2 for uncalibrated sensors.
+_MAX_LEVEL_SIGMAS = 2.0
 # Largest bank of straight flight, rad.
 _MAX_STRAIGHT_BANK_RAD = 0.1
 
@@ -38,11 +46,39 @@ def forward_excess(signals: Signals) -> list[float]:
     return excesses
 
 
+def lateral_biases(signals: Signals) -> Floats:
+    """Return the biases of the gyros p, q, r, rad/s, and of the right accelerometer, m/s^2, per stretch, (s, 4)."""
+    biases = []
+    for first, last in zip(signals.edges[:-1], signals.edges[1:], strict=True):
+        rows = slice(first, last)
+        roll, pitch, yaw = signals.attitude[rows].T
+        roll_change, pitch_change, yaw_change = np.gradient(signals.attitude[rows], 1.0 / signals.hertz, axis=0).T
+        turning = np.column_stack(
+            [
+                roll_change - yaw_change * np.sin(pitch),
+                pitch_change * np.cos(roll) + yaw_change * np.sin(roll) * np.cos(pitch),
+                yaw_change * np.cos(roll) * np.cos(pitch) - pitch_change * np.sin(roll),
+            ]
+        )
+        north, east, down = np.gradient(signals.velocity[rows], 1.0 / signals.hertz, axis=0).T
+        ahead, across = north * np.cos(yaw) + east * np.sin(yaw), east * np.cos(yaw) - north * np.sin(yaw)
+        below = ahead * np.sin(pitch) + (down - GRAVITY) * np.cos(pitch)
+        right = across * np.cos(roll) + below * np.sin(roll)
+        gyro_bias = (signals.rates[rows] - turning).mean(axis=0)
+        biases.append(np.append(gyro_bias, (signals.acceleration[rows, 1] - right).mean()))
+    return np.array(biases)
+
+
 def level_signals(signals: Signals) -> Signals:
-    """Return signals with the forward excess divided between the level and the accelerometer."""
+    """Return signals without biases, and with the forward excess divided between level and accelerometer."""
     level_fraction = LEVEL_SD**2 / (LEVEL_SD**2 + (FORWARD_SD / GRAVITY) ** 2)
-    attitude, acceleration = signals.attitude.copy(), signals.acceleration.copy()
-    for excess, first, last in zip(forward_excess(signals), signals.edges[:-1], signals.edges[1:], strict=True):
-        attitude[first:last, 1] += level_fraction * excess / GRAVITY
-        acceleration[first:last, 0] -= (1.0 - level_fraction) * excess
-    return replace(signals, attitude=attitude, acceleration=acceleration)
+    attitude, acceleration, rates = signals.attitude.copy(), signals.acceleration.copy(), signals.rates.copy()
+    biases = zip(forward_excess(signals), lateral_biases(signals), strict=True)
+    for (excess, lateral), first, last in zip(biases, signals.edges[:-1], signals.edges[1:], strict=True):
+        limit = _MAX_LEVEL_SIGMAS * LEVEL_SD
+        level = float(np.clip(level_fraction * excess / GRAVITY, -limit, limit))
+        attitude[first:last, 1] += level
+        acceleration[first:last, 0] -= excess - GRAVITY * level
+        acceleration[first:last, 1] -= lateral[3]
+        rates[first:last] -= lateral[:3]
+    return replace(signals, attitude=attitude, acceleration=acceleration, rates=rates)

@@ -21,8 +21,8 @@ AXES: tuple[Group, ...] = ("pitch", "roll", "yaw")
 MOMENT_BAND = 4.0
 # One of this many samples is used.
 MOMENT_THINNING = 2
-# Standard deviation of the moment coefficient from an aircraft's asymmetry.
-_ASYMMETRY_SD = 0.01
+# Standard deviation of the moment coefficient from an aircraft's asymmetry, or a surface's trim, in a stretch.
+_TRIM_SD = 0.01
 
 
 def fit_moments(
@@ -33,7 +33,10 @@ def fit_moments(
     motor: Motor | None = None,
     spread: float = 1.0,
 ) -> dict[Group, Fit]:
-    """Fit pitch, roll and yaw, and return the fits by axis; roll and yaw fit an additional constant, which is dropped.
+    """Fit pitch, roll and yaw, and return the fits by axis.
+
+    Each axis has a trim offset for each stretch, which follows the parameters in the fit: surfaces may be trimmed, and
+    sensors biased, differently in each stretch.
 
     alpha, beta: (n,) rad.
     motor: motor whose torque rolls the aircraft; None for the base's motor.
@@ -41,7 +44,7 @@ def fit_moments(
     """
     thinned = signals.thinned(MOMENT_THINNING, {"alpha": alpha, "beta": beta})
     pressure = pressure_of(thinned, base)
-    required = _required_moments(thinned, base, base.motor if motor is None else motor)
+    required = required_moments(thinned, base, base.motor if motor is None else motor)
     terms = _moment_regressors(thinned, base)
     fits = {}
     ixx, iyy, izz, _ = base.inertia
@@ -49,17 +52,31 @@ def fit_moments(
         known_part, *columns = terms[axis]
         parameters = [parameter for parameter in PARAMETERS if parameter.group == axis]
         means, sds = [parameter.prior for parameter in parameters], [parameter.sd for parameter in parameters]
-        if axis != "pitch":
-            columns, means, sds = [*columns, np.ones(len(known_part))], [*means, 0.0], [*sds, _ASYMMETRY_SD]
+        # With a single stretch, a trim offset in pitch is the parameter's own offset.
+        trims = _stretch_indicators(thinned) if axis != "pitch" or len(thinned.edges) > 2 else []
+        columns, means, sds = [*columns, *trims], [*means, *(0.0 for _ in trims)], [*sds, *(_TRIM_SD for _ in trims)]
         scale = pressure * length / inertia
-        regressors = thinned.smooth(np.column_stack([scale * column for column in columns]), MOMENT_BAND)
-        target = thinned.smooth(required[axis] / inertia - scale * known_part, MOMENT_BAND)
-        fits[axis] = fit_with_prior(regressors, target, np.array(means), spread * np.array(sds), thinned.block)
+        equation = np.column_stack(
+            [required[axis] / inertia - scale * known_part, *(scale * column for column in columns)]
+        )
+        equation = thinned.smooth(equation, MOMENT_BAND)
+        fits[axis] = fit_with_prior(
+            equation[:, 1:], equation[:, 0], np.array(means), spread * np.array(sds), thinned.block
+        )
     return fits
 
 
-def _required_moments(signals: Signals, base: BaseModel, motor: Motor) -> dict[Group, Floats]:
-    """Return the aerodynamic moments (n,), N m, that the motion requires.
+def _stretch_indicators(signals: Signals) -> list[Floats]:
+    """Return for each stretch a column (n,) that is 1 in the stretch and 0 elsewhere."""
+    rows = np.arange(len(signals.airspeed))
+    return [
+        ((rows >= first) & (rows < last)).astype(float)
+        for first, last in zip(signals.edges[:-1], signals.edges[1:], strict=True)
+    ]
+
+
+def required_moments(signals: Signals, base: BaseModel, motor: Motor) -> dict[Group, Floats]:
+    """Return the aerodynamic moments (n,), N m, that the motion requires, by axis.
 
     The propeller's torque rolls to the left.
     """

@@ -25,7 +25,6 @@ class Parameter:
     sd: standard deviation of the prior, about 1 or 0.
     group: equation in which it is estimated.
     bounds: range of all aircraft of this kind.
-    fast: True for a motion as fast as the servos, whose interval is doubled: lag and damping look alike.
     show: maneuver that would inform it.
     """
 
@@ -35,7 +34,6 @@ class Parameter:
     sd: float
     group: Group
     bounds: tuple[float, float]
-    fast: bool = False
     show: str = ""
 
     @property
@@ -70,17 +68,17 @@ PARAMETERS = (
     Parameter("propeller-torque", "propeller torque", "factor", 0.1, "drag", (0.4, 2.0), show="battery current (BAT)"),
     Parameter("pitch-offset", "pitching moment at zero", "offset", 0.06, "pitch", (-0.4, 0.4), show=_SPEEDS),
     Parameter("pitch-stiffness", "pitch stiffness", "factor", 0.5, "pitch", (0.05, 3.5), show=_PULLS),
-    Parameter("pitch-damping", "pitch damping", "factor", 0.4, "pitch", (-0.5, 4.0), fast=True, show=_PULLS),
-    Parameter("elevator-power", "elevator power", "factor", 0.4, "pitch", (0.1, 3.0), fast=True, show=_PULLS),
+    Parameter("pitch-damping", "pitch damping", "factor", 0.4, "pitch", (-0.5, 4.0), show=_PULLS),
+    Parameter("elevator-power", "elevator power", "factor", 0.4, "pitch", (0.1, 3.0), show=_PULLS),
     Parameter("dihedral-effect", "roll from sideslip", "factor", 0.5, "roll", (-1.5, 4.0), show=_YAWS),
-    Parameter("roll-damping", "roll damping", "factor", 0.4, "roll", (0.1, 3.0), fast=True, show=_ROLLS),
-    Parameter("roll-from-yaw", "roll from yaw rate", "factor", 0.4, "roll", (-1.0, 3.5), fast=True, show=_YAWS),
-    Parameter("aileron-power", "aileron power", "factor", 0.4, "roll", (0.1, 3.0), fast=True, show=_ROLLS),
+    Parameter("roll-damping", "roll damping", "factor", 0.4, "roll", (0.1, 3.0), show=_ROLLS),
+    Parameter("roll-from-yaw", "roll from yaw rate", "factor", 0.4, "roll", (-1.0, 3.5), show=_YAWS),
+    Parameter("aileron-power", "aileron power", "factor", 0.4, "roll", (0.1, 3.0), show=_ROLLS),
     Parameter("weathercock", "weathercock stability", "factor", 0.4, "yaw", (0.0, 3.0), show=_YAWS),
-    Parameter("yaw-from-roll", "yaw from roll rate", "factor", 0.6, "yaw", (-3.0, 4.5), fast=True, show=_ROLLS),
-    Parameter("yaw-damping", "yaw damping", "factor", 0.4, "yaw", (-1.0, 3.5), fast=True, show=_YAWS),
-    Parameter("adverse-yaw", "yaw from ailerons", "factor", 0.6, "yaw", (-3.0, 4.5), fast=True, show=_ROLLS),
-    Parameter("rudder-power", "rudder power", "factor", 0.4, "yaw", (0.1, 3.0), fast=True, show=_YAWS),
+    Parameter("yaw-from-roll", "yaw from roll rate", "factor", 0.6, "yaw", (-3.0, 4.5), show=_ROLLS),
+    Parameter("yaw-damping", "yaw damping", "factor", 0.4, "yaw", (-1.0, 3.5), show=_YAWS),
+    Parameter("adverse-yaw", "yaw from ailerons", "factor", 0.6, "yaw", (-3.0, 4.5), show=_ROLLS),
+    Parameter("rudder-power", "rudder power", "factor", 0.4, "yaw", (0.1, 3.0), show=_YAWS),
 )
 # Names of the parameters.
 NAMES = tuple(parameter.name for parameter in PARAMETERS)

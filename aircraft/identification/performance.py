@@ -97,6 +97,26 @@ def fastest_level(base: BaseModel, values: Floats, density: float) -> Floats:
     return np.asarray(0.5 * (low_speed + high_speed))
 
 
+def level_controls(base: BaseModel, values: Floats, airspeed: float, density: float) -> tuple[float, float]:
+    """Return elevator, rad, and throttle (0..1) of level flight for parameter values (n,)."""
+    rows = np.atleast_2d(values)
+    throttle = performance(base, rows, airspeed, density).throttle
+    thrust, _ = _thrust(base, rows, airspeed, throttle, density)
+    alpha, _ = _flow(base, rows, airspeed, density, thrust, np.zeros(1))
+    at_zero, per_alpha = _elevator(base, rows)
+    return float(at_zero[0] + per_alpha[0] * alpha[0]), float(throttle[0])
+
+
+def _elevator(base: BaseModel, values: Floats) -> tuple[Floats, Floats]:
+    """Return the elevator of balanced pitch at zero angle of attack, rad, and its change per angle of attack, (m,)."""
+    c = base.coefficients
+    power = c.pitch_elevator * values[:, INDEX["elevator-power"]]
+    return (
+        -(c.pitch_zero + values[:, INDEX["pitch-offset"]]) / power,
+        -c.pitch_alpha * values[:, INDEX["pitch-stiffness"]] / power,
+    )
+
+
 def _path_angle(base: BaseModel, values: Floats, airspeed: float, density: float, throttle: Floats) -> Floats:
     """Return the path angle (m,), rad, at a throttle."""
     thrust, _ = _thrust(base, values, airspeed, throttle, density)
@@ -116,10 +136,7 @@ def _flow(
     column = {name: values[:, k] for name, k in INDEX.items()}
     slope = c.lift_alpha * column["lift-slope"]
     lift_at_zero = c.lift_zero + column["lift-offset"]
-    # The constant, the angle of attack and the elevator balance in pitch.
-    elevator_power = c.pitch_elevator * column["elevator-power"]
-    elevator_per_alpha = -c.pitch_alpha * column["pitch-stiffness"] / elevator_power
-    elevator_at_zero = -(c.pitch_zero + column["pitch-offset"]) / elevator_power
+    elevator_at_zero, elevator_per_alpha = _elevator(base, values)
     alpha = np.zeros(len(values))
     weight = base.mass * GRAVITY
     for _ in range(6):

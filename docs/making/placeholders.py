@@ -11,6 +11,7 @@ from making.commands import command_pages
 from making.extras import extras_table
 from making.mission_commands import command_table
 from making.public_names import name_tables, public_names
+from making.quantities import quantity_table
 from making.schemas import answer_table, schema_tables
 from making.state_fields import state_fields
 from making.tolerances import all_tolerances, rule_tolerances
@@ -26,6 +27,7 @@ MAKERS: dict[str, Callable[..., str]] = {
     "extras": extras_table,
     "mission_commands": command_table,
     "names": name_tables,
+    "quantities": quantity_table,
     "schema": schema_tables,
     "state": state_fields,
     "tolerances": rule_tolerances,

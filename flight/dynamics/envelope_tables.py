@@ -54,6 +54,7 @@ def load_envelope(aircraft: Aircraft, *, motor_braking: bool = False) -> Envelop
         fastest_sd=0.0 if uncertainty is None else uncertainty.fastest,
         power_sd=0.0 if uncertainty is None else uncertainty.power,
         battery_guessed=uncertainty is not None and uncertainty.battery_guessed,
+        climb_guessed=uncertainty is not None and uncertainty.climb_guessed,
         aircraft=aircraft.name,
         model_hash=model_hash(aircraft),
         motor_braking=motor_braking,
@@ -100,6 +101,11 @@ def compute_tables(aircraft: Aircraft, motor_braking: bool) -> dict[str, Floats]
             max_level_speed[j] = found.airspeed
         if found := slowest(fdm, amsl):
             min_level_speed[j] = found.airspeed
+    if np.isnan(min_level_speed).all():
+        # The wing stalls before the elevator reaches its stop: the slowest trim of the grid is the slowest flight.
+        is_level = np.isfinite(powers["power_level"])
+        has_level_flight = is_level.any(axis=0) & np.isfinite(max_level_speed)
+        min_level_speed = np.where(has_level_flight, airspeeds[is_level.argmax(axis=0)], math.nan)
     # A trim is accurate to about 1e-11; nine decimals are the same on every machine.
     return {
         "airspeed": airspeeds,

@@ -203,6 +203,7 @@ class EnvelopeTable(SetupModel):
     fastest_sd: Annotated[Finite, Field(alias="fastest_sd_mps", ge=0.0)] = 0.0
     power_sd: Annotated[Finite, Field(ge=0.0)] = 0.0
     battery_guessed: bool = False
+    climb_guessed: bool = False
 
     def envelope(self, file: str) -> Envelope:
         """Return the envelope of the table.

@@ -18,7 +18,7 @@ PlaceKind = Literal["flight", "mission", "plan", "leg", "waypoint", "missile", "
 # "turn".  By a step: "height" or "descent" (higher, lower) of a leg, or of the path at a zone; "inset" of the path from
 # the area's edges, "distance" from a missile, "north", "east", "south" or "west" at a zone, "duration" of the flight.
 # By a factor: the "battery" or the "tank".  Not of a plan, but of the knowledge about the aircraft: the duration of a
-# flight at "full throttle" or with "no throttle" that measures its ability.
+# flight at "full throttle" or with "no throttle" that measures its ability, and a "stated climb" that it has to have.
 Quantity = Literal[
     "length",
     "rise",
@@ -37,6 +37,7 @@ Quantity = Literal[
     "tank",
     "full throttle",
     "no throttle",
+    "stated climb",
 ]
 
 

@@ -144,14 +144,19 @@ def suggest_gentler_slope(
 ) -> tuple[Suggestion, ...]:
     """Suggest a gentler slope, a longer leg or another speed for one leg; the smallest relative change first.
 
-    If the aircraft is not known well enough, suggest a flight that measures its ability.
+    If the aircraft is not known well enough, suggest a flight that measures its ability; for a guessed climb, suggest
+    to state it first.
     """
     leg = finding.place.index
     if leg is None:
         return ()
     if finding.check == UNKNOWN_AIRCRAFT:
         quantity: Quantity = "full throttle" if requirements.slopes[leg] > 0.0 else "no throttle"
-        return ((Change(quantity, finding.place, None, MIN_EVIDENCE_FLIGHT_S, "s"),),)
+        flight = (Change(quantity, finding.place, None, MIN_EVIDENCE_FLIGHT_S, "s"),)
+        if quantity == "no throttle" or not requirements.setup.envelope.climb_guessed:
+            return (flight,)
+        slope_deg = math.degrees(float(requirements.slopes[leg]))
+        return (Change("stated climb", finding.place, None, round(slope_deg, 1), "°"),), flight
     limit, source = slope_limit(requirements, leg)
     planned_slope = abs(float(requirements.slopes[leg]))
     height_change = abs(float(requirements.points[leg + 1, 2] - requirements.points[leg, 2]))

@@ -112,6 +112,8 @@ def _other_change_text(change: Change) -> str:
                 else f"a glide of {requested_value:.0f} s without throttle"
             )
             return f"fly {flight_text} and give its log to planfly aircraft --identify"
+        case "stated climb":
+            return "state the climb of the aircraft at full throttle: planfly aircraft --new ... --climb DEGREES"
     return f"use a {change.what} {requested_value:.2f} times as large"
 
 

@@ -1,12 +1,10 @@
-"""Chart an identification: measured and predicted values of equations, and a replayed log."""
-
-from collections.abc import Sequence
+"""Chart an identification: measured and predicted values of equations, and predictions of a log."""
 
 import numpy as np
 
 from aircraft.identification.estimate import Equation
+from aircraft.identification.prediction import QUANTITIES, UNITS, PredictedLog
 from logs.views.charts import Chart, Panel, filled_series, series
-from world.arrays import Floats
 
 # Displayed unit and factor, by unit: degrees in place of radians.
 _SHOWN = {"rad": ("°", 180.0 / np.pi), "rad/s2": ("°/s²", 180.0 / np.pi), "m/s2": ("m/s²", 1.0)}
@@ -34,19 +32,18 @@ def equation_chart(equation: Equation) -> Chart:
     return Chart(f"{equation.name}, R² {equation.explained:.3f}", "time of all stretches", "s", panels)
 
 
-def replay_chart(names: Sequence[str], units: Sequence[str], logged: Floats, identified: Floats, hertz: float) -> Chart:
-    """Return some windows of a replay one after the other, with one panel a quantity.
-
-    names, units: names and units of the k quantities.  logged, identified: (t, k).
-    """
-    time = np.arange(len(logged)) / hertz
+def prediction_chart(predicted: PredictedLog) -> Chart:
+    """Return measured quantities, and the identified model's predictions half a second before, one panel each."""
     panels = tuple(
         Panel(
             name,
             unit.replace("deg", "°"),
-            (series("logged", "flown", time, logged[:, k]), series("replayed", "other", time, identified[:, k])),
+            (
+                series("measured", "flown", predicted.time, predicted.measured[:, k]),
+                series("predicted 0.5 s before", "other", predicted.time, predicted.predicted[:, k]),
+            ),
             min_span=1.0,
         )
-        for k, (name, unit) in enumerate(zip(names, units, strict=True))
+        for k, (name, unit) in enumerate(zip(QUANTITIES, UNITS, strict=True))
     )
-    return Chart("Windows of 5 s of the check log", "time of the windows", "s", panels)
+    return Chart("Predictions half a second ahead", "time of all stretches", "s", panels)

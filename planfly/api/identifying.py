@@ -8,8 +8,9 @@ from pathlib import Path
 import numpy as np
 
 from aircraft.catalog import Aircraft, check_new_folder, find_aircraft, read_aircraft, write_own_folder
-from aircraft.identification.estimate import Estimate, estimate_model
-from aircraft.identification.flight_record import GRID_HZ, FlightRecord
+from aircraft.identification.estimate import Estimate, estimate_model, score_predictions
+from aircraft.identification.flight_record import FlightRecord
+from aircraft.identification.prediction import PredictedLog
 from logs.importers.motion import MotionLog
 from logs.importers.motion_log import read_motion
 from planfly.identification.base_numbers import base_model, scale_model
@@ -19,13 +20,14 @@ from planfly.identification.model_text import check_base
 from planfly.identification.records import (
     AMPLE_HZ,
     LEFT,
+    MIN_CHECK_SECONDS,
     MIN_HZ,
+    MIN_SECONDS,
     flight_records,
     log_outputs,
     recording_setting,
     slowest_rows,
 )
-from planfly.identification.replay import QUANTITIES, UNITS, Replay, replay_log
 from planfly.identification.servos import ServoOutput, read_servos
 from planfly.identification.wide_numbers import WideNumber, wide_numbers
 from planfly.runtime.first_start import with_warm_up
@@ -67,7 +69,8 @@ class IdentifiedAircraft:
     climb: lower end, estimate and upper end (95 %) of the climb angle at cruise and full throttle, degrees.
     sink: lower end, estimate and upper end (95 %) of the sink angle at cruise and idle, degrees.
     power: lower end, estimate and upper end (95 %) of the power of level flight at cruise, W.
-    replays: replays of the check log by the base and by the identified model; empty without a check log.
+    predicted: predictions up to a second ahead by constant rates, the base and the identified model, of the check log,
+        or of `logs` without a check log.
     without_current: logs without battery current, if other logs have it; then the current of no log is used.
     slow: logs with few rows per second.
     wide: numbers with a wide interval, each with the flight that would narrow the interval.
@@ -78,7 +81,7 @@ class IdentifiedAircraft:
     climb: tuple[float, float, float]
     sink: tuple[float, float, float]
     power: tuple[float, float, float]
-    replays: tuple[Replay, ...] = ()
+    predicted: PredictedLog
     without_current: tuple[str, ...] = ()
     slow: tuple[SlowLog, ...] = ()
     wide: tuple[WideNumber, ...] = ()
@@ -106,7 +109,7 @@ def identify_aircraft(
     from the base.
     battery: volts and capacity, "44.4V,888Wh"; None takes the battery of the base.
     base: the most similar aircraft, by name or folder; it supplies every property that the logs do not show.
-    check: a log that is not among `logs`, to replay with the base and the identified model.
+    check: a log that is not among `logs`, to predict with the base and the identified model; a minute is enough.
     Raises a `planfly.PlanflyError` for logs that cannot be used; then nothing is written.
     """
     target = check_new_folder(Path(folder), overwrite=overwrite)
@@ -130,7 +133,7 @@ def identify_aircraft(
         check_motion = None if check is None else read_motion(Path(check))
         _check_distinct([*motion_logs, *([] if check_motion is None else [check_motion])])
         log_parts = [(log, *_records_and_outputs(log, prior)) for log in motion_logs]
-        check_records = None if check_motion is None else _records_and_outputs(check_motion, prior)[0]
+        checked = [] if check_motion is None else _records_and_outputs(check_motion, prior, MIN_CHECK_SECONDS)[0]
     records = [record for _, stretches, _ in log_parts for record in stretches]
     log, _, outputs = log_parts[-1]
     with stage("estimating"):
@@ -141,16 +144,15 @@ def identify_aircraft(
             prior, base_numbers, estimate, [motion_log for motion_log, _, _ in log_parts], outputs
         )
         files = folder_files(identified, target.name, (volts, energy))
-    replays = () if check_records is None else _replay_check_log(identified, files, target.name, check_records)
+    with stage("predicting"):
+        predicted = score_predictions(estimate, checked or records, base_numbers, prior.name)
     with stage("drawing", "drawing an identification"):
-        files["identify.html"] = _report_page(
-            identified, replays, None if check is None else Path(check).name, target.name
-        )
+        files["identify.html"] = _report_page(identified, predicted, check, target.name)
     write_own_folder(target, {name: text.encode() for name, text in files.items()})
     slow = slow_logs([motion_log for motion_log, _, _ in log_parts])
     aircraft, wide = read_aircraft(target), _find_wide_numbers(identified)
     return IdentifiedAircraft(
-        aircraft, estimate, *_intervals(identified), replays, without_current(records), slow, wide
+        aircraft, estimate, *_intervals(identified), predicted, without_current(records), slow, wide
     )
 
 
@@ -195,24 +197,28 @@ def _check_distinct(logs: Sequence[MotionLog]) -> None:
         sources[log.sha256] = log.source
 
 
-def _records_and_outputs(log: MotionLog, prior: Aircraft) -> tuple[list[FlightRecord], dict[str, ServoOutput]]:
+def _records_and_outputs(
+    log: MotionLog, prior: Aircraft, min_seconds: float = MIN_SECONDS
+) -> tuple[list[FlightRecord], dict[str, ServoOutput]]:
     """Return the flight records of a log, and the servo outputs of the aircraft.
 
     The servo outputs are those of the base if all of them match the log, otherwise those of the log.  With PX4, and
     with elevons, whose mixer is part of the model, they are always those of the base.
+
+    min_seconds: shortest usable flight, s.
     """
     file = prior.folder / "ardupilot.toml"
     base_outputs = read_servos(file) if file.is_file() else {}
     if log.program_kind in ("px4", "columns"):
-        return flight_records(log, prior), dict(base_outputs)
+        return flight_records(log, prior, min_seconds=min_seconds), dict(base_outputs)
     outputs = log_outputs(log, prior)
     if LEFT in outputs:
-        return flight_records(log, prior, outputs), dict(base_outputs)
+        return flight_records(log, prior, outputs, min_seconds), dict(base_outputs)
     is_same = base_outputs.keys() == outputs.keys() and all(
         _is_same_output(base_outputs[name], output) for name, output in outputs.items()
     )
     used_outputs = dict(base_outputs) if is_same else outputs
-    return flight_records(log, prior, used_outputs if is_same else None), used_outputs
+    return flight_records(log, prior, used_outputs if is_same else None, min_seconds), used_outputs
 
 
 def _unmixed_outputs(log: MotionLog, prior: Aircraft) -> dict[str, int]:
@@ -231,15 +237,8 @@ def _is_same_output(first: ServoOutput, second: ServoOutput) -> bool:
     )
 
 
-def _replay_check_log(
-    identified: Identified, files: dict[str, str], name: str, records: list[FlightRecord]
-) -> tuple[Replay, ...]:
-    with stage("replaying the check log"):
-        return replay_log(identified, files, name, records)
-
-
-def _report_page(identified: Identified, replays: tuple[Replay, ...], check_name: str | None, name: str) -> str:
-    from logs.views.report.identification import IdentificationFacts, ReplayedLog, identification_page
+def _report_page(identified: Identified, predicted: PredictedLog, check: str | Path | None, name: str) -> str:
+    from logs.views.report.identification import IdentificationFacts, identification_page
 
     numbers = tuple(
         (title, unit, *interval)
@@ -249,18 +248,12 @@ def _report_page(identified: Identified, replays: tuple[Replay, ...], check_name
             strict=True,
         )
     )
-    replay = None
-    if check_name is not None and replays:
-        before, after = replays
-        logged, flown = after.shown
-        rows = tuple(
-            (quantity, unit, before.rms[quantity], after.rms[quantity])
-            for quantity, unit in zip(QUANTITIES, UNITS, strict=True)
-        )
-        replay = ReplayedLog(check_name, after.windows, rows, logged, flown, GRID_HZ)
     logs = tuple((Path(log.source).name, log.sha256) for log in identified.logs)
     wide = tuple(wide_number.text for wide_number in _find_wide_numbers(identified))
-    return identification_page(IdentificationFacts(name, identified.estimate, logs, numbers, replay, wide))
+    check_name = None if check is None else Path(check).name
+    return identification_page(
+        IdentificationFacts(name, identified.estimate, logs, numbers, predicted, check_name, wide)
+    )
 
 
 def _find_wide_numbers(identified: Identified) -> tuple[WideNumber, ...]:

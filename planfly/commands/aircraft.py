@@ -31,6 +31,8 @@ _DATA_SHEET_KEYWORDS = (
     *("mass", "span", "area", "cruise", "stall", "top", "bank", "climb"),
     *("battery", "motor", "prop", "layout", "fuel"),
 )
+# Half width of the interval of 95 % of a normal distribution, in standard deviations.
+_INTERVAL_SIGMAS = 1.96
 # Wind of the printed ground slopes, m/s.
 _WIND_MPS = 10.0
 
@@ -79,7 +81,7 @@ def aircraft_options(line: LineParser) -> None:
         complete_aircraft,
     )
     with_completer(
-        log_group.add_argument("--check", metavar="LOG", help="with --identify: another log, to replay with the model"),
+        log_group.add_argument("--check", metavar="LOG", help="with --identify: another log to predict"),
         files("bin", "BIN", "tlog", "ulg", "toml", "csv", "mat", "parquet", "h5"),
     )
     result_options(
@@ -95,9 +97,9 @@ def _data_sheet_options(parser: CommandParser) -> None:
         "mass": ("KG", "mass, 0.5 to 25 kg"),
         "span": ("M", "wing span, m"),
         "area": ("M2", "wing area, m2 (default: the area that carries the mass at the stall speed)"),
-        "cruise": ("M/S", "cruise airspeed"),
-        "stall": ("M/S", "minimum airspeed of level flight"),
-        "top": ("M/S", "maximum airspeed of level flight (default: 1.4 times the cruise speed)"),
+        "cruise": ("M/S", "usual airspeed"),
+        "stall": ("M/S", "airspeed of slowest level flight"),
+        "top": ("M/S", "airspeed of fastest level flight (default: 1.65 times the cruise's)"),
         "bank": ("DEG", "steepest bank in turns (default: 35)"),
         "climb": ("DEG", "steepest climb at cruise (default: 12, or the climb that fits the top speed)"),
         "motor": ("KV", "rpm per volt"),
@@ -207,24 +209,37 @@ def _identify(args: argparse.Namespace) -> int:
         print(f"  {name:<8} {value:.{0 if unit == 'W' else 1}f} {unit} at cruise, {lower:.1f} to {upper:.1f} (95 %)")
     _print_uncertain_properties(result)
     if "identify.waypoints" not in files_made:
-        print("  identify.waypoints not written: the logs have neither home (ORGN) nor a position on the ground (POS)")
-    for replay in result.replays:
-        rms_text = ", ".join(f"{name} {value:.2g}" for name, value in replay.rms.items())
-        print(f"  replay   {replay.model}: {rms_text} (rms of {replay.windows} windows of 5 s; deg/s, deg, m/s)")
+        print("  no mission identify.waypoints: the logs have neither home (ORGN) nor a position on the ground (POS)")
+    _print_predictions(result, args.check)
     write_json_if_requested(args, lambda: _json_answer([new_aircraft]))
-    print(
-        f"next      `planfly aircraft {shlex.quote(args.out)}` prints the model; {args.out}/identify.html "
-        "shows each estimate with its uncertainty"
-    )
+    print(f"next      planfly aircraft {shlex.quote(args.out)}; {args.out}/identify.html says how sure each number is")
     return FLYABLE
 
 
+def _print_predictions(result: "planfly.IdentifiedAircraft", check: str | None) -> None:
+    """Print the errors of predictions half a second ahead by each model, and the whiteness of the innovations."""
+    from aircraft.identification.prediction import QUANTITIES
+
+    predicted = result.predicted
+    print(
+        f"  ahead    rms errors 0.5 s ahead, {predicted.count} predictions"
+        f" {'on the same logs' if check is None else f'on {check}'} (deg/s, deg, m/s)"
+    )
+    for prediction in predicted.predictions:
+        rms_text = ", ".join(f"{name} {rms:.2g}" for name, rms in zip(QUANTITIES, prediction.rms[0.5], strict=True))
+        print(f"  ahead    {prediction.model}: {rms_text}")
+    shares = ", ".join(f"{100.0 * share:.0f}" for share in predicted.predictions[-1].whiteness)
+    print(
+        f"  ahead    innovations of roll, pitch, yaw: white at {shares} % of lags to 0.5 s (95 % in a complete model)"
+    )
+
+
 def _print_uncertain_properties(result: "planfly.IdentifiedAircraft") -> None:
-    """Print the properties that the logs do not determine, and what would determine them."""
+    """Print the properties that the logs do not show, and the flights that would show them."""
     if not result.estimate.dynamics:
-        print("  performance only: fewer than 10 rows of inertial sensors or outputs a second do not show the moments")
+        print("  performance only: under 10 rows of inertial sensors or outputs a second tell nothing of the moments")
     for log in result.slow:
-        print(f"  rows     {log.source}: {log.hertz:.1f} a second of sensors or outputs; {log.setting} records more")
+        print(f"  rows     {log.source}: {log.hertz:.1f} a second of sensors or outputs: {log.setting} records more")
     for number in result.wide:
         print(f"  wide     {number.text}")
     for line in result.estimate.silent():
@@ -253,7 +268,11 @@ def _print_sheet(aircraft: "Aircraft") -> None:
             f"  slopes   climb {climb:.1f} degrees ± {climb_sd:.1f}; descent {descent:.1f} ± "
             f"{descent_sd:.1f} (at cruise and 500 m; one standard deviation)"
         )
-    print("  guessed  README.md lists the guessed values and their possible error")
+        power = envelope.power(aircraft.airspeed, 500.0, 0.0)
+        low, high = (power * math.exp(sign * _INTERVAL_SIGMAS * uncertainty.power) for sign in (-1.0, 1.0))
+        kind = "from the battery" if aircraft.battery_voltage else "of fuel heat"
+        print(f"  power    {power:.3g} W {kind} in level flight at cruise, {low:.3g} to {high:.3g} (95 %)")
+    print("  guessed  README.md says what was, and how far off it may be")
 
 
 def _print_numbers(numbers: "AircraftNumbers") -> None:
@@ -293,7 +312,8 @@ def _print_limits(aircraft: "Aircraft", envelope: "Envelope") -> None:
         climb, descent = math.degrees(envelope.climb_sd), math.degrees(envelope.descent_sd)
         print(
             f"  known    from {envelope.source}: climbs to {climb:.1f} deg, descents to {descent:.1f}, the fastest"
-            f" level flight to {envelope.fastest_sd:.1f} m/s (one deviation)"
+            f" level flight to {envelope.fastest_sd:.1f} m/s, power to a factor of {math.exp(envelope.power_sd):.2f}"
+            " (one deviation)"
         )
 
 

@@ -13,10 +13,12 @@ from aircraft.identification.drag import NUISANCES
 from aircraft.identification.draws import draw_aircraft
 from aircraft.identification.estimate import Estimate
 from aircraft.identification.parameters import PARAMETERS
-from aircraft.identification.performance import Performance, fastest_level, performance
+from aircraft.identification.performance import GRAVITY, Performance, fastest_level, level_controls, performance
 from aircraft.uncertainty import Draws, draws_text
 from flight.autopilots.arduplane.parameters import DEFINITIONS, ArduPilotParameters
 from flight.dynamics.envelope_tables import load_envelope
+from flight.dynamics.fdm import Fdm
+from flight.dynamics.trim import straight
 from flight.guidance.model_gains import gains_of_model, gains_text
 from flight.mission_files.wpl import waypoints_text
 from logs.importers.motion import MotionLog
@@ -24,12 +26,15 @@ from planfly.identification.manoeuvres import identification_mission
 from planfly.identification.model_text import identified_xml
 from planfly.identification.servos import ServoOutput
 from world.arrays import Floats
+from world.errors import LogError
 from world.files import temporary_folder
 
 # Altitude at which performance is stated, m AMSL.
 AMSL = 480.0
 # Density of the standard atmosphere at that altitude, kg/m^3 (ISO 2533).
 DENSITY = 1.1695
+# Throttle above which level flight is beyond the motor; the search for it ends just below 1.
+_FULL_THROTTLE = 0.999
 # Prefixes of the parameters that determine flight behaviour; other parameters describe hardware.
 _FLIGHT_PREFIXES = (
     "AIRSPEED_",
@@ -103,7 +108,7 @@ def folder_files(identified: Identified, name: str, battery: tuple[float, float]
     left out.
 
     battery: voltage, V, and energy, J.
-    Raises FlightError for an aircraft that cannot be trimmed.
+    Raises LogError for an aircraft that holds no level flight.
     """
     xml = identified_xml(identified.base, name, identified.numbers, identified.estimate.values)
     with temporary_folder("planfly-identified-") as parent:
@@ -112,6 +117,7 @@ def folder_files(identified: Identified, name: str, battery: tuple[float, float]
         (folder / f"{name}.xml").write_text(xml, encoding="utf-8")
         toml = folder / f"{name}.toml"
         toml.write_text(_metadata_text(identified, battery, 0.0), encoding="utf-8")
+        _check_level_flight(identified, read_aircraft(folder))
         envelope = load_envelope(read_aircraft(folder))
         min_speed, max_speed = envelope.level_speeds(0.0)
         toml.write_text(_metadata_text(identified, battery, min_speed, max_speed), encoding="utf-8")
@@ -132,6 +138,25 @@ def folder_files(identified: Identified, name: str, battery: tuple[float, float]
         "posterior.toml": posterior_text(identified),
         "draws.csv": draws_text(Draws(properties, identified.draws)),
     }
+
+
+def _check_level_flight(identified: Identified, aircraft: Aircraft) -> None:
+    """Raise LogError, with the reason, if the identified model holds no level flight at cruise."""
+    if straight(Fdm(aircraft), identified.cruise, AMSL) is not None:
+        return
+    numbers, source = identified.numbers, identified.logs[-1].source
+    elevator, throttle = level_controls(numbers, identified.estimate.values, identified.cruise, DENSITY)
+    stop = math.degrees(aircraft.max_elevator)
+    if throttle > _FULL_THROTTLE:
+        reason = "full throttle does not hold its drag"
+    elif abs(math.degrees(elevator)) > stop:
+        reason = f"its elevator would be at {math.degrees(elevator):.0f} deg, and its stop is {stop:.0f} deg"
+    else:
+        lift = numbers.mass * GRAVITY / (0.5 * DENSITY * identified.cruise**2 * numbers.area)
+        reason = f"it needs a lift coefficient of {lift:.2f}"
+    message = f"the identified aircraft holds no level flight at {identified.cruise:.1f} m/s: {reason}"
+    allowed = "check the mass, span and area of these logs, and the base"
+    raise LogError(f"{source}: {message}: {allowed}", file=source, field="mass", value=numbers.mass, allowed=allowed)
 
 
 def _airspeeds(log: MotionLog, base: Aircraft) -> tuple[float, float, float]:

@@ -19,6 +19,8 @@ MIN_HZ = 9.5
 AMPLE_HZ = 20.0
 # Minimum usable flight time of a log, after unusable parts are cut, s.
 MIN_SECONDS = 180.0
+# Minimum usable flight time of a log that only checks an estimate, s; a minute of flight has as much after its cuts.
+MIN_CHECK_SECONDS = 30.0
 # Minimum duration of a stretch, s.
 MIN_STRETCH = 30.0
 # Maximum pause between rows of the sensors within a stretch, s.
@@ -71,11 +73,15 @@ _HIGH_RATE_PROFILE = 17
 
 
 def flight_records(
-    log: MotionLog, aircraft: Aircraft, servos: Mapping[str, ServoOutput] | None = None
+    log: MotionLog,
+    aircraft: Aircraft,
+    servos: Mapping[str, ServoOutput] | None = None,
+    min_seconds: float = MIN_SECONDS,
 ) -> list[FlightRecord]:
     """Return the stretches of a log that an identification can use, in which only the wing carries the aircraft.
 
     servos: output of each control, if known better than from the SERVOn_* parameters of the log.
+    min_seconds: shortest usable flight, s.
     Raises LogError, with a one-line message, for a log that cannot be used.
     """
     _check_usable(log)
@@ -129,12 +135,20 @@ def flight_records(
                 source=log.source,
             )
         )
-    seconds = sum(record.seconds for record in records)
-    if seconds < MIN_SECONDS:
-        vtol_note = "; flight on its lifting motors is cut" if _vtol_rows(log, grid, pulses).any() else ""
-        message = f"{seconds / 60.0:.1f} min of it are flight on the wing that can be used{vtol_note}"
-        raise LogError(f"{log.source}: {message}: at least {MIN_SECONDS / 60.0:g} min are needed", file=log.source)
+    _check_length(log, records, min_seconds, cut=bool(_vtol_rows(log, grid, pulses).any()))
     return records
+
+
+def _check_length(log: MotionLog, records: list[FlightRecord], min_seconds: float, *, cut: bool) -> None:
+    """Raise LogError for too little usable flight.
+
+    cut: True if flight on lifting motors was cut.
+    """
+    seconds = sum(record.seconds for record in records)
+    if seconds < min_seconds:
+        vtol_note = "; flight on its lifting motors is cut" if cut else ""
+        message = f"{seconds / 60.0:.1f} min of it are flight on the wing that can be used{vtol_note}"
+        raise LogError(f"{log.source}: {message}: at least {min_seconds / 60.0:g} min are needed", file=log.source)
 
 
 def _pulses_to_controls(outputs: Mapping[str, ServoOutput], pulses: Floats) -> Floats:

@@ -20,11 +20,19 @@ from aircraft.data_sheet import (
     size_aircraft,
 )
 from aircraft.envelope import GRAVITY, UNDECIDED, turn_radius
-from aircraft.model_writer import FACTORS, Layout, model_xml
+from aircraft.model_writer import FACTORS, POWER_FACTORS, Layout, model_xml
+from aircraft.power_prior import (
+    AVIONICS_LOG_SD,
+    EFFICIENCY_LOG_SD,
+    INDUCED_DRAG_LOG_SD,
+    LEAST_DRAG_LOG_SD,
+    power_log_sd,
+)
+from aircraft.propulsion import ElectricMotor
 from aircraft.uncertainty import (
     DRAWS,
     DRAWS_FILE,
-    POWER_SD,
+    Draws,
     UncertainQuantity,
     Uncertainty,
     draw_quantities,
@@ -180,11 +188,13 @@ def _parse_number(text: str) -> float:
 # ----------------------------------------------------------------------
 # Estimate the standard deviations of the model's factors.
 
-# Standard deviation of each guessed factor, as a fraction, and the basis of the guess.
+# Standard deviation of the logarithm of each guessed factor, and the basis of the guess.
 _SPREADS = {
-    "zero-lift-drag": (0.25, "least drag from published aircraft of the class"),
-    "induced-drag": (0.20, "span efficiency from published aircraft of the class"),
-    "thrust": (0.20, "propeller scaled to the climb"),
+    "zero-lift-drag": (LEAST_DRAG_LOG_SD, "least drag by layout and aspect ratio, fitted to real aircraft"),
+    "induced-drag": (INDUCED_DRAG_LOG_SD, "span efficiency from published aircraft of the class"),
+    "drive-power": (EFFICIENCY_LOG_SD, "efficiency of the drive by mass, fitted to real aircraft"),
+    "avionics-power": (AVIONICS_LOG_SD, "autopilot, radios and servos, fitted to real aircraft"),
+    "thrust": (0.20, "propeller scaled to the climb; balances the other factors"),
     "motor-speed": (0.07, "motor scaled to the climb and the top speed"),
     "windmill-drag": (0.50, "drag of an idle propeller depends on hub and controller"),
     "lift-slope": (0.10, "lift curve slope from published aircraft of the class"),
@@ -194,77 +204,128 @@ _SPREADS = {
     "roll-damping": (0.20, "roll damping from published aircraft of the class"),
     "aileron-power": (0.20, "ailerons from published aircraft of the class"),
 }
-# Standard deviation of a guessed steepest climb, rad.  For three aircraft whose true values are known, a scaled model
-# was wrong by 4.8 degrees on average (docs/measured.md); the mean absolute error of a normal distribution is
-# sqrt(2 / pi) = 0.8 of the standard deviation.
+# Standard deviation of a guessed steepest climb, rad.  Models of published aircraft climb 13.6, 12.9, 16.4 and 7.2
+# degrees at cruise and a real one 8.9 (`examples/real/aircraft.csv`): 95 % of others are within 11.3 degrees of the
+# mean (Student's t).  For three aircraft whose true values are known, a scaled model was wrong by 4.8 degrees on
+# average (docs/measured.md), 0.8 of a deviation.
 GUESSED_CLIMB = math.radians(6.0)
-# Standard deviation of a stated steepest climb, rad.
-STATED_CLIMB = math.radians(3.0)
-# Standard deviation of the zero-lift drag if the sheet states the power-off sink rate, as a fraction.
+# Standard deviation of a stated steepest climb, rad: 0.4 m/s at 15 m/s.
+STATED_CLIMB = math.radians(1.5)
+# Standard deviation of the logarithm of the least drag if the sheet states the power-off sink rate.
 STATED_DRAG = 0.15
-# Factors of the motor and the propeller.
-_PROPULSION = ("thrust", "motor-speed")
 
 
-def _uncertainty(sized: SizedAircraft, aircraft: Aircraft, performance: "Performance", climb_sd: float) -> Uncertainty:
-    """Return standard deviations of the factors; the steepest climb has at least the deviation `climb_sd`.
+def _uncertainty(sized: SizedAircraft, aircraft: Aircraft) -> tuple[Uncertainty, Draws]:
+    """Return standard deviations of the factors, and of climb, descent, top speed and power at cruise, with draws.
 
-    performance: performance of the estimated aircraft.
-    climb_sd: standard deviation of the steepest climb angle, rad.
+    The factors are independent but for the thrust, which a draw sets such that the climb has its own deviation: an
+    aircraft with more drag than expected has the motor for its climb.
     """
-    estimated = np.array([performance.climb.climb, performance.idle.climb, performance.fastest.airspeed])
-    spreads = {name: sd for name, (sd, _) in _SPREADS.items()}
+    estimated = _performance_vector(aircraft)
+    spreads = {name: sd for name, (sd, _) in _SPREADS.items() if name in sized.numbers.factors}
     if sized.sheet.sink:
         spreads["zero-lift-drag"] = STATED_DRAG
-    effects = {name: _effect_of_factor(aircraft, estimated, name, spreads[name]) for name in spreads}
-    propulsion_climb = math.hypot(*(effects[name][0] for name in _PROPULSION))
-    other_climb = math.hypot(*(change for name, (change, *_) in effects.items() if name not in _PROPULSION))
-    propulsion_climb_target = math.sqrt(max((0.3 * climb_sd) ** 2, climb_sd**2 - other_climb**2))
-    scale = min(2.0, max(0.1, propulsion_climb_target / propulsion_climb if propulsion_climb > 0.0 else 1.0))
-    spreads |= {name: scale * spreads[name] for name in _PROPULSION}
-    descent_sd = math.hypot(*(change for _, change, _ in effects.values()))
-    top_speed_sd = math.hypot(
-        *(change * (scale if name in _PROPULSION else 1.0) for name, (*_, change) in effects.items())
-    )
+    climb_sd = GUESSED_CLIMB if "climb" in sized.guessed else STATED_CLIMB
+    slopes = {name: _effect_of_factor(aircraft, estimated, name, sd) / sd for name, sd in spreads.items()}
+    thrust_slopes = slopes.pop("thrust")
+    # Change of the logarithm of the thrust per factor that keeps the climb.
+    balance = {name: -slope[0] / thrust_slopes[0] for name, slope in slopes.items()}
+    effects = {name: spreads[name] * (slope + balance[name] * thrust_slopes) for name, slope in slopes.items()}
+    effects["climb"] = climb_sd / thrust_slopes[0] * thrust_slopes
+    # The drive's deviation is what all others leave of the calibrated deviation of the power.
+    other_power = math.hypot(*(effect[3] for name, effect in effects.items() if name != "drive-power"))
+    calibrated_power = _calibrated_power_sd(sized, math.exp(estimated[3]), spreads["zero-lift-drag"])
+    drive_power = math.sqrt(max((0.3 * calibrated_power) ** 2, calibrated_power**2 - other_power**2))
+    drive_scale = abs(drive_power / effects["drive-power"][3])
+    spreads["drive-power"] *= drive_scale
+    effects["drive-power"] *= drive_scale
+    total_climb_sd, descent_sd, top_speed_sd, power_sd = np.linalg.norm(list(effects.values()), axis=0).tolist()
     # The sheet states that the aircraft flies level at cruise speed; this limits the deviation of the top speed.
-    top_speed_sd = min(top_speed_sd, max(0.0, performance.fastest.airspeed - aircraft.airspeed) / UNDECIDED)
+    top_speed_sd = min(top_speed_sd, max(0.0, float(estimated[2]) - aircraft.airspeed) / UNDECIDED)
+    balance_sds = [balance[name] * spreads[name] for name in slopes]
+    spreads["thrust"] = math.hypot(climb_sd / thrust_slopes[0], *balance_sds)
     quantities = tuple(
         UncertainQuantity(f"ident/{name}", "factor", 1.0, sd, _SPREADS[name][1]) for name, sd in spreads.items()
     )
-    # The factors of motor and propeller are limited, but the deviation of the climb must not shrink with them.
-    total_climb_sd = max(climb_sd, math.hypot(other_climb, scale * propulsion_climb))
-    guessed = "energy" in sized.guessed
-    return Uncertainty("a data sheet", total_climb_sd, descent_sd, quantities, POWER_SD, guessed, top_speed_sd)
+    uncertainty = Uncertainty(
+        "a data sheet",
+        climb=total_climb_sd,
+        descent=descent_sd,
+        quantities=quantities,
+        power=power_sd,
+        battery_guessed="energy" in sized.guessed,
+        fastest=top_speed_sd,
+        climb_guessed="climb" in sized.guessed,
+    )
+    return uncertainty, _draw_with_climb(uncertainty, balance, climb_sd / thrust_slopes[0])
 
 
-def _effect_of_factor(aircraft: Aircraft, estimated: Floats, name: str, sd: float) -> tuple[float, float, float]:
-    """Return the effect of one standard deviation of a factor on climb and descent, rad, and top speed, m/s.
+def _draw_with_climb(uncertainty: Uncertainty, balance: Mapping[str, float], thrust_sd: float) -> Draws:
+    """Draw all factors, and set the thrust such that it keeps the climb but for a deviation of its own.
 
-    Climb and descent are the steepest path angles at cruise speed.
-    estimated: climb angle, descent angle and maximum level airspeed of the estimated aircraft, (3,).
+    balance: change of the logarithm of the thrust per logarithm of each other factor.
+    thrust_sd: deviation of the logarithm of the thrust for the deviation of the climb.
     """
-    varied_values = []
-    for sign in (1.0, -1.0):
-        fdm = Fdm(aircraft, tried=True, variation=Variation(properties=((f"ident/{name}", 1.0 + sign * sd),)))
-        angles = [steepest(fdm, aircraft.airspeed, AMSL) for steepest in (full_throttle, idle)]
-        fastest_trim = fastest(fdm, AMSL)
-        varied_values.append(
-            [
-                *(math.nan if trim is None else trim.climb for trim in angles),
-                math.nan if fastest_trim is None else fastest_trim.airspeed,
-            ]
-        )
-    climb, descent, top_speed = factor_effect(
-        np.array(varied_values[0]), np.array(varied_values[1]), estimated
-    ).tolist()
-    return climb, descent, top_speed
+    drawn = draw_quantities(uncertainty.quantities)
+    logarithms = np.log(drawn.values)
+    names = [name.removeprefix("ident/") for name in drawn.names]
+    thrust = names.index("thrust")
+    scale = thrust_sd / next(quantity.sd for quantity in uncertainty.quantities if quantity.name == "ident/thrust")
+    logarithms[:, thrust] *= scale
+    for k, name in enumerate(names):
+        if k != thrust:
+            logarithms[:, thrust] += balance[name] * logarithms[:, k]
+    return replace(drawn, values=np.exp(logarithms).round(6))
+
+
+def _calibrated_power_sd(sized: SizedAircraft, power: float, least_drag_sd: float) -> float:
+    """Return the standard deviation of the logarithm of the power (W) at cruise, as calibrated on real aircraft."""
+    aero, sheet, propulsion = sized.numbers.aero, sized.sheet, sized.numbers.propulsion
+    lift = sheet.mass * GRAVITY / (0.5 * SHEET_DENSITY * sheet.cruise**2 * sheet.area)
+    least_share = aero.drag_min / (aero.drag_min + aero.drag_lift * lift**2)
+    avionics_share = propulsion.avionics / power if isinstance(propulsion, ElectricMotor) else 0.0
+    return power_log_sd(least_share, avionics_share, least_drag_sd)
+
+
+def _performance_vector(aircraft: Aircraft, properties: tuple[tuple[str, float], ...] = ()) -> Floats:
+    """Return climb and descent, rad, top speed, m/s, and the logarithm of the power, W, of an aircraft, (4,).
+
+    Climb and descent are the steepest path angles at cruise speed, and the power is that of level flight at cruise; a
+    value is NaN if the aircraft cannot be trimmed.
+
+    properties: values of the model's properties by name.
+    """
+    fdm = Fdm(aircraft, tried=True, variation=Variation(properties=properties))
+    angles = [steepest(fdm, aircraft.airspeed, AMSL) for steepest in (full_throttle, idle)]
+    fastest_trim = fastest(fdm, AMSL)
+    level = straight(fdm, aircraft.airspeed, AMSL)
+    if level is not None:
+        fdm.balance(level.vector())
+    return np.array(
+        [
+            *(math.nan if trim is None else trim.climb for trim in angles),
+            math.nan if fastest_trim is None else fastest_trim.airspeed,
+            math.nan if level is None else math.log(float(fdm.read().power)),
+        ]
+    )
+
+
+def _effect_of_factor(aircraft: Aircraft, estimated: Floats, name: str, sd: float) -> Floats:
+    """Return the effect of a standard deviation of a factor's logarithm on the values of `_performance_vector`, (4,).
+
+    estimated: values of the estimated aircraft, (4,).
+    """
+    increased, decreased = (
+        _performance_vector(aircraft, ((f"ident/{name}", math.exp(sign * sd)),)) for sign in (1.0, -1.0)
+    )
+    return factor_effect(increased, decreased, estimated)
 
 
 def factor_effect(increased: Floats, decreased: Floats, estimated: Floats) -> Floats:
-    """Return the effect of a factor on path angles and speeds, (n,).
+    """Return the signed effect of a factor on path angles and speeds, (n,).
 
     A value is NaN if the aircraft cannot be trimmed.  Then the change to the other value applies; if both are NaN, the
-    estimated value itself applies.
+    magnitude of the estimated value applies.
 
     increased, decreased: values with the factor increased and decreased, (n,).
     estimated: estimated values, (n,).
@@ -273,9 +334,9 @@ def factor_effect(increased: Floats, decreased: Floats, estimated: Floats) -> Fl
     >>> factor_effect(more, less, np.array([0.2, 0.2, -0.2])).round(2).tolist()
     [0.1, 0.15, 0.2]
     """
-    one_sided_change = np.fmax(np.abs(increased - estimated), np.abs(decreased - estimated))
+    one_sided_change = np.where(np.isnan(increased), estimated - decreased, increased - estimated)
     one_sided_change = np.where(np.isnan(one_sided_change), np.abs(estimated), one_sided_change)
-    two_sided_change: Floats = 0.5 * np.abs(increased - decreased)
+    two_sided_change: Floats = 0.5 * (increased - decreased)
     return np.where(np.isnan(two_sided_change), one_sided_change, two_sided_change)
 
 
@@ -363,8 +424,7 @@ def _make_files(
     (folder / f"{name}.toml").write_text(metadata, encoding="utf-8")
     aircraft = read_aircraft(folder)
     fdm = Fdm(aircraft, tried=True)
-    climb_is_guessed = "climb" in sized.guessed
-    uncertainty = _uncertainty(sized, aircraft, performance, GUESSED_CLIMB if climb_is_guessed else STATED_CLIMB)
+    uncertainty, draws = _uncertainty(sized, aircraft)
     return {
         f"{name}.xml": model,
         f"{name}.toml": metadata,
@@ -372,7 +432,7 @@ def _make_files(
         "ardupilot.parm": arduplane_parameters(aircraft, performance, fdm, file_parameters),
         "ardupilot.toml": servo_text(aircraft, performance),
         "uncertainty.toml": uncertainty_text(uncertainty),
-        DRAWS_FILE: draws_text(draw_quantities(uncertainty.quantities)),
+        DRAWS_FILE: draws_text(draws),
         "README.md": _readme_text(name, sized, performance, uncertainty, file_parameters),
     }
 
@@ -392,8 +452,9 @@ def performance_of(fdm: Simulator, aircraft: Aircraft) -> Performance:
     for name, trim in trims.items():
         if trim is None:
             argument = {"climb": "climb", "idle": "cruise", "slowest": "stall", "fastest": "top"}[name]
-            allowed = f"the model cannot fly this ({name}); give numbers closer to those of other aircraft"
-            raise FlightError.of_argument(argument, None, allowed, shown="")
+            option, unit, low, high, _ = RANGES[argument]
+            allowed = f"no trim of the model for this sheet ({name}): state another value, {low:g}..{high:g} {unit}"
+            raise FlightError.of_argument(option, None, allowed, shown="")
     return Performance(level, **{name: trim for name, trim in trims.items() if trim is not None})
 
 
@@ -581,7 +642,7 @@ def _readme_text(
         "|---|---|---|---|",
     ]
     for quantity in uncertainty.quantities:
-        factor_text = FACTORS[quantity.name.removeprefix("ident/")]
+        factor_text = (FACTORS | POWER_FACTORS)[quantity.name.removeprefix("ident/")]
         lines.append(f"| `{quantity.name}` | {factor_text} | {100.0 * quantity.sd:.0f} % | {quantity.reason} |")
     lines += [
         "",

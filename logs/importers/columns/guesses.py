@@ -99,7 +99,7 @@ _TRIED = {
     "speed": ("m/s", "cm/s"),
     "length": ("m", "mm"),
     "deflection": ("rad", "deg"),
-    "fraction": ("fraction", "%"),
+    "fraction": ("fraction", "%", "us"),
     "voltage": ("V", "cV", "mV"),
     "current": ("A", "cA", "mA"),
     "pressure": ("kPa", "hPa", "Pa"),
@@ -176,7 +176,8 @@ def guess_table(paths: Sequence[Path], target: Path) -> str:
     guesses: list[_Guess] = []
     rivals_of_guesses: list[_Guess] = []
     for quantity in NAMES:
-        found = list(_candidates(quantity, clocks, files))
+        # A column with the rate of the sensors is preferred.
+        found = sorted(_candidates(quantity, clocks, files), key=lambda guess: guess.clock != clocks[0])
         guesses += found[:1]
         rivals_of_guesses += [guess for guess in found[1:] if guess.clock != found[0].clock]
     if not guesses:
@@ -305,9 +306,12 @@ def _table_text(guesses: Sequence[_Guess], rivals: Sequence[_Guess], files: dict
         lines += [f'column = "{clock.column}"', f'unit = "{clock.unit}"']
         partner = next((guess for guess in rivals if guess.clock == clock), None)
         # Groups of one file with names of their own (GPS, IMU) share one clock.
-        if clock != main and partner is not None and (clock.file != main.file or clock.prefix == main.prefix):
+        is_separate = clock != main and (clock.file != main.file or clock.prefix == main.prefix)
+        if is_separate and partner is not None:
             pair = f'column = "{partner.column}", with = "{partner.quantity}"'
             lines.append(f"align = {{ {pair} }}  # guess: both move together")
+        elif is_separate:
+            lines.append('# guess: the same clock as main; otherwise add align = { column = "...", with = "..." }')
     lines += ["", "[columns]"]
     for guess in guesses:
         parts = [f'column = "{guess.column}"', *([f'unit = "{guess.unit}"'] if guess.unit else [])]

@@ -11,7 +11,7 @@ UNITS: dict[str, dict[str, float]] = {
     "speed": {"m/s": 1.0, "km/h": 1.0 / 3.6, "kt": 1852.0 / 3600.0, "ft/s": 0.3048, "mph": 0.44704, "cm/s": 0.01},
     "length": {"m": 1.0, "ft": 0.3048, "km": 1000.0, "cm": 0.01, "mm": 0.001},
     "deflection": {"rad": 1.0, "deg": math.pi / 180.0, "fraction": 1.0, "%": 0.01},
-    "fraction": {"fraction": 1.0, "%": 0.01},
+    "fraction": {"fraction": 1.0, "%": 0.01, "us": 0.001},
     "voltage": {"V": 1.0, "cV": 0.01, "mV": 0.001},
     "current": {"A": 1.0, "cA": 0.01, "mA": 0.001},
     "pressure": {"Pa": 1.0, "hPa": 100.0, "mbar": 100.0, "kPa": 1000.0},
@@ -19,8 +19,8 @@ UNITS: dict[str, dict[str, float]] = {
     "time": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0, "iso": 1.0},
     "mode": {"": 1.0},
 }
-# Value of a unit's zero in the base unit of its dimension.
-UNIT_ZEROS = {"K": -273.15}
+# Value of a unit's zero in the base unit of its dimension; a throttle is idle at a pulse of 1000 us, full at 2000 us.
+UNIT_ZEROS = {"K": -273.15, "us": -1.0}
 # Units of a deflection that state a fraction of full travel instead of an angle.
 FRACTION_UNITS = ("fraction", "%")
 

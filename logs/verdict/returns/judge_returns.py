@@ -44,7 +44,7 @@ from logs.verdict.measures.path_moves import MOVE
 from logs.verdict.measures.route_requirements import Airspace, judged_airspace
 from logs.verdict.measures.zone_visits import path_zones
 from logs.verdict.returns.return_starts import ReturnStarts
-from logs.verdict.tolerances import CLEARANCE_TOLERANCE_M, ENERGY_RESERVE_FRACTION
+from logs.verdict.tolerances import CLEARANCE_TOLERANCE_M, ENERGY_RESERVE_FRACTION, UNDECIDED_FRACTION
 from world.arrays import Floats
 from world.errors import MissionError
 from world.kernels import Record, Records
@@ -52,10 +52,12 @@ from world.scenario import Scenario
 from world.wind import mean_wind_speed
 
 # Outcome of a return, the worst first: it hits the ground, enters a missile's sphere, violates a zone, does not arrive,
-# uses more energy than available, leaves the elevation data, differs too much between the point mass and JSBSim, goes
-# below the least height above ground; or is safe.
-Kind = Literal["ground", "threat", "zone", "lost", "energy", "unknown", "unsure", "low", "safe"]
-KINDS: tuple[Kind, ...] = ("ground", "threat", "zone", "lost", "energy", "unknown", "unsure", "low", "safe")
+# uses more energy than available, leaves the elevation data, may use more energy than available because the power is
+# uncertain, differs too much between the point mass and JSBSim, goes below the least height above ground; or is safe.
+Kind = Literal["ground", "threat", "zone", "lost", "energy", "unknown", "power", "unsure", "low", "safe"]
+KINDS: tuple[Kind, ...] = ("ground", "threat", "zone", "lost", "energy", "unknown", "power", "unsure", "low", "safe")
+# Outcomes that are not judged.
+UNJUDGED: tuple[Kind, ...] = ("unknown", "power", "unsure")
 # Outcomes that are failures of the return.
 UNSAFE = frozenset(KINDS[:5])
 
@@ -139,8 +141,8 @@ class ReturnRange:
 
 
 # Point of no return by energy: none; after some place; before the first place; or unknown, because the battery or the
-# energy used is unknown, or because no return arrives.
-NoReturn = Literal["never", "later", "at once", "battery", "used", "arrives"]
+# energy used is unknown, because the aircraft's power is too uncertain, or because no return arrives.
+NoReturn = Literal["never", "later", "at once", "battery", "used", "power", "arrives"]
 
 
 class PointOfNoReturn(NamedTuple):
@@ -200,7 +202,7 @@ class Returns:
     def undecided(self) -> bool:
         """True if no return is known to be unsafe, but some are unknown."""
         has_failures = bool(self.unsafe) or self.count("low") > 0
-        return not has_failures and (bool(self.unjudged_parts) or self.count("unknown") > 0 or self.count("unsure") > 0)
+        return not has_failures and (bool(self.unjudged_parts) or any(self.count(kind) > 0 for kind in UNJUDGED))
 
     @property
     def lands(self) -> bool:
@@ -222,6 +224,8 @@ class Returns:
         last_time, least_left, skipped_count = math.nan, math.inf, 0
         if not self.each or all(math.isnan(ret.energy_left) for ret in self.each):
             return PointOfNoReturn("battery")
+        if any(ret.kind == "power" for ret in self.each) and not any(ret.kind == "energy" for ret in self.each):
+            return PointOfNoReturn("power")
         for k, ret in enumerate(self.each):
             if k and ret.time <= self.each[k - 1].time:
                 # From here on the returns end differently.
@@ -565,7 +569,11 @@ def classify_return(world: ReturnWorld, result: Record, zone: int, energy_left: 
     if result["clearance"] < required_height - CLEARANCE_TOLERANCE_M:
         # Applies wherever the return goes after that.
         return "low"
-    return "unknown" if result["ended"] == RETURN_OFF_TERRAIN or math.isnan(result["clearance"]) else "safe"
+    if result["ended"] == RETURN_OFF_TERRAIN or math.isnan(result["clearance"]):
+        return "unknown"
+    battery = world.setup.battery
+    max_used = (battery - energy_left) * math.exp(UNDECIDED_FRACTION * world.setup.envelope.power_sd)
+    return "power" if max_used > (1.0 - ENERGY_RESERVE_FRACTION) * battery else "safe"
 
 
 def _judge_return(

@@ -17,8 +17,9 @@ _SINGULAR_TEXTS: dict[Kind, str] = {
     "zone": "violates a zone",
     "lost": "does not arrive",
     "energy": "takes more energy than may be used",
-    "unknown": "flies where the terrain is unknown",
-    "unsure": "cannot be judged because the point mass and JSBSim disagree",
+    "unknown": "flies where the ground is not known",
+    "power": "may take more energy than may be used, as the power of the aircraft is uncertain",
+    "unsure": "is flown too differently by the point mass and in JSBSim to be judged",
     "low": "comes lower than {limit:.0f} m above ground",
 }
 _PLURAL_TEXTS: dict[Kind, str] = {
@@ -27,8 +28,9 @@ _PLURAL_TEXTS: dict[Kind, str] = {
     "zone": "violate a zone",
     "lost": "do not arrive",
     "energy": "take more energy than may be used",
-    "unknown": "fly where the terrain is unknown",
-    "unsure": "cannot be judged because the point mass and JSBSim disagree",
+    "unknown": "fly where the ground is not known",
+    "power": "may take more energy than may be used, as the power of the aircraft is uncertain",
+    "unsure": "are flown too differently by the point mass and in JSBSim to be judged",
     "low": "come lower than {limit:.0f} m above ground",
 }
 # Name of the path segment from which returns have this outcome.
@@ -38,8 +40,9 @@ _SEGMENT_NAMES: dict[Kind, str] = {
     "zone": "a return violates a zone",
     "lost": "a return does not arrive",
     "energy": "a return takes too much energy",
-    "unknown": "a return is not judged: terrain unknown",
-    "unsure": "a return is not judged: the point mass and JSBSim disagree",
+    "unknown": "a return is not judged: ground not known",
+    "power": "a return is not judged: power uncertain",
+    "unsure": "a return is not judged: flown too differently",
     "low": "a return comes lower than required",
     "safe": "a return is safe",
 }
@@ -160,6 +163,8 @@ def point_of_no_return_text(returns: Returns) -> str:
             return f"{name}: not judged, because the battery energy is unknown"
         case "used":
             return f"{name}: not judged, because the energy used before is unknown"
+        case "power":
+            return f"{name}: not judged, because the power of the aircraft is uncertain"
         case "arrives":
             return f"{name}: not judged, because no return arrives"
         case "at once":
@@ -273,6 +278,9 @@ def _range_outcome_text(
         case "energy":
             left_text = f"leaves {worst_return.energy_left:.0f} Wh of the required {returns.reserve:.0f} Wh"
             return f"{prefix}takes {worst_return.energy:.0f} Wh and {left_text}"
+        case "power":
+            left_text = f"leaves {worst_return.energy_left:.0f} Wh of the required {returns.reserve:.0f} Wh"
+            return f"{prefix}takes {worst_return.energy:.0f} Wh and {left_text}, but the power is uncertain"
         case "unknown":
             return f"{prefix}flies where the terrain is unknown"
         case "unsure":

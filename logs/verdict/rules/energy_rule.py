@@ -31,7 +31,8 @@ def energy_findings(
     is_measured = setup.source is not None and not geometric
     failsafe_messages, failsafe_text = _battery_failsafe_messages(requirements, energy)
     faults += failsafe_messages
-    max_energy = energy * (1.0 + (0.0 if is_measured else UNDECIDED_FRACTION * setup.envelope.power_sd))
+    # Power is log-normal; this is the upper end of 95 %.
+    max_energy = energy * math.exp(0.0 if is_measured else UNDECIDED_FRACTION * setup.envelope.power_sd)
     is_uncertain = not faults and not is_guessed and energy <= limit < max_energy
     if energy == 0.0 and planned_energy == 0.0:
         # A model without a reading of power reads as 0 W.
@@ -47,13 +48,10 @@ def energy_findings(
             reason = (
                 f"the battery is guessed: state --battery with the aircraft, or the scenario's battery_wh; {reason}"
             )
-        elif is_uncertain:
-            reason += (
-                f"; the power according to {setup.envelope.source} has a standard deviation of "
-                f"{setup.envelope.power_sd:.0%}"
-            )
         elif energy > limit:
             reason += f"; {ENERGY_RESERVE_FRACTION:.0%} must be left"
+        elif max_energy > energy:
+            reason += f"; at most {max_energy:.1f} Wh with 95 % probability, because the power is from {setup.envelope.source}"
         reason += failsafe_text
     return [
         make_finding(

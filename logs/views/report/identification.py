@@ -9,9 +9,10 @@ from markupsafe import Markup
 
 from aircraft.identification.estimate import Estimate
 from aircraft.identification.parameters import PARAMETERS
+from aircraft.identification.prediction import HORIZONS_S, QUANTITIES, UNITS, PredictedLog
 from logs.views.charts import Chart
 from logs.views.figures import draw_pictures, view_json
-from logs.views.identification import equation_chart, replay_chart
+from logs.views.identification import equation_chart, prediction_chart
 from logs.views.report.page import (
     CHART_SCRIPTS,
     page_library,
@@ -22,27 +23,9 @@ from logs.views.report.page import (
     style_text,
 )
 from logs.views.scene import script_json
-from world.arrays import Floats
 
 # Standard deviations from the estimate to either end of a 95 % interval.
 _INTERVAL_SIGMAS = 1.96
-
-
-@dataclass(frozen=True, slots=True)
-class ReplayedLog:
-    """A check log, replayed by both models.
-
-    file: its name.  windows: number of windows of 5 s.
-    rows: quantity, unit, and root mean square errors of both models.
-    logged, replayed: (t, k) of some windows, replayed by the identified model.  hertz: rows a second.
-    """
-
-    file: str
-    windows: int
-    rows: tuple[tuple[str, str, float, float], ...]
-    logged: Floats
-    replayed: Floats
-    hertz: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,7 +34,7 @@ class IdentificationFacts:
 
     title: title of the aircraft.  logs: name and SHA-256 of each log.
     numbers: performance of the aircraft: name, unit, lower end, estimate and upper end (95 %).
-    replay: replay of a check log; None without one.
+    predicted: predictions of the check log, or of the logs themselves.  check: file of the check log; None without one.
     wide: numbers that the logs leave uncertain, with the flights that would narrow each, a line each.
     """
 
@@ -59,7 +42,8 @@ class IdentificationFacts:
     estimate: Estimate
     logs: tuple[tuple[str, str], ...]
     numbers: tuple[tuple[str, str, float, float, float], ...]
-    replay: ReplayedLog | None = None
+    predicted: PredictedLog
+    check: str | None = None
     wide: tuple[str, ...] = ()
 
 
@@ -107,12 +91,19 @@ def shift_rows(estimate: Estimate, count: int = 3) -> list[tuple[str, str]]:
     return rows
 
 
+def prediction_rows(predicted: PredictedLog) -> list[tuple[str, str, list[str]]]:
+    """Return quantity with unit, time ahead, and the root mean square error of each model, as text."""
+    return [
+        (f"{name} ({unit})", f"{horizon:g} s", [f"{one.rms[horizon][k]:.3g}" for one in predicted.predictions])
+        for k, (name, unit) in enumerate(zip(QUANTITIES, UNITS, strict=True))
+        for horizon in HORIZONS_S
+    ]
+
+
 def identification_page(facts: IdentificationFacts) -> str:
     """Return the whole page with its pictures, charts and scripts."""
     charts = {f"fit-{k}": equation_chart(one) for k, one in enumerate(facts.estimate.equations)}
-    if facts.replay is not None:
-        names, units = [row[0] for row in facts.replay.rows], [row[1] for row in facts.replay.rows]
-        charts["replay"] = replay_chart(names, units, facts.replay.logged, facts.replay.replayed, facts.replay.hertz)
+    charts["predicted"] = prediction_chart(facts.predicted)
     pictures = draw_pictures(charts)
     script = script_text(CHART_SCRIPTS)
     return page_template("identification.html").render(
@@ -122,7 +113,9 @@ def identification_page(facts: IdentificationFacts) -> str:
         parameters=parameter_rows(facts.estimate),
         silent=facts.estimate.silent(),
         shifts=shift_rows(facts.estimate),
-        replay_picture=picture_address(pictures["replay.png"]) if facts.replay is not None else "",
+        predictions=prediction_rows(facts.predicted),
+        whiteness=[f"{100.0 * share:.0f} %" for share in facts.predicted.predictions[-1].whiteness],
+        predicted_picture=picture_address(pictures["predicted.png"]),
         style=Markup(style_text("style", "compare", "identification")),
         scene=Markup(script_json(None)),
         flight_data=Markup(script_json({"flights": []})),

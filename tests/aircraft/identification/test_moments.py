@@ -9,7 +9,7 @@ import pytest
 from aircraft.catalog import load_aircraft
 from aircraft.identification.base_model import BaseModel
 from aircraft.identification.electric_motor import ElectricMotor
-from aircraft.identification.moments import _required_moments, fit_moments
+from aircraft.identification.moments import fit_moments, required_moments
 from planfly.identification.base_numbers import base_model
 from tests.aircraft.identification.made_signals import steady
 
@@ -24,7 +24,7 @@ def signals(rates: tuple[float, ...], changes: tuple[float, ...]) -> Any:
 
 
 def moments(base: BaseModel, rates: tuple[float, ...], changes: tuple[float, ...]) -> list[float]:
-    found = _required_moments(signals(rates, changes), base, STILL)
+    found = required_moments(signals(rates, changes), base, STILL)
     return [float(found[axis][0]) for axis in ("roll", "pitch", "yaw")]
 
 
@@ -59,7 +59,7 @@ def test_the_propellers_torque_rolls_it_to_the_left() -> None:
     )
     torque = float(base.motor.reaction(running.airspeed, running.throttle, running.density)[0])
     assert 0.5 < torque < 3.0
-    assert _required_moments(running, base, base.motor)["roll"] == pytest.approx([torque])
+    assert required_moments(running, base, base.motor)["roll"] == pytest.approx([torque])
 
 
 def test_what_nothing_moves_keeps_its_prior() -> None:

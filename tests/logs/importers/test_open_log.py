@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from logs.importers.open_log import FORMATS, MAX_BYTES, is_imported_log, log_format, open_log
-from tests.logs.importers.written_logs import dataflash, gpx, igc, kml, px4, telemetry
+from tests.logs.importers.written_logs import columns, dataflash, gpx, igc, kml, px4, telemetry
 from world.errors import LogError
 
 WRITERS: dict[str, tuple[str, Callable[[Path], Path]]] = {
@@ -16,6 +16,7 @@ WRITERS: dict[str, tuple[str, Callable[[Path], Path]]] = {
     "GPX track": (".gpx", gpx),
     "IGC flight recorder file": (".igc", igc),
     "KML track": (".kml", kml),
+    "table of columns": (".columns.toml", columns),
 }
 
 

@@ -328,3 +328,36 @@ def _each_second(raw: RawLog) -> list[tuple[tuple[float, float, float], float]]:
         ((float(lat), float(lon), float(up)), round(float(t)))
         for (lat, lon, up), t in zip(series.values[rows], time[rows], strict=True)
     ]
+
+
+def columns(path: Path, log: RawLog | None = None) -> Path:
+    """Write a log as a CSV file with its table of columns, which is the path."""
+    raw = example_raw_log() if log is None else log
+    time = raw.series["position"].time
+    names = {
+        "position": ("latitude", "longitude", "altitude"),
+        "velocity": ("velocity_east", "velocity_north", "velocity_down"),
+        "attitude": ("roll", "pitch", "yaw"),
+        "airspeed": ("airspeed",),
+        "wind": ("wind_east", "wind_north"),
+        "throttle": ("throttle",),
+    }
+    units = {"latitude": "deg", "longitude": "deg", "altitude": "m", "throttle": "fraction"}
+    units |= dict.fromkeys(("roll", "pitch", "yaw"), "rad")
+    frames = {"velocity_down": "ENU", "airspeed": "true"}
+    table = {
+        name: values
+        for series, quantities in names.items()
+        for name, values in zip(quantities, raw.series[series].values.T, strict=True)
+    }
+    file = path.with_name("columns.csv")
+    rows = [",".join(("t", *table))]
+    rows += [",".join(f"{value!r}" for value in row) for row in np.column_stack([time, *table.values()]).tolist()]
+    file.write_text("\n".join(rows) + "\n")
+    lines = [f'file = "{file.name}"', f'program = "{raw.program}"', "[clocks.main]", 'column = "t"', "[columns]"]
+    for name in table:
+        frame = f', frame = "{frames[name]}"' if name in frames else ""
+        lines.append(f'{name} = {{ column = "{name}", unit = "{units.get(name, "m/s")}"{frame} }}')
+    lines += ["[parameters]", *(f"{name} = {value}" for name, value in raw.parameters.items())]
+    path.write_text("\n".join(lines) + "\n")
+    return path

@@ -110,6 +110,7 @@ def test_what_is_not_known_of_an_aircraft_comes_back(tmp_path: Path, track: Trac
         fastest_sd=1.5,
         power_sd=0.25,
         battery_guessed=True,
+        climb_guessed=True,
     )
     limits = dataclasses.replace(made.limits, envelope=envelope)
     setup = dataclasses.replace(made, limits=limits)
@@ -139,7 +140,7 @@ def test_no_field_of_a_setup_is_left_behind() -> None:
     assert len(names[Route]) == 20
     assert set(names[Route]) == set(RouteTable.model_fields)
     assert set(names[Envelope]) == set(EnvelopeTable.model_fields)
-    assert len(names[Envelope]) == 20
+    assert len(names[Envelope]) == 21
     assert len(dataclasses.fields(MissionItem)) == 8
 
 

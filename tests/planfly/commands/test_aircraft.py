@@ -1,5 +1,6 @@
 """`planfly aircraft`: its tables, its pictures, and a second and a third aircraft flown by the same commands."""
 
+import math
 import re
 import shutil
 from dataclasses import replace
@@ -259,7 +260,7 @@ SIX = ("--mass", "2.1", "--span", "1.6", "--cruise", "15", "--stall", "10")
 @pytest.mark.parametrize(
     ("more", "climb", "sd"),
     # 3.75 m/s at 15 m/s: 14.5 degrees, which somebody measured.
-    [(("--layout", "vtail", "--battery", "14.8V,5Ah"), 12.0, 6.0), (("--params", "own.parm"), 14.5, 3.0)],
+    [(("--layout", "vtail", "--battery", "14.8V,5Ah"), 12.0, 6.0), (("--params", "own.parm"), 14.5, 1.5)],
 )
 def test_a_data_sheet_makes_a_folder_that_is_described(
     more: tuple[str, ...], climb: float, sd: float, capsys: pytest.CaptureFixture[str]
@@ -271,6 +272,12 @@ def test_a_data_sheet_makes_a_folder_that_is_described(
     said = re.search(r"climb ([0-9.]+) degrees ± ([0-9.]+);", text)
     assert said is not None
     assert [float(number) for number in said.groups()] == pytest.approx([climb, sd], abs=0.2)
+    power = re.search(r"power    ([0-9.]+) W from the battery in level flight at cruise, ([0-9.]+) to ([0-9.]+) ", text)
+    assert power is not None
+    level, low, high = map(float, power.groups())
+    # Log-normal: as many times as much as as little; a deviation of about 0.38, and 1.96 of them.
+    assert level / low == pytest.approx(high / level, rel=0.02)
+    assert math.log(high / level) == pytest.approx(1.96 * 0.38, rel=0.15)
     made = planfly.aircraft(Path("foam"))
     assert (made.mass, made.wing_span, made.airspeed) == (2.1, 1.6, 15.0)
 

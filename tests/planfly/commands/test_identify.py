@@ -61,7 +61,7 @@ def test_a_log_becomes_a_folder_that_flies(
     monkeypatch.setattr(identification, "draw_pictures", lambda charts: {f"{name}.png": b"" for name in charts})
     Path("a.BIN").write_bytes(log_bytes())
     # The start of the same flight as PX4 would have logged it.
-    write_px4(Path("b.ulg"), px4_topics(start_of(flown_truth().log)), PX4_PARAMETERS)
+    write_px4(Path("b.ulg"), px4_topics(start_of(flown_truth().log, 60.0)), PX4_PARAMETERS)
     assert identify("--battery", "44.4V,888Wh", "--check", "b.ulg") == 0
     said = capsys.readouterr().out
     assert "at cruise" in said
@@ -87,11 +87,12 @@ def test_a_log_becomes_a_folder_that_flies(
     joint = np.corrcoef(draws.values.T)
     thrust, speed = (draws.names.index(f"ident/{name}") for name in ("thrust", "motor-speed"))
     assert joint[thrust, speed] < -0.5
-    # The replay: far nearer than the base, whose ailerons and mass are others.
-    rows = [line for line in said.splitlines() if line.strip().startswith("replay")]
-    assert [row.split(":")[0].split()[1] for row in rows] == ["aerosonde", "identified"]
-    roll = [float(row.split("roll ")[2].split(",")[0]) for row in rows]
-    assert roll[1] < 0.4 * roll[0]
+    # A minute of check: far nearer than the base, whose ailerons and mass are others.
+    rows = [line.split(":") for line in said.splitlines() if line.strip().startswith("ahead") and "roll rate" in line]
+    assert [model.split()[1] for model, _ in rows] == ["constant", "aerosonde", "identified"]
+    roll = [float(errors.split("roll rate ")[1].split(",")[0]) for _, errors in rows]
+    assert roll[2] < 0.5 * roll[1] < roll[0]
+    assert "predictions on b.ulg" in said
     # Nothing of the mission is beyond the model; of some minutes of log its slopes may stay undecided.
     assert main(["check", "mine/identify.waypoints", "--aircraft", "./mine"]) in (0, 3)
 

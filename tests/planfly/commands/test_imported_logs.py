@@ -10,7 +10,7 @@ from logs.importers.raw_log import RawLog, example_raw_log
 from logs.recording.example_log import write_example_log
 from logs.recording.reader import read_log
 from planfly.cli import main
-from tests.logs.importers.written_logs import dataflash, gpx, igc, kml, px4, telemetry
+from tests.logs.importers.written_logs import columns, dataflash, gpx, igc, kml, px4, telemetry
 from tests.planfly.commands.imported_log_files import FLIGHTS, example_plan
 from tests.soak import SOAK
 
@@ -24,6 +24,7 @@ WRITERS: dict[str, Callable[[Path], Path]] = {
     "a.gpx": gpx,
     "a.igc": igc,
     "a.kml": kml,
+    "a.columns.toml": columns,
 }
 Output = pytest.CaptureFixture[str]
 

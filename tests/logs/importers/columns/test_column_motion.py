@@ -47,6 +47,7 @@ def test_other_frames_signs_and_units_give_the_same_motion(tmp_path: Path) -> No
         "yaw": 90.0 - columns["yaw"],
         "vd": -100.0 * columns["vd"],
         "ele": 1500.0 - 10.0 * columns["ele"],
+        "thr": 1000.0 + 10.0 * columns["thr"],
     }
     table = TABLE
     for before, after in (
@@ -55,6 +56,7 @@ def test_other_frames_signs_and_units_give_the_same_motion(tmp_path: Path) -> No
         ('"az", unit = "m/s2"', '"az", unit = "g", frame = "FLU"'),
         ('"yaw", unit = "deg"', '"yaw", unit = "deg", frame = "ENU"'),
         ('"vd", unit = "m/s", frame = "NED"', '"vd", unit = "cm/s", frame = "ENU"'),
+        ('"thr", unit = "%"', '"thr", unit = "us"'),
         ('"ele", unit = "deg"', '"ele", unit = "deg", sign = -1, scale = 0.1, offset = -150.0'),
     ):
         assert before in table

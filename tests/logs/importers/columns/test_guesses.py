@@ -74,6 +74,23 @@ def test_each_guess_is_marked_and_what_is_missing_is_listed(tmp_path: Path) -> N
     assert table["columns"]["latitude"] == {"column": "flight_data.navlat", "unit": "rad"}
 
 
+def test_two_files_are_aligned_by_a_throttle_that_both_have(tmp_path: Path) -> None:
+    time = np.arange(0.0, 60.0, 0.02)
+    throttle = 0.5 + 0.4 * np.sign(np.sin(0.3 * time))
+    pd.DataFrame({"time": time, "roll": np.sin(time), "dthr": throttle}).to_csv(tmp_path / "a.csv", index=False)
+    motor = {"t_ms": 500 * np.arange(80), "throttle_us": 1000.0 + 1000.0 * throttle[::25][:80], "amp": 9.0 + time[:80]}
+    pd.DataFrame(motor).to_csv(tmp_path / "motor.csv", index=False)
+    table = toml_table(guess_table([tmp_path / "a.csv", tmp_path / "motor.csv"], tmp_path / "columns.toml"))
+    assert table["columns"]["throttle"] == {"column": "dthr", "unit": "fraction"}
+    assert table["columns"]["current"]["clock"] == "motor"
+    assert table["clocks"]["motor"] == {
+        "file": "motor.csv",
+        "column": "t_ms",
+        "unit": "ms",
+        "align": {"column": "throttle_us", "with": "throttle"},
+    }
+
+
 def test_messages_of_one_file_share_the_clock_of_the_longest(tmp_path: Path) -> None:
     table = toml_table(guess_table([REAL / "arduplane2013" / "TestLog2.mat"], tmp_path / "columns.toml"))
     # GPS.TimeMS counts from the start of the week, GPS.T from the start of the vehicle, as all others do.

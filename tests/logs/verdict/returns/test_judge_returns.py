@@ -274,6 +274,23 @@ def guessed(setup: FlightSetup) -> FlightSetup:
     return replace(setup, limits=limits)
 
 
+def test_energy_that_may_not_suffice_is_undecided(tmp_path: Path) -> None:
+    """Power with a deviation of 0.4: exp(1.645 x 0.4) = 1.931 times as much at the upper end."""
+    setup = hill_setup(tmp_path)
+    used = max(one.energy for one in judged(setup, 20.0, RTL_ALTITUDE=600.0).each)
+    limits = replace(setup.limits, envelope=replace(setup.envelope, power_sd=0.4))
+    for battery, worst in (
+        (1.02 * 1.931 * used / 0.8, "safe"),
+        (0.98 * 1.931 * used / 0.8, "power"),
+        (0.98 * used / 0.8, "energy"),
+    ):
+        found = judged(replace(setup, limits=limits, battery=battery), 20.0, RTL_ALTITUDE=600.0)
+        assert found.each[-1].kind == worst
+        assert {one.kind for one in found.each} <= {"safe", "power", "energy"}
+        assert (found.undecided, bool(found.unsafe)) == (worst == "power", worst == "energy")
+        assert (found.point_of_no_return.kind == "power") is (worst == "power")
+
+
 def test_a_guessed_battery_is_not_judged_and_a_note_says_so(tmp_path: Path) -> None:
     setup = hill_setup(tmp_path)
     guess = guessed(setup)

@@ -270,6 +270,17 @@ def test_what_is_sure_of_an_unsure_aircraft_is_judged() -> None:
         assert not verdict.undecided
 
 
+def test_a_guessed_climb_is_settled_by_stating_it_first() -> None:
+    setup = make_setup([[e, n, u + 400] for e, n, u in hill(10.0)], table=replace(unsure(), climb_guessed=True))
+    item = of(judge_geometry(setup), "slope", leg(1))
+    assert [[change.what for change in one] for one in item.suggestions] == [["stated climb"], ["full throttle"]]
+    assert item.suggestion.startswith("state the climb of the aircraft at full throttle: planfly aircraft --new")
+    # A descent has no option.
+    down = make_setup([[e, n, u + 400] for e, n, u in hill(-6.5)], table=replace(unsure(), climb_guessed=True))
+    suggestions = of(judge_geometry(down), "slope", leg(1)).suggestions
+    assert [change.what for one in suggestions for change in one] == ["no throttle"]
+
+
 def test_a_scenarios_tighter_limit_does_not_make_the_aircraft_known() -> None:
     # 8.8 degrees are sure of 13.7; the scenario allows 11.
     for slope, ok in ((8.0, True), (10.0, None), (11.5, False)):

@@ -7,7 +7,8 @@ import pytest
 
 from aircraft.identification.estimate import Equation, Estimate
 from aircraft.identification.parameters import INDEX, PARAMETERS, prior_means, prior_sds
-from logs.views.report.identification import IdentificationFacts, ReplayedLog, identification_page, parameter_rows
+from aircraft.identification.prediction import HORIZONS_S, PredictedLog, Prediction
+from logs.views.report.identification import IdentificationFacts, identification_page, parameter_rows
 
 WAVE = np.sin(np.arange(2000) / 40.0)
 
@@ -22,12 +23,13 @@ def facts() -> IdentificationFacts:
     equations = tuple(Equation(name, unit, 25.0, WAVE, 0.9 * WAVE, 0.99, 0.4) for name, unit in names)
     shifts = {"airspeed (1 %)": 0.01 * np.eye(len(PARAMETERS))[INDEX["thrust"]]}
     estimate = Estimate(values, np.diag(sds**2), (), equations, shifts, seconds=600.0)
-    rows = (("roll rate", "deg/s", 3.1, 0.43), ("airspeed", "m/s", 0.65, 0.041))
-    table = np.column_stack([WAVE, 25.0 + WAVE])
-    replay = ReplayedLog("C<1>.BIN", 40, rows, table, 1.02 * table, 50.0)
+    errors = {horizon: np.array([3.1, 0.43, 0.2, 1.7, 0.65, 0.041]) for horizon in HORIZONS_S}
+    table = np.column_stack([WAVE] * 6)
+    models = (Prediction("constant rates", errors), Prediction("identified", errors, (0.36, 0.24, 0.68)))
+    predicted = PredictedLog(models, 1500, np.arange(2000) / 50.0, table, 1.02 * table)
     numbers = (("climb at full throttle", "°", 5.8, 7.7, 9.6), ("power in level flight", "W", 380.0, 485.0, 624.0))
     wide = ("sink at idle: known to ±23 % only; fly glides",)
-    return IdentificationFacts("mine", estimate, (("A.BIN", "ab" * 32),), numbers, replay, wide)
+    return IdentificationFacts("mine", estimate, (("A.BIN", "ab" * 32),), numbers, predicted, "C<1>.BIN", wide)
 
 
 def test_the_share_of_the_log_is_what_it_takes_off_the_priors_variance() -> None:
@@ -41,7 +43,7 @@ def test_the_share_of_the_log_is_what_it_takes_off_the_priors_variance() -> None
 
 def test_the_page_says_what_was_found_and_what_was_not(monkeypatch: pytest.MonkeyPatch) -> None:
     # A browser is shown the pictures themselves.
-    blank = dict.fromkeys(("fit-0.png", "fit-1.png", "fit-2.png", "replay.png"), b"")
+    blank = dict.fromkeys(("fit-0.png", "fit-1.png", "fit-2.png", "predicted.png"), b"")
     monkeypatch.setattr("logs.views.report.identification.draw_pictures", lambda _: blank)
     page = identification_page(facts())
     for said in (
@@ -55,14 +57,15 @@ def test_the_page_says_what_was_found_and_what_was_not(monkeypatch: pytest.Monke
         "airspeed (1 %)",
         "thrust +0.010",
         "ab" * 32,
-        "C&lt;1&gt;.BIN",
+        "1500 predictions of C&lt;1&gt;.BIN, which was not used",
+        "white at 36 %, 24 %, 68 %",
     ):
         assert said in page, said
     assert "sink at idle: known to ±23 % only; fly glides" in page
     assert "<1>" not in page
     # Nothing is asked of a network.
     assert "http" not in page.partition('<script type="application/json"')[0].replace("http-equiv", "")
-    bare = replace(facts(), replay=None, estimate=replace(facts().estimate, dynamics=False))
+    bare = replace(facts(), check=None, estimate=replace(facts().estimate, dynamics=False))
     shown = identification_page(bare)
-    assert "The check" not in shown
+    assert "of the logs that the estimate was made from" in shown
     assert "Performance only" in shown

@@ -1,4 +1,4 @@
-"""A window replayed by the model that flew it is what was logged."""
+"""A flight begun in a given state goes on from it."""
 
 import numpy as np
 import pytest

@@ -1,0 +1,347 @@
+"""Predict the motion up to a second ahead, and score a model by the errors of its predictions.
+
+In real air an open-loop simulation over seconds shows the gusts, not the model. A prediction starts from the state that
+sensors show, gusts included, and a Kalman filter carries the moments that gusts and other unmodelled effects add: a
+first-order Gauss-Markov process about each axis (process noise, as in the filter-error method: Jategaonkar, Flight
+Vehicle System Identification, second edition, chapter 5; rotational gusts of MIL-F-8785C, 3.7.2, have that form). Its
+time constant and gain make the innovations smallest. The errors stand next to the errors of constant rates, which show
+how much a model explains. The innovations of a complete model are white (Klein and Morelli, Aircraft System
+Identification, section 6.2).
+
+Trim offsets (constant moments, one for each stretch) are estimated for each model before it predicts.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from aircraft.identification.alignment import Signals
+from aircraft.identification.base_model import BaseModel
+from aircraft.identification.flow import Flow, lift_curve, motor_of, vane, voltage_of
+from aircraft.identification.level import GRAVITY
+from aircraft.identification.moments import required_moments
+from aircraft.identification.parameters import INDEX
+from world.arrays import Floats, Ints
+
+# Predicted quantities.
+QUANTITIES = ("roll rate", "pitch rate", "yaw rate", "bank", "pitch", "airspeed")
+# Unit of each quantity.
+UNITS = ("deg/s", "deg/s", "deg/s", "deg", "deg", "m/s")
+# Times of the predictions, s.
+HORIZONS_S = (0.2, 0.5, 1.0)
+# Largest number of predictions.
+MAX_PREDICTIONS = 1500
+# Time in a stretch before its first prediction, s; the filter has settled then.
+_SETTLING_TIME_S = 2.0
+# Time constants of the unmodelled moments that are tried, s.
+_GUST_TIMES_S = (0.05, 0.1, 0.2, 0.4, 0.8)
+# Gains of the filter that are tried.
+_FILTER_GAINS = (0.0, 0.02, 0.05, 0.1, 0.2, 0.4, 0.7)
+# Time over which the innovations' autocorrelation is examined, s.
+_WHITENESS_TIME_S = 0.5
+
+
+@dataclass(frozen=True, slots=True)
+class Prediction:
+    """Errors of one model's predictions.
+
+    model: name for people: of the base, "identified" or "constant rates".
+    rms: root mean square error for each of `QUANTITIES`, in `UNITS`, by the time ahead, s.
+    whiteness: for roll, pitch and yaw the fraction of the innovations' autocorrelations, at lags up to 0.5 s, within
+        the 95 % interval of white noise; 0.95 for white innovations. Empty for constant rates.
+    """
+
+    model: str
+    rms: Mapping[float, Floats]
+    whiteness: tuple[float, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class PredictedLog:
+    """Predictions of a log by several models.
+
+    predictions: of constant rates, the base and the identified model.
+    count: number of predictions.
+    time: (n,) of the predicted values that are shown, s.
+    measured, predicted: (n, 6) measured values, and the identified model's predictions half a second ahead.
+    """
+
+    predictions: tuple[Prediction, ...]
+    count: int
+    time: Floats
+    measured: Floats
+    predicted: Floats
+
+
+@dataclass(frozen=True, slots=True)
+class GustFilter:
+    """Steady Kalman filter of the unmodelled moments about one axis, a first-order Gauss-Markov process in white noise.
+
+    decay: factor on the process over a sample.
+    gain: fraction of an innovation that is taken for the process.
+    """
+
+    decay: float
+    gain: float
+
+    def estimate(self, residual: Floats, signals: Signals) -> Floats:
+        """Return the estimate (n,) of each sample of a residual from the samples before it."""
+        from scipy.signal import lfilter
+
+        estimate = np.zeros_like(residual)
+        for first, last in zip(signals.edges[:-1], signals.edges[1:], strict=True):
+            numerator, denominator = [self.decay * self.gain], [1.0, -self.decay * (1.0 - self.gain)]
+            estimate[first + 1 : last] = lfilter(numerator, denominator, residual[first:last])[:-1]
+        return estimate
+
+
+class Predictor:
+    """A model with the trim offsets and the filtered unmodelled moments of one log.
+
+    filters: of roll, pitch and yaw; None for the filters with the smallest innovations.
+    with_flow: True to take measured flow angles and airspeed throughout, for an estimate; False to predict them too.
+    """
+
+    def __init__(
+        self,
+        signals: Signals,
+        base: BaseModel,
+        values: Floats,
+        filters: Sequence[GustFilter] | None = None,
+        *,
+        with_flow: bool = False,
+    ) -> None:
+        self._signals, self._base, self._values = signals, base, values
+        self._with_flow = with_flow
+        # A prediction must not start from later samples.
+        self._flow = vane(signals, base, values, smooth=with_flow)
+        self._motor = motor_of(base, values)
+        required = self._required_accelerations()
+        modelled = self._accelerations(self._flow, signals.rates, signals.airspeed, np.arange(len(signals.airspeed)))
+        self.trims = np.empty_like(modelled)
+        for first, last in zip(signals.edges[:-1], signals.edges[1:], strict=True):
+            self.trims[first:last] = (required[first:last] - modelled[first:last]).mean(axis=0)
+        residual = required - modelled - self.trims
+        self.filters = (
+            [_best_filter(residual[:, axis], signals) for axis in range(3)] if filters is None else list(filters)
+        )
+        self._unmodelled = np.column_stack(
+            [one.estimate(residual[:, axis], signals) for axis, one in enumerate(self.filters)]
+        )
+        self._innovations = residual - self._unmodelled
+
+    @property
+    def whiteness(self) -> tuple[float, ...]:
+        """Fraction of the innovations' autocorrelations within the 95 % interval of white noise, by axis."""
+        count = round(_WHITENESS_TIME_S * self._signals.hertz)
+        return tuple(whiteness(self._innovations[:, axis], count) for axis in range(3))
+
+    def predict(self, starts: Ints, horizons: Sequence[float] = HORIZONS_S) -> dict[float, Floats]:
+        """Return predicted `QUANTITIES` (rad and m/s, (n, 6)) by the time ahead (s) from some rows (n,)."""
+        signals, step = self._signals, 1.0 / self._signals.hertz
+        # Velocity through the air, angular rates, bank and pitch.
+        state = np.column_stack([self._air_velocity(starts), signals.rates[starts], signals.attitude[starts, :2]])
+        disturbances, decays = self._unmodelled[starts], np.array([one.decay for one in self.filters])
+        predictions, due = {}, {round(horizon * signals.hertz): horizon for horizon in horizons}
+        for k in range(max(due)):
+            rows = starts + k
+            # Heun's method, with disturbances held over a step.
+            first = self._state_rates(state, disturbances, rows)
+            second = self._state_rates(state + step * first, disturbances, rows + 1)
+            state = state + 0.5 * step * (first + second)
+            if self._with_flow:
+                state[:, :3] = self._air_velocity(rows + 1)
+            disturbances = disturbances * decays
+            if k + 1 in due:
+                speed = np.linalg.norm(state[:, :3], axis=1)
+                predictions[due[k + 1]] = np.column_stack([state[:, 3:8], speed])
+        return predictions
+
+    def _air_velocity(self, rows: Ints) -> Floats:
+        """Return the measured velocity through the air (n, 3), body axes, m/s."""
+        speed, alpha, beta = self._signals.airspeed[rows], self._flow.alpha[rows], self._flow.beta[rows]
+        ahead = speed * np.cos(beta)
+        return np.column_stack([ahead * np.cos(alpha), speed * np.sin(beta), ahead * np.sin(alpha)])
+
+    def _required_accelerations(self) -> Floats:
+        """Return the measured angular accelerations (n, 3), as the aerodynamic moments over the inertias."""
+        ixx, iyy, izz, _ = self._base.inertia
+        required = required_moments(self._signals, self._base, self._motor)
+        return np.column_stack([required["roll"] / ixx, required["pitch"] / iyy, required["yaw"] / izz])
+
+    def _accelerations(self, flow: Flow, rates: Floats, airspeed: Floats, rows: Ints) -> Floats:
+        """Return the model's aerodynamic moments over the moments of inertia (n, 3)."""
+        base, c = self._base, self._base.coefficients
+        factor = {name: float(self._values[k]) for name, k in INDEX.items()}
+        elevator, aileron, rudder = self._signals.surfaces[rows].T
+        roll, pitch, yaw = (rates * np.array([base.span, base.chord, base.span])).T / (2.0 * airspeed)
+        pressure = 0.5 * self._signals.density[rows] * np.square(airspeed) * base.area
+        roll_moment = (
+            c.roll_beta * factor["dihedral-effect"] * flow.beta
+            + c.roll_roll * factor["roll-damping"] * roll
+            + c.roll_yaw * factor["roll-from-yaw"] * yaw
+            + c.roll_aileron * factor["aileron-power"] * aileron
+            + c.roll_rudder * rudder
+        )
+        pitch_moment = (
+            c.pitch_zero
+            + factor["pitch-offset"]
+            + c.pitch_alpha * factor["pitch-stiffness"] * flow.alpha
+            + c.pitch_rate * factor["pitch-damping"] * pitch
+            + c.pitch_elevator * factor["elevator-power"] * elevator
+        )
+        yaw_moment = (
+            c.yaw_beta * factor["weathercock"] * flow.beta
+            + c.yaw_roll * factor["yaw-from-roll"] * roll
+            + c.yaw_yaw * factor["yaw-damping"] * yaw
+            + c.yaw_aileron * factor["adverse-yaw"] * aileron
+            + c.yaw_rudder * factor["rudder-power"] * rudder
+        )
+        ixx, iyy, izz, _ = base.inertia
+        moments = np.column_stack(
+            [base.span / ixx * roll_moment, base.chord / iyy * pitch_moment, base.span / izz * yaw_moment]
+        )
+        return np.asarray(pressure[:, np.newaxis] * moments)
+
+    def _state_rates(self, state: Floats, disturbances: Floats, rows: Ints) -> Floats:
+        """Return the rates of change of the state (n, 8), in air with constant gusts."""
+        signals, base = self._signals, self._base
+        u, v, w, p, q, r, roll, pitch = state.T
+        airspeed = np.sqrt(u * u + v * v + w * w)
+        flow = Flow(np.arctan2(w, u), np.arcsin(v / airspeed), np.zeros_like(u))
+        moments = self._accelerations(flow, state[:, 3:6], airspeed, rows) + self.trims[rows] + disturbances
+        forces = self._specific_forces(flow, state[:, 3:6], airspeed, rows)
+        ixx, iyy, izz, ixz = base.inertia
+        torque = self._motor.reaction(airspeed, signals.throttle[rows], signals.density[rows]) if base.reacts else 0.0
+        # Euler's equations with a product of inertia, solved for the accelerations.
+        roll_moment = ixx * moments[:, 0] - torque + ixz * p * q - (izz - iyy) * q * r
+        yaw_moment = izz * moments[:, 2] - ixz * q * r - (iyy - ixx) * p * q
+        determinant = ixx * izz - ixz * ixz
+        return np.column_stack(
+            [
+                r * v - q * w - GRAVITY * np.sin(pitch) + forces[0],
+                p * w - r * u + GRAVITY * np.cos(pitch) * np.sin(roll) + forces[1],
+                q * u - p * v + GRAVITY * np.cos(pitch) * np.cos(roll) + forces[2],
+                (izz * roll_moment + ixz * yaw_moment) / determinant,
+                moments[:, 1] - ((ixx - izz) * p * r + ixz * (p * p - r * r)) / iyy,
+                (ixz * roll_moment + ixx * yaw_moment) / determinant,
+                p + np.tan(pitch) * (q * np.sin(roll) + r * np.cos(roll)),
+                q * np.cos(roll) - r * np.sin(roll),
+            ]
+        )
+
+    def _specific_forces(
+        self, flow: Flow, rates: Floats, airspeed: Floats, rows: Ints
+    ) -> tuple[Floats, Floats, Floats]:
+        """Return the specific forces forward, right and down (n,), m/s^2."""
+        signals, base, c = self._signals, self._base, self._base.coefficients
+        elevator, aileron, rudder = signals.surfaces[rows].T
+        roll, pitch, yaw = (rates * np.array([base.span, base.chord, base.span])).T / (2.0 * airspeed)
+        slope, zero = lift_curve(base, self._values)
+        from_alpha = zero + slope * flow.alpha
+        lift = from_alpha + c.lift_rate * pitch + c.lift_elevator * elevator
+        induced = c.drag_induced * self._values[INDEX["induced-drag"]] * np.square(from_alpha - c.lift_least_drag)
+        drag = c.drag_zero * self._values[INDEX["zero-lift-drag"]] + induced + c.drag_elevator * elevator
+        side = (
+            c.side_beta * flow.beta
+            + c.side_roll * roll
+            + c.side_yaw * yaw
+            + c.side_aileron * aileron
+            + c.side_rudder * rudder
+        )
+        density = signals.density[rows]
+        volts = voltage_of(signals, base)
+        thrust, _ = self._motor.thrust_and_current(
+            airspeed, signals.throttle[rows], density, volts[rows] if isinstance(volts, np.ndarray) else volts
+        )
+        per_mass = 0.5 * density * np.square(airspeed) * base.area / base.mass
+        sine, cosine = np.sin(flow.alpha), np.cos(flow.alpha)
+        forward = per_mass * (lift * sine - drag * cosine) + thrust / base.mass
+        return forward, per_mass * side, -per_mass * (lift * cosine + drag * sine)
+
+
+def _best_filter(residual: Floats, signals: Signals) -> GustFilter:
+    """Return the filter whose innovations of the unexplained accelerations (n,) about an axis are smallest."""
+    filters = [
+        GustFilter(float(np.exp(-1.0 / (signals.hertz * gust_time))), gain)
+        for gust_time in _GUST_TIMES_S
+        for gain in _FILTER_GAINS
+    ]
+    return min(filters, key=lambda one: float((residual - one.estimate(residual, signals)).var()))
+
+
+def whiteness(innovations: Floats, lags: int) -> float:
+    """Return the fraction of autocorrelations, at lags of 1 to `lags` samples, within +-1.96 / sqrt(n).
+
+    >>> whiteness(np.random.default_rng(1).normal(size=5000), 100) > 0.9
+    True
+    """
+    centred = innovations - innovations.mean()
+    total = float(centred @ centred) + 1e-300
+    limit = 1.96 / np.sqrt(len(centred))
+    correlations = [float(centred[lag:] @ centred[:-lag]) / total for lag in range(1, lags + 1)]
+    return float(np.mean(np.abs(correlations) < limit))
+
+
+def prediction_starts(signals: Signals, count: int = MAX_PREDICTIONS, horizon: float = max(HORIZONS_S)) -> Ints:
+    """Return at most ``count`` rows (n,) from which predictions start, evenly over all stretches.
+
+    horizon: longest time ahead, s.
+    """
+    longest = round(horizon * signals.hertz)
+    settling = round(_SETTLING_TIME_S * signals.hertz)
+    rows = np.concatenate(
+        [
+            np.arange(first + settling, last - longest - 1)
+            for first, last in zip(signals.edges[:-1], signals.edges[1:], strict=True)
+        ]
+    )
+    return rows[np.unique(np.linspace(0, len(rows) - 1, min(count, len(rows))).astype(np.int64))]
+
+
+def predict_log(signals: Signals, models: Mapping[str, tuple[BaseModel, Floats]]) -> PredictedLog:
+    """Predict a log by constant rates and by each model (base model and parameter values), by name."""
+    starts = prediction_starts(signals)
+    measured = {
+        horizon: _measured_quantities(signals, starts + round(horizon * signals.hertz)) for horizon in HORIZONS_S
+    }
+    now = _measured_quantities(signals, starts)
+    constant = {horizon: _constant_rates(now, horizon) for horizon in HORIZONS_S}
+    predictions = [Prediction("constant rates", _rms_errors(constant, measured))]
+    shown = constant[HORIZONS_S[1]]
+    for name, (base, values) in models.items():
+        predictor = Predictor(signals, base, values)
+        predicted = predictor.predict(starts)
+        shown = predicted[HORIZONS_S[1]]
+        predictions.append(Prediction(name, _rms_errors(predicted, measured), predictor.whiteness))
+    return PredictedLog(
+        tuple(predictions),
+        len(starts),
+        starts / signals.hertz + HORIZONS_S[1],
+        _in_units(measured[HORIZONS_S[1]]),
+        _in_units(shown),
+    )
+
+
+def _measured_quantities(signals: Signals, rows: Ints) -> Floats:
+    return np.column_stack([signals.rates[rows], signals.attitude[rows, :2], signals.airspeed[rows]])
+
+
+def _constant_rates(quantities: Floats, horizon: float) -> Floats:
+    """Return quantities (n, 6) after a time at constant angular rates and airspeed."""
+    p, q, r, roll, pitch, _ = quantities.T
+    predicted = quantities.copy()
+    predicted[:, 3] += horizon * (p + np.tan(pitch) * (q * np.sin(roll) + r * np.cos(roll)))
+    predicted[:, 4] += horizon * (q * np.cos(roll) - r * np.sin(roll))
+    return predicted
+
+
+def _in_units(quantities: Floats) -> Floats:
+    return quantities * np.array([np.degrees(1.0)] * 5 + [1.0])
+
+
+def _rms_errors(predicted: Mapping[float, Floats], measured: Mapping[float, Floats]) -> dict[float, Floats]:
+    """Return the root mean square errors (6,) in `UNITS`, by the time ahead."""
+    errors = {horizon: _in_units(predicted[horizon] - measured[horizon]) for horizon in HORIZONS_S}
+    return {horizon: np.sqrt(np.square(error).mean(axis=0)) for horizon, error in errors.items()}

@@ -1,0 +1,120 @@
+"""Refine the moments by the errors of short predictions.
+
+Equation error takes the measured rates for the true ones, and its low-pass lets later samples in: in real air,
+stiffness, damping and the power of the surfaces come out too small together. The prediction-error method (Ljung, System
+Identification, second edition, chapter 7; the filter-error method of Jategaonkar, Flight Vehicle System Identification,
+second edition, chapter 5, is its one-step form) compares angular rates one and three tenths of a second ahead: long
+enough for the rates to respond, short enough that the autopilot has hardly reacted to later gusts. The measured flow
+angles, gusts included, are inputs. On a flight of an Ultra Stick 25e, dampings and the power of elevator and ailerons
+are 0.7 to 0.8 of the wind tunnel's values in this way, and 0.3 to 0.45 by equation error.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from aircraft.identification.alignment import Signals
+from aircraft.identification.base_model import BaseModel
+from aircraft.identification.moments import AXES
+from aircraft.identification.parameters import PARAMETERS, prior_means, prior_sds
+from aircraft.identification.prediction import GustFilter, Predictor, prediction_starts
+from aircraft.identification.regression import correlation_samples, fit_with_prior
+from world.arrays import Flags, Floats, Ints
+
+# Times ahead of the compared predictions, s.
+HORIZONS_S = (0.1, 0.3)
+# Times ahead whose estimate shows how much the estimate depends on them, s.
+LONGER_HORIZONS_S = (0.2, 0.5)
+# Number of compared predictions.
+_COUNT = 600
+# Factor on the standard deviations of the prior in the refinement.
+PRIOR_SPREAD = 2.5
+# Number of Gauss-Newton steps.
+MAX_STEPS = 4
+# Step of the difference quotients, in standard deviations of the prior.
+_DIFFERENCE_STEP = 0.02
+# True for the parameters of the moments.
+IS_MOMENT: Flags = np.array([parameter.group in AXES for parameter in PARAMETERS])
+
+
+@dataclass(frozen=True, slots=True)
+class Refinement:
+    """Refined parameters of the moments.
+
+    values: (m,) of the parameters for which `IS_MOMENT` is true.
+    covariance: (m, m).
+    starts: (n,) rows of the compared predictions.
+    filters: filters of the unmodelled moments about roll, pitch and yaw.
+    errors: (3, n, h) errors of the predictions, rad/s, by axis, start and time ahead.
+    gains: (m, 3 n h) change of the parameters with each error.
+    """
+
+    values: Floats
+    covariance: Floats
+    starts: Ints
+    filters: Sequence[GustFilter]
+    errors: Floats
+    gains: Floats
+
+    def shifted(self, signals: Signals, base: BaseModel, values: Floats) -> Floats:
+        """Return the parameters (m,) for changed signals, base, and parameters of lift and drag, to first order.
+
+        values: (n,) all parameters, of which the parameters of the moments are ignored.
+        """
+        tried_values = values.copy()
+        tried_values[IS_MOMENT] = self.values
+        errors = prediction_errors(signals, base, tried_values, self.starts, self.filters)
+        return np.asarray(self.values + self.gains @ (errors - self.errors).ravel())
+
+
+def refine_moments(
+    signals: Signals, base: BaseModel, values: Floats, horizons: Sequence[float] = HORIZONS_S, steps: int = MAX_STEPS
+) -> Refinement:
+    """Refine the moments of parameter values (n,) by Gauss-Newton steps, each at most one deviation of the prior.
+
+    horizons: times ahead of the compared predictions, s.
+    steps: number of steps.
+    """
+    starts = prediction_starts(signals, _COUNT, max(horizons))
+    filters = Predictor(signals, base, values, with_flow=True).filters
+    means, sds = prior_means()[IS_MOMENT], PRIOR_SPREAD * prior_sds()[IS_MOMENT]
+    values = values.copy()
+
+    def errors_of(tried_values: Floats) -> Floats:
+        return prediction_errors(signals, base, tried_values, starts, filters, horizons)
+
+    errors = errors_of(values)
+    for _ in range(steps):
+        scales = errors.std(axis=1, keepdims=True)
+        slopes = np.empty((errors.size, len(means)))
+        for column, k in enumerate(np.flatnonzero(IS_MOMENT)):
+            moved_values, change = values.copy(), _DIFFERENCE_STEP * sds[column]
+            moved_values[k] += change
+            slopes[:, column] = ((errors - errors_of(moved_values)) / (scales * change)).ravel()
+        target = (errors / scales).ravel() + slopes @ values[IS_MOMENT]
+        blocks = np.broadcast_to(signals.block[starts][:, np.newaxis], errors.shape).ravel()
+        fit = fit_with_prior(slopes, target, means, sds, blocks)
+        step = np.clip(fit.estimate - values[IS_MOMENT], -sds / PRIOR_SPREAD, sds / PRIOR_SPREAD)
+        values[IS_MOMENT] += step
+        errors = errors_of(values)
+    weight = 1.0 / (float(fit.residual.var()) * correlation_samples(fit.residual))
+    gains = np.linalg.solve(weight * slopes.T @ slopes + np.diag(1.0 / np.square(sds)), weight * slopes.T)
+    gains = gains / np.broadcast_to(scales, errors.shape).ravel()
+    return Refinement(values[IS_MOMENT], fit.covariance, starts, filters, errors, gains)
+
+
+def prediction_errors(
+    signals: Signals,
+    base: BaseModel,
+    values: Floats,
+    starts: Ints,
+    filters: Sequence[GustFilter],
+    horizons: Sequence[float] = HORIZONS_S,
+) -> Floats:
+    """Return measured less predicted angular rates (3, n, h), rad/s, by axis, start and time ahead."""
+    predicted = Predictor(signals, base, values, filters, with_flow=True).predict(starts, horizons)
+    measured = [signals.rates[starts + round(horizon * signals.hertz)] for horizon in horizons]
+    return np.stack(
+        [(rates - predicted[horizon][:, :3]).T for rates, horizon in zip(measured, horizons, strict=True)], axis=2
+    )
