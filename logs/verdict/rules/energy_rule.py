@@ -51,7 +51,8 @@ def energy_findings(
         elif energy > limit:
             reason += f"; {ENERGY_RESERVE_FRACTION:.0%} must be left"
         elif max_energy > energy:
-            reason += f"; at most {max_energy:.1f} Wh with 95 % probability, because the power is from {setup.envelope.source}"
+            source = setup.envelope.source
+            reason += f"; at most {max_energy:.1f} Wh with 95 % probability, because the power is from {source}"
         reason += failsafe_text
     return [
         make_finding(
