@@ -259,8 +259,8 @@ def posterior_text(identified: Identified) -> str:
     """Return the text of ``posterior.toml``."""
     estimate = identified.estimate
     best, samples = identified.performance()
-    # Standard deviation as a fraction; if it exceeds the value itself, nothing is known of the value.
-    power = min(1.0, float(np.std(samples.power) / best.power[0]))
+    # Standard deviation of the logarithm; if it exceeds 1, nothing is known of the value.
+    power = min(1.0, float(np.std(np.log(samples.power))))
     climb, sink = (float(np.degrees(np.std(angles))) for angles in (samples.climb, samples.sink))
     fastest = fastest_level(identified.numbers, identified.draws, DENSITY)
     log_fractions = estimate.of_log()

@@ -40,7 +40,7 @@ def judged(
 def test_throttle_at_a_limit_is_told_from_a_second_on(
     limit: str, seconds: float, told: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    measure = SlopeMeasure(**{f"at_{limit}": seconds}, is_finished=True)
+    measure = SlopeMeasure(**{f"{limit}_throttle_time": seconds}, is_finished=True)
     item = judged(measure, monkeypatch, 5.0, envelope=True)
     assert (f"throttle at {limit} for 1 s" in item.reason) is told
     assert {fact.what: fact.value for fact in item.facts}[f"throttle at {limit}"] == seconds
@@ -79,8 +79,8 @@ def test_air_takes_speed_where_the_aircraft_showed_more_than_the_leg_asks(
 ) -> None:
     """By more than three standard errors of a tenth of a degree, at the throttle limit of that direction."""
     ability = Ability(math.radians(shown), math.radians(0.1), 20.0)
-    off = {"slow": 2.0} if at == "full" else {"fast": 2.0}
-    measure = SlopeMeasure(**{f"at_{at}": 8.0}, **off, ability=ability, is_finished=True)
+    off = {"speed_loss": 2.0} if at == "full" else {"speed_gain": 2.0}
+    measure = SlopeMeasure(**{f"{at}_throttle_time": 8.0}, **off, ability=ability, is_finished=True)
     item = judged(measure, monkeypatch, slope)
     assert item.ok is ok
     if not ok:
