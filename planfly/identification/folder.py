@@ -258,9 +258,9 @@ def _servo_file_text(outputs: Mapping[str, ServoOutput]) -> str:
 def posterior_text(identified: Identified) -> str:
     """Return the text of ``posterior.toml``."""
     estimate = identified.estimate
-    best, samples = identified.performance()
+    _, samples = identified.performance()
     # Standard deviation of the logarithm; if it exceeds 1, nothing is known of the value.
-    power = min(1.0, float(np.std(np.log(samples.power))))
+    power = min(1.0, float(np.std(np.log(np.maximum(samples.power, 1.0)))))
     climb, sink = (float(np.degrees(np.std(angles))) for angles in (samples.climb, samples.sink))
     fastest = fastest_level(identified.numbers, identified.draws, DENSITY)
     log_fractions = estimate.of_log()
@@ -272,7 +272,7 @@ def posterior_text(identified: Identified) -> str:
         f"climb_sd_deg = {climb:.3f}    # of the steepest climb at cruise, one standard deviation",
         f"descent_sd_deg = {sink:.3f}  # of the steepest descent",
         f"fastest_sd_mps = {np.std(fastest):.3f}  # of the fastest level flight",
-        f"power_sd = {power:.4f}        # of the power in level flight, as a share of it",
+        f"power_sd = {power:.4f}        # of the logarithm of the power in level flight",
         f'base = "{identified.base.name}"',
         f"mass_kg = {identified.numbers.mass:.6g}",
         f"seconds = {estimate.seconds:.0f}",
