@@ -22,6 +22,8 @@ class ElectricMotor:
     idle_current: i0, A.
     voltage: battery voltage, V.
     windmill: fraction of the formula's thrust that is applied below zero.
+    power_ratio: ratio of the battery's power for the drive to the power of these formulas.
+    avionics: power of autopilot, radios and servos, W.
     """
 
     torque: tuple[float, float, float]
@@ -31,6 +33,8 @@ class ElectricMotor:
     idle_current: float
     voltage: float
     windmill: float = 1.0
+    power_ratio: float = 1.0
+    avionics: float = 0.0
 
     def with_factors(
         self, thrust: float = 1.0, speed: float = 1.0, torque: float = 1.0, resistance: float = 1.0, idle: float = 1.0
@@ -89,7 +93,7 @@ class ElectricMotor:
         thrust = density * (a * speed * speed + b * airspeed * speed + c * airspeed * airspeed)
         thrust = np.where(thrust < 0.0, self.windmill * thrust, thrust)
         current = np.maximum(0.0, (volts * throttle - self.back_voltage * speed) / self.resistance)
-        return thrust, throttle * current
+        return thrust, self.power_ratio * throttle * current + self.avionics / volts
 
     def reaction(self, airspeed: Floats, throttle: Floats, density: Floats) -> Floats:
         """Return the propeller's torque (n,), N m, whose reaction rolls the aircraft left."""

@@ -231,6 +231,9 @@ def _read_electric_motor(functions: dict[str, ElementTree.Element], volts: float
         if loss_function is not None
         else next(value for value in driven if 0.0 < value < 2.0)
     )
+    # A data sheet's model has the ratio of battery power to these formulas, and the power of the avionics.
+    power_numbers = numbers("motor/battery-power-w")
+    power_ratio, avionics = power_numbers if len(power_numbers) == 2 else (1.0, 0.0)
     back_voltage = damping / per_volt
     thrust_name = "motor/pull-n" if "motor/pull-n" in functions else "motor/thrust-n"
     thrust = numbers(thrust_name)
@@ -242,6 +245,8 @@ def _read_electric_motor(functions: dict[str, ElementTree.Element], volts: float
         idle_current=no_load_torque / back_voltage,
         voltage=volts,
         windmill=numbers("motor/thrust-n")[1] if thrust_name == "motor/pull-n" else 1.0,
+        power_ratio=power_ratio,
+        avionics=avionics,
     )
 
 

@@ -308,8 +308,9 @@ def _electric_functions(motor: ElectricMotor) -> dict[str, str]:
         "current-a": "<max> <product> <v> -1000000 </v> <p> motor/braking </p> </product>"
         f" <quotient> <difference> <p> motor/input-v </p> {back_voltage} </difference> <v> {number(resistance)} </v>"
         " </quotient> </max>",
-        "battery-power-w": "<product> <p> motor/input-v </p> <p> motor/current-a </p> </product>",
-        "battery-current-a": "<product> <p> motor/throttle-norm </p> <p> motor/current-a </p> </product>",
+        "battery-power-w": f"<sum> <v> {number(motor.avionics)} </v> <product> <v> {number(motor.power_ratio)} </v>"
+        " <p> motor/input-v </p> <p> motor/current-a </p> </product> </sum>",
+        "battery-current-a": "<quotient> <p> motor/battery-power-w </p> <p> motor/battery-v </p> </quotient>",
         "pull-n": f"<product> {_RHO} <p> ident/thrust </p> <sum> {' '.join(thrust_terms)} </sum> </product>",
         "thrust-n": "<sum> <max> <v> 0 </v> <p> motor/pull-n </p> </max>"
         f" <product> <v> {number(motor.windmill)} </v> <min> <v> 0 </v> <p> motor/pull-n </p> </min> </product> </sum>",

@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 import planfly
-from aircraft.catalog import load_aircraft, read_aircraft
+from aircraft.catalog import Aircraft, load_aircraft, read_aircraft
 from aircraft.identification.electric_motor import ElectricMotor
 from aircraft.identification.parameters import prior_means
+from aircraft.identification.performance import performance
 from flight.dynamics.fdm import Fdm
 from flight.dynamics.trim import straight
 from planfly.identification.base_numbers import base_model, is_flying_wing, scale_model
@@ -156,3 +157,29 @@ def test_a_flying_wing_from_a_data_sheet_is_a_base_without_the_propellers_torque
     assert before is not None
     assert after is not None
     assert after.vector() == pytest.approx(before.vector(), abs=2e-3)
+
+
+def test_the_battery_power_of_a_data_sheet_is_kept(tmp_path: Path) -> None:
+    """Losses of a small drive and the avionics are in the numbers, and in the model written from them, as in JSBSim."""
+    sheet = planfly.new_aircraft(tmp_path / "foam", mass=2.1, span=1.6, cruise=15.0, stall=10.0)
+    numbers = base_model(sheet)
+    motor = numbers.motor
+    assert isinstance(motor, ElectricMotor)
+    assert motor.power_ratio > 1.1
+    assert motor.avionics > 1.0
+
+    def power(aircraft: Aircraft) -> float:
+        fdm = Fdm(aircraft)
+        level = straight(fdm, 15.0, 500.0)
+        assert level is not None
+        fdm.balance(level.vector())
+        return float(fdm.read().power)
+
+    found = float(performance(numbers, prior_means(), 15.0, 1.1673).power[0])
+    assert found == pytest.approx(power(sheet), rel=0.02)
+    folder = tmp_path / "mine"
+    shutil.copytree(sheet.folder, folder)
+    (folder / "foam.toml").rename(folder / "mine.toml")
+    (folder / "foam.xml").unlink()
+    (folder / "mine.xml").write_text(identified_xml(sheet, "mine", numbers, prior_means()), encoding="utf-8")
+    assert power(read_aircraft(folder)) == pytest.approx(power(sheet), rel=0.02)

@@ -143,6 +143,12 @@ def test_clocks_that_do_not_correlate_are_refused(tmp_path: Path) -> None:
     assert re.search(r"clocks.motor.align: servo and throttle correlate by 0.\d\d at most; expected 0.6", message)
 
 
+def test_a_clock_is_not_aligned_with_its_own_quantity(tmp_path: Path) -> None:
+    table = write_motor(tmp_path, shift=0.0)
+    table.write_text(table.read_text().replace('with = "throttle"', 'with = "current"'))
+    assert "clocks.motor.align.with: expected a quantity on a clock that is not aligned itself" in said(table)
+
+
 def test_clocks_without_a_common_time_are_refused(tmp_path: Path) -> None:
     table = write_motor(tmp_path, shift=-5000.0)
     table.write_text(table.read_text().replace("align = ", "# align = "))
