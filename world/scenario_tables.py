@@ -448,7 +448,9 @@ class FlightTable(ScenarioTable):
         if self.guidance is not None and autopilot != OWN_GUIDANCE:
             raise ValueError(f'guidance: not a key of autopilot = "{autopilot}"')
         if self.params is not None and autopilot == OWN_GUIDANCE:
-            raise ValueError('params: not a key of autopilot = "planfly", which a guidance without autopilot selects')
+            raise ValueError(
+                'params: not a key of autopilot = "planfly", which guidance selects if no autopilot is named'
+            )
         if self.arduplane_version is not None and autopilot != _ARDUPILOT:
             raise ValueError(f'arduplane_version: only a key of autopilot = "ardupilot", not of "{autopilot}"')
         if self.px4_version is not None and autopilot != _PX4:

@@ -97,8 +97,8 @@ def _data_sheet_options(parser: CommandParser) -> None:
         "mass": ("KG", "mass, 0.5 to 25 kg"),
         "span": ("M", "wing span, m"),
         "area": ("M2", "wing area, m2 (default: the area that carries the mass at the stall speed)"),
-        "cruise": ("M/S", "usual airspeed"),
-        "stall": ("M/S", "airspeed of slowest level flight"),
+        "cruise": ("M/S", "cruise airspeed"),
+        "stall": ("M/S", "minimum airspeed of level flight"),
         "top": ("M/S", "airspeed of fastest level flight (default: 1.65 times the cruise's)"),
         "bank": ("DEG", "steepest bank in turns (default: 35)"),
         "climb": ("DEG", "steepest climb at cruise (default: 12, or the climb that fits the top speed)"),
@@ -209,10 +209,13 @@ def _identify(args: argparse.Namespace) -> int:
         print(f"  {name:<8} {value:.{0 if unit == 'W' else 1}f} {unit} at cruise, {lower:.1f} to {upper:.1f} (95 %)")
     _print_uncertain_properties(result)
     if "identify.waypoints" not in files_made:
-        print("  no mission identify.waypoints: the logs have neither home (ORGN) nor a position on the ground (POS)")
+        print("  identify.waypoints not written: the logs have neither home (ORGN) nor a position on the ground (POS)")
     _print_predictions(result, args.check)
     write_json_if_requested(args, lambda: _json_answer([new_aircraft]))
-    print(f"next      planfly aircraft {shlex.quote(args.out)}; {args.out}/identify.html says how sure each number is")
+    print(
+        f"next      `planfly aircraft {shlex.quote(args.out)}` prints the model; {args.out}/identify.html "
+        "shows each estimate with its uncertainty"
+    )
     return FLYABLE
 
 
@@ -237,9 +240,9 @@ def _print_predictions(result: "planfly.IdentifiedAircraft", check: str | None) 
 def _print_uncertain_properties(result: "planfly.IdentifiedAircraft") -> None:
     """Print the properties that the logs do not show, and the flights that would show them."""
     if not result.estimate.dynamics:
-        print("  performance only: under 10 rows of inertial sensors or outputs a second tell nothing of the moments")
+        print("  performance only: fewer than 10 rows of inertial sensors or outputs a second do not show the moments")
     for log in result.slow:
-        print(f"  rows     {log.source}: {log.hertz:.1f} a second of sensors or outputs: {log.setting} records more")
+        print(f"  rows     {log.source}: {log.hertz:.1f} a second of sensors or outputs; {log.setting} records more")
     for number in result.wide:
         print(f"  wide     {number.text}")
     for line in result.estimate.silent():
@@ -272,7 +275,7 @@ def _print_sheet(aircraft: "Aircraft") -> None:
         low, high = (power * math.exp(sign * _INTERVAL_SIGMAS * uncertainty.power) for sign in (-1.0, 1.0))
         kind = "from the battery" if aircraft.battery_voltage else "of fuel heat"
         print(f"  power    {power:.3g} W {kind} in level flight at cruise, {low:.3g} to {high:.3g} (95 %)")
-    print("  guessed  README.md says what was, and how far off it may be")
+    print("  guessed  README.md lists the guessed values and their possible error")
 
 
 def _print_numbers(numbers: "AircraftNumbers") -> None:

@@ -17,9 +17,9 @@ _SINGULAR_TEXTS: dict[Kind, str] = {
     "zone": "violates a zone",
     "lost": "does not arrive",
     "energy": "takes more energy than may be used",
-    "unknown": "flies where the ground is not known",
+    "unknown": "flies where the terrain is unknown",
     "power": "may take more energy than may be used, as the power of the aircraft is uncertain",
-    "unsure": "is flown too differently by the point mass and in JSBSim to be judged",
+    "unsure": "cannot be judged because the point mass and JSBSim disagree",
     "low": "comes lower than {limit:.0f} m above ground",
 }
 _PLURAL_TEXTS: dict[Kind, str] = {
@@ -28,9 +28,9 @@ _PLURAL_TEXTS: dict[Kind, str] = {
     "zone": "violate a zone",
     "lost": "do not arrive",
     "energy": "take more energy than may be used",
-    "unknown": "fly where the ground is not known",
+    "unknown": "fly where the terrain is unknown",
     "power": "may take more energy than may be used, as the power of the aircraft is uncertain",
-    "unsure": "are flown too differently by the point mass and in JSBSim to be judged",
+    "unsure": "cannot be judged because the point mass and JSBSim disagree",
     "low": "come lower than {limit:.0f} m above ground",
 }
 # Name of the path segment from which returns have this outcome.
@@ -40,9 +40,9 @@ _SEGMENT_NAMES: dict[Kind, str] = {
     "zone": "a return violates a zone",
     "lost": "a return does not arrive",
     "energy": "a return takes too much energy",
-    "unknown": "a return is not judged: ground not known",
+    "unknown": "a return is not judged: terrain unknown",
     "power": "a return is not judged: power uncertain",
-    "unsure": "a return is not judged: flown too differently",
+    "unsure": "a return is not judged: the point mass and JSBSim disagree",
     "low": "a return comes lower than required",
     "safe": "a return is safe",
 }
