@@ -112,7 +112,7 @@ def survey_remedies(
         trials.find_stride(math.inf if longer_turn_around is None else longer_turn_around.value),
         trials.find_course(),
         trials.find_parameter(),
-        trials.airspeed() or trials.try_default_airspeed(),
+        trials.find_airspeed() or trials.try_default_airspeed(),
     ]
     if not any(candidates):
         candidates.append(trials.find_parameter_and_turn_around() or trials.find_airspeed_and_turn_around())
@@ -329,7 +329,7 @@ class _Trials:
             "parameter", deciding.name, deciding.current, deciding.passing, deciding.unit, *passed_flights[-1]
         )
 
-    def airspeed(self) -> SurveyRemedy | None:
+    def find_airspeed(self) -> SurveyRemedy | None:
         """Find the highest reduced airspeed that passes; None for a mission that sets its own airspeed."""
         for speed, airframe in self._slower_airspeeds():
             flight = self._fly(self._setup.mission, airframe, f"{speed:g} m/s")

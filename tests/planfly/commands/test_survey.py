@@ -27,7 +27,14 @@ def test_each_line_is_told_and_what_would_help_is_flown(
     monkeypatch.chdir(tmp_path)
     if not SOAK:
         # Fifteen flights more, of which some help, too.
-        for kind in ("side", "every", "course", "parameter", "airspeed", "mission_airspeed"):
+        for kind in (
+            "try_other_side",
+            "find_stride",
+            "find_course",
+            "find_parameter",
+            "find_airspeed",
+            "try_default_airspeed",
+        ):
             monkeypatch.setattr(survey_remedies._Trials, kind, lambda *_: None)
     asked = ["survey", str(FIELD_SURVEY), *BY, "--suggest", "--out", "better", "--json", "answer.json"]
     assert main(asked) == 4
