@@ -59,7 +59,7 @@ class PowerPrior:
         """Return the ratio of D V to the battery power of the drive, for a mass in kg.
 
         >>> [round(POWER_PRIOR.drive_efficiency(mass), 2) for mass in (0.5, 2.0, 20.0)]
-        [0.26, 0.43, 0.65]
+        [0.26, 0.43, 0.64]
         """
         return LARGEST_EFFICIENCY / (1.0 + (mass / self.loss_mass) ** LOSS_POWER)
 

@@ -43,7 +43,7 @@ def test_two_hundred_of_them_are_the_same_each_time_and_of_all_rooms() -> None:
 
 
 def test_a_modules_own_tests_come_first_and_its_limits_are_found_where_they_are_used() -> None:
-    mutant = replacing("rules", "logs/verdict/rules/bounds_rule.py", "planned >= -ROUNDING_M", "planned >= -9.0")
+    mutant = replacing("rules", "logs/verdict/rules/bounds_rule.py", "planned_margin >= -ROUNDING_M", "planned >= -9.0")
     own = "tests/logs/verdict/rules/test_bounds_rule.py", "tests/logs/verdict/rules/limits/test_bounds_rule_limits.py"
     assert set(own) == set(covering_tests(mutant)[0])
     # The pages state what rules rank by.

@@ -129,11 +129,11 @@ def test_a_strip_without_a_course_is_landed_on_into_the_wind() -> None:
 HOME = "[home]\neast_m = 0\nnorth_m = 0\n"
 LAND = HOME + "[landing]\neast_m = 0\nnorth_m = 0\n"
 CASES = {
-    "a launch without home": ('[launch]\nmethod = "hand"', "home: missing; [launch] needs it"),
+    "a launch without home": ('[launch]\nmethod = "hand"', "home: missing; [launch] requires it"),
     "an empty home": ("[home]", 'home: position: missing; give place = "start"'),
     "a home in the air": (HOME + "amsl_m = 9", "home: amsl_m: home is on the scenario's ground"),
     "two landings": (HOME + "[[landing]]\neast_m = 0\nnorth_m = 0", "landing: expected a table"),
-    "a landing without home": ("[landing]\neast_m = 0\nnorth_m = 0", "home: missing; [landing] needs it"),
+    "a landing without home": ("[landing]\neast_m = 0\nnorth_m = 0", "home: missing; [landing] requires it"),
     "home nowhere": ("[home]\neast_m = 0", "home: position: give east_m and north_m, or lat_deg and lon_deg"),
     "home twice": ('[home]\nplace = "start"\neast_m = 0', 'home: place: give place = "start" or a position, not both'),
     "home by another name": ('[home]\nplace = "base"', "home.place: \"base\": Input should be 'start'"),

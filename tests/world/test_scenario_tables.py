@@ -235,7 +235,7 @@ CASES: dict[str, tuple[str, str, str]] = {
     "turbulence": ("", '[wind]\nturbulence = "severe"', 'wind.turbulence: "severe"'),
     "terrain kind": ('kind = "flat"', 'kind = "mars"', 'terrain.kind: "mars"'),
     "another kind's key": ("amsl_m = 200", 'amsl_m = 200\npath = "x"', 'path: not a key of kind = "flat"'),
-    "kind without its key": ("amsl_m = 200", "", 'amsl_m: missing; kind = "flat" needs it'),
+    "kind without its key": ("amsl_m = 200", "", 'amsl_m: missing; kind = "flat" requires it'),
     "a tile's name with a line break": (
         'kind = "flat"\namsl_m = 200',
         'kind = "dem"\npath = "a\\nb.tif"',

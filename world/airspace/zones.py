@@ -76,7 +76,7 @@ class Zone:
 
     @property
     def above_ground(self) -> bool:
-        """Whether the floor or the ceiling is a height above ground."""
+        """True if the floor or the ceiling is a height above ground."""
         return any(level is not None and level.datum == "ground" for level in (self.floor, self.ceiling))
 
 

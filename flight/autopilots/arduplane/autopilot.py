@@ -69,7 +69,7 @@ _LEG_FIELDS = (
         "at_height",
         "next_look",
     ),
-    *("up_before", "over", "waited", "left_for", "returning", "climbed", "ground_leg", "sloped_leg"),
+    *("up_before", "over", "waited", "left_for", "returning", "climbed", "terrain_leg", "sloped_leg"),
 )
 
 

@@ -34,7 +34,8 @@ def find_clock_shift(
     not move.
 
     >>> time = np.arange(0.0, 100.0, 0.1)
-    >>> found = find_clock_shift(time, np.sin(time) + 0.1 * time, time + 3.0, np.sin(time) + 0.1 * time, 10.0)
+    >>> chirp = np.sin(0.02 * time**2)
+    >>> found = find_clock_shift(time, chirp, time + 3.0, chirp, 10.0)
     >>> round(found.shift, 2), round(found.correlation, 3)
     (3.0, 1.0)
     """

@@ -321,7 +321,7 @@ class ReturnWorld:
 
     @property
     def ending(self) -> Ending:
-        """How an RTL ends, by RTL_AUTOLAND."""
+        """End of an RTL, by RTL_AUTOLAND: a circle or a landing sequence."""
         ending_of_setting: dict[int, Ending] = {1: "on to land", 2: "straight to land"}
         return ending_of_setting.get(int(self.parameters.rtl_autoland), "circle") if self.landings else "circle"
 

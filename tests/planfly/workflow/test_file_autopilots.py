@@ -84,7 +84,7 @@ def test_the_autopilot_is_taken_from_the_files(mission: str, options: dict[str, 
     if taken:
         file = options.get("params", mission)
         assert line.startswith("Autopilot: the simulated PX4 1.17 with")
-        assert f"; taken from {Path(file).resolve() if file.endswith('params') else file}, as no" in line
+        assert f"; taken from {Path(file).resolve() if file.endswith('params') else file}, because no" in line
 
 
 TO_PX4 = "but ArduPlane is to fly; --autopilot px4 simulates PX4 instead"

@@ -18,7 +18,7 @@ def test_the_values_of_a_path_are_plain_sums(problem: Problem) -> None:
     heights = np.ones(len(data.aircraft.amsl))
     # 200 W whatever the climb.
     power = LENGTH_COST._replace(level=200.0 * heights, linear=0.0 * heights, square=0.0 * heights)
-    values = front_values(data, power._replace(lowest=-heights, highest=heights), path[None])[0]
+    values = front_values(data, power._replace(min_sine=-heights, max_sine=heights), path[None])[0]
     steps = (np.arange(40_000) + 0.5) / 40_000
     points = np.concatenate([a + steps[:, None] * (b - a) for a, b in itertools.pairwise(path)])
     lengths = np.linalg.norm(np.diff(path, axis=0), axis=1)
