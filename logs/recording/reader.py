@@ -311,10 +311,8 @@ def read_log(path: Path | str) -> FlightLog:
     stored_setup = unpack_setup(container.attachments, str(path))
     rows, row_fault = _usable_rows(messages.rows(), len(stored_setup.setup.route.waypoints))
     if not len(rows):
-        raise LogError(
-            f"{path}: contains no complete second of flight: {row_fault or container.problem or 'an empty log'}",
-            file=path,
-        )
+        fault = row_fault or container.problem or "an empty log"
+        raise LogError(f"{path}: contains no complete second of flight: {fault}", file=path)
     end_reason, result_fault = _read_result(container.attachments, len(rows))
     verdict, verdict_fault = _read_verdict(container.attachments)
     reference, reference_fault = _read_reference(container.attachments)

@@ -67,10 +67,8 @@ def replay_options(line: LineParser) -> None:
         "--speed",
         metavar="X",
         type=number("speed"),
-        help=(
-            "at X times real time (default: 1 on a terminal and to Foxglove; for a film, so that it "
-            "takes 20 s; otherwise at once)"
-        ),
+        help="at X times real time (default: 1 on a terminal and to Foxglove; for a film, so that it takes 20 s; "
+        "otherwise at once)",
     )
     part_group.add_argument("--at-once", action="store_true", help="print the timeline at once, also on a terminal")
     output_group = parser.group("other ways to see it")
@@ -82,11 +80,8 @@ def replay_options(line: LineParser) -> None:
     output_group.add_argument(
         "--foxglove",
         action="store_true",
-        help=(
-            "play it to Foxglove on this machine over WebSocket; requires the extra "
-            "planfly[foxglove], and a viewer that speaks foxglove.sdk.v1 (Foxglove since 2025, "
-            "Lichtblick after 1.21)"
-        ),
+        help="play it to Foxglove on this machine over WebSocket; requires the extra planfly[foxglove], and a viewer "
+        "that speaks foxglove.sdk.v1 (Foxglove since 2025, Lichtblick after 1.21)",
     )
     output_group.add_argument(
         "--port",

@@ -65,7 +65,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     telemetry(made / "flight.tlog")
     (made / "flight.ulg").write_bytes(b"ULog\x01\x12\x35\x01" + bytes(8))
     (made / "flight.csv").write_text("t,roll\n0,1\n")
-    (made / "flight.columns.toml").write_text("")
+    (made / "flight.columns.toml").write_text("[columns]\n")
     (made / "arduplane").write_text("#!/bin/sh\n")
     (made / "arduplane").chmod(0o755)
     write_geotiff(made / "dem.tif", compress="lzw", predictor=3)

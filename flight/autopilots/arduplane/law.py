@@ -335,7 +335,8 @@ def look_ahead(
     work: a record of `flight.simulation.tick.WORKSPACE`.
     """
     b = waypoints[own.leg + 1]
-    if not b.over_ground or own.clock - work.timing.dt >= 0.5 * work.timing.dt:
+    # Before the first update of the law, the begin of the first leg is not set.
+    if not own.begun or not b.over_ground or own.clock - work.timing.dt >= 0.5 * work.timing.dt:
         return
     here, place = work.estimated, work.place.ground
     own.ground = own.ground if math.isnan(place) else place

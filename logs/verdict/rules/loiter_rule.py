@@ -212,9 +212,7 @@ def _loiter_finding(
         tolerance=RADIUS_TOLERANCE_FRACTION,
         margin=circle.radius - min_radius,
         unit="m",
-        method=(
-            "radius over the ground compared with the radius at the bank limit in this wind; each corner as a turn"
-        ),
+        method="radius over the ground, and the radius at the bank limit in this wind; each corner as a turn",
         check=UNKNOWN_WAY if ok is None and open_text else "",
     )
 

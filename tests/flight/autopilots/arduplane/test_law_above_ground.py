@@ -63,7 +63,7 @@ def test_before_the_ground_at_its_begin_is_known_a_leg_keeps_the_demand() -> Non
 
 def looked(heights: np.ndarray, above: float = 100.0, **values: float) -> Record:
     """Look ahead from the middle of the south end of a raster of 10 m pixels along a leg of 1,000 m north."""
-    own = memory(clock=0.0)
+    own = memory(clock=0.0, begun=True)
     work = record(WORKSPACE)
     work.estimated = flying(0.0, 0.0, 500.0)
     work.place.ground = float(heights[0, 1])
