@@ -525,7 +525,7 @@ class _NoPropellerError(Exception):
 def _size_propulsion(stated_sheet: DataSheet, sheet: DataSheet, drag: Drag) -> tuple[Drive, DataSheet]:
     """Size motor or engine, and propeller.
 
-    Raises FlightError with an allowed range if there are none for the sheet.
+    Raises FlightError with an allowed range if no value fits the sheet.
     """
     try:
         return _size_drive(stated_sheet, sheet, drag)
@@ -579,7 +579,7 @@ _D = TypeVar("_D", ElectricMotor, FuelEngine)
 def _limit_climb(
     solve: Callable[[], tuple[_D, DataSheet]], solve_for: Callable[[float], tuple[_D, DataSheet]]
 ) -> tuple[_D, DataSheet]:
-    """Return the drive that follows from a top speed, or the drive for a possible climb if its climb is none.
+    """Return the drive for a top speed, or for a guessed climb if no propeller fits or the climb is too steep.
 
     solve_for: solves for a climb, rad.
     """

@@ -29,10 +29,8 @@ def through_json(table: SetupModel) -> Any:
     return json.loads(json.dumps(table.model_dump(by_alias=True)))
 
 
-ROUTE, ENVELOPE = (
-    through_json(RouteTable.from_dataclass(SETUP.route)),
-    through_json(EnvelopeTable.from_dataclass(SETUP.envelope)),
-)
+ROUTE = through_json(RouteTable.from_dataclass(SETUP.route))
+ENVELOPE = through_json(EnvelopeTable.from_dataclass(SETUP.envelope))
 
 
 # Of a return: the circle at its end.

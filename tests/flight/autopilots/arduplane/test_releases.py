@@ -1,4 +1,4 @@
-"""Which release of ArduPlane flies: the stated one, a parameter file's, a log's, or the newest."""
+"""The simulated release of ArduPlane: the stated one, a parameter file's, a log's, or the newest."""
 
 from pathlib import Path
 

@@ -13,7 +13,9 @@ WIND_EAST = 4.0
 RATE = 0.2
 SECONDS = 240.0
 HERTZ = 20.0
-LAT, LON = 46.0, 8.0
+# Degrees, where the made flights begin.
+LAT = 46.0
+LON = 8.0
 
 TABLE = """
 file = "flight.csv"

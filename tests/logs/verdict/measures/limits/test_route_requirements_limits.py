@@ -1,4 +1,4 @@
-"""Which turn is a reversal, that no leg would be long enough for."""
+"""Turns that are judged as reversals, because no leg would be long enough for their arc."""
 
 import math
 
