@@ -61,15 +61,24 @@ _LEG_FIELDS = (
     *(
         "leg",
         "cross_track_integrator",
-        "on_circle",
-        "loitering",
-        "stayed",
-        "circled",
-        "bearing",
-        "at_height",
-        "next_look",
+        "reached_loiter_target",
+        "loiter_started",
+        "loiter_time",
+        "loiter_angle_sum",
+        "old_loiter_bearing",
+        "reached_target_altitude",
+        "next_sum_lap",
     ),
-    *("up_before", "over", "waited", "left_for", "returning", "climbed", "terrain_leg", "sloped_leg"),
+    *(
+        "start_lap_altitude",
+        "loiter_complete",
+        "exit_wait_angle",
+        "leg_after_loiter",
+        "is_in_rtl",
+        "rtl_climb_complete",
+        "terrain_leg",
+        "sloped_leg",
+    ),
 )
 
 
@@ -159,7 +168,7 @@ class ArduPlane(Autopilot):
 
     @property
     def loop(self) -> Loop:
-        """Compiled loop of the law with a compiled model."""
+        """Compiled simulation loop of the control law and the aircraft model."""
         return arduplane_loop
 
     def begin(self, memory: Record, own: Record) -> None:
@@ -369,7 +378,7 @@ class ArduPlane(Autopilot):
         return tracking_error(self.parameters, airspeed, nav, fly_over=fly_over, turbulence=turbulence)
 
     def gust_rise(self, sink: float, turbulence: Turbulence) -> float:
-        """Return the altitude gain in updrafts, in which it holds its airspeed with a limited sink rate."""
+        """Return the altitude gained in updrafts while ArduPlane holds airspeed and cannot sink fast enough, m."""
         return height_in_updrafts(sink, turbulence)
 
     def from_ground(self, ways: GroundWays, aircraft: Aircraft, contacts: Sequence[Contact]) -> "ArduPlaneFromGround":
@@ -401,7 +410,7 @@ class ArduPlaneFromGround(ArduPlane, GroundAutopilot):
 
     @property
     def loop(self) -> Loop:
-        """Compiled loop of the law with a compiled model."""
+        """Compiled simulation loop of the control law and the aircraft model."""
         return ground_loop
 
     @property
@@ -455,10 +464,10 @@ class ArduPlaneFromGround(ArduPlane, GroundAutopilot):
         )
 
     def _climb_pitch(self, take_off: TakeOff) -> float:
-        """Return the pitch of the climb, rad: the item's, or the highest if the motor runs before the push.
+        """Return the climb pitch, rad: the item's pitch, or the maximum pitch if the motor runs before the launch.
 
-        TECS runs with the motor, and the push winds its integrator up to the highest pitch: two flights of ArduPlane
-        4.6.3.  In five flights whose motor the push started it was the item's.
+        TECS runs with the motor, and the launch winds its integrator up to the maximum pitch: two flights of ArduPlane
+        4.6.3.  In five flights in which the launch acceleration started the motor it was the item's pitch.
         """
         if self.motor_start > -math.inf or take_off.acceleration <= 0.0:
             return take_off.pitch

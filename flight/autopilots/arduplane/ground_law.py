@@ -26,11 +26,11 @@ from flight.autopilots.arduplane.law import (
     ARDUPILOT_MEMORY,
     NAVIGATION_TICK,
     airspeed_target,
-    begin_law,
-    fly_as_ardupilot,
-    follow_attitude,
-    look_ahead,
+    control_as_ardupilot,
+    control_attitude,
+    initialise_memory,
     update_tecs,
+    update_terrain_lookahead,
 )
 from flight.autopilots.arduplane.parameters import ARDUPILOT_PARAMETERS
 from flight.dynamics.instructions import Code
@@ -162,9 +162,9 @@ def ground_tick(block: Floats, heights: Heights) -> int:
     """
     path_begins = WORKSPACE_NUMBERS + GROUND_NUMBERS
     work = block[:WORKSPACE_NUMBERS].view(WORKSPACE)[0]
-    own = block[WORKSPACE_NUMBERS:path_begins].view(ARDUPLANE_GROUND)[0]
+    arduplane = block[WORKSPACE_NUMBERS:path_begins].view(ARDUPLANE_GROUND)[0]
     path: Record = block[path_begins:].view(PATH_ROW)
-    settings, ground, memory = work.settings, own.ground, own.memory
+    settings, ground, memory = work.settings, arduplane.ground, arduplane.memory
     if not begin_tick(work, heights):
         return NOT_A_NUMBER
     ground.time = work.timing.tick * work.timing.dt
@@ -172,10 +172,10 @@ def ground_tick(block: Floats, heights: Heights) -> int:
     pieces = path.piece[: settings.pieces]
     update_ground_contact(work.state, work.place.clearance, ground)
     if ground.stage == TAKING_OFF:
-        _tick_take_off(work, own, waypoints, pieces)
+        _tick_take_off(work, arduplane, waypoints, pieces)
     elif ground.stage == IN_AIR:
-        look_ahead(work, heights, waypoints, own.parameters, memory)
-        fly_as_ardupilot(
+        update_terrain_lookahead(work, heights, waypoints, arduplane.parameters, memory)
+        control_as_ardupilot(
             work.state,
             work.estimated,
             pieces,
@@ -183,7 +183,7 @@ def ground_tick(block: Floats, heights: Heights) -> int:
             waypoints,
             work.gains,
             work.memory,
-            own.parameters,
+            arduplane.parameters,
             memory,
             work.commands,
             work.timing.dt,
@@ -193,7 +193,7 @@ def ground_tick(block: Floats, heights: Heights) -> int:
             ground.approaches_at_once = waypoints[memory.leg].to_height
     else:
         find_on_path(work.estimated, pieces, work.memory)
-        _tick_landing(work, own, waypoints[memory.leg + 1])
+        _tick_landing(work, arduplane, waypoints[memory.leg + 1])
     fill_tick(work)
     return end_status(work, ground)
 
@@ -277,37 +277,37 @@ def end_status(work: Record, ground: Record) -> int:
 
 
 @inner
-def _tick_take_off(work: Record, own: Record, waypoints: Records, pieces: Records) -> None:
+def _tick_take_off(work: Record, arduplane: Record, waypoints: Records, pieces: Records) -> None:
     """Run one tick of the take-off, which fills the commands; at the end of the take-off, begin the first leg."""
-    state, estimated, ground, memory = work.state, work.estimated, own.ground, own.memory
-    dt, staged = work.timing.dt, own.staged
+    state, estimated, ground, memory = work.state, work.estimated, arduplane.ground, arduplane.memory
+    dt, staged = work.timing.dt, arduplane.staged
     factor = true_by_equivalent(estimated.up)
     # The measured track begins where the take-off ends.
     work.memory.leg, work.memory.distance = ground.leg, pieces[0].start
     work.memory.cross_track, work.memory.height_error = 0.0, 0.0
-    if not memory.begun:
-        begin_law(state, estimated, waypoints, work.memory, own.parameters, memory)
+    if not memory.is_initialised:
+        initialise_memory(state, estimated, waypoints, work.memory, arduplane.parameters, memory)
         ground.yaw = state.yaw
     ground.max_airspeed = max(ground.max_airspeed, state.airspeed / factor)
     ground.lifted = ground.lifted or (ground.rolls and estimated.up > ground.launch_up + 2.0 and not ground.touches)
-    memory.clock -= dt
-    if memory.clock < 0.5 * dt:
-        memory.clock += NAVIGATION_TICK
-        _demand_heading(state, estimated, own.parameters, ground, memory)
-        memory.height_asked, memory.height_limited = estimated.up, estimated.up
-        memory.height_demand, memory.height_rate = estimated.up, 0.0
-        memory.climb_share, memory.sink_share = 1.0, 1.0
-        _set_take_off_parameters(estimated, own.parameters, staged, ground)
+    memory.time_to_update -= dt
+    if memory.time_to_update < 0.5 * dt:
+        memory.time_to_update += NAVIGATION_TICK
+        _demand_heading(state, estimated, arduplane.parameters, ground, memory)
+        memory.altitude_demand_raw, memory.altitude_demand_limited = estimated.up, estimated.up
+        memory.altitude_demand, memory.climb_rate_demand = estimated.up, 0.0
+        memory.max_climb_scaler, memory.max_sink_scaler = 1.0, 1.0
+        _set_take_off_parameters(estimated, arduplane.parameters, staged, ground)
         wanted = min(staged.airspeed_max, max(staged.airspeed_min, waypoints[ground.leg].airspeed))
         work.memory.speed_command = wanted * factor
         update_tecs(state, estimated, staged, memory, wanted * factor, factor, NAVIGATION_TICK)
-        if ground.max_airspeed < own.parameters.takeoff_rotation:
-            memory.pitch_demand = own.parameters.takeoff_ground_pitch
+        if ground.max_airspeed < arduplane.parameters.takeoff_rotation:
+            memory.pitch_demand = arduplane.parameters.takeoff_ground_pitch
     wanted_throttle = ground.full if ground.time >= ground.motor_start else 0.0
     step = ground.slew * dt
     throttle = min(work.commands.throttle + step, max(work.commands.throttle - step, wanted_throttle))
     memory.throttle_demand = throttle
-    follow_attitude(state, estimated, work.gains, work.memory, staged, memory, factor, work.commands, dt)
+    control_attitude(state, estimated, work.gains, work.memory, staged, memory, factor, work.commands, dt)
     if estimated.up > ground.top:
         _begin_first_leg(estimated, waypoints, pieces, work.memory, ground, memory)
 
@@ -353,23 +353,23 @@ def _demand_heading(state: Record, estimated: Record, parameters: Record, ground
         ground.is_heading_held = True
         course = math.atan2(estimated.velocity_east, estimated.velocity_north)
         ground.heading = course - wrap(state.yaw - ground.yaw)
-    memory.side_acceleration = 0.0
+    memory.lateral_acceleration = 0.0
     if ground.is_heading_held:
         angle = min(0.5 * math.pi, max(-0.5 * math.pi, wrap(ground.heading - state.yaw)))
-        memory.side_acceleration = 2.0 * math.sin(angle) * speed * _HEADING_GAIN / parameters.navl1_period
+        memory.lateral_acceleration = 2.0 * math.sin(angle) * speed * _HEADING_GAIN / parameters.navl1_period
 
 
 @inner
 def _begin_first_leg(
-    estimated: Record, waypoints: Records, pieces: Records, guided: Record, ground: Record, memory: Record
+    estimated: Record, waypoints: Records, pieces: Records, guidance: Record, ground: Record, memory: Record
 ) -> None:
     """Begin the leg that follows the take-off at the aircraft's position."""
     ground.stage = IN_AIR
     memory.leg = ground.leg
     memory.from_east, memory.from_north, memory.from_up = estimated.east, estimated.north, estimated.up
     # Go to the first piece of that leg.
-    while pieces[guided.piece].leg < ground.leg and guided.piece + 1 < pieces.shape[0]:
-        guided.piece += 1
+    while pieces[guidance.piece].leg < ground.leg and guidance.piece + 1 < pieces.shape[0]:
+        guidance.piece += 1
 
 
 # ----------------------------------------------------------------------
@@ -377,34 +377,34 @@ def _begin_first_leg(
 
 
 @inner
-def _tick_landing(work: Record, own: Record, point: Record) -> None:
+def _tick_landing(work: Record, arduplane: Record, point: Record) -> None:
     """Run one tick of the landing.
 
     point: waypoint of the landing point.
     """
-    state, estimated, ground, memory = work.state, work.estimated, own.ground, own.memory
-    dt, staged = work.timing.dt, own.staged
+    state, estimated, ground, memory = work.state, work.estimated, arduplane.ground, arduplane.memory
+    dt, staged = work.timing.dt, arduplane.staged
     factor = true_by_equivalent(estimated.up)
     work.memory.done = False
-    memory.clock -= dt
-    if memory.clock < 0.5 * dt:
-        memory.clock += NAVIGATION_TICK
-        left = _follow_line_to_point(estimated, own.parameters, ground, memory)
-        _update_stage(estimated, own.parameters, ground, memory, left)
-        _demand_glide(estimated, own.parameters, ground, memory, left[0])
-        _set_landing_parameters(estimated, own.parameters, staged, ground, left[1])
-        stated = ground.airspeed if ground.stage > ON_GLIDE else own.parameters.airspeed_cruise
+    memory.time_to_update -= dt
+    if memory.time_to_update < 0.5 * dt:
+        memory.time_to_update += NAVIGATION_TICK
+        left = _follow_line_to_point(estimated, arduplane.parameters, ground, memory)
+        _update_stage(estimated, arduplane.parameters, ground, memory, left)
+        _demand_glide(estimated, arduplane.parameters, ground, memory, left[0])
+        _set_landing_parameters(estimated, arduplane.parameters, staged, ground, left[1])
+        stated = ground.airspeed if ground.stage > ON_GLIDE else arduplane.parameters.airspeed_cruise
         wanted = airspeed_target(state, estimated, stated, point, staged, memory, factor)
         work.memory.speed_command = wanted * factor
         if ground.stage == FLARING:
             # Slow and without throttle it must not be in underspeed: the flare ignores it.
             memory.throttle_demand = 0.0
         update_tecs(state, estimated, staged, memory, wanted * factor, factor, NAVIGATION_TICK)
-    work.memory.height_error = estimated.up - memory.height_demand
+    work.memory.height_error = estimated.up - memory.altitude_demand
     before = work.commands.throttle
-    follow_attitude(state, estimated, work.gains, work.memory, staged, memory, factor, work.commands, dt)
+    control_attitude(state, estimated, work.gains, work.memory, staged, memory, factor, work.commands, dt)
     if ground.stage == FLARING:
-        slew = own.parameters.throttle_slew
+        slew = arduplane.parameters.throttle_slew
         # Without a slew limit the throttle closes at once.
         work.commands.throttle = max(0.0, before - slew * dt) if slew > 0.0 else 0.0
 
@@ -439,7 +439,7 @@ def _follow_line_to_point(
     )
     if not math.isnan(aim):
         angle += aim + memory.cross_track_integrator
-    memory.side_acceleration = l1_acceleration(angle, speed, length, parameters.navl1_damping)
+    memory.lateral_acceleration = l1_acceleration(angle, speed, length, parameters.navl1_damping)
     return run - along, along / run, abs(angle), abs(cross_track)
 
 
@@ -471,9 +471,9 @@ def _update_stage(
     )
     if (ground.stage == APPROACHING and (flare_height_reached or flare_time_reached)) or share >= 1.0:
         ground.stage = FLARING
-        ground.entry_sink = -memory.height_rate if ground.flares_by_demand else sink
+        ground.entry_sink = -memory.climb_rate_demand if ground.flares_by_demand else sink
         ground.entry_height = height
-        ground.flare_adjusted, ground.flare_ideal = memory.height_demand, estimated.up
+        ground.flare_adjusted, ground.flare_ideal = memory.altitude_demand, estimated.up
 
 
 @inner
@@ -482,24 +482,24 @@ def _demand_glide(estimated: Record, parameters: Record, ground: Record, memory:
 
     left: distance to the landing point, m.
     """
-    memory.climb_share, memory.sink_share = 1.0, 1.0
+    memory.max_climb_scaler, memory.max_sink_scaler = 1.0, 1.0
     if ground.stage < FLARING:
         speed = math.hypot(estimated.velocity_east, estimated.velocity_north)
         glide = ground.up + ground.flare_height + ground.slope * (left - ground.flare_distance)
-        memory.height_demand = min(ground.begin, glide)
-        memory.height_rate = -ground.slope * speed if glide < ground.begin else 0.0
+        memory.altitude_demand = min(ground.begin, glide)
+        memory.climb_rate_demand = -ground.slope * speed if glide < ground.begin else 0.0
     else:
         height, entry = estimated.up - ground.up, ground.entry_height
         share = 1.0
         if entry > parameters.flare_holdoff:
             share = min(1.0, max(0.0, (entry - height) / (entry - parameters.flare_holdoff)))
         last = parameters.landing_sink + parameters.landing_sink_change * max(0.0, -left)
-        memory.height_rate = -ground.entry_sink * (1.0 - share) - last * share
-        ground.flare_adjusted += memory.height_rate * NAVIGATION_TICK
-        ground.flare_ideal += memory.height_rate * NAVIGATION_TICK
+        memory.climb_rate_demand = -ground.entry_sink * (1.0 - share) - last * share
+        ground.flare_adjusted += memory.climb_rate_demand * NAVIGATION_TICK
+        ground.flare_ideal += memory.climb_rate_demand * NAVIGATION_TICK
         # As in `AP_TECS::_update_height_demand` since 4.6.3.
-        memory.height_demand = ground.flare_adjusted * (1.0 - share) + ground.flare_ideal * share
-    memory.height_asked, memory.height_limited = memory.height_demand, memory.height_demand
+        memory.altitude_demand = ground.flare_adjusted * (1.0 - share) + ground.flare_ideal * share
+    memory.altitude_demand_raw, memory.altitude_demand_limited = memory.altitude_demand, memory.altitude_demand
 
 
 @inner

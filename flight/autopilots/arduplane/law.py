@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from aircraft.envelope import GRAVITY
-from flight.autopilots.arduplane.navigator import navigate_legs, target_of
+from flight.autopilots.arduplane.navigator import navigate_legs, target_position
 from flight.autopilots.arduplane.parameters import ARDUPILOT_PARAMETERS, FULL_LOAD_FACTOR_LIMIT, IMMEDIATE_CLIMB
 from flight.dynamics.instructions import Code
 from flight.guidance.equivalent_airspeed import true_by_equivalent
@@ -32,65 +32,68 @@ from world.terrain import pixel_height
 # Memory of ArduPlane's control law from tick to tick.
 
 ARDUPILOT_MEMORY = record_dtype(
-    "clock",  # s until the next navigation update
-    ("begun", np.bool_),  # True once a tick was flown
-    # Lateral.
+    "time_to_update",  # s until the next navigation update
+    ("is_initialised", np.bool_),  # True once a tick was flown
+    # Lateral: `AP_L1_Control`, `Plane::loiter` and `Plane::rtl`.
     ("leg", np.int64),  # current leg, from waypoint `leg` to `leg + 1`
-    "from_east",  # m, start of the leg's line
+    "from_east",  # m, start of the leg's line (`prev_WP_loc`)
     "from_north",
     "from_up",  # m, start of its altitude slope
-    "cross_track_integrator",  # rad, L1's cross-track integrator
-    ("on_circle", np.bool_),  # True while the loiter is followed, not just approached
-    ("loitering", np.bool_),  # True once this loiter was captured: its turns and time are measured from then on
-    "stayed",  # s since the capture
-    "circled",  # rad around the center since the capture, positive in the direction of the loiter
-    "bearing",  # rad, bearing from the center at the last update
-    ("at_height", np.bool_),  # True once the loiter's altitude was reached, or given up
-    "next_look",  # rad around the loiter at which the altitude is next checked for progress
-    "up_before",  # m, altitude at the last such check
-    ("over", np.bool_),  # True once the loiter's turns, time or altitude are done
-    "waited",  # rad around the loiter since then
-    ("left_for", np.int64),  # leg that followed the last loiter, 0 if none
-    ("returning", np.bool_),  # True during an RTL; from_east, from_north and from_up are then where the RTL began
-    ("climbed", np.bool_),  # True once the climb that precedes the turn to home is done
-    "side_acceleration",  # m/s^2 to the right, the last demand
-    "roll_demand",  # rad
-    # Altitude.
-    "ground",  # m AMSL, terrain at the aircraft
-    "rise_ahead",  # m, added to the altitude of a leg above terrain because of the terrain ahead
+    "cross_track_integrator",  # rad, L1's cross-track integrator (`_L1_xtrack_i`)
+    ("reached_loiter_target", np.bool_),  # True while the loiter is followed, not just approached (`_WPcircle`)
+    ("loiter_started", np.bool_),  # True once this loiter was captured (`loiter.start_time_ms` is set)
+    "loiter_time",  # s since the capture (compared with `loiter.time_max_ms`)
+    "loiter_angle_sum",  # rad around the center since the capture, in the loiter's direction (`loiter.sum_cd`)
+    "old_loiter_bearing",  # rad, from the center at the last update (`loiter.old_target_bearing_cd`: to the center)
+    ("reached_target_altitude", np.bool_),  # True once it was reached, or given up (`loiter.reached_target_alt`)
+    "next_sum_lap",  # rad around the loiter at which progress in altitude is checked next (`loiter.next_sum_lap_cd`)
+    "start_lap_altitude",  # m, altitude at the last such check (`loiter.start_lap_alt_cm`)
+    ("loiter_complete", np.bool_),  # True once the loiter's turns, time or altitude are done
+    "exit_wait_angle",  # rad around the loiter since then
+    ("leg_after_loiter", np.int64),  # leg that followed the last loiter, 0 if none
+    ("is_in_rtl", np.bool_),  # True during an RTL; from_east, from_north and from_up are then where the RTL began
+    ("rtl_climb_complete", np.bool_),  # True once the climb that precedes the turn to home is done (`rtl.done_climb`)
+    "lateral_acceleration",  # m/s^2 to the right, the last demand (`_latAccDem`)
+    "roll_demand",  # rad (`nav_roll_cd`)
+    # Altitude: `Plane::target_altitude` and `AP_TECS::_update_height_demand`.
+    "terrain_altitude",  # m AMSL, terrain at the aircraft
+    "lookahead_rise",  # m, rise of the terrain ahead, from `AP_Terrain::lookahead`
     ("terrain_leg", np.int64),  # current leg above terrain, plus one; 0 before the first
     ("sloped_leg", np.int64),  # current leg with a slope between altitudes, plus one; 0 before the first
-    "from_above_ground",  # m, height above ground where the line of the leg above terrain begins
-    "lookahead_offset",  # m, height above ground to gain on that leg as it began; a descent reduces the lookahead
-    "height_asked",  # m, altitude setpoint of the leg, frozen while the aircraft cannot follow it
-    "height_limited",  # m, the same after the rate limit
-    "height_demand",  # m, the same after the rate limit and the lag
-    "height_rate",  # m/s, rate of the altitude demand
-    "climb_share",  # 0..1, fraction of the maximum climb and sink rates that is demanded
-    "sink_share",
-    ("saturation", np.int64),  # saturation: 1 with throttle or pitch at its upper limit, -1 at its lower limit
-    ("underspeed", np.bool_),  # underspeed: speed has priority over altitude until the altitude demand is reached
-    "since_slow",  # s since the airspeed was last below the underspeed threshold
-    # Airspeed.
-    ("flown", np.bool_),  # True once there is a previous velocity
+    "from_height_above_terrain",  # m, height above terrain at the start of the leg above terrain
+    "altitude_offset",  # m, height above terrain to gain on that leg at its start (`target_altitude.offset_cm`)
+    "altitude_demand_raw",  # m, demand of the leg, frozen while the aircraft cannot follow it (`_hgt_dem_in`)
+    "altitude_demand_limited",  # m, the same after the rate limit (`_hgt_dem_rate_ltd`)
+    "altitude_demand",  # m, the same after the rate limit and the lag (`_hgt_dem`)
+    "climb_rate_demand",  # m/s, rate of the altitude demand (`_hgt_rate_dem`)
+    "max_climb_scaler",  # 0..1, fraction of the maximum climb rate that is demanded (`_max_climb_scaler`)
+    "max_sink_scaler",  # 0..1, fraction of the maximum sink rate that is demanded (`_max_sink_scaler`)
+    # 1 with throttle or pitch at its upper limit, -1 at its lower limit (`_thr_clip_status`, `_SEBdot_dem_clip`).
+    ("saturation", np.int64),
+    # True while speed has priority over altitude, until the altitude demand is reached (`_flags.underspeed`).
+    ("underspeed", np.bool_),
+    "time_above_underspeed_threshold",  # s since the airspeed was last below it (from `_underspeed_start_ms`)
+    # Airspeed: `AP_TECS::_update_speed`, `_update_speed_demand` and `Plane::calc_gndspeed_undershoot`.
+    ("has_last_velocity", np.bool_),  # True once there is a previous velocity
     "last_velocity_east",  # m/s, at the last update
     "last_velocity_north",
     "last_velocity_up",
-    "airspeed_read",  # m/s, smoothed sensor reading
-    "airspeed",  # m/s, filtered from the reading and the acceleration
-    "airspeed_drift",  # m/s^2, correction of the acceleration by the filter
-    "acceleration",  # m/s^2, along the nose, mean removed
-    "acceleration_mean",
-    "airspeed_demand",  # m/s, within its rate limits
-    "ground_speed_rise",  # m/s, equivalent, by which the airspeed was last raised for a minimum ground speed
-    # Energy.
-    "ste_rate_error",  # m^2/s^3, STE rate error, smoothed
-    "throttle_before",  # 0..1, last throttle without its integrator
-    "ste_integrator",  # 0..1, STE integrator
-    "seb_integrator",  # m^2/s^3, SEB integrator
-    "ske_integrator",  # m^2/s^3, SKE integrator, positive when too fast
-    "pitch_demand",  # rad, without the trim
-    "throttle_demand",  # 0..1
+    "airspeed_smoothed",  # m/s, smoothed sensor reading (`AP_AHRS::airspeed_estimate`)
+    "tas",  # m/s, filtered from the reading and the acceleration (`_TAS_state`)
+    "tas_rate_correction",  # m/s^2, correction of the acceleration by the filter (`_integDTAS_state`)
+    "tas_rate",  # m/s^2, along the nose, mean removed (`_vel_dot` without `_vel_dot_lpf`)
+    "tas_rate_mean",  # m/s^2 (`_vel_dot_lpf`)
+    "tas_demand",  # m/s, within its rate limits (`_TAS_dem_adj`)
+    # m/s, equivalent, last raise of the airspeed for a minimum ground speed (`groundspeed_undershoot`).
+    "ground_speed_undershoot",
+    # Energy: `AP_TECS::_update_throttle_with_airspeed` and `_update_pitch`.
+    "ste_rate_error",  # m^2/s^3, STE rate error, smoothed (`_STEdotErrLast`)
+    "last_throttle_demand",  # 0..1, last throttle without its integrator (`_last_throttle_dem`)
+    "ste_integrator",  # 0..1, STE integrator (`_integTHR_state`)
+    "seb_integrator",  # m^2/s^3, SEB integrator (`_integSEBdot`)
+    "ske_integrator",  # m^2/s^3, SKE integrator, positive when too fast (`_integKE`)
+    "pitch_demand",  # rad, without the trim (`_pitch_dem`)
+    "throttle_demand",  # 0..1 (`_throttle_dem`)
 )
 # ArduPlane's part of a `flight.simulation.tick.Workspace`.
 ARDUPLANE = record_dtype(("memory", ARDUPILOT_MEMORY), ("parameters", ARDUPILOT_PARAMETERS))
@@ -105,14 +108,16 @@ MIN_ROLL_LIMIT_RAD = math.radians(25.0)
 
 
 @inner
-def demanded_bank(side_acceleration: float, pitch: float, parameters: Record) -> float:
-    """Return the bank for a side acceleration (m/s^2), within ROLL_LIMIT_DEG, rad.
+def nav_roll(lateral_acceleration: float, pitch: float, parameters: Record) -> float:
+    """Return the bank for a lateral acceleration (m/s^2), within ROLL_LIMIT_DEG, rad.
+
+    Follows `AP_L1_Control::nav_roll_cd`.
 
     pitch: rad.
     """
-    level = math.cos(min(math.radians(60.0), max(-math.radians(60.0), pitch)))
-    wanted = math.atan(side_acceleration / (GRAVITY * level))
-    return min(parameters.roll_limit, max(-parameters.roll_limit, wanted))
+    cos_pitch = math.cos(min(math.radians(60.0), max(-math.radians(60.0), pitch)))
+    bank = math.atan(lateral_acceleration / (GRAVITY * cos_pitch))
+    return min(parameters.roll_limit, max(-parameters.roll_limit, bank))
 
 
 @inner
@@ -124,42 +129,44 @@ def min_airspeed(bank: float, parameters: Record) -> float:
     """
     if parameters.stall_prevention <= 0.0:
         return parameters.airspeed_min
-    load_root = 1.0 / math.sqrt(math.cos(min(math.radians(85.0), abs(bank))))
+    load_factor_root = 1.0 / math.sqrt(math.cos(min(math.radians(85.0), abs(bank))))
     if parameters.airspeed_stall > 0.0:
-        return max(parameters.airspeed_min, parameters.airspeed_stall * load_root)
-    return parameters.airspeed_min * load_root
+        return max(parameters.airspeed_min, parameters.airspeed_stall * load_factor_root)
+    return parameters.airspeed_min * load_factor_root
 
 
 @inner
-def stall_bank(airspeed: float, slowest: float, least: float) -> float:
+def load_factor_roll_limit(airspeed: float, min_level_airspeed: float, min_bank: float) -> float:
     """Return the bank that an airspeed allows without a stall, rad, but at least a given bank.
 
-    airspeed, slowest: flown airspeed and minimum airspeed of straight flight, both equivalent or both true, m/s.
-    least: rad.
+    airspeed: flown, m/s.  min_level_airspeed: minimum of straight flight, equivalent or true like ``airspeed``, m/s.
+    min_bank: rad.
     """
-    speed_ratio = max(1.0, airspeed / slowest)
-    return max(least, math.acos(min(1.0, 1.0 / (speed_ratio * speed_ratio))))
+    speed_ratio = max(1.0, airspeed / min_level_airspeed)
+    return max(min_bank, math.acos(min(1.0, 1.0 / (speed_ratio * speed_ratio))))
 
 
 @inner
-def roll_demand(side_acceleration: float, pitch: float, airspeed: float, parameters: Record) -> float:
-    """Return the bank for a side acceleration (m/s^2), limited by ROLL_LIMIT_DEG and the stall, rad.
+def limited_nav_roll(lateral_acceleration: float, pitch: float, airspeed: float, parameters: Record) -> float:
+    """Return the bank for a lateral acceleration (m/s^2), limited by ROLL_LIMIT_DEG and the stall, rad.
+
+    Follows `Plane::calc_nav_roll` and `Plane::update_load_factor`.
 
     pitch: rad.  airspeed: equivalent, m/s.
     """
-    wanted = demanded_bank(side_acceleration, pitch, parameters)
+    bank = nav_roll(lateral_acceleration, pitch, parameters)
     if parameters.stall_prevention <= 0.0:
-        return wanted
-    slowest, least = parameters.airspeed_min, MIN_ROLL_LIMIT_RAD
+        return bank
+    min_level_airspeed, min_bank = parameters.airspeed_min, MIN_ROLL_LIMIT_RAD
     if parameters.is_4_7:
         # `Plane::apply_load_factor_roll_limits`.
         if parameters.airspeed_stall > 0.0:
-            slowest = parameters.airspeed_stall
+            min_level_airspeed = parameters.airspeed_stall
             if int(parameters.flight_options) & FULL_LOAD_FACTOR_LIMIT:
-                least = 0.0
-        least = max(least, parameters.level_roll_limit)
-    limit = stall_bank(airspeed, slowest, least)
-    return min(limit, max(-limit, wanted))
+                min_bank = 0.0
+        min_bank = max(min_bank, parameters.level_roll_limit)
+    roll_limit = load_factor_roll_limit(airspeed, min_level_airspeed, min_bank)
+    return min(roll_limit, max(-roll_limit, bank))
 
 
 # ----------------------------------------------------------------------
@@ -198,7 +205,7 @@ _SPEED_RATE_FRACTION = 0.5
 # the demand touch the limit now and then: the band is three standard deviations.  Climbs at full throttle depend on it:
 # with 0.003 to 0.005 the least clearances of 20 ArduPlane flights are met within 1.2 m; without it one is 9 m off.
 _SATURATION_BAND_FRACTION = 0.003
-# A rise of the airspeed for a minimum ground speed falls no less than this, m/s.
+# A raise of the airspeed for a minimum ground speed falls by no less than this, m/s.
 _GROUND_SPEED_HYSTERESIS_MPS = 1.2
 # An RTL that climbs before its turn demands this much more than the climb, m.
 _RTL_CLIMB_EXTRA_M = 10.0
@@ -213,160 +220,174 @@ _UNDERSPEED_EXIT_DELAY_S = 3.0
 
 
 @inner
-def demand_height(estimated: Record, b: Record, parameters: Record, own: Record, dt: float) -> None:
+def update_height_demand(estimated: Record, target: Record, parameters: Record, memory: Record, dt: float) -> None:
     """Update the altitude demand for the current leg, with its rate limit and its lag.
 
+    Follows `AP_TECS::_update_height_demand`.
+
     estimated: a record of `flight.guidance.navigation_error.MOTION`.
-    b: the leg's end, of `flight.guidance.lateral_reference_laws.WAYPOINT`.
-    parameters, own: as `flight.autopilots.arduplane.navigator.navigate_legs` takes them.
+    target: the leg's end, of `flight.guidance.lateral_reference_laws.WAYPOINT`.
+    parameters, memory: as `flight.autopilots.arduplane.navigator.navigate_legs` takes them.
     """
-    if b.returns:
-        target = _return_altitude(estimated, b, parameters, own)
-    elif b.over_ground:
-        target = _leg_altitude_above_terrain(estimated, b, parameters, own)
+    if target.returns:
+        altitude_target = _rtl_altitude(estimated, target, parameters, memory)
+    elif target.over_ground:
+        altitude_target = _leg_altitude_above_terrain(estimated, target, parameters, memory)
     else:
-        target = _leg_altitude(estimated, b, parameters, own)
-    share = dt / (dt + parameters.tecs_height_demand_time)
-    # In saturation the setpoint is frozen, and the rate of the demand fades out.
+        altitude_target = _leg_altitude(estimated, target, parameters, memory)
+    lag_fraction = dt / (dt + parameters.tecs_height_demand_time)
+    # In saturation the raw demand is frozen, and the limits of its rate fade out.
     cannot_climb, cannot_sink = (
-        own.saturation > 0 and own.height_rate > 0.0,
-        own.saturation < 0 and own.height_rate < 0.0,
+        memory.saturation > 0 and memory.climb_rate_demand > 0.0,
+        memory.saturation < 0 and memory.climb_rate_demand < 0.0,
     )
-    own.climb_share += share * ((0.0 if cannot_climb else 1.0) - own.climb_share)
-    own.sink_share += share * ((0.0 if cannot_sink else 1.0) - own.sink_share)
+    memory.max_climb_scaler += lag_fraction * ((0.0 if cannot_climb else 1.0) - memory.max_climb_scaler)
+    memory.max_sink_scaler += lag_fraction * ((0.0 if cannot_sink else 1.0) - memory.max_sink_scaler)
     if cannot_climb:
-        target = min(target, own.height_asked)
+        altitude_target = min(altitude_target, memory.altitude_demand_raw)
     if cannot_sink:
-        target = max(target, own.height_asked)
-    own.height_asked = target
-    climb = parameters.tecs_climb_max * own.climb_share * dt
-    sink = parameters.tecs_sink_max * own.sink_share * dt
-    own.height_limited += min(climb, max(-sink, target - own.height_limited))
-    lag = own.height_limited - own.height_demand
-    own.height_demand += share * lag
-    own.height_rate = lag / max(dt, parameters.tecs_height_demand_time)
+        altitude_target = max(altitude_target, memory.altitude_demand_raw)
+    memory.altitude_demand_raw = altitude_target
+    max_climb = parameters.tecs_climb_max * memory.max_climb_scaler * dt
+    max_sink = parameters.tecs_sink_max * memory.max_sink_scaler * dt
+    memory.altitude_demand_limited += min(max_climb, max(-max_sink, altitude_target - memory.altitude_demand_limited))
+    altitude_lag = memory.altitude_demand_limited - memory.altitude_demand
+    memory.altitude_demand += lag_fraction * altitude_lag
+    memory.climb_rate_demand = altitude_lag / max(dt, parameters.tecs_height_demand_time)
 
 
 @inner
-def _climbs_at_once(up: float, rise: float, b: Record, parameters: Record) -> bool:
-    """Return True if a leg that begins at an altitude (m AMSL) is a step, not a slope.
+def _is_altitude_step(start_altitude: float, altitude_change: float, target: Record, parameters: Record) -> bool:
+    """Return True if the altitude of a leg from an altitude (m AMSL) changes in a step, not on a slope.
 
-    rise: height of the leg's end above the aircraft, m.  b: the leg's end.
+    altitude_change: height of the leg's end above the aircraft, m.  target: the leg's end.
 
     It is a step unless it leads down, if every climb is one, and in 4.6 if it begins low over home
     (`Plane::setup_glide_slope`, in 4.7 `setup_alt_slope`).
     """
-    if rise < 0.0:
+    if altitude_change < 0.0:
         return False
     if int(parameters.flight_options) & IMMEDIATE_CLIMB:
         return True
-    return not parameters.is_4_7 and up - b.home_up <= parameters.climb_slope_height
+    return not parameters.is_4_7 and start_altitude - target.home_up <= parameters.climb_slope_height
 
 
 @inner
-def _leg_altitude(estimated: Record, b: Record, parameters: Record, own: Record) -> float:
+def _leg_altitude(estimated: Record, target: Record, parameters: Record, memory: Record) -> float:
     """Return the altitude on the leg's slope at the aircraft, or of the leg's end if the leg is a step.
 
     The slope of a leg to a loiter leads to the loiter's center; on the loiter the loiter's altitude applies.  In 4.7
     the altitude of the leg's end also applies in a climb while the aircraft is low over home
     (`Plane::set_target_altitude_proportion`).
     """
-    end: float = b.up
-    if own.sloped_leg != own.leg + 1:
-        own.sloped_leg = own.leg + 1
-        if _climbs_at_once(estimated.up, end - estimated.up, b, parameters):
-            own.from_up = end
-    if own.on_circle:
-        return end
-    altitude_change = end - own.from_up
-    end_e, end_n = target_of(b)
-    leg_e, leg_n = end_e - own.from_east, end_n - own.from_north
-    run = max(1e-6, leg_e * leg_e + leg_n * leg_n)
-    progress = ((estimated.east - own.from_east) * leg_e + (estimated.north - own.from_north) * leg_n) / run
+    end_altitude: float = target.up
+    if memory.sloped_leg != memory.leg + 1:
+        memory.sloped_leg = memory.leg + 1
+        if _is_altitude_step(estimated.up, end_altitude - estimated.up, target, parameters):
+            memory.from_up = end_altitude
+    if memory.reached_loiter_target:
+        return end_altitude
+    altitude_change = end_altitude - memory.from_up
+    end_e, end_n = target_position(target)
+    leg_e, leg_n = end_e - memory.from_east, end_n - memory.from_north
+    leg_length_squared = max(1e-6, leg_e * leg_e + leg_n * leg_n)
+    progress = (
+        (estimated.east - memory.from_east) * leg_e + (estimated.north - memory.from_north) * leg_n
+    ) / leg_length_squared
     if abs(altitude_change) < parameters.altitude_slope_min or altitude_change == 0.0 or progress >= 1.0:
-        return end
-    if parameters.is_4_7 and altitude_change > 0.0 and estimated.up - b.home_up < parameters.climb_slope_height:
-        return end
-    remaining = 1.0 - max(0.0, progress)
-    altitude: float = end - altitude_change * remaining
-    here: float = estimated.up
-    threshold = parameters.altitude_slope_threshold
-    if threshold <= 0.0 or altitude_change <= 0.0 or here <= altitude + threshold:
-        return altitude
-    # This far above a slope that climbs, the slope is redrawn from here to its end.
-    remaining_change = end - here
+        return end_altitude
+    if parameters.is_4_7 and altitude_change > 0.0 and estimated.up - target.home_up < parameters.climb_slope_height:
+        return end_altitude
+    remaining_fraction = 1.0 - max(0.0, progress)
+    slope_altitude: float = end_altitude - altitude_change * remaining_fraction
+    current_altitude: float = estimated.up
+    slope_threshold = parameters.altitude_slope_threshold
+    if slope_threshold <= 0.0 or altitude_change <= 0.0 or current_altitude <= slope_altitude + slope_threshold:
+        return slope_altitude
+    # Above the threshold over a climbing slope, the slope is redrawn from here to its end.
+    remaining_change = end_altitude - current_altitude
     if remaining_change < parameters.altitude_slope_min:
-        own.from_up = end
-        return end
-    own.from_up = end - remaining_change / remaining
-    return here
+        memory.from_up = end_altitude
+        return end_altitude
+    memory.from_up = end_altitude - remaining_change / remaining_fraction
+    return current_altitude
 
 
 @inner
-def _leg_altitude_above_terrain(estimated: Record, b: Record, parameters: Record, own: Record) -> float:
-    """Return the altitude setpoint of a leg above terrain at the aircraft, m AMSL.
+def _leg_altitude_above_terrain(estimated: Record, target: Record, parameters: Record, memory: Record) -> float:
+    """Return the altitude demand of a leg above terrain at the aircraft, m AMSL.
 
     The height above ground changes linearly along the leg, whatever the change, from the height of the leg's start
     above the ground there (`Plane::set_target_altitude_proportion_terrain`).  Rise of the terrain ahead beyond half of
     the maximum climb is added, less the leg's descent (`lookahead_adjustment` in ArduPlane/altitude.cpp).
     """
-    if own.terrain_leg != own.leg + 1:
+    if memory.terrain_leg != memory.leg + 1:
         # The leg began in this update: the ground at its start is looked up before the next update.
-        return own.height_asked
-    if own.on_circle:
-        return own.ground + b.above_ground
-    end_e, end_n = target_of(b)
-    leg_e, leg_n = end_e - own.from_east, end_n - own.from_north
-    run = max(1e-6, leg_e * leg_e + leg_n * leg_n)
-    progress = ((estimated.east - own.from_east) * leg_e + (estimated.north - own.from_north) * leg_n) / run
-    height = own.from_above_ground + min(1.0, max(0.0, progress)) * (b.above_ground - own.from_above_ground)
-    return own.ground + height + max(0.0, own.rise_ahead + min(0.0, own.lookahead_offset))
+        return memory.altitude_demand_raw
+    if memory.reached_loiter_target:
+        return memory.terrain_altitude + target.above_ground
+    end_e, end_n = target_position(target)
+    leg_e, leg_n = end_e - memory.from_east, end_n - memory.from_north
+    leg_length_squared = max(1e-6, leg_e * leg_e + leg_n * leg_n)
+    progress = (
+        (estimated.east - memory.from_east) * leg_e + (estimated.north - memory.from_north) * leg_n
+    ) / leg_length_squared
+    height_demand = memory.from_height_above_terrain + min(1.0, max(0.0, progress)) * (
+        target.above_ground - memory.from_height_above_terrain
+    )
+    return memory.terrain_altitude + height_demand + max(0.0, memory.lookahead_rise + min(0.0, memory.altitude_offset))
 
 
 @inner
-def look_ahead(
-    work: Record, heights: Heights, waypoints: Records, parameters: Record, own: Record
+def update_terrain_lookahead(
+    work: Record, heights: Heights, waypoints: Records, parameters: Record, memory: Record
 ) -> None:  # pragma: no cover
     """Update the ground below the aircraft and the terrain lookahead on a leg above terrain.
 
-    At the first update of a leg, note the height above ground of its begin.  The lookahead follows
+    At the first update of a leg, store the height above ground of its start.  The lookahead follows
     `AP_Terrain::lookahead` with half of TECS_CLMB_MAX as the climb: one sample every TERRAIN_SPACING towards the
     waypoint, no further than the waypoint or TERRAIN_LOOKAHD.  Samples of unknown ground change nothing.
     work: a record of `flight.simulation.tick.WORKSPACE`.
     """
-    b = waypoints[own.leg + 1]
-    # Before the first update of the law, the begin of the first leg is not set.
-    if not own.begun or not b.over_ground or own.clock - work.timing.dt >= 0.5 * work.timing.dt:
+    target = waypoints[memory.leg + 1]
+    # Before the law's first update, the start of the first leg is not set.
+    if (
+        not memory.is_initialised
+        or not target.over_ground
+        or memory.time_to_update - work.timing.dt >= 0.5 * work.timing.dt
+    ):
         return
-    here, place = work.estimated, work.place.ground
-    own.ground = own.ground if math.isnan(place) else place
-    if own.terrain_leg != own.leg + 1:
-        own.terrain_leg = own.leg + 1
-        column, row = polymap(work.pixel_map, own.from_east, own.from_north)
+    estimated, ground_altitude = work.estimated, work.place.ground
+    memory.terrain_altitude = memory.terrain_altitude if math.isnan(ground_altitude) else ground_altitude
+    if memory.terrain_leg != memory.leg + 1:
+        memory.terrain_leg = memory.leg + 1
+        column, row = polymap(work.pixel_map, memory.from_east, memory.from_north)
         from_ground = pixel_height(heights, column, row)
-        own.from_above_ground = own.from_up - (own.ground if math.isnan(from_ground) else from_ground)
-        gain = b.above_ground - (here.up - own.ground)
-        own.lookahead_offset = gain if abs(gain) >= parameters.altitude_slope_min else 0.0
-    own.rise_ahead = 0.0
-    speed = math.hypot(here.velocity_east, here.velocity_north)
-    end_e, end_n = target_of(b)
-    distance = math.hypot(end_e - here.east, end_n - here.north)
-    reach = min(distance, parameters.terrain_lookahead)
-    if own.on_circle or reach <= 0.0 or speed < 1.0:
+        memory.from_height_above_terrain = memory.from_up - (
+            memory.terrain_altitude if math.isnan(from_ground) else from_ground
+        )
+        height_gain = target.above_ground - (estimated.up - memory.terrain_altitude)
+        memory.altitude_offset = height_gain if abs(height_gain) >= parameters.altitude_slope_min else 0.0
+    memory.lookahead_rise = 0.0
+    ground_speed = math.hypot(estimated.velocity_east, estimated.velocity_north)
+    end_e, end_n = target_position(target)
+    distance = math.hypot(end_e - estimated.east, end_n - estimated.north)
+    lookahead_distance = min(distance, parameters.terrain_lookahead)
+    if memory.reached_loiter_target or lookahead_distance <= 0.0 or ground_speed < 1.0:
         return
     step = parameters.terrain_spacing
-    climb = 0.5 * parameters.tecs_climb_max / speed * step
-    step_e, step_n = step * (end_e - here.east) / distance, step * (end_n - here.north) / distance
-    for k in range(1, math.ceil(reach / step) + 1):
-        column, row = polymap(work.pixel_map, here.east + k * step_e, here.north + k * step_n)
-        rise = pixel_height(heights, column, row) - own.ground - k * climb
-        if rise > own.rise_ahead:
-            own.rise_ahead = rise
+    climb_per_step = 0.5 * parameters.tecs_climb_max / ground_speed * step
+    step_e, step_n = step * (end_e - estimated.east) / distance, step * (end_n - estimated.north) / distance
+    for k in range(1, math.ceil(lookahead_distance / step) + 1):
+        column, row = polymap(work.pixel_map, estimated.east + k * step_e, estimated.north + k * step_n)
+        rise = pixel_height(heights, column, row) - memory.terrain_altitude - k * climb_per_step
+        if rise > memory.lookahead_rise:
+            memory.lookahead_rise = rise
 
 
 @inner
-def _return_altitude(estimated: Record, b: Record, parameters: Record, own: Record) -> float:
-    """Return the altitude setpoint of an RTL, m, on a straight slope in a descent, or the target's altitude in a climb.
+def _rtl_altitude(estimated: Record, rtl: Record, parameters: Record, memory: Record) -> float:
+    """Return the altitude demand of an RTL, m, on a straight slope in a descent, or the target's altitude in a climb.
 
     The slope leads from where the RTL began to the center of its loiter; on the loiter the target's altitude applies
     (`Plane::setup_glide_slope`, `Mode::update_target_altitude`).  The slope down to a rally point is computed as if the
@@ -374,137 +395,165 @@ def _return_altitude(estimated: Record, b: Record, parameters: Record, own: Reco
     (`Plane::set_offset_altitude_location`, `Plane::constrain_target_altitude_location`; seen in 20 flights).  Until the
     climb that precedes the turn is done, the demand lies above the start and the target (`Plane::update_alt`).
     """
-    end: float = b.up
-    if not own.climbed:
-        return max(own.from_up, end) + parameters.rtl_climb_min + _RTL_CLIMB_EXTRA_M
-    fall = own.from_up - end
-    slope_fall = fall + b.slope_base
-    if own.on_circle or fall <= 0.0 or abs(slope_fall) < parameters.altitude_slope_min:
-        return end
-    leg_e, leg_n = b.centre_east - own.from_east, b.centre_north - own.from_north
-    run = max(1e-6, leg_e * leg_e + leg_n * leg_n)
-    progress = ((estimated.east - own.from_east) * leg_e + (estimated.north - own.from_north) * leg_n) / run
-    return min(own.from_up, end + slope_fall * (1.0 - min(1.0, max(0.0, progress))))
+    end_altitude: float = rtl.up
+    if not memory.rtl_climb_complete:
+        return max(memory.from_up, end_altitude) + parameters.rtl_climb_min + _RTL_CLIMB_EXTRA_M
+    descent = memory.from_up - end_altitude
+    slope_descent = descent + rtl.slope_base
+    if memory.reached_loiter_target or descent <= 0.0 or abs(slope_descent) < parameters.altitude_slope_min:
+        return end_altitude
+    leg_e, leg_n = rtl.centre_east - memory.from_east, rtl.centre_north - memory.from_north
+    leg_length_squared = max(1e-6, leg_e * leg_e + leg_n * leg_n)
+    progress = (
+        (estimated.east - memory.from_east) * leg_e + (estimated.north - memory.from_north) * leg_n
+    ) / leg_length_squared
+    return min(memory.from_up, end_altitude + slope_descent * (1.0 - min(1.0, max(0.0, progress))))
 
 
 @inner
-def _estimate_airspeed(state: Record, estimated: Record, parameters: Record, own: Record, dt: float) -> None:
+def _update_speed(state: Record, estimated: Record, parameters: Record, memory: Record, dt: float) -> None:
     """Estimate airspeed and its rate with a complementary filter of acceleration and airspeed.
+
+    Follows `AP_TECS::update_50hz` for the acceleration and `AP_TECS::_update_speed` for the filter.
 
     The acceleration along the nose gives the fast changes, and the measured airspeed gives the slow changes.  An
     accelerometer along the nose, with gravity removed, measures changes of the velocity over the ground, including its
     vertical part: at the start of a climb that is more than the airspeed gains.
     """
-    level = math.cos(state.pitch)
-    acceleration = (estimated.velocity_east - own.last_velocity_east) * math.sin(state.yaw) * level
-    acceleration += (estimated.velocity_north - own.last_velocity_north) * math.cos(state.yaw) * level
-    acceleration += (estimated.velocity_up - own.last_velocity_up) * math.sin(state.pitch)
-    acceleration = acceleration / dt if own.flown else 0.0
-    own.flown = True
-    own.last_velocity_east, own.last_velocity_north = estimated.velocity_east, estimated.velocity_north
-    own.last_velocity_up = estimated.velocity_up
-    frequency = parameters.tecs_speed_frequency
-    error = own.airspeed_read - own.airspeed
-    own.airspeed_read += _READING_FRACTION * (AIRSPEED_READING * state.airspeed - own.airspeed_read)
-    own.airspeed_drift += error * frequency * frequency * dt
-    own.airspeed = max(
-        3.0, own.airspeed + (acceleration + own.airspeed_drift + error * frequency * _FILTER_DAMPING_RATIO) * dt
+    cos_pitch = math.cos(state.pitch)
+    acceleration = (estimated.velocity_east - memory.last_velocity_east) * math.sin(state.yaw) * cos_pitch
+    acceleration += (estimated.velocity_north - memory.last_velocity_north) * math.cos(state.yaw) * cos_pitch
+    acceleration += (estimated.velocity_up - memory.last_velocity_up) * math.sin(state.pitch)
+    acceleration = acceleration / dt if memory.has_last_velocity else 0.0
+    memory.has_last_velocity = True
+    memory.last_velocity_east, memory.last_velocity_north = estimated.velocity_east, estimated.velocity_north
+    memory.last_velocity_up = estimated.velocity_up
+    filter_frequency = parameters.tecs_speed_frequency
+    airspeed_error = memory.airspeed_smoothed - memory.tas
+    memory.airspeed_smoothed += _READING_FRACTION * (AIRSPEED_READING * state.airspeed - memory.airspeed_smoothed)
+    memory.tas_rate_correction += airspeed_error * filter_frequency * filter_frequency * dt
+    memory.tas = max(
+        3.0,
+        memory.tas
+        + (acceleration + memory.tas_rate_correction + airspeed_error * filter_frequency * _FILTER_DAMPING_RATIO) * dt,
     )
-    own.acceleration_mean += (acceleration - own.acceleration_mean) * dt / (dt + parameters.tecs_time)
-    own.acceleration = acceleration - own.acceleration_mean
+    memory.tas_rate_mean += (acceleration - memory.tas_rate_mean) * dt / (dt + parameters.tecs_time)
+    memory.tas_rate = acceleration - memory.tas_rate_mean
 
 
 @inner
-def is_underspeed(estimated: Record, parameters: Record, own: Record, slowest: float, dt: float) -> bool:
+def detect_underspeed(estimated: Record, parameters: Record, memory: Record, tas_min: float, dt: float) -> bool:
     """Return True while speed has priority over altitude (`AP_TECS::_detect_underspeed`).
 
-    slowest: AIRSPEED_MIN as a true airspeed, m/s.
+    tas_min: AIRSPEED_MIN as a true airspeed, m/s.
 
     After an engine failure underspeed lasts until the aircraft meets a slope that leads down: it glides at
     AIRSPEED_MIN, and does not become as slow again (seen in 14 flights).
     """
-    is_slow = own.airspeed < _UNDERSPEED_RATIO * slowest
-    own.since_slow = 0.0 if is_slow else own.since_slow + dt
+    is_slow = memory.tas < _UNDERSPEED_RATIO * tas_min
+    memory.time_above_underspeed_threshold = 0.0 if is_slow else memory.time_above_underspeed_threshold + dt
     if (
-        own.underspeed
-        and own.airspeed >= _UNDERSPEED_EXIT_RATIO * slowest
-        and own.since_slow > _UNDERSPEED_EXIT_DELAY_S
+        memory.underspeed
+        and memory.tas >= _UNDERSPEED_EXIT_RATIO * tas_min
+        and memory.time_above_underspeed_threshold > _UNDERSPEED_EXIT_DELAY_S
     ):
-        own.underspeed = False
-    is_full_throttle = own.throttle_demand >= _FULL_THROTTLE_FRACTION * parameters.throttle_max
-    own.underspeed = (is_slow and is_full_throttle) or (own.underspeed and estimated.up < own.height_demand)
-    return own.underspeed
+        memory.underspeed = False
+    is_full_throttle = memory.throttle_demand >= _FULL_THROTTLE_FRACTION * parameters.throttle_max
+    memory.underspeed = (is_slow and is_full_throttle) or (memory.underspeed and estimated.up < memory.altitude_demand)
+    return memory.underspeed
 
 
 @inner
 def airspeed_target(
-    state: Record, estimated: Record, stated: float, b: Record, parameters: Record, own: Record, factor: float
+    state: Record,
+    estimated: Record,
+    commanded_airspeed: float,
+    target: Record,
+    parameters: Record,
+    memory: Record,
+    eas2tas: float,
 ) -> float:
-    """Return the equivalent airspeed to fly for a stated one, raised for a minimum ground speed, within limits, m/s.
+    """Return the target equivalent airspeed for a commanded one, raised for a minimum ground speed, within limits, m/s.
 
-    b: the leg's end, with the minimum ground speed.
+    target: the leg's end, with the minimum ground speed.
 
-    What the ground speed along the heading lacks is added to the measured airspeed.  The rise is in whole m/s, and
-    falls only if it is to fall by more than a hysteresis (`Plane::calc_airspeed_errors`,
+    The undershoot of the ground speed along the heading is added to the measured airspeed.  The raise is in whole
+    m/s, and falls only by more than a hysteresis (`Plane::calc_airspeed_errors`,
     `Plane::calc_gndspeed_undershoot`).
     """
-    wanted = stated
-    if b.min_ground_speed > 0.0:
-        ahead = estimated.velocity_east * math.sin(state.yaw) + estimated.velocity_north * math.cos(state.yaw)
-        needed = (own.airspeed_read + b.min_ground_speed - ahead) / factor
-        rise = float(math.floor(max(0.0, needed - stated) + 0.5))
-        if rise >= own.ground_speed_rise or own.ground_speed_rise - rise >= _GROUND_SPEED_HYSTERESIS_MPS:
-            own.ground_speed_rise = rise
-        wanted += own.ground_speed_rise
-    return min(parameters.airspeed_max, max(parameters.airspeed_min, wanted))
+    target_airspeed = commanded_airspeed
+    if target.min_ground_speed > 0.0:
+        forward_ground_speed = estimated.velocity_east * math.sin(state.yaw) + estimated.velocity_north * math.cos(
+            state.yaw
+        )
+        required_airspeed = (memory.airspeed_smoothed + target.min_ground_speed - forward_ground_speed) / eas2tas
+        undershoot = float(math.floor(max(0.0, required_airspeed - commanded_airspeed) + 0.5))
+        if (
+            undershoot >= memory.ground_speed_undershoot
+            or memory.ground_speed_undershoot - undershoot >= _GROUND_SPEED_HYSTERESIS_MPS
+        ):
+            memory.ground_speed_undershoot = undershoot
+        target_airspeed += memory.ground_speed_undershoot
+    return min(parameters.airspeed_max, max(parameters.airspeed_min, target_airspeed))
 
 
 @inner
 def update_tecs(
-    state: Record, estimated: Record, parameters: Record, own: Record, airspeed: float, factor: float, dt: float
+    state: Record, estimated: Record, parameters: Record, memory: Record, tas_target: float, eas2tas: float, dt: float
 ) -> None:
-    """Update the throttle and pitch demands for the altitude demand and an airspeed (m/s, true).
+    """Update the throttle and pitch demands for the altitude demand and a target airspeed (m/s, true).
 
-    state: a record of `flight.dynamics.state.STATE`.  factor: ratio of true to equivalent airspeed.  The other
-    parameters are those of `demand_height`.
+    Follows `AP_TECS::update_pitch_throttle`: `_update_speed`, `_detect_underspeed`, `_update_speed_demand`,
+    `_update_energies`, `_update_throttle_with_airspeed` and `_update_pitch`.
+
+    state: a record of `flight.dynamics.state.STATE`.  eas2tas: ratio of true to equivalent airspeed.  The other
+    parameters are those of `update_height_demand`.
     """
-    _estimate_airspeed(state, estimated, parameters, own, dt)
-    speed = own.airspeed
-    slowest = min_airspeed(demanded_bank(own.side_acceleration, state.pitch, parameters), parameters) * factor
+    _update_speed(state, estimated, parameters, memory, dt)
+    tas = memory.tas
+    tas_min = min_airspeed(nav_roll(memory.lateral_acceleration, state.pitch, parameters), parameters) * eas2tas
     # Where the aircraft fails to climb as demanded, full throttle is assumed to give less.
-    max_rate = GRAVITY * parameters.tecs_climb_max * own.climb_share
-    min_rate = -GRAVITY * parameters.tecs_sink_min
-    underspeed = is_underspeed(estimated, parameters, own, slowest, dt)
-    wanted = slowest if underspeed else max(slowest, airspeed)
-    change = wanted - own.airspeed_demand
-    max_change = _SPEED_RATE_FRACTION * max_rate / speed * dt
-    min_change = _SPEED_RATE_FRACTION * min_rate / speed * dt
-    own.airspeed_demand = max(slowest, own.airspeed_demand + min(max_change, max(min_change, change)))
-    spe_error = GRAVITY * (own.height_demand - estimated.up)
-    ske_error = 0.5 * (own.airspeed_demand * own.airspeed_demand - speed * speed)
-    max_spe_error = max(0.0, 0.5 * (speed * speed - slowest * slowest))
-    fastest = parameters.airspeed_max * factor
-    min_spe_error = min(0.0, 0.5 * (speed * speed - fastest * fastest))
-    spe_rate, ske_rate = GRAVITY * estimated.velocity_up, speed * own.acceleration
+    ste_rate_max = GRAVITY * parameters.tecs_climb_max * memory.max_climb_scaler
+    ste_rate_min = -GRAVITY * parameters.tecs_sink_min
+    is_underspeed = detect_underspeed(estimated, parameters, memory, tas_min, dt)
+    limited_tas_target = tas_min if is_underspeed else max(tas_min, tas_target)
+    tas_change = limited_tas_target - memory.tas_demand
+    max_tas_change = _SPEED_RATE_FRACTION * ste_rate_max / tas * dt
+    min_tas_change = _SPEED_RATE_FRACTION * ste_rate_min / tas * dt
+    memory.tas_demand = max(tas_min, memory.tas_demand + min(max_tas_change, max(min_tas_change, tas_change)))
+    spe_error = GRAVITY * (memory.altitude_demand - estimated.up)
+    ske_error = 0.5 * (memory.tas_demand * memory.tas_demand - tas * tas)
+    max_spe_error = max(0.0, 0.5 * (tas * tas - tas_min * tas_min))
+    tas_max = parameters.airspeed_max * eas2tas
+    min_spe_error = min(0.0, 0.5 * (tas * tas - tas_max * tas_max))
+    spe_rate, ske_rate = GRAVITY * estimated.velocity_up, tas * memory.tas_rate
     limited_spe_error = min(max_spe_error, max(min_spe_error, spe_error))
-    _set_throttle(
-        state, parameters, own, spe_error, limited_spe_error + ske_error, spe_rate + ske_rate, max_rate, min_rate, dt
+    _update_throttle(
+        state,
+        parameters,
+        memory,
+        spe_error,
+        limited_spe_error + ske_error,
+        spe_rate + ske_rate,
+        ste_rate_max,
+        ste_rate_min,
+        dt,
     )
-    if underspeed:
-        own.throttle_demand = parameters.throttle_max
-    _set_pitch(state, parameters, own, spe_error, ske_error, spe_rate, ske_rate, underspeed, dt)
+    if is_underspeed:
+        memory.throttle_demand = parameters.throttle_max
+    _update_pitch(state, parameters, memory, spe_error, ske_error, spe_rate, ske_rate, is_underspeed, dt)
 
 
 @inner
-def _set_throttle(
+def _update_throttle(
     state: Record,
     parameters: Record,
-    own: Record,
+    memory: Record,
     spe_error: float,
     ste_error: float,
     ste_rate: float,
-    max_rate: float,
-    min_rate: float,
+    ste_rate_max: float,
+    ste_rate_min: float,
     dt: float,
 ) -> None:
     """Set the throttle demand from the STE error (m^2/s^2) and the STE rate (m^2/s^3).
@@ -512,91 +561,106 @@ def _set_throttle(
     Follows `AP_TECS::_update_throttle_with_airspeed`.
 
     spe_error: m^2/s^2.
-    max_rate, min_rate: STE rates at full and at idle throttle, m^2/s^3.
+    ste_rate_max, ste_rate_min: STE rates at full and at idle throttle, m^2/s^3.
     """
-    lowest, highest = max(0.0, parameters.throttle_min), parameters.throttle_max
-    rate_per_throttle = (max_rate - min_rate) / (highest - parameters.throttle_min)
-    rate_demand = min(max_rate, max(min_rate, spe_error / parameters.tecs_time))
-    own.ste_rate_error += (rate_demand - ste_rate - own.ste_rate_error) * dt / (dt + _STE_RATE_LAG_S)
+    throttle_min, throttle_max = max(0.0, parameters.throttle_min), parameters.throttle_max
+    ste_rate_per_throttle = (ste_rate_max - ste_rate_min) / (throttle_max - parameters.throttle_min)
+    ste_rate_demand = min(ste_rate_max, max(ste_rate_min, spe_error / parameters.tecs_time))
+    memory.ste_rate_error += (ste_rate_demand - ste_rate - memory.ste_rate_error) * dt / (dt + _STE_RATE_LAG_S)
     tilt = math.sin(state.roll) * math.cos(state.pitch)
-    roll_drag = parameters.tecs_roll_to_throttle * (1.0 / max(0.1, 1.0 - tilt * tilt) - 1.0)
-    throttle = parameters.throttle_cruise + (rate_demand + roll_drag) / rate_per_throttle
-    gain = 1.0 / (parameters.tecs_time * rate_per_throttle)
-    throttle += gain * (ste_error + parameters.tecs_throttle_damping * own.ste_rate_error)
-    limit = _STE_INTEGRATOR_FRACTION * (highest - lowest)
-    integrator_max = min(limit, max(-limit, highest - throttle + _THROTTLE_OVERSHOOT_FRACTION))
-    integrator_min = min(limit, max(-limit, parameters.throttle_min - throttle - _THROTTLE_OVERSHOOT_FRACTION))
-    own.ste_integrator += gain * parameters.tecs_integral * ste_error * dt
-    own.ste_integrator = min(integrator_max, max(integrator_min, own.ste_integrator))
+    roll_compensation = parameters.tecs_roll_to_throttle * (1.0 / max(0.1, 1.0 - tilt * tilt) - 1.0)
+    throttle = parameters.throttle_cruise + (ste_rate_demand + roll_compensation) / ste_rate_per_throttle
+    throttle_per_ste = 1.0 / (parameters.tecs_time * ste_rate_per_throttle)
+    throttle += throttle_per_ste * (ste_error + parameters.tecs_throttle_damping * memory.ste_rate_error)
+    integrator_limit = _STE_INTEGRATOR_FRACTION * (throttle_max - throttle_min)
+    integrator_max = min(
+        integrator_limit, max(-integrator_limit, throttle_max - throttle + _THROTTLE_OVERSHOOT_FRACTION)
+    )
+    integrator_min = min(
+        integrator_limit, max(-integrator_limit, parameters.throttle_min - throttle - _THROTTLE_OVERSHOOT_FRACTION)
+    )
+    memory.ste_integrator += throttle_per_ste * parameters.tecs_integral * ste_error * dt
+    memory.ste_integrator = min(integrator_max, max(integrator_min, memory.ste_integrator))
     if parameters.throttle_slew > 0.0:
-        step = parameters.throttle_slew * (highest - lowest) * dt
-        throttle = min(own.throttle_before + step, max(own.throttle_before - step, throttle))
-    own.throttle_before = throttle
-    throttle += own.ste_integrator
-    own.throttle_demand = min(highest, max(lowest, throttle))
-    own.saturation = (
-        1 if throttle >= highest - _SATURATION_BAND_FRACTION else (-1 if throttle <= parameters.throttle_min else 0)
+        max_step = parameters.throttle_slew * (throttle_max - throttle_min) * dt
+        throttle = min(memory.last_throttle_demand + max_step, max(memory.last_throttle_demand - max_step, throttle))
+    memory.last_throttle_demand = throttle
+    throttle += memory.ste_integrator
+    memory.throttle_demand = min(throttle_max, max(throttle_min, throttle))
+    memory.saturation = (
+        1
+        if throttle >= throttle_max - _SATURATION_BAND_FRACTION
+        else (-1 if throttle <= parameters.throttle_min else 0)
     )
 
 
 @inner
-def wind_up_throttle(parameters: Record, own: Record) -> None:
+def wind_up_ste_integrator(parameters: Record, memory: Record) -> None:
     """Set the STE integrator to its value at full throttle, as ArduPlane does at every update of a climb-out.
 
     `AP_TECS::_update_throttle_with_airspeed` does so during take-off and an aborted landing; the throttle stays open
     for a while after that.
     """
-    lowest, highest = max(0.0, parameters.throttle_min), parameters.throttle_max
-    limit = _STE_INTEGRATOR_FRACTION * (highest - lowest)
-    own.ste_integrator = min(limit, max(-limit, highest - own.throttle_before + _THROTTLE_OVERSHOOT_FRACTION))
+    throttle_min, throttle_max = max(0.0, parameters.throttle_min), parameters.throttle_max
+    integrator_limit = _STE_INTEGRATOR_FRACTION * (throttle_max - throttle_min)
+    memory.ste_integrator = min(
+        integrator_limit,
+        max(-integrator_limit, throttle_max - memory.last_throttle_demand + _THROTTLE_OVERSHOOT_FRACTION),
+    )
 
 
 @inner
-def _set_pitch(
+def _update_pitch(
     state: Record,
     parameters: Record,
-    own: Record,
+    memory: Record,
     spe_error: float,
     ske_error: float,
     spe_rate: float,
     ske_rate: float,
-    underspeed: bool,
+    is_underspeed: bool,
     dt: float,
 ) -> None:
     """Set the pitch demand from the balance between potential and kinetic energy.
 
     Follows `AP_TECS::_update_pitch`.  spe_error, ske_error: m^2/s^2.  spe_rate, ske_rate: m^2/s^3.
     """
-    ske_weight = 1.0 if underspeed else min(1.0, parameters.tecs_speed_weight)
-    spe_weight = 0.0 if underspeed else min(1.0, 2.0 - parameters.tecs_speed_weight)
+    ske_weight = 1.0 if is_underspeed else min(1.0, parameters.tecs_speed_weight)
+    spe_weight = 0.0 if is_underspeed else min(1.0, 2.0 - parameters.tecs_speed_weight)
     pitch_max = parameters.pitch_limit_max
     if parameters.tecs_pitch_max > 0.0:
         pitch_max = min(pitch_max, parameters.tecs_pitch_max)
     pitch_min = parameters.pitch_limit_min
     if parameters.tecs_pitch_min < 0.0:
         pitch_min = max(pitch_min, parameters.tecs_pitch_min)
-    rate_per_pitch = own.airspeed * GRAVITY
-    rate_demand = spe_weight * (spe_error / parameters.tecs_time + GRAVITY * own.height_rate)
-    rate_demand -= ske_weight * ske_error / parameters.tecs_time
-    unlimited = rate_demand
-    rate_demand = min(GRAVITY * parameters.tecs_climb_max, max(-GRAVITY * parameters.tecs_sink_max, unlimited))
-    seb_rate_error = rate_demand - (spe_weight * spe_rate - ske_weight * ske_rate)
-    total_demand = rate_demand + parameters.tecs_pitch_damping * seb_rate_error
-    own.ske_integrator -= ske_weight * ske_error / parameters.tecs_time * dt
-    limit = _SKE_INTEGRATOR_FRACTION * (pitch_max - pitch_min) * rate_per_pitch
-    own.ske_integrator = min(limit, max(-limit, own.ske_integrator))
-    own.seb_integrator += parameters.tecs_integral * seb_rate_error * dt
-    integrator_max = (pitch_max + _PITCH_OVERSHOOT_RAD) * rate_per_pitch - total_demand - own.ske_integrator
-    integrator_min = (pitch_min - _PITCH_OVERSHOOT_RAD) * rate_per_pitch - total_demand - own.ske_integrator
-    own.seb_integrator = min(integrator_max, max(integrator_min, own.seb_integrator))
-    pitch = (total_demand + own.seb_integrator + own.ske_integrator) / rate_per_pitch
-    if pitch > pitch_max or unlimited > rate_demand:
-        own.saturation = 1
-    elif pitch < pitch_min or unlimited < rate_demand:
-        own.saturation = -1
+    seb_rate_per_pitch = memory.tas * GRAVITY
+    seb_rate_demand = spe_weight * (spe_error / parameters.tecs_time + GRAVITY * memory.climb_rate_demand)
+    seb_rate_demand -= ske_weight * ske_error / parameters.tecs_time
+    unlimited_seb_rate_demand = seb_rate_demand
+    seb_rate_demand = min(
+        GRAVITY * parameters.tecs_climb_max, max(-GRAVITY * parameters.tecs_sink_max, unlimited_seb_rate_demand)
+    )
+    seb_rate_error = seb_rate_demand - (spe_weight * spe_rate - ske_weight * ske_rate)
+    seb_rate_demand_total = seb_rate_demand + parameters.tecs_pitch_damping * seb_rate_error
+    memory.ske_integrator -= ske_weight * ske_error / parameters.tecs_time * dt
+    integrator_limit = _SKE_INTEGRATOR_FRACTION * (pitch_max - pitch_min) * seb_rate_per_pitch
+    memory.ske_integrator = min(integrator_limit, max(-integrator_limit, memory.ske_integrator))
+    memory.seb_integrator += parameters.tecs_integral * seb_rate_error * dt
+    integrator_max = (
+        (pitch_max + _PITCH_OVERSHOOT_RAD) * seb_rate_per_pitch - seb_rate_demand_total - memory.ske_integrator
+    )
+    integrator_min = (
+        (pitch_min - _PITCH_OVERSHOOT_RAD) * seb_rate_per_pitch - seb_rate_demand_total - memory.ske_integrator
+    )
+    memory.seb_integrator = min(integrator_max, max(integrator_min, memory.seb_integrator))
+    pitch = (seb_rate_demand_total + memory.seb_integrator + memory.ske_integrator) / seb_rate_per_pitch
+    if pitch > pitch_max or unlimited_seb_rate_demand > seb_rate_demand:
+        memory.saturation = 1
+    elif pitch < pitch_min or unlimited_seb_rate_demand < seb_rate_demand:
+        memory.saturation = -1
     pitch = min(pitch_max, max(pitch_min, pitch))
-    step = parameters.tecs_vertical_acceleration / own.airspeed * dt
-    own.pitch_demand = min(own.pitch_demand + step, max(own.pitch_demand - step, pitch))
+    max_step = parameters.tecs_vertical_acceleration / memory.tas * dt
+    memory.pitch_demand = min(memory.pitch_demand + max_step, max(memory.pitch_demand - max_step, pitch))
 
 
 # ----------------------------------------------------------------------
@@ -626,13 +690,13 @@ def arduplane_tick(block: Floats, heights: Heights) -> int:
     """
     path_begins = WORKSPACE_NUMBERS + ARDUPLANE_NUMBERS
     work = block[:WORKSPACE_NUMBERS].view(WORKSPACE)[0]
-    own = block[WORKSPACE_NUMBERS:path_begins].view(ARDUPLANE)[0]
+    arduplane = block[WORKSPACE_NUMBERS:path_begins].view(ARDUPLANE)[0]
     path: Record = block[path_begins:].view(PATH_ROW)
     settings = work.settings
     if not begin_tick(work, heights):
         return NOT_A_NUMBER
-    look_ahead(work, heights, path.waypoint[: settings.waypoints], own.parameters, own.memory)
-    fly_as_ardupilot(
+    update_terrain_lookahead(work, heights, path.waypoint[: settings.waypoints], arduplane.parameters, arduplane.memory)
+    control_as_ardupilot(
         work.state,
         work.estimated,
         path.piece[: settings.pieces],
@@ -640,8 +704,8 @@ def arduplane_tick(block: Floats, heights: Heights) -> int:
         path.waypoint[: settings.waypoints],
         work.gains,
         work.memory,
-        own.parameters,
-        own.memory,
+        arduplane.parameters,
+        arduplane.memory,
         work.commands,
         work.timing.dt,
     )
@@ -670,105 +734,123 @@ def arduplane_loop(
 
 
 @inner
-def fly_as_ardupilot(
+def control_as_ardupilot(
     state: Record,
     estimated: Record,
     pieces: Records,
     nodes: Records,
     waypoints: Records,
     gains: Record,
-    memory: Record,
+    guidance: Record,
     parameters: Record,
-    own: Record,
+    memory: Record,
     commands: Record,
     dt: float,
 ) -> None:
-    """Fill the commands for one tick of ``dt`` seconds, and update the memories.
+    """Fill the commands for one tick of ``dt`` seconds, and update both memories.
+
+    guidance: a record of `flight.guidance.inner_loops.GUIDANCE_MEMORY`.
 
     parameters: a record of `flight.autopilots.arduplane.parameters.ARDUPILOT_PARAMETERS`.
-    own: a `flight.autopilots.arduplane.law.ARDUPILOT_MEMORY` record.  The other parameters are those of
+    memory: a `flight.autopilots.arduplane.law.ARDUPILOT_MEMORY` record.  The other parameters are those of
     `flight.autopilots.planfly.law.guide`.  The path is only the reference against which the track is measured; the law
     does not use it.
     """
-    find_on_path(estimated, pieces, memory)
-    b = waypoints[own.leg + 1]
-    if b.circle != 0.0 and not b.returns:
+    find_on_path(estimated, pieces, guidance)
+    target = waypoints[memory.leg + 1]
+    if target.circle != 0.0 and not target.returns:
         # ArduPlane's own logic ends a loiter; an aircraft that loiters at the mission's end has not missed the route.
-        last = b.stop == waypoints[-1].stop
+        is_last = target.stop == waypoints[-1].stop
         # An altitude that ArduPlane gave up to reach is a missed altitude.
-        memory.returning = last and (not b.to_height or abs(estimated.up - b.up) <= MISSED_ROUTE_DISTANCE_M)
-        stays = b.stays == math.inf and own.stayed > UNLIMITED
-        memory.done = last and (own.over or stays)
-    if own.returning and waypoints[waypoints.shape[0] - 1].returns:
-        end_return(estimated, waypoints[own.leg + 1], memory, dt)
-    memory.height_error = estimated.up - profile(nodes, memory.distance)[0]
-    if memory.done and b.to_height:
-        memory.height_error = estimated.up - b.up
-    factor = true_by_equivalent(estimated.up)
-    if not own.begun:
-        begin_law(state, estimated, waypoints, memory, parameters, own)
-    own.clock -= dt
-    if own.clock < 0.5 * dt:
-        own.clock += NAVIGATION_TICK
-        navigate_legs(estimated, waypoints, parameters, own, factor, NAVIGATION_TICK)
+        guidance.returning = is_last and (
+            not target.to_height or abs(estimated.up - target.up) <= MISSED_ROUTE_DISTANCE_M
+        )
+        loiters_forever = target.stays == math.inf and memory.loiter_time > UNLIMITED
+        guidance.done = is_last and (memory.loiter_complete or loiters_forever)
+    if memory.is_in_rtl and waypoints[waypoints.shape[0] - 1].returns:
+        end_return(estimated, waypoints[memory.leg + 1], guidance, dt)
+    guidance.height_error = estimated.up - profile(nodes, guidance.distance)[0]
+    if guidance.done and target.to_height:
+        guidance.height_error = estimated.up - target.up
+    eas2tas = true_by_equivalent(estimated.up)
+    if not memory.is_initialised:
+        initialise_memory(state, estimated, waypoints, guidance, parameters, memory)
+    memory.time_to_update -= dt
+    if memory.time_to_update < 0.5 * dt:
+        memory.time_to_update += NAVIGATION_TICK
+        navigate_legs(estimated, waypoints, parameters, memory, eas2tas, NAVIGATION_TICK)
         # Skip the rest of a loiter that was left earlier than the path has it.
-        while pieces[memory.piece].leg < own.left_for - 1 and memory.piece + 1 < pieces.shape[0]:
-            memory.piece += 1
-        leave_sharp_corners(pieces, memory, own.leg)
-        demand_height(estimated, waypoints[own.leg + 1], parameters, own, NAVIGATION_TICK)
-        stated, b = waypoints[own.leg].airspeed, waypoints[own.leg + 1]
-        wanted = airspeed_target(state, estimated, stated, b, parameters, own, factor)
-        memory.speed_command = wanted * factor
-        update_tecs(state, estimated, parameters, own, wanted * factor, factor, NAVIGATION_TICK)
-    follow_attitude(state, estimated, gains, memory, parameters, own, factor, commands, dt)
+        while pieces[guidance.piece].leg < memory.leg_after_loiter - 1 and guidance.piece + 1 < pieces.shape[0]:
+            guidance.piece += 1
+        leave_sharp_corners(pieces, guidance, memory.leg)
+        update_height_demand(estimated, waypoints[memory.leg + 1], parameters, memory, NAVIGATION_TICK)
+        commanded_airspeed, target = waypoints[memory.leg].airspeed, waypoints[memory.leg + 1]
+        target_airspeed = airspeed_target(state, estimated, commanded_airspeed, target, parameters, memory, eas2tas)
+        guidance.speed_command = target_airspeed * eas2tas
+        update_tecs(state, estimated, parameters, memory, target_airspeed * eas2tas, eas2tas, NAVIGATION_TICK)
+    control_attitude(state, estimated, gains, guidance, parameters, memory, eas2tas, commands, dt)
 
 
 @inner
-def begin_law(
-    state: Record, estimated: Record, waypoints: Records, memory: Record, parameters: Record, own: Record
+def initialise_memory(
+    state: Record, estimated: Record, waypoints: Records, guidance: Record, parameters: Record, memory: Record
 ) -> None:
-    """Initialise the law in steady flight at the first waypoint."""
-    own.begun = True
-    own.from_east, own.from_north, own.from_up = waypoints[0].east, waypoints[0].north, waypoints[0].up
-    own.height_asked = estimated.up
-    own.height_limited = estimated.up
-    own.height_demand = estimated.up
-    own.climb_share, own.sink_share = 1.0, 1.0
-    own.airspeed_read = state.airspeed
-    own.airspeed = state.airspeed
-    own.airspeed_demand = state.airspeed
+    """Initialise the controller's memory for steady flight at the first waypoint (`AP_TECS::_initialise_states`)."""
+    memory.is_initialised = True
+    memory.from_east, memory.from_north, memory.from_up = waypoints[0].east, waypoints[0].north, waypoints[0].up
+    memory.altitude_demand_raw = estimated.up
+    memory.altitude_demand_limited = estimated.up
+    memory.altitude_demand = estimated.up
+    memory.max_climb_scaler, memory.max_sink_scaler = 1.0, 1.0
+    memory.airspeed_smoothed = state.airspeed
+    memory.tas = state.airspeed
+    memory.tas_demand = state.airspeed
     # Start with the trim of level flight here, as if the aircraft had flown before.
-    own.pitch_demand = state.alpha - parameters.pitch_trim
-    own.ske_integrator = INITIAL_SKE_INTEGRATOR
-    own.seb_integrator = own.pitch_demand * state.airspeed * GRAVITY - INITIAL_SKE_INTEGRATOR
-    own.throttle_demand = memory.trim_throttle
-    own.throttle_before = parameters.throttle_cruise
-    own.ste_integrator = memory.trim_throttle - parameters.throttle_cruise
+    memory.pitch_demand = state.alpha - parameters.pitch_trim
+    memory.ske_integrator = INITIAL_SKE_INTEGRATOR
+    memory.seb_integrator = memory.pitch_demand * state.airspeed * GRAVITY - INITIAL_SKE_INTEGRATOR
+    memory.throttle_demand = guidance.trim_throttle
+    memory.last_throttle_demand = parameters.throttle_cruise
+    memory.ste_integrator = guidance.trim_throttle - parameters.throttle_cruise
 
 
 @inner
-def follow_attitude(
+def control_attitude(
     state: Record,
     estimated: Record,
     gains: Record,
-    memory: Record,
+    guidance: Record,
     parameters: Record,
-    own: Record,
-    factor: float,
+    memory: Record,
+    eas2tas: float,
     commands: Record,
     dt: float,
 ) -> None:
-    """Drive roll and pitch to their demands with the lags of ArduPlane's controllers, and set throttle."""
-    own.roll_demand = roll_demand(own.side_acceleration, state.pitch, state.airspeed / factor, parameters)
-    before = memory.bank_rate
-    rate = (own.roll_demand - memory.bank) / (ROLL_LAG * parameters.roll_time)
-    rate = min(gains.roll_rate_max, max(-gains.roll_rate_max, rate))
-    limit = gains.roll_acceleration_max * dt
-    rate = before + min(limit, max(-limit, rate - before))
-    follow_roll(state, gains, memory, commands, memory.bank + rate * dt, rate, (rate - before) / dt, dt)
+    """Drive roll and pitch to their demands with the lags of ArduPlane's controllers, and set the throttle.
+
+    Stands for `Plane::stabilize_roll`, `Plane::stabilize_pitch` and `Plane::set_servos`.
+    """
+    memory.roll_demand = limited_nav_roll(
+        memory.lateral_acceleration, state.pitch, state.airspeed / eas2tas, parameters
+    )
+    previous_roll_rate = guidance.bank_rate
+    roll_rate = (memory.roll_demand - guidance.bank) / (ROLL_LAG * parameters.roll_time)
+    roll_rate = min(gains.roll_rate_max, max(-gains.roll_rate_max, roll_rate))
+    max_change = gains.roll_acceleration_max * dt
+    roll_rate = previous_roll_rate + min(max_change, max(-max_change, roll_rate - previous_roll_rate))
+    follow_roll(
+        state,
+        gains,
+        guidance,
+        commands,
+        guidance.bank + roll_rate * dt,
+        roll_rate,
+        (roll_rate - previous_roll_rate) / dt,
+        dt,
+    )
     # The rudder gets only its mix with the ailerons: the sideslip of a turn remains and widens the turn.
     commands.rudder = -parameters.rudder_mix * commands.aileron
-    pitch_rate = (own.pitch_demand + parameters.pitch_trim - state.pitch) / (PITCH_LAG * parameters.pitch_time)
+    pitch_rate = (memory.pitch_demand + parameters.pitch_trim - state.pitch) / (PITCH_LAG * parameters.pitch_time)
     pitch_rate = min(_MAX_PITCH_RATE_RADPS, max(-_MAX_PITCH_RATE_RADPS, pitch_rate))
-    steer_elevator(state, gains, memory, commands, estimated.velocity_up, state.airspeed * pitch_rate)
-    commands.throttle = own.throttle_demand
+    steer_elevator(state, gains, guidance, commands, estimated.velocity_up, state.airspeed * pitch_rate)
+    commands.throttle = memory.throttle_demand

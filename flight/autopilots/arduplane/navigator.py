@@ -40,30 +40,33 @@ _MIN_EXIT_DISTANCE_RATIO = 1.05
 
 
 @compiled
-def turn_distance(
-    acceptance: float, turn: float, radius: float, l1_distance: float, air_density_factor: float
-) -> float:
+def turn_distance(acceptance: float, turn_angle: float, wp_radius: float, l1_distance: float, eas2tas: float) -> float:
     """Return the distance before a waypoint at which ArduPlane turns to the next leg, m; 0 if it flies to the waypoint.
 
+    Follows `AP_L1_Control::turn_distance`.
+
     acceptance: acceptance radius that the mission states, in whole metres; 0 if it states none.
-    turn: rad, positive.
-    radius: WP_RADIUS, m.
+    turn_angle: rad, positive.
+    wp_radius: WP_RADIUS, m.
     l1_distance: m.
-    air_density_factor: ratio of true to equivalent airspeed; the distance for a turn grows as its square.
+    eas2tas: ratio of true to equivalent airspeed; the distance for a turn grows as its square.
     """
     acceptance_m = math.floor(min(MAX_ACCEPTANCE_M, acceptance))
     if acceptance_m > 0.0:
         return acceptance_m
-    right_angle: float = min(radius * air_density_factor * air_density_factor, l1_distance)
-    return right_angle * min(1.0, turn / (0.5 * math.pi))
+    right_angle_distance: float = min(wp_radius * eas2tas * eas2tas, l1_distance)
+    return right_angle_distance * min(1.0, turn_angle / (0.5 * math.pi))
 
 
 @inner
-def past_line(estimated: Record, from_east: float, from_north: float, east: float, north: float) -> bool:
-    """Return True if the aircraft is past the line across the leg's end (east, north), or if the leg has no length."""
+def is_past_finish_line(estimated: Record, from_east: float, from_north: float, east: float, north: float) -> bool:
+    """Return True if the aircraft is past the line across the leg's end (east, north), or if the leg has no length.
+
+    Follows `Location::past_interval_finish_line`.
+    """
     leg_e, leg_n = east - from_east, north - from_north
-    ahead_e, ahead_n = east - estimated.east, north - estimated.north
-    return ahead_e * leg_e + ahead_n * leg_n <= 0.0
+    remaining_e, remaining_n = east - estimated.east, north - estimated.north
+    return remaining_e * leg_e + remaining_n * leg_n <= 0.0
 
 
 @inner
@@ -71,308 +74,361 @@ def navigate_legs(
     estimated: Record,
     waypoints: Records,
     parameters: Record,
-    own: Record,
-    air_density_factor: float,
+    memory: Record,
+    eas2tas: float,
     dt: float,
 ) -> None:
-    """Demand a side acceleration for the current leg, and change to the next leg when it is time.
+    """Demand a lateral acceleration for the current leg, and change to the next leg when it is time.
 
     estimated: a record of `flight.guidance.navigation_error.MOTION`.
     waypoints: (w,) of `flight.guidance.lateral_reference_laws.WAYPOINT`.
     parameters: of `flight.autopilots.arduplane.parameters.ARDUPILOT_PARAMETERS`.
-    own: of `flight.autopilots.arduplane.law.ARDUPILOT_MEMORY`.
-    air_density_factor: ratio of true to equivalent airspeed.
+    memory: of `flight.autopilots.arduplane.law.ARDUPILOT_MEMORY`.
+    eas2tas: ratio of true to equivalent airspeed.
     dt: s since the last update.
     """
-    b = waypoints[own.leg + 1]
-    speed = max(0.1, math.hypot(estimated.velocity_east, estimated.velocity_north))
-    l1_distance = l1_length(speed, parameters.navl1_period, parameters.navl1_damping)
-    if b.returns:
+    target = waypoints[memory.leg + 1]
+    ground_speed = max(0.1, math.hypot(estimated.velocity_east, estimated.velocity_north))
+    l1_distance = l1_length(ground_speed, parameters.navl1_period, parameters.navl1_damping)
+    if target.returns:
         # An RTL is one leg, which lasts until the flight ends or joins the mission's landing sequence.
-        _navigate_rtl(estimated, b, parameters, own, air_density_factor)
-        _join_landing(estimated, waypoints, b, own)
+        _navigate_rtl(estimated, target, parameters, memory, eas2tas)
+        _join_landing(estimated, waypoints, target, memory)
         return
-    if b.circle != 0.0:
-        _fly_loiter(estimated, waypoints, b, parameters, own, l1_distance, speed, air_density_factor, dt)
+    if target.circle != 0.0:
+        _update_loiter(estimated, waypoints, target, parameters, memory, l1_distance, ground_speed, eas2tas, dt)
         return
-    own.on_circle = False
-    end_e, end_n = _end_of_leg(b, own)
-    _follow_line(estimated, end_e, end_n, parameters, own, l1_distance, speed, dt, b.straight)
-    turn = _turn_angle_at(waypoints, b, own)
-    if own.leg + 2 < waypoints.shape[0] and _is_leg_over(
-        estimated, b, end_e, end_n, turn, parameters, own, l1_distance, air_density_factor
+    memory.reached_loiter_target = False
+    end_e, end_n = _leg_end(target, memory)
+    _follow_line(estimated, end_e, end_n, parameters, memory, l1_distance, ground_speed, dt, target.straight)
+    turn_angle = _turn_angle(waypoints, target, memory)
+    if memory.leg + 2 < waypoints.shape[0] and _is_leg_over(
+        estimated, target, end_e, end_n, turn_angle, parameters, memory, l1_distance, eas2tas
     ):
-        _begin_leg(estimated, waypoints, own.leg + 1, own)
+        _begin_leg(estimated, waypoints, memory.leg + 1, memory)
 
 
 @inner
-def _end_of_leg(b: Record, own: Record) -> tuple[float, float]:
-    """Return east and north (m) of the leg's end, which lies beyond b if b has a pass-by distance.
+def _leg_end(target: Record, memory: Record) -> tuple[float, float]:
+    """Return east and north (m) of the leg's end, which lies beyond a target with a pass-by distance.
 
     `Plane::verify_nav_wp` moves the waypoint on along the leg.
     """
-    leg_e, leg_n = b.east - own.from_east, b.north - own.from_north
-    run = math.hypot(leg_e, leg_n)
-    if b.pass_by <= 0.0 or run <= 0.0:
-        return b.east, b.north
-    return b.east + b.pass_by * leg_e / run, b.north + b.pass_by * leg_n / run
+    leg_e, leg_n = target.east - memory.from_east, target.north - memory.from_north
+    leg_length = math.hypot(leg_e, leg_n)
+    if target.pass_by <= 0.0 or leg_length <= 0.0:
+        return target.east, target.north
+    return target.east + target.pass_by * leg_e / leg_length, target.north + target.pass_by * leg_n / leg_length
 
 
 @inner
-def target_of(b: Record) -> tuple[float, float]:
+def target_position(waypoint: Record) -> tuple[float, float]:
     """Return east and north (m) of a waypoint of the route, or of the center if it belongs to a loiter."""
-    return (b.centre_east, b.centre_north) if b.circle != 0.0 and not b.returns else (b.east, b.north)
+    return (
+        (waypoint.centre_east, waypoint.centre_north)
+        if waypoint.circle != 0.0 and not waypoint.returns
+        else (waypoint.east, waypoint.north)
+    )
 
 
 @inner
 def _follow_line(
     estimated: Record,
-    east: float,
-    north: float,
+    end_e: float,
+    end_n: float,
     parameters: Record,
-    own: Record,
+    memory: Record,
     l1_distance: float,
-    speed: float,
+    ground_speed: float,
     dt: float,
-    straight: bool,
+    without_crosstrack: bool,
 ) -> None:
-    """Demand the side acceleration along the line from the leg's start to its end, m.
+    """Demand the lateral acceleration along the line from the leg's start to its end, m.
 
-    straight: True for a line from the aircraft itself (`Plane::verify_nav_wp` without crosstrack).
+    Follows `AP_L1_Control::update_waypoint`.
+
+    without_crosstrack: True for a line from the aircraft itself (`Plane::verify_nav_wp` without crosstrack).
     """
-    from_e, from_n = (estimated.east, estimated.north) if straight else (own.from_east, own.from_north)
-    angle, aim = l1_angles(estimated, from_e, from_n, east, north, l1_distance)
-    own.cross_track_integrator = l1_integrate(aim, own.cross_track_integrator, parameters.navl1_xtrack_i, dt)
+    from_e, from_n = (estimated.east, estimated.north) if without_crosstrack else (memory.from_east, memory.from_north)
+    angle, aim = l1_angles(estimated, from_e, from_n, end_e, end_n, l1_distance)
+    memory.cross_track_integrator = l1_integrate(aim, memory.cross_track_integrator, parameters.navl1_xtrack_i, dt)
     if not math.isnan(aim):
-        angle += aim + own.cross_track_integrator
-    own.side_acceleration = l1_acceleration(angle, speed, l1_distance, parameters.navl1_damping)
+        angle += aim + memory.cross_track_integrator
+    memory.lateral_acceleration = l1_acceleration(angle, ground_speed, l1_distance, parameters.navl1_damping)
 
 
 @inner
-def _turn_angle_at(waypoints: Records, b: Record, own: Record) -> float:
-    """Return the turn angle at b that ArduPlane uses, rad, positive.
+def _turn_angle(waypoints: Records, target: Record, memory: Record) -> float:
+    """Return the turn angle at the target that ArduPlane uses, rad, positive (`Plane::setup_turn_angle`).
 
     Next to a loiter, the angle is that of the turn from or to the loiter's center.
     """
-    turn: float = b.turn
-    if own.leg + 2 >= waypoints.shape[0]:
-        return turn
-    after = waypoints[own.leg + 2]
-    if after.returns or (waypoints[own.leg].circle == 0.0 and after.circle == 0.0):
-        return turn
-    east, north = target_of(after)
-    onward = math.atan2(east - b.east, north - b.north)
-    return abs(wrap(onward - math.atan2(b.east - own.from_east, b.north - own.from_north)))
+    turn_angle: float = target.turn
+    if memory.leg + 2 >= waypoints.shape[0]:
+        return turn_angle
+    next_waypoint = waypoints[memory.leg + 2]
+    if next_waypoint.returns or (waypoints[memory.leg].circle == 0.0 and next_waypoint.circle == 0.0):
+        return turn_angle
+    next_e, next_n = target_position(next_waypoint)
+    next_course = math.atan2(next_e - target.east, next_n - target.north)
+    return abs(wrap(next_course - math.atan2(target.east - memory.from_east, target.north - memory.from_north)))
 
 
 @inner
-def _begin_leg(estimated: Record, waypoints: Records, leg: int, own: Record) -> None:
+def _begin_leg(estimated: Record, waypoints: Records, leg: int, memory: Record) -> None:
     """Begin a leg, whose line leads from its waypoint to the next, or from the aircraft if it is past the end."""
-    a, b = waypoints[leg], waypoints[leg + 1]
-    own.leg = leg
+    start, target = waypoints[leg], waypoints[leg + 1]
+    memory.leg = leg
     # The next loiter has not been captured yet, even if the current one was.
-    own.on_circle = False
-    own.loitering, own.over, own.at_height = False, False, False
-    own.stayed, own.circled, own.waited, own.next_look = 0.0, 0.0, 0.0, 0.0
-    own.from_up = a.up
-    own.from_east, own.from_north = target_of(a)
-    if a.circle != 0.0 and a.leaves_on_tangent:
-        own.from_east, own.from_north, own.from_up = estimated.east, estimated.north, estimated.up
-    east, north = target_of(b)
-    if not b.returns and past_line(estimated, own.from_east, own.from_north, east, north):
-        own.from_east, own.from_north, own.from_up = estimated.east, estimated.north, estimated.up
+    memory.reached_loiter_target = False
+    memory.loiter_started, memory.loiter_complete, memory.reached_target_altitude = False, False, False
+    memory.loiter_time, memory.loiter_angle_sum, memory.exit_wait_angle, memory.next_sum_lap = 0.0, 0.0, 0.0, 0.0
+    memory.from_up = start.up
+    memory.from_east, memory.from_north = target_position(start)
+    if start.circle != 0.0 and start.leaves_on_tangent:
+        memory.from_east, memory.from_north, memory.from_up = estimated.east, estimated.north, estimated.up
+    target_e, target_n = target_position(target)
+    if not target.returns and is_past_finish_line(estimated, memory.from_east, memory.from_north, target_e, target_n):
+        memory.from_east, memory.from_north, memory.from_up = estimated.east, estimated.north, estimated.up
 
 
 @inner
 def _is_leg_over(
     estimated: Record,
-    b: Record,
+    target: Record,
     end_e: float,
     end_n: float,
-    turn: float,
+    turn_angle: float,
     parameters: Record,
-    own: Record,
+    memory: Record,
     l1_distance: float,
-    air_density_factor: float,
+    eas2tas: float,
 ) -> bool:
-    """Return True if the leg to b is over, because its end is within the turn distance or the line across it is passed.
+    """Return True if the leg's end is within the turn distance, or the line across it is passed.
 
-    end_e, end_n: end of the leg, m; it lies beyond b if b has a pass-by distance, and is then flown to.
-    turn: of the route at b, rad.
+    Follows `Plane::verify_nav_wp`.
+
+    end_e, end_n: end of the leg, m; it lies beyond a target with a pass-by distance, and is then flown to.
+    turn_angle: turn of the route at the target, rad.
     """
-    passed = past_line(estimated, own.from_east, own.from_north, end_e, end_n)
+    is_past_end = is_past_finish_line(estimated, memory.from_east, memory.from_north, end_e, end_n)
     if (
         parameters.wp_max_radius > 0.0
-        and math.hypot(b.east - estimated.east, b.north - estimated.north) > parameters.wp_max_radius
+        and math.hypot(target.east - estimated.east, target.north - estimated.north) > parameters.wp_max_radius
     ):
-        if passed and b.pass_by <= 0.0:
+        if is_past_end and target.pass_by <= 0.0:
             # Passed beyond WP_MAX_RADIUS: it turns back to the waypoint.
-            own.from_east, own.from_north = estimated.east, estimated.north
+            memory.from_east, memory.from_north = estimated.east, estimated.north
         return False
-    if b.fly_over or (b.pass_by > 0.0 and b.acceptance < 1.0):
-        return passed
+    if target.fly_over or (target.pass_by > 0.0 and target.acceptance < 1.0):
+        return is_past_end
     distance = math.hypot(end_e - estimated.east, end_n - estimated.north)
-    reach = turn_distance(b.acceptance, turn, parameters.wp_radius, l1_distance, air_density_factor)
-    return passed or distance <= reach
+    acceptance_distance = turn_distance(target.acceptance, turn_angle, parameters.wp_radius, l1_distance, eas2tas)
+    return is_past_end or distance <= acceptance_distance
 
 
 @inner
-def _fly_loiter(
+def _update_loiter(
     estimated: Record,
     waypoints: Records,
-    b: Record,
+    loiter: Record,
     parameters: Record,
-    own: Record,
+    memory: Record,
     l1_distance: float,
-    speed: float,
-    air_density_factor: float,
+    ground_speed: float,
+    eas2tas: float,
     dt: float,
 ) -> None:
-    """Fly to a loiter and around it until it is over and the aircraft heads for the next place.
+    """Fly to a loiter and around it until it is complete and the aircraft heads for the next waypoint.
 
-    b: the corner of the route that stands for the loiter; its circle has the radius at its altitude.
+    Follows `Plane::update_loiter`.
+
+    loiter: the corner of the route that stands for the loiter; its circle has the radius at its altitude.
     """
-    density_ratio = air_density_factor / true_by_equivalent(b.up)
-    radius = abs(b.circle) * density_ratio * density_ratio
-    distance = math.hypot(b.centre_east - estimated.east, b.centre_north - estimated.north)
-    if not own.loitering and distance > _APPROACH_LINE_RADII_RATIO * radius:
-        own.on_circle = False
-        _follow_line(estimated, b.centre_east, b.centre_north, parameters, own, l1_distance, speed, dt, b.straight)
+    eas2tas_ratio = eas2tas / true_by_equivalent(loiter.up)
+    radius = abs(loiter.circle) * eas2tas_ratio * eas2tas_ratio
+    distance = math.hypot(loiter.centre_east - estimated.east, loiter.centre_north - estimated.north)
+    if not memory.loiter_started and distance > _APPROACH_LINE_RADII_RATIO * radius:
+        memory.reached_loiter_target = False
+        _follow_line(
+            estimated,
+            loiter.centre_east,
+            loiter.centre_north,
+            parameters,
+            memory,
+            l1_distance,
+            ground_speed,
+            dt,
+            loiter.straight,
+        )
         return
-    own.side_acceleration = _loiter_acceleration(estimated, b, radius, parameters, own, l1_distance, speed)
-    _update_loiter_progress(estimated, b, own, dt)
-    if not own.over and _is_loiter_done(estimated, b, own):
-        own.over, own.waited = True, 0.0
-    after = own.leg + 2
-    while after < waypoints.shape[0] and waypoints[after].stop == b.stop:
-        after += 1
-    if after >= waypoints.shape[0]:
+    memory.lateral_acceleration = _loiter_acceleration(
+        estimated, loiter, radius, parameters, memory, l1_distance, ground_speed
+    )
+    _update_loiter_angle(estimated, loiter, memory, dt)
+    if not memory.loiter_complete and _is_loiter_done(estimated, loiter, memory):
+        memory.loiter_complete, memory.exit_wait_angle = True, 0.0
+    exit_index = memory.leg + 2
+    while exit_index < waypoints.shape[0] and waypoints[exit_index].stop == loiter.stop:
+        exit_index += 1
+    if exit_index >= waypoints.shape[0]:
         return
-    if own.over and (own.on_circle or b.turns == 0.0) and _is_lined_up(estimated, waypoints[after], b, radius, own):
-        own.left_for = after - 1
-        _begin_leg(estimated, waypoints, after - 1, own)
+    if (
+        memory.loiter_complete
+        and (memory.reached_loiter_target or loiter.turns == 0.0)
+        and _is_heading_lined_up(estimated, waypoints[exit_index], loiter, radius, memory)
+    ):
+        memory.leg_after_loiter = exit_index - 1
+        _begin_leg(estimated, waypoints, exit_index - 1, memory)
 
 
 @inner
-def _update_loiter_progress(estimated: Record, b: Record, own: Record, dt: float) -> None:
-    """Update the time and the angle around a loiter since the aircraft captured it."""
-    bearing = math.atan2(estimated.east - b.centre_east, estimated.north - b.centre_north)
-    if own.loitering:
-        own.stayed += dt
-        turned = wrap(bearing - own.bearing) * math.copysign(1.0, b.circle)
-        own.circled += turned
-        own.waited += turned
-    elif own.on_circle:
-        own.loitering = True
-        own.next_look, own.up_before = _ALTITUDE_CHECK_INTERVAL_LAPS * 2.0 * math.pi, estimated.up
-    own.bearing = bearing
-    if own.on_circle and abs(estimated.up - b.up) < LOITER_ALTITUDE_TOLERANCE_M:
-        own.at_height = True
+def _update_loiter_angle(estimated: Record, loiter: Record, memory: Record, dt: float) -> None:
+    """Update the time and the angle around a loiter since its capture (`Plane::loiter_angle_update`)."""
+    bearing = math.atan2(estimated.east - loiter.centre_east, estimated.north - loiter.centre_north)
+    if memory.loiter_started:
+        memory.loiter_time += dt
+        angle_change = wrap(bearing - memory.old_loiter_bearing) * math.copysign(1.0, loiter.circle)
+        memory.loiter_angle_sum += angle_change
+        memory.exit_wait_angle += angle_change
+    elif memory.reached_loiter_target:
+        memory.loiter_started = True
+        memory.next_sum_lap, memory.start_lap_altitude = _ALTITUDE_CHECK_INTERVAL_LAPS * 2.0 * math.pi, estimated.up
+    memory.old_loiter_bearing = bearing
+    if memory.reached_loiter_target and abs(estimated.up - loiter.up) < LOITER_ALTITUDE_TOLERANCE_M:
+        memory.reached_target_altitude = True
 
 
 @inner
-def _is_loiter_done(estimated: Record, b: Record, own: Record) -> bool:
-    """Return True once the loiter's turns or time are completed, or its altitude is reached."""
-    if not own.loitering:
+def _is_loiter_done(estimated: Record, loiter: Record, memory: Record) -> bool:
+    """Return True once the loiter's turns or time are complete, or its altitude is reached.
+
+    Follows `Plane::verify_loiter_turns`, `verify_loiter_time` and `verify_loiter_to_alt`.
+    """
+    if not memory.loiter_started:
         return False
-    if b.to_height:
-        if not own.at_height and own.circled >= own.next_look:
-            own.at_height = abs(estimated.up - own.up_before) < LOITER_ALTITUDE_TOLERANCE_M
-            own.next_look, own.up_before = own.next_look + _ALTITUDE_CHECK_INTERVAL_LAPS * 2.0 * math.pi, estimated.up
-        return own.at_height
-    if math.isnan(b.stays):
-        return own.circled > b.turns * 2.0 * math.pi
-    return own.stayed > b.stays
+    if loiter.to_height:
+        if not memory.reached_target_altitude and memory.loiter_angle_sum >= memory.next_sum_lap:
+            memory.reached_target_altitude = abs(estimated.up - memory.start_lap_altitude) < LOITER_ALTITUDE_TOLERANCE_M
+            memory.next_sum_lap, memory.start_lap_altitude = (
+                memory.next_sum_lap + _ALTITUDE_CHECK_INTERVAL_LAPS * 2.0 * math.pi,
+                estimated.up,
+            )
+        return memory.reached_target_altitude
+    if math.isnan(loiter.stays):
+        return memory.loiter_angle_sum > loiter.turns * 2.0 * math.pi
+    return memory.loiter_time > loiter.stays
 
 
 @inner
-def _is_lined_up(estimated: Record, onward: Record, b: Record, radius: float, own: Record) -> bool:
-    """Return True if the course leads to the place after loiter b, or if no course can.
+def _is_heading_lined_up(
+    estimated: Record, next_waypoint: Record, loiter: Record, radius: float, memory: Record
+) -> bool:
+    """Return True if the course points to the waypoint after a loiter, within the tolerance.
 
-    No course from the loiter leads to a place inside its circle (radius, m).
+    Also True if that waypoint lies inside the loiter's circle (radius, m): the course can then never point to it.
+    Follows `ModeLoiter::isHeadingLinedUp`.
     """
-    east, north = (onward.centre_east, onward.centre_north) if onward.returns else target_of(onward)
-    if math.hypot(east - b.centre_east, north - b.centre_north) < _MIN_EXIT_DISTANCE_RATIO * radius:
+    next_e, next_n = (
+        (next_waypoint.centre_east, next_waypoint.centre_north)
+        if next_waypoint.returns
+        else target_position(next_waypoint)
+    )
+    if math.hypot(next_e - loiter.centre_east, next_n - loiter.centre_north) < _MIN_EXIT_DISTANCE_RATIO * radius:
         return True
-    bearing = math.atan2(east - estimated.east, north - estimated.north)
+    bearing = math.atan2(next_e - estimated.east, next_n - estimated.north)
     heading_error = abs(wrap(bearing - math.atan2(estimated.velocity_east, estimated.velocity_north)))
     return heading_error <= _EXIT_HEADING_TOLERANCE_RAD + _EXIT_HEADING_GROWTH_RAD * math.floor(
-        abs(own.waited) / (2.0 * math.pi)
+        abs(memory.exit_wait_angle) / (2.0 * math.pi)
     )
 
 
 @inner
-def _navigate_rtl(estimated: Record, b: Record, parameters: Record, own: Record, air_density_factor: float) -> None:
-    """Demand the side acceleration of an RTL (`ModeRTL::update`, ArduPlane/mode_rtl.cpp).
+def _navigate_rtl(estimated: Record, rtl: Record, parameters: Record, memory: Record, eas2tas: float) -> None:
+    """Demand the lateral acceleration of an RTL (`ModeRTL::update`, ArduPlane/mode_rtl.cpp).
 
     The aircraft turns to the center of the RTL loiter at once, from any leg; the radius grows with altitude as the
     square of the ratio of true to equivalent airspeed (`AP_L1_Control::loiter_radius`).  Until the initial climb is
     done, bank is limited to LEVEL_ROLL_LIMIT; only then the altitude slope begins, at the aircraft.
     """
-    if not own.returning:
-        own.returning = True
-        own.from_east, own.from_north, own.from_up = estimated.east, estimated.north, estimated.up
-    speed = max(0.1, math.hypot(estimated.velocity_east, estimated.velocity_north))
-    l1_distance = l1_length(speed, parameters.navl1_period, parameters.navl1_damping)
-    radius = abs(b.circle) * air_density_factor * air_density_factor
-    own.side_acceleration = _loiter_acceleration(estimated, b, radius, parameters, own, l1_distance, speed)
-    if own.climbed:
+    if not memory.is_in_rtl:
+        memory.is_in_rtl = True
+        memory.from_east, memory.from_north, memory.from_up = estimated.east, estimated.north, estimated.up
+    ground_speed = max(0.1, math.hypot(estimated.velocity_east, estimated.velocity_north))
+    l1_distance = l1_length(ground_speed, parameters.navl1_period, parameters.navl1_damping)
+    radius = abs(rtl.circle) * eas2tas * eas2tas
+    memory.lateral_acceleration = _loiter_acceleration(
+        estimated, rtl, radius, parameters, memory, l1_distance, ground_speed
+    )
+    if memory.rtl_climb_complete:
         return
     if int(parameters.flight_options) & CLIMB_BEFORE_TURN:
-        own.climbed = estimated.up > b.up
+        memory.rtl_climb_complete = estimated.up > rtl.up
     else:
-        own.climbed = parameters.rtl_climb_min <= 0.0 or estimated.up - own.from_up > parameters.rtl_climb_min
-    if own.climbed:
-        own.from_east, own.from_north, own.from_up = estimated.east, estimated.north, estimated.up
+        memory.rtl_climb_complete = (
+            parameters.rtl_climb_min <= 0.0 or estimated.up - memory.from_up > parameters.rtl_climb_min
+        )
+    if memory.rtl_climb_complete:
+        memory.from_east, memory.from_north, memory.from_up = estimated.east, estimated.north, estimated.up
         return
     max_acceleration = GRAVITY * math.tan(parameters.level_roll_limit)
-    own.side_acceleration = min(max_acceleration, max(-max_acceleration, own.side_acceleration))
+    memory.lateral_acceleration = min(max_acceleration, max(-max_acceleration, memory.lateral_acceleration))
 
 
 @inner
-def _join_landing(estimated: Record, waypoints: Records, b: Record, own: Record) -> None:
+def _join_landing(estimated: Record, waypoints: Records, rtl: Record, memory: Record) -> None:
     """Leave the RTL loiter for the landing sequence, if there is one, once the aircraft loiters near its altitude.
 
     `ModeRTL::navigate` of ArduPlane 4.6 with RTL_AUTOLAND 1.  The leg begins at the aircraft.
     """
-    after = own.leg + 2
-    while after < waypoints.shape[0] and waypoints[after].returns:
-        after += 1
+    landing_index = memory.leg + 2
+    while landing_index < waypoints.shape[0] and waypoints[landing_index].returns:
+        landing_index += 1
     if (
-        after >= waypoints.shape[0]
-        or not own.on_circle
-        or abs(estimated.up - b.up) >= LANDING_JOIN_ALTITUDE_TOLERANCE_M
+        landing_index >= waypoints.shape[0]
+        or not memory.reached_loiter_target
+        or abs(estimated.up - rtl.up) >= LANDING_JOIN_ALTITUDE_TOLERANCE_M
     ):
         return
-    own.left_for = after - 1
-    own.returning, own.climbed = False, False
-    _begin_leg(estimated, waypoints, after - 1, own)
-    own.from_east, own.from_north, own.from_up = estimated.east, estimated.north, estimated.up
+    memory.leg_after_loiter = landing_index - 1
+    memory.is_in_rtl, memory.rtl_climb_complete = False, False
+    _begin_leg(estimated, waypoints, landing_index - 1, memory)
+    memory.from_east, memory.from_north, memory.from_up = estimated.east, estimated.north, estimated.up
 
 
 @inner
 def _loiter_acceleration(
-    estimated: Record, b: Record, radius: float, parameters: Record, own: Record, l1_distance: float, speed: float
+    estimated: Record,
+    loiter: Record,
+    radius: float,
+    parameters: Record,
+    memory: Record,
+    l1_distance: float,
+    ground_speed: float,
 ) -> float:
-    """Return the side acceleration of a loiter, m/s^2 (`AP_L1_Control::update_loiter`).
+    """Return the lateral acceleration of a loiter, m/s^2 (`AP_L1_Control::update_loiter`).
 
     It steers straight to the center until the circle demands the sharper turn, and then around the circle.
     """
-    direction = math.copysign(1.0, b.circle)
-    out_e, out_n = estimated.east - b.centre_east, estimated.north - b.centre_north
-    distance = max(0.1, math.hypot(out_e, out_n))
+    direction = math.copysign(1.0, loiter.circle)
+    offset_e, offset_n = estimated.east - loiter.centre_east, estimated.north - loiter.centre_north
+    distance = max(0.1, math.hypot(offset_e, offset_n))
     course = math.atan2(estimated.velocity_east, estimated.velocity_north)
-    inward = wrap(course - math.atan2(-out_e, -out_n))
-    capture = l1_acceleration(inward, speed, l1_distance, parameters.navl1_damping)
+    capture_angle = wrap(course - math.atan2(-offset_e, -offset_n))
+    capture_acceleration = l1_acceleration(capture_angle, ground_speed, l1_distance, parameters.navl1_damping)
     # Speeds over the ground: outwards, and around the circle in its direction.
-    outwards = -speed * math.cos(inward)
-    around = -direction * speed * math.sin(inward)
-    frequency = 2.0 * math.pi / parameters.navl1_period
-    error = distance - radius
-    correction = frequency * (frequency * error + 2.0 * parameters.navl1_damping * outwards)
-    if outwards > 0.0 and around < 0.0:
+    outward_velocity = -ground_speed * math.cos(capture_angle)
+    tangential_velocity = -direction * ground_speed * math.sin(capture_angle)
+    omega = 2.0 * math.pi / parameters.navl1_period
+    radial_error = distance - radius
+    pd_correction = omega * (omega * radial_error + 2.0 * parameters.navl1_damping * outward_velocity)
+    if outward_velocity > 0.0 and tangential_velocity < 0.0:
         # Flying outwards against the loiter's direction, it turns in the loiter's direction.
-        correction = max(correction, 0.0)
-    circling = direction * (correction + around * around / max(0.5 * radius, distance))
-    own.on_circle = not (error > 0.0 and direction * capture < direction * circling)
-    return circling if own.on_circle else capture
+        pd_correction = max(pd_correction, 0.0)
+    circle_acceleration = direction * (
+        pd_correction + tangential_velocity * tangential_velocity / max(0.5 * radius, distance)
+    )
+    memory.reached_loiter_target = not (
+        radial_error > 0.0 and direction * capture_acceleration < direction * circle_acceleration
+    )
+    return circle_acceleration if memory.reached_loiter_target else capture_acceleration

@@ -190,71 +190,76 @@ def _induced_drag_factor(speeds: Floats, excess: Floats) -> float:
 @inner
 def angle_of_attack(state: Record, aircraft: Record) -> float:
     """Return the angle of attack at an airspeed in a bank, rad."""
-    load = 1.0 / max(0.3, math.cos(state.roll))
-    return aircraft.alpha + aircraft.alpha_lift * load / (state.airspeed * state.airspeed)
+    load_factor = 1.0 / max(0.3, math.cos(state.roll))
+    return aircraft.alpha + aircraft.alpha_lift * load_factor / (state.airspeed * state.airspeed)
 
 
 @inner
-def move_on(
-    motion: Record,
+def advance_point_mass(
+    estimated: Record,
     state: Record,
-    angle: float,
+    path_angle: float,
     throttle: float,
     aircraft: Record,
-    excess: Floats,
+    excess_table: Floats,
     power: Floats,
     dt: float,
 ) -> float:
     """Move a point mass by ``dt`` s on a path angle relative to the air (rad), and return the power used, W."""
-    thrust = excess_power(excess, throttle, state.airspeed, motion.up, aircraft)
-    tilt = math.tan(min(1.2, abs(state.roll)))
-    gain = thrust - aircraft.induced / state.airspeed * tilt * tilt
-    taken = _electric_power(thrust, excess, power, state.airspeed, motion.up, aircraft)
+    thrust_power = excess_power(excess_table, throttle, state.airspeed, estimated.up, aircraft)
+    tan_bank = math.tan(min(1.2, abs(state.roll)))
+    net_power = thrust_power - aircraft.induced / state.airspeed * tan_bank * tan_bank
+    electric_power = _electric_power(thrust_power, excess_table, power, state.airspeed, estimated.up, aircraft)
     state.yaw += GRAVITY * math.tan(state.roll) / state.airspeed * dt
-    state.airspeed = max(3.0, state.airspeed + (GRAVITY * gain / state.airspeed - GRAVITY * math.sin(angle)) * dt)
-    wind = mean_wind_speed(aircraft.wind_speed, aircraft.wind_gradient, aircraft.wind_reference, motion.up)
-    level = state.airspeed * math.cos(angle)
-    motion.velocity_east = level * math.sin(state.yaw) + wind * aircraft.wind_east
-    motion.velocity_north = level * math.cos(state.yaw) + wind * aircraft.wind_north
-    motion.velocity_up = state.airspeed * math.sin(angle)
-    motion.east += motion.velocity_east * dt
-    motion.north += motion.velocity_north * dt
-    motion.up += motion.velocity_up * dt
-    return taken
+    state.airspeed = max(
+        3.0, state.airspeed + (GRAVITY * net_power / state.airspeed - GRAVITY * math.sin(path_angle)) * dt
+    )
+    wind = mean_wind_speed(aircraft.wind_speed, aircraft.wind_gradient, aircraft.wind_reference, estimated.up)
+    horizontal_airspeed = state.airspeed * math.cos(path_angle)
+    estimated.velocity_east = horizontal_airspeed * math.sin(state.yaw) + wind * aircraft.wind_east
+    estimated.velocity_north = horizontal_airspeed * math.cos(state.yaw) + wind * aircraft.wind_north
+    estimated.velocity_up = state.airspeed * math.sin(path_angle)
+    estimated.east += estimated.velocity_east * dt
+    estimated.north += estimated.velocity_north * dt
+    estimated.up += estimated.velocity_up * dt
+    return electric_power
 
 
 @inner
 def _electric_power(
-    thrust: float, excess: Floats, power: Floats, airspeed: float, amsl: float, aircraft: Record
+    thrust_power: float, excess_table: Floats, power: Floats, airspeed: float, amsl: float, aircraft: Record
 ) -> float:
     """Return electric power at a specific excess power, W, by the parabola of `Envelope.power`."""
     if not aircraft.has_power:
         return 0.0
-    low = _interpolate(power[0], airspeed, amsl, aircraft)
-    middle = _interpolate(power[1], airspeed, amsl, aircraft)
-    high = _interpolate(power[2], airspeed, amsl, aircraft)
-    full, idle = (
-        _interpolate(excess[excess.shape[0] - 1], airspeed, amsl, aircraft),
-        _interpolate(excess[0], airspeed, amsl, aircraft),
+    idle_power = _interpolate(power[0], airspeed, amsl, aircraft)
+    level_power = _interpolate(power[1], airspeed, amsl, aircraft)
+    full_power = _interpolate(power[2], airspeed, amsl, aircraft)
+    full_excess, idle_excess = (
+        _interpolate(excess_table[excess_table.shape[0] - 1], airspeed, amsl, aircraft),
+        _interpolate(excess_table[0], airspeed, amsl, aircraft),
     )
-    if thrust >= full or not idle < 0.0 < full:
-        return high
-    if thrust <= idle:
-        return low
+    if thrust_power >= full_excess or not idle_excess < 0.0 < full_excess:
+        return full_power
+    if thrust_power <= idle_excess:
+        return idle_power
     return (
-        low * thrust * (thrust - full) / (idle * (idle - full))
-        + middle * (thrust - idle) * (thrust - full) / (-idle * -full)
-        + high * thrust * (thrust - idle) / (full * (full - idle))
+        idle_power * thrust_power * (thrust_power - full_excess) / (idle_excess * (idle_excess - full_excess))
+        + level_power * (thrust_power - idle_excess) * (thrust_power - full_excess) / (-idle_excess * -full_excess)
+        + full_power * thrust_power * (thrust_power - idle_excess) / (full_excess * (full_excess - idle_excess))
     )
 
 
 @inner
-def excess_power(excess: Floats, throttle: float, airspeed: float, amsl: float, aircraft: Record) -> float:
+def excess_power(excess_table: Floats, throttle: float, airspeed: float, amsl: float, aircraft: Record) -> float:
     """Return specific excess power in straight flight at a throttle, an airspeed and an altitude, m/s."""
-    x = min(1.0, max(0.0, throttle)) * (excess.shape[0] - 1)
-    i = min(excess.shape[0] - 2, int(x))
-    low, high = _interpolate(excess[i], airspeed, amsl, aircraft), _interpolate(excess[i + 1], airspeed, amsl, aircraft)
-    return low + (x - i) * (high - low)
+    grid_position = min(1.0, max(0.0, throttle)) * (excess_table.shape[0] - 1)
+    row = min(excess_table.shape[0] - 2, int(grid_position))
+    lower_power, upper_power = (
+        _interpolate(excess_table[row], airspeed, amsl, aircraft),
+        _interpolate(excess_table[row + 1], airspeed, amsl, aircraft),
+    )
+    return lower_power + (grid_position - row) * (upper_power - lower_power)
 
 
 @inner

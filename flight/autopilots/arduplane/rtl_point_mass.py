@@ -6,8 +6,8 @@ demands with the lags of ArduPlane's controllers.  The least clearance is within
 (`tests/flight/autopilots/arduplane/test_rtl_point_mass.py`).
 
 After an engine failure the law does not know that there is no thrust: it demands full throttle, slows down until it is
-in underspeed (`flight.autopilots.arduplane.law.is_underspeed`), holds its minimum airspeed from then on, and dives onto
-its slope where it meets the slope.  Fourteen such flights of ArduPlane are reproduced as well
+in underspeed (`flight.autopilots.arduplane.law.detect_underspeed`), holds its minimum airspeed from then on, and
+dives onto its slope where it meets the slope.  Fourteen such flights of ArduPlane are reproduced as well
 (`tests/flight/autopilots/arduplane/test_engine_out.py`).
 """
 
@@ -25,14 +25,14 @@ from flight.autopilots.arduplane.law import (
     PITCH_LAG,
     ROLL_LAG,
     airspeed_target,
-    demand_height,
-    roll_demand,
+    limited_nav_roll,
+    update_height_demand,
     update_tecs,
-    wind_up_throttle,
+    wind_up_ste_integrator,
 )
-from flight.autopilots.arduplane.navigator import LANDING_JOIN_ALTITUDE_TOLERANCE_M, navigate_legs, past_line
+from flight.autopilots.arduplane.navigator import LANDING_JOIN_ALTITUDE_TOLERANCE_M, is_past_finish_line, navigate_legs
 from flight.autopilots.arduplane.parameters import ArduPilotParameters
-from flight.autopilots.arduplane.point_mass import PointMass, angle_of_attack, excess_power, move_on
+from flight.autopilots.arduplane.point_mass import PointMass, advance_point_mass, angle_of_attack, excess_power
 from flight.dynamics.state import STATE
 from flight.guidance.equivalent_airspeed import true_by_equivalent
 from flight.guidance.lateral_reference_laws import WAYPOINT
@@ -309,234 +309,311 @@ def fly_stages(
     start: Record,
     stages: Records,
     parameters: Record,
-    staged: Record,
+    climb_parameters: Record,
     climb: Record,
     aircraft: Record,
-    excess: Floats,
+    excess_table: Floats,
     power: Floats,
     heights: Heights,
     to_pixel: PolyMapRecord,
     spheres: Floats,
     radii: Floats,
-    known: bool,
-    most: float,
-    floor: float,
-    apart: float,
+    has_terrain: bool,
+    timeout: float,
+    min_clearance: float,
+    min_outside: float,
     engine_out: bool,
-    way: Floats,
-    out: Record,
+    positions: Floats,
+    result: Record,
 ) -> None:
-    """Fly from stage to stage for at most ``most`` s, and fill in the outcome.
+    """Fly from stage to stage for at most ``timeout`` s, and fill in the outcome.
 
-    climb: True if the first stage is a climb, and its final altitude.  staged: the parameters of that climb.
+    climb: a record of `CLIMB`.  climb_parameters: the parameters of that climb.
     """
     # The same spacing as in `waypoint_column`.  A loiter is flown until the RTL is over: no leg follows it.
-    spaced, turns = np.zeros(6, WAYPOINT), np.zeros(1, _LOITER_PROGRESS)
-    waypoints, circling = spaced[::2], turns[0]
+    spaced, progress_records = np.zeros(6, WAYPOINT), np.zeros(1, _LOITER_PROGRESS)
+    waypoints, loiter = spaced[::2], progress_records[0]
     motions, states, memories = np.zeros(1, MOTION), np.zeros(1, STATE), np.zeros(1, ARDUPILOT_MEMORY)
-    b, estimated, state, own = waypoints[1], motions[0], states[0], memories[0]
-    _initialise_outcome(start, estimated, known, out)
-    _load_stage(stages, 0, waypoints, estimated, own)
-    _initialise_law(start, parameters, aircraft, excess, state, own)
-    pitch, angle, dt = state.pitch, state.pitch - state.alpha, NAVIGATION_TICK
-    roll_share = 1.0 - math.exp(-dt / (ROLL_LAG * parameters.roll_time))
-    pitch_share = 1.0 - math.exp(-dt / (PITCH_LAG * parameters.pitch_time))
-    path_share = 1.0 - math.exp(-dt / _PATH_LAG_S)
-    stage, used = 0, 0.0
-    for tick in range(int(most / dt)):
+    target, estimated, state, memory = waypoints[1], motions[0], states[0], memories[0]
+    _initialise_outcome(start, estimated, has_terrain, result)
+    _load_stage(stages, 0, waypoints, estimated, memory)
+    _initialise_memory(start, parameters, aircraft, excess_table, state, memory)
+    pitch, path_angle, dt = state.pitch, state.pitch - state.alpha, NAVIGATION_TICK
+    roll_fraction = 1.0 - math.exp(-dt / (ROLL_LAG * parameters.roll_time))
+    pitch_fraction = 1.0 - math.exp(-dt / (PITCH_LAG * parameters.pitch_time))
+    path_fraction = 1.0 - math.exp(-dt / _PATH_LAG_S)
+    stage, energy = 0, 0.0
+    for tick in range(int(timeout / dt)):
         time = tick * dt
         if tick % KEPT_EVERY == 0:
-            _store_position(estimated, way, out)
-        factor = true_by_equivalent(estimated.up)
+            _store_position(estimated, positions, result)
+        eas2tas = true_by_equivalent(estimated.up)
         is_last = stage + 1 == stages.shape[0]
-        distance = math.hypot(estimated.east - b.centre_east, estimated.north - b.centre_north)
-        wide = RTL_ARRIVAL_LOITER_RADII * abs(b.circle) * factor * factor
-        if is_last and distance < max(LOITER_CAPTURE_RADIUS_M, wide):
-            _record_arrival(estimated, time, engine_out, out)
-        out.seconds = time
-        _update_clearances(estimated, time, heights, to_pixel, spheres, radii, known, out)
-        if out.ended == RETURN_TIMEOUT and (out.clearance < floor or out.outside < apart):
-            out.ended = RETURN_ABORTED
-        if out.ended != RETURN_TIMEOUT:
+        distance = math.hypot(estimated.east - target.centre_east, estimated.north - target.centre_north)
+        arrival_radius = RTL_ARRIVAL_LOITER_RADII * abs(target.circle) * eas2tas * eas2tas
+        if is_last and distance < max(LOITER_CAPTURE_RADIUS_M, arrival_radius):
+            _record_arrival(estimated, time, engine_out, result)
+        result.seconds = time
+        _update_clearances(estimated, time, heights, to_pixel, spheres, radii, has_terrain, result)
+        if result.ended == RETURN_TIMEOUT and (result.clearance < min_clearance or result.outside < min_outside):
+            result.ended = RETURN_ABORTED
+        if result.ended != RETURN_TIMEOUT:
             break
         if _is_stage_complete(
-            estimated, b, own, circling, climb, engine_out and stage == 0, stage == 0, time, is_last, wide, dt
+            estimated,
+            target,
+            memory,
+            loiter,
+            climb,
+            engine_out and stage == 0,
+            stage == 0,
+            time,
+            is_last,
+            arrival_radius,
+            dt,
         ):
             if is_last:
-                out.ended = RETURN_ARRIVED
+                result.ended = RETURN_ARRIVED
                 break
             stage += 1
-            _load_stage(stages, stage, waypoints, estimated, own)
-        state.pitch, unpowered = pitch, engine_out and stage > 0
+            _load_stage(stages, stage, waypoints, estimated, memory)
+        state.pitch, is_gliding = pitch, engine_out and stage > 0
         if climb.climbs and stage == 0:
-            _demand_climb(state, estimated, staged, own, climb, b.airspeed, factor, dt)
+            _demand_climb(state, estimated, climb_parameters, memory, climb, target.airspeed, eas2tas, dt)
         else:
-            _update_demands(state, estimated, waypoints, parameters, own, aircraft, excess, factor, unpowered, dt)
-        banked = roll_demand(own.side_acceleration, state.pitch, state.airspeed / factor, parameters)
-        state.roll += roll_share * (banked - state.roll)
-        pitch += pitch_share * (own.pitch_demand + parameters.pitch_trim - pitch)
-        angle += path_share * (pitch - angle_of_attack(state, aircraft) - angle)
-        throttle = 0.0 if engine_out else own.throttle_demand
-        used += dt * move_on(estimated, state, angle, throttle, aircraft, excess, power, dt)
-    if out.clearance <= 0.0:
-        out.ended = RETURN_GROUND_IMPACT
+            _update_demands(
+                state, estimated, waypoints, parameters, memory, aircraft, excess_table, eas2tas, is_gliding, dt
+            )
+        nav_roll = limited_nav_roll(memory.lateral_acceleration, state.pitch, state.airspeed / eas2tas, parameters)
+        state.roll += roll_fraction * (nav_roll - state.roll)
+        pitch += pitch_fraction * (memory.pitch_demand + parameters.pitch_trim - pitch)
+        path_angle += path_fraction * (pitch - angle_of_attack(state, aircraft) - path_angle)
+        throttle = 0.0 if engine_out else memory.throttle_demand
+        energy += dt * advance_point_mass(estimated, state, path_angle, throttle, aircraft, excess_table, power, dt)
+    if result.clearance <= 0.0:
+        result.ended = RETURN_GROUND_IMPACT
     # Compiled code frees an array after its last use, and a record that views it does not keep it alive.
-    held = motions.size + states.size + memories.size + turns.size + spaced.size == 10
-    out.energy = used / 3600.0 if aircraft.has_power and held else math.nan
+    are_arrays_alive = motions.size + states.size + memories.size + progress_records.size + spaced.size == 10
+    result.energy = energy / 3600.0 if aircraft.has_power and are_arrays_alive else math.nan
 
 
 @inner
-def _store_position(here: Record, way: Floats, out: Record) -> None:
+def _store_position(estimated: Record, positions: Floats, result: Record) -> None:
     """Store a position unless the array is full."""
-    if out.rows < way.shape[0]:
-        way[out.rows, 0], way[out.rows, 1], way[out.rows, 2] = here.east, here.north, here.up
-        out.rows += 1
+    if result.rows < positions.shape[0]:
+        positions[result.rows, 0], positions[result.rows, 1], positions[result.rows, 2] = (
+            estimated.east,
+            estimated.north,
+            estimated.up,
+        )
+        result.rows += 1
 
 
 @inner
-def _record_arrival(here: Record, time: float, engine_out: bool, out: Record) -> None:
+def _record_arrival(estimated: Record, time: float, engine_out: bool, result: Record) -> None:
     """Record time and altitude of the first arrival at the loiter."""
-    if math.isnan(out.to_circle):
-        out.to_circle, out.circle_up = time, here.up
+    if math.isnan(result.to_circle):
+        result.to_circle, result.circle_up = time, estimated.up
         if engine_out:
             # Without an engine it comes down in circles there.
-            out.ended = RETURN_ARRIVED
+            result.ended = RETURN_ARRIVED
 
 
 @inner
 def _is_stage_complete(
-    here: Record,
-    b: Record,
-    own: Record,
-    circling: Record,
+    estimated: Record,
+    target: Record,
+    memory: Record,
+    loiter: Record,
     climb: Record,
-    waits: bool,
+    is_reacting: bool,
     is_first: bool,
     time: float,
     is_last: bool,
-    wide: float,
+    arrival_radius: float,
     dt: float,
 ) -> bool:
     """Return True if the next stage begins.
 
-    waits: True while the aircraft flies straight on, until the engine failure is noticed.
+    is_reacting: True while the aircraft flies straight on, until the engine failure is noticed.
     """
-    if waits:
+    if is_reacting:
         return time >= ENGINE_FAILURE_REACTION_S
     if climb.climbs and is_first:
         # The climb ends no earlier than it has begun.
-        return time > 0.0 and here.up > climb.top
-    return _is_target_reached(here, b, own, circling, is_last, wide, dt)
+        return time > 0.0 and estimated.up > climb.top
+    return _is_target_reached(estimated, target, memory, loiter, is_last, arrival_radius, dt)
 
 
 @inner
 def _demand_climb(
-    state: Record, motion: Record, staged: Record, own: Record, climb: Record, wanted: float, factor: float, dt: float
+    state: Record,
+    estimated: Record,
+    climb_parameters: Record,
+    memory: Record,
+    climb: Record,
+    airspeed_demand: float,
+    eas2tas: float,
+    dt: float,
 ) -> None:
     """Demand a climb straight ahead, with level wings, the pitch of its parameters, and increasing throttle.
 
-    wanted: equivalent airspeed, m/s.
+    airspeed_demand: equivalent airspeed, m/s.
     """
-    own.side_acceleration = 0.0
-    own.height_asked, own.height_limited, own.height_demand = motion.up, motion.up, motion.up
-    own.height_rate, own.climb_share, own.sink_share = 0.0, 1.0, 1.0
-    before, balance, speed = own.throttle_demand, own.seb_integrator, own.ske_integrator
-    own.airspeed_demand = wanted * factor
-    update_tecs(state, motion, staged, own, wanted * factor, factor, dt)
-    wind_up_throttle(staged, own)
+    memory.lateral_acceleration = 0.0
+    memory.altitude_demand_raw, memory.altitude_demand_limited, memory.altitude_demand = (
+        estimated.up,
+        estimated.up,
+        estimated.up,
+    )
+    memory.climb_rate_demand, memory.max_climb_scaler, memory.max_sink_scaler = 0.0, 1.0, 1.0
+    previous_throttle, seb_integrator, ske_integrator = (
+        memory.throttle_demand,
+        memory.seb_integrator,
+        memory.ske_integrator,
+    )
+    memory.tas_demand = airspeed_demand * eas2tas
+    update_tecs(state, estimated, climb_parameters, memory, airspeed_demand * eas2tas, eas2tas, dt)
+    wind_up_ste_integrator(climb_parameters, memory)
     # The pitch integrators stay: `AP_TECS::_update_pitch` starts them from the minimum pitch here, so what the minimum
     # adds does not enter them.
-    own.seb_integrator, own.ske_integrator = balance, speed
-    own.throttle_demand = max(before, min(climb.throttle, before + climb.slew * dt))
+    memory.seb_integrator, memory.ske_integrator = seb_integrator, ske_integrator
+    memory.throttle_demand = max(previous_throttle, min(climb.throttle, previous_throttle + climb.slew * dt))
 
 
 @inner
 def _is_target_reached(
-    here: Record, b: Record, own: Record, circling: Record, is_last: bool, wide: float, dt: float
+    estimated: Record,
+    target: Record,
+    memory: Record,
+    loiter: Record,
+    is_last: bool,
+    arrival_radius: float,
+    dt: float,
 ) -> bool:
     """Return True once a waypoint is reached, the last loiter is flown, or a loiter is left for the landing.
 
-    b: its waypoint.  wide: distance from the center, m, within which the aircraft has arrived at the loiter.
+    target: waypoint of the stage.
+    arrival_radius: distance from the center, m, within which the aircraft has arrived at the loiter.
     dt: s since the last call.
     """
-    if b.circle == 0.0:
-        return own.leg > 0
-    high = abs(here.up - b.up)
+    if target.circle == 0.0:
+        return memory.leg > 0
+    altitude_error = abs(estimated.up - target.up)
     if not is_last:
-        return own.on_circle and high < LANDING_JOIN_ALTITUDE_TOLERANCE_M
-    off_e, off_n = here.east - b.centre_east, here.north - b.centre_north
-    bearing = math.atan2(off_e, off_n)
-    if circling.seconds > 0.0:
-        circling.turned += wrap(bearing - circling.bearing)
-    circling.bearing = bearing
-    if circling.seconds > 0.0 or (
-        math.hypot(off_e, off_n) < max(RTL_ARRIVAL_RADIUS_M, wide) and high < RTL_ARRIVAL_ALTITUDE_TOLERANCE_M
+        return memory.reached_loiter_target and altitude_error < LANDING_JOIN_ALTITUDE_TOLERANCE_M
+    offset_e, offset_n = estimated.east - target.centre_east, estimated.north - target.centre_north
+    bearing = math.atan2(offset_e, offset_n)
+    if loiter.seconds > 0.0:
+        loiter.turned += wrap(bearing - loiter.bearing)
+    loiter.bearing = bearing
+    if loiter.seconds > 0.0 or (
+        math.hypot(offset_e, offset_n) < max(RTL_ARRIVAL_RADIUS_M, arrival_radius)
+        and altitude_error < RTL_ARRIVAL_ALTITUDE_TOLERANCE_M
     ):
-        circling.seconds += dt
-    return circling.seconds > UNLIMITED and abs(circling.turned) >= 2.0 * math.pi
+        loiter.seconds += dt
+    return loiter.seconds > UNLIMITED and abs(loiter.turned) >= 2.0 * math.pi
 
 
 @inner
-def _initialise_outcome(start: Record, estimated: Record, known: bool, out: Record) -> None:  # pragma: no cover
+def _initialise_outcome(
+    start: Record, estimated: Record, has_terrain: bool, result: Record
+) -> None:  # pragma: no cover
     """Fill in the start, and the outcome before the flight."""
     estimated.east, estimated.north, estimated.up = start.east, start.north, start.up
     estimated.velocity_east, estimated.velocity_north = start.velocity_east, start.velocity_north
     estimated.velocity_up = start.velocity_up
-    out.clearance = out.clearance_before = math.inf if known else math.nan
-    out.threat = -1
-    out.outside, out.outside_before = math.inf, math.inf
-    out.to_circle, out.circle_up, out.energy, out.ended, out.rows = math.nan, math.nan, 0.0, RETURN_TIMEOUT, 0
+    result.clearance = result.clearance_before = math.inf if has_terrain else math.nan
+    result.threat = -1
+    result.outside, result.outside_before = math.inf, math.inf
+    result.to_circle, result.circle_up, result.energy, result.ended, result.rows = (
+        math.nan,
+        math.nan,
+        0.0,
+        RETURN_TIMEOUT,
+        0,
+    )
 
 
 @inner
-def _load_stage(stages: Records, at: int, waypoints: Records, estimated: Record, own: Record) -> None:
-    """Set both waypoints to a stage; its leg begins here, or at the last waypoint if that was reached."""
-    stage, reached = stages[at], own.leg > 0
+def _load_stage(stages: Records, index: int, waypoints: Records, estimated: Record, memory: Record) -> None:
+    """Make the stage ``index`` the current leg, from the previous stage if that was passed, else from the aircraft.
+
+    Both waypoints 1 and 2 become a copy of the stage.
+    """
+    stage, is_previous_reached = stages[index], memory.leg > 0
     for k in range(1, 3):
-        b = waypoints[k]
-        b.east, b.north, b.turn, b.airspeed = stage.east, stage.north, stage.turn, stage.airspeed
-        b.centre_east, b.centre_north, b.up, b.circle = stage.centre_east, stage.centre_north, stage.up, stage.circle
-        b.returns, b.slope_base, b.straight = stage.returns, stage.slope_base, stage.straight
-        b.pass_by, b.min_ground_speed, b.home_up = stage.pass_by, stage.min_ground_speed, stage.home_up
-    own.from_east, own.from_north, own.from_up = estimated.east, estimated.north, estimated.up
-    if reached and not past_line(estimated, stages[at - 1].east, stages[at - 1].north, stage.east, stage.north):
-        own.from_east, own.from_north, own.from_up = stages[at - 1].east, stages[at - 1].north, stages[at - 1].up
-    if stage.circle == 0.0 and at + 1 < stages.shape[0]:
-        after, course = stages[at + 1], math.atan2(stage.east - own.from_east, stage.north - own.from_north)
-        turn = abs(wrap(math.atan2(after.east - stage.east, after.north - stage.north) - course))
+        target = waypoints[k]
+        target.east, target.north, target.turn, target.airspeed = (
+            stage.east,
+            stage.north,
+            stage.turn,
+            stage.airspeed,
+        )
+        target.centre_east, target.centre_north, target.up, target.circle = (
+            stage.centre_east,
+            stage.centre_north,
+            stage.up,
+            stage.circle,
+        )
+        target.returns, target.slope_base, target.straight = stage.returns, stage.slope_base, stage.straight
+        target.pass_by, target.min_ground_speed, target.home_up = (
+            stage.pass_by,
+            stage.min_ground_speed,
+            stage.home_up,
+        )
+    memory.from_east, memory.from_north, memory.from_up = estimated.east, estimated.north, estimated.up
+    if is_previous_reached and not is_past_finish_line(
+        estimated, stages[index - 1].east, stages[index - 1].north, stage.east, stage.north
+    ):
+        memory.from_east, memory.from_north, memory.from_up = (
+            stages[index - 1].east,
+            stages[index - 1].north,
+            stages[index - 1].up,
+        )
+    if stage.circle == 0.0 and index + 1 < stages.shape[0]:
+        next_stage, course = (
+            stages[index + 1],
+            math.atan2(stage.east - memory.from_east, stage.north - memory.from_north),
+        )
+        turn = abs(wrap(math.atan2(next_stage.east - stage.east, next_stage.north - stage.north) - course))
         waypoints[1].turn, waypoints[2].turn = turn, turn
-    own.leg, own.sloped_leg, own.on_circle, own.cross_track_integrator = 0, 0, False, 0.0
+    memory.leg, memory.sloped_leg, memory.reached_loiter_target, memory.cross_track_integrator = 0, 0, False, 0.0
 
 
 @inner
-def _initialise_law(
-    start: Record, parameters: Record, aircraft: Record, excess: Floats, state: Record, own: Record
+def _initialise_memory(
+    start: Record, parameters: Record, aircraft: Record, excess_table: Floats, state: Record, memory: Record
 ) -> None:
     """Fill the state from the motion over the ground, and the law's memory as after a long steady flight.
 
-    Follows `flight.autopilots.arduplane.law.begin_law`, but on a slope: the altitude setpoint leads by its lag.
+    Follows `flight.autopilots.arduplane.law.initialise_memory`, but on a slope: the altitude setpoint leads by its lag.
     """
     wind = mean_wind_speed(aircraft.wind_speed, aircraft.wind_gradient, aircraft.wind_reference, start.up)
     air_east = start.velocity_east - wind * aircraft.wind_east
     air_north = start.velocity_north - wind * aircraft.wind_north
-    climb = start.velocity_up
-    state.airspeed = max(1.0, math.hypot(math.hypot(air_east, air_north), climb))
+    climb_rate = start.velocity_up
+    state.airspeed = max(1.0, math.hypot(math.hypot(air_east, air_north), climb_rate))
     state.yaw, state.roll = math.atan2(air_east, air_north), start.roll
     state.alpha = angle_of_attack(state, aircraft)
-    state.pitch = math.asin(min(1.0, max(-1.0, climb / state.airspeed))) + state.alpha
-    own.begun = True
-    own.height_demand, own.height_rate = start.up, climb
-    own.height_asked = own.height_limited = start.up + climb * parameters.tecs_height_demand_time
-    own.climb_share, own.sink_share = 1.0, 1.0
-    own.airspeed_read = own.airspeed = own.airspeed_demand = state.airspeed
-    own.pitch_demand = state.pitch - parameters.pitch_trim
-    own.ske_integrator = INITIAL_SKE_INTEGRATOR
-    own.seb_integrator = own.pitch_demand * state.airspeed * GRAVITY - GRAVITY * climb - INITIAL_SKE_INTEGRATOR
+    state.pitch = math.asin(min(1.0, max(-1.0, climb_rate / state.airspeed))) + state.alpha
+    memory.is_initialised = True
+    memory.altitude_demand, memory.climb_rate_demand = start.up, climb_rate
+    memory.altitude_demand_raw = memory.altitude_demand_limited = (
+        start.up + climb_rate * parameters.tecs_height_demand_time
+    )
+    memory.max_climb_scaler, memory.max_sink_scaler = 1.0, 1.0
+    memory.airspeed_smoothed = memory.tas = memory.tas_demand = state.airspeed
+    memory.pitch_demand = state.pitch - parameters.pitch_trim
+    memory.ske_integrator = INITIAL_SKE_INTEGRATOR
+    memory.seb_integrator = (
+        memory.pitch_demand * state.airspeed * GRAVITY - GRAVITY * climb_rate - INITIAL_SKE_INTEGRATOR
+    )
     throttle = 1.0
-    while throttle > 0.0 and excess_power(excess, throttle, state.airspeed, start.up, aircraft) > climb:
+    while throttle > 0.0 and excess_power(excess_table, throttle, state.airspeed, start.up, aircraft) > climb_rate:
         throttle -= 0.01
-    own.throttle_demand, own.throttle_before = throttle, parameters.throttle_cruise
-    own.ste_integrator = throttle - parameters.throttle_cruise
+    memory.throttle_demand, memory.last_throttle_demand = throttle, parameters.throttle_cruise
+    memory.ste_integrator = throttle - parameters.throttle_cruise
 
 
 @inner
@@ -545,90 +622,102 @@ def _update_demands(
     estimated: Record,
     waypoints: Records,
     parameters: Record,
-    own: Record,
+    memory: Record,
     aircraft: Record,
-    excess: Floats,
-    factor: float,
-    unpowered: bool,
+    excess_table: Floats,
+    eas2tas: float,
+    is_gliding: bool,
     dt: float,
 ) -> None:
     """Update the demands of bank, altitude, throttle and pitch on the leg to the second waypoint."""
-    b = waypoints[1]
-    navigate_legs(estimated, waypoints[: 2 if b.circle != 0.0 else 3], parameters, own, factor, dt)
-    if own.on_circle and not b.returns:
+    target = waypoints[1]
+    navigate_legs(estimated, waypoints[: 2 if target.circle != 0.0 else 3], parameters, memory, eas2tas, dt)
+    if memory.reached_loiter_target and not target.returns:
         # On a loiter of the mission its altitude applies at once (`Plane::update_loiter`).
-        own.from_up = b.up
-    demand_height(estimated, b, parameters, own, dt)
-    wanted = airspeed_target(state, estimated, b.airspeed, b, parameters, own, factor)
-    _demand_throttle_and_pitch(state, estimated, parameters, own, aircraft, excess, wanted, factor, unpowered, dt)
+        memory.from_up = target.up
+    update_height_demand(estimated, target, parameters, memory, dt)
+    airspeed_demand = airspeed_target(state, estimated, target.airspeed, target, parameters, memory, eas2tas)
+    _demand_throttle_and_pitch(
+        state, estimated, parameters, memory, aircraft, excess_table, airspeed_demand, eas2tas, is_gliding, dt
+    )
 
 
 @inner
 def _demand_throttle_and_pitch(
     state: Record,
-    motion: Record,
+    estimated: Record,
     parameters: Record,
-    own: Record,
+    memory: Record,
     aircraft: Record,
-    excess: Floats,
-    wanted: float,
-    factor: float,
-    unpowered: bool,
+    excess_table: Floats,
+    airspeed_demand: float,
+    eas2tas: float,
+    is_gliding: bool,
     dt: float,
 ) -> None:
     """Demand throttle and pitch by TECS, or in a turn without thrust the pitch for an airspeed.
 
-    wanted: equivalent airspeed, m/s.  In a bank it grows as the root of the load factor, at the same angle of attack.
+    airspeed_demand: equivalent, m/s.  In a bank it grows as the root of the load factor, at the same angle of attack.
     Of eight flights of ArduPlane six turned back so, and lost 55 m in their turn; the other two, which had been sinking
     before, held their altitude and slowed down, which costs half of that.  The worse case stands for both.
     """
-    balance, speed = own.seb_integrator, own.ske_integrator
-    update_tecs(state, motion, parameters, own, wanted * factor, factor, dt)
-    if not unpowered or abs(state.roll) < _TURN_BANK_RAD:
+    seb_integrator, ske_integrator = memory.seb_integrator, memory.ske_integrator
+    update_tecs(state, estimated, parameters, memory, airspeed_demand * eas2tas, eas2tas, dt)
+    if not is_gliding or abs(state.roll) < _TURN_BANK_RAD:
         return
-    own.seb_integrator, own.ske_integrator = balance, speed
-    tilt = math.tan(state.roll)
-    drag = aircraft.induced / state.airspeed * tilt * tilt
-    sink = drag - excess_power(excess, 0.0, state.airspeed, motion.up, aircraft)
-    faster = (wanted * factor / math.sqrt(math.cos(state.roll)) - state.airspeed) / _TURN_AIRSPEED_LAG_S
-    path = -math.asin(min(0.5, max(-0.5, sink / state.airspeed + faster / GRAVITY)))
-    own.pitch_demand = path + angle_of_attack(state, aircraft) - parameters.pitch_trim
+    memory.seb_integrator, memory.ske_integrator = seb_integrator, ske_integrator
+    tan_bank = math.tan(state.roll)
+    drag = aircraft.induced / state.airspeed * tan_bank * tan_bank
+    sink = drag - excess_power(excess_table, 0.0, state.airspeed, estimated.up, aircraft)
+    acceleration_demand = (
+        airspeed_demand * eas2tas / math.sqrt(math.cos(state.roll)) - state.airspeed
+    ) / _TURN_AIRSPEED_LAG_S
+    path_angle = -math.asin(min(0.5, max(-0.5, sink / state.airspeed + acceleration_demand / GRAVITY)))
+    memory.pitch_demand = path_angle + angle_of_attack(state, aircraft) - parameters.pitch_trim
 
 
 @inner
 def _update_clearances(
-    here: Record,
+    estimated: Record,
     time: float,
     heights: Heights,
     to_pixel: PolyMapRecord,
     spheres: Floats,
     radii: Floats,
-    known: bool,
-    out: Record,
+    has_terrain: bool,
+    result: Record,
 ) -> None:
     """Update the clearances above ground and outside each sphere, and end the RTL where they demand it."""
     for m in range(spheres.shape[0]):
         radius = radii[m]
         if radius <= 0.0:
             continue
-        off_e, off_n, off_u = here.east - spheres[m, 0], here.north - spheres[m, 1], here.up - spheres[m, 2]
-        outside = math.sqrt(off_e * off_e + off_n * off_n + off_u * off_u) - radius
-        if outside < out.outside:
-            out.outside, out.threat, out.threat_time = outside, m, time
-        if math.isnan(out.to_circle):
-            out.outside_before = min(out.outside_before, outside)
-    if not known:
+        offset_e, offset_n, offset_up = (
+            estimated.east - spheres[m, 0],
+            estimated.north - spheres[m, 1],
+            estimated.up - spheres[m, 2],
+        )
+        sphere_distance = math.sqrt(offset_e * offset_e + offset_n * offset_n + offset_up * offset_up) - radius
+        if sphere_distance < result.outside:
+            result.outside, result.threat, result.threat_time = sphere_distance, m, time
+        if math.isnan(result.to_circle):
+            result.outside_before = min(result.outside_before, sphere_distance)
+    if not has_terrain:
         return
-    clearance = here.up - ground_height(heights, to_pixel, here.east, here.north)
+    clearance = estimated.up - ground_height(heights, to_pixel, estimated.east, estimated.north)
     if math.isnan(clearance):
-        out.ended = RETURN_OFF_TERRAIN
+        result.ended = RETURN_OFF_TERRAIN
         return
-    if clearance < out.clearance:
-        if out.clearance > 0.0:
-            if math.isnan(out.to_circle):
-                out.clearance_before = clearance
-            out.clearance_time = time
-            out.clearance_east, out.clearance_north, out.clearance_up = here.east, here.north, here.up
-        out.clearance = clearance
+    if clearance < result.clearance:
+        if result.clearance > 0.0:
+            if math.isnan(result.to_circle):
+                result.clearance_before = clearance
+            result.clearance_time = time
+            result.clearance_east, result.clearance_north, result.clearance_up = (
+                estimated.east,
+                estimated.north,
+                estimated.up,
+            )
+        result.clearance = clearance
     if clearance <= -DEEPEST:
-        out.ended, out.seconds = RETURN_GROUND_IMPACT, out.clearance_time
+        result.ended, result.seconds = RETURN_GROUND_IMPACT, result.clearance_time

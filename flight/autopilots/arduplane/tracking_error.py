@@ -16,7 +16,7 @@ from flight.autopilots.arduplane.law import (
     ARDUPILOT_MEMORY,
     NAVIGATION_TICK,
     ROLL_LAG,
-    roll_demand,
+    limited_nav_roll,
 )
 from flight.autopilots.arduplane.navigator import MAX_ACCEPTANCE_M, navigate_legs
 from flight.autopilots.arduplane.parameters import ArduPilotParameters
@@ -170,12 +170,12 @@ def _fly_corner(
     The first leg leads north to the origin.  turn: rad, to the right.  speed: over the ground, m/s.
     """
     motions, memories = np.zeros(1, MOTION), np.zeros(1, ARDUPILOT_MEMORY)
-    estimated, own = motions[0], memories[0]
+    estimated, memory = motions[0], memories[0]
     east, north = math.sin(turn), math.cos(turn)
     waypoints[0].north = -_LEG_LENGTH_M
     waypoints[1].turn, waypoints[1].acceptance, waypoints[1].fly_over = turn, acceptance, fly_over
     waypoints[2].east, waypoints[2].north = _LEG_LENGTH_M * east, _LEG_LENGTH_M * north
-    own.from_north = -_LEG_LENGTH_M
+    memory.from_north = -_LEG_LENGTH_M
     # The waypoint comes within the acceptance radius in the middle between two updates, which is the average case.
     tick_length = speed * NAVIGATION_TICK
     estimated.north = -acceptance - (math.floor(_RUN_IN_M / tick_length) + 0.5) * tick_length
@@ -184,8 +184,10 @@ def _fly_corner(
     course, lateral_acceleration, time, excursion, settled_distance, along = 0.0, 0.0, 0.0, 0.0, 0.0, -1.0
     while along < 0.75 * _LEG_LENGTH_M and time < 120.0:
         estimated.velocity_east, estimated.velocity_north = speed * math.sin(course), speed * math.cos(course)
-        navigate_legs(estimated, waypoints, parameters, own, 1.0, NAVIGATION_TICK)
-        acceleration_demand = GRAVITY * math.tan(roll_demand(own.side_acceleration, 0.0, airspeed, parameters))
+        navigate_legs(estimated, waypoints, parameters, memory, 1.0, NAVIGATION_TICK)
+        acceleration_demand = GRAVITY * math.tan(
+            limited_nav_roll(memory.lateral_acceleration, 0.0, airspeed, parameters)
+        )
         # The exact solution of the lag, and the displacement on the mean course.
         course_change = (
             acceleration_demand * NAVIGATION_TICK + (lateral_acceleration - acceleration_demand) * lag * (1.0 - decay)
@@ -200,9 +202,9 @@ def _fly_corner(
         first_leg_distance = abs(estimated.east) if estimated.north < 0.0 else corner_distance
         second_leg_distance = abs(estimated.east * north - estimated.north * east) if along > 0.0 else corner_distance
         excursion = max(excursion, min(first_leg_distance, second_leg_distance))
-        if own.leg == 1 and second_leg_distance > _SETTLED_CROSS_TRACK_M:
+        if memory.leg == 1 and second_leg_distance > _SETTLED_CROSS_TRACK_M:
             settled_distance = max(0.0, along)
-        if own.leg == 1 and along > settled_distance + _SETTLED_TIME_S * speed:
+        if memory.leg == 1 and along > settled_distance + _SETTLED_TIME_S * speed:
             break
     # Compiled code frees an array after its last use, and a record that views it does not keep it alive.
     if motions.size + memories.size != 2:

@@ -12,7 +12,7 @@ import math
 import numpy as np
 
 from aircraft.envelope import GRAVITY
-from flight.autopilots.arduplane.law import MIN_ROLL_LIMIT_RAD, stall_bank
+from flight.autopilots.arduplane.law import MIN_ROLL_LIMIT_RAD, load_factor_roll_limit
 from flight.autopilots.arduplane.point_mass import PointMass, excess_power
 from flight.autopilots.arduplane.rtl_point_mass import ENGINE_FAILURE_REACTION_S, ReturnEnvironment
 from flight.guidance.equivalent_airspeed import true_by_equivalent
@@ -106,7 +106,7 @@ def _fill_reach(
         air_east, air_north = start.velocity_east - wind_east, start.velocity_north - wind_north
         min_speed = glider.airspeed * true_by_equivalent(start.up)
         speed = max(min_speed, math.hypot(air_east, air_north))
-        bank = min(glider.bank, stall_bank(speed, min_speed, MIN_ROLL_LIMIT_RAD))
+        bank = min(glider.bank, load_factor_roll_limit(speed, min_speed, MIN_ROLL_LIMIT_RAD))
         tilt = math.tan(bank)
         level_sink = -excess_power(excess, 0.0, speed, start.up, aircraft)
         # The turn is flown at the same angle of attack: the load makes it faster, but no faster than the airspeed

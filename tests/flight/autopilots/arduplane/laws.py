@@ -53,16 +53,16 @@ def parameters(version: ArduPlaneVersion = "4.7", /, **values: float) -> Record:
 def memory(**values: Any) -> Record:
     """At the beginning of the first leg, in level flight at 500 m and 25 m/s."""
     usual: dict[str, Any] = {
-        "begun": True,
+        "is_initialised": True,
         "from_up": 500.0,
-        "height_asked": 500.0,
-        "height_limited": 500.0,
-        "height_demand": 500.0,
-        "climb_share": 1.0,
-        "sink_share": 1.0,
-        "airspeed": 25.0,
-        "airspeed_demand": 25.0,
-        "throttle_before": 0.45,
+        "altitude_demand_raw": 500.0,
+        "altitude_demand_limited": 500.0,
+        "altitude_demand": 500.0,
+        "max_climb_scaler": 1.0,
+        "max_sink_scaler": 1.0,
+        "tas": 25.0,
+        "tas_demand": 25.0,
+        "last_throttle_demand": 0.45,
         "throttle_demand": 0.45,
     }
     return record(ARDUPILOT_MEMORY, **(usual | values))

@@ -18,10 +18,10 @@ from flight.autopilots.arduplane.law import (
     ARDUPILOT_MEMORY,
     ROLL_LAG,
     airspeed_target,
-    demand_height,
-    follow_attitude,
+    control_attitude,
+    limited_nav_roll,
     min_airspeed,
-    roll_demand,
+    update_height_demand,
     update_tecs,
 )
 from flight.autopilots.arduplane.parameters import ArduPilotParameters
@@ -43,24 +43,29 @@ from world.scenario_tables import ArduPlaneVersion
 
 def test_a_fresh_memory_is_on_the_first_leg_and_has_flown_nothing() -> None:
     fresh: Record = np.zeros(1, ARDUPILOT_MEMORY)[0]
-    assert (fresh.leg, bool(fresh.begun), bool(fresh.flown), bool(fresh.on_circle)) == (0, False, False, False)
+    assert (
+        fresh.leg,
+        bool(fresh.is_initialised),
+        bool(fresh.has_last_velocity),
+        bool(fresh.reached_loiter_target),
+    ) == (0, False, False, False)
 
 
 def test_counts_are_whole_and_all_else_are_numbers() -> None:
     kinds = {name: ARDUPILOT_MEMORY[name] for name in field_names(ARDUPILOT_MEMORY)}
     assert {name for name, kind in kinds.items() if kind == np.int64} == {
-        *("leg", "saturation", "left_for", "terrain_leg", "sloped_leg"),
+        *("leg", "saturation", "leg_after_loiter", "terrain_leg", "sloped_leg"),
     }
     truths = {name for name, kind in kinds.items() if kind == np.bool_}
     assert truths == {
-        "begun",
-        "flown",
-        "on_circle",
-        "loitering",
-        "at_height",
-        "over",
-        "returning",
-        "climbed",
+        "is_initialised",
+        "has_last_velocity",
+        "reached_loiter_target",
+        "loiter_started",
+        "reached_target_altitude",
+        "loiter_complete",
+        "is_in_rtl",
+        "rtl_climb_complete",
         "underspeed",
     }
     assert all(kind == np.float64 for kind in kinds.values() if kind not in (np.int64, np.bool_))
@@ -75,8 +80,8 @@ DT = 0.1
 def demanded(own: Record, north: float, end: float, up: float = 500.0, **values: float) -> float:
     """Height that a leg of 1,000 m from 500 m asks for."""
     (b,) = waypoints((0, 1000, end))
-    demand_height(flying(0.0, north, up), b, parameters(**values), own, DT)
-    return float(own.height_asked)
+    update_height_demand(flying(0.0, north, up), b, parameters(**values), own, DT)
+    return float(own.altitude_demand_raw)
 
 
 @pytest.mark.parametrize(
@@ -115,8 +120,8 @@ def test_a_climb_that_begins_low_over_home_is_a_step(
     (b,) = waypoints((0, 1000, end), home_up=500.0 - over_home)
     made = parameters("4.6", FLIGHT_OPTIONS=float(options), ALT_SLOPE_MAXHGT=0.0)
     for north, up in ((0.0, 500.0), (500.0, 540.0)):
-        demand_height(flying(0.0, north, up), b, made, own, DT)
-    assert own.height_asked == pytest.approx(expected)
+        update_height_demand(flying(0.0, north, up), b, made, own, DT)
+    assert own.altitude_demand_raw == pytest.approx(expected)
 
 
 def test_each_leg_is_a_step_or_a_slope_by_the_height_at_its_own_begin() -> None:
@@ -124,8 +129,8 @@ def test_each_leg_is_a_step_or_a_slope_by_the_height_at_its_own_begin() -> None:
     for leg, over_home, expected in ((0, 10.0, 600.0), (1, 30.0, 550.0)):
         own.leg, own.from_up = leg, 500.0
         (b,) = waypoints((0, 1000, 600.0), home_up=500.0 - over_home)
-        demand_height(flying(0.0, 500.0, 500.0), b, made, own, DT)
-        assert own.height_asked == pytest.approx(expected)
+        update_height_demand(flying(0.0, 500.0, 500.0), b, made, own, DT)
+        assert own.altitude_demand_raw == pytest.approx(expected)
 
 
 @pytest.mark.parametrize(
@@ -146,9 +151,9 @@ def test_in_47_a_climb_is_a_slope_from_a_height_over_home(
     (b,) = waypoints((0, 1000, end), home_up=500.0 - over_home)
     # The leg begins well above home; halfway the aircraft is at a height over home.
     begin = waypoints((0, 1000, end), home_up=0.0)[0]
-    demand_height(flying(0.0, 0.0, 500.0), begin, made, own, DT)
-    demand_height(flying(0.0, 500.0, 500.0), b, made, own, DT)
-    assert own.height_asked == pytest.approx(expected)
+    update_height_demand(flying(0.0, 0.0, 500.0), begin, made, own, DT)
+    update_height_demand(flying(0.0, 500.0, 500.0), b, made, own, DT)
+    assert own.altitude_demand_raw == pytest.approx(expected)
 
 
 def test_before_and_past_a_leg_its_ends_heights_hold() -> None:
@@ -171,22 +176,22 @@ def test_a_slope_is_followed_one_time_constant_late(time: float) -> None:
     own, (b,) = memory(), waypoints((0, 1000, 600))
     for k in range(600):
         north = 25.0 * DT * k
-        demand_height(flying(0.0, north, own.height_demand), b, parameters(TECS_HDEM_TCONST=time), own, DT)
+        update_height_demand(flying(0.0, north, own.altitude_demand), b, parameters(TECS_HDEM_TCONST=time), own, DT)
         if north > 900.0:
             break
     climb = 2.5
     # The sampled lag is behind by its time constant x the rate, and up to a sample.
-    assert own.height_asked - own.height_demand == pytest.approx(time * climb, abs=climb * DT)
-    assert own.height_rate == pytest.approx(climb, rel=DT / time + 1e-6)
+    assert own.altitude_demand_raw - own.altitude_demand == pytest.approx(time * climb, abs=climb * DT)
+    assert own.climb_rate_demand == pytest.approx(climb, rel=DT / time + 1e-6)
 
 
 @pytest.mark.parametrize(("end", "rate"), [(900.0, 5.0), (100.0, -4.0)])
 def test_no_more_is_asked_than_the_climb_and_sink_rates(end: float, rate: float) -> None:
     own, (b,) = memory(), waypoints((0, 1000, end))
     for _ in range(300):
-        demand_height(flying(0.0, 1001.0), b, parameters(TECS_SINK_MAX=4.0), own, DT)
-    assert own.height_limited == pytest.approx(500.0 + 30.0 * rate)
-    assert own.height_rate == pytest.approx(rate, rel=0.04)
+        update_height_demand(flying(0.0, 1001.0), b, parameters(TECS_SINK_MAX=4.0), own, DT)
+    assert own.altitude_demand_limited == pytest.approx(500.0 + 30.0 * rate)
+    assert own.climb_rate_demand == pytest.approx(rate, rel=0.04)
 
 
 @pytest.mark.parametrize("held", [1, -1])
@@ -194,18 +199,18 @@ def test_what_cannot_be_followed_waits(held: int) -> None:
     end = 500.0 + held * 100.0
     own, (b,) = memory(), waypoints((0, 1000, end))
     for k in range(100):
-        demand_height(flying(0.0, 25.0 * DT * k), b, parameters(), own, DT)
-    asked, share = own.height_asked, own.climb_share if held > 0 else own.sink_share
+        update_height_demand(flying(0.0, 25.0 * DT * k), b, parameters(), own, DT)
+    asked, share = own.altitude_demand_raw, own.max_climb_scaler if held > 0 else own.max_sink_scaler
     assert share == pytest.approx(1.0)
     own.saturation = held
     for k in range(100, 130):
-        demand_height(flying(0.0, 25.0 * DT * k), b, parameters(), own, DT)
-    assert own.height_asked == asked
+        update_height_demand(flying(0.0, 25.0 * DT * k), b, parameters(), own, DT)
+    assert own.altitude_demand_raw == asked
     # After three seconds of a lag of three, 1 / e of the rate is left.
-    assert (own.climb_share if held > 0 else own.sink_share) == pytest.approx((3.0 / 3.1) ** 30)
+    assert (own.max_climb_scaler if held > 0 else own.max_sink_scaler) == pytest.approx((3.0 / 3.1) ** 30)
     own.saturation = -held
-    demand_height(flying(0.0, 25.0 * 13.0), b, parameters(), own, DT)
-    assert abs(own.height_asked - 500.0) == pytest.approx(2.5 * 13.0)
+    update_height_demand(flying(0.0, 25.0 * 13.0), b, parameters(), own, DT)
+    assert abs(own.altitude_demand_raw - 500.0) == pytest.approx(2.5 * 13.0)
 
 
 def weighed(own: Record, seen: Record, at: Record, **values: float) -> None:
@@ -214,7 +219,9 @@ def weighed(own: Record, seen: Record, at: Record, **values: float) -> None:
 
 def steady(**values: Any) -> Record:
     """Memory of steady flight: what the sensor reads is what is demanded."""
-    return memory(**({"airspeed": 25.0, "airspeed_read": 25.0, "flown": True, "last_velocity_north": 25.0} | values))
+    return memory(
+        **({"tas": 25.0, "airspeed_smoothed": 25.0, "has_last_velocity": True, "last_velocity_north": 25.0} | values)
+    )
 
 
 def reading(**values: Any) -> Record:
@@ -231,12 +238,12 @@ def test_in_steady_flight_nothing_changes() -> None:
 
 def test_throttle_for_missing_height() -> None:
     # 2 m low: feed-forward, error and damping, divided by the energy rate that all of the throttle gives.
-    own = steady(height_demand=502.0)
+    own = steady(altitude_demand=502.0)
     weighed(own, reading(), flying())
     missing, per_throttle = 2.0 * GRAVITY, (5.0 + 2.0) * GRAVITY / 1.0
     damped = 0.5 * (missing / 5.0) * DT / (DT + 0.5)
     expected = 0.45 + (missing / 5.0 + (missing + damped) / 5.0) / per_throttle
-    assert own.throttle_before == pytest.approx(min(expected, 0.45 + 1.0 * DT))
+    assert own.last_throttle_demand == pytest.approx(min(expected, 0.45 + 1.0 * DT))
     assert own.ste_integrator == pytest.approx(0.3 * missing * DT / (5.0 * per_throttle))
 
 
@@ -253,7 +260,7 @@ def test_the_rate_of_energy_that_is_amiss_is_smoothed_over_half_a_second() -> No
 
 def test_too_fast_to_sink_height_is_no_reason_to_throttle_back() -> None:
     """3 m too high are 29.4 m^2/s^2; at 30.5 m/s to AIRSPEED_MAX 31 are only 15.4, and no more is taken back."""
-    fast = {"airspeed": 30.5, "airspeed_read": 30.5, "last_velocity_north": 30.5, "airspeed_demand": 30.5}
+    fast = {"tas": 30.5, "airspeed_smoothed": 30.5, "last_velocity_north": 30.5, "tas_demand": 30.5}
     own = steady(**fast)
     seen = record(MOTION, up=503.0, velocity_north=30.5)
     at = state(airspeed=30.5 / AIRSPEED_READING, velocity_north=30.5)
@@ -271,7 +278,7 @@ def test_a_bank_takes_throttle() -> None:
 
 
 def test_pitch_for_missing_height() -> None:
-    own = steady(height_demand=501.0)
+    own = steady(altitude_demand=501.0)
     weighed(own, reading(), flying())
     wanted = GRAVITY / 5.0
     total = wanted + 0.3 * wanted + 0.3 * wanted * DT
@@ -280,7 +287,7 @@ def test_pitch_for_missing_height() -> None:
 
 
 def test_pitch_moves_no_faster_than_the_vertical_acceleration_allows() -> None:
-    own = steady(height_demand=520.0)
+    own = steady(altitude_demand=520.0)
     weighed(own, reading(), flying(), TECS_VERT_ACC=4.0)
     assert own.pitch_demand == pytest.approx(4.0 / 25.0 * DT)
 
@@ -289,7 +296,7 @@ def test_pitch_moves_no_faster_than_the_vertical_acceleration_allows() -> None:
 def test_pitch_and_throttle_keep_their_limits(high: float, degrees: float, throttle: float) -> None:
     own = steady()
     for _ in range(200):
-        own.height_demand = 500.0 + high
+        own.altitude_demand = 500.0 + high
         weighed(own, reading(), flying(), THR_MIN=10.0, AIRSPEED_MAX=35.0)
     assert math.degrees(own.pitch_demand) == pytest.approx(degrees)
     assert own.throttle_demand == throttle
@@ -297,7 +304,7 @@ def test_pitch_and_throttle_keep_their_limits(high: float, degrees: float, throt
 
 
 def test_too_fast_it_pitches_up_and_throttles_back() -> None:
-    own = steady(airspeed=26.0)
+    own = steady(tas=26.0)
     weighed(own, reading(airspeed=26.0 / AIRSPEED_READING), flying())
     assert own.pitch_demand > 0.0
     assert own.throttle_demand < 0.45
@@ -306,7 +313,7 @@ def test_too_fast_it_pitches_up_and_throttles_back() -> None:
 def test_the_airspeed_demand_changes_within_what_the_energy_allows() -> None:
     own = steady()
     update_tecs(reading(), flying(), parameters(AIRSPEED_MAX=40.0), own, 30.0, 1.0, DT)
-    assert own.airspeed_demand == pytest.approx(25.0 + 0.5 * 5.0 * GRAVITY / 25.0 * DT)
+    assert own.tas_demand == pytest.approx(25.0 + 0.5 * 5.0 * GRAVITY / 25.0 * DT)
 
 
 def test_what_a_pull_up_turns_the_velocity_by_counts_as_acceleration_along_the_nose() -> None:
@@ -314,31 +321,31 @@ def test_what_a_pull_up_turns_the_velocity_by_counts_as_acceleration_along_the_n
     own = steady()
     weighed(own, reading(pitch=math.radians(10.0)), flying(climb=0.2))
     lost = 1.0 - DT / (DT + 5.0)
-    assert own.acceleration == pytest.approx(2.0 * math.sin(math.radians(10.0)) * lost)
+    assert own.tas_rate == pytest.approx(2.0 * math.sin(math.radians(10.0)) * lost)
     # On the level it is not.
     own = steady()
     weighed(own, reading(), flying(climb=0.2))
-    assert own.acceleration == pytest.approx(0.0)
+    assert own.tas_rate == pytest.approx(0.0)
 
 
 def test_the_airspeed_is_a_smoothed_reading_of_before() -> None:
     """The sensor reads 1 m/s more from now on: 0.3 of what is missing at each turn, and none of it at the first."""
     own = steady()
     for k in range(1, 4):
-        held = own.airspeed
+        held = own.tas
         weighed(own, reading(airspeed=26.0 / AIRSPEED_READING), flying())
-        assert own.airspeed_read == pytest.approx(26.0 - 0.7**k)
+        assert own.airspeed_smoothed == pytest.approx(26.0 - 0.7**k)
         if k == 1:
-            assert own.airspeed == held
+            assert own.tas == held
 
 
 @pytest.mark.parametrize(("bank_deg", "prevents", "least"), [(30.0, 1.0, 19.34), (30.0, 0.0, 18.0), (0.0, 1.0, 18.0)])
 def test_the_least_airspeed_grows_with_the_load_in_a_bank(bank_deg: float, prevents: float, least: float) -> None:
     """18 m/s over the root of cos 30: as ArduPlane's log of a turn shows it, at once (19.32 m/s; TECS.spdem)."""
-    own = steady(airspeed_demand=18.0, side_acceleration=GRAVITY * math.tan(math.radians(bank_deg)))
+    own = steady(tas_demand=18.0, lateral_acceleration=GRAVITY * math.tan(math.radians(bank_deg)))
     values = parameters(AIRSPEED_MIN=18.0, AIRSPEED_MAX=31.0, STALL_PREVENTION=prevents)
     update_tecs(reading(), flying(), values, own, 18.0, 1.0, DT)
-    assert own.airspeed_demand == pytest.approx(least, abs=0.005)
+    assert own.tas_demand == pytest.approx(least, abs=0.005)
 
 
 # ----------------------------------------------------------------------
@@ -347,19 +354,19 @@ def test_the_least_airspeed_grows_with_the_load_in_a_bank(bank_deg: float, preve
 
 def test_bank_is_that_of_the_acceleration_within_the_limit() -> None:
     wide = parameters(ROLL_LIMIT_DEG=60.0, AIRSPEED_MIN=9.0)
-    assert roll_demand(5.0, 0.0, 25.0, wide) == pytest.approx(math.atan(5.0 / GRAVITY))
+    assert limited_nav_roll(5.0, 0.0, 25.0, wide) == pytest.approx(math.atan(5.0 / GRAVITY))
     # Pitched up, the lift's share across is less.
-    assert roll_demand(5.0, 0.3, 25.0, wide) == pytest.approx(math.atan(5.0 / (GRAVITY * math.cos(0.3))))
+    assert limited_nav_roll(5.0, 0.3, 25.0, wide) == pytest.approx(math.atan(5.0 / (GRAVITY * math.cos(0.3))))
     limited = parameters(ROLL_LIMIT_DEG=30.0)
     for wanted, degrees in ((100.0, 30.0), (-100.0, -30.0)):
-        assert math.degrees(roll_demand(wanted, 0.0, 25.0, limited)) == pytest.approx(degrees)
+        assert math.degrees(limited_nav_roll(wanted, 0.0, 25.0, limited)) == pytest.approx(degrees)
 
 
 def test_slow_flight_narrows_the_bank() -> None:
     # At 1.2 times the least airspeed 1 / 1.2^2 of the lift must stay upright: 46 degrees; at 1.1, 34.3; at 1.0, 25.
     limits = parameters(ROLL_LIMIT_DEG=60.0, AIRSPEED_MIN=20.0)
     for airspeed, degrees in ((24.0, math.degrees(math.acos(1 / 1.44))), (22.0, 34.2654), (20.0, 25.0)):
-        assert math.degrees(roll_demand(100.0, 0.0, airspeed, limits)) == pytest.approx(degrees, abs=1e-3)
+        assert math.degrees(limited_nav_roll(100.0, 0.0, airspeed, limits)) == pytest.approx(degrees, abs=1e-3)
 
 
 @pytest.mark.parametrize(
@@ -384,7 +391,7 @@ def test_a_stall_speed_widens_the_bank_of_47(
     """`Plane::apply_load_factor_roll_limits`."""
     limits = {"ROLL_LIMIT_DEG": 60.0, "AIRSPEED_MIN": 20.0, "AIRSPEED_STALL": 16.0} | values
     made = parameters(version, **limits)
-    assert math.degrees(roll_demand(100.0, 0.0, airspeed, made)) == pytest.approx(degrees, abs=1e-3)
+    assert math.degrees(limited_nav_roll(100.0, 0.0, airspeed, made)) == pytest.approx(degrees, abs=1e-3)
 
 
 @pytest.mark.parametrize(
@@ -424,7 +431,7 @@ def even_gains() -> Record:
 def followed(own: Record, at: Record) -> tuple[Record, Record]:
     """Commands and memory after a tick of a sixtieth of a second, with ArduPlane's parameters."""
     kept, commands = record(GUIDANCE_MEMORY), record(COMMANDS)
-    follow_attitude(at, flying(), even_gains(), kept, parameters(KFF_RDDRMIX=0.3), own, 1.0, commands, 1.0 / 60.0)
+    control_attitude(at, flying(), even_gains(), kept, parameters(KFF_RDDRMIX=0.3), own, 1.0, commands, 1.0 / 60.0)
     return commands, kept
 
 
@@ -434,7 +441,7 @@ def test_a_bank_is_late_as_in_logs_of_arduplane() -> None:
     Those of ridge-5mps, demo and tight, with ArduPlane's RLL2SRV_TCONST of 0.5 s.  A share of an error of 0.1 rad is
     rolled off at once, in proportion to it.
     """
-    own = memory(side_acceleration=GRAVITY * math.tan(0.1))
+    own = memory(lateral_acceleration=GRAVITY * math.tan(0.1))
     _, kept = followed(own, state())
     assert own.roll_demand == pytest.approx(0.1)
     assert 0.1 / kept.bank_rate == pytest.approx(0.43, abs=0.015)
@@ -450,7 +457,7 @@ def test_a_pitch_is_followed_a_tenth_later_than_its_time_constant_says() -> None
 
 def test_the_rudder_has_its_share_of_the_ailerons_and_no_more() -> None:
     # Whatever sideslips: ArduPlane's yaw damper is off by default.
-    commands, _ = followed(memory(side_acceleration=3.0), state(beta=0.05, yaw_rate=0.1))
+    commands, _ = followed(memory(lateral_acceleration=3.0), state(beta=0.05, yaw_rate=0.1))
     assert commands.aileron > 0.0
     # A roll to the right goes with a yaw to the right, which is negative.
     assert commands.rudder == pytest.approx(-0.3 * commands.aileron)
@@ -487,7 +494,7 @@ def test_the_airspeed_is_raised_for_a_minimum_ground_speed(
     least: float, ground: float, before: float, target: float
 ) -> None:
     """At 25 m/s through the air, northwards (`Plane::calc_airspeed_errors` of 4.6.3)."""
-    own = memory(airspeed_read=25.0, ground_speed_rise=before)
+    own = memory(airspeed_smoothed=25.0, ground_speed_undershoot=before)
     here = record(MOTION, velocity_north=ground, velocity_east=9.0)
     way = waypoints((0, 0, 500), (0, 5000, 500), min_ground_speed=least)
     made = airspeed_target(state(), here, 25.0, way[1], parameters(AIRSPEED_MAX=32.0), own, 1.0)
@@ -496,7 +503,7 @@ def test_the_airspeed_is_raised_for_a_minimum_ground_speed(
 
 def test_what_the_ground_speed_lacks_is_an_equivalent_airspeed() -> None:
     # 27.5 m/s of true airspeed are 25 at 1.1: 4.4 m/s over the ground are 4 of equivalent airspeed.
-    own, here = memory(airspeed_read=27.5), record(MOTION, velocity_north=13.6)
+    own, here = memory(airspeed_smoothed=27.5), record(MOTION, velocity_north=13.6)
     way = waypoints((0, 0, 500), (0, 5000, 500), min_ground_speed=18.0)
     assert airspeed_target(state(), here, 25.0, way[1], parameters(AIRSPEED_MAX=32.0), own, 1.1) == pytest.approx(29.0)
 

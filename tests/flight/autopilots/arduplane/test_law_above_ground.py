@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from flight.autopilots.arduplane.law import demand_height, look_ahead
+from flight.autopilots.arduplane.law import update_height_demand, update_terrain_lookahead
 from flight.simulation.tick import WORKSPACE
 from tests.flight.autopilots.arduplane.laws import flying, memory, parameters, record, waypoints
 from world.frames import fit_polymap
@@ -17,21 +17,21 @@ DT = 0.1
 def asked(own: Record, north: float, up: float, above: float = 100.0, **values: float) -> float:
     """Return the altitude that a leg of 1,000 m to a height above ground asks for, m AMSL."""
     (b,) = waypoints((0, 1000, 0), over_ground=True, above_ground=above)
-    demand_height(flying(0.0, north, up), b, parameters(**values), own, DT)
-    return float(own.height_asked)
+    update_height_demand(flying(0.0, north, up), b, parameters(**values), own, DT)
+    return float(own.altitude_demand_raw)
 
 
 def begun(from_above: float, offset: float = 0.0) -> Record:
     """Return the memory of a leg that began at a height above ground (m), over ground of 400 m."""
-    return memory(ground=400.0, terrain_leg=1, from_above_ground=from_above, lookahead_offset=offset)
+    return memory(terrain_altitude=400.0, terrain_leg=1, from_height_above_terrain=from_above, altitude_offset=offset)
 
 
 def test_the_height_above_ground_is_held_wherever_the_ground_is() -> None:
     own = begun(100.0)
     assert asked(own, 100.0, 500.0) == 500.0
-    own.ground = 437.0
+    own.terrain_altitude = 437.0
     assert asked(own, 500.0, 500.0) == 537.0
-    own.rise_ahead = 12.5
+    own.lookahead_rise = 12.5
     assert asked(own, 600.0, 500.0) == 549.5
 
 
@@ -49,21 +49,21 @@ def test_the_height_above_ground_changes_evenly_however_little_it_changes(
 
 def test_a_descent_leaves_out_what_it_descends_of_the_rise_ahead() -> None:
     own = begun(100.0, -40.0)
-    own.rise_ahead = 50.0
+    own.lookahead_rise = 50.0
     # Halfway down from 100 to 60 m above ground, and 50 - 40 m of the rise.
     assert asked(own, 500.0, 480.0, 60.0) == pytest.approx(400.0 + 80.0 + 10.0)
-    own.rise_ahead = 39.0
+    own.lookahead_rise = 39.0
     assert asked(own, 500.0, 480.0, 60.0) == pytest.approx(480.0)
 
 
 def test_before_the_ground_at_its_begin_is_known_a_leg_keeps_the_demand() -> None:
-    own = memory(ground=400.0, height_asked=512.0)
+    own = memory(terrain_altitude=400.0, altitude_demand_raw=512.0)
     assert asked(own, 0.0, 500.0) == 512.0
 
 
 def looked(heights: np.ndarray, above: float = 100.0, **values: float) -> Record:
     """Look ahead from the middle of the south end of a raster of 10 m pixels along a leg of 1,000 m north."""
-    own = memory(clock=0.0, begun=True)
+    own = memory(time_to_update=0.0, is_initialised=True)
     work = record(WORKSPACE)
     work.estimated = flying(0.0, 0.0, 500.0)
     work.place.ground = float(heights[0, 1])
@@ -72,7 +72,7 @@ def looked(heights: np.ndarray, above: float = 100.0, **values: float) -> Record
     to_pixel = fit_polymap(lambda east, north: (1.0 + east / 1000.0, north / 10.0), span, 1e-6)
     work.pixel_map = to_pixel.record
     way = waypoints((0, 0, 0), (0, 1000, 0), over_ground=True, above_ground=above)
-    look_ahead(work, heights.astype(np.float32), way, parameters(**values), own)
+    update_terrain_lookahead(work, heights.astype(np.float32), way, parameters(**values), own)
     return own
 
 
@@ -98,21 +98,21 @@ def raster(*hills: tuple[float, float]) -> np.ndarray:
 )
 def test_the_rise_ahead_is_beyond_half_of_the_greatest_climb(north: float, up: float, rise: float) -> None:
     own = looked(raster((north, up)))
-    assert own.ground == 300.0
-    assert own.rise_ahead == pytest.approx(rise, abs=0.01)
+    assert own.terrain_altitude == 300.0
+    assert own.lookahead_rise == pytest.approx(rise, abs=0.01)
 
 
 def test_how_far_and_how_often_it_looks_are_parameters() -> None:
     hill = raster((800.0, 500.0))
-    assert looked(hill).rise_ahead == pytest.approx(120.0, abs=0.01)
-    assert looked(hill, TERRAIN_LOOKAHD=600.0).rise_ahead == 0.0
-    assert looked(hill, TERRAIN_LOOKAHD=0.0).rise_ahead == 0.0
-    assert looked(raster((450.0, 500.0)), TERRAIN_SPACING=50.0).rise_ahead == pytest.approx(155.0, abs=0.01)
-    assert looked(hill, TECS_CLMB_MAX=10.0).rise_ahead == pytest.approx(40.0, abs=0.01)
+    assert looked(hill).lookahead_rise == pytest.approx(120.0, abs=0.01)
+    assert looked(hill, TERRAIN_LOOKAHD=600.0).lookahead_rise == 0.0
+    assert looked(hill, TERRAIN_LOOKAHD=0.0).lookahead_rise == 0.0
+    assert looked(raster((450.0, 500.0)), TERRAIN_SPACING=50.0).lookahead_rise == pytest.approx(155.0, abs=0.01)
+    assert looked(hill, TECS_CLMB_MAX=10.0).lookahead_rise == pytest.approx(40.0, abs=0.01)
 
 
 def test_ground_that_is_not_known_changes_nothing() -> None:
-    assert looked(raster((300.0, math.nan), (400.0, 380.0))).rise_ahead == pytest.approx(40.0, abs=0.01)
+    assert looked(raster((300.0, math.nan), (400.0, 380.0))).lookahead_rise == pytest.approx(40.0, abs=0.01)
 
 
 @pytest.mark.parametrize(
@@ -125,5 +125,5 @@ def test_a_leg_begins_at_the_height_of_its_waypoint_above_the_ground_there(
 ) -> None:
     own = looked(raster(), above)
     # The waypoint is at 500 m, the ground at 300 m.
-    assert (own.terrain_leg, own.from_above_ground) == (1, 200.0)
-    assert own.lookahead_offset == pytest.approx(offset)
+    assert (own.terrain_leg, own.from_height_above_terrain) == (1, 200.0)
+    assert own.altitude_offset == pytest.approx(offset)

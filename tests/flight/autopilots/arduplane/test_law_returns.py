@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from aircraft.envelope import GRAVITY
-from flight.autopilots.arduplane.law import demand_height
+from flight.autopilots.arduplane.law import update_height_demand
 from flight.autopilots.arduplane.navigator import navigate_legs
 from flight.guidance.path import waypoint_records
 from tests.flight.autopilots.arduplane.kept_flights import KEPT, flown_return, kept_track, return_setup
@@ -81,8 +81,8 @@ def navigated(own: Record, here: Record, way: np.ndarray, **values: float) -> Re
 
 def asked(own: Record, here: Record, way: np.ndarray, **values: float) -> float:
     """Height that is asked for after that."""
-    demand_height(here, way[own.leg + 1], parameters(**values), own, 0.1)
-    return float(own.height_asked)
+    update_height_demand(here, way[own.leg + 1], parameters(**values), own, 0.1)
+    return float(own.altitude_demand_raw)
 
 
 def test_it_turns_to_the_middle_of_its_circle_at_once() -> None:
@@ -90,16 +90,16 @@ def test_it_turns_to_the_middle_of_its_circle_at_once() -> None:
     own, speed = navigated(memory(), flying(), back(600.0)), 25.0
     length = 17.0 * 0.75 * speed / math.pi
     wanted = 4.0 * 0.75**2 * speed**2 / length * math.sin(math.atan2(EAST, NORTH))
-    assert own.side_acceleration == pytest.approx(wanted)
+    assert own.lateral_acceleration == pytest.approx(wanted)
     # Behind it, as much as for a right angle, to the short side.
     west = navigated(memory(), flying(course=math.radians(-120.0)), back(600.0))
-    assert west.side_acceleration == pytest.approx(4.0 * 0.75**2 * speed**2 / length)
-    assert navigated(memory(), flying(course=math.radians(150.0)), back(600.0)).side_acceleration < 0.0
+    assert west.lateral_acceleration == pytest.approx(4.0 * 0.75**2 * speed**2 / length)
+    assert navigated(memory(), flying(course=math.radians(150.0)), back(600.0)).lateral_acceleration < 0.0
 
 
 def test_it_sinks_on_a_straight_slope_in_distance_and_climbs_at_once() -> None:
     way = back(100.0)
-    own = navigated(memory(height_asked=500.0), flying(), way)
+    own = navigated(memory(altitude_demand_raw=500.0), flying(), way)
     # A quarter of the way, 100 m aside of the line, which counts for nothing.
     run = math.hypot(EAST, NORTH)
     ue, un = EAST / run, NORTH / run
@@ -122,15 +122,15 @@ def test_to_a_rally_point_it_holds_its_height_first() -> None:
 
 def test_the_circle_is_flown_at_the_targets_height_and_grows_with_height() -> None:
     way = back(100.0, radius=-200.0)
-    own = memory(returning=True, climbed=True, from_up=500.0)
+    own = memory(is_in_rtl=True, rtl_climb_complete=True, from_up=500.0)
     # On the circle, the left way round: what the speed takes, V^2 / R.
     here = flying(EAST + 200.0, NORTH, 300.0, course=0.0)
     assert asked(navigated(own, here, way), here, way) == 100.0
-    assert own.side_acceleration == pytest.approx(-(25.0**2) / 200.0)
+    assert own.lateral_acceleration == pytest.approx(-(25.0**2) / 200.0)
     # At 1.05 of true by equivalent airspeed the circle is 1.1025 times as wide.
     there = flying(EAST + 200.0 * 1.05**2, NORTH, 300.0, course=0.0)
     navigate_legs(there, way, parameters(), own, 1.05, 0.1)
-    assert own.side_acceleration == pytest.approx(-(25.0**2) / (200.0 * 1.05**2))
+    assert own.lateral_acceleration == pytest.approx(-(25.0**2) / (200.0 * 1.05**2))
 
 
 def test_after_a_loiter_the_slope_begins_at_its_top() -> None:
@@ -140,7 +140,7 @@ def test_after_a_loiter_the_slope_begins_at_its_top() -> None:
         way[name][:2], way[name][2] = loiter, ahead
     way["returns"][2], way["stop"] = True, (1, 1, 2)
     here = flying(0.0, 1.0, course=math.atan2(EAST, NORTH))
-    own = navigated(memory(loitering=True, over=True), here, way)
+    own = navigated(memory(loiter_started=True, loiter_complete=True), here, way)
     assert own.leg == 1
     assert asked(own, here, way) > 499.0
 
@@ -149,20 +149,20 @@ def test_it_banks_little_before_it_has_climbed_what_it_has_to() -> None:
     most = GRAVITY * math.tan(math.radians(5.0))
     way = back(700.0)
     own = navigated(memory(), flying(), way, RTL_CLIMB_MIN=50.0)
-    assert own.side_acceleration == pytest.approx(most)
-    assert navigated(own, flying(up=549.9), way, RTL_CLIMB_MIN=50.0).side_acceleration == pytest.approx(most)
-    assert navigated(own, flying(up=550.1), way, RTL_CLIMB_MIN=50.0).climbed
-    assert navigated(own, flying(up=550.1), way, RTL_CLIMB_MIN=50.0).side_acceleration > most
+    assert own.lateral_acceleration == pytest.approx(most)
+    assert navigated(own, flying(up=549.9), way, RTL_CLIMB_MIN=50.0).lateral_acceleration == pytest.approx(most)
+    assert navigated(own, flying(up=550.1), way, RTL_CLIMB_MIN=50.0).rtl_climb_complete
+    assert navigated(own, flying(up=550.1), way, RTL_CLIMB_MIN=50.0).lateral_acceleration > most
     # Above its target it does so too, and turns normally from there.
     low = navigated(memory(), flying(up=500.0), back(100.0), RTL_CLIMB_MIN=50.0)
-    assert low.side_acceleration == pytest.approx(most)
-    assert navigated(low, flying(up=550.1), back(100.0), RTL_CLIMB_MIN=50.0).side_acceleration > most
+    assert low.lateral_acceleration == pytest.approx(most)
+    assert navigated(low, flying(up=550.1), back(100.0), RTL_CLIMB_MIN=50.0).lateral_acceleration > most
     # Bit 4 of FLIGHT_OPTIONS: up to the target's height, whatever RTL_CLIMB_MIN says.
     bit4 = {"FLIGHT_OPTIONS": 16.0, "RTL_CLIMB_MIN": 50.0}
     own = navigated(memory(), flying(up=699.0), way, **bit4)
-    assert own.side_acceleration == pytest.approx(most)
-    assert navigated(own, flying(up=700.5), way, **bit4).side_acceleration > most
-    assert navigated(memory(), flying(up=710.0), way, FLIGHT_OPTIONS=8.0 + 32.0).side_acceleration > most
+    assert own.lateral_acceleration == pytest.approx(most)
+    assert navigated(own, flying(up=700.5), way, **bit4).lateral_acceleration > most
+    assert navigated(memory(), flying(up=710.0), way, FLIGHT_OPTIONS=8.0 + 32.0).lateral_acceleration > most
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from flight.autopilots.arduplane.navigator import navigate_legs, past_line, turn_distance
+from flight.autopilots.arduplane.navigator import is_past_finish_line, navigate_legs, turn_distance
 from tests.flight.autopilots.arduplane.laws import flying, memory, parameters, waypoints
 
 RIGHT_ANGLE = math.pi / 2
@@ -78,8 +78,8 @@ def test_a_pass_by_beyond_the_greatest_radius_is_flown_on_along_the_leg() -> Non
 
 def test_past_the_line_across_a_waypoint_the_leg_is_over() -> None:
     way = waypoints((0, 0, 500), (0, 1000, 500), (1000, 1000, 500), turn=RIGHT_ANGLE)
-    assert past_line(flying(300.0, 1000.1), 0.0, 0.0, 0.0, 1000.0)
-    assert not past_line(flying(300.0, 999.9), 0.0, 0.0, 0.0, 1000.0)
+    assert is_past_finish_line(flying(300.0, 1000.1), 0.0, 0.0, 0.0, 1000.0)
+    assert not is_past_finish_line(flying(300.0, 999.9), 0.0, 0.0, 0.0, 1000.0)
     for north, leg in ((999.9, 0), (1000.1, 1)):
         own = memory()
         navigate_legs(flying(300.0, north), way, parameters(), own, 1.0, 0.1)
@@ -108,7 +108,7 @@ def test_its_side_acceleration_is_l1s() -> None:
     way = waypoints((0, 0, 500), (0, 5000, 500), (1000, 5000, 500))
     own = memory()
     navigate_legs(flying(10.0, 500.0), way, parameters(NAVL1_XTRACK_I=0.0), own, 1.0, 0.1)
-    assert own.side_acceleration == pytest.approx(-4.0 * 0.75**2 * 25.0**2 / LENGTH * 10.0 / LENGTH)
+    assert own.lateral_acceleration == pytest.approx(-4.0 * 0.75**2 * 25.0**2 / LENGTH * 10.0 / LENGTH)
     assert own.cross_track_integrator == 0.0
     # Within five degrees its integral grows by gain x angle x time, and not beyond.
     for right, grows in ((8.0, True), (9.0, False)):
@@ -125,16 +125,16 @@ def test_around_a_loiter_it_turns_with_its_radius(side: float) -> None:
     way["centre_north"], way["up"] = 900.0, 0.0
     own = memory()
     navigate_legs(flying(0.0, 900.0), way, parameters(), own, 1.0, 0.1)
-    assert own.on_circle
-    assert own.side_acceleration == pytest.approx(side * 25.0**2 / 120.0)
+    assert own.reached_loiter_target
+    assert own.lateral_acceleration == pytest.approx(side * 25.0**2 / 120.0)
 
 
 def test_far_from_a_loiter_it_flies_to_its_centre() -> None:
     way = waypoints((0, 0, 500), (0, 1000, 500), (100, 1100, 500), circle=120.0, centre_east=0.0, centre_north=1000.0)
     own = memory()
     navigate_legs(flying(0.0, 0.0), way, parameters(), own, 1.0, 0.1)
-    assert not own.on_circle
-    assert own.side_acceleration == pytest.approx(0.0)
+    assert not own.reached_loiter_target
+    assert own.lateral_acceleration == pytest.approx(0.0)
     assert own.leg == 0
 
 
@@ -175,7 +175,7 @@ def test_the_line_to_a_loiters_middle_is_followed_to_three_of_its_radii() -> Non
         navigate_legs(flying(30.0, -away), circle_route(), parameters(NAVL1_XTRACK_I=0.0), own, 1.0, 0.1)
         # To the line as from any leg; or to the middle, from where the course leads 30 m beside it.
         angle = math.asin(30.0 / LENGTH) if follows else math.atan2(30.0, away)
-        assert own.side_acceleration == pytest.approx(-4.0 * 0.75**2 * 25.0**2 / LENGTH * math.sin(angle), rel=1e-3)
+        assert own.lateral_acceleration == pytest.approx(-4.0 * 0.75**2 * 25.0**2 / LENGTH * math.sin(angle), rel=1e-3)
 
 
 @pytest.mark.parametrize("turns", [1.0, 2.0])
@@ -233,8 +233,8 @@ def test_above_its_height_a_circle_is_wider() -> None:
     way = circle_route()
     way["up"] = 0.0
     navigate_legs(flying(-242.0, 0.0), way, parameters(), own, 1.1, 0.1)
-    assert own.on_circle
-    assert own.side_acceleration == pytest.approx(25.0**2 / 242.0)
+    assert own.reached_loiter_target
+    assert own.lateral_acceleration == pytest.approx(25.0**2 / 242.0)
 
 
 def test_beside_a_loiter_the_turn_is_that_from_or_to_its_middle() -> None:
@@ -255,7 +255,7 @@ def test_a_return_goes_on_to_the_landing_sequence_within_10_m_of_its_circles_hei
     back["returns"], back["circle"], back["centre_east"], back["centre_north"] = True, 120.0, 120.0, 900.0
     own = memory()
     navigate_legs(flying(0.0, 900.0, up), way, parameters(), own, 1.0, 0.1)
-    assert (own.leg, bool(own.returning)) == ((2, False) if joins else (0, True))
+    assert (own.leg, bool(own.is_in_rtl)) == ((2, False) if joins else (0, True))
     if joins:
         assert (own.from_east, own.from_north, own.from_up) == (0.0, 900.0, up)
     # Not yet on it, or with nothing behind it, it goes on returning.
